@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/atomic_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr size_t kBufferSize = size_t{1} << 20;
+
+void write_all(int descriptor, std::string_view bytes, const std::filesystem::path& path) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(descriptor, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) throw IoError(path, n < 0 ? std::strerror(errno) : "the disk took no bytes");
+    bytes.remove_prefix(static_cast<size_t>(n));
+  }
+}
+
+void sync_to_disk(int descriptor, const std::filesystem::path& path) {
+  if (::fsync(descriptor) != 0) throw IoError(path, std::strerror(errno));
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), part_(path_) {
+  part_ += ".part" + std::to_string(::getpid());
+  descriptor_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) throw IoError(path_, std::strerror(errno));
+}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  std::error_code ignored;
+  std::filesystem::remove(part_, ignored);  // finds nothing after commit()
+}
+
+void AtomicFile::flush_buffer() {
+  write_all(descriptor_, buffer_, path_);
+  buffer_.clear();
+}
+
+void AtomicFile::write(std::string_view bytes) {
+  buffer_ += bytes;
+  if (buffer_.size() >= kBufferSize) flush_buffer();
+}
+
+void AtomicFile::write(std::span<const std::byte> bytes) {
+  write(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
+std::filesystem::path AtomicFile::release_to_library() {
+  flush_buffer();
+  ::close(std::exchange(descriptor_, -1));
+  return part_;
+}
+
+void AtomicFile::commit() {
+  if (descriptor_ < 0) {
+    descriptor_ = ::open(part_.c_str(), O_RDWR | O_CLOEXEC);
+    if (descriptor_ < 0) throw IoError(path_, std::strerror(errno));
+  }
+  flush_buffer();
+  sync_to_disk(descriptor_, path_);
+  if (::close(std::exchange(descriptor_, -1)) != 0) throw IoError(path_, std::strerror(errno));
+  std::error_code error;
+  std::filesystem::rename(part_, path_, error);  // same folder, so the move is atomic
+  if (error) throw IoError(path_, error.message());
+  // The name itself must survive a power cut too.
+  const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
+  const int folder_descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder_descriptor >= 0) {
+    (void)::fsync(folder_descriptor);
+    ::close(folder_descriptor);
+  }
+}
+
+void write_file(const std::filesystem::path& path, std::string_view bytes) {
+  AtomicFile file(path);
+  file.write(bytes);
+  file.commit();
+}
+
+void make_output_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!std::filesystem::is_directory(folder)) {
+    throw IoError(folder, error ? error.message() : "exists, but is not a folder");
+  }
+  const AtomicFile probe(folder / ".probe");  // removed again, as it is never committed
+}
+
+}  // namespace cgs

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/core/error.h"
+
+#include <array>
+#include <cstdio>
+
+namespace cgs {
+
+std::string_view defect_name(Defect defect) {
+  static constexpr std::array<std::string_view, 13> kNames = {"EMPTY",
+                                                              "OPEN",
+                                                              "MAGIC",
+                                                              "SYNTAX",
+                                                              "SCHEMA",
+                                                              "UNSUPPORTED",
+                                                              "TRUNCATED",
+                                                              "COUNT",
+                                                              "VALUE",
+                                                              "REF",
+                                                              "PATH",
+                                                              "MISSING",
+                                                              "MISMATCH"};
+  return kNames.at(static_cast<size_t>(defect));
+}
+
+std::string printable(const std::filesystem::path& path) {
+  std::string out;
+  for (const char c : path.string()) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x20 && byte < 0x7f) {
+      out += c;
+      continue;
+    }
+    std::array<char, 5> escaped{};
+    std::snprintf(escaped.data(), escaped.size(), "\\x%02x", byte);
+    out += escaped.data();
+  }
+  return out;
+}
+
+BadInput::BadInput(Defect defect, const std::filesystem::path& path, const std::string& reason)
+    : Error(3, std::string(defect_name(defect)) + ": " + printable(path) + ": " + reason),
+      defect_(defect) {}
+
+IoError::IoError(const std::filesystem::path& path, const std::string& reason)
+    : Error(5, "IO: " + printable(path) + ": " + reason) {}
+
+}  // namespace cgs

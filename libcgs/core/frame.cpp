@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/core/frame.h"
+
+#include <array>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+std::string scale_source_name(ScaleSource source) {
+  static constexpr std::array<const char*, 6> kNames = {
+      "unknown", "assumed", "camera poses", "known distance", "control points", "depth sensor"};
+  return kNames.at(static_cast<size_t>(source));
+}
+
+std::string Frame::unit_name() const {
+  static constexpr std::array<std::pair<double, const char*>, 6> kUnits = {
+      {{1.0, "m"}, {1e-2, "cm"}, {1e-3, "mm"}, {1e3, "km"}, {0.0254, "in"}, {0.3048, "ft"}}};
+  if (!has_metric_scale()) return "unknown";
+  for (const auto& [metres, name] : kUnits) {
+    if (std::abs(metres_per_unit - metres) <= 1e-12 * metres) return name;
+  }
+  std::ostringstream text;
+  text.precision(9);
+  text << metres_per_unit << " m";
+  return text.str();
+}
+
+Frame canonical_frame(const std::vector<Eigen::Vector3d>& points_in_world) {
+  require(!points_in_world.empty(), "canonical_frame: number of points must be > 0", 0);
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : points_in_world) {
+    require(p.allFinite(), "canonical_frame: every point must be finite", p.transpose());
+    box.extend(p);
+  }
+  const double extent = box.sizes().maxCoeff();
+  Frame frame;
+  if (extent > 0) {
+    int exponent = 0;
+    (void)std::frexp(extent, &exponent);  // extent = m * 2^exponent with m in [0.5, 1)
+    frame.scale = std::ldexp(1.0, exponent);
+  }
+  // A grid of 2^-10 of the scale: fine enough to centre the scene, coarse enough that the
+  // subtraction is exact and that moving the world by whole cells changes nothing inside.
+  const double cell = std::ldexp(frame.scale, -10);
+  frame.origin = (box.center() / cell).array().round() * cell;
+  constexpr double kFarAway = 256;  // of the extent: float coordinates then keep < 16 bits of it
+  if (frame.origin.norm() > kFarAway * frame.scale) frame.file_origin = frame.origin;
+  return frame;
+}
+
+Eigen::Isometry3d internal_from_world(const Frame& frame, const Eigen::Isometry3d& world_from_cam) {
+  Eigen::Isometry3d out = world_from_cam;
+  out.translation() = frame.internal_from_world(world_from_cam.translation());
+  return out;
+}
+
+Eigen::Isometry3d world_from_internal(const Frame& frame,
+                                      const Eigen::Isometry3d& internal_from_cam) {
+  Eigen::Isometry3d out = internal_from_cam;
+  out.translation() = frame.world_from_internal(internal_from_cam.translation());
+  return out;
+}
+
+}  // namespace cgs

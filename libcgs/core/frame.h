@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+namespace cgs {
+
+/// How the length of one scene unit became known.
+enum class ScaleSource { Unknown, Assumed, CameraPoses, KnownDistance, ControlPoints, DepthSensor };
+
+std::string scale_source_name(ScaleSource source);
+
+/// The canonical frame all float data live in, and how to leave it.
+///
+/// world = origin + scale * internal. The origin is snapped to a power-of-two grid and the scale is
+/// a power of two, so that multiplying the world by 2^k, or moving it by a multiple of the grid,
+/// leaves every internal number bit-identical. Files hold world coordinates minus `file_origin`,
+/// which is zero unless the scene lies so far away that float coordinates would lose it.
+struct Frame {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();       ///< World point of internal (0, 0, 0).
+  double scale = 1.0;                                     ///< World units per internal unit; 2^k.
+  Eigen::Vector3d file_origin = Eigen::Vector3d::Zero();  ///< World point of (0, 0, 0) in files.
+  double metres_per_unit = 0;  ///< Metres per world unit; 0 = unknown.
+  double metres_sigma = 0;     ///< Standard deviation of metres_per_unit; 0 = not estimated.
+  ScaleSource scale_source = ScaleSource::Unknown;
+
+  bool has_metric_scale() const { return metres_per_unit > 0; }
+  /// "m", "mm", … for a known metres_per_unit of that name, "<x> m" for others, "unknown".
+  std::string unit_name() const;
+
+  Eigen::Vector3d world_from_internal(const Eigen::Vector3d& p) const { return origin + scale * p; }
+  Eigen::Vector3d internal_from_world(const Eigen::Vector3d& p) const {
+    return (p - origin) / scale;
+  }
+  Eigen::Vector3d file_from_internal(const Eigen::Vector3d& p) const {
+    return (origin - file_origin) + scale * p;
+  }
+  Eigen::Vector3d internal_from_file(const Eigen::Vector3d& p) const {
+    return (p - (origin - file_origin)) / scale;
+  }
+};
+
+/// A frame for a scene whose cameras and roughly whose surface lie at `points_in_world`.
+///
+/// The internal extent (largest side of the bounding box) comes to lie in [0.5, 1).
+/// \throws InvalidInput if there is no point, or one is not finite.
+Frame canonical_frame(const std::vector<Eigen::Vector3d>& points_in_world);
+
+/// The same pose with its translation moved into (or out of) the canonical frame; axes stay.
+Eigen::Isometry3d internal_from_world(const Frame& frame, const Eigen::Isometry3d& world_from_cam);
+Eigen::Isometry3d world_from_internal(const Frame& frame,
+                                      const Eigen::Isometry3d& internal_from_cam);
+
+}  // namespace cgs

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "libcgs/core/frame.h"
+
+namespace cgs {
+
+/// Value of the constant spherical harmonic Y_00; colour = kShC0 * coefficient + 0.5.
+inline constexpr float kShC0 = 0.28209479177387814f;
+
+/// A set of 3D Gaussians, one entry per Gaussian in every array, as values (no log, no logit).
+/// Positions and scales are in internal units of the canonical frame that comes with it.
+struct Gaussians {
+  std::vector<Eigen::Vector3f> position;  ///< [internal units]
+  std::vector<Eigen::Vector3f> scale;     ///< Standard deviation along the local axes; > 0.
+  std::vector<Eigen::Vector4f> rotation;  ///< Local-to-world unit quaternion (w, x, y, z).
+  std::vector<float> opacity;             ///< In (0, 1).
+  int sh_degree = 0;                      ///< 0 … 3
+  std::vector<Eigen::Vector3f> sh;        ///< size() * sh_count() RGB coefficients, Gaussian-major.
+
+  size_t size() const { return position.size(); }
+  int sh_count() const { return (sh_degree + 1) * (sh_degree + 1); }
+};
+
+/// Covariance of a Gaussian from its scale and rotation, Sigma = R S S^T R^T.
+///
+/// Symmetric and positive semi-definite for any input, which a free 3x3 matrix under gradient
+/// descent is not. Kerbl et al. 2023, "3D Gaussian Splatting", Eq. 6.
+///
+/// \param scale     standard deviation along each local axis [internal units]
+/// \param rotation  local-to-world (w, x, y, z); normalised here, zero counts as identity
+Eigen::Matrix3f covariance(const Eigen::Vector3f& scale, const Eigen::Vector4f& rotation);
+
+/// Rotation matrix of a quaternion (w, x, y, z) of any length; zero counts as identity.
+Eigen::Matrix3f rotation_matrix(const Eigen::Vector4f& rotation);
+
+}  // namespace cgs

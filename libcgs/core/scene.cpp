@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/core/scene.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr double kOrderQuantile = 0.01;  // of sparse points trimmed on each side, as outliers
+
+double quantile(std::vector<double> values, double q) {
+  const auto k = static_cast<size_t>(q * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
+  return values[k];
+}
+
+// z-depths of the sparse points in front of a camera and inside its image.
+std::vector<double> point_depths(const Scene& scene, const Camera& camera) {
+  std::vector<double> depths;
+  const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
+  for (const SparsePoint& point : scene.points) {
+    const Eigen::Vector3d uvz = camera.project_in_cam(cam_from_world * point.position);
+    if (camera.sees(uvz)) depths.push_back(uvz.z());
+  }
+  return depths;
+}
+
+// Least-squares point closest to all optical axes; nullopt-like NaN if they are parallel.
+Eigen::Vector3d convergence_point(const Scene& scene) {
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (const int i : scene.input) {
+    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+    const Eigen::Vector3d axis = camera.world_from_cam.rotation().col(2);
+    const Eigen::Matrix3d P = Eigen::Matrix3d::Identity() - axis * axis.transpose();
+    A += P;
+    b += P * camera.center();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(A);
+  if (eigen.eigenvalues()[0] < 1e-4 * eigen.eigenvalues()[2]) {
+    return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return A.ldlt().solve(b);
+}
+
+}  // namespace
+
+double median_baseline(const Scene& scene) {
+  std::vector<double> lengths;
+  for (size_t i = 0; i < scene.input.size(); ++i) {
+    for (size_t j = i + 1; j < scene.input.size(); ++j) {
+      const auto& a = scene.views[static_cast<size_t>(scene.input[i])].camera;
+      const auto& b = scene.views[static_cast<size_t>(scene.input[j])].camera;
+      lengths.push_back((a.center() - b.center()).norm());
+    }
+  }
+  return lengths.empty() ? 0 : quantile(lengths, 0.5);
+}
+
+DepthRange depth_range(const Scene& scene, int view) {
+  const View& v = scene.views[static_cast<size_t>(view)];
+  if (v.near > 0 && v.far > v.near) return {v.near, v.far};
+  const std::vector<double> depths = point_depths(scene, v.camera);
+  constexpr size_t kEnoughPoints = 20;
+  if (depths.size() >= kEnoughPoints) {
+    // Sparse points miss what has no texture: leave room before and behind them.
+    return {0.8 * quantile(depths, kOrderQuantile), 1.5 * quantile(depths, 1 - kOrderQuantile)};
+  }
+  const double baseline = median_baseline(scene);
+  if (!(baseline > 0)) {
+    throw BadInput(Defect::Value,
+                   scene.folder,
+                   "the input cameras share one centre (baseline 0), so no depth can be measured; "
+                   "choose views taken from different places");
+  }
+  const Eigen::Vector3d uvz = v.camera.project(convergence_point(scene));
+  // Axes that (nearly) meet in front of the camera say where the subject is; parallel axes leave
+  // only the baseline as a unit of length.
+  if (std::isfinite(uvz.z()) && uvz.z() > baseline * 0.5 && uvz.z() < baseline * 100) {
+    return {0.3 * uvz.z(), 4.0 * uvz.z()};
+  }
+  return {2 * baseline, 100 * baseline};
+}
+
+void to_canonical(Scene& scene) {
+  std::vector<Eigen::Vector3d> points;
+  for (const int i : scene.input) {
+    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+    points.push_back(camera.center());
+    const DepthRange range = depth_range(scene, i);
+    // The far bound may be guessed generously; the near half of the range in inverse depth is
+    // where the subject stands.
+    const double middle = 2 / (1 / range.near + 1 / range.far);
+    points.push_back(camera.unproject(camera.cx, camera.cy, middle));
+  }
+  const double metres_per_unit = scene.frame.metres_per_unit;
+  const double metres_sigma = scene.frame.metres_sigma;
+  const ScaleSource source = scene.frame.scale_source;
+  scene.frame = canonical_frame(points);
+  scene.frame.metres_per_unit = metres_per_unit;
+  scene.frame.metres_sigma = metres_sigma;
+  scene.frame.scale_source = source;
+  for (View& view : scene.views) {
+    view.camera.world_from_cam = internal_from_world(scene.frame, view.camera.world_from_cam);
+    view.near /= scene.frame.scale;
+    view.far /= scene.frame.scale;
+  }
+  for (SparsePoint& point : scene.points) {
+    point.position = scene.frame.internal_from_world(point.position);
+  }
+}
+
+}  // namespace cgs

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libcgs/core/camera.h"
+#include "libcgs/core/frame.h"
+#include "libcgs/core/raster.h"
+
+namespace cgs {
+
+/// One photograph and the camera that took it.
+struct View {
+  std::string name;                  ///< File stem; unique within a scene.
+  std::filesystem::path image_path;  ///< Empty if the file is missing.
+  Camera camera;                     ///< Undistorted, at the size the image is (or will be) used.
+  ColorImage image;                  ///< Empty until loaded; same size as camera.
+  MaskMap valid;                     ///< Empty = every pixel; else 1 where the image may be used.
+  double near = 0;                   ///< Smallest z-depth of the scene seen here; 0 = unknown.
+  double far = 0;                    ///< Largest z-depth; 0 = unknown.
+};
+
+/// A point known before reconstruction, from structure from motion.
+struct SparsePoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  std::vector<int> views;  ///< Indices into Scene::views that observed it; may be empty.
+};
+
+/// Photographs with known cameras, views in the order of their names.
+///
+/// Readers return it in world coordinates with the identity frame; to_canonical() moves it into
+/// its canonical frame, and everything after that works in internal units.
+struct Scene {
+  std::string kind;                   ///< "LLFF", "COLMAP", "transforms.json", "Strecha".
+  std::filesystem::path folder;       ///< What was opened.
+  std::vector<View> views;            ///< All of them, sorted by name.
+  std::vector<int> input;             ///< Views to reconstruct from.
+  std::vector<int> held_out;          ///< Views kept for evaluation.
+  std::vector<SparsePoint> points;    ///< May be empty.
+  std::vector<std::string> missing;   ///< Image files that cameras name but the disk lacks.
+  std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
+  Frame frame;
+};
+
+/// Moves cameras, depth ranges and sparse points of a scene into its canonical frame.
+///
+/// The frame is taken from the camera centres and, where the depth range or sparse points are
+/// known, from the part of the scene they bound.
+/// \pre scene.frame is the identity.
+void to_canonical(Scene& scene);
+
+/// Median length of the baselines between input views [scene units]; 0 for fewer than two.
+double median_baseline(const Scene& scene);
+
+/// A depth range that holds everything the input views may show: near and far of the view if it
+/// has them, else from sparse points, else from where the optical axes converge.
+/// \throws BadInput(Value) if the cameras share one centre (no depth can be measured).
+struct DepthRange {
+  double near = 0;
+  double far = 0;
+};
+DepthRange depth_range(const Scene& scene, int view);
+
+}  // namespace cgs

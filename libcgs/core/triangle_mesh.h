@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace cgs {
+
+/// Where a face comes from. The numbers are those in files.
+enum class Provenance : uint8_t {
+  Inferred = 0,      ///< No input view saw it: closes the surface, invented.
+  SingleView = 1,    ///< One input view saw it: its depth rests on the prior.
+  Observed = 2,      ///< Two or more input views saw it.
+  Interpolated = 3,  ///< Bridges a hole whose whole rim was observed.
+};
+
+/// An indexed triangle mesh with its evidence. Optional arrays are empty or as long as vertices.
+struct TriangleMesh {
+  std::vector<Eigen::Vector3f> vertices;       ///< [internal units]
+  std::vector<std::array<uint32_t, 3>> faces;  ///< Counter-clockwise seen from outside.
+  std::vector<Eigen::Vector3f> normals;        ///< Optional; unit length, outward.
+  std::vector<Eigen::Vector3f> colors;         ///< Optional; sRGB-coded RGB in [0, 1].
+  std::vector<float> support;                  ///< Optional; number of input views that see it.
+  std::vector<float> sigma;  ///< Optional; standard deviation along the normal [internal units],
+                             ///< NaN = no statement (inferred).
+  std::vector<Provenance> provenance;  ///< Optional; one per face.
+};
+
+/// Area-weighted vertex normals from the faces; 0 where a vertex has no face of positive area.
+std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh);
+
+/// Total face area per provenance label, index = label [internal units squared].
+std::array<double, 4> area_by_provenance(const TriangleMesh& mesh);
+
+}  // namespace cgs

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/core/scene.h"
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+namespace {
+
+// Three cameras on a line, turned towards (0, 0, 4).
+Scene converging_scene() {
+  Scene scene;
+  scene.folder = "scene";
+  for (int i = 0; i < 3; ++i) {
+    View view;
+    view.name = std::to_string(i);
+    view.camera = {.width = 64, .height = 48, .fx = 60, .fy = 60, .cx = 32, .cy = 24};
+    const Eigen::Vector3d center(i - 1.0, 0, 0);
+    const Eigen::Vector3d z = (Eigen::Vector3d(0, 0, 4) - center).normalized();
+    const Eigen::Vector3d x = Eigen::Vector3d::UnitY().cross(z).normalized();
+    view.camera.world_from_cam.linear() << x, z.cross(x), z;
+    view.camera.world_from_cam.translation() = center;
+    scene.views.push_back(view);
+    scene.input.push_back(i);
+  }
+  return scene;
+}
+
+TEST(DepthRange, TakesTheViewsOwnBoundsFirst) {
+  Scene scene = converging_scene();
+  scene.views[1].near = 1.5;
+  scene.views[1].far = 9;
+  EXPECT_EQ(depth_range(scene, 1).near, 1.5);
+  EXPECT_EQ(depth_range(scene, 1).far, 9);
+}
+
+TEST(DepthRange, HoldsTheSparsePoints) {
+  Scene scene = converging_scene();
+  for (int i = 0; i < 30; ++i) {
+    scene.points.push_back({.position = Eigen::Vector3d(0.01 * i, 0, 3 + 0.1 * i), .views = {}});
+  }
+  const DepthRange range = depth_range(scene, 1);
+  EXPECT_LT(range.near, 3.0);
+  EXPECT_GT(range.far, 5.9);
+}
+
+TEST(DepthRange, FallsBackToWhereTheAxesMeet) {
+  const DepthRange range = depth_range(converging_scene(), 1);
+  EXPECT_LT(range.near, 4);
+  EXPECT_GT(range.far, 4);
+}
+
+TEST(DepthRange, RefusesOneCommonCentre) {
+  Scene scene = converging_scene();
+  for (View& view : scene.views) view.camera.world_from_cam.translation().setZero();
+  EXPECT_THROW(depth_range(scene, 0), BadInput);
+}
+
+TEST(ToCanonical, KeepsProjections) {
+  Scene scene = converging_scene();
+  const Eigen::Vector3d point(0.3, -0.2, 3.7);
+  const Eigen::Vector3d before = scene.views[0].camera.project(point);
+  to_canonical(scene);
+  const Eigen::Vector3d after =
+      scene.views[0].camera.project(scene.frame.internal_from_world(point));
+  EXPECT_NEAR(before.x(), after.x(), 1e-9);
+  EXPECT_NEAR(before.y(), after.y(), 1e-9);
+  EXPECT_NEAR(before.z(), after.z() * scene.frame.scale, 1e-12);
+}
+
+}  // namespace
+}  // namespace cgs

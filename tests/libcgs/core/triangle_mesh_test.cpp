@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/core/triangle_mesh.h"
+
+#include <gtest/gtest.h>
+
+namespace cgs {
+namespace {
+
+TriangleMesh unit_square() {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {9, 9, 9}};
+  mesh.faces = {{0, 1, 2}, {0, 2, 3}};
+  mesh.provenance = {Provenance::Observed, Provenance::Inferred};
+  return mesh;
+}
+
+TEST(VertexNormals, PointToTheCounterClockwiseSide) {
+  const auto normals = vertex_normals(unit_square());
+  for (int v = 0; v < 4; ++v) EXPECT_EQ(normals[size_t(v)], Eigen::Vector3f(0, 0, 1));
+}
+
+TEST(VertexNormals, AreZeroWithoutAFace) {
+  EXPECT_EQ(vertex_normals(unit_square())[4], Eigen::Vector3f::Zero());
+}
+
+TEST(AreaByProvenance, SplitsTheArea) {
+  const auto area = area_by_provenance(unit_square());
+  EXPECT_DOUBLE_EQ(area[size_t(Provenance::Observed)], 0.5);
+  EXPECT_DOUBLE_EQ(area[size_t(Provenance::Inferred)], 0.5);
+  EXPECT_DOUBLE_EQ(area[size_t(Provenance::SingleView)], 0);
+}
+
+}  // namespace
+}  // namespace cgs
