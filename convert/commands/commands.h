@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <CLI/App.hpp>
+
+namespace cgs {
+
+// One function per command: adds it to the program, with its options and its help. Running it
+// throws what libcgs/core/error.h lists; main() turns that into the exit code.
+void add_evaluate(CLI::App& app);
+void add_fuse(CLI::App& app);
+void add_info(CLI::App& app);
+void add_mesh(CLI::App& app);
+void add_render(CLI::App& app);
+void add_run(CLI::App& app);
+void add_train(CLI::App& app);
+
+}  // namespace cgs

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/commands/common_options.h"
+
+#include <tbb/global_control.h>
+
+#include <memory>
+#include <opencv2/core/utility.hpp>
+#include <thread>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+void add_common_options(CLI::App& command, CommonOptions& options) {
+  command.add_option("--threads", options.threads, "Threads to use; 0 = one per core")
+      ->capture_default_str();
+  command.add_option("--memory-limit",
+                     options.memory_limit,
+                     "Memory to stay below, e.g. 4G; default 80 % of what is free");
+  command.add_flag("--json", options.json, "Print the report as JSON on standard output");
+  command.add_flag("-q,--quiet", options.quiet, "No progress on standard error");
+}
+
+void add_scene_options(CLI::App& command, SceneOptions& options) {
+  command.add_option("--views",
+                     options.views,
+                     "Input views: indices in name order or file stems, e.g. 1,10,19; the rest is "
+                     "held out. Default: all of up to four, else three evenly spaced");
+  command.add_option("--downscale", options.downscale, "Divide the image size by this")
+      ->capture_default_str();
+  command.add_flag("--allow-external",
+                   options.allow_external,
+                   "Follow links and absolute paths that leave the scene folder");
+}
+
+void limit_threads(int threads) {
+  constexpr int kMost = 1024;
+  require(threads >= 0 && threads <= kMost, "--threads must be in 0 ... 1024", threads);
+  const int count =
+      threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  static std::unique_ptr<tbb::global_control> control;
+  control = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                  static_cast<size_t>(count));
+  cv::setNumThreads(count);
+}
+
+}  // namespace cgs

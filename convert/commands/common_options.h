@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <CLI/App.hpp>
+#include <string>
+
+#include "io/scene_reader.h"
+
+namespace cgs {
+
+/// Flags that every long command has.
+struct CommonOptions {
+  int threads = 0;           ///< 0 = one per core.
+  std::string memory_limit;  ///< "4G"; empty = 80 % of what is free.
+  bool json = false;         ///< Report on standard output, as JSON.
+  bool quiet = false;        ///< No progress on standard error.
+};
+
+/// Adds them to a command; limit_threads() must be called when the command runs.
+void add_common_options(CLI::App& command, CommonOptions& options);
+
+/// --views, --downscale and --allow-external.
+void add_scene_options(CLI::App& command, SceneOptions& options);
+
+/// Keeps every library within the number of threads for the rest of the program.
+/// \throws InvalidInput if it is negative or above 1024.
+void limit_threads(int threads);
+
+}  // namespace cgs

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "convert/commands/commands.h"
+#include "convert/commands/common_options.h"
+#include "convert/model.h"
+#include "convert/terminal.h"
+#include "convert/views.h"
+#include "io/scene_reader.h"
+#include "io/view_selection.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+struct EvaluateArgs {
+  std::filesystem::path model;
+  std::filesystem::path scene;
+  std::string views;
+  CommonOptions common;
+};
+
+void print_table(const nlohmann::ordered_json& report) {
+  std::printf("%-24s %8s %8s %10s %10s %8s\n",
+              "view",
+              "PSNR",
+              "SSIM",
+              "PSNR seen",
+              "SSIM seen",
+              "holes");
+  const auto row = [](const std::string& name, const nlohmann::ordered_json& r) {
+    std::printf("%-24s %8.2f %8.3f %10.2f %10.3f %7.1f%%\n",
+                name.c_str(),
+                r["psnr"].get<double>(),
+                r["ssim"].get<double>(),
+                r["psnr_seen"].get<double>(),
+                r["ssim_seen"].get<double>(),
+                100 * r["hole_fraction"].get<double>());
+  };
+  for (const auto& view : report["views"]) row(view["name"].get<std::string>(), view);
+  row("mean", report["mean"]);
+}
+
+void run_evaluate(const EvaluateArgs& args) {
+  limit_threads(args.common.threads);
+  Terminal terminal(args.common.quiet);
+  Model model = read_model(args.model);
+  if (!args.scene.empty()) relink_images(model.scene, args.scene);
+  const std::vector<int> views =
+      args.views.empty() ? model.scene.held_out : select_views(model.scene, args.views);
+  if (views.empty()) {
+    throw InvalidInput("no view was held out; name the views to evaluate with --views");
+  }
+  const nlohmann::ordered_json report = evaluate_views(model, views, terminal.begin("evaluate"));
+  terminal.end(std::to_string(views.size()) + " views");
+  if (args.common.json) {
+    std::cout << report.dump(2) << "\n";
+  } else {
+    print_table(report);
+  }
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app) {
+  auto args = std::make_shared<EvaluateArgs>();
+  auto* cmd = app.add_subcommand(
+      "evaluate", "PSNR and SSIM on held-out views, over all pixels and without holes");
+  cmd->add_option("model", args->model, "Model folder, e.g. out/portal/model")->required();
+  cmd->add_option("--scene", args->scene, "Scene folder, where the photographs have moved");
+  cmd->add_option("--views", args->views, "Views: indices in name order or names; default held out");
+  add_common_options(*cmd, args->common);
+  cmd->footer("Example: cgs evaluate out/portal/model --scene photos/portal --json");
+  cmd->callback([args] { run_evaluate(*args); });
+}
+
+}  // namespace cgs

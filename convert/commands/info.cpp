@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "convert/commands/commands.h"
+#include "convert/commands/common_options.h"
+#include "convert/pipeline.h"
+
+namespace cgs {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct InfoArgs {
+  std::filesystem::path scene;
+  SceneOptions scene_options;
+  bool json = false;
+};
+
+Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Json camera_json(const Scene& scene, int index) {
+  const View& view = scene.views[static_cast<size_t>(index)];
+  const Camera& camera = view.camera;
+  const auto listed = [&](const std::vector<int>& views) {
+    return std::find(views.begin(), views.end(), index) != views.end();
+  };
+  const DepthRange range = listed(scene.input) ? depth_range(scene, index) : DepthRange{};
+  return {{"index", index},
+          {"name", view.name},
+          {"role", listed(scene.input) ? "input" : listed(scene.held_out) ? "held out" : "no image"},
+          {"width", camera.width},
+          {"height", camera.height},
+          {"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy},
+          {"center", vector_json(camera.center())},
+          {"near", range.near},
+          {"far", range.far}};
+}
+
+Json baselines_json(const Scene& scene) {
+  Json rows = Json::array();
+  for (size_t i = 0; i < scene.input.size(); ++i) {
+    for (size_t j = i + 1; j < scene.input.size(); ++j) {
+      const View& a = scene.views[static_cast<size_t>(scene.input[i])];
+      const View& b = scene.views[static_cast<size_t>(scene.input[j])];
+      const double length = (a.camera.center() - b.camera.center()).norm();
+      const double cosine = a.camera.world_from_cam.rotation().col(2).dot(
+          b.camera.world_from_cam.rotation().col(2));
+      const DepthRange range = depth_range(scene, scene.input[i]);
+      const double middle = 2 / (1 / range.near + 1 / range.far);
+      rows.push_back({{"views", {a.name, b.name}},
+                      {"length", length},
+                      {"baseline_to_depth", length / middle},
+                      {"angle_degrees", std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / M_PI}});
+    }
+  }
+  return rows;
+}
+
+// What a user should know before spending minutes: too little or too much baseline.
+void add_baseline_warnings(const Json& baselines, Json& warnings) {
+  double largest = 0;
+  for (const Json& row : baselines) {
+    largest = std::max(largest, row["baseline_to_depth"].get<double>());
+    if (row["angle_degrees"].get<double>() > 60) {
+      warnings.push_back("views " + row["views"][0].get<std::string>() + " and " +
+                         row["views"][1].get<std::string>() +
+                         " look in directions more than 60 degrees apart; they may share too little");
+    }
+  }
+  if (largest < 0.02) {
+    warnings.push_back("the largest baseline is below 2 % of the depth; depth will be uncertain");
+  }
+}
+
+Json scene_json(const Scene& scene) {
+  Json cameras = Json::array();
+  for (int i = 0; i < static_cast<int>(scene.views.size()); ++i) {
+    cameras.push_back(camera_json(scene, i));
+  }
+  Eigen::AlignedBox3d box;
+  for (const View& view : scene.views) box.extend(view.camera.center());
+  const Json baselines = baselines_json(scene);
+  Json warnings = scene.warnings;
+  add_baseline_warnings(baselines, warnings);
+  return {{"kind", scene.kind},
+          {"counts",
+           {{"views", scene.views.size()},
+            {"input", scene.input.size()},
+            {"held_out", scene.held_out.size()},
+            {"missing_images", scene.missing.size()},
+            {"sparse_points", scene.points.size()}}},
+          {"bounds", {{"camera_min", vector_json(box.min())}, {"camera_max", vector_json(box.max())}}},
+          {"units", scene.frame.unit_name()},
+          {"cameras", cameras},
+          {"baselines", baselines},
+          {"missing", scene.missing},
+          {"warnings", warnings}};
+}
+
+void print_scene(const Json& info) {
+  const Json& counts = info["counts"];
+  std::printf("%s scene: %zu views (%zu input, %zu held out, %zu images missing), %zu sparse points\n",
+              info["kind"].get<std::string>().c_str(),
+              counts["views"].get<size_t>(),
+              counts["input"].get<size_t>(),
+              counts["held_out"].get<size_t>(),
+              counts["missing_images"].get<size_t>(),
+              counts["sparse_points"].get<size_t>());
+  std::printf("units: %s\n\n%5s %-24s %-9s %11s %9s %22s\n",
+              info["units"].get<std::string>().c_str(),
+              "index",
+              "name",
+              "role",
+              "size",
+              "focal",
+              "depth range");
+  for (const Json& c : info["cameras"]) {
+    const double near = c["near"].get<double>();
+    std::printf("%5d %-24s %-9s %5d x %-5d %7.1f",
+                c["index"].get<int>(),
+                c["name"].get<std::string>().c_str(),
+                c["role"].get<std::string>().c_str(),
+                c["width"].get<int>(),
+                c["height"].get<int>(),
+                c["fx"].get<double>());
+    if (near > 0) std::printf("  %9.4g ... %-9.4g", near, c["far"].get<double>());
+    std::printf("\n");
+  }
+  std::printf("\nbaselines between input views:\n");
+  for (const Json& row : info["baselines"]) {
+    std::printf("  %s - %s: %.4g units, %.1f %% of the depth, %.1f degrees\n",
+                row["views"][0].get<std::string>().c_str(),
+                row["views"][1].get<std::string>().c_str(),
+                row["length"].get<double>(),
+                100 * row["baseline_to_depth"].get<double>(),
+                row["angle_degrees"].get<double>());
+  }
+  for (const Json& name : info["missing"]) {
+    std::printf("missing: %s\n", name.get<std::string>().c_str());
+  }
+  for (const Json& text : info["warnings"]) {
+    std::printf("warning: %s\n", text.get<std::string>().c_str());
+  }
+}
+
+void run_info(const InfoArgs& args) {
+  const Json info = scene_json(read_scene(args.scene, args.scene_options));
+  if (args.json) {
+    std::cout << info.dump(2) << "\n";
+  } else {
+    print_scene(info);
+  }
+}
+
+}  // namespace
+
+void add_info(CLI::App& app) {
+  auto args = std::make_shared<InfoArgs>();
+  auto* cmd = app.add_subcommand(
+      "info", "What a scene holds and what is wrong with it (exit code 3 if it cannot be used)");
+  cmd->add_option("scene", args->scene, "Folder of a scene, as for run")->required();
+  add_scene_options(*cmd, args->scene_options);
+  cmd->add_flag("--json", args->json, "Print JSON on standard output");
+  cmd->footer("Example: cgs info photos/portal --views 1,10,19");
+  cmd->callback([args] { run_info(*args); });
+}
+
+}  // namespace cgs

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "convert/commands/commands.h"
+#include "convert/commands/common_options.h"
+#include "convert/mesh_files.h"
+#include "convert/terminal.h"
+#include "convert/volume_file.h"
+#include "meshing/isosurface.h"
+
+namespace cgs {
+
+namespace {
+
+struct MeshArgs {
+  std::filesystem::path volume;
+  std::filesystem::path output;
+  std::vector<double> up = {0, 0, 1};
+  CommonOptions common;
+};
+
+void run_mesh_command(const MeshArgs& args) {
+  limit_threads(args.common.threads);
+  Terminal terminal(args.common.quiet);
+  VolumeFile file = read_volume(args.volume);
+  const Progress progress = terminal.begin("mesh");
+  const TriangleMesh open = open_surface(file.volume, {});
+  const WatertightResult closed =
+      watertight_surface(file.volume, {}, part_of(progress, 0.1, 0.9));
+  const Eigen::Vector3d up(args.up[0], args.up[1], args.up[2]);
+  const nlohmann::ordered_json files =
+      write_mesh_files(args.output, open, closed.mesh, file.frame, up);
+  terminal.end(std::to_string(closed.mesh.faces.size()) + " faces, " +
+               (closed.certificate.passed() ? "certified watertight" : "NOT certified"));
+  for (const auto& [name, reason] : files["left_out"].items()) {
+    terminal.say(name + " left out: " + reason.get<std::string>());
+  }
+  if (!args.common.json) return;
+  const nlohmann::ordered_json report = {
+      {"certificate", certificate_to_json(closed.certificate, closed.mesh, file.frame)},
+      {"method", closed.method},
+      {"output", files}};
+  std::cout << report.dump(2) << "\n";
+}
+
+}  // namespace
+
+void add_mesh(CLI::App& app) {
+  auto args = std::make_shared<MeshArgs>();
+  auto* cmd = app.add_subcommand("mesh", "Volume to meshes: open surface, and watertight with certificate");
+  cmd->add_option("volume", args->volume, "Volume written by fuse or run (.vdb)")->required();
+  cmd->add_option("-o,--output", args->output, "Folder to write")->required();
+  cmd->add_option("--up", args->up, "Direction that is up in the scene, three numbers")
+      ->expected(3)
+      ->capture_default_str();
+  add_common_options(*cmd, args->common);
+  cmd->footer("Example: cgs mesh portal.vdb --up 0 -1 0 -o out/mesh");
+  cmd->callback([args] { run_mesh_command(*args); });
+}
+
+}  // namespace cgs

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "convert/commands/commands.h"
+#include "convert/commands/common_options.h"
+#include "convert/length.h"
+#include "convert/pipeline.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+struct RunArgs {
+  RunRequest request;
+  CommonOptions common;
+};
+
+// One paragraph a user reads after a run: what was made, how far to trust it, what to open.
+void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Terminal& terminal) {
+  const auto& certificate = report["certificate"];
+  terminal.say(std::string("watertight mesh: ") +
+               (certificate["passed"].get<bool>() ? "closed, manifold, no self-intersection"
+                                                  : "NOT certified, see the report") +
+               ", " + std::to_string(certificate["faces"].get<size_t>()) + " faces");
+  for (const auto& [file, reason] : report["mesh"]["output"]["left_out"].items()) {
+    terminal.say(file + " left out: " + reason.get<std::string>());
+  }
+  terminal.say("open " + (args.request.output / "report.html").string());
+}
+
+void run_run(const RunArgs& args) {
+  limit_threads(args.common.threads);
+  RunRequest request = args.request;
+  if (!args.common.memory_limit.empty()) {
+    request.memory_limit = parse_bytes(args.common.memory_limit);
+  }
+  if (!request.assume_unit.empty()) (void)metres_in(request.assume_unit);
+  Terminal terminal(args.common.quiet);
+  const nlohmann::ordered_json report = run_pipeline(request, terminal);
+  if (args.common.json) std::cout << report.dump(2) << "\n";
+  say_summary(report, args, terminal);
+}
+
+}  // namespace
+
+void add_run(CLI::App& app) {
+  auto args = std::make_shared<RunArgs>();
+  auto* cmd = app.add_subcommand("run", "Photographs with known cameras to every asset, resumable");
+  cmd->add_option("scene",
+                  args->request.scene,
+                  "Folder: LLFF, COLMAP, transforms.json (nerfstudio, instant-ngp) or Strecha")
+      ->required();
+  cmd->add_option("-o,--output", args->request.output, "Folder to write")->required();
+  add_scene_options(*cmd, args->request.scene_options);
+  cmd->add_option("--assume-unit",
+                  args->request.assume_unit,
+                  "What one scene unit is (m, cm, mm, in, ft), where the scene does not say; STL "
+                  "and 3MF need it");
+  cmd->add_option("--voxel-size",
+                  args->request.voxel_size,
+                  "Edge of a voxel, e.g. 5mm, or in scene units; default: from the pixel size");
+  cmd->add_option("--max-error",
+                  args->request.max_error,
+                  "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
+  cmd->add_flag("-w,--overwrite", args->request.overwrite, "Replace the results of another run");
+  add_common_options(*cmd, args->common);
+  cmd->footer(
+      "Example: cgs run photos/portal --views 1,10,19 --assume-unit m -o out/portal\n"
+      "Running it again resumes at the first stage whose output is not there.");
+  cmd->callback([args] { run_run(*args); });
+}
+
+}  // namespace cgs

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "convert/commands/commands.h"
+#include "convert/commands/common_options.h"
+#include "convert/model.h"
+#include "convert/pipeline.h"
+
+namespace cgs {
+
+namespace {
+
+struct TrainArgs {
+  std::filesystem::path scene;
+  std::filesystem::path output;
+  SceneOptions scene_options;
+  std::string assume_unit;
+  CommonOptions common;
+};
+
+void run_train(const TrainArgs& args) {
+  limit_threads(args.common.threads);
+  Terminal terminal(args.common.quiet);
+  Scene scene = open_scene(args.scene, args.scene_options, args.assume_unit);
+  for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  const TrainedModel trained =
+      train_model(std::move(scene), PriorsOptions{}, terminal.begin("depth and Gaussians"));
+  write_model(args.output, trained.model);
+  const size_t count = trained.model.gaussians.size();
+  const double seconds = terminal.end(std::to_string(count) + " Gaussians");
+  if (!args.common.json) return;
+  const nlohmann::ordered_json report = {
+      {"model", kModelDescription}, {"gaussians", count}, {"seconds", seconds}};
+  std::cout << report.dump(2) << "\n";
+}
+
+}  // namespace
+
+void add_train(CLI::App& app) {
+  auto args = std::make_shared<TrainArgs>();
+  auto* cmd = app.add_subcommand("train", "Photographs to coherent Gaussians (a model folder)");
+  cmd->add_option("scene", args->scene, "Folder of a scene, as for run")->required();
+  cmd->add_option("-o,--output", args->output, "Model folder to write")->required();
+  add_scene_options(*cmd, args->scene_options);
+  cmd->add_option("--assume-unit", args->assume_unit, "What one scene unit is: m, cm, mm, in, ft");
+  add_common_options(*cmd, args->common);
+  cmd->footer("Example: cgs train photos/portal --views 1,10,19 -o out/model");
+  cmd->callback([args] { run_train(*args); });
+}
+
+}  // namespace cgs

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "convert/commands/commands.h"
+#include "convert/terminal.h"
+#include "libcgs/core/error.h"
+
+namespace {
+
+constexpr const char* kDescription =
+    "cgs - two to four photographs to assets that say what was seen and what was invented";
+
+constexpr const char* kFooter =
+    "Example: cgs run photos/portal --views 1,10,19 -o out/portal\n"
+    "         opens as out/portal/report.html\n"
+    "Each command explains itself: cgs run --help";
+
+// --voxel_size and --voxel-size are the same flag; values are left alone.
+std::vector<std::string> with_dashes(int argc, char** argv) {
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  for (std::string& argument : arguments) {
+    if (argument.rfind("--", 0) != 0) continue;
+    const size_t end = std::min(argument.find('='), argument.size());
+    std::replace(argument.begin(), argument.begin() + static_cast<std::ptrdiff_t>(end), '_', '-');
+  }
+  std::reverse(arguments.begin(), arguments.end());  // the order CLI11 takes a vector in
+  return arguments;
+}
+
+int run_program(int argc, char** argv) {
+  CLI::App app(kDescription, "cgs");
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "cgs 0.1.0");
+  cgs::add_run(app);
+  cgs::add_info(app);
+  cgs::add_train(app);
+  cgs::add_evaluate(app);
+  cgs::add_render(app);
+  cgs::add_fuse(app);
+  cgs::add_mesh(app);
+  try {
+    app.parse(with_dashes(argc, argv));
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  cgs::catch_interrupts();
+  try {
+    return run_program(argc, argv);
+  } catch (const cgs::Cancelled&) {
+    std::fprintf(stderr, "\ncgs: interrupted; finished stages are kept\n");
+    return cgs::interrupt_exit_code();
+  } catch (const cgs::Error& error) {
+    std::fprintf(stderr, "cgs: %s\n", error.what());
+    return error.exit_code();
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "cgs: LIMIT: out of memory; try --downscale 2 or a larger --voxel-size\n");
+    return 4;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "cgs: unexpected: %s\n", error.what());
+    return 1;
+  }
+}

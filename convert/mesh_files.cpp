@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/mesh_files.h"
+
+#include <nlohmann/json.hpp>
+
+#include "io/atomic_file.h"
+#include "io/mesh_ply.h"
+#include "io/obj.h"
+#include "io/stl.h"
+#include "io/threemf.h"
+#include "libcgs/core/up_axis.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+Json certificate_to_json(const Certificate& certificate,
+                         const TriangleMesh& mesh,
+                         const Frame& frame) {
+  const double area_unit = frame.scale * frame.scale;
+  const auto area = area_by_provenance(mesh);
+  const auto of = [&](Provenance label) { return area_unit * area[static_cast<size_t>(label)]; };
+  return {{"passed", certificate.passed()},
+          {"closed", certificate.closed},
+          {"edge_manifold", certificate.edge_manifold},
+          {"vertex_manifold", certificate.vertex_manifold},
+          {"oriented", certificate.oriented_outward},
+          {"self_intersections", certificate.self_intersections},
+          {"components", certificate.components},
+          {"genus", certificate.genus},
+          {"volume", certificate.volume * area_unit * frame.scale},
+          {"area_observed", of(Provenance::Observed)},
+          {"area_single_view", of(Provenance::SingleView)},
+          {"area_interpolated", of(Provenance::Interpolated)},
+          {"area_inferred", of(Provenance::Inferred)},
+          {"units", frame.unit_name()},
+          {"vertices", mesh.vertices.size()},
+          {"faces", mesh.faces.size()}};
+}
+
+Json write_mesh_files(const std::filesystem::path& folder,
+                      const TriangleMesh& open_surface,
+                      const TriangleMesh& watertight,
+                      const Frame& frame,
+                      const Eigen::Vector3d& up) {
+  make_output_folder(folder);
+  write_mesh_ply(folder / "surface.ply", open_surface, frame);
+  write_mesh_ply(folder / "watertight.ply", watertight, frame);
+  write_obj(folder / "watertight.obj", watertight, frame);
+  Json files = {"surface.ply", "watertight.ply", "watertight.obj"};
+  Json left_out = Json::object();
+  for (const char* name : {"watertight.stl", "watertight.3mf"}) {
+    if (!frame.has_metric_scale()) {
+      left_out[name] =
+          "the scale of this scene is unknown and CAD files are in millimetres; "
+          "--assume-unit m writes them as if one scene unit were a metre";
+      continue;
+    }
+    const Eigen::Matrix3d z_up = z_up_from(up);
+    if (std::string(name) == "watertight.stl") {
+      write_stl(folder / name, watertight, frame, z_up);
+    } else {
+      write_3mf(folder / name, watertight, frame, z_up);
+    }
+    files.push_back(name);
+  }
+  return {{"files", files}, {"left_out", left_out}};
+}
+
+}  // namespace cgs

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/model.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "io/atomic_file.h"
+#include "io/cameras_json.h"
+#include "io/exr.h"
+#include "io/gaussian_ply.h"
+#include "io/scene_reader.h"
+#include "libcgs/coherence/initialisation.h"
+#include "libcgs/core/error.h"
+#include "libcgs/render/rasterizer.h"
+
+namespace cgs {
+
+namespace {
+
+template <typename T>
+std::vector<float> as_floats(const Raster<T>& raster) {
+  std::vector<float> out(raster.data.size());
+  std::transform(raster.data.begin(), raster.data.end(), out.begin(), [](T value) {
+    return static_cast<float>(value);
+  });
+  return out;
+}
+
+template <typename T>
+Raster<T> as_raster(const ExrImage& image, const std::string& channel, const std::string& file) {
+  for (const auto& [name, values] : image.channels) {
+    if (name != channel) continue;
+    Raster<T> raster(image.width, image.height, T{});
+    std::transform(values.begin(), values.end(), raster.data.begin(), [](float value) {
+      return static_cast<T>(value);
+    });
+    return raster;
+  }
+  throw BadInput(Defect::Schema, file, "has no channel '" + channel + "'");
+}
+
+std::filesystem::path priors_path(const std::filesystem::path& folder, const View& view) {
+  return folder / "priors" / (view.name + ".exr");
+}
+
+// Depths stay in internal units here: the file is for resuming, and restores the same bits.
+void write_priors(const std::filesystem::path& path, const ViewPriors& priors) {
+  ExrImage image;
+  image.width = priors.depth.width;
+  image.height = priors.depth.height;
+  image.channels = {{"Z", priors.depth.data},
+                    {"confidence.Y", priors.confidence.data},
+                    {"layer.Y", as_floats(priors.layer)},
+                    {"matched.Y", as_floats(priors.matched_views)},
+                    {"origin.Y", as_floats(priors.origin)},
+                    {"sigma.Y", priors.sigma.data}};
+  image.text["cgs:units"] = "internal";
+  write_exr(path, image);
+}
+
+ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) {
+  const ExrImage image = read_exr(path);
+  if (image.width != camera.width || image.height != camera.height) {
+    throw BadInput(Defect::Mismatch,
+                   path,
+                   "is " + std::to_string(image.width) + " x " + std::to_string(image.height) +
+                       ", its camera " + std::to_string(camera.width) + " x " +
+                       std::to_string(camera.height));
+  }
+  const std::string file = path.string();
+  ViewPriors priors;
+  priors.depth = as_raster<float>(image, "Z", file);
+  priors.sigma = as_raster<float>(image, "sigma.Y", file);
+  priors.confidence = as_raster<float>(image, "confidence.Y", file);
+  priors.layer = as_raster<uint8_t>(image, "layer.Y", file);
+  priors.matched_views = as_raster<uint8_t>(image, "matched.Y", file);
+  const Raster<uint8_t> origin = as_raster<uint8_t>(image, "origin.Y", file);
+  priors.origin = Raster<DepthOrigin>(image.width, image.height, DepthOrigin::Unknown);
+  std::transform(origin.data.begin(), origin.data.end(), priors.origin.data.begin(), [](uint8_t v) {
+    return v > 2 ? DepthOrigin::Unknown : static_cast<DepthOrigin>(v);
+  });
+  return priors;
+}
+
+}  // namespace
+
+TrainedModel train_model(Scene scene, const PriorsOptions& options, const Progress& progress) {
+  load_images(scene, scene.input, part_of(progress, 0, 0.05));
+  to_canonical(scene);
+  EstimatedPriors estimated = estimate_priors(scene, options, part_of(progress, 0.05, 0.98));
+  TrainedModel trained;
+  trained.report = estimated.report;
+  trained.model.gaussians = initial_gaussians(scene, estimated.views);
+  trained.model.priors = std::move(estimated.views);
+  trained.model.scene = std::move(scene);
+  report(progress, 1);
+  return trained;
+}
+
+void write_model(const std::filesystem::path& folder, const Model& model) {
+  make_output_folder(folder / "priors");
+  for (size_t k = 0; k < model.priors.size(); ++k) {
+    const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
+    write_priors(priors_path(folder, view), model.priors[k]);
+  }
+  write_cameras_json(folder / "cameras.json", model.scene);
+  write_gaussian_ply(folder / "gaussians.ply", model.gaussians, model.scene.frame);
+}
+
+Model read_model(const std::filesystem::path& folder) {
+  if (!std::filesystem::is_directory(folder)) {
+    throw BadInput(Defect::Open, folder, "no such folder; give the model folder of a run");
+  }
+  Model model;
+  model.scene = read_cameras_json(folder / "cameras.json");
+  model.gaussians = read_gaussian_ply(folder / "gaussians.ply", model.scene.frame).gaussians;
+  for (const int i : model.scene.input) {
+    const View& view = model.scene.views[static_cast<size_t>(i)];
+    model.priors.push_back(read_priors(priors_path(folder, view), view.camera));
+  }
+  return model;
+}
+
+std::vector<SupportView> support_views(const Model& model) {
+  std::vector<SupportView> views;
+  for (size_t k = 0; k < model.priors.size(); ++k) {
+    const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
+    views.push_back({view.camera, model.priors[k].depth, model.priors[k].sigma});
+  }
+  return views;
+}
+
+RenderBuffers render_camera(const Model& model,
+                            const std::vector<SupportView>& inputs,
+                            const Camera& camera) {
+  RenderBuffers buffers = rasterize(model.gaussians, camera);
+  annotate_support(buffers, camera, inputs);
+  return buffers;
+}
+
+ColorImage picture(const RenderBuffers& buffers) {
+  ColorImage out = buffers.color;
+  constexpr float kMinAlpha = 0.5f;
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    const float alpha = buffers.alpha.data[i];
+    if (alpha >= kMinAlpha) out.data[i] /= alpha;
+    out.data[i] = out.data[i].cwiseMax(0.0f).cwiseMin(1.0f);
+  }
+  return out;
+}
+
+Eigen::Vector3d world_up(const Scene& scene) {
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d mean_up = Eigen::Vector3d::Zero();
+  for (const View& view : scene.views) {
+    const Eigen::Matrix3d R = view.camera.world_from_cam.rotation();
+    spread += R.col(0) * R.col(0).transpose();
+    mean_up -= R.col(1);
+  }
+  if (!(mean_up.norm() > 1e-6)) return Eigen::Vector3d::UnitZ();
+  mean_up.normalize();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(spread);
+  // The image x axes of level cameras lie in the horizontal plane and, once the cameras turn by
+  // some degrees, span it; its normal is then free of the cameras' pitch.
+  constexpr double kMinTurn = 0.004;  // second to first eigenvalue: about +-3.6 degrees
+  constexpr double kLevel = 0.05;     // third to second: the axes do lie in a plane
+  const Eigen::Vector3d values = eigen.eigenvalues();
+  if (values[1] < kMinTurn * values[2] || values[0] > kLevel * values[1]) return mean_up;
+  const Eigen::Vector3d normal = eigen.eigenvectors().col(0);
+  return normal.dot(mean_up) < 0 ? Eigen::Vector3d(-normal) : normal;
+}
+
+}  // namespace cgs

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libcgs/core/gaussians.h"
+#include "libcgs/core/progress.h"
+#include "libcgs/core/scene.h"
+#include "libcgs/priors/estimate_priors.h"
+#include "libcgs/priors/view_priors.h"
+#include "libcgs/render/render_buffers.h"
+#include "libcgs/render/support.h"
+
+namespace cgs {
+
+/// A reconstruction: cameras, Gaussians, and what the input views know about depth. This is what
+/// the folder OUT/model holds.
+struct Model {
+  Scene scene;  ///< In its canonical frame; pixels only where loaded.
+  Gaussians gaussians;
+  std::vector<ViewPriors> priors;  ///< In the order of scene.input; empty for foreign splats.
+};
+
+/// What a model is, in plain words, for run.json and the report.
+inline constexpr const char* kModelDescription =
+    "aligned initialisation: one Gaussian per pixel at the depth of a multi-view plane sweep; "
+    "not optimised against the photographs";
+
+/// Scene -> model. Loads the images of the input views. Moves `scene` to its canonical frame.
+struct TrainedModel {
+  Model model;
+  PriorsReport report;
+};
+TrainedModel train_model(Scene scene, const PriorsOptions& options, const Progress& progress);
+
+/// Writes gaussians.ply, cameras.json and priors/<view>.exr. \throws IoError
+void write_model(const std::filesystem::path& folder, const Model& model);
+
+/// Reads what write_model() wrote. \throws BadInput
+Model read_model(const std::filesystem::path& folder);
+
+/// The input views with their depth and its uncertainty: who can vouch for a rendered pixel.
+std::vector<SupportView> support_views(const Model& model);
+
+/// Rasters of one camera with support and hole mask.
+RenderBuffers render_camera(const Model& model,
+                            const std::vector<SupportView>& inputs,
+                            const Camera& camera);
+
+/// The rendered colour as a picture: divided by alpha where alpha reaches one half, black in holes
+/// without colour. Values in [0, 1].
+ColorImage picture(const RenderBuffers& buffers);
+
+/// World direction that is up in the photographs, by the axis all cameras were turned around
+/// (people hold cameras level), or by the mean image up where the cameras do not turn.
+Eigen::Vector3d world_up(const Scene& scene);
+
+}  // namespace cgs

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "libcgs/core/raster.h"
+#include "libcgs/render/render_buffers.h"
+
+namespace cgs {
+
+/// Depth as a picture: near red, far blue (Google's turbo map), linear in inverse depth between
+/// the 1st and 99th percentile; unknown depth is black.
+ColorImage depth_picture(const DepthMap& depth);
+
+/// (n + 1) / 2 per axis, in camera axes with +y up and +z towards the camera, as normal maps are
+/// usually shown; unknown is black.
+ColorImage normal_picture(const NormalMap& normals, const Eigen::Isometry3d& cam_from_world);
+
+/// 1 = hole.
+MaskMap hole_mask(const RenderBuffers& buffers);
+
+}  // namespace cgs

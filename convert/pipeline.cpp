@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/pipeline.h"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "convert/frame_json.h"
+#include "convert/length.h"
+#include "convert/mesh_files.h"
+#include "convert/report.h"
+#include "convert/run_record.h"
+#include "convert/views.h"
+#include "convert/volume_file.h"
+#include "io/atomic_file.h"
+#include "io/gltf.h"
+#include "io/mesh_ply.h"
+#include "io/png.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/up_axis.h"
+#include "meshing/isosurface.h"
+#include "meshing/preview.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+/// One run: the request, what is in memory so far, and the record on disk.
+struct Run {
+  const RunRequest& request;
+  Terminal& terminal;
+  RunRecord record;
+  Scene scene;                       ///< As opened: world coordinates.
+  std::optional<Model> model;        ///< Loaded when a stage needs it.
+  std::optional<TriangleMesh> mesh;  ///< Watertight; loaded when a stage needs it.
+};
+
+const std::vector<std::string> kStages = {"model", "views", "evaluation", "mesh", "web", "report"};
+
+Json request_json(const RunRequest& request, const Scene& scene) {
+  Json inputs = Json::object();
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    inputs[view.name] = content_hash(view.image_path);
+  }
+  Json cameras = Json::array();
+  for (const View& view : scene.views) {
+    const Eigen::Vector3d c = view.camera.center();
+    cameras.push_back({view.name, view.camera.fx, c.x(), c.y(), c.z()});
+  }
+  const size_t cameras_hash = std::hash<std::string>{}(cameras.dump());
+  return {{"scene", std::filesystem::weakly_canonical(request.scene).string()},
+          {"views", request.scene_options.views},
+          {"downscale", request.scene_options.downscale},
+          {"assume_unit", request.assume_unit},
+          {"voxel_size", request.voxel_size},
+          {"max_error", request.max_error},
+          {"input_images", inputs},
+          {"cameras", cameras_hash}};
+}
+
+Model& loaded_model(Run& run) {
+  if (!run.model) run.model = read_model(run.request.output / "model");
+  return *run.model;
+}
+
+const TriangleMesh& loaded_mesh(Run& run) {
+  if (!run.mesh) {
+    const Frame& frame = loaded_model(run).scene.frame;
+    run.mesh = read_mesh_ply(run.request.output / "mesh/watertight.ply", frame).mesh;
+  }
+  return *run.mesh;
+}
+
+std::vector<int> views_with_photograph(const Scene& scene) {
+  std::vector<int> views = scene.input;
+  views.insert(views.end(), scene.held_out.begin(), scene.held_out.end());
+  std::sort(views.begin(), views.end());
+  return views;
+}
+
+Json run_model(Run& run, const Progress& progress) {
+  TrainedModel trained = train_model(run.scene, PriorsOptions{}, progress);
+  write_model(run.request.output / "model", trained.model);
+  run.model = std::move(trained.model);
+  return {{"description", kModelDescription},
+          {"gaussians", run.model->gaussians.size()},
+          {"alignment",
+           {{"scale", trained.report.alignment.scale},
+            {"offset", trained.report.alignment.offset},
+            {"correspondences", trained.report.alignment.correspondences}}}};
+}
+
+Json run_views(Run& run, const Progress& progress) {
+  Model& model = loaded_model(run);
+  return write_views(
+      model, views_with_photograph(model.scene), run.request.output / "views", progress);
+}
+
+Json run_evaluation(Run& run, const Progress& progress) {
+  Model& model = loaded_model(run);
+  if (model.scene.held_out.empty()) return nullptr;
+  return evaluate_views(model, model.scene.held_out, progress);
+}
+
+// Two pictures of the mesh for the report: as the middle input camera sees it, and from the side.
+void write_mesh_pictures(const Run& run, const TriangleMesh& mesh) {
+  const Scene& scene = run.model->scene;
+  const Camera& reference =
+      scene.views[static_cast<size_t>(scene.input[scene.input.size() / 2])].camera;
+  constexpr double kSide = 0.6;      // [rad]
+  constexpr double kFromAbove = 0.3;  // [rad]
+  const Camera front = overview_camera(mesh, reference, 0, 0);
+  const Camera side = overview_camera(mesh, reference, kSide, kFromAbove);
+  const std::filesystem::path folder = run.request.output / "mesh";
+  write_png(folder / "front.png", preview(mesh, front, {}));
+  write_png(folder / "side.png", preview(mesh, side, {}));
+  write_png(folder / "front.provenance.png", preview(mesh, front, {.by_provenance = true}));
+  write_png(folder / "side.provenance.png", preview(mesh, side, {.by_provenance = true}));
+}
+
+Json run_mesh(Run& run, const Progress& progress) {
+  const Model& model = loaded_model(run);
+  const Frame& frame = model.scene.frame;
+  FusedVolume fused = fuse_model(
+      model, run.request.voxel_size, run.request.memory_limit, part_of(progress, 0, 0.3));
+  const TriangleMesh open = open_surface(fused.volume, {});
+  WatertightResult closed = watertight_surface(fused.volume, {}, part_of(progress, 0.35, 0.85));
+  write_volume(run.request.output / "volume.vdb", fused.volume, frame);
+  const Json files = write_mesh_files(
+      run.request.output / "mesh", open, closed.mesh, frame, world_up(model.scene));
+  run.mesh = std::move(closed.mesh);
+  write_mesh_pictures(run, *run.mesh);
+  report(progress, 1);
+  return {{"fusion", fusion_to_json(fused.report, frame)},
+          {"method", closed.method},
+          {"certificate", certificate_to_json(closed.certificate, *run.mesh, frame)},
+          {"open_surface_faces", open.faces.size()},
+          {"output", files}};
+}
+
+Json run_web(Run& run, const Progress& progress) {
+  const Model& model = loaded_model(run);
+  const Frame& frame = model.scene.frame;
+  const TriangleMesh& mesh = loaded_mesh(run);
+  report(progress, 0);
+  GlbOptions options;
+  options.y_up = y_up_from(world_up(model.scene));
+  if (!run.request.max_error.empty()) {
+    options.max_error = parse_length(run.request.max_error, frame) * frame.scale;
+  }
+  options.summary_json =
+      Json({{"model", kModelDescription}, {"certificate", run.record.result("mesh")["certificate"]}})
+          .dump();
+  make_output_folder(run.request.output / "web");
+  const GlbReport glb = write_glb(run.request.output / "web/asset.glb", mesh, frame, options);
+  return {{"asset.glb",
+           {{"bytes", glb.bytes},
+            {"position_bits", glb.position_bits},
+            {"measured_max_error", glb.measured_max_error},
+            {"units", frame.unit_name()}}}};
+}
+
+Json report_json(const Run& run) {
+  const Scene& scene = run.model->scene;
+  Json photographs = Json::object();
+  for (const View& view : scene.views) photographs[view.name] = view.image_path.string();
+  Json stages = Json::array();
+  for (const auto& [name, stage] : run.record.json()["stages"].items()) {
+    stages.push_back({{"stage", name},
+                      {"seconds", stage["seconds"]},
+                      {"peak_memory", stage["peak_memory"]}});
+  }
+  const Json mesh = run.record.result("mesh");
+  Json out = {{"program", "cgs 0.1.0"},
+              {"scene", scene.kind},
+              {"folder", run.request.scene.string()},
+              {"units", scene.frame.unit_name()},
+              {"scale_source", scale_source_name(scene.frame.scale_source)},
+              {"frame", frame_to_json(scene.frame)},
+              {"model", run.record.result("model")},
+              {"views", run.record.result("views")},
+              {"evaluation", run.record.result("evaluation")},
+              {"mesh", mesh},
+              {"certificate", mesh["certificate"]},
+              {"web", run.record.result("web")},
+              {"photographs", photographs},
+              {"stages", stages},
+              {"warnings", run.scene.warnings}};
+  return out;
+}
+
+Json run_report(Run& run, const Progress& progress) {
+  loaded_model(run);
+  report(progress, 0);
+  const Json json = report_json(run);
+  write_file(run.request.output / "report.json", json.dump(2) + "\n");
+  write_html_report(run.request.output, json);
+  return {{"pages", 1}};
+}
+
+std::string view_file(const Scene& scene, const char* suffix) {
+  return "views/" + scene.views[static_cast<size_t>(scene.input.front())].name + suffix;
+}
+
+/// A stage: its files (whose absence means it must run), what it does, and a remark for the user.
+struct Stage {
+  std::string name;
+  std::string title;
+  std::vector<std::string> files;
+  Json (*work)(Run&, const Progress&);
+};
+
+std::vector<Stage> stages_of(const Scene& scene) {
+  std::vector<std::string> view_files;
+  for (const int i : views_with_photograph(scene)) {
+    const std::string stem = "views/" + scene.views[static_cast<size_t>(i)].name;
+    for (const char* suffix :
+         {".exr", ".color.png", ".depth.png", ".normal.png", ".hole.png"}) {
+      view_files.push_back(stem + suffix);
+    }
+  }
+  std::vector<std::string> model_files = {"model/gaussians.ply", "model/cameras.json"};
+  for (const int i : scene.input) {
+    model_files.push_back("model/priors/" + scene.views[static_cast<size_t>(i)].name + ".exr");
+  }
+  return {{"model", "depth and Gaussians", model_files, run_model},
+          {"views", "views", view_files, run_views},
+          {"evaluation", "held-out views", {}, run_evaluation},
+          {"mesh",
+           "volume and mesh",
+           {"volume.vdb", "mesh/surface.ply", "mesh/watertight.ply", "mesh/watertight.obj",
+            "mesh/front.png", "mesh/side.png", "mesh/front.provenance.png",
+            "mesh/side.provenance.png"},
+           run_mesh},
+          {"web", "web asset", {"web/asset.glb"}, run_web},
+          {"report", "report", {"report.html", "report.json"}, run_report}};
+}
+
+}  // namespace
+
+Scene open_scene(const std::filesystem::path& path,
+                 const SceneOptions& options,
+                 const std::string& assume_unit) {
+  Scene scene = read_scene(path, options);
+  if (!assume_unit.empty()) {
+    scene.frame.metres_per_unit = metres_in(assume_unit);
+    scene.frame.scale_source = ScaleSource::Assumed;
+  }
+  return scene;
+}
+
+size_t memory_budget(size_t limit) {
+  if (limit > 0) return limit;
+  std::ifstream meminfo("/proc/meminfo");
+  std::string key;
+  size_t kibibytes = 0;
+  std::string unit;
+  while (meminfo >> key >> kibibytes >> unit) {
+    if (key == "MemAvailable:") return kibibytes * 1024 / 10 * 8;
+  }
+  return size_t{4} << 30;
+}
+
+FusedVolume fuse_model(const Model& model,
+                       const std::string& voxel_size,
+                       size_t memory_limit,
+                       const Progress& progress) {
+  std::vector<TsdfView> views;
+  const std::vector<SupportView> inputs = support_views(model);
+  for (size_t k = 0; k < model.scene.input.size(); ++k) {
+    const Camera& camera = model.scene.views[static_cast<size_t>(model.scene.input[k])].camera;
+    const RenderBuffers buffers = render_camera(model, inputs, camera);
+    TsdfView view;
+    view.camera = camera;
+    view.depth = model.priors[k].depth;
+    view.sigma = model.priors[k].sigma;
+    view.color = picture(buffers);
+    views.push_back(std::move(view));
+  }
+  TsdfOptions options;
+  if (!voxel_size.empty()) options.voxel_size = parse_length(voxel_size, model.scene.frame);
+  options.memory_limit = memory_budget(memory_limit);
+  return fuse(views, options, progress);
+}
+
+Json run_pipeline(const RunRequest& request, Terminal& terminal) {
+  Scene scene = open_scene(request.scene, request.scene_options, request.assume_unit);
+  for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  make_output_folder(request.output);
+  RunRecord record(request.output, request_json(request, scene), request.overwrite);
+  Run run{request, terminal, std::move(record), std::move(scene), {}, {}};
+  bool stale = false;  // a stage that ran makes everything after it stale
+  for (const Stage& stage : stages_of(run.scene)) {
+    if (!stale && run.record.is_done(stage.name, stage.files)) {
+      terminal.say(stage.title + ": done before");
+      continue;
+    }
+    stale = true;
+    const Json result = stage.work(run, terminal.begin(stage.title));
+    run.record.finish(stage.name, terminal.end(""), result);
+  }
+  loaded_model(run);
+  return report_json(run);
+}
+
+}  // namespace cgs

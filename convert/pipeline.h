@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "convert/model.h"
+#include "convert/terminal.h"
+#include "io/scene_reader.h"
+#include "meshing/tsdf.h"
+
+namespace cgs {
+
+/// What `cgs run` is asked for; lengths are as the user typed them, with or without a unit.
+struct RunRequest {
+  std::filesystem::path scene;
+  std::filesystem::path output;
+  SceneOptions scene_options;
+  std::string assume_unit;      ///< Unit of one scene unit where the scene does not say; empty = unknown.
+  std::string voxel_size;       ///< Empty = from the pixel footprint.
+  std::string max_error;        ///< Of the compressed mesh; empty = 1/16384 of its size.
+  size_t memory_limit = 0;      ///< [bytes]; 0 = 80 % of what is free.
+  bool overwrite = false;
+};
+
+/// Reads a scene and gives it the unit the user assumes, if any.
+Scene open_scene(const std::filesystem::path& path,
+                 const SceneOptions& options,
+                 const std::string& assume_unit);
+
+/// Photographs to every asset, in stages that are skipped when their output is there already.
+/// \return the content of OUT/report.json.
+nlohmann::ordered_json run_pipeline(const RunRequest& request, Terminal& terminal);
+
+/// Fuses what the input views of a model see. `voxel_size` as in RunRequest.
+FusedVolume fuse_model(const Model& model,
+                       const std::string& voxel_size,
+                       size_t memory_limit,
+                       const Progress& progress);
+
+/// The figures of a fusion for a report, in file units.
+nlohmann::ordered_json fusion_to_json(const TsdfReport& report, const Frame& frame);
+
+/// Memory the program may plan for: the user's limit, or 80 % of what is free now [bytes].
+size_t memory_budget(size_t limit);
+
+}  // namespace cgs

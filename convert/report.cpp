@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/report.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "io/atomic_file.h"
+#include "io/image.h"
+#include "io/png.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kStyle = R"(
+:root { color-scheme: light dark; --line: #8884; --good: #2a7d46; --bad: #b3261e; }
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 1280px; margin: 2rem auto; padding: 0 1rem; }
+h1 { margin-bottom: 0; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); }
+.note { border-left: 4px solid #c90; padding: .4rem .8rem; background: #c901; }
+table { border-collapse: collapse; } td, th { padding: .2rem .8rem; border-bottom: 1px solid var(--line); text-align: right; }
+td:first-child, th:first-child { text-align: left; }
+.row { display: grid; grid-template-columns: repeat(5, 1fr); gap: 6px; margin: .3rem 0 1.2rem; }
+.two { display: grid; grid-template-columns: 1fr 1fr; gap: 8px; }
+img { width: 100%; display: block; background: #777; } figure { margin: 0; }
+figcaption { font-size: 13px; opacity: .8; }
+.bar { background: #4a7fb5; height: .9em; display: inline-block; }
+.good { color: var(--good); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; }
+@media (max-width: 800px) { .row { grid-template-columns: 1fr 1fr; } .two { grid-template-columns: 1fr; } }
+)";
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '&': out += "&amp;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += c;
+    }
+  }
+  return out;
+}
+
+std::string number(const Json& value, const char* format = "%.4g") {
+  if (!value.is_number()) return "-";
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), format, value.get<double>());  // NOLINT: fixed formats
+  return text.data();
+}
+
+std::string base64(const std::string& bytes) {
+  static constexpr const char* kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve(bytes.size() * 4 / 3 + 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    uint32_t group = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      group = group << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    }
+    for (size_t k = 0; k < 4; ++k) {
+      out += i + k <= bytes.size() ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+    }
+  }
+  return out;
+}
+
+// A picture file as a figure with the picture inside; a line of text where it cannot be read.
+std::string figure(const std::filesystem::path& file, const std::string& caption) {
+  constexpr int kQuality = 85;
+  std::string content;
+  try {
+    const ColorImage image = read_image(file, nullptr, {});
+    content = "<img alt=\"" + escaped(caption) + "\" src=\"data:image/jpeg;base64," +
+              base64(encode_jpeg(image, kQuality)) + "\">";
+  } catch (const Error& error) {
+    content = "<p>" + escaped(error.what()) + "</p>";
+  }
+  return "<figure>" + content + "<figcaption>" + escaped(caption) + "</figcaption></figure>\n";
+}
+
+std::string verdict(bool good, const std::string& yes, const std::string& no) {
+  return good ? "<span class=good>" + yes + "</span>" : "<span class=bad>" + no + "</span>";
+}
+
+std::string table_row(const std::string& name, const std::string& value) {
+  return "<tr><td>" + escaped(name) + "</td><td>" + value + "</td></tr>\n";
+}
+
+std::string certificate_section(const Json& report) {
+  const Json& c = report["certificate"];
+  const std::string unit = c["units"] == "unknown" ? "units" : c["units"].get<std::string>();
+  const auto yes = [&](const char* key) { return verdict(c[key].get<bool>(), "yes", "no"); };
+  const auto area = [&](const char* key) {
+    return number(c[key]) + " " + escaped(unit) + "<sup>2</sup>";
+  };
+  std::ostringstream html;
+  html << "<h2>Certificate of the watertight mesh</h2>\n<p>Made by: "
+       << escaped(report["mesh"]["method"].get<std::string>()) << "</p>\n<table>\n"
+       << table_row("closed", yes("closed")) << table_row("edge-manifold", yes("edge_manifold"))
+       << table_row("vertex-manifold", yes("vertex_manifold"))
+       << table_row("oriented outward", yes("oriented"))
+       << table_row("self-intersections", number(c["self_intersections"], "%.0f"))
+       << table_row("components", number(c["components"], "%.0f"))
+       << table_row("genus", number(c["genus"], "%.0f"))
+       << table_row("volume", number(c["volume"]) + " " + escaped(unit) + "<sup>3</sup>")
+       << table_row("area seen by two or more views", area("area_observed"))
+       << table_row("area seen by one view", area("area_single_view"))
+       << table_row("area interpolated", area("area_interpolated"))
+       << table_row("area inferred (never seen, invented)", area("area_inferred"))
+       << table_row("faces", number(c["faces"], "%.0f")) << "</table>\n";
+  return html.str();
+}
+
+std::string mesh_section(const std::filesystem::path& folder) {
+  return "<h2>Mesh</h2>\n<div class=two>\n" +
+         figure(folder / "mesh/front.png", "watertight mesh, from the middle input view") +
+         figure(folder / "mesh/side.png", "from the side") +
+         figure(folder / "mesh/front.provenance.png",
+                "magenta = inferred, never seen by any input view") +
+         figure(folder / "mesh/side.provenance.png", "the same from the side") + "</div>\n";
+}
+
+std::string views_section(const std::filesystem::path& folder, const Json& report) {
+  std::ostringstream html;
+  html << "<h2>Views</h2>\n";
+  for (const Json& view : report["views"]) {
+    const auto name = view["name"].get<std::string>();
+    html << "<h3>" << escaped(name) << " (" << view["role"].get<std::string>() << "), "
+         << number(100 * view["hole_fraction"].get<double>(), "%.1f")
+         << " % holes</h3>\n<div class=row>\n"
+         << figure(report["photographs"].value(name, ""), "photograph")
+         << figure(folder / "views" / (name + ".color.png"), "rendered")
+         << figure(folder / "views" / (name + ".depth.png"), "depth (red = near)")
+         << figure(folder / "views" / (name + ".normal.png"), "normals")
+         << figure(folder / "views" / (name + ".hole.png"), "holes (white = no input saw this)")
+         << "</div>\n";
+  }
+  return html.str();
+}
+
+std::string evaluation_section(const Json& evaluation) {
+  if (evaluation.is_null()) return "";
+  std::ostringstream html;
+  html << "<h2>Held-out views</h2>\n<p>Rendered pictures against photographs that were not used. "
+          "\"Seen\" leaves hole pixels out.</p>\n<table>\n<tr><th>view</th><th>PSNR [dB]</th>"
+          "<th>SSIM</th><th>PSNR seen</th><th>SSIM seen</th><th>holes</th></tr>\n";
+  const auto row = [&](const std::string& name, const Json& r) {
+    html << "<tr><td>" << escaped(name) << "</td><td>" << number(r["psnr"], "%.2f") << "</td><td>"
+         << number(r["ssim"], "%.3f") << "</td><td>" << number(r["psnr_seen"], "%.2f")
+         << "</td><td>" << number(r["ssim_seen"], "%.3f") << "</td><td>"
+         << number(100 * r["hole_fraction"].get<double>(), "%.1f") << " %</td></tr>\n";
+  };
+  for (const Json& view : evaluation["views"]) row(view["name"].get<std::string>(), view);
+  row("mean", evaluation["mean"]);
+  html << "</table>\n";
+  return html.str();
+}
+
+std::string timing_section(const Json& stages) {
+  double longest = 1e-9;
+  for (const Json& stage : stages) longest = std::max(longest, stage["seconds"].get<double>());
+  std::ostringstream html;
+  html << "<h2>Time and memory</h2>\n<table>\n<tr><th>stage</th><th>seconds</th>"
+          "<th>peak memory [MiB]</th><th></th></tr>\n";
+  for (const Json& stage : stages) {
+    const double seconds = stage["seconds"].get<double>();
+    html << "<tr><td>" << stage["stage"].get<std::string>() << "</td><td>"
+         << number(stage["seconds"], "%.1f") << "</td><td>"
+         << number(stage["peak_memory"].get<double>() / (1 << 20), "%.0f")
+         << "</td><td style=\"text-align:left;width:400px\"><span class=bar style=\"width:"
+         << number(100 * seconds / longest, "%.1f") << "%\"></span></td></tr>\n";
+  }
+  html << "</table>\n";
+  return html.str();
+}
+
+}  // namespace
+
+void write_html_report(const std::filesystem::path& folder, const Json& report) {
+  std::ostringstream html;
+  const auto title = report["folder"].get<std::string>();
+  html << "<!doctype html>\n<html lang=en><head><meta charset=utf-8>"
+          "<meta name=viewport content=\"width=device-width\"><title>"
+       << escaped(title) << "</title>\n<style>" << kStyle << "</style></head><body>\n<h1>"
+       << escaped(std::filesystem::path(title).filename().string()) << "</h1>\n<p>"
+       << escaped(report["scene"].get<std::string>()) << " scene, units: "
+       << escaped(report["units"].get<std::string>()) << " (scale "
+       << escaped(report["scale_source"].get<std::string>()) << ")</p>\n<p class=note>This model is an "
+       << escaped(report["model"]["description"].get<std::string>()) << ".</p>\n";
+  for (const Json& warning : report["warnings"]) {
+    html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
+  }
+  html << certificate_section(report) << mesh_section(folder)
+       << evaluation_section(report["evaluation"]) << views_section(folder, report)
+       << timing_section(report["stages"]) << "</body></html>\n";
+  write_file(folder / "report.html", html.str());
+}
+
+}  // namespace cgs

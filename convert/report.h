@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+
+namespace cgs {
+
+/// Writes report.html, one self-contained page: the certificate, pictures of every view, the mesh
+/// from two angles, timings. `report` is the content of report.json; pictures come from
+/// OUT/views/*.png and OUT/mesh/*.png, photographs from the paths the report names.
+void write_html_report(const std::filesystem::path& folder, const nlohmann::ordered_json& report);
+
+}  // namespace cgs

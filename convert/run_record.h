@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace cgs {
+
+/// OUT/run.json: what was asked for, what went in, and which stages are done. It is rewritten
+/// after every stage, so an interrupted run resumes where it stopped.
+class RunRecord {
+ public:
+  /// Opens the record of `folder`, or begins one if there is none.
+  ///
+  /// `request` is everything that decides the result: arguments and hashes of the input files.
+  /// \throws InvalidInput if the folder holds another request's results and `overwrite` is not
+  ///         set; with it, the old stages are forgotten.
+  RunRecord(std::filesystem::path folder, nlohmann::ordered_json request, bool overwrite);
+
+  /// True if the stage was finished and each of its files is still there.
+  bool is_done(const std::string& stage, const std::vector<std::string>& files) const;
+  /// What the stage reported when it finished; null if it did not.
+  nlohmann::ordered_json result(const std::string& stage) const;
+  /// Records a finished stage. Stages after it, done from older data, are forgotten.
+  void finish(const std::string& stage, double seconds, const nlohmann::ordered_json& result);
+
+  const nlohmann::ordered_json& json() const { return json_; }
+
+ private:
+  void save() const;
+
+  std::filesystem::path folder_;
+  nlohmann::ordered_json json_;
+};
+
+/// 64-bit FNV-1a of a file's content, as 16 hexadecimal digits. \throws BadInput
+std::string content_hash(const std::filesystem::path& file);
+
+}  // namespace cgs

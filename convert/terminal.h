@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "libcgs/core/progress.h"
+
+namespace cgs {
+
+/// Progress and messages on standard error: a line that is rewritten on a terminal, one line per
+/// finished stage elsewhere.
+class Terminal {
+ public:
+  explicit Terminal(bool quiet);
+
+  /// Begins a named stage and returns the function that shows how far it is. The function throws
+  /// Cancelled after SIGINT or SIGTERM.
+  Progress begin(const std::string& stage);
+  /// Ends the stage with a remark ("412 k Gaussians"). \return seconds since begin().
+  double end(const std::string& remark);
+  /// One line for the user, unless quiet.
+  void say(const std::string& line) const;
+  /// One line the user must see even when quiet.
+  void warn(const std::string& line) const;
+
+ private:
+  bool quiet_;
+  bool rewrites_;
+  std::string stage_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+/// From now on SIGINT and SIGTERM make the next progress report throw Cancelled; a second signal
+/// ends the program at once. \return nothing; the exit code is 130 or 143.
+void catch_interrupts();
+/// 130 after SIGINT, 143 after SIGTERM.
+int interrupt_exit_code();
+
+/// Highest resident memory of this process so far [bytes].
+size_t peak_memory();
+
+}  // namespace cgs

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/views.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "convert/pictures.h"
+#include "io/atomic_file.h"
+#include "io/png.h"
+#include "io/scene_reader.h"
+#include "io/view_exr.h"
+#include "libcgs/core/error.h"
+#include "libcgs/train/image_metrics.h"
+
+namespace cgs {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double fraction(const Raster<Hole>& holes, Hole kind) {
+  const auto count = std::count(holes.data.begin(), holes.data.end(), kind);
+  return static_cast<double>(count) / static_cast<double>(holes.data.size());
+}
+
+ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
+  ViewRasters rasters;
+  rasters.color = buffers.color;
+  rasters.alpha = buffers.alpha;
+  rasters.depth = buffers.median_depth;
+  rasters.normal = normals_from_depth(buffers.median_depth, camera);
+  rasters.depth_variance = buffers.depth_variance;
+  rasters.support = buffers.support;
+  rasters.hole = hole_mask(buffers);
+  return rasters;
+}
+
+Json write_view(const Model& model,
+                const std::vector<SupportView>& inputs,
+                int index,
+                const std::filesystem::path& folder) {
+  const View& view = model.scene.views[static_cast<size_t>(index)];
+  const RenderBuffers buffers = render_camera(model, inputs, view.camera);
+  const ViewRasters rasters = view_rasters(buffers, view.camera);
+  write_view_exr(folder / (view.name + ".exr"), rasters, view.camera, model.scene.frame);
+  const auto png = [&](const char* what) { return folder / (view.name + "." + what + ".png"); };
+  write_png(png("color"), picture(buffers));
+  write_png(png("depth"), depth_picture(rasters.depth));
+  write_png(png("normal"), normal_picture(rasters.normal, view.camera.cam_from_world()));
+  write_png(png("hole"), rasters.hole);
+  const auto& input = model.scene.input;
+  const bool is_input = std::find(input.begin(), input.end(), index) != input.end();
+  return {{"name", view.name},
+          {"role", is_input ? "input" : "held out"},
+          {"hole_fraction", 1 - fraction(buffers.hole, Hole::None)},
+          {"transparent_fraction", fraction(buffers.hole, Hole::Transparent)},
+          {"unsupported_fraction", fraction(buffers.hole, Hole::Unsupported)}};
+}
+
+MaskMap intersection(const MaskMap& a, const MaskMap& b) {
+  if (b.empty()) return a;
+  MaskMap out = a;
+  for (size_t i = 0; i < out.data.size(); ++i) out.data[i] = a.data[i] & b.data[i];
+  return out;
+}
+
+Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, const View& view) {
+  const RenderBuffers buffers = render_camera(model, inputs, view.camera);
+  const ColorImage shown = picture(buffers);
+  MaskMap seen = hole_mask(buffers);
+  for (uint8_t& value : seen.data) value = 1 - value;
+  const MaskMap everywhere(seen.width, seen.height, 1);
+  const MaskMap all = intersection(everywhere, view.valid);
+  const MaskMap use = intersection(seen, view.valid);
+  return {{"name", view.name},
+          {"psnr", psnr(shown, view.image, &all)},
+          {"ssim", ssim(shown, view.image, &all)},
+          {"psnr_seen", psnr(shown, view.image, &use)},
+          {"ssim_seen", ssim(shown, view.image, &use)},
+          {"hole_fraction", 1 - fraction(buffers.hole, Hole::None)}};
+}
+
+}  // namespace
+
+Json write_views(const Model& model,
+                 const std::vector<int>& views,
+                 const std::filesystem::path& folder,
+                 const Progress& progress) {
+  make_output_folder(folder);
+  const std::vector<SupportView> inputs = support_views(model);
+  Json out = Json::array();
+  for (size_t k = 0; k < views.size(); ++k) {
+    report(progress, static_cast<double>(k) / static_cast<double>(views.size()));
+    out.push_back(write_view(model, inputs, views[k], folder));
+  }
+  report(progress, 1);
+  return out;
+}
+
+Json evaluate_views(Model& model, const std::vector<int>& views, const Progress& progress) {
+  std::vector<int> with_photograph;
+  for (const int i : views) {
+    if (!model.scene.views[static_cast<size_t>(i)].image_path.empty()) with_photograph.push_back(i);
+  }
+  if (with_photograph.empty()) {
+    throw BadInput(Defect::Empty, model.scene.folder, "no view to evaluate has a photograph");
+  }
+  const std::vector<SupportView> inputs = support_views(model);
+  Json rows = Json::array();
+  for (size_t k = 0; k < with_photograph.size(); ++k) {
+    report(progress, static_cast<double>(k) / static_cast<double>(with_photograph.size()));
+    View& view = model.scene.views[static_cast<size_t>(with_photograph[k])];
+    load_images(model.scene, {with_photograph[k]});
+    rows.push_back(evaluate_view(model, inputs, view));
+    view.image = {};  // one photograph in memory at a time
+  }
+  Json mean;
+  for (const char* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction"}) {
+    double sum = 0;
+    for (const Json& row : rows) sum += row[key].get<double>();
+    mean[key] = sum / static_cast<double>(rows.size());
+  }
+  report(progress, 1);
+  return {{"mean", mean}, {"views", rows}};
+}
+
+}  // namespace cgs

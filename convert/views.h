@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "convert/model.h"
+
+namespace cgs {
+
+/// Writes <name>.exr and <name>.{color,depth,normal,hole}.png for each of the given views of the
+/// model, and returns per view {"name", "role", "hole_fraction", …}.
+nlohmann::ordered_json write_views(const Model& model,
+                                   const std::vector<int>& views,
+                                   const std::filesystem::path& folder,
+                                   const Progress& progress);
+
+/// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
+/// that are not holes: {"mean": {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction"},
+/// "views": [{"name", …}]}. Loads the photographs.
+/// \throws BadInput if none of the views has a photograph.
+nlohmann::ordered_json evaluate_views(Model& model,
+                                      const std::vector<int>& views,
+                                      const Progress& progress);
+
+}  // namespace cgs

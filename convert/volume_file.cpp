@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/volume_file.h"
+
+#include <openvdb/tools/ValueTransformer.h>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/frame_json.h"
+#include "io/vdb.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+// A copy of a grid whose transform is moved and scaled; shares no tree with the original if its
+// values are lengths, which are scaled too.
+template <typename Grid>
+typename Grid::Ptr placed(const typename Grid::Ptr& grid,
+                          double scale,
+                          const Eigen::Vector3d& offset,
+                          bool values_are_lengths) {
+  typename Grid::Ptr out = values_are_lengths ? grid->deepCopy() : grid->copy();
+  out->setTransform(grid->transform().copy());
+  out->transform().postScale(scale);
+  out->transform().postTranslate(openvdb::Vec3d(offset.x(), offset.y(), offset.z()));
+  return out;
+}
+
+openvdb::FloatGrid::Ptr scaled_lengths(const openvdb::FloatGrid::Ptr& grid,
+                                       double scale,
+                                       const Eigen::Vector3d& offset) {
+  auto out = placed<openvdb::FloatGrid>(grid, scale, offset, true);
+  const auto factor = static_cast<float>(scale);
+  openvdb::tools::foreach(
+      out->beginValueAll(), [factor](const auto& it) { it.setValue(*it * factor); }, true, false);
+  openvdb::tools::changeBackground(out->tree(), grid->background() * factor);
+  return out;
+}
+
+constexpr const char* kFrameKey = "cgs_frame";
+
+template <typename Grid>
+typename Grid::Ptr find_grid(const openvdb::GridPtrVec& grids,
+                             const std::string& name,
+                             const std::filesystem::path& path) {
+  for (const auto& grid : grids) {
+    if (grid->getName() != name) continue;
+    if (auto typed = openvdb::gridPtrCast<Grid>(grid)) return typed;
+  }
+  throw BadInput(Defect::Schema, path, "has no grid '" + name + "'; was it made by cgs fuse?");
+}
+
+Frame frame_of(const openvdb::GridBase& grid, const std::filesystem::path& path) {
+  try {
+    return frame_from_json(
+        nlohmann::ordered_json::parse(grid.metaValue<std::string>(kFrameKey)));
+  } catch (const std::exception&) {
+    throw BadInput(Defect::Schema, path, "grid 'tsdf' has no readable frame (" +
+                                             std::string(kFrameKey) + ")");
+  }
+}
+
+template <typename Grid>
+openvdb::GridBase::ConstPtr named(typename Grid::Ptr grid, const char* name) {
+  grid->setName(name);
+  return grid;
+}
+
+}  // namespace
+
+void write_volume(const std::filesystem::path& path, const Volume& volume, const Frame& frame) {
+  const double scale = frame.scale;
+  const Eigen::Vector3d offset = frame.origin - frame.file_origin;
+  const auto values = [&](const auto& grid) {
+    using Grid = typename std::decay_t<decltype(grid)>::element_type;
+    return placed<Grid>(grid, scale, offset, false);
+  };
+  auto tsdf = scaled_lengths(volume.tsdf, scale, offset);
+  tsdf->insertMeta(kFrameKey, openvdb::StringMetadata(frame_to_json(frame).dump()));
+  tsdf->setGridClass(openvdb::GRID_UNKNOWN);  // one-sided and open: no valid level set
+  std::vector<openvdb::GridBase::ConstPtr> grids = {
+      named<openvdb::FloatGrid>(tsdf, "tsdf"),
+      named<openvdb::FloatGrid>(values(volume.weight), "weight"),
+      named<openvdb::Vec3SGrid>(values(volume.color), "color"),
+      named<openvdb::FloatGrid>(values(volume.support), "support"),
+      named<openvdb::FloatGrid>(scaled_lengths(volume.sigma, scale, offset), "sigma"),
+      named<openvdb::Int32Grid>(values(volume.state), "state")};
+  if (volume.surface) {
+    auto surface = scaled_lengths(volume.surface, scale, offset);
+    surface->setGridClass(openvdb::GRID_LEVEL_SET);
+    grids.push_back(named<openvdb::FloatGrid>(surface, "surface"));
+  }
+  write_vdb(path, grids, {{"creator", "cgs"}, {"cgs_units", frame.unit_name()}});
+}
+
+VolumeFile read_volume(const std::filesystem::path& path) {
+  const openvdb::GridPtrVec grids = read_vdb(path);
+  VolumeFile file;
+  const auto tsdf = find_grid<openvdb::FloatGrid>(grids, "tsdf", path);
+  file.frame = frame_of(*tsdf, path);
+  const double scale = 1 / file.frame.scale;
+  const Eigen::Vector3d offset = -(file.frame.origin - file.frame.file_origin) * scale;
+  const auto lengths = [&](const char* name) {
+    return scaled_lengths(find_grid<openvdb::FloatGrid>(grids, name, path), scale, offset);
+  };
+  Volume& volume = file.volume;
+  volume.tsdf = scaled_lengths(tsdf, scale, offset);
+  volume.sigma = lengths("sigma");
+  const auto plain = [&]<typename Grid>(typename Grid::Ptr& target, const char* name) {
+    target = placed<Grid>(find_grid<Grid>(grids, name, path), scale, offset, false);
+  };
+  plain.operator()<openvdb::FloatGrid>(volume.weight, "weight");
+  plain.operator()<openvdb::Vec3SGrid>(volume.color, "color");
+  plain.operator()<openvdb::FloatGrid>(volume.support, "support");
+  plain.operator()<openvdb::Int32Grid>(volume.state, "state");
+  volume.voxel_size = static_cast<float>(volume.tsdf->voxelSize().x());
+  return file;
+}
+
+}  // namespace cgs

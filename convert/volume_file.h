@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include "libcgs/core/frame.h"
+#include "meshing/volume.h"
+
+namespace cgs {
+
+/// Writes the grids of a volume as OpenVDB in file coordinates and file units, so that Blender and
+/// Houdini place it where the mesh is; internal lengths are scaled by a power of two, so
+/// read_volume() restores the same bits. The frame travels in the metadata.
+void write_volume(const std::filesystem::path& path, const Volume& volume, const Frame& frame);
+
+struct VolumeFile {
+  Volume volume;
+  Frame frame;
+};
+/// \throws BadInput if it is no volume of ours.
+VolumeFile read_volume(const std::filesystem::path& path);
+
+}  // namespace cgs
