@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/model.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace cgs {
+namespace {
+
+// Cameras on an arc in the y-z plane normal `up`, pitched down by `pitch` radians.
+Scene arc_scene(const Eigen::Vector3d& up, double arc, double pitch) {
+  Scene scene;
+  const Eigen::Vector3d side = up.unitOrthogonal();
+  for (int i = -1; i <= 1; ++i) {
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(arc * i, up).toRotationMatrix();
+    const Eigen::Vector3d x = turn * side;
+    const Eigen::Matrix3d tilt = Eigen::AngleAxisd(pitch, x).toRotationMatrix();
+    View view;
+    view.camera.world_from_cam.linear() << x, tilt * -up, tilt * x.cross(-up);
+    scene.views.push_back(view);
+  }
+  return scene;
+}
+
+TEST(WorldUp, IsFreeOfThePitchOfCamerasOnAnArc) {
+  const Eigen::Vector3d up = Eigen::Vector3d(0.2, -0.3, 1).normalized();
+  EXPECT_GT(world_up(arc_scene(up, 0.3, 0.4)).dot(up), 1 - 1e-9);
+}
+
+TEST(WorldUp, IsTheMeanImageUpOfParallelCameras) {
+  const Eigen::Vector3d up(0, 0, 1);
+  const double cosine = world_up(arc_scene(up, 0, 0.1)).dot(up);
+  EXPECT_NEAR(std::acos(cosine), 0.1, 1e-6);
+}
+
+TEST(Picture, DividesByAlphaAboveOneHalfOnly) {
+  RenderBuffers buffers;
+  buffers.color = ColorImage(2, 1, Eigen::Vector3f(0.3f, 0.3f, 0.3f));
+  buffers.alpha = Raster<float>(2, 1, 0.6f);
+  buffers.alpha(1, 0) = 0.4f;
+  const ColorImage shown = picture(buffers);
+  EXPECT_NEAR(shown(0, 0).x(), 0.5f, 1e-6f);
+  EXPECT_NEAR(shown(1, 0).x(), 0.3f, 1e-6f);
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/run_record.h"
+
+#include <gtest/gtest.h>
+
+#include "io/atomic_file.h"
+#include "libcgs/core/error.h"
+#include "tests/support/temp_dir.h"
+
+namespace cgs {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+TEST(RunRecord, AStageIsDoneOnceFinishedAndItsFilesAreThere) {
+  const test::TempDir dir;
+  RunRecord record(dir.path(), {{"scene", "a"}}, false);
+  EXPECT_FALSE(record.is_done("model", {}));
+  record.finish("model", 1.5, {{"gaussians", 7}});
+  EXPECT_TRUE(record.is_done("model", {}));
+  EXPECT_FALSE(record.is_done("model", {"gaussians.ply"}));
+  write_file(dir / "gaussians.ply", "ply");
+  EXPECT_TRUE(record.is_done("model", {"gaussians.ply"}));
+}
+
+TEST(RunRecord, SurvivesReopening) {
+  const test::TempDir dir;
+  RunRecord(dir.path(), {{"scene", "a"}}, false).finish("model", 1, {{"gaussians", 7}});
+  const RunRecord again(dir.path(), {{"scene", "a"}}, false);
+  EXPECT_EQ(again.result("model")["gaussians"], 7);
+}
+
+TEST(RunRecord, RefusesAnotherRequestAndNamesTheDifference) {
+  const test::TempDir dir;
+  const RunRecord first(dir.path(), {{"scene", "a"}, {"views", "1,2"}}, false);
+  try {
+    const RunRecord second(dir.path(), {{"scene", "a"}, {"views", "1,3"}}, false);
+    FAIL() << "was accepted";
+  } catch (const InvalidInput& error) {
+    EXPECT_NE(std::string(error.what()).find("views"), std::string::npos);
+    EXPECT_EQ(std::string(error.what()).find("scene,"), std::string::npos);
+  }
+}
+
+TEST(RunRecord, OverwriteForgetsTheOldStages) {
+  const test::TempDir dir;
+  RunRecord(dir.path(), {{"views", "1,2"}}, false).finish("model", 1, nullptr);
+  const RunRecord record(dir.path(), {{"views", "1,3"}}, true);
+  EXPECT_FALSE(record.is_done("model", {}));
+}
+
+TEST(RunRecord, RunningAStageAgainForgetsWhatFollowed) {
+  const test::TempDir dir;
+  RunRecord record(dir.path(), {}, false);
+  record.finish("model", 1, nullptr);
+  record.finish("mesh", 1, nullptr);
+  record.finish("model", 1, nullptr);
+  EXPECT_TRUE(record.is_done("model", {}));
+  EXPECT_FALSE(record.is_done("mesh", {}));
+}
+
+TEST(RunRecord, ACutFileCountsAsAnotherRun) {
+  const test::TempDir dir;
+  write_file(dir / "run.json", "{\"request\":");
+  EXPECT_THROW(RunRecord(dir.path(), {}, false), InvalidInput);
+  EXPECT_NO_THROW(RunRecord(dir.path(), {}, true));
+}
+
+TEST(ContentHash, IsFnv1aOfTheBytes) {
+  const test::TempDir dir;
+  write_file(dir / "a", "a");
+  EXPECT_EQ(content_hash(dir / "a"), "af63dc4c8601ec8c");  // published FNV-1a test vector
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "io/png.h"
+#include "tests/support/run_cgs.h"
+
+namespace cgs {
+namespace {
+
+using test::ProgramResult;
+using test::run_cgs;
+using test::TempDir;
+
+ColorImage textured_image(int shift) {
+  ColorImage image(32, 24, Eigen::Vector3f::Zero());
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const float v = 0.5f + 0.4f * std::sin(0.9f * float(x + shift)) * std::cos(1.3f * float(y));
+      image(x, y) = Eigen::Vector3f(v, 1 - v, 0.5f);
+    }
+  }
+  return image;
+}
+
+std::string frame_json(const std::string& file, double x) {
+  std::ostringstream text;
+  text << R"({"file_path": ")" << file << R"(", "transform_matrix": [[1,0,0,)" << x
+       << "],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}";
+  return text.str();
+}
+
+void write_transforms(const TempDir& dir, const std::vector<std::string>& frames) {
+  std::string text = R"({"w": 32, "h": 24, "fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "frames": [)";
+  for (size_t i = 0; i < frames.size(); ++i) text += (i == 0 ? "" : ", ") + frames[i];
+  test::write_bytes(dir / "scene/transforms.json", text + "]}");
+}
+
+// A readable scene of three views, before a test breaks it.
+void write_scene(const TempDir& dir) {
+  std::filesystem::create_directories(dir / "scene/images");
+  std::vector<std::string> frames;
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "images/" + std::to_string(i) + ".png";
+    write_png(dir / ("scene/" + name), textured_image(i));
+    frames.push_back(frame_json(name, 0.1 * i));
+  }
+  write_transforms(dir, frames);
+}
+
+void cut(const std::filesystem::path& file, double keep) {
+  const std::string bytes = test::read_bytes(file);
+  test::write_bytes(file, bytes.substr(0, size_t(keep * double(bytes.size()))));
+}
+
+// Runs the scene and expects one line of complaint that holds `words`, and no output folder.
+void expect_refused(const TempDir& dir, int exit_code, const std::vector<std::string>& words) {
+  const ProgramResult result =
+      run_cgs("run " + (dir / "scene").string() + " -q -o " + (dir / "out").string());
+  EXPECT_EQ(result.exit_code, exit_code) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_EQ(result.err.rfind("cgs: ", 0), 0u) << result.err;
+  for (const std::string& word : words) {
+    EXPECT_NE(result.err.find(word), std::string::npos) << "no '" << word << "' in " << result.err;
+  }
+  EXPECT_FALSE(std::filesystem::exists(dir / "out")) << "something was left behind";
+}
+
+TEST(BadInput, MissingFolder) {
+  const TempDir dir;
+  expect_refused(dir, 3, {"OPEN", "scene"});
+}
+
+TEST(BadInput, FolderOfNoKnownLayout) {
+  const TempDir dir;
+  test::write_bytes(dir / "scene/readme.txt", "hello");
+  expect_refused(dir, 3, {"SCHEMA", "transforms.json"});
+}
+
+TEST(BadInput, OneView) {
+  const TempDir dir;
+  write_scene(dir);
+  write_transforms(dir, {frame_json("images/0.png", 0)});
+  expect_refused(dir, 3, {"EMPTY", "2"});
+}
+
+TEST(BadInput, EmptyImage) {
+  const TempDir dir;
+  write_scene(dir);
+  test::write_bytes(dir / "scene/images/1.png", "");
+  expect_refused(dir, 3, {"EMPTY", "1.png"});
+}
+
+TEST(BadInput, CutPng) {
+  const TempDir dir;
+  write_scene(dir);
+  cut(dir / "scene/images/1.png", 0.6);
+  expect_refused(dir, 3, {"TRUNCATED", "1.png"});
+}
+
+TEST(BadInput, CutJpeg) {
+  const TempDir dir;
+  write_scene(dir);
+  test::write_bytes(dir / "scene/images/1.jpg", encode_jpeg(textured_image(1), 90));
+  cut(dir / "scene/images/1.jpg", 0.9);
+  write_transforms(dir, {frame_json("images/0.png", 0), frame_json("images/1.jpg", 0.1)});
+  expect_refused(dir, 3, {"TRUNCATED", "1.jpg"});
+}
+
+TEST(BadInput, PathThatLeavesTheScene) {
+  const TempDir dir;
+  write_scene(dir);
+  write_png(dir / "outside.png", textured_image(5));
+  write_transforms(dir, {frame_json("images/0.png", 0), frame_json("../outside.png", 0.1)});
+  expect_refused(dir, 3, {"PATH", "outside.png"});
+}
+
+TEST(BadInput, CutJson) {
+  const TempDir dir;
+  write_scene(dir);
+  cut(dir / "scene/transforms.json", 0.8);
+  expect_refused(dir, 3, {"SYNTAX", "transforms.json"});
+}
+
+TEST(BadInput, SameCameraCentre) {
+  const TempDir dir;
+  write_scene(dir);
+  write_transforms(dir, {frame_json("images/0.png", 1), frame_json("images/1.png", 1)});
+  expect_refused(dir, 3, {"VALUE", "baseline"});
+}
+
+// poses_bounds.npy of `rows` x `columns` float64 in NPY format 1.0.
+std::string npy(int rows, int columns) {
+  std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (" +
+                       std::to_string(rows) + ", " + std::to_string(columns) + "), }";
+  header.resize(117, ' ');
+  header += '\n';
+  std::string bytes("\x93NUMPY\x01\x00", 8);
+  bytes += static_cast<char>(header.size());
+  bytes += '\0';
+  bytes += header;
+  return bytes + std::string(size_t(rows) * size_t(columns) * 8, '\0');
+}
+
+void write_llff(const TempDir& dir, const std::string& poses) {
+  for (int i = 0; i < 3; ++i) {
+    std::filesystem::create_directories(dir / "scene/images");
+    write_png(dir / ("scene/images/" + std::to_string(i) + ".png"), textured_image(i));
+  }
+  test::write_bytes(dir / "scene/poses_bounds.npy", poses);
+}
+
+TEST(BadInput, PosesOfTheWrongShape) {
+  const TempDir dir;
+  write_llff(dir, npy(3, 16));
+  expect_refused(dir, 3, {"SCHEMA", "poses_bounds.npy", "17"});
+}
+
+TEST(BadInput, MorePosesThanImages) {
+  const TempDir dir;
+  write_llff(dir, npy(4, 17));
+  expect_refused(dir, 3, {"MISMATCH", "4", "3"});
+}
+
+TEST(BadInput, CutPoses) {
+  const TempDir dir;
+  write_llff(dir, npy(3, 17).substr(0, 300));
+  expect_refused(dir, 3, {"TRUNCATED", "poses_bounds.npy"});
+}
+
+TEST(Usage, MistakesEndWithExitCode2) {
+  const TempDir dir;
+  write_scene(dir);
+  const std::string scene = (dir / "scene").string();
+  const std::string out = " -o " + (dir / "out").string();
+  EXPECT_EQ(run_cgs("run " + scene).exit_code, 2);
+  EXPECT_EQ(run_cgs("fly").exit_code, 2);
+  EXPECT_EQ(run_cgs("run " + scene + out + " --views 0,9").exit_code, 2);
+  EXPECT_EQ(run_cgs("run " + scene + out + " --downscale 0").exit_code, 2);
+  EXPECT_EQ(run_cgs("run " + scene + out + " --assume-unit parsec").exit_code, 2);
+  EXPECT_EQ(run_cgs("run " + scene + out + " --voxel-size 5mm").exit_code, 2);
+  EXPECT_EQ(run_cgs("run " + scene + out + " --threads -1").exit_code, 2);
+  EXPECT_FALSE(std::filesystem::exists(dir / "out"));
+}
+
+TEST(Output, AFolderThatCannotBeMadeEndsWithExitCode5) {
+  const TempDir dir;
+  write_scene(dir);
+  test::write_bytes(dir / "file", "in the way");
+  const ProgramResult result =
+      run_cgs("run " + (dir / "scene").string() + " -q -o " + (dir / "file").string());
+  EXPECT_EQ(result.exit_code, 5) << result.err;
+}
+
+TEST(Help, EveryCommandEndsWithAWorkedExample) {
+  for (const auto* command : {"run", "info", "train", "evaluate", "render", "fuse", "mesh"}) {
+    const ProgramResult result = run_cgs(std::string(command) + " --help");
+    EXPECT_EQ(result.exit_code, 0) << command;
+    EXPECT_NE(result.out.find("Example: cgs " + std::string(command)), std::string::npos) << command;
+  }
+}
+
+TEST(Flags, UnderscoresAndDashesAreTheSame) {
+  const TempDir dir;
+  write_scene(dir);
+  const ProgramResult result =
+      run_cgs("info " + (dir / "scene").string() + " --allow_external --json");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("\"kind\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,80 @@
+#!/usr/bin/env bash
+# Opens the files of a finished run with other people's programs and checks what they see:
+# vdb_print, exrheader, Open3D, and the Khronos glTF validator where npm has it installed.
+#
+# usage: other_readers.sh OUT        (a folder that cgs run --assume-unit m wrote)
+set -euo pipefail
+out="$1"
+failures=0
+passed=0
+
+expect() {  # expect NAME COMMAND...: the command must succeed
+  local name="$1"
+  shift
+  if "$@" >/tmp/other_reader.$$ 2>&1; then
+    passed=$((passed + 1))
+  else
+    failures=$((failures + 1))
+    echo "FAILED: $name"
+    sed 's/^/    /' /tmp/other_reader.$$ | tail -5
+  fi
+  rm -f /tmp/other_reader.$$
+}
+
+grids=$(vdb_print "$out/volume.vdb")
+for grid in tsdf weight color state surface; do
+  expect "vdb_print lists $grid" grep -qw "$grid" <<<"$grids"
+done
+
+for exr in "$out"/views/*.exr; do
+  header=$(exrheader "$exr")
+  for channel in A B G R Z N.X N.Y N.Z distance.Y variance.Y support.Y hole.Y; do
+    expect "$(basename "$exr") has channel $channel" grep -q "  *$channel, 32-bit floating-point" <<<"$header"
+  done
+  for attribute in worldToCamera cgs:worldToCamera cgs:K cgs:units; do
+    expect "$(basename "$exr") has $attribute" grep -q "^$attribute " <<<"$header"
+  done
+done
+
+expect "Open3D: watertight.ply is a closed manifold" /usr/bin/python3 - "$out" <<'PY'
+import sys
+import open3d as o3d
+mesh = o3d.io.read_triangle_mesh(sys.argv[1] + "/mesh/watertight.ply")
+assert len(mesh.triangles) > 1000, "few triangles"
+assert mesh.has_vertex_colors() and mesh.has_vertex_normals(), "no colours or normals"
+assert mesh.is_edge_manifold(allow_boundary_edges=False), "not edge-manifold"
+assert mesh.is_vertex_manifold(), "not vertex-manifold"
+assert mesh.is_orientable(), "not orientable"
+assert not mesh.is_self_intersecting(), "self-intersecting"
+assert mesh.is_watertight(), "not watertight"
+for name, scale in (("stl", 1000), ("obj", 1)):
+    other = o3d.io.read_triangle_mesh(f"{sys.argv[1]}/mesh/watertight.{name}")
+    assert len(other.triangles) == len(mesh.triangles), name
+    size = sorted(other.get_max_bound() - other.get_min_bound())
+    assert len(size) == 3 and size[0] > 0, name
+PY
+
+expect "Open3D: gaussians.ply opens as points" /usr/bin/python3 - "$out" <<'PY'
+import sys
+import open3d as o3d
+points = o3d.io.read_point_cloud(sys.argv[1] + "/model/gaussians.ply")
+assert len(points.points) > 1000
+PY
+
+if node -e 'require("gltf-validator")' 2>/dev/null; then
+  expect "glTF validator: no error, no warning" node -e '
+const fs = require("fs");
+const file = process.argv[1] + "/web/asset.glb";
+require("gltf-validator").validateBytes(new Uint8Array(fs.readFileSync(file))).then((report) => {
+  const { numErrors, numWarnings } = report.issues;
+  if (numErrors + numWarnings > 0) {
+    console.log(JSON.stringify(report.issues.messages.slice(0, 5), null, 1));
+    process.exit(1);
+  }
+});' "$out"
+else
+  echo "skipped: glTF validator (npm install gltf-validator)"
+fi
+
+echo "$passed passed, $failures failed"
+[ "$failures" -eq 0 ]
