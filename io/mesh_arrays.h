@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include <Eigen/Core>
+
+#include "libcgs/core/frame.h"
+#include "libcgs/core/triangle_mesh.h"
+
+namespace cgs {
+
+/// What every mesh writer demands before it writes a byte: optional arrays are empty or as long as
+/// vertices (faces), indices are in range, vertices are finite.
+/// \throws InvalidInput that starts with `writer`
+void require_writable(const TriangleMesh& mesh, std::string_view writer);
+
+/// What a file for printing or machining demands on top: a known scale, at least one face, and at
+/// most 2^32 - 1 of them.
+/// \throws InvalidInput that starts with `writer`
+void require_printable_solid(const TriangleMesh& mesh, const Frame& frame, std::string_view writer);
+
+/// A point in file coordinates, in millimetres along target axes.
+/// \pre frame.has_metric_scale()
+Eigen::Vector3d millimetres(const Eigen::Vector3f& point,
+                            const Frame& frame,
+                            const Eigen::Matrix3d& up_rotation);
+
+/// "observed", "single view", "interpolated", "inferred": the words in files and reports.
+std::string_view provenance_name(Provenance provenance);
+
+/// sRGB-coded value in [0, 1] as a byte; NaN becomes 0.
+uint8_t color_byte(float value);
+
+/// Linear light of an sRGB-coded value; continued beyond 1, odd below 0. IEC 61966-2-1.
+float linear_from_srgb(float value);
+
+}  // namespace cgs

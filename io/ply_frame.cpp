@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/ply_frame.h"
+
+#include <cmath>
+#include <sstream>
+
+#include "io/byte_reader.h"
+#include "io/byte_writer.h"
+
+namespace cgs {
+
+namespace {
+
+/// The values after `key` in the comment that starts with it, if they are `count` finite numbers.
+std::optional<Eigen::Vector3d> numbers_after(const std::vector<std::string>& comments,
+                                             std::string_view key,
+                                             int count) {
+  for (const std::string& comment : comments) {
+    std::istringstream words(comment);
+    std::string word;
+    if (!(words >> word) || word != key) continue;
+    Eigen::Vector3d out = Eigen::Vector3d::Zero();
+    bool good = true;
+    for (int i = 0; i < count; ++i) {
+      good = good && (words >> word) && parse_number(word, out[i]) && std::isfinite(out[i]);
+    }
+    if (good) return out;
+  }
+  return std::nullopt;
+}
+
+ScaleSource scale_source_in(const std::vector<std::string>& comments) {
+  for (const ScaleSource source : {ScaleSource::Assumed,
+                                   ScaleSource::CameraPoses,
+                                   ScaleSource::KnownDistance,
+                                   ScaleSource::ControlPoints,
+                                   ScaleSource::DepthSensor}) {
+    for (const std::string& comment : comments) {
+      if (comment == "scale_source " + scale_source_name(source)) return source;
+    }
+  }
+  return ScaleSource::Unknown;
+}
+
+}  // namespace
+
+std::string ply_frame_comments(const Frame& frame) {
+  std::string out = "comment unit " + frame.unit_name() + "\ncomment metres_per_unit ";
+  append_number(out, frame.metres_per_unit);
+  out += "\ncomment metres_sigma ";
+  append_number(out, frame.metres_sigma);
+  out += "\ncomment scale_source " + scale_source_name(frame.scale_source);
+  out += "\ncomment file_origin";
+  for (const double value : frame.file_origin) {
+    out += ' ';
+    append_number(out, value);
+  }
+  return out + "\n";
+}
+
+PlyPlacement ply_placement(const std::vector<std::string>& comments,
+                           const std::vector<Eigen::Vector3d>& bounds,
+                           const std::optional<Frame>& wanted) {
+  const auto origin = numbers_after(comments, "file_origin", 3);
+  const auto metres = numbers_after(comments, "metres_per_unit", 1);
+  const bool has_unit = metres && metres->x() > 0;
+  if (wanted) {
+    PlyPlacement out{*wanted, origin.value_or(wanted->file_origin), {}};
+    if (has_unit && wanted->has_metric_scale() &&
+        std::abs(metres->x() / wanted->metres_per_unit - 1) > 1e-9) {
+      out.warnings.push_back("the file says its unit is " + std::to_string(metres->x()) +
+                             " m, it is read as " + wanted->unit_name());
+    }
+    return out;
+  }
+  const Eigen::Vector3d file_origin = origin.value_or(Eigen::Vector3d::Zero());
+  std::vector<Eigen::Vector3d> in_world;
+  for (const Eigen::Vector3d& corner : bounds) in_world.emplace_back(corner + file_origin);
+  PlyPlacement out{canonical_frame(in_world), file_origin, {}};
+  if (origin) out.frame.file_origin = file_origin;
+  if (has_unit) {
+    out.frame.metres_per_unit = metres->x();
+    const auto sigma = numbers_after(comments, "metres_sigma", 1);
+    out.frame.metres_sigma = sigma ? sigma->x() : 0;
+    out.frame.scale_source = scale_source_in(comments);
+  }
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "libcgs/core/frame.h"
+
+namespace cgs {
+
+/// Header lines that say in which unit the coordinates of a PLY file are and where its origin lies:
+/// "comment unit …", "comment metres_per_unit …", "comment metres_sigma …",
+/// "comment scale_source …", "comment file_origin x y z", the numbers exact.
+std::string ply_frame_comments(const Frame& frame);
+
+/// Where the coordinates of a PLY file belong.
+struct PlyPlacement {
+  Frame frame;                  ///< The frame the content is read into.
+  Eigen::Vector3d file_origin;  ///< World point of (0, 0, 0) of the file.
+  std::vector<std::string> warnings;
+
+  Eigen::Vector3d internal(const Eigen::Vector3d& point_in_file) const {
+    return (point_in_file - (frame.origin - file_origin)) / frame.scale;
+  }
+};
+
+/// The frame to read a PLY file into.
+///
+/// \param comments  of its header; lines that ply_frame_comments() did not write are ignored
+/// \param bounds    two opposite corners of its content in file coordinates; finite
+/// \param wanted    read into exactly this frame; empty = a canonical frame made from the bounds,
+///                  with the unit and the file origin that the comments tell
+PlyPlacement ply_placement(const std::vector<std::string>& comments,
+                           const std::vector<Eigen::Vector3d>& bounds,
+                           const std::optional<Frame>& wanted);
+
+}  // namespace cgs

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/png.h"
+
+#include <csetjmp>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+// The C libraries' headers must follow <cstdio>.
+#include <jpeglib.h>
+#include <png.h>
+
+#include "io/atomic_file.h"
+#include "io/mesh_arrays.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+template <typename T>
+void require_size(const Raster<T>& image, int largest) {
+  const bool good =
+      image.width > 0 && image.height > 0 && image.width <= largest && image.height <= largest;
+  require(good,
+          "picture sides must be 1 to " + std::to_string(largest) + " pixels",
+          std::to_string(image.width) + "x" + std::to_string(image.height));
+}
+
+std::string rgb_bytes(const ColorImage& image) {
+  std::string bytes;
+  bytes.reserve(image.data.size() * 3);
+  for (const Eigen::Vector3f& color : image.data) {
+    for (const float c : color) bytes += static_cast<char>(color_byte(c));
+  }
+  return bytes;
+}
+
+std::string png_bytes(int width, int height, png_uint_32 format, const std::string& pixels) {
+  png_image image = {};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(width);
+  image.height = static_cast<png_uint_32>(height);
+  image.format = format;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string out(size, '\0');
+  if (png_image_write_to_memory(&image, out.data(), &size, 0, pixels.data(), 0, nullptr) == 0) {
+    throw NumericalError(std::string("PNG encoder: ") + image.message);
+  }
+  out.resize(size);
+  return out;
+}
+
+/// libjpeg reports errors through a call that must not return.
+struct JpegErrors {
+  jpeg_error_mgr base = {};
+  std::jmp_buf escape = {};
+};
+
+void leave_jpeg(j_common_ptr info) {
+  std::longjmp(reinterpret_cast<JpegErrors*>(info->err)->escape, 1);  // NOLINT(bugprone-*)
+}
+
+/// No object with a destructor may live here: an error jumps out. \return false on an error.
+bool compress_jpeg(const char* rgb,
+                   int width,
+                   int height,
+                   int quality,
+                   unsigned char** bytes,
+                   unsigned long* size) {
+  jpeg_compress_struct info = {};
+  JpegErrors errors;
+  info.err = jpeg_std_error(&errors.base);
+  errors.base.error_exit = leave_jpeg;
+  if (setjmp(errors.escape) != 0) {  // NOLINT(cert-err52-cpp)
+    jpeg_destroy_compress(&info);
+    return false;
+  }
+  jpeg_create_compress(&info);
+  jpeg_mem_dest(&info, bytes, size);
+  info.image_width = static_cast<JDIMENSION>(width);
+  info.image_height = static_cast<JDIMENSION>(height);
+  info.input_components = 3;
+  info.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&info);
+  jpeg_set_quality(&info, quality, TRUE);
+  info.comp_info[0].h_samp_factor = 1;
+  info.comp_info[0].v_samp_factor = 1;
+  jpeg_start_compress(&info, TRUE);
+  while (info.next_scanline < info.image_height) {
+    const size_t offset = size_t{info.next_scanline} * static_cast<size_t>(width) * 3;
+    auto* row = const_cast<JSAMPROW>(reinterpret_cast<const JSAMPLE*>(rgb + offset));
+    jpeg_write_scanlines(&info, &row, 1);
+  }
+  jpeg_finish_compress(&info);
+  jpeg_destroy_compress(&info);
+  return true;
+}
+
+}  // namespace
+
+std::string encode_png(const ColorImage& image) {
+  require_size(image, PNG_USER_WIDTH_MAX);
+  return png_bytes(image.width, image.height, PNG_FORMAT_RGB, rgb_bytes(image));
+}
+
+std::string encode_png(const MaskMap& mask) {
+  require_size(mask, PNG_USER_WIDTH_MAX);
+  std::string grey;
+  grey.reserve(mask.data.size());
+  for (const uint8_t value : mask.data) grey += value != 0 ? '\xff' : '\0';
+  return png_bytes(mask.width, mask.height, PNG_FORMAT_GRAY, grey);
+}
+
+std::string encode_jpeg(const ColorImage& image, int quality) {
+  require_size(image, JPEG_MAX_DIMENSION);
+  require(quality >= 1 && quality <= 100, "JPEG quality must be 1 to 100", quality);
+  const std::string rgb = rgb_bytes(image);
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;  // NOLINT(google-runtime-int): the type libjpeg wants
+  const bool good = compress_jpeg(rgb.data(), image.width, image.height, quality, &bytes, &size);
+  const std::unique_ptr<unsigned char, decltype(&std::free)> owner(bytes, &std::free);
+  if (!good) throw NumericalError("JPEG encoder: out of memory");
+  return {reinterpret_cast<const char*>(bytes), size};
+}
+
+void write_png(const std::filesystem::path& path, const ColorImage& image) {
+  write_file(path, encode_png(image));
+}
+
+void write_png(const std::filesystem::path& path, const MaskMap& mask) {
+  write_file(path, encode_png(mask));
+}
+
+}  // namespace cgs

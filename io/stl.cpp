@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/stl.h"
+
+#include <limits>
+#include <string>
+
+#include <Eigen/Geometry>
+
+#include "io/atomic_file.h"
+#include "io/byte_writer.h"
+#include "io/mesh_arrays.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+void write_stl(const std::filesystem::path& path,
+               const TriangleMesh& mesh,
+               const Frame& frame,
+               const Eigen::Matrix3d& up_rotation) {
+  require_writable(mesh, "write_stl");
+  require_printable_solid(mesh, frame, "write_stl");
+  std::string header = "cgs binary STL, unit mm";  // must not begin with "solid"
+  header.resize(80, ' ');
+  append_bytes(header, static_cast<uint32_t>(mesh.faces.size()));
+  AtomicFile file(path);
+  file.write(header);
+  std::string record;
+  for (const auto& face : mesh.faces) {
+    std::array<Eigen::Vector3f, 3> corner;
+    for (size_t k = 0; k < 3; ++k) {
+      corner.at(k) = millimetres(mesh.vertices[face.at(k)], frame, up_rotation).cast<float>();
+    }
+    const Eigen::Vector3d a = (corner[1] - corner[0]).cast<double>();
+    const Eigen::Vector3d b = (corner[2] - corner[0]).cast<double>();
+    const Eigen::Vector3d normal = a.cross(b).stableNormalized();
+    record.clear();
+    for (const double c : normal) append_bytes(record, static_cast<float>(c));
+    for (const Eigen::Vector3f& p : corner) {
+      for (const float c : p) append_bytes(record, c);
+    }
+    append_bytes(record, uint16_t{0});
+    file.write(record);
+  }
+  file.commit();
+}
+
+}  // namespace cgs

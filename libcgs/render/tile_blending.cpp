@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/render/tile_blending.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <immintrin.h>
+
+namespace cgs {
+
+namespace {
+
+// Eight pixels of a row at once.
+constexpr int kLanes = 8;
+using Floats = float __attribute__((vector_size(sizeof(float) * kLanes)));
+using Ints = int32_t __attribute__((vector_size(sizeof(int32_t) * kLanes)));
+
+template <typename Vector, typename Scalar>
+Vector load(const Scalar* from) {
+  Vector out;
+  std::memcpy(&out, from, sizeof(out));
+  return out;
+}
+
+template <typename Vector, typename Scalar>
+void store(const Vector& vector, Scalar* to) {
+  std::memcpy(to, &vector, sizeof(vector));
+}
+
+// e^x for x in [-87, 0], relative error < 3e-7. Not std::exp because that is one lane at a time.
+inline Floats exp_negative(Floats x) {
+  constexpr float kLog2E = 1.44269504f;
+  constexpr float kLn2High = 0.693145752f;  // few bits, so that its multiples are exact
+  constexpr float kLn2Low = 1.42860677e-6f;
+  const Ints n = __builtin_convertvector(x * kLog2E - 0.5f, Ints);
+  const Floats nf = __builtin_convertvector(n, Floats);
+  const Floats r = (x - nf * kLn2High) - nf * kLn2Low;  // |r| <= ln 2 / 2
+  Floats p = r * (1.0f / 720) + 1.0f / 120;
+  p = p * r + 1.0f / 24;
+  p = p * r + 1.0f / 6;
+  p = p * r + 0.5f;
+  p = p * r + 1.0f;
+  p = p * r + 1.0f;
+  return p * std::bit_cast<Floats>((n + 127) << 23);
+}
+
+// Blends eight pixels from `at` on; distance is that of the first from the ridge of the splat.
+inline void blend_window(
+    const BandSplat& s, float row_exponent, float distance, int at, TileAccumulator& tile) {
+  constexpr Floats kLane = {0, 1, 2, 3, 4, 5, 6, 7};
+  constexpr Floats kZero = {};
+  constexpr float kHighestExponent = 60;  // far below the cut, yet inside exp_negative
+  const Floats t = (kLane + distance) * s.inv_sigma_x;
+  Floats q = t * t + row_exponent;
+  q = q < kHighestExponent ? q : kZero + kHighestExponent;
+  Floats alpha = s.opacity * exp_negative(q * -0.5f);
+  alpha = alpha < kMaxSplatAlpha ? alpha : kZero + kMaxSplatAlpha;
+
+  const Floats before = load<Floats>(&tile.transmittance[at]);
+  const Ints blended = (alpha >= kMinSplatAlpha) & (before >= kMinTransmittance);
+  alpha = blended ? alpha : kZero;
+  const Floats w = alpha * before;
+  const Floats after = before * (1.0f - alpha);
+  store(after, &tile.transmittance[at]);
+  for (int c = 0; c < 3; ++c) {
+    store(load<Floats>(&tile.color[c][at]) + w * s.color[c], &tile.color[c][at]);
+  }
+  store(load<Floats>(&tile.weight_square[at]) + w * w, &tile.weight_square[at]);
+
+  const Floats best = load<Floats>(&tile.best_weight[at]);
+  Floats first = load<Floats>(&tile.first_depth[at]);
+  first = (best == 0.0f) & (w > 0.0f) ? kZero + s.depth : first;
+  store(first, &tile.first_depth[at]);
+  const Floats z = s.depth - first;
+  const Floats wz = w * z;
+  store(load<Floats>(&tile.depth_sum[at]) + wz, &tile.depth_sum[at]);
+  store(load<Floats>(&tile.depth_square[at]) + wz * z, &tile.depth_square[at]);
+
+  const Ints halved = (before > 0.5f) & (after <= 0.5f);
+  const Floats median = load<Floats>(&tile.median_depth[at]);
+  store(halved ? kZero + s.depth : median, &tile.median_depth[at]);
+  const Ints stronger = w > best;
+  store(stronger ? w : best, &tile.best_weight[at]);
+  const Ints strongest = load<Ints>(&tile.strongest[at]);
+  store(stronger ? Ints{} + static_cast<int32_t>(s.index) : strongest, &tile.strongest[at]);
+}
+
+void blend_splat(const BandSplat& s, int first_column, uint32_t open_rows, TileAccumulator& tile) {
+  const auto ridge_at_top = static_cast<float>(s.x - first_column);
+  for (int row = 0; row < kTileSize; ++row) {
+    const auto r = static_cast<float>(row);
+    const float ty = (s.dy + r) * s.inv_sigma_y;
+    const float rest = s.q_max - ty * ty;
+    if (rest < 0 || (open_rows >> row & 1U) == 0) continue;
+    const float ridge = ridge_at_top + s.slope * r;
+    // Pixels x whose centre lies within the ellipse, and a little more against rounding.
+    const float half = std::sqrt(rest) * s.sigma_x + 1e-3f;
+    const float left = std::max(ridge - half - 0.5f, -1.0f);
+    const float right = std::min(ridge + half - 0.5f, float(kTileSize));
+    if (!(left <= right) || right < 0 || left > float(kTileSize - 1)) continue;
+    const int begin = static_cast<int>(left + 1.0f);  // = ceil(left), as the margin forgives
+    const int end = static_cast<int>(right) + 1;
+    const int at = row * kTileSize;
+    if (end - std::min(begin, kLanes) <= kLanes) {
+      const int window = std::min(begin, kLanes);
+      blend_window(s, ty * ty, (static_cast<float>(window) + 0.5f) - ridge, at + window, tile);
+    } else {
+      blend_window(s, ty * ty, 0.5f - ridge, at, tile);
+      blend_window(s, ty * ty, (kLanes + 0.5f) - ridge, at + kLanes, tile);
+    }
+  }
+}
+
+// Bit r is set while pixel row r has a pixel that is not finished.
+uint32_t unfinished_rows(const TileAccumulator& tile) {
+  uint32_t rows = 0;
+  for (int row = 0; row < kTileSize; ++row) {
+    const float* T = &tile.transmittance[row * kTileSize];
+    const float clearest = *std::max_element(T, T + kTileSize);
+    rows |= static_cast<uint32_t>(clearest >= kMinTransmittance) << row;
+  }
+  return rows;
+}
+
+void reset(TileAccumulator& tile, std::array<int, 2> size) {
+  tile.transmittance.fill(0);  // pixels beyond the image are finished from the start
+  for (int y = 0; y < size[1]; ++y) {
+    std::fill_n(&tile.transmittance[y * kTileSize], size[0], 1.0f);
+  }
+  for (TileAccumulator::Plane& plane : tile.color) plane.fill(0);
+  tile.first_depth.fill(0);
+  tile.depth_sum.fill(0);
+  tile.depth_square.fill(0);
+  tile.weight_square.fill(0);
+  tile.median_depth.fill(std::numeric_limits<float>::quiet_NaN());
+  tile.best_weight.fill(0);
+  tile.strongest.fill(-1);
+}
+
+// Subnormals cost the blending loop more than a factor of two. A property of the thread, so it is
+// set per tile and put back: the bits must not depend on which thread blends.
+class FlushSubnormals {
+ public:
+  FlushSubnormals() : before_(_mm_getcsr()) {
+    constexpr unsigned kFlushToZeroAndDenormalsAreZero = 0x8040;
+    _mm_setcsr(before_ | kFlushToZeroAndDenormalsAreZero);
+  }
+  ~FlushSubnormals() { _mm_setcsr(before_); }
+  FlushSubnormals(const FlushSubnormals&) = delete;
+  FlushSubnormals& operator=(const FlushSubnormals&) = delete;
+
+ private:
+  unsigned before_;
+};
+
+}  // namespace
+
+BandSplat in_band(const Splat& splat, uint32_t index, int first_row) {
+  BandSplat out;
+  const double dy = first_row + 0.5 - splat.v;
+  out.x = splat.u + splat.slope * dy;
+  out.slope = static_cast<float>(splat.slope);
+  out.dy = static_cast<float>(dy);
+  out.inv_sigma_y = splat.inv_sigma_y;
+  out.inv_sigma_x = 1.0f / splat.sigma_x;
+  out.sigma_x = splat.sigma_x;
+  out.q_max = splat.q_max;
+  out.opacity = splat.opacity;
+  out.depth = splat.depth;
+  out.color = {splat.color.x(), splat.color.y(), splat.color.z()};
+  out.index = index;
+  return out;
+}
+
+void blend_tile(std::span<const BandSplat> band,
+                std::span<const uint32_t> nearest_first,
+                int first_column,
+                std::array<int, 2> size,
+                TileAccumulator& tile) {
+  const FlushSubnormals flush;
+  reset(tile, size);
+  constexpr size_t kCheckEvery = 32;  // splats between two looks at which rows are finished
+  uint32_t open_rows = unfinished_rows(tile);
+  for (size_t i = 0; i < nearest_first.size() && open_rows != 0; ++i) {
+    blend_splat(band[nearest_first[i]], first_column, open_rows, tile);
+    if (i % kCheckEvery == kCheckEvery - 1) open_rows = unfinished_rows(tile);
+  }
+}
+
+}  // namespace cgs

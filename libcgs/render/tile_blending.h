@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "libcgs/render/projection.h"
+
+namespace cgs {
+
+inline constexpr int kTileSize = 16;               ///< Edge of a tile [pixels].
+inline constexpr float kMaxSplatAlpha = 0.99f;     ///< Upper bound of one splat's opacity.
+inline constexpr float kMinTransmittance = 1e-4f;  ///< Pixels darker than this are finished.
+
+/// A splat as one row of tiles needs it; fills a cache line.
+struct BandSplat {
+  double x = 0;     ///< Where dx - slope * dy vanishes on the first pixel row of the band.
+  float slope = 0;  ///< Shift of that place per pixel row.
+  float dy = 0;     ///< First pixel row of the band minus the centre [pixels].
+  float inv_sigma_y = 0;
+  float inv_sigma_x = 0;
+  float sigma_x = 0;
+  float q_max = 0;
+  float opacity = 0;
+  float depth = 0;
+  std::array<float, 3> color{};
+  uint32_t index = 0;  ///< Of the Gaussian in its set.
+};
+
+/// What blending accumulates over the pixels of one tile, row-major.
+struct alignas(32) TileAccumulator {
+  using Plane = std::array<float, kTileSize * kTileSize>;
+  Plane transmittance;
+  std::array<Plane, 3> color;
+  Plane first_depth;   ///< Depth of the first Gaussian; the two sums below are relative to it.
+  Plane depth_sum;     ///< Sum w (z - first)
+  Plane depth_square;  ///< Sum w (z - first)^2
+  Plane weight_square;
+  Plane median_depth;  ///< NaN until transmittance falls through 0.5.
+  Plane best_weight;
+  std::array<int32_t, kTileSize * kTileSize> strongest;  ///< -1 = none.
+};
+
+/// The splat seen from a band of kTileSize pixel rows that starts at pixel row `first_row`.
+BandSplat in_band(const Splat& splat, uint32_t index, int first_row);
+
+/// Blends splats, nearest first, over the tile whose first pixel column is `first_column`.
+///
+/// Only the leading `width` x `height` pixels of the tile belong to the image.
+/// Subnormal numbers count as zero inside, whatever the mode of the calling thread.
+void blend_tile(std::span<const BandSplat> band,
+                std::span<const uint32_t> nearest_first,
+                int first_column,
+                std::array<int, 2> size,
+                TileAccumulator& tile);
+
+}  // namespace cgs
