@@ -17,6 +17,7 @@
 #include "convert/volume_file.h"
 #include "io/atomic_file.h"
 #include "io/gltf.h"
+#include "io/image.h"
 #include "io/mesh_ply.h"
 #include "io/png.h"
 #include "libcgs/core/error.h"
@@ -62,6 +63,14 @@ Json request_json(const RunRequest& request, const Scene& scene) {
           {"max_error", request.max_error},
           {"input_images", inputs},
           {"cameras", cameras_hash}};
+}
+
+// Decodes every photograph once before anything is written: a run must not stop halfway, or leave
+// a folder behind, because of a damaged file.
+void refuse_unreadable_images(const Scene& scene) {
+  for (const View& view : scene.views) {
+    if (!view.image_path.empty()) (void)read_image(view.image_path, nullptr, {});
+  }
 }
 
 Model& loaded_model(Run& run) {
@@ -289,9 +298,31 @@ FusedVolume fuse_model(const Model& model,
   return fuse(views, options, progress);
 }
 
+Json fusion_to_json(const TsdfReport& report, const Frame& frame) {
+  const auto corner = [&](const Eigen::Vector3d& p) -> Json {
+    const Eigen::Vector3d q = frame.file_from_internal(p);
+    return {q.x(), q.y(), q.z()};
+  };
+  return {{"voxel_size", report.voxel_size * frame.scale},
+          {"units", frame.unit_name()},
+          {"bounds", {corner(report.bounds.min()), corner(report.bounds.max())}},
+          {"voxels",
+           {{"free", report.free},
+            {"occupied", report.occupied},
+            {"never_seen_hidden", report.hidden},
+            {"never_seen_outside", report.unseen},
+            {"conflicts", report.conflicts},
+            {"carved", report.carved}}},
+          {"predicted_bytes", report.predicted_bytes},
+          {"actual_bytes", report.actual_bytes}};
+}
+
 Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   Scene scene = open_scene(request.scene, request.scene_options, request.assume_unit);
   for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  refuse_unreadable_images(scene);
+  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, scene.frame);
+  if (!request.max_error.empty()) (void)parse_length(request.max_error, scene.frame);
   make_output_folder(request.output);
   RunRecord record(request.output, request_json(request, scene), request.overwrite);
   Run run{request, terminal, std::move(record), std::move(scene), {}, {}};
