@@ -85,7 +85,7 @@ void require_writable(const ExrImage& image) {
   for (const auto& [name, values] : image.channels) {
     require(!name.empty() && names.insert(name).second,
             "ExrImage channels must have names that differ",
-            "'" + name + "'");
+            name);
     require(values.size() == pixels,
             "ExrImage channel " + name + " must be as large as the image",
             values.size());

@@ -49,7 +49,9 @@ std::string description(const TriangleMesh& mesh) {
     std::array<char, 64> text{};
     const double percent = total > 0 ? 100 * area.at(static_cast<size_t>(label)) / total : 0;
     std::snprintf(text.data(), text.size(), " %.1f %%,", percent);
-    out += " " + std::string(provenance_name(label)) + text.data();
+    out += ' ';
+    out += provenance_name(label);
+    out += text.data();
   }
   out.back() = '.';
   return out;
