@@ -20,11 +20,11 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using std::numbers::pi;
 
-constexpr int kOrders = 4;         // recessed rings of the arch
-constexpr double kStep = 0.26;     // of their radius [m]
-constexpr double kRecess = 0.28;   // of their depth [m]
-constexpr double kBack = 1.60;     // where they end in the masonry [m]
-constexpr double kHalfWidth = 10;  // of wall and ground [m]
+constexpr int kOrders = 4;          // recessed rings of the arch
+constexpr double kStep = 0.26;      // of their radius [m]
+constexpr double kRecess = 0.28;    // of their depth [m]
+constexpr double kBack = 1.60;      // where they end in the masonry [m]
+constexpr double kHalfWidth = 6.5;  // of wall and ground [m]
 
 double order_radius(int order) { return kWallRadius - kStep * (order + 1); }
 double order_front(int order) { return 0.15 + kRecess * order; }
@@ -138,8 +138,10 @@ std::vector<Vector2d> order_profile(int order, double along) {
   return out;
 }
 
+// The front is a net of its own; what lies behind it is hidden and stays coarse.
 void add_wall(Mason& mason) {
-  constexpr double kTop = 8;
+  constexpr double kTop = 7;
+  constexpr int kSteps = 48;
   std::vector<Loop> loops;
   for (const auto& station : arch_path(-0.3, kWallRadius, 0.06)) {
     const double c = std::cos(station.angle);
@@ -147,24 +149,26 @@ void add_wall(Mason& mason) {
     const double to_side = std::abs(c) > 1e-9 ? kHalfWidth / std::abs(c) : 1e9;
     const double to_top = s > 1e-9 ? (kTop - kSpringing) / s : 1e9;
     const double outer = std::min(to_side, to_top);
-    loops.push_back({station.at({kWallRadius, 0.0}),
-                     station.at({outer, 0.0}),
-                     station.at({outer, 2.0}),
-                     station.at({kWallRadius, 2.0})});
+    Loop loop{station.at({kWallRadius, 2.0}), station.at({kWallRadius, 0.2})};
+    for (int i = 0; i <= kSteps; ++i) {
+      loop.push_back(station.at({kWallRadius + (outer - kWallRadius) * i / kSteps, 0.0}));
+    }
+    loop.push_back(station.at({outer, 2.0}));
+    loops.push_back(loop);
   }
-  mason.add_stone("wall", Material::Ashlar, loft(loops, LoftEnds::Capped), 0.10);
+  mason.add_stone("wall", Material::Ashlar, loft(loops, LoftEnds::Capped), 10);
   mason.add_stone("core", Material::Ashlar, box({-2.5, kBack - 0.1, -0.2}, {2.5, 1.95, 5}), 0.3);
 }
 
 void add_ground(Mason& mason) {
   mason.add_stone(
-      "ground", Material::Paving, box({-kHalfWidth, -10, -0.5}, {kHalfWidth, 1.9, 0}), 0.12);
+      "ground", Material::Paving, box({-kHalfWidth, -8, -0.5}, {kHalfWidth, 1.9, 0}), 0.15);
   for (int i = 0; i < 3; ++i) {
     const double half = 3.0 - 0.22 * i;
     mason.add_stone("step " + std::to_string(i + 1),
                     Material::Paving,
                     box({-half, -1.40 + 0.42 * i, -0.1}, {half, 1.5, 0.16 * (i + 1)}),
-                    0.08);
+                    0.11);
   }
 }
 
@@ -174,7 +178,7 @@ void add_arch(Mason& mason) {
                     Material::Arch,
                     swept(arch_path(-0.1, order_radius(order), 0.025),
                           [order](double along) { return order_profile(order, along); }),
-                    0.12);
+                    0.3);
   }
   const double r = kWallRadius;
   mason.add_stone("hood mould",
@@ -310,10 +314,11 @@ void add_reliefs(Mason& mason) {
             "lintel",
             {{.width = 2 * r + 0.3, .top = 0.40, .height = frieze}, {0, 1.15, kSpringing - 0.38}},
             Material::Carved);
-  add_panel(mason,
-            "door",
-            {{.width = 2 * r + 0.3, .top = 1.7, .height = door_height}, {0, 1.42, 0.44}},
-            Material::Wood);
+  add_panel(
+      mason,
+      "door",
+      {{.width = 2 * r + 0.3, .top = 1.7, .spacing = 0.02, .height = door_height}, {0, 1.42, 0.44}},
+      Material::Wood);
   for (int side = -1; side <= 1; side += 2) {
     const std::string which = side < 0 ? " left" : " right";
     const uint32_t seed = side < 0 ? 21 : 57;
@@ -373,7 +378,7 @@ void add_buttresses(Mason& mason) {
 
 void add_cornice(Mason& mason) {
   mason.add_stone(
-      "cornice", Material::Ashlar, box({-kHalfWidth, -0.26, 5.12}, {kHalfWidth, 0.2, 5.36}), 0.10);
+      "cornice", Material::Ashlar, box({-kHalfWidth, -0.26, 5.12}, {kHalfWidth, 0.2, 5.36}), 0.20);
   for (int i = -14; i <= 14; ++i) {
     const uint32_t h = mixed(static_cast<uint32_t>(i), 17);
     const double x = 0.46 * i + 0.06 * (static_cast<double>(uniform(h, 1)) - 0.5);

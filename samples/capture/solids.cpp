@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <unordered_map>
 #include <utility>
 
 namespace cgs {
@@ -246,20 +247,17 @@ TriangleMesh bored_block(const BoredBlock& size) {
 }
 
 void refine(TriangleMesh& mesh, double max_edge) {
-  using Edge = std::pair<uint32_t, uint32_t>;
   for (bool split = true; split;) {
     split = false;
-    std::map<Edge, uint32_t> middle;
+    std::unordered_map<uint64_t, uint32_t> middle;  // by both ends
     // Index of the middle of an edge that is too long, or the count of vertices for "no split".
     const auto middle_of = [&](uint32_t a, uint32_t b) -> uint32_t {
       const double length = (mesh.vertices[a] - mesh.vertices[b]).norm();
       if (length <= max_edge) return UINT32_MAX;
-      const Edge key = std::minmax(a, b);
-      const auto found = middle.find(key);
-      if (found != middle.end()) return found->second;
-      const Eigen::Vector3f p = 0.5F * (mesh.vertices[key.first] + mesh.vertices[key.second]);
-      mesh.vertices.push_back(p);
-      return middle[key] = static_cast<uint32_t>(mesh.vertices.size() - 1);
+      const uint64_t key = uint64_t{std::min(a, b)} << 32U | std::max(a, b);
+      const auto [place, fresh] = middle.try_emplace(key, mesh.vertices.size());
+      if (fresh) mesh.vertices.emplace_back(0.5F * (mesh.vertices[a] + mesh.vertices[b]));
+      return place->second;
     };
     std::vector<std::array<uint32_t, 3>> faces;
     for (auto [a, b, c] : mesh.faces) {

@@ -25,7 +25,9 @@ float spots(const Vector3f& p, float cell, float footprint, uint32_t seed) {
       mixed(static_cast<uint32_t>(static_cast<int32_t>(corner.x())),
             mixed(static_cast<uint32_t>(static_cast<int32_t>(corner.y())),
                   mixed(static_cast<uint32_t>(static_cast<int32_t>(corner.z())), seed)));
-  const float radius = 0.12F + 0.33F * uniform(h, 4);
+  if (uniform(h, 5) < 0.55F) return 0;  // empty cells keep the lattice from showing
+  const float size = uniform(h, 4);
+  const float radius = 0.08F + 0.37F * size * size;
   const Vector3f centre(radius + (1 - 2 * radius) * uniform(h, 1),
                         radius + (1 - 2 * radius) * uniform(h, 2),
                         radius + (1 - 2 * radius) * uniform(h, 3));
