@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string_view>
 
@@ -26,6 +27,10 @@ void require_printable_solid(const TriangleMesh& mesh, const Frame& frame, std::
 Eigen::Vector3d millimetres(const Eigen::Vector3f& point,
                             const Frame& frame,
                             const Eigen::Matrix3d& up_rotation);
+
+/// From best to no evidence: the order in which files list the classes.
+inline constexpr std::array<Provenance, 4> kProvenanceOrder = {
+    Provenance::Observed, Provenance::SingleView, Provenance::Interpolated, Provenance::Inferred};
 
 /// "observed", "single view", "interpolated", "inferred": the words in files and reports.
 std::string_view provenance_name(Provenance provenance);

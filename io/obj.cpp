@@ -14,9 +14,6 @@ namespace cgs {
 
 namespace {
 
-constexpr std::array<Provenance, 4> kGroups = {
-    Provenance::Observed, Provenance::SingleView, Provenance::Interpolated, Provenance::Inferred};
-
 /// Names in OBJ files end at a blank.
 std::string group_name(Provenance provenance) {
   std::string name(provenance_name(provenance));
@@ -29,8 +26,9 @@ std::string materials_text() {
   constexpr std::array<const char*, 4> kDiffuse = {
       "0.8 0.8 0.8", "0.8 0.74 0.56", "0.56 0.68 0.8", "0.8 0.28 0.68"};
   std::string out = "# cgs: materials tell where a surface comes from\n";
-  for (size_t i = 0; i < kGroups.size(); ++i) {
-    out += "newmtl " + group_name(kGroups.at(i)) + "\nKd " + kDiffuse.at(i) + "\nillum 1\n";
+  for (size_t i = 0; i < kProvenanceOrder.size(); ++i) {
+    out +=
+        "newmtl " + group_name(kProvenanceOrder.at(i)) + "\nKd " + kDiffuse.at(i) + "\nillum 1\n";
   }
   return out;
 }
@@ -83,7 +81,7 @@ void write_faces(AtomicFile& file, const TriangleMesh& mesh) {
     for (const auto& face : mesh.faces) write_face(file, face, has_normals);
     return;
   }
-  for (const Provenance group : kGroups) {
+  for (const Provenance group : kProvenanceOrder) {
     const std::string name = group_name(group);
     bool open = false;
     for (size_t i = 0; i < mesh.faces.size(); ++i) {

@@ -52,7 +52,9 @@ bool is_float(PlyType type) { return type == PlyType::Float32 || type == PlyType
 
 /// A token of the file, short enough and clean enough for a message.
 std::string in_quotes(std::string_view token) {
-  return "'" + printable(std::string(token.substr(0, 40))) + "'";
+  std::string out = "'";
+  out += printable(std::string(token.substr(0, 40)));
+  return out += "'";
 }
 
 /// Reads the header line by line; one member function per keyword.

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/draco_codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include <draco/compression/decode.h>
+#include <draco/compression/expert_encode.h>
+#include <draco/mesh/mesh.h>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr int kNormalBits = 10;
+constexpr int kColorBits = 12;
+constexpr int kSigmaBits = 12;
+
+[[noreturn]] void fail(const std::string& reason) {
+  throw NumericalError("Draco compression: " + reason);
+}
+
+/// The mesh in the library's form, attributes one entry per vertex.
+class DracoInput {
+ public:
+  explicit DracoInput(const GlbPrimitive& primitive) : size_(primitive.positions.size()) {
+    mesh_.set_num_points(static_cast<uint32_t>(size_));
+    for (const auto& f : primitive.faces) {
+      mesh_.AddFace({draco::PointIndex(f[0]), draco::PointIndex(f[1]), draco::PointIndex(f[2])});
+    }
+  }
+
+  int add(draco::GeometryAttribute::Type type, const std::vector<Eigen::Vector3f>& values) {
+    return add(type, values.data()->data(), 3);
+  }
+  int add(draco::GeometryAttribute::Type type, const std::vector<float>& values) {
+    return add(type, values.data(), 1);
+  }
+
+  const draco::Mesh& mesh() const { return mesh_; }
+
+ private:
+  int add(draco::GeometryAttribute::Type type, const float* values, int8_t components) {
+    const size_t stride = sizeof(float) * static_cast<size_t>(components);
+    draco::GeometryAttribute attribute;
+    attribute.Init(
+        type, nullptr, components, draco::DT_FLOAT32, false, static_cast<int64_t>(stride), 0);
+    const int id = mesh_.AddAttribute(attribute, true, static_cast<uint32_t>(size_));
+    mesh_.attribute(id)->buffer()->Write(0, values, stride * size_);
+    return id;
+  }
+
+  draco::Mesh mesh_;
+  size_t size_;
+};
+
+void quantize(draco::ExpertEncoder& encoder, int id, int bits, float origin, float range) {
+  const std::array<float, 3> origins = {origin, origin, origin};
+  encoder.SetAttributeExplicitQuantization(id, bits, 1, origins.data(), range);
+}
+
+/// The smallest number of bits that holds every value as a whole number.
+int whole_bits(const std::vector<float>& values) {
+  const float largest = *std::max_element(values.begin(), values.end());
+  int bits = 1;
+  while (bits < 16 && static_cast<float>((1 << bits) - 1) < largest) ++bits;
+  return bits;
+}
+
+std::string encode(const GlbPrimitive& primitive,
+                   const DracoGrid& grid,
+                   int speed,
+                   std::map<std::string, int>& ids) {
+  using Attribute = draco::GeometryAttribute;
+  DracoInput input(primitive);
+  ids["POSITION"] = input.add(Attribute::POSITION, primitive.positions);
+  ids["NORMAL"] = input.add(Attribute::NORMAL, primitive.normals);
+  if (!primitive.colors.empty()) ids["COLOR_0"] = input.add(Attribute::COLOR, primitive.colors);
+  if (!primitive.support.empty())
+    ids["_SUPPORT"] = input.add(Attribute::GENERIC, primitive.support);
+  if (!primitive.sigma.empty()) ids["_SIGMA"] = input.add(Attribute::GENERIC, primitive.sigma);
+
+  draco::ExpertEncoder encoder(input.mesh());
+  encoder.SetSpeedOptions(speed, speed);
+  // Not left to the library: its sequential method cannot be decoded for large meshes before 1.5.7.
+  encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
+  encoder.SetAttributeExplicitQuantization(
+      ids["POSITION"], grid.bits, 3, grid.origin.data(), grid.range);
+  encoder.SetAttributeQuantization(ids["NORMAL"], kNormalBits);
+  if (ids.count("COLOR_0") != 0) {
+    const Eigen::Vector3f black = Eigen::Vector3f::Zero();
+    encoder.SetAttributeExplicitQuantization(ids["COLOR_0"], kColorBits, 3, black.data(), 1.0f);
+  }
+  if (ids.count("_SUPPORT") != 0) {
+    const int bits = whole_bits(primitive.support);
+    quantize(encoder, ids["_SUPPORT"], bits, 0, static_cast<float>((1 << bits) - 1));
+  }
+  if (ids.count("_SIGMA") != 0) {
+    const auto [low, high] = std::minmax_element(primitive.sigma.begin(), primitive.sigma.end());
+    const float range = *high > *low ? *high - *low : 1.0f;
+    quantize(encoder, ids["_SIGMA"], kSigmaBits, *low, range);
+  }
+  draco::EncoderBuffer buffer;
+  const draco::Status status = encoder.EncodeToBuffer(&buffer);
+  if (!status.ok()) fail(status.error_msg_string());
+  return {buffer.data(), buffer.size()};
+}
+
+/// The geometry in a Draco buffer, as a decoder gives it.
+struct Decoded {
+  std::vector<Eigen::Vector3f> positions;
+  std::vector<std::array<uint32_t, 3>> faces;
+};
+
+Decoded decode(const std::string& bytes) {
+  draco::DecoderBuffer buffer;
+  buffer.Init(bytes.data(), bytes.size());
+  draco::Decoder decoder;
+  auto result = decoder.DecodeMeshFromBuffer(&buffer);
+  if (!result.ok()) fail("cannot be decoded: " + result.status().error_msg_string());
+  const std::unique_ptr<draco::Mesh> mesh = std::move(result).value();
+  const draco::PointAttribute* position =
+      mesh->GetNamedAttribute(draco::GeometryAttribute::POSITION);
+  if (position == nullptr) fail("positions are lost");
+  Decoded out;
+  out.positions.resize(mesh->num_points());
+  for (uint32_t i = 0; i < mesh->num_points(); ++i) {
+    position->GetMappedValue(draco::PointIndex(i), out.positions[i].data());
+  }
+  for (uint32_t i = 0; i < mesh->num_faces(); ++i) {
+    const draco::Mesh::Face& f = mesh->face(draco::FaceIndex(i));
+    out.faces.push_back({f[0].value(), f[1].value(), f[2].value()});
+  }
+  return out;
+}
+
+/// Decoded vertices by the grid cell they lie on. Draco reorders vertices and faces, so places are
+/// what both sides have in common.
+class Cells {
+ public:
+  Cells(const std::vector<Eigen::Vector3f>& decoded, const DracoGrid& grid) : grid_(grid) {
+    keys_.reserve(decoded.size());
+    for (const Eigen::Vector3f& p : decoded) keys_.push_back(key(cell(p).array().round()));
+    std::vector<std::pair<uint64_t, uint32_t>> sorted(decoded.size());
+    for (uint32_t i = 0; i < decoded.size(); ++i) sorted[i] = {keys_[i], i};
+    std::sort(sorted.begin(), sorted.end());
+    for (const auto& [k, i] : sorted) {
+      if (!unique_.empty() && unique_.back() == k) continue;
+      unique_.push_back(k);
+      places_.push_back(decoded[i]);
+    }
+  }
+
+  size_t size() const { return unique_.size(); }
+  const Eigen::Vector3f& place(uint32_t cell_number) const { return places_[cell_number]; }
+  uint32_t of_decoded(uint32_t vertex) const { return *number(keys_[vertex]); }
+
+  /// The cell nearest to a point, if a decoded vertex lies there; the second nearest along each
+  /// axis counts too, as the encoder rounds in float.
+  std::optional<uint32_t> nearest(const Eigen::Vector3f& p) const {
+    const Eigen::Vector3d exact = cell(p);
+    const Eigen::Vector3d near = exact.array().round();
+    for (int side = 0; side < 8; ++side) {
+      Eigen::Vector3d candidate = near;
+      for (int k = 0; k < 3; ++k) {
+        if ((side >> k & 1) != 0) candidate[k] += exact[k] > near[k] ? 1 : -1;
+      }
+      if (candidate.minCoeff() < 0) continue;
+      if (const auto found = number(key(candidate))) return found;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  Eigen::Vector3d cell(const Eigen::Vector3f& p) const {
+    return (p - grid_.origin).cast<double>() / grid_.step();
+  }
+  static uint64_t key(const Eigen::Vector3d& whole) {
+    constexpr int kBits = kMaxDracoBits;
+    return static_cast<uint64_t>(whole.x()) << 2 * kBits |
+           static_cast<uint64_t>(whole.y()) << kBits | static_cast<uint64_t>(whole.z());
+  }
+  std::optional<uint32_t> number(uint64_t k) const {
+    const auto it = std::lower_bound(unique_.begin(), unique_.end(), k);
+    if (it == unique_.end() || *it != k) return std::nullopt;
+    return static_cast<uint32_t>(it - unique_.begin());
+  }
+
+  const DracoGrid& grid_;
+  std::vector<uint64_t> keys_;    // per decoded vertex
+  std::vector<uint64_t> unique_;  // ascending
+  std::vector<Eigen::Vector3f> places_;
+};
+
+/// Faces as cell numbers, each beginning with its smallest, in ascending order.
+template <typename CellOf>
+std::vector<std::array<uint32_t, 3>> faces_by_cell(
+    const std::vector<std::array<uint32_t, 3>>& faces, const CellOf& cell_of) {
+  std::vector<std::array<uint32_t, 3>> out;
+  out.reserve(faces.size());
+  for (const auto& f : faces) {
+    std::array<uint32_t, 3> c = {cell_of(f[0]), cell_of(f[1]), cell_of(f[2])};
+    std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
+    if (c[0] == c[2]) c = {c[0], c[0], c[1]};  // two corners in one cell: one form of three
+    out.push_back(c);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+/// \return the largest distance between a vertex and its decoded place
+double compare(const GlbPrimitive& input, const Decoded& decoded, const DracoGrid& grid) {
+  const Cells cells(decoded.positions, grid);
+  std::vector<uint32_t> cell_of(input.positions.size());
+  std::vector<bool> hit(cells.size(), false);
+  double worst = 0;
+  for (size_t i = 0; i < input.positions.size(); ++i) {
+    const std::optional<uint32_t> cell = cells.nearest(input.positions[i]);
+    if (!cell) fail("vertex " + std::to_string(i) + " of '" + input.name + "' is lost");
+    cell_of[i] = *cell;
+    hit[*cell] = true;
+    const Eigen::Vector3f move = cells.place(*cell) - input.positions[i];
+    worst = std::max(worst, move.cast<double>().norm());
+  }
+  if (std::find(hit.begin(), hit.end(), false) != hit.end()) fail("a vertex appeared");
+  const auto before = faces_by_cell(input.faces, [&](uint32_t v) { return cell_of[v]; });
+  const auto after = faces_by_cell(decoded.faces, [&](uint32_t v) { return cells.of_decoded(v); });
+  if (before != after) fail("faces of '" + input.name + "' changed");
+  return worst;
+}
+
+}  // namespace
+
+DracoPrimitive draco_compress(const GlbPrimitive& primitive, const DracoGrid& grid, int speed) {
+  DracoPrimitive out;
+  try {
+    out.bytes = encode(primitive, grid, speed, out.attribute_ids);
+    const Decoded decoded = decode(out.bytes);
+    out.vertices = decoded.positions.size();
+    out.faces = decoded.faces.size();
+    out.max_error = compare(primitive, decoded, grid);
+    out.min = out.max = decoded.positions.front();
+    for (const Eigen::Vector3f& p : decoded.positions) {
+      out.min = out.min.cwiseMin(p);
+      out.max = out.max.cwiseMax(p);
+    }
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    fail(error.what());
+  }
+  return out;
+}
+
+}  // namespace cgs

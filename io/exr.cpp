@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/exr.h"
+
+#include <algorithm>
+#include <cstring>
+#include <set>
+#include <stdexcept>
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfInputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
+
+#include "io/atomic_file.h"
+#include "io/exr_header.h"
+
+namespace cgs {
+
+namespace {
+
+class MemoryOut : public Imf::OStream {
+ public:
+  MemoryOut() : Imf::OStream("memory") {}
+  void write(const char* data, int size) override {
+    const auto n = static_cast<size_t>(size);
+    if (bytes.size() < position_ + n) bytes.resize(position_ + n);
+    std::copy(data, data + n, bytes.begin() + static_cast<ptrdiff_t>(position_));
+    position_ += n;
+  }
+  uint64_t tellp() override { return position_; }
+  void seekp(uint64_t position) override { position_ = position; }
+
+  std::string bytes;
+
+ private:
+  size_t position_ = 0;
+};
+
+class MemoryIn : public Imf::IStream {
+ public:
+  explicit MemoryIn(std::string_view bytes) : Imf::IStream("memory"), bytes_(bytes) {}
+  bool read(char* out, int size) override {
+    const auto n = static_cast<size_t>(size);
+    if (size < 0 || position_ > bytes_.size() || n > bytes_.size() - position_) {
+      throw std::runtime_error("read past the end");
+    }
+    std::memcpy(out, bytes_.data() + position_, n);
+    position_ += n;
+    return position_ < bytes_.size();
+  }
+  uint64_t tellg() override { return position_; }
+  void seekg(uint64_t position) override { position_ = position; }
+
+ private:
+  std::string_view bytes_;
+  uint64_t position_ = 0;
+};
+
+/// OpenEXR multiplies row vectors from the left.
+Imath::M44f row_matrix(const Eigen::Matrix4f& m) {
+  Imath::M44f out;
+  for (int r = 0; r < 4; ++r) {
+    for (int c = 0; c < 4; ++c) out[c][r] = m(r, c);
+  }
+  return out;
+}
+
+Eigen::Matrix4f column_matrix(const Imath::M44f& m) {
+  Eigen::Matrix4f out;
+  for (int r = 0; r < 4; ++r) {
+    for (int c = 0; c < 4; ++c) out(r, c) = m[c][r];
+  }
+  return out;
+}
+
+void require_writable(const ExrImage& image) {
+  require(image.width > 0 && image.height > 0, "ExrImage must have pixels; width", image.width);
+  require(!image.channels.empty(), "ExrImage must have channels", 0);
+  const size_t pixels = static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
+  std::set<std::string> names;
+  for (const auto& [name, values] : image.channels) {
+    require(!name.empty() && names.insert(name).second,
+            "ExrImage channels must have names that differ",
+            name);
+    require(values.size() == pixels,
+            "ExrImage channel " + name + " must be as large as the image",
+            values.size());
+  }
+}
+
+Imf::Slice slice_of(const float* values, int width) {
+  auto* base = const_cast<char*>(reinterpret_cast<const char*>(values));
+  return {Imf::FLOAT, base, sizeof(float), sizeof(float) * static_cast<size_t>(width)};
+}
+
+ExrImage decode(std::string_view bytes, const std::filesystem::path& path) {
+  MemoryIn stream(bytes);
+  Imf::InputFile file(stream, 0);
+  const Imath::Box2i window = file.header().dataWindow();
+  ExrImage image;
+  image.width = window.max.x - window.min.x + 1;
+  image.height = window.max.y - window.min.y + 1;
+  const size_t pixels = static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
+  for (auto it = file.header().channels().begin(); it != file.header().channels().end(); ++it) {
+    image.channels.emplace_back(it.name(), std::vector<float>(pixels));
+  }
+  if (image.channels.empty()) throw BadInput(Defect::Schema, path, "no channels");
+  Imf::FrameBuffer frame_buffer;
+  for (auto& [name, values] : image.channels) {
+    // The library subtracts the window's corner itself, through a pointer to pixel (0, 0).
+    frame_buffer.insert(name,
+                        Imf::Slice::Make(Imf::FLOAT,
+                                         values.data(),
+                                         window,
+                                         sizeof(float),
+                                         sizeof(float) * static_cast<size_t>(image.width)));
+  }
+  file.setFrameBuffer(frame_buffer);
+  file.readPixels(window.min.y, window.max.y);
+  for (auto it = file.header().begin(); it != file.header().end(); ++it) {
+    const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute());
+    if (text != nullptr) image.text[it.name()] = text->value();
+  }
+  if (Imf::hasWorldToCamera(file.header())) {
+    image.world_to_camera = column_matrix(Imf::worldToCamera(file.header()));
+  }
+  return image;
+}
+
+}  // namespace
+
+const std::vector<float>* ExrImage::find(const std::string& channel) const {
+  for (const auto& [name, values] : channels) {
+    if (name == channel) return &values;
+  }
+  return nullptr;
+}
+
+void write_exr(const std::filesystem::path& path, const ExrImage& image) {
+  require_writable(image);
+  Imf::Header header(image.width, image.height);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  Imf::FrameBuffer frame_buffer;
+  for (const auto& [name, values] : image.channels) {
+    header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+    frame_buffer.insert(name, slice_of(values.data(), image.width));
+  }
+  for (const auto& [key, value] : image.text) header.insert(key, Imf::StringAttribute(value));
+  if (image.world_to_camera) Imf::addWorldToCamera(header, row_matrix(*image.world_to_camera));
+  MemoryOut stream;
+  {
+    Imf::OutputFile file(stream, header, 0);
+    file.setFrameBuffer(frame_buffer);
+    file.writePixels(image.height);
+  }  // its destructor completes the table of chunks
+  write_file(path, stream.bytes);
+}
+
+ExrImage read_exr(const std::filesystem::path& path, const ReadLimits& limits) {
+  const std::string bytes = read_file(path, limits);
+  screen_exr(bytes, path, limits);
+  try {
+    return decode(bytes, path);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw BadInput(Defect::Syntax, path, error.what());
+  }
+}
+
+}  // namespace cgs

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/glb_primitive.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "io/mesh_arrays.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr uint32_t kUnused = std::numeric_limits<uint32_t>::max();
+
+/// glTF forbids NaN: no statement becomes a negative number, of the size of the others so that it
+/// does not coarsen a quantisation of them.
+float unknown_sigma(const TriangleMesh& mesh, double scale) {
+  float largest = 0;
+  for (const float s : mesh.sigma) {
+    if (std::isfinite(s)) largest = std::max(largest, s);
+  }
+  return largest > 0 ? -static_cast<float>(largest * scale) : -1.0f;
+}
+
+class Splitter {
+ public:
+  Splitter(const TriangleMesh& mesh, const GlbPlacement& placement)
+      : mesh_(mesh), placement_(placement), unknown_sigma_(unknown_sigma(mesh, placement.scale)) {
+    positions_.reserve(mesh.vertices.size());
+    for (const Eigen::Vector3f& v : mesh.vertices) positions_.push_back(placement(v));
+    normals_ = mesh.normals.empty() ? vertex_normals(mesh) : mesh.normals;
+  }
+
+  /// Faces for which `wanted(index)` holds.
+  template <typename Wanted>
+  GlbPrimitive part(std::string_view name, const Wanted& wanted) const {
+    GlbPrimitive out;
+    out.name = name;
+    std::vector<uint32_t> renumbered(mesh_.vertices.size(), kUnused);
+    for (size_t i = 0; i < mesh_.faces.size(); ++i) {
+      if (wanted(i) && has_three_places(mesh_.faces[i])) out.faces.push_back(mesh_.faces[i]);
+    }
+    for (const auto& face : out.faces) {
+      for (const uint32_t corner : face) renumbered[corner] = 0;
+    }
+    for (size_t v = 0; v < renumbered.size(); ++v) {
+      if (renumbered[v] == kUnused) continue;
+      renumbered[v] = static_cast<uint32_t>(out.positions.size());
+      append_vertex(out, v);
+    }
+    for (auto& face : out.faces) {
+      for (uint32_t& corner : face) corner = renumbered[corner];
+    }
+    return out;
+  }
+
+ private:
+  bool has_three_places(const std::array<uint32_t, 3>& f) const {
+    const Eigen::Vector3f& a = positions_[f[0]];
+    const Eigen::Vector3f& b = positions_[f[1]];
+    const Eigen::Vector3f& c = positions_[f[2]];
+    return a != b && b != c && c != a;
+  }
+
+  void append_vertex(GlbPrimitive& out, size_t v) const {
+    out.positions.push_back(positions_[v]);
+    const Eigen::Vector3d normal = placement_.rotation * normals_[v].cast<double>();
+    const bool known = normal.allFinite() && normal.norm() > 0;
+    out.normals.push_back(known ? Eigen::Vector3f(normal.stableNormalized().cast<float>())
+                                : Eigen::Vector3f::UnitY());
+    if (!mesh_.colors.empty()) {
+      Eigen::Vector3f color = Eigen::Vector3f::Zero();
+      for (int c = 0; c < 3; ++c) {
+        const float coded = mesh_.colors[v][c];
+        if (coded > 0) color[c] = std::min(1.0f, linear_from_srgb(coded));  // NaN stays 0
+      }
+      out.colors.push_back(color);
+    }
+    if (!mesh_.support.empty()) {
+      out.support.push_back(std::isfinite(mesh_.support[v]) ? mesh_.support[v] : 0.0f);
+    }
+    if (!mesh_.sigma.empty()) {
+      const auto sigma = static_cast<float>(mesh_.sigma[v] * placement_.scale);
+      out.sigma.push_back(sigma >= 0 && std::isfinite(sigma) ? sigma : unknown_sigma_);
+    }
+  }
+
+  const TriangleMesh& mesh_;
+  const GlbPlacement& placement_;
+  float unknown_sigma_;
+  std::vector<Eigen::Vector3f> positions_;
+  std::vector<Eigen::Vector3f> normals_;
+};
+
+}  // namespace
+
+std::vector<GlbPrimitive> glb_primitives(const TriangleMesh& mesh, const GlbPlacement& placement) {
+  const Splitter splitter(mesh, placement);
+  std::vector<GlbPrimitive> out;
+  if (mesh.provenance.empty()) {
+    out.push_back(splitter.part("surface", [](size_t) { return true; }));
+  } else {
+    for (const Provenance label : kProvenanceOrder) {
+      out.push_back(splitter.part(provenance_name(label),
+                                  [&](size_t i) { return mesh.provenance[i] == label; }));
+    }
+  }
+  std::erase_if(out, [](const GlbPrimitive& part) { return part.faces.empty(); });
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/gltf.h"
+
+// The only file with the implementation; it may not touch files or pictures.
+#define TINYGLTF_IMPLEMENTATION
+#define TINYGLTF_NO_FS
+#define TINYGLTF_NO_STB_IMAGE
+#define TINYGLTF_NO_STB_IMAGE_WRITE
+#define TINYGLTF_NO_EXTERNAL_IMAGE
+#include <algorithm>
+#include <cmath>
+#include <fstream>  // tinygltf forgets it
+#include <limits>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+#include <tiny_gltf.h>
+
+#include "io/atomic_file.h"
+#include "io/draco_codec.h"
+#include "io/glb_primitive.h"
+#include "io/mesh_arrays.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
+
+tinygltf::Value value_of(const nlohmann::json& json) {
+  if (json.is_object()) {
+    tinygltf::Value::Object object;
+    for (const auto& [key, entry] : json.items()) object[key] = value_of(entry);
+    return tinygltf::Value(object);
+  }
+  if (json.is_array()) {
+    tinygltf::Value::Array array;
+    for (const auto& entry : json) array.push_back(value_of(entry));
+    return tinygltf::Value(array);
+  }
+  if (json.is_boolean()) return tinygltf::Value(json.get<bool>());
+  if (json.is_string()) return tinygltf::Value(json.get<std::string>());
+  if (!json.is_number()) return tinygltf::Value();
+  const double number = json.get<double>();
+  constexpr double kLargestInt = std::numeric_limits<int>::max();
+  if (json.is_number_integer() && std::abs(number) <= kLargestInt) {
+    return tinygltf::Value(json.get<int>());
+  }
+  return tinygltf::Value(number);
+}
+
+nlohmann::json parsed_summary(const std::string& text) {
+  nlohmann::json json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  require(!json.is_discarded(), "GlbOptions.summary_json must be JSON", text.substr(0, 40));
+  return json;
+}
+
+/// Corners of the box around the vertices that faces use.
+std::pair<Eigen::Vector3f, Eigen::Vector3f> bounds(const TriangleMesh& mesh) {
+  Eigen::Vector3f low = mesh.vertices[mesh.faces.front()[0]];
+  Eigen::Vector3f high = low;
+  for (const auto& face : mesh.faces) {
+    for (const uint32_t corner : face) {
+      low = low.cwiseMin(mesh.vertices[corner]);
+      high = high.cwiseMax(mesh.vertices[corner]);
+    }
+  }
+  return {low, high};
+}
+
+/// The cube that holds every position, and as few bits as keep the error.
+DracoGrid grid_for(const std::vector<GlbPrimitive>& primitives, double max_error) {
+  Eigen::Vector3f low = primitives.front().positions.front();
+  Eigen::Vector3f high = low;
+  for (const GlbPrimitive& primitive : primitives) {
+    for (const Eigen::Vector3f& p : primitive.positions) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+  }
+  DracoGrid grid{low, (high - low).maxCoeff(), 1};
+  const double half_diagonal = std::sqrt(3.0) / 2;  // of a cell: the farthest a vertex can move
+  const double wanted = max_error > 0 ? max_error : std::ldexp(double{grid.range}, -14);
+  while (grid.bits < kMaxDracoBits && grid.step() * half_diagonal > wanted) ++grid.bits;
+  require(grid.step() * half_diagonal <= wanted,
+          "GlbOptions.max_error must be above extent / 2^21",
+          max_error);
+  return grid;
+}
+
+/// Assembles the container.
+class GlbBuilder {
+ public:
+  GlbBuilder() {
+    model_.asset.version = "2.0";
+    model_.asset.generator = "cgs";
+    model_.buffers.resize(1);
+    model_.meshes.resize(1);
+    model_.meshes[0].name = "mesh";
+    model_.nodes.resize(1);
+    model_.nodes[0].mesh = 0;
+    model_.nodes[0].name = "mesh";
+    model_.scenes.resize(1);
+    model_.scenes[0].nodes = {0};
+    model_.defaultScene = 0;
+  }
+
+  void set_extras(const nlohmann::json& extras) { model_.asset.extras = value_of(extras); }
+
+  void add_plain(const GlbPrimitive& in) {
+    tinygltf::Primitive out = empty_primitive(in);
+    const auto [low, high] = std::pair(extreme(in.positions, true), extreme(in.positions, false));
+    out.attributes["POSITION"] =
+        accessor(in.positions.size(), TINYGLTF_TYPE_VEC3, view(in.positions));
+    set_bounds(out.attributes["POSITION"], low, high);
+    out.attributes["NORMAL"] = accessor(in.normals.size(), TINYGLTF_TYPE_VEC3, view(in.normals));
+    if (!in.colors.empty()) {
+      out.attributes["COLOR_0"] = accessor(in.colors.size(), TINYGLTF_TYPE_VEC3, view(in.colors));
+    }
+    if (!in.support.empty()) {
+      out.attributes["_SUPPORT"] =
+          accessor(in.support.size(), TINYGLTF_TYPE_SCALAR, view(in.support));
+    }
+    if (!in.sigma.empty()) {
+      out.attributes["_SIGMA"] = accessor(in.sigma.size(), TINYGLTF_TYPE_SCALAR, view(in.sigma));
+    }
+    const int indices = view(in.faces, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
+    out.indices = accessor(in.faces.size() * 3, TINYGLTF_TYPE_SCALAR, indices);
+    model_.accessors.back().componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+    model_.meshes[0].primitives.push_back(std::move(out));
+  }
+
+  void add_compressed(const GlbPrimitive& in, const DracoPrimitive& draco) {
+    tinygltf::Primitive out = empty_primitive(in);
+    nlohmann::json extension = {
+        {"bufferView", raw_view(draco.bytes.data(), draco.bytes.size(), 0)}};
+    for (const auto& [name, id] : draco.attribute_ids) {
+      const bool scalar = name == "_SUPPORT" || name == "_SIGMA";
+      out.attributes[name] =
+          accessor(draco.vertices, scalar ? TINYGLTF_TYPE_SCALAR : TINYGLTF_TYPE_VEC3, -1);
+      extension["attributes"][name] = id;
+    }
+    set_bounds(out.attributes["POSITION"], draco.min, draco.max);
+    out.indices = accessor(draco.faces * 3, TINYGLTF_TYPE_SCALAR, -1);
+    model_.accessors.back().componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+    out.extensions[kDraco] = value_of(extension);
+    model_.extensionsUsed = {kDraco};
+    model_.extensionsRequired = {kDraco};
+    model_.meshes[0].primitives.push_back(std::move(out));
+  }
+
+  std::string bytes() {
+    constexpr size_t kRoomForJson = size_t{1} << 20;
+    if (model_.buffers[0].data.size() > std::numeric_limits<uint32_t>::max() - kRoomForJson) {
+      throw LimitError("write_glb: glTF binary files end at 4 GiB");
+    }
+    std::ostringstream out(std::ios::binary);
+    out.exceptions(std::ios::badbit | std::ios::failbit);
+    tinygltf::TinyGLTF().WriteGltfSceneToStream(&model_, out, false, true);
+    return std::move(out).str();
+  }
+
+ private:
+  tinygltf::Primitive empty_primitive(const GlbPrimitive& in) {
+    tinygltf::Material material;
+    material.name = in.name;
+    material.doubleSided = true;
+    material.pbrMetallicRoughness.metallicFactor = 0;
+    material.pbrMetallicRoughness.roughnessFactor = 1;
+    if (in.name == provenance_name(Provenance::Inferred)) {
+      material.pbrMetallicRoughness.baseColorFactor = {1.0, 0.25, 0.8, 1.0};
+    } else if (in.name == provenance_name(Provenance::Interpolated)) {
+      material.pbrMetallicRoughness.baseColorFactor = {0.55, 0.75, 1.0, 1.0};
+    }
+    tinygltf::Primitive out;
+    out.mode = TINYGLTF_MODE_TRIANGLES;
+    out.material = static_cast<int>(model_.materials.size());
+    model_.materials.push_back(std::move(material));
+    return out;
+  }
+
+  template <typename T>
+  int view(const std::vector<T>& values, int target = TINYGLTF_TARGET_ARRAY_BUFFER) {
+    return raw_view(values.data(), values.size() * sizeof(T), target);
+  }
+
+  int raw_view(const void* bytes, size_t size, int target) {
+    std::vector<unsigned char>& data = model_.buffers[0].data;
+    tinygltf::BufferView out;
+    out.buffer = 0;
+    out.byteOffset = data.size();
+    out.byteLength = size;
+    out.target = target;
+    const auto* first = static_cast<const unsigned char*>(bytes);
+    data.insert(data.end(), first, first + size);
+    data.resize((data.size() + 3) / 4 * 4);  // accessors must begin at multiples of four
+    model_.bufferViews.push_back(out);
+    return static_cast<int>(model_.bufferViews.size()) - 1;
+  }
+
+  int accessor(size_t count, int type, int buffer_view) {
+    tinygltf::Accessor out;
+    out.bufferView = buffer_view;
+    out.componentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
+    out.count = count;
+    out.type = type;
+    model_.accessors.push_back(out);
+    return static_cast<int>(model_.accessors.size()) - 1;
+  }
+
+  void set_bounds(int number, const Eigen::Vector3f& low, const Eigen::Vector3f& high) {
+    tinygltf::Accessor& out = model_.accessors[static_cast<size_t>(number)];
+    out.minValues = {low.x(), low.y(), low.z()};
+    out.maxValues = {high.x(), high.y(), high.z()};
+  }
+
+  static Eigen::Vector3f extreme(const std::vector<Eigen::Vector3f>& points, bool low) {
+    Eigen::Vector3f out = points.front();
+    for (const Eigen::Vector3f& p : points) {
+      out = low ? out.cwiseMin(p).eval() : out.cwiseMax(p).eval();
+    }
+    return out;
+  }
+
+  tinygltf::Model model_;
+};
+
+nlohmann::json extras_for(const TriangleMesh& mesh,
+                          const Frame& frame,
+                          const GlbPlacement& placement,
+                          const GlbOptions& options) {
+  const Eigen::Vector3d origin = frame.world_from_internal(placement.center);
+  nlohmann::json rotation = nlohmann::json::array();
+  for (int i = 0; i < 9; ++i) rotation.push_back(placement.rotation(i / 3, i % 3));
+  nlohmann::json out = {{"units", frame.has_metric_scale() ? "m" : "unknown"},
+                        {"metres_per_unit", frame.metres_per_unit},
+                        {"metres_sigma", frame.metres_sigma},
+                        {"scale_source", scale_source_name(frame.scale_source)},
+                        {"origin_in_world", {origin.x(), origin.y(), origin.z()}},
+                        {"gltf_from_world", rotation}};
+  if (!mesh.provenance.empty()) {
+    const std::array<double, 4> area = area_by_provenance(mesh);
+    for (const Provenance label : kProvenanceOrder) {
+      out["area"][std::string(provenance_name(label))] =
+          area.at(static_cast<size_t>(label)) * placement.scale * placement.scale;
+    }
+  }
+  if (!options.summary_json.empty()) out["summary"] = parsed_summary(options.summary_json);
+  return out;
+}
+
+GlbPlacement placement_for(const TriangleMesh& mesh,
+                           const Frame& frame,
+                           const GlbOptions& options) {
+  const auto [low, high] = bounds(mesh);
+  GlbPlacement out;
+  out.rotation = options.y_up;
+  out.scale = frame.scale * (frame.has_metric_scale() ? frame.metres_per_unit : 1.0);
+  out.center = 0.5 * (low.cast<double>() + high.cast<double>());
+  const double reach = (high.cast<double>() - out.center).norm() * out.scale;
+  constexpr double kFarthest = 1e18;  // the encoder's float arithmetic overflows beyond
+  require(reach > 1 / kFarthest && reach < kFarthest,
+          "write_glb: the mesh must have an extent between 1e-18 and 1e18",
+          reach);
+  return out;
+}
+
+}  // namespace
+
+void GlbOptions::validate() const {
+  require(
+      max_error >= 0 && std::isfinite(max_error), "GlbOptions.max_error must be >= 0", max_error);
+  require(speed >= 0 && speed <= 10, "GlbOptions.speed must be 0 to 10", speed);
+  const double off = (y_up * y_up.transpose() - Eigen::Matrix3d::Identity()).norm();
+  require(off < 1e-6 && y_up.determinant() > 0, "GlbOptions.y_up must be a rotation; error", off);
+  if (!summary_json.empty()) (void)parsed_summary(summary_json);
+}
+
+GlbReport write_glb(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const GlbOptions& options) {
+  options.validate();
+  require_writable(mesh, "write_glb");
+  require(!mesh.faces.empty(), "write_glb: number of faces must be > 0", mesh.faces.size());
+  const GlbPlacement placement = placement_for(mesh, frame, options);
+  const std::vector<GlbPrimitive> primitives = glb_primitives(mesh, placement);
+  require(!primitives.empty(), "write_glb: faces with three different corners must be > 0", 0);
+  const double world_scale = placement.scale / frame.scale;  // units of the file per world unit
+  const double max_error = options.max_error * world_scale;
+  GlbReport report;
+  GlbBuilder builder;
+  builder.set_extras(extras_for(mesh, frame, placement, options));
+  const DracoGrid grid = options.draco ? grid_for(primitives, max_error) : DracoGrid{};
+  double worst = 0;
+  for (const GlbPrimitive& primitive : primitives) {
+    report.triangles += primitive.faces.size();
+    if (!options.draco) {
+      report.vertices += primitive.positions.size();
+      builder.add_plain(primitive);
+      continue;
+    }
+    const DracoPrimitive draco = draco_compress(primitive, grid, options.speed);
+    report.vertices += draco.vertices;
+    worst = std::max(worst, draco.max_error);
+    builder.add_compressed(primitive, draco);
+  }
+  // Half a rounding error of float coordinates is not the compression's.
+  const double slack = 1e-6 * double{grid.range};
+  if (max_error > 0 && worst > max_error + slack) {
+    throw NumericalError("write_glb: compression moved a vertex by " + std::to_string(worst));
+  }
+  report.primitives = primitives.size();
+  report.dropped_triangles = mesh.faces.size() - report.triangles;
+  report.position_bits = options.draco ? grid.bits : 0;
+  report.measured_max_error = worst / world_scale;
+  const std::string bytes = builder.bytes();
+  report.bytes = bytes.size();
+  write_file(path, bytes);
+  return report;
+}
+
+}  // namespace cgs

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+
+#include <Eigen/Core>
+
+#include "libcgs/core/frame.h"
+#include "libcgs/core/triangle_mesh.h"
+
+namespace cgs {
+
+/// How a mesh becomes a binary glTF file.
+struct GlbOptions {
+  bool draco = true;     ///< Compress with KHR_draco_mesh_compression.
+  double max_error = 0;  ///< Largest move of a vertex by compression [world units];
+                         ///< 0 = extent / 2^14, else > extent / 2^21.
+  int speed = 5;         ///< Of the encoder, 0 (smallest file) to 10 (fastest).
+  Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
+  std::string summary_json;  ///< JSON text for asset.extras.summary; may be empty.
+
+  /// \throws InvalidInput naming the first field out of range.
+  void validate() const;
+};
+
+/// What was written, measured on the decoded content.
+struct GlbReport {
+  size_t bytes = 0;       ///< Of the file.
+  size_t primitives = 0;  ///< One per provenance class that has faces.
+  size_t vertices = 0;    ///< Of all primitives; borders between classes count twice.
+  size_t triangles = 0;
+  size_t dropped_triangles = 0;   ///< Without area: two corners at one place.
+  int position_bits = 0;          ///< Per coordinate; 0 = not quantised.
+  double measured_max_error = 0;  ///< Largest distance of a decoded vertex [world units].
+};
+
+/// Writes a mesh as .glb: +Y up, in metres where the scale is known, else in world units.
+///
+/// - One primitive and material per provenance class that is present ("observed", "single view",
+///   "interpolated", "inferred", or "surface" if the mesh has no labels), double-sided and opaque;
+///   inferred surface is tinted magenta, interpolated surface blue.
+/// - POSITION is relative to the middle of the mesh. asset.extras tells where that lies
+///   (origin_in_world), the axes (gltf_from_world, row by row), units ("m" or "unknown"),
+///   metres_per_unit, metres_sigma, scale_source, the area of each class, and the summary.
+/// - NORMAL; COLOR_0 in linear light; _SUPPORT (number of views that see the vertex); _SIGMA
+///   (standard deviation along the normal [units of the file]; negative = no statement).
+/// - With Draco (edgebreaker) all primitives share one quantisation grid, so that borders between
+///   them stay closed. The result is decoded again and compared with the input.
+///
+/// \throws InvalidInput if options or mesh are not usable (an array does not fit, no face with an
+///         area, coordinates beyond 1e18); NumericalError if the decoded mesh differs from the
+///         input by more than max_error; LimitError above 4 GiB; IoError
+/// Source: glTF 2.0 and KHR_draco_mesh_compression, Khronos Group.
+GlbReport write_glb(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const GlbOptions& options = {});
+
+}  // namespace cgs

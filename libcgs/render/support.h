@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+
+#include "libcgs/core/camera.h"
+#include "libcgs/render/render_buffers.h"
+
+namespace cgs {
+
+/// An input view as a witness: what it saw, how far away, how sure.
+struct SupportView {
+  Camera camera;
+  DepthMap depth;  ///< Of the size of the camera [internal units]; NaN = saw nothing here.
+  DepthMap sigma;  ///< Standard deviation of depth [internal units]; NaN, or empty, = no statement.
+};
+
+/// When an input view counts as having seen a rendered pixel.
+struct SupportOptions {
+  float min_alpha = 0.5f;            ///< Pixels less opaque than this show no surface; in (0, 1].
+  float sigma_factor = 3;            ///< Depths agree within this many standard deviations; >= 0.
+  float relative_tolerance = 0.01f;  ///< They always agree within this part of the depth; > 0.
+
+  /// \throws InvalidInput naming the first field out of range.
+  void validate() const;
+};
+
+/// Fills support and hole of a rendered view.
+///
+/// The surface of a pixel is its median depth (its mean depth where that is unknown). An input view
+/// supports the pixel if the point projects into its image and its own depth there agrees: the
+/// point is neither in front of what the view saw (a contradiction) nor behind it (occluded), by
+/// more than max(relative_tolerance * depth, sigma_factor * sigma).
+///
+/// \param buffers  as rasterize() gives them for `camera`
+/// \param views    the input views only: a virtual camera is no witness
+/// \throws InvalidInput if sizes disagree, an option is out of range or there are more than 255
+///         views.
+void annotate_support(RenderBuffers& buffers,
+                      const Camera& camera,
+                      std::span<const SupportView> views,
+                      const SupportOptions& options = {});
+
+}  // namespace cgs

@@ -1,0 +1,530 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "samples/capture/portal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <string>
+
+#include "samples/capture/carving.h"
+#include "samples/capture/noise.h"
+#include "samples/capture/solids.h"
+#include <Eigen/Geometry>
+
+namespace cgs {
+
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using std::numbers::pi;
+
+constexpr int kOrders = 4;          // recessed rings of the arch
+constexpr double kStep = 0.26;      // of their radius [m]
+constexpr double kRecess = 0.28;    // of their depth [m]
+constexpr double kBack = 1.60;      // where they end in the masonry [m]
+constexpr double kHalfWidth = 6.5;  // of wall and ground [m]
+
+double order_radius(int order) { return kWallRadius - kStep * (order + 1); }
+double order_front(int order) { return 0.15 + kRecess * order; }
+
+// Uneven stone: moves vertices by a few millimetres in all directions.
+void weather(TriangleMesh& mesh, float amplitude, uint32_t seed) {
+  const NoiseBand band{.longest = 0.5F, .shortest = 0.06F, .gain = 0.6F};
+  for (auto& v : mesh.vertices) {
+    const Eigen::Vector3f p = v;
+    for (uint32_t k = 0; k < 3; ++k) {
+      v[k] += amplitude * band_noise(p, band, 0.01F, seed + 101 * k);
+    }
+  }
+}
+
+class Mason {
+ public:
+  explicit Mason(PortalScene& scene) : scene_(scene) {}
+
+  void add(const std::string& name, Material material, const TriangleMesh& mesh) {
+    const auto base = static_cast<uint32_t>(scene_.mesh.vertices.size());
+    scene_.parts.push_back({name,
+                            material,
+                            base,
+                            static_cast<uint32_t>(mesh.vertices.size()),
+                            static_cast<uint32_t>(scene_.mesh.faces.size()),
+                            static_cast<uint32_t>(mesh.faces.size())});
+    auto& all = scene_.mesh;
+    all.vertices.insert(all.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
+    for (const auto& f : mesh.faces) all.faces.push_back({f[0] + base, f[1] + base, f[2] + base});
+    scene_.part_of_face.resize(all.faces.size(), static_cast<uint16_t>(scene_.parts.size() - 1));
+  }
+
+  // Stone: edges no longer than max_edge [m], then made uneven.
+  void add_stone(const std::string& name, Material material, TriangleMesh mesh, double max_edge) {
+    refine(mesh, max_edge);
+    weather(mesh, 0.004F, static_cast<uint32_t>(scene_.parts.size()) * 977U);
+    add(name, material, mesh);
+  }
+
+ private:
+  PortalScene& scene_;
+};
+
+// A place on the path of the arch: up the left jamb, over the arch, down the right jamb.
+struct Station {
+  double height = 0;  // of the centre [m]
+  double angle = pi;  // of the radial direction, 0 = right [rad]
+  double along = -1;  // distance along the arch [m], negative on the jambs
+
+  Vector3d at(const Vector2d& profile) const {
+    return {profile.x() * std::cos(angle), profile.y(), height + profile.x() * std::sin(angle)};
+  }
+};
+
+std::vector<Station> arch_path(double bottom, double radius, double spacing) {
+  std::vector<Station> path;
+  const int jamb = bottom < kSpringing ? static_cast<int>((kSpringing - bottom) / 0.06) : 0;
+  const int steps = static_cast<int>(pi * radius / spacing);
+  const auto height = [&](int i) { return bottom + (kSpringing - bottom) * i / jamb; };
+  for (int i = 0; i < jamb; ++i) path.push_back({height(i), pi, -1});
+  for (int i = 0; i <= steps; ++i) {
+    path.push_back({kSpringing, pi - pi * i / steps, pi * radius * i / steps});
+  }
+  for (int i = jamb - 1; i >= 0; --i) path.push_back({height(i), 0, -1});
+  return path;
+}
+
+using Profile = std::function<std::vector<Vector2d>(double along)>;
+
+TriangleMesh swept(const std::vector<Station>& path, const Profile& profile) {
+  std::vector<Loop> loops;
+  for (const auto& station : path) {
+    Loop loop;
+    for (const auto& p : profile(station.along)) loop.push_back(station.at(p));
+    loops.push_back(loop);
+  }
+  return loft(loops, LoftEnds::Capped);
+}
+
+double triangle_wave(double t) { return 4 * std::abs(t - std::floor(t + 0.5)) - 1; }
+
+// Section of a recessed ring, (radius, y): a roll on the edge, a hollow, a flat face. The
+// ornament differs from ring to ring and ends where the jamb begins.
+std::vector<Vector2d> order_profile(int order, double along) {
+  const double carved_arch = along >= 0 ? 1 : 0;
+  const double pitch = 0.17 + 0.02 * order;
+  const double cell = std::floor(along / pitch + 0.5);
+  const double jitter =
+      0.75 + 0.5 * static_cast<double>(
+                       uniform(static_cast<uint32_t>(static_cast<int32_t>(cell)), 40U + order));
+  const double wave = carved_arch * jitter * triangle_wave(along / pitch);
+  const double roll = 0.06 * (1 + (order == 3 ? 0.22 * wave : 0.0));
+  const double zigzag = order == 1 ? 0.035 * wave : 0;
+  const double block = order == 2 ? 0.03 * std::clamp(4 * wave, -1.0, 1.0) : 0;
+  const double r = order_radius(order);
+  const double y = order_front(order);
+  std::vector<Vector2d> out{{r + 0.34, y}, {r + 0.26, y}, {r + 0.21 + zigzag, y - block}};
+  for (int i = 1; i < 5; ++i) {  // the hollow
+    const double a = pi * i / 5;
+    out.emplace_back(r + 0.165 + zigzag + 0.035 * std::cos(a),
+                     y + 0.045 * std::sin(a) * (order == 2 ? -0.2 : 1.0) - block);
+  }
+  for (int i = 0; i <= 9; ++i) {  // the roll
+    const double a = pi * (0.12 + 0.95 * i / 9);
+    out.emplace_back(r + 0.062 + 0.5 * zigzag + roll * std::cos(a),
+                     y + 0.055 - roll * std::sin(a) - (order == 1 ? 0.02 * wave : 0.0));
+  }
+  for (const double depth : {0.13, 0.2, 0.3, 0.6, kBack - y}) out.emplace_back(r, y + depth);
+  out.emplace_back(r + 0.34, kBack);
+  return out;
+}
+
+// The front is a net of its own; what lies behind it is hidden and stays coarse.
+void add_wall(Mason& mason) {
+  constexpr double kTop = 7;
+  constexpr int kSteps = 48;
+  std::vector<Loop> loops;
+  for (const auto& station : arch_path(-0.3, kWallRadius, 0.06)) {
+    const double c = std::cos(station.angle);
+    const double s = std::sin(station.angle);
+    const double to_side = std::abs(c) > 1e-9 ? kHalfWidth / std::abs(c) : 1e9;
+    const double to_top = s > 1e-9 ? (kTop - kSpringing) / s : 1e9;
+    const double outer = std::min(to_side, to_top);
+    Loop loop{station.at({kWallRadius, 2.0}), station.at({kWallRadius, 0.2})};
+    for (int i = 0; i <= kSteps; ++i) {
+      loop.push_back(station.at({kWallRadius + (outer - kWallRadius) * i / kSteps, 0.0}));
+    }
+    loop.push_back(station.at({outer, 2.0}));
+    loops.push_back(loop);
+  }
+  mason.add_stone("wall", Material::Ashlar, loft(loops, LoftEnds::Capped), 10);
+  mason.add_stone("core", Material::Ashlar, box({-2.5, kBack - 0.1, -0.2}, {2.5, 1.95, 5}), 0.3);
+}
+
+void add_ground(Mason& mason) {
+  mason.add_stone(
+      "ground", Material::Paving, box({-kHalfWidth, -8, -0.5}, {kHalfWidth, 1.9, 0}), 0.15);
+  for (int i = 0; i < 3; ++i) {
+    const double half = 3.0 - 0.22 * i;
+    mason.add_stone("step " + std::to_string(i + 1),
+                    Material::Paving,
+                    box({-half, -1.40 + 0.42 * i, -0.1}, {half, 1.5, 0.16 * (i + 1)}),
+                    0.11);
+  }
+}
+
+void add_arch(Mason& mason) {
+  for (int order = 0; order < kOrders; ++order) {
+    mason.add_stone("order " + std::to_string(order + 1),
+                    Material::Arch,
+                    swept(arch_path(-0.1, order_radius(order), 0.025),
+                          [order](double along) { return order_profile(order, along); }),
+                    0.3);
+  }
+  const double r = kWallRadius;
+  mason.add_stone("hood mould",
+                  Material::Arch,
+                  swept(arch_path(kSpringing, r, 0.03),
+                        [r](double) {
+                          return std::vector<Vector2d>{{r - 0.01, 0.1},
+                                                       {r - 0.01, -0.05},
+                                                       {r + 0.05, -0.13},
+                                                       {r + 0.15, -0.15},
+                                                       {r + 0.20, -0.11},
+                                                       {r + 0.20, 0.1}};
+                        }),
+                  0.08);
+  for (uint32_t i = 0; i < 19; ++i) {
+    const double angle = pi * (0.04 + 0.92 * i / 18);
+    const double size = 0.055 + 0.03 * static_cast<double>(uniform(i, 5));
+    const Lathe ball{.profile = {{0.2 * size, -size},
+                                 {0.7 * size, -0.7 * size},
+                                 {size, 0},
+                                 {0.7 * size, 0.7 * size},
+                                 {0.2 * size, size}},
+                     .sides = 20};
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation() << (r + 0.1) * std::cos(angle), -0.16,
+        kSpringing + (r + 0.1) * std::sin(angle);
+    pose.rotate(Eigen::AngleAxisd(angle, Vector3d::UnitY()));
+    mason.add_stone(
+        "ball " + std::to_string(i + 1), Material::Carved, moved(lathed(ball), pose), 0.04);
+  }
+}
+
+// Shaft patterns: twisted, diapered, fluted, plain; with the leaves of the capital on top.
+double shaft_carving(uint32_t kind, double angle, double z) {
+  const double capital = kSpringing - 0.12 - 0.42;
+  if (z > capital) {
+    const double t = (z - capital) / 0.42;
+    const double leaves = std::abs(std::cos((2.0 + kind % 3U) * angle + (t > 0.5 ? 0.8 : 0.0)));
+    return 1 + 0.22 * (leaves - 0.5) * std::sin(pi * std::min(1.0, 2 * std::fmod(t, 0.5) + 0.1));
+  }
+  if (z < kThreshold + 0.28) return 1;
+  switch (kind % 4U) {
+    case 0:
+      return 1 + 0.09 * std::sin(3 * angle + 11 * z);
+    case 1:
+      return 1 + 0.08 * triangle_wave(0.6366 * angle + 2.6 * z) *
+                     triangle_wave(0.6366 * angle - 2.6 * z);
+    case 2:
+      return 1 + 0.06 * std::cos(10 * angle);
+    default:
+      return 1;
+  }
+}
+
+TriangleMesh column(uint32_t kind) {
+  Lathe lathe{.profile = {}, .sides = 64, .carving = [kind](double angle, double z) {
+                return shaft_carving(kind, angle, z);
+              }};
+  const double foot = kThreshold;
+  lathe.profile = {{0.150, foot - 0.1},
+                   {0.150, foot + 0.08},
+                   {0.165, foot + 0.10},
+                   {0.170, foot + 0.13},
+                   {0.160, foot + 0.16},
+                   {0.130, foot + 0.18},
+                   {0.125, foot + 0.20},
+                   {0.135, foot + 0.22},
+                   {0.130, foot + 0.245},
+                   {0.105, foot + 0.26}};
+  const double neck = kSpringing - 0.12 - 0.42;
+  for (double z = foot + 0.29; z < neck - 0.06; z += 0.025) lathe.profile.emplace_back(0.098, z);
+  lathe.profile.insert(
+      lathe.profile.end(),
+      {{0.098, neck - 0.05}, {0.120, neck - 0.035}, {0.120, neck - 0.01}, {0.100, neck}});
+  for (int i = 1; i <= 20; ++i) {
+    const double t = i / 20.0;
+    lathe.profile.emplace_back(0.10 + 0.075 * t * t + 0.02 * std::sin(pi * t), neck + 0.44 * t);
+  }
+  return lathed(lathe);
+}
+
+void add_columns(Mason& mason) {
+  for (int side = -1; side <= 1; side += 2) {
+    const std::string which = side < 0 ? " left" : " right";
+    for (int order = 0; order < kOrders; ++order) {
+      const double x = order_radius(order) + kStep;  // the corner the column stands in
+      const double y = order_front(order);
+      const auto kind = static_cast<uint32_t>(order + (side < 0 ? 0 : 1));
+      Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+      pose.translation() << side * (x - 0.125), y - 0.125, 0;
+      const std::string number = std::to_string(order + 1);
+      mason.add_stone(
+          "column" + which + ' ' + number, Material::Carved, moved(column(kind), pose), 0.1);
+      const double inner = side * (order_radius(order) - 0.04);
+      const double outer = side * (x + 0.06);
+      mason.add_stone("impost" + which + ' ' + number,
+                      Material::Arch,
+                      box({std::min(inner, outer), y - 0.30, kSpringing - 0.12},
+                          {std::max(inner, outer), kBack, kSpringing}),
+                      0.06);
+    }
+  }
+  Lathe pillar{.profile = {}, .sides = 64, .carving = [](double angle, double z) {
+                 return 1 + 0.10 * std::sin(4 * angle - 7 * z) + 0.05 * std::sin(23 * z);
+               }};
+  for (double z = kThreshold - 0.05; z < 2.12; z += 0.03) pillar.profile.emplace_back(0.15, z);
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() << 0, 1.20, 0;
+  mason.add_stone("middle pillar", Material::Carved, moved(lathed(pillar), pose), 0.1);
+}
+
+struct Panel {
+  Relief relief;
+  Vector3d place = Vector3d::Zero();  // of its lower middle
+};
+
+void add_panel(Mason& mason, const std::string& name, Panel panel, Material material) {
+  panel.relief.depth = 0.15;
+  panel.place.y() -= 0.01;
+  const Eigen::Isometry3d pose(Eigen::Translation3d(panel.place));
+  mason.add(name, material, moved(carved(panel.relief), pose));
+}
+
+void add_reliefs(Mason& mason) {
+  const double r = order_radius(kOrders - 1);
+  const auto height = [r](double x, double z) { return tympanum_height(x, z, r); };
+  add_panel(mason,
+            "tympanum",
+            {{.width = 2 * r + 0.3, .top = r + 0.15, .height = height}, {0, 1.25, kSpringing}},
+            Material::Carved);
+  const auto frieze = [](double x, double z) { return frieze_height(x, z, 0.40, 3); };
+  add_panel(mason,
+            "lintel",
+            {{.width = 2 * r + 0.3, .top = 0.40, .height = frieze}, {0, 1.15, kSpringing - 0.38}},
+            Material::Carved);
+  add_panel(
+      mason,
+      "door",
+      {{.width = 2 * r + 0.3, .top = 1.7, .spacing = 0.02, .height = door_height}, {0, 1.42, 0.44}},
+      Material::Wood);
+  for (int side = -1; side <= 1; side += 2) {
+    const std::string which = side < 0 ? " left" : " right";
+    const uint32_t seed = side < 0 ? 21 : 57;
+    const auto medallion = [seed](double x, double z) {
+      return medallion_height(x, z, 0.42, seed);
+    };
+    add_panel(mason,
+              "medallion" + which,
+              {{.width = 0.84, .top = 0.84, .height = medallion}, {side * 2.52, 0, 4.08}},
+              Material::Carved);
+    const auto figure = [seed](double x, double z) { return figure_height(x, z, 1.25, seed); };
+    add_panel(mason,
+              "figure" + which,
+              {{.width = 0.50, .top = 1.25, .height = figure}, {side * 3.42, -0.45, 1.35}},
+              Material::Carved);
+    const auto band = [seed](double x, double z) { return frieze_height(x, z, 0.46, seed); };
+    add_panel(mason,
+              "band" + which,
+              {{.width = 0.50, .top = 0.46, .height = band}, {side * 3.42, -0.45, 2.85}},
+              Material::Carved);
+  }
+}
+
+void add_buttresses(Mason& mason) {
+  for (int side = -1; side <= 1; side += 2) {
+    const std::string which = side < 0 ? " left" : " right";
+    const auto rectangle = [side](double grow, double front, double z) {
+      const double x = side * 3.42;
+      return Loop{{x - 0.33 - grow, front, z},
+                  {x + 0.33 + grow, front, z},
+                  {x + 0.33 + grow, 0.3, z},
+                  {x - 0.33 - grow, 0.3, z}};
+    };
+    mason.add_stone(
+        "buttress" + which,
+        Material::Ashlar,
+        loft({rectangle(0, -0.45, -0.1), rectangle(0, -0.45, 3.7), rectangle(0, -0.05, 4.3)},
+             LoftEnds::Capped),
+        0.08);
+    mason.add_stone(
+        "buttress foot" + which,
+        Material::Ashlar,
+        loft(
+            {rectangle(0.12, -0.58, -0.1), rectangle(0.12, -0.58, 0.55), rectangle(0, -0.45, 0.68)},
+            LoftEnds::Capped),
+        0.08);
+    mason.add_stone("string" + which,
+                    Material::Arch,
+                    loft({rectangle(0.05, -0.51, 2.64),
+                          rectangle(0.08, -0.54, 2.70),
+                          rectangle(0.08, -0.54, 2.78),
+                          rectangle(0, -0.46, 2.84)},
+                         LoftEnds::Capped),
+                    0.06);
+  }
+}
+
+void add_cornice(Mason& mason) {
+  mason.add_stone(
+      "cornice", Material::Ashlar, box({-kHalfWidth, -0.26, 5.12}, {kHalfWidth, 0.2, 5.36}), 0.20);
+  for (int i = -14; i <= 14; ++i) {
+    const uint32_t h = mixed(static_cast<uint32_t>(i), 17);
+    const double x = 0.46 * i + 0.06 * (static_cast<double>(uniform(h, 1)) - 0.5);
+    const double low = 4.86 + 0.05 * static_cast<double>(uniform(h, 2));
+    const std::string name = "corbel " + std::to_string(i + 15);
+    if (h % 3U == 0) {
+      mason.add_stone(
+          name, Material::Carved, box({x - 0.09, -0.20, low}, {x + 0.09, 0.1, 5.15}), 0.05);
+      continue;
+    }
+    const double lobes = 2 + static_cast<double>(h % 5U);
+    Lathe head{.profile = {}, .sides = 40, .carving = [=](double angle, double z) {
+                 return 1 + 0.12 * std::sin(lobes * angle + 9 * z);
+               }};
+    for (int k = 0; k <= 14; ++k) {
+      const double t = k / 14.0;
+      head.profile.emplace_back(0.05 + 0.10 * std::sqrt(std::sin(0.3 + 1.9 * t)),
+                                low + (5.14 - low) * t);
+    }
+    const Eigen::Isometry3d pose(Eigen::Translation3d(x, -0.06, 0));
+    mason.add_stone(name, Material::Carved, moved(lathed(head), pose), 0.08);
+  }
+}
+
+void add_font(Mason& mason) {
+  Lathe font{.profile = {{0.34, -0.05}, {0.34, 0.10}, {0.27, 0.16}, {0.22, 0.24}}, .sides = 96};
+  for (double z = 0.26; z < 0.60; z += 0.02) font.profile.emplace_back(0.18, z);
+  for (int i = 0; i <= 16; ++i) {
+    const double t = i / 16.0;
+    font.profile.emplace_back(0.20 + 0.22 * std::sqrt(std::sin(0.5 * pi * t)), 0.62 + 0.38 * t);
+  }
+  font.profile.insert(font.profile.end(),
+                      {{0.44, 1.02},
+                       {0.45, 1.08},
+                       {0.42, 1.11},
+                       {0.37, 1.11},
+                       {0.34, 1.05},
+                       {0.28, 0.95},
+                       {0.1, 0.92}});
+  font.carving = [](double angle, double z) {
+    if (z < 0.25 || z > 1.0) return 1.0;
+    if (z < 0.61) return 1 + 0.09 * std::sin(6 * angle + 16 * z);
+    return 1 + 0.05 * std::abs(std::sin(5.5 * angle)) * std::sin(pi * (z - 0.6) / 0.4) +
+           0.02 * std::sin(17 * angle + 30 * z);
+  };
+  const Eigen::Isometry3d pose(Eigen::Translation3d(-1.75, -2.05, 0));
+  mason.add_stone("font", Material::Carved, moved(lathed(font), pose), 0.06);
+}
+
+// Turned about the vertical by `yaw`, and the local z axis laid to point forward (-y).
+Eigen::Isometry3d facing_front(const Vector3d& place, double yaw) {
+  Eigen::Isometry3d pose(Eigen::Translation3d{place});
+  pose.rotate(Eigen::AngleAxisd(yaw, Vector3d::UnitZ()));
+  pose.rotate(Eigen::AngleAxisd(pi / 2, Vector3d::UnitX()));
+  return pose;
+}
+
+void add_machine_parts(Mason& mason) {
+  mason.add_stone("plinth", Material::Ashlar, box({1.05, -2.35, -0.05}, {2.45, -1.65, 0.55}), 0.08);
+  const auto add_exact =
+      [&](const std::string& name, TriangleMesh mesh, const Eigen::Isometry3d& pose) {
+        refine(mesh, 0.06);
+        mason.add(name, Material::Painted, moved(mesh, pose));
+      };
+  const BoredBlock block{
+      .size = {0.52, 0.50, 0.36}, .wide_radius = 0.17, .narrow_radius = 0.11, .step_depth = 0.13};
+  add_exact("bored block", bored_block(block), facing_front({1.42, -1.86, 0.80}, 0.25));
+  add_exact(
+      "base plate", box({1.10, -2.31, 0.54}, {1.74, -1.72, 0.60}), Eigen::Isometry3d::Identity());
+  const Flange plate{.rim_radius = 0.29,
+                     .bore_radius = 0.11,
+                     .hole_radius = 0.032,
+                     .hole_circle = 0.22,
+                     .thickness = 0.06};
+  const Eigen::Isometry3d pipe_pose = facing_front({2.08, -1.75, 0.85}, -0.30);
+  add_exact("flange", flange(plate), pipe_pose * Eigen::Translation3d(0, 0, 0.34));
+  const auto circle = [](double radius, double z) {
+    Loop loop;
+    for (int i = 0; i < 96; ++i) {
+      loop.emplace_back(radius * std::cos(2 * pi * i / 96), radius * std::sin(2 * pi * i / 96), z);
+    }
+    return loop;
+  };
+  add_exact("pipe",
+            loft({circle(0.15, 0), circle(0.15, 0.36), circle(0.11, 0.36), circle(0.11, 0)},
+                 LoftEnds::Joined),
+            pipe_pose);
+  add_exact("saddle", box({1.98, -2.0, 0.54}, {2.20, -1.75, 0.74}), Eigen::Isometry3d::Identity());
+}
+
+void add_ironwork(Mason& mason) {
+  for (int side = -1; side <= 1; side += 2) {
+    const std::string which = side < 0 ? " left" : " right";
+    for (int i = 0; i < 2; ++i) {
+      const double z = 0.85 + 0.75 * i;
+      const double inner = side * 0.30;
+      const double outer = side * 1.35;
+      TriangleMesh strap =
+          box({std::min(inner, outer), 1.35, z}, {std::max(inner, outer), 1.45, z + 0.07});
+      refine(strap, 0.05);
+      mason.add("hinge" + which + " " + std::to_string(i + 1), Material::Iron, strap);
+    }
+    std::vector<Loop> loops;
+    for (int i = 0; i < 32; ++i) {
+      Loop loop;
+      for (int k = 0; k < 10; ++k) {
+        const double r = 0.10 + 0.016 * std::cos(2 * pi * k / 10);
+        loop.emplace_back(side * 0.38 + r * std::cos(2 * pi * i / 32),
+                          1.36 + 0.016 * std::sin(2 * pi * k / 10),
+                          1.35 + r * std::sin(2 * pi * i / 32));
+      }
+      loops.push_back(loop);
+    }
+    mason.add("ring" + which, Material::Iron, loft(loops, LoftEnds::Joined));
+  }
+}
+
+}  // namespace
+
+PortalScene portal_scene() {
+  PortalScene scene;
+  Mason mason(scene);
+  add_wall(mason);
+  add_ground(mason);
+  add_arch(mason);
+  add_columns(mason);
+  add_reliefs(mason);
+  add_buttresses(mason);
+  add_cornice(mason);
+  add_font(mason);
+  add_machine_parts(mason);
+  add_ironwork(mason);
+  scene.bvh = build_bvh(scene.mesh);
+  return scene;
+}
+
+TriangleMesh part_mesh(const PortalScene& scene, const PortalPart& part) {
+  TriangleMesh mesh;
+  const auto vertex = scene.mesh.vertices.begin() + part.first_vertex;
+  mesh.vertices.assign(vertex, vertex + part.vertex_count);
+  for (uint32_t f = part.first_face; f < part.first_face + part.face_count; ++f) {
+    const auto& face = scene.mesh.faces[f];
+    mesh.faces.push_back(
+        {face[0] - part.first_vertex, face[1] - part.first_vertex, face[2] - part.first_vertex});
+  }
+  return mesh;
+}
+
+}  // namespace cgs

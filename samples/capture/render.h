@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "samples/capture/portal.h"
+
+#include "libcgs/core/camera.h"
+
+namespace cgs {
+
+/// Share of the sky that each vertex of the scene sees, in [0, 1], cosine-weighted; things farther
+/// away than a metre and a half do not count.
+std::vector<float> sky_visibility(const PortalScene& scene);
+
+/// A photograph: sun with shadows and sky on matt surfaces, averaged over 2 x 2 samples per pixel,
+/// sRGB-coded, with sensor noise of half a grey level that depends on `seed`, rounded to 8 bits.
+///
+/// \param sky  from sky_visibility(scene)
+ColorImage render_view(const PortalScene& scene,
+                       const std::vector<float>& sky,
+                       const Camera& camera,
+                       uint32_t seed);
+
+}  // namespace cgs
