@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The whole chain on the portal capture, measured against its truth. CTest runs every test in a
+// process of its own, so the run is kept in the build folder and resumed.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "samples/capture/files.h"
+#include "tests/support/portal_measurement.h"
+#include "tests/support/run_cgs.h"
+
+namespace cgs {
+namespace {
+
+using test::run_cgs;
+using nlohmann::ordered_json;
+
+const std::filesystem::path kCapture = std::filesystem::path(CGS_TEST_FOLDER) / "capture";
+const std::filesystem::path kRun = std::filesystem::path(CGS_TEST_FOLDER) / "run";
+
+void make_capture(const std::filesystem::path& folder, int downscale) {
+  if (std::filesystem::exists(folder / "capture.json")) return;
+  const auto views = capture_views(downscale);
+  write_capture(folder, portal_scene(), views, input_cameras(views));
+}
+
+std::string run_arguments(const std::filesystem::path& capture, const std::filesystem::path& out) {
+  return "run " + capture.string() + " --views view_01,view_02,view_03 --assume-unit m -q -o " +
+         out.string();
+}
+
+TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
+  make_capture(kCapture, 1);
+  std::filesystem::remove_all(kRun);
+  const auto result = run_cgs(run_arguments(kCapture, kRun));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+
+  const auto m = test::measure_portal(kRun);
+  for (const auto& view : m.inputs) EXPECT_GE(view.depth_within_1_percent, 0.90) << view.name;
+  EXPECT_GE(m.hole_iou, 0.90);
+  EXPECT_LE(std::abs(m.volume.relative_error), 0.02);
+  EXPECT_LE(m.volume.missed, 0.01);
+
+  const auto report = ordered_json::parse(test::read_bytes(kRun / "report.json"));
+  const auto& certificate = report["certificate"];
+  for (const auto* property : {"passed", "closed", "edge_manifold", "vertex_manifold", "oriented"}) {
+    EXPECT_TRUE(certificate[property].get<bool>()) << property;
+  }
+  EXPECT_EQ(certificate["self_intersections"], 0);
+  EXPECT_GT(certificate["area_inferred"].get<double>(), 0);
+  EXPECT_NE(report["model"]["description"].get<std::string>().find("not optimised"),
+            std::string::npos);
+}
+
+TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
+  const auto capture = kCapture.string() + "_small";
+  make_capture(capture, 3);
+  const test::TempDir dir;
+  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "out")).exit_code, 0);
+  const auto splats_written = std::filesystem::last_write_time(dir / "out/model/gaussians.ply");
+  const auto glb = test::read_bytes(dir / "out/web/asset.glb");
+  std::filesystem::remove(dir / "out/web/asset.glb");
+  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "out")).exit_code, 0);
+  EXPECT_EQ(test::read_bytes(dir / "out/web/asset.glb"), glb);
+  EXPECT_EQ(std::filesystem::last_write_time(dir / "out/model/gaussians.ply"), splats_written);
+}
+
+TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
+  const auto capture = kCapture.string() + "_small";
+  make_capture(capture, 3);
+  const test::TempDir dir;
+  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "1") + " --threads 1").exit_code, 0);
+  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "3") + " --threads 3").exit_code, 0);
+  for (const auto* file : {"model/gaussians.ply",
+                           "views/view_04.exr",
+                           "volume.vdb",
+                           "mesh/surface.ply",
+                           "mesh/watertight.ply",
+                           "mesh/watertight.stl",
+                           "web/asset.glb"}) {
+    EXPECT_TRUE(test::read_bytes(dir / "1" / file) == test::read_bytes(dir / "3" / file)) << file;
+  }
+}
+
+TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
+  const auto capture = kCapture.string() + "_small";
+  make_capture(capture, 3);
+  const test::TempDir dir;
+  const auto result = run_cgs("run " + capture + " --views 0,1,2 --json -o " + (dir / "out").string());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
+  EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.3mf"));
+  EXPECT_NE(result.err.find("--assume-unit"), std::string::npos);
+  EXPECT_EQ(ordered_json::parse(result.out)["units"], "unknown");
+}
+
+TEST(Portal, StagesByHandGiveTheFilesOfARun) {
+  const auto capture = kCapture.string() + "_small";
+  make_capture(capture, 3);
+  const test::TempDir dir;
+  const std::string out = dir.path().string();
+  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "run")).exit_code, 0);
+  ASSERT_EQ(run_cgs("train " + capture + " --views view_01,view_02,view_03 --assume-unit m -q -o " +
+                    out + "/model")
+                .exit_code,
+            0);
+  EXPECT_EQ(run_cgs("render " + out + "/model -q -o " + out + "/views").exit_code, 0);
+  EXPECT_EQ(run_cgs("fuse " + out + "/model -q -o " + out + "/volume.vdb").exit_code, 0);
+  EXPECT_EQ(run_cgs("mesh " + out + "/volume.vdb --up 0 0 1 -q -o " + out + "/mesh").exit_code, 0);
+  const auto evaluation = run_cgs("evaluate " + out + "/model -q --json");
+  ASSERT_EQ(evaluation.exit_code, 0) << evaluation.err;
+  const auto mean = ordered_json::parse(evaluation.out)["mean"];
+  for (const auto* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction"}) {
+    EXPECT_TRUE(mean[key].is_number()) << key;
+  }
+  for (const auto* file :
+       {"model/gaussians.ply", "views/view_05.exr", "mesh/surface.ply", "mesh/watertight.ply"}) {
+    EXPECT_TRUE(test::read_bytes(dir / file) == test::read_bytes(dir / "run" / file)) << file;
+  }
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "samples/capture/compare.h"
+
+namespace cgs::test {
+
+/// How far the result of a run on the portal capture is from the capture's truth.
+struct PortalMeasurement {
+  struct InputView {
+    std::string name;
+    double depth_within_1_percent = 0;  ///< Of pixels that two input views or more see.
+  };
+  struct HeldOutView {
+    std::string name;
+    double true_hole_fraction = 0;
+    double hole_fraction = 0;
+    double hole_iou = 0;
+  };
+  std::vector<InputView> inputs;
+  std::vector<HeldOutView> held_out;
+  double depth_within_1_percent = 0;  ///< Mean over the input views.
+  double hole_iou = 0;  ///< Over the pixels of all held-out views together.
+  ObservedVolumeError volume;
+};
+
+/// Reads views/<name>.exr and mesh/watertight.ply of a run on the full-size capture (three inputs,
+/// --assume-unit m) and compares them with the truth, which is computed anew.
+/// \throws BadInput if the run is not complete
+PortalMeasurement measure_portal(const std::filesystem::path& run_folder);
+
+}  // namespace cgs::test
