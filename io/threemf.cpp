@@ -5,11 +5,13 @@
 #include <array>
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Model/COM/NMR_DLLInterfaces.h>
 
 #include "io/atomic_file.h"
+#include "io/content_uuid.h"
 #include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
 
@@ -92,6 +94,9 @@ void set_materials(NMR::PLib3MFBase* model, NMR::PLib3MFBase* object, const Tria
     check(NMR::lib3mf_basematerial_addmaterialutf8(
               group.get(), name.c_str(), red, green, blue, &index.at(i)),
           "add a material");
+    check(NMR::lib3mf_basematerial_setdisplaycolorrgba(
+              group.get(), index.at(i), red, green, blue, 255),
+          "make a material opaque");
   }
   DWORD group_id = 0;
   check(NMR::lib3mf_resource_getresourceid(group.get(), &group_id), "name the materials");
@@ -111,6 +116,19 @@ void set_materials(NMR::PLib3MFBase* model, NMR::PLib3MFBase* object, const Tria
   check(NMR::lib3mf_defaultpropertyhandler_setbasematerial(
             defaults.get(), group_id, index.at(static_cast<size_t>(Provenance::Observed))),
         "label the object");
+}
+
+/// The library would draw them at random.
+void set_uuids(NMR::PLib3MFBase* model,
+               NMR::PLib3MFBase* object,
+               NMR::PLib3MFBase* item,
+               const TriangleMesh& mesh) {
+  const std::string_view content(reinterpret_cast<const char*>(mesh.vertices.data()),
+                                 mesh.vertices.size() * sizeof(mesh.vertices[0]));
+  const auto uuid = [&](const char* purpose) { return content_uuid(content, purpose); };
+  check(NMR::lib3mf_object_setuuidutf8(object, uuid("object").c_str()), "name the object");
+  check(NMR::lib3mf_builditem_setuuidutf8(item, uuid("item").c_str()), "name the item");
+  check(NMR::lib3mf_model_setbuilduuidutf8(model, uuid("build").c_str()), "name the build");
 }
 
 /// The file as it grows; the library seeks back to complete zip headers.
@@ -161,6 +179,7 @@ void write_3mf(const std::filesystem::path& path,
   }
   Handle item;
   check(NMR::lib3mf_model_addbuilditem(model.get(), object.get(), nullptr, item.out()), "build");
+  set_uuids(model.get(), object.get(), item.get(), mesh);
   Handle writer;
   check(NMR::lib3mf_model_querywriter(model.get(), "3mf", writer.out()), "write");
   Buffer buffer;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/vdb.h"
 
-#include <array>
-#include <cstdio>
 #include <ios>
 #include <sstream>
 #include <string_view>
@@ -11,6 +9,7 @@
 #include <openvdb/io/Stream.h>
 
 #include "io/atomic_file.h"
+#include "io/content_uuid.h"
 
 namespace cgs {
 
@@ -33,30 +32,6 @@ class SeekableArchive : public openvdb::io::Archive {
     Archive::write(out, grids, /*seekable=*/true, metadata);
   }
 };
-
-/// FNV-1a, 64 bits.
-uint64_t hash(std::string_view bytes, uint64_t state) {
-  for (const char c : bytes) state = (state ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-  return state;
-}
-
-/// The library stamps every file with a random UUID; one made from the content serves as well and
-/// keeps equal content equal.
-void stamp_uuid(std::string& bytes) {
-  const std::string_view body = std::string_view(bytes).substr(kUuidOffset + kUuidLength);
-  const uint64_t a = hash(body, 0xcbf29ce484222325u);
-  const uint64_t b = hash(body, ~a);
-  std::array<char, kUuidLength + 1> text{};
-  std::snprintf(text.data(),
-                text.size(),
-                "%08x-%04x-8%03x-8%03x-%012llx",
-                static_cast<unsigned>(a >> 32),
-                static_cast<unsigned>((a >> 16) & 0xffff),
-                static_cast<unsigned>(a & 0xfff),
-                static_cast<unsigned>(b >> 52),
-                static_cast<unsigned long long>(b & 0xffffffffffffu));  // NOLINT
-  bytes.replace(kUuidOffset, kUuidLength, text.data(), kUuidLength);
-}
 
 void screen_header(std::string_view bytes, const std::filesystem::path& path) {
   ByteReader reader(bytes, path);
@@ -90,7 +65,9 @@ void write_vdb(const std::filesystem::path& path,
   out.exceptions(std::ios::badbit | std::ios::failbit);
   SeekableArchive().write_to(out, grids, file_metadata);
   std::string bytes = std::move(out).str();
-  stamp_uuid(bytes);
+  // The library stamps every file with a random UUID.
+  const std::string_view body = std::string_view(bytes).substr(kUuidOffset + kUuidLength);
+  bytes.replace(kUuidOffset, kUuidLength, content_uuid(body));
   write_file(path, bytes);
 }
 

@@ -109,7 +109,8 @@ void write_view_exr(const std::filesystem::path& path,
   file_from_cam.translation() = frame.file_from_internal(camera.center());
   const Eigen::Matrix4d cam_from_file = file_from_cam.inverse().matrix();
   const Eigen::Vector4d y_up(1, -1, 1, 1);
-  image.world_to_camera = (y_up.asDiagonal() * cam_from_file).cast<float>();
+  const Eigen::Matrix4f left_handed = (y_up.asDiagonal() * cam_from_file).cast<float>();
+  image.world_to_camera = left_handed.array() + 0.0f;  // no negative zeros
   image.text = {{"cgs:worldToCamera", numbers(cam_from_file)},
                 {"cgs:K", numbers(camera.K())},
                 {"cgs:units", frame.unit_name()},
