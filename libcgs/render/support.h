@@ -28,9 +28,14 @@ struct SupportOptions {
 /// Fills support and hole of a rendered view.
 ///
 /// The surface of a pixel is its median depth (its mean depth where that is unknown). An input view
-/// supports the pixel if the point projects into its image and its own depth there agrees: the
-/// point is neither in front of what the view saw (a contradiction) nor behind it (occluded), by
-/// more than max(relative_tolerance * depth, sigma_factor * sigma).
+/// supports the pixel if the point projects into its image and its own depth at that very pixel
+/// agrees: the point is neither in front of what the view saw (a contradiction) nor behind it
+/// (occluded) by more than max(relative_tolerance * depth, sigma_factor * sigma), plus what a
+/// slanted surface changes over 1.5 pixels.
+///
+/// Blended Gaussians have soft rims, so that a pixel beside a silhouette may show what is not quite
+/// there. Where no view agrees at the very pixel but one does in the 3x3 around it, the pixel is
+/// therefore judged by the best of the depths drawn within two pixels.
 ///
 /// \param buffers  as rasterize() gives them for `camera`
 /// \param views    the input views only: a virtual camera is no witness

@@ -58,11 +58,12 @@ TEST(ProjectGaussians, PutsTheGaussianOfAPixelOnItsCentre) {
     const Camera camera = camera_at({far, -far, 0});
     for (int y = 0; y < camera.height; y += 13) {
       for (int x = 0; x < camera.width; x += 17) {
-        const Eigen::Vector3f p = camera.unproject(x + 0.5, y + 0.5, 0.75).cast<float>();
+        const Eigen::Vector3d p = camera.unproject(x + 0.5, y + 0.5, 0.75);
+        const Gaussians g = one(p.cast<float>(), Eigen::Vector3f::Constant(0.01f));
+        const ProjectedGaussians projected = project_gaussians(g, camera);
         // Rounding the position to float moves the pixel; projecting it must not.
-        const Eigen::Vector3d rounded = p.cast<double>();
+        const Eigen::Vector3d rounded = g.position[0].cast<double>();
         const Eigen::Vector3d truth = camera.project(rounded);
-        const auto projected = project_gaussians(one(p, Eigen::Vector3f::Constant(0.01f)), camera);
         EXPECT_NEAR(projected.splats[0].u, truth.x(), 1e-9);
         EXPECT_NEAR(projected.splats[0].v, truth.y(), 1e-9);
         if (far == 0) EXPECT_NEAR(projected.splats[0].u, x + 0.5, 1e-5);
@@ -75,7 +76,7 @@ TEST(ProjectGaussians, PutsTheGaussianOfAPixelOnItsCentre) {
 TEST(ProjectGaussians, OfExactPositionsGivesExactPixelCentres) {
   Camera camera{.width = 64, .height = 32, .fx = 64, .fy = 64, .cx = 32, .cy = 16};
   for (int x = 0; x < 64; ++x) {
-    const auto p = camera.unproject(x + 0.5, 8.5, 0.5).cast<float>();  // representable in float
+    const Eigen::Vector3f p = camera.unproject(x + 0.5, 8.5, 0.5).cast<float>();  // representable in float
     EXPECT_EQ(project_gaussians(one(p, {0.1f, 0.1f, 0.1f}), camera).splats[0].u, x + 0.5);
   }
 }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/render/support.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -17,9 +19,10 @@ namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-// A wall with a box in front of it, in closed form.
+// A wall and a floor with a box in front of the wall, in closed form.
 struct WallAndBox {
   double wall_z = 1.0;
+  double floor_y = 0.15;
   Eigen::AlignedBox3d box{Eigen::Vector3d(-0.12, -0.1, 0.55), Eigen::Vector3d(0.1, 0.12, 0.7)};
 
   // Parameter of the first hit of origin + s * direction, direction.z > 0.
@@ -30,7 +33,9 @@ struct WallAndBox {
     const double enter = a.min(b).maxCoeff();
     const double leave = a.max(b).minCoeff();
     if (enter <= leave && enter > 0) return enter;
-    return (wall_z - origin.z()) / direction.z();
+    const double wall = (wall_z - origin.z()) / direction.z();
+    const double floor = direction.y() > 0 ? (floor_y - origin.y()) / direction.y() : wall;
+    return std::min(wall, floor);
   }
 
   double depth(const Camera& camera, double u, double v) const {
@@ -109,29 +114,6 @@ HoleScore score_holes(const std::vector<Camera>& inputs, const Camera& novel) {
     }
   }
   score.iou = double(both) / double(both + score.missed + score.invented);
-  if (std::getenv("CGS_DUMP")) {
-    static int n = 0;
-    std::string name = std::string(std::getenv("CGS_DUMP")) + std::to_string(n++) + ".ppm";
-    FILE* f = fopen(name.c_str(), "wb");
-    fprintf(f, "P6\n%d %d\n255\n", novel.width, novel.height);
-    for (int y = 0; y < novel.height; ++y) {
-      for (int x = 0; x < novel.width; ++x) {
-        const Eigen::Vector3d point =
-            novel.unproject(x + 0.5, y + 0.5, scene.depth(novel, x + 0.5, y + 0.5));
-        bool seen = false;
-        for (const Camera& camera : inputs) seen = seen || scene.visible(camera, point);
-        const Hole hole = buffers.hole(x, y);
-        unsigned char c[3] = {0, 0, 0};
-        if (!seen) c[1] = 255;
-        if (hole == Hole::Transparent) c[0] = 255;
-        if (hole == Hole::Unsupported) c[2] = 255;
-        if (seen && hole == Hole::None)
-          c[0] = c[1] = c[2] = (unsigned char)(60 * scene.depth(novel, x + 0.5, y + 0.5));
-        fwrite(c, 1, 3, f);
-      }
-    }
-    fclose(f);
-  }
   return score;
 }
 
@@ -139,27 +121,138 @@ std::vector<Camera> three_in_a_row() {
   return {camera_at({-0.06, 0, 0}), camera_at({0, 0, 0}), camera_at({0.06, 0, 0})};
 }
 
-TEST(Dev, Scores) {
-  const std::vector<std::pair<const char*, Camera>> novels = {
-      {"own", camera_at({0, 0, 0})},
-      {"up", camera_at({0, 0.05, 0})},
-      {"up2", camera_at({0.02, 0.1, 0})},
-      {"side", camera_at({0.12, 0, 0})},
+// Novel views in which a good part of the picture was never seen.
+TEST(AnnotateSupport, FindsTheHolesOfExactVisibility) {
+  const std::vector<std::pair<std::string, Camera>> novels = {
+      {"above", camera_at({0, 0.05, 0})},
+      {"far above", camera_at({0.02, 0.1, 0})},
+      {"beside", camera_at({0.12, 0, 0})},
       {"between", camera_at({0.03, 0.01, 0})},
-      {"near", camera_at({0.01, 0.04, 0.2})},
-      {"nearer", camera_at({0.01, 0.04, 0.3})},
-      {"back", camera_at({0.01, 0.04, -0.2})},
-      {"yaw", camera_at({0.15, 0.03, 0}, -0.2)},
+      {"along the floor", camera_at({0.01, 0.12, 0})},
+      {"closer", camera_at({0.01, 0.14, 0.1})},
+      {"farther", camera_at({0.01, 0.04, -0.2})},
+      {"turned", camera_at({0.15, 0.03, 0}, -0.2)},
   };
   for (const auto& [name, camera] : novels) {
-    const HoleScore s = score_holes(three_in_a_row(), camera);
-    printf("%8s iou %.3f truth %zu missed %zu invented %zu\n",
-           name,
-           s.iou,
-           s.truth,
-           s.missed,
-           s.invented);
+    const HoleScore score = score_holes(three_in_a_row(), camera);
+    EXPECT_GT(score.truth, 1000U) << name;
+    EXPECT_GT(score.iou, 0.94) << name << ": " << score.missed << " missed, " << score.invented
+                               << " invented of " << score.truth;
   }
+}
+
+TEST(AnnotateSupport, InventsNoHolesWhereEverythingWasSeen) {
+  for (const Camera& novel :
+       {camera_at({0, 0, 0}), camera_at({0.01, 0.04, 0.2}), camera_at({0.01, 0.04, 0.3})}) {
+    const HoleScore score = score_holes(three_in_a_row(), novel);
+    EXPECT_EQ(score.truth, 0U);
+    EXPECT_EQ(score.invented, 0U);
+  }
+}
+
+TEST(AnnotateSupport, CountsTheViewsThatSeeTheSurface) {
+  const WallAndBox scene;
+  std::vector<SupportView> views;
+  Gaussians g;
+  for (const Camera& camera : three_in_a_row()) {
+    views.push_back(view_of(scene, camera));
+    add_pixels(views.back(), g);
+  }
+  const Camera novel = camera_at({0.02, 0.01, 0});
+  RenderBuffers buffers = rasterize(g, novel);
+  annotate_support(buffers, novel, views);
+  int wrong = 0;
+  for (int y = 0; y < novel.height; ++y) {
+    for (int x = 0; x < novel.width; ++x) {
+      const Eigen::Vector3d point =
+          novel.unproject(x + 0.5, y + 0.5, scene.depth(novel, x + 0.5, y + 0.5));
+      const auto seen_by = std::count_if(views.begin(), views.end(), [&](const SupportView& view) {
+        return scene.visible(view.camera, point);
+      });
+      if (buffers.support(x, y) != seen_by) ++wrong;
+    }
+  }
+  // What remains are silhouettes, a pixel wide.
+  EXPECT_LT(wrong, 0.02 * novel.width * novel.height);
+}
+
+// A rendered view and one witness, both of constant depth, from the same place.
+struct Facing {
+  Camera camera = camera_at({0, 0, 0});
+  RenderBuffers buffers;
+  SupportView view;
+
+  Facing(float drawn, float seen) {
+    const int w = camera.width;
+    const int h = camera.height;
+    buffers.alpha = Raster<float>(w, h, 1);
+    buffers.depth = DepthMap(w, h, drawn);
+    buffers.median_depth = DepthMap(w, h, drawn);
+    view = {camera, DepthMap(w, h, seen), {}};
+  }
+  Hole judged(const SupportOptions& options = {}) {
+    annotate_support(buffers, camera, std::span(&view, 1), options);
+    EXPECT_EQ(buffers.support(9, 7), buffers.hole(9, 7) == Hole::None ? 1 : 0);
+    return buffers.hole(9, 7);
+  }
+};
+
+TEST(AnnotateSupport, DependsOnTheDepthOfTheWitness) {
+  EXPECT_EQ(Facing(1, 1).judged(), Hole::None);
+  EXPECT_EQ(Facing(0.995f, 1).judged(), Hole::None);
+  EXPECT_EQ(Facing(0.9f, 1).judged(), Hole::Unsupported);  // would have hidden what it saw
+  EXPECT_EQ(Facing(1.1f, 1).judged(), Hole::Unsupported);  // hidden from it
+  EXPECT_EQ(Facing(1, kNan).judged(), Hole::Unsupported);
+  EXPECT_EQ(Facing(1.1f, 1).judged({.relative_tolerance = 0.2f}), Hole::None);
+}
+
+TEST(AnnotateSupport, BelievesAnUncertainWitnessMore) {
+  Facing facing(1.1f, 1);
+  facing.view.sigma = DepthMap(facing.camera.width, facing.camera.height, 0.05f);
+  EXPECT_EQ(facing.judged(), Hole::None);
+  EXPECT_EQ(facing.judged({.sigma_factor = 1}), Hole::Unsupported);
+  for (float& sigma : facing.view.sigma.data) sigma = kNan;  // no statement
+  EXPECT_EQ(facing.judged(), Hole::Unsupported);
+}
+
+TEST(AnnotateSupport, CallsPixelsWithoutASurfaceTransparent) {
+  Facing facing(1, 1);
+  facing.buffers.alpha(9, 7) = 0.49f;
+  EXPECT_EQ(facing.judged(), Hole::Transparent);
+  EXPECT_EQ(facing.judged({.min_alpha = 0.4f}), Hole::None);
+  facing.buffers.median_depth(9, 7) = kNan;
+  EXPECT_EQ(facing.judged({.min_alpha = 0.4f}), Hole::None);  // by its mean depth
+  facing.buffers.depth(9, 7) = kNan;
+  EXPECT_EQ(facing.judged({.min_alpha = 0.4f}), Hole::Transparent);
+}
+
+TEST(AnnotateSupport, DoesNotTakeAFloaterForASurface) {
+  // Three pixels that nobody saw, in front of a wall that everybody saw.
+  Facing facing(1, 1);
+  for (int x = 8; x <= 10; ++x) facing.buffers.median_depth(x, 7) = 0.6f;
+  EXPECT_EQ(facing.judged(), Hole::Unsupported);
+  EXPECT_EQ(facing.buffers.hole(12, 7), Hole::None);
+}
+
+TEST(AnnotateSupport, FindsNoWitnessBehindOrBesideItsImage) {
+  Facing facing(1, 1);
+  facing.view.camera.world_from_cam.translation().z() = 2;
+  EXPECT_EQ(facing.judged(), Hole::Unsupported);
+  facing.view.camera.world_from_cam.translation() << 5, 0, 0;
+  EXPECT_EQ(facing.judged(), Hole::Unsupported);
+}
+
+TEST(AnnotateSupport, RefusesSizesThatDisagreeAndOptionsOutOfRange) {
+  Facing facing(1, 1);
+  EXPECT_NO_THROW(SupportOptions{}.validate());
+  EXPECT_THROW((SupportOptions{.min_alpha = 0}.validate()), InvalidInput);
+  EXPECT_THROW((SupportOptions{.sigma_factor = -1}.validate()), InvalidInput);
+  EXPECT_THROW((SupportOptions{.relative_tolerance = kNan}.validate()), InvalidInput);
+  facing.view.sigma = DepthMap(3, 3, 1);
+  EXPECT_THROW(facing.judged(), InvalidInput);
+  facing.view.sigma = {};
+  const Camera other = resized(facing.camera, 10, 10);
+  EXPECT_THROW(annotate_support(facing.buffers, other, {}), InvalidInput);
 }
 
 }  // namespace
