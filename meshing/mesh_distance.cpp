@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/mesh_distance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <tbb/parallel_for.h>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Triangles = std::vector<Kernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
+using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+
+Kernel::Point_3 to_cgal(const Eigen::Vector3f& p) {
+  return {double(p.x()), double(p.y()), double(p.z())};
+}
+
+Triangles triangles(const TriangleMesh& mesh) {
+  CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
+  Triangles out;
+  out.reserve(mesh.faces.size());
+  for (const auto& f : mesh.faces) {
+    const Kernel::Triangle_3 t(
+        to_cgal(mesh.vertices[f[0]]), to_cgal(mesh.vertices[f[1]]), to_cgal(mesh.vertices[f[2]]));
+    if (!t.is_degenerate()) out.push_back(t);
+  }
+  return out;
+}
+
+double face_area(const TriangleMesh& mesh, size_t f) {
+  const auto& face = mesh.faces[f];
+  const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
+  const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>();
+  const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>();
+  const Eigen::Vector3d u = b - a;
+  const Eigen::Vector3d v = c - a;
+  return 0.5 * std::sqrt((u.y() * v.z() - u.z() * v.y()) * (u.y() * v.z() - u.z() * v.y()) +
+                         (u.z() * v.x() - u.x() * v.z()) * (u.z() * v.x() - u.x() * v.z()) +
+                         (u.x() * v.y() - u.y() * v.x()) * (u.x() * v.y() - u.y() * v.x()));
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3f> sample_surface(const TriangleMesh& mesh, size_t count) {
+  std::vector<double> up_to(mesh.faces.size());
+  double sum = 0;
+  for (size_t f = 0; f < up_to.size(); ++f) up_to[f] = sum += face_area(mesh, f);
+  std::vector<Eigen::Vector3f> points;
+  if (!(sum > 0)) return points;
+  points.reserve(count);
+  // The two-dimensional golden ratio sequence (Roberts 2018).
+  constexpr double kStepX = 0.7548776662466927;
+  constexpr double kStepY = 0.5698402909980532;
+  for (size_t i = 0; i < count; ++i) {
+    const double at = sum * (static_cast<double>(i) + 0.5) / static_cast<double>(count);
+    const auto f = std::min(
+        size_t(std::lower_bound(up_to.begin(), up_to.end(), at) - up_to.begin()), up_to.size() - 1);
+    double whole = 0;
+    double u = std::modf(0.5 + kStepX * static_cast<double>(i), &whole);
+    double v = std::modf(0.5 + kStepY * static_cast<double>(i), &whole);
+    if (u + v > 1) {
+      u = 1 - u;
+      v = 1 - v;
+    }
+    const auto& face = mesh.faces[f];
+    const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
+    const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>();
+    const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>();
+    points.emplace_back((a + u * (b - a) + v * (c - a)).cast<float>());
+  }
+  return points;
+}
+
+std::vector<float> distances_to(const TriangleMesh& mesh,
+                                const std::vector<Eigen::Vector3f>& points) {
+  const Triangles soup = triangles(mesh);
+  Tree tree(soup.begin(), soup.end());
+  tree.build();
+  tree.accelerate_distance_queries();
+  std::vector<float> out(points.size());
+  tbb::parallel_for(size_t(0), points.size(), [&](size_t i) {
+    out[i] = static_cast<float>(std::sqrt(tree.squared_distance(to_cgal(points[i]))));
+  });
+  return out;
+}
+
+DistanceStatistics statistics(std::vector<float> distances) {
+  DistanceStatistics out;
+  if (distances.empty()) return out;
+  std::sort(distances.begin(), distances.end());
+  double squares = 0;
+  for (const float d : distances) {
+    out.mean += double(d);
+    squares += double(d) * double(d);
+  }
+  const auto n = static_cast<double>(distances.size());
+  out.mean /= n;
+  out.rms = std::sqrt(squares / n);
+  out.median = double(distances[distances.size() / 2]);
+  out.p95 = double(distances[(distances.size() - 1) * 95 / 100]);
+  out.max = double(distances.back());
+  return out;
+}
+
+MeshDistance mesh_distance(const TriangleMesh& mesh,
+                           const TriangleMesh& reference,
+                           size_t samples) {
+  const auto ours = sample_surface(mesh, samples);
+  const auto theirs = sample_surface(reference, samples);
+  require(!ours.empty(), "mesh_distance needs a mesh with area, its faces", mesh.faces.size());
+  require(!theirs.empty(),
+          "mesh_distance needs a reference with area, its faces",
+          reference.faces.size());
+  return {statistics(distances_to(reference, ours)), statistics(distances_to(mesh, theirs))};
+}
+
+std::vector<float> cast(const TriangleMesh& mesh,
+                        const std::vector<Eigen::Vector3f>& origins,
+                        const std::vector<Eigen::Vector3f>& directions) {
+  require(origins.size() == directions.size(),
+          "cast needs as many directions as origins",
+          directions.size());
+  const Triangles soup = triangles(mesh);
+  Tree tree(soup.begin(), soup.end());
+  tree.build();
+  std::vector<float> out(origins.size(), std::numeric_limits<float>::quiet_NaN());
+  tbb::parallel_for(size_t(0), origins.size(), [&](size_t i) {
+    const Eigen::Vector3d d = directions[i].cast<double>();
+    if (soup.empty() || !(d.squaredNorm() > 0)) return;
+    const Kernel::Ray_3 ray(to_cgal(origins[i]), Kernel::Vector_3(d.x(), d.y(), d.z()));
+    const auto hit = tree.first_intersection(ray);
+    if (!hit) return;
+    const auto* point = boost::get<Kernel::Point_3>(&hit->first);
+    if (point == nullptr) point = &boost::get<Kernel::Segment_3>(hit->first).source();
+    const Eigen::Vector3d p(point->x(), point->y(), point->z());
+    out[i] = static_cast<float>((p - origins[i].cast<double>()).dot(d) / d.squaredNorm());
+  });
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "libcgs/core/triangle_mesh.h"
+
+namespace cgs {
+
+/// Points spread evenly over the area of a mesh, the same for the same mesh and count.
+///
+/// Every point stands for an equal share of the area; within its share it is placed by a
+/// low-discrepancy sequence. Empty if the mesh has no area.
+std::vector<Eigen::Vector3f> sample_surface(const TriangleMesh& mesh, size_t count);
+
+/// Distance from each point to the nearest point of the mesh [internal units].
+/// \pre mesh has faces.
+std::vector<float> distances_to(const TriangleMesh& mesh,
+                                const std::vector<Eigen::Vector3f>& points);
+
+/// Distances in one direction.
+struct DistanceStatistics {
+  double mean = 0;  ///< [internal units], as all.
+  double rms = 0;
+  double median = 0;
+  double p95 = 0;  ///< 95th percentile.
+  double max = 0;  ///< Of the samples; a lower bound of the one-sided Hausdorff distance.
+};
+
+DistanceStatistics statistics(std::vector<float> distances);
+
+/// Two meshes compared by samples in both directions.
+struct MeshDistance {
+  DistanceStatistics accuracy;      ///< From samples of the mesh to the reference.
+  DistanceStatistics completeness;  ///< From samples of the reference to the mesh.
+  double chamfer() const { return 0.5 * (accuracy.mean + completeness.mean); }
+  double hausdorff() const { return std::max(accuracy.max, completeness.max); }
+};
+
+/// \throws InvalidInput if a mesh has no area.
+MeshDistance mesh_distance(const TriangleMesh& mesh, const TriangleMesh& reference, size_t samples);
+
+/// Where rays first meet a mesh.
+///
+/// \param origins, directions   one pair per ray; directions need no unit length
+/// \return  per ray the factor of its direction, >= 0, that leads to the first hit; NaN = no hit.
+/// \throws InvalidInput if the arrays differ in length.
+std::vector<float> cast(const TriangleMesh& mesh,
+                        const std::vector<Eigen::Vector3f>& origins,
+                        const std::vector<Eigen::Vector3f>& directions);
+
+}  // namespace cgs

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "libcgs/core/camera.h"
+#include "libcgs/core/raster.h"
+#include "libcgs/core/triangle_mesh.h"
+
+namespace cgs {
+
+struct PreviewOptions {
+  int width = 960;             ///< [pixels], in [1, 16384]
+  int height = 720;            ///< [pixels], in [1, 16384]
+  bool by_provenance = false;  ///< Draw inferred faces in magenta, interpolated ones in orange.
+
+  /// \throws InvalidInput naming the first field out of range.
+  void validate() const;
+};
+
+/// A picture of a mesh for people: vertex colours (grey without) under a light at the camera, on
+/// white. Both sides of a face are drawn; back sides are darker.
+///
+/// \param camera   scaled to the size in the options; faces that reach behind it are left out
+ColorImage preview(const TriangleMesh& mesh, const Camera& camera, const PreviewOptions& options);
+
+/// A camera that looks at the middle of the bounding box from the side of `reference`, turned
+/// around it by `azimuth_rad` about the vertical axis of the reference picture (positive = to the
+/// right) and raised by `elevation_rad`, as far away as frames the whole mesh.
+///
+/// \pre mesh has vertices.
+Camera overview_camera(const TriangleMesh& mesh,
+                       const Camera& reference,
+                       double azimuth_rad,
+                       double elevation_rad);
+
+}  // namespace cgs

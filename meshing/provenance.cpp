@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/provenance.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+namespace cgs {
+
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+// A weighted mean over those of the eight voxels that have a value.
+template <typename T>
+struct CellMean {
+  T sum;
+  float weight = 0;
+  void add(const T& value, float w) {
+    sum += w * value;
+    weight += w;
+  }
+};
+
+class VolumeProbe {
+ public:
+  explicit VolumeProbe(const Volume& volume)
+      : voxel_(volume.voxel_size),
+        tsdf_(volume.tsdf->getConstAccessor()),
+        support_(volume.support->getConstAccessor()),
+        sigma_(volume.sigma->getConstAccessor()),
+        color_(volume.color->getConstAccessor()) {}
+
+  // Writes the attributes of vertex v; a missing colour becomes NaN.
+  Evidence annotate(TriangleMesh& mesh, size_t v) {
+    const Eigen::Vector3f index = mesh.vertices[v] / voxel_;
+    const Eigen::Vector3f floor = index.array().floor();
+    const Eigen::Vector3f t = index - floor;
+    CellMean<float> distance{0};
+    CellMean<float> sigma{0};
+    CellMean<Eigen::Vector3f> color{Eigen::Vector3f::Zero()};
+    float nearest = std::numeric_limits<float>::max();
+    float support = 0;
+    int inside = 0;
+    int outside = 0;
+    for (int k = 0; k < 8; ++k) {
+      const Eigen::Vector3i d(k & 1, k >> 1 & 1, k >> 2 & 1);
+      const openvdb::Coord at(
+          int(floor.x()) + d.x(), int(floor.y()) + d.y(), int(floor.z()) + d.z());
+      float value = 0;
+      if (!tsdf_.probeValue(at, value)) continue;
+      // A little weight everywhere keeps the mean defined on the faces of the cell.
+      const float w = 1e-3f + (d.x() != 0 ? t.x() : 1 - t.x()) * (d.y() != 0 ? t.y() : 1 - t.y()) *
+                                  (d.z() != 0 ? t.z() : 1 - t.z());
+      distance.add(value, w);
+      ++(value < 0 ? inside : outside);
+      if (std::abs(value) < nearest) {
+        nearest = std::abs(value);
+        support = support_.getValue(at);
+      }
+      float s = 0;
+      if (sigma_.probeValue(at, s)) sigma.add(s, w);
+      openvdb::Vec3f c(0);
+      if (color_.probeValue(at, c)) color.add({c.x(), c.y(), c.z()}, w);
+    }
+    const bool crossing =
+        inside > 0 && outside > 0 && std::abs(distance.sum) <= voxel_ * distance.weight;
+    mesh.support[v] = crossing ? support : 0;
+    mesh.sigma[v] = crossing && sigma.weight > 0 ? sigma.sum / sigma.weight : kNaN;
+    mesh.colors[v].setConstant(kNaN);
+    if (crossing && color.weight > 0) mesh.colors[v] = color.sum / color.weight;
+    if (!crossing) return Evidence::None;
+    return inside + outside == 8 ? Evidence::Full : Evidence::Partial;
+  }
+
+ private:
+  float voxel_;
+  openvdb::FloatGrid::ConstAccessor tsdf_, support_, sigma_;
+  openvdb::Vec3SGrid::ConstAccessor color_;
+};
+
+// The vertices on the other end of every edge, vertex by vertex.
+struct Neighbours {
+  std::vector<size_t> begin;
+  std::vector<uint32_t> vertex;
+};
+
+Neighbours neighbours(const TriangleMesh& mesh) {
+  Neighbours out;
+  out.begin.assign(mesh.vertices.size() + 1, 0);
+  for (const auto& face : mesh.faces) {
+    for (const uint32_t v : face) out.begin[v + 1] += 2;
+  }
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) out.begin[v + 1] += out.begin[v];
+  out.vertex.resize(out.begin.back());
+  std::vector<size_t> next(out.begin.begin(), out.begin.end() - 1);
+  for (const auto& face : mesh.faces) {
+    for (size_t k = 0; k < 3; ++k) {
+      out.vertex[next[face[k]]++] = face[(k + 1) % 3];
+      out.vertex[next[face[k]]++] = face[(k + 2) % 3];
+    }
+  }
+  return out;
+}
+
+void spread_colors(TriangleMesh& mesh) {
+  std::vector<uint32_t> front;
+  for (uint32_t v = 0; v < mesh.colors.size(); ++v) {
+    if (!std::isnan(mesh.colors[v].x())) front.push_back(v);
+  }
+  if (front.empty()) {
+    mesh.colors.clear();
+    return;
+  }
+  const Neighbours around = neighbours(mesh);
+  for (size_t i = 0; i < front.size(); ++i) {
+    const uint32_t v = front[i];
+    for (size_t k = around.begin[v]; k < around.begin[v + 1]; ++k) {
+      const uint32_t w = around.vertex[k];
+      if (!std::isnan(mesh.colors[w].x())) continue;
+      mesh.colors[w] = mesh.colors[v];
+      front.push_back(w);
+    }
+  }
+  // Parts that no coloured vertex is joined to.
+  for (auto& color : mesh.colors) {
+    if (std::isnan(color.x())) color.setConstant(0.5f);
+  }
+}
+
+using Edge = std::array<uint32_t, 2>;
+
+struct FaceSide {
+  Edge edge;
+  uint32_t face;
+  auto operator<=>(const FaceSide&) const = default;
+};
+
+// The face on the other side of each of the three edges of every face; itself at a border.
+std::vector<std::array<uint32_t, 3>> adjacent_faces(const TriangleMesh& mesh) {
+  std::vector<std::pair<FaceSide, uint32_t>> sides;
+  sides.reserve(3 * mesh.faces.size());
+  std::vector<std::array<uint32_t, 3>> out(mesh.faces.size());
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    out[f].fill(f);
+    for (uint32_t k = 0; k < 3; ++k) {
+      const uint32_t a = mesh.faces[f][k];
+      const uint32_t b = mesh.faces[f][(k + 1) % 3];
+      sides.push_back({{{std::min(a, b), std::max(a, b)}, f}, k});
+    }
+  }
+  std::sort(sides.begin(), sides.end());
+  for (size_t i = 0; i + 1 < sides.size(); ++i) {
+    const auto& [a, ka] = sides[i];
+    const auto& [b, kb] = sides[i + 1];
+    if (a.edge != b.edge) continue;
+    out[a.face][ka] = b.face;
+    out[b.face][kb] = a.face;
+  }
+  return out;
+}
+
+Eigen::Vector3d area_vector(const TriangleMesh& mesh, uint32_t f) {
+  const auto& face = mesh.faces[f];
+  const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
+  const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>();
+  const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>();
+  return 0.5 * (b - a).cross(c - a);
+}
+
+// Faces without evidence that hang together over edges.
+struct Patch {
+  std::vector<uint32_t> faces;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // sum of area vectors
+  Eigen::Vector3d rim_direction = Eigen::Vector3d::Zero();
+  double area = 0;
+  bool at_border = false;
+};
+
+class PatchLabeller {
+ public:
+  explicit PatchLabeller(TriangleMesh& mesh)
+      : mesh_(mesh), adjacent_(adjacent_faces(mesh)), seen_(mesh.faces.size(), 0) {}
+
+  void label(double gap) {
+    for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
+      if (seen_[f] != 0 || has_evidence(f)) continue;
+      const Patch patch = patch_from(f);
+      const bool alike = patch.direction.dot(patch.rim_direction) >
+                         0.5 * patch.direction.norm() * patch.rim_direction.norm();
+      if (patch.at_border || !(patch.area <= gap * gap) || !alike || !is_disc(patch)) continue;
+      for (const uint32_t g : patch.faces) interpolated_.push_back(g);
+    }
+    for (const uint32_t f : interpolated_) mesh_.provenance[f] = Provenance::Interpolated;
+  }
+
+ private:
+  bool has_evidence(uint32_t f) const { return mesh_.provenance[f] != Provenance::Inferred; }
+
+  Patch patch_from(uint32_t start) {
+    Patch patch;
+    patch.faces = {start};
+    seen_[start] = 1;
+    for (size_t i = 0; i < patch.faces.size(); ++i) {
+      const uint32_t f = patch.faces[i];
+      const Eigen::Vector3d area = area_vector(mesh_, f);
+      patch.direction += area;
+      patch.area += area.norm();
+      for (const uint32_t g : adjacent_[f]) {
+        if (g == f) patch.at_border = true;
+        if (has_evidence(g)) patch.rim_direction += area_vector(mesh_, g);
+        if (seen_[g] != 0 || has_evidence(g)) continue;
+        seen_[g] = 1;
+        patch.faces.push_back(g);
+      }
+    }
+    return patch;
+  }
+
+  // Euler characteristic 1.
+  bool is_disc(const Patch& patch) const {
+    std::vector<uint32_t> vertices;
+    std::vector<Edge> edges;
+    for (const uint32_t f : patch.faces) {
+      for (size_t k = 0; k < 3; ++k) {
+        const uint32_t a = mesh_.faces[f][k];
+        const uint32_t b = mesh_.faces[f][(k + 1) % 3];
+        vertices.push_back(a);
+        edges.push_back({std::min(a, b), std::max(a, b)});
+      }
+    }
+    const auto distinct = [](auto& items) {
+      std::sort(items.begin(), items.end());
+      return std::unique(items.begin(), items.end()) - items.begin();
+    };
+    return distinct(vertices) - distinct(edges) + std::ptrdiff_t(patch.faces.size()) == 1;
+  }
+
+  TriangleMesh& mesh_;
+  std::vector<std::array<uint32_t, 3>> adjacent_;
+  std::vector<uint8_t> seen_;
+  std::vector<uint32_t> interpolated_;
+};
+
+}  // namespace
+
+std::vector<Evidence> annotate_vertices(TriangleMesh& mesh, const Volume& volume) {
+  const size_t n = mesh.vertices.size();
+  mesh.support.assign(n, 0);
+  mesh.sigma.assign(n, kNaN);
+  mesh.colors.assign(n, Eigen::Vector3f::Zero());
+  std::vector<Evidence> evidence(n, Evidence::None);
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, n, 1024), [&](const auto& range) {
+    VolumeProbe probe(volume);  // Accessors keep a cache, so every task has its own.
+    for (size_t v = range.begin(); v != range.end(); ++v) evidence[v] = probe.annotate(mesh, v);
+  });
+  spread_colors(mesh);
+  return evidence;
+}
+
+void label_faces(TriangleMesh& mesh, const std::vector<Evidence>& evidence, double gap) {
+  mesh.provenance.assign(mesh.faces.size(), Provenance::Inferred);
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    float support = std::numeric_limits<float>::max();
+    bool seen = true;
+    for (const uint32_t v : mesh.faces[f]) {
+      seen = seen && evidence[v] != Evidence::None;
+      support = std::min(support, mesh.support[v]);
+    }
+    if (!seen) continue;
+    mesh.provenance[f] = support >= 2 ? Provenance::Observed : Provenance::SingleView;
+  }
+  PatchLabeller(mesh).label(gap);
+}
+
+}  // namespace cgs

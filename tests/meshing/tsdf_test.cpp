@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/tsdf.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+
+#include "libcgs/core/error.h"
+#include "meshing/isosurface.h"
+#include "tests/support/depth_scenes.h"
+
+namespace cgs {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int kWidth = 160;
+const Vector3d kCenter(0.01, -0.02, 0.03);
+constexpr double kRadius = 0.2;
+
+// Three cameras in front of `shape`, 20 degrees apart.
+std::vector<TsdfView> three_views(const test::Shape& shape, int width = kWidth) {
+  std::vector<TsdfView> views;
+  for (const double x : {-0.3, 0.0, 0.3}) {
+    views.push_back(
+        test::photographed(shape, test::camera_at({x, 0.1 * x, -0.8}, kCenter, width)));
+  }
+  return views;
+}
+
+test::Shape sphere_before_wall() {
+  return test::nearest({test::sphere(kCenter, kRadius), test::plane({0, 0, 1}, 0.35)});
+}
+
+VoxelState state_at(const Volume& volume, const Vector3d& point) {
+  const auto at = volume.state->transform().worldToIndexNodeCentered(
+      openvdb::Vec3d(point.x(), point.y(), point.z()));
+  return static_cast<VoxelState>(volume.state->tree().getValue(at));
+}
+
+bool is_hidden(const Volume& volume, const Vector3d& point) {
+  const auto at = volume.state->transform().worldToIndexNodeCentered(
+      openvdb::Vec3d(point.x(), point.y(), point.z()));
+  return state_at(volume, point) == VoxelState::NeverSeen && volume.state->tree().isValueOn(at);
+}
+
+// Root mean square of `distance` over the vertices [voxels].
+double rms(const TriangleMesh& mesh, double voxel, const std::function<double(Vector3d)>& distance) {
+  double sum = 0;
+  for (const auto& v : mesh.vertices) sum += std::pow(distance(v.cast<double>()) / voxel, 2);
+  return std::sqrt(sum / static_cast<double>(mesh.vertices.size()));
+}
+
+TEST(Fuse, PutsTheZeroCrossingOnASphere) {
+  for (const float truncation : {3.0f, 5.0f, 8.0f}) {
+    const auto fused = fuse(three_views(sphere_before_wall()), {.truncation = truncation});
+    TriangleMesh mesh = open_surface(fused.volume, {});
+    std::erase_if(mesh.vertices, [](const auto& v) { return v.z() > kCenter.z() - 0.05; });
+    ASSERT_GT(mesh.vertices.size(), 1000U);
+    const double voxel = fused.report.voxel_size;
+    EXPECT_LT(rms(mesh, voxel, [](const Vector3d& p) { return (p - kCenter).norm() - kRadius; }),
+              0.1)
+        << truncation;
+  }
+}
+
+TEST(Fuse, PutsTheZeroCrossingOnATiltedPlane) {
+  const Vector3d n = Vector3d(0.4, 0.3, 1).normalized();
+  const auto fused = fuse(three_views(test::plane(n, 0.1)), {});
+  const TriangleMesh mesh = open_surface(fused.volume, {});
+  ASSERT_GT(mesh.vertices.size(), 1000U);
+  EXPECT_LT(rms(mesh, fused.report.voxel_size, [&](const Vector3d& p) { return n.dot(p) - 0.1; }),
+            0.02);
+}
+
+TEST(Fuse, MeshesAPlaneThroughVoxelCentresWithoutDegenerateFaces) {
+  const double voxel = 1.0 / 256;
+  const auto fused =
+      fuse(three_views(test::plane({0, 0, 1}, 8 * voxel)), {.voxel_size = voxel});
+  const TriangleMesh mesh = open_surface(fused.volume, {});
+  ASSERT_GT(mesh.faces.size(), 1000U);
+  for (const auto& f : mesh.faces) {
+    const Eigen::Vector3f u = mesh.vertices[f[1]] - mesh.vertices[f[0]];
+    const Eigen::Vector3f v = mesh.vertices[f[2]] - mesh.vertices[f[0]];
+    ASSERT_GT(u.cross(v).norm(), 0);
+    ASSERT_LT(u.cross(v).z(), 0);  // Outside is where the cameras are.
+  }
+}
+
+TEST(Fuse, TellsFreeFromHiddenFromUnknown) {
+  const auto views = three_views(sphere_before_wall());
+  const auto fused = fuse(views, {});
+  const Volume& v = fused.volume;
+  EXPECT_EQ(state_at(v, kCenter - Vector3d(0, 0, kRadius)), VoxelState::Occupied);
+  EXPECT_EQ(state_at(v, kCenter - Vector3d(0, 0, kRadius + 0.1)), VoxelState::Free);
+  EXPECT_TRUE(is_hidden(v, kCenter));
+  EXPECT_TRUE(is_hidden(v, kCenter + Vector3d(0, 0, kRadius + 0.02)));
+  EXPECT_EQ(state_at(v, {kCenter.x(), kCenter.y() + 0.24, 0.2}), VoxelState::Free);
+  // Far to the side no camera looks.
+  EXPECT_EQ(state_at(v, {5, 0, 0}), VoxelState::NeverSeen);
+  EXPECT_FALSE(is_hidden(v, {5, 0, 0}));
+  const TsdfReport& r = fused.report;
+  EXPECT_EQ(r.free + r.occupied + r.hidden + r.unseen, r.voxels);
+  EXPECT_EQ(r.occupied, v.tsdf->activeVoxelCount());
+  EXPECT_GE(r.predicted_bytes, r.actual_bytes);
+}
+
+// The fast path over blocks must agree with the definition, voxel by voxel.
+TEST(Fuse, CountsTheSameStatesInBlocksAsVoxelByVoxel) {
+  const auto views = three_views(sphere_before_wall(), 96);
+  const auto fused = fuse(views, {});
+  const double voxel = fused.report.voxel_size;
+  size_t wrong = 0;
+  size_t checked = 0;
+  const auto box = fused.volume.state->evalActiveVoxelBoundingBox();
+  for (auto it = box.begin(); it; ++it) {
+    const openvdb::Coord at = *it;
+    if ((at.x() * 7 + at.y() * 5 + at.z() * 3) % 11 != 0) continue;
+    const Vector3d p = voxel * Vector3d(at.x(), at.y(), at.z());
+    bool clearly_free = false;
+    bool clearly_hidden = true;
+    for (const TsdfView& view : views) {
+      const Vector3d uvz = view.camera.project(p);
+      if (!view.camera.sees(uvz)) {
+        clearly_hidden = false;
+        continue;
+      }
+      const double d = double(view.depth(int(uvz.x()), int(uvz.y())));
+      clearly_free |= d - uvz.z() > 30 * voxel;
+      clearly_hidden &= uvz.z() - d > 30 * voxel;
+    }
+    if (!clearly_free && !clearly_hidden) continue;
+    ++checked;
+    wrong += state_at(fused.volume, p) !=
+             (clearly_free ? VoxelState::Free : VoxelState::NeverSeen);
+  }
+  EXPECT_GT(checked, 5000U);
+  EXPECT_EQ(wrong, 0U);
+}
+
+TEST(Fuse, DoesNotBridgeAnOcclusionEdge) {
+  const auto fused = fuse(three_views(sphere_before_wall()), {});
+  const TriangleMesh mesh = open_surface(fused.volume, {});
+  size_t astray = 0;
+  for (const auto& v : mesh.vertices) {
+    const Vector3d p = v.cast<double>();
+    const double off = std::min(std::abs((p - kCenter).norm() - kRadius), std::abs(p.z() - 0.35));
+    astray += off > 2 * fused.report.voxel_size;
+  }
+  EXPECT_LT(astray, mesh.vertices.size() / 1000);
+}
+
+TEST(Fuse, KeepsWhatOneViewSeesAlone) {
+  auto views = three_views(sphere_before_wall());
+  views.resize(1);
+  const auto fused = fuse(views, {});
+  const TriangleMesh mesh = open_surface(fused.volume, {});
+  EXPECT_GT(mesh.faces.size(), 1000U);
+  for (const Provenance p : mesh.provenance) ASSERT_EQ(p, Provenance::SingleView);
+}
+
+TEST(Fuse, LabelsTheOverlapOfTwoViewsObserved) {
+  auto views = three_views(sphere_before_wall());
+  views.erase(views.begin() + 1);
+  const TriangleMesh mesh = open_surface(fuse(views, {}).volume, {});
+  const auto area = area_by_provenance(mesh);
+  EXPECT_GT(area[size_t(Provenance::Observed)], 0.3);
+  EXPECT_GT(area[size_t(Provenance::SingleView)], 0.05);
+  EXPECT_EQ(area[size_t(Provenance::Inferred)], 0);
+  ASSERT_EQ(mesh.colors.size(), mesh.vertices.size());
+  EXPECT_LT((mesh.colors[0] - Eigen::Vector3f(0.2f, 0.5f, 0.8f)).norm(), 1e-4f);
+}
+
+TEST(Fuse, CarriesTheUncertaintyOfTheViews) {
+  auto views = three_views(test::plane({0, 0, 1}, 0.1));
+  for (TsdfView& view : views) view.sigma = DepthMap(view.depth.width, view.depth.height, 0.002f);
+  const TriangleMesh mesh = open_surface(fuse(views, {}).volume, {});
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+    // Two to three equal views, roughly straight on.
+    const double expected = 0.002 / std::sqrt(double(mesh.support[v]));
+    ASSERT_NEAR(mesh.sigma[v], expected, 0.3 * expected);
+  }
+}
+
+TEST(Fuse, RemovesAFloaterThatTheOtherViewsSeeThrough) {
+  auto views = three_views(test::plane({0, 0, 1}, 0.1));
+  for (int y = 50; y < 65; ++y) {
+    for (int x = 70; x < 85; ++x) views[1].depth(x, y) *= 0.7f;
+  }
+  const auto fused = fuse(views, {});
+  for (const auto& v : open_surface(fused.volume, {}).vertices) ASSERT_NEAR(v.z(), 0.1f, 0.01f);
+  EXPECT_GT(fused.report.carved, 0U);
+}
+
+TEST(Fuse, IgnoresUnknownMaskedAndFarPixels) {
+  auto views = three_views(test::plane({0, 0, 1}, 0.1));
+  views.resize(1);
+  views[0].depth(20, 20) = -1;
+  views[0].depth(21, 21) = INFINITY;
+  views[0].usable = Raster<uint8_t>(kWidth, kWidth * 3 / 4, 1);
+  for (int y = 0; y < kWidth * 3 / 4; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      if (x < 40) views[0].depth(x, y) = std::nanf("");
+      if (x >= 40 && x < 80) views[0].usable(x, y) = 0;
+      if (x >= 80 && x < 120) views[0].depth(x, y) += 3;
+    }
+  }
+  const auto fused = fuse(views, {.depth_trunc = 2});
+  for (const auto& v : open_surface(fused.volume, {}).vertices) {
+    ASSERT_GT(views[0].camera.project(v.cast<double>()).x(), 118);
+  }
+}
+
+TEST(Fuse, GivesTheSameBitsForAnyNumberOfThreads) {
+  auto views = three_views(sphere_before_wall());
+  for (size_t i = 0; i < views.size(); ++i) test::spoil(views[i], 0.01, uint32_t(i));
+  const auto run = [&](size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return open_surface(fuse(views, {}).volume, {});
+  };
+  const TriangleMesh one = run(1);
+  const TriangleMesh four = run(4);
+  EXPECT_EQ(one.vertices, four.vertices);
+  EXPECT_EQ(one.faces, four.faces);
+  EXPECT_EQ(one.colors, four.colors);
+}
+
+TEST(Fuse, CoarsensTheVoxelsToTheLimit) {
+  const auto views = three_views(sphere_before_wall());
+  const auto fine = fuse(views, {});
+  const auto coarse = fuse(views, {.max_voxels = 100000});
+  EXPECT_GT(coarse.report.voxel_size, 1.5 * fine.report.voxel_size);
+  EXPECT_LT(coarse.report.voxels, 250000U);  // Blocks stick out of the bounds.
+}
+
+TEST(Fuse, RefusesWhatDoesNotFitIntoMemory) {
+  const auto views = three_views(sphere_before_wall());
+  EXPECT_THROW(fuse(views, {.memory_limit = 1000000}), LimitError);
+  EXPECT_THROW(fuse(views, {.voxel_size = 1e-7}), LimitError);
+}
+
+TEST(Fuse, RefusesViewsItCannotUse) {
+  EXPECT_THROW(fuse({}, {}), InvalidInput);
+  auto views = three_views(sphere_before_wall());
+  views[0].sigma = DepthMap(3, 3, 1);
+  EXPECT_THROW(fuse(views, {}), InvalidInput);
+  views.resize(1);
+  views[0].sigma = {};
+  for (float& d : views[0].depth.data) d = std::nanf("");
+  EXPECT_THROW(fuse(views, {}), InvalidInput);
+}
+
+TEST(Fuse, ReportsProgressAndStopsWhenAsked) {
+  const auto views = three_views(sphere_before_wall());
+  double last = 0;
+  fuse(views, {}, [&](double fraction) {
+    EXPECT_GE(fraction, last);
+    last = fraction;
+  });
+  EXPECT_EQ(last, 1);
+  EXPECT_THROW(fuse(views, {}, [](double) { throw Cancelled(); }), Cancelled);
+}
+
+TEST(TsdfOptions, RefusesEveryFieldOutOfRange) {
+  const auto nan = std::nan("");
+  EXPECT_NO_THROW(TsdfOptions{}.validate());
+  EXPECT_THROW(TsdfOptions{.voxel_size = nan}.validate(), InvalidInput);
+  EXPECT_THROW(TsdfOptions{.truncation = 1.9f}.validate(), InvalidInput);
+  EXPECT_THROW(TsdfOptions{.max_voxels = 0}.validate(), InvalidInput);
+  EXPECT_THROW(TsdfOptions{.min_weight = -1}.validate(), InvalidInput);
+  EXPECT_THROW(TsdfOptions{.depth_trunc = nan}.validate(), InvalidInput);
+  EXPECT_THROW(TsdfOptions{.gap_pixels = -1}.validate(), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs
