@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/cross_check.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace cgs {
+
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+const SweepSource& towards(const SweptView& from, const SweptView& to) {
+  return *std::find_if(from.geometry.sources.begin(),
+                       from.geometry.sources.end(),
+                       [&](const SweepSource& s) { return s.image == to.geometry.image; });
+}
+
+struct Lifted {
+  double u, v;           // [pixels]
+  double inverse_depth;  // > 0
+};
+
+// A pixel of one view, on plane t of that view, as another view sees it.
+std::optional<Lifted> transfer(const SweptView& from, const SweepSource& s, const Lifted& p) {
+  const Eigen::Vector3d h = s.project(p.u, p.v, from.geometry.plane_of(p.inverse_depth));
+  if (!(h.z() > 0)) return std::nullopt;
+  return Lifted{h.x() / h.z(), h.y() / h.z(), p.inverse_depth / h.z()};
+}
+
+// t of a view at an image point: of the four pixels around it the one that agrees best with
+// `expected`, because next to a depth edge the others lie on another surface.
+float plane_at(const SweptView& view, double u, double v, double expected) {
+  const int x0 = static_cast<int>(std::floor(u - 0.5));
+  const int y0 = static_cast<int>(std::floor(v - 0.5));
+  float best = kNaN;
+  double least = std::numeric_limits<double>::infinity();
+  for (int y = y0; y <= y0 + 1; ++y) {
+    for (int x = x0; x <= x0 + 1; ++x) {
+      if (!view.pixels.contains(x, y)) continue;
+      const SlantedPlane& plane = view.pixels(x, y).plane;
+      const double t = double(plane.t) + double(plane.slope_x) * (u - x - 0.5) +
+                       double(plane.slope_y) * (v - y - 0.5);
+      if (std::abs(t - expected) < least) {
+        least = std::abs(t - expected);
+        best = static_cast<float>(t);
+      }
+    }
+  }
+  return best;
+}
+
+// Difference of t between a pixel and what `other` sees there, if that view confirms it.
+std::optional<double> difference(const SweptView& view, const SweptView& other, const Lifted& p,
+                                 double max_disagreement) {
+  const std::optional<Lifted> there = transfer(view, towards(view, other), p);
+  if (!there) return std::nullopt;
+  const double expected = other.geometry.plane_of(there->inverse_depth);
+  const double t = static_cast<double>(plane_at(other, there->u, there->v, expected));
+  if (std::isnan(t) || other.geometry.inverse_depth(t) <= 0) return std::nullopt;
+  const Lifted seen{there->u, there->v, other.geometry.inverse_depth(t)};
+  const std::optional<Lifted> back = transfer(other, towards(other, view), seen);
+  if (!back || std::hypot(back->u - p.u, back->v - p.v) > max_disagreement) return std::nullopt;
+  const double d = (back->inverse_depth - p.inverse_depth) / view.geometry.step;
+  if (std::abs(d) > max_disagreement) return std::nullopt;
+  return d;
+}
+
+// The plane n of the scene (n . X = 1 in camera axes) that a pixel lies on.
+Eigen::Vector3d plane_normal(const SweptView& view, int x, int y) {
+  const SlantedPlane& p = view.pixels(x, y).plane;
+  const Camera& c = view.camera;
+  const double gu = view.geometry.step * double(p.slope_x);
+  const double gv = view.geometry.step * double(p.slope_y);
+  const double at_center = view.geometry.inverse_depth(double(p.t)) + gu * (c.cx - x - 0.5) +
+                           gv * (c.cy - y - 0.5);
+  return {gu * c.fx, gv * c.fy, at_center};
+}
+
+}  // namespace
+
+Raster<Agreement> cross_check(const std::vector<SweptView>& views, size_t view,
+                              double max_disagreement) {
+  const SweptView& here = views[view];
+  Raster<Agreement> out(here.pixels.width, here.pixels.height, Agreement{});
+  tbb::parallel_for(0, out.height, [&](int y) {
+    for (int x = 0; x < out.width; ++x) {
+      const float t = here.pixels(x, y).plane.t;
+      if (std::isnan(t)) continue;
+      const Lifted p{x + 0.5, y + 0.5, here.geometry.inverse_depth(double(t))};
+      if (!(p.inverse_depth > 0)) continue;
+      double sum = 0;
+      for (size_t j = 0; j < views.size(); ++j) {
+        if (j == view) continue;
+        const std::optional<double> d = difference(here, views[j], p, max_disagreement);
+        if (!d) continue;
+        sum += *d * *d;
+        ++out(x, y).views;
+      }
+      const int n = out(x, y).views;
+      if (n > 0) out(x, y).difference = static_cast<float>(std::sqrt(sum / n));
+    }
+  });
+  return out;
+}
+
+Raster<SlantedPlane> planes_of_others(const std::vector<SweptView>& views, size_t view,
+                                      const std::vector<Raster<Agreement>>& agreements) {
+  const SweptView& here = views[view];
+  const SweepGeometry& g = here.geometry;
+  Raster<SlantedPlane> out(here.pixels.width, here.pixels.height, SlantedPlane{kNaN, 0, 0});
+  for (size_t j = 0; j < views.size(); ++j) {
+    if (j == view) continue;
+    const SweptView& other = views[j];
+    const SweepSource& s = towards(other, here);
+    const Eigen::Isometry3d other_from_here =
+        other.camera.cam_from_world() * here.camera.world_from_cam;
+    for (int y = 0; y < other.pixels.height; ++y) {
+      for (int x = 0; x < other.pixels.width; ++x) {
+        if (agreements[j](x, y).views == 0) continue;
+        const double rho = other.geometry.inverse_depth(double(other.pixels(x, y).plane.t));
+        const std::optional<Lifted> seen = transfer(other, s, {x + 0.5, y + 0.5, rho});
+        if (!seen || seen->u < 0 || seen->v < 0) continue;
+        const int u = static_cast<int>(seen->u);
+        const int v = static_cast<int>(seen->v);
+        if (!out.contains(u, v)) continue;
+        const Eigen::Vector3d m = plane_normal(other, x, y);
+        const Eigen::Vector3d n = other_from_here.rotation().transpose() * m /
+                                  (1 - m.dot(other_from_here.translation()));
+        const double t = g.plane_of(n.dot(here.camera.ray_in_cam(u + 0.5, v + 0.5)));
+        if (!std::isfinite(t) || out(u, v).t >= static_cast<float>(t)) continue;
+        out(u, v) = {static_cast<float>(t),
+                     static_cast<float>(n.x() / here.camera.fx / g.step),
+                     static_cast<float>(n.y() / here.camera.fy / g.step)};
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "libcgs/priors/slanted_refinement.h"
+
+namespace cgs {
+
+/// What a view holds after refinement, and the planes it is expressed in.
+struct SweptView {
+  Camera camera;
+  SweepGeometry geometry;
+  Raster<RefinedPixel> pixels;
+};
+
+/// How far the other views agree with a pixel.
+struct Agreement {
+  uint8_t views = 0;     ///< Other views that confirm it.
+  float difference = 0;  ///< Root mean square difference of t to those views [planes].
+};
+
+/// Checks a view against all others: another view confirms a pixel if its own depth, at the place
+/// the pixel projects to, leads back to within `max_disagreement` [pixels, and planes].
+Raster<Agreement> cross_check(const std::vector<SweptView>& views, size_t view,
+                              double max_disagreement);
+
+/// The surface that other views confirm at the pixels of a view, nearest in front; t is NaN where
+/// they show none. `agreements` are those of all views.
+Raster<SlantedPlane> planes_of_others(const std::vector<SweptView>& views, size_t view,
+                                      const std::vector<Raster<Agreement>>& agreements);
+
+}  // namespace cgs

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "libcgs/priors/sweep_geometry.h"
+
+namespace cgs {
+
+/// A cost per pixel and plane; the planes of a pixel lie together.
+struct CostVolume {
+  int width = 0;
+  int height = 0;
+  int planes = 0;
+  std::vector<uint8_t> cost;  ///< [0, kLargestCost]
+
+  const uint8_t* at(int x, int y) const {
+    return &cost[(static_cast<size_t>(y) * width + static_cast<size_t>(x)) * planes];
+  }
+};
+inline constexpr int kLargestCost = 120;
+
+/// Dissimilarity of a reference view and its sources, warped over every plane.
+///
+/// Per source a census transform (7 x 7, robust to lighting, outliers and foreground fattening;
+/// Zabih and Woodfill 1994) plus normalised cross-correlation (5 x 5, sharper where there is
+/// texture). Sources that see a pixel are combined so that one of them may be occluded.
+CostVolume matching_cost(const std::vector<SweepImage>& images, const SweepGeometry& geometry);
+
+}  // namespace cgs

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "libcgs/priors/sweep_geometry.h"
+
+namespace cgs {
+
+/// The surface at a pixel as a plane of the scene: t changes by slope per pixel [planes].
+struct SlantedPlane {
+  float t = 0;
+  float slope_x = 0;
+  float slope_y = 0;
+
+  float at(int dx, int dy) const {
+    return t + slope_x * static_cast<float>(dx) + slope_y * static_cast<float>(dy);
+  }
+};
+
+/// What refinement found at a pixel.
+struct RefinedPixel {
+  SlantedPlane plane;
+  float score = 0;  ///< Normalised correlation with the better half of the sources, in [-1, 1].
+  float sigma = 0;  ///< Standard deviation of t from image noise and texture [planes]; > 0.
+};
+
+/// Continuous local refinement of a sweep.
+///
+/// Per pixel a plane (t, slope) that makes the window around it correlate with the sources, with
+/// bilateral weights so that the window follows the surface of its pixel. Hypotheses come from the
+/// neighbours (PatchMatch; Bleyer et al. 2011) and from Gauss-Newton steps on the correlation; a
+/// truncated difference to the neighbours' planes decides where there is no texture.
+/// Pixels are visited as on a chessboard, so the result does not depend on the number of threads.
+class SlantedRefinement {
+ public:
+  SlantedRefinement(const std::vector<SweepImage>& images, const SweepGeometry& geometry,
+                    const Raster<float>& start);
+
+  /// One round over all pixels. `extra` (may be empty) holds one more hypothesis per pixel, from
+  /// other views; t NaN = none.
+  void round(const Raster<SlantedPlane>& extra);
+
+  /// \return NaN t at invalid pixels
+  Raster<RefinedPixel> result() const;
+
+ private:
+  struct Window;
+  struct Normal;
+  Window window(int x, int y) const;
+  float correlation(const Window& window, size_t source, const SlantedPlane& plane) const;
+  float data_cost(const Window& window, const SlantedPlane& plane) const;
+  float smoothness(const Window& window, const SlantedPlane& plane) const;
+  float cost(const Window& window, const SlantedPlane& plane) const;
+  bool normal_equations(const Window& w, size_t source, const SlantedPlane& p, Normal& sum) const;
+  Normal normal_equations(const Window& window, const SlantedPlane& plane) const;
+  void visit(int x, int y, const Raster<SlantedPlane>& extra);
+
+  const std::vector<SweepImage>& images_;
+  const SweepGeometry& geometry_;
+  const SweepImage& reference_;
+  Raster<SlantedPlane> planes_;
+};
+
+}  // namespace cgs
