@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/byte_reader.h"
 
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <cerrno>
-#include <charconv>
 
 namespace cgs {
 
@@ -31,24 +32,28 @@ std::string mebibytes(uint64_t bytes) { return std::to_string(bytes >> 20) + " M
 
 }  // namespace
 
-std::string read_file(const std::filesystem::path& path, const ReadLimits& limits) {
-  // O_NONBLOCK: a FIFO nobody writes to must not hang us before fstat can refuse it.
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+namespace {
+
+// O_NONBLOCK: a FIFO nobody writes to must not hang us before fstat can refuse it.
+int open_for_reading(const std::filesystem::path& path) {
+  return ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+}
+
+uint64_t regular_file_size(const Descriptor& file, const std::filesystem::path& path) {
   if (file.get() < 0) throw BadInput(Defect::Open, path, std::strerror(errno));
   struct stat info = {};
   if (::fstat(file.get(), &info) != 0) throw BadInput(Defect::Open, path, std::strerror(errno));
   if (!S_ISREG(info.st_mode)) throw BadInput(Defect::Open, path, "not a regular file");
   if (info.st_size == 0) throw BadInput(Defect::Empty, path, "empty file");
-  const auto size = static_cast<uint64_t>(info.st_size);
-  if (size > limits.max_file_bytes) {
-    throw LimitError(printable(path) + ": " + mebibytes(size) + ", allowed are " +
-                     mebibytes(limits.max_file_bytes));
-  }
-  std::string bytes(size, '\0');
+  return static_cast<uint64_t>(info.st_size);
+}
+
+std::string first_bytes(const Descriptor& file, uint64_t count, const std::filesystem::path& path) {
+  std::string bytes(count, '\0');
   size_t done = 0;
   while (done < bytes.size()) {
-    const ssize_t n = ::pread(
-        file.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));
+    const ssize_t n =
+        ::pread(file.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) throw BadInput(Defect::Open, path, std::strerror(errno));
     if (n == 0) {
@@ -59,10 +64,29 @@ std::string read_file(const std::filesystem::path& path, const ReadLimits& limit
   return bytes;
 }
 
+}  // namespace
+
+std::string read_file(const std::filesystem::path& path, const ReadLimits& limits) {
+  const Descriptor file(open_for_reading(path));
+  const uint64_t size = regular_file_size(file, path);
+  if (size > limits.max_file_bytes) {
+    throw LimitError(printable(path) + ": " + mebibytes(size) + ", allowed are " +
+                     mebibytes(limits.max_file_bytes));
+  }
+  return first_bytes(file, size, path);
+}
+
+std::string read_file_start(const std::filesystem::path& path, uint64_t max_bytes) {
+  const Descriptor file(open_for_reading(path));
+  return first_bytes(file, std::min(regular_file_size(file, path), max_bytes), path);
+}
+
 void refuse_foreign_content(const std::filesystem::path& path,
                             std::string_view bytes,
                             std::string_view expected) {
-  const auto starts = [&](std::string_view magic) { return bytes.substr(0, magic.size()) == magic; };
+  const auto starts = [&](std::string_view magic) {
+    return bytes.substr(0, magic.size()) == magic;
+  };
   const auto refuse = [&](const std::string& found) {
     throw BadInput(Defect::Magic, path, "expected " + std::string(expected) + ", found " + found);
   };

@@ -30,6 +30,10 @@ struct ReadLimits {
 /// \throws BadInput Open (missing, not a regular file, no permission), Empty; LimitError.
 std::string read_file(const std::filesystem::path& path, const ReadLimits& limits = {});
 
+/// The first `max_bytes` of a regular file, or all of it if it is shorter: enough for most headers.
+/// \throws BadInput as read_file()
+std::string read_file_start(const std::filesystem::path& path, uint64_t max_bytes);
+
 /// Refuses, with advice, what is often found under a wrong name: HTML, Git LFS pointers, archives.
 /// `expected` names the format for the message ("PLY"). \throws BadInput Magic
 void refuse_foreign_content(const std::filesystem::path& path,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -17,10 +18,13 @@ struct View {
   std::string name;                  ///< File stem; unique within a scene.
   std::filesystem::path image_path;  ///< Empty if the file is missing.
   Camera camera;                     ///< Undistorted, at the size the image is (or will be) used.
-  ColorImage image;                  ///< Empty until loaded; same size as camera.
-  MaskMap valid;                     ///< Empty = every pixel; else 1 where the image may be used.
-  double near = 0;                   ///< Smallest z-depth of the scene seen here; 0 = unknown.
-  double far = 0;                    ///< Largest z-depth; 0 = unknown.
+  /// Lens distortion k1 k2 p1 p2 k3 (Brown-Conrady, as OpenCV defines it) of the image file, which
+  /// load_images() takes out of the pixels; all zero = none.
+  std::array<double, 5> distortion = {};
+  ColorImage image;  ///< Empty until loaded; same size as camera.
+  MaskMap valid;     ///< Empty = every pixel; else 1 where the image may be used.
+  double near = 0;   ///< Smallest z-depth of the scene seen here; 0 = unknown.
+  double far = 0;    ///< Largest z-depth; 0 = unknown.
 };
 
 /// A point known before reconstruction, from structure from motion.

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/camera_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include <Eigen/SVD>
+#include <unsupported/Eigen/Polynomials>
+
+namespace cgs {
+
+namespace {
+
+std::string text(double value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
+}
+
+double radial_factor(const std::array<double, 5>& distortion, double r) {
+  const double r2 = r * r;
+  return 1 + r2 * (distortion[0] + r2 * (distortion[1] + r2 * distortion[4]));
+}
+
+}  // namespace
+
+Eigen::Isometry3d checked_pose(const Eigen::Matrix3d& rotation,
+                               const Eigen::Vector3d& translation,
+                               const Refuse& refuse) {
+  if (!rotation.allFinite() || !translation.allFinite()) {
+    refuse(Defect::Value, "the pose contains a value that is not finite");
+  }
+  constexpr double kTolerance = 1e-3;
+  constexpr double kExactEnough = 1e-12;
+  const double residual =
+      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(residual <= kTolerance)) {
+    refuse(Defect::Value,
+           "the rotation is not orthonormal (residual " + text(residual) + ", allowed " +
+               text(kTolerance) + ")");
+  }
+  if (!(rotation.determinant() > 0)) {
+    refuse(Defect::Value, "the rotation is a reflection (determinant -1)");
+  }
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = rotation;
+  if (residual > kExactEnough) {
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation,
+                                                Eigen::ComputeFullU | Eigen::ComputeFullV);
+    pose.linear() = svd.matrixU() * svd.matrixV().transpose();
+  }
+  pose.translation() = translation;
+  return pose;
+}
+
+void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimits& limits) {
+  if (camera.width <= 0 || camera.height <= 0) {
+    refuse(Defect::Value,
+           "image size " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+               " must be positive");
+  }
+  const uint64_t pixels =
+      static_cast<uint64_t>(camera.width) * static_cast<uint64_t>(camera.height);
+  if (pixels > limits.max_pixels) {
+    throw LimitError("a camera declares " + std::to_string(pixels) + " pixels, allowed are " +
+                     std::to_string(limits.max_pixels));
+  }
+  constexpr double kMaxFocal = 1e6;  // image widths: a view of less than 0.00006 degrees
+  for (const auto& [value, name] : {std::pair(camera.fx, "fx"), std::pair(camera.fy, "fy")}) {
+    if (!(value > 0 && value < kMaxFocal * camera.width)) {
+      refuse(Defect::Value, std::string(name) + " = " + text(value) + " must be > 0 and finite");
+    }
+  }
+  constexpr double kFarOut = 10;  // image sizes
+  if (!(std::abs(camera.cx) <= kFarOut * camera.width)) {
+    refuse(Defect::Value, "cx = " + text(camera.cx) + " lies far outside the image");
+  }
+  if (!(std::abs(camera.cy) <= kFarOut * camera.height)) {
+    refuse(Defect::Value, "cy = " + text(camera.cy) + " lies far outside the image");
+  }
+}
+
+double fold_radius(const std::array<double, 5>& distortion) {
+  const auto& [k1, k2, p1, p2, k3] = distortion;
+  // d/dr of r (1 + k1 r^2 + k2 r^4 + k3 r^6), as a polynomial in s = r^2.
+  Eigen::VectorXd polynomial(4);
+  polynomial << 1, 3 * k1, 5 * k2, 7 * k3;
+  Eigen::Index degree = 3;
+  while (degree > 0 && polynomial[degree] == 0) --degree;
+  if (degree == 0) return std::numeric_limits<double>::infinity();
+  const Eigen::PolynomialSolver<double, Eigen::Dynamic> solver(polynomial.head(degree + 1));
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const std::complex<double>& root : solver.roots()) {
+    const bool is_real = std::abs(root.imag()) <= 1e-9 * std::abs(root.real());
+    if (is_real && root.real() > 0) smallest = std::min(smallest, root.real());
+  }
+  return std::sqrt(smallest);
+}
+
+void check_distortion(const Camera& camera,
+                      const std::array<double, 5>& distortion,
+                      const Refuse& refuse) {
+  for (const double value : distortion) {
+    if (!std::isfinite(value)) refuse(Defect::Value, "a distortion coefficient is not finite");
+  }
+  const double fold = fold_radius(distortion);
+  if (!std::isfinite(fold)) return;
+  const double circle = std::min(std::min(camera.cx, camera.width - camera.cx) / camera.fx,
+                                 std::min(camera.cy, camera.height - camera.cy) / camera.fy);
+  const double reach = fold * radial_factor(distortion, fold);
+  if (reach < circle) {
+    refuse(Defect::Value,
+           "the lens distortion cannot be undone beyond radius " + text(reach * camera.fx) +
+               " pixels, which is inside the image");
+  }
+}
+
+}  // namespace cgs

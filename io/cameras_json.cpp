@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/cameras_json.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "io/atomic_file.h"
+#include "io/camera_checks.h"
+#include "io/json_file.h"
+
+namespace cgs {
+
+namespace {
+
+using nlohmann::json;
+
+json vector_json(const Eigen::Vector3d& v) { return json::array({v.x(), v.y(), v.z()}); }
+
+json frame_json(const Scene& scene) {
+  const Frame& frame = scene.frame;
+  return {{"origin", vector_json(frame.origin)},
+          {"scale", frame.scale},
+          {"file_origin", vector_json(frame.file_origin)},
+          {"metres_per_unit", frame.metres_per_unit},
+          {"metres_sigma", frame.metres_sigma},
+          {"scale_source", scale_source_name(frame.scale_source)},
+          {"kind", scene.kind},
+          {"folder", std::filesystem::absolute(scene.folder).lexically_normal().string()}};
+}
+
+json camera_json(const Scene& scene, size_t index) {
+  const View& view = scene.views[index];
+  const Camera& camera = view.camera;
+  const Eigen::Matrix3d R = camera.world_from_cam.linear();
+  const bool is_finite = camera.world_from_cam.matrix().allFinite() && std::isfinite(camera.fx) &&
+                         std::isfinite(camera.fy) && std::isfinite(camera.cx) &&
+                         std::isfinite(camera.cy);
+  require(is_finite, "write_cameras_json: every camera must be finite", view.name);
+  json entry = {
+      {"id", index},
+      {"img_name", view.name},
+      {"width", camera.width},
+      {"height", camera.height},
+      {"position", vector_json(scene.frame.file_from_internal(camera.center()))},
+      {"rotation",
+       json::array({vector_json(R.row(0)), vector_json(R.row(1)), vector_json(R.row(2))})},
+      {"fx", camera.fx},
+      {"fy", camera.fy},
+      {"cx", camera.cx},
+      {"cy", camera.cy},
+      // position loses the low bits of the internal one where the origin is far away
+      {"internal_position", vector_json(camera.center())},
+      {"near", view.near},
+      {"far", view.far},
+      {"distortion", view.distortion},
+  };
+  const auto contains = [&](const std::vector<int>& list) {
+    return std::find(list.begin(), list.end(), static_cast<int>(index)) != list.end();
+  };
+  entry["role"] = contains(scene.input) ? "input" : contains(scene.held_out) ? "held_out" : "";
+  if (!view.image_path.empty()) {
+    entry["image_path"] = std::filesystem::absolute(view.image_path).lexically_normal().string();
+  }
+  return entry;
+}
+
+Eigen::Vector3d read_vector(const JsonValue& value) {
+  if (value.size() != 3) value.fail(Defect::Schema, "expected 3 numbers");
+  return {value.at(size_t{0}).number(), value.at(1).number(), value.at(2).number()};
+}
+
+ScaleSource read_scale_source(const JsonValue& value) {
+  const std::string name = value.text();
+  for (int i = 0; i <= static_cast<int>(ScaleSource::DepthSensor); ++i) {
+    if (scale_source_name(static_cast<ScaleSource>(i)) == name) return static_cast<ScaleSource>(i);
+  }
+  value.fail(Defect::Schema, "unknown source of the scale");
+}
+
+void read_frame(const JsonValue& value, Scene& scene) {
+  Frame& frame = scene.frame;
+  frame.origin = read_vector(value.at("origin"));
+  frame.scale = value.at("scale").number();
+  if (!(frame.scale > 0)) value.fail(Defect::Value, "scale must be > 0");
+  frame.file_origin = read_vector(value.at("file_origin"));
+  frame.metres_per_unit = value.at("metres_per_unit").number();
+  frame.metres_sigma = value.at("metres_sigma").number();
+  frame.scale_source = read_scale_source(value.at("scale_source"));
+  scene.kind = value.at("kind").text();
+  scene.folder = value.at("folder").text();
+}
+
+Eigen::Vector3d read_position(const JsonValue& entry, const Frame& frame) {
+  const Eigen::Vector3d in_file = read_vector(entry.at("position"));
+  const Eigen::Vector3d from_file = frame.internal_from_file(in_file);
+  const auto exact = entry.find("internal_position");
+  if (!exact) return from_file;
+  const Eigen::Vector3d internal = read_vector(*exact);
+  // Written together they agree exactly; otherwise somebody moved the camera.
+  return frame.file_from_internal(internal) == in_file ? internal : from_file;
+}
+
+View read_view(const JsonValue& entry, const Frame& frame, const ReadLimits& limits) {
+  const Refuse refuse = [&](Defect defect, const std::string& why) { entry.fail(defect, why); };
+  View view;
+  view.name = entry.at("img_name").text();
+  Camera& camera = view.camera;
+  camera.width = entry.at("width").count();
+  camera.height = entry.at("height").count();
+  camera.fx = entry.at("fx").number();
+  camera.fy = entry.at("fy").number();
+  const auto cx = entry.find("cx");
+  const auto cy = entry.find("cy");
+  camera.cx = cx ? cx->number() : 0.5 * camera.width;
+  camera.cy = cy ? cy->number() : 0.5 * camera.height;
+  check_intrinsics(camera, refuse, limits);
+  const JsonValue rotation = entry.at("rotation");
+  if (rotation.size() != 3) rotation.fail(Defect::Schema, "expected a 3 x 3 matrix");
+  Eigen::Matrix3d R;
+  for (size_t i = 0; i < 3; ++i) R.row(Eigen::Index(i)) = read_vector(rotation.at(i));
+  camera.world_from_cam = checked_pose(R, read_position(entry, frame), refuse);
+  if (const auto near = entry.find("near")) view.near = near->number();
+  if (const auto far = entry.find("far")) view.far = far->number();
+  if (const auto distortion = entry.find("distortion")) {
+    if (distortion->size() != 5) distortion->fail(Defect::Schema, "expected k1 k2 p1 p2 k3");
+    for (size_t i = 0; i < 5; ++i) view.distortion[i] = distortion->at(i).number();
+    check_distortion(camera, view.distortion, refuse);
+  }
+  return view;
+}
+
+void read_image_path(const JsonValue& entry, View& view, Scene& scene) {
+  const auto name = entry.find("image_path");
+  if (!name) return;
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(name->text(), ignored)) {
+    view.image_path = name->text();
+  } else {
+    scene.missing.push_back(name->text());
+  }
+}
+
+}  // namespace
+
+void write_cameras_json(const std::filesystem::path& path, const Scene& scene) {
+  json document = json::array();
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    document.push_back(camera_json(scene, i));
+    if (i == 0) document.back()["frame"] = frame_json(scene);
+  }
+  // File names need not be UTF-8, JSON has to be.
+  write_file(path, document.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+}
+
+Scene read_cameras_json(const std::filesystem::path& path) {
+  const ReadLimits limits;
+  const json document = read_json(path, limits);
+  const JsonValue entries(document, path);
+  if (entries.size() == 0) entries.fail(Defect::Empty, "there is no camera");
+  if (entries.size() > limits.max_views) {
+    throw LimitError(printable(path) + ": " + std::to_string(entries.size()) + " cameras");
+  }
+  Scene scene;
+  scene.kind = "cameras.json";
+  scene.folder = path.parent_path();
+  if (const auto frame = entries.at(size_t{0}).find("frame")) read_frame(*frame, scene);
+  for (size_t i = 0; i < entries.size(); ++i) {
+    const JsonValue entry = entries.at(i);
+    View view = read_view(entry, scene.frame, limits);
+    read_image_path(entry, view, scene);
+    if (const auto role = entry.find("role")) {
+      if (role->text() == "input") scene.input.push_back(static_cast<int>(i));
+      if (role->text() == "held_out") scene.held_out.push_back(static_cast<int>(i));
+    }
+    scene.views.push_back(std::move(view));
+  }
+  return scene;
+}
+
+}  // namespace cgs

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "libcgs/core/camera.h"
+
+namespace cgs {
+
+/// A camera of a COLMAP model; the pose of `camera` is not set.
+struct ColmapCamera {
+  Camera camera;
+  std::array<double, 5> distortion = {};  ///< k1 k2 p1 p2 k3
+};
+
+struct ColmapImage {
+  uint32_t id = 0;
+  uint32_t camera_id = 0;
+  std::string name;                                       ///< Path below the image folder.
+  Eigen::Vector4d rotation = Eigen::Vector4d::UnitX();    ///< cam_from_world, (w, x, y, z)
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< cam_from_world
+  uint64_t keypoints = 0;                                 ///< Number of 2D points.
+};
+
+struct ColmapPoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< May be not finite: check.
+  std::vector<std::pair<uint32_t, uint32_t>> track;    ///< (image id, keypoint index)
+};
+
+using ColmapCameras = std::map<uint32_t, ColmapCamera>;
+
+/// Readers of COLMAP's model files. Camera models SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL
+/// and OPENCV are understood.
+/// \throws BadInput Truncated, Count, Syntax (also ids that occur twice), Unsupported (other camera
+///         models), Value (intrinsics out of range, naming the camera); LimitError.
+/// Source: COLMAP documentation, "Output format"; binary layout of COLMAP 3.x.
+ColmapCameras read_colmap_cameras_binary(const std::filesystem::path& path);
+ColmapCameras read_colmap_cameras_text(const std::filesystem::path& path);
+std::vector<ColmapImage> read_colmap_images_binary(const std::filesystem::path& path);
+std::vector<ColmapImage> read_colmap_images_text(const std::filesystem::path& path);
+std::vector<ColmapPoint> read_colmap_points_binary(const std::filesystem::path& path);
+/// A text file without any byte counts as no points: models from known poses start like that.
+std::vector<ColmapPoint> read_colmap_points_text(const std::filesystem::path& path);
+
+}  // namespace cgs

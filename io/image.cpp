@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/image.h"
+
+// jpeglib.h needs FILE declared before it.
+#include <cstdio>
+// clang-format off
+#include <jpeglib.h>
+// clang-format on
+#include <algorithm>
+#include <cmath>
+#include <csetjmp>
+#include <string>
+#include <vector>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "io/image_header.h"
+
+namespace cgs {
+
+namespace {
+
+// What libjpeg calls instead of exit() and fprintf().
+struct JpegErrors {
+  jpeg_error_mgr base;  // first, so that a pointer to it is a pointer to this
+  std::jmp_buf jump;
+  char message[JMSG_LENGTH_MAX];
+};
+
+void on_jpeg_error(j_common_ptr info) {
+  auto* errors = reinterpret_cast<JpegErrors*>(info->err);
+  info->err->format_message(info, errors->message);
+  std::longjmp(errors->jump, 1);  // NOLINT(cert-err52-cpp): the way out libjpeg documents
+}
+
+void on_jpeg_message(j_common_ptr info, int level) {
+  constexpr int kWarning = -1;
+  if (level != kWarning) return;
+  auto* errors = reinterpret_cast<JpegErrors*>(info->err);
+  if (info->err->num_warnings++ == 0) info->err->format_message(info, errors->message);
+}
+
+// Decodes into rgb, which holds width * height * 3 bytes. Only plain data lives in this frame,
+// since an error leaves it by longjmp.
+// \return false after an error; errors.message says which
+bool decode_jpeg(const unsigned char* bytes,
+                 unsigned long size,
+                 const ImageHeader& header,
+                 unsigned char* rgb,
+                 JpegErrors& errors) {
+  jpeg_decompress_struct info;
+  info.err = jpeg_std_error(&errors.base);
+  errors.base.error_exit = on_jpeg_error;
+  errors.base.emit_message = on_jpeg_message;
+  errors.message[0] = '\0';
+  jpeg_create_decompress(&info);
+  if (setjmp(errors.jump) != 0) {  // NOLINT(cert-err52-cpp)
+    jpeg_destroy_decompress(&info);
+    return false;
+  }
+  jpeg_mem_src(&info, bytes, size);
+  jpeg_read_header(&info, TRUE);
+  info.out_color_space = JCS_RGB;
+  jpeg_start_decompress(&info);
+  const bool is_as_announced = info.output_width == static_cast<JDIMENSION>(header.width) &&
+                               info.output_height == static_cast<JDIMENSION>(header.height) &&
+                               info.output_components == 3;
+  if (!is_as_announced) {
+    std::snprintf(errors.message, sizeof errors.message, "second frame header of another size");
+    jpeg_destroy_decompress(&info);
+    return false;
+  }
+  while (info.output_scanline < info.output_height) {
+    JSAMPROW row = rgb + size_t{info.output_scanline} * info.output_width * 3;
+    jpeg_read_scanlines(&info, &row, 1);
+  }
+  jpeg_finish_decompress(&info);  // reads on to the end marker: a missing one is a warning
+  jpeg_destroy_decompress(&info);
+  return true;
+}
+
+ColorImage read_jpeg(std::string_view bytes,
+                     const ImageHeader& header,
+                     const std::filesystem::path& path) {
+  ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
+  std::vector<unsigned char> rgb(image.data.size() * 3);
+  JpegErrors errors = {};
+  const bool is_decoded = decode_jpeg(reinterpret_cast<const unsigned char*>(bytes.data()),
+                                      bytes.size(),
+                                      header,
+                                      rgb.data(),
+                                      errors);
+  if (!is_decoded) throw BadInput(Defect::Syntax, path, std::string("JPEG: ") + errors.message);
+  if (errors.base.num_warnings > 0) {
+    throw BadInput(Defect::Truncated,
+                   path,
+                   std::string("JPEG data is cut or damaged (") + errors.message + ")");
+  }
+  for (size_t i = 0; i < image.data.size(); ++i) {
+    const unsigned char* p = rgb.data() + 3 * i;
+    image.data[i] = Eigen::Vector3f(p[0], p[1], p[2]) / 255.0f;
+  }
+  return image;
+}
+
+cv::Mat decode_with_opencv(std::string_view bytes, const std::filesystem::path& path) {
+  const cv::Mat buffer(1,
+                       static_cast<int>(bytes.size()),
+                       CV_8UC1,
+                       const_cast<char*>(bytes.data()));  // NOLINT: OpenCV has no const matrix
+  cv::Mat pixels;
+  try {
+    // Unchanged keeps 16 bits and alpha, and does not apply the orientation tag.
+    pixels = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
+  } catch (const std::exception&) {
+    throw BadInput(Defect::Syntax, path, "the image decoder refused the content");
+  }
+  if (pixels.empty()) throw BadInput(Defect::Truncated, path, "the pixels are cut or damaged");
+  return pixels;
+}
+
+// Copies samples of type T, OpenCV's BGR order, scaled by 1 / full. \return usable pixels
+template <typename T>
+void convert(const cv::Mat& pixels, double full, ColorImage& image, MaskMap& usable) {
+  const int channels = pixels.channels();
+  const bool has_alpha = channels == 2 || channels == 4;
+  const int blue = 0;
+  const int green = channels >= 3 ? 1 : 0;
+  const int red = channels >= 3 ? 2 : 0;
+  for (int y = 0; y < image.height; ++y) {
+    const T* p = pixels.ptr<T>(y);
+    for (int x = 0; x < image.width; ++x, p += channels) {
+      const auto sample = [&](int c) { return static_cast<float>(double(p[c]) / full); };
+      const Eigen::Vector3f color(sample(red), sample(green), sample(blue));
+      const bool is_usable = color.allFinite() && (!has_alpha || sample(channels - 1) >= 0.5f);
+      usable(x, y) = is_usable ? 1 : 0;
+      for (int c = 0; c < 3; ++c) {
+        image(x, y)[c] = std::isfinite(color[c]) ? std::clamp(color[c], 0.0f, 1.0f) : 0.0f;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits) {
+  constexpr uint64_t kUsuallyEnough = uint64_t{256} << 10;
+  ImageHeader header;
+  const std::string start = read_file_start(path, kUsuallyEnough);
+  try {
+    header = parse_image_header(start, path, limits);
+  } catch (const BadInput&) {
+    // Large metadata, or a TIFF directory at the end: only the whole file can tell.
+    if (start.size() < kUsuallyEnough) throw;
+    header = parse_image_header(read_file(path, limits), path, limits);
+  }
+  return {header.width, header.height};
+}
+
+ColorImage read_image(const std::filesystem::path& path,
+                      MaskMap* alpha_mask,
+                      const ReadLimits& limits) {
+  constexpr uint64_t kDecoderLimit = (uint64_t{1} << 31) - 1;  // OpenCV counts bytes in int
+  ReadLimits file_limits = limits;
+  file_limits.max_file_bytes = std::min(limits.max_file_bytes, kDecoderLimit);
+  const std::string bytes = read_file(path, file_limits);
+  const ImageHeader header = parse_image_header(bytes, path, limits);
+  check_image_is_whole(bytes, header, path);
+  if (alpha_mask != nullptr) *alpha_mask = {};
+  if (header.format == ImageFormat::Jpeg) return read_jpeg(bytes, header, path);
+
+  const cv::Mat pixels = decode_with_opencv(bytes, path);
+  if (pixels.cols != header.width || pixels.rows != header.height || pixels.channels() > 4) {
+    throw BadInput(Defect::Syntax, path, "the decoded image is not what its header announces");
+  }
+  ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
+  MaskMap usable(header.width, header.height, 1);
+  switch (pixels.depth()) {
+    case CV_8U:
+      convert<uint8_t>(pixels, 255, image, usable);
+      break;
+    case CV_16U:
+      convert<uint16_t>(pixels, 65535, image, usable);
+      break;
+    case CV_32F:
+      convert<float>(pixels, 1, image, usable);
+      break;
+    case CV_64F:
+      convert<double>(pixels, 1, image, usable);
+      break;
+    default:
+      throw BadInput(Defect::Unsupported, path, "signed whole-number samples are not read");
+  }
+  const bool is_all =
+      std::all_of(usable.data.begin(), usable.data.end(), [](uint8_t set) { return set != 0; });
+  if (alpha_mask != nullptr && !is_all) *alpha_mask = std::move(usable);
+  return image;
+}
+
+}  // namespace cgs

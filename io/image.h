@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include "io/byte_reader.h"
+#include "libcgs/core/raster.h"
+
+namespace cgs {
+
+struct ImageSize {
+  int width = 0;   ///< [pixels]
+  int height = 0;  ///< [pixels]
+};
+
+/// The size of a PNG, JPEG, TIFF or WebP file from its header; the format is told from the content,
+/// not the name. Orientation tags are ignored, as cameras are calibrated on the stored pixels.
+/// \throws BadInput as parse_image_header(); LimitError above max_pixels.
+ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits = {});
+
+/// Decodes an image to sRGB-coded RGB in [0, 1]. Grey, palette and 16-bit images are converted;
+/// of several pages the first is read; float TIFF is clamped.
+///
+/// \param alpha_mask  where not null: emptied if every pixel is usable, else 1 where alpha is at
+///                    least 0.5 and, for float images, the colour is finite
+/// \throws BadInput Truncated (also when a decoder only warns about missing data), Syntax,
+///         Unsupported, Magic, Open, Empty; LimitError before anything is decoded.
+ColorImage read_image(const std::filesystem::path& path,
+                      MaskMap* alpha_mask = nullptr,
+                      const ReadLimits& limits = {});
+
+}  // namespace cgs

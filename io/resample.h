@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+
+#include "libcgs/core/camera.h"
+#include "libcgs/core/raster.h"
+
+namespace cgs {
+
+/// Takes lens distortion out of a photograph, in place: what a pinhole camera of the same K and
+/// size would have recorded. Bicubic, clamped to [0, 1].
+///
+/// \param valid       in: usable pixels, empty = all; out: the same, less those the photograph does
+///                    not reach; empty again if every pixel is usable
+/// \param camera      intrinsics at the size of the image
+/// \param distortion  k1 k2 p1 p2 k3 (Brown-Conrady, as OpenCV's calibration model)
+/// \throws LimitError for sides above 32766 pixels.
+void undistort(ColorImage& image,
+               MaskMap& valid,
+               const Camera& camera,
+               const std::array<double, 5>& distortion);
+
+/// Averages the usable pixels under each pixel of a smaller image, in place. A pixel is usable if
+/// at least half of its area is; `valid` is emptied if every pixel is.
+/// \pre 0 < width <= image.width, 0 < height <= image.height
+void area_downscale(ColorImage& image, MaskMap& valid, int width, int height);
+
+}  // namespace cgs

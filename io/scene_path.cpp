@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/scene_path.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+#include "io/byte_reader.h"
+
+namespace cgs {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_beneath(const fs::path& path, const fs::path& folder) {
+  const auto [end, rest] = std::mismatch(folder.begin(), folder.end(), path.begin(), path.end());
+  (void)rest;
+  return end == folder.end();
+}
+
+// "http://…", "file:///…", "data:…": a scheme is letters, then a colon (RFC 3986).
+bool looks_like_url(std::string_view name) {
+  const size_t colon = name.find(':');
+  if (colon == std::string_view::npos || colon < 2) return false;
+  const std::string_view scheme = name.substr(0, colon);
+  return std::all_of(scheme.begin(),
+                     scheme.end(),
+                     [](unsigned char c) {
+                       return std::isalnum(c) != 0 || c == '+' || c == '-' || c == '.';
+                     }) &&
+         (name.substr(colon).starts_with("://") || scheme == "file" || scheme == "data");
+}
+
+}  // namespace
+
+fs::path resolve_in_scene(const SceneRoot& root, std::string_view name, const fs::path& named_in) {
+  const auto refuse = [&](const std::string& reason) {
+    throw BadInput(Defect::Path, named_in, "\"" + printable(fs::path(name)) + "\" " + reason);
+  };
+  const std::string advice = "; allow it with --allow-external if you trust the data set";
+  if (name.empty()) refuse("is an empty path");
+  if (name.find('\0') != std::string_view::npos) refuse("contains a NUL byte");
+  if (looks_like_url(name)) refuse("is a URL; only local files are read");
+  const fs::path path(name);
+  const fs::path joined = root.folder / path;  // an absolute path replaces the folder
+  if (root.allow_external) return joined;
+  if (path.is_absolute()) refuse("is an absolute path" + advice);
+  const fs::path normal = path.lexically_normal();
+  if (!normal.empty() && *normal.begin() == "..")
+    refuse("escapes the folder of the scene" + advice);
+  std::error_code error;
+  const fs::path folder = fs::weakly_canonical(root.folder, error);
+  const fs::path target = error ? fs::path() : fs::weakly_canonical(joined, error);
+  if (error) refuse("cannot be followed: " + error.message());
+  if (!is_beneath(target, folder)) {
+    refuse("escapes the folder of the scene through a symbolic link" + advice);
+  }
+  return joined;
+}
+
+bool has_image_extension(const fs::path& path) {
+  static constexpr std::array<std::string_view, 6> kKnown = {
+      ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"};
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end();
+}
+
+std::vector<fs::path> image_files(const SceneRoot& root, const std::string& subfolder) {
+  const fs::path folder = resolve_in_scene(root, subfolder, root.folder);
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (!has_image_extension(entry->path())) continue;
+    const fs::path name = fs::path(subfolder) / entry->path().filename();
+    files.push_back(resolve_in_scene(root, name.string(), folder));
+    if (files.size() > ReadLimits{}.max_views) {
+      throw LimitError(printable(folder) + ": more than " + std::to_string(ReadLimits{}.max_views) +
+                       " images");
+    }
+  }
+  if (error) throw BadInput(Defect::Open, folder, error.message());
+  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+    return a.filename().native() < b.filename().native();
+  });
+  return files;
+}
+
+}  // namespace cgs

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cgs {
+
+/// The folder a data set lives in, and whether what it names may lie elsewhere.
+struct SceneRoot {
+  std::filesystem::path folder;
+  bool allow_external = false;  ///< Follow links and absolute paths that leave the folder.
+};
+
+/// Where a path written inside a data set leads; the file itself need not exist.
+///
+/// Empty names, NUL bytes and URLs are always refused; absolute paths, ".." and symbolic links
+/// that leave the folder only without allow_external.
+/// \param named_in  file that contains the name, for the message
+/// \throws BadInput Path
+std::filesystem::path resolve_in_scene(const SceneRoot& root,
+                                       std::string_view name,
+                                       const std::filesystem::path& named_in);
+
+/// True for the extensions of image files: .png .jpg .jpeg .tif .tiff .webp, in any case.
+bool has_image_extension(const std::filesystem::path& path);
+
+/// The image files directly inside a folder, sorted by file name.
+/// \throws BadInput Open if the folder cannot be listed, Path as resolve_in_scene(); LimitError
+std::vector<std::filesystem::path> image_files(const SceneRoot& root, const std::string& subfolder);
+
+}  // namespace cgs

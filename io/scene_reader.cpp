@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/scene_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include "io/byte_reader.h"
+#include "io/colmap.h"
+#include "io/image.h"
+#include "io/llff.h"
+#include "io/resample.h"
+#include "io/strecha.h"
+#include "io/transforms_json.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Scene read_layout(const SceneRoot& root) {
+  std::error_code error;
+  const fs::file_status status = fs::status(root.folder, error);
+  if (!fs::exists(status)) {
+    throw BadInput(Defect::Open, root.folder, error ? error.message() : "no such folder");
+  }
+  if (!fs::is_directory(status)) throw BadInput(Defect::Open, root.folder, "not a folder");
+  if (is_llff(root.folder)) return read_llff(root);
+  if (is_transforms_json(root.folder)) return read_transforms_json(root);
+  if (is_colmap(root.folder)) return read_colmap(root);
+  if (is_strecha(root.folder)) return read_strecha(root);
+  throw BadInput(Defect::Schema,
+                 root.folder,
+                 "no known layout: understood are LLFF (poses_bounds.npy), transforms.json "
+                 "(nerfstudio, instant-ngp), COLMAP (sparse/0/cameras.bin or .txt) and Strecha "
+                 "(<image>.camera)");
+}
+
+std::string without_extension(const std::string& name) {
+  const fs::path path(name);
+  return has_image_extension(path) ? fs::path(path).replace_extension().string() : name;
+}
+
+// Turns names as files state them into stems, or into whole paths where stems would collide.
+void name_views(Scene& scene) {
+  std::map<std::string, int> uses;
+  for (const View& view : scene.views) ++uses[fs::path(without_extension(view.name)).filename()];
+  std::set<std::string> taken;
+  for (View& view : scene.views) {
+    const std::string whole = without_extension(view.name);
+    std::string name = fs::path(whole).filename().string();
+    if (uses[name] > 1) {
+      name = fs::path(whole).lexically_normal().string();
+      std::replace(name.begin(), name.end(), '/', '_');
+    }
+    // Files that differ in nothing but their extension.
+    if (taken.contains(name)) name = fs::path(view.name).filename().string();
+    std::string unique = name;
+    for (int i = 2; !taken.insert(unique).second; ++i) unique = name + "_" + std::to_string(i);
+    view.name = unique;
+  }
+}
+
+void sort_views(Scene& scene) {
+  std::vector<size_t> order(scene.views.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return scene.views[a].name < scene.views[b].name;
+  });
+  std::vector<int> new_index(order.size());
+  std::vector<View> sorted;
+  for (size_t i = 0; i < order.size(); ++i) {
+    new_index[order[i]] = static_cast<int>(i);
+    sorted.push_back(std::move(scene.views[order[i]]));
+  }
+  scene.views = std::move(sorted);
+  for (SparsePoint& point : scene.points) {
+    for (int& view : point.views) view = new_index[static_cast<size_t>(view)];
+    std::sort(point.views.begin(), point.views.end());
+  }
+  std::sort(scene.missing.begin(), scene.missing.end());
+}
+
+// True if one size is the other, scaled and rounded to whole pixels.
+bool have_same_shape(int width_a, int height_a, int width_b, int height_b) {
+  const double difference =
+      static_cast<double>(height_a) * width_b - static_cast<double>(height_b) * width_a;
+  return std::abs(difference) <= std::max({width_a, height_a, width_b, height_b});
+}
+
+std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+void fit_cameras(Scene& scene, int downscale) {
+  int rescaled = 0;
+  for (View& view : scene.views) {
+    Camera& camera = view.camera;
+    if (!view.image_path.empty()) {
+      const ImageSize size = image_size(view.image_path);
+      if (!have_same_shape(camera.width, camera.height, size.width, size.height)) {
+        throw BadInput(Defect::Mismatch,
+                       view.image_path,
+                       "the image has " + size_text(size.width, size.height) +
+                           " pixels, its camera is for " + size_text(camera.width, camera.height));
+      }
+      rescaled += camera.width != size.width ? 1 : 0;
+      camera = resized(camera, size.width, size.height);
+    }
+    const int width = camera.width / downscale;
+    const int height = camera.height / downscale;
+    constexpr int kSmallest = 8;  // below, no stage has anything to work on
+    if (width < kSmallest || height < kSmallest) {
+      throw InvalidInput("SceneOptions.downscale " + std::to_string(downscale) + " leaves " +
+                         size_text(width, height) + " pixels of view " + printable(view.name));
+    }
+    camera = resized(camera, width, height);
+  }
+  const bool is_expected = scene.kind == "LLFF";  // states the size of the full photographs
+  if (rescaled > 0 && !is_expected) {
+    scene.warnings.push_back(std::to_string(rescaled) +
+                             " images are of another size than their camera states; intrinsics "
+                             "were scaled to the images");
+  }
+}
+
+std::string first_of(const std::vector<std::string>& names) {
+  constexpr size_t kShown = 5;
+  std::string out;
+  for (size_t i = 0; i < std::min(names.size(), kShown); ++i) {
+    out += (i > 0 ? ", " : "") + printable(names[i]);
+  }
+  return names.size() > kShown ? out + ", …" : out;
+}
+
+std::vector<int> views_with_files(const Scene& scene) {
+  std::vector<int> out;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    if (!scene.views[i].image_path.empty()) out.push_back(static_cast<int>(i));
+  }
+  return out;
+}
+
+void check_presence(Scene& scene) {
+  if (scene.missing.empty()) return;
+  const size_t present = views_with_files(scene).size();
+  const std::string text = std::to_string(scene.missing.size()) + " of " +
+                           std::to_string(scene.missing.size() + present) +
+                           " images are missing: " + first_of(scene.missing);
+  if (present == 0) throw BadInput(Defect::Missing, scene.folder, text);
+  scene.warnings.push_back(text);
+}
+
+std::vector<int> llff_protocol(const std::vector<int>& usable) {
+  constexpr size_t kHoldEvery = 8;
+  constexpr int kInputs = 3;
+  std::vector<int> pool;
+  for (size_t i = 0; i < usable.size(); ++i) {
+    if (i % kHoldEvery != 0) pool.push_back(usable[i]);
+  }
+  std::vector<int> out;
+  for (int i = 0; i < kInputs; ++i) {
+    const double at = static_cast<double>(pool.size() - 1) * i / (kInputs - 1);
+    out.push_back(pool[static_cast<size_t>(std::nearbyint(at))]);  // ties to even
+  }
+  return out;
+}
+
+int find_view(const Scene& scene, const std::string& token) {
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    if (scene.views[i].name == token) return static_cast<int>(i);
+  }
+  uint64_t index = 0;
+  if (parse_number(token, index) && index < scene.views.size()) return static_cast<int>(index);
+  std::vector<std::string> names;
+  for (const View& view : scene.views) names.push_back(view.name);
+  throw InvalidInput("SceneOptions.views: there is no view \"" + printable(token) + "\" among " +
+                     std::to_string(names.size()) + ": " + first_of(names));
+}
+
+std::vector<int> named_views(const Scene& scene, const std::string& list) {
+  std::vector<int> out;
+  size_t at = 0;
+  while (at <= list.size()) {
+    const size_t end = std::min(list.find(',', at), list.size());
+    std::string token = list.substr(at, end - at);
+    token.erase(0, token.find_first_not_of(' '));
+    token.erase(token.find_last_not_of(' ') + 1);
+    const int view = find_view(scene, token);
+    const std::string& name = scene.views[static_cast<size_t>(view)].name;
+    if (std::find(out.begin(), out.end(), view) != out.end()) {
+      throw InvalidInput("SceneOptions.views: view \"" + printable(name) + "\" is named twice");
+    }
+    if (scene.views[static_cast<size_t>(view)].image_path.empty()) {
+      throw InvalidInput("SceneOptions.views: view \"" + printable(name) + "\" has no image file");
+    }
+    out.push_back(view);
+    at = end + 1;
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+void choose_views(Scene& scene, const std::string& list) {
+  constexpr size_t kTakeAll = 4;
+  const std::vector<int> usable = views_with_files(scene);
+  if (!list.empty()) {
+    scene.input = named_views(scene, list);
+  } else {
+    scene.input = usable.size() <= kTakeAll ? usable : llff_protocol(usable);
+  }
+  if (scene.input.size() < 2) throw BadInput(Defect::Empty, scene.folder, "need at least 2 views");
+  std::set_difference(usable.begin(),
+                      usable.end(),
+                      scene.input.begin(),
+                      scene.input.end(),
+                      std::back_inserter(scene.held_out));
+}
+
+void check_baselines(const Scene& scene) {
+  constexpr double kRounding = 1e-12;
+  const auto& first = scene.views[static_cast<size_t>(scene.input[0])].camera;
+  for (const int i : scene.input) {
+    const auto& camera = scene.views[static_cast<size_t>(i)].camera;
+    const double baseline = (camera.center() - first.center()).norm();
+    if (baseline > kRounding * first.center().norm()) return;
+  }
+  throw BadInput(Defect::Value,
+                 scene.folder,
+                 "all input cameras share one centre (baseline 0), so no depth can be measured");
+}
+
+void load_image(Scene& scene, View& view) {
+  if (view.image_path.empty()) {
+    throw BadInput(Defect::Missing, scene.folder, "view " + printable(view.name) + " has no image");
+  }
+  Camera& camera = view.camera;
+  view.image = read_image(view.image_path, &view.valid);
+  const int width = view.image.width;
+  const int height = view.image.height;
+  if (width < camera.width || height < camera.height ||
+      !have_same_shape(camera.width, camera.height, width, height)) {
+    throw BadInput(Defect::Mismatch,
+                   view.image_path,
+                   "the image has " + size_text(width, height) + " pixels, its camera is for " +
+                       size_text(camera.width, camera.height));
+  }
+  if (view.distortion != std::array<double, 5>{}) {
+    undistort(view.image, view.valid, resized(camera, width, height), view.distortion);
+  }
+  area_downscale(view.image, view.valid, camera.width, camera.height);
+  const auto is_set = [](uint8_t set) { return set != 0; };
+  const bool is_masked =
+      !view.valid.empty() && std::none_of(view.valid.data.begin(), view.valid.data.end(), is_set);
+  if (is_masked) scene.warnings.push_back("view " + printable(view.name) + " is fully masked");
+  const auto is_first = [&](const Eigen::Vector3f& c) { return c == view.image.data.front(); };
+  if (std::all_of(view.image.data.begin(), view.image.data.end(), is_first)) {
+    scene.warnings.push_back("view " + printable(view.name) + " has one colour everywhere");
+  }
+}
+
+void warn_of_identical_images(Scene& scene, const std::vector<int>& views) {
+  for (size_t i = 0; i < views.size(); ++i) {
+    for (size_t j = i + 1; j < views.size(); ++j) {
+      const View& a = scene.views[static_cast<size_t>(views[i])];
+      const View& b = scene.views[static_cast<size_t>(views[j])];
+      if (a.image.data != b.image.data) continue;
+      scene.warnings.push_back("views " + printable(a.name) + " and " + printable(b.name) +
+                               " are the same picture");
+    }
+  }
+}
+
+}  // namespace
+
+void SceneOptions::validate() const {
+  require(downscale >= 1, "SceneOptions.downscale must be >= 1", downscale);
+}
+
+Scene read_scene(const fs::path& folder, const SceneOptions& options) {
+  options.validate();
+  Scene scene = read_layout({folder, options.allow_external});
+  name_views(scene);
+  sort_views(scene);
+  check_presence(scene);
+  fit_cameras(scene, options.downscale);
+  choose_views(scene, options.views);
+  check_baselines(scene);
+  return scene;
+}
+
+void load_images(Scene& scene, const std::vector<int>& views, const Progress& progress) {
+  for (size_t i = 0; i < views.size(); ++i) {
+    report(progress, static_cast<double>(i) / static_cast<double>(views.size()));
+    load_image(scene, scene.views.at(static_cast<size_t>(views[i])));
+  }
+  warn_of_identical_images(scene, views);
+  report(progress, 1);
+}
+
+}  // namespace cgs

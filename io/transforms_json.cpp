@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/transforms_json.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+#include "io/camera_checks.h"
+#include "io/image.h"
+#include "io/json_file.h"
+
+namespace cgs {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// A setting of the frame, else of the whole file.
+std::optional<JsonValue> setting(const JsonValue& document,
+                                 const JsonValue& frame,
+                                 std::string_view key) {
+  if (auto value = frame.find(key)) return value;
+  return document.find(key);
+}
+
+double number_or(const std::optional<JsonValue>& value, double fallback) {
+  return value ? value->number() : fallback;
+}
+
+double focal_from_angle(const JsonValue& angle, int side) {
+  const double value = angle.number();
+  if (!(value > 0 && value < std::numbers::pi)) {
+    angle.fail(Defect::Value, "a field of view must lie in (0, pi)");
+  }
+  return 0.5 * side / std::tan(0.5 * value);
+}
+
+void check_model(const JsonValue& document, const JsonValue& frame) {
+  static constexpr std::array<std::string_view, 6> kKnown = {
+      "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE"};
+  if (const auto model = setting(document, frame, "camera_model")) {
+    if (std::find(kKnown.begin(), kKnown.end(), model->text()) == kKnown.end()) {
+      model->fail(Defect::Unsupported,
+                  "camera model \"" + printable(model->text()) +
+                      "\" is not read; known are PINHOLE and OPENCV: undistort the images first");
+    }
+  }
+  const auto fisheye = setting(document, frame, "is_fisheye");
+  if (fisheye && fisheye->boolean()) {
+    fisheye->fail(Defect::Unsupported, "fisheye images are not read: undistort them first");
+  }
+  const auto k4 = setting(document, frame, "k4");
+  if (k4 && k4->number() != 0) {
+    k4->fail(Defect::Unsupported, "distortion beyond k3 is not read: undistort the images first");
+  }
+}
+
+// Intrinsics of a frame for an image of the given size.
+void read_intrinsics(const JsonValue& document, const JsonValue& frame, View& view) {
+  check_model(document, frame);
+  Camera& camera = view.camera;
+  const auto get = [&](std::string_view key) { return setting(document, frame, key); };
+  const auto fl_x = get("fl_x");
+  const auto fl_y = get("fl_y");
+  const auto angle_x = get("camera_angle_x");
+  const auto angle_y = get("camera_angle_y");
+  if (fl_x) {
+    camera.fx = fl_x->number();
+  } else if (angle_x) {
+    camera.fx = focal_from_angle(*angle_x, camera.width);
+  } else {
+    frame.fail(Defect::Schema, "neither fl_x nor camera_angle_x is given, here or for all frames");
+  }
+  if (fl_y) {
+    camera.fy = fl_y->number();
+  } else if (!fl_x && angle_y) {
+    camera.fy = focal_from_angle(*angle_y, camera.height);
+  } else {
+    camera.fy = camera.fx;  // square pixels
+  }
+  camera.cx = number_or(get("cx"), 0.5 * camera.width);
+  camera.cy = number_or(get("cy"), 0.5 * camera.height);
+  static constexpr std::array<std::string_view, 5> kKeys = {"k1", "k2", "p1", "p2", "k3"};
+  for (size_t i = 0; i < kKeys.size(); ++i) view.distortion[i] = number_or(get(kKeys[i]), 0);
+  const Refuse refuse = [&](Defect defect, const std::string& why) { frame.fail(defect, why); };
+  check_intrinsics(camera, refuse);
+  check_distortion(camera, view.distortion, refuse);
+}
+
+Eigen::Isometry3d read_pose(const JsonValue& matrix) {
+  const size_t rows = matrix.size();
+  if (rows != 4 && rows != 3) matrix.fail(Defect::Schema, "expected a 4 x 4 matrix");
+  Eigen::Matrix4d M = Eigen::Matrix4d::Identity();
+  for (size_t r = 0; r < rows; ++r) {
+    const JsonValue row = matrix.at(r);
+    if (row.size() != 4) row.fail(Defect::Schema, "expected a row of 4 numbers");
+    for (size_t c = 0; c < 4; ++c) M(Eigen::Index(r), Eigen::Index(c)) = row.at(c).number();
+  }
+  if ((M.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > 1e-9) {
+    matrix.fail(Defect::Value, "the last row must be 0 0 0 1");
+  }
+  const Eigen::Matrix3d opencv_from_opengl = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  return checked_pose(M.topLeftCorner<3, 3>() * opencv_from_opengl,
+                      M.topRightCorner<3, 1>(),
+                      [&](Defect defect, const std::string& why) { matrix.fail(defect, why); });
+}
+
+// The file a frame names, whether or not it exists.
+fs::path photograph(const SceneRoot& root, const std::string& name, const fs::path& json) {
+  const fs::path path = resolve_in_scene(root, name, json);
+  if (fs::is_regular_file(path)) return path;
+  for (const char* extension : {".png", ".jpg", ".jpeg"}) {
+    fs::path candidate = resolve_in_scene(root, name + extension, json);
+    if (fs::is_regular_file(candidate)) return candidate;
+  }
+  return path;
+}
+
+// Sets the size of the view's camera from w and h or from the file.
+void read_size(const JsonValue& document, const JsonValue& frame, View& view) {
+  const auto w = setting(document, frame, "w");
+  const auto h = setting(document, frame, "h");
+  view.camera.width = w ? w->count() : 0;
+  view.camera.height = h ? h->count() : 0;
+  if (view.image_path.empty()) return;
+  const ImageSize size = image_size(view.image_path);
+  if ((w && view.camera.width != size.width) || (h && view.camera.height != size.height)) {
+    frame.fail(Defect::Mismatch,
+               "w x h is " + std::to_string(view.camera.width) + " x " +
+                   std::to_string(view.camera.height) + ", the image file has " +
+                   std::to_string(size.width) + " x " + std::to_string(size.height));
+  }
+  view.camera.width = size.width;
+  view.camera.height = size.height;
+}
+
+// Paths that this reader does not follow are held to the same rule as those it does.
+void check_other_paths(const SceneRoot& root, const JsonValue& object, const fs::path& json) {
+  for (const char* key : {"depth_file_path", "mask_path", "ply_file_path"}) {
+    if (const auto name = object.find(key)) (void)resolve_in_scene(root, name->text(), json);
+  }
+}
+
+}  // namespace
+
+bool is_transforms_json(const fs::path& folder) {
+  return fs::exists(folder / "transforms.json") || fs::exists(folder / "transforms_train.json");
+}
+
+Scene read_transforms_json(const SceneRoot& root) {
+  const bool has_all = fs::exists(root.folder / "transforms.json");
+  const char* const file_name = has_all ? "transforms.json" : "transforms_train.json";
+  const fs::path path = resolve_in_scene(root, file_name, root.folder);
+  const nlohmann::json json = read_json(path);
+  const JsonValue document(json, path);
+  const JsonValue frames = document.at("frames");
+  check_other_paths(root, document, path);
+  Scene scene;
+  scene.kind = "transforms.json";
+  scene.folder = root.folder;
+  if (frames.size() == 0) frames.fail(Defect::Empty, "there are no frames");
+  std::set<fs::path> seen;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    const JsonValue frame = frames.at(i);
+    check_other_paths(root, frame, path);
+    View view;
+    const std::string name = frame.at("file_path").text();
+    const fs::path image = photograph(root, name, path);
+    if (!seen.insert(image.lexically_normal()).second) {
+      scene.warnings.push_back(frame.pointer() + ": \"" + printable(name) +
+                               "\" occurs twice; the first was taken");
+      continue;
+    }
+    if (fs::is_regular_file(image)) {
+      view.image_path = image;
+    } else {
+      scene.missing.push_back(name);
+    }
+    view.name = view.image_path.empty() ? name : image.lexically_relative(root.folder).string();
+    read_size(document, frame, view);
+    view.camera.world_from_cam = read_pose(frame.at("transform_matrix"));
+    const bool has_size = view.camera.width > 0 && view.camera.height > 0;
+    if (!has_size && view.image_path.empty()) continue;  // nothing would ever tell its size
+    read_intrinsics(document, frame, view);
+    scene.views.push_back(std::move(view));
+  }
+  return scene;
+}
+
+}  // namespace cgs
