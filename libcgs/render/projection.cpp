@@ -72,11 +72,11 @@ ImageCovariance image_covariance(const View& view,
                                  const Eigen::Vector3f& scale,
                                  const Eigen::Vector4f& rotation,
                                  double dilation) {
-  const double z = in_cam.z();
-  const double a = std::clamp(in_cam.x() / z, view.min_slope[0], view.max_slope[0]);
-  const double b = std::clamp(in_cam.y() / z, view.min_slope[1], view.max_slope[1]);
-  const double jx = view.camera.fx / z;
-  const double jy = view.camera.fy / z;
+  const double inverse_z = 1 / in_cam.z();
+  const double a = std::clamp(in_cam.x() * inverse_z, view.min_slope[0], view.max_slope[0]);
+  const double b = std::clamp(in_cam.y() * inverse_z, view.min_slope[1], view.max_slope[1]);
+  const double jx = view.camera.fx * inverse_z;
+  const double jy = view.camera.fy * inverse_z;
   if (scale.x() == scale.y() && scale.x() == scale.z()) {
     // A ball looks the same in any rotation: the camera axes serve as its own.
     const double s = scale.x();

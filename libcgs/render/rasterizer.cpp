@@ -119,9 +119,13 @@ Band make_band(const ProjectedGaussians& projected,
   std::vector<TileRange> reach;
   reach.reserve(gaussians.size());
   band.begin.assign(static_cast<size_t>(columns) + 1, 0);
-  for (const uint32_t g : gaussians) {
+  for (size_t k = 0; k < gaussians.size(); ++k) {
+    // Depth order visits the splats at random, faster than memory can follow unasked.
+    constexpr size_t kAhead = 12;
+    __builtin_prefetch(&projected.splats[gaussians[std::min(k + kAhead, gaussians.size() - 1)]]);
+    const uint32_t g = gaussians[k];
     const Splat& splat = projected.splats[g];
-    band.splats.push_back(in_band(splat, g, row * kTileSize));
+    band.splats.push_back(in_band(splat, projected.rows[g], g, row * kTileSize));
     reach.push_back(tiles_reached(splat, band.splats.back(), columns));
     for (int c = reach.back().first; c <= reach.back().last; ++c) ++band.begin[c + 1];
   }
@@ -144,7 +148,7 @@ void write_pixel(const TileAccumulator& tile,
   out.alpha.data[to] = alpha;
   out.color.data[to] = Eigen::Vector3f(tile.color[0][at], tile.color[1][at], tile.color[2][at]) +
                        T * options.background;
-  out.median_depth.data[to] = tile.median_depth[at];
+  if (T <= 0.5f) out.median_depth.data[to] = tile.last_above_half[at];
   out.weight_squared.data[to] = tile.weight_square[at];
   out.strongest.data[to] = static_cast<uint32_t>(tile.strongest[at]);
   if (!(alpha >= options.min_alpha)) return;

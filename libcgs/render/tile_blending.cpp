@@ -18,6 +18,8 @@ constexpr int kLanes = 8;
 using Floats = float __attribute__((vector_size(sizeof(float) * kLanes)));
 using Ints = int32_t __attribute__((vector_size(sizeof(int32_t) * kLanes)));
 
+constexpr float kLog2OfGaussian = -0.5f * 1.44269504f;  // e^(-q / 2) = 2^(q * kLog2OfGaussian)
+
 template <typename Vector, typename Scalar>
 Vector load(const Scalar* from) {
   Vector out;
@@ -30,21 +32,19 @@ void store(const Vector& vector, Scalar* to) {
   std::memcpy(to, &vector, sizeof(vector));
 }
 
-// e^x for x in [-87, 0], relative error < 3e-7. Not std::exp because that is one lane at a time.
-inline Floats exp_negative(Floats x) {
-  constexpr float kLog2E = 1.44269504f;
-  constexpr float kLn2High = 0.693145752f;  // few bits, so that its multiples are exact
-  constexpr float kLn2Low = 1.42860677e-6f;
-  const Ints n = __builtin_convertvector(x * kLog2E - 0.5f, Ints);
-  const Floats nf = __builtin_convertvector(n, Floats);
-  const Floats r = (x - nf * kLn2High) - nf * kLn2Low;  // |r| <= ln 2 / 2
+inline Floats min(Floats a, Floats b) { return _mm256_min_ps(a, b); }
+
+// 2^x for x in [-126, 0], relative error < 3e-7. Not std::exp2: that is one lane at a time.
+inline Floats exp2_negative(Floats x) {
+  const Floats whole = _mm256_round_ps(x, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
+  const Floats r = (x - whole) * 0.693147181f;  // e^r with |r| <= ln 2 / 2
   Floats p = r * (1.0f / 720) + 1.0f / 120;
   p = p * r + 1.0f / 24;
   p = p * r + 1.0f / 6;
   p = p * r + 0.5f;
   p = p * r + 1.0f;
   p = p * r + 1.0f;
-  return p * std::bit_cast<Floats>((n + 127) << 23);
+  return p * std::bit_cast<Floats>((__builtin_convertvector(whole, Ints) + 127) << 23);
 }
 
 // Blends eight pixels from `at` on; distance is that of the first from the ridge of the splat.
@@ -52,36 +52,34 @@ inline void blend_window(
     const BandSplat& s, float row_exponent, float distance, int at, TileAccumulator& tile) {
   constexpr Floats kLane = {0, 1, 2, 3, 4, 5, 6, 7};
   constexpr Floats kZero = {};
-  constexpr float kHighestExponent = 60;  // far below the cut, yet inside exp_negative
+  constexpr Floats kHighestExponent = kZero + 100.0f;  // far below the cut
   const Floats t = (kLane + distance) * s.inv_sigma_x;
-  Floats q = t * t + row_exponent;
-  q = q < kHighestExponent ? q : kZero + kHighestExponent;
-  Floats alpha = s.opacity * exp_negative(q * -0.5f);
-  alpha = alpha < kMaxSplatAlpha ? alpha : kZero + kMaxSplatAlpha;
+  const Floats q = min(t * t + row_exponent, kHighestExponent);
+  Floats alpha = min(s.opacity * exp2_negative(q * kLog2OfGaussian), kZero + kMaxSplatAlpha);
 
   const Floats before = load<Floats>(&tile.transmittance[at]);
   const Ints blended = (alpha >= kMinSplatAlpha) & (before >= kMinTransmittance);
   alpha = blended ? alpha : kZero;
   const Floats w = alpha * before;
-  const Floats after = before * (1.0f - alpha);
-  store(after, &tile.transmittance[at]);
+  store(before * (1.0f - alpha), &tile.transmittance[at]);
   for (int c = 0; c < 3; ++c) {
     store(load<Floats>(&tile.color[c][at]) + w * s.color[c], &tile.color[c][at]);
   }
   store(load<Floats>(&tile.weight_square[at]) + w * w, &tile.weight_square[at]);
 
+  const Floats depth = kZero + s.depth;
   const Floats best = load<Floats>(&tile.best_weight[at]);
-  Floats first = load<Floats>(&tile.first_depth[at]);
-  first = (best == 0.0f) & (w > 0.0f) ? kZero + s.depth : first;
+  // Up to and including the first Gaussian that leaves any weight.
+  const Floats first = best == kZero ? depth : load<Floats>(&tile.first_depth[at]);
   store(first, &tile.first_depth[at]);
-  const Floats z = s.depth - first;
+  const Floats z = depth - first;
   const Floats wz = w * z;
   store(load<Floats>(&tile.depth_sum[at]) + wz, &tile.depth_sum[at]);
   store(load<Floats>(&tile.depth_square[at]) + wz * z, &tile.depth_square[at]);
 
-  const Ints halved = (before > 0.5f) & (after <= 0.5f);
-  const Floats median = load<Floats>(&tile.median_depth[at]);
-  store(halved ? kZero + s.depth : median, &tile.median_depth[at]);
+  const Ints above_half = blended & (before > 0.5f);
+  const Floats last = load<Floats>(&tile.last_above_half[at]);
+  store(above_half ? depth : last, &tile.last_above_half[at]);
   const Ints stronger = w > best;
   store(stronger ? w : best, &tile.best_weight[at]);
   const Ints strongest = load<Ints>(&tile.strongest[at]);
@@ -90,7 +88,7 @@ inline void blend_window(
 
 void blend_splat(const BandSplat& s, int first_column, uint32_t open_rows, TileAccumulator& tile) {
   const auto ridge_at_top = static_cast<float>(s.x - first_column);
-  for (int row = 0; row < kTileSize; ++row) {
+  for (int row = s.rows.first; row <= s.rows.last; ++row) {
     const auto r = static_cast<float>(row);
     const float ty = (s.dy + r) * s.inv_sigma_y;
     const float rest = s.q_max - ty * ty;
@@ -104,13 +102,10 @@ void blend_splat(const BandSplat& s, int first_column, uint32_t open_rows, TileA
     const int begin = static_cast<int>(left + 1.0f);  // = ceil(left), as the margin forgives
     const int end = static_cast<int>(right) + 1;
     const int at = row * kTileSize;
-    if (end - std::min(begin, kLanes) <= kLanes) {
-      const int window = std::min(begin, kLanes);
-      blend_window(s, ty * ty, (static_cast<float>(window) + 0.5f) - ridge, at + window, tile);
-    } else {
-      blend_window(s, ty * ty, 0.5f - ridge, at, tile);
-      blend_window(s, ty * ty, (kLanes + 0.5f) - ridge, at + kLanes, tile);
-    }
+    // Whole halves of the row: windows that overlap the last ones by parts would have to wait until
+    // those are written back.
+    if (begin < kLanes) blend_window(s, ty * ty, 0.5f - ridge, at, tile);
+    if (end > kLanes) blend_window(s, ty * ty, (kLanes + 0.5f) - ridge, at + kLanes, tile);
   }
 }
 
@@ -135,7 +130,7 @@ void reset(TileAccumulator& tile, std::array<int, 2> size) {
   tile.depth_sum.fill(0);
   tile.depth_square.fill(0);
   tile.weight_square.fill(0);
-  tile.median_depth.fill(std::numeric_limits<float>::quiet_NaN());
+  tile.last_above_half.fill(std::numeric_limits<float>::quiet_NaN());
   tile.best_weight.fill(0);
   tile.strongest.fill(-1);
 }
@@ -158,7 +153,7 @@ class FlushSubnormals {
 
 }  // namespace
 
-BandSplat in_band(const Splat& splat, uint32_t index, int first_row) {
+BandSplat in_band(const Splat& splat, RowRange rows, uint32_t index, int first_row) {
   BandSplat out;
   const double dy = first_row + 0.5 - splat.v;
   out.x = splat.u + splat.slope * dy;
@@ -171,6 +166,7 @@ BandSplat in_band(const Splat& splat, uint32_t index, int first_row) {
   out.opacity = splat.opacity;
   out.depth = splat.depth;
   out.color = {splat.color.x(), splat.color.y(), splat.color.z()};
+  out.rows = {std::max(rows.first - first_row, 0), std::min(rows.last - first_row, kTileSize - 1)};
   out.index = index;
   return out;
 }

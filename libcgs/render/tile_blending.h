@@ -25,6 +25,7 @@ struct BandSplat {
   float opacity = 0;
   float depth = 0;
   std::array<float, 3> color{};
+  RowRange rows;       ///< Pixel rows of the band that the splat can reach.
   uint32_t index = 0;  ///< Of the Gaussian in its set.
 };
 
@@ -37,13 +38,16 @@ struct alignas(32) TileAccumulator {
   Plane depth_sum;     ///< Sum w (z - first)
   Plane depth_square;  ///< Sum w (z - first)^2
   Plane weight_square;
-  Plane median_depth;  ///< NaN until transmittance falls through 0.5.
+  Plane last_above_half;  ///< Depth of the last Gaussian blended while transmittance was > 0.5.
   Plane best_weight;
   std::array<int32_t, kTileSize * kTileSize> strongest;  ///< -1 = none.
 };
 
 /// The splat seen from a band of kTileSize pixel rows that starts at pixel row `first_row`.
-BandSplat in_band(const Splat& splat, uint32_t index, int first_row);
+///
+/// \param rows   pixel rows of the image that the splat can reach
+/// \param index  of its Gaussian
+BandSplat in_band(const Splat& splat, RowRange rows, uint32_t index, int first_row);
 
 /// Blends splats, nearest first, over the tile whose first pixel column is `first_column`.
 ///

@@ -44,6 +44,7 @@ Gaussians needles() {
 }
 
 void bench_project(benchmark::State& state) {
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   const Gaussians g = state.range(0) != 0 ? needles() : stacked_views();
   for (auto _ : state) benchmark::DoNotOptimize(project_gaussians(g, stacked_camera(1)));
 }

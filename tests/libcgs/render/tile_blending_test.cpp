@@ -30,7 +30,7 @@ TileAccumulator blend(const std::vector<Splat>& splats,
                       int row,
                       std::array<int, 2> size) {
   std::vector<BandSplat> band;
-  for (uint32_t i = 0; i < splats.size(); ++i) band.push_back(in_band(splats[i], i, row));
+  for (uint32_t i = 0; i < splats.size(); ++i) band.push_back(in_band(splats[i], {0, 1000}, i, row));
   std::vector<uint32_t> order(splats.size());
   std::iota(order.begin(), order.end(), 0);
   TileAccumulator tile;
@@ -74,7 +74,7 @@ TEST(BlendTile, RemembersWhatMadeAPixelOpaque) {
   for (size_t i = 0; i < splats.size(); ++i) splats[i].depth = 1 + float(i);
   const TileAccumulator tile = blend(splats, 0, 0, kWhole);
   const size_t centre = 8 * kTileSize + 8;
-  EXPECT_EQ(tile.median_depth[centre], 2);  // 0.7, then 0.49
+  EXPECT_EQ(tile.last_above_half[centre], 2);  // 0.7, then 0.49
   EXPECT_EQ(tile.strongest[centre], 0);
   EXPECT_EQ(tile.first_depth[centre], 1);
 }
