@@ -123,6 +123,16 @@ Model read_model(const std::filesystem::path& folder) {
   return model;
 }
 
+void relink_images(Scene& scene, const std::filesystem::path& folder) {
+  const Scene found = read_scene(folder);
+  for (View& view : scene.views) {
+    const auto match = std::find_if(found.views.begin(), found.views.end(), [&](const View& other) {
+      return other.name == view.name;
+    });
+    if (match != found.views.end()) view.image_path = match->image_path;
+  }
+}
+
 std::vector<SupportView> support_views(const Model& model) {
   std::vector<SupportView> views;
   for (size_t k = 0; k < model.priors.size(); ++k) {

@@ -42,6 +42,10 @@ void write_model(const std::filesystem::path& folder, const Model& model);
 /// Reads what write_model() wrote. \throws BadInput
 Model read_model(const std::filesystem::path& folder);
 
+/// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model
+/// or photographs that were moved. \throws BadInput as read_scene()
+void relink_images(Scene& scene, const std::filesystem::path& folder);
+
 /// The input views with their depth and its uncertainty: who can vouch for a rendered pixel.
 std::vector<SupportView> support_views(const Model& model);
 

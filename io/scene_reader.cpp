@@ -183,34 +183,17 @@ int find_view(const Scene& scene, const std::string& token) {
                      std::to_string(names.size()) + ": " + first_of(names));
 }
 
-std::vector<int> named_views(const Scene& scene, const std::string& list) {
-  std::vector<int> out;
-  size_t at = 0;
-  while (at <= list.size()) {
-    const size_t end = std::min(list.find(',', at), list.size());
-    std::string token = list.substr(at, end - at);
-    token.erase(0, token.find_first_not_of(' '));
-    token.erase(token.find_last_not_of(' ') + 1);
-    const int view = find_view(scene, token);
-    const std::string& name = scene.views[static_cast<size_t>(view)].name;
-    if (std::find(out.begin(), out.end(), view) != out.end()) {
-      throw InvalidInput("SceneOptions.views: view \"" + printable(name) + "\" is named twice");
-    }
-    if (scene.views[static_cast<size_t>(view)].image_path.empty()) {
-      throw InvalidInput("SceneOptions.views: view \"" + printable(name) + "\" has no image file");
-    }
-    out.push_back(view);
-    at = end + 1;
-  }
-  std::sort(out.begin(), out.end());
-  return out;
-}
-
 void choose_views(Scene& scene, const std::string& list) {
   constexpr size_t kTakeAll = 4;
   const std::vector<int> usable = views_with_files(scene);
   if (!list.empty()) {
-    scene.input = named_views(scene, list);
+    scene.input = select_views(scene, list);
+    for (const int i : scene.input) {
+      const View& view = scene.views[static_cast<size_t>(i)];
+      if (!view.image_path.empty()) continue;
+      throw InvalidInput("SceneOptions.views: view \"" + printable(view.name) +
+                         "\" has no image file");
+    }
   } else {
     scene.input = usable.size() <= kTakeAll ? usable : llff_protocol(usable);
   }
@@ -280,6 +263,26 @@ void warn_of_identical_images(Scene& scene, const std::vector<int>& views) {
 
 void SceneOptions::validate() const {
   require(downscale >= 1, "SceneOptions.downscale must be >= 1", downscale);
+}
+
+std::vector<int> select_views(const Scene& scene, const std::string& list) {
+  std::vector<int> out;
+  size_t at = 0;
+  while (at <= list.size()) {
+    const size_t end = std::min(list.find(',', at), list.size());
+    std::string token = list.substr(at, end - at);
+    token.erase(0, token.find_first_not_of(' '));
+    token.erase(token.find_last_not_of(' ') + 1);
+    const int view = find_view(scene, token);
+    if (std::find(out.begin(), out.end(), view) != out.end()) {
+      const std::string& name = scene.views[static_cast<size_t>(view)].name;
+      throw InvalidInput("SceneOptions.views: view \"" + printable(name) + "\" is named twice");
+    }
+    out.push_back(view);
+    at = end + 1;
+  }
+  std::sort(out.begin(), out.end());
+  return out;
 }
 
 Scene read_scene(const fs::path& folder, const SceneOptions& options) {

@@ -37,6 +37,11 @@ struct SceneOptions {
 ///         Value (input cameras in one place), and as the readers of the layouts.
 Scene read_scene(const std::filesystem::path& folder, const SceneOptions& options = {});
 
+/// The views a list names: comma-separated file stems or indices in name order, as in
+/// SceneOptions::views. \return indices into scene.views, ascending
+/// \throws InvalidInput for a view that does not exist or is named twice
+std::vector<int> select_views(const Scene& scene, const std::string& list);
+
 /// Decodes the images of some views, takes lens distortion out and averages them down to the size
 /// of their camera, in place. View::distortion stays, as it describes the file; View::valid marks
 /// the usable pixels where not all are. Odd pictures (constant, fully masked, identical) become

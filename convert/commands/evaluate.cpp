@@ -10,7 +10,6 @@
 #include "convert/terminal.h"
 #include "convert/views.h"
 #include "io/scene_reader.h"
-#include "io/view_selection.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

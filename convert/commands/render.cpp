@@ -9,7 +9,7 @@
 #include "convert/model.h"
 #include "convert/terminal.h"
 #include "convert/views.h"
-#include "io/view_selection.h"
+#include "io/scene_reader.h"
 
 namespace cgs {
 
