@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Geometry>
+
 #include "libcgs/core/raster.h"
 #include "libcgs/render/render_buffers.h"
 

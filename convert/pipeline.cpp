@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -40,8 +39,6 @@ struct Run {
   std::optional<Model> model;        ///< Loaded when a stage needs it.
   std::optional<TriangleMesh> mesh;  ///< Watertight; loaded when a stage needs it.
 };
-
-const std::vector<std::string> kStages = {"model", "views", "evaluation", "mesh", "web", "report"};
 
 Json request_json(const RunRequest& request, const Scene& scene) {
   Json inputs = Json::object();
@@ -211,10 +208,6 @@ Json run_report(Run& run, const Progress& progress) {
   write_file(run.request.output / "report.json", json.dump(2) + "\n");
   write_html_report(run.request.output, json);
   return {{"pages", 1}};
-}
-
-std::string view_file(const Scene& scene, const char* suffix) {
-  return "views/" + scene.views[static_cast<size_t>(scene.input.front())].name + suffix;
 }
 
 /// A stage: its files (whose absence means it must run), what it does, and a remark for the user.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/volume_file.h"
 
+#include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/ValueTransformer.h>
 
 #include <nlohmann/json.hpp>
