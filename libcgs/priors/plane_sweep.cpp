@@ -29,9 +29,34 @@ void require_images(const Scene& scene) {
   }
 }
 
+// Takes back confirmations of pixels that stand alone: chance agreements do not form surfaces.
+Raster<Agreement> without_speckles(const SweptView& view, const Raster<Agreement>& agreement) {
+  constexpr int kRadius = 2;
+  constexpr int kFewest = 6;  // a line one pixel wide, itself included, has 5
+  constexpr float kSameSurface = 1.5f;  // [planes]
+  Raster<Agreement> out = agreement;
+  tbb::parallel_for(0, out.height, [&](int y) {
+    for (int x = 0; x < out.width; ++x) {
+      if (agreement(x, y).views == 0) continue;
+      int like = 0;
+      for (int dy = -kRadius; dy <= kRadius; ++dy) {
+        for (int dx = -kRadius; dx <= kRadius; ++dx) {
+          if (!out.contains(x + dx, y + dy) || agreement(x + dx, y + dy).views == 0) continue;
+          const float t = view.pixels(x + dx, y + dy).plane.at(-dx, -dy);
+          like += std::abs(t - view.pixels(x, y).plane.t) < kSameSurface;
+        }
+      }
+      if (like < kFewest) out(x, y) = {};
+    }
+  });
+  return out;
+}
+
 std::vector<Raster<Agreement>> check_all(const std::vector<SweptView>& views, double tolerance) {
   std::vector<Raster<Agreement>> out;
-  for (size_t i = 0; i < views.size(); ++i) out.push_back(cross_check(views, i, tolerance));
+  for (size_t i = 0; i < views.size(); ++i) {
+    out.push_back(without_speckles(views[i], cross_check(views, i, tolerance)));
+  }
   return out;
 }
 

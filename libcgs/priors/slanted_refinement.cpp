@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace cgs {
@@ -15,7 +16,9 @@ namespace {
 
 constexpr int kRadius = 4;
 constexpr int kSide = 2 * kRadius + 1;
-constexpr int kSamples = (kSide * kSide + 7) / 8 * 8;  // padded with weight 0
+constexpr size_t kTaps = (kSide * kSide + 1) / 2;     // every other pixel, like a chessboard
+constexpr size_t kSamples = (kTaps + 7) / 8 * 8;      // padded with weight 0
+constexpr size_t kCenter = kTaps / 2;
 constexpr float kLevelScale = 12;      // bilateral weight halves at this difference [gray levels]
 constexpr float kDistanceScale = 4;    // … and at this distance [pixels]
 constexpr float kNoiseVariance = 4;    // [gray levels squared]
@@ -35,12 +38,28 @@ constexpr std::array<Offset, 8> kNeighbours = {{
 
 using Samples = std::array<float, kSamples>;
 
+// Eight samples at a time; sums of lanes have a fixed order.
+using Lanes = float __attribute__((vector_size(32)));
+Lanes lanes(const Samples& samples, size_t i) {
+  Lanes v;
+  std::memcpy(&v, &samples[i], sizeof v);
+  return v;
+}
+float sum(const Lanes& v) {
+  return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
+}
+float dot(const Samples& a, const Samples& b) {
+  Lanes total{};
+  for (size_t i = 0; i < kSamples; i += 8) total += lanes(a, i) * lanes(b, i);
+  return sum(total);
+}
+
 struct OffsetTable {
   Samples dx{}, dy{};
   OffsetTable() {
-    for (int i = 0; i < kSide * kSide; ++i) {
-      dx[static_cast<size_t>(i)] = static_cast<float>(i % kSide - kRadius);
-      dy[static_cast<size_t>(i)] = static_cast<float>(i / kSide - kRadius);
+    for (size_t i = 0; i < kTaps; ++i) {
+      dx[i] = static_cast<float>(static_cast<int>(2 * i) % kSide - kRadius);
+      dy[i] = static_cast<float>(static_cast<int>(2 * i) / kSide - kRadius);
     }
   }
 };
@@ -76,54 +95,58 @@ LocalMap local_map(const SweepImage& image, const SweepSource& s, Offset p, cons
   return m;
 }
 
-// Bilinear samples of the source around the image of a window; `inside` is 0 beyond the frame.
-void sample(const Raster<float>& gray, const LocalMap& m, Samples& value, Samples& inside) {
-  const float max_u = static_cast<float>(gray.width) - 1.001f;
-  const float max_v = static_cast<float>(gray.height) - 1.001f;
-  const float* data = gray.data.data();
-  const int stride = gray.width;
-  for (int i = 0; i < kSamples; ++i) {
-    const float u = m.u + m.ux * kOffsets.dx[i] + m.uy * kOffsets.dy[i];
-    const float v = m.v + m.vx * kOffsets.dx[i] + m.vy * kOffsets.dy[i];
-    const float cu = std::min(std::max(u, 0.0f), max_u);
-    const float cv = std::min(std::max(v, 0.0f), max_v);
-    inside[i] = std::abs(u - cu) + std::abs(v - cv) <= 1.0f ? 1.0f : 0.0f;
-    const int iu = static_cast<int>(cu);
-    const int iv = static_cast<int>(cv);
-    const float a = cu - static_cast<float>(iu);
-    const float b = cv - static_cast<float>(iv);
-    const float* p = data + iv * stride + iu;
-    const float top = p[0] + a * (p[1] - p[0]);
-    const float bottom = p[stride] + a * (p[stride + 1] - p[stride]);
-    value[i] = top + b * (bottom - top);
-  }
-}
+// The source around the image of a window: the bilinear cell of every sample. In three loops, so
+// that all but the loads are done eight samples at a time.
+struct Cells {
+  Samples inside;                      // 0 beyond the frame, else 1
+  Samples a, b;                        // position in the cell
+  Samples p00, p10, p01, p11;          // its corners, first index along the row
 
-// As sample(), with the derivative of the value by t at a fixed pixel.
-void sample_with_slope(const Raster<float>& gray, const LocalMap& m, Samples& value, Samples& slope,
-                       Samples& inside) {
-  const float max_u = static_cast<float>(gray.width) - 1.001f;
-  const float max_v = static_cast<float>(gray.height) - 1.001f;
-  const float* data = gray.data.data();
-  const int stride = gray.width;
-  for (int i = 0; i < kSamples; ++i) {
-    const float u = m.u + m.ux * kOffsets.dx[i] + m.uy * kOffsets.dy[i];
-    const float v = m.v + m.vx * kOffsets.dx[i] + m.vy * kOffsets.dy[i];
-    const float cu = std::min(std::max(u, 0.0f), max_u);
-    const float cv = std::min(std::max(v, 0.0f), max_v);
-    inside[i] = std::abs(u - cu) + std::abs(v - cv) <= 1.0f ? 1.0f : 0.0f;
-    const int iu = static_cast<int>(cu);
-    const int iv = static_cast<int>(cv);
-    const float a = cu - static_cast<float>(iu);
-    const float b = cv - static_cast<float>(iv);
-    const float* p = data + iv * stride + iu;
-    const float top = p[0] + a * (p[1] - p[0]);
-    const float bottom = p[stride] + a * (p[stride + 1] - p[stride]);
-    value[i] = top + b * (bottom - top);
-    const float gu = (1 - b) * (p[1] - p[0]) + b * (p[stride + 1] - p[stride]);
-    slope[i] = gu * m.ut + (bottom - top) * m.vt;
+  Cells(const Raster<float>& gray, const LocalMap& m) {
+    const float max_u = static_cast<float>(gray.width) - 1.001f;
+    const float max_v = static_cast<float>(gray.height) - 1.001f;
+    std::array<int, kSamples> at;
+    for (size_t i = 0; i < kSamples; ++i) {
+      const float u = m.u + m.ux * kOffsets.dx[i] + m.uy * kOffsets.dy[i];
+      const float v = m.v + m.vx * kOffsets.dx[i] + m.vy * kOffsets.dy[i];
+      const float cu = std::min(std::max(u, 0.0f), max_u);
+      const float cv = std::min(std::max(v, 0.0f), max_v);
+      inside[i] = std::abs(u - cu) + std::abs(v - cv) <= 1.0f ? 1.0f : 0.0f;
+      const int iu = static_cast<int>(cu);
+      const int iv = static_cast<int>(cv);
+      a[i] = cu - static_cast<float>(iu);
+      b[i] = cv - static_cast<float>(iv);
+      at[i] = iv * gray.width + iu;
+    }
+    const float* top = gray.data.data();
+    const float* bottom = top + gray.width;
+    for (size_t i = 0; i < kSamples; ++i) {
+      p00[i] = top[at[i]];
+      p10[i] = top[at[i] + 1];
+      p01[i] = bottom[at[i]];
+      p11[i] = bottom[at[i] + 1];
+    }
   }
-}
+
+  void values(Samples& out) const {
+    for (size_t i = 0; i < kSamples; ++i) {
+      const float top = p00[i] + a[i] * (p10[i] - p00[i]);
+      const float bottom = p01[i] + a[i] * (p11[i] - p01[i]);
+      out[i] = top + b[i] * (bottom - top);
+    }
+  }
+
+  // Derivative of the values by t at a fixed pixel.
+  void derivatives(const LocalMap& m, Samples& out) const {
+    for (size_t i = 0; i < kSamples; ++i) {
+      const float along_top = p10[i] - p00[i];
+      const float along_bottom = p11[i] - p01[i];
+      const float gu = along_top + b[i] * (along_bottom - along_top);
+      const float gv = p01[i] - p00[i] + a[i] * (along_bottom - along_top);
+      out[i] = gu * m.ut + gv * m.vt;
+    }
+  }
+};
 
 }  // namespace
 
@@ -170,12 +193,12 @@ SlantedRefinement::Window SlantedRefinement::window(int x, int y) const {
   const float center = gray(x, y);
   w.value.fill(center);
   w.weight.fill(0);
-  for (int dy = std::max(-kRadius, -y); dy <= std::min(kRadius, gray.height - 1 - y); ++dy) {
-    for (int dx = std::max(-kRadius, -x); dx <= std::min(kRadius, gray.width - 1 - x); ++dx) {
-      const auto i = static_cast<size_t>((dy + kRadius) * kSide + dx + kRadius);
-      w.value[i] = gray(x + dx, y + dy);
-      w.weight[i] = reference_.valid(x + dx, y + dy) != 0 ? 1.0f : 0.0f;
-    }
+  for (size_t i = 0; i < kTaps; ++i) {
+    const int u = x + static_cast<int>(kOffsets.dx[i]);
+    const int v = y + static_cast<int>(kOffsets.dy[i]);
+    if (!gray.contains(u, v) || reference_.valid(u, v) == 0) continue;
+    w.value[i] = gray(u, v);
+    w.weight[i] = 1;
   }
   for (size_t i = 0; i < kSamples; ++i) {
     const float level = (w.value[i] - center) / kLevelScale;
@@ -193,27 +216,24 @@ float SlantedRefinement::correlation(const Window& w, size_t source,
   const SweepImage& image = images_[static_cast<size_t>(s.image)];
   const LocalMap map = local_map(image, s, {w.x, w.y}, plane);
   if (!map.seen) return kNaN;
+  const Cells cells(image.gray, map);
   Samples value;
-  Samples inside;
-  sample(image.gray, map, value, inside);
-  const float center = value[kRadius * kSide + kRadius];
-  std::array<float, 8> sw{}, sa{}, sb{}, saa{}, sbb{}, sab{};
+  cells.values(value);
+  const float center = value[kCenter];
+  Lanes sw{}, sa{}, sb{}, saa{}, sbb{}, sab{};
   for (size_t i = 0; i < kSamples; i += 8) {
-    for (size_t k = 0; k < 8; ++k) {
-      const float weight = w.weight[i + k] * inside[i + k];
-      const float a = w.value[i + k];
-      const float b = value[i + k] - center;
-      sw[k] += weight;
-      sa[k] += weight * a;
-      sb[k] += weight * b;
-      saa[k] += weight * a * a;
-      sbb[k] += weight * b * b;
-      sab[k] += weight * a * b;
-    }
+    const Lanes weight = lanes(w.weight, i) * lanes(cells.inside, i);
+    const Lanes a = lanes(w.value, i);
+    const Lanes b = lanes(value, i) - center;
+    const Lanes wa = weight * a;
+    const Lanes wb = weight * b;
+    sw += weight;
+    sa += wa;
+    sb += wb;
+    saa += wa * a;
+    sbb += wb * b;
+    sab += wa * b;
   }
-  const auto sum = [](const std::array<float, 8>& v) {
-    return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
-  };
   const float inv = 1 / std::max(sum(sw), 1e-6f);
   const float ma = sum(sa) * inv;
   const float mb = sum(sb) * inv;
@@ -248,7 +268,10 @@ float SlantedRefinement::smoothness(const Window& w, const SlantedPlane& plane) 
   float weight = 1e-6f;
   for (const Offset o : {Offset{-1, 0}, Offset{1, 0}, Offset{0, -1}, Offset{0, 1}}) {
     if (!planes_.contains(w.x + o.dx, w.y + o.dy)) continue;
-    const float k = w.weight[static_cast<size_t>((o.dy + kRadius) * kSide + o.dx + kRadius)];
+    if (reference_.valid(w.x + o.dx, w.y + o.dy) == 0) continue;
+    const float level =
+        (reference_.gray(w.x + o.dx, w.y + o.dy) - reference_.gray(w.x, w.y)) / kLevelScale;
+    const float k = 1 / (1 + level * level);
     const float there = planes_(w.x + o.dx, w.y + o.dy).at(-o.dx, -o.dy);
     total += k * std::min(std::abs(there - plane.t), kTruncation);
     weight += k;
@@ -261,24 +284,34 @@ float SlantedRefinement::cost(const Window& w, const SlantedPlane& plane) const 
 }
 
 bool SlantedRefinement::normal_equations(const Window& w, size_t source, const SlantedPlane& plane,
-                                         Normal& sum) const {
+                                         Normal& total) const {
   const SweepSource& s = geometry_.sources[source];
   const SweepImage& image = images_[static_cast<size_t>(s.image)];
   const LocalMap map = local_map(image, s, {w.x, w.y}, plane);
   if (!map.seen) return false;
-  Samples value;
-  Samples slope;
-  Samples inside;
-  sample_with_slope(image.gray, map, value, slope, inside);
-  // Unknowns: t, slope_x, slope_y, gain, offset; right side: the reference.
-  Eigen::Matrix<float, 6, 6> M = Eigen::Matrix<float, 6, 6>::Zero();
-  const float center = value[kRadius * kSide + kRadius];
-  for (size_t i = 0; i < kSide * kSide; ++i) {
-    const float weight = w.weight[i] * inside[i];
-    Eigen::Matrix<float, 6, 1> row;
-    row << slope[i], slope[i] * kOffsets.dx[i], slope[i] * kOffsets.dy[i], value[i] - center, 1,
-        w.value[i];
-    M.noalias() += weight * row * row.transpose();
+  const Cells cells(image.gray, map);
+  // Unknowns: t, slope_x, slope_y, gain, offset; last the right side: the reference.
+  std::array<Samples, 6> rows;
+  cells.derivatives(map, rows[0]);
+  cells.values(rows[3]);
+  const float center = rows[3][kCenter];
+  for (size_t i = 0; i < kSamples; ++i) {
+    rows[1][i] = rows[0][i] * kOffsets.dx[i];
+    rows[2][i] = rows[0][i] * kOffsets.dy[i];
+    rows[3][i] -= center;
+    rows[4][i] = 1;
+  }
+  rows[5] = w.value;
+  Eigen::Matrix<float, 6, 6> M;
+  for (size_t r = 0; r < 6; ++r) {
+    Samples weighted;
+    for (size_t i = 0; i < kSamples; ++i) {
+      weighted[i] = w.weight[i] * cells.inside[i] * rows[r][i];
+    }
+    for (size_t c = r; c < 6; ++c) {
+      M(int(r), int(c)) = dot(weighted, rows[c]);
+      M(int(c), int(r)) = M(int(r), int(c));
+    }
   }
   if (!(M(4, 4) > 0)) return false;
   // Photometric gain and offset first, by regression of the reference on the source.
@@ -293,10 +326,10 @@ bool SlantedRefinement::normal_equations(const Window& w, size_t source, const S
   const float residual = std::max(C(5, 5) - gain * C(3, 5), 0.0f);
   // Divided by the variance of the reference, so that sources count as in the correlation.
   const float scale = 1 / (C(5, 5) * inv + kNoiseVariance);
-  sum.H += scale * gain * gain * H;
-  sum.g += scale * gain * g;
-  sum.residual += scale * residual;
-  sum.weight += M(4, 4);
+  total.H += scale * gain * gain * H;
+  total.g += scale * gain * g;
+  total.residual += scale * residual;
+  total.weight += M(4, 4);
   return true;
 }
 
@@ -309,12 +342,12 @@ SlantedRefinement::Normal SlantedRefinement::normal_equations(const Window& w,
     scores[s] = correlation(w, s, plane);
     if (scores[s] > best) best = scores[s];
   }
-  Normal sum;
+  Normal total;
   constexpr float kBelowBest = 0.3f;  // a source this much worse is taken for occluded
   for (size_t s = 0; s < count; ++s) {
-    if (scores[s] >= best - kBelowBest) normal_equations(w, s, plane, sum);
+    if (scores[s] >= best - kBelowBest) normal_equations(w, s, plane, total);
   }
-  return sum;
+  return total;
 }
 
 void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
@@ -329,7 +362,9 @@ void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
                          2 * (std::abs(plane.slope_x - best.slope_x) +
                               std::abs(plane.slope_y - best.slope_y));
     if (change < 0.02f) return;
-    const float c = cost(w, plane);
+    const float smooth = kSmoothness * smoothness(w, plane);
+    if (smooth >= least) return;
+    const float c = smooth + data_cost(w, plane);
     if (c < least) {
       least = c;
       best = plane;

@@ -52,7 +52,7 @@ class SlantedRefinement {
   float data_cost(const Window& window, const SlantedPlane& plane) const;
   float smoothness(const Window& window, const SlantedPlane& plane) const;
   float cost(const Window& window, const SlantedPlane& plane) const;
-  bool normal_equations(const Window& w, size_t source, const SlantedPlane& p, Normal& sum) const;
+  bool normal_equations(const Window& w, size_t source, const SlantedPlane& p, Normal& total) const;
   Normal normal_equations(const Window& window, const SlantedPlane& plane) const;
   void visit(int x, int y, const Raster<SlantedPlane>& extra);
 

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/coherence/initialisation.h"
+
+#include <cmath>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+float starting_opacity(size_t views, const InitialisationOptions& options) {
+  if (options.opacity > 0) return options.opacity;
+  if (views <= 2) return 0.6f;
+  return views == 3 ? 0.5f : 0.35f;
+}
+
+void require_same_sizes(const View& view, const ViewPriors& priors) {
+  const Camera& c = view.camera;
+  const auto fits = [&](const auto& raster) {
+    return raster.width == c.width && raster.height == c.height;
+  };
+  require(fits(priors.depth) && fits(view.image),
+          "image and depth of an input view must be of its camera's size",
+          view.name);
+}
+
+}  // namespace
+
+void InitialisationOptions::validate() const {
+  require(radius_factor > 0, "InitialisationOptions.radius_factor must be > 0", radius_factor);
+  require(opacity >= 0 && opacity < 1, "InitialisationOptions.opacity must be in [0, 1)", opacity);
+}
+
+Gaussians initial_gaussians(const Scene& scene, const std::vector<ViewPriors>& priors,
+                            const InitialisationOptions& options) {
+  options.validate();
+  require(priors.size() == scene.input.size(), "there must be priors per input view", priors.size());
+  Gaussians out;
+  const float opacity = starting_opacity(priors.size(), options);
+  for (size_t n = 0; n < priors.size(); ++n) {
+    const View& view = scene.views[static_cast<size_t>(scene.input[n])];
+    require_same_sizes(view, priors[n]);
+    const DepthMap& depth = priors[n].depth;
+    const double pixel = 2 / (view.camera.fx + view.camera.fy);  // per unit of depth
+    for (int y = 0; y < depth.height; ++y) {
+      for (int x = 0; x < depth.width; ++x) {
+        const auto z = static_cast<double>(depth(x, y));
+        if (!(z > 0) || std::isinf(z)) continue;
+        const auto radius = static_cast<float>(double(options.radius_factor) * z * pixel);
+        out.position.push_back(view.camera.unproject(x + 0.5, y + 0.5, z).cast<float>());
+        out.scale.push_back(Eigen::Vector3f::Constant(radius));
+        out.rotation.emplace_back(1.0f, 0.0f, 0.0f, 0.0f);
+        out.opacity.push_back(opacity);
+        out.sh.push_back((view.image(x, y) - Eigen::Vector3f::Constant(0.5f)) / kShC0);
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace cgs

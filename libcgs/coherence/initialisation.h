@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "libcgs/core/gaussians.h"
+#include "libcgs/core/scene.h"
+#include "libcgs/priors/view_priors.h"
+
+namespace cgs {
+
+/// How Gaussians start.
+struct InitialisationOptions {
+  float radius_factor = 0.6f;  ///< Standard deviation in pixels of the own view; > 0.
+  float opacity = 0;  ///< In [0, 1); 0 = by the number of views: 0.6 for two, 0.5 for three, 0.35
+                      ///< for more, so that a surface drawn once per view is about opaque.
+  /// \throws InvalidInput naming the first field out of range.
+  void validate() const;
+};
+
+/// One isotropic Gaussian per pixel with depth, on the ray through the pixel's centre, of the
+/// pixel's colour (SH degree 0).
+///
+/// \param priors in the order of scene.input; pixels of NaN depth are skipped
+/// \return view-major, row-major [internal units]
+/// \throws InvalidInput if priors, images and cameras are not of one size
+/// Source: Paliwal et al. 2024, "CoherentGS", section 3; rays there pass through pixel corners.
+Gaussians initial_gaussians(const Scene& scene, const std::vector<ViewPriors>& priors,
+                            const InitialisationOptions& options = {});
+
+}  // namespace cgs

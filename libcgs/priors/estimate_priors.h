@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "libcgs/core/progress.h"
+#include "libcgs/core/scene.h"
+#include "libcgs/priors/alignment.h"
+#include "libcgs/priors/depth_completion.h"
+#include "libcgs/priors/depth_layers.h"
+#include "libcgs/priors/plane_sweep.h"
+#include "libcgs/priors/view_priors.h"
+
+namespace cgs {
+
+struct PriorsOptions {
+  PlaneSweepOptions sweep;
+  AlignmentOptions alignment;
+  DepthCompletionOptions completion;
+  DepthLayersOptions layers;
+
+  /// \throws InvalidInput naming the first field out of range.
+  void validate() const;
+};
+
+/// Shares of the valid pixels of a view.
+struct PriorsCoverage {
+  double measured = 0;
+  double completed = 0;
+};
+
+struct PriorsReport {
+  AlignmentReport alignment;
+  std::vector<PriorsCoverage> coverage;  ///< In the order of Scene::input.
+};
+
+struct EstimatedPriors {
+  std::vector<ViewPriors> views;  ///< In the order of Scene::input.
+  PriorsReport report;
+};
+
+/// Everything known about the input views before training: sweep, align, complete, layers.
+/// Preconditions and errors as plane_sweep().
+EstimatedPriors estimate_priors(const Scene& scene, const PriorsOptions& options,
+                                const Progress& progress = {});
+
+}  // namespace cgs

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// How accurate the plane sweep is on stereo pairs with known disparity (Middlebury 2014 at quarter
+// size and 2006 at third size), as scenes of two views.
+//
+//   stereo_accuracy FOLDER        FOLDER holds middlebury2014Q/ and middlebury2006T/
+//
+// Prints per pair, over pixels that both photographs show: the share that a depth was measured
+// for, the share of those whose disparity is wrong by more than 0.5, 1 and 2 pixels, the same
+// after completion (every pixel counts), and the time.
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+#include <regex>
+#include <string>
+
+#include "libcgs/core/error.h"
+#include "libcgs/priors/depth_completion.h"
+#include "libcgs/priors/plane_sweep.h"
+
+namespace {
+
+using namespace cgs;
+
+struct Pair {
+  Scene scene;
+  Raster<float> disparity;  // of the left view; infinite = unknown
+  MaskMap counted;          // known and not occluded
+  double focal_baseline = 0;
+  double offset = 0;  // disparity = focal_baseline / depth - offset
+};
+
+cv::Mat read(const std::filesystem::path& path, int flags) {
+  cv::Mat image = cv::imread(path.string(), flags);
+  if (image.empty()) throw BadInput(Defect::Open, path, "cannot be read");
+  return image;
+}
+
+ColorImage color_image(const std::filesystem::path& path) {
+  const cv::Mat bgr = read(path, cv::IMREAD_COLOR);
+  ColorImage image(bgr.cols, bgr.rows, Eigen::Vector3f::Zero());
+  for (int y = 0; y < bgr.rows; ++y) {
+    for (int x = 0; x < bgr.cols; ++x) {
+      const auto& p = bgr.at<cv::Vec3b>(y, x);
+      image(x, y) = Eigen::Vector3f(p[2], p[1], p[0]) / 255.0f;
+    }
+  }
+  return image;
+}
+
+// Left camera at the origin, right one a unit to its right.
+Scene stereo_scene(const std::filesystem::path& folder, const char* left, const char* right,
+                   const Eigen::Vector3d& fxy) {
+  Scene scene;
+  scene.folder = folder;
+  for (const int i : {0, 1}) {
+    View view;
+    view.name = i == 0 ? left : right;
+    view.image = color_image(folder / view.name);
+    view.camera = {.width = view.image.width,
+                   .height = view.image.height,
+                   .fx = fxy.x(),
+                   .fy = fxy.x(),
+                   .cx = fxy.y() + (i == 1 ? fxy.z() : 0),
+                   .cy = 0.5 * view.image.height};
+    view.camera.world_from_cam.translation().x() = i;
+    scene.views.push_back(std::move(view));
+    scene.input.push_back(i);
+  }
+  return scene;
+}
+
+// The depth range is what a user of the benchmark is told: the largest disparity.
+void set_range(Pair& pair, double smallest, double largest) {
+  for (View& view : pair.scene.views) {
+    view.near = pair.focal_baseline / (largest + pair.offset);
+    view.far = pair.focal_baseline / (smallest + pair.offset);
+  }
+}
+
+Pair read_2014(const std::filesystem::path& folder) {
+  std::ifstream file(folder / "calib.txt");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const auto number = [&](const char* pattern) {
+    std::smatch match;
+    if (!std::regex_search(text, match, std::regex(pattern))) {
+      throw BadInput(Defect::Syntax, folder / "calib.txt", pattern);
+    }
+    return std::stod(match[1]);
+  };
+  Pair pair;
+  const double focal = number(R"(cam0=\[\s*([\d.]+))");
+  const double cx = number(R"(cam0=\[\s*[\d.]+\s+0\s+([\d.]+))");
+  pair.offset = number(R"(doffs=\s*([\d.]+))");
+  pair.focal_baseline = focal;
+  pair.scene = stereo_scene(folder, "im0.png", "im1.png", {focal, cx, pair.offset});
+  set_range(pair, number(R"(vmin=\s*([\d.]+))"), number(R"(ndisp=\s*([\d.]+))"));
+  const cv::Mat disparity = read(folder / "disp0GT.pfm", cv::IMREAD_UNCHANGED);
+  const cv::Mat mask = read(folder / "mask0nocc.png", cv::IMREAD_GRAYSCALE);
+  pair.disparity = Raster<float>(disparity.cols, disparity.rows, 0.0f);
+  pair.counted = MaskMap(disparity.cols, disparity.rows, 0);
+  for (int y = 0; y < disparity.rows; ++y) {
+    for (int x = 0; x < disparity.cols; ++x) {
+      pair.disparity(x, y) = disparity.at<float>(y, x);
+      pair.counted(x, y) = mask.at<uint8_t>(y, x) == 255 && std::isfinite(pair.disparity(x, y));
+    }
+  }
+  return pair;
+}
+
+Pair read_2006(const std::filesystem::path& folder) {
+  Pair pair;
+  pair.focal_baseline = 1240;  // third of 3740 pixels; any positive number gives the same result
+  const cv::Mat left = read(folder / "disp1.png", cv::IMREAD_GRAYSCALE);
+  const cv::Mat right = read(folder / "disp5.png", cv::IMREAD_GRAYSCALE);
+  pair.scene = stereo_scene(folder, "view1.png", "view5.png", {1240, 0.5 * left.cols, 0});
+  pair.disparity = Raster<float>(left.cols, left.rows, 0.0f);
+  pair.counted = MaskMap(left.cols, left.rows, 0);
+  for (int y = 0; y < left.rows; ++y) {
+    for (int x = 0; x < left.cols; ++x) {
+      const double d = left.at<uint8_t>(y, x) / 3.0;  // the scale of third-size maps
+      pair.disparity(x, y) = static_cast<float>(d);
+      const int other = static_cast<int>(std::lround(x - d));
+      if (d <= 0 || other < 0) continue;
+      pair.counted(x, y) = std::abs(right.at<uint8_t>(y, other) / 3.0 - d) <= 1;
+    }
+  }
+  set_range(pair, 10, 85);
+  return pair;
+}
+
+struct BadPixels {
+  double known = 0;
+  double half = 0;
+  double one = 0;
+  double two = 0;
+};
+
+BadPixels bad_pixels(const Pair& pair, const ViewPriors& priors) {
+  BadPixels bad;
+  double counted = 0;
+  for (size_t i = 0; i < pair.counted.data.size(); ++i) {
+    if (pair.counted.data[i] == 0) continue;
+    counted += 1;
+    const double depth = double(priors.depth.data[i]) * pair.scene.frame.scale;
+    if (std::isnan(depth)) continue;
+    const double error =
+        std::abs(pair.focal_baseline / depth - pair.offset - double(pair.disparity.data[i]));
+    bad.known += 1;
+    bad.half += error > 0.5;
+    bad.one += error > 1;
+    bad.two += error > 2;
+  }
+  for (double* sum : {&bad.half, &bad.one, &bad.two}) *sum *= 100 / bad.known;
+  bad.known *= 100 / counted;
+  return bad;
+}
+
+void evaluate(Pair pair) {
+  to_canonical(pair.scene);
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<ViewPriors> priors = plane_sweep(pair.scene, {});
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
+  const BadPixels measured = bad_pixels(pair, priors[0]);
+  complete_depth(priors[0], pair.scene.views[0], {});
+  const BadPixels all = bad_pixels(pair, priors[0]);
+  std::printf("%-14s %8.1f | %6.2f %6.2f %6.2f | %6.2f %6.2f %6.2f | %6.2f\n",
+              pair.scene.folder.filename().c_str(),
+              measured.known,
+              measured.half,
+              measured.one,
+              measured.two,
+              all.half,
+              all.one,
+              all.two,
+              time.count());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: stereo_accuracy FOLDER\n");
+    return 2;
+  }
+  try {
+    const std::filesystem::path root = argv[1];
+    std::printf("pair            measured |  bad0.5  bad1  bad2 |  completed: the same |   time\n");
+    std::printf("                  [%%]    |       [%%]            |       [%%]            |   [s]\n");
+    for (const char* name : {"Motorcycle", "Piano", "Playroom"}) {
+      evaluate(read_2014(root / "middlebury2014Q" / name));
+    }
+    for (const char* name : {"Aloe", "Cloth3", "Lampshade2"}) {
+      evaluate(read_2006(root / "middlebury2006T" / name));
+    }
+  } catch (const Error& error) {
+    std::fprintf(stderr, "stereo_accuracy: %s\n", error.what());
+    return error.exit_code();
+  }
+  return 0;
+}

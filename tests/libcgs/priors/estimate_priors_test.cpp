@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/estimate_priors.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/stereo_scene.h"
+
+namespace cgs {
+namespace {
+
+using Eigen::Vector3d;
+
+Scene wall_and_square() {
+  const std::vector<test::TexturedPatch> patches = {
+      {Vector3d(0, 0, 6), Vector3d::UnitX(), Vector3d::UnitY()},
+      {Vector3d(0, 0, 3), Vector3d::UnitX(), Vector3d::UnitY(), 0.5, 0.5}};
+  std::vector<Camera> cameras;
+  for (const double x : {-0.25, 0.25}) {
+    cameras.push_back(test::looking_at({x, 0, 0}, {0, 0, 4}, 80, 60, 75));
+  }
+  Scene scene = test::photographed_scene(patches, cameras, 0.06);
+  to_canonical(scene);
+  return scene;
+}
+
+TEST(EstimatePriors, GivesEveryPixelDepthSigmaAndLayer) {
+  const Scene scene = wall_and_square();
+  double last = 0;
+  const EstimatedPriors priors = estimate_priors(scene, {}, [&](double done) {
+    EXPECT_GE(done, last);
+    last = done;
+  });
+  EXPECT_EQ(last, 1);
+  ASSERT_EQ(priors.views.size(), 2u);
+  for (size_t v = 0; v < 2; ++v) {
+    const ViewPriors& p = priors.views[v];
+    for (size_t i = 0; i < p.depth.data.size(); ++i) {
+      ASSERT_TRUE(p.depth.data[i] > 0 && std::isfinite(p.depth.data[i]));
+      ASSERT_TRUE(p.sigma.data[i] > 0 && std::isfinite(p.sigma.data[i]));
+      ASSERT_LT(p.layer.data[i], 5);
+    }
+    EXPECT_GT(p.layer(40, 30), p.layer(5, 5));
+    const PriorsCoverage& coverage = priors.report.coverage[v];
+    EXPECT_GT(coverage.measured, 0.7);
+    EXPECT_NEAR(coverage.measured + coverage.completed, 1, 1e-12);
+  }
+}
+
+TEST(EstimatePriors, SurvivesPhotographsWithoutTexture) {
+  Scene scene = wall_and_square();
+  for (View& view : scene.views) {
+    for (Eigen::Vector3f& c : view.image.data) c.setConstant(0.5f);
+  }
+  const EstimatedPriors priors = estimate_priors(scene, {});
+  for (const float z : priors.views[0].depth.data) ASSERT_TRUE(z > 0 && std::isfinite(z));
+}
+
+}  // namespace
+}  // namespace cgs
