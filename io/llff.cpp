@@ -131,7 +131,8 @@ void pair_with_images(const SceneRoot& root, Scene& scene) {
 // LLFF keeps COLMAP's points but not always its list of images; by convention image id i + 1 is
 // row i. The points are taken only if nearly all of their observations bear that out.
 void add_sparse_points(Scene& scene) {
-  const fs::path path = scene.folder / "sparse" / "0" / "points3D.bin";
+  fs::path path = scene.folder / "sparse" / "0" / "points3D.bin";
+  if (!fs::exists(path)) path = scene.folder / "sparse" / "points3D.bin";
   if (!fs::exists(path)) return;
   std::vector<SparsePoint> points;
   size_t observations = 0;
@@ -159,7 +160,7 @@ void add_sparse_points(Scene& scene) {
   constexpr double kNearlyAll = 0.95;
   if (static_cast<double>(agreeing) < kNearlyAll * static_cast<double>(observations)) {
     scene.warnings.push_back(
-        "sparse/0/points3D.bin does not fit the cameras of poses_bounds.npy and was not used");
+        "points3D.bin does not fit the cameras of poses_bounds.npy and was not used");
     return;
   }
   scene.points = std::move(points);

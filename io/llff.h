@@ -15,8 +15,8 @@ bool is_llff(const std::filesystem::path& folder);
 ///
 /// Where only some of the images are present, a text file INDEX.txt of lines "<row> <file name>"
 /// says which row is whose. World coordinates are those of the file; cameras have the size the file
-/// states; near and far are the row's bounds. Points of sparse/0/points3D.bin are added where they
-/// provably share the coordinates.
+/// states; near and far are the row's bounds. Points of sparse/0/points3D.bin or
+/// sparse/points3D.bin are added where they provably share the coordinates.
 /// \throws BadInput Schema (shape), Mismatch (N is not the number of images), Value (naming the
 ///         row), and as read_npy() and resolve_in_scene().
 /// Source: Mildenhall et al. 2019, "Local Light Field Fusion", its data format.

@@ -2,13 +2,14 @@
 #include "io/resample.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <tbb/parallel_for.h>
 
 #include "io/camera_checks.h"
-#include "libcgs/core/error.h"
 
 namespace cgs {
 
@@ -45,48 +46,81 @@ MaskMap at_least(const cv::Mat& coverage, float threshold) {
 
 }  // namespace
 
+namespace {
+
+// Weights of the samples before - 1 … before + 2 around a position, by Catmull-Rom interpolation
+// (Keys 1981, a = -1/2), which reproduces quadratics; OpenCV's bicubic (a = -3/4, positions
+// rounded to 1/32 pixel) bends even a linear ramp. Linear where the outer samples do not exist.
+std::array<double, 4> cubic_weights(int before, double t, int size) {
+  if (before < 1 || before + 2 >= size) return {0, 1 - t, t, 0};
+  return {0.5 * t * (-1 + t * (2 - t)),
+          1 + 0.5 * t * t * (-5 + 3 * t),
+          0.5 * t * (1 + t * (4 - 3 * t)),
+          0.5 * t * t * (t - 1)};
+}
+
+// u and v count from the centre of the first pixel and lie inside the image.
+Eigen::Vector3f sample(const ColorImage& image, double u, double v) {
+  const int x0 = static_cast<int>(std::floor(u));
+  const int y0 = static_cast<int>(std::floor(v));
+  const std::array<double, 4> wx = cubic_weights(x0, u - x0, image.width);
+  const std::array<double, 4> wy = cubic_weights(y0, v - y0, image.height);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int j = 0; j < 4; ++j) {
+    const int y = std::clamp(y0 + j - 1, 0, image.height - 1);
+    Eigen::Vector3d row = Eigen::Vector3d::Zero();
+    for (int i = 0; i < 4; ++i) {
+      const int x = std::clamp(x0 + i - 1, 0, image.width - 1);
+      row += wx[static_cast<size_t>(i)] * image(x, y).cast<double>();
+    }
+    sum += wy[static_cast<size_t>(j)] * row;
+  }
+  return sum.cast<float>().cwiseMax(0.0f).cwiseMin(1.0f);
+}
+
+// True if all pixels that a bilinear interpolation at (u, v) would touch may be used.
+bool is_covered(const MaskMap& valid, double u, double v) {
+  if (valid.empty()) return true;
+  const int x0 = static_cast<int>(std::floor(u));
+  const int y0 = static_cast<int>(std::floor(v));
+  const int x1 = std::min(x0 + 1, valid.width - 1);
+  const int y1 = std::min(y0 + 1, valid.height - 1);
+  return valid(x0, y0) != 0 && valid(x1, y0) != 0 && valid(x0, y1) != 0 && valid(x1, y1) != 0;
+}
+
+}  // namespace
+
 void undistort(ColorImage& image,
                MaskMap& valid,
                const Camera& camera,
                const std::array<double, 5>& distortion) {
-  constexpr int kMaxSide = 32766;  // cv::remap holds positions in 16 bits
-  if (image.width > kMaxSide || image.height > kMaxSide) {
-    throw LimitError("an image of " + std::to_string(image.width) + " x " +
-                     std::to_string(image.height) + " pixels cannot be undistorted, sides up to " +
-                     std::to_string(kMaxSide) + " can");
-  }
   // OpenCV counts pixel centres from 0, this project from 0.5.
   const cv::Matx33d K(camera.fx, 0, camera.cx - 0.5, 0, camera.fy, camera.cy - 0.5, 0, 0, 1);
-  cv::Mat map_x;
-  cv::Mat map_y;
-  cv::initUndistortRectifyMap(K,
-                              cv::Mat(1, 5, CV_64F, const_cast<double*>(distortion.data())),
-                              cv::Mat(),
-                              K,
-                              cv::Size(image.width, image.height),
-                              CV_32FC1,
-                              map_x,
-                              map_y);
+  const cv::Vec<double, 5> coefficients(distortion.data());
+  const cv::Size size(image.width, image.height);
+  cv::Mat map_u;
+  cv::Mat map_v;
+  cv::initUndistortRectifyMap(K, coefficients, cv::noArray(), K, size, CV_32FC1, map_u, map_v);
   const double fold = fold_radius(distortion);
-  if (std::isfinite(fold)) {
-    for (int y = 0; y < image.height; ++y) {
-      for (int x = 0; x < image.width; ++x) {
-        // Beyond the fold the polynomial runs back into the image and would mirror it.
-        const Eigen::Vector3d ray = camera.ray_in_cam(x + 0.5, y + 0.5);
-        if (ray.head<2>().norm() >= fold) map_x.at<float>(y, x) = -kMaxSide;
-      }
-    }
-  }
-  const cv::Mat coverage = coverage_of(valid, image.width, image.height);
-  cv::Mat reached;
-  cv::remap(coverage, reached, map_x, map_y, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
   ColorImage out(image.width, image.height, Eigen::Vector3f::Zero());
-  cv::Mat target = as_matrix(out);
-  cv::remap(as_matrix(image), target, map_x, map_y, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-  for (Eigen::Vector3f& color : out.data) color = color.cwiseMax(0.0f).cwiseMin(1.0f);
+  MaskMap reached(image.width, image.height, 0);
+  tbb::parallel_for(0, image.height, [&](int y) {
+    for (int x = 0; x < image.width; ++x) {
+      const double u = map_u.at<float>(y, x);
+      const double v = map_v.at<float>(y, x);
+      // Beyond the fold the polynomial runs back into the image and would mirror it.
+      const double radius = camera.ray_in_cam(x + 0.5, y + 0.5).head<2>().norm();
+      const bool is_inside =
+          u >= 0 && v >= 0 && u <= image.width - 1 && v <= image.height - 1 && radius < fold;
+      if (!is_inside || !is_covered(valid, u, v)) continue;
+      out(x, y) = sample(image, u, v);
+      reached(x, y) = 1;
+    }
+  });
   image = std::move(out);
-  constexpr float kAll = 0.999f;  // every sample under the pixel, but for rounding
-  valid = at_least(reached, kAll);
+  const bool is_all =
+      std::all_of(reached.data.begin(), reached.data.end(), [](uint8_t set) { return set != 0; });
+  valid = is_all ? MaskMap() : std::move(reached);
 }
 
 void area_downscale(ColorImage& image, MaskMap& valid, int width, int height) {

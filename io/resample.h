@@ -9,13 +9,12 @@
 namespace cgs {
 
 /// Takes lens distortion out of a photograph, in place: what a pinhole camera of the same K and
-/// size would have recorded. Bicubic, clamped to [0, 1].
+/// size would have recorded. Bicubic, clamped to [0, 1]; 0 where there is nothing to see.
 ///
 /// \param valid       in: usable pixels, empty = all; out: the same, less those the photograph does
 ///                    not reach; empty again if every pixel is usable
 /// \param camera      intrinsics at the size of the image
 /// \param distortion  k1 k2 p1 p2 k3 (Brown-Conrady, as OpenCV's calibration model)
-/// \throws LimitError for sides above 32766 pixels.
 void undistort(ColorImage& image,
                MaskMap& valid,
                const Camera& camera,

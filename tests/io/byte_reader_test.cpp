@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/byte_reader.h"
 
+#include <functional>
+
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-
-#include <functional>
 
 #include "tests/support/temp_dir.h"
 
@@ -39,6 +39,14 @@ TEST(ReadFile, RefusesAnEmptyFileAndOneAboveTheLimit) {
   EXPECT_EQ(defect_of([&] { read_file(dir / "empty"); }), Defect::Empty);
   EXPECT_THROW(read_file(dir / "big", {.max_file_bytes = 99}), LimitError);
   EXPECT_EQ(read_file(dir / "big").size(), 100u);
+}
+
+TEST(ReadFileStart, ReadsNoMoreThanAsked) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "ten", "0123456789");
+  EXPECT_EQ(read_file_start(dir / "ten", 4), "0123");
+  EXPECT_EQ(read_file_start(dir / "ten", 400), "0123456789");
+  EXPECT_EQ(defect_of([&] { read_file_start(dir.path(), 4); }), Defect::Open);
 }
 
 TEST(RefuseForeignContent, NamesWhatItFound) {
