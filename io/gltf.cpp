@@ -13,6 +13,7 @@
 #include <limits>
 #include <sstream>
 
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
 
@@ -69,17 +70,24 @@ std::pair<Eigen::Vector3f, Eigen::Vector3f> bounds(const TriangleMesh& mesh) {
   return {low, high};
 }
 
+/// Below it the encoder's quantisation of floats breaks down.
+constexpr float kSmallestDracoExtent = 1e-6f;
+
+Eigen::AlignedBox3f box_of(const std::vector<GlbPrimitive>& primitives) {
+  Eigen::AlignedBox3f box;
+  for (const GlbPrimitive& primitive : primitives) {
+    for (const Eigen::Vector3f& p : primitive.positions) box.extend(p);
+  }
+  return box;
+}
+
+float extent_of(const std::vector<GlbPrimitive>& primitives) {
+  return box_of(primitives).sizes().maxCoeff();
+}
+
 /// The cube that holds every position, and as few bits as keep the error.
 DracoGrid grid_for(const std::vector<GlbPrimitive>& primitives, double max_error) {
-  Eigen::Vector3f low = primitives.front().positions.front();
-  Eigen::Vector3f high = low;
-  for (const GlbPrimitive& primitive : primitives) {
-    for (const Eigen::Vector3f& p : primitive.positions) {
-      low = low.cwiseMin(p);
-      high = high.cwiseMax(p);
-    }
-  }
-  DracoGrid grid{low, (high - low).maxCoeff(), 1};
+  DracoGrid grid{box_of(primitives).min(), extent_of(primitives), 1};
   const double half_diagonal = std::sqrt(3.0) / 2;  // of a cell: the farthest a vertex can move
   const double wanted = max_error > 0 ? max_error : std::ldexp(double{grid.range}, -14);
   while (grid.bits < kMaxDracoBits && grid.step() * half_diagonal > wanted) ++grid.bits;
@@ -292,19 +300,20 @@ GlbReport write_glb(const std::filesystem::path& path,
   GlbReport report;
   GlbBuilder builder;
   builder.set_extras(extras_for(mesh, frame, placement, options));
-  const DracoGrid grid = options.draco ? grid_for(primitives, max_error) : DracoGrid{};
+  const bool draco = options.draco && extent_of(primitives) >= kSmallestDracoExtent;
+  const DracoGrid grid = draco ? grid_for(primitives, max_error) : DracoGrid{};
   double worst = 0;
   for (const GlbPrimitive& primitive : primitives) {
     report.triangles += primitive.faces.size();
-    if (!options.draco) {
+    if (!draco) {
       report.vertices += primitive.positions.size();
       builder.add_plain(primitive);
       continue;
     }
-    const DracoPrimitive draco = draco_compress(primitive, grid, options.speed);
-    report.vertices += draco.vertices;
-    worst = std::max(worst, draco.max_error);
-    builder.add_compressed(primitive, draco);
+    const DracoPrimitive compressed = draco_compress(primitive, grid, options.speed);
+    report.vertices += compressed.vertices;
+    worst = std::max(worst, compressed.max_error);
+    builder.add_compressed(primitive, compressed);
   }
   // Half a rounding error of float coordinates is not the compression's.
   const double slack = 1e-6 * double{grid.range};
@@ -313,7 +322,7 @@ GlbReport write_glb(const std::filesystem::path& path,
   }
   report.primitives = primitives.size();
   report.dropped_triangles = mesh.faces.size() - report.triangles;
-  report.position_bits = options.draco ? grid.bits : 0;
+  report.position_bits = draco ? grid.bits : 0;
   report.measured_max_error = worst / world_scale;
   const std::string bytes = builder.bytes();
   report.bytes = bytes.size();

@@ -14,7 +14,8 @@ namespace cgs {
 
 /// How a mesh becomes a binary glTF file.
 struct GlbOptions {
-  bool draco = true;     ///< Compress with KHR_draco_mesh_compression.
+  bool draco = true;     ///< Compress with KHR_draco_mesh_compression; meshes smaller than 1e-6
+                         ///< [units of the file] are not, as Draco cannot hold them.
   double max_error = 0;  ///< Largest move of a vertex by compression [world units];
                          ///< 0 = extent / 2^14, else > extent / 2^21.
   int speed = 5;         ///< Of the encoder, 0 (smallest file) to 10 (fastest).
@@ -32,7 +33,7 @@ struct GlbReport {
   size_t vertices = 0;    ///< Of all primitives; borders between classes count twice.
   size_t triangles = 0;
   size_t dropped_triangles = 0;   ///< Without area: two corners at one place.
-  int position_bits = 0;          ///< Per coordinate; 0 = not quantised.
+  int position_bits = 0;          ///< Per coordinate; 0 = not compressed.
   double measured_max_error = 0;  ///< Largest distance of a decoded vertex [world units].
 };
 

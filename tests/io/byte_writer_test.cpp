@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/byte_writer.h"
+
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "io/byte_reader.h"
+
+namespace cgs {
+namespace {
+
+TEST(AppendBytes, IsLittleEndian) {
+  std::string out = "x";
+  append_bytes(out, uint32_t{0x01020304});
+  EXPECT_EQ(out, std::string("x\4\3\2\1"));
+}
+
+TEST(AppendNumber, ReadsBackExactly) {
+  const double tiny = std::numeric_limits<double>::denorm_min();
+  for (const double value : {0.1, -1.0 / 3, 1e300, tiny, 5.4e6, -0.0}) {
+    std::string out;
+    append_number(out, value);
+    double back = 1;
+    EXPECT_TRUE(parse_number(out, back)) << out;
+    EXPECT_EQ(back, value);
+  }
+  std::string shortest;
+  append_number(shortest, 0.1f);
+  EXPECT_EQ(shortest, "0.1");
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/exr.h"
+
+#include <bit>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/full_disk.h"
+
+namespace cgs {
+namespace {
+
+ExrImage sample(int width, int height) {
+  ExrImage image;
+  image.width = width;
+  image.height = height;
+  const size_t pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+  for (const char* name : {"B", "G.deep.name", "Z"}) {
+    std::vector<float> values(pixels);
+    for (size_t i = 0; i < pixels; ++i) values[i] = 0.1f * static_cast<float>(i) - 3;
+    image.channels.emplace_back(name, values);
+  }
+  std::vector<float>& odd = image.channels[2].second;
+  odd[0] = std::bit_cast<float>(0x7fc12345u);  // a NaN with a message
+  odd[1] = -std::numeric_limits<float>::infinity();
+  odd[2] = std::numeric_limits<float>::denorm_min();
+  odd[3] = -0.0f;
+  image.text = {{"cgs:units", "mm"}, {"note", "two\nlines"}};
+  image.world_to_camera = Eigen::Matrix4f::Random();
+  return image;
+}
+
+TEST(Exr, ComesBackBitForBit) {
+  const test::TempDir dir;
+  const ExrImage image = sample(37, 21);
+  write_exr(dir / "a.exr", image);
+  const ExrImage back = read_exr(dir / "a.exr");
+  EXPECT_EQ(back.width, 37);
+  EXPECT_EQ(back.height, 21);
+  ASSERT_EQ(back.channels.size(), 3u);
+  for (size_t c = 0; c < 3; ++c) {
+    EXPECT_EQ(back.channels[c].first, image.channels[c].first);
+    const auto& a = image.channels[c].second;
+    EXPECT_EQ(std::memcmp(a.data(), back.channels[c].second.data(), a.size() * sizeof(float)), 0);
+  }
+  EXPECT_EQ(back.text.at("cgs:units"), "mm");
+  EXPECT_EQ(back.text.at("note"), "two\nlines");
+  ASSERT_TRUE(back.world_to_camera.has_value());
+  EXPECT_EQ(*back.world_to_camera, *image.world_to_camera);
+  ASSERT_NE(back.find("Z"), nullptr);
+  EXPECT_EQ(back.find("Y"), nullptr);
+}
+
+TEST(Exr, StoresTheCameraForRowVectors) {
+  const test::TempDir dir;
+  ExrImage image = sample(4, 2);
+  Eigen::Matrix4f m = Eigen::Matrix4f::Identity();
+  m(0, 3) = 7;  // a translation belongs into the fourth row of the file
+  image.world_to_camera = m;
+  write_exr(dir / "a.exr", image);
+  const std::string bytes = test::read_bytes(dir / "a.exr");
+  const std::string key("worldToCamera\0m44f\0\x40\0\0\0", 23);
+  const size_t at = bytes.find(key);
+  ASSERT_NE(at, std::string::npos);
+  float value = 0;
+  std::memcpy(&value, bytes.data() + at + key.size() + 12 * sizeof(float), sizeof(float));
+  EXPECT_EQ(value, 7.0f);
+}
+
+TEST(Exr, GivesEqualBytesForEqualImages) {
+  const test::TempDir dir;
+  ExrImage image = sample(40, 40);
+  write_exr(dir / "a.exr", image);
+  write_exr(dir / "b.exr", image);
+  EXPECT_EQ(test::read_bytes(dir / "a.exr"), test::read_bytes(dir / "b.exr"));
+}
+
+TEST(Exr, RefusesEveryTruncation) {
+  const test::TempDir dir;
+  write_exr(dir / "a.exr", sample(5, 20));
+  test::expect_every_truncation_is_refused(test::read_bytes(dir / "a.exr"),
+                                           [](const auto& path) { (void)read_exr(path); });
+}
+
+TEST(Exr, SurvivesEveryFlippedByte) {
+  const test::TempDir dir;
+  write_exr(dir / "a.exr", sample(5, 20));
+  const std::string whole = test::read_bytes(dir / "a.exr");
+  for (size_t i = 0; i < whole.size(); ++i) {
+    std::string bytes = whole;
+    bytes[i] = static_cast<char>(bytes[i] ^ 0xff);
+    (void)test::defect_of(bytes, [](const auto& path) {
+      const ExrImage image = read_exr(path);
+      EXPECT_LE(image.channels.size() * image.channels[0].second.size(), size_t{1} << 28);
+    });
+  }
+}
+
+TEST(Exr, RefusesToWriteNonsense) {
+  const test::TempDir dir;
+  const auto refused = [&](const auto& damage) {
+    ExrImage image = sample(4, 4);
+    damage(image);
+    EXPECT_THROW(write_exr(dir / "a.exr", image), InvalidInput);
+  };
+  refused([](ExrImage& i) { i.width = 0; });
+  refused([](ExrImage& i) { i.channels.clear(); });
+  refused([](ExrImage& i) { i.channels[1].second.pop_back(); });
+  refused([](ExrImage& i) { i.channels[1].first = i.channels[0].first; });
+  refused([](ExrImage& i) { i.channels[1].first.clear(); });
+}
+
+TEST(Exr, NoticesAFullDisk) {
+  test::expect_full_disk_is_noticed([](const auto& path) { write_exr(path, sample(40, 40)); });
+}
+
+}  // namespace
+}  // namespace cgs

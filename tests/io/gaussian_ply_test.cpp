@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/gaussian_ply.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "io/byte_writer.h"
+#include "tests/support/full_disk.h"
+#include "tests/support/sample_mesh.h"
+
+namespace cgs {
+namespace {
+
+Frame exact_frame() {
+  Frame frame = test::centimetre_frame();
+  frame.file_origin = frame.origin;
+  return frame;
+}
+
+Gaussians sample(int degree, int count = 20) {
+  Gaussians g;
+  g.sh_degree = degree;
+  for (int i = 0; i < count; ++i) {
+    const float t = static_cast<float>(i) / static_cast<float>(count);
+    g.position.emplace_back(0.4f * std::cos(9 * t), 0.4f * std::sin(7 * t), 0.4f * t);
+    g.scale.emplace_back(0.001f + 0.01f * t, 0.003f, 0.0001f);
+    g.rotation.push_back(Eigen::Vector4f(1, t, -t, 0.3f).normalized());
+    g.opacity.push_back(0.01f + 0.98f * t);
+    for (int k = 0; k < g.sh_count(); ++k) {
+      g.sh.emplace_back(t - 0.5f, 0.1f * static_cast<float>(k), -t);
+    }
+  }
+  return g;
+}
+
+/// A splat as a file of the reference implementation has it, with values to be spoiled.
+struct RawSplat {
+  float x = 0, y = 0, z = 0, dc = 0.5f, opacity = -1, scale = -4;
+  Eigen::Vector4f rotation = {1, 0, 0, 0};
+};
+
+std::string raw_file(const std::vector<RawSplat>& splats) {
+  std::string out = "ply\nformat binary_little_endian 1.0\nelement vertex " +
+                    std::to_string(splats.size()) + "\n";
+  for (const char* name : {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0"}) {
+    out += std::string("property float ") + name + "\n";
+  }
+  for (const char* name : {"scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"}) {
+    out += std::string("property float ") + name + "\n";
+  }
+  out += "end_header\n";
+  for (const RawSplat& s : splats) {
+    for (const float v : {s.x, s.y, s.z, s.dc, s.dc, s.dc, s.opacity}) append_bytes(out, v);
+    for (const float v : {s.scale, s.scale - 1, s.scale - 2}) append_bytes(out, v);
+    for (const float v : s.rotation) append_bytes(out, v);
+  }
+  return out;
+}
+
+/// Ten good splats on a line of length 9 and the one in question.
+GaussianFile read_with(const RawSplat& odd) {
+  std::vector<RawSplat> splats(11);
+  for (size_t i = 0; i < 10; ++i) splats[i].x = static_cast<float>(i);
+  splats[10] = odd;
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply", raw_file(splats));
+  return read_gaussian_ply(dir / "a.ply");
+}
+
+bool warns(const GaussianFile& file, const std::string& text) {
+  for (const std::string& warning : file.warnings) {
+    if (warning.find(text) != std::string::npos) return true;
+  }
+  return false;
+}
+
+std::string defect(const std::string& bytes) {
+  return test::defect_of(bytes, [](const auto& path) { (void)read_gaussian_ply(path); });
+}
+
+std::string without_line(std::string bytes, const std::string& line) {
+  const size_t at = bytes.find(line);
+  EXPECT_NE(at, std::string::npos);
+  return bytes.erase(at, line.size());
+}
+
+TEST(GaussianPly, ComesBackAtEveryDegree) {
+  for (int degree = 0; degree <= 3; ++degree) {
+    const test::TempDir dir;
+    const Gaussians g = sample(degree);
+    write_gaussian_ply(dir / "a.ply", g, exact_frame());
+    const GaussianFile back = read_gaussian_ply(dir / "a.ply", exact_frame());
+    EXPECT_TRUE(back.warnings.empty());
+    EXPECT_EQ(back.gaussians.sh_degree, degree);
+    EXPECT_EQ(back.gaussians.position, g.position);
+    EXPECT_EQ(back.gaussians.rotation, g.rotation);
+    EXPECT_EQ(back.gaussians.sh, g.sh);
+    ASSERT_EQ(back.gaussians.size(), g.size());
+    for (size_t i = 0; i < g.size(); ++i) {  // the file holds their logarithms
+      EXPECT_NEAR(back.gaussians.opacity[i], g.opacity[i], 2e-7f * g.opacity[i]);
+      const Eigen::Array3f ratio = back.gaussians.scale[i].array() / g.scale[i].array();
+      EXPECT_LT((ratio - 1).abs().maxCoeff(), 1e-6f);
+    }
+  }
+}
+
+TEST(GaussianPly, FileIsLaidOutAsTheReferenceDoes) {
+  const test::TempDir dir;
+  Gaussians g = sample(3, 1);
+  g.scale[0] = {0.5f, 0.25f, 0.125f};
+  g.opacity[0] = 0.75f;
+  for (int k = 0; k < 16; ++k) {
+    const auto c = static_cast<float>(k);
+    g.sh[static_cast<size_t>(k)] = {c, c + 100, c + 200};
+  }
+  write_gaussian_ply(dir / "a.ply", g, exact_frame());
+  const std::string bytes = test::read_bytes(dir / "a.ply");
+  const size_t data = bytes.find("end_header\n") + 11;
+  ASSERT_EQ(bytes.size() - data, 62 * sizeof(float));
+  std::array<float, 62> v{};
+  std::memcpy(v.data(), bytes.data() + data, sizeof(v));
+  EXPECT_EQ(v[0], 64 * g.position[0].x());
+  EXPECT_EQ(v[3], 0.0f);
+  EXPECT_EQ(v[7], 100.0f);       // f_dc_1
+  EXPECT_EQ(v[9], 1.0f);         // f_rest_0: red of the first band
+  EXPECT_EQ(v[9 + 14], 15.0f);   // f_rest_14: last red
+  EXPECT_EQ(v[9 + 15], 101.0f);  // f_rest_15: first green
+  EXPECT_EQ(v[9 + 44], 215.0f);  // f_rest_44: last blue
+  EXPECT_FLOAT_EQ(v[54], std::log(3.0f));
+  EXPECT_FLOAT_EQ(v[55], std::log(32.0f));
+  EXPECT_FLOAT_EQ(v[57], std::log(8.0f));
+  EXPECT_EQ(v[58], g.rotation[0][0]);
+  const std::string head = bytes.substr(0, data);
+  EXPECT_LT(head.find("property float nz"), head.find("property float f_dc_0"));
+  EXPECT_LT(head.find("property float f_rest_44"), head.find("property float opacity"));
+  EXPECT_LT(head.find("property float scale_2"), head.find("property float rot_0"));
+}
+
+TEST(GaussianPly, WithoutAFrameTheWorldStaysWhereItWas) {
+  const test::TempDir dir;
+  const Gaussians g = sample(1);
+  const Frame frame = test::centimetre_frame();
+  write_gaussian_ply(dir / "a.ply", g, frame);
+  const GaussianFile back = read_gaussian_ply(dir / "a.ply");
+  EXPECT_EQ(back.frame.unit_name(), "cm");
+  for (size_t i = 0; i < g.size(); ++i) {
+    const Eigen::Vector3d a = frame.world_from_internal(g.position[i].cast<double>());
+    const Eigen::Vector3d b =
+        back.frame.world_from_internal(back.gaussians.position[i].cast<double>());
+    EXPECT_LT((a - b).norm(), 64 * 1e-6);
+    EXPECT_NEAR(back.gaussians.scale[i].x() * back.frame.scale, g.scale[i].x() * frame.scale, 1e-5);
+  }
+}
+
+TEST(GaussianPly, DropsWhatCannotBeDrawn) {
+  const float nan = std::nanf("");
+  const float inf = std::numeric_limits<float>::infinity();
+  const auto dropped = [](const RawSplat& odd) {
+    const GaussianFile out = read_with(odd);
+    return out.gaussians.size() == 10 && warns(out, "dropped 1 splat") &&
+           out.gaussians.sh.size() == 10;
+  };
+  EXPECT_TRUE(dropped({.x = nan}));
+  EXPECT_TRUE(dropped({.y = inf}));
+  EXPECT_TRUE(dropped({.dc = nan}));
+  EXPECT_TRUE(dropped({.opacity = nan}));
+  EXPECT_TRUE(dropped({.opacity = -inf}));
+  EXPECT_TRUE(dropped({.scale = nan}));
+  EXPECT_TRUE(dropped({.scale = 95}));
+  EXPECT_TRUE(dropped({.rotation = Eigen::Vector4f::Zero()}));
+  EXPECT_FALSE(dropped({}));
+}
+
+TEST(GaussianPly, ClampsWhatItCan) {
+  const GaussianFile opaque = read_with({.opacity = std::numeric_limits<float>::infinity()});
+  EXPECT_EQ(opaque.gaussians.opacity[10], 0.99f);
+  EXPECT_TRUE(warns(opaque, "clamped opacity or scale of 1 splat"));
+  const GaussianFile nearly = read_with({.opacity = 40});
+  EXPECT_LT(nearly.gaussians.opacity[10], 1.0f);
+  const GaussianFile tiny = read_with({.scale = -104});
+  ASSERT_EQ(tiny.gaussians.size(), 11u);
+  EXPECT_GT(tiny.gaussians.scale[10].cwiseAbs2().minCoeff(), 0.0f);
+  EXPECT_TRUE(warns(tiny, "clamped"));
+}
+
+TEST(GaussianPly, NormalisesQuaternionsOfAnyLength) {
+  const Eigen::Vector4f unit = Eigen::Vector4f(1, 2, -3, 4).normalized();
+  for (const float length : {1e20f, 1e-23f, 7.0f}) {
+    const GaussianFile out = read_with({.rotation = length * unit});
+    ASSERT_EQ(out.gaussians.size(), 11u);
+    EXPECT_LT((out.gaussians.rotation[10] - unit).norm(), 1e-6f) << length;
+  }
+}
+
+TEST(GaussianPly, IsNotMisledByStraySplats) {
+  std::vector<RawSplat> splats(1000);
+  for (size_t i = 0; i < splats.size(); ++i) splats[i].x = 0.01f * static_cast<float>(i) - 5;
+  for (size_t i = 0; i < 10; ++i) splats[i * 97].x = i % 2 == 0 ? 2e7f : -2e7f;
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply", raw_file(splats));
+  const GaussianFile out = read_gaussian_ply(dir / "a.ply");
+  EXPECT_EQ(out.gaussians.size(), 1000u);
+  EXPECT_EQ(out.frame.scale, 16);
+}
+
+TEST(GaussianPly, SaysWhatLooksOdd) {
+  std::vector<RawSplat> splats(1000);
+  for (size_t i = 0; i < splats.size(); ++i) splats[i].x = static_cast<float>(i);
+  const auto read = [&] {
+    const test::TempDir dir;
+    test::write_bytes(dir / "a.ply", raw_file(splats) + "xyz");
+    return read_gaussian_ply(dir / "a.ply");
+  };
+  EXPECT_TRUE(warns(read(), "trailing 3 bytes"));
+  EXPECT_FALSE(warns(read(), "linear"));
+  for (RawSplat& s : splats) s.scale = 9;  // wider than the scene
+  EXPECT_TRUE(warns(read(), "fill ratio"));
+  for (RawSplat& s : splats) s.scale = 2.5f;
+  for (RawSplat& s : splats) s.opacity = 0.5f;
+  EXPECT_TRUE(warns(read(), "scale_* look linear"));
+  EXPECT_TRUE(warns(read(), "probability"));
+}
+
+TEST(GaussianPly, NamesWhatIsMissing) {
+  const std::string good = raw_file(std::vector<RawSplat>(3));
+  EXPECT_EQ(defect(good), "OK");
+  for (const char* name : {"x", "scale_1", "rot_3", "opacity", "f_dc_2"}) {
+    EXPECT_EQ(defect(without_line(good, std::string("property float ") + name + "\n")), "SCHEMA");
+  }
+  EXPECT_EQ(defect(without_line(good, "property float scale_2\n")), "UNSUPPORTED");
+  EXPECT_EQ(defect("ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n"),
+            "EMPTY");
+  RawSplat bad;
+  bad.x = std::nanf("");
+  EXPECT_EQ(defect(raw_file({bad, bad})), "VALUE");
+  const test::TempDir dir;
+  write_gaussian_ply(dir / "a.ply", sample(3, 2), exact_frame());
+  const std::string full = test::read_bytes(dir / "a.ply");
+  EXPECT_EQ(defect(without_line(full, "property float f_rest_44\n")), "SCHEMA");
+  std::string gap = full;
+  gap.replace(gap.find("f_rest_1\n"), 9, "f_rest_x\n");
+  EXPECT_EQ(defect(gap), "SCHEMA");
+}
+
+TEST(GaussianPly, RefusesEveryTruncation) {
+  const test::TempDir dir;
+  write_gaussian_ply(dir / "a.ply", sample(1, 3), exact_frame());
+  test::expect_every_truncation_is_refused(test::read_bytes(dir / "a.ply"),
+                                           [](const auto& path) { (void)read_gaussian_ply(path); });
+}
+
+TEST(GaussianPly, NoticesAFullDisk) {
+  test::expect_full_disk_is_noticed(
+      [](const auto& path) { write_gaussian_ply(path, sample(3), exact_frame()); });
+}
+
+TEST(GaussianPly, RefusesToWriteWhatItCouldNotRead) {
+  const test::TempDir dir;
+  const auto refused = [&](const auto& damage) {
+    Gaussians g = sample(2);
+    damage(g);
+    EXPECT_THROW(write_gaussian_ply(dir / "a.ply", g, exact_frame()), InvalidInput);
+  };
+  refused([](Gaussians& g) { g.opacity[3] = 1; });
+  refused([](Gaussians& g) { g.opacity[3] = std::nanf(""); });
+  refused([](Gaussians& g) { g.scale[3].y() = 0; });
+  refused([](Gaussians& g) { g.position[3].y() = std::nanf(""); });
+  refused([](Gaussians& g) { g.sh.pop_back(); });
+  refused([](Gaussians& g) { g.rotation.pop_back(); });
+  refused([](Gaussians& g) { g.sh_degree = 4; });
+  EXPECT_EQ(test::entries(dir.path()), 0);
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/gltf.h"
+
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <draco/compression/decode.h>
+#include <draco/mesh/mesh.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "io/mesh_arrays.h"
+#include "libcgs/core/up_axis.h"
+#include "tests/support/full_disk.h"
+#include "tests/support/sample_mesh.h"
+
+namespace cgs {
+namespace {
+
+/// A primitive as an independent reader of the container finds it.
+struct Part {
+  std::string material;
+  std::vector<std::array<uint32_t, 3>> faces;
+  std::map<std::string, std::vector<std::vector<float>>> values;  // attribute, vertex, component
+};
+
+struct Glb {
+  nlohmann::json json;
+  std::string binary;
+  std::vector<Part> parts;
+};
+
+uint32_t word(const std::string& bytes, size_t offset) {
+  uint32_t value = 0;
+  std::memcpy(&value, bytes.data() + offset, 4);
+  return value;
+}
+
+std::string view_bytes(const Glb& glb, size_t view) {
+  const auto& v = glb.json["bufferViews"][view];
+  return glb.binary.substr(v.value("byteOffset", size_t{0}), v["byteLength"]);
+}
+
+size_t components(const Glb& glb, size_t accessor) {
+  return glb.json["accessors"][accessor]["type"] == "VEC3" ? 3 : 1;
+}
+
+void read_plain(const Glb& glb, const nlohmann::json& primitive, Part& part) {
+  const auto raw = [&](size_t accessor) {
+    return view_bytes(glb, glb.json["accessors"][accessor]["bufferView"]);
+  };
+  const std::string indices = raw(primitive["indices"]);
+  part.faces.resize(indices.size() / 12);
+  std::memcpy(part.faces.data(), indices.data(), indices.size());
+  for (const auto& [name, accessor] : primitive["attributes"].items()) {
+    const size_t n = components(glb, accessor);
+    const std::string bytes = raw(accessor);
+    for (size_t at = 0; at < bytes.size(); at += n * 4) {
+      std::vector<float> value(n);
+      std::memcpy(value.data(), bytes.data() + at, n * 4);
+      part.values[name].push_back(value);
+    }
+  }
+}
+
+void read_draco(const Glb& glb, const nlohmann::json& primitive, Part& part) {
+  const auto& extension = primitive["extensions"]["KHR_draco_mesh_compression"];
+  const std::string bytes = view_bytes(glb, extension["bufferView"]);
+  draco::DecoderBuffer buffer;
+  buffer.Init(bytes.data(), bytes.size());
+  const auto mesh = draco::Decoder().DecodeMeshFromBuffer(&buffer).value();
+  for (uint32_t i = 0; i < mesh->num_faces(); ++i) {
+    const auto& f = mesh->face(draco::FaceIndex(i));
+    part.faces.push_back({f[0].value(), f[1].value(), f[2].value()});
+  }
+  EXPECT_EQ(glb.json["accessors"][primitive["indices"].get<size_t>()]["count"],
+            mesh->num_faces() * 3);
+  for (const auto& [name, accessor] : primitive["attributes"].items()) {
+    const auto* attribute = mesh->GetAttributeByUniqueId(extension["attributes"][name]);
+    ASSERT_NE(attribute, nullptr) << name;
+    const size_t n = components(glb, accessor);
+    ASSERT_EQ(static_cast<size_t>(attribute->num_components()), n) << name;
+    EXPECT_EQ(glb.json["accessors"][accessor.get<size_t>()]["count"], mesh->num_points());
+    for (uint32_t i = 0; i < mesh->num_points(); ++i) {
+      std::vector<float> value(n);
+      attribute->GetMappedValue(draco::PointIndex(i), value.data());
+      part.values[name].push_back(value);
+    }
+  }
+}
+
+Glb parse(const std::string& bytes) {
+  Glb glb;
+  EXPECT_EQ(bytes.substr(0, 4), "glTF");
+  EXPECT_EQ(word(bytes, 4), 2u);
+  EXPECT_EQ(word(bytes, 8), bytes.size());
+  const size_t json_size = word(bytes, 12);
+  EXPECT_EQ(word(bytes, 16), 0x4e4f534au);
+  glb.json = nlohmann::json::parse(bytes.substr(20, json_size));
+  EXPECT_EQ(json_size % 4, 0u);
+  EXPECT_EQ(word(bytes, 24 + json_size), 0x004e4942u);
+  glb.binary = bytes.substr(28 + json_size);
+  EXPECT_EQ(glb.binary.size(), word(bytes, 20 + json_size));
+  for (const auto& primitive : glb.json["meshes"][0]["primitives"]) {
+    Part part;
+    part.material = glb.json["materials"][primitive["material"].get<size_t>()]["name"];
+    if (primitive.contains("extensions")) {
+      read_draco(glb, primitive, part);
+    } else {
+      read_plain(glb, primitive, part);
+    }
+    const auto& bounds = glb.json["accessors"][primitive["attributes"]["POSITION"].get<size_t>()];
+    for (const auto& p : part.values["POSITION"]) {
+      for (size_t k = 0; k < 3; ++k) {
+        EXPECT_GE(p[k], bounds["min"][k].get<float>());
+        EXPECT_LE(p[k], bounds["max"][k].get<float>());
+      }
+    }
+    glb.parts.push_back(part);
+  }
+  return glb;
+}
+
+struct Written {
+  GlbReport report;
+  Glb glb;
+};
+
+Written written(const TriangleMesh& mesh, const Frame& frame, const GlbOptions& options) {
+  const test::TempDir dir;
+  Written out;
+  out.report = write_glb(dir / "a.glb", mesh, frame, options);
+  const std::string bytes = test::read_bytes(dir / "a.glb");
+  EXPECT_EQ(out.report.bytes, bytes.size());
+  out.glb = parse(bytes);
+  return out;
+}
+
+/// World coordinates of a position in the file, by what its extras say.
+Eigen::Vector3d in_world(const nlohmann::json& extras, const std::vector<float>& p) {
+  Eigen::Matrix3d R;
+  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = extras["gltf_from_world"][static_cast<size_t>(i)];
+  Eigen::Vector3d origin;
+  for (int k = 0; k < 3; ++k) origin[k] = extras["origin_in_world"][static_cast<size_t>(k)];
+  const double unit = extras["units"] == "m" ? extras["metres_per_unit"].get<double>() : 1.0;
+  return origin + R.transpose() * Eigen::Vector3d(p[0], p[1], p[2]) / unit;
+}
+
+/// Holds a file against the mesh: every face of the class is there, at its place, turned the same
+/// way, with the attributes of its corners.
+void expect_same(const Glb& glb, const TriangleMesh& mesh, const Frame& frame, double tolerance) {
+  const auto& extras = glb.json["asset"]["extras"];
+  for (const Part& part : glb.parts) {
+    std::vector<size_t> wanted;
+    for (size_t i = 0; i < mesh.faces.size(); ++i) {
+      if (provenance_name(mesh.provenance[i]) == part.material) wanted.push_back(i);
+    }
+    ASSERT_EQ(part.faces.size(), wanted.size()) << part.material;
+    // The nearest vertex of the mesh for each vertex of the file, by trying all.
+    std::vector<uint32_t> nearest;
+    for (size_t i = 0; i < part.values.at("POSITION").size(); ++i) {
+      const Eigen::Vector3d p = in_world(extras, part.values.at("POSITION")[i]);
+      double best = 1e300;
+      uint32_t index = 0;
+      for (uint32_t v = 0; v < mesh.vertices.size(); ++v) {
+        const double d = (frame.world_from_internal(mesh.vertices[v].cast<double>()) - p).norm();
+        if (d < best) index = v;
+        best = std::min(best, d);
+      }
+      EXPECT_LE(best, tolerance);
+      nearest.push_back(index);
+      EXPECT_EQ(part.values.at("_SUPPORT")[i][0], mesh.support[index]);
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_NEAR(part.values.at("COLOR_0")[i][static_cast<size_t>(k)],
+                    linear_from_srgb(mesh.colors[index][k]),
+                    2e-4);
+      }
+    }
+    std::multiset<std::array<uint32_t, 3>> before;
+    std::multiset<std::array<uint32_t, 3>> after;
+    const auto turned = [](std::array<uint32_t, 3> f) {
+      std::rotate(f.begin(), std::min_element(f.begin(), f.end()), f.end());
+      return f;
+    };
+    for (const size_t i : wanted) before.insert(turned(mesh.faces[i]));
+    for (const auto& f : part.faces) {
+      after.insert(turned({nearest[f[0]], nearest[f[1]], nearest[f[2]]}));
+    }
+    EXPECT_EQ(before, after) << part.material;
+  }
+}
+
+TEST(WriteGlb, PlainFileHoldsTheMesh) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  const Frame frame = test::centimetre_frame();
+  const Written out = written(mesh, frame, {.draco = false});
+  ASSERT_EQ(out.glb.parts.size(), 4u);
+  expect_same(out.glb, mesh, frame, 1e-5);
+  EXPECT_EQ(out.report.measured_max_error, 0);
+  EXPECT_FALSE(out.glb.json.contains("extensionsRequired"));
+}
+
+TEST(WriteGlb, DracoFileHoldsTheMeshWithinItsReport) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  const Frame frame = test::centimetre_frame();
+  const Written out =
+      written(mesh, frame, {.y_up = y_up_from(Eigen::Vector3d::UnitZ()), .summary_json = ""});
+  ASSERT_EQ(out.glb.parts.size(), 4u);
+  EXPECT_GT(out.report.measured_max_error, 0);
+  expect_same(out.glb, mesh, frame, out.report.measured_max_error + 1e-5);
+  EXPECT_EQ(out.glb.json["extensionsRequired"][0], "KHR_draco_mesh_compression");
+  EXPECT_EQ(out.report.triangles, mesh.faces.size());
+  EXPECT_EQ(out.report.position_bits, 14);
+}
+
+TEST(WriteGlb, KeepsSigmaInMetresAndMarksTheUnknown) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  const Frame frame = test::centimetre_frame();
+  for (const bool draco : {false, true}) {
+    const Written out = written(mesh, frame, {.draco = draco});
+    for (const auto& value : out.glb.parts[0].values.at("_SIGMA")) {
+      EXPECT_GT(value[0], 0.001f * 64 * 0.01f * 0.99f);
+      EXPECT_LT(value[0], 0.005f * 64 * 0.01f);
+    }
+    for (const auto& value : out.glb.parts[3].values.at("_SIGMA")) EXPECT_LT(value[0], 0);
+  }
+}
+
+TEST(WriteGlb, BordersBetweenClassesStayClosed) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  const Written out = written(mesh, test::centimetre_frame(), {});
+  std::set<std::vector<float>> places;
+  std::map<std::array<std::vector<float>, 2>, int> edges;
+  for (const Part& part : out.glb.parts) {
+    const auto& p = part.values.at("POSITION");
+    places.insert(p.begin(), p.end());
+    for (const auto& f : part.faces) {
+      for (size_t k = 0; k < 3; ++k) {
+        ++edges[{p[f.at(k)], p[f.at((k + 1) % 3)]}];
+        --edges[{p[f.at((k + 1) % 3)], p[f.at(k)]}];
+      }
+    }
+  }
+  EXPECT_EQ(places.size(), mesh.vertices.size());
+  for (const auto& [edge, balance] : edges) EXPECT_EQ(balance, 0);
+}
+
+TEST(WriteGlb, KeepsTheErrorItWasGiven) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  for (const double wanted : {1.0, 0.1, 1e-2, 1e-3, 1e-4}) {  // of an extent of 51.2
+    const Written out = written(mesh, test::centimetre_frame(), {.max_error = wanted});
+    EXPECT_LE(out.report.measured_max_error, wanted);
+    EXPECT_GT(out.report.measured_max_error, wanted / 8);  // no bits wasted
+  }
+  const test::TempDir dir;
+  EXPECT_THROW(write_glb(dir / "a.glb", mesh, test::centimetre_frame(), {.max_error = 1e-6}),
+               InvalidInput);
+}
+
+TEST(WriteGlb, TellsUnitsOriginAreasAndSummary) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  const Frame frame = test::centimetre_frame();
+  const Written out =
+      written(mesh, frame, {.summary_json = R"({"a": [1, 2.5, "x", true, 5000000000]})"});
+  const auto& extras = out.glb.json["asset"]["extras"];
+  EXPECT_EQ(extras["units"], "m");
+  EXPECT_EQ(extras["metres_per_unit"], 0.01);
+  EXPECT_EQ(extras["scale_source"], "known distance");
+  EXPECT_EQ(extras["summary"]["a"][1], 2.5);
+  EXPECT_EQ(extras["summary"]["a"][4], 5e9);
+  const auto area = area_by_provenance(mesh);
+  EXPECT_NEAR(extras["area"]["inferred"].get<double>(), area[0] * 0.64 * 0.64, 1e-9);
+  EXPECT_NEAR(extras["area"]["observed"].get<double>(), area[2] * 0.64 * 0.64, 1e-9);
+
+  Frame unscaled = frame;
+  unscaled.metres_per_unit = 0;
+  const Written plain = written(mesh, unscaled, {});
+  EXPECT_EQ(plain.glb.json["asset"]["extras"]["units"], "unknown");
+  expect_same(plain.glb, mesh, unscaled, plain.report.measured_max_error + 1e-5);
+}
+
+TEST(WriteGlb, ShowsInferredSurfaceDifferently) {
+  const Written out = written(test::labelled_sphere(), test::centimetre_frame(), {});
+  std::set<std::vector<double>> factors;
+  for (const auto& material : out.glb.json["materials"]) {
+    EXPECT_TRUE(material["doubleSided"]);
+    EXPECT_FALSE(material.contains("alphaMode"));  // opaque
+    const auto& pbr = material["pbrMetallicRoughness"];
+    factors.insert(pbr.value("baseColorFactor", std::vector<double>{1, 1, 1, 1}));
+  }
+  EXPECT_EQ(factors.size(), 3u);  // seen surface keeps its colours
+}
+
+TEST(WriteGlb, WritesBareMeshesAndLeavesOutEmptyClasses) {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {0.5f, 0, 0}, {0, 0.5f, 0}, {9, 9, 9}};
+  mesh.faces = {{0, 1, 2}, {1, 1, 2}};
+  for (const bool draco : {false, true}) {
+    const Written out = written(mesh, {}, {.draco = draco});
+    ASSERT_EQ(out.glb.parts.size(), 1u);
+    EXPECT_EQ(out.glb.parts[0].material, "surface");
+    EXPECT_EQ(out.glb.parts[0].values.size(), 2u);  // position and normal
+    EXPECT_EQ(out.report.dropped_triangles, 1u);
+    EXPECT_EQ(out.report.vertices, 3u);
+  }
+}
+
+TEST(WriteGlb, WorksAtTheExtremesOfScale) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  for (const int exponent : {-50, -21, -20, -19, 0, 20, 50}) {
+    Frame frame;
+    frame.scale = std::ldexp(1.0, exponent);
+    frame.origin = Eigen::Vector3d::Constant(frame.scale * 4096);
+    frame.file_origin = frame.origin;
+    const Written out = written(mesh, frame, {});
+    if (out.report.position_bits > 0) {
+      EXPECT_NEAR(out.report.measured_max_error / frame.scale, 0.8 / 16384 * 0.8, 0.2 / 16384);
+    }
+    EXPECT_EQ(out.report.position_bits > 0, exponent > -20);  // too small for Draco
+    expect_same(out.glb, mesh, frame, frame.scale * 1e-4);
+  }
+  const test::TempDir dir;
+  Frame enormous;
+  enormous.scale = 0x1p80;
+  EXPECT_THROW(write_glb(dir / "a.glb", mesh, enormous), InvalidInput);
+}
+
+TEST(WriteGlb, GivesEqualBytesForEqualMeshes) {
+  const test::TempDir dir;
+  write_glb(dir / "a.glb", test::labelled_sphere(), test::centimetre_frame());
+  write_glb(dir / "b.glb", test::labelled_sphere(), test::centimetre_frame());
+  EXPECT_EQ(test::read_bytes(dir / "a.glb"), test::read_bytes(dir / "b.glb"));
+}
+
+TEST(WriteGlb, RefusesWhatItCannotWrite) {
+  const test::TempDir dir;
+  const auto refused = [&](const TriangleMesh& mesh, const GlbOptions& options) {
+    EXPECT_THROW(write_glb(dir / "a.glb", mesh, {}, options), InvalidInput);
+  };
+  TriangleMesh mesh = test::labelled_sphere();
+  refused(mesh, {.max_error = -1});
+  refused(mesh, {.max_error = std::nan("")});
+  refused(mesh, {.speed = 11});
+  refused(mesh, {.speed = -1});
+  refused(mesh, {.y_up = 2 * Eigen::Matrix3d::Identity()});
+  refused(mesh, {.y_up = -Eigen::Matrix3d::Identity()});
+  refused(mesh, {.y_up = Eigen::Matrix3d::Constant(std::nan(""))});
+  refused(mesh, {.summary_json = "{"});
+  refused({}, {});
+  mesh.vertices[4].y() = std::nanf("");
+  refused(mesh, {});
+  mesh.vertices.assign(mesh.vertices.size(), Eigen::Vector3f::Zero());
+  refused(mesh, {});
+  EXPECT_EQ(test::entries(dir.path()), 0);
+}
+
+TEST(WriteGlb, NoticesAFullDisk) {
+  test::expect_full_disk_is_noticed(
+      [](const auto& path) { write_glb(path, test::labelled_sphere(), test::centimetre_frame()); });
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/ply_frame.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/sample_mesh.h"
+
+namespace cgs {
+namespace {
+
+std::vector<std::string> comments_of(const Frame& frame) {
+  std::vector<std::string> out;
+  std::string text = ply_frame_comments(frame);
+  for (size_t end = 0; (end = text.find('\n')) != std::string::npos; text.erase(0, end + 1)) {
+    EXPECT_EQ(text.substr(0, 8), "comment ");
+    out.push_back(text.substr(8, end - 8));
+  }
+  return out;
+}
+
+const std::vector<Eigen::Vector3d> kBounds = {{-1, -2, -3}, {4, 5, 6}};
+
+TEST(PlyFrame, CommentsCarryUnitScaleSourceAndOriginExactly) {
+  Frame frame = test::centimetre_frame();
+  frame.metres_per_unit = 0.1 + 0.2;
+  frame.file_origin = {1.0 / 3, -1e-300, 5.4e6};
+  const PlyPlacement back = ply_placement(comments_of(frame), kBounds, {});
+  EXPECT_EQ(back.frame.metres_per_unit, frame.metres_per_unit);
+  EXPECT_EQ(back.frame.metres_sigma, frame.metres_sigma);
+  EXPECT_EQ(back.frame.scale_source, frame.scale_source);
+  EXPECT_EQ(back.frame.file_origin, frame.file_origin);
+  EXPECT_TRUE(back.warnings.empty());
+}
+
+TEST(PlyFrame, PlacesContentInTheWorld) {
+  const PlyPlacement back = ply_placement(comments_of(test::centimetre_frame()), kBounds, {});
+  const Eigen::Vector3d in_file(0.5, 1.5, -2.5);
+  const Eigen::Vector3d in_world = in_file + test::centimetre_frame().file_origin;
+  EXPECT_LT((back.frame.world_from_internal(back.internal(in_file)) - in_world).norm(), 1e-12);
+  EXPECT_EQ(back.frame.scale, 16);  // the largest side is 9
+}
+
+TEST(PlyFrame, ReadsIntoAGivenFrame) {
+  const Frame frame = test::centimetre_frame();
+  const PlyPlacement plain = ply_placement({}, kBounds, frame);
+  EXPECT_EQ(plain.internal({3, 4, 5}), frame.internal_from_file({3, 4, 5}));
+  Frame elsewhere = frame;
+  elsewhere.file_origin.setZero();
+  const PlyPlacement moved = ply_placement(comments_of(elsewhere), kBounds, frame);
+  EXPECT_EQ(moved.internal({3, 4, 5}), frame.internal_from_world({3, 4, 5}));
+}
+
+TEST(PlyFrame, WarnsIfTheUnitIsAnother) {
+  Frame millimetres = test::centimetre_frame();
+  millimetres.metres_per_unit = 0.001;
+  const PlyPlacement out =
+      ply_placement(comments_of(millimetres), kBounds, test::centimetre_frame());
+  EXPECT_EQ(out.warnings.size(), 1u);
+}
+
+TEST(PlyFrame, IgnoresCommentsItDidNotWrite) {
+  const PlyPlacement out = ply_placement(
+      {"file_origin 1 2", "metres_per_unit nan", "unit parsec", "metres_per_unit -1", ""},
+      kBounds,
+      {});
+  EXPECT_FALSE(out.frame.has_metric_scale());
+  EXPECT_EQ(out.file_origin, Eigen::Vector3d::Zero());
+}
+
+}  // namespace
+}  // namespace cgs
