@@ -153,24 +153,6 @@ class FlushSubnormals {
 
 }  // namespace
 
-BandSplat in_band(const Splat& splat, RowRange rows, uint32_t index, int first_row) {
-  BandSplat out;
-  const double dy = first_row + 0.5 - splat.v;
-  out.x = splat.u + splat.slope * dy;
-  out.slope = static_cast<float>(splat.slope);
-  out.dy = static_cast<float>(dy);
-  out.inv_sigma_y = splat.inv_sigma_y;
-  out.inv_sigma_x = 1.0f / splat.sigma_x;
-  out.sigma_x = splat.sigma_x;
-  out.q_max = splat.q_max;
-  out.opacity = splat.opacity;
-  out.depth = splat.depth;
-  out.color = {splat.color.x(), splat.color.y(), splat.color.z()};
-  out.rows = {std::max(rows.first - first_row, 0), std::min(rows.last - first_row, kTileSize - 1)};
-  out.index = index;
-  return out;
-}
-
 void blend_tile(std::span<const BandSplat> band,
                 std::span<const uint32_t> nearest_first,
                 int first_column,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -14,7 +15,7 @@ inline constexpr float kMaxSplatAlpha = 0.99f;     ///< Upper bound of one splat
 inline constexpr float kMinTransmittance = 1e-4f;  ///< Pixels darker than this are finished.
 
 /// A splat as one row of tiles needs it; fills a cache line.
-struct BandSplat {
+struct alignas(64) BandSplat {
   double x = 0;     ///< Where dx - slope * dy vanishes on the first pixel row of the band.
   float slope = 0;  ///< Shift of that place per pixel row.
   float dy = 0;     ///< First pixel row of the band minus the centre [pixels].
@@ -47,7 +48,23 @@ struct alignas(32) TileAccumulator {
 ///
 /// \param rows   pixel rows of the image that the splat can reach
 /// \param index  of its Gaussian
-BandSplat in_band(const Splat& splat, RowRange rows, uint32_t index, int first_row);
+inline BandSplat in_band(const Splat& splat, RowRange rows, uint32_t index, int first_row) {
+  BandSplat out;
+  const double dy = first_row + 0.5 - splat.v;
+  out.x = splat.u + splat.slope * dy;
+  out.slope = static_cast<float>(splat.slope);
+  out.dy = static_cast<float>(dy);
+  out.inv_sigma_y = splat.inv_sigma_y;
+  out.inv_sigma_x = 1.0f / splat.sigma_x;
+  out.sigma_x = splat.sigma_x;
+  out.q_max = splat.q_max;
+  out.opacity = splat.opacity;
+  out.depth = splat.depth;
+  out.color = {splat.color.x(), splat.color.y(), splat.color.z()};
+  out.rows = {std::max(rows.first - first_row, 0), std::min(rows.last - first_row, kTileSize - 1)};
+  out.index = index;
+  return out;
+}
 
 /// Blends splats, nearest first, over the tile whose first pixel column is `first_column`.
 ///
