@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -32,7 +33,8 @@ struct alignas(64) BandSplat {
 
 /// What blending accumulates over the pixels of one tile, row-major.
 struct alignas(32) TileAccumulator {
-  using Plane = std::array<float, kTileSize * kTileSize>;
+  static constexpr size_t kPixels = size_t{kTileSize} * kTileSize;
+  using Plane = std::array<float, kPixels>;
   Plane transmittance;
   std::array<Plane, 3> color;
   Plane first_depth;   ///< Depth of the first Gaussian; the two sums below are relative to it.
@@ -41,7 +43,7 @@ struct alignas(32) TileAccumulator {
   Plane weight_square;
   Plane last_above_half;  ///< Depth of the last Gaussian blended while transmittance was > 0.5.
   Plane best_weight;
-  std::array<int32_t, kTileSize * kTileSize> strongest;  ///< -1 = none.
+  std::array<int32_t, kPixels> strongest;  ///< -1 = none.
 };
 
 /// The splat seen from a band of kTileSize pixel rows that starts at pixel row `first_row`.
