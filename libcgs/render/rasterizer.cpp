@@ -96,7 +96,7 @@ TileRange tiles_reached(const Splat& s, const BandSplat& b, int columns) {
     left = edge(-1);
     right = edge(1);
   }
-  // One more pixel on each side takes the rounding of spans into account.
+  // One more pixel on each side, against rounding.
   const double first = std::floor((left - 1) / kTileSize);
   const double last = std::floor((right + 1) / kTileSize);
   return {static_cast<int32_t>(std::clamp(first, 0.0, double(columns))),

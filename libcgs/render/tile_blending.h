@@ -13,7 +13,7 @@ namespace cgs {
 
 inline constexpr int kTileSize = 16;               ///< Edge of a tile [pixels].
 inline constexpr float kMaxSplatAlpha = 0.99f;     ///< Upper bound of one splat's opacity.
-inline constexpr float kMinTransmittance = 1e-4f;  ///< Pixels darker than this are finished.
+inline constexpr float kMinTransmittance = 1e-4f;  ///< Pixels that let less through are finished.
 
 /// A splat as one row of tiles needs it; fills a cache line.
 struct alignas(64) BandSplat {
