@@ -48,17 +48,12 @@ struct ImageCovariance {
   double xx, xy, yy, det;
 };
 
-// From the rows of the 2x3 factor whose columns are the principal axes displaced into the image.
-ImageCovariance dilated(const Eigen::Vector3d& row_x,
-                        const Eigen::Vector3d& row_y,
-                        double dilation) {
-  const double xx = row_x.squaredNorm();
-  const double yy = row_y.squaredNorm();
-  const double minors = row_x.cross(row_y).squaredNorm();  // Cauchy-Binet
+// minors: sum of the squared 2x2 minors of the 2x3 factor, the determinant before dilation.
+ImageCovariance dilated(double xx, double xy, double yy, double minors, double dilation) {
   return {xx + dilation,
-          row_x.dot(row_y),
+          xy,
           yy + dilation,
-          minors + dilation * (xx + yy) + dilation * dilation};
+          minors + dilation * (xx + yy) + dilation * dilation};  // Cauchy-Binet
 }
 
 Eigen::Matrix3d axes_in_world(const Eigen::Vector4f& rotation) {
@@ -78,14 +73,24 @@ ImageCovariance image_covariance(const View& view,
   const double jx = view.camera.fx * inverse_z;
   const double jy = view.camera.fy * inverse_z;
   if (scale.x() == scale.y() && scale.x() == scale.z()) {
-    // A ball looks the same in any rotation: the camera axes serve as its own.
-    const double s = scale.x();
-    return dilated({jx * s, 0, -jx * s * a}, {0, jy * s, -jy * s * b}, dilation);
+    // A ball looks the same in any rotation, so the factor is J times its radius.
+    const double sx = jx * double(scale.x());
+    const double sy = jy * double(scale.x());
+    return dilated(sx * sx * (1 + a * a),
+                   sx * sy * a * b,
+                   sy * sy * (1 + b * b),
+                   sx * sx * sy * sy * (1 + a * a + b * b),
+                   dilation);
   }
   const Eigen::Matrix3d axes =
       view.cam_from_world * axes_in_world(rotation) * scale.cast<double>().asDiagonal();
-  return dilated(
-      jx * (axes.row(0) - a * axes.row(2)), jy * (axes.row(1) - b * axes.row(2)), dilation);
+  const Eigen::RowVector3d in_x = jx * (axes.row(0) - a * axes.row(2));
+  const Eigen::RowVector3d in_y = jy * (axes.row(1) - b * axes.row(2));
+  return dilated(in_x.squaredNorm(),
+                 in_x.dot(in_y),
+                 in_y.squaredNorm(),
+                 in_x.cross(in_y).squaredNorm(),
+                 dilation);
 }
 
 bool is_degenerate(const Gaussians& g, size_t i) {

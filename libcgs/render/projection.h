@@ -39,8 +39,9 @@ enum class SplatFate : uint8_t {
 /// covariance, the exponent is factored as the Cholesky solve does it, y first:
 ///   q = dy^2 / C_yy + (dx - slope * dy)^2 / C_x|y,   slope = C_xy / C_yy,   C_x|y = det C / C_yy,
 /// and alpha = min(0.99, opacity * exp(-q / 2)) where that is at least kMinSplatAlpha, which
-/// implies q <= q_max.
-struct Splat {
+/// implies q <= q_max. Aligned to the cache line that it fills: depth order visits splats at
+/// random.
+struct alignas(64) Splat {
   double u = 0;  ///< Centre [pixels].
   double v = 0;
   double slope = 0;

@@ -96,7 +96,7 @@ TileRange tiles_reached(const Splat& s, const BandSplat& b, int columns) {
     left = edge(-1);
     right = edge(1);
   }
-  // One more pixel on each side takes the rounding of spans into account.
+  // One more pixel on each side, against rounding.
   const double first = std::floor((left - 1) / kTileSize);
   const double last = std::floor((right + 1) / kTileSize);
   return {static_cast<int32_t>(std::clamp(first, 0.0, double(columns))),
@@ -121,8 +121,10 @@ Band make_band(const ProjectedGaussians& projected,
   band.begin.assign(static_cast<size_t>(columns) + 1, 0);
   for (size_t k = 0; k < gaussians.size(); ++k) {
     // Depth order visits the splats at random, faster than memory can follow unasked.
-    constexpr size_t kAhead = 12;
-    __builtin_prefetch(&projected.splats[gaussians[std::min(k + kAhead, gaussians.size() - 1)]]);
+    constexpr size_t kAhead = 16;
+    const uint32_t coming = gaussians[std::min(k + kAhead, gaussians.size() - 1)];
+    __builtin_prefetch(&projected.splats[coming]);
+    __builtin_prefetch(&projected.rows[coming]);
     const uint32_t g = gaussians[k];
     const Splat& splat = projected.splats[g];
     band.splats.push_back(in_band(splat, projected.rows[g], g, row * kTileSize));

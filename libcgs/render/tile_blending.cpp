@@ -86,6 +86,12 @@ inline void blend_window(
   store(stronger ? Ints{} + static_cast<int32_t>(s.index) : strongest, &tile.strongest[at]);
 }
 
+// Exponent of the pixel centre nearest to the ridge among the eight from `first` on.
+inline float least_exponent(float ridge, float first, float inv_sigma_x) {
+  const float t = std::max({first + 0.5f - ridge, ridge - (first + 7.5f), 0.0f}) * inv_sigma_x;
+  return t * t;
+}
+
 void blend_splat(const BandSplat& s, int first_column, uint32_t open_rows, TileAccumulator& tile) {
   const auto ridge_at_top = static_cast<float>(s.x - first_column);
   for (int row = s.rows.first; row <= s.rows.last; ++row) {
@@ -94,18 +100,15 @@ void blend_splat(const BandSplat& s, int first_column, uint32_t open_rows, TileA
     const float rest = s.q_max - ty * ty;
     if (rest < 0 || (open_rows >> row & 1U) == 0) continue;
     const float ridge = ridge_at_top + s.slope * r;
-    // Pixels x whose centre lies within the ellipse, and a little more against rounding.
-    const float half = std::sqrt(rest) * s.sigma_x + 1e-3f;
-    const float left = std::max(ridge - half - 0.5f, -1.0f);
-    const float right = std::min(ridge + half - 0.5f, float(kTileSize));
-    if (!(left <= right) || right < 0 || left > float(kTileSize - 1)) continue;
-    const int begin = static_cast<int>(left + 1.0f);  // = ceil(left), as the margin forgives
-    const int end = static_cast<int>(right) + 1;
     const int at = row * kTileSize;
-    // Whole halves of the row: windows that overlap the last ones by parts would have to wait until
+    // Fixed halves of the row: windows that overlap the last ones by parts would have to wait until
     // those are written back.
-    if (begin < kLanes) blend_window(s, ty * ty, 0.5f - ridge, at, tile);
-    if (end > kLanes) blend_window(s, ty * ty, (kLanes + 0.5f) - ridge, at + kLanes, tile);
+    if (least_exponent(ridge, 0, s.inv_sigma_x) <= rest) {
+      blend_window(s, ty * ty, 0.5f - ridge, at, tile);
+    }
+    if (least_exponent(ridge, kLanes, s.inv_sigma_x) <= rest) {
+      blend_window(s, ty * ty, (kLanes + 0.5f) - ridge, at + kLanes, tile);
+    }
   }
 }
 
@@ -113,7 +116,7 @@ void blend_splat(const BandSplat& s, int first_column, uint32_t open_rows, TileA
 uint32_t unfinished_rows(const TileAccumulator& tile) {
   uint32_t rows = 0;
   for (int row = 0; row < kTileSize; ++row) {
-    const float* T = &tile.transmittance[row * kTileSize];
+    const float* T = &tile.transmittance[size_t{kTileSize} * row];
     const float clearest = *std::max_element(T, T + kTileSize);
     rows |= static_cast<uint32_t>(clearest >= kMinTransmittance) << row;
   }
@@ -123,7 +126,7 @@ uint32_t unfinished_rows(const TileAccumulator& tile) {
 void reset(TileAccumulator& tile, std::array<int, 2> size) {
   tile.transmittance.fill(0);  // pixels beyond the image are finished from the start
   for (int y = 0; y < size[1]; ++y) {
-    std::fill_n(&tile.transmittance[y * kTileSize], size[0], 1.0f);
+    std::fill_n(&tile.transmittance[size_t{kTileSize} * y], size[0], 1.0f);
   }
   for (TileAccumulator::Plane& plane : tile.color) plane.fill(0);
   tile.first_depth.fill(0);
@@ -152,24 +155,6 @@ class FlushSubnormals {
 };
 
 }  // namespace
-
-BandSplat in_band(const Splat& splat, RowRange rows, uint32_t index, int first_row) {
-  BandSplat out;
-  const double dy = first_row + 0.5 - splat.v;
-  out.x = splat.u + splat.slope * dy;
-  out.slope = static_cast<float>(splat.slope);
-  out.dy = static_cast<float>(dy);
-  out.inv_sigma_y = splat.inv_sigma_y;
-  out.inv_sigma_x = 1.0f / splat.sigma_x;
-  out.sigma_x = splat.sigma_x;
-  out.q_max = splat.q_max;
-  out.opacity = splat.opacity;
-  out.depth = splat.depth;
-  out.color = {splat.color.x(), splat.color.y(), splat.color.z()};
-  out.rows = {std::max(rows.first - first_row, 0), std::min(rows.last - first_row, kTileSize - 1)};
-  out.index = index;
-  return out;
-}
 
 void blend_tile(std::span<const BandSplat> band,
                 std::span<const uint32_t> nearest_first,

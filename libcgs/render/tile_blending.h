@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -11,10 +13,10 @@ namespace cgs {
 
 inline constexpr int kTileSize = 16;               ///< Edge of a tile [pixels].
 inline constexpr float kMaxSplatAlpha = 0.99f;     ///< Upper bound of one splat's opacity.
-inline constexpr float kMinTransmittance = 1e-4f;  ///< Pixels darker than this are finished.
+inline constexpr float kMinTransmittance = 1e-4f;  ///< Pixels that let less through are finished.
 
 /// A splat as one row of tiles needs it; fills a cache line.
-struct BandSplat {
+struct alignas(64) BandSplat {
   double x = 0;     ///< Where dx - slope * dy vanishes on the first pixel row of the band.
   float slope = 0;  ///< Shift of that place per pixel row.
   float dy = 0;     ///< First pixel row of the band minus the centre [pixels].
@@ -31,7 +33,8 @@ struct BandSplat {
 
 /// What blending accumulates over the pixels of one tile, row-major.
 struct alignas(32) TileAccumulator {
-  using Plane = std::array<float, kTileSize * kTileSize>;
+  static constexpr size_t kPixels = size_t{kTileSize} * kTileSize;
+  using Plane = std::array<float, kPixels>;
   Plane transmittance;
   std::array<Plane, 3> color;
   Plane first_depth;   ///< Depth of the first Gaussian; the two sums below are relative to it.
@@ -40,14 +43,30 @@ struct alignas(32) TileAccumulator {
   Plane weight_square;
   Plane last_above_half;  ///< Depth of the last Gaussian blended while transmittance was > 0.5.
   Plane best_weight;
-  std::array<int32_t, kTileSize * kTileSize> strongest;  ///< -1 = none.
+  std::array<int32_t, kPixels> strongest;  ///< -1 = none.
 };
 
 /// The splat seen from a band of kTileSize pixel rows that starts at pixel row `first_row`.
 ///
 /// \param rows   pixel rows of the image that the splat can reach
 /// \param index  of its Gaussian
-BandSplat in_band(const Splat& splat, RowRange rows, uint32_t index, int first_row);
+inline BandSplat in_band(const Splat& splat, RowRange rows, uint32_t index, int first_row) {
+  BandSplat out;
+  const double dy = first_row + 0.5 - splat.v;
+  out.x = splat.u + splat.slope * dy;
+  out.slope = static_cast<float>(splat.slope);
+  out.dy = static_cast<float>(dy);
+  out.inv_sigma_y = splat.inv_sigma_y;
+  out.inv_sigma_x = 1.0f / splat.sigma_x;
+  out.sigma_x = splat.sigma_x;
+  out.q_max = splat.q_max;
+  out.opacity = splat.opacity;
+  out.depth = splat.depth;
+  out.color = {splat.color.x(), splat.color.y(), splat.color.z()};
+  out.rows = {std::max(rows.first - first_row, 0), std::min(rows.last - first_row, kTileSize - 1)};
+  out.index = index;
+  return out;
+}
 
 /// Blends splats, nearest first, over the tile whose first pixel column is `first_column`.
 ///

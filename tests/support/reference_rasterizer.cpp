@@ -101,7 +101,9 @@ ReferenceImage rasterize_reference(const Gaussians& gaussians,
                      Raster<uint8_t>(w, h, 0)};
   const std::vector<ReferenceSplat> splats = splats_of(gaussians, camera);
   for (size_t p = 0; p < out.alpha.data.size(); ++p) {
-    const Eigen::Vector2d pixel(double(p % w) + 0.5, double(p / w) + 0.5);
+    const size_t row = p / static_cast<size_t>(w);
+    const size_t column = p % static_cast<size_t>(w);
+    const Eigen::Vector2d pixel(double(column) + 0.5, double(row) + 0.5);
     double T = 1;
     double best = 0;
     Eigen::Vector3d color = Eigen::Vector3d::Zero();

@@ -76,7 +76,8 @@ TEST(ProjectGaussians, PutsTheGaussianOfAPixelOnItsCentre) {
 TEST(ProjectGaussians, OfExactPositionsGivesExactPixelCentres) {
   Camera camera{.width = 64, .height = 32, .fx = 64, .fy = 64, .cx = 32, .cy = 16};
   for (int x = 0; x < 64; ++x) {
-    const Eigen::Vector3f p = camera.unproject(x + 0.5, 8.5, 0.5).cast<float>();  // representable in float
+    const Eigen::Vector3f p =
+        camera.unproject(x + 0.5, 8.5, 0.5).cast<float>();  // representable in float
     EXPECT_EQ(project_gaussians(one(p, {0.1f, 0.1f, 0.1f}), camera).splats[0].u, x + 0.5);
   }
 }

@@ -29,7 +29,7 @@ Camera oblique_camera() {
   return camera;
 }
 
-// Random Gaussians spread over the image between depths 0.4 and 1.2.
+// Random Gaussians over the image and well beyond it, between depths 0.4 and 1.2.
 struct Spread {
   int count = 300;
   float sigma_px = 2;    // of the longest axis
@@ -47,8 +47,8 @@ Gaussians random_gaussians(const Camera& camera, const Spread& spread, unsigned 
   g.sh_degree = spread.sh_degree;
   for (int i = 0; i < spread.count; ++i) {
     const double z = 0.4 + 0.8 * uniform(random);
-    const double u = camera.width * (1.2 * uniform(random) - 0.1);
-    const double v = camera.height * (1.2 * uniform(random) - 0.1);
+    const double u = camera.width * (1.8 * uniform(random) - 0.4);
+    const double v = camera.height * (1.8 * uniform(random) - 0.4);
     g.position.push_back(camera.unproject(u, v, z).cast<float>());
     const float longest = spread.sigma_px * float(z / camera.fx) * float(0.5 + uniform(random));
     g.scale.emplace_back(longest / spread.anisotropy, longest, longest / spread.anisotropy);
@@ -80,7 +80,6 @@ void expect_reference(const Gaussians& g, const Camera& camera, double tolerance
               4 * room)
         << p;
     ASSERT_NEAR(double(got.weight_squared.data[p]), truth.weight_squared.data[p], 2 * room) << p;
-    ASSERT_EQ(std::isnan(got.depth.data[p]), std::isnan(got.depth.data[p])) << p;
     if (truth.alpha.data[p] > 0.5 + room) {
       ASSERT_NEAR(double(got.depth.data[p]), truth.depth.data[p], 4 * room) << p;
       ASSERT_NEAR(double(got.depth_variance.data[p]), truth.depth_variance.data[p], 4 * room) << p;

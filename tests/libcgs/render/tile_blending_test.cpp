@@ -30,7 +30,8 @@ TileAccumulator blend(const std::vector<Splat>& splats,
                       int row,
                       std::array<int, 2> size) {
   std::vector<BandSplat> band;
-  for (uint32_t i = 0; i < splats.size(); ++i) band.push_back(in_band(splats[i], {0, 1000}, i, row));
+  for (uint32_t i = 0; i < splats.size(); ++i)
+    band.push_back(in_band(splats[i], {0, 1000}, i, row));
   std::vector<uint32_t> order(splats.size());
   std::iota(order.begin(), order.end(), 0);
   TileAccumulator tile;
