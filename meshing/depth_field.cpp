@@ -11,7 +11,8 @@ namespace cgs {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kMinSlope = 0.25f;  // At grazing incidence the local plane says little.
+constexpr float kBackground = 1e6f;  // Depth of rays that hit nothing; far beyond any surface.
+constexpr float kMinSlope = 0.25f;   // At grazing incidence the local plane says little.
 constexpr float kMaxBandGrowth = 3.0f;
 
 // Depth steps between neighbours, in footprints of a pixel.
@@ -55,7 +56,13 @@ DepthMap usable_depth(const TsdfView& view, double depth_trunc) {
   for (size_t i = 0; i < depth.data.size(); ++i) {
     float& d = depth.data[i];
     const bool usable = view.usable.empty() || view.usable.data[i] != 0;
-    if (!usable || !std::isfinite(d) || !(d > 0) || (depth_trunc > 0 && d > depth_trunc)) d = kNaN;
+    if (!usable || !(d > 0)) {
+      d = kNaN;
+    } else if (std::isinf(d)) {
+      d = kBackground;
+    } else if (depth_trunc > 0 && d > depth_trunc) {
+      d = kNaN;
+    }
   }
   return depth;
 }

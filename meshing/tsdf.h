@@ -14,11 +14,12 @@ namespace cgs {
 
 /// One depth map to fuse. Rasters other than depth may be empty; all have the size of the camera.
 struct TsdfView {
-  Camera camera;           ///< [internal units]
-  DepthMap depth;          ///< z-depth [internal units]; NaN = unknown.
-  DepthMap sigma;          ///< Standard deviation of depth [internal units]; empty or NaN = none
-                           ///< known, the pixel then counts as exact.
-  ColorImage color;        ///< Empty = no colour.
+  Camera camera;     ///< [internal units]
+  DepthMap depth;    ///< z-depth [internal units]; NaN = unknown, +infinity = known to hit nothing,
+                     ///< such as the background of a cut-out object.
+  DepthMap sigma;    ///< Standard deviation of depth [internal units]; empty or NaN = none
+                     ///< known, the pixel then counts as exact.
+  ColorImage color;  ///< Empty = no colour.
   Raster<uint8_t> usable;  ///< 0 where depth must be ignored; empty = use all.
 };
 
