@@ -177,12 +177,17 @@ DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double 
   }
 }
 
-float DepthField::depth_at(float u, float v, int x, int y) const {
+bool DepthField::shows_one_surface(float u, float v) const {
+  const int x0 = static_cast<int>(std::floor(u - 0.5f));
+  const int y0 = static_cast<int>(std::floor(v - 0.5f));
+  return continuous_.contains(x0, y0) && continuous_(x0, y0) != 0;
+}
+
+float DepthField::interpolated(float u, float v) const {
   const float fu = u - 0.5f;
   const float fv = v - 0.5f;
   const int x0 = static_cast<int>(std::floor(fu));
   const int y0 = static_cast<int>(std::floor(fv));
-  if (!continuous_.contains(x0, y0) || continuous_(x0, y0) == 0) return depth_(x, y);
   const float a = fu - static_cast<float>(x0);
   const float b = fv - static_cast<float>(y0);
   // Inverse depth is linear in pixel coordinates on a plane, depth is not.
@@ -202,7 +207,8 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   }
   out.x = static_cast<int>(u);
   out.y = static_cast<int>(v);
-  const float d = depth_at(u, v, out.x, out.y);
+  const bool one_surface = shows_one_surface(u, v);
+  const float d = one_surface ? interpolated(u, v) : depth_(out.x, out.y);
   if (!std::isfinite(d)) {
     if (p.z() > hides_(out.x, out.y)) out.sight = Sight::Hidden;
     return out;
@@ -214,6 +220,9 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   const float band = std::min(wanted, kMaxBandGrowth * truncation_);
   const float noise = out.sigma / voxel_;
   out.weight = facing_(out.x, out.y) / (1 + noise * noise);
+  // Half a pixel from an occlusion edge either surface may be the true one.
+  constexpr float kEdgeWeight = 0.25f;
+  if (!one_surface) out.weight *= kEdgeWeight;
   if (out.distance > wanted) {
     out.sight = Sight::Free;
   } else if (out.distance < -band) {

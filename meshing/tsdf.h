@@ -69,9 +69,9 @@ struct FusedVolume {
 ///   1/z (exact on planes), never across an occlusion edge; pixels that hang between two surfaces
 ///   are ignored.
 /// - Weight: cosine of incidence, 1 / (1 + (sigma / voxel)^2), falling off behind the surface,
-///   where the band is an assumption and not a measurement.
+///   where the band is an assumption and not a measurement, and a quarter at occlusion edges.
 /// - Free: farther than max(truncation, 3 sigma) in front of the surface. Where one view says free
-///   and another sees surface, the larger weight wins; a tie keeps the surface.
+///   and others a voxel behind their surface, the larger weight wins; a tie keeps it.
 /// The result is bit-identical for any number of threads.
 ///
 /// \throws InvalidInput   if there is no view, a raster does not match its camera, or no pixel has

@@ -133,7 +133,8 @@ TEST(Fuse, CountsTheSameStatesInBlocksAsVoxelByVoxel) {
     }
     if (near_surface || (!clearly_free && !clearly_hidden)) continue;
     ++checked;
-    wrong += state_at(fused.volume, p) != (clearly_free ? VoxelState::Free : VoxelState::NeverSeen);
+    const int expected = int(clearly_free ? VoxelState::Free : VoxelState::NeverSeen);
+    wrong += fused.volume.state->tree().getValue(at) != expected;
   }
   EXPECT_GT(checked, 5000U);
   EXPECT_EQ(wrong, 0U);
@@ -178,11 +179,11 @@ TEST(Fuse, CarriesTheUncertaintyOfTheViews) {
   const TriangleMesh mesh = open_surface(fuse(views, {}).volume, {});
   size_t as_expected = 0;
   for (size_t v = 0; v < mesh.vertices.size(); ++v) {
-    // One to three equal views, straight on or tilted by 20 degrees. Where the number changes,
-    // sigma is interpolated and support is not.
-    const double expected = 0.002 / std::sqrt(double(mesh.support[v]));
-    as_expected += std::abs(double(mesh.sigma[v]) - expected) < 0.15 * expected;
-    ASSERT_GT(mesh.sigma[v], 0.85 * 0.002 / std::sqrt(3.0));
+    // One to three equal views; along the normal an error is smaller than along z by the slant of
+    // the rays, 0.7 at the rim. Where the number changes, sigma is interpolated, support is not.
+    const double most = 0.002 / std::sqrt(double(mesh.support[v]));
+    as_expected += double(mesh.sigma[v]) > 0.7 * most && double(mesh.sigma[v]) < 1.01 * most;
+    ASSERT_GT(mesh.sigma[v], 0.7 * 0.002 / std::sqrt(3.0));
     ASSERT_LT(mesh.sigma[v], 1.01 * 0.002);
   }
   EXPECT_GT(as_expected, mesh.vertices.size() * 9 / 10);
