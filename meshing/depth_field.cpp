@@ -11,7 +11,8 @@ namespace cgs {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kMinSlope = 0.25f;  // At grazing incidence the local plane says little.
+constexpr float kBackground = 1e6f;  // Depth of rays that hit nothing; far beyond any surface.
+constexpr float kMinSlope = 0.25f;   // At grazing incidence the local plane says little.
 constexpr float kMaxBandGrowth = 3.0f;
 
 // Depth steps between neighbours, in footprints of a pixel.
@@ -55,7 +56,13 @@ DepthMap usable_depth(const TsdfView& view, double depth_trunc) {
   for (size_t i = 0; i < depth.data.size(); ++i) {
     float& d = depth.data[i];
     const bool usable = view.usable.empty() || view.usable.data[i] != 0;
-    if (!usable || !std::isfinite(d) || !(d > 0) || (depth_trunc > 0 && d > depth_trunc)) d = kNaN;
+    if (!usable || !(d > 0)) {
+      d = kNaN;
+    } else if (std::isinf(d)) {
+      d = kBackground;
+    } else if (depth_trunc > 0 && d > depth_trunc) {
+      d = kNaN;
+    }
   }
   return depth;
 }
@@ -170,12 +177,17 @@ DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double 
   }
 }
 
-float DepthField::depth_at(float u, float v, int x, int y) const {
+bool DepthField::shows_one_surface(float u, float v) const {
+  const int x0 = static_cast<int>(std::floor(u - 0.5f));
+  const int y0 = static_cast<int>(std::floor(v - 0.5f));
+  return continuous_.contains(x0, y0) && continuous_(x0, y0) != 0;
+}
+
+float DepthField::interpolated(float u, float v) const {
   const float fu = u - 0.5f;
   const float fv = v - 0.5f;
   const int x0 = static_cast<int>(std::floor(fu));
   const int y0 = static_cast<int>(std::floor(fv));
-  if (!continuous_.contains(x0, y0) || continuous_(x0, y0) == 0) return depth_(x, y);
   const float a = fu - static_cast<float>(x0);
   const float b = fv - static_cast<float>(y0);
   // Inverse depth is linear in pixel coordinates on a plane, depth is not.
@@ -195,7 +207,8 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   }
   out.x = static_cast<int>(u);
   out.y = static_cast<int>(v);
-  const float d = depth_at(u, v, out.x, out.y);
+  const bool one_surface = shows_one_surface(u, v);
+  const float d = one_surface ? interpolated(u, v) : depth_(out.x, out.y);
   if (!std::isfinite(d)) {
     if (p.z() > hides_(out.x, out.y)) out.sight = Sight::Hidden;
     return out;
@@ -207,6 +220,9 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   const float band = std::min(wanted, kMaxBandGrowth * truncation_);
   const float noise = out.sigma / voxel_;
   out.weight = facing_(out.x, out.y) / (1 + noise * noise);
+  // Half a pixel from an occlusion edge either surface may be the true one.
+  constexpr float kEdgeWeight = 0.25f;
+  if (!one_surface) out.weight *= kEdgeWeight;
   if (out.distance > wanted) {
     out.sight = Sight::Free;
   } else if (out.distance < -band) {

@@ -50,7 +50,8 @@ class DepthField {
   };
   using Level = Raster<Extremes>;
 
-  float depth_at(float u, float v, int x, int y) const;
+  bool shows_one_surface(float u, float v) const;
+  float interpolated(float u, float v) const;
   Extremes over_pixels(int x0, int y0, int x1, int y1) const;
 
   Eigen::Matrix3f R_;  // cam_from_world

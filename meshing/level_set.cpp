@@ -90,7 +90,6 @@ class Band {
     if (!index(at, i) || solid_.evidence[i] == 0) return false;
     distance = tsdf.getValue(at);
     if ((distance < 0) != (solid_.inside[i] != 0)) return false;
-    distance = std::clamp(distance, -background(), background());
     return true;
   }
 
@@ -130,7 +129,8 @@ void restore_observed(openvdb::FloatGrid& grid, const Band& band, const Volume& 
     auto tsdf = volume.tsdf->getConstAccessor();
     for (auto it = leaf.beginValueOn(); it; ++it) {
       float distance = 0;
-      if (band.observed(it.getCoord(), tsdf, distance)) it.setValue(distance);
+      if (!band.observed(it.getCoord(), tsdf, distance)) distance = *it;
+      it.setValue(std::clamp(distance, -band.background(), band.background()));
     }
   });
 }

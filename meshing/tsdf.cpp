@@ -235,7 +235,8 @@ class BlockFuser {
     Counts& counts = block.counts;
     const bool seen = e.weight > 0 && e.weight >= double(min_weight_);
     const bool conflict = seen && e.free_weight > 0 && std::abs(e.mean()) < voxel_;
-    const bool carved = seen && double(e.free_weight) > e.weight;
+    // In front of the surface both say the same.
+    const bool carved = seen && e.distance < 0 && double(e.free_weight) > e.weight;
     counts.conflicts += conflict;
     counts.carved += conflict && carved;
     if (seen && !carved) {

@@ -14,11 +14,12 @@ namespace cgs {
 
 /// One depth map to fuse. Rasters other than depth may be empty; all have the size of the camera.
 struct TsdfView {
-  Camera camera;           ///< [internal units]
-  DepthMap depth;          ///< z-depth [internal units]; NaN = unknown.
-  DepthMap sigma;          ///< Standard deviation of depth [internal units]; empty or NaN = none
-                           ///< known, the pixel then counts as exact.
-  ColorImage color;        ///< Empty = no colour.
+  Camera camera;     ///< [internal units]
+  DepthMap depth;    ///< z-depth [internal units]; NaN = unknown, +infinity = known to hit nothing,
+                     ///< such as the background of a cut-out object.
+  DepthMap sigma;    ///< Standard deviation of depth [internal units]; empty or NaN = none
+                     ///< known, the pixel then counts as exact.
+  ColorImage color;  ///< Empty = no colour.
   Raster<uint8_t> usable;  ///< 0 where depth must be ignored; empty = use all.
 };
 
@@ -68,9 +69,9 @@ struct FusedVolume {
 ///   1/z (exact on planes), never across an occlusion edge; pixels that hang between two surfaces
 ///   are ignored.
 /// - Weight: cosine of incidence, 1 / (1 + (sigma / voxel)^2), falling off behind the surface,
-///   where the band is an assumption and not a measurement.
+///   where the band is an assumption and not a measurement, and a quarter at occlusion edges.
 /// - Free: farther than max(truncation, 3 sigma) in front of the surface. Where one view says free
-///   and another sees surface, the larger weight wins; a tie keeps the surface.
+///   and others a voxel behind their surface, the larger weight wins; a tie keeps it.
 /// The result is bit-identical for any number of threads.
 ///
 /// \throws InvalidInput   if there is no view, a raster does not match its camera, or no pixel has

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/certificate.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
+
+#include <gtest/gtest.h>
 
 namespace cgs {
 namespace {
@@ -18,8 +18,18 @@ TriangleMesh cube(const Vector3f& low, const Vector3f& high) {
                                (k & 2) != 0 ? high.y() : low.y(),
                                (k & 4) != 0 ? high.z() : low.z());
   }
-  mesh.faces = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
-                {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  mesh.faces = {{0, 2, 3},
+                {0, 3, 1},
+                {4, 5, 7},
+                {4, 7, 6},
+                {0, 1, 5},
+                {0, 5, 4},
+                {2, 6, 7},
+                {2, 7, 3},
+                {0, 4, 6},
+                {0, 6, 2},
+                {1, 3, 7},
+                {1, 7, 5}};
   return mesh;
 }
 

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/depth_field.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/depth_scenes.h"
+
+namespace cgs {
+namespace {
+
+using Eigen::Vector3d;
+
+Camera camera() { return test::camera_at({0, 0, -1}, {0, 0, 0}, 64); }
+
+TEST(ContinuousQuads, FollowASteepPlaneButStopAtAStep) {
+  const Camera c = camera();
+  const TsdfView steep = test::photographed(test::plane(Vector3d(2, 0, 1).normalized(), 0.0), c);
+  const auto on_plane = continuous_quads(steep.depth, c);
+  EXPECT_EQ(on_plane(20, 20), 1);
+  EXPECT_EQ(on_plane(40, 30), 1);
+  DepthMap step(c.width, c.height, 1.0f);
+  for (int y = 0; y < c.height; ++y) {
+    for (int x = 32; x < c.width; ++x) step(x, y) = 1.2f;
+  }
+  const auto at_step = continuous_quads(step, c);
+  EXPECT_EQ(at_step(30, 20), 1);
+  EXPECT_EQ(at_step(31, 20), 0);
+  EXPECT_EQ(at_step(32, 20), 1);
+}
+
+TEST(WithGapsFilled, ContinuesAPlaneIntoSmallEnclosedGapsOnly) {
+  const Camera c = camera();
+  const DepthMap whole =
+      test::photographed(test::plane(Vector3d(0.3, 0.2, 1).normalized(), 0.0), c).depth;
+  DepthMap holes = whole;
+  const auto cut = [&](int x0, int y0, int size) {
+    for (int y = y0; y < y0 + size; ++y) {
+      for (int x = x0; x < x0 + size; ++x) holes(x, y) = std::nanf("");
+    }
+  };
+  cut(10, 10, 5);
+  cut(30, 10, 12);
+  cut(0, 30, 3);
+  const DepthMap filled = with_gaps_filled(holes, 30);
+  for (int y = 10; y < 15; ++y) {
+    for (int x = 10; x < 15; ++x) EXPECT_NEAR(filled(x, y), whole(x, y), 1e-3f);
+  }
+  EXPECT_TRUE(std::isnan(filled(35, 15)));  // too large
+  EXPECT_TRUE(std::isnan(filled(1, 31)));   // open to the border
+}
+
+TEST(DepthField, SaysTheSameOverABoxAsAtItsPoints) {
+  const auto shape = test::nearest({test::sphere({0, 0, 0}, 0.15), test::plane({0, 0, 1}, 0.4)});
+  TsdfView view = test::photographed(shape, camera());
+  view.sigma = DepthMap(view.depth.width, view.depth.height, 0.004f);
+  for (int y = 5; y < 9; ++y) view.depth(50, y) = std::nanf("");
+  const DepthField field(view, {}, 0.01);
+  int told = 0;
+  for (int i = 0; i < 20 * 20 * 20; ++i) {
+    const Eigen::Vector3f low(-0.5f + 0.05f * float(i % 20),
+                              -0.5f + 0.05f * float(i / 20 % 20),
+                              -0.4f + 0.05f * float(i / 400));
+    const Eigen::AlignedBox3f box(low, low.array() + 0.04f);
+    const Sight sight = field.over(box);
+    if (sight == Sight::Mixed) continue;
+    ++told;
+    for (int k = 0; k < 27; ++k) {
+      const Eigen::Vector3f p =
+          low + 0.02f * Eigen::Vector3f(float(k % 3), float(k / 3 % 3), float(k / 9));
+      ASSERT_EQ(field.at(p).sight, sight) << p.transpose();
+    }
+  }
+  EXPECT_GT(told, 2000);
+}
+
+TEST(DepthField, CarvesAlongRaysThatHitNothing) {
+  TsdfView view = test::photographed(test::sphere({0, 0, 0}, 0.15), camera());
+  for (float& d : view.depth.data) d = std::isnan(d) ? INFINITY : d;
+  const DepthField field(view, {}, 0.01);
+  EXPECT_EQ(field.at({0.3f, 0, 0.5f}).sight, Sight::Free);
+  EXPECT_EQ(field.at({0, 0, 0.5f}).sight, Sight::Hidden);
+  EXPECT_EQ(field.at({0, 0, -0.15f}).sight, Sight::Band);
+}
+
+}  // namespace
+}  // namespace cgs
