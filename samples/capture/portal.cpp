@@ -45,17 +45,7 @@ class Mason {
   explicit Mason(PortalScene& scene) : scene_(scene) {}
 
   void add(const std::string& name, Material material, const TriangleMesh& mesh) {
-    const auto base = static_cast<uint32_t>(scene_.mesh.vertices.size());
-    scene_.parts.push_back({name,
-                            material,
-                            base,
-                            static_cast<uint32_t>(mesh.vertices.size()),
-                            static_cast<uint32_t>(scene_.mesh.faces.size()),
-                            static_cast<uint32_t>(mesh.faces.size())});
-    auto& all = scene_.mesh;
-    all.vertices.insert(all.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
-    for (const auto& f : mesh.faces) all.faces.push_back({f[0] + base, f[1] + base, f[2] + base});
-    scene_.part_of_face.resize(all.faces.size(), static_cast<uint16_t>(scene_.parts.size() - 1));
+    add_part(scene_, name, material, mesh);
   }
 
   // Stone: edges no longer than max_edge [m], then made uneven.
@@ -497,6 +487,23 @@ void add_ironwork(Mason& mason) {
 }
 
 }  // namespace
+
+void add_part(PortalScene& scene,
+              const std::string& name,
+              Material material,
+              const TriangleMesh& mesh) {
+  auto& all = scene.mesh;
+  const auto base = static_cast<uint32_t>(all.vertices.size());
+  scene.parts.push_back({name,
+                         material,
+                         base,
+                         static_cast<uint32_t>(mesh.vertices.size()),
+                         static_cast<uint32_t>(all.faces.size()),
+                         static_cast<uint32_t>(mesh.faces.size())});
+  all.vertices.insert(all.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
+  for (const auto& f : mesh.faces) all.faces.push_back({f[0] + base, f[1] + base, f[2] + base});
+  scene.part_of_face.resize(all.faces.size(), static_cast<uint16_t>(scene.parts.size() - 1));
+}
 
 PortalScene portal_scene() {
   PortalScene scene;

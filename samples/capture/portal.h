@@ -35,6 +35,12 @@ struct PortalScene {
   Bvh bvh;
 };
 
+/// Appends a closed mesh to a scene; its hierarchy must be built anew afterwards.
+void add_part(PortalScene& scene,
+              const std::string& name,
+              Material material,
+              const TriangleMesh& mesh);
+
 /// Always the same scene.
 PortalScene portal_scene();
 

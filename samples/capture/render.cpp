@@ -18,8 +18,8 @@ using Eigen::Vector3d;
 using Eigen::Vector3f;
 using std::numbers::pi;
 
-constexpr int kSkyRays = 32;
-constexpr double kSkyReach = 1.5;    // [m]
+constexpr int kSkyRays = 24;
+constexpr double kSkyReach = 1.2;    // [m]
 constexpr int kSamples = 2;          // per pixel and axis
 constexpr double kOffGround = 1e-5;  // start of secondary rays above the surface [m]
 
@@ -64,9 +64,7 @@ struct Shader {
     const auto hit = first_hit(scene.bvh, ray);
     if (!hit) return Vector3f::Zero();
     const auto& face = scene.mesh.faces[hit->face];
-    const auto corner = [&](size_t i) { return scene.mesh.vertices[face[i]].cast<double>(); };
-    const Vector3d a = corner(0);
-    const Vector3d normal = (corner(1) - a).cross(corner(2) - a).normalized();
+    const Vector3d normal = face_normal(scene.mesh, hit->face);
     const Vector3d point = ray.origin + hit->t * ray.direction;
     const double distance = hit->t * ray.direction.norm();
     const double facing = std::abs(normal.dot(ray.direction)) / ray.direction.norm();

@@ -9,8 +9,8 @@
 
 namespace cgs {
 
-/// Share of the sky that each vertex of the scene sees, in [0, 1], cosine-weighted; things farther
-/// away than a metre and a half do not count.
+/// Share of the sky that each vertex of the scene sees, in [0, 1], cosine-weighted; only
+/// what lies within 1.2 m hides it.
 std::vector<float> sky_visibility(const PortalScene& scene);
 
 /// A photograph: sun with shadows and sky on matt surfaces, averaged over 2 x 2 samples per pixel,
