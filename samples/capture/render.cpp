@@ -24,7 +24,7 @@ constexpr int kSamples = 2;          // per pixel and axis
 constexpr double kOffGround = 1e-5;  // start of secondary rays above the surface [m]
 
 const Vector3d kToSun = Vector3d(-0.50, -0.72, 0.60).normalized();
-const Vector3f kSun(1.75F, 1.62F, 1.38F);
+const Vector3f kSun(1.65F, 1.53F, 1.30F);
 const Vector3f kSky(0.62F, 0.70F, 0.84F);
 const Vector3f kBounce(0.30F, 0.27F, 0.22F);  // light that comes back from the ground
 
