@@ -143,9 +143,11 @@ ObservedVolumeError observed_volume_error(const PortalScene& scene,
   const auto cells = static_cast<size_t>(grid);
   std::vector<Column> columns(cells * cells);
   tbb::parallel_for(size_t{0}, columns.size(), [&](size_t i) {
+    const size_t row = i / cells;
+    const size_t column = i % cells;
     Vector3d start = bounds.min();
-    start.x() += bounds.sizes().x() * (static_cast<double>(i % cells) + 0.5) / grid;
-    start.y() += bounds.sizes().y() * (static_cast<double>(i / cells) + 0.5) / grid;
+    start.x() += bounds.sizes().x() * (static_cast<double>(column) + 0.5) / grid;
+    start.y() += bounds.sizes().y() * (static_cast<double>(row) + 0.5) / grid;
     start.z() = front;
     const Ray ray{.origin = axes.transpose() * start, .direction = axes.row(2).transpose()};
     const auto truth = first_hit(scene.bvh, ray);

@@ -5,10 +5,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "samples/capture/noise.h"
-#include "samples/capture/surface_colour.h"
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
+
+#include "samples/capture/noise.h"
+#include "samples/capture/surface_colour.h"
 
 namespace cgs {
 
@@ -119,8 +120,9 @@ ColorImage render_view(const PortalScene& scene,
     for (int x = 0; x < camera.width; ++x) {
       Vector3f sum = Vector3f::Zero();
       for (int s = 0; s < kSamples * kSamples; ++s) {
+        const int row = s / kSamples;
         const double u = x + (s % kSamples + 0.5) / kSamples;
-        const double v = y + (static_cast<double>(s / kSamples) + 0.5) / kSamples;
+        const double v = y + (row + 0.5) / kSamples;
         const Vector3d direction = camera.world_from_cam.linear() * camera.ray_in_cam(u, v);
         sum += shade({.origin = camera.center(), .direction = direction}, spread);
       }

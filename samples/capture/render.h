@@ -3,9 +3,8 @@
 
 #include <vector>
 
-#include "samples/capture/portal.h"
-
 #include "libcgs/core/camera.h"
+#include "samples/capture/portal.h"
 
 namespace cgs {
 

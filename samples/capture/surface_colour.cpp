@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "samples/capture/arch.h"
 #include "samples/capture/noise.h"
 
 namespace cgs {

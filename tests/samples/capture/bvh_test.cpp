@@ -3,8 +3,9 @@
 
 #include <random>
 
-#include "samples/capture/solids.h"
 #include <gtest/gtest.h>
+
+#include "samples/capture/solids.h"
 
 namespace cgs {
 namespace {

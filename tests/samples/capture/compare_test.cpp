@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "samples/capture/solids.h"
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
+#include "samples/capture/solids.h"
 
 namespace cgs {
 namespace {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "samples/capture/files.h"
 
-#include "samples/capture/render.h"
-#include "samples/capture/solids.h"
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfInputFile.h>
@@ -10,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "samples/capture/render.h"
+#include "samples/capture/solids.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs {

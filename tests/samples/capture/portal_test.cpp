@@ -4,8 +4,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "samples/capture/solids.h"
 #include <gtest/gtest.h>
+
+#include "samples/capture/solids.h"
 
 namespace cgs {
 namespace {

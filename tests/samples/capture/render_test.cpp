@@ -3,10 +3,11 @@
 
 #include <cmath>
 
-#include "samples/capture/solids.h"
-#include "samples/capture/truth.h"
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
+
+#include "samples/capture/solids.h"
+#include "samples/capture/truth.h"
 
 namespace cgs {
 namespace {
