@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "samples/capture/files.h"
 #include <CLI/CLI.hpp>
 
 #include "libcgs/core/error.h"
+#include "samples/capture/files.h"
 
 namespace {
 

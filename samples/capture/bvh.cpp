@@ -124,17 +124,14 @@ struct BoxTest {
   explicit BoxTest(const Ray& ray)
       : origin(ray.origin.array()), inverse(ray.direction.array().inverse()) {}
 
-  // Entry parameter, or infinity on a miss. A ray inside a face plane gives 0 * inf = NaN, which
-  // the order of the comparisons below lets count as inside.
+  // Entry parameter, or infinity on a miss. A ray that lies in a side of the box gives 0 * inf and
+  // may miss it: the boxes are padded, so nothing lies there.
   double entry(const Bvh::Node& node, double t_min, double t_max) const {
-    // Rounding of the divisions must not lose a box whose face holds the triangle.
-    constexpr double kSlack = 1 + 1e-14;
     for (int k = 0; k < 3; ++k) {
-      double near = (static_cast<double>(node.lower[k]) - origin[k]) * inverse[k];
-      double far = (static_cast<double>(node.upper[k]) - origin[k]) * inverse[k];
-      if (near > far) std::swap(near, far);
-      near *= near > 0 ? 1 / kSlack : kSlack;
-      far *= far > 0 ? kSlack : 1 / kSlack;
+      const double t0 = (static_cast<double>(node.lower[k]) - origin[k]) * inverse[k];
+      const double t1 = (static_cast<double>(node.upper[k]) - origin[k]) * inverse[k];
+      const double near = t0 < t1 ? t0 : t1;
+      const double far = t0 < t1 ? t1 : t0;
       t_min = near > t_min ? near : t_min;
       t_max = far < t_max ? far : t_max;
     }
@@ -211,6 +208,13 @@ Bvh build_bvh(const TriangleMesh& mesh) {
   if (bvh.triangles.empty()) return bvh;
   bvh.nodes.resize(1);
   Builder(bvh).build(0, 0, static_cast<uint32_t>(bvh.triangles.size()), 0);
+  const float reach =
+      std::max(bvh.nodes[0].lower.cwiseAbs().maxCoeff(), bvh.nodes[0].upper.cwiseAbs().maxCoeff());
+  const float padding = 1e-6F * reach;
+  for (auto& node : bvh.nodes) {
+    node.lower.array() -= padding;
+    node.upper.array() += padding;
+  }
   return bvh;
 }
 
@@ -219,5 +223,11 @@ std::optional<RayHit> first_hit(const Bvh& bvh, const Ray& ray) {
 }
 
 bool any_hit(const Bvh& bvh, const Ray& ray) { return traverse<true>(bvh, ray).has_value(); }
+
+Eigen::Vector3d face_normal(const TriangleMesh& mesh, uint32_t face) {
+  const auto corner = [&](size_t i) { return mesh.vertices[mesh.faces[face][i]].cast<double>(); };
+  const Eigen::Vector3d a = corner(0);
+  return (corner(1) - a).cross(corner(2) - a).normalized();
+}
 
 }  // namespace cgs

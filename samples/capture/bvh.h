@@ -30,7 +30,7 @@ struct RayHit {
 
 /// Bounding volume hierarchy over the faces of a mesh; holds a copy of what it needs of it.
 struct Bvh {
-  struct Node {
+  struct Node {  // its box is a little larger than what it holds
     Eigen::Vector3f lower = Eigen::Vector3f::Zero();
     Eigen::Vector3f upper = Eigen::Vector3f::Zero();
     uint32_t first = 0;  ///< First triangle of a leaf, or first of the two children.
@@ -59,5 +59,8 @@ bool any_hit(const Bvh& bvh, const Ray& ray);
 
 /// Intersection with one triangle, in double. Its face index is taken over.
 std::optional<RayHit> hit_triangle(const Bvh::Triangle& triangle, const Ray& ray);
+
+/// Unit normal of a face, to the side from which its corners run counter-clockwise.
+Eigen::Vector3d face_normal(const TriangleMesh& mesh, uint32_t face);
 
 }  // namespace cgs

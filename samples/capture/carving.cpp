@@ -90,8 +90,10 @@ double person(double x, double z, uint32_t seed) {
   const double right = 0.9 * Bump{0.15, 0.56, 0.06, 0.17, 0.7 * arm}.at(x, z);
   const double book = Bump{0.06, 0.50, 0.07, 0.09, 0.3}.at(x, z) > 0.2 ? 0.95 : 0.0;
   const double body = std::max(torso, robe);
-  const double bend = 3 * x * (1.3 - z) / (0.2 + z) + 0.6 * std::sin(9 * z);
-  const double folds = z < 0.72 ? 0.13 * std::sin(16 * bend + 11 * x + 6 * z) : 0;
+  const Eigen::Vector3f cloth(static_cast<float>(4 * x), 0.21F, static_cast<float>(3.1 * z));
+  const auto drape = static_cast<double>(gradient_noise(cloth, seed));
+  const double phase = 40 * x / (1.15 - 0.5 * z) + 3.5 * drape + 1.2 * std::sin(5 * z);
+  const double folds = z < 0.72 ? (0.10 + 0.06 * drape) * std::sin(phase) : 0;
   return std::max({head, halo, body > 0 ? body + folds : 0.0, left, right, book});
 }
 

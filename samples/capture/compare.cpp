@@ -55,11 +55,39 @@ Eigen::AlignedBox3d observed_bounds(const PortalScene& scene,
   return bounds;
 }
 
-// What one ray finds; negative = not a ray that counts, or a miss.
+// Length of the solid along one ray, from its first hit to the rear; NaN = there is none.
 struct Column {
-  double truth = -1;
-  double mesh = -1;
+  double truth = std::numeric_limits<double>::quiet_NaN();
+  double mesh = std::numeric_limits<double>::quiet_NaN();
 };
+
+// Rays may begin inside the ground; only what they enter from outside is a surface seen.
+bool enters(const PortalScene& scene, const RayHit& hit, const Ray& ray) {
+  return face_normal(scene.mesh, hit.face).dot(ray.direction) < 0;
+}
+
+ObservedVolumeError summed(const std::vector<Column>& columns) {
+  ObservedVolumeError error;
+  int missed = 0;
+  double truth = 0;
+  double difference = 0;
+  double deviation = 0;
+  for (const auto& column : columns) {
+    if (std::isnan(column.truth)) continue;
+    ++error.rays;
+    if (std::isnan(column.mesh)) {
+      ++missed;
+      continue;
+    }
+    truth += column.truth;
+    difference += column.mesh - column.truth;
+    deviation += std::abs(column.mesh - column.truth);
+  }
+  error.missed = error.rays > 0 ? static_cast<double>(missed) / error.rays : 1.0;
+  error.relative_error = difference / truth;
+  error.absolute_error = deviation / truth;
+  return error;
+}
 
 }  // namespace
 
@@ -108,41 +136,27 @@ ObservedVolumeError observed_volume_error(const PortalScene& scene,
   const Eigen::Matrix3d axes = mean_view_axes(inputs);
   const Eigen::AlignedBox3d bounds = observed_bounds(scene, inputs, axes);
   const Bvh bvh = build_bvh(mesh);
+  // From the cameras on, so that what floats before the true surface is met.
+  double front = bounds.min().z();
+  for (const auto& camera : inputs) front = std::min(front, axes.row(2).dot(camera.center()));
+  const double length = bounds.max().z() - front;
   const auto cells = static_cast<size_t>(grid);
   std::vector<Column> columns(cells * cells);
   tbb::parallel_for(size_t{0}, columns.size(), [&](size_t i) {
-    const double u = (static_cast<double>(i % cells) + 0.5) / grid;
-    const double v = (static_cast<double>(i / cells) + 0.5) / grid;
-    const Vector3d start = bounds.min() + bounds.sizes().cwiseProduct(Vector3d(u, v, 0));
-    const Ray ray{.origin = axes.transpose() * start,
-                  .direction = axes.row(2).transpose(),
-                  .t_max = bounds.sizes().z()};
+    const size_t row = i / cells;
+    const size_t column = i % cells;
+    Vector3d start = bounds.min();
+    start.x() += bounds.sizes().x() * (static_cast<double>(column) + 0.5) / grid;
+    start.y() += bounds.sizes().y() * (static_cast<double>(row) + 0.5) / grid;
+    start.z() = front;
+    const Ray ray{.origin = axes.transpose() * start, .direction = axes.row(2).transpose()};
     const auto truth = first_hit(scene.bvh, ray);
-    if (!truth) return;
+    if (!truth || !enters(scene, *truth, ray)) return;
     if (seen_by(scene.bvh, ray.origin + truth->t * ray.direction, inputs) < 2) return;
-    columns[i].truth = bounds.sizes().z() - truth->t;
-    if (const auto hit = first_hit(bvh, ray)) columns[i].mesh = bounds.sizes().z() - hit->t;
+    columns[i].truth = length - truth->t;
+    if (const auto hit = first_hit(bvh, ray)) columns[i].mesh = length - hit->t;
   });
-  ObservedVolumeError error;
-  int missed = 0;
-  double truth_sum = 0;
-  double difference = 0;
-  double deviation = 0;
-  for (const auto& column : columns) {
-    if (column.truth < 0) continue;
-    ++error.rays;
-    if (column.mesh < 0) {
-      ++missed;
-      continue;
-    }
-    truth_sum += column.truth;
-    difference += column.mesh - column.truth;
-    deviation += std::abs(column.mesh - column.truth);
-  }
-  error.missed = error.rays > 0 ? static_cast<double>(missed) / error.rays : 1.0;
-  error.relative_error = difference / truth_sum;
-  error.absolute_error = deviation / truth_sum;
-  return error;
+  return summed(columns);
 }
 
 }  // namespace cgs

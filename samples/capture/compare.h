@@ -26,13 +26,14 @@ MaskMap true_holes(const ViewTruth& truth);
 struct ObservedVolumeError {
   int rays = 0;               ///< Rays whose true first hit is seen by two input views or more.
   double missed = 0;          ///< Share of them that do not meet the mesh at all.
-  double relative_error = 0;  ///< (volume - true volume) / true volume, over rays that meet both.
+  double relative_error = 0;  ///< (volume - true volume) / true volume over rays that meet both;
+                              ///< NaN if there is none.
   double absolute_error = 0;  ///< The same with |…| per ray: differences do not cancel.
 };
 
-/// Casts grid x grid parallel rays along the mean viewing direction of the inputs through the box
-/// (aligned with that direction) of all that two input views or more see. The volume of a ray
-/// reaches from its first hit to the rear of that box.
+/// Casts grid x grid parallel rays along the mean viewing direction of the inputs, from where they
+/// stand, through the box (aligned with that direction) of all that two input views or more see.
+/// The volume of a ray reaches from its first hit to the rear of that box.
 ///
 /// \param mesh  in the world frame of the scene [m]
 /// \throws InvalidInput if grid < 1 or there are fewer than two inputs

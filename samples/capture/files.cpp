@@ -5,7 +5,6 @@
 #include <cstring>
 #include <utility>
 
-#include "samples/capture/render.h"
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -15,6 +14,7 @@
 
 #include "io/atomic_file.h"
 #include "libcgs/core/error.h"
+#include "samples/capture/render.h"
 
 namespace cgs {
 

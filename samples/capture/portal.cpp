@@ -7,10 +7,12 @@
 #include <numbers>
 #include <string>
 
+#include <Eigen/Geometry>
+
+#include "samples/capture/arch.h"
 #include "samples/capture/carving.h"
 #include "samples/capture/noise.h"
 #include "samples/capture/solids.h"
-#include <Eigen/Geometry>
 
 namespace cgs {
 
@@ -20,14 +22,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using std::numbers::pi;
 
-constexpr int kOrders = 4;          // recessed rings of the arch
-constexpr double kStep = 0.26;      // of their radius [m]
-constexpr double kRecess = 0.28;    // of their depth [m]
-constexpr double kBack = 1.60;      // where they end in the masonry [m]
 constexpr double kHalfWidth = 6.5;  // of wall and ground [m]
-
-double order_radius(int order) { return kWallRadius - kStep * (order + 1); }
-double order_front(int order) { return 0.15 + kRecess * order; }
 
 // Uneven stone: moves vertices by a few millimetres in all directions.
 void weather(TriangleMesh& mesh, float amplitude, uint32_t seed) {
@@ -45,17 +40,7 @@ class Mason {
   explicit Mason(PortalScene& scene) : scene_(scene) {}
 
   void add(const std::string& name, Material material, const TriangleMesh& mesh) {
-    const auto base = static_cast<uint32_t>(scene_.mesh.vertices.size());
-    scene_.parts.push_back({name,
-                            material,
-                            base,
-                            static_cast<uint32_t>(mesh.vertices.size()),
-                            static_cast<uint32_t>(scene_.mesh.faces.size()),
-                            static_cast<uint32_t>(mesh.faces.size())});
-    auto& all = scene_.mesh;
-    all.vertices.insert(all.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
-    for (const auto& f : mesh.faces) all.faces.push_back({f[0] + base, f[1] + base, f[2] + base});
-    scene_.part_of_face.resize(all.faces.size(), static_cast<uint16_t>(scene_.parts.size() - 1));
+    add_part(scene_, name, material, mesh);
   }
 
   // Stone: edges no longer than max_edge [m], then made uneven.
@@ -68,75 +53,6 @@ class Mason {
  private:
   PortalScene& scene_;
 };
-
-// A place on the path of the arch: up the left jamb, over the arch, down the right jamb.
-struct Station {
-  double height = 0;  // of the centre [m]
-  double angle = pi;  // of the radial direction, 0 = right [rad]
-  double along = -1;  // distance along the arch [m], negative on the jambs
-
-  Vector3d at(const Vector2d& profile) const {
-    return {profile.x() * std::cos(angle), profile.y(), height + profile.x() * std::sin(angle)};
-  }
-};
-
-std::vector<Station> arch_path(double bottom, double radius, double spacing) {
-  std::vector<Station> path;
-  const int jamb = bottom < kSpringing ? static_cast<int>((kSpringing - bottom) / 0.06) : 0;
-  const int steps = static_cast<int>(pi * radius / spacing);
-  const auto height = [&](int i) { return bottom + (kSpringing - bottom) * i / jamb; };
-  for (int i = 0; i < jamb; ++i) path.push_back({height(i), pi, -1});
-  for (int i = 0; i <= steps; ++i) {
-    path.push_back({kSpringing, pi - pi * i / steps, pi * radius * i / steps});
-  }
-  for (int i = jamb - 1; i >= 0; --i) path.push_back({height(i), 0, -1});
-  return path;
-}
-
-using Profile = std::function<std::vector<Vector2d>(double along)>;
-
-TriangleMesh swept(const std::vector<Station>& path, const Profile& profile) {
-  std::vector<Loop> loops;
-  for (const auto& station : path) {
-    Loop loop;
-    for (const auto& p : profile(station.along)) loop.push_back(station.at(p));
-    loops.push_back(loop);
-  }
-  return loft(loops, LoftEnds::Capped);
-}
-
-double triangle_wave(double t) { return 4 * std::abs(t - std::floor(t + 0.5)) - 1; }
-
-// Section of a recessed ring, (radius, y): a roll on the edge, a hollow, a flat face. The
-// ornament differs from ring to ring and ends where the jamb begins.
-std::vector<Vector2d> order_profile(int order, double along) {
-  const double carved_arch = along >= 0 ? 1 : 0;
-  const double pitch = 0.17 + 0.02 * order;
-  const double cell = std::floor(along / pitch + 0.5);
-  const double jitter =
-      0.75 + 0.5 * static_cast<double>(
-                       uniform(static_cast<uint32_t>(static_cast<int32_t>(cell)), 40U + order));
-  const double wave = carved_arch * jitter * triangle_wave(along / pitch);
-  const double roll = 0.06 * (1 + (order == 3 ? 0.22 * wave : 0.0));
-  const double zigzag = order == 1 ? 0.035 * wave : 0;
-  const double block = order == 2 ? 0.03 * std::clamp(4 * wave, -1.0, 1.0) : 0;
-  const double r = order_radius(order);
-  const double y = order_front(order);
-  std::vector<Vector2d> out{{r + 0.34, y}, {r + 0.26, y}, {r + 0.21 + zigzag, y - block}};
-  for (int i = 1; i < 5; ++i) {  // the hollow
-    const double a = pi * i / 5;
-    out.emplace_back(r + 0.165 + zigzag + 0.035 * std::cos(a),
-                     y + 0.045 * std::sin(a) * (order == 2 ? -0.2 : 1.0) - block);
-  }
-  for (int i = 0; i <= 9; ++i) {  // the roll
-    const double a = pi * (0.12 + 0.95 * i / 9);
-    out.emplace_back(r + 0.062 + 0.5 * zigzag + roll * std::cos(a),
-                     y + 0.055 - roll * std::sin(a) - (order == 1 ? 0.02 * wave : 0.0));
-  }
-  for (const double depth : {0.13, 0.2, 0.3, 0.6, kBack - y}) out.emplace_back(r, y + depth);
-  out.emplace_back(r + 0.34, kBack);
-  return out;
-}
 
 // The front is a net of its own; what lies behind it is hidden and stays coarse.
 void add_wall(Mason& mason) {
@@ -157,7 +73,8 @@ void add_wall(Mason& mason) {
     loops.push_back(loop);
   }
   mason.add_stone("wall", Material::Ashlar, loft(loops, LoftEnds::Capped), 10);
-  mason.add_stone("core", Material::Ashlar, box({-2.5, kBack - 0.1, -0.2}, {2.5, 1.95, 5}), 0.3);
+  mason.add_stone(
+      "core", Material::Ashlar, box({-2.5, kOrderBack - 0.1, -0.2}, {2.5, 1.95, 5}), 0.3);
 }
 
 void add_ground(Mason& mason) {
@@ -177,7 +94,7 @@ void add_arch(Mason& mason) {
     mason.add_stone("order " + std::to_string(order + 1),
                     Material::Arch,
                     swept(arch_path(-0.1, order_radius(order), 0.025),
-                          [order](double along) { return order_profile(order, along); }),
+                          [order](double along) { return order_section(order, along); }),
                     0.3);
   }
   const double r = kWallRadius;
@@ -211,73 +128,24 @@ void add_arch(Mason& mason) {
   }
 }
 
-// Shaft patterns: twisted, diapered, fluted, plain; with the leaves of the capital on top.
-double shaft_carving(uint32_t kind, double angle, double z) {
-  const double capital = kSpringing - 0.12 - 0.42;
-  if (z > capital) {
-    const double t = (z - capital) / 0.42;
-    const double leaves = std::abs(std::cos((2.0 + kind % 3U) * angle + (t > 0.5 ? 0.8 : 0.0)));
-    return 1 + 0.22 * (leaves - 0.5) * std::sin(pi * std::min(1.0, 2 * std::fmod(t, 0.5) + 0.1));
-  }
-  if (z < kThreshold + 0.28) return 1;
-  switch (kind % 4U) {
-    case 0:
-      return 1 + 0.09 * std::sin(3 * angle + 11 * z);
-    case 1:
-      return 1 + 0.08 * triangle_wave(0.6366 * angle + 2.6 * z) *
-                     triangle_wave(0.6366 * angle - 2.6 * z);
-    case 2:
-      return 1 + 0.06 * std::cos(10 * angle);
-    default:
-      return 1;
-  }
-}
-
-TriangleMesh column(uint32_t kind) {
-  Lathe lathe{.profile = {}, .sides = 64, .carving = [kind](double angle, double z) {
-                return shaft_carving(kind, angle, z);
-              }};
-  const double foot = kThreshold;
-  lathe.profile = {{0.150, foot - 0.1},
-                   {0.150, foot + 0.08},
-                   {0.165, foot + 0.10},
-                   {0.170, foot + 0.13},
-                   {0.160, foot + 0.16},
-                   {0.130, foot + 0.18},
-                   {0.125, foot + 0.20},
-                   {0.135, foot + 0.22},
-                   {0.130, foot + 0.245},
-                   {0.105, foot + 0.26}};
-  const double neck = kSpringing - 0.12 - 0.42;
-  for (double z = foot + 0.29; z < neck - 0.06; z += 0.025) lathe.profile.emplace_back(0.098, z);
-  lathe.profile.insert(
-      lathe.profile.end(),
-      {{0.098, neck - 0.05}, {0.120, neck - 0.035}, {0.120, neck - 0.01}, {0.100, neck}});
-  for (int i = 1; i <= 20; ++i) {
-    const double t = i / 20.0;
-    lathe.profile.emplace_back(0.10 + 0.075 * t * t + 0.02 * std::sin(pi * t), neck + 0.44 * t);
-  }
-  return lathed(lathe);
-}
-
 void add_columns(Mason& mason) {
   for (int side = -1; side <= 1; side += 2) {
     const std::string which = side < 0 ? " left" : " right";
     for (int order = 0; order < kOrders; ++order) {
-      const double x = order_radius(order) + kStep;  // the corner the column stands in
+      const double x = order_radius(order) + kOrderStep;  // the corner the column stands in
       const double y = order_front(order);
       const auto kind = static_cast<uint32_t>(order + (side < 0 ? 0 : 1));
       Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
       pose.translation() << side * (x - 0.125), y - 0.125, 0;
-      const std::string number = std::to_string(order + 1);
-      mason.add_stone(
-          "column" + which + ' ' + number, Material::Carved, moved(column(kind), pose), 0.1);
+      std::string place = which;
+      place.append(" ").append(std::to_string(order + 1));
+      mason.add_stone("column" + place, Material::Carved, moved(column(kind), pose), 0.1);
       const double inner = side * (order_radius(order) - 0.04);
       const double outer = side * (x + 0.06);
-      mason.add_stone("impost" + which + ' ' + number,
+      mason.add_stone("impost" + place,
                       Material::Arch,
                       box({std::min(inner, outer), y - 0.30, kSpringing - 0.12},
-                          {std::max(inner, outer), kBack, kSpringing}),
+                          {std::max(inner, outer), kOrderBack, kSpringing}),
                       0.06);
     }
   }
@@ -497,6 +365,23 @@ void add_ironwork(Mason& mason) {
 }
 
 }  // namespace
+
+void add_part(PortalScene& scene,
+              const std::string& name,
+              Material material,
+              const TriangleMesh& mesh) {
+  auto& all = scene.mesh;
+  const auto base = static_cast<uint32_t>(all.vertices.size());
+  scene.parts.push_back({name,
+                         material,
+                         base,
+                         static_cast<uint32_t>(mesh.vertices.size()),
+                         static_cast<uint32_t>(all.faces.size()),
+                         static_cast<uint32_t>(mesh.faces.size())});
+  all.vertices.insert(all.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
+  for (const auto& f : mesh.faces) all.faces.push_back({f[0] + base, f[1] + base, f[2] + base});
+  scene.part_of_face.resize(all.faces.size(), static_cast<uint16_t>(scene.parts.size() - 1));
+}
 
 PortalScene portal_scene() {
   PortalScene scene;

@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "samples/capture/bvh.h"
-
 #include "libcgs/core/triangle_mesh.h"
+#include "samples/capture/bvh.h"
 
 namespace cgs {
 
@@ -35,15 +34,16 @@ struct PortalScene {
   Bvh bvh;
 };
 
+/// Appends a closed mesh to a scene; its hierarchy must be built anew afterwards.
+void add_part(PortalScene& scene,
+              const std::string& name,
+              Material material,
+              const TriangleMesh& mesh);
+
 /// Always the same scene.
 PortalScene portal_scene();
 
 /// One part as a mesh of its own.
 TriangleMesh part_mesh(const PortalScene& scene, const PortalPart& part);
-
-// Where the arch and its parts lie; the masonry's pattern follows it.
-inline constexpr double kSpringing = 2.45;   ///< Height of the centre of the arch [m].
-inline constexpr double kWallRadius = 2.35;  ///< Of the opening in the wall [m].
-inline constexpr double kThreshold = 0.48;   ///< Height of the uppermost step [m].
 
 }  // namespace cgs

@@ -5,10 +5,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "samples/capture/noise.h"
-#include "samples/capture/surface_colour.h"
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
+
+#include "samples/capture/noise.h"
+#include "samples/capture/surface_colour.h"
 
 namespace cgs {
 
@@ -18,13 +19,13 @@ using Eigen::Vector3d;
 using Eigen::Vector3f;
 using std::numbers::pi;
 
-constexpr int kSkyRays = 32;
-constexpr double kSkyReach = 1.5;    // [m]
+constexpr int kSkyRays = 24;
+constexpr double kSkyReach = 1.2;    // [m]
 constexpr int kSamples = 2;          // per pixel and axis
 constexpr double kOffGround = 1e-5;  // start of secondary rays above the surface [m]
 
 const Vector3d kToSun = Vector3d(-0.50, -0.72, 0.60).normalized();
-const Vector3f kSun(1.75F, 1.62F, 1.38F);
+const Vector3f kSun(1.65F, 1.53F, 1.30F);
 const Vector3f kSky(0.62F, 0.70F, 0.84F);
 const Vector3f kBounce(0.30F, 0.27F, 0.22F);  // light that comes back from the ground
 
@@ -64,9 +65,7 @@ struct Shader {
     const auto hit = first_hit(scene.bvh, ray);
     if (!hit) return Vector3f::Zero();
     const auto& face = scene.mesh.faces[hit->face];
-    const auto corner = [&](size_t i) { return scene.mesh.vertices[face[i]].cast<double>(); };
-    const Vector3d a = corner(0);
-    const Vector3d normal = (corner(1) - a).cross(corner(2) - a).normalized();
+    const Vector3d normal = face_normal(scene.mesh, hit->face);
     const Vector3d point = ray.origin + hit->t * ray.direction;
     const double distance = hit->t * ray.direction.norm();
     const double facing = std::abs(normal.dot(ray.direction)) / ray.direction.norm();
@@ -121,8 +120,9 @@ ColorImage render_view(const PortalScene& scene,
     for (int x = 0; x < camera.width; ++x) {
       Vector3f sum = Vector3f::Zero();
       for (int s = 0; s < kSamples * kSamples; ++s) {
+        const int row = s / kSamples;
         const double u = x + (s % kSamples + 0.5) / kSamples;
-        const double v = y + (static_cast<double>(s / kSamples) + 0.5) / kSamples;
+        const double v = y + (row + 0.5) / kSamples;
         const Vector3d direction = camera.world_from_cam.linear() * camera.ray_in_cam(u, v);
         sum += shade({.origin = camera.center(), .direction = direction}, spread);
       }

@@ -3,14 +3,13 @@
 
 #include <vector>
 
-#include "samples/capture/portal.h"
-
 #include "libcgs/core/camera.h"
+#include "samples/capture/portal.h"
 
 namespace cgs {
 
-/// Share of the sky that each vertex of the scene sees, in [0, 1], cosine-weighted; things farther
-/// away than a metre and a half do not count.
+/// Share of the sky that each vertex of the scene sees, in [0, 1], cosine-weighted; only
+/// what lies within 1.2 m hides it.
 std::vector<float> sky_visibility(const PortalScene& scene);
 
 /// A photograph: sun with shadows and sky on matt surfaces, averaged over 2 x 2 samples per pixel,

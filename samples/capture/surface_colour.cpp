@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "samples/capture/arch.h"
 #include "samples/capture/noise.h"
 
 namespace cgs {
@@ -88,7 +89,7 @@ Block masonry(const SurfacePoint& s) {
 // Brightness pattern of all sizes from centimetres to metres, as a factor.
 float grain(const SurfacePoint& s, uint32_t seed, float strength) {
   const float all = band_noise(
-      s.position, {.longest = 1.3F, .shortest = 0.018F, .gain = 0.97F}, s.footprint, seed);
+      s.position, {.longest = 1.3F, .shortest = 0.018F, .gain = 1.08F}, s.footprint, seed);
   return std::exp(strength * all);
 }
 
@@ -113,7 +114,7 @@ Vector3f stone(const SurfacePoint& s) {
   SurfacePoint cut = s;
   cut.position = quarry;
   Vector3f color =
-      stone_tint(block, s.part, s.material == Material::Paving) * grain(cut, 11, 0.33F);
+      stone_tint(block, s.part, s.material == Material::Paving) * grain(cut, 11, 0.30F);
 
   const float bedding =
       gradient_noise({quarry.x() / 0.5F, quarry.y() / 0.5F, quarry.z() / 0.045F}, 61);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "samples/capture/portal.h"
 #include <Eigen/Core>
+
+#include "samples/capture/portal.h"
 
 namespace cgs {
 

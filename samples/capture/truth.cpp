@@ -50,9 +50,9 @@ std::vector<CaptureView> capture_views(int downscale) {
       view("view_03", true, {1.08, -7.10, 1.70}, portal),
       view("view_04", false, {-0.50, -7.20, 1.62}, portal),
       view("view_05", false, {0.56, -7.25, 2.05}, portal),
-      view("view_06", false, {-2.30, -6.85, 1.80}, portal + Vector3d(-0.2, 0, 0)),
-      view("view_07", false, {2.35, -6.80, 2.00}, portal + Vector3d(0.2, 0, 0)),
-      view("view_08", false, {0.75, -5.60, 3.10}, portal + Vector3d(0.1, 0, -0.35)),
+      view("view_06", false, {-3.00, -6.50, 1.80}, portal + Vector3d(-0.35, 0, 0)),
+      view("view_07", false, {3.05, -6.40, 2.00}, portal + Vector3d(0.35, 0, 0)),
+      view("view_08", false, {0.85, -5.20, 3.45}, portal + Vector3d(0.1, 0, -0.40)),
   };
 }
 
@@ -90,11 +90,7 @@ ViewTruth view_truth(const PortalScene& scene,
       const Ray ray = pixel_ray(camera, x, y);
       const auto hit = first_hit(scene.bvh, ray);
       if (!hit) continue;
-      const auto& face = scene.mesh.faces[hit->face];
-      const Vector3d a = scene.mesh.vertices[face[0]].cast<double>();
-      const Vector3d b = scene.mesh.vertices[face[1]].cast<double>();
-      const Vector3d c = scene.mesh.vertices[face[2]].cast<double>();
-      Vector3d normal = (b - a).cross(c - a).normalized();
+      Vector3d normal = face_normal(scene.mesh, hit->face);
       if (normal.dot(ray.direction) > 0) normal = -normal;
       truth.depth(x, y) = static_cast<float>(hit->t);
       truth.normal(x, y) = normal.cast<float>();

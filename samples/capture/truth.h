@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "samples/capture/portal.h"
-
 #include "libcgs/core/camera.h"
+#include "samples/capture/portal.h"
 
 namespace cgs {
 
