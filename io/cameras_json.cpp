@@ -95,10 +95,10 @@ void read_frame(const JsonValue& value, Scene& scene) {
 
 Eigen::Vector3d read_position(const JsonValue& entry, const Frame& frame) {
   const Eigen::Vector3d in_file = read_vector(entry.at("position"));
-  const Eigen::Vector3d from_file = frame.internal_from_file(in_file);
+  Eigen::Vector3d from_file = frame.internal_from_file(in_file);
   const auto exact = entry.find("internal_position");
   if (!exact) return from_file;
-  const Eigen::Vector3d internal = read_vector(*exact);
+  Eigen::Vector3d internal = read_vector(*exact);
   // Written together they agree exactly; otherwise somebody moved the camera.
   return frame.file_from_internal(internal) == in_file ? internal : from_file;
 }

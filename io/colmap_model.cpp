@@ -162,8 +162,12 @@ std::vector<ColmapImage> read_colmap_images_text(const std::filesystem::path& pa
     ColmapImage image;
     image.id = id_from(lines, parts[0]);
     check_unique(ids, image.id, [&](Defect d, const std::string& why) { lines.fail(d, why); });
-    for (int i = 0; i < 4; ++i) image.rotation[i] = lines.number(parts[size_t(1 + i)]);
-    for (int i = 0; i < 3; ++i) image.translation[i] = lines.number(parts[size_t(5 + i)]);
+    for (size_t i = 0; i < 4; ++i) {
+      image.rotation[Eigen::Index(i)] = lines.number(parts[1 + i]);
+    }
+    for (size_t i = 0; i < 3; ++i) {
+      image.translation[Eigen::Index(i)] = lines.number(parts[5 + i]);
+    }
     image.camera_id = id_from(lines, parts[8]);
     // Names may contain spaces: everything up to the end of the last part.
     const char* const begin = parts[kBeforeName].data();
@@ -216,7 +220,9 @@ std::vector<ColmapPoint> read_colmap_points_text(const std::filesystem::path& pa
       lines.fail(Defect::Syntax, "expected id, position, colour, error and pairs of a track");
     }
     ColmapPoint point;
-    for (int i = 0; i < 3; ++i) point.position[i] = lines.number(parts[size_t(1 + i)]);
+    for (size_t i = 0; i < 3; ++i) {
+      point.position[Eigen::Index(i)] = lines.number(parts[1 + i]);
+    }
     for (size_t i = kBeforeTrack; i < parts.size(); i += 2) {
       point.track.emplace_back(id_from(lines, parts[i]), id_from(lines, parts[i + 1]));
     }

@@ -77,7 +77,7 @@ class HeaderParser {
     if (quote != '\'' && quote != '"') fail("expected a quoted string");
     const size_t end = text_.find(quote, at_ + 1);
     if (end == std::string_view::npos) fail("string never ends");
-    const std::string out(text_.substr(at_ + 1, end - at_ - 1));
+    std::string out(text_.substr(at_ + 1, end - at_ - 1));
     at_ = end + 1;
     return out;
   }

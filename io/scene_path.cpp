@@ -43,7 +43,7 @@ fs::path resolve_in_scene(const SceneRoot& root, std::string_view name, const fs
   if (name.find('\0') != std::string_view::npos) refuse("contains a NUL byte");
   if (looks_like_url(name)) refuse("is a URL; only local files are read");
   const fs::path path(name);
-  const fs::path joined = root.folder / path;  // an absolute path replaces the folder
+  fs::path joined = root.folder / path;  // an absolute path replaces the folder
   if (root.allow_external) return joined;
   if (path.is_absolute()) refuse("is an absolute path" + advice);
   const fs::path normal = path.lexically_normal();

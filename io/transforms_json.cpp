@@ -111,7 +111,7 @@ Eigen::Isometry3d read_pose(const JsonValue& matrix) {
 
 // The file a frame names, whether or not it exists.
 fs::path photograph(const SceneRoot& root, const std::string& name, const fs::path& json) {
-  const fs::path path = resolve_in_scene(root, name, json);
+  fs::path path = resolve_in_scene(root, name, json);
   if (fs::is_regular_file(path)) return path;
   for (const char* extension : {".png", ".jpg", ".jpeg"}) {
     fs::path candidate = resolve_in_scene(root, name + extension, json);
