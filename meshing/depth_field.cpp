@@ -219,7 +219,8 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   const float wanted = std::max(truncation_, 3 * out.sigma);
   const float band = std::min(wanted, kMaxBandGrowth * truncation_);
   const float noise = out.sigma / voxel_;
-  out.weight = facing_(out.x, out.y) / (1 + noise * noise);
+  const float facing = facing_(out.x, out.y);
+  out.weight = facing * facing / (1 + noise * noise);
   // Half a pixel from an occlusion edge either surface may be the true one.
   constexpr float kEdgeWeight = 0.25f;
   if (!one_surface) out.weight *= kEdgeWeight;

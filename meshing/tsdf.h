@@ -68,7 +68,7 @@ struct FusedVolume {
 ///   plane, so that it is a distance to the surface, not along the ray. Depth is interpolated in
 ///   1/z (exact on planes), never across an occlusion edge; pixels that hang between two surfaces
 ///   are ignored.
-/// - Weight: cosine of incidence, 1 / (1 + (sigma / voxel)^2), falling off behind the surface,
+/// - Weight: squared cosine of incidence / (1 + (sigma / voxel)^2), falling off behind the surface,
 ///   where the band is an assumption and not a measurement, and a quarter at occlusion edges.
 /// - Free: farther than max(truncation, 3 sigma) in front of the surface. Where one view says free
 ///   and others a voxel behind their surface, the larger weight wins; a tie keeps it.
