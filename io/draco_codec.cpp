@@ -159,11 +159,15 @@ class Cells {
   const Eigen::Vector3f& place(uint32_t cell_number) const { return places_[cell_number]; }
   uint32_t of_decoded(uint32_t vertex) const { return *number(keys_[vertex]); }
 
-  /// The cell nearest to a point, if a decoded vertex lies there; the second nearest along each
-  /// axis counts too, as the encoder rounds in float.
+  /// The cell that the encoder rounds a point to, if a decoded vertex lies there; the second
+  /// nearest along each axis counts too.
   std::optional<uint32_t> nearest(const Eigen::Vector3f& p) const {
     const Eigen::Vector3d exact = cell(p);
-    const Eigen::Vector3d near = exact.array().round();
+    // In float and in the encoder's order: where a point lies between two cells that both hold
+    // vertices, the other one would be taken for a changed face.
+    const float cells_per_unit = static_cast<float>((1 << grid_.bits) - 1) / grid_.range;
+    const Eigen::Array3f scaled = (p - grid_.origin).array() * cells_per_unit;
+    const Eigen::Vector3d near = (scaled + 0.5f).floor().matrix().cast<double>();
     for (int side = 0; side < 8; ++side) {
       Eigen::Vector3d candidate = near;
       for (int k = 0; k < 3; ++k) {

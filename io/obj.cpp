@@ -86,7 +86,7 @@ void write_faces(AtomicFile& file, const TriangleMesh& mesh) {
     bool open = false;
     for (size_t i = 0; i < mesh.faces.size(); ++i) {
       if (mesh.provenance[i] != group) continue;
-      if (!open) file.write("g " + name + "\nusemtl " + name + "\n");
+      if (!open) file.write(std::string("g ").append(name).append("\nusemtl ").append(name) + "\n");
       open = true;
       write_face(file, mesh.faces[i], has_normals);
     }

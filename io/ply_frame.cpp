@@ -75,6 +75,7 @@ PlyPlacement ply_placement(const std::vector<std::string>& comments,
   }
   const Eigen::Vector3d file_origin = origin.value_or(Eigen::Vector3d::Zero());
   std::vector<Eigen::Vector3d> in_world;
+  in_world.reserve(bounds.size());
   for (const Eigen::Vector3d& corner : bounds) in_world.emplace_back(corner + file_origin);
   PlyPlacement out{canonical_frame(in_world), file_origin, {}};
   if (origin) out.frame.file_origin = file_origin;

@@ -60,13 +60,18 @@ void leave_jpeg(j_common_ptr info) {
   std::longjmp(reinterpret_cast<JpegErrors*>(info->err)->escape, 1);  // NOLINT(bugprone-*)
 }
 
+/// What goes into the encoder and what comes out; `bytes` is the library's, to be freed.
+struct JpegJob {
+  const char* rgb = nullptr;
+  int width = 0;
+  int height = 0;
+  int quality = 0;
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;  // the type libjpeg wants
+};
+
 /// No object with a destructor may live here: an error jumps out. \return false on an error.
-bool compress_jpeg(const char* rgb,
-                   int width,
-                   int height,
-                   int quality,
-                   unsigned char** bytes,
-                   unsigned long* size) {
+bool compress_jpeg(JpegJob& job) {
   jpeg_compress_struct info = {};
   JpegErrors errors;
   info.err = jpeg_std_error(&errors.base);
@@ -76,19 +81,19 @@ bool compress_jpeg(const char* rgb,
     return false;
   }
   jpeg_create_compress(&info);
-  jpeg_mem_dest(&info, bytes, size);
-  info.image_width = static_cast<JDIMENSION>(width);
-  info.image_height = static_cast<JDIMENSION>(height);
+  jpeg_mem_dest(&info, &job.bytes, &job.size);
+  info.image_width = static_cast<JDIMENSION>(job.width);
+  info.image_height = static_cast<JDIMENSION>(job.height);
   info.input_components = 3;
   info.in_color_space = JCS_RGB;
   jpeg_set_defaults(&info);
-  jpeg_set_quality(&info, quality, TRUE);
+  jpeg_set_quality(&info, job.quality, TRUE);
   info.comp_info[0].h_samp_factor = 1;
   info.comp_info[0].v_samp_factor = 1;
   jpeg_start_compress(&info, TRUE);
   while (info.next_scanline < info.image_height) {
-    const size_t offset = size_t{info.next_scanline} * static_cast<size_t>(width) * 3;
-    auto* row = const_cast<JSAMPROW>(reinterpret_cast<const JSAMPLE*>(rgb + offset));
+    const size_t offset = size_t{info.next_scanline} * static_cast<size_t>(job.width) * 3;
+    auto* row = const_cast<JSAMPROW>(reinterpret_cast<const JSAMPLE*>(job.rgb + offset));
     jpeg_write_scanlines(&info, &row, 1);
   }
   jpeg_finish_compress(&info);
@@ -115,12 +120,11 @@ std::string encode_jpeg(const ColorImage& image, int quality) {
   require_size(image, JPEG_MAX_DIMENSION);
   require(quality >= 1 && quality <= 100, "JPEG quality must be 1 to 100", quality);
   const std::string rgb = rgb_bytes(image);
-  unsigned char* bytes = nullptr;
-  unsigned long size = 0;  // NOLINT(google-runtime-int): the type libjpeg wants
-  const bool good = compress_jpeg(rgb.data(), image.width, image.height, quality, &bytes, &size);
-  const std::unique_ptr<unsigned char, decltype(&std::free)> owner(bytes, &std::free);
+  JpegJob job{rgb.data(), image.width, image.height, quality};
+  const bool good = compress_jpeg(job);
+  const std::unique_ptr<unsigned char, decltype(&std::free)> owner(job.bytes, &std::free);
   if (!good) throw NumericalError("JPEG encoder: out of memory");
-  return {reinterpret_cast<const char*>(bytes), size};
+  return {reinterpret_cast<const char*>(job.bytes), job.size};
 }
 
 void write_png(const std::filesystem::path& path, const ColorImage& image) {

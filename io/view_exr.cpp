@@ -60,8 +60,9 @@ std::array<float, 12> pixel(const ViewRasters& view, const Camera& camera, doubl
   const bool known = std::isfinite(depth);
   if (known) {
     const auto width = static_cast<size_t>(camera.width);
+    const size_t row = i / width;
     const double u = static_cast<double>(i % width) + 0.5;
-    const double v = static_cast<double>(i / width) + 0.5;
+    const double v = static_cast<double>(row) + 0.5;
     out[4] = finite_or_zero(depth);
     out[8] = finite_or_zero(depth * camera.ray_in_cam(u, v).norm());
     out[9] = finite_or_zero(view.depth_variance.data[i] * scale * scale);

@@ -12,7 +12,7 @@ namespace cgs {
 namespace {
 
 Eigen::Vector3d unit_up(const Eigen::Vector3d& up) {
-  const Eigen::Vector3d unit = up.stableNormalized();
+  Eigen::Vector3d unit = up.stableNormalized();
   require(up.allFinite() && unit.norm() > 0.5,
           "up must be a finite vector other than zero",
           up.transpose());

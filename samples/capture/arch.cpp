@@ -44,6 +44,8 @@ std::vector<Station> arch_path(double bottom, double radius, double spacing) {
   const int jamb = bottom < kSpringing ? static_cast<int>((kSpringing - bottom) / 0.06) : 0;
   const int steps = static_cast<int>(pi * radius / spacing);
   const auto height = [&](int i) { return bottom + (kSpringing - bottom) * i / jamb; };
+  const int count = 2 * jamb + steps + 1;
+  path.reserve(static_cast<size_t>(count));
   for (int i = 0; i < jamb; ++i) path.push_back({height(i), pi, -1});
   for (int i = 0; i <= steps; ++i) {
     path.push_back({kSpringing, pi - pi * i / steps, pi * radius * i / steps});

@@ -66,6 +66,17 @@ TEST(DracoCompress, CollapsesOntoOneCellWithoutLosingAFace) {
   EXPECT_EQ(draco_compress(sphere(), coarse, 5).faces, sphere().faces.size());
 }
 
+TEST(DracoCompress, KeepsFacesSmallerThanACell) {
+  // Many vertices per cell, and many so close to the border of two that rounding decides.
+  TriangleMesh mesh = test::labelled_sphere(60, 120);
+  mesh.provenance.clear();
+  const GlbPrimitive dense = glb_primitives(mesh, {}).front();
+  for (const int bits : {3, 5, 6, 7, 8}) {
+    const DracoGrid grid{{-0.35f, -0.5f, -0.25f}, 0.8f, bits};
+    EXPECT_EQ(draco_compress(dense, grid, 5).faces, dense.faces.size()) << bits;
+  }
+}
+
 TEST(DracoCompress, NoticesAVertexTheGridDoesNotHold) {
   const DracoGrid small{{0, 0, 0}, 0.1f, 10};
   EXPECT_THROW(draco_compress(sphere(), small, 5), NumericalError);

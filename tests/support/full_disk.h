@@ -48,14 +48,14 @@ void expect_full_disk_is_noticed(const Write& write) {
 }
 
 /// `read(path)` must refuse the file cut at every length with BadInput. Of lengths in the middle of
-/// a large file, beyond the first and before the last kilobyte, only every `step`-th is tried.
+/// a large file, beyond the first and before the last 512 bytes, only every `step`-th is tried.
 template <typename Read>
 void expect_every_truncation_is_refused(const std::string& whole,
                                         const Read& read,
                                         size_t step = 1) {
   const TempDir dir;
   for (size_t n = 0; n < whole.size(); ++n) {
-    if (n > 1024 && n + 1024 < whole.size() && n % step != 0) continue;
+    if (n > 512 && n + 512 < whole.size() && n % step != 0) continue;
     write_bytes(dir / "cut.bin", whole.substr(0, n));
     EXPECT_THROW(read(dir / "cut.bin"), BadInput) << "cut to " << n << " of " << whole.size();
   }
