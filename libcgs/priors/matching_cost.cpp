@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/matching_cost.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include <tbb/parallel_for.h>
 
 namespace cgs {
 
 namespace {
 
-constexpr int kMargin = 3;       // census radius, the larger window
+constexpr int kMargin = 3;  // census radius, the larger window
 constexpr int kZnccRadius = 2;
 constexpr int kBandRows = 16;
 constexpr float kCensusWeight = 0.6f;
 constexpr float kNoiseVariance = 4.0f;  // [gray levels squared]
 constexpr float kUnseen = 1e9f;
-constexpr float kNeutral = 0.5f;  // cost of a plane that no source sees
+constexpr float kNeutral = 0.5f;        // cost of a plane that no source sees
 constexpr float kSecondWeight = 0.35f;  // of the worse half of the sources
 
 // Rows [first - kMargin, last + kMargin) of an image, columns [-kMargin, width + kMargin), borders
@@ -51,8 +51,11 @@ struct Band {
 };
 
 // One row of the source as the reference would see it on plane t; not seen -> `seen` 0.
-void warp_row(const SweepImage& image, const Eigen::Vector3f& first, const Eigen::Vector3f& step,
-              int width, float* out) {
+void warp_row(const SweepImage& image,
+              const Eigen::Vector3f& first,
+              const Eigen::Vector3f& step,
+              int width,
+              float* out) {
   const float max_u = static_cast<float>(image.gray.width) - 1.001f;
   const float max_v = static_cast<float>(image.gray.height) - 1.001f;
   const float* gray = image.gray.data.data();
@@ -73,14 +76,16 @@ void warp_row(const SweepImage& image, const Eigen::Vector3f& first, const Eigen
   }
 }
 
-void seen_row(const SweepImage& image, const Eigen::Vector3f& first, const Eigen::Vector3f& step,
-              int width, uint8_t* out) {
+void seen_row(const SweepImage& image,
+              const Eigen::Vector3f& first,
+              const Eigen::Vector3f& step,
+              int width,
+              uint8_t* out) {
   for (int x = 0; x < width; ++x) {
     const Eigen::Vector3f h = first + static_cast<float>(x) * step;
     const float u = h.x() / h.z();
     const float v = h.y() / h.z();
-    const bool inside = h.z() > 0 && u >= 0 && v >= 0 &&
-                        u < static_cast<float>(image.gray.width) &&
+    const bool inside = h.z() > 0 && u >= 0 && v >= 0 && u < static_cast<float>(image.gray.width) &&
                         v < static_cast<float>(image.gray.height);
     out[x] = inside && image.valid(static_cast<int>(u), static_cast<int>(v)) != 0;
   }
@@ -163,7 +168,10 @@ float combine(float* costs, size_t count) {
 
 class BandCost {
  public:
-  BandCost(const std::vector<SweepImage>& images, const SweepGeometry& geometry, int first, int last)
+  BandCost(const std::vector<SweepImage>& images,
+           const SweepGeometry& geometry,
+           int first,
+           int last)
       : images_(images),
         geometry_(geometry),
         reference_(images[static_cast<size_t>(geometry.image)]),

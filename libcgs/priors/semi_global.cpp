@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/semi_global.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 namespace cgs {
 
@@ -140,7 +140,8 @@ class Aggregation {
 
 }  // namespace
 
-Raster<float> semi_global_planes(const CostVolume& volume, const Raster<float>& guide,
+Raster<float> semi_global_planes(const CostVolume& volume,
+                                 const Raster<float>& guide,
                                  const SmoothnessPenalties& penalties) {
   Aggregation aggregation(volume, guide, penalties);
   aggregation.along_rows();
