@@ -50,7 +50,7 @@ struct Band {
   }
 };
 
-// One row of the source as the reference would see it on plane t; not seen -> `seen` 0.
+// One row of the source as the reference would see it on plane t.
 void warp_row(const SweepImage& image,
               const Eigen::Vector3f& first,
               const Eigen::Vector3f& step,
@@ -69,7 +69,7 @@ void warp_row(const SweepImage& image,
     const int iv = static_cast<int>(v);
     const float a = u - static_cast<float>(iu);
     const float b = v - static_cast<float>(iv);
-    const float* p = gray + iv * stride + iu;
+    const float* p = gray + static_cast<std::ptrdiff_t>(iv) * stride + iu;
     const float top = p[0] + a * (p[1] - p[0]);
     const float bottom = p[stride] + a * (p[stride + 1] - p[stride]);
     out[x] = top + b * (bottom - top);
@@ -116,7 +116,7 @@ struct ZnccRow {
   std::vector<float> a, b, aa, bb, ab;  // column sums, from -kMargin
 
   void add(const Band& A, const Band& B, int row, int width, float* out) {
-    const auto n = static_cast<size_t>(width + 2 * kMargin);
+    const auto n = static_cast<size_t>(width) + 2 * kMargin;
     for (auto* sums : {&a, &b, &aa, &bb, &ab}) sums->assign(n, 0.0f);
     for (int dy = -kZnccRadius; dy <= kZnccRadius; ++dy) {
       const float* ra = A.gray_row(row + dy) - kMargin;
@@ -132,7 +132,7 @@ struct ZnccRow {
       }
     }
     const auto box = [](const std::vector<float>& sums, int x) {
-      const float* s = &sums[static_cast<size_t>(x + kMargin)];
+      const float* s = &sums[static_cast<size_t>(x) + kMargin];
       return s[-2] + s[-1] + s[0] + s[1] + s[2];
     };
     static_assert(kZnccRadius == 2);

@@ -58,8 +58,10 @@ struct OffsetTable {
   Samples dx{}, dy{};
   OffsetTable() {
     for (size_t i = 0; i < kTaps; ++i) {
-      dx[i] = static_cast<float>(static_cast<int>(2 * i) % kSide - kRadius);
-      dy[i] = static_cast<float>(static_cast<int>(2 * i) / kSide - kRadius);
+      const int column = static_cast<int>(2 * i) % kSide;
+      const int row = static_cast<int>(2 * i) / kSide;
+      dx[i] = static_cast<float>(column - kRadius);
+      dy[i] = static_cast<float>(row - kRadius);
     }
   }
 };
