@@ -116,7 +116,7 @@ struct ZnccRow {
   std::vector<float> a, b, aa, bb, ab;  // column sums, from -kMargin
 
   void add(const Band& A, const Band& B, int row, int width, float* out) {
-    const auto n = static_cast<size_t>(width) + size_t{2 * kMargin};
+    const size_t n = static_cast<size_t>(width) + kMargin + kMargin;
     for (auto* sums : {&a, &b, &aa, &bb, &ab}) sums->assign(n, 0.0f);
     for (int dy = -kZnccRadius; dy <= kZnccRadius; ++dy) {
       const float* ra = A.gray_row(row + dy) - kMargin;
