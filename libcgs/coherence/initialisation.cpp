@@ -32,10 +32,12 @@ void InitialisationOptions::validate() const {
   require(opacity >= 0 && opacity < 1, "InitialisationOptions.opacity must be in [0, 1)", opacity);
 }
 
-Gaussians initial_gaussians(const Scene& scene, const std::vector<ViewPriors>& priors,
+Gaussians initial_gaussians(const Scene& scene,
+                            const std::vector<ViewPriors>& priors,
                             const InitialisationOptions& options) {
   options.validate();
-  require(priors.size() == scene.input.size(), "there must be priors per input view", priors.size());
+  require(
+      priors.size() == scene.input.size(), "there must be priors per input view", priors.size());
   Gaussians out;
   const float opacity = starting_opacity(priors.size(), options);
   for (size_t n = 0; n < priors.size(); ++n) {

@@ -25,7 +25,8 @@ struct InitialisationOptions {
 /// \return view-major, row-major [internal units]
 /// \throws InvalidInput if priors, images and cameras are not of one size
 /// Source: Paliwal et al. 2024, "CoherentGS", section 3; rays there pass through pixel corners.
-Gaussians initial_gaussians(const Scene& scene, const std::vector<ViewPriors>& priors,
+Gaussians initial_gaussians(const Scene& scene,
+                            const std::vector<ViewPriors>& priors,
                             const InitialisationOptions& options = {});
 
 }  // namespace cgs

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/alignment.h"
 
-#include <ceres/ceres.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include <ceres/ceres.h>
 
 #include "libcgs/core/error.h"
 
@@ -36,7 +36,8 @@ struct Transfer {
   }
 };
 
-// Inverse depth at an image point, bilinear; NaN where a neighbour is unknown or on another surface.
+// Inverse depth at an image point, bilinear; NaN where a neighbour is unknown or on another
+// surface.
 double inverse_depth_at(const DepthMap& depth, const Eigen::Vector2d& p) {
   const int x = static_cast<int>(std::floor(p.x() - 0.5));
   const int y = static_cast<int>(std::floor(p.y() - 0.5));
@@ -84,7 +85,8 @@ struct Reprojection {
   }
 };
 
-std::vector<Observation> observations(const Scene& scene, const std::vector<ViewPriors>& priors,
+std::vector<Observation> observations(const Scene& scene,
+                                      const std::vector<ViewPriors>& priors,
                                       const std::vector<Correspondence>& correspondences) {
   std::vector<Observation> out;
   const auto add = [&](int from, int to, const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
@@ -104,7 +106,8 @@ std::vector<Observation> observations(const Scene& scene, const std::vector<View
 
 using ScaleOffset = std::array<double, 2>;
 
-double capped_rms(const std::vector<Observation>& points, const std::vector<ScaleOffset>& solution,
+double capped_rms(const std::vector<Observation>& points,
+                  const std::vector<ScaleOffset>& solution,
                   double cap) {
   double sum = 0;
   for (const Observation& p : points) {
@@ -114,7 +117,8 @@ double capped_rms(const std::vector<Observation>& points, const std::vector<Scal
   return points.empty() ? 0 : std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-void solve(const std::vector<Observation>& points, double loss_scale,
+void solve(const std::vector<Observation>& points,
+           double loss_scale,
            std::vector<ScaleOffset>& solution) {
   ceres::Problem problem;
   std::vector<size_t> count(solution.size(), 0);
@@ -194,7 +198,8 @@ std::vector<Correspondence> depth_correspondences(const Scene& scene,
   return out;
 }
 
-AlignmentReport align_depths(const Scene& scene, std::vector<ViewPriors>& priors,
+AlignmentReport align_depths(const Scene& scene,
+                             std::vector<ViewPriors>& priors,
                              const std::vector<Correspondence>& correspondences,
                              const AlignmentOptions& options) {
   options.validate();
@@ -207,8 +212,8 @@ AlignmentReport align_depths(const Scene& scene, std::vector<ViewPriors>& priors
   report.correspondences = correspondences.size();
   report.rms_before = capped_rms(points, start, cap);
   report.rms_after = capped_rms(points, solution, cap);
-  const bool positive = std::all_of(
-      solution.begin(), solution.end(), [](const ScaleOffset& s) { return s[0] > 0; });
+  const bool positive =
+      std::all_of(solution.begin(), solution.end(), [](const ScaleOffset& s) { return s[0] > 0; });
   if (!positive || !(report.rms_after < report.rms_before)) {
     solution = start;
     report.rms_after = report.rms_before;
@@ -221,7 +226,8 @@ AlignmentReport align_depths(const Scene& scene, std::vector<ViewPriors>& priors
   return report;
 }
 
-AlignmentReport align_depths(const Scene& scene, std::vector<ViewPriors>& priors,
+AlignmentReport align_depths(const Scene& scene,
+                             std::vector<ViewPriors>& priors,
                              const AlignmentOptions& options) {
   return align_depths(scene, priors, depth_correspondences(scene, priors, options), options);
 }

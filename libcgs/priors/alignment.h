@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/view_priors.h"
@@ -20,9 +21,9 @@ struct Correspondence {
 
 /// How depths are made to agree.
 struct AlignmentOptions {
-  double loss_scale = 0.5;       ///< Residuals beyond this count less and less [pixels]; > 0.
-  double max_disagreement = 3;   ///< Correspondences taken from depth must come back this close
-                                 ///< [pixels]; > 0.
+  double loss_scale = 0.5;          ///< Residuals beyond this count less and less [pixels]; > 0.
+  double max_disagreement = 3;      ///< Correspondences taken from depth must come back this close
+                                    ///< [pixels]; > 0.
   int max_correspondences = 20000;  ///< Per ordered pair of views, evenly thinned; >= 1.
 
   /// \throws InvalidInput naming the first field out of range.
@@ -33,7 +34,7 @@ struct AlignmentOptions {
 struct AlignmentReport {
   std::vector<double> scale;
   std::vector<double> offset;  ///< [1 / internal units]
-  double rms_before = 0;       ///< Of reprojection residuals, each capped at 4 loss scales [pixels].
+  double rms_before = 0;  ///< Of reprojection residuals, each capped at 4 loss scales [pixels].
   double rms_after = 0;
   size_t correspondences = 0;
 };
@@ -52,12 +53,14 @@ std::vector<Correspondence> depth_correspondences(const Scene& scene,
 ///
 /// Sigma is scaled with the depth. Pixels that would come to lie at or beyond infinity keep their
 /// depth unless they are Measured: those become Unknown.
-AlignmentReport align_depths(const Scene& scene, std::vector<ViewPriors>& priors,
+AlignmentReport align_depths(const Scene& scene,
+                             std::vector<ViewPriors>& priors,
                              const std::vector<Correspondence>& correspondences,
                              const AlignmentOptions& options);
 
 /// As above with depth_correspondences().
-AlignmentReport align_depths(const Scene& scene, std::vector<ViewPriors>& priors,
+AlignmentReport align_depths(const Scene& scene,
+                             std::vector<ViewPriors>& priors,
                              const AlignmentOptions& options);
 
 }  // namespace cgs

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/cross_check.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
+
+#include <tbb/parallel_for.h>
 
 namespace cgs {
 
@@ -55,7 +55,9 @@ float plane_at(const SweptView& view, double u, double v, double expected) {
 }
 
 // Difference of t between a pixel and what `other` sees there, if that view confirms it.
-std::optional<double> difference(const SweptView& view, const SweptView& other, const Lifted& p,
+std::optional<double> difference(const SweptView& view,
+                                 const SweptView& other,
+                                 const Lifted& p,
                                  double max_disagreement) {
   const std::optional<Lifted> there = transfer(view, towards(view, other), p);
   if (!there) return std::nullopt;
@@ -76,14 +78,15 @@ Eigen::Vector3d plane_normal(const SweptView& view, int x, int y) {
   const Camera& c = view.camera;
   const double gu = view.geometry.step * double(p.slope_x);
   const double gv = view.geometry.step * double(p.slope_y);
-  const double at_center = view.geometry.inverse_depth(double(p.t)) + gu * (c.cx - x - 0.5) +
-                           gv * (c.cy - y - 0.5);
+  const double at_center =
+      view.geometry.inverse_depth(double(p.t)) + gu * (c.cx - x - 0.5) + gv * (c.cy - y - 0.5);
   return {gu * c.fx, gv * c.fy, at_center};
 }
 
 }  // namespace
 
-Raster<Agreement> cross_check(const std::vector<SweptView>& views, size_t view,
+Raster<Agreement> cross_check(const std::vector<SweptView>& views,
+                              size_t view,
                               double max_disagreement) {
   const SweptView& here = views[view];
   Raster<Agreement> out(here.pixels.width, here.pixels.height, Agreement{});
@@ -108,7 +111,8 @@ Raster<Agreement> cross_check(const std::vector<SweptView>& views, size_t view,
   return out;
 }
 
-Raster<SlantedPlane> planes_of_others(const std::vector<SweptView>& views, size_t view,
+Raster<SlantedPlane> planes_of_others(const std::vector<SweptView>& views,
+                                      size_t view,
                                       const std::vector<Raster<Agreement>>& agreements) {
   const SweptView& here = views[view];
   const SweepGeometry& g = here.geometry;
@@ -129,8 +133,8 @@ Raster<SlantedPlane> planes_of_others(const std::vector<SweptView>& views, size_
         const int v = static_cast<int>(seen->v);
         if (!out.contains(u, v)) continue;
         const Eigen::Vector3d m = plane_normal(other, x, y);
-        const Eigen::Vector3d n = other_from_here.rotation().transpose() * m /
-                                  (1 - m.dot(other_from_here.translation()));
+        const Eigen::Vector3d n =
+            other_from_here.rotation().transpose() * m / (1 - m.dot(other_from_here.translation()));
         const double t = g.plane_of(n.dot(here.camera.ray_in_cam(u + 0.5, v + 0.5)));
         if (!std::isfinite(t) || out(u, v).t >= static_cast<float>(t)) continue;
         out(u, v) = {static_cast<float>(t),

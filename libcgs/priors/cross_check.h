@@ -22,12 +22,14 @@ struct Agreement {
 
 /// Checks a view against all others: another view confirms a pixel if its own depth, at the place
 /// the pixel projects to, leads back to within `max_disagreement` [pixels, and planes].
-Raster<Agreement> cross_check(const std::vector<SweptView>& views, size_t view,
+Raster<Agreement> cross_check(const std::vector<SweptView>& views,
+                              size_t view,
                               double max_disagreement);
 
 /// The surface that other views confirm at the pixels of a view, nearest in front; t is NaN where
 /// they show none. `agreements` are those of all views.
-Raster<SlantedPlane> planes_of_others(const std::vector<SweptView>& views, size_t view,
+Raster<SlantedPlane> planes_of_others(const std::vector<SweptView>& views,
+                                      size_t view,
                                       const std::vector<Raster<Agreement>>& agreements);
 
 }  // namespace cgs

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/depth_completion.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
+
+#include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
 
@@ -66,8 +66,8 @@ class Completion {
     tbb::parallel_for(0, filled_.height, [&](int y) {
       for (int x = 0; x < filled_.width; ++x) {
         if (!usable(x, y)) continue;
-        filled_(x, y) = measured(x, y) ? Filled{1 / priors_.depth(x, y), 0, 0}
-                                       : estimate(x, y, fallback);
+        filled_(x, y) =
+            measured(x, y) ? Filled{1 / priors_.depth(x, y), 0, 0} : estimate(x, y, fallback);
       }
     });
   }
@@ -144,8 +144,13 @@ class Completion {
   }
 
   void relax(int x, int y) {
-    constexpr float kSameSurface = 0.05f;  // relative step of inverse depth
+    // Relative step of inverse depth. In a wide gap the two sides of one slanted surface may have
+    // come further apart than in a narrow one.
+    constexpr float kSameSurface = 0.05f;
+    constexpr float kSlope = 0.01f;  // [1 / pixel]
+    constexpr float kLargest = 0.12f;
     Filled& here = filled_(x, y);
+    const float step = std::min(kSameSurface + kSlope * here.distance, kLargest);
     float sum = 0;
     float weight = 0;
     for (size_t k = 0; k < 4; ++k) {
@@ -153,7 +158,7 @@ class Completion {
       const int v = y + kDirections[k].dy;
       if (!filled_.contains(u, v) || !usable(u, v)) continue;
       const float there = filled_(u, v).inverse_depth;
-      if (std::abs(there - here.inverse_depth) > kSameSurface * here.inverse_depth) continue;
+      if (std::abs(there - here.inverse_depth) > step * here.inverse_depth) continue;
       const float change = color_change(x, y, u, v) / options_.level_scale;
       const float w = 1 / (1 + change * change);
       sum += w * there;
@@ -186,14 +191,14 @@ float fallback_inverse_depth(const ViewPriors& priors, const DepthCompletionOpti
 }  // namespace
 
 void DepthCompletionOptions::validate() const {
-  require(fallback_depth >= 0, "DepthCompletionOptions.fallback_depth must be >= 0", fallback_depth);
+  require(
+      fallback_depth >= 0, "DepthCompletionOptions.fallback_depth must be >= 0", fallback_depth);
   require(level_scale > 0, "DepthCompletionOptions.level_scale must be > 0", level_scale);
   require(background_share >= 0 && background_share <= 1,
           "DepthCompletionOptions.background_share must be in [0, 1]",
           background_share);
-  require(sigma_per_pixel >= 0,
-          "DepthCompletionOptions.sigma_per_pixel must be >= 0",
-          sigma_per_pixel);
+  require(
+      sigma_per_pixel >= 0, "DepthCompletionOptions.sigma_per_pixel must be >= 0", sigma_per_pixel);
   require(smoothing_rounds >= 0 && smoothing_rounds <= 10000,
           "DepthCompletionOptions.smoothing_rounds must be in [0, 10000]",
           smoothing_rounds);
@@ -210,8 +215,8 @@ void complete_depth(ViewPriors& priors, const View& view, const DepthCompletionO
     for (int x = 0; x < priors.depth.width; ++x) {
       if (!completion.usable(x, y) || completion.measured(x, y)) continue;
       const Filled& filled = completion.filled()(x, y);
-      const float relative = kFloor + filled.spread / filled.inverse_depth +
-                             options.sigma_per_pixel * filled.distance;
+      const float relative =
+          kFloor + filled.spread / filled.inverse_depth + options.sigma_per_pixel * filled.distance;
       priors.depth(x, y) = 1 / filled.inverse_depth;
       priors.sigma(x, y) = std::min(relative, kCap) / filled.inverse_depth;
       priors.origin(x, y) = DepthOrigin::Completed;

@@ -13,8 +13,8 @@ struct DepthCompletionOptions {
   float background_share = 0.3f;  ///< Of the evidence around a pixel, ordered from far to near, the
                                   ///< depth at this share is taken; in [0, 1], below 0.5 prefers
                                   ///< the farther surface.
-  float sigma_per_pixel = 0.002f; ///< Relative growth of sigma per pixel to the evidence; >= 0.
-  int smoothing_rounds = 60;      ///< >= 0
+  float sigma_per_pixel = 0.002f;  ///< Relative growth of sigma per pixel to the evidence; >= 0.
+  int smoothing_rounds = 60;       ///< >= 0
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

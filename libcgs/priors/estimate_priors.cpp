@@ -26,7 +26,8 @@ void PriorsOptions::validate() const {
   layers.validate();
 }
 
-EstimatedPriors estimate_priors(const Scene& scene, const PriorsOptions& options,
+EstimatedPriors estimate_priors(const Scene& scene,
+                                const PriorsOptions& options,
                                 const Progress& progress) {
   options.validate();
   EstimatedPriors out;

@@ -41,7 +41,8 @@ struct EstimatedPriors {
 
 /// Everything known about the input views before training: sweep, align, complete, layers.
 /// Preconditions and errors as plane_sweep().
-EstimatedPriors estimate_priors(const Scene& scene, const PriorsOptions& options,
+EstimatedPriors estimate_priors(const Scene& scene,
+                                const PriorsOptions& options,
                                 const Progress& progress = {});
 
 }  // namespace cgs

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/matching_cost.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include <tbb/parallel_for.h>
 
 namespace cgs {
 
 namespace {
 
-constexpr int kMargin = 3;       // census radius, the larger window
+constexpr int kMargin = 3;  // census radius, the larger window
 constexpr int kZnccRadius = 2;
 constexpr int kBandRows = 16;
 constexpr float kCensusWeight = 0.6f;
 constexpr float kNoiseVariance = 4.0f;  // [gray levels squared]
 constexpr float kUnseen = 1e9f;
-constexpr float kNeutral = 0.5f;  // cost of a plane that no source sees
+constexpr float kNeutral = 0.5f;        // cost of a plane that no source sees
 constexpr float kSecondWeight = 0.35f;  // of the worse half of the sources
 
 // Rows [first - kMargin, last + kMargin) of an image, columns [-kMargin, width + kMargin), borders
@@ -50,9 +50,12 @@ struct Band {
   }
 };
 
-// One row of the source as the reference would see it on plane t; not seen -> `seen` 0.
-void warp_row(const SweepImage& image, const Eigen::Vector3f& first, const Eigen::Vector3f& step,
-              int width, float* out) {
+// One row of the source as the reference would see it on plane t.
+void warp_row(const SweepImage& image,
+              const Eigen::Vector3f& first,
+              const Eigen::Vector3f& step,
+              int width,
+              float* out) {
   const float max_u = static_cast<float>(image.gray.width) - 1.001f;
   const float max_v = static_cast<float>(image.gray.height) - 1.001f;
   const float* gray = image.gray.data.data();
@@ -66,21 +69,23 @@ void warp_row(const SweepImage& image, const Eigen::Vector3f& first, const Eigen
     const int iv = static_cast<int>(v);
     const float a = u - static_cast<float>(iu);
     const float b = v - static_cast<float>(iv);
-    const float* p = gray + iv * stride + iu;
+    const float* p = gray + static_cast<std::ptrdiff_t>(iv) * stride + iu;
     const float top = p[0] + a * (p[1] - p[0]);
     const float bottom = p[stride] + a * (p[stride + 1] - p[stride]);
     out[x] = top + b * (bottom - top);
   }
 }
 
-void seen_row(const SweepImage& image, const Eigen::Vector3f& first, const Eigen::Vector3f& step,
-              int width, uint8_t* out) {
+void seen_row(const SweepImage& image,
+              const Eigen::Vector3f& first,
+              const Eigen::Vector3f& step,
+              int width,
+              uint8_t* out) {
   for (int x = 0; x < width; ++x) {
     const Eigen::Vector3f h = first + static_cast<float>(x) * step;
     const float u = h.x() / h.z();
     const float v = h.y() / h.z();
-    const bool inside = h.z() > 0 && u >= 0 && v >= 0 &&
-                        u < static_cast<float>(image.gray.width) &&
+    const bool inside = h.z() > 0 && u >= 0 && v >= 0 && u < static_cast<float>(image.gray.width) &&
                         v < static_cast<float>(image.gray.height);
     out[x] = inside && image.valid(static_cast<int>(u), static_cast<int>(v)) != 0;
   }
@@ -111,7 +116,7 @@ struct ZnccRow {
   std::vector<float> a, b, aa, bb, ab;  // column sums, from -kMargin
 
   void add(const Band& A, const Band& B, int row, int width, float* out) {
-    const auto n = static_cast<size_t>(width + 2 * kMargin);
+    const size_t n = static_cast<size_t>(width) + kMargin + kMargin;
     for (auto* sums : {&a, &b, &aa, &bb, &ab}) sums->assign(n, 0.0f);
     for (int dy = -kZnccRadius; dy <= kZnccRadius; ++dy) {
       const float* ra = A.gray_row(row + dy) - kMargin;
@@ -127,7 +132,7 @@ struct ZnccRow {
       }
     }
     const auto box = [](const std::vector<float>& sums, int x) {
-      const float* s = &sums[static_cast<size_t>(x + kMargin)];
+      const float* s = &sums[static_cast<size_t>(x) + kMargin];
       return s[-2] + s[-1] + s[0] + s[1] + s[2];
     };
     static_assert(kZnccRadius == 2);
@@ -163,7 +168,10 @@ float combine(float* costs, size_t count) {
 
 class BandCost {
  public:
-  BandCost(const std::vector<SweepImage>& images, const SweepGeometry& geometry, int first, int last)
+  BandCost(const std::vector<SweepImage>& images,
+           const SweepGeometry& geometry,
+           int first,
+           int last)
       : images_(images),
         geometry_(geometry),
         reference_(images[static_cast<size_t>(geometry.image)]),

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/plane_sweep.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
 #include "libcgs/priors/cross_check.h"
@@ -17,7 +18,8 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 void require_images(const Scene& scene) {
-  require(scene.input.size() >= 2, "a plane sweep needs two or more input views", scene.input.size());
+  require(
+      scene.input.size() >= 2, "a plane sweep needs two or more input views", scene.input.size());
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
     const bool sized = view.image.width == view.camera.width &&
@@ -29,33 +31,46 @@ void require_images(const Scene& scene) {
   }
 }
 
-// Takes back confirmations of pixels that stand alone: chance agreements do not form surfaces.
-Raster<Agreement> without_speckles(const SweptView& view, const Raster<Agreement>& agreement) {
-  constexpr int kRadius = 2;
-  constexpr int kFewest = 6;  // a line one pixel wide, itself included, has 5
-  constexpr float kSameSurface = 1.5f;  // [planes]
-  Raster<Agreement> out = agreement;
-  tbb::parallel_for(0, out.height, [&](int y) {
-    for (int x = 0; x < out.width; ++x) {
-      if (agreement(x, y).views == 0) continue;
-      int like = 0;
-      for (int dy = -kRadius; dy <= kRadius; ++dy) {
-        for (int dx = -kRadius; dx <= kRadius; ++dx) {
-          if (!out.contains(x + dx, y + dy) || agreement(x + dx, y + dy).views == 0) continue;
-          const float t = view.pixels(x + dx, y + dy).plane.at(-dx, -dy);
-          like += std::abs(t - view.pixels(x, y).plane.t) < kSameSurface;
+// Takes back confirmations of small patches that continue no surface around them: agreements by
+// chance, which completion would spread.
+void remove_speckles(const SweptView& view, Raster<Agreement>& agreement) {
+  constexpr float kSameSurface = 1.0f;  // largest step inside a patch [planes]
+  constexpr double kSmallest = 4e-4;    // share of the image
+  const auto smallest = static_cast<size_t>(kSmallest * double(agreement.data.size()) + 5);
+  MaskMap visited(agreement.width, agreement.height, 0);
+  std::vector<std::pair<int, int>> patch;
+  const auto grow = [&](int x, int y) {
+    if (visited(x, y) != 0 || agreement(x, y).views == 0) return;
+    visited(x, y) = 1;
+    patch.emplace_back(x, y);
+  };
+  for (int y0 = 0; y0 < agreement.height; ++y0) {
+    for (int x0 = 0; x0 < agreement.width; ++x0) {
+      patch.clear();
+      grow(x0, y0);
+      for (size_t i = 0; i < patch.size(); ++i) {
+        const auto [x, y] = patch[i];
+        const SlantedPlane& here = view.pixels(x, y).plane;
+        for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+          if (!agreement.contains(x + dx, y + dy)) continue;
+          const SlantedPlane& there = view.pixels(x + dx, y + dy).plane;
+          // Either plane may be the one that continues.
+          const float step =
+              std::min(std::abs(there.at(-dx, -dy) - here.t), std::abs(here.at(dx, dy) - there.t));
+          if (step < kSameSurface) grow(x + dx, y + dy);
         }
       }
-      if (like < kFewest) out(x, y) = {};
+      if (patch.size() >= smallest) continue;
+      for (const auto& [x, y] : patch) agreement(x, y) = {};
     }
-  });
-  return out;
+  }
 }
 
 std::vector<Raster<Agreement>> check_all(const std::vector<SweptView>& views, double tolerance) {
   std::vector<Raster<Agreement>> out;
   for (size_t i = 0; i < views.size(); ++i) {
-    out.push_back(without_speckles(views[i], cross_check(views, i, tolerance)));
+    out.push_back(cross_check(views, i, tolerance));
+    remove_speckles(views[i], out.back());
   }
   return out;
 }
@@ -77,7 +92,8 @@ ViewPriors view_priors(const SweptView& view, const Raster<Agreement>& agreement
     const Agreement& a = agreement.data[i];
     const double rho = view.geometry.inverse_depth(double(p.plane.t));
     if (a.views == 0 || !(rho > 0)) continue;
-    const float sigma_t = std::sqrt(kFloor * kFloor + p.sigma * p.sigma + a.difference * a.difference);
+    const float sigma_t =
+        std::sqrt(kFloor * kFloor + p.sigma * p.sigma + a.difference * a.difference);
     out.depth.data[i] = static_cast<float>(1 / rho);
     out.sigma.data[i] = static_cast<float>(double(sigma_t) * view.geometry.step / (rho * rho));
     out.confidence.data[i] = std::clamp(p.score, 0.0f, 1.0f) / (1 + sigma_t);
@@ -111,18 +127,18 @@ void PlaneSweepOptions::validate() const {
   require(refinement_rounds >= 0 && refinement_rounds <= 100,
           "PlaneSweepOptions.refinement_rounds must be in [0, 100]",
           refinement_rounds);
-  require(max_disagreement > 0,
-          "PlaneSweepOptions.max_disagreement must be > 0",
-          max_disagreement);
+  require(max_disagreement > 0, "PlaneSweepOptions.max_disagreement must be > 0", max_disagreement);
 }
 
-std::vector<ViewPriors> plane_sweep(const Scene& scene, const PlaneSweepOptions& options,
+std::vector<ViewPriors> plane_sweep(const Scene& scene,
+                                    const PlaneSweepOptions& options,
                                     const Progress& progress) {
   options.validate();
   require_images(scene);
   const size_t count = scene.input.size();
   std::vector<SweepImage> images;
-  for (const int i : scene.input) images.push_back(sweep_image(scene.views[static_cast<size_t>(i)]));
+  for (const int i : scene.input)
+    images.push_back(sweep_image(scene.views[static_cast<size_t>(i)]));
   std::vector<SweptView> views(count);
   std::vector<SlantedRefinement> refinements;
   refinements.reserve(count);

@@ -15,9 +15,9 @@ namespace cgs {
 struct PlaneSweepOptions {
   SweepSampling sampling;
   SmoothnessPenalties smoothness;
-  int refinement_rounds = 4;   ///< >= 0; each costs about as much as the sweep.
-  double max_disagreement = 1; ///< Another view confirms a depth if the pixel comes back this
-                               ///< close [pixels]; > 0.
+  int refinement_rounds = 4;    ///< >= 0; each costs about as much as the sweep.
+  double max_disagreement = 1;  ///< Another view confirms a depth if the pixel comes back this
+                                ///< close [pixels]; > 0.
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
 };
@@ -30,7 +30,8 @@ struct PlaneSweepOptions {
 ///         else Unknown with NaN depth. `layer` is left 0.
 /// \throws InvalidInput for fewer than two input views or images not of their camera's size,
 ///         BadInput(Value) if the cameras share one centre
-std::vector<ViewPriors> plane_sweep(const Scene& scene, const PlaneSweepOptions& options,
+std::vector<ViewPriors> plane_sweep(const Scene& scene,
+                                    const PlaneSweepOptions& options,
                                     const Progress& progress = {});
 
 }  // namespace cgs

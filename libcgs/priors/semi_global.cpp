@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/semi_global.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 namespace cgs {
 
@@ -22,12 +22,12 @@ struct PathCosts {
   std::vector<int16_t> least;
   int planes;
 
-  PathCosts(int pixels, int planes_)
-      : values(static_cast<size_t>(pixels) * static_cast<size_t>(planes_ + 2), kNever),
+  PathCosts(int pixels, int plane_count)
+      : values(static_cast<size_t>(pixels) * (static_cast<size_t>(plane_count) + 2), kNever),
         least(static_cast<size_t>(pixels), 0),
-        planes(planes_) {}
+        planes(plane_count) {}
   int16_t* at(int pixel) {
-    return &values[static_cast<size_t>(pixel) * static_cast<size_t>(planes + 2) + 1];
+    return &values[static_cast<size_t>(pixel) * (static_cast<size_t>(planes) + 2) + 1];
   }
 };
 
@@ -60,7 +60,7 @@ class Aggregation {
       tbb::parallel_for(columns, [&](const tbb::blocked_range<int>& range) {
         for (int x = range.begin(); x != range.end(); ++x) {
           for (int dx = -1; dx <= 1; ++dx) {
-            const auto path = static_cast<size_t>(dx + 1);
+            const auto path = static_cast<size_t>(dx) + 1;
             step({x, y}, {x - dx, y - dy}, {before[path], x - dx}, {here[path], x});
           }
         }
@@ -140,7 +140,8 @@ class Aggregation {
 
 }  // namespace
 
-Raster<float> semi_global_planes(const CostVolume& volume, const Raster<float>& guide,
+Raster<float> semi_global_planes(const CostVolume& volume,
+                                 const Raster<float>& guide,
                                  const SmoothnessPenalties& penalties) {
   Aggregation aggregation(volume, guide, penalties);
   aggregation.along_rows();

@@ -17,7 +17,8 @@ struct SmoothnessPenalties {
 /// a parabola. Source: Hirschmüller 2008, "Stereo processing by semiglobal matching".
 ///
 /// \param guide gray levels of the view the volume belongs to
-Raster<float> semi_global_planes(const CostVolume& volume, const Raster<float>& guide,
+Raster<float> semi_global_planes(const CostVolume& volume,
+                                 const Raster<float>& guide,
                                  const SmoothnessPenalties& penalties);
 
 }  // namespace cgs

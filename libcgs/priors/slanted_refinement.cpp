@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/slanted_refinement.h"
 
-#include <tbb/parallel_for.h>
-
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
+
+#include <Eigen/Cholesky>
+#include <tbb/parallel_for.h>
 
 namespace cgs {
 
@@ -16,25 +16,25 @@ namespace {
 
 constexpr int kRadius = 4;
 constexpr int kSide = 2 * kRadius + 1;
-constexpr size_t kTaps = (kSide * kSide + 1) / 2;     // every other pixel, like a chessboard
-constexpr size_t kSamples = (kTaps + 7) / 8 * 8;      // padded with weight 0
+constexpr size_t kTaps = (kSide * kSide + 1) / 2;  // every other pixel, like a chessboard
+constexpr size_t kSamples = (kTaps + 7) / 8 * 8;   // padded with weight 0
 constexpr size_t kCenter = kTaps / 2;
-constexpr float kLevelScale = 12;      // bilateral weight halves at this difference [gray levels]
-constexpr float kDistanceScale = 4;    // … and at this distance [pixels]
-constexpr float kNoiseVariance = 4;    // [gray levels squared]
-constexpr float kSmoothness = 0.12f;   // cost of a full disagreement with the neighbours
-constexpr float kTruncation = 2.0f;    // largest disagreement that counts [planes]
+constexpr float kLevelScale = 12;     // bilateral weight halves at this difference [gray levels]
+constexpr float kDistanceScale = 4;   // … and at this distance [pixels]
+constexpr float kNoiseVariance = 4;   // [gray levels squared]
+constexpr float kSmoothness = 0.12f;  // cost of a full disagreement with the neighbours
+constexpr float kTruncation = 2.0f;   // largest disagreement that counts [planes]
 constexpr float kSecondWeight = 0.35f;
-constexpr float kUnseenCost = 1.0f;    // as uncorrelated
-constexpr float kMaxSlope = 2.0f;      // [planes per pixel]
+constexpr float kUnseenCost = 1.0f;  // as uncorrelated
+constexpr float kMaxSlope = 2.0f;    // [planes per pixel]
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 struct Offset {
   int dx, dy;
 };
 // All of the other colour of the chessboard.
-constexpr std::array<Offset, 8> kNeighbours = {{
-    {-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-5, 0}, {5, 0}, {0, -5}, {0, 5}}};
+constexpr std::array<Offset, 8> kNeighbours = {
+    {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-5, 0}, {5, 0}, {0, -5}, {0, 5}}};
 
 using Samples = std::array<float, kSamples>;
 
@@ -58,8 +58,10 @@ struct OffsetTable {
   Samples dx{}, dy{};
   OffsetTable() {
     for (size_t i = 0; i < kTaps; ++i) {
-      dx[i] = static_cast<float>(static_cast<int>(2 * i) % kSide - kRadius);
-      dy[i] = static_cast<float>(static_cast<int>(2 * i) / kSide - kRadius);
+      const int column = static_cast<int>(2 * i) % kSide;
+      const int row = static_cast<int>(2 * i) / kSide;
+      dx[i] = static_cast<float>(column - kRadius);
+      dy[i] = static_cast<float>(row - kRadius);
     }
   }
 };
@@ -67,9 +69,9 @@ const OffsetTable kOffsets;
 
 // The homography of a plane near one pixel: where it goes and its derivative.
 struct LocalMap {
-  float u, v;      // in array coordinates: pixel centres on integers
+  float u, v;  // in array coordinates: pixel centres on integers
   float ux, uy, vx, vy;
-  float ut, vt;    // derivative by t
+  float ut, vt;  // derivative by t
   bool seen;
 };
 
@@ -98,9 +100,9 @@ LocalMap local_map(const SweepImage& image, const SweepSource& s, Offset p, cons
 // The source around the image of a window: the bilinear cell of every sample. In three loops, so
 // that all but the loads are done eight samples at a time.
 struct Cells {
-  Samples inside;                      // 0 beyond the frame, else 1
-  Samples a, b;                        // position in the cell
-  Samples p00, p10, p01, p11;          // its corners, first index along the row
+  Samples inside;              // 0 beyond the frame, else 1
+  Samples a, b;                // position in the cell
+  Samples p00, p10, p01, p11;  // its corners, first index along the row
 
   Cells(const Raster<float>& gray, const LocalMap& m) {
     const float max_u = static_cast<float>(gray.width) - 1.001f;
@@ -166,7 +168,8 @@ struct SlantedRefinement::Normal {
 };
 
 SlantedRefinement::SlantedRefinement(const std::vector<SweepImage>& images,
-                                     const SweepGeometry& geometry, const Raster<float>& start)
+                                     const SweepGeometry& geometry,
+                                     const Raster<float>& start)
     : images_(images),
       geometry_(geometry),
       reference_(images[static_cast<size_t>(geometry.image)]),
@@ -210,7 +213,8 @@ SlantedRefinement::Window SlantedRefinement::window(int x, int y) const {
   return w;
 }
 
-float SlantedRefinement::correlation(const Window& w, size_t source,
+float SlantedRefinement::correlation(const Window& w,
+                                     size_t source,
                                      const SlantedPlane& plane) const {
   const SweepSource& s = geometry_.sources[source];
   const SweepImage& image = images_[static_cast<size_t>(s.image)];
@@ -283,7 +287,9 @@ float SlantedRefinement::cost(const Window& w, const SlantedPlane& plane) const 
   return data_cost(w, plane) + kSmoothness * smoothness(w, plane);
 }
 
-bool SlantedRefinement::normal_equations(const Window& w, size_t source, const SlantedPlane& plane,
+bool SlantedRefinement::normal_equations(const Window& w,
+                                         size_t source,
+                                         const SlantedPlane& plane,
                                          Normal& total) const {
   const SweepSource& s = geometry_.sources[source];
   const SweepImage& image = images_[static_cast<size_t>(s.image)];
@@ -320,8 +326,8 @@ bool SlantedRefinement::normal_equations(const Window& w, size_t source, const S
   const float gain = C(3, 5) / (C(3, 3) + kNoiseVariance * M(4, 4));
   if (!(gain > 0.1f)) return false;
   const float inv_gain = 1 / (C(3, 3) + kNoiseVariance * M(4, 4));
-  const Eigen::Matrix3f H = C.topLeftCorner<3, 3>() -
-                            inv_gain * C.block<3, 1>(0, 3) * C.block<1, 3>(3, 0);
+  const Eigen::Matrix3f H =
+      C.topLeftCorner<3, 3>() - inv_gain * C.block<3, 1>(0, 3) * C.block<1, 3>(3, 0);
   const Eigen::Vector3f g = C.block<3, 1>(0, 5) - gain * C.block<3, 1>(0, 3);
   const float residual = std::max(C(5, 5) - gain * C(3, 5), 0.0f);
   // Divided by the variance of the reference, so that sources count as in the correlation.
@@ -358,9 +364,8 @@ void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
   const auto try_plane = [&](const SlantedPlane& plane) {
     if (!(plane.t >= 0 && plane.t <= largest)) return;
     if (std::abs(plane.slope_x) > kMaxSlope || std::abs(plane.slope_y) > kMaxSlope) return;
-    const float change = std::abs(plane.t - best.t) +
-                         2 * (std::abs(plane.slope_x - best.slope_x) +
-                              std::abs(plane.slope_y - best.slope_y));
+    const float change = std::abs(plane.t - best.t) + 2 * (std::abs(plane.slope_x - best.slope_x) +
+                                                           std::abs(plane.slope_y - best.slope_y));
     if (change < 0.02f) return;
     const float smooth = kSmoothness * smoothness(w, plane);
     if (smooth >= least) return;

@@ -34,7 +34,8 @@ struct RefinedPixel {
 /// Pixels are visited as on a chessboard, so the result does not depend on the number of threads.
 class SlantedRefinement {
  public:
-  SlantedRefinement(const std::vector<SweepImage>& images, const SweepGeometry& geometry,
+  SlantedRefinement(const std::vector<SweepImage>& images,
+                    const SweepGeometry& geometry,
                     const Raster<float>& start);
 
   /// One round over all pixels. `extra` (may be empty) holds one more hypothesis per pixel, from

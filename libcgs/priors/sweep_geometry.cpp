@@ -73,8 +73,8 @@ double largest_speed(const Camera& reference, const Camera& other, double near_t
       for (int k = 0; k <= kSteps; ++k) {
         const Eigen::Vector3d h = s.project(u, v, near_t * k / kSteps);
         const Eigen::Vector2d q = h.head<2>() / h.z();
-        const bool seen = h.z() > 0 && q.x() >= 0 && q.y() >= 0 && q.x() <= other.width &&
-                          q.y() <= other.height;
+        const bool seen =
+            h.z() > 0 && q.x() >= 0 && q.y() >= 0 && q.x() <= other.width && q.y() <= other.height;
         if (!seen) continue;
         speed = std::max(speed, (s.b.head<2>() - q * s.b.z()).norm() / h.z());
       }
@@ -125,8 +125,8 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
                    "choose views taken from different places");
   }
   const double wanted = std::ceil(speed * span / sampling.pixels_per_plane) + 1;
-  geometry.planes = static_cast<int>(
-      std::clamp(wanted, double(kFewestPlanes), std::max<double>(kFewestPlanes, sampling.max_planes)));
+  geometry.planes = static_cast<int>(std::clamp(
+      wanted, double(kFewestPlanes), std::max<double>(kFewestPlanes, sampling.max_planes)));
   geometry.step = span / (geometry.planes - 1);
   for (SweepSource& source : geometry.sources) source.b *= geometry.step;
   return geometry;

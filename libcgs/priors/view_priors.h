@@ -17,11 +17,11 @@ enum class DepthOrigin : uint8_t {
 
 /// What is known about one input view before training; every raster has the size of its image.
 struct ViewPriors {
-  DepthMap depth;                 ///< z-depth [internal units]; NaN exactly where origin is Unknown.
-  DepthMap sigma;                 ///< Standard deviation of depth [internal units]; NaN as depth.
-  Raster<float> confidence;       ///< In [0, 1]; completed pixels keep the low value they had.
-  Raster<DepthOrigin> origin;     ///< See DepthOrigin.
-  Raster<uint8_t> layer;          ///< Depth layer, 0 = farthest … layer_count - 1 = nearest.
+  DepthMap depth;              ///< z-depth [internal units]; NaN exactly where origin is Unknown.
+  DepthMap sigma;              ///< Standard deviation of depth [internal units]; NaN as depth.
+  Raster<float> confidence;    ///< In [0, 1]; completed pixels keep the low value they had.
+  Raster<DepthOrigin> origin;  ///< See DepthOrigin.
+  Raster<uint8_t> layer;       ///< Depth layer, 0 = farthest … layer_count - 1 = nearest.
   Raster<uint8_t> matched_views;  ///< Number of other input views that confirm the depth.
 };
 

@@ -12,9 +12,10 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
-#include <opencv2/imgcodecs.hpp>
 #include <regex>
 #include <string>
+
+#include <opencv2/imgcodecs.hpp>
 
 #include "libcgs/core/error.h"
 #include "libcgs/priors/depth_completion.h"
@@ -50,8 +51,31 @@ ColorImage color_image(const std::filesystem::path& path) {
   return image;
 }
 
+// Little-endian PFM, rows from below. OpenCV's reader divides by the scale in the header, which in
+// these files is not meant.
+Raster<float> read_pfm(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string tag;
+  int width = 0;
+  int height = 0;
+  double scale = 0;
+  file >> tag >> width >> height >> scale;
+  if (tag != "Pf" || width <= 0 || height <= 0 || !(scale < 0)) {
+    throw BadInput(Defect::Syntax, path, "not a little-endian grey PFM");
+  }
+  file.get();
+  Raster<float> out(width, height, 0.0f);
+  for (int y = height - 1; y >= 0; --y) {
+    file.read(reinterpret_cast<char*>(&out(0, y)), std::streamsize(sizeof(float)) * width);
+  }
+  if (!file) throw BadInput(Defect::Truncated, path, "rows are missing");
+  return out;
+}
+
 // Left camera at the origin, right one a unit to its right.
-Scene stereo_scene(const std::filesystem::path& folder, const char* left, const char* right,
+Scene stereo_scene(const std::filesystem::path& folder,
+                   const char* left,
+                   const char* right,
                    const Eigen::Vector3d& fxy) {
   Scene scene;
   scene.folder = folder;
@@ -97,13 +121,11 @@ Pair read_2014(const std::filesystem::path& folder) {
   pair.focal_baseline = focal;
   pair.scene = stereo_scene(folder, "im0.png", "im1.png", {focal, cx, pair.offset});
   set_range(pair, number(R"(vmin=\s*([\d.]+))"), number(R"(ndisp=\s*([\d.]+))"));
-  const cv::Mat disparity = read(folder / "disp0GT.pfm", cv::IMREAD_UNCHANGED);
+  pair.disparity = read_pfm(folder / "disp0GT.pfm");
   const cv::Mat mask = read(folder / "mask0nocc.png", cv::IMREAD_GRAYSCALE);
-  pair.disparity = Raster<float>(disparity.cols, disparity.rows, 0.0f);
-  pair.counted = MaskMap(disparity.cols, disparity.rows, 0);
-  for (int y = 0; y < disparity.rows; ++y) {
-    for (int x = 0; x < disparity.cols; ++x) {
-      pair.disparity(x, y) = disparity.at<float>(y, x);
+  pair.counted = MaskMap(pair.disparity.width, pair.disparity.height, 0);
+  for (int y = 0; y < pair.disparity.height; ++y) {
+    for (int x = 0; x < pair.disparity.width; ++x) {
       pair.counted(x, y) = mask.at<uint8_t>(y, x) == 255 && std::isfinite(pair.disparity(x, y));
     }
   }
@@ -188,7 +210,8 @@ int main(int argc, char** argv) {
   try {
     const std::filesystem::path root = argv[1];
     std::printf("pair            measured |  bad0.5  bad1  bad2 |  completed: the same |   time\n");
-    std::printf("                  [%%]    |       [%%]            |       [%%]            |   [s]\n");
+    std::printf(
+        "                  [%%]    |       [%%]            |       [%%]            |   [s]\n");
     for (const char* name : {"Motorcycle", "Piano", "Playroom"}) {
       evaluate(read_2014(root / "middlebury2014Q" / name));
     }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include "libcgs/core/scene.h"
 
@@ -21,7 +22,8 @@ struct TexturedPatch {
 };
 
 /// A box standing along the axes: six patches.
-inline void add_box(std::vector<TexturedPatch>& patches, const Eigen::Vector3d& low,
+inline void add_box(std::vector<TexturedPatch>& patches,
+                    const Eigen::Vector3d& low,
                     const Eigen::Vector3d& high) {
   const Eigen::Vector3d c = 0.5 * (low + high);
   const Eigen::Vector3d h = 0.5 * (high - low);
@@ -73,7 +75,10 @@ struct Hit {
 };
 
 /// Nearest patch on the ray through an image point.
-inline Hit cast(const std::vector<TexturedPatch>& patches, const Camera& camera, double u, double v) {
+inline Hit cast(const std::vector<TexturedPatch>& patches,
+                const Camera& camera,
+                double u,
+                double v) {
   const Eigen::Vector3d origin = camera.center();
   const Eigen::Vector3d ray = camera.world_from_cam.rotation() * camera.ray_in_cam(u, v);
   Hit hit;
@@ -93,8 +98,10 @@ inline Hit cast(const std::vector<TexturedPatch>& patches, const Camera& camera,
 }
 
 /// Photograph of the patches: `samples`^2 rays per pixel, texture cells of `finest` scene units.
-inline ColorImage photograph(const std::vector<TexturedPatch>& patches, const Camera& camera,
-                             double finest, int samples = 3) {
+inline ColorImage photograph(const std::vector<TexturedPatch>& patches,
+                             const Camera& camera,
+                             double finest,
+                             int samples = 3) {
   ColorImage image(camera.width, camera.height, Eigen::Vector3f::Constant(0.5f));
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -131,8 +138,11 @@ inline DepthMap true_depth(const std::vector<TexturedPatch>& patches, const Came
 }
 
 /// A camera at `center` that looks at `target`, +y of the world down.
-inline Camera looking_at(const Eigen::Vector3d& center, const Eigen::Vector3d& target, int width,
-                         int height, double focal) {
+inline Camera looking_at(const Eigen::Vector3d& center,
+                         const Eigen::Vector3d& target,
+                         int width,
+                         int height,
+                         double focal) {
   Camera camera{.width = width,
                 .height = height,
                 .fx = focal,
@@ -148,7 +158,8 @@ inline Camera looking_at(const Eigen::Vector3d& center, const Eigen::Vector3d& t
 
 /// Views of the patches from the given cameras, all of them input, with their depth ranges.
 inline Scene photographed_scene(const std::vector<TexturedPatch>& patches,
-                                const std::vector<Camera>& cameras, double finest) {
+                                const std::vector<Camera>& cameras,
+                                double finest) {
   Scene scene;
   scene.folder = "patches";
   for (size_t i = 0; i < cameras.size(); ++i) {
@@ -169,8 +180,12 @@ inline Scene photographed_scene(const std::vector<TexturedPatch>& patches,
 }
 
 /// True if another view sees, unoccluded, what a view shows at a pixel.
-inline bool seen_elsewhere(const std::vector<TexturedPatch>& patches, const Scene& scene,
-                           size_t view, int x, int y, double depth) {
+inline bool seen_elsewhere(const std::vector<TexturedPatch>& patches,
+                           const Scene& scene,
+                           size_t view,
+                           int x,
+                           int y,
+                           double depth) {
   const Camera& camera = scene.views[view].camera;
   const Eigen::Vector3d point = camera.unproject(x + 0.5, y + 0.5, depth);
   for (size_t j = 0; j < scene.views.size(); ++j) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/alignment.h"
 
-#include <gtest/gtest.h>
-
 #include <limits>
 #include <random>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
 #include "tests/support/stereo_scene.h"

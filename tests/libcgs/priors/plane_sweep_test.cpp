@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/plane_sweep.h"
 
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
-
 #include <cmath>
 #include <cstring>
 #include <vector>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
 #include "tests/support/stereo_scene.h"
@@ -25,11 +25,13 @@ constexpr double kFinest = 0.05;  // texture cell, about one pixel at depth 4.5
 std::vector<Camera> three_cameras() {
   std::vector<Camera> cameras;
   for (const double x : {-0.4, 0.0, 0.4}) {
-    cameras.push_back(
-        test::looking_at({x, 0.1 * x, 0}, {0.3 * x, 0, 4}, kWidth, kHeight, kFocal));
+    cameras.push_back(test::looking_at({x, 0.1 * x, 0}, {0.3 * x, 0, 4}, kWidth, kHeight, kFocal));
   }
   return cameras;
 }
+
+// For properties that do not depend on how well depth is refined.
+PlaneSweepOptions one_round() { return {.refinement_rounds = 1}; }
 
 std::vector<TexturedPatch> slanted_plane() {
   const Vector3d u = Vector3d(1, 0, 0.5).normalized();
@@ -134,8 +136,8 @@ TEST(PlaneSweep, NeverReadsMaskedPixels) {
       if (view.valid.data[i] == 0) view.image.data[i].setConstant(std::nanf(""));
     }
   }
-  const std::vector<ViewPriors> expected = plane_sweep(scene, {});
-  const std::vector<ViewPriors> priors = plane_sweep(poisoned, {});
+  const std::vector<ViewPriors> expected = plane_sweep(scene, one_round());
+  const std::vector<ViewPriors> priors = plane_sweep(poisoned, one_round());
   for (size_t v = 0; v < priors.size(); ++v) {
     EXPECT_TRUE(same_bits(priors[v].depth, expected[v].depth));
     for (size_t i = 0; i < priors[v].depth.data.size(); ++i) {
@@ -148,7 +150,7 @@ TEST(PlaneSweep, NeverReadsMaskedPixels) {
 
 TEST(PlaneSweep, DepthIsKnownExactlyWhereAnotherViewConfirmsIt) {
   const Scene scene = test::photographed_scene(wall_and_square(), three_cameras(), kFinest);
-  for (const ViewPriors& p : plane_sweep(scene, {})) {
+  for (const ViewPriors& p : plane_sweep(scene, one_round())) {
     for (size_t i = 0; i < p.depth.data.size(); ++i) {
       const bool measured = p.origin.data[i] == DepthOrigin::Measured;
       ASSERT_EQ(measured, p.matched_views.data[i] > 0);
@@ -164,7 +166,7 @@ TEST(PlaneSweep, IsTheSameForAnyNumberOfThreads) {
   std::vector<std::vector<ViewPriors>> results;
   for (const size_t threads : {1u, 2u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    results.push_back(plane_sweep(scene, {}));
+    results.push_back(plane_sweep(scene, one_round()));
   }
   for (size_t v = 0; v < 3; ++v) {
     EXPECT_TRUE(same_bits(results[0][v].depth, results[1][v].depth));
@@ -174,13 +176,13 @@ TEST(PlaneSweep, IsTheSameForAnyNumberOfThreads) {
 
 TEST(PlaneSweep, StaysTheSameWhenTheSceneIsScaledByAPowerOfTwo) {
   Scene scene = test::photographed_scene(wall_and_square(), three_cameras(), kFinest);
-  const std::vector<ViewPriors> expected = plane_sweep(scene, {});
+  const std::vector<ViewPriors> expected = plane_sweep(scene, one_round());
   for (View& view : scene.views) {
     view.camera.world_from_cam.translation() *= 0x1p-20;
     view.near *= 0x1p-20;
     view.far *= 0x1p-20;
   }
-  const std::vector<ViewPriors> priors = plane_sweep(scene, {});
+  const std::vector<ViewPriors> priors = plane_sweep(scene, one_round());
   for (size_t i = 0; i < priors[0].depth.data.size(); ++i) {
     if (std::isnan(expected[0].depth.data[i])) continue;
     ASSERT_EQ(priors[0].depth.data[i], expected[0].depth.data[i] * 0x1p-20f);
@@ -194,16 +196,16 @@ TEST(PlaneSweep, RefusesCamerasAtOnePlace) {
     view.camera.world_from_cam.translation() *= 1e-9;
     view.camera.world_from_cam.translation().z() += 1;
   }
-  EXPECT_THROW(plane_sweep(scene, {}), BadInput);
+  EXPECT_THROW(plane_sweep(scene, one_round()), BadInput);
 }
 
 TEST(PlaneSweep, RefusesWhatItCannotMatch) {
   Scene scene = test::photographed_scene(slanted_plane(), three_cameras(), kFinest);
   Scene one = scene;
   one.input = {1};
-  EXPECT_THROW(plane_sweep(one, {}), InvalidInput);
+  EXPECT_THROW(plane_sweep(one, one_round()), InvalidInput);
   scene.views[2].image = {};
-  EXPECT_THROW(plane_sweep(scene, {}), InvalidInput);
+  EXPECT_THROW(plane_sweep(scene, one_round()), InvalidInput);
 }
 
 TEST(PlaneSweepOptions, RefusesEachFieldOutOfRange) {
