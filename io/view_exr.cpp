@@ -113,7 +113,7 @@ void write_view_exr(const std::filesystem::path& path,
   const Eigen::Matrix4f left_handed = (y_up.asDiagonal() * cam_from_file).cast<float>();
   image.world_to_camera = left_handed.array() + 0.0f;  // no negative zeros
   image.text = {{"cgs:worldToCamera", numbers(cam_from_file)},
-                {"cgs:K", numbers(camera.K())},
+                {"cgs:K", numbers(camera.intrinsics())},
                 {"cgs:units", frame.unit_name()},
                 {"cgs:fileOrigin", numbers(frame.file_origin.transpose())}};
   write_exr(path, image);

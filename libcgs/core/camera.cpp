@@ -7,7 +7,7 @@
 
 namespace cgs {
 
-Eigen::Matrix3d Camera::K() const {
+Eigen::Matrix3d Camera::intrinsics() const {
   Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
   K(0, 0) = fx;
   K(1, 1) = fy;

@@ -23,7 +23,8 @@ struct Camera {
 
   Eigen::Isometry3d cam_from_world() const { return world_from_cam.inverse(); }
   Eigen::Vector3d center() const { return world_from_cam.translation(); }
-  Eigen::Matrix3d K() const;
+  /// The calibration matrix [pixels].
+  Eigen::Matrix3d intrinsics() const;
 
   /// Direction in camera axes, with z = 1, of the ray through a point of the image [pixels].
   Eigen::Vector3d ray_in_cam(double u, double v) const {

@@ -28,8 +28,8 @@ struct Transfer {
 
   Transfer(const Camera& from, const Camera& to) {
     const Eigen::Isometry3d to_from = to.cam_from_world() * from.world_from_cam;
-    A = to.K() * to_from.rotation() * from.K().inverse();
-    b = to.K() * to_from.translation();
+    A = to.intrinsics() * to_from.rotation() * from.intrinsics().inverse();
+    b = to.intrinsics() * to_from.translation();
   }
   Eigen::Vector3d operator()(const Eigen::Vector2d& p, double rho) const {
     return A * p.homogeneous() + rho * b;

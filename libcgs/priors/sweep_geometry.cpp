@@ -53,8 +53,8 @@ void fill_invalid(Raster<float>& gray, const MaskMap& valid) {
 SweepSource source_of(const Camera& reference, const Camera& other, double inverse_far) {
   const Eigen::Isometry3d other_from_reference = other.cam_from_world() * reference.world_from_cam;
   SweepSource source;
-  const Eigen::Vector3d shift = other.K() * other_from_reference.translation();
-  source.A = other.K() * other_from_reference.rotation() * reference.K().inverse();
+  const Eigen::Vector3d shift = other.intrinsics() * other_from_reference.translation();
+  source.A = other.intrinsics() * other_from_reference.rotation() * reference.intrinsics().inverse();
   source.A.col(2) += inverse_far * shift;
   source.b = shift;
   return source;

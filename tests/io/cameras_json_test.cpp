@@ -68,7 +68,7 @@ TEST_F(CamerasJson, RestoresTheSceneBitForBit) {
     const Camera& a = scene.views[i].camera;
     const Camera& b = out.views[i].camera;
     EXPECT_EQ(a.world_from_cam.matrix(), b.world_from_cam.matrix());
-    EXPECT_EQ(a.K(), b.K());
+    EXPECT_EQ(a.intrinsics(), b.intrinsics());
     EXPECT_EQ(scene.views[i].near, out.views[i].near);
     EXPECT_EQ(scene.views[i].far, out.views[i].far);
     EXPECT_EQ(scene.views[i].distortion, out.views[i].distortion);
