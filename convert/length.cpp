@@ -50,7 +50,8 @@ double parse_length(const std::string& text, const Frame& frame) {
   if (unit.empty()) return value / frame.scale;
   const double metres = value * metres_in(unit);
   if (!frame.has_metric_scale()) {
-    throw InvalidInput("'" + text + "': the scale of this scene is unknown; give the length in scene "
+    throw InvalidInput("'" + text +
+                       "': the scale of this scene is unknown; give the length in scene "
                        "units, or say --assume-unit");
   }
   return metres / frame.metres_per_unit / frame.scale;

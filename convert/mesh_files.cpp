@@ -8,6 +8,7 @@
 #include "io/obj.h"
 #include "io/stl.h"
 #include "io/threemf.h"
+#include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
 
 namespace cgs {
@@ -43,6 +44,10 @@ Json write_mesh_files(const std::filesystem::path& folder,
                       const TriangleMesh& watertight,
                       const Frame& frame,
                       const Eigen::Vector3d& up) {
+  if (watertight.faces.empty()) {
+    throw NumericalError(
+        "no surface was found: the views agree on no depth; choose views that overlap more");
+  }
   make_output_folder(folder);
   write_mesh_ply(folder / "surface.ply", open_surface, frame);
   write_mesh_ply(folder / "watertight.ply", watertight, frame);

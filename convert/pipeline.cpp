@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
+
+#include <nlohmann/json.hpp>
 
 #include "convert/frame_json.h"
 #include "convert/length.h"
@@ -35,9 +36,11 @@ struct Run {
   const RunRequest& request;
   Terminal& terminal;
   RunRecord record;
-  Scene scene;                       ///< As opened: world coordinates.
-  std::optional<Model> model;        ///< Loaded when a stage needs it.
-  std::optional<TriangleMesh> mesh;  ///< Watertight; loaded when a stage needs it.
+  Scene scene;  ///< As opened: world coordinates.
+  // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
+  // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
+  std::optional<Model> model;
+  std::optional<TriangleMesh> mesh;  ///< Watertight.
 };
 
 Json request_json(const RunRequest& request, const Scene& scene) {
@@ -91,11 +94,10 @@ std::vector<int> views_with_photograph(const Scene& scene) {
 }
 
 Json run_model(Run& run, const Progress& progress) {
-  TrainedModel trained = train_model(run.scene, PriorsOptions{}, progress);
+  const TrainedModel trained = train_model(run.scene, PriorsOptions{}, progress);
   write_model(run.request.output / "model", trained.model);
-  run.model = std::move(trained.model);
   return {{"description", kModelDescription},
-          {"gaussians", run.model->gaussians.size()},
+          {"gaussians", trained.model.gaussians.size()},
           {"alignment",
            {{"scale", trained.report.alignment.scale},
             {"offset", trained.report.alignment.offset},
@@ -119,7 +121,7 @@ void write_mesh_pictures(const Run& run, const TriangleMesh& mesh) {
   const Scene& scene = run.model->scene;
   const Camera& reference =
       scene.views[static_cast<size_t>(scene.input[scene.input.size() / 2])].camera;
-  constexpr double kSide = 0.6;      // [rad]
+  constexpr double kSide = 0.6;       // [rad]
   constexpr double kFromAbove = 0.3;  // [rad]
   const Camera front = overview_camera(mesh, reference, 0, 0);
   const Camera side = overview_camera(mesh, reference, kSide, kFromAbove);
@@ -136,16 +138,16 @@ Json run_mesh(Run& run, const Progress& progress) {
   FusedVolume fused = fuse_model(
       model, run.request.voxel_size, run.request.memory_limit, part_of(progress, 0, 0.3));
   const TriangleMesh open = open_surface(fused.volume, {});
-  WatertightResult closed = watertight_surface(fused.volume, {}, part_of(progress, 0.35, 0.85));
+  const WatertightResult closed =
+      watertight_surface(fused.volume, {}, part_of(progress, 0.35, 0.85));
   write_volume(run.request.output / "volume.vdb", fused.volume, frame);
   const Json files = write_mesh_files(
       run.request.output / "mesh", open, closed.mesh, frame, world_up(model.scene));
-  run.mesh = std::move(closed.mesh);
-  write_mesh_pictures(run, *run.mesh);
+  write_mesh_pictures(run, closed.mesh);
   report(progress, 1);
   return {{"fusion", fusion_to_json(fused.report, frame)},
           {"method", closed.method},
-          {"certificate", certificate_to_json(closed.certificate, *run.mesh, frame)},
+          {"certificate", certificate_to_json(closed.certificate, closed.mesh, frame)},
           {"open_surface_faces", open.faces.size()},
           {"output", files}};
 }
@@ -160,9 +162,9 @@ Json run_web(Run& run, const Progress& progress) {
   if (!run.request.max_error.empty()) {
     options.max_error = parse_length(run.request.max_error, frame) * frame.scale;
   }
-  options.summary_json =
-      Json({{"model", kModelDescription}, {"certificate", run.record.result("mesh")["certificate"]}})
-          .dump();
+  options.summary_json = Json({{"model", kModelDescription},
+                               {"certificate", run.record.result("mesh")["certificate"]}})
+                             .dump();
   make_output_folder(run.request.output / "web");
   const GlbReport glb = write_glb(run.request.output / "web/asset.glb", mesh, frame, options);
   return {{"asset.glb",
@@ -178,13 +180,12 @@ Json report_json(const Run& run) {
   for (const View& view : scene.views) photographs[view.name] = view.image_path.string();
   Json stages = Json::array();
   for (const auto& [name, stage] : run.record.json()["stages"].items()) {
-    stages.push_back({{"stage", name},
-                      {"seconds", stage["seconds"]},
-                      {"peak_memory", stage["peak_memory"]}});
+    stages.push_back(
+        {{"stage", name}, {"seconds", stage["seconds"]}, {"peak_memory", stage["peak_memory"]}});
   }
   const Json mesh = run.record.result("mesh");
   Json out = {{"program", "cgs 0.1.0"},
-              {"scene", scene.kind},
+              {"scene", run.scene.kind},
               {"folder", run.request.scene.string()},
               {"units", scene.frame.unit_name()},
               {"scale_source", scale_source_name(scene.frame.scale_source)},
@@ -222,8 +223,7 @@ std::vector<Stage> stages_of(const Scene& scene) {
   std::vector<std::string> view_files;
   for (const int i : views_with_photograph(scene)) {
     const std::string stem = "views/" + scene.views[static_cast<size_t>(i)].name;
-    for (const char* suffix :
-         {".exr", ".color.png", ".depth.png", ".normal.png", ".hole.png"}) {
+    for (const char* suffix : {".exr", ".color.png", ".depth.png", ".normal.png", ".hole.png"}) {
       view_files.push_back(stem + suffix);
     }
   }
@@ -236,8 +236,13 @@ std::vector<Stage> stages_of(const Scene& scene) {
           {"evaluation", "held-out views", {}, run_evaluation},
           {"mesh",
            "volume and mesh",
-           {"volume.vdb", "mesh/surface.ply", "mesh/watertight.ply", "mesh/watertight.obj",
-            "mesh/front.png", "mesh/side.png", "mesh/front.provenance.png",
+           {"volume.vdb",
+            "mesh/surface.ply",
+            "mesh/watertight.ply",
+            "mesh/watertight.obj",
+            "mesh/front.png",
+            "mesh/side.png",
+            "mesh/front.provenance.png",
             "mesh/side.provenance.png"},
            run_mesh},
           {"web", "web asset", {"web/asset.glb"}, run_web},

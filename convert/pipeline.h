@@ -2,8 +2,9 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "convert/model.h"
 #include "convert/terminal.h"
@@ -17,10 +18,11 @@ struct RunRequest {
   std::filesystem::path scene;
   std::filesystem::path output;
   SceneOptions scene_options;
-  std::string assume_unit;      ///< Unit of one scene unit where the scene does not say; empty = unknown.
-  std::string voxel_size;       ///< Empty = from the pixel footprint.
-  std::string max_error;        ///< Of the compressed mesh; empty = 1/16384 of its size.
-  size_t memory_limit = 0;      ///< [bytes]; 0 = 80 % of what is free.
+  std::string
+      assume_unit;  ///< Unit of one scene unit where the scene does not say; empty = unknown.
+  std::string voxel_size;   ///< Empty = from the pixel footprint.
+  std::string max_error;    ///< Of the compressed mesh; empty = 1/16384 of its size.
+  size_t memory_limit = 0;  ///< [bytes]; 0 = 80 % of what is free.
   bool overwrite = false;
 };
 

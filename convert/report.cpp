@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <sstream>
+
+#include <nlohmann/json.hpp>
 
 #include "io/atomic_file.h"
 #include "io/image.h"
@@ -38,11 +39,20 @@ std::string escaped(const std::string& text) {
   std::string out;
   for (const char c : text) {
     switch (c) {
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '&': out += "&amp;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '&':
+        out += "&amp;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
     }
   }
   return out;
@@ -191,9 +201,10 @@ void write_html_report(const std::filesystem::path& folder, const Json& report) 
           "<meta name=viewport content=\"width=device-width\"><title>"
        << escaped(title) << "</title>\n<style>" << kStyle << "</style></head><body>\n<h1>"
        << escaped(std::filesystem::path(title).filename().string()) << "</h1>\n<p>"
-       << escaped(report["scene"].get<std::string>()) << " scene, units: "
-       << escaped(report["units"].get<std::string>()) << " (scale "
-       << escaped(report["scale_source"].get<std::string>()) << ")</p>\n<p class=note>This model is an "
+       << escaped(report["scene"].get<std::string>())
+       << " scene, units: " << escaped(report["units"].get<std::string>()) << " (scale "
+       << escaped(report["scale_source"].get<std::string>())
+       << ")</p>\n<p class=note>This model is an "
        << escaped(report["model"]["description"].get<std::string>()) << ".</p>\n";
   for (const Json& warning : report["warnings"]) {
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";

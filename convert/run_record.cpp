@@ -39,10 +39,10 @@ RunRecord::RunRecord(std::filesystem::path folder, Json request, bool overwrite)
       return;
     }
     if (!overwrite) {
-      throw InvalidInput(printable(folder_) + " holds the results of another run" +
-                         (readable ? " (different: " + difference(old["request"], request) + ")"
-                                   : "") +
-                         "; choose another folder, or say --overwrite");
+      throw InvalidInput(
+          printable(folder_) + " holds the results of another run" +
+          (readable ? " (different: " + difference(old["request"], request) + ")" : "") +
+          "; choose another folder, or say --overwrite");
     }
   }
   json_ = {{"program", "cgs 0.1.0"}, {"request", std::move(request)}, {"stages", Json::object()}};

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/terminal.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include "libcgs/core/error.h"
 
@@ -28,8 +28,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 }  // namespace
 
-Terminal::Terminal(bool quiet)
-    : quiet_(quiet), rewrites_(::isatty(STDERR_FILENO) == 1), start_() {}
+Terminal::Terminal(bool quiet) : quiet_(quiet), rewrites_(::isatty(STDERR_FILENO) == 1), start_() {}
 
 Progress Terminal::begin(const std::string& stage) {
   stage_ = stage;

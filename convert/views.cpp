@@ -2,6 +2,7 @@
 #include "convert/views.h"
 
 #include <algorithm>
+
 #include <nlohmann/json.hpp>
 
 #include "convert/pictures.h"

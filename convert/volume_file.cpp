@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/volume_file.h"
 
-#include <openvdb/tools/ChangeBackground.h>
-#include <openvdb/tools/ValueTransformer.h>
+#include <array>
 
 #include <nlohmann/json.hpp>
+#include <openvdb/tools/ChangeBackground.h>
+#include <openvdb/tools/ValueTransformer.h>
 
 #include "convert/frame_json.h"
 #include "io/vdb.h"
@@ -33,13 +34,14 @@ openvdb::FloatGrid::Ptr scaled_lengths(const openvdb::FloatGrid::Ptr& grid,
                                        const Eigen::Vector3d& offset) {
   auto out = placed<openvdb::FloatGrid>(grid, scale, offset, true);
   const auto factor = static_cast<float>(scale);
-  openvdb::tools::foreach(
+  openvdb::tools::foreach (
       out->beginValueAll(), [factor](const auto& it) { it.setValue(*it * factor); }, true, false);
   openvdb::tools::changeBackground(out->tree(), grid->background() * factor);
   return out;
 }
 
 constexpr const char* kFrameKey = "cgs_frame";
+constexpr const char* kBoundsKey = "cgs_bounds";  // min and max corner [internal units]
 
 template <typename Grid>
 typename Grid::Ptr find_grid(const openvdb::GridPtrVec& grids,
@@ -54,11 +56,28 @@ typename Grid::Ptr find_grid(const openvdb::GridPtrVec& grids,
 
 Frame frame_of(const openvdb::GridBase& grid, const std::filesystem::path& path) {
   try {
-    return frame_from_json(
-        nlohmann::ordered_json::parse(grid.metaValue<std::string>(kFrameKey)));
+    return frame_from_json(nlohmann::ordered_json::parse(grid.metaValue<std::string>(kFrameKey)));
   } catch (const std::exception&) {
-    throw BadInput(Defect::Schema, path, "grid 'tsdf' has no readable frame (" +
-                                             std::string(kFrameKey) + ")");
+    throw BadInput(
+        Defect::Schema, path, "grid 'tsdf' has no readable frame (" + std::string(kFrameKey) + ")");
+  }
+}
+
+std::string bounds_text(const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector3d& a = box.min();
+  const Eigen::Vector3d& b = box.max();
+  return nlohmann::ordered_json({a.x(), a.y(), a.z(), b.x(), b.y(), b.z()}).dump();
+}
+
+Eigen::AlignedBox3d bounds_of(const openvdb::GridBase& grid, const std::filesystem::path& path) {
+  try {
+    const auto v = nlohmann::ordered_json::parse(grid.metaValue<std::string>(kBoundsKey))
+                       .get<std::array<double, 6>>();
+    return {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Vector3d(v[3], v[4], v[5])};
+  } catch (const std::exception&) {
+    throw BadInput(Defect::Schema,
+                   path,
+                   "grid 'tsdf' has no readable bounds (" + std::string(kBoundsKey) + ")");
   }
 }
 
@@ -79,6 +98,7 @@ void write_volume(const std::filesystem::path& path, const Volume& volume, const
   };
   auto tsdf = scaled_lengths(volume.tsdf, scale, offset);
   tsdf->insertMeta(kFrameKey, openvdb::StringMetadata(frame_to_json(frame).dump()));
+  tsdf->insertMeta(kBoundsKey, openvdb::StringMetadata(bounds_text(volume.bounds)));
   tsdf->setGridClass(openvdb::GRID_UNKNOWN);  // one-sided and open: no valid level set
   std::vector<openvdb::GridBase::ConstPtr> grids = {
       named<openvdb::FloatGrid>(tsdf, "tsdf"),
@@ -115,6 +135,7 @@ VolumeFile read_volume(const std::filesystem::path& path) {
   plain.operator()<openvdb::Vec3SGrid>(volume.color, "color");
   plain.operator()<openvdb::FloatGrid>(volume.support, "support");
   plain.operator()<openvdb::Int32Grid>(volume.state, "state");
+  volume.bounds = bounds_of(*tsdf, path);
   volume.voxel_size = static_cast<float>(volume.tsdf->voxelSize().x());
   return file;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/commands/common_options.h"
 
-#include <tbb/global_control.h>
-
 #include <memory>
-#include <opencv2/core/utility.hpp>
 #include <thread>
+
+#include <opencv2/core/utility.hpp>
+#include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
 

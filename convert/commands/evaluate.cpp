@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <iostream>
 #include <memory>
+
 #include <nlohmann/json.hpp>
 
 #include "convert/commands/commands.h"
@@ -24,13 +25,8 @@ struct EvaluateArgs {
 };
 
 void print_table(const nlohmann::ordered_json& report) {
-  std::printf("%-24s %8s %8s %10s %10s %8s\n",
-              "view",
-              "PSNR",
-              "SSIM",
-              "PSNR seen",
-              "SSIM seen",
-              "holes");
+  std::printf(
+      "%-24s %8s %8s %10s %10s %8s\n", "view", "PSNR", "SSIM", "PSNR seen", "SSIM seen", "holes");
   const auto row = [](const std::string& name, const nlohmann::ordered_json& r) {
     std::printf("%-24s %8.2f %8.3f %10.2f %10.3f %7.1f%%\n",
                 name.c_str(),
@@ -71,7 +67,8 @@ void add_evaluate(CLI::App& app) {
       "evaluate", "PSNR and SSIM on held-out views, over all pixels and without holes");
   cmd->add_option("model", args->model, "Model folder, e.g. out/portal/model")->required();
   cmd->add_option("--scene", args->scene, "Scene folder, where the photographs have moved");
-  cmd->add_option("--views", args->views, "Views: indices in name order or names; default held out");
+  cmd->add_option(
+      "--views", args->views, "Views: indices in name order or names; default held out");
   add_common_options(*cmd, args->common);
   cmd->footer("Example: cgs evaluate out/portal/model --scene photos/portal --json");
   cmd->callback([args] { run_evaluate(*args); });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <iostream>
 #include <memory>
+
 #include <nlohmann/json.hpp>
 
 #include "convert/commands/commands.h"
@@ -39,7 +40,8 @@ void run_fuse(const FuseArgs& args) {
 void add_fuse(CLI::App& app) {
   auto args = std::make_shared<FuseArgs>();
   auto* cmd = app.add_subcommand(
-      "fuse", "Model to OpenVDB volume: signed distance, weight, colour, free / occupied / never seen");
+      "fuse",
+      "Model to OpenVDB volume: signed distance, weight, colour, free / occupied / never seen");
   cmd->add_option("model", args->model, "Model folder, e.g. out/portal/model")->required();
   cmd->add_option("-o,--output", args->output, "Volume to write (.vdb)")->required();
   cmd->add_option("--voxel-size",

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <iostream>
 #include <memory>
+
 #include <nlohmann/json.hpp>
 
 #include "convert/commands/commands.h"
@@ -33,7 +34,10 @@ Json camera_json(const Scene& scene, int index) {
   const DepthRange range = listed(scene.input) ? depth_range(scene, index) : DepthRange{};
   return {{"index", index},
           {"name", view.name},
-          {"role", listed(scene.input) ? "input" : listed(scene.held_out) ? "held out" : "no image"},
+          {"role",
+           listed(scene.input)      ? "input"
+           : listed(scene.held_out) ? "held out"
+                                    : "no image"},
           {"width", camera.width},
           {"height", camera.height},
           {"fx", camera.fx},
@@ -52,8 +56,8 @@ Json baselines_json(const Scene& scene) {
       const View& a = scene.views[static_cast<size_t>(scene.input[i])];
       const View& b = scene.views[static_cast<size_t>(scene.input[j])];
       const double length = (a.camera.center() - b.camera.center()).norm();
-      const double cosine = a.camera.world_from_cam.rotation().col(2).dot(
-          b.camera.world_from_cam.rotation().col(2));
+      const double cosine =
+          a.camera.world_from_cam.rotation().col(2).dot(b.camera.world_from_cam.rotation().col(2));
       const DepthRange range = depth_range(scene, scene.input[i]);
       const double middle = 2 / (1 / range.near + 1 / range.far);
       rows.push_back({{"views", {a.name, b.name}},
@@ -71,9 +75,10 @@ void add_baseline_warnings(const Json& baselines, Json& warnings) {
   for (const Json& row : baselines) {
     largest = std::max(largest, row["baseline_to_depth"].get<double>());
     if (row["angle_degrees"].get<double>() > 60) {
-      warnings.push_back("views " + row["views"][0].get<std::string>() + " and " +
-                         row["views"][1].get<std::string>() +
-                         " look in directions more than 60 degrees apart; they may share too little");
+      warnings.push_back(
+          "views " + row["views"][0].get<std::string>() + " and " +
+          row["views"][1].get<std::string>() +
+          " look in directions more than 60 degrees apart; they may share too little");
     }
   }
   if (largest < 0.02) {
@@ -91,30 +96,32 @@ Json scene_json(const Scene& scene) {
   const Json baselines = baselines_json(scene);
   Json warnings = scene.warnings;
   add_baseline_warnings(baselines, warnings);
-  return {{"kind", scene.kind},
-          {"counts",
-           {{"views", scene.views.size()},
-            {"input", scene.input.size()},
-            {"held_out", scene.held_out.size()},
-            {"missing_images", scene.missing.size()},
-            {"sparse_points", scene.points.size()}}},
-          {"bounds", {{"camera_min", vector_json(box.min())}, {"camera_max", vector_json(box.max())}}},
-          {"units", scene.frame.unit_name()},
-          {"cameras", cameras},
-          {"baselines", baselines},
-          {"missing", scene.missing},
-          {"warnings", warnings}};
+  return {
+      {"kind", scene.kind},
+      {"counts",
+       {{"views", scene.views.size()},
+        {"input", scene.input.size()},
+        {"held_out", scene.held_out.size()},
+        {"missing_images", scene.missing.size()},
+        {"sparse_points", scene.points.size()}}},
+      {"bounds", {{"camera_min", vector_json(box.min())}, {"camera_max", vector_json(box.max())}}},
+      {"units", scene.frame.unit_name()},
+      {"cameras", cameras},
+      {"baselines", baselines},
+      {"missing", scene.missing},
+      {"warnings", warnings}};
 }
 
 void print_scene(const Json& info) {
   const Json& counts = info["counts"];
-  std::printf("%s scene: %zu views (%zu input, %zu held out, %zu images missing), %zu sparse points\n",
-              info["kind"].get<std::string>().c_str(),
-              counts["views"].get<size_t>(),
-              counts["input"].get<size_t>(),
-              counts["held_out"].get<size_t>(),
-              counts["missing_images"].get<size_t>(),
-              counts["sparse_points"].get<size_t>());
+  std::printf(
+      "%s scene: %zu views (%zu input, %zu held out, %zu images missing), %zu sparse points\n",
+      info["kind"].get<std::string>().c_str(),
+      counts["views"].get<size_t>(),
+      counts["input"].get<size_t>(),
+      counts["held_out"].get<size_t>(),
+      counts["missing_images"].get<size_t>(),
+      counts["sparse_points"].get<size_t>());
   std::printf("units: %s\n\n%5s %-24s %-9s %11s %9s %22s\n",
               info["units"].get<std::string>().c_str(),
               "index",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <iostream>
 #include <memory>
+
 #include <nlohmann/json.hpp>
 
 #include "convert/commands/commands.h"
@@ -27,8 +28,7 @@ void run_mesh_command(const MeshArgs& args) {
   VolumeFile file = read_volume(args.volume);
   const Progress progress = terminal.begin("mesh");
   const TriangleMesh open = open_surface(file.volume, {});
-  const WatertightResult closed =
-      watertight_surface(file.volume, {}, part_of(progress, 0.1, 0.9));
+  const WatertightResult closed = watertight_surface(file.volume, {}, part_of(progress, 0.1, 0.9));
   const Eigen::Vector3d up(args.up[0], args.up[1], args.up[2]);
   const nlohmann::ordered_json files =
       write_mesh_files(args.output, open, closed.mesh, file.frame, up);
@@ -49,7 +49,8 @@ void run_mesh_command(const MeshArgs& args) {
 
 void add_mesh(CLI::App& app) {
   auto args = std::make_shared<MeshArgs>();
-  auto* cmd = app.add_subcommand("mesh", "Volume to meshes: open surface, and watertight with certificate");
+  auto* cmd =
+      app.add_subcommand("mesh", "Volume to meshes: open surface, and watertight with certificate");
   cmd->add_option("volume", args->volume, "Volume written by fuse or run (.vdb)")->required();
   cmd->add_option("-o,--output", args->output, "Folder to write")->required();
   cmd->add_option("--up", args->up, "Direction that is up in the scene, three numbers")

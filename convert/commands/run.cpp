@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <iostream>
 #include <memory>
+
 #include <nlohmann/json.hpp>
 
 #include "convert/commands/commands.h"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/core/camera.h"
 
-#include <tbb/parallel_for.h>
-
 #include <cmath>
+
+#include <tbb/parallel_for.h>
 
 namespace cgs {
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace cgs {
 
@@ -23,8 +24,8 @@ struct Frame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();       ///< World point of internal (0, 0, 0).
   double scale = 1.0;                                     ///< World units per internal unit; 2^k.
   Eigen::Vector3d file_origin = Eigen::Vector3d::Zero();  ///< World point of (0, 0, 0) in files.
-  double metres_per_unit = 0;  ///< Metres per world unit; 0 = unknown.
-  double metres_sigma = 0;     ///< Standard deviation of metres_per_unit; 0 = not estimated.
+  double metres_per_unit = 0;                             ///< Metres per world unit; 0 = unknown.
+  double metres_sigma = 0;  ///< Standard deviation of metres_per_unit; 0 = not estimated.
   ScaleSource scale_source = ScaleSource::Unknown;
 
   bool has_metric_scale() const { return metres_per_unit > 0; }

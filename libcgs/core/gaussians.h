@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <Eigen/Geometry>
 #include <cstdint>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include "libcgs/core/frame.h"
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <Eigen/Core>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
+
+#include <Eigen/Core>
 
 namespace cgs {
 
@@ -33,7 +34,8 @@ struct Raster {
 
 using ColorImage = Raster<Eigen::Vector3f>;  ///< sRGB-coded RGB in [0, 1], as photographs store it.
 using DepthMap = Raster<float>;              ///< z-depth [internal units], NaN = unknown.
-using NormalMap = Raster<Eigen::Vector3f>;   ///< Unit normals in world axes, towards the camera; 0 = unknown.
-using MaskMap = Raster<uint8_t>;             ///< 1 = set, 0 = not set.
+using NormalMap =
+    Raster<Eigen::Vector3f>;      ///< Unit normals in world axes, towards the camera; 0 = unknown.
+using MaskMap = Raster<uint8_t>;  ///< 1 = set, 0 = not set.
 
 }  // namespace cgs

@@ -34,8 +34,8 @@ std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh) {
 std::array<double, 4> area_by_provenance(const TriangleMesh& mesh) {
   std::array<double, 4> area = {};
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    const auto label = static_cast<size_t>(mesh.provenance.empty() ? Provenance::Inferred
-                                                                   : mesh.provenance[f]);
+    const auto label =
+        static_cast<size_t>(mesh.provenance.empty() ? Provenance::Inferred : mesh.provenance[f]);
     area.at(label) += 0.5 * area_vector(mesh, mesh.faces[f]).norm();
   }
   return area;

@@ -54,7 +54,8 @@ SweepSource source_of(const Camera& reference, const Camera& other, double inver
   const Eigen::Isometry3d other_from_reference = other.cam_from_world() * reference.world_from_cam;
   SweepSource source;
   const Eigen::Vector3d shift = other.intrinsics() * other_from_reference.translation();
-  source.A = other.intrinsics() * other_from_reference.rotation() * reference.intrinsics().inverse();
+  source.A =
+      other.intrinsics() * other_from_reference.rotation() * reference.intrinsics().inverse();
   source.A.col(2) += inverse_far * shift;
   source.b = shift;
   return source;

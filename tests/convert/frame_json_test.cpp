@@ -2,7 +2,6 @@
 #include "convert/frame_json.h"
 
 #include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
 
 namespace cgs {

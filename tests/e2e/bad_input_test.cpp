@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <gtest/gtest.h>
-
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
+
+#include <gtest/gtest.h>
 
 #include "io/png.h"
 #include "tests/support/run_cgs.h"
@@ -34,7 +35,8 @@ std::string frame_json(const std::string& file, double x) {
 }
 
 void write_transforms(const TempDir& dir, const std::vector<std::string>& frames) {
-  std::string text = R"({"w": 32, "h": 24, "fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "frames": [)";
+  std::string text =
+      R"({"w": 32, "h": 24, "fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "frames": [)";
   for (size_t i = 0; i < frames.size(); ++i) text += (i == 0 ? "" : ", ") + frames[i];
   test::write_bytes(dir / "scene/transforms.json", text + "]}");
 }
@@ -132,7 +134,8 @@ TEST(BadInput, SameCameraCentre) {
   expect_refused(dir, 3, {"VALUE", "baseline"});
 }
 
-// poses_bounds.npy of `rows` x `columns` float64 in NPY format 1.0.
+// poses_bounds.npy of `rows` x `columns` float64 in NPY format 1.0: cameras side by side that look
+// along -z, for pictures of 32 x 24.
 std::string npy(int rows, int columns) {
   std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (" +
                        std::to_string(rows) + ", " + std::to_string(columns) + "), }";
@@ -142,7 +145,13 @@ std::string npy(int rows, int columns) {
   bytes += static_cast<char>(header.size());
   bytes += '\0';
   bytes += header;
-  return bytes + std::string(size_t(rows) * size_t(columns) * 8, '\0');
+  for (int row = 0; row < rows; ++row) {
+    // Columns of the 3 x 5 block: down, right, backward, position, (height, width, focal).
+    const std::array<double, 17> values = {
+        0, 1, 0, 0.1 * row, 24, -1, 0, 0, 0, 32, 0, 0, 1, 0, 30, 1, 10};
+    bytes.append(reinterpret_cast<const char*>(values.data()), size_t(columns) * sizeof(double));
+  }
+  return bytes;
 }
 
 void write_llff(const TempDir& dir, const std::string& poses) {
@@ -199,7 +208,8 @@ TEST(Help, EveryCommandEndsWithAWorkedExample) {
   for (const auto* command : {"run", "info", "train", "evaluate", "render", "fuse", "mesh"}) {
     const ProgramResult result = run_cgs(std::string(command) + " --help");
     EXPECT_EQ(result.exit_code, 0) << command;
-    EXPECT_NE(result.out.find("Example: cgs " + std::string(command)), std::string::npos) << command;
+    EXPECT_NE(result.out.find("Example: cgs " + std::string(command)), std::string::npos)
+        << command;
   }
 }
 

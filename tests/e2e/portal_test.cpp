@@ -2,7 +2,6 @@
 // The whole chain on the portal capture, measured against its truth. CTest runs every test in a
 // process of its own, so the run is kept in the build folder and resumed.
 #include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
 
 #include "samples/capture/files.h"
@@ -12,11 +11,14 @@
 namespace cgs {
 namespace {
 
-using test::run_cgs;
 using nlohmann::ordered_json;
+using test::run_cgs;
 
 const std::filesystem::path kCapture = std::filesystem::path(CGS_TEST_FOLDER) / "capture";
+const std::filesystem::path kSmallCapture =
+    std::filesystem::path(CGS_TEST_FOLDER) / "capture_small";
 const std::filesystem::path kRun = std::filesystem::path(CGS_TEST_FOLDER) / "run";
+const std::filesystem::path kSmallRun = std::filesystem::path(CGS_TEST_FOLDER) / "run_small";
 
 void make_capture(const std::filesystem::path& folder, int downscale) {
   if (std::filesystem::exists(folder / "capture.json")) return;
@@ -43,7 +45,8 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
 
   const auto report = ordered_json::parse(test::read_bytes(kRun / "report.json"));
   const auto& certificate = report["certificate"];
-  for (const auto* property : {"passed", "closed", "edge_manifold", "vertex_manifold", "oriented"}) {
+  for (const auto* property :
+       {"passed", "closed", "edge_manifold", "vertex_manifold", "oriented"}) {
     EXPECT_TRUE(certificate[property].get<bool>()) << property;
   }
   EXPECT_EQ(certificate["self_intersections"], 0);
@@ -53,24 +56,23 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
 }
 
 TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
-  const auto capture = kCapture.string() + "_small";
-  make_capture(capture, 3);
-  const test::TempDir dir;
-  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "out")).exit_code, 0);
-  const auto splats_written = std::filesystem::last_write_time(dir / "out/model/gaussians.ply");
-  const auto glb = test::read_bytes(dir / "out/web/asset.glb");
-  std::filesystem::remove(dir / "out/web/asset.glb");
-  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "out")).exit_code, 0);
-  EXPECT_EQ(test::read_bytes(dir / "out/web/asset.glb"), glb);
-  EXPECT_EQ(std::filesystem::last_write_time(dir / "out/model/gaussians.ply"), splats_written);
+  make_capture(kSmallCapture, 3);
+  std::filesystem::remove_all(kSmallRun);
+  const std::string arguments = run_arguments(kSmallCapture, kSmallRun) + " --voxel-size 8cm";
+  ASSERT_EQ(run_cgs(arguments).exit_code, 0);
+  const auto splats_written = std::filesystem::last_write_time(kSmallRun / "model/gaussians.ply");
+  const auto glb = test::read_bytes(kSmallRun / "web/asset.glb");
+  std::filesystem::remove(kSmallRun / "web/asset.glb");
+  ASSERT_EQ(run_cgs(arguments).exit_code, 0);
+  EXPECT_TRUE(test::read_bytes(kSmallRun / "web/asset.glb") == glb);
+  EXPECT_EQ(std::filesystem::last_write_time(kSmallRun / "model/gaussians.ply"), splats_written);
 }
 
 TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
-  const auto capture = kCapture.string() + "_small";
-  make_capture(capture, 3);
+  make_capture(kSmallCapture, 3);
   const test::TempDir dir;
-  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "1") + " --threads 1").exit_code, 0);
-  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "3") + " --threads 3").exit_code, 0);
+  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "1") + " --threads 1").exit_code, 0);
+  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "3") + " --threads 3").exit_code, 0);
   for (const auto* file : {"model/gaussians.ply",
                            "views/view_04.exr",
                            "volume.vdb",
@@ -83,10 +85,10 @@ TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
 }
 
 TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
-  const auto capture = kCapture.string() + "_small";
-  make_capture(capture, 3);
+  make_capture(kSmallCapture, 3);
   const test::TempDir dir;
-  const auto result = run_cgs("run " + capture + " --views 0,1,2 --json -o " + (dir / "out").string());
+  const auto result = run_cgs("run " + kSmallCapture.string() + " --views 0,1,2 --json -o " +
+                              (dir / "out").string());
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
   EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.3mf"));
@@ -95,13 +97,12 @@ TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
 }
 
 TEST(Portal, StagesByHandGiveTheFilesOfARun) {
-  const auto capture = kCapture.string() + "_small";
-  make_capture(capture, 3);
+  make_capture(kSmallCapture, 3);
   const test::TempDir dir;
   const std::string out = dir.path().string();
-  ASSERT_EQ(run_cgs(run_arguments(capture, dir / "run")).exit_code, 0);
-  ASSERT_EQ(run_cgs("train " + capture + " --views view_01,view_02,view_03 --assume-unit m -q -o " +
-                    out + "/model")
+  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "run")).exit_code, 0);
+  ASSERT_EQ(run_cgs("train " + kSmallCapture.string() +
+                    " --views view_01,view_02,view_03 --assume-unit m -q -o " + out + "/model")
                 .exit_code,
             0);
   EXPECT_EQ(run_cgs("render " + out + "/model -q -o " + out + "/views").exit_code, 0);

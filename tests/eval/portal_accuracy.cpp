@@ -15,9 +15,10 @@ int main(int argc, char** argv) {
   try {
     const auto m = cgs::test::measure_portal(argv[1]);
     for (const auto& view : m.inputs) {
-      std::printf("%s  depth within 1 %% of the truth: %.1f %% of pixels seen by two views or more\n",
-                  view.name.c_str(),
-                  100 * view.depth_within_1_percent);
+      std::printf(
+          "%s  depth within 1 %% of the truth: %.1f %% of pixels seen by two views or more\n",
+          view.name.c_str(),
+          100 * view.depth_within_1_percent);
     }
     for (const auto& view : m.held_out) {
       std::printf("%s  holes: true %.1f %%, found %.1f %%, IoU %.3f\n",

@@ -24,7 +24,7 @@ struct PortalMeasurement {
   std::vector<InputView> inputs;
   std::vector<HeldOutView> held_out;
   double depth_within_1_percent = 0;  ///< Mean over the input views.
-  double hole_iou = 0;  ///< Over the pixels of all held-out views together.
+  double hole_iou = 0;                ///< Over the pixels of all held-out views together.
   ObservedVolumeError volume;
 };
 

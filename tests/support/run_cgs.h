@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <sys/wait.h>
-
 #include <cstdlib>
 #include <string>
+
+#include <sys/wait.h>
 
 #include "tests/support/temp_dir.h"
 

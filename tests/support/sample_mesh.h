@@ -17,9 +17,8 @@ inline TriangleMesh labelled_sphere(int rings = 12, int sectors = 16) {
   TriangleMesh mesh;
   const Eigen::Vector3f center(0.05f, -0.1f, 0.15f);
   const auto add = [&](double polar, double around) {
-    const Eigen::Vector3d n(std::sin(polar) * std::cos(around),
-                            std::sin(polar) * std::sin(around),
-                            std::cos(polar));
+    const Eigen::Vector3d n(
+        std::sin(polar) * std::cos(around), std::sin(polar) * std::sin(around), std::cos(polar));
     mesh.vertices.push_back(center + 0.4f * n.cast<float>());
     mesh.normals.push_back(n.cast<float>().normalized());
     // Whole bytes, so that 8-bit files lose nothing.

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/volume_file.h"
+
+#include <gtest/gtest.h>
+
+#include "io/vdb.h"
+
+#include "libcgs/core/error.h"
+#include "tests/support/temp_dir.h"
+
+namespace cgs {
+namespace {
+
+Volume small_volume() {
+  openvdb::initialize();
+  Volume volume;
+  volume.voxel_size = 0.1f;
+  const auto transform = openvdb::math::Transform::createLinearTransform(0.1);
+  volume.tsdf = openvdb::FloatGrid::create(0.3f);
+  volume.weight = openvdb::FloatGrid::create(0);
+  volume.support = openvdb::FloatGrid::create(0);
+  volume.sigma = openvdb::FloatGrid::create(0);
+  volume.color = openvdb::Vec3SGrid::create(openvdb::Vec3s(0));
+  volume.state = openvdb::Int32Grid::create(0);
+  const openvdb::Coord at(3, -2, 7);
+  volume.tsdf->tree().setValue(at, 0.07f);
+  volume.sigma->tree().setValue(at, 0.01f);
+  volume.weight->tree().setValue(at, 2);
+  volume.support->tree().setValue(at, 3);
+  volume.color->tree().setValue(at, openvdb::Vec3s(0.1f, 0.2f, 0.3f));
+  volume.state->tree().setValueOn(at, 2);
+  for (const openvdb::GridBase::Ptr& grid : std::initializer_list<openvdb::GridBase::Ptr>{
+           volume.tsdf, volume.weight, volume.support, volume.sigma, volume.color, volume.state}) {
+    grid->setTransform(transform->copy());
+  }
+  volume.bounds = {Eigen::Vector3d(-0.5, -0.5, -0.5), Eigen::Vector3d(0.5, 0.7, 0.9)};
+  return volume;
+}
+
+Frame large_frame() {
+  Frame frame;
+  frame.scale = 16;
+  frame.origin = Eigen::Vector3d(100, -50, 3);
+  frame.metres_per_unit = 1;
+  return frame;
+}
+
+TEST(VolumeFile, ReadsBackTheSameBits) {
+  const test::TempDir dir;
+  const Volume volume = small_volume();
+  write_volume(dir / "v.vdb", volume, large_frame());
+  const VolumeFile file = read_volume(dir / "v.vdb");
+  const openvdb::Coord at(3, -2, 7);
+  EXPECT_EQ(file.volume.tsdf->tree().getValue(at), 0.07f);
+  EXPECT_EQ(file.volume.tsdf->background(), 0.3f);
+  EXPECT_EQ(file.volume.sigma->tree().getValue(at), 0.01f);
+  EXPECT_EQ(file.volume.support->tree().getValue(at), 3);
+  EXPECT_EQ(file.volume.state->tree().getValue(at), 2);
+  EXPECT_EQ(file.volume.voxel_size, volume.voxel_size);
+  EXPECT_EQ(file.volume.bounds.min(), volume.bounds.min());
+  EXPECT_EQ(file.volume.bounds.max(), volume.bounds.max());
+  EXPECT_EQ(file.frame.origin, large_frame().origin);
+}
+
+TEST(VolumeFile, HoldsFileCoordinatesAndLengths) {
+  const test::TempDir dir;
+  write_volume(dir / "v.vdb", small_volume(), large_frame());
+  for (const auto& grid : read_vdb(dir / "v.vdb")) {
+    if (grid->getName() != "tsdf") continue;
+    const auto tsdf = openvdb::gridPtrCast<openvdb::FloatGrid>(grid);
+    const openvdb::Vec3d p = tsdf->indexToWorld(openvdb::Coord(3, -2, 7));
+    EXPECT_NEAR(p.x(), 100 + 16 * 0.3, 1e-9);
+    EXPECT_NEAR(p.y(), -50 - 16 * 0.2, 1e-9);
+    EXPECT_NEAR(p.z(), 3 + 16 * 0.7, 1e-9);
+    EXPECT_EQ(tsdf->tree().getValue(openvdb::Coord(3, -2, 7)), 16 * 0.07f);
+    return;
+  }
+  FAIL() << "no grid tsdf";
+}
+
+TEST(VolumeFile, RefusesAVolumeOfAnotherProgram) {
+  const test::TempDir dir;
+  openvdb::initialize();
+  const auto grid = openvdb::FloatGrid::create(1);
+  grid->setName("density");
+  write_vdb(dir / "v.vdb", {grid}, {});
+  EXPECT_THROW(read_volume(dir / "v.vdb"), BadInput);
+}
+
+}  // namespace
+}  // namespace cgs
