@@ -50,13 +50,63 @@ struct Filled {
   float distance = 0;  // to the nearest evidence [pixels]
 };
 
+// Whether a witness sees past points of a view.
+class EmptySpace {
+ public:
+  EmptySpace(const Camera& camera, const CompletionWitness& witness)
+      : camera_(camera), witness_(witness) {
+    const Eigen::Isometry3d to = witness.camera->cam_from_world() * camera.world_from_cam;
+    turn_ = (witness.camera->intrinsics() * to.rotation()).cast<float>();
+    shift_ = (witness.camera->intrinsics() * to.translation()).cast<float>();
+  }
+
+  bool holds(int x, int y, float inverse_depth) const {
+    const Eigen::Vector3f ray = camera_.ray_in_cam(x + 0.5, y + 0.5).cast<float>();
+    const Eigen::Vector3f h = turn_ * ray + inverse_depth * shift_;  // z = ratio of the depths
+    if (!(h.z() > 0)) return false;
+    const float u = h.x() / h.z() - 0.5f;
+    const float v = h.y() / h.z() - 0.5f;
+    const ViewPriors& priors = *witness_.priors;
+    if (!(u >= 0 && v >= 0 && u <= static_cast<float>(priors.depth.width - 1) &&
+          v <= static_cast<float>(priors.depth.height - 1))) {
+      return false;
+    }
+    // All four pixels around must lie behind: next to a depth edge one of them alone may not.
+    const float depth = h.z() / inverse_depth;
+    const int x0 = static_cast<int>(u);
+    const int y0 = static_cast<int>(v);
+    for (int j = y0; j <= std::min(y0 + 1, priors.depth.height - 1); ++j) {
+      for (int i = x0; i <= std::min(x0 + 1, priors.depth.width - 1); ++i) {
+        if (priors.origin(i, j) != DepthOrigin::Measured) return false;
+        const float margin = std::max(kMargin * priors.depth(i, j), kSigmas * priors.sigma(i, j));
+        if (!(priors.depth(i, j) > depth + margin)) return false;
+      }
+    }
+    return true;
+  }
+
+ private:
+  static constexpr float kMargin = 0.03f;  // of the depth
+  static constexpr float kSigmas = 3;
+
+  const Camera& camera_;
+  const CompletionWitness& witness_;
+  Eigen::Matrix3f turn_;
+  Eigen::Vector3f shift_;
+};
+
 class Completion {
  public:
-  Completion(const ViewPriors& priors, const View& view, const DepthCompletionOptions& options)
+  Completion(const ViewPriors& priors,
+             const View& view,
+             const DepthCompletionOptions& options,
+             const std::vector<CompletionWitness>& witnesses)
       : priors_(priors),
         view_(view),
         options_(options),
-        filled_(priors.depth.width, priors.depth.height, Filled{}) {}
+        filled_(priors.depth.width, priors.depth.height, Filled{}) {
+    for (const CompletionWitness& witness : witnesses) empty_.emplace_back(view.camera, witness);
+  }
 
   bool usable(int x, int y) const { return view_.valid.empty() || view_.valid(x, y) != 0; }
   bool measured(int x, int y) const { return priors_.origin(x, y) == DepthOrigin::Measured; }
@@ -111,6 +161,23 @@ class Completion {
     }
   }
 
+  bool empty(int x, int y, float inverse_depth) const {
+    return std::any_of(empty_.begin(), empty_.end(), [&](const EmptySpace& space) {
+      return space.holds(x, y, inverse_depth);
+    });
+  }
+
+  // The nearest place that no witness sees past, from the given one backwards.
+  float behind_empty(int x, int y, float inverse_depth) const {
+    constexpr float kStep = 0.98f;
+    constexpr int kSteps = 50;
+    float rho = inverse_depth;
+    for (int k = 0; k < kSteps; ++k, rho *= kStep) {
+      if (!empty(x, y, rho)) return rho;
+    }
+    return inverse_depth;
+  }
+
   Filled estimate(int x, int y, float fallback) const {
     std::array<Evidence, kDirections.size()> found;
     size_t count = 0;
@@ -119,10 +186,18 @@ class Completion {
     }
     const auto whole = static_cast<float>(std::hypot(filled_.width, filled_.height));
     if (count == 0) return {fallback, 0, whole};
-    const auto end = found.begin() + static_cast<std::ptrdiff_t>(count);
+    auto end = found.begin() + static_cast<std::ptrdiff_t>(count);
     std::sort(found.begin(), end, [](const Evidence& a, const Evidence& b) {
       return a.inverse_depth < b.inverse_depth;
     });
+    const auto possible = std::remove_if(
+        found.begin(), end, [&](const Evidence& e) { return empty(x, y, e.inverse_depth); });
+    if (possible == found.begin()) {
+      found[0].inverse_depth = behind_empty(x, y, found[0].inverse_depth);
+      end = found.begin() + 1;
+    } else {
+      end = possible;
+    }
     float total = 0;
     Filled out{found[0].inverse_depth, 0, whole};
     for (auto e = found.begin(); e != end; ++e) {
@@ -170,6 +245,7 @@ class Completion {
   const ViewPriors& priors_;
   const View& view_;
   const DepthCompletionOptions& options_;
+  std::vector<EmptySpace> empty_;
   Raster<Filled> filled_;
 };
 
@@ -204,9 +280,12 @@ void DepthCompletionOptions::validate() const {
           smoothing_rounds);
 }
 
-void complete_depth(ViewPriors& priors, const View& view, const DepthCompletionOptions& options) {
+void complete_depth(ViewPriors& priors,
+                    const View& view,
+                    const DepthCompletionOptions& options,
+                    const std::vector<CompletionWitness>& witnesses) {
   options.validate();
-  Completion completion(priors, view, options);
+  Completion completion(priors, view, options, witnesses);
   completion.collect(fallback_inverse_depth(priors, options));
   completion.smooth();
   constexpr float kFloor = 0.02f;  // relative sigma next to the evidence

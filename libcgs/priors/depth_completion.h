@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <vector>
+
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/view_priors.h"
 
@@ -20,16 +22,27 @@ struct DepthCompletionOptions {
   void validate() const;
 };
 
+/// Another view as a witness of empty space: nothing stands before what it measured.
+struct CompletionWitness {
+  const Camera* camera = nullptr;      ///< Not owned; must outlive the call.
+  const ViewPriors* priors = nullptr;  ///< Likewise. Only measured pixels speak.
+};
+
 /// Gives every valid pixel a finite depth. Measured pixels are left as they are; the others get
 /// origin Completed, a large sigma and keep their confidence.
 ///
 /// Works in inverse depth. From a pixel without depth, rays in 16 directions collect the first
 /// measured pixel each, weighted down by the way and by the colour changes along it. Of those the
 /// value at `background_share` is taken: what one view alone shows is mostly what nearer surfaces
-/// hide from the others, so it belongs to the farther one. Then the values are smoothed towards
+/// hide from the others, so it belongs to the farther one. Evidence that would put the pixel where
+/// a witness looks through does not count; if none is left, the pixel moves back until no witness
+/// objects. Then the values are smoothed towards
 /// neighbours on the same surface, which turns steps on slanted surfaces into slopes.
 ///
 /// \throws NumericalError if nothing is measured and there is no fallback
-void complete_depth(ViewPriors& priors, const View& view, const DepthCompletionOptions& options);
+void complete_depth(ViewPriors& priors,
+                    const View& view,
+                    const DepthCompletionOptions& options,
+                    const std::vector<CompletionWitness>& witnesses = {});
 
 }  // namespace cgs

@@ -41,7 +41,12 @@ EstimatedPriors estimate_priors(const Scene& scene,
       completion.fallback_depth = 2 / (1 / range.near + 1 / range.far);
     }
     const View& view = scene.views[static_cast<size_t>(scene.input[i])];
-    complete_depth(out.views[i], view, completion);
+    std::vector<CompletionWitness> witnesses;
+    for (size_t j = 0; j < out.views.size(); ++j) {
+      const View& other = scene.views[static_cast<size_t>(scene.input[j])];
+      if (j != i) witnesses.push_back({&other.camera, &out.views[j]});
+    }
+    complete_depth(out.views[i], view, completion, witnesses);
     out.views[i].layer = depth_layers(out.views[i].depth, options.layers);
     out.report.coverage.push_back(coverage(out.views[i]));
   }

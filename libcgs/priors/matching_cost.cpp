@@ -17,7 +17,7 @@ constexpr float kCensusWeight = 0.6f;
 constexpr float kNoiseVariance = 4.0f;  // [gray levels squared]
 constexpr float kUnseen = 1e9f;
 constexpr float kNeutral = 0.5f;        // cost of a plane that no source sees
-constexpr float kSecondWeight = 0.35f;  // of the worse half of the sources
+constexpr float kSecondWeight = 0.15f;  // of the worse half of the sources
 
 // Rows [first - kMargin, last + kMargin) of an image, columns [-kMargin, width + kMargin), borders
 // repeated; as floats and, for the census, as integers.

@@ -120,6 +120,48 @@ TEST(CompleteDepth, LeavesMeasuredPixelsAndTrustsOthersLessTheFartherTheyAre) {
   EXPECT_EQ(e.priors.confidence(50, 10), 0);
 }
 
+// A gap between surfaces at depths 2 and 5, all of one colour, so near the left rim its pixels
+// would go with the nearer one; a second view, to the left, measures `seen` everywhere.
+Example gap_with_witness(float seen) {
+  Example e(60, 20);
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 60; ++x) {
+      if (x < 25) e.measure(x, y, 2);
+      if (x >= 35) e.measure(x, y, 5);
+    }
+  }
+  Example witness(60, 20);
+  witness.view.camera.world_from_cam.translation().x() = -0.2;
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 60; ++x) witness.measure(x, y, seen);
+  }
+  complete_depth(
+      e.priors, e.view, {.background_share = 1}, {{&witness.view.camera, &witness.priors}});
+  return e;
+}
+
+TEST(CompleteDepth, PutsNothingWhereAnotherViewLooksThrough) {
+  const Example through = gap_with_witness(5);
+  for (int x = 25; x < 35; ++x) EXPECT_NEAR(through.priors.depth(x, 10), 5, 0.01) << x;
+  const Example stopped = gap_with_witness(2);
+  for (int x = 25; x < 35; ++x) EXPECT_NEAR(stopped.priors.depth(x, 10), 2, 0.01) << x;
+}
+
+TEST(CompleteDepth, MovesBackWhereOtherViewsLeaveNoEvidence) {
+  Example e(60, 20);
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 25; ++x) e.measure(x, y, 2);
+  }
+  Example witness(60, 20);
+  witness.view.camera.world_from_cam.translation().x() = -0.2;
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 60; ++x) witness.measure(x, y, 4);
+  }
+  complete_depth(e.priors, e.view, {}, {{&witness.view.camera, &witness.priors}});
+  // As near as the margin of the test and the step of the search allow.
+  EXPECT_NEAR(e.priors.depth(30, 10), 4, 0.05 * 4);
+}
+
 TEST(CompleteDepth, NeedsEvidenceOrAFallback) {
   Example e(8, 8);
   EXPECT_THROW(complete_depth(e.priors, e.view, {}), NumericalError);
