@@ -14,6 +14,7 @@
 #include "io/scene_reader.h"
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
+#include "libcgs/priors/measured_range.h"
 #include "libcgs/render/rasterizer.h"
 
 namespace cgs {
@@ -90,6 +91,7 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
 TrainedModel train_model(Scene scene, const PriorsOptions& options, const Progress& progress) {
   load_images(scene, scene.input, part_of(progress, 0, 0.05));
   to_canonical(scene);
+  narrow_depth_ranges(scene, options.sweep);
   EstimatedPriors estimated = estimate_priors(scene, options, part_of(progress, 0.05, 0.98));
   TrainedModel trained;
   trained.report = estimated.report;

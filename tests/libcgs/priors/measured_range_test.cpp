@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/measured_range.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/stereo_scene.h"
+
+namespace cgs {
+namespace {
+
+using Eigen::Vector3d;
+
+// A wall at depth 6 with a square at depth 3 before it, in a scene that states no depth range.
+Scene wall_and_square(double contrast) {
+  const std::vector<test::TexturedPatch> patches = {
+      {Vector3d(0, 0, 6), Vector3d::UnitX(), Vector3d::UnitY(), 1e9, 1e9, contrast},
+      {Vector3d(0, 0, 3), Vector3d::UnitX(), Vector3d::UnitY(), 0.8, 0.8, contrast}};
+  std::vector<Camera> cameras;
+  for (const double x : {-0.25, 0.25}) {
+    cameras.push_back(test::looking_at({x, 0, 0}, {0, 0, 4}, 320, 240, 300));
+  }
+  Scene scene = test::photographed_scene(patches, cameras, 0.06);
+  to_canonical(scene);
+  for (View& view : scene.views) view.near = view.far = 0;
+  return scene;
+}
+
+TEST(NarrowDepthRanges, HoldWhatIsThereAndLittleMore) {
+  Scene scene = wall_and_square(1);
+  const DepthRange guess = depth_range(scene, 0);
+  narrow_depth_ranges(scene, {});
+  for (const View& view : scene.views) {
+    EXPECT_LE(view.near * scene.frame.scale, 3);
+    EXPECT_GE(view.far * scene.frame.scale, 6);
+    EXPECT_LT(1 / view.near - 1 / view.far, 0.7 * (1 / guess.near - 1 / guess.far));
+  }
+}
+
+TEST(NarrowDepthRanges, KeepWhatAViewStates) {
+  Scene scene = wall_and_square(1);
+  for (View& view : scene.views) {
+    view.near = 0.01;
+    view.far = 5;
+  }
+  narrow_depth_ranges(scene, {});
+  for (const View& view : scene.views) EXPECT_EQ(view.near, 0.01);
+}
+
+TEST(NarrowDepthRanges, NeverWidenTheGuessWhereTextureIsMissing) {
+  Scene scene = wall_and_square(0);
+  const DepthRange guess = depth_range(scene, 0);
+  narrow_depth_ranges(scene, {});
+  EXPECT_GE(depth_range(scene, 0).near, guess.near);
+  EXPECT_LE(depth_range(scene, 0).far, guess.far);
+}
+
+}  // namespace
+}  // namespace cgs
