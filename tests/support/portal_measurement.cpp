@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/support/portal_measurement.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "io/exr.h"
@@ -42,6 +43,36 @@ double fraction(const MaskMap& mask) {
   return double(set) / double(mask.data.size());
 }
 
+// 1 where the 5 x 5 pixels around hold both set and unset ones.
+MaskMap border_band(const MaskMap& mask) {
+  MaskMap band(mask.width, mask.height, 0);
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      for (int v = std::max(y - 2, 0); v <= std::min(y + 2, mask.height - 1); ++v) {
+        for (int u = std::max(x - 2, 0); u <= std::min(x + 2, mask.width - 1); ++u) {
+          band(x, y) |= mask(u, v) != mask(x, y);
+        }
+      }
+    }
+  }
+  return band;
+}
+
+/// Intersection and union of masks, summed over views.
+struct Overlap {
+  size_t both = 0;
+  size_t either = 0;
+  double iou() const { return either == 0 ? 1 : double(both) / double(either); }
+};
+
+void add_overlap(Overlap& sum, const MaskMap& a, const MaskMap& b, const MaskMap* ignored) {
+  for (size_t i = 0; i < a.data.size(); ++i) {
+    if (ignored != nullptr && ignored->data[i] != 0) continue;
+    sum.both += a.data[i] & b.data[i];
+    sum.either += a.data[i] | b.data[i];
+  }
+}
+
 TriangleMesh in_world(MeshFile file) {
   for (Eigen::Vector3f& v : file.mesh.vertices) {
     v = file.frame.world_from_internal(v.cast<double>()).cast<float>();
@@ -56,8 +87,8 @@ PortalMeasurement measure_portal(const std::filesystem::path& run_folder) {
   const std::vector<CaptureView> views = capture_views();
   const std::vector<Camera> inputs = input_cameras(views);
   PortalMeasurement out;
-  MaskMap all_true(views[0].camera.width, 0, 0);
-  MaskMap all_found = all_true;
+  Overlap all;
+  Overlap inside;
   for (const CaptureView& view : views) {
     const std::filesystem::path path = run_folder / "views" / (view.name + ".exr");
     const ExrImage image = read_exr(path);
@@ -71,12 +102,12 @@ PortalMeasurement measure_portal(const std::filesystem::path& run_folder) {
     const MaskMap expected = true_holes(truth);
     out.held_out.push_back(
         {view.name, fraction(expected), fraction(holes), mask_iou(holes, expected)});
-    all_true.data.insert(all_true.data.end(), expected.data.begin(), expected.data.end());
-    all_found.data.insert(all_found.data.end(), holes.data.begin(), holes.data.end());
-    all_true.height += expected.height;
-    all_found.height += holes.height;
+    const MaskMap band = border_band(expected);
+    add_overlap(all, holes, expected, nullptr);
+    add_overlap(inside, holes, expected, &band);
   }
-  out.hole_iou = mask_iou(all_true, all_found);
+  out.hole_iou = all.iou();
+  out.hole_iou_inside = inside.iou();
   out.volume = observed_volume_error(
       scene, inputs, in_world(read_mesh_ply(run_folder / "mesh/watertight.ply")));
   return out;

@@ -25,6 +25,8 @@ struct PortalMeasurement {
   std::vector<HeldOutView> held_out;
   double depth_within_1_percent = 0;  ///< Mean over the input views.
   double hole_iou = 0;                ///< Over the pixels of all held-out views together.
+  /// The same without pixels within 2 px of a border of a true hole: the holes that people notice.
+  double hole_iou_inside = 0;
   ObservedVolumeError volume;
 };
 
