@@ -179,7 +179,7 @@ Eigen::Vector3d world_up(const Scene& scene) {
   // some degrees, span it; its normal is then free of the cameras' pitch.
   constexpr double kMinTurn = 0.004;  // second to first eigenvalue: about +-3.6 degrees
   constexpr double kLevel = 0.05;     // third to second: the axes do lie in a plane
-  const Eigen::Vector3d values = eigen.eigenvalues();
+  const Eigen::Vector3d& values = eigen.eigenvalues();
   if (values[1] < kMinTurn * values[2] || values[0] > kLevel * values[1]) return mean_up;
   const Eigen::Vector3d normal = eigen.eigenvectors().col(0);
   return normal.dot(mean_up) < 0 ? Eigen::Vector3d(-normal) : normal;

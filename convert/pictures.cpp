@@ -43,7 +43,7 @@ ColorImage depth_picture(const DepthMap& depth) {
     const float z = depth.data[i];
     if (!std::isfinite(z) || z <= 0) continue;
     const float t = std::clamp((1 / z - low) / range, 0.0f, 1.0f);
-    out.data[i] = colors[static_cast<size_t>(t * 255 + 0.5f)];
+    out.data[i] = colors[static_cast<size_t>(std::lround(t * 255))];
   }
   return out;
 }

@@ -11,6 +11,7 @@
 #include "io/atomic_file.h"
 #include "io/image.h"
 #include "io/png.h"
+#include "io/resample.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -85,9 +86,14 @@ std::string base64(const std::string& bytes) {
 // A picture file as a figure with the picture inside; a line of text where it cannot be read.
 std::string figure(const std::filesystem::path& file, const std::string& caption) {
   constexpr int kQuality = 85;
+  constexpr int kWidest = 1000;  // [pixels]
   std::string content;
   try {
-    const ColorImage image = read_image(file, nullptr, {});
+    ColorImage image = read_image(file, nullptr, {});
+    if (image.width > kWidest) {
+      MaskMap all_usable;
+      area_downscale(image, all_usable, kWidest, std::max(1, image.height * kWidest / image.width));
+    }
     content = "<img alt=\"" + escaped(caption) + "\" src=\"data:image/jpeg;base64," +
               base64(encode_jpeg(image, kQuality)) + "\">";
   } catch (const Error& error) {

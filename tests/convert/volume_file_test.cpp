@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "io/vdb.h"
-
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
