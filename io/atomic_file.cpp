@@ -2,7 +2,7 @@
 #include "io/atomic_file.h"
 
 #include <cerrno>
-#include <cstring>
+#include <system_error>
 #include <utility>
 
 #include <fcntl.h>
@@ -20,13 +20,15 @@ void write_all(int descriptor, std::string_view bytes, const std::filesystem::pa
   while (!bytes.empty()) {
     const ssize_t n = ::write(descriptor, bytes.data(), bytes.size());
     if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) throw IoError(path, n < 0 ? std::strerror(errno) : "the disk took no bytes");
+    if (n <= 0)
+      throw IoError(path,
+                    n < 0 ? std::generic_category().message(errno) : "the disk took no bytes");
     bytes.remove_prefix(static_cast<size_t>(n));
   }
 }
 
 void sync_to_disk(int descriptor, const std::filesystem::path& path) {
-  if (::fsync(descriptor) != 0) throw IoError(path, std::strerror(errno));
+  if (::fsync(descriptor) != 0) throw IoError(path, std::generic_category().message(errno));
 }
 
 }  // namespace
@@ -34,7 +36,7 @@ void sync_to_disk(int descriptor, const std::filesystem::path& path) {
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), part_(path_) {
   part_ += ".part" + std::to_string(::getpid());
   descriptor_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor_ < 0) throw IoError(path_, std::strerror(errno));
+  if (descriptor_ < 0) throw IoError(path_, std::generic_category().message(errno));
 }
 
 AtomicFile::~AtomicFile() {
@@ -66,11 +68,12 @@ std::filesystem::path AtomicFile::release_to_library() {
 void AtomicFile::commit() {
   if (descriptor_ < 0) {
     descriptor_ = ::open(part_.c_str(), O_RDWR | O_CLOEXEC);
-    if (descriptor_ < 0) throw IoError(path_, std::strerror(errno));
+    if (descriptor_ < 0) throw IoError(path_, std::generic_category().message(errno));
   }
   flush_buffer();
   sync_to_disk(descriptor_, path_);
-  if (::close(std::exchange(descriptor_, -1)) != 0) throw IoError(path_, std::strerror(errno));
+  if (::close(std::exchange(descriptor_, -1)) != 0)
+    throw IoError(path_, std::generic_category().message(errno));
   std::error_code error;
   std::filesystem::rename(part_, path_, error);  // same folder, so the move is atomic
   if (error) throw IoError(path_, error.message());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <system_error>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -40,9 +41,10 @@ int open_for_reading(const std::filesystem::path& path) {
 }
 
 uint64_t regular_file_size(const Descriptor& file, const std::filesystem::path& path) {
-  if (file.get() < 0) throw BadInput(Defect::Open, path, std::strerror(errno));
+  if (file.get() < 0) throw BadInput(Defect::Open, path, std::generic_category().message(errno));
   struct stat info = {};
-  if (::fstat(file.get(), &info) != 0) throw BadInput(Defect::Open, path, std::strerror(errno));
+  if (::fstat(file.get(), &info) != 0)
+    throw BadInput(Defect::Open, path, std::generic_category().message(errno));
   if (!S_ISREG(info.st_mode)) throw BadInput(Defect::Open, path, "not a regular file");
   if (info.st_size == 0) throw BadInput(Defect::Empty, path, "empty file");
   return static_cast<uint64_t>(info.st_size);
@@ -55,7 +57,7 @@ std::string first_bytes(const Descriptor& file, uint64_t count, const std::files
     const ssize_t n =
         ::pread(file.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw BadInput(Defect::Open, path, std::strerror(errno));
+    if (n < 0) throw BadInput(Defect::Open, path, std::generic_category().message(errno));
     if (n == 0) {
       throw BadInput(Defect::Truncated, path, "shrank to " + std::to_string(done) + " bytes");
     }

@@ -34,7 +34,14 @@ namespace {
 // Difference of the unprojected points before and after p along one axis. Of a one-sided and a
 // central difference the one with the smaller depth step is taken, so that normals at an
 // occlusion edge belong to the surface of the pixel and not to the jump.
-Eigen::Vector3d tangent(const DepthMap& depth, const Camera& camera, int x, int y, int dx, int dy) {
+Eigen::Vector3d tangent(const DepthMap& depth,
+                        const Camera& camera,
+                        const Eigen::Vector2i& pixel,
+                        const Eigen::Vector2i& step) {
+  const int x = pixel.x();
+  const int y = pixel.y();
+  const int dx = step.x();
+  const int dy = step.y();
   const auto depth_at = [&](int u, int v) {
     return depth.contains(u, v) ? depth(u, v) : std::nanf("");
   };
@@ -65,7 +72,7 @@ NormalMap normals_from_depth(const DepthMap& depth, const Camera& camera) {
     for (int x = 0; x < depth.width; ++x) {
       if (!std::isfinite(depth(x, y))) continue;
       const Eigen::Vector3d n =
-          tangent(depth, camera, x, y, 0, 1).cross(tangent(depth, camera, x, y, 1, 0));
+          tangent(depth, camera, {x, y}, {0, 1}).cross(tangent(depth, camera, {x, y}, {1, 0}));
       const double length = n.norm();
       if (length > 0) normals(x, y) = (R * (n / length)).cast<float>();
     }

@@ -16,7 +16,7 @@ namespace {
 constexpr double kOrderQuantile = 0.01;  // of sparse points trimmed on each side, as outliers
 
 double quantile(std::vector<double> values, double q) {
-  const auto k = static_cast<size_t>(q * static_cast<double>(values.size() - 1) + 0.5);
+  const auto k = static_cast<size_t>(std::lround(q * static_cast<double>(values.size() - 1)));
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
   return values[k];
 }
