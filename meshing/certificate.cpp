@@ -30,7 +30,7 @@ std::vector<HalfEdge> sorted_half_edges(const TriangleMesh& mesh) {
     for (size_t k = 0; k < 3; ++k) {
       const uint32_t a = mesh.faces[f][k];
       const uint32_t b = mesh.faces[f][(k + 1) % 3];
-      edges[3 * f + k] = {std::min(a, b), std::max(a, b), f, a < b};
+      edges[size_t{3} * f + k] = {std::min(a, b), std::max(a, b), f, a < b};
     }
   }
   tbb::parallel_sort(edges.begin(), edges.end(), [](const HalfEdge& a, const HalfEdge& b) {

@@ -56,12 +56,11 @@ DepthMap usable_depth(const TsdfView& view, double depth_trunc) {
   for (size_t i = 0; i < depth.data.size(); ++i) {
     float& d = depth.data[i];
     const bool usable = view.usable.empty() || view.usable.data[i] != 0;
-    if (!usable || !(d > 0)) {
+    const bool beyond = depth_trunc > 0 && d > depth_trunc && !std::isinf(d);
+    if (!usable || !(d > 0) || beyond) {
       d = kNaN;
     } else if (std::isinf(d)) {
       d = kBackground;
-    } else if (depth_trunc > 0 && d > depth_trunc) {
-      d = kNaN;
     }
   }
   return depth;

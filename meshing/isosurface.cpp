@@ -21,7 +21,7 @@ constexpr double kClearance = 0.02;
 
 openvdb::FloatGrid::Ptr off_the_corners(const openvdb::FloatGrid& distance) {
   const auto clearance = static_cast<float>(kClearance * distance.voxelSize()[0]);
-  const auto grid = distance.deepCopy();
+  openvdb::FloatGrid::Ptr grid = distance.deepCopy();
   grid->setGridClass(openvdb::GRID_LEVEL_SET);  // The winding of the faces depends on it.
   openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid->tree());
   leaves.foreach ([&](auto& leaf, size_t) {

@@ -21,8 +21,7 @@ constexpr int kHalfWidth = 3;  // Voxels of the band on each side.
 // Distances of a solid, block by block.
 class Band {
  public:
-  Band(const Solid& solid, const Volume& volume)
-      : solid_(solid), volume_(volume), voxel_(volume.voxel_size) {
+  Band(const Solid& solid, const Volume& volume) : solid_(solid), voxel_(volume.voxel_size) {
     for (size_t k = 0; k < 3; ++k) {
       first_[int(k)] = (solid.origin[int(k)] & ~(kBlock - 1)) - kBlock;
       const int end = solid.origin[int(k)] + solid.size.at(k) + kBlock;
@@ -41,7 +40,7 @@ class Band {
   // The leaf of a block, or null if no voxel of it lies in the band.
   std::unique_ptr<Leaf> leaf(const Coord& at) const {
     constexpr int kSide = kBlock + 2 * kHalfWidth;
-    std::array<uint8_t, kSide * kSide * kSide> inside{};
+    std::array<uint8_t, size_t{kSide} * kSide * kSide> inside{};
     bool any = false;
     bool all = true;
     for (int n = 0; n < kSide * kSide * kSide; ++n) {
@@ -55,7 +54,8 @@ class Band {
     const auto same_around = [&](const Coord& voxel) {
       const auto side = [&](int x, int y, int z) {
         const Coord p = voxel.offsetBy(x, y, z);
-        return inside.at(size_t((p.x() * kSide + p.y()) * kSide + p.z()));
+        const int n = (p.x() * kSide + p.y()) * kSide + p.z();
+        return inside.at(size_t(n));
       };
       const auto own = side(kHalfWidth, kHalfWidth, kHalfWidth);
       for (int x = 1; x < 2 * kHalfWidth; ++x) {
@@ -117,7 +117,6 @@ class Band {
   }
 
   const Solid& solid_;
-  const Volume& volume_;
   float voxel_;
   Coord first_;
   Coord blocks_;
@@ -150,7 +149,7 @@ void redistance(openvdb::FloatGrid& grid) {
 
 openvdb::FloatGrid::Ptr level_set(const Solid& solid, const Volume& volume) {
   const Band band(solid, volume);
-  const auto grid = openvdb::FloatGrid::create(band.background());
+  openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(band.background());
   grid->setName("surface");
   grid->setTransform(volume.tsdf->transform().copy());
   grid->setGridClass(openvdb::GRID_LEVEL_SET);

@@ -139,6 +139,7 @@ using Edge = std::array<uint32_t, 2>;
 struct FaceSide {
   Edge edge;
   uint32_t face;
+  // NOLINTNEXTLINE(modernize-use-nullptr): false alarm on a defaulted comparison
   auto operator<=>(const FaceSide&) const = default;
 };
 
