@@ -40,7 +40,7 @@ int run_program(int argc, char** argv) {
   CLI::App app(kDescription, "cgs");
   app.footer(kFooter);
   app.require_subcommand(1);
-  app.set_version_flag("--version", "cgs 0.1.0");
+  app.set_version_flag("--version", cgs::kProgramVersion);
   cgs::add_run(app);
   cgs::add_info(app);
   cgs::add_train(app);

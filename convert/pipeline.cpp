@@ -34,7 +34,6 @@ namespace {
 /// One run: the request, what is in memory so far, and the record on disk.
 struct Run {
   const RunRequest& request;
-  Terminal& terminal;
   RunRecord record;
   Scene scene;  ///< As opened: world coordinates.
   // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
@@ -184,7 +183,7 @@ Json report_json(const Run& run) {
         {{"stage", name}, {"seconds", stage["seconds"]}, {"peak_memory", stage["peak_memory"]}});
   }
   const Json mesh = run.record.result("mesh");
-  Json out = {{"program", "cgs 0.1.0"},
+  Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
               {"folder", run.request.scene.string()},
               {"units", scene.frame.unit_name()},
@@ -323,7 +322,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   if (!request.max_error.empty()) (void)parse_length(request.max_error, scene.frame);
   make_output_folder(request.output);
   RunRecord record(request.output, request_json(request, scene), request.overwrite);
-  Run run{request, terminal, std::move(record), std::move(scene), {}, {}};
+  Run run{request, std::move(record), std::move(scene), {}, {}};
   bool stale = false;  // a stage that ran makes everything after it stale
   for (const Stage& stage : stages_of(run.scene)) {
     if (!stale && run.record.is_done(stage.name, stage.files)) {

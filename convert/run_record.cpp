@@ -45,7 +45,8 @@ RunRecord::RunRecord(std::filesystem::path folder, Json request, bool overwrite)
           "; choose another folder, or say --overwrite");
     }
   }
-  json_ = {{"program", "cgs 0.1.0"}, {"request", std::move(request)}, {"stages", Json::object()}};
+  json_ = {
+      {"program", kProgramVersion}, {"request", std::move(request)}, {"stages", Json::object()}};
   save();
 }
 

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/mesh_files.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "libcgs/core/error.h"
+#include "tests/support/temp_dir.h"
+
+namespace cgs {
+namespace {
+
+// The corner of a cube of edge 1: volume 1/6, one slanted face that nobody saw.
+TriangleMesh corner() {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mesh.faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  mesh.provenance = {
+      Provenance::Observed, Provenance::Observed, Provenance::SingleView, Provenance::Inferred};
+  mesh.normals = vertex_normals(mesh);
+  mesh.colors.assign(4, Eigen::Vector3f(0.5f, 0.5f, 0.5f));
+  mesh.support.assign(4, 2);
+  mesh.sigma.assign(4, 0.01f);
+  return mesh;
+}
+
+Frame frame_of_scale_2() {
+  Frame frame;
+  frame.scale = 2;
+  return frame;
+}
+
+TEST(CertificateToJson, GivesMeasuresInFileUnits) {
+  const auto json = certificate_to_json(certify(corner()), corner(), frame_of_scale_2());
+  EXPECT_TRUE(json["passed"].get<bool>());
+  EXPECT_NEAR(json["volume"].get<double>(), 8.0 / 6, 1e-6);
+  EXPECT_NEAR(json["area_observed"].get<double>(), 4.0, 1e-6);
+  EXPECT_NEAR(json["area_single_view"].get<double>(), 2.0, 1e-6);
+  EXPECT_NEAR(json["area_inferred"].get<double>(), 2 * std::sqrt(3.0), 1e-6);
+  EXPECT_EQ(json["units"], "unknown");
+}
+
+TEST(WriteMeshFiles, LeavesCadFilesOutWithoutAScaleAndSaysHowToGetThem) {
+  const test::TempDir dir;
+  const auto json = write_mesh_files(
+      dir / "mesh", corner(), corner(), frame_of_scale_2(), Eigen::Vector3d::UnitZ());
+  EXPECT_TRUE(std::filesystem::exists(dir / "mesh/watertight.ply"));
+  EXPECT_FALSE(std::filesystem::exists(dir / "mesh/watertight.stl"));
+  for (const auto* name : {"watertight.stl", "watertight.3mf"}) {
+    const auto reason = json["left_out"][name].get<std::string>();
+    EXPECT_NE(reason.find("--assume-unit"), std::string::npos) << name;
+  }
+}
+
+TEST(WriteMeshFiles, WritesCadFilesOfAKnownScale) {
+  const test::TempDir dir;
+  Frame frame = frame_of_scale_2();
+  frame.metres_per_unit = 1;
+  const auto json =
+      write_mesh_files(dir / "mesh", corner(), corner(), frame, Eigen::Vector3d::UnitZ());
+  EXPECT_TRUE(json["left_out"].empty());
+  for (const auto& name : json["files"]) {
+    EXPECT_TRUE(std::filesystem::exists(dir / "mesh" / name.get<std::string>())) << name;
+  }
+}
+
+TEST(WriteMeshFiles, RefusesAMeshWithoutSurfaceAndWritesNothing) {
+  const test::TempDir dir;
+  EXPECT_THROW(write_mesh_files(dir / "mesh", {}, {}, {}, Eigen::Vector3d::UnitZ()),
+               NumericalError);
+  EXPECT_FALSE(std::filesystem::exists(dir / "mesh"));
+}
+
+}  // namespace
+}  // namespace cgs
