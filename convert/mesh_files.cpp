@@ -19,8 +19,6 @@ Json certificate_to_json(const Certificate& certificate,
                          const TriangleMesh& mesh,
                          const Frame& frame) {
   const double area_unit = frame.scale * frame.scale;
-  const auto area = area_by_provenance(mesh);
-  const auto of = [&](Provenance label) { return area_unit * area[static_cast<size_t>(label)]; };
   return {{"passed", certificate.passed()},
           {"closed", certificate.closed},
           {"edge_manifold", certificate.edge_manifold},
@@ -30,10 +28,10 @@ Json certificate_to_json(const Certificate& certificate,
           {"components", certificate.components},
           {"genus", certificate.genus},
           {"volume", certificate.volume * area_unit * frame.scale},
-          {"area_observed", of(Provenance::Observed)},
-          {"area_single_view", of(Provenance::SingleView)},
-          {"area_interpolated", of(Provenance::Interpolated)},
-          {"area_inferred", of(Provenance::Inferred)},
+          {"area_observed", certificate.observed_area * area_unit},
+          {"area_single_view", certificate.single_view_area * area_unit},
+          {"area_interpolated", certificate.interpolated_area * area_unit},
+          {"area_inferred", certificate.inferred_area * area_unit},
           {"units", frame.unit_name()},
           {"vertices", mesh.vertices.size()},
           {"faces", mesh.faces.size()}};

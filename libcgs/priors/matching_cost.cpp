@@ -16,8 +16,7 @@ constexpr int kBandRows = 16;
 constexpr float kCensusWeight = 0.6f;
 constexpr float kNoiseVariance = 4.0f;  // [gray levels squared]
 constexpr float kUnseen = 1e9f;
-constexpr float kNeutral = 0.5f;        // cost of a plane that no source sees
-constexpr float kSecondWeight = 0.15f;  // of the worse half of the sources
+constexpr float kNeutral = 0.5f;  // cost of a plane that no source sees
 
 // Rows [first - kMargin, last + kMargin) of an image, columns [-kMargin, width + kMargin), borders
 // repeated; as floats and, for the census, as integers.
@@ -148,22 +147,13 @@ struct ZnccRow {
   }
 };
 
-// Combined cost of one pixel on one plane: the better half of the sources counts fully, so that
-// a surface hidden from the other half (from the other side, say) is still found.
+// Combined cost of one pixel on one plane, over the sources that see it.
 float combine(float* costs, size_t count) {
   std::sort(costs, costs + count);
   size_t seen = 0;
   while (seen < count && costs[seen] < kUnseen) ++seen;
   if (seen == 0) return kNeutral;
-  const size_t full = (seen + 1) / 2;
-  float sum = 0;
-  float weight = 0;
-  for (size_t i = 0; i < seen; ++i) {
-    const float w = i < full ? 1.0f : kSecondWeight;
-    sum += w * costs[i];
-    weight += w;
-  }
-  return sum / weight;
+  return combined_cost({costs, seen});
 }
 
 class BandCost {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "libcgs/priors/sweep_geometry.h"
@@ -20,6 +21,22 @@ struct CostVolume {
   }
 };
 inline constexpr int kLargestCost = 120;
+
+/// One cost from those of several sources: the better half counts fully and the rest little, so
+/// that a surface hidden from half of the sources is still found.
+/// \pre `sorted` is ascending and not empty. Inline: called per pixel and plane.
+inline float combined_cost(std::span<const float> sorted) {
+  constexpr float kSecondWeight = 0.15f;  // of the worse half of the sources
+  const size_t full = (sorted.size() + 1) / 2;
+  float sum = 0;
+  float weight = 0;
+  for (size_t i = 0; i < sorted.size(); ++i) {
+    const float w = i < full ? 1.0f : kSecondWeight;
+    sum += w * sorted[i];
+    weight += w;
+  }
+  return sum / weight;
+}
 
 /// Dissimilarity of a reference view and its sources, warped over every plane.
 ///

@@ -10,6 +10,8 @@
 #include <Eigen/Cholesky>
 #include <tbb/parallel_for.h>
 
+#include "libcgs/priors/matching_cost.h"
+
 namespace cgs {
 
 namespace {
@@ -24,9 +26,8 @@ constexpr float kDistanceScale = 2.5f;  // … and at this distance [pixels]
 constexpr float kNoiseVariance = 4;     // [gray levels squared]
 constexpr float kSmoothness = 0.12f;    // cost of a full disagreement with the neighbours
 constexpr float kTruncation = 2.0f;     // largest disagreement that counts [planes]
-constexpr float kSecondWeight = 0.15f;
-constexpr float kUnseenCost = 1.0f;  // as uncorrelated
-constexpr float kMaxSlope = 2.0f;    // [planes per pixel]
+constexpr float kUnseenCost = 1.0f;     // as uncorrelated
+constexpr float kMaxSlope = 2.0f;       // [planes per pixel]
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 struct Offset {
@@ -256,15 +257,7 @@ float SlantedRefinement::data_cost(const Window& w, const SlantedPlane& plane) c
   }
   if (seen == 0) return kUnseenCost;
   std::sort(scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(seen));
-  const size_t full = (seen + 1) / 2;
-  float total = 0;
-  float weight = 0;
-  for (size_t i = 0; i < seen; ++i) {
-    const float k = i < full ? 1.0f : kSecondWeight;
-    total += k * scores[i];
-    weight += k;
-  }
-  return total / weight;
+  return combined_cost({scores.data(), seen});
 }
 
 float SlantedRefinement::smoothness(const Window& w, const SlantedPlane& plane) const {
