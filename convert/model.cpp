@@ -2,17 +2,21 @@
 #include "convert/model.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
 #include <Eigen/Eigenvalues>
+#include <nlohmann/json.hpp>
 
+#include "convert/terminal.h"
 #include "io/atomic_file.h"
 #include "io/cameras_json.h"
+#include "io/checkpoint.h"
+#include "io/content_hash.h"
 #include "io/exr.h"
 #include "io/gaussian_ply.h"
 #include "io/scene_reader.h"
-#include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/measured_range.h"
 #include "libcgs/render/rasterizer.h"
@@ -42,6 +46,8 @@ Raster<T> as_raster(const ExrImage& image, const std::string& channel, const std
   }
   throw BadInput(Defect::Schema, file, "has no channel '" + channel + "'");
 }
+
+constexpr const char* kCheckpointName = "training";
 
 std::filesystem::path priors_path(const std::filesystem::path& folder, const View& view) {
   return folder / "priors" / (view.name + ".exr");
@@ -86,20 +92,102 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
   return priors;
 }
 
+// Everything the training depends on.
+uint64_t training_key(const Model& model, const TrainingOptions& options) {
+  uint64_t key = content_hash(kProgramVersion);
+  for (const auto& [name, value] : training_fields(options)) {
+    key = content_hash(value, content_hash(name, key));
+  }
+  const auto add = [&](const void* data, size_t bytes) {
+    key = content_hash({static_cast<const char*>(data), bytes}, key);
+  };
+  for (size_t k = 0; k < model.priors.size(); ++k) {
+    const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
+    const DepthMap& depth = model.priors[k].depth;
+    add(view.image.data.data(), view.image.data.size() * sizeof(Eigen::Vector3f));
+    add(depth.data.data(), depth.data.size() * sizeof(float));
+  }
+  return key;
+}
+
+void optimise(TrainedModel& trained, const ModelRequest& request, const Progress& progress) {
+  constexpr auto kBetweenCheckpoints = std::chrono::seconds(20);
+  Model& model = trained.model;
+  Trainer trainer(model.scene, model.priors, request.training);
+  const uint64_t key = training_key(model, request.training);
+  const bool saves = !request.checkpoints.empty();
+  const auto save = [&] {
+    if (!saves) return;
+    make_output_folder(request.checkpoints);
+    write_checkpoint(request.checkpoints, kCheckpointName, key, trainer.save());
+  };
+  if (saves) {
+    const auto state = read_checkpoint(request.checkpoints, kCheckpointName, key);
+    if (state) trainer.restore(*state);
+  }
+  auto saved = std::chrono::steady_clock::now();
+  while (!trainer.done()) {
+    trainer.step();
+    try {
+      report(progress, double(trainer.steps_done()) / request.training.steps);
+    } catch (const Cancelled&) {
+      save();
+      throw;
+    }
+    if (std::chrono::steady_clock::now() - saved < kBetweenCheckpoints) continue;
+    save();
+    saved = std::chrono::steady_clock::now();
+  }
+  save();
+  model.gaussians = trainer.model().gaussians();
+  for (size_t k = 0; k < model.priors.size(); ++k) model.priors[k].depth = trainer.model().depth(k);
+  trained.steps = trainer.history();
+}
+
 }  // namespace
 
-TrainedModel train_model(Scene scene, const PriorsOptions& options, const Progress& progress) {
-  load_images(scene, scene.input, part_of(progress, 0, 0.05));
+TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress) {
+  request.priors.validate();
+  request.training.validate();
+  constexpr double kPriorsShare = 0.2;
+  load_images(scene, scene.input, part_of(progress, 0, 0.01));
   to_canonical(scene);
-  narrow_depth_ranges(scene, options.sweep);
-  EstimatedPriors estimated = estimate_priors(scene, options, part_of(progress, 0.05, 0.98));
+  narrow_depth_ranges(scene, request.priors.sweep);
+  EstimatedPriors estimated =
+      estimate_priors(scene, request.priors, part_of(progress, 0.01, kPriorsShare));
   TrainedModel trained;
-  trained.report = estimated.report;
-  trained.model.gaussians = initial_gaussians(scene, estimated.views);
+  trained.priors = estimated.report;
   trained.model.priors = std::move(estimated.views);
   trained.model.scene = std::move(scene);
+  optimise(trained, request, part_of(progress, kPriorsShare, 1));
   report(progress, 1);
   return trained;
+}
+
+void forget_checkpoints(const std::filesystem::path& folder) {
+  remove_checkpoint(folder, kCheckpointName);
+}
+
+nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request) {
+  nlohmann::ordered_json settings = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : training_fields(request.training)) settings[name] = value;
+  nlohmann::ordered_json loss = nlohmann::ordered_json::array();
+  for (const StepReport& step : trained.steps) loss.push_back(step.total());
+  const std::string start = "one Gaussian per pixel at the depth of a multi-view plane sweep; ";
+  return {{"description",
+           trained.steps.empty()
+               ? "aligned initialisation: " + start + "not optimised against the photographs"
+               : "coherent Gaussians: " + start +
+                     "depth, opacity and shape optimised against the "
+                     "photographs in " +
+                     std::to_string(trained.steps.size()) + " steps"},
+          {"gaussians", trained.model.gaussians.size()},
+          {"settings", settings},
+          {"loss", loss},
+          {"alignment",
+           {{"scale", trained.priors.alignment.scale},
+            {"offset", trained.priors.alignment.offset},
+            {"correspondences", trained.priors.alignment.correspondences}}}};
 }
 
 void write_model(const std::filesystem::path& folder, const Model& model) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/core/scene.h"
@@ -13,6 +15,7 @@
 #include "libcgs/priors/view_priors.h"
 #include "libcgs/render/render_buffers.h"
 #include "libcgs/render/support.h"
+#include "libcgs/train/trainer.h"
 
 namespace cgs {
 
@@ -24,17 +27,30 @@ struct Model {
   std::vector<ViewPriors> priors;  ///< In the order of scene.input; empty for foreign splats.
 };
 
-/// What a model is, in plain words, for run.json and the report.
-inline constexpr const char* kModelDescription =
-    "aligned initialisation: one Gaussian per pixel at the depth of a multi-view plane sweep; "
-    "not optimised against the photographs";
+/// What to do with the photographs.
+struct ModelRequest {
+  PriorsOptions priors;
+  TrainingOptions training;
+  /// Where checkpoints of the training go; empty = none. They stay until forget_checkpoints().
+  std::filesystem::path checkpoints;
+};
 
-/// Scene -> model. Loads the images of the input views. Moves `scene` to its canonical frame.
+/// Scene -> model. Loads the images of the input views, moves the scene to its canonical frame,
+/// estimates depth and optimises the Gaussians; goes on from a checkpoint of the same work.
+/// If the progress function throws Cancelled, the training so far is saved first.
 struct TrainedModel {
   Model model;
-  PriorsReport report;
+  PriorsReport priors;
+  std::vector<StepReport> steps;  ///< Of the training; empty = aligned initialisation.
 };
-TrainedModel train_model(Scene scene, const PriorsOptions& options, const Progress& progress);
+TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress);
+
+/// Removes the checkpoints of finished work. \throws IoError
+void forget_checkpoints(const std::filesystem::path& folder);
+
+/// What was done, for run.json, the report and OUT/model/training.json: a description in plain
+/// words, the effective settings, and the loss over the steps.
+nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request);
 
 /// Writes gaussians.ply, cameras.json and priors/<view>.exr. \throws IoError
 void write_model(const std::filesystem::path& folder, const Model& model);

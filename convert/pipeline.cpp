@@ -16,6 +16,7 @@
 #include "convert/views.h"
 #include "convert/volume_file.h"
 #include "io/atomic_file.h"
+#include "io/content_hash.h"
 #include "io/gltf.h"
 #include "io/image.h"
 #include "io/mesh_ply.h"
@@ -46,18 +47,21 @@ Json request_json(const RunRequest& request, const Scene& scene) {
   Json inputs = Json::object();
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
-    inputs[view.name] = content_hash(view.image_path);
+    inputs[view.name] = file_hash(view.image_path);
   }
   Json cameras = Json::array();
   for (const View& view : scene.views) {
     const Eigen::Vector3d c = view.camera.center();
     cameras.push_back({view.name, view.camera.fx, c.x(), c.y(), c.z()});
   }
-  const size_t cameras_hash = std::hash<std::string>{}(cameras.dump());
+  const uint64_t cameras_hash = content_hash(cameras.dump());
+  Json settings = Json::object();
+  for (const auto& [name, value] : training_fields(request.training)) settings[name] = value;
   return {{"scene", std::filesystem::weakly_canonical(request.scene).string()},
           {"views", request.scene_options.views},
           {"downscale", request.scene_options.downscale},
           {"assume_unit", request.assume_unit},
+          {"training", settings},
           {"voxel_size", request.voxel_size},
           {"max_error", request.max_error},
           {"input_images", inputs},
@@ -93,14 +97,13 @@ std::vector<int> views_with_photograph(const Scene& scene) {
 }
 
 Json run_model(Run& run, const Progress& progress) {
-  const TrainedModel trained = train_model(run.scene, PriorsOptions{}, progress);
-  write_model(run.request.output / "model", trained.model);
-  return {{"description", kModelDescription},
-          {"gaussians", trained.model.gaussians.size()},
-          {"alignment",
-           {{"scale", trained.report.alignment.scale},
-            {"offset", trained.report.alignment.offset},
-            {"correspondences", trained.report.alignment.correspondences}}}};
+  const std::filesystem::path folder = run.request.output / "model";
+  const ModelRequest request = {{}, run.request.training, folder};
+  const TrainedModel trained = train_model(run.scene, request, progress);
+  const Json report = training_to_json(trained, request);
+  write_model(folder, trained.model);
+  write_file(folder / "training.json", report.dump(2) + "\n");
+  return report;
 }
 
 Json run_views(Run& run, const Progress& progress) {
@@ -161,7 +164,7 @@ Json run_web(Run& run, const Progress& progress) {
   if (!run.request.max_error.empty()) {
     options.max_error = parse_length(run.request.max_error, frame) * frame.scale;
   }
-  options.summary_json = Json({{"model", kModelDescription},
+  options.summary_json = Json({{"model", run.record.result("model")["description"]},
                                {"certificate", run.record.result("mesh")["certificate"]}})
                              .dump();
   make_output_folder(run.request.output / "web");
@@ -333,6 +336,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
     const Json result = stage.work(run, terminal.begin(stage.title));
     run.record.finish(stage.name, terminal.end(""), result);
   }
+  forget_checkpoints(request.output / "model");
   loaded_model(run);
   return report_json(run);
 }

@@ -9,6 +9,7 @@
 #include "convert/model.h"
 #include "convert/terminal.h"
 #include "io/scene_reader.h"
+#include "libcgs/train/training_options.h"
 #include "meshing/tsdf.h"
 
 namespace cgs {
@@ -20,6 +21,7 @@ struct RunRequest {
   SceneOptions scene_options;
   std::string
       assume_unit;  ///< Unit of one scene unit where the scene does not say; empty = unknown.
+  TrainingOptions training;
   std::string voxel_size;   ///< Empty = from the pixel footprint.
   std::string max_error;    ///< Of the compressed mesh; empty = 1/16384 of its size.
   size_t memory_limit = 0;  ///< [bytes]; 0 = 80 % of what is free.

@@ -180,6 +180,33 @@ std::string evaluation_section(const Json& evaluation) {
   return html.str();
 }
 
+// The loss over the steps of the training as a line, and the settings that led there.
+std::string training_section(const Json& model) {
+  const auto loss = model["loss"].get<std::vector<double>>();
+  if (loss.size() < 2) return "";
+  constexpr double kWidth = 640;
+  constexpr double kHeight = 160;
+  const double top = *std::max_element(loss.begin(), loss.end());
+  std::ostringstream html;
+  html << "<h2>Training</h2>\n<svg viewBox=\"0 0 " << kWidth << " " << kHeight
+       << "\" style=\"width:100%;max-width:" << kWidth
+       << "px;border:1px solid #888\" role=img aria-label=\"loss over steps\">"
+          "<polyline fill=none stroke=\"#2a7\" stroke-width=1.5 points=\"";
+  for (size_t i = 0; i < loss.size(); ++i) {
+    const double x = kWidth * double(i) / double(loss.size() - 1);
+    html << number(x, "%.1f") << "," << number(kHeight * (1 - loss[i] / top), "%.1f") << " ";
+  }
+  html << "\"/></svg>\n<p>Loss over " << loss.size() << " steps, from 0 to " << number(top, "%.4f")
+       << "; it is taken from smaller images at first, so it may jump.</p>\n"
+          "<details><summary>Settings</summary><table>\n";
+  for (const auto& [name, value] : model["settings"].items()) {
+    html << "<tr><td>" << escaped(name) << "</td><td>" << escaped(value.get<std::string>())
+         << "</td></tr>\n";
+  }
+  html << "</table></details>\n";
+  return html.str();
+}
+
 std::string timing_section(const Json& stages) {
   double longest = 1e-9;
   for (const Json& stage : stages) longest = std::max(longest, stage["seconds"].get<double>());
@@ -209,15 +236,15 @@ void write_html_report(const std::filesystem::path& folder, const Json& report) 
        << escaped(std::filesystem::path(title).filename().string()) << "</h1>\n<p>"
        << escaped(report["scene"].get<std::string>())
        << " scene, units: " << escaped(report["units"].get<std::string>()) << " (scale "
-       << escaped(report["scale_source"].get<std::string>())
-       << ")</p>\n<p class=note>This model is an "
+       << escaped(report["scale_source"].get<std::string>()) << ")</p>\n<p class=note>Model: "
        << escaped(report["model"]["description"].get<std::string>()) << ".</p>\n";
   for (const Json& warning : report["warnings"]) {
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
   }
   html << certificate_section(report) << mesh_section(folder)
        << evaluation_section(report["evaluation"]) << views_section(folder, report)
-       << timing_section(report["stages"]) << "</body></html>\n";
+       << training_section(report["model"]) << timing_section(report["stages"])
+       << "</body></html>\n";
   write_file(folder / "report.html", html.str());
 }
 

@@ -8,6 +8,7 @@
 #include "convert/terminal.h"
 #include "io/atomic_file.h"
 #include "io/byte_reader.h"
+#include "io/content_hash.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -76,13 +77,10 @@ void RunRecord::finish(const std::string& stage, double seconds, const Json& res
 
 void RunRecord::save() const { write_file(folder_ / "run.json", json_.dump(2) + "\n"); }
 
-std::string content_hash(const std::filesystem::path& file) {
-  uint64_t hash = 0xcbf29ce484222325;
-  for (const char c : read_file(file)) {
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-  }
+std::string file_hash(const std::filesystem::path& file) {
   std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(hash));
+  const auto hash = static_cast<unsigned long long>(content_hash(read_file(file)));
+  std::snprintf(text.data(), text.size(), "%016llx", hash);
   return text.data();
 }
 

@@ -37,6 +37,6 @@ class RunRecord {
 };
 
 /// 64-bit FNV-1a of a file's content, as 16 hexadecimal digits. \throws BadInput
-std::string content_hash(const std::filesystem::path& file);
+std::string file_hash(const std::filesystem::path& file);
 
 }  // namespace cgs

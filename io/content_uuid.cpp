@@ -6,21 +6,13 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "io/content_hash.h"
+
 namespace cgs {
 
-namespace {
-
-/// FNV-1a, 64 bits.
-uint64_t hash(std::string_view bytes, uint64_t state) {
-  for (const char c : bytes) state = (state ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-  return state;
-}
-
-}  // namespace
-
 std::string content_uuid(std::string_view content, std::string_view purpose) {
-  const uint64_t a = hash(content, hash(purpose, 0xcbf29ce484222325u));
-  const uint64_t b = hash(content, ~a);
+  const uint64_t a = content_hash(content, content_hash(purpose));
+  const uint64_t b = content_hash(content, ~a);
   std::array<char, 37> text{};
   std::snprintf(text.data(),
                 text.size(),

@@ -33,6 +33,27 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
                    "Follow links and absolute paths that leave the scene folder");
 }
 
+void add_training_options(CLI::App& command, TrainingArguments& arguments) {
+  command.add_option("--preset", arguments.preset, "draft, standard or reference")
+      ->capture_default_str();
+  command.add_option(
+      "--set",
+      arguments.settings,
+      "One setting of the training, name=value; may be repeated. model/training.json "
+      "lists all");
+}
+
+TrainingOptions training_options(const TrainingArguments& arguments) {
+  TrainingOptions options = training_preset(arguments.preset);
+  for (const std::string& setting : arguments.settings) {
+    const size_t equals = setting.find('=');
+    require(equals != std::string::npos, "--set must be name=value", setting);
+    set_training_field(options, setting.substr(0, equals), setting.substr(equals + 1));
+  }
+  options.validate();
+  return options;
+}
+
 void limit_threads(int threads) {
   constexpr int kMost = 1024;
   require(threads >= 0 && threads <= kMost, "--threads must be in 0 ... 1024", threads);

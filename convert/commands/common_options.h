@@ -2,10 +2,12 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <CLI/App.hpp>
 
 #include "io/scene_reader.h"
+#include "libcgs/train/training_options.h"
 
 namespace cgs {
 
@@ -22,6 +24,18 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 
 /// --views, --downscale and --allow-external.
 void add_scene_options(CLI::App& command, SceneOptions& options);
+
+/// How to train, as typed.
+struct TrainingArguments {
+  std::string preset = "standard";
+  std::vector<std::string> settings;  ///< "name=value"
+};
+
+/// --preset and --set.
+void add_training_options(CLI::App& command, TrainingArguments& arguments);
+
+/// The preset with the settings applied. \throws InvalidInput
+TrainingOptions training_options(const TrainingArguments& arguments);
 
 /// Keeps every library within the number of threads for the rest of the program.
 /// \throws InvalidInput if it is negative or above 1024.

@@ -16,6 +16,7 @@ namespace {
 
 struct RunArgs {
   RunRequest request;
+  TrainingArguments training;
   CommonOptions common;
 };
 
@@ -35,6 +36,7 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
 void run_run(const RunArgs& args) {
   limit_threads(args.common.threads);
   RunRequest request = args.request;
+  request.training = training_options(args.training);
   if (!args.common.memory_limit.empty()) {
     request.memory_limit = parse_bytes(args.common.memory_limit);
   }
@@ -67,6 +69,7 @@ void add_run(CLI::App& app) {
                   args->request.max_error,
                   "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
   cmd->add_flag("-w,--overwrite", args->request.overwrite, "Replace the results of another run");
+  add_training_options(*cmd, args->training);
   add_common_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs run photos/portal --views 1,10,19 --assume-unit m -o out/portal\n"

@@ -8,6 +8,7 @@
 #include "convert/commands/common_options.h"
 #include "convert/model.h"
 #include "convert/pipeline.h"
+#include "io/atomic_file.h"
 
 namespace cgs {
 
@@ -18,23 +19,25 @@ struct TrainArgs {
   std::filesystem::path output;
   SceneOptions scene_options;
   std::string assume_unit;
+  TrainingArguments training;
   CommonOptions common;
 };
 
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
+  const ModelRequest request = {{}, training_options(args.training), args.output};
   Terminal terminal(args.common.quiet);
   Scene scene = open_scene(args.scene, args.scene_options, args.assume_unit);
   for (const std::string& warning : scene.warnings) terminal.warn(warning);
   const TrainedModel trained =
-      train_model(std::move(scene), PriorsOptions{}, terminal.begin("depth and Gaussians"));
+      train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
+  nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);
+  write_file(args.output / "training.json", report.dump(2) + "\n");
+  forget_checkpoints(args.output);
   const size_t count = trained.model.gaussians.size();
-  const double seconds = terminal.end(std::to_string(count) + " Gaussians");
-  if (!args.common.json) return;
-  const nlohmann::ordered_json report = {
-      {"model", kModelDescription}, {"gaussians", count}, {"seconds", seconds}};
-  std::cout << report.dump(2) << "\n";
+  report["seconds"] = terminal.end(std::to_string(count) + " Gaussians");
+  if (args.common.json) std::cout << report.dump(2) << "\n";
 }
 
 }  // namespace
@@ -46,8 +49,11 @@ void add_train(CLI::App& app) {
   cmd->add_option("-o,--output", args->output, "Model folder to write")->required();
   add_scene_options(*cmd, args->scene_options);
   cmd->add_option("--assume-unit", args->assume_unit, "What one scene unit is: m, cm, mm, in, ft");
+  add_training_options(*cmd, args->training);
   add_common_options(*cmd, args->common);
-  cmd->footer("Example: cgs train photos/portal --views 1,10,19 -o out/model");
+  cmd->footer(
+      "Example: cgs train photos/portal --views 1,10,19 --preset draft -o out/model\n"
+      "Interrupted, it goes on where it was when it is run again.");
   cmd->callback([args] { run_train(*args); });
 }
 

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/checkpoint.h"
+
+#include <array>
+#include <system_error>
+
+#include "io/atomic_file.h"
+#include "io/byte_reader.h"
+#include "io/byte_writer.h"
+#include "io/content_hash.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr std::string_view kMagic = "CGSCKPT1";
+
+std::filesystem::path current_path(const std::filesystem::path& folder, const std::string& name) {
+  return folder / (name + ".checkpoint");
+}
+
+std::filesystem::path previous_path(const std::filesystem::path& folder, const std::string& name) {
+  return folder / (name + ".previous.checkpoint");
+}
+
+std::optional<std::string> read_one(const std::filesystem::path& path, uint64_t belongs_to) {
+  try {
+    const std::string bytes = read_file(path);
+    ByteReader in(bytes, path);
+    if (in.take(kMagic.size(), "magic") != kMagic) return std::nullopt;
+    if (in.get<uint64_t>("key") != belongs_to) return std::nullopt;
+    const auto size = in.get<uint64_t>("size");
+    in.expect_records(size, 1, "state");
+    const std::string_view state = in.take(size, "state");
+    const uint64_t expected = content_hash(std::string_view(bytes).substr(0, in.offset()));
+    if (in.get<uint64_t>("hash") != expected || in.remaining() != 0) return std::nullopt;
+    return std::string(state);
+  } catch (const BadInput&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+void write_checkpoint(const std::filesystem::path& folder,
+                      const std::string& name,
+                      uint64_t belongs_to,
+                      std::string_view state) {
+  std::string head(kMagic);
+  append_bytes(head, belongs_to);
+  append_bytes(head, static_cast<uint64_t>(state.size()));
+  std::string tail;
+  append_bytes(tail, content_hash(state, content_hash(head)));
+  const std::filesystem::path path = current_path(folder, name);
+  AtomicFile file(path);
+  file.write(head);
+  file.write(state);
+  file.write(tail);
+  std::error_code error;
+  if (std::filesystem::exists(path, error)) {
+    std::filesystem::rename(path, previous_path(folder, name), error);
+    if (error) throw IoError(path, "cannot keep the older checkpoint: " + error.message());
+  }
+  file.commit();
+}
+
+std::optional<std::string> read_checkpoint(const std::filesystem::path& folder,
+                                           const std::string& name,
+                                           uint64_t belongs_to) {
+  std::optional<std::string> state = read_one(current_path(folder, name), belongs_to);
+  return state ? state : read_one(previous_path(folder, name), belongs_to);
+}
+
+void remove_checkpoint(const std::filesystem::path& folder, const std::string& name) {
+  for (const auto& path : {current_path(folder, name), previous_path(folder, name)}) {
+    std::error_code error;
+    std::filesystem::remove(path, error);
+    if (error) throw IoError(path, "cannot remove: " + error.message());
+  }
+}
+
+}  // namespace cgs

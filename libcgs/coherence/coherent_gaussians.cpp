@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/coherence/coherent_gaussians.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "libcgs/coherence/initialisation.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr size_t kShapeSize = 7;     // three log radii, four quaternion components
+constexpr float kMinLogRadius = -6;  // of a pixel: far below anything visible
+constexpr float kMaxLogRadius = 4;
+
+float sigmoid(float x) {
+  const float e = std::exp(-std::abs(x));
+  return (x >= 0 ? 1.0f : e) / (1.0f + e);
+}
+
+float logit(float p) { return std::log(p) - std::log1p(-p); }
+
+double pixel_size(const Camera& camera) { return 2 / (camera.fx + camera.fy); }
+
+// Calls work(k, pixel) for the k-th Gaussian of a view, in blocks on all threads.
+template <typename Work>
+void for_each_gaussian(const std::vector<int>& pixels, const Work& work) {
+  constexpr size_t kBlock = 4096;
+  const size_t blocks = (pixels.size() + kBlock - 1) / kBlock;
+  tbb::parallel_for(size_t{0}, blocks, [&](size_t block) {
+    const size_t end = std::min(pixels.size(), (block + 1) * kBlock);
+    for (size_t k = block * kBlock; k < end; ++k) work(k, pixels[k]);
+  });
+}
+
+Eigen::Vector3f shape_scale(const float* shape, float unit) {
+  return {unit * std::exp(std::clamp(shape[0], kMinLogRadius, kMaxLogRadius)),
+          unit * std::exp(std::clamp(shape[1], kMinLogRadius, kMaxLogRadius)),
+          unit * std::exp(std::clamp(shape[2], kMinLogRadius, kMaxLogRadius))};
+}
+
+}  // namespace
+
+void CoherenceOptions::validate() const {
+  require(max_depth_change > 0 && std::isfinite(max_depth_change),
+          "CoherenceOptions.max_depth_change must be > 0",
+          max_depth_change);
+  require(max_logit_change > 0 && std::isfinite(max_logit_change),
+          "CoherenceOptions.max_logit_change must be > 0",
+          max_logit_change);
+  LayeredLatticeOptions{depth_spacing}.validate();
+  LayeredLatticeOptions{opacity_spacing}.validate();
+  InitialisationOptions{radius_factor, opacity}.validate();
+}
+
+CoherentGaussians::CoherentGaussians(const Scene& scene,
+                                     const std::vector<ViewPriors>& priors,
+                                     const CoherenceOptions& options)
+    : options_(options) {
+  options.validate();
+  gaussians_ = initial_gaussians(scene, priors, {options.radius_factor, options.opacity});
+  if (gaussians_.size() > 0) start_logit_ = logit(gaussians_.opacity[0]);
+  size_t first = 0;
+  for (size_t n = 0; n < priors.size(); ++n) {
+    const Camera& camera = scene.views[static_cast<size_t>(scene.input[n])].camera;
+    const DepthMap& depth = priors[n].depth;
+    ViewState view{camera,
+                   LayeredLattice(priors[n].layer, {options.depth_spacing}),
+                   LayeredLattice(priors[n].layer, {options.opacity_spacing}),
+                   depth,
+                   depth,
+                   Raster<float>(depth.width, depth.height, 0),
+                   Raster<float>(depth.width, depth.height, 0),
+                   {},
+                   {}};
+    for (size_t i = 0; i < depth.data.size(); ++i) {
+      if (depth.data[i] > 0 && !std::isinf(depth.data[i])) {
+        view.pixels.push_back(static_cast<int>(i));
+      }
+    }
+    view.range = {first, first + view.pixels.size()};
+    first = view.range.last;
+    ViewParameters own;
+    own.depth.resize(view.depth_lattice.parameter_count());
+    own.opacity.resize(view.opacity_lattice.parameter_count());
+    parameters.push_back(std::move(own));
+    views_.push_back(std::move(view));
+  }
+}
+
+void CoherentGaussians::free_shapes() {
+  if (shapes_are_free_) return;
+  shapes_are_free_ = true;
+  for (size_t n = 0; n < views_.size(); ++n) {
+    ParameterBlock& shape = parameters[n].shape;
+    const size_t count = views_[n].pixels.size();
+    shape.resize(count * kShapeSize);
+    for (size_t k = 0; k < count; ++k) {
+      std::fill_n(&shape.value[k * kShapeSize], 3, std::log(options_.radius_factor));
+      shape.value[k * kShapeSize + 3] = 1;
+    }
+  }
+}
+
+void CoherentGaussians::decode_view(size_t n) {
+  ViewState& view = views_[n];
+  view.depth_lattice.evaluate(parameters[n].depth.value, view.depth_change);
+  view.opacity_lattice.evaluate(parameters[n].opacity.value, view.logit_change);
+  const auto unit = static_cast<float>(pixel_size(view.camera));
+  const float max_depth = options_.max_depth_change;
+  const float max_logit = options_.max_logit_change;
+  for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
+    const size_t g = view.range.first + k;
+    float& f = view.depth_change.data[pixel];
+    float& h = view.logit_change.data[pixel];
+    f = std::tanh(f / max_depth);
+    h = std::tanh(h / max_logit);
+    const float z = view.start.data[pixel] * std::exp(max_depth * f);
+    view.depth.data[pixel] = z;
+    const int x = pixel % view.depth.width;
+    const int y = pixel / view.depth.width;
+    gaussians_.position[g] = view.camera.unproject(x + 0.5, y + 0.5, double(z)).cast<float>();
+    gaussians_.opacity[g] = sigmoid(start_logit_ + max_logit * h);
+    if (!shapes_are_free_) {
+      gaussians_.scale[g].setConstant(options_.radius_factor * z * unit);
+      return;
+    }
+    const float* shape = &parameters[n].shape.value[k * kShapeSize];
+    gaussians_.scale[g] = shape_scale(shape, z * unit);
+    gaussians_.rotation[g] = Eigen::Vector4f(shape[3], shape[4], shape[5], shape[6]).normalized();
+  });
+}
+
+void CoherentGaussians::decode() {
+  for (size_t n = 0; n < views_.size(); ++n) decode_view(n);
+}
+
+void CoherentGaussians::add_view_gradients(size_t n,
+                                           const GaussianGradients& gradients,
+                                           const Raster<float>& depth) {
+  const ViewState& view = views_[n];
+  Raster<float> by_f(view.depth.width, view.depth.height, 0);
+  Raster<float> by_h(view.depth.width, view.depth.height, 0);
+  const auto unit = static_cast<float>(pixel_size(view.camera));
+  const Eigen::Matrix3d R = view.camera.world_from_cam.linear();
+  for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
+    const size_t g = view.range.first + k;
+    const int x = pixel % view.depth.width;
+    const int y = pixel / view.depth.width;
+    const Eigen::Vector3f ray = (R * view.camera.ray_in_cam(x + 0.5, y + 0.5)).cast<float>();
+    const float z = view.depth.data[pixel];
+    float by_z = gradients.position[g].dot(ray);
+    if (!depth.empty()) by_z += depth.data[pixel];
+    if (!shapes_are_free_) {
+      by_z += gradients.radius[g] * options_.radius_factor * unit;
+    } else {
+      const Eigen::Vector3f by_log_scale = gradients.scale[g].cwiseProduct(gaussians_.scale[g]);
+      by_z += by_log_scale.sum() / z;
+      float* sum = &parameters[n].shape.gradient[k * kShapeSize];
+      for (int axis = 0; axis < 3; ++axis) sum[axis] += by_log_scale[axis];
+      const float* value = &parameters[n].shape.value[k * kShapeSize];
+      const float length = Eigen::Map<const Eigen::Vector4f>(value + 3).norm();
+      for (int c = 0; c < 4; ++c) sum[3 + c] += gradients.rotation[g][c] / length;
+    }
+    const float f = view.depth_change.data[pixel];
+    const float h = view.logit_change.data[pixel];
+    const float o = gaussians_.opacity[g];
+    by_f.data[pixel] = by_z * z * (1 - f) * (1 + f);
+    by_h.data[pixel] = gradients.opacity[g] * o * (1 - o) * (1 - h) * (1 + h);
+  });
+  view.depth_lattice.add_gradient(by_f, parameters[n].depth.gradient);
+  view.opacity_lattice.add_gradient(by_h, parameters[n].opacity.gradient);
+}
+
+void CoherentGaussians::add_gradients(const GaussianGradients& gaussians,
+                                      std::span<const Raster<float>> depth) {
+  for (size_t n = 0; n < views_.size(); ++n) {
+    add_view_gradients(n, gaussians, n < depth.size() ? depth[n] : Raster<float>{});
+  }
+}
+
+double CoherentGaussians::add_bending(double depth_weight, double opacity_weight) {
+  double sum = 0;
+  for (size_t n = 0; n < views_.size(); ++n) {
+    ViewParameters& own = parameters[n];
+    sum += views_[n].depth_lattice.add_bending(own.depth.value, depth_weight, own.depth.gradient);
+    sum += views_[n].opacity_lattice.add_bending(
+        own.opacity.value, opacity_weight, own.opacity.gradient);
+  }
+  return sum;
+}
+
+}  // namespace cgs

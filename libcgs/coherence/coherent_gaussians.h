@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "libcgs/coherence/layered_lattice.h"
+#include "libcgs/core/gaussians.h"
+#include "libcgs/core/scene.h"
+#include "libcgs/priors/view_priors.h"
+#include "libcgs/render/training_rasterizer.h"
+
+namespace cgs {
+
+/// Numbers that an optimiser changes, and the derivative of the loss with respect to each.
+struct ParameterBlock {
+  std::vector<float> value;
+  std::vector<float> gradient;
+
+  void resize(size_t count) {
+    value.assign(count, 0);
+    gradient.assign(count, 0);
+  }
+};
+
+/// How Gaussians hang together.
+struct CoherenceOptions {
+  std::vector<int> depth_spacing = {128, 64, 32, 16};  ///< Knots of the depth lattice [pixels].
+  std::vector<int> opacity_spacing = {64, 32, 16, 8};  ///< Knots of the opacity lattice [pixels].
+  float max_depth_change = 0.5f;   ///< Bound of |log(depth / starting depth)|; > 0.
+  float max_logit_change = 12.0f;  ///< Bound of the change of the opacity's logit; > 0.
+  float radius_factor = 0.6f;      ///< As in InitialisationOptions.
+  float opacity = 0;               ///< As in InitialisationOptions.
+
+  /// \throws InvalidInput naming the first field out of range.
+  void validate() const;
+};
+
+/// One Gaussian per input pixel, on the ray of its pixel, moved by few numbers.
+///
+/// For a pixel p of view n with starting depth z0(p):
+///   z = z0 exp(D tanh(f_n(p) / D)),  logit(opacity) = logit(o0) + L tanh(g_n(p) / L),
+/// with layered lattices f, g and the bounds D, L of CoherenceOptions. Both start at the identity.
+/// Standard deviations are z / focal length * exp(s), s = log(radius_factor) until shapes are free.
+/// Colours are those of the pixels.
+/// Source: Paliwal et al. 2024, "CoherentGS", section 3, with lattices instead of convolutional
+///         decoders and the residual relative to depth.
+class CoherentGaussians {
+ public:
+  /// \param priors  in the order of scene.input; pixels of NaN depth have no Gaussian
+  /// \throws InvalidInput if priors, images and cameras are not of one size
+  CoherentGaussians(const Scene& scene,
+                    const std::vector<ViewPriors>& priors,
+                    const CoherenceOptions& options);
+
+  /// What the optimiser may change in one view. `shape` holds log radii relative to the pixel (3)
+  /// and a quaternion (4) per Gaussian; it is empty until free_shapes().
+  struct ViewParameters {
+    ParameterBlock depth;
+    ParameterBlock opacity;
+    ParameterBlock shape;
+  };
+  std::vector<ViewParameters> parameters;
+
+  /// From now on every Gaussian has a shape of its own, at first the ball it was.
+  void free_shapes();
+  bool shapes_are_free() const { return shapes_are_free_; }
+
+  /// Brings gaussians() and depth() up to date with the parameters.
+  void decode();
+  const Gaussians& gaussians() const { return gaussians_; }
+  size_t view_count() const { return views_.size(); }
+  const DepthMap& depth(size_t view) const { return views_[view].depth; }
+  /// Indices [first, last) in gaussians() of those of one view, in row-major order of its pixels.
+  struct Range {
+    size_t first, last;
+  };
+  Range range(size_t view) const { return views_[view].range; }
+  /// The pixel of a Gaussian of `view`, row-major; `index` counts from range(view).first.
+  int pixel(size_t view, size_t index) const { return views_[view].pixels[index]; }
+
+  /// Adds to the gradients of all parameters.
+  ///
+  /// \param gaussians  of the loss with respect to gaussians()
+  /// \param depth      of the loss with respect to depth(), one raster per view; empty = zero
+  void add_gradients(const GaussianGradients& gaussians, std::span<const Raster<float>> depth);
+
+  /// Adds the bending energies of depth and opacity, times weights. \return the weighted sum
+  double add_bending(double depth_weight, double opacity_weight);
+
+ private:
+  struct ViewState {
+    Camera camera;
+    LayeredLattice depth_lattice;
+    LayeredLattice opacity_lattice;
+    DepthMap start;
+    DepthMap depth;
+    Raster<float> depth_change;  // f, then tanh(f / D)
+    Raster<float> logit_change;
+    std::vector<int> pixels;
+    Range range;
+  };
+  void decode_view(size_t n);
+  void add_view_gradients(size_t n, const GaussianGradients& gaussians, const Raster<float>& depth);
+
+  CoherenceOptions options_;
+  float start_logit_ = 0;
+  bool shapes_are_free_ = false;
+  std::vector<ViewState> views_;
+  Gaussians gaussians_;
+};
+
+}  // namespace cgs

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "libcgs/coherence/coherent_gaussians.h"
+#include "libcgs/core/scene.h"
+#include "libcgs/priors/view_priors.h"
+#include "libcgs/train/adam.h"
+#include "libcgs/train/losses.h"
+#include "libcgs/train/training_options.h"
+
+namespace cgs {
+
+/// What one step did: each term already multiplied by its weight, summed over views.
+struct StepReport {
+  double l1 = 0;
+  double ssim = 0;
+  double tv = 0;
+  double flow = 0;
+  double prior = 0;
+  double bending = 0;
+  double total() const { return l1 + ssim + tv + flow + prior + bending; }
+};
+
+/// Optimises coherent Gaussians against the photographs of the input views.
+///
+/// Everything a step does depends on the options, the scene, the priors and the number of steps
+/// done, and on nothing else, so the same call gives the same bits on any number of threads.
+class Trainer {
+ public:
+  /// \param scene   canonical, input images loaded; must outlive the trainer
+  /// \param priors  in the order of scene.input; must outlive the trainer
+  Trainer(const Scene& scene,
+          const std::vector<ViewPriors>& priors,
+          const TrainingOptions& options);
+
+  bool done() const { return step_ >= options_.steps; }
+  int steps_done() const { return step_; }
+  StepReport step();
+
+  const CoherentGaussians& model() const { return model_; }
+  const std::vector<StepReport>& history() const { return history_; }  ///< Of all steps done.
+
+  /// Everything that later steps depend on beside what the constructor got.
+  std::string save() const;
+  /// Goes on from what save() of a trainer with the same arguments gave.
+  /// \throws InvalidInput if the state does not fit; the trainer must then not be used.
+  void restore(std::string_view state);
+
+ private:
+  struct TrainingView {
+    Camera camera;
+    ColorPlanes photograph;
+    MaskMap use;
+    Raster<uint8_t> layer;
+  };
+  struct Pair {
+    size_t first, second;
+    std::vector<PixelMatch> matches;
+  };
+  double time() const { return double(step_) / options_.steps; }
+  Gaussians with_dropout(size_t view) const;
+  void add_view(size_t n, GaussianGradients& sum, StepReport& report);
+  void add_depth_terms(std::vector<Raster<float>>& sum, StepReport& report);
+  void update();
+
+  const Scene& scene_;
+  const std::vector<ViewPriors>& priors_;
+  TrainingOptions options_;
+  CoherentGaussians model_;
+  std::vector<TrainingView> full_;    // per input view
+  std::vector<TrainingView> coarse_;  // at half size
+  std::vector<Pair> pairs_;
+  std::vector<AdamState> depth_state_, opacity_state_, shape_state_;
+  float disparity_unit_ = 1;
+  std::vector<StepReport> history_;
+  int step_ = 0;
+};
+
+}  // namespace cgs

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/train/training_options.h"
+
+#include <charconv>
+#include <cmath>
+#include <variant>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+struct Field {
+  std::string_view name;
+  std::variant<int*, float*, double*, std::vector<int>*> value;
+};
+
+std::vector<Field> fields_of(TrainingOptions& o) {
+  return {{"steps", &o.steps},
+          {"coarse_until", &o.coarse_until},
+          {"free_from", &o.free_from},
+          {"sharp_from", &o.sharp_from},
+          {"depth_rate", &o.depth_rate},
+          {"opacity_rate", &o.opacity_rate},
+          {"shape_rate", &o.shape_rate},
+          {"final_rate", &o.final_rate},
+          {"l1_weight", &o.l1_weight},
+          {"ssim_weight", &o.ssim_weight},
+          {"tv_weight", &o.tv_weight},
+          {"masked_tv_weight", &o.masked_tv_weight},
+          {"flow_weight", &o.flow_weight},
+          {"prior_weight", &o.prior_weight},
+          {"depth_bending", &o.depth_bending},
+          {"opacity_bending", &o.opacity_bending},
+          {"l1_levels", &o.l1_levels},
+          {"dropout", &o.dropout},
+          {"dropout_block", &o.dropout_block},
+          {"depth_spacing", &o.coherence.depth_spacing},
+          {"opacity_spacing", &o.coherence.opacity_spacing},
+          {"max_depth_change", &o.coherence.max_depth_change},
+          {"max_logit_change", &o.coherence.max_logit_change},
+          {"radius_factor", &o.coherence.radius_factor},
+          {"opacity", &o.coherence.opacity}};
+}
+
+template <typename T>
+void parse(std::string_view name, std::string_view text, T& out) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
+  const bool whole = error == std::errc() && end == text.data() + text.size();
+  require(whole, std::string(name).append(" must be a number"), text);
+}
+
+void parse(std::string_view name, std::string_view text, std::vector<int>& out) {
+  out.clear();
+  while (true) {
+    const size_t comma = text.find(',');
+    parse(name, text.substr(0, comma), out.emplace_back());
+    if (comma == std::string_view::npos) return;
+    text.remove_prefix(comma + 1);
+  }
+}
+
+template <typename T>
+std::string print(T value) {
+  std::array<char, 64> text{};
+  const auto result = std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), result.ptr};
+}
+
+std::string print(const std::vector<int>& values) {
+  std::string out;
+  for (const int value : values) {
+    if (!out.empty()) out += ',';
+    out += print(value);
+  }
+  return out;
+}
+
+void require_fraction(double value, std::string name) {
+  require(value >= 0 && value <= 1, name.append(" must be in [0, 1]"), value);
+}
+
+void require_weight(double value, std::string name) {
+  require(value >= 0 && std::isfinite(value), name.append(" must be >= 0"), value);
+}
+
+}  // namespace
+
+void TrainingOptions::validate() const {
+  coherence.validate();
+  require(steps >= 0, "steps must be >= 0", steps);
+  require_fraction(coarse_until, "coarse_until");
+  require_fraction(free_from, "free_from");
+  require_fraction(sharp_from, "sharp_from");
+  require_fraction(final_rate, "final_rate");
+  require_weight(depth_rate, "depth_rate");
+  require_weight(opacity_rate, "opacity_rate");
+  require_weight(shape_rate, "shape_rate");
+  require_weight(l1_weight, "l1_weight");
+  require_weight(ssim_weight, "ssim_weight");
+  require_weight(tv_weight, "tv_weight");
+  require_weight(masked_tv_weight, "masked_tv_weight");
+  require_weight(flow_weight, "flow_weight");
+  require_weight(prior_weight, "prior_weight");
+  require_weight(depth_bending, "depth_bending");
+  require_weight(opacity_bending, "opacity_bending");
+  require(l1_levels >= 1, "l1_levels must be >= 1", l1_levels);
+  require(dropout >= 0 && dropout < 1, "dropout must be in [0, 1)", dropout);
+  require(dropout_block >= 1, "dropout_block must be >= 1", dropout_block);
+}
+
+TrainingOptions training_preset(std::string_view name) {
+  TrainingOptions options;
+  if (name == "standard") return options;
+  if (name == "draft") {
+    options.steps = 60;
+    return options;
+  }
+  throw InvalidInput("--preset must be draft or standard, but is " + std::string(name));
+}
+
+void set_training_field(TrainingOptions& options, std::string_view name, std::string_view value) {
+  for (const Field& field : fields_of(options)) {
+    if (field.name != name) continue;
+    std::visit([&](auto* target) { parse(name, value, *target); }, field.value);
+    return;
+  }
+  throw InvalidInput("there is no training field '" + std::string(name) + "'");
+}
+
+std::vector<std::pair<std::string, std::string>> training_fields(const TrainingOptions& options) {
+  TrainingOptions copy = options;
+  std::vector<std::pair<std::string, std::string>> out;
+  for (const Field& field : fields_of(copy)) {
+    out.emplace_back(field.name,
+                     std::visit([](auto* value) { return print(*value); }, field.value));
+  }
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "libcgs/coherence/coherent_gaussians.h"
+
+namespace cgs {
+
+/// How a model is trained. One step looks at all input views. Points in time are fractions of the
+/// whole schedule, so that a run of another length is the same run, slower or faster.
+struct TrainingOptions {
+  CoherenceOptions coherence;
+
+  int steps = 300;            ///< >= 0; 0 leaves the aligned initialisation.
+  double coarse_until = 0.3;  ///< Until then images are halved; in [0, 1].
+  double free_from = 0.7;     ///< From then on shapes are free; in [0, 1].
+  double sharp_from = 0.85;   ///< From then on images are drawn at twice the size and averaged.
+
+  double depth_rate = 2e-3;   ///< Of log depth, per step, at the start.
+  double opacity_rate = 0.1;  ///< Of the logit.
+  double shape_rate = 5e-3;   ///< Of log radius and of the quaternion.
+  double final_rate = 0.05;   ///< All rates fall to this part of themselves, along a cosine.
+
+  double l1_weight = 0.8;
+  double ssim_weight = 0.2;
+  double tv_weight = 0.0;         ///< Total variation of the rendered disparity.
+  double masked_tv_weight = 0.0;  ///< The same within layers.
+  double flow_weight = 0.0;       ///< Distance of corresponding points [scene extents].
+  double prior_weight = 0.0;      ///< Departure of measured depths from their prior, in sigmas.
+  double depth_bending = 0.0;     ///< Of the depth lattice.
+  double opacity_bending = 0.0;
+
+  int l1_levels = 5;
+  double dropout = 0.5;    ///< Share of a view's own blocks left out of its picture; in [0, 1).
+  int dropout_block = 32;  ///< Edge of a block [pixels].
+
+  /// \throws InvalidInput naming the first field out of range.
+  void validate() const;
+};
+
+/// The settings of a name: "draft", "standard" or "reference". \throws InvalidInput
+TrainingOptions training_preset(std::string_view name);
+
+/// Sets one field by its name, e.g. ("steps", "500") or ("depth_spacing", "64,16"); the names are
+/// those of TrainingOptions and CoherenceOptions.
+/// \throws InvalidInput if there is no such field or the value is not of its type.
+void set_training_field(TrainingOptions& options, std::string_view name, std::string_view value);
+
+/// All fields, in the order above, with their values as set_training_field() takes them.
+std::vector<std::pair<std::string, std::string>> training_fields(const TrainingOptions& options);
+
+}  // namespace cgs

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What training settings bring on held-out views.
+//
+// usage: training_accuracy MODEL [every=STEPS] [limit=VIEWS] [FIELD=VALUE ...]
+//
+// MODEL is a folder that `cgs train --preset none` wrote. Fields are those of TrainingOptions.
+// Prints one line per evaluation: PSNR and SSIM over all pixels, over the pixels that were seen
+// before training (a fixed set, so that lines can be compared), and over those seen now.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <string>
+
+#include "convert/model.h"
+#include "io/exr.h"
+#include "io/scene_reader.h"
+#include "libcgs/core/error.h"
+#include "libcgs/render/rasterizer.h"
+#include "libcgs/train/image_metrics.h"
+#include "libcgs/train/trainer.h"
+
+namespace {
+
+using cgs::MaskMap;
+
+struct HeldOut {
+  cgs::View view;
+  MaskMap seen_at_start;
+};
+
+MaskMap seen_pixels(const cgs::RenderBuffers& buffers) {
+  MaskMap out(buffers.hole.width, buffers.hole.height, 0);
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    out.data[i] = buffers.hole.data[i] == cgs::Hole::None ? 1 : 0;
+  }
+  return out;
+}
+
+// Exact depth of the input views [internal units], where the scene has a folder truth/.
+std::vector<cgs::DepthMap> true_depths(const cgs::Scene& scene) {
+  std::vector<cgs::DepthMap> out;
+  for (const int i : scene.input) {
+    const cgs::View& view = scene.views[static_cast<size_t>(i)];
+    const auto path =
+        view.image_path.parent_path().parent_path() / "truth" / (view.name + "_depth.exr");
+    if (!std::filesystem::exists(path)) return {};
+    const cgs::ExrImage image = cgs::read_exr(path);
+    cgs::DepthMap depth(image.width, image.height, 0);
+    for (size_t k = 0; k < depth.data.size(); ++k) {
+      depth.data[k] = image.channels[0].second[k] / static_cast<float>(scene.frame.scale);
+    }
+    out.push_back(std::move(depth));
+  }
+  return out;
+}
+
+// Mean |log depth ratio| and the share within 1 % over all pixels whose truth is known.
+void print_depth_error(const cgs::Trainer& trainer, const std::vector<cgs::DepthMap>& truth) {
+  double sum = 0;
+  double within = 0;
+  double count = 0;
+  for (size_t n = 0; n < truth.size(); ++n) {
+    const cgs::DepthMap& depth = trainer.model().depth(n);
+    for (size_t i = 0; i < depth.data.size(); ++i) {
+      if (!(truth[n].data[i] > 0) || !(depth.data[i] > 0)) continue;
+      const double error = std::abs(std::log(double(depth.data[i]) / double(truth[n].data[i])));
+      sum += std::min(error, 0.1);
+      within += error < 0.01 ? 1 : 0;
+      ++count;
+    }
+  }
+  if (count > 0)
+    std::printf(" | depth %.3f%% off, %.1f%% good", 100 * sum / count, 100 * within / count);
+}
+
+struct Means {
+  double psnr = 0, ssim = 0, psnr_fixed = 0, ssim_fixed = 0, psnr_seen = 0, holes = 0;
+};
+
+Means evaluate(const cgs::Gaussians& gaussians,
+               const std::vector<cgs::SupportView>& inputs,
+               std::vector<HeldOut>& held_out) {
+  Means m;
+  for (HeldOut& h : held_out) {
+    cgs::RenderBuffers buffers = cgs::rasterize(gaussians, h.view.camera);
+    cgs::annotate_support(buffers, h.view.camera, inputs);
+    const MaskMap seen = seen_pixels(buffers);
+    if (h.seen_at_start.empty()) h.seen_at_start = seen;
+    const cgs::ColorImage shown = cgs::picture(buffers);
+    m.psnr += cgs::psnr(shown, h.view.image);
+    m.ssim += cgs::ssim(shown, h.view.image);
+    m.psnr_fixed += cgs::psnr(shown, h.view.image, &h.seen_at_start);
+    m.ssim_fixed += cgs::ssim(shown, h.view.image, &h.seen_at_start);
+    m.psnr_seen += cgs::psnr(shown, h.view.image, &seen);
+    m.holes +=
+        1 - double(std::count(seen.data.begin(), seen.data.end(), 1)) / double(seen.data.size());
+  }
+  const auto n = double(held_out.size());
+  return {m.psnr / n, m.ssim / n, m.psnr_fixed / n, m.ssim_fixed / n, m.psnr_seen / n, m.holes / n};
+}
+
+void run(int argc, char** argv) {
+  cgs::Model model = cgs::read_model(argv[1]);
+  cgs::TrainingOptions options;
+  int every = 100;
+  size_t limit = 6;
+  for (int i = 2; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const size_t equals = std::min(argument.find('='), argument.size() - 1);
+    const std::string name = argument.substr(0, equals);
+    const std::string value = argument.substr(equals + 1);
+    if (name == "every") {
+      every = std::atoi(value.c_str());
+    } else if (name == "limit") {
+      limit = static_cast<size_t>(std::atoi(value.c_str()));
+    } else {
+      cgs::set_training_field(options, name, value);
+    }
+  }
+  cgs::load_images(model.scene, model.scene.input);
+  std::vector<HeldOut> held_out;
+  const std::vector<int>& indices = model.scene.held_out;
+  const size_t stride = std::max<size_t>(1, indices.size() / std::max<size_t>(limit, 1));
+  for (size_t k = stride / 2; k < indices.size(); k += stride) {
+    cgs::load_images(model.scene, {indices[k]});
+    held_out.push_back({model.scene.views[static_cast<size_t>(indices[k])], {}});
+  }
+  const std::vector<cgs::SupportView> inputs = cgs::support_views(model);
+  cgs::Trainer trainer(model.scene, model.priors, options);
+  std::printf(
+      "%5s %7s | %6s %5s | %6s %5s | %6s %5s |  l1      ssim    tv      flow    prior   bend\n",
+      "step",
+      "s",
+      "all",
+      "ssim",
+      "fixed",
+      "ssim",
+      "seen",
+      "holes");
+  const std::vector<cgs::DepthMap> truth = true_depths(model.scene);
+  double seconds = 0;
+  cgs::StepReport last;
+  while (true) {
+    if (trainer.steps_done() % every == 0 || trainer.done()) {
+      const Means m = evaluate(trainer.model().gaussians(), inputs, held_out);
+      std::printf(
+          "%5d %7.1f | %6.2f %.3f | %6.2f %.3f | %6.2f %4.1f%% | %.5f %.5f %.5f %.5f %.5f %.5f",
+          trainer.steps_done(),
+          seconds,
+          m.psnr,
+          m.ssim,
+          m.psnr_fixed,
+          m.ssim_fixed,
+          m.psnr_seen,
+          100 * m.holes,
+          last.l1,
+          last.ssim,
+          last.tv,
+          last.flow,
+          last.prior,
+          last.bending);
+      std::fflush(stdout);
+    }
+    if (trainer.done()) break;
+    const auto start = std::chrono::steady_clock::now();
+    last = trainer.step();
+    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::fprintf(stderr,
+                 "usage: training_accuracy MODEL [every=STEPS] [limit=VIEWS] [FIELD=VALUE ...]\n");
+    return 2;
+  }
+  try {
+    run(argc, argv);
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "training_accuracy: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/coherence/coherent_gaussians.h"
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "libcgs/coherence/initialisation.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+namespace {
+
+constexpr int kWidth = 14;
+constexpr int kHeight = 10;
+
+Scene scene_of(size_t views) {
+  Scene scene;
+  for (size_t n = 0; n < views; ++n) {
+    View view;
+    view.camera = {.width = kWidth, .height = kHeight, .fx = 16, .fy = 15, .cx = 7, .cy = 5};
+    view.camera.world_from_cam.translation() = Eigen::Vector3d(0.1 * double(n), 0.05, -0.1);
+    view.camera.world_from_cam.linear() =
+        Eigen::AngleAxisd(0.1 * double(n), Eigen::Vector3d::UnitY()).toRotationMatrix();
+    view.image = ColorImage(kWidth, kHeight, Eigen::Vector3f(0.1f, 0.5f, 0.9f));
+    scene.input.push_back(static_cast<int>(n));
+    scene.views.push_back(view);
+  }
+  return scene;
+}
+
+// Two layers, one unknown pixel.
+std::vector<ViewPriors> priors_of(size_t views) {
+  ViewPriors p;
+  p.depth = DepthMap(kWidth, kHeight, 0.5f);
+  p.layer = Raster<uint8_t>(kWidth, kHeight, 0);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 8; x < kWidth; ++x) {
+      p.depth(x, y) = 0.3f + 0.01f * static_cast<float>(y);
+      p.layer(x, y) = 1;
+    }
+  }
+  p.depth(3, 3) = std::numeric_limits<float>::quiet_NaN();
+  return std::vector<ViewPriors>(views, p);
+}
+
+CoherenceOptions small_lattices() {
+  CoherenceOptions options;
+  options.depth_spacing = {8, 4};
+  options.opacity_spacing = {4, 2};
+  return options;
+}
+
+void randomise(ParameterBlock& block, float size, std::mt19937& random) {
+  std::normal_distribution<float> normal(0, size);
+  for (float& value : block.value) value += normal(random);
+}
+
+void randomise(CoherentGaussians& model, unsigned seed) {
+  std::mt19937 random(seed);
+  for (auto& own : model.parameters) {
+    randomise(own.depth, 0.1f, random);
+    randomise(own.opacity, 1.0f, random);
+    randomise(own.shape, 0.2f, random);
+  }
+}
+
+// A fixed linear function of everything that decode() gives.
+struct LinearLoss {
+  GaussianGradients weights;
+  std::vector<Raster<float>> depth;
+
+  LinearLoss(const CoherentGaussians& model, bool free) {
+    std::mt19937 random(5);
+    std::normal_distribution<float> normal(0, 1);
+    const auto vector = [&] {
+      return Eigen::Vector3f(normal(random), normal(random), normal(random));
+    };
+    for (size_t g = 0; g < model.gaussians().size(); ++g) {
+      weights.position.push_back(vector());
+      weights.opacity.push_back(normal(random));
+      if (free) {
+        weights.scale.push_back(100 * vector());
+        weights.rotation.emplace_back(
+            normal(random), normal(random), normal(random), normal(random));
+      } else {
+        weights.radius.push_back(100 * normal(random));
+      }
+    }
+    for (size_t n = 0; n < model.view_count(); ++n) {
+      depth.emplace_back(kWidth, kHeight, 0.0f);
+      for (float& w : depth.back().data) w = normal(random);
+    }
+  }
+
+  double operator()(const CoherentGaussians& model) const {
+    const Gaussians& g = model.gaussians();
+    double sum = 0;
+    for (size_t i = 0; i < g.size(); ++i) {
+      sum += weights.position[i].cast<double>().dot(g.position[i].cast<double>());
+      sum += double(weights.opacity[i]) * double(g.opacity[i]);
+      if (!weights.radius.empty()) sum += double(weights.radius[i]) * double(g.scale[i].x());
+      if (weights.scale.empty()) continue;
+      sum += weights.scale[i].cast<double>().dot(g.scale[i].cast<double>());
+      sum += weights.rotation[i].cast<double>().dot(g.rotation[i].cast<double>());
+    }
+    for (size_t n = 0; n < model.view_count(); ++n) {
+      for (size_t p = 0; p < depth[n].data.size(); ++p) {
+        const float z = model.depth(n).data[p];
+        if (z > 0) sum += double(depth[n].data[p]) * double(z);
+      }
+    }
+    return sum;
+  }
+
+  // What a rasterizer gives for rotations is orthogonal to the quaternion.
+  GaussianGradients gradients(const CoherentGaussians& model) const {
+    GaussianGradients out = weights;
+    for (size_t i = 0; i < out.rotation.size(); ++i) {
+      const Eigen::Vector4f& q = model.gaussians().rotation[i];
+      out.rotation[i] -= q * q.dot(out.rotation[i]);
+    }
+    return out;
+  }
+};
+
+void expect_finite_differences(CoherentGaussians& model,
+                               ParameterBlock& block,
+                               const LinearLoss& loss) {
+  const std::vector<float> gradient = block.gradient;
+  double worst = 0;
+  double largest = 0;
+  for (size_t i = 0; i < block.value.size(); i += 1 + block.value.size() / 97) {
+    const float before = block.value[i];
+    constexpr float kStep = 4e-3f;
+    block.value[i] = before + kStep;
+    model.decode();
+    const double above = loss(model);
+    block.value[i] = before - kStep;
+    model.decode();
+    const double below = loss(model);
+    block.value[i] = before;
+    worst = std::max(worst, std::abs((above - below) / (2 * double(kStep)) - double(gradient[i])));
+    largest = std::max(largest, std::abs(double(gradient[i])));
+  }
+  model.decode();
+  EXPECT_GT(largest, 0.01);
+  EXPECT_LT(worst, 2e-3 * largest);  // single precision on both sides
+}
+
+void expect_gradients(bool free) {
+  CoherentGaussians model(scene_of(2), priors_of(2), small_lattices());
+  if (free) model.free_shapes();
+  randomise(model, 3);
+  model.decode();
+  const LinearLoss loss(model, free);
+  model.add_gradients(loss.gradients(model), loss.depth);
+  for (auto& own : model.parameters) {
+    expect_finite_differences(model, own.depth, loss);
+    expect_finite_differences(model, own.opacity, loss);
+    if (free) expect_finite_differences(model, own.shape, loss);
+  }
+}
+
+TEST(CoherentGaussians, StartAsTheInitialOnes) {
+  CoherentGaussians model(scene_of(3), priors_of(3), small_lattices());
+  model.decode();
+  const Gaussians start = initial_gaussians(scene_of(3), priors_of(3), {0.6f, 0});
+  ASSERT_EQ(model.gaussians().size(), start.size());
+  for (size_t i = 0; i < start.size(); ++i) {
+    EXPECT_EQ(model.gaussians().position[i], start.position[i]);
+    EXPECT_LT((model.gaussians().scale[i] - start.scale[i]).norm(), 1e-6f * start.scale[i].norm());
+    EXPECT_NEAR(model.gaussians().opacity[i], 0.5f, 1e-6f);
+  }
+}
+
+TEST(CoherentGaussians, FreeingShapesChangesNothingYet) {
+  CoherentGaussians model(scene_of(2), priors_of(2), small_lattices());
+  randomise(model, 1);
+  model.decode();
+  const Gaussians before = model.gaussians();
+  model.free_shapes();
+  model.decode();
+  for (size_t i = 0; i < before.size(); ++i) {
+    EXPECT_EQ(model.gaussians().position[i], before.position[i]);
+    EXPECT_LT((model.gaussians().scale[i] - before.scale[i]).norm(),
+              1e-5f * before.scale[i].norm());
+  }
+}
+
+TEST(CoherentGaussians, StayOnTheRaysOfTheirPixels) {
+  const Scene scene = scene_of(2);
+  CoherentGaussians model(scene, priors_of(2), small_lattices());
+  randomise(model, 2);
+  model.decode();
+  for (size_t n = 0; n < 2; ++n) {
+    const auto [first, last] = model.range(n);
+    for (size_t g = first; g < last; ++g) {
+      const int pixel = model.pixel(n, g - first);
+      const Eigen::Vector3d uvz =
+          scene.views[n].camera.project(model.gaussians().position[g].cast<double>());
+      EXPECT_NEAR(uvz.x(), pixel % kWidth + 0.5, 1e-5);
+      EXPECT_NEAR(uvz.y(), pixel / kWidth + 0.5, 1e-5);
+      EXPECT_NEAR(uvz.z(), double(model.depth(n).data[pixel]), 1e-6);
+    }
+  }
+}
+
+TEST(CoherentGaussians, MoveByNoMoreThanTheBound) {
+  CoherenceOptions options = small_lattices();
+  options.max_depth_change = 0.2f;
+  CoherentGaussians model(scene_of(2), priors_of(2), options);
+  for (float& value : model.parameters[0].depth.value) value = 1e6f;
+  for (float& value : model.parameters[1].depth.value) value = -1e6f;
+  for (float& value : model.parameters[0].opacity.value) value = 1e6f;
+  for (float& value : model.parameters[1].opacity.value) value = -1e6f;
+  model.decode();
+  EXPECT_NEAR(model.depth(0)(0, 0), 0.5 * std::exp(0.2), 1e-5);
+  EXPECT_NEAR(model.depth(1)(0, 0), 0.5 * std::exp(-0.2), 1e-5);
+  for (const float o : model.gaussians().opacity) {
+    EXPECT_TRUE(o >= 0 && o <= 1 && std::isfinite(o));
+  }
+}
+
+TEST(CoherentGaussians, GradientsOfBallsMatchFiniteDifferences) { expect_gradients(false); }
+
+TEST(CoherentGaussians, GradientsOfFreeShapesMatchFiniteDifferences) { expect_gradients(true); }
+
+TEST(CoherenceOptions, NameTheFieldOutOfRange) {
+  CoherenceOptions options;
+  options.max_depth_change = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(options.validate(), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs

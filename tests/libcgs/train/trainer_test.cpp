@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/train/trainer.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "libcgs/core/error.h"
+#include "libcgs/priors/depth_layers.h"
+#include "tests/support/stereo_scene.h"
+
+namespace cgs {
+namespace {
+
+struct PlantedScene {
+  Scene scene;
+  std::vector<DepthMap> truth;
+  std::vector<ViewPriors> priors;
+};
+
+// A textured wall with a box in front, seen by three cameras; its depth is known up to a smooth
+// bump of `error` relative height, another one in each view.
+PlantedScene planted_scene(double error) {
+  std::vector<test::TexturedPatch> patches;
+  patches.push_back({{0, 0, 1.0}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()});
+  test::add_box(patches, {-0.15, -0.12, 0.7}, {0.15, 0.12, 0.9});
+  std::vector<Camera> cameras;
+  for (const double x : {-0.12, 0.0, 0.12}) {
+    cameras.push_back(test::looking_at({x, 0.03 * x, 0}, {0, 0, 0.9}, 72, 56, 70));
+  }
+  PlantedScene out;
+  out.scene = test::photographed_scene(patches, cameras, 0.02);
+  for (size_t n = 0; n < cameras.size(); ++n) {
+    const DepthMap truth = test::true_depth(patches, cameras[n]);
+    ViewPriors p;
+    p.depth = truth;
+    p.sigma = truth;
+    for (float& s : p.sigma.data) s *= 0.02f;
+    for (int y = 0; y < truth.height; ++y) {
+      for (int x = 0; x < truth.width; ++x) {
+        const double bump = std::sin(0.09 * x + 2.0 * double(n)) * std::cos(0.11 * y + double(n));
+        p.depth(x, y) *= static_cast<float>(1 + error * bump);
+      }
+    }
+    p.confidence = Raster<float>(truth.width, truth.height, 1);
+    p.origin = Raster<DepthOrigin>(truth.width, truth.height, DepthOrigin::Measured);
+    p.matched_views = Raster<uint8_t>(truth.width, truth.height, 2);
+    p.layer = depth_layers(p.depth, {.count = 2, .sample_step = 2});
+    out.truth.push_back(truth);
+    out.priors.push_back(std::move(p));
+  }
+  return out;
+}
+
+double mean_depth_error(const PlantedScene& planted, const CoherentGaussians& model) {
+  double sum = 0;
+  double count = 0;
+  for (size_t n = 0; n < planted.truth.size(); ++n) {
+    for (size_t i = 0; i < planted.truth[n].data.size(); ++i) {
+      sum += std::abs(std::log(double(model.depth(n).data[i]) / double(planted.truth[n].data[i])));
+      ++count;
+    }
+  }
+  return sum / count;
+}
+
+TrainingOptions short_training(int steps) {
+  TrainingOptions options;
+  options.steps = steps;
+  options.coherence.depth_spacing = {32, 16};
+  options.coherence.opacity_spacing = {16, 8};
+  return options;
+}
+
+void run(Trainer& trainer) {
+  while (!trainer.done()) trainer.step();
+}
+
+bool same_bits(const Gaussians& a, const Gaussians& b) {
+  return a.position == b.position && a.scale == b.scale && a.rotation == b.rotation &&
+         a.opacity == b.opacity && a.sh == b.sh;
+}
+
+TEST(Trainer, MovesDepthTowardsTheTruth) {
+  const PlantedScene planted = planted_scene(0.03);
+  Trainer trainer(planted.scene, planted.priors, short_training(120));
+  const double before = mean_depth_error(planted, trainer.model());
+  run(trainer);
+  const double after = mean_depth_error(planted, trainer.model());
+  RecordProperty("before", std::to_string(before));
+  RecordProperty("after", std::to_string(after));
+  EXPECT_LT(after, 0.5 * before) << "from " << before;
+}
+
+TEST(Trainer, LosesLessAndLess) {
+  const PlantedScene planted = planted_scene(0.03);
+  TrainingOptions options = short_training(60);
+  options.dropout = 0;
+  options.coarse_until = 0;
+  options.free_from = 1;
+  options.sharp_from = 1;
+  Trainer trainer(planted.scene, planted.priors, options);
+  run(trainer);
+  EXPECT_LT(trainer.history().back().total(), 0.9 * trainer.history().front().total());
+}
+
+TEST(Trainer, GivesTheSameBitsForAnyNumberOfThreads) {
+  const PlantedScene planted = planted_scene(0.02);
+  Gaussians first;
+  for (const size_t threads : {1, 2, 3, 4}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    Trainer trainer(planted.scene, planted.priors, short_training(10));
+    run(trainer);
+    if (threads == 1) first = trainer.model().gaussians();
+    EXPECT_TRUE(same_bits(first, trainer.model().gaussians())) << threads << " threads";
+  }
+}
+
+TEST(Trainer, RestoredFromAnyStepEndsWithTheSameBits) {
+  const PlantedScene planted = planted_scene(0.02);
+  const TrainingOptions options = short_training(12);
+  Trainer whole(planted.scene, planted.priors, options);
+  run(whole);
+  for (int stop = 0; stop <= 12; stop += 3) {
+    Trainer interrupted(planted.scene, planted.priors, options);
+    while (interrupted.steps_done() < stop) interrupted.step();
+    Trainer resumed(planted.scene, planted.priors, options);
+    resumed.restore(interrupted.save());
+    EXPECT_EQ(resumed.steps_done(), stop);
+    run(resumed);
+    EXPECT_TRUE(same_bits(whole.model().gaussians(), resumed.model().gaussians())) << stop;
+    EXPECT_EQ(resumed.history().size(), 12u);
+  }
+}
+
+TEST(Trainer, RefusesAStateThatDoesNotFit) {
+  const PlantedScene planted = planted_scene(0.02);
+  Trainer trainer(planted.scene, planted.priors, short_training(4));
+  trainer.step();
+  const std::string state = trainer.save();
+  for (const size_t size : {size_t{0}, size_t{5}, state.size() / 2, state.size() - 1}) {
+    Trainer other(planted.scene, planted.priors, short_training(4));
+    EXPECT_THROW(other.restore(state.substr(0, size)), InvalidInput) << size;
+  }
+  Trainer other(planted.scene, planted.priors, short_training(4));
+  EXPECT_THROW(other.restore(state + "x"), InvalidInput);
+}
+
+TEST(Trainer, WithoutStepsIsTheInitialisation) {
+  const PlantedScene planted = planted_scene(0.02);
+  Trainer trainer(planted.scene, planted.priors, short_training(0));
+  EXPECT_TRUE(trainer.done());
+  EXPECT_EQ(trainer.model().depth(0).data, planted.priors[0].depth.data);
+}
+
+TEST(Trainer, ChangesNoColour) {
+  const PlantedScene planted = planted_scene(0.02);
+  Trainer trainer(planted.scene, planted.priors, short_training(5));
+  const auto before = trainer.model().gaussians().sh;
+  run(trainer);
+  EXPECT_EQ(trainer.model().gaussians().sh, before);
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/train/training_options.h"
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+namespace {
+
+TEST(TrainingOptions, EveryFieldSurvivesPrintingAndReading) {
+  TrainingOptions options;
+  options.steps = 17;
+  options.depth_rate = 0.1 + 0.2;
+  options.coherence.max_depth_change = 0.7f;
+  options.coherence.depth_spacing = {40, 10};
+  TrainingOptions copy;
+  for (const auto& [name, value] : training_fields(options)) {
+    set_training_field(copy, name, value);
+  }
+  EXPECT_EQ(training_fields(copy), training_fields(options));
+  EXPECT_EQ(copy.depth_rate, options.depth_rate);
+  EXPECT_EQ(copy.coherence.depth_spacing, options.coherence.depth_spacing);
+}
+
+TEST(TrainingOptions, RefuseUnknownFieldsAndBadValues) {
+  TrainingOptions options;
+  EXPECT_THROW(set_training_field(options, "stepz", "1"), InvalidInput);
+  EXPECT_THROW(set_training_field(options, "steps", "1.5"), InvalidInput);
+  EXPECT_THROW(set_training_field(options, "steps", ""), InvalidInput);
+  EXPECT_THROW(set_training_field(options, "depth_rate", "fast"), InvalidInput);
+  EXPECT_THROW(set_training_field(options, "depth_spacing", "8,"), InvalidInput);
+}
+
+TEST(TrainingOptions, ValidateNamesTheFieldOutOfRange) {
+  for (const char* setting : {"steps", "dropout", "ssim_weight", "final_rate", "l1_levels"}) {
+    TrainingOptions options;
+    set_training_field(options, setting, "-1");
+    try {
+      options.validate();
+      ADD_FAILURE() << setting << " = -1 was accepted";
+    } catch (const InvalidInput& error) {
+      EXPECT_NE(std::string(error.what()).find(setting), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(TrainingPreset, EveryNameIsValidAndOthersAreRefused) {
+  for (const char* name : {"draft", "standard"}) {
+    EXPECT_NO_THROW(training_preset(name).validate()) << name;
+  }
+  EXPECT_THROW(training_preset("fastest"), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs
