@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -26,10 +25,8 @@ struct Sample {
 Sample sample(const DepthMap& depth, double u, double v) {
   const double x = u - 0.5;
   const double y = v - 0.5;
-  const int last_x = depth.width - 1;
-  const int last_y = depth.height - 1;
-  if (!(x >= 0 && y >= 0 && x <= last_x && y <= last_y) || last_x < 1 || last_y < 1) return {};
-  Sample out{.x = std::min(int(x), last_x - 1), .y = std::min(int(y), last_y - 1)};
+  if (!(x >= 0 && y >= 0 && x < depth.width - 1 && y < depth.height - 1)) return {};
+  Sample out{.x = static_cast<int>(x), .y = static_cast<int>(y)};
   const double fx = x - out.x;
   const double fy = y - out.y;
   const std::array<double, 4> weight = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
