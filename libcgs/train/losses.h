@@ -13,6 +13,8 @@ namespace cgs {
 // Every term returns weight * value and adds weight * derivative to the gradient it is given,
 // creating rasters, filled with zero, that are empty. A weight of 0 returns 0 and touches nothing.
 // Sums are taken in double, row by row in a fixed order: the same bits for any number of threads.
+// Where a term has a kink its derivative is 0. All throw InvalidInput if sizes differ or nothing
+// is there. Each term is in the source of its name.
 
 /// Mean absolute difference at full, half, ... resolution (2x2 means, odd rows and columns left
 /// out), levels weighted 1, 1/4, 1/8, 1/16, ...; pixels outside `use` take the photograph's value.
@@ -28,7 +30,9 @@ double multi_scale_l1(const ColorPlanes& rendered,
                       ColorPlanes& gradient);
 
 /// 1 - SSIM with the window and constants of ssim() in train/image_metrics.h.
-/// Variances are clamped at 0. \param use  as in multi_scale_l1()
+/// Arithmetic is in float, in a form whose error is relative to 1 - SSIM, not to 1.
+///
+/// \param use  as in multi_scale_l1()
 double structural_dissimilarity(const ColorPlanes& rendered,
                                 const ColorPlanes& photograph,
                                 const MaskMap* use,
@@ -36,8 +40,9 @@ double structural_dissimilarity(const ColorPlanes& rendered,
                                 ColorPlanes& gradient);
 
 /// Total variation of the rendered disparity A unit / (A unit + D), with A = alpha + 1e-6 and D =
-/// depth_sum: mean |difference| along x plus along y, over pairs of pixels whose alpha is at least
-/// 0.05. With layers, only pairs within one layer count ("masked").
+/// depth_sum: mean |difference| along x plus mean |difference| along y, each over its pairs of
+/// neighbours whose alpha is at least 0.05. With layers, only pairs within one layer count
+/// ("masked"). Without a pair the mean is 0.
 ///
 /// \param unit      depth at which disparity is 1/2 [internal units]
 /// \param layer     layer of every pixel, or null
@@ -50,15 +55,16 @@ double total_variation(const TrainingBuffers& rendered,
                        TrainingBuffers& gradient);
 
 /// What one view's pixel and a point of another view's depth map show in common.
-struct Correspondence {
+struct PixelMatch {
   int32_t pixel = 0;  ///< Index of the pixel in the first view, row-major.
   float u = 0;        ///< Place in the second view [pixels, centres at +0.5].
   float v = 0;
 };
 
-/// Mean over all pixels of the first view of the L1 distance between the 3D points that two depth
-/// maps give at corresponding places; the second depth is interpolated bilinearly in inverse
-/// depth. Places whose four neighbours are not all known, or outside, do not count.
+/// Mean over all pixels of the first view of the L1 distance (the sum of three coordinates)
+/// between the 3D points that two depth maps give at corresponding places; the second depth is
+/// interpolated bilinearly in inverse depth. Correspondences whose pixel, or one of the four
+/// pixels around whose place, is unknown or outside add nothing.
 ///
 /// \param gradient_first   adds dL/d(depth of first), gradient_second dL/d(depth of second)
 /// Source: Paliwal et al. 2024, "CoherentGS", flow loss; sampling here is at pixel centres.
@@ -66,7 +72,7 @@ double flow_consistency(const Camera& first,
                         const DepthMap& depth_first,
                         const Camera& second,
                         const DepthMap& depth_second,
-                        std::span<const Correspondence> matches,
+                        std::span<const PixelMatch> matches,
                         double weight,
                         Raster<float>& gradient_first,
                         Raster<float>& gradient_second);
