@@ -2,15 +2,13 @@
 #include "libcgs/render/projection.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 #include <span>
-#include <utility>
 
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/render/depth_sort.h"
 #include "libcgs/render/spherical_harmonics.h"
 
 namespace cgs {
@@ -21,26 +19,6 @@ namespace {
 constexpr double kMaxVariance = 1e24;    // [pixels^2]
 constexpr double kMinVariance = 1e-12;   // [pixels^2]
 constexpr float kSupportMargin = 1e-4f;  // of q_max, so that rounding never cuts a pixel off
-
-struct View {
-  Eigen::Matrix3d cam_from_world;
-  Eigen::Vector3d center;
-  Camera camera;
-  Eigen::Array2d min_slope;  // of x/z and y/z inside the derivative
-  Eigen::Array2d max_slope;
-};
-
-View make_view(const Camera& camera) {
-  const Eigen::Array2d focal(camera.fx, camera.fy);
-  const Eigen::Array2d size(camera.width, camera.height);
-  const Eigen::Array2d center(camera.cx, camera.cy);
-  const Eigen::Array2d margin = 0.15 * size;  // 0.3 of the half size: 1.3 tan(fov / 2) if centred
-  return {camera.world_from_cam.linear().transpose(),
-          camera.center(),
-          camera,
-          (-margin - center) / focal,
-          (size + margin - center) / focal};
-}
 
 // Dilated image covariance; det carries the determinant apart because it cannot be had from the
 // entries without cancellation.
@@ -62,7 +40,7 @@ Eigen::Matrix3d axes_in_world(const Eigen::Vector4f& rotation) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
 }
 
-ImageCovariance image_covariance(const View& view,
+ImageCovariance image_covariance(const ProjectionView& view,
                                  const Eigen::Vector3d& in_cam,
                                  const Eigen::Vector3f& scale,
                                  const Eigen::Vector4f& rotation,
@@ -124,7 +102,7 @@ RowRange covered(double center, double half, int size) {
 
 SplatFate project_one(const Gaussians& g,
                       size_t i,
-                      const View& view,
+                      const ProjectionView& view,
                       const ProjectionOptions& options,
                       ProjectedGaussians& out) {
   if (is_degenerate(g, i)) return SplatFate::Degenerate;
@@ -178,49 +156,54 @@ void ProjectionOptions::validate() const {
           near_depth);
 }
 
+ProjectionView projection_view(const Camera& camera) {
+  const Eigen::Array2d focal(camera.fx, camera.fy);
+  const Eigen::Array2d size(camera.width, camera.height);
+  const Eigen::Array2d center(camera.cx, camera.cy);
+  const Eigen::Array2d margin = 0.15 * size;  // 0.3 of the half size: 1.3 tan(fov / 2) if centred
+  return {camera.world_from_cam.linear().transpose(),
+          camera.center(),
+          camera,
+          (-margin - center) / focal,
+          (size + margin - center) / focal};
+}
+
 ProjectedGaussians project_gaussians(const Gaussians& gaussians,
                                      const Camera& camera,
                                      const ProjectionOptions& options) {
+  ProjectedGaussians out;
+  project_gaussians(gaussians, camera, options, out);
+  return out;
+}
+
+void project_gaussians(const Gaussians& gaussians,
+                       const Camera& camera,
+                       const ProjectionOptions& options,
+                       ProjectedGaussians& out) {
   options.validate();
   check_arguments(gaussians, camera);
-  const View view = make_view(camera);
+  const ProjectionView view = projection_view(camera);
   const size_t n = gaussians.size();
-  ProjectedGaussians out{
-      std::vector<Splat>(n), std::vector<RowRange>(n), std::vector<SplatFate>(n)};
+  out.splats.resize(n);
+  out.rows.resize(n);
+  out.fate.resize(n);
   constexpr size_t kGrain = 4096;
   tbb::parallel_for(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
     for (size_t i = range.begin(); i < range.end(); ++i) {
       out.fate[i] = project_one(gaussians, i, view, options, out);
     }
   });
-  return out;
 }
 
 std::vector<uint32_t> depth_order(const ProjectedGaussians& projected) {
-  // Positive floats sort like their bits. Least significant digit first is stable, so that the
-  // index order of the input decides between equal depths.
-  constexpr int kBits = 11;
-  constexpr int kPasses = 3;
-  constexpr uint32_t kDigits = 1U << kBits;
   std::vector<uint64_t> keys;
   keys.reserve(projected.fate.size());
-  std::array<std::array<uint32_t, kDigits>, kPasses> starts{};
   for (size_t i = 0; i < projected.fate.size(); ++i) {
     if (projected.fate[i] != SplatFate::Drawn) continue;
-    const auto depth = std::bit_cast<uint32_t>(projected.splats[i].depth);
-    keys.push_back(uint64_t{depth} << 32 | i);
-    for (int pass = 0; pass < kPasses; ++pass)
-      ++starts[pass][depth >> (kBits * pass) & (kDigits - 1)];
+    keys.push_back(depth_key(projected.splats[i].depth, static_cast<uint32_t>(i)));
   }
-  std::vector<uint64_t> sorted(keys.size());
-  for (int pass = 0; pass < kPasses; ++pass) {
-    uint32_t begin = 0;
-    for (uint32_t& start : starts[pass]) begin += std::exchange(start, begin);
-    for (const uint64_t key : keys) {
-      sorted[starts[pass][key >> (32 + kBits * pass) & (kDigits - 1)]++] = key;
-    }
-    keys.swap(sorted);
-  }
+  std::vector<uint64_t> scratch;
+  sort_depth_keys(keys, scratch);
   std::vector<uint32_t> order(keys.size());
   std::transform(keys.begin(), keys.end(), order.begin(), [](uint64_t key) {
     return static_cast<uint32_t>(key);

@@ -69,6 +69,17 @@ struct ProjectedGaussians {
   std::vector<SplatFate> fate;
 };
 
+/// A camera as the projection of Gaussians needs it.
+struct ProjectionView {
+  Eigen::Matrix3d cam_from_world;  ///< Rotation.
+  Eigen::Vector3d center;          ///< [internal units]
+  Camera camera;
+  Eigen::Array2d min_slope;  ///< Of x/z and y/z inside the derivative of the perspective map.
+  Eigen::Array2d max_slope;
+};
+
+ProjectionView projection_view(const Camera& camera);
+
 /// Projects every Gaussian with the affine approximation of the perspective map at its centre.
 ///
 /// Everything up to the footprint is computed in double, after subtracting the camera centre in
@@ -83,6 +94,12 @@ struct ProjectedGaussians {
 ProjectedGaussians project_gaussians(const Gaussians& gaussians,
                                      const Camera& camera,
                                      const ProjectionOptions& options = {});
+
+/// The same into arrays that keep their memory from one call to the next.
+void project_gaussians(const Gaussians& gaussians,
+                       const Camera& camera,
+                       const ProjectionOptions& options,
+                       ProjectedGaussians& out);
 
 /// Indices of the drawn Gaussians, nearest first; equal float depths keep index order.
 std::vector<uint32_t> depth_order(const ProjectedGaussians& projected);

@@ -17,8 +17,6 @@ namespace cgs {
 
 namespace {
 
-int tiles_in(int pixels) { return (pixels + kTileSize - 1) / kTileSize; }
-
 // The Gaussians that reach each row of tiles, nearest first. Tiles sort out their share row by
 // row, so that the memory needed grows with the rows a splat covers and not with its area.
 struct TileRows {
@@ -68,39 +66,6 @@ TileRows sort_into_rows(const ProjectedGaussians& projected,
     for_each_row_of_block(block, [&](int r, uint32_t g) { out.gaussians[cursor[block][r]++] = g; });
   });
   return out;
-}
-
-struct TileRange {
-  int32_t first, last;
-};
-
-// Columns of tiles that the support of a splat reaches within its band of pixel rows.
-TileRange tiles_reached(const Splat& s, const BandSplat& b, int columns) {
-  double left = s.u - double(s.half_width);
-  double right = s.u + double(s.half_width);
-  if (right - left > 2 * kTileSize) {
-    // A long needle crosses a band in a short stretch. The outermost points of an ellipse lie
-    // where the shift along the ridge, slope * dy, is in balance with the narrowing; outside the
-    // band the nearest row inside takes their place.
-    const double q = double(b.q_max);
-    const double sigma_y = 1.0 / double(b.inv_sigma_y);
-    const double sigma_x = double(b.sigma_x);
-    const double dy_top = b.dy;
-    const double dy_bottom = b.dy + float(kTileSize - 1);
-    const double balance = q * s.slope * sigma_y * sigma_y / double(s.half_width);
-    const auto edge = [&](double sign) {
-      const double dy = std::clamp(sign * balance, dy_top, dy_bottom);
-      const double t = dy / sigma_y;
-      return s.u + s.slope * dy + sign * std::sqrt(std::max(q - t * t, 0.0)) * sigma_x;
-    };
-    left = edge(-1);
-    right = edge(1);
-  }
-  // One more pixel on each side, against rounding.
-  const double first = std::floor((left - 1) / kTileSize);
-  const double last = std::floor((right + 1) / kTileSize);
-  return {static_cast<int32_t>(std::clamp(first, 0.0, double(columns))),
-          static_cast<int32_t>(std::clamp(last, -1.0, columns - 1.0))};
 }
 
 // One row of tiles, ready to blend.

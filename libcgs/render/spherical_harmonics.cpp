@@ -58,4 +58,46 @@ Eigen::Vector3f sh_color(std::span<const Eigen::Vector3f> coefficients,
   return sum.unaryExpr([](float value) { return value < -0.5f ? 0.0f : value + 0.5f; });
 }
 
+ShBasis sh_basis(int degree, const Eigen::Vector3f& direction) {
+  assert(degree >= 0 && degree <= 3);
+  ShBasis out;
+  out.slope.fill(Eigen::Vector3f::Zero());
+  out.value[0] = kShC0;
+  if (degree == 0 || !std::isfinite(direction.sum()) || direction.isZero(0)) return out;
+  const float x = direction.x();
+  const float y = direction.y();
+  const float z = direction.z();
+  const auto set = [&](int k, float value, float of_x, float of_y, float of_z) {
+    out.value[k] = value;
+    out.slope[k] = {of_x, of_y, of_z};
+  };
+  set(1, -kY1 * y, 0, -kY1, 0);
+  set(2, kY1 * z, 0, 0, kY1);
+  set(3, -kY1 * x, -kY1, 0, 0);
+  if (degree == 1) return out;
+  const float xx = x * x;
+  const float yy = y * y;
+  const float zz = z * z;
+  set(4, kXY * x * y, kXY * y, kXY * x, 0);
+  set(5, -kXY * y * z, 0, -kXY * z, -kXY * y);
+  set(6, kZZ * (2 * zz - xx - yy), -2 * kZZ * x, -2 * kZZ * y, 4 * kZZ * z);
+  set(7, -kXY * x * z, -kXY * z, 0, -kXY * x);
+  set(8, kXXYY * (xx - yy), 2 * kXXYY * x, -2 * kXXYY * y, 0);
+  if (degree == 2) return out;
+  const float c = kCubic;
+  const float l = kLinear;
+  set(9, -c * y * (3 * xx - yy), -6 * c * x * y, -3 * c * (xx - yy), 0);
+  set(10, kXYZ * x * y * z, kXYZ * y * z, kXYZ * x * z, kXYZ * x * y);
+  set(11, -l * y * (4 * zz - xx - yy), 2 * l * x * y, -l * (4 * zz - xx - 3 * yy), -8 * l * y * z);
+  set(12,
+      kZZZ * z * (2 * zz - 3 * xx - 3 * yy),
+      -6 * kZZZ * x * z,
+      -6 * kZZZ * y * z,
+      kZZZ * (6 * zz - 3 * xx - 3 * yy));
+  set(13, -l * x * (4 * zz - xx - yy), -l * (4 * zz - 3 * xx - yy), 2 * l * x * y, -8 * l * x * z);
+  set(14, kZXXYY * z * (xx - yy), 2 * kZXXYY * x * z, -2 * kZXXYY * y * z, kZXXYY * (xx - yy));
+  set(15, -c * x * (xx - 3 * yy), -3 * c * (xx - yy), 6 * c * x * y, 0);
+  return out;
+}
+
 }  // namespace cgs

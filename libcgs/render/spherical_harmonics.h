@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <span>
 
 #include <Eigen/Core>
@@ -21,5 +22,16 @@ namespace cgs {
 Eigen::Vector3f sh_color(std::span<const Eigen::Vector3f> coefficients,
                          int degree,
                          const Eigen::Vector3f& direction);
+
+/// Values of the basis in one direction and their derivatives with respect to its coordinates, as
+/// polynomials: a derivative along the unit sphere is the part orthogonal to the direction.
+struct ShBasis {
+  std::array<float, 16> value{};
+  std::array<Eigen::Vector3f, 16> slope;  ///< Of the (degree + 1)^2 first.
+};
+
+/// The basis of sh_color(): colour before the cut = 0.5 + sum of coefficient * value. Above degree
+/// 0 a zero or non-finite direction has values and slopes of zero.
+ShBasis sh_basis(int degree, const Eigen::Vector3f& direction);
 
 }  // namespace cgs

@@ -2,50 +2,14 @@
 #include "libcgs/render/tile_blending.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
-#include <immintrin.h>
+#include "libcgs/render/lanes.h"
 
 namespace cgs {
 
 namespace {
-
-// Eight pixels of a row at once.
-constexpr int kLanes = 8;
-using Floats = float __attribute__((vector_size(sizeof(float) * kLanes)));
-using Ints = int32_t __attribute__((vector_size(sizeof(int32_t) * kLanes)));
-
-constexpr float kLog2OfGaussian = -0.5f * 1.44269504f;  // e^(-q / 2) = 2^(q * kLog2OfGaussian)
-
-template <typename Vector, typename Scalar>
-Vector load(const Scalar* from) {
-  Vector out;
-  std::memcpy(&out, from, sizeof(out));
-  return out;
-}
-
-template <typename Vector, typename Scalar>
-void store(const Vector& vector, Scalar* to) {
-  std::memcpy(to, &vector, sizeof(vector));
-}
-
-inline Floats min(Floats a, Floats b) { return _mm256_min_ps(a, b); }
-
-// 2^x for x in [-126, 0], relative error < 3e-7. Not std::exp2: that is one lane at a time.
-inline Floats exp2_negative(Floats x) {
-  const Floats whole = _mm256_round_ps(x, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
-  const Floats r = (x - whole) * 0.693147181f;  // e^r with |r| <= ln 2 / 2
-  Floats p = r * (1.0f / 720) + 1.0f / 120;
-  p = p * r + 1.0f / 24;
-  p = p * r + 1.0f / 6;
-  p = p * r + 0.5f;
-  p = p * r + 1.0f;
-  p = p * r + 1.0f;
-  return p * std::bit_cast<Floats>((__builtin_convertvector(whole, Ints) + 127) << 23);
-}
 
 // Blends eight pixels from `at` on; distance is that of the first from the ridge of the splat.
 inline void blend_window(
@@ -84,12 +48,6 @@ inline void blend_window(
   store(stronger ? w : best, &tile.best_weight[at]);
   const Ints strongest = load<Ints>(&tile.strongest[at]);
   store(stronger ? Ints{} + static_cast<int32_t>(s.index) : strongest, &tile.strongest[at]);
-}
-
-// Exponent of the pixel centre nearest to the ridge among the eight from `first` on.
-inline float least_exponent(float ridge, float first, float inv_sigma_x) {
-  const float t = std::max({first + 0.5f - ridge, ridge - (first + 7.5f), 0.0f}) * inv_sigma_x;
-  return t * t;
 }
 
 void blend_splat(const BandSplat& s, int first_column, uint32_t open_rows, TileAccumulator& tile) {
@@ -138,23 +96,35 @@ void reset(TileAccumulator& tile, std::array<int, 2> size) {
   tile.strongest.fill(-1);
 }
 
-// Subnormals cost the blending loop more than a factor of two. A property of the thread, so it is
-// set per tile and put back: the bits must not depend on which thread blends.
-class FlushSubnormals {
- public:
-  FlushSubnormals() : before_(_mm_getcsr()) {
-    constexpr unsigned kFlushToZeroAndDenormalsAreZero = 0x8040;
-    _mm_setcsr(before_ | kFlushToZeroAndDenormalsAreZero);
-  }
-  ~FlushSubnormals() { _mm_setcsr(before_); }
-  FlushSubnormals(const FlushSubnormals&) = delete;
-  FlushSubnormals& operator=(const FlushSubnormals&) = delete;
-
- private:
-  unsigned before_;
-};
-
 }  // namespace
+
+TileRange tiles_reached(const Splat& s, const BandSplat& b, int columns) {
+  double left = s.u - double(s.half_width);
+  double right = s.u + double(s.half_width);
+  if (right - left > 2 * kTileSize) {
+    // A long needle crosses a band in a short stretch. The outermost points of an ellipse lie
+    // where the shift along the ridge, slope * dy, is in balance with the narrowing; outside the
+    // band the nearest row inside takes their place.
+    const double q = double(b.q_max);
+    const double sigma_y = 1.0 / double(b.inv_sigma_y);
+    const double sigma_x = double(b.sigma_x);
+    const double dy_top = b.dy;
+    const double dy_bottom = b.dy + float(kTileSize - 1);
+    const double balance = q * s.slope * sigma_y * sigma_y / double(s.half_width);
+    const auto edge = [&](double sign) {
+      const double dy = std::clamp(sign * balance, dy_top, dy_bottom);
+      const double t = dy / sigma_y;
+      return s.u + s.slope * dy + sign * std::sqrt(std::max(q - t * t, 0.0)) * sigma_x;
+    };
+    left = edge(-1);
+    right = edge(1);
+  }
+  // One more pixel on each side, against rounding.
+  const double first = std::floor((left - 1) / kTileSize);
+  const double last = std::floor((right + 1) / kTileSize);
+  return {static_cast<int32_t>(std::clamp(first, 0.0, double(columns))),
+          static_cast<int32_t>(std::clamp(last, -1.0, columns - 1.0))};
+}
 
 void blend_tile(std::span<const BandSplat> band,
                 std::span<const uint32_t> nearest_first,

@@ -68,6 +68,26 @@ inline BandSplat in_band(const Splat& splat, RowRange rows, uint32_t index, int 
   return out;
 }
 
+/// Number of tiles that cover so many pixels.
+inline int tiles_in(int pixels) { return (pixels + kTileSize - 1) / kTileSize; }
+
+/// e^(-q / 2) = 2^(q * kLog2OfGaussian)
+inline constexpr float kLog2OfGaussian = -0.5f * 1.44269504f;
+
+/// Exponent of the pixel centre nearest to the ridge among the eight from `first` on.
+inline float least_exponent(float ridge, float first, float inv_sigma_x) {
+  const float t = std::max({first + 0.5f - ridge, ridge - (first + 7.5f), 0.0f}) * inv_sigma_x;
+  return t * t;
+}
+
+/// Inclusive range of columns of tiles; empty when first > last.
+struct TileRange {
+  int32_t first, last;
+};
+
+/// Columns, of `columns` in all, whose tiles the support of a splat reaches within its band.
+TileRange tiles_reached(const Splat& splat, const BandSplat& in_band, int columns);
+
 /// Blends splats, nearest first, over the tile whose first pixel column is `first_column`.
 ///
 /// Only the leading `width` x `height` pixels of the tile belong to the image.
