@@ -65,6 +65,14 @@ MaskMap intersection(const MaskMap& a, const MaskMap& b) {
   return out;
 }
 
+// Pixels that cannot be compared take the photograph's value, so that they count as equal.
+ColorImage completed(ColorImage shown, const View& view) {
+  for (size_t i = 0; i < view.valid.data.size(); ++i) {
+    if (view.valid.data[i] == 0) shown.data[i] = view.image.data[i];
+  }
+  return shown;
+}
+
 Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, const View& view) {
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
   const ColorImage shown = picture(buffers);
@@ -78,7 +86,8 @@ Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, c
           {"ssim", ssim(shown, view.image, &all)},
           {"psnr_seen", psnr(shown, view.image, &use)},
           {"ssim_seen", ssim(shown, view.image, &use)},
-          {"hole_fraction", 1 - fraction(buffers.hole, Hole::None)}};
+          {"hole_fraction", 1 - fraction(buffers.hole, Hole::None)},
+          {"ms_ssim", ms_ssim(completed(shown, view), view.image)}};
 }
 
 }  // namespace
@@ -116,7 +125,7 @@ Json evaluate_views(Model& model, const std::vector<int>& views, const Progress&
     view.image = {};  // one photograph in memory at a time
   }
   Json mean;
-  for (const char* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction"}) {
+  for (const char* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}) {
     double sum = 0;
     for (const Json& row : rows) sum += row[key].get<double>();
     mean[key] = sum / static_cast<double>(rows.size());

@@ -18,8 +18,8 @@ nlohmann::ordered_json write_views(const Model& model,
                                    const Progress& progress);
 
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
-/// that are not holes: {"mean": {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction"},
-/// "views": [{"name", …}]}. Loads the photographs.
+/// that are not holes, and MS-SSIM over all: {"mean": {"psnr", "ssim", "psnr_seen", "ssim_seen",
+/// "hole_fraction", "ms_ssim"}, "views": [{"name", …}]}. Loads the photographs.
 /// \throws BadInput if none of the views has a photograph.
 nlohmann::ordered_json evaluate_views(Model& model,
                                       const std::vector<int>& views,

@@ -25,16 +25,23 @@ struct EvaluateArgs {
 };
 
 void print_table(const nlohmann::ordered_json& report) {
-  std::printf(
-      "%-24s %8s %8s %10s %10s %8s\n", "view", "PSNR", "SSIM", "PSNR seen", "SSIM seen", "holes");
+  std::printf("%-24s %8s %8s %10s %10s %8s %8s\n",
+              "view",
+              "PSNR",
+              "SSIM",
+              "PSNR seen",
+              "SSIM seen",
+              "holes",
+              "MS-SSIM");
   const auto row = [](const std::string& name, const nlohmann::ordered_json& r) {
-    std::printf("%-24s %8.2f %8.3f %10.2f %10.3f %7.1f%%\n",
+    std::printf("%-24s %8.2f %8.3f %10.2f %10.3f %7.1f%% %8.3f\n",
                 name.c_str(),
                 r["psnr"].get<double>(),
                 r["ssim"].get<double>(),
                 r["psnr_seen"].get<double>(),
                 r["ssim_seen"].get<double>(),
-                100 * r["hole_fraction"].get<double>());
+                100 * r["hole_fraction"].get<double>(),
+                r["ms_ssim"].get<double>());
   };
   for (const auto& view : report["views"]) row(view["name"].get<std::string>(), view);
   row("mean", report["mean"]);

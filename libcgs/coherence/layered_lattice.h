@@ -77,7 +77,7 @@ class LayeredLattice {
     const Eigen::Array4f* weight;
     int columns;
     Eigen::Map<Eigen::Array4f> at(int x, int layer) const {
-      return Eigen::Map<Eigen::Array4f>(folded + layer * columns + first[x]);
+      return Eigen::Map<Eigen::Array4f>(folded + ptrdiff_t(layer) * columns + first[x]);
     }
   };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include <tbb/parallel_for.h>
@@ -13,61 +15,93 @@ namespace cgs {
 
 namespace {
 
+constexpr size_t kMatchesPerTask = 4096;
+
 bool known(float depth) { return depth > 0 && std::isfinite(depth); }
+
+// One of the views: world points are centre + depth * direction * (u, v, 1).
+struct View {
+  View(const Camera& camera, const DepthMap& map)
+      : depth(map),
+        centre(camera.center()),
+        direction(camera.world_from_cam.linear() * camera.intrinsics().inverse()) {
+    require(!map.empty() && map.width == camera.width && map.height == camera.height,
+            "flow_consistency: depth must have the size of its camera",
+            map.width);
+  }
+  // From a pixel to the k-th of the four whose first it is.
+  size_t step(int k) const { return k % 2 + static_cast<size_t>(k / 2) * depth.width; }
+
+  const DepthMap& depth;
+  Eigen::Vector3d centre;
+  Eigen::Matrix3d direction;
+};
 
 // Depth between four pixels and its derivatives with respect to theirs.
 struct Sample {
-  double depth = 0;  // 0 = unknown
-  int x = 0, y = 0;  // of the first of the pixels (x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)
-  std::array<double, 4> by_pixel = {};
+  double depth;  // 0 = unknown
+  size_t pixel;  // the first of the four
+  std::array<double, 4> by_pixel;
 };
 
-Sample sample(const DepthMap& depth, double u, double v) {
+Sample sample(const View& view, double u, double v) {
+  const DepthMap& depth = view.depth;
   const double x = u - 0.5;
   const double y = v - 0.5;
   if (!(x >= 0 && y >= 0 && x < depth.width - 1 && y < depth.height - 1)) return {};
-  Sample out{.x = static_cast<int>(x), .y = static_cast<int>(y)};
-  const double fx = x - out.x;
-  const double fy = y - out.y;
+  Sample out{0, depth.index(static_cast<int>(x), static_cast<int>(y)), {}};
+  const double fx = x - static_cast<int>(x);
+  const double fy = y - static_cast<int>(y);
   const std::array<double, 4> weight = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
   double inverse = 0;
   for (int k = 0; k < 4; ++k) {
-    const float z = depth(out.x + k % 2, out.y + k / 2);
+    const float z = depth.data[out.pixel + view.step(k)];
     if (!known(z)) return {};
-    inverse += weight[k] / double(z);
-    out.by_pixel[k] = weight[k] / (double(z) * double(z));
+    const double part = weight[k] / double(z);
+    inverse += part;
+    out.by_pixel[k] = part / double(z);
   }
   out.depth = 1 / inverse;
   for (double& by : out.by_pixel) by *= out.depth * out.depth;
   return out;
 }
 
-// What one correspondence adds to the loss.
-struct Term {
-  double distance = 0;
-  double by_first = 0;   // derivative with respect to the depth of the first view
-  double by_second = 0;  // and to the depth sampled in the second
-  Sample second;
+// Derivatives of what one correspondence adds to the loss.
+struct Slopes {
+  float by_first = 0;
+  std::array<float, 4> by_second = {};
+  int32_t second = -1;  // the first of the four pixels of the second view; -1 = adds nothing
 };
 
-Term term(const Camera& first,
-          float depth,
-          const Camera& second,
-          const PixelMatch& match,
-          const Sample& sampled) {
-  const double u = match.pixel % first.width + 0.5;
-  const double v = match.pixel / first.width + 0.5;
-  const Eigen::Vector3d difference =
-      first.unproject(u, v, double(depth)) - second.unproject(match.u, match.v, sampled.depth);
-  const Eigen::Vector3d sign = difference.cwiseSign();
-  const Eigen::Vector3d along_first = first.world_from_cam.linear() * first.ray_in_cam(u, v);
+// L1 distance between the points of one correspondence; `scale` times its derivatives to `slopes`.
+double distance(const View& first,
+                const View& second,
+                const PixelMatch& match,
+                Slopes& slopes,
+                double scale) {
+  const float depth = first.depth.data[match.pixel];
+  const Sample sampled = sample(second, double(match.u), double(match.v));
+  if (!known(depth) || sampled.depth == 0) return 0;
+  const int x = match.pixel % first.depth.width;
+  const int y = match.pixel / first.depth.width;
+  const Eigen::Vector3d along_first = first.direction * Eigen::Vector3d(x + 0.5, y + 0.5, 1);
   const Eigen::Vector3d along_second =
-      second.world_from_cam.linear() * second.ray_in_cam(match.u, match.v);
-  return {difference.lpNorm<1>(), sign.dot(along_first), -sign.dot(along_second), sampled};
+      second.direction * Eigen::Vector3d(double(match.u), double(match.v), 1);
+  const Eigen::Vector3d difference =
+      first.centre - second.centre + double(depth) * along_first - sampled.depth * along_second;
+  const Eigen::Vector3d sign = scale * difference.cwiseSign();
+  slopes.by_first = static_cast<float>(sign.dot(along_first));
+  const double by_sample = -sign.dot(along_second);
+  for (size_t k = 0; k < 4; ++k) {
+    slopes.by_second[k] = static_cast<float>(by_sample * sampled.by_pixel[k]);
+  }
+  slopes.second = static_cast<int32_t>(sampled.pixel);
+  return difference.lpNorm<1>();
 }
 
 }  // namespace
 
+// NOLINTNEXTLINE(readability-function-size): two views of three things each
 double flow_consistency(const Camera& first,
                         const DepthMap& depth_first,
                         const Camera& second,
@@ -76,42 +110,29 @@ double flow_consistency(const Camera& first,
                         double weight,
                         Raster<float>& gradient_first,
                         Raster<float>& gradient_second) {
-  require(!depth_first.empty() && !depth_second.empty(),
-          "flow_consistency: depth maps must hold pixels",
-          depth_first.width);
-  require(depth_first.width == first.width && depth_first.height == first.height,
-          "flow_consistency: depth must have the size of its camera",
-          depth_first.width);
-  require(depth_second.width == second.width && depth_second.height == second.height,
-          "flow_consistency: depth must have the size of its camera",
-          depth_second.width);
+  const View from(first, depth_first);
+  const View to(second, depth_second);
   if (weight == 0) return 0;
-  std::vector<Term> terms(matches.size());
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, matches.size(), 1024), [&](const auto& some) {
-    for (size_t i = some.begin(); i < some.end(); ++i) {
-      const float depth = depth_first.data[matches[i].pixel];
-      const Sample sampled = sample(depth_second, matches[i].u, matches[i].v);
-      if (known(depth) && sampled.depth > 0) {
-        terms[i] = term(first, depth, second, matches[i], sampled);
-      }
+  const double scale = weight / static_cast<double>(depth_first.data.size());
+  std::vector<Slopes> slopes(matches.size());
+  std::vector<double> sums((matches.size() + kMatchesPerTask - 1) / kMatchesPerTask, 0);
+  tbb::parallel_for(size_t(0), sums.size(), [&](size_t task) {
+    const size_t end = std::min(matches.size(), (task + 1) * kMatchesPerTask);
+    for (size_t i = task * kMatchesPerTask; i < end; ++i) {
+      sums[task] += distance(from, to, matches[i], slopes[i], scale);
     }
   });
   // One after the other: several correspondences may end at one pixel.
   Raster<float>& to_first = gradient_like(depth_first, gradient_first);
   Raster<float>& to_second = gradient_like(depth_second, gradient_second);
-  const double scale = weight / static_cast<double>(depth_first.data.size());
-  double sum = 0;
   for (size_t i = 0; i < matches.size(); ++i) {
-    const Term& term = terms[i];
-    if (!(term.second.depth > 0)) continue;
-    sum += term.distance;
-    to_first.data[matches[i].pixel] += float(scale * term.by_first);
+    if (slopes[i].second < 0) continue;
+    to_first.data[matches[i].pixel] += slopes[i].by_first;
     for (int k = 0; k < 4; ++k) {
-      to_second(term.second.x + k % 2, term.second.y + k / 2) +=
-          float(scale * term.by_second * term.second.by_pixel[k]);
+      to_second.data[slopes[i].second + to.step(k)] += slopes[i].by_second[k];
     }
   }
-  return scale * sum;
+  return scale * std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
 }  // namespace cgs

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <vector>
 
@@ -75,8 +76,13 @@ Moments zero() {
   return out;
 }
 
-// Sum over the channels of the SSIM of one window.
-double ssim_sum(const Moments& m) {
+// The two factors of SSIM in each channel of one window.
+struct Similarity {
+  Eigen::Array3d luminance;
+  Eigen::Array3d structure;  // with contrast
+};
+
+Similarity similarity(const Moments& m) {
   constexpr double kC1 = 0.01 * 0.01;
   constexpr double kC2 = 0.03 * 0.03;
   const Eigen::Array3d product = m[0] * m[1];
@@ -84,9 +90,76 @@ double ssim_sum(const Moments& m) {
   // In double a flat patch leaves about 1e-16 here, far below kC2, but it may be negative.
   const Eigen::Array3d variances = (m[2] + m[3] - squares).max(0.0);
   const Eigen::Array3d covariance = m[4] - product;
-  const Eigen::Array3d map =
-      (2 * product + kC1) * (2 * covariance + kC2) / ((squares + kC1) * (variances + kC2));
-  return map.sum();
+  return {(2 * product + kC1) / (squares + kC1), (2 * covariance + kC2) / (variances + kC2)};
+}
+
+// Windowed averages of two images, along rows first.
+class WindowAverages {
+ public:
+  WindowAverages(const ColorImage& a, const ColorImage& b)
+      : along_rows_(a.width, a.height, zero()) {
+    tbb::parallel_for(0, a.height, [&](int y) {
+      for (int x = 0; x < a.width; ++x) {
+        const Moments here = moments_of(a(x, y), b(x, y));
+        const int last = std::min(a.width - 1, x + kRadius);
+        for (int to = std::max(0, x - kRadius); to <= last; ++to) {
+          add(along_rows_(to, y), weights_[x - to + kRadius], here);
+        }
+      }
+    });
+  }
+
+  Moments at(int x, int y) const {
+    Moments sum = zero();
+    const int last = std::min(along_rows_.height - 1, y + kRadius);
+    for (int from = std::max(0, y - kRadius); from <= last; ++from) {
+      add(sum, weights_[from - y + kRadius], along_rows_(x, from));
+    }
+    return sum;
+  }
+
+ private:
+  std::array<double, kTaps> weights_ = window();
+  Raster<Moments> along_rows_;
+};
+
+// Means over the windows that lie inside both images.
+struct Means {
+  Eigen::Array3d ssim = Eigen::Array3d::Zero();
+  Eigen::Array3d structure = Eigen::Array3d::Zero();
+};
+
+Means means_inside(const ColorImage& a, const ColorImage& b) {
+  const WindowAverages averages(a, b);
+  std::vector<Means> rows(a.height);
+  tbb::parallel_for(kRadius, a.height - kRadius, [&](int y) {
+    for (int x = kRadius; x < a.width - kRadius; ++x) {
+      const Similarity here = similarity(averages.at(x, y));
+      rows[y].ssim += here.luminance * here.structure;
+      rows[y].structure += here.structure;
+    }
+  });
+  Means sum;
+  for (const Means& row : rows) {
+    sum.ssim += row.ssim;
+    sum.structure += row.structure;
+  }
+  const double count = double(a.width - 2 * kRadius) * (a.height - 2 * kRadius);
+  return {sum.ssim / count, sum.structure / count};
+}
+
+bool holds_a_window(int width, int height) { return std::min(width, height) >= kTaps; }
+
+// Means of 2x2 pixels; an odd last row or column is left out.
+ColorImage halved(const ColorImage& image) {
+  ColorImage out(image.width / 2, image.height / 2, Eigen::Vector3f::Zero());
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      out(x, y) = 0.25f * (image(2 * x, 2 * y) + image(2 * x + 1, 2 * y) + image(2 * x, 2 * y + 1) +
+                           image(2 * x + 1, 2 * y + 1));
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -101,25 +174,33 @@ double psnr(const ColorImage& a, const ColorImage& b, const MaskMap* use) {
 
 double ssim(const ColorImage& a, const ColorImage& b, const MaskMap* use) {
   check_sizes(a, b, use);
-  const std::array<double, kTaps> weights = window();
-  Raster<Moments> along_rows(a.width, a.height, zero());
-  tbb::parallel_for(0, a.height, [&](int y) {
-    for (int x = 0; x < a.width; ++x) {
-      const Moments here = moments_of(a(x, y), b(x, y));
-      const int last = std::min(a.width - 1, x + kRadius);
-      for (int to = std::max(0, x - kRadius); to <= last; ++to) {
-        add(along_rows(to, y), weights[x - to + kRadius], here);
-      }
-    }
-  });
+  const WindowAverages averages(a, b);
   return mean_over(a, use, [&](int x, int y) {
-    Moments sum = zero();
-    const int last = std::min(a.height - 1, y + kRadius);
-    for (int from = std::max(0, y - kRadius); from <= last; ++from) {
-      add(sum, weights[from - y + kRadius], along_rows(x, from));
-    }
-    return ssim_sum(sum);
+    const Similarity here = similarity(averages.at(x, y));
+    return (here.luminance * here.structure).sum();
   });
+}
+
+double ms_ssim(const ColorImage& a, const ColorImage& b) {
+  check_sizes(a, b, nullptr);
+  constexpr std::array<double, 5> kWeights = {0.0448, 0.2856, 0.3001, 0.2363, 0.1333};
+  if (!holds_a_window(a.width, a.height)) return std::numeric_limits<double>::quiet_NaN();
+  ColorImage fine_a = a;
+  ColorImage fine_b = b;
+  Eigen::Array3d product = Eigen::Array3d::Ones();
+  double weights = 0;
+  for (size_t level = 0; level < kWeights.size(); ++level) {
+    weights += kWeights[level];
+    const Means means = means_inside(fine_a, fine_b);
+    const bool coarsest =
+        level + 1 == kWeights.size() || !holds_a_window(fine_a.width / 2, fine_a.height / 2);
+    const Eigen::Array3d& mean = coarsest ? means.ssim : means.structure;
+    product *= mean.max(0.0).pow(kWeights[level]);  // a power of a negative mean is not real
+    if (coarsest) break;
+    fine_a = halved(fine_a);
+    fine_b = halved(fine_b);
+  }
+  return product.pow(1 / weights).mean();
 }
 
 }  // namespace cgs

@@ -30,8 +30,8 @@ Raster<float> half(const Raster<float>& fine) {
     const float* above = &fine.data[fine.index(0, 2 * y)];
     const float* below = above + fine.width;
     float* to = &out.data[out.index(0, y)];
-    for (int x = 0; x < out.width; ++x) {
-      to[x] = 0.25f * ((above[2 * x] + above[2 * x + 1]) + (below[2 * x] + below[2 * x + 1]));
+    for (int x = 0; x < out.width; ++x, above += 2, below += 2) {
+      to[x] = 0.25f * ((above[0] + above[1]) + (below[0] + below[1]));
     }
   });
   return out;
@@ -56,9 +56,9 @@ void differentiate(Raster<float>& level, double slope, const Raster<float>& coar
     }
     if (y / 2 >= coarser.height) return;
     const float* from = &coarser.data[coarser.index(0, y / 2)];
-    for (int x = 0; x < coarser.width; ++x) {
-      row[2 * x] += 0.25f * from[x];
-      row[2 * x + 1] += 0.25f * from[x];
+    for (int x = 0; x < coarser.width; ++x, row += 2) {
+      row[0] += 0.25f * from[x];
+      row[1] += 0.25f * from[x];
     }
   });
 }
@@ -74,6 +74,7 @@ void add_in_use(const Raster<float>& values, const MaskMap* use, Raster<float>& 
 
 }  // namespace
 
+// NOLINTNEXTLINE(readability-function-size): what all losses on images take, and the levels
 double multi_scale_l1(const ColorPlanes& rendered,
                       const ColorPlanes& photograph,
                       const MaskMap* use,

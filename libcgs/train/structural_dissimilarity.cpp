@@ -13,7 +13,8 @@ namespace cgs {
 namespace {
 
 // With a, b the images and d = a - b, and E the windowed mean, SSIM is written without the
-// differences of nearly equal numbers that its usual form takes where a and b agree:
+// differences of nearly equal numbers that its usual form takes where a and b agree. Its luminance
+// and its structure term (with contrast) become
 //   1 - (2 E[a]E[b] + C1) / (E[a]^2 + E[b]^2 + C1) = E[d]^2 / (E[a]^2 + E[b]^2 + C1) = A,
 //   1 - (2 cov(a, b) + C2) / (var a + var b + C2)  = var d  / (var a + var b + C2)   = B,
 //   1 - SSIM = 1 - (1 - A)(1 - B) = A + B - AB.
@@ -41,7 +42,7 @@ Window window() {
 // A row with kRadius zeros on both sides.
 class PaddedRow {
  public:
-  explicit PaddedRow(int width) : data_(static_cast<size_t>(width) + 2 * kRadius, 0) {}
+  explicit PaddedRow(int width) : data_(width + size_t(2) * kRadius, 0) {}
   float* data() { return data_.data() + kRadius; }
 
  private:
@@ -95,12 +96,12 @@ inline Term term(float d, float b, float dd, float squares) {
   const float two = 1 / (std::max(squares - means, 0.0f) + kC2);
   const float A = d * d * one;
   const float B = variance_d * two;
-  const float by_A = 1 - B;
-  const float by_B = 1 - A;
+  const float by_luminance = 1 - B;
+  const float by_structure = 1 - A;
   return {A + B - A * B,
-          2 * (by_A * one * (d - A * a) + by_B * two * (B * a - d)),
-          by_B * two,
-          -by_B * B * two};
+          2 * (by_luminance * one * (d - A * a) + by_structure * two * (B * a - d)),
+          by_structure * two,
+          -by_structure * B * two};
 }
 
 class Channel {

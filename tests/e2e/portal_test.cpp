@@ -114,7 +114,7 @@ TEST(Portal, StagesByHandGiveTheFilesOfARun) {
   const auto evaluation = run_cgs("evaluate " + out + "/model -q --json");
   ASSERT_EQ(evaluation.exit_code, 0) << evaluation.err;
   const auto mean = ordered_json::parse(evaluation.out)["mean"];
-  for (const auto* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction"}) {
+  for (const auto* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}) {
     EXPECT_TRUE(mean[key].is_number()) << key;
   }
   for (const auto* file :

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/train/image_metrics.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <random>
+#include <tuple>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -118,6 +122,97 @@ TEST(Ssim, EqualsTheDefinition) {
   }
 }
 
+ColorImage half(const ColorImage& image) {
+  ColorImage out = flat(image.width / 2, image.height / 2, 0);
+  for (int y = 0; y < 2 * out.height; ++y) {
+    for (int x = 0; x < 2 * out.width; ++x) out(x / 2, y / 2) += image(x, y) / 4;
+  }
+  return out;
+}
+
+// Mean over the windows inside the image of SSIM, or of its structure term, in one channel: the
+// structure term is SSIM over the luminance term.
+double reference_mean(const ColorImage& a, const ColorImage& b, int channel, bool structure) {
+  double sum = 0;
+  double count = 0;
+  for (int y = 5; y < a.height - 5; ++y) {
+    for (int x = 5; x < a.width - 5; ++x) {
+      double ma = 0;
+      double mb = 0;
+      double total = 0;
+      for (int k = 0; k < 121; ++k) {
+        const int i = k % 11 - 5;
+        const int j = k / 11 - 5;
+        const double weight = std::exp(-(i * i + j * j) / 4.5);
+        total += weight;
+        ma += weight * double(a(x + i, y + j)[channel]);
+        mb += weight * double(b(x + i, y + j)[channel]);
+      }
+      ma /= total;
+      mb /= total;
+      const double luminance = (2 * ma * mb + 1e-4) / (ma * ma + mb * mb + 1e-4);
+      sum += reference_ssim(a, b, x, y, channel) / (structure ? luminance : 1);
+      ++count;
+    }
+  }
+  return sum / count;
+}
+
+TEST(MsSsim, EqualsTheDefinition) {
+  // 57 pixels are halved to 28, 14 and 7: three levels; 12 pixels hold one.
+  const std::vector<double> weights = {0.0448, 0.2856, 0.3001};
+  for (const auto& [width, height, levels] : {std::tuple{70, 57, 3}, {12, 90, 1}}) {
+    ColorImage a = noise(width, height, 2);
+    ColorImage b = noise(width, height, 3);
+    for (size_t p = 0; p < b.data.size(); ++p) {
+      a.data[p].x() *= 0.5f;
+      b.data[p] = 0.7f * a.data[p] + 0.3f * b.data[p];
+    }
+    const double sum = std::accumulate(weights.begin(), weights.begin() + levels, 0.0);
+    const double value = ms_ssim(a, b);
+    std::array<double, 3> product = {1, 1, 1};
+    for (int level = 0; level < levels; ++level) {
+      for (int c = 0; c < 3; ++c) {
+        const double mean = reference_mean(a, b, c, level + 1 < levels);
+        product[c] *= std::pow(mean, weights[level] / sum);
+      }
+      a = half(a);
+      b = half(b);
+    }
+    EXPECT_NEAR(value, (product[0] + product[1] + product[2]) / 3, 1e-6);
+  }
+}
+
+TEST(MsSsim, OfEqualImagesIsOne) {
+  EXPECT_NEAR(ms_ssim(noise(200, 180, 1), noise(200, 180, 1)), 1, 1e-12);
+  EXPECT_NEAR(ms_ssim(flat(30, 20, 0), flat(30, 20, 0)), 1, 1e-12);
+}
+
+TEST(MsSsim, OfTwoFlatImagesIsTheLuminanceOfTheCoarsestOfFiveLevels) {
+  const double luminance = (2 * 0.5 * 0.25 + 1e-4) / (0.25 + 0.0625 + 1e-4);
+  EXPECT_NEAR(ms_ssim(flat(176, 180, 0.5f), flat(176, 180, 0.25f)),
+              std::pow(luminance, 0.1333 / 1.0001),
+              1e-12);
+  EXPECT_NEAR(ms_ssim(flat(175, 180, 0.5f), flat(175, 180, 0.25f)),
+              std::pow(luminance, 0.2363 / (1.0001 - 0.1333)),
+              1e-12);
+}
+
+TEST(MsSsim, OfANegativeIsZeroAndOfLessThanAWindowUnknown) {
+  const ColorImage a = noise(40, 40, 1);
+  ColorImage negative = a;
+  for (Eigen::Vector3f& pixel : negative.data) pixel = Eigen::Vector3f::Ones() - pixel;
+  EXPECT_EQ(ms_ssim(a, negative), 0);
+  EXPECT_TRUE(std::isnan(ms_ssim(noise(40, 10, 1), noise(40, 10, 1))));
+}
+
+TEST(MsSsim, ForgivesNoiseAtFullSizeMoreThanSsim) {
+  const ColorImage a = flat(200, 200, 0.5f);
+  ColorImage b = noise(200, 200, 1);
+  for (Eigen::Vector3f& pixel : b.data) pixel = 0.45f * Eigen::Vector3f::Ones() + 0.1f * pixel;
+  EXPECT_GT(ms_ssim(a, b), ssim(a, b) + 0.1);
+}
+
 TEST(ImageMetrics, RefuseUnequalSizesAndEmptySelections) {
   const ColorImage a = flat(4, 3, 0);
   const MaskMap none(4, 3, 0);
@@ -127,6 +222,8 @@ TEST(ImageMetrics, RefuseUnequalSizesAndEmptySelections) {
   EXPECT_THROW(psnr(a, a, &none), InvalidInput);
   EXPECT_THROW(ssim(a, a, &wrong), InvalidInput);
   EXPECT_THROW(psnr({}, {}), InvalidInput);
+  EXPECT_THROW(ms_ssim(a, flat(3, 4, 0)), InvalidInput);
+  EXPECT_THROW(ms_ssim({}, {}), InvalidInput);
 }
 
 }  // namespace
