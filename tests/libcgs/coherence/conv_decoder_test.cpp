@@ -83,7 +83,7 @@ std::vector<Case> cases() {
           {"FlatAndWide", 2, {67, 5}, {.width = 1, .layers = 2}},
           {"NarrowAndTall", 2, {6, 41}, {.width = 1, .layers = 2, .reference_coordinates = true}},
           {"SeveralBands", 2, {131, 97}, {.width = 1, .reference_coordinates = true}},
-          {"MoreThanOneGroupAtTheEnd", 1, {130, 129}, {.width = 5, .layers = 3}}};
+          {"MoreThanOneGroupAtTheEnd", 1, {34, 33}, {.width = 5, .layers = 3}}};
 }
 
 class ConvDecoderCase : public testing::TestWithParam<Case> {};
@@ -149,7 +149,8 @@ TEST_P(ConvDecoderCase, GradientIsThatOfFiniteDifferences) {
     return dot(by_value, test::reference_conv_decoder(layers, c.options, at));
   };
   for (const size_t k : probes(c, net.parameter_count())) {
-    constexpr double kStep = 1e-6;
+    // So small that no LeakyReLU of these networks changes sides; rounding then is some 1e-7.
+    constexpr double kStep = 1e-7;
     const double before = at[k];
     at[k] = before + kStep;
     const double above = loss();
