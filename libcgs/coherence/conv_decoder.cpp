@@ -78,12 +78,15 @@ std::array<float, kCoordinates> coordinates(const DecoderBlock& block,
 }
 
 void leaky_relu(float* values, size_t count) {
-  for (size_t i = 0; i < count; ++i) values[i] = values[i] > 0 ? values[i] : kLeak * values[i];
+  for (size_t i = 0; i < count; ++i) values[i] = std::max(values[i], kLeak * values[i]);
 }
 
 // Turns dL/dy into dL/da, y = LeakyReLU(a).
 void leaky_relu_backward(const float* y, size_t count, float* gradient) {
-  for (size_t i = 0; i < count; ++i) gradient[i] *= y[i] > 0 ? 1.0f : kLeak;
+  for (size_t i = 0; i < count; i += 8) {
+    const Float8 slope = load8(y + i) > 0 ? Float8{} + 1.0f : Float8{} + kLeak;
+    store8(load8(gradient + i) * slope, gradient + i);
+  }
 }
 
 // Natural logarithm from the four basic operations only: libraries differ in its last bit.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 #include <new>
 #include <vector>
 
@@ -25,6 +26,15 @@ struct CacheLineAllocator {
 };
 
 using FloatBuffer = std::vector<float, CacheLineAllocator<float>>;
+
+/// Eight floats at once: compilers do not see by themselves that lanes lie side by side.
+using Float8 = float __attribute__((vector_size(32)));
+inline Float8 load8(const float* from) {
+  Float8 out;
+  std::memcpy(&out, from, sizeof(out));
+  return out;
+}
+inline void store8(const Float8& value, float* to) { std::memcpy(to, &value, sizeof(value)); }
 
 /// Channels of an image, `lanes` of them side by side, rows in bands of `band_rows` (the last band
 /// may be lower): channel c of pixel (x, y) is row(c / lanes, y)[x * lanes + c % lanes], and

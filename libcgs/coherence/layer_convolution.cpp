@@ -10,7 +10,6 @@ namespace cgs {
 namespace {
 
 constexpr int kTaps = 9;
-constexpr size_t kStep = 8;  // divides the padded channels
 
 int reflected(int i, int size) {
   if (i < 0) return -i;
@@ -47,23 +46,19 @@ void fold_row(FloatBuffer& sum, const FeatureMap& in, int rows, int y, float* ou
 }
 
 float dot(const float* a, const float* b, size_t count) {
-  std::array<std::array<float, kStep>, 3> sum{};  // three, for the processor to overlap
+  std::array<Float8, 3> sums{};  // three, for the processor to overlap
   const size_t third = count / 3;
-  for (size_t i = 0; i < third; i += kStep) {
+  for (size_t i = 0; i < third; i += 8) {
     for (size_t part = 0; part < 3; ++part) {
-      const size_t at = part * third + i;
-      for (size_t l = 0; l < kStep; ++l) sum[part][l] += a[at + l] * b[at + l];
+      sums[part] += load8(a + part * third + i) * load8(b + part * third + i);
     }
   }
-  float total = 0;
-  for (size_t l = 0; l < kStep; ++l) total += sum[0][l] + sum[1][l] + sum[2][l];
-  return total;
+  const Float8 sum = sums[0] + sums[1] + sums[2];
+  return ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
 }
 
 void add_scaled(const float* from, float factor, size_t count, float* to) {
-  for (size_t i = 0; i < count; i += kStep) {
-    for (size_t l = i; l < i + kStep; ++l) to[l] += factor * from[l];
-  }
+  for (size_t i = 0; i < count; i += 8) store8(load8(to + i) + factor * load8(from + i), to + i);
 }
 
 // Calls work(y, rows) for the rows of a band in turn; rows[ky] is the gathered input row that

@@ -7,24 +7,33 @@ namespace cgs {
 
 namespace {
 
-template <int kLanes>
+// to = (1 - weight) first + weight second
+void interpolate(const float* first, const float* second, float weight, size_t count, float* to) {
+  for (size_t i = 0; i < count; i += 8) {
+    const Float8 a = load8(first + i);
+    store8(a + weight * (load8(second + i) - a), to + i);
+  }
+}
+
+void add_scaled(const float* from, float factor, size_t count, float* to) {
+  for (size_t i = 0; i < count; i += 8) store8(load8(to + i) + factor * load8(from + i), to + i);
+}
+
+template <size_t kLanes>
 void interpolate_row(const float* in, const std::vector<UpsampledTap>& taps, float* out) {
   for (const UpsampledTap& tap : taps) {
-    const float* first = in + static_cast<ptrdiff_t>(tap.first) * kLanes;
-    const float* second = in + static_cast<ptrdiff_t>(tap.second) * kLanes;
-    for (int l = 0; l < kLanes; ++l) out[l] = first[l] + tap.weight * (second[l] - first[l]);
+    const float* first = in + static_cast<size_t>(tap.first) * kLanes;
+    const float* second = in + static_cast<size_t>(tap.second) * kLanes;
+    interpolate(first, second, tap.weight, kLanes, out);
     out += kLanes;
   }
 }
 
-template <int kLanes>
+template <size_t kLanes>
 void scatter_row(const float* gradient, const std::vector<UpsampledTap>& taps, float* out) {
   for (const UpsampledTap& tap : taps) {
-    float* first = out + static_cast<ptrdiff_t>(tap.first) * kLanes;
-    float* second = out + static_cast<ptrdiff_t>(tap.second) * kLanes;
-    const float rest = 1 - tap.weight;
-    for (int l = 0; l < kLanes; ++l) first[l] += rest * gradient[l];
-    for (int l = 0; l < kLanes; ++l) second[l] += tap.weight * gradient[l];
+    add_scaled(gradient, 1 - tap.weight, kLanes, out + static_cast<size_t>(tap.first) * kLanes);
+    add_scaled(gradient, tap.weight, kLanes, out + static_cast<size_t>(tap.second) * kLanes);
     gradient += kLanes;
   }
 }
@@ -68,9 +77,7 @@ void upsample(const FeatureMap& in, const Upsampling& how, RowRange rows, float*
       const UpsampledTap& tap = how.y[static_cast<size_t>(rows.first + i)];
       const float* first = in.row(group, tap.first);
       const float* second = in.row(group, tap.second);
-      for (size_t k = 0; k < low_size; ++k) {
-        between[k] = first[k] + tap.weight * (second[k] - first[k]);
-      }
+      interpolate(first, second, tap.weight, low_size, between.data());
       interpolate_row(in, between.data(), how, out);
     }
   }
@@ -101,9 +108,8 @@ void upsample_transposed(const float* gradient,
       scatter_row(shape, gradient, how, between.data());
       float* first = rows_out + static_cast<size_t>(tap.first - lowest) * low_size;
       float* second = rows_out + static_cast<size_t>(tap.second - lowest) * low_size;
-      const float rest = 1 - tap.weight;
-      for (size_t k = 0; k < low_size; ++k) first[k] += rest * between[k];
-      for (size_t k = 0; k < low_size; ++k) second[k] += tap.weight * between[k];
+      add_scaled(between.data(), 1 - tap.weight, low_size, first);
+      add_scaled(between.data(), tap.weight, low_size, second);
     }
   }
 }
