@@ -215,8 +215,7 @@ ConvDecoder::Network::Network(int width, int height, const ConvDecoderOptions& h
     const DecoderBlock& from = blocks[k - 1];
     const DecoderBlock& to = blocks[k];
     const int extra = k == 1 ? kCoordinates : 0;
-    Convolution convolution(
-        from.channels + extra, to.channels, to.width, heights(feature_map(to)));
+    Convolution convolution(from.channels + extra, to.channels, to.width, heights(feature_map(to)));
     const size_t count = convolution.parameter_count();
     stages.push_back(
         {{upsampled_axis(from.width, to.width), upsampled_axis(from.height, to.height)},
@@ -281,8 +280,8 @@ const float* ConvDecoder::Network::upsampled(size_t k, const Task& task, Workspa
   const FeatureMap& from = maps[k][task.view];
   const FeatureMap& to = maps[k + 1][task.view];
   const int rows = to.rows_of(task.band);
-  const size_t size = static_cast<size_t>(from.groups() * (rows + 2) * from.lanes) *
-                      stages[k].upsampling.x.size();
+  const size_t size =
+      static_cast<size_t>(from.groups() * (rows + 2) * from.lanes) * stages[k].upsampling.x.size();
   if (space.input.size() < size) space.input.resize(size);
   upsample(from, stages[k].upsampling, {to.first_row(task.band), rows}, space.input.data());
   return space.input.data();
@@ -351,8 +350,9 @@ void ConvDecoder::Network::backward_stage(size_t k,
                         maps[k][task.view],
                         parts[task.index]);
   });
-  convolution.add_gradients(
-      gradients.data(), count, sum.subspan(stages[k].first_parameter, convolution.parameter_count()));
+  convolution.add_gradients(gradients.data(),
+                            count,
+                            sum.subspan(stages[k].first_parameter, convolution.parameter_count()));
   std::swap(parts, later_parts);
 }
 
@@ -437,8 +437,7 @@ std::vector<float> ConvDecoder::initial_parameters() const {
     const auto biases = static_cast<size_t>(net.blocks[k + 1].channels);
     fill(net.stages[k].first_parameter, net.stages[k].convolution.parameter_count() - biases);
   }
-  fill(net.first_of_last,
-       net.last.parameter_count() - static_cast<size_t>(net.options.layers));
+  fill(net.first_of_last, net.last.parameter_count() - static_cast<size_t>(net.options.layers));
   return out;
 }
 
@@ -460,10 +459,8 @@ void ConvDecoder::evaluate(std::span<const float> parameters,
     }
   }
   net.for_each_task(net.maps.size() - 1, [&](const Network::Task& task) {
-    net.last.forward(net.maps.back()[task.view],
-                     net.layers[task.view],
-                     task.band,
-                     value_per_view[task.view]);
+    net.last.forward(
+        net.maps.back()[task.view], net.layers[task.view], task.band, value_per_view[task.view]);
   });
   net.is_evaluated = true;
 }

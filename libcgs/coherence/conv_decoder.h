@@ -58,8 +58,10 @@ std::vector<DecoderBlock> decoder_blocks(int image_width, int image_height, int 
 /// Source: Paliwal et al. 2024, "CoherentGS", section 3 and published implementation.
 class ConvDecoder {
  public:
-  /// Allocates what evaluate() and add_gradient() need; about 330 bytes per pixel and unit of
-  /// options.width / 15 ... \param layer_per_view  layer of every pixel, as depth_layers() gives it
+  /// Allocates what evaluate() and add_gradient() need: about 40 bytes per pixel of all views and
+  /// unit of options.width (350 MB for three views of 504 x 378 and a width of 15).
+  ///
+  /// \param layer_per_view  layer of every pixel, as depth_layers() gives it
   /// \throws InvalidInput if there is no view, a raster is not of the size of the images or holds
   ///         a layer beyond options.layers, or an image is smaller than 4 x 4
   ConvDecoder(int view_count,

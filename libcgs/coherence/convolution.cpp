@@ -4,9 +4,9 @@
 #include <cassert>
 #include <unordered_map>
 
+#include <dnnl.hpp>
 #include <omp.h>
 #include <tbb/parallel_for.h>
-#include <dnnl.hpp>
 
 namespace cgs {
 
@@ -120,10 +120,7 @@ int convolution_lanes() {
   return (isa & wide) == wide ? 16 : 8;
 }
 
-Convolution::Convolution(int in_channels,
-                         int out_channels,
-                         int width,
-                         const std::vector<int>& rows)
+Convolution::Convolution(int in_channels, int out_channels, int width, const std::vector<int>& rows)
     : primitives_(std::make_unique<Primitives>()) {
   const OneOpenMpThread one;
   Primitives& own = *primitives_;

@@ -26,11 +26,8 @@ void bench_conv_decoder(benchmark::State& state) {
                                     static_cast<size_t>(state.range(2)));
   const auto width = static_cast<int>(state.range(0));
   const int height = width * 3 / 4;
-  ConvDecoder decoder(kViews,
-                      width,
-                      height,
-                      stripes(width, height),
-                      {.width = static_cast<int>(state.range(1))});
+  ConvDecoder decoder(
+      kViews, width, height, stripes(width, height), {.width = static_cast<int>(state.range(1))});
   const std::vector<float> parameters = decoder.initial_parameters();
   const std::vector<Raster<float>> by_value(kViews, Raster<float>(width, height, 1e-6f));
   std::vector<Raster<float>> values;

@@ -50,9 +50,7 @@ struct Padding {
 
 Image reflection_padded(const Image& in, const Padding& by) {
   Image out(in.channels, in.height + by.top + by.bottom, in.width + by.left + by.right);
-  const auto reflected = [](int i, int n) {
-    return i < 0 ? -i : i >= n ? 2 * n - 2 - i : i;
-  };
+  const auto reflected = [](int i, int n) { return i < 0 ? -i : i >= n ? 2 * n - 2 - i : i; };
   for (int c = 0; c < out.channels; ++c) {
     for (int y = 0; y < out.height; ++y) {
       for (int x = 0; x < out.width; ++x) {
@@ -101,8 +99,7 @@ Image with_coordinates(const Image& in, bool reference) {
   const Image pattern = reflection_padded(corners, {0, in.height - 2, 0, in.width - 2});
   for (int y = 0; y < in.height; ++y) {
     for (int x = 0; x < in.width; ++x) {
-      out.at(in.channels, y, x) =
-          reference ? pattern.at(0, y, x) : -1 + 2.0 * x / (in.width - 1);
+      out.at(in.channels, y, x) = reference ? pattern.at(0, y, x) : -1 + 2.0 * x / (in.width - 1);
       out.at(in.channels + 1, y, x) =
           reference ? pattern.at(1, y, x) : -1 + 2.0 * y / (in.height - 1);
     }
