@@ -19,7 +19,7 @@ namespace cgs {
 namespace {
 
 constexpr int kCoordinates = 2;
-constexpr int kFrequencies = 10;
+constexpr size_t kFrequencies = 10;
 constexpr size_t kInputs = 2 * kFrequencies;
 constexpr float kLeak = 0.2f;
 constexpr double kInitialDeviation = 0.02;

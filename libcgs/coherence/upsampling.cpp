@@ -72,9 +72,10 @@ void upsample(const FeatureMap& in, const Upsampling& how, RowRange rows, float*
   const size_t low_size = in.row_size();
   const size_t high_size = how.x.size() * static_cast<size_t>(in.lanes);
   FloatBuffer between(low_size);
+  const UpsampledTap* taps = how.y.data() + rows.first;
   for (int group = 0; group < in.groups(); ++group) {
     for (int i = 0; i < rows.count + 2; ++i, out += high_size) {
-      const UpsampledTap& tap = how.y[static_cast<size_t>(rows.first + i)];
+      const UpsampledTap& tap = taps[i];
       const float* first = in.row(group, tap.first);
       const float* second = in.row(group, tap.second);
       interpolate(first, second, tap.weight, low_size, between.data());
@@ -90,11 +91,12 @@ void upsample_transposed(const float* gradient,
                          RowBlock& out) {
   const size_t low_size = shape.row_size();
   const size_t high_size = how.x.size() * static_cast<size_t>(shape.lanes);
+  const UpsampledTap* taps = how.y.data() + rows.first;
   int lowest = shape.height;
   int highest = 0;
-  for (int i = rows.first; i < rows.first + rows.count + 2; ++i) {
-    lowest = std::min(lowest, how.y[static_cast<size_t>(i)].first);
-    highest = std::max(highest, how.y[static_cast<size_t>(i)].second);
+  for (int i = 0; i < rows.count + 2; ++i) {
+    lowest = std::min(lowest, taps[i].first);
+    highest = std::max(highest, taps[i].second);
   }
   out.rows = {lowest, highest - lowest + 1};
   const size_t group_size = static_cast<size_t>(out.rows.count) * low_size;
@@ -103,7 +105,7 @@ void upsample_transposed(const float* gradient,
   for (int group = 0; group < shape.groups(); ++group) {
     float* rows_out = out.data.data() + static_cast<size_t>(group) * group_size;
     for (int i = 0; i < rows.count + 2; ++i, gradient += high_size) {
-      const UpsampledTap& tap = how.y[static_cast<size_t>(rows.first + i)];
+      const UpsampledTap& tap = taps[i];
       std::fill(between.begin(), between.end(), 0.0f);
       scatter_row(shape, gradient, how, between.data());
       float* first = rows_out + static_cast<size_t>(tap.first - lowest) * low_size;
