@@ -40,7 +40,7 @@ struct DecoderBlock {
 std::vector<DecoderBlock> decoder_blocks(int image_width, int image_height, int width);
 
 /// value_n(p) = channel layer_n(p), at pixel p, of a network whose only input is the index n of
-/// the view. Untrained, values are small: about 0.001 for the sizes CoherentGS uses.
+/// the view. Untrained, values are small: at most 1e-4 (width 6) to 4e-3 (width 18) on 504 x 378.
 ///
 /// Input: sin 2^k t, cos 2^k t, k = 0..9, t = n / (views - 1), for each pixel. A block doubles its
 /// input by bilinear interpolation (corners stay corners), reflects it by a pixel on each side, and
