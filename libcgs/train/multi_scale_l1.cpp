@@ -54,7 +54,7 @@ void differentiate(Raster<float>& level, double slope, const Raster<float>& coar
     for (int x = 0; x < level.width; ++x) {
       row[x] = row[x] == 0 ? 0 : std::copysign(step, row[x]);
     }
-    if (y / 2 >= coarser.height) return;
+    if (coarser.empty() || y / 2 >= coarser.height) return;
     const float* from = &coarser.data[coarser.index(0, y / 2)];
     for (int x = 0; x < coarser.width; ++x, row += 2) {
       row[0] += 0.25f * from[x];
