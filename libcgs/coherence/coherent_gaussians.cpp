@@ -183,6 +183,24 @@ void CoherentGaussians::add_gradients(const GaussianGradients& gaussians,
   }
 }
 
+double CoherentGaussians::add_opacity_prior(double weight) {
+  if (!(weight > 0)) return 0;
+  const double share = weight / double(std::max<size_t>(gaussians_.size(), 1));
+  double sum = 0;
+  for (size_t n = 0; n < views_.size(); ++n) {
+    const ViewState& view = views_[n];
+    Raster<float> by_h(view.depth.width, view.depth.height, 0);
+    for (const int pixel : view.pixels) {
+      const float h = view.logit_change.data[pixel];
+      const float change = options_.max_logit_change * h;
+      sum += double(change) * double(change);
+      by_h.data[pixel] = static_cast<float>(2 * share) * change * (1 - h) * (1 + h);
+    }
+    view.opacity_lattice.add_gradient(by_h, parameters[n].opacity.gradient);
+  }
+  return share * sum;
+}
+
 double CoherentGaussians::add_bending(double depth_weight, double opacity_weight) {
   double sum = 0;
   for (size_t n = 0; n < views_.size(); ++n) {

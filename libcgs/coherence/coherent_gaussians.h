@@ -26,10 +26,10 @@ struct ParameterBlock {
 /// How Gaussians hang together.
 struct CoherenceOptions {
   std::vector<int> depth_spacing = {128, 64, 32, 16};  ///< Knots of the depth lattice [pixels].
-  std::vector<int> opacity_spacing = {64, 32, 16, 8};  ///< Knots of the opacity lattice [pixels].
+  std::vector<int> opacity_spacing = {16, 4, 2};       ///< Knots of the opacity lattice [pixels].
   float max_depth_change = 0.5f;   ///< Bound of |log(depth / starting depth)|; > 0.
   float max_logit_change = 12.0f;  ///< Bound of the change of the opacity's logit; > 0.
-  float radius_factor = 0.6f;      ///< As in InitialisationOptions.
+  float radius_factor = 0.4f;      ///< As in InitialisationOptions.
   float opacity = 0;               ///< As in InitialisationOptions.
 
   /// \throws InvalidInput naming the first field out of range.
@@ -84,6 +84,10 @@ class CoherentGaussians {
   /// \param gaussians  of the loss with respect to gaussians()
   /// \param depth      of the loss with respect to depth(), one raster per view; empty = zero
   void add_gradients(const GaussianGradients& gaussians, std::span<const Raster<float>> depth);
+
+  /// Adds weight times the mean over Gaussians of the squared change of the logit of their opacity,
+  /// and its gradient. \return weight times the mean
+  double add_opacity_prior(double weight);
 
   /// Adds the bending energies of depth and opacity, times weights. \return the weighted sum
   double add_bending(double depth_weight, double opacity_weight);

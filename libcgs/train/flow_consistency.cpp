@@ -74,11 +74,8 @@ struct Slopes {
 };
 
 // L1 distance between the points of one correspondence; `scale` times its derivatives to `slopes`.
-double distance(const View& first,
-                const View& second,
-                const PixelMatch& match,
-                Slopes& slopes,
-                double scale) {
+double distance(
+    const View& first, const View& second, const PixelMatch& match, Slopes& slopes, double scale) {
   const float depth = first.depth.data[match.pixel];
   const Sample sampled = sample(second, double(match.u), double(match.v));
   if (!known(depth) || sampled.depth == 0) return 0;

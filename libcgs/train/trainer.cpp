@@ -83,9 +83,9 @@ uint64_t mixed(uint64_t a, uint64_t b, uint64_t c) {
 
 // Pixels of `first` whose measured depth `second` confirms, with the place where it does.
 std::vector<PixelMatch> matches_between(const Camera& first,
-                                            const ViewPriors& own,
-                                            const Camera& second,
-                                            const ViewPriors& other) {
+                                        const ViewPriors& own,
+                                        const Camera& second,
+                                        const ViewPriors& other) {
   std::vector<PixelMatch> out;
   for (int y = 0; y < own.depth.height; ++y) {
     for (int x = 0; x < own.depth.width; ++x) {
@@ -149,6 +149,16 @@ void take(std::string_view& from, std::vector<float>& values, AdamState& adam) {
   take(from, adam.mean, values.size(), true);
   take(from, adam.square, values.size(), true);
   adam.steps = take<int64_t>(from);
+}
+
+// Another colour in every step, so that no surface can hide in front of it half transparent.
+Eigen::Vector3f background(uint64_t step, size_t view) {
+  const uint64_t bits = mixed(step, view, 0xBACC);
+  constexpr uint64_t kMask = (1U << 21) - 1;
+  const auto channel = [&](int shift) {
+    return static_cast<float>(bits >> shift & kMask) / static_cast<float>(kMask);
+  };
+  return {channel(0), channel(21), channel(42)};
 }
 
 float median_depth(const std::vector<ViewPriors>& priors) {
@@ -218,7 +228,7 @@ void Trainer::add_view(size_t n, GaussianGradients& sum, StepReport& report) {
   const bool sharp = time() >= options_.sharp_from;
   const TrainingView& view = coarse ? coarse_[n] : full_[n];
   TrainingRasterizerOptions how;
-  how.background = Eigen::Vector3f::Constant(0.5f);
+  how.background = background(static_cast<uint64_t>(step_), n);
   how.shape = model_.shapes_are_free() ? GaussianShape::Ellipsoids : GaussianShape::Balls;
   TrainingRasterizer rasterizer(how);
   const Gaussians drawn = with_dropout(n);
@@ -313,7 +323,8 @@ StepReport Trainer::step() {
   std::vector<Raster<float>> depth(full_.size());
   add_depth_terms(depth, report);
   model_.add_gradients(gaussians, depth);
-  report.bending = model_.add_bending(options_.depth_bending, options_.opacity_bending);
+  report.bending = model_.add_bending(options_.depth_bending, options_.opacity_bending) +
+                   model_.add_opacity_prior(options_.opacity_prior);
   update();
   ++step_;
   model_.decode();

@@ -33,6 +33,7 @@ std::vector<Field> fields_of(TrainingOptions& o) {
           {"prior_weight", &o.prior_weight},
           {"depth_bending", &o.depth_bending},
           {"opacity_bending", &o.opacity_bending},
+          {"opacity_prior", &o.opacity_prior},
           {"l1_levels", &o.l1_levels},
           {"dropout", &o.dropout},
           {"dropout_block", &o.dropout_block},

@@ -15,27 +15,28 @@ namespace cgs {
 struct TrainingOptions {
   CoherenceOptions coherence;
 
-  int steps = 300;            ///< >= 0; 0 leaves the aligned initialisation.
-  double coarse_until = 0.3;  ///< Until then images are halved; in [0, 1].
-  double free_from = 0.7;     ///< From then on shapes are free; in [0, 1].
-  double sharp_from = 0.85;   ///< From then on images are drawn at twice the size and averaged.
+  int steps = 60;           ///< >= 0; 0 leaves the aligned initialisation.
+  double coarse_until = 0;  ///< Until then images are halved; in [0, 1].
+  double free_from = 0;     ///< From then on shapes are free; in [0, 1].
+  double sharp_from = 1;    ///< From then on images are drawn at twice the size and averaged.
 
-  double depth_rate = 2e-3;   ///< Of log depth, per step, at the start.
+  double depth_rate = 1e-3;   ///< Of log depth, per step, at the start.
   double opacity_rate = 0.1;  ///< Of the logit.
-  double shape_rate = 5e-3;   ///< Of log radius and of the quaternion.
+  double shape_rate = 0.2;    ///< Of log radius and of the quaternion.
   double final_rate = 0.05;   ///< All rates fall to this part of themselves, along a cosine.
 
   double l1_weight = 0.8;
   double ssim_weight = 0.2;
-  double tv_weight = 0.0;         ///< Total variation of the rendered disparity.
-  double masked_tv_weight = 0.0;  ///< The same within layers.
-  double flow_weight = 0.0;       ///< Distance of corresponding points [scene extents].
-  double prior_weight = 0.0;      ///< Departure of measured depths from their prior, in sigmas.
-  double depth_bending = 0.0;     ///< Of the depth lattice.
-  double opacity_bending = 0.0;
+  double tv_weight = 0;         ///< Total variation of the rendered disparity.
+  double masked_tv_weight = 0;  ///< The same within layers.
+  double flow_weight = 0;       ///< Distance of corresponding points [scene extents].
+  double prior_weight = 0.005;  ///< Departure of measured depths from their prior, in sigmas.
+  double depth_bending = 0;     ///< Of the depth lattice.
+  double opacity_bending = 0;
+  double opacity_prior = 0.001;  ///< Squared change of the logit, mean over Gaussians.
 
   int l1_levels = 5;
-  double dropout = 0.5;    ///< Share of a view's own blocks left out of its picture; in [0, 1).
+  double dropout = 0;      ///< Share of a view's own blocks left out of its picture; in [0, 1).
   int dropout_block = 32;  ///< Edge of a block [pixels].
 
   /// \throws InvalidInput naming the first field out of range.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What training settings bring on held-out views.
 //
-// usage: training_accuracy MODEL [every=STEPS] [limit=VIEWS] [FIELD=VALUE ...]
+// usage: training_accuracy MODEL [every=STEPS] [limit=COUNT | views=NAME,NAME] [FIELD=VALUE ...]
 //
 // MODEL is a folder that `cgs train --preset none` wrote. Fields are those of TrainingOptions.
 // Prints one line per evaluation: PSNR and SSIM over all pixels, over the pixels that were seen
@@ -48,6 +48,7 @@ std::vector<cgs::DepthMap> true_depths(const cgs::Scene& scene) {
         view.image_path.parent_path().parent_path() / "truth" / (view.name + "_depth.exr");
     if (!std::filesystem::exists(path)) return {};
     const cgs::ExrImage image = cgs::read_exr(path);
+    if (image.width != view.camera.width) return {};  // a reduced size
     cgs::DepthMap depth(image.width, image.height, 0);
     for (size_t k = 0; k < depth.data.size(); ++k) {
       depth.data[k] = image.channels[0].second[k] / static_cast<float>(scene.frame.scale);
@@ -107,6 +108,7 @@ void run(int argc, char** argv) {
   cgs::TrainingOptions options;
   int every = 100;
   size_t limit = 6;
+  std::string views;
   for (int i = 2; i < argc; ++i) {
     const std::string argument = argv[i];
     const size_t equals = std::min(argument.find('='), argument.size() - 1);
@@ -116,13 +118,19 @@ void run(int argc, char** argv) {
       every = std::atoi(value.c_str());
     } else if (name == "limit") {
       limit = static_cast<size_t>(std::atoi(value.c_str()));
+    } else if (name == "views") {
+      views = "," + value + ",";
     } else {
       cgs::set_training_field(options, name, value);
     }
   }
   cgs::load_images(model.scene, model.scene.input);
   std::vector<HeldOut> held_out;
-  const std::vector<int>& indices = model.scene.held_out;
+  std::vector<int> indices;
+  for (const int i : model.scene.held_out) {
+    const std::string& name = model.scene.views[static_cast<size_t>(i)].name;
+    if (views.empty() || views.find("," + name + ",") != std::string::npos) indices.push_back(i);
+  }
   const size_t stride = std::max<size_t>(1, indices.size() / std::max<size_t>(limit, 1));
   for (size_t k = stride / 2; k < indices.size(); k += stride) {
     cgs::load_images(model.scene, {indices[k]});
@@ -162,6 +170,8 @@ void run(int argc, char** argv) {
           last.flow,
           last.prior,
           last.bending);
+      print_depth_error(trainer, truth);
+      std::printf("\n");
       std::fflush(stdout);
     }
     if (trainer.done()) break;
@@ -176,7 +186,8 @@ void run(int argc, char** argv) {
 int main(int argc, char** argv) {
   if (argc < 2) {
     std::fprintf(stderr,
-                 "usage: training_accuracy MODEL [every=STEPS] [limit=VIEWS] [FIELD=VALUE ...]\n");
+                 "usage: training_accuracy MODEL [every=STEPS] [limit=COUNT | views=NAME,NAME] "
+                 "[FIELD=VALUE ...]\n");
     return 2;
   }
   try {
