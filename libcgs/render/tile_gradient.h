@@ -10,13 +10,27 @@
 namespace cgs {
 
 inline constexpr size_t kTilePixels = size_t{kTileSize} * kTileSize;
-using TilePlane = std::array<float, kTilePixels>;  ///< Row-major.
+
+/// The pixels of a tile in blocks of 4 x 4, row-major within a block and block by block: small
+/// splats touch fewer squares than stretches of rows.
+using TilePlane = std::array<float, kTilePixels>;
+
+/// Position of the pixel in column x, row y of a tile.
+inline size_t tile_index(int x, int y) {
+  return static_cast<size_t>(y / 4 * 64 + x / 4 * 16 + y % 4 * 4 + x % 4);
+}
+
+/// A splat of a tile.
+struct TileEntry {
+  uint32_t splat = 0;    ///< Position in its band.
+  uint32_t windows = 0;  ///< Bit i: pixels 8 i ... 8 i + 7 were drawn. Filled by draw_tile().
+};
 
 /// The splats of one tile.
 struct TileSplats {
   std::span<const BandSplat> band;
-  std::span<const uint32_t> nearest_first;  ///< Positions in band.
-  int first_column = 0;                     ///< First pixel column of the tile.
+  std::span<TileEntry> nearest_first;
+  int first_column = 0;  ///< First pixel column of the tile.
 };
 
 /// Where drawing a tile ended, for the way back.
