@@ -214,19 +214,43 @@ inline Floats lane_sums(const std::array<Floats, 8>& v) {
 
 template <bool kColor, bool kDepth, bool kColorDerivative>
 struct Channels {
-  // Derivative of the loss with respect to the weight of a splat, as if other weights stayed.
-  static Floats of_weight(const BandSplat& s, const TileLoss& loss, size_t at) {
-    Floats out = load<Floats>(&loss.alpha[at]);
+  // Derivative of the loss with respect to the weight of a splat, as if other weights stayed, less
+  // that of the anchor.
+  static Floats of_weight(const BandSplat& s,
+                          const BandSplat& anchor,
+                          const TileLoss& loss,
+                          size_t at) {
+    Floats out = {};
     if constexpr (kColor) {
       for (int c = 0; c < 3; ++c) {
-        out = multiply_add(load<Floats>(&loss.color[c][at]), kZero + s.color[c], out);
+        const Floats color = kZero + (s.color[c] - anchor.color[c]);
+        out = multiply_add(load<Floats>(&loss.color[c][at]), color, out);
       }
     }
     if constexpr (kDepth) {
-      const Floats z = kZero + s.depth;
-      const Floats slope = multiply_add(
-          load<Floats>(&loss.depth_square_sum[at]), z, load<Floats>(&loss.depth_sum[at]));
-      out = multiply_add(slope, z, out);
+      const Floats slope = multiply_add(load<Floats>(&loss.depth_square_sum[at]),
+                                        kZero + (s.depth + anchor.depth),
+                                        load<Floats>(&loss.depth_sum[at]));
+      out = multiply_add(slope, kZero + (s.depth - anchor.depth), out);
+    }
+    return out;
+  }
+
+  // The background is the last splat.
+  static Behind behind_everything(const TileEnd& end,
+                                  const BandSplat& anchor,
+                                  const TileLoss& loss) {
+    Behind out;
+    out.transmittance = end.transmittance;
+    for (size_t p = 0; p < kTilePixels; ++p) {
+      float of_weight = loss.transmittance[p];
+      if constexpr (kColor) {
+        for (int c = 0; c < 3; ++c) of_weight -= anchor.color[c] * loss.color[c][p];
+      }
+      if constexpr (kDepth) {
+        of_weight -= anchor.depth * (loss.depth_sum[p] + anchor.depth * loss.depth_square_sum[p]);
+      }
+      out.weighted[p] = end.transmittance[p] * of_weight;
     }
     return out;
   }
@@ -250,9 +274,9 @@ struct Channels {
                             const TileEnd& end,
                             const TileLoss& loss,
                             const TileRecords& records) {
-    Behind behind;
-    behind.transmittance = end.transmittance;
-    behind.weighted.fill(0);
+    if (end.visited == 0) return;
+    const BandSplat& anchor = splats.band[splats.nearest_first[0].splat];
+    Behind behind = behind_everything(end, anchor, loss);
     for (auto i = static_cast<int32_t>(end.visited) - 1; i >= 0; --i) {
       const TileEntry entry = splats.nearest_first[static_cast<size_t>(i)];
       prefetch(splats, i - kAhead);
@@ -268,7 +292,7 @@ struct Channels {
         const Floats before = load<Floats>(&behind.transmittance[at]) * inverse;
         const Floats rest = load<Floats>(&behind.weighted[at]);
         const Floats w = alpha * before;
-        const Floats of_weight = Channels::of_weight(s, loss, at);
+        const Floats of_weight = Channels::of_weight(s, anchor, loss, at);
         const Floats of_alpha = before * of_weight - rest * inverse;
         // Where alpha is clamped it does not change.
         const Floats m = unclamped > kMaxSplatAlpha ? kZero : alpha * of_alpha;

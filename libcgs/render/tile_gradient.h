@@ -57,7 +57,7 @@ void draw_tile(const TileSplats& splats, std::array<int, 2> size, TileEnd& end, 
 /// Derivatives of a loss with respect to what a tile shows; zero beyond the image.
 struct alignas(32) TileLoss {
   std::array<TilePlane, 3> color;
-  TilePlane alpha;  ///< With respect to Sum w: what the background adds is included.
+  TilePlane transmittance;  ///< With respect to 1 - Sum w, which lets the background through.
   TilePlane depth_sum;
   TilePlane depth_square_sum;
 };
@@ -90,8 +90,11 @@ struct TileRecords {
 
 /// Walks back over the splats that draw_tile() visited and overwrites the records of all.
 ///
-/// For weight w_i = alpha_i T_i and s_i the derivative of the loss with respect to w_i alone,
+/// With weights w_i = alpha_i T_i, s_i the derivative of the loss with respect to w_i alone and the
+/// background as a last splat of weight T,
 ///   dL/dalpha_i = T_i s_i - (sum of w_j s_j behind i) / (1 - alpha_i).
+/// All weights sum to 1, so s may be taken relative to any value; that of the nearest splat is
+/// taken, or digits would cancel between splats that look alike.
 void differentiate_tile(const TileSplats& splats,
                         const TileEnd& end,
                         const TileLoss& loss,

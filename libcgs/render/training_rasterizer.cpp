@@ -254,14 +254,15 @@ void TrainingRasterizer::Tape::read_loss(const TrainingBuffers& loss,
       for (int x = 0; x < size[0]; ++x) plane[tile_index(x, y)] = from[x];
     }
   };
-  read(loss.alpha, tile.alpha);
+  read(loss.alpha, tile.transmittance);
+  for (float& of_transmittance : tile.transmittance) of_transmittance = -of_transmittance;
   read(loss.depth_sum, tile.depth_sum);
   read(loss.depth_square_sum, tile.depth_square_sum);
   for (int c = 0; c < 3; ++c) {
     read(loss.color[c], tile.color[c]);
     if (options.background[c] == 0) continue;
     for (size_t p = 0; p < kTilePixels; ++p) {
-      tile.alpha[p] -= options.background[c] * tile.color[c][p];
+      tile.transmittance[p] += options.background[c] * tile.color[c][p];
     }
   }
 }
