@@ -26,6 +26,7 @@ void store(const Vector& vector, Scalar* to) {
 }
 
 inline Floats min(Floats a, Floats b) { return _mm256_min_ps(a, b); }
+inline Floats max(Floats a, Floats b) { return _mm256_max_ps(a, b); }
 
 /// a * b + c, rounded once.
 inline Floats multiply_add(Floats a, Floats b, Floats c) { return _mm256_fmadd_ps(a, b, c); }
@@ -37,12 +38,12 @@ inline bool any(Ints mask) { return _mm256_movemask_ps(std::bit_cast<__m256>(mas
 inline Floats exp2_negative(Floats x) {
   const Floats whole = _mm256_round_ps(x, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
   const Floats r = (x - whole) * 0.693147181f;  // e^r with |r| <= ln 2 / 2
-  Floats p = r * (1.0f / 720) + 1.0f / 120;
-  p = p * r + 1.0f / 24;
-  p = p * r + 1.0f / 6;
-  p = p * r + 0.5f;
-  p = p * r + 1.0f;
-  p = p * r + 1.0f;
+  Floats p = multiply_add(r, Floats{} + 1.0f / 720, Floats{} + 1.0f / 120);
+  p = multiply_add(p, r, Floats{} + 1.0f / 24);
+  p = multiply_add(p, r, Floats{} + 1.0f / 6);
+  p = multiply_add(p, r, Floats{} + 0.5f);
+  p = multiply_add(p, r, Floats{} + 1.0f);
+  p = multiply_add(p, r, Floats{} + 1.0f);
   return p * std::bit_cast<Floats>((__builtin_convertvector(whole, Ints) + 127) << 23);
 }
 

@@ -10,13 +10,27 @@
 namespace cgs {
 
 inline constexpr size_t kTilePixels = size_t{kTileSize} * kTileSize;
-using TilePlane = std::array<float, kTilePixels>;  ///< Row-major.
+
+/// The pixels of a tile in blocks of 4 x 4, row-major within a block and block by block: small
+/// splats touch fewer squares than stretches of rows.
+using TilePlane = std::array<float, kTilePixels>;
+
+/// Position of the pixel in column x, row y of a tile.
+inline size_t tile_index(int x, int y) {
+  return static_cast<size_t>(y / 4 * 64 + x / 4 * 16 + y % 4 * 4 + x % 4);
+}
+
+/// A splat of a tile.
+struct TileEntry {
+  uint32_t splat = 0;    ///< Position in its band.
+  uint32_t windows = 0;  ///< Bit i: pixels 8 i ... 8 i + 7 were drawn. Filled by draw_tile().
+};
 
 /// The splats of one tile.
 struct TileSplats {
   std::span<const BandSplat> band;
-  std::span<const uint32_t> nearest_first;  ///< Positions in band.
-  int first_column = 0;                     ///< First pixel column of the tile.
+  std::span<TileEntry> nearest_first;
+  int first_column = 0;  ///< First pixel column of the tile.
 };
 
 /// Where drawing a tile ended, for the way back.
@@ -43,7 +57,7 @@ void draw_tile(const TileSplats& splats, std::array<int, 2> size, TileEnd& end, 
 /// Derivatives of a loss with respect to what a tile shows; zero beyond the image.
 struct alignas(32) TileLoss {
   std::array<TilePlane, 3> color;
-  TilePlane alpha;  ///< With respect to Sum w: what the background adds is included.
+  TilePlane transmittance;  ///< With respect to 1 - Sum w, which lets the background through.
   TilePlane depth_sum;
   TilePlane depth_square_sum;
 };
@@ -76,8 +90,11 @@ struct TileRecords {
 
 /// Walks back over the splats that draw_tile() visited and overwrites the records of all.
 ///
-/// For weight w_i = alpha_i T_i and s_i the derivative of the loss with respect to w_i alone,
+/// With weights w_i = alpha_i T_i, s_i the derivative of the loss with respect to w_i alone and the
+/// background as a last splat of weight T,
 ///   dL/dalpha_i = T_i s_i - (sum of w_j s_j behind i) / (1 - alpha_i).
+/// All weights sum to 1, so s may be taken relative to any value; that of the nearest splat is
+/// taken, or digits would cancel between splats that look alike.
 void differentiate_tile(const TileSplats& splats,
                         const TileEnd& end,
                         const TileLoss& loss,

@@ -26,8 +26,8 @@ constexpr size_t kBlock = 4096;  // Gaussians that one task projects or differen
 
 // One row of tiles.
 struct Band {
-  std::vector<uint32_t> in_tiles;  // positions among the splats of the band, tile by tile
-  std::vector<size_t> begin;       // per tile, and the end of the last
+  std::vector<TileEntry> in_tiles;  // tile by tile, nearest first
+  std::vector<size_t> begin;        // per tile, and the end of the last
   std::vector<uint64_t> keys;
   std::vector<uint64_t> scratch;
 };
@@ -108,7 +108,7 @@ struct TrainingRasterizer::Tape {
             std::min(kTileSize, view.camera.height - row * kTileSize)};
   }
   size_t band_size(int row) const { return row_begin[row + 1] - row_begin[row]; }
-  TileSplats tile_splats(int column, int row) const;
+  TileSplats tile_splats(int column, int row);
 
   template <typename Visit>
   void for_each_entry(size_t block, Visit visit) const;
@@ -125,8 +125,8 @@ struct TrainingRasterizer::Tape {
   void prepare(GaussianGradients& sum) const;
 };
 
-TileSplats TrainingRasterizer::Tape::tile_splats(int column, int row) const {
-  const Band& band = bands[row];
+TileSplats TrainingRasterizer::Tape::tile_splats(int column, int row) {
+  Band& band = bands[row];
   const size_t begin = band.begin[column];
   return {std::span(splats).subspan(row_begin[row], band_size(row)),
           std::span(band.in_tiles).subspan(begin, band.begin[column + 1] - begin),
@@ -203,7 +203,7 @@ void TrainingRasterizer::Tape::bin_into_tiles(int row) {
   for (const uint64_t key : band.keys) {
     const uint32_t k = index_of_key(key);
     const TileRange tiles = reach[first + k];
-    for (int c = tiles.first; c <= tiles.last; ++c) band.in_tiles[next[c]++] = k;
+    for (int c = tiles.first; c <= tiles.last; ++c) band.in_tiles[next[c]++].splat = k;
   }
 }
 
@@ -228,15 +228,15 @@ void TrainingRasterizer::Tape::draw(int column, int row) {
   draw_tile(tile_splats(column, row), size, end, sums);
   for (int y = 0; y < size[1]; ++y) {
     const size_t to = out.alpha.index(column * kTileSize, row * kTileSize + y);
-    const size_t from = static_cast<size_t>(y) * kTileSize;
-    for (size_t x = 0; x < static_cast<size_t>(size[0]); ++x) {
-      const float T = end.transmittance[from + x];
+    for (int x = 0; x < size[0]; ++x) {
+      const size_t from = tile_index(x, y);
+      const float T = end.transmittance[from];
       for (int c = 0; c < 3; ++c) {
-        out.color[c].data[to + x] = sums.color[c][from + x] + T * options.background[c];
+        out.color[c].data[to + x] = sums.color[c][from] + T * options.background[c];
       }
       out.alpha.data[to + x] = 1.0f - T;
-      out.depth_sum.data[to + x] = sums.depth[from + x];
-      out.depth_square_sum.data[to + x] = sums.depth_square[from + x];
+      out.depth_sum.data[to + x] = sums.depth[from];
+      out.depth_square_sum.data[to + x] = sums.depth_square[from];
     }
   }
 }
@@ -251,17 +251,18 @@ void TrainingRasterizer::Tape::read_loss(const TrainingBuffers& loss,
     if (raster.empty()) return;
     for (int y = 0; y < size[1]; ++y) {
       const float* from = &raster.data[raster.index(column * kTileSize, row * kTileSize + y)];
-      std::copy_n(from, size[0], &plane[static_cast<size_t>(y) * kTileSize]);
+      for (int x = 0; x < size[0]; ++x) plane[tile_index(x, y)] = from[x];
     }
   };
-  read(loss.alpha, tile.alpha);
+  read(loss.alpha, tile.transmittance);
+  for (float& of_transmittance : tile.transmittance) of_transmittance = -of_transmittance;
   read(loss.depth_sum, tile.depth_sum);
   read(loss.depth_square_sum, tile.depth_square_sum);
   for (int c = 0; c < 3; ++c) {
     read(loss.color[c], tile.color[c]);
     if (options.background[c] == 0) continue;
     for (size_t p = 0; p < kTilePixels; ++p) {
-      tile.alpha[p] -= options.background[c] * tile.color[c][p];
+      tile.transmittance[p] += options.background[c] * tile.color[c][p];
     }
   }
 }

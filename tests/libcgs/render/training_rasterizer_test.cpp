@@ -3,13 +3,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <functional>
+#include <limits>
+#include <map>
 #include <random>
+#include <string>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/render/rasterizer.h"
+#include "tests/support/reference_rasterizer.h"
 #include "tests/support/reference_training_rasterizer.h"
 
 namespace cgs {
@@ -131,43 +137,52 @@ double loss_of(const test::ReferencePlanes& planes_of_scene, TrainingBuffers& we
   return sum;
 }
 
-// Compares every derivative with central differences of the reference, for each channel by itself
-// and for all together.
-void expect_differences(const Gaussians& g, const TrainingRasterizerOptions& options) {
-  const Camera camera = oblique_camera();
+struct Comparison {
+  std::vector<unsigned> channels = {1, 2, 4, 8, 16, 32, kEveryChannel};
+  Camera camera = oblique_camera();
+  size_t every = 1;  // compares one derivative in so many
+  double step = 1e-6;
+};
+
+// Compares derivatives with central differences of the reference, for each set of channels.
+void expect_differences(const Gaussians& g,
+                        const TrainingRasterizerOptions& options,
+                        const Comparison& how = {}) {
   TrainingRasterizer rasterizer(options);
   std::vector<TrainingBuffers> losses;
   std::vector<std::vector<Entry>> entries;
-  for (const unsigned channels : {1U, 2U, 4U, 8U, 16U, 32U, kEveryChannel}) {
-    losses.push_back(random_loss(camera, channels, 7));
+  for (const unsigned channels : how.channels) {
+    losses.push_back(random_loss(how.camera, channels, 7));
     GaussianGradients sum;
-    rasterizer.forward(g, camera);
+    rasterizer.forward(g, how.camera);
     rasterizer.backward(losses.back(), sum);
     entries.push_back(entries_of(g, sum));
   }
-  std::vector<std::vector<double>> truth(losses.size());
   const Eigen::Vector3d background = options.background.cast<double>();
-  for (const Entry& entry : entries[0]) {
-    constexpr double kStep = 1e-6;
+  std::vector<std::vector<double>> truth(losses.size());
+  std::vector<size_t> compared;
+  for (size_t e = 0; e < entries[0].size(); e += how.every) {
     auto scene = test::reference_gaussians(g);
-    entry.add(scene, kStep);
-    const auto plus = test::draw_reference(scene, camera, background);
-    entry.add(scene, -2 * kStep);
-    const auto minus = test::draw_reference(scene, camera, background);
+    entries[0][e].add(scene, how.step);
+    const auto plus = test::draw_reference(scene, how.camera, background);
+    entries[0][e].add(scene, -2 * how.step);
+    const auto minus = test::draw_reference(scene, how.camera, background);
+    compared.push_back(e);
     for (size_t l = 0; l < losses.size(); ++l) {
-      truth[l].push_back((loss_of(plus, losses[l]) - loss_of(minus, losses[l])) / (2 * kStep));
+      truth[l].push_back((loss_of(plus, losses[l]) - loss_of(minus, losses[l])) / (2 * how.step));
     }
   }
   for (size_t l = 0; l < losses.size(); ++l) {
     std::map<std::string, double> largest;
-    for (size_t e = 0; e < truth[l].size(); ++e) {
-      double& most = largest[entries[l][e].kind];
-      most = std::max(most, std::abs(truth[l][e]));
+    for (size_t k = 0; k < compared.size(); ++k) {
+      double& most = largest[entries[l][compared[k]].kind];
+      most = std::max(most, std::abs(truth[l][k]));
     }
-    for (size_t e = 0; e < truth[l].size(); ++e) {
-      const double room = 1e-4 * std::abs(truth[l][e]) + 2e-6 * largest[entries[l][e].kind];
-      EXPECT_NEAR(entries[l][e].got, truth[l][e], room)
-          << entries[l][e].kind << ", entry " << e << ", loss " << l;
+    for (size_t k = 0; k < compared.size(); ++k) {
+      const Entry& entry = entries[l][compared[k]];
+      const double room = 1e-4 * std::abs(truth[l][k]) + 2e-6 * largest[entry.kind];
+      EXPECT_NEAR(entry.got, truth[l][k], room)
+          << entry.kind << ", entry " << compared[k] << ", channels " << how.channels[l];
     }
   }
 }
@@ -187,6 +202,266 @@ TEST(TrainingRasterizer, DifferentiatesDirectionalColour) {
     expect_differences(random_gaussians(oblique_camera(), {.count = 15, .sh_degree = degree}, 3),
                        {.sh_gradients = true});
   }
+}
+
+TEST(TrainingRasterizer, DifferentiatesOpacitiesAtBothEnds) {
+  Gaussians g = random_gaussians(oblique_camera(), {.sigma_px = 3}, 4);
+  for (size_t i = 0; i < g.size(); ++i) {
+    const std::array<float, 5> extremes = {0.9999f, 0.995f, 1 / 250.0f, 1 / 254.0f, 0.5f};
+    g.opacity[i] = extremes[i % extremes.size()];
+  }
+  expect_differences(g, {}, {.channels = {kEveryChannel}});
+}
+
+TEST(TrainingRasterizer, DifferentiatesNeedles) {
+  for (const float anisotropy : {1e2f, 1e4f}) {
+    for (const float sigma_px : {3.0f, 100.0f}) {
+      SCOPED_TRACE(testing::Message() << sigma_px << " px, 1 : " << anisotropy);
+      const Spread spread{
+          .count = 12, .sigma_px = sigma_px, .anisotropy = anisotropy, .max_opacity = 0.3f};
+      // A step of 1e-6 is wider than the thin axis.
+      Gaussians g = random_gaussians(oblique_camera(), spread, 5);
+      for (Eigen::Vector3f& scale : g.scale) scale = scale.cwiseMax(1e-4f);
+      expect_differences(g, {.shape = GaussianShape::Ellipsoids}, {.channels = {8, kEveryChannel}});
+    }
+  }
+}
+
+TEST(TrainingRasterizer, DifferentiatesBallsThatCoverTheImage) {
+  const Spread spread{.count = 12, .sigma_px = 60, .max_opacity = 0.6f};
+  expect_differences(
+      random_gaussians(oblique_camera(), spread, 6), {}, {.channels = {8, kEveryChannel}});
+}
+
+TEST(TrainingRasterizer, DifferentiatesManySplatsAtOneDepth) {
+  const Camera camera{.width = 4, .height = 4, .fx = 4, .fy = 4, .cx = 2, .cy = 2};
+  for (const float opacity : {0.0045f, 0.012f, 0.1f}) {
+    Gaussians g;
+    for (int i = 0; i < 1000; ++i) {
+      g.position.emplace_back(0.01f * float(i % 10), 0.01f * float(i % 7), 0.5f);
+      g.scale.push_back(Eigen::Vector3f::Constant(2));
+      g.rotation.emplace_back(1, 0, 0, 0);
+      g.opacity.push_back(opacity);
+      g.sh.push_back(Eigen::Vector3f::Constant(0.01f * float(i % 17)));
+    }
+    // Entry 4 of each Gaussian is the opacity; differences in z would change the order.
+    expect_differences(
+        g, {}, {.channels = {1, 8, kEveryChannel}, .camera = camera, .every = 15, .step = 1e-4});
+  }
+}
+
+// Compares what is drawn with the reference of rasterize(), which knows the pixels that rounding
+// may decide either way.
+void expect_drawn(const Gaussians& g, GaussianShape shape) {
+  const Camera camera = oblique_camera();
+  const Eigen::Vector3f background(0.2f, 0.4f, 0.8f);
+  TrainingRasterizer rasterizer({.background = background, .shape = shape});
+  const TrainingBuffers& got = rasterizer.forward(g, camera);
+  const test::ReferenceImage truth =
+      test::rasterize_reference(g, camera, background.cast<double>(), 1e-4);
+  for (size_t p = 0; p < got.alpha.data.size(); ++p) {
+    const double room = 3e-6 + 2 * truth.undecided.data[p];
+    const double alpha = truth.alpha.data[p];
+    const double depth = alpha > 0 ? truth.depth.data[p] : 0;
+    ASSERT_NEAR(double(got.alpha.data[p]), alpha, room) << p;
+    ASSERT_NEAR(double(got.depth_sum.data[p]), alpha * depth, 2 * room) << p;
+    const double square = alpha * (depth * depth + truth.depth_variance.data[p]);
+    ASSERT_NEAR(double(got.depth_square_sum.data[p]), square, 2 * room) << p;
+    for (int c = 0; c < 3; ++c) {
+      ASSERT_NEAR(double(got.color[size_t(c)].data[p]), truth.color.data[p][c], 4 * room) << p;
+    }
+  }
+}
+
+TEST(TrainingRasterizer, DrawsWhatTheReferenceDraws) {
+  const Camera camera = oblique_camera();
+  for (const float sigma_px : {0.3f, 1.0f, 3.0f, 10.0f}) {
+    expect_drawn(random_gaussians(camera, {.count = 300, .sigma_px = sigma_px}, 8),
+                 GaussianShape::Balls);
+  }
+  for (const float anisotropy : {5.0f, 1e3f}) {
+    const Spread spread{.count = 100, .sigma_px = 8, .anisotropy = anisotropy, .sh_degree = 1};
+    expect_drawn(random_gaussians(camera, spread, 9), GaussianShape::Ellipsoids);
+  }
+}
+
+TEST(TrainingRasterizer, DrawsWhatRasterizeDraws) {
+  const Camera camera = resized(oblique_camera(), 370, 260);
+  const Gaussians g = random_gaussians(
+      camera, {.count = 5000, .sigma_px = 4, .anisotropy = 3, .max_opacity = 1.0f}, 10);
+  TrainingRasterizer rasterizer({.shape = GaussianShape::Ellipsoids});
+  const TrainingBuffers& got = rasterizer.forward(g, camera);
+  const RenderBuffers expected = rasterize(g, camera);
+  for (size_t p = 0; p < got.alpha.data.size(); ++p) {
+    ASSERT_NEAR(got.alpha.data[p], expected.alpha.data[p], 2e-6f) << p;
+    for (int c = 0; c < 3; ++c) {
+      ASSERT_NEAR(got.color[size_t(c)].data[p], expected.color.data[p][c], 1e-5f) << p;
+    }
+  }
+}
+
+template <typename T>
+bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+}
+
+bool same_bits(const GaussianGradients& a, const GaussianGradients& b) {
+  return same_bits(a.position, b.position) && same_bits(a.opacity, b.opacity) &&
+         same_bits(a.radius, b.radius) && same_bits(a.scale, b.scale) &&
+         same_bits(a.rotation, b.rotation) && same_bits(a.sh, b.sh);
+}
+
+GaussianGradients gradients(const Gaussians& g,
+                            const Camera& camera,
+                            const TrainingRasterizerOptions& options) {
+  TrainingRasterizer rasterizer(options);
+  rasterizer.forward(g, camera);
+  GaussianGradients out;
+  rasterizer.backward(random_loss(camera, kEveryChannel, 11), out);
+  return out;
+}
+
+TEST(TrainingRasterizer, GivesTheSameBitsForAnyNumberOfThreads) {
+  const Camera camera = resized(oblique_camera(), 370, 260);
+  const Gaussians g = random_gaussians(
+      camera, {.count = 20'000, .sigma_px = 6, .anisotropy = 5, .sh_degree = 1}, 12);
+  const TrainingRasterizerOptions options{.shape = GaussianShape::Ellipsoids, .sh_gradients = true};
+  GaussianGradients one_thread;
+  {
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    one_thread = gradients(g, camera, options);
+  }
+  for (const size_t threads : {2, 3, 4}) {
+    const tbb::global_control many(tbb::global_control::max_allowed_parallelism, threads);
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      EXPECT_TRUE(same_bits(one_thread, gradients(g, camera, options))) << threads;
+    }
+  }
+}
+
+TEST(TrainingRasterizer, ForgetsTheLastViewEntirely) {
+  const Camera small = oblique_camera();
+  const Camera large = resized(small, 111, 78);
+  const Gaussians few = random_gaussians(small, {.sigma_px = 4}, 13);
+  const Gaussians many = random_gaussians(large, {.count = 700, .sigma_px = 9}, 14);
+  TrainingRasterizer rasterizer({.sh_gradients = true});
+  GaussianGradients ignored;
+  rasterizer.forward(many, large);
+  rasterizer.backward(random_loss(large, kEveryChannel, 15), ignored);
+  GaussianGradients got;
+  rasterizer.forward(few, small);
+  rasterizer.backward(random_loss(small, kEveryChannel, 11), got);
+  EXPECT_TRUE(same_bits(got, gradients(few, small, {.sh_gradients = true})));
+}
+
+TEST(TrainingRasterizer, AddsToTheDerivativesItIsGiven) {
+  const Camera camera = oblique_camera();
+  const Gaussians g = random_gaussians(camera, {}, 16);
+  const GaussianGradients once = gradients(g, camera, {});
+  TrainingRasterizer rasterizer({});
+  rasterizer.forward(g, camera);
+  GaussianGradients sum;
+  rasterizer.backward(random_loss(camera, kEveryChannel, 11), sum);
+  rasterizer.backward(random_loss(camera, kEveryChannel, 11), sum);
+  for (size_t i = 0; i < g.size(); ++i) {
+    EXPECT_FLOAT_EQ(sum.radius[i], 2 * once.radius[i]);
+    EXPECT_FLOAT_EQ(sum.opacity[i], 2 * once.opacity[i]);
+  }
+  EXPECT_TRUE(sum.scale.empty() && sum.rotation.empty() && sum.sh.empty());
+}
+
+TEST(TrainingRasterizer, GivesNothingForNothing) {
+  Camera camera = oblique_camera();
+  const Gaussians g = random_gaussians(camera, {.count = 20}, 17);
+  const std::vector<Eigen::Vector3f> zero(g.size(), Eigen::Vector3f::Zero());
+  const auto backward = [&](const Gaussians& set, const TrainingBuffers& loss) {
+    TrainingRasterizer rasterizer({.background = {0.1f, 0.2f, 0.3f}});
+    const TrainingBuffers& drawn = rasterizer.forward(set, camera);
+    EXPECT_TRUE(std::isfinite(drawn.color[0].data[0]));
+    GaussianGradients sum;
+    rasterizer.backward(loss, sum);
+    return sum.position;
+  };
+  EXPECT_EQ(backward(g, {}), zero);
+  EXPECT_TRUE(backward({}, random_loss(camera, kEveryChannel, 1)).empty());
+  camera.world_from_cam.linear() *= Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()).matrix();
+  EXPECT_EQ(backward(g, random_loss(camera, kEveryChannel, 1)), zero);
+}
+
+TEST(TrainingRasterizer, GivesDeadGaussiansNothingAndOthersTheSame) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  const Camera camera = oblique_camera();
+  const Gaussians g = random_gaussians(camera, {.anisotropy = 2}, 18);
+  Gaussians with_dead = g;
+  const auto add = [&](Eigen::Vector3f scale, Eigen::Vector4f rotation, float opacity, float z) {
+    with_dead.position.push_back(camera.unproject(20, 20, double(z)).cast<float>());
+    with_dead.scale.push_back(scale);
+    with_dead.rotation.push_back(rotation);
+    with_dead.opacity.push_back(opacity);
+    with_dead.sh.emplace_back(1, 1, 1);
+  };
+  const Eigen::Vector3f ball = Eigen::Vector3f::Constant(0.1f);
+  add(Eigen::Vector3f::Constant(kNan), {1, 0, 0, 0}, 0.9f, 0.5f);
+  add(ball, Eigen::Vector4f::Zero(), 0.9f, 0.5f);
+  add(ball, {1, 0, 0, 0}, kNan, 0.5f);
+  add(ball, {1, 0, 0, 0}, 0.001f, 0.5f);
+  add(ball, {1, 0, 0, 0}, 0.9f, -0.5f);
+  const TrainingRasterizerOptions options{.shape = GaussianShape::Ellipsoids};
+  GaussianGradients expected = gradients(g, camera, options);
+  expected.position.resize(with_dead.size(), Eigen::Vector3f::Zero());
+  expected.scale.resize(with_dead.size(), Eigen::Vector3f::Zero());
+  expected.rotation.resize(with_dead.size(), Eigen::Vector4f::Zero());
+  expected.opacity.resize(with_dead.size(), 0);
+  EXPECT_TRUE(same_bits(gradients(with_dead, camera, options), expected));
+}
+
+TEST(TrainingRasterizer, GivesRotationsWhatIsOrthogonalToThemAtAnyLength) {
+  const Camera camera = oblique_camera();
+  const TrainingRasterizerOptions options{.shape = GaussianShape::Ellipsoids};
+  Gaussians g = random_gaussians(camera, {.sigma_px = 3, .anisotropy = 3}, 19);
+  const GaussianGradients expected = gradients(g, camera, options);
+  for (const int exponent : {-40, -10, 0, 10, 40}) {
+    Gaussians scaled = g;
+    for (Eigen::Vector4f& q : scaled.rotation) q *= std::ldexp(1.0f, exponent);
+    const GaussianGradients got = gradients(scaled, camera, options);
+    EXPECT_TRUE(same_bits(got.position, expected.position)) << exponent;
+    for (size_t i = 0; i < g.size(); ++i) {
+      const Eigen::Vector4f d = got.rotation[i] * std::ldexp(1.0f, exponent);
+      EXPECT_LE((d - expected.rotation[i]).norm(), 1e-6f * expected.rotation[i].norm());
+      EXPECT_LE(std::abs(d.dot(g.rotation[i].normalized())), 1e-6f * d.norm());
+    }
+  }
+}
+
+TEST(TrainingRasterizer, RefusesWhatItIsNotMadeFor) {
+  EXPECT_THROW(TrainingRasterizer({.dilation = -1}), InvalidInput);
+  EXPECT_THROW(TrainingRasterizer({.near_depth = 0}), InvalidInput);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(TrainingRasterizer({.background = {0, nan, 0}}), InvalidInput);
+  const Camera camera = oblique_camera();
+  const Gaussians needles = random_gaussians(camera, {.anisotropy = 2}, 20);
+  const Gaussians balls = random_gaussians(camera, {}, 20);
+  TrainingRasterizer rasterizer({});
+  GaussianGradients sum;
+  EXPECT_THROW(rasterizer.backward({}, sum), InvalidInput);
+  EXPECT_THROW(rasterizer.forward(needles, camera), InvalidInput);
+  rasterizer.forward(balls, camera);
+  TrainingBuffers loss = random_loss(camera, kEveryChannel, 1);
+  loss.alpha = {camera.height, camera.width, 1};
+  EXPECT_THROW(rasterizer.backward(loss, sum), InvalidInput);
+  sum.opacity.resize(1);
+  EXPECT_THROW(rasterizer.backward({}, sum), InvalidInput);
+}
+
+TEST(TrainingRasterizer, RefusesMoreRowsOfTilesThanItCanList) {
+  const Camera tower{.width = 1, .height = 1 << 20, .fx = 1, .fy = 1, .cx = 0.5, .cy = 1 << 19};
+  Gaussians g;
+  g.position.assign(1100, {0, 0, 0.5f});
+  g.scale.assign(1100, Eigen::Vector3f::Constant(1e7f));
+  g.rotation.assign(1100, {1, 0, 0, 0});
+  g.opacity.assign(1100, 0.5f);
+  g.sh.assign(1100, Eigen::Vector3f::Zero());
+  EXPECT_THROW(TrainingRasterizer({}).forward(g, tower), LimitError);
 }
 
 }  // namespace
