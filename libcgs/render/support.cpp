@@ -9,19 +9,11 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/render/seen_surface.h"
 
 namespace cgs {
 
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-// An input view and how far off each of its depths may be.
-struct Witness {
-  const SupportView* view;
-  Eigen::Isometry3d cam_from_world;
-  DepthMap tolerance;
-};
 
 // How much depth changes from a pixel to the next, along one axis. Of the two sides the smoother
 // one counts: at the edge of an object the other is the jump to what lies behind.
@@ -41,82 +33,89 @@ float change_over_pixel(const DepthMap& depth, int x, int y, const SupportOption
   return std::min(change, kLargest * options.relative_tolerance * depth(x, y));
 }
 
-Witness make_witness(const SupportView& view, const SupportOptions& options) {
-  Witness out{&view, view.camera.cam_from_world(), view.depth};
-  tbb::parallel_for(0, view.depth.height, [&](int y) {
-    for (int x = 0; x < view.depth.width; ++x) {
-      float tolerance = options.relative_tolerance * view.depth(x, y);
-      if (!view.sigma.empty() && std::isfinite(view.sigma(x, y))) {
-        tolerance = std::max(tolerance, options.sigma_factor * view.sigma(x, y));
-      }
-      // A point falls up to half a pixel from the centre whose depth is known, and carries the
-      // depth of a Gaussian centred up to a pixel away.
-      out.tolerance(x, y) = tolerance + 1.5f * change_over_pixel(view.depth, x, y, options);
-    }
-  });
+// What an input view shows to the rendered camera, and how far off each depth may be.
+struct Witness {
+  DepthMap depth;
+  DepthMap tolerance;
+};
+
+// Uncertain depth is not torn by its own noise.
+DepthMap gaps(const SupportView& view, const SupportOptions& options) {
+  constexpr float kLargest = 5;  // times the tolerance
+  DepthMap out(view.depth.width, view.depth.height, options.relative_tolerance);
+  if (view.sigma.empty()) return out;
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    const float relative = 2 * view.sigma.data[i] / view.depth.data[i];
+    if (!(relative > options.relative_tolerance)) continue;
+    out.data[i] = std::min(relative, kLargest * options.relative_tolerance);
+  }
   return out;
 }
 
-// How the depth of a pixel is compared: at the very pixel that the point falls on, or anywhere in
-// the 3x3 pixels around it.
-enum class Reach : int { Pixel = 0, Neighbours = 1 };
-
-bool sees(const Witness& witness, const Eigen::Vector3d& point, Reach reach) {
-  const Camera& camera = witness.view->camera;
-  const Eigen::Vector3d uvz = camera.project_in_cam(witness.cam_from_world * point);
-  if (!camera.sees(uvz)) return false;
-  const int radius = static_cast<int>(reach);
-  for (int dy = -radius; dy <= radius; ++dy) {
-    for (int dx = -radius; dx <= radius; ++dx) {
-      const int x = static_cast<int>(uvz.x()) + dx;
-      const int y = static_cast<int>(uvz.y()) + dy;
-      if (!witness.tolerance.contains(x, y)) continue;
-      const double off = std::abs(uvz.z() - double(witness.view->depth(x, y)));
-      if (off <= double(witness.tolerance(x, y))) return true;  // not if unknown
+Witness make_witness(const SupportView& view, const Camera& camera, const SupportOptions& options) {
+  const SeenSurface surface = seen_surface({view.camera, view.depth, gaps(view, options)}, camera);
+  Witness out{surface.depth, surface.depth};
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      if (surface.pixel(x, y) < 0) continue;
+      const auto pixel = static_cast<size_t>(surface.pixel(x, y));
+      float tolerance = options.relative_tolerance * surface.depth(x, y);
+      if (!view.sigma.empty() && std::isfinite(view.sigma.data[pixel])) {
+        tolerance = std::max(tolerance, options.sigma_factor * view.sigma.data[pixel]);
+      }
+      // A drawn pixel carries the depth of a Gaussian centred up to a pixel away.
+      out.tolerance(x, y) = tolerance + 1.5f * change_over_pixel(surface.depth, x, y, options);
     }
   }
-  return false;
+  return out;
 }
 
 // One rendered view and everything its pixels are judged by.
 struct Judge {
   const RenderBuffers& buffers;
-  const Camera& camera;
   const std::vector<Witness>& witnesses;
   const SupportOptions& options;
 
   // NaN where no surface is drawn.
-  double surface(int x, int y) const {
-    if (!buffers.alpha.contains(x, y) || !(buffers.alpha(x, y) >= options.min_alpha)) return kNan;
+  float surface(int x, int y) const {
+    if (!buffers.alpha.contains(x, y) || !(buffers.alpha(x, y) >= options.min_alpha)) {
+      return std::nanf("");
+    }
     const float median = buffers.median_depth(x, y);
-    return double(std::isnan(median) ? buffers.depth(x, y) : median);
+    return std::isnan(median) ? buffers.depth(x, y) : median;
   }
 
-  // Number of views that see the surface of pixel (x, y) at depth z.
-  int count(int x, int y, double z, Reach reach) const {
-    const Eigen::Vector3d point = camera.unproject(x + 0.5, y + 0.5, z);
+  // Number of views that show a surface of depth z at pixel (x, y).
+  int count(int x, int y, float z) const {
     int out = 0;
-    for (const Witness& witness : witnesses) out += sees(witness, point, reach) ? 1 : 0;
+    for (const Witness& witness : witnesses) {
+      if (!witness.depth.contains(x, y)) continue;
+      const float off = std::abs(witness.depth(x, y) - z);
+      out += off <= witness.tolerance(x, y) ? 1 : 0;  // not if unknown
+    }
     return out;
   }
 
   int support(int x, int y) const {
-    const double z = surface(x, y);
-    const int at_own_depth = count(x, y, z, Reach::Pixel);
-    if (at_own_depth > 0 || count(x, y, z, Reach::Neighbours) == 0) return at_own_depth;
-    // A real surface at most a pixel away: what is drawn here is the soft rim of its silhouette,
-    // and the pixel belongs to what lies beside it.
-    constexpr int kRim = 2;
+    const float z = surface(x, y);
+    const int at_own_depth = count(x, y, z);
+    if (at_own_depth > 0) return at_own_depth;
+    bool shown_beside = false;
     int best = 0;
     for (int v = y - kRim; v <= y + kRim; ++v) {
       for (int u = x - kRim; u <= x + kRim; ++u) {
-        const double beside = surface(u, v);
-        if (std::isnan(beside)) continue;
-        best = std::max(best, count(x, y, beside, Reach::Pixel));
+        shown_beside = shown_beside || count(u, v, z) > 0;
+        const float beside = surface(u, v);
+        if (!std::isnan(beside)) best = std::max(best, count(x, y, beside));
       }
     }
-    return best;
+    // What is drawn here is real a few pixels away: it is the soft rim of a silhouette, and the
+    // pixel belongs to what lies beside it.
+    return shown_beside ? best : 0;
   }
+
+ private:
+  static constexpr int kRim = 3;  // [pixels]
 };
 
 void check_arguments(const RenderBuffers& buffers,
@@ -157,11 +156,13 @@ void annotate_support(RenderBuffers& buffers,
                       const SupportOptions& options) {
   options.validate();
   check_arguments(buffers, camera, views);
-  std::vector<Witness> witnesses;
-  for (const SupportView& view : views) witnesses.push_back(make_witness(view, options));
+  std::vector<Witness> witnesses(views.size());
+  tbb::parallel_for(size_t{0}, views.size(), [&](size_t i) {
+    witnesses[i] = make_witness(views[i], camera, options);
+  });
   buffers.support = Raster<uint8_t>(camera.width, camera.height, 0);
   buffers.hole = Raster<Hole>(camera.width, camera.height, Hole::Transparent);
-  const Judge judge{buffers, camera, witnesses, options};
+  const Judge judge{buffers, witnesses, options};
   tbb::parallel_for(0, camera.height, [&](int y) {
     for (int x = 0; x < camera.width; ++x) {
       if (std::isnan(judge.surface(x, y))) continue;

@@ -28,14 +28,15 @@ struct SupportOptions {
 /// Fills support and hole of a rendered view.
 ///
 /// The surface of a pixel is its median depth (its mean depth where that is unknown). An input view
-/// supports the pixel if the point projects into its image and its own depth at that very pixel
-/// agrees: the point is neither in front of what the view saw (a contradiction) nor behind it
-/// (occluded) by more than max(relative_tolerance * depth, sigma_factor * sigma), plus what a
-/// slanted surface changes over 1.5 pixels.
+/// supports the pixel if the surface that the view saw (seen_surface()) lands on the centre of that
+/// very pixel, nearest first, at the same depth: within max(relative_tolerance * depth,
+/// sigma_factor * sigma), plus what a slanted surface changes over 1.5 pixels. What the view hides
+/// or never had in its picture lands nowhere. Depth that is uncertain by more than
+/// relative_tolerance is not taken to be torn by its own noise.
 ///
 /// Blended Gaussians have soft rims, so that a pixel beside a silhouette may show what is not quite
-/// there. Where no view agrees at the very pixel but one does in the 3x3 around it, the pixel is
-/// therefore judged by the best of the depths drawn within two pixels.
+/// there. Where no view agrees at the very pixel but one does within three pixels, the pixel is
+/// therefore judged by the best of the depths drawn within three pixels.
 ///
 /// \param buffers  as rasterize() gives them for `camera`
 /// \param views    the input views only: a virtual camera is no witness

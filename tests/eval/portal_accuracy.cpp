@@ -34,6 +34,9 @@ int main(int argc, char** argv) {
         100 * m.depth_within_1_percent,
         m.hole_iou,
         m.hole_iou_inside);
+    std::printf("hole IoU without true holes narrower than 3 px: %.3f (they are %.1f %% of all)\n",
+                m.hole_iou_wide,
+                100 * m.narrow_hole_share);
     std::printf("observed volume: %+.2f %% (absolute %.2f %%), %.2f %% of %d rays missed\n",
                 100 * m.volume.relative_error,
                 100 * m.volume.absolute_error,

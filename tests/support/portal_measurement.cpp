@@ -58,6 +58,20 @@ MaskMap border_band(const MaskMap& mask) {
   return band;
 }
 
+// 1 for set pixels that no 3 x 3 block of set pixels covers.
+MaskMap narrow_parts(const MaskMap& mask) {
+  MaskMap narrow = mask;
+  for (int y = 1; y + 1 < mask.height; ++y) {
+    for (int x = 1; x + 1 < mask.width; ++x) {
+      bool whole = true;
+      for (int k = 0; k < 9; ++k) whole = whole && mask(x - 1 + k % 3, y - 1 + k / 3) != 0;
+      if (!whole) continue;
+      for (int k = 0; k < 9; ++k) narrow(x - 1 + k % 3, y - 1 + k / 3) = 0;
+    }
+  }
+  return narrow;
+}
+
 /// Intersection and union of masks, summed over views.
 struct Overlap {
   size_t both = 0;
@@ -89,6 +103,9 @@ PortalMeasurement measure_portal(const std::filesystem::path& run_folder) {
   PortalMeasurement out;
   Overlap all;
   Overlap inside;
+  Overlap wide;
+  double narrow_area = 0;
+  double hole_area = 0;
   for (const CaptureView& view : views) {
     const std::filesystem::path path = run_folder / "views" / (view.name + ".exr");
     const ExrImage image = read_exr(path);
@@ -105,9 +122,15 @@ PortalMeasurement measure_portal(const std::filesystem::path& run_folder) {
     const MaskMap band = border_band(expected);
     add_overlap(all, holes, expected, nullptr);
     add_overlap(inside, holes, expected, &band);
+    const MaskMap narrow = narrow_parts(expected);
+    add_overlap(wide, holes, expected, &narrow);
+    narrow_area += fraction(narrow);
+    hole_area += fraction(expected);
   }
   out.hole_iou = all.iou();
   out.hole_iou_inside = inside.iou();
+  out.hole_iou_wide = wide.iou();
+  out.narrow_hole_share = narrow_area / hole_area;
   out.volume = observed_volume_error(
       scene, inputs, in_world(read_mesh_ply(run_folder / "mesh/watertight.ply")));
   return out;

@@ -27,6 +27,10 @@ struct PortalMeasurement {
   double hole_iou = 0;                ///< Over the pixels of all held-out views together.
   /// The same without pixels within 2 px of a border of a true hole: the holes that people notice.
   double hole_iou_inside = 0;
+  /// The same over all but true holes too narrow for 3 x 3 pixels, and how large a part of the true
+  /// holes those are: half a pixel of doubt at either side of a hole outweighs them.
+  double hole_iou_wide = 0;
+  double narrow_hole_share = 0;
   ObservedVolumeError volume;
 };
 

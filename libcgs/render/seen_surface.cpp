@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/render/seen_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace cgs {
+
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+struct Step {
+  int dx, dy;
+};
+
+// The cells of a view in inverse depth, in which planes are linear over the picture.
+class Surface {
+ public:
+  explicit Surface(const DepthCells& cells)
+      : gap_(cells.gap), inverse_depth_(cells.depth.width, cells.depth.height, kNan) {
+    for (size_t i = 0; i < inverse_depth_.data.size(); ++i) {
+      if (cells.depth.data[i] > 0) inverse_depth_.data[i] = 1 / cells.depth.data[i];
+    }
+  }
+
+  float at(int x, int y) const {
+    return inverse_depth_.contains(x, y) ? inverse_depth_(x, y) : kNan;
+  }
+
+  bool continues(int x, int y, Step s) const {
+    constexpr float kSteepest = 0.1f;   // step of a slanted surface, part of the inverse depth
+    constexpr float kCurvature = 0.5f;  // change from step to step, part of the step
+    const float here = at(x, y);
+    const float there = at(x + s.dx, y + s.dy);
+    if (std::isnan(here) || std::isnan(there)) return false;
+    const float step = there - here;
+    const float size = std::abs(step) / std::min(here, there);
+    if (size <= std::max(gap_(x, y), gap_(x + s.dx, y + s.dy))) return true;
+    if (size > kSteepest) return false;
+    const float before = here - at(x - s.dx, y - s.dy);
+    const float after = at(x + 2 * s.dx, y + 2 * s.dy) - there;
+    const float change = std::fmin(std::abs(before - step), std::abs(after - step));
+    return change <= kCurvature * std::abs(step);  // not if unknown
+  }
+
+  // Change over one pixel along an axis, of the neighbours on the same surface.
+  float slope(int x, int y, Step s) const {
+    const bool after = continues(x, y, s);
+    const bool before = continues(x, y, {-s.dx, -s.dy});
+    if (!after && !before) return 0;
+    const float first = before ? at(x - s.dx, y - s.dy) : at(x, y);
+    const float last = after ? at(x + s.dx, y + s.dy) : at(x, y);
+    return (last - first) / (after && before ? 2.0f : 1.0f);
+  }
+
+  // At the corner of a cell; sx, sy = -1 or 1.
+  float corner(int x, int y, int sx, int sy) const {
+    if (continues(x, y, {sx, 0}) && continues(x, y, {0, sy}) && continues(x + sx, y, {0, sy}) &&
+        continues(x, y + sy, {sx, 0})) {
+      return (at(x, y) + at(x + sx, y) + at(x, y + sy) + at(x + sx, y + sy)) / 4;
+    }
+    return at(x, y) + 0.5f * (static_cast<float>(sx) * slope(x, y, {1, 0}) +
+                              static_cast<float>(sy) * slope(x, y, {0, 1}));
+  }
+
+ private:
+  const DepthMap& gap_;
+  DepthMap inverse_depth_;
+};
+
+// u, v [pixels] and inverse depth in the camera that cells are drawn into.
+using Corner = Eigen::Vector3d;
+
+class Canvas {
+ public:
+  explicit Canvas(const Camera& camera)
+      : inverse_depth_(camera.width, camera.height, kNan),
+        pixel_(camera.width, camera.height, -1) {}
+
+  void draw(const Corner& a, const Corner& b, const Corner& c, int32_t pixel) {
+    const auto first = [](double p, double q, double r) {
+      return std::ceil(std::min({p, q, r}) - 0.5 - kEdge);
+    };
+    const auto last = [](double p, double q, double r) {
+      return std::floor(std::max({p, q, r}) - 0.5 + kEdge);
+    };
+    const double x0 = std::max(first(a.x(), b.x(), c.x()), 0.0);
+    const double y0 = std::max(first(a.y(), b.y(), c.y()), 0.0);
+    const double x1 = std::min(last(a.x(), b.x(), c.x()), double(pixel_.width - 1));
+    const double y1 = std::min(last(a.y(), b.y(), c.y()), double(pixel_.height - 1));
+    const Eigen::Vector2d ab = (b - a).head<2>();
+    const Eigen::Vector2d ac = (c - a).head<2>();
+    const double area = ab.x() * ac.y() - ab.y() * ac.x();
+    // A cell so large shows that the camera is almost inside the surface, where depth says nothing.
+    constexpr double kLargest = 64;
+    if (!(std::abs(area) > 1e-12) || x1 - x0 > kLargest || y1 - y0 > kLargest) return;
+    for (int y = static_cast<int>(y0); y <= static_cast<int>(y1); ++y) {
+      for (int x = static_cast<int>(x0); x <= static_cast<int>(x1); ++x) {
+        const Eigen::Vector2d p(x + 0.5 - a.x(), y + 0.5 - a.y());
+        const double wb = (p.x() * ac.y() - p.y() * ac.x()) / area;
+        const double wc = (ab.x() * p.y() - ab.y() * p.x()) / area;
+        if (wb < -kEdge || wc < -kEdge || wb + wc > 1 + kEdge) continue;
+        const auto value = static_cast<float>(a.z() + wb * (b.z() - a.z()) + wc * (c.z() - a.z()));
+        if (inverse_depth_(x, y) >= value) continue;
+        inverse_depth_(x, y) = value;
+        pixel_(x, y) = pixel;
+      }
+    }
+  }
+
+  SeenSurface take() {
+    for (float& value : inverse_depth_.data) value = 1 / value;
+    return {std::move(inverse_depth_), std::move(pixel_)};
+  }
+
+ private:
+  static constexpr double kEdge = 1e-4;  // so that rounding leaves no crack between triangles
+
+  DepthMap inverse_depth_;
+  Raster<int32_t> pixel_;
+};
+
+}  // namespace
+
+SeenSurface seen_surface(const DepthCells& cells, const Camera& camera) {
+  constexpr std::array<Step, 4> kCorners = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};
+  const Surface surface(cells);
+  const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
+  Canvas canvas(camera);
+  for (int y = 0; y < cells.depth.height; ++y) {
+    for (int x = 0; x < cells.depth.width; ++x) {
+      if (std::isnan(surface.at(x, y))) continue;
+      std::array<Corner, 4> corners;
+      bool before_camera = true;
+      for (size_t k = 0; k < corners.size(); ++k) {
+        const auto [sx, sy] = kCorners[k];
+        const double z = 1 / double(surface.corner(x, y, sx, sy));
+        const Eigen::Vector3d point =
+            cells.camera.unproject(x + 0.5 + 0.5 * sx, y + 0.5 + 0.5 * sy, z);
+        corners[k] = camera.project_in_cam(cam_from_world * point);
+        before_camera = before_camera && z > 0 && corners[k].z() > 0;
+        corners[k].z() = 1 / corners[k].z();
+      }
+      if (!before_camera) continue;
+      const auto pixel = static_cast<int32_t>(cells.depth.index(x, y));
+      canvas.draw(corners[0], corners[1], corners[2], pixel);
+      canvas.draw(corners[0], corners[2], corners[3], pixel);
+    }
+  }
+  return canvas.take();
+}
+
+}  // namespace cgs
