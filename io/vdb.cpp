@@ -10,17 +10,15 @@
 
 #include "io/atomic_file.h"
 #include "io/content_uuid.h"
+#include "io/vdb_screen.h"
 
 namespace cgs {
 
 namespace {
 
-// Start of every file: magic (8), file version (4), library version (8), has offsets (1), UUID.
+// Before it: magic (8), file version (4), library version (8), has offsets (1).
 constexpr size_t kUuidOffset = 21;
 constexpr size_t kUuidLength = 36;
-constexpr int64_t kMagic = 0x56444220;
-constexpr uint32_t kOldestVersion = 222;  // OpenVDB 2.0; older layouts take other code paths
-
 /// Gives access to the writer for any seekable stream: io::File writes to paths only, and does not
 /// notice a full disk; io::Stream leaves out the offsets that let readers pick one grid.
 class SeekableArchive : public openvdb::io::Archive {
@@ -33,20 +31,14 @@ class SeekableArchive : public openvdb::io::Archive {
   }
 };
 
-void screen_header(std::string_view bytes, const std::filesystem::path& path) {
-  ByteReader reader(bytes, path);
-  if (reader.get<int64_t>("magic number") != kMagic) {
-    refuse_foreign_content(path, bytes, "OpenVDB");
-    reader.fail(Defect::Magic, "expected OpenVDB");
-  }
-  const auto version = reader.get<uint32_t>("file version");
-  if (version < kOldestVersion || version > openvdb::OPENVDB_FILE_VERSION) {
-    reader.fail(Defect::Unsupported,
-                "file version " + std::to_string(version) + ", allowed are " +
-                    std::to_string(kOldestVersion) + " to " +
-                    std::to_string(openvdb::OPENVDB_FILE_VERSION));
-  }
-  (void)reader.take(8 + 1 + kUuidLength, "header");
+// Files of write_vdb() carry the hash of their content as UUID, of the version that marks such;
+// the library and other programs write random ones.
+void check_content(std::string_view bytes, const std::filesystem::path& path) {
+  const std::string_view uuid = bytes.substr(kUuidOffset, kUuidLength);
+  constexpr size_t kVersionAt = 14;
+  if (uuid[kVersionAt] != '8') return;
+  if (uuid == content_uuid(bytes.substr(kUuidOffset + kUuidLength))) return;
+  throw BadInput(Defect::Syntax, path, "damaged: the content does not match its checksum");
 }
 
 }  // namespace
@@ -75,7 +67,9 @@ std::vector<openvdb::GridBase::Ptr> read_vdb(const std::filesystem::path& path,
                                              const ReadLimits& limits) {
   openvdb::initialize();
   std::string bytes = read_file(path, limits);
-  screen_header(bytes, path);
+  const std::vector<size_t> delayed_load_types = screen_vdb(bytes, path, limits);
+  check_content(bytes, path);
+  for (const size_t at : delayed_load_types) bytes[at] = '-';
   std::istringstream in(std::move(bytes), std::ios::binary);
   // The library does not look at the state of its stream: a short read must end it at once.
   in.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
@@ -83,6 +77,7 @@ std::vector<openvdb::GridBase::Ptr> read_vdb(const std::filesystem::path& path,
     openvdb::io::Stream stream(in, /*delayLoad=*/false);
     const openvdb::GridPtrVecPtr grids = stream.getGrids();
     if (!grids || grids->empty()) throw BadInput(Defect::Empty, path, "no grids");
+    for (const auto& grid : *grids) grid->removeMeta(openvdb::GridBase::META_FILE_DELAYED_LOAD);
     return *grids;
   } catch (const Error&) {
     throw;

@@ -24,10 +24,9 @@ void write_vdb(const std::filesystem::path& path,
 
 /// Reads every grid of a .vdb file, with all values.
 ///
-/// A short file ends in an exception, but OpenVDB and blosc trust sizes inside the file: content
-/// from strangers must be read in a process of its own.
-/// \throws BadInput Magic, Unsupported (a newer file version, an unknown grid type), Truncated,
-///         Syntax, Empty (no grid); LimitError
+/// Safe for content from strangers: the library sees the bytes only after screen_vdb(), which also
+/// says which files are read. Files of write_vdb() are also held against their checksum.
+/// \throws BadInput as screen_vdb(); Syntax also for a wrong checksum; LimitError
 std::vector<openvdb::GridBase::Ptr> read_vdb(const std::filesystem::path& path,
                                              const ReadLimits& limits = {});
 
