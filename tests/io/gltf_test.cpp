@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/mesh_arrays.h"
+#include "libcgs/core/srgb.h"
 #include "libcgs/core/up_axis.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
