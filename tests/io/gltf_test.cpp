@@ -5,8 +5,6 @@
 #include <map>
 #include <set>
 
-#include <draco/compression/decode.h>
-#include <draco/mesh/mesh.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -14,114 +12,15 @@
 #include "libcgs/core/srgb.h"
 #include "libcgs/core/up_axis.h"
 #include "tests/support/full_disk.h"
+#include "tests/support/glb_file.h"
 #include "tests/support/sample_mesh.h"
 
 namespace cgs {
 namespace {
 
-/// A primitive as an independent reader of the container finds it.
-struct Part {
-  std::string material;
-  std::vector<std::array<uint32_t, 3>> faces;
-  std::map<std::string, std::vector<std::vector<float>>> values;  // attribute, vertex, component
-};
-
-struct Glb {
-  nlohmann::json json;
-  std::string binary;
-  std::vector<Part> parts;
-};
-
-uint32_t word(const std::string& bytes, size_t offset) {
-  uint32_t value = 0;
-  std::memcpy(&value, bytes.data() + offset, 4);
-  return value;
-}
-
-std::string view_bytes(const Glb& glb, size_t view) {
-  const auto& v = glb.json["bufferViews"][view];
-  return glb.binary.substr(v.value("byteOffset", size_t{0}), v["byteLength"]);
-}
-
-size_t components(const Glb& glb, size_t accessor) {
-  return glb.json["accessors"][accessor]["type"] == "VEC3" ? 3 : 1;
-}
-
-void read_plain(const Glb& glb, const nlohmann::json& primitive, Part& part) {
-  const auto raw = [&](size_t accessor) {
-    return view_bytes(glb, glb.json["accessors"][accessor]["bufferView"]);
-  };
-  const std::string indices = raw(primitive["indices"]);
-  part.faces.resize(indices.size() / 12);
-  std::memcpy(part.faces.data(), indices.data(), indices.size());
-  for (const auto& [name, accessor] : primitive["attributes"].items()) {
-    const size_t n = components(glb, accessor);
-    const std::string bytes = raw(accessor);
-    for (size_t at = 0; at < bytes.size(); at += n * 4) {
-      std::vector<float> value(n);
-      std::memcpy(value.data(), bytes.data() + at, n * 4);
-      part.values[name].push_back(value);
-    }
-  }
-}
-
-void read_draco(const Glb& glb, const nlohmann::json& primitive, Part& part) {
-  const auto& extension = primitive["extensions"]["KHR_draco_mesh_compression"];
-  const std::string bytes = view_bytes(glb, extension["bufferView"]);
-  draco::DecoderBuffer buffer;
-  buffer.Init(bytes.data(), bytes.size());
-  const auto mesh = draco::Decoder().DecodeMeshFromBuffer(&buffer).value();
-  for (uint32_t i = 0; i < mesh->num_faces(); ++i) {
-    const auto& f = mesh->face(draco::FaceIndex(i));
-    part.faces.push_back({f[0].value(), f[1].value(), f[2].value()});
-  }
-  EXPECT_EQ(glb.json["accessors"][primitive["indices"].get<size_t>()]["count"],
-            mesh->num_faces() * 3);
-  for (const auto& [name, accessor] : primitive["attributes"].items()) {
-    const auto* attribute = mesh->GetAttributeByUniqueId(extension["attributes"][name]);
-    ASSERT_NE(attribute, nullptr) << name;
-    const size_t n = components(glb, accessor);
-    ASSERT_EQ(static_cast<size_t>(attribute->num_components()), n) << name;
-    EXPECT_EQ(glb.json["accessors"][accessor.get<size_t>()]["count"], mesh->num_points());
-    for (uint32_t i = 0; i < mesh->num_points(); ++i) {
-      std::vector<float> value(n);
-      attribute->GetMappedValue(draco::PointIndex(i), value.data());
-      part.values[name].push_back(value);
-    }
-  }
-}
-
-Glb parse(const std::string& bytes) {
-  Glb glb;
-  EXPECT_EQ(bytes.substr(0, 4), "glTF");
-  EXPECT_EQ(word(bytes, 4), 2u);
-  EXPECT_EQ(word(bytes, 8), bytes.size());
-  const size_t json_size = word(bytes, 12);
-  EXPECT_EQ(word(bytes, 16), 0x4e4f534au);
-  glb.json = nlohmann::json::parse(bytes.substr(20, json_size));
-  EXPECT_EQ(json_size % 4, 0u);
-  EXPECT_EQ(word(bytes, 24 + json_size), 0x004e4942u);
-  glb.binary = bytes.substr(28 + json_size);
-  EXPECT_EQ(glb.binary.size(), word(bytes, 20 + json_size));
-  for (const auto& primitive : glb.json["meshes"][0]["primitives"]) {
-    Part part;
-    part.material = glb.json["materials"][primitive["material"].get<size_t>()]["name"];
-    if (primitive.contains("extensions")) {
-      read_draco(glb, primitive, part);
-    } else {
-      read_plain(glb, primitive, part);
-    }
-    const auto& bounds = glb.json["accessors"][primitive["attributes"]["POSITION"].get<size_t>()];
-    for (const auto& p : part.values["POSITION"]) {
-      for (size_t k = 0; k < 3; ++k) {
-        EXPECT_GE(p[k], bounds["min"][k].get<float>());
-        EXPECT_LE(p[k], bounds["max"][k].get<float>());
-      }
-    }
-    glb.parts.push_back(part);
-  }
-  return glb;
-}
+using test::Glb;
+using test::in_world;
+using Part = test::GlbPart;
 
 struct Written {
   GlbReport report;
@@ -134,18 +33,8 @@ Written written(const TriangleMesh& mesh, const Frame& frame, const GlbOptions& 
   out.report = write_glb(dir / "a.glb", mesh, frame, options);
   const std::string bytes = test::read_bytes(dir / "a.glb");
   EXPECT_EQ(out.report.bytes, bytes.size());
-  out.glb = parse(bytes);
+  out.glb = test::parse_glb(bytes);
   return out;
-}
-
-/// World coordinates of a position in the file, by what its extras say.
-Eigen::Vector3d in_world(const nlohmann::json& extras, const std::vector<float>& p) {
-  Eigen::Matrix3d R;
-  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = extras["gltf_from_world"][static_cast<size_t>(i)];
-  Eigen::Vector3d origin;
-  for (int k = 0; k < 3; ++k) origin[k] = extras["origin_in_world"][static_cast<size_t>(k)];
-  const double unit = extras["units"] == "m" ? extras["metres_per_unit"].get<double>() : 1.0;
-  return origin + R.transpose() * Eigen::Vector3d(p[0], p[1], p[2]) / unit;
 }
 
 /// Holds a file against the mesh: every face of the class is there, at its place, turned the same
