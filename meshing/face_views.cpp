@@ -39,22 +39,25 @@ class ViewScorer {
         faces_(projected_faces(mesh, view.camera)),
         nearest_(nearness_map(faces_, view.camera.width, view.camera.height)),
         // A footprint at depth z is z / f, which in 1 / z is the share 1 / f.
-        behind_(1 +
-                kDepthTolerance / static_cast<float>(std::min(view.camera.fx, view.camera.fy))) {}
+        footprint_(1 / static_cast<float>(std::min(view.camera.fx, view.camera.fy))) {}
 
   float score(size_t f) const {
     if (!faces_[f].in_front) return 0;
     const Eigen::Vector3d normal = area_vector(mesh_, f);
     const Eigen::Vector3d to_eye = eye_ - mesh_.vertices[mesh_.faces[f][0]].cast<double>();
     const double cosine = normal.dot(to_eye) / (normal.norm() * to_eye.norm());
-    if (!(cosine >= kMinCosine) || !is_clear(faces_[f])) return 0;
+    if (!(cosine >= kMinCosine)) return 0;
+    const auto slope = static_cast<float>(std::sqrt(std::max(0.0, 1 - cosine * cosine)) / cosine);
+    if (!is_clear(faces_[f], slope)) return 0;
     const auto& [a, b, c] = faces_[f].corner;
     const double pixels = std::abs(edge_function(a, b, c.x(), c.y()));
     return static_cast<float>(pixels / normal.norm() * cosine);
   }
 
  private:
-  bool is_clear(const ProjectedFace& face) const {
+  /// \param slope  of the face [footprints of depth per pixel]
+  bool is_clear(const ProjectedFace& face, float slope) const {
+    const float behind = 1 + kDepthTolerance * footprint_;
     for (const Eigen::Vector3f& corner : face.corner) {
       const float u = corner.x() - 0.5f;
       const float v = corner.y() - 0.5f;
@@ -65,35 +68,47 @@ class ViewScorer {
           view_.valid(static_cast<int>(corner.x()), static_cast<int>(corner.y())) == 0) {
         return false;
       }
-      if (corner.z() * behind_ < nearest_between(u, v)) return false;
+      const Nearest nearest = nearest_between(u, v);
+      const float extra = nearest.is_whole ? 0.0f : slope * footprint_;
+      if (corner.z() * (behind + extra) < nearest.nearness) return false;
     }
     bool clear = true;
     for_each_pixel(face,
                    {0, 0, nearest_.width, nearest_.height},
                    [&](int x, int y, const Eigen::Vector3f&, float nearness) {
-                     clear = clear && nearness * behind_ >= nearest_(x, y) &&
+                     clear = clear && nearness * behind >= nearest_(x, y) &&
                              (view_.valid.empty() || view_.valid(x, y) != 0);
                    });
     return clear;
   }
 
+  struct Nearest {
+    float nearness = 0;
+    bool is_whole = true;  ///< No pixel around shows nothing.
+  };
+
   /// Bilinear: exact on planes, as 1 / z is linear in the picture. Pixels that show nothing take
-  /// no part, or they would hide that the others show something nearer.
-  float nearest_between(float u, float v) const {
+  /// no part, or they would hide that the others show something nearer; what is left is that of a
+  /// place up to a pixel away.
+  Nearest nearest_between(float u, float v) const {
     const int x = std::min(static_cast<int>(u), nearest_.width - 2);
     const int y = std::min(static_cast<int>(v), nearest_.height - 2);
     float sum = 0;
     float weights = 0;
+    Nearest out;
     for (int k = 0; k < 4; ++k) {
       const int i = x + (k & 1);
       const int j = y + (k >> 1);
-      if (!nearest_.contains(i, j) || nearest_(i, j) <= 0) continue;
+      if (!nearest_.contains(i, j)) continue;
+      if (nearest_(i, j) <= 0) out.is_whole = false;
+      if (nearest_(i, j) <= 0) continue;
       const float weight =
           (1 - std::abs(u - static_cast<float>(i))) * (1 - std::abs(v - static_cast<float>(j)));
       sum += weight * nearest_(i, j);
       weights += weight;
     }
-    return weights > 0 ? sum / weights : 0;
+    if (weights > 0) out.nearness = sum / weights;
+    return out;
   }
 
   const TriangleMesh& mesh_;
@@ -101,7 +116,7 @@ class ViewScorer {
   Eigen::Vector3d eye_;
   std::vector<ProjectedFace> faces_;
   Raster<float> nearest_;
-  float behind_;
+  float footprint_;  // over depth
 };
 
 bool may_have_photograph(const TriangleMesh& mesh, size_t f) {
@@ -168,16 +183,21 @@ class Labelling {
     return changed;
   }
 
-  /// Gives connected regions of one view to a neighbouring view where that lowers the energy.
+  /// Gives connected regions of one view to a neighbouring view where that lowers the energy, the
+  /// smallest first: else a large region would be given to the specks in it.
   /// \return how many regions changed
   size_t sweep_regions() {
     size_t changed = 0;
+    std::vector<Region> regions;
     std::vector<uint8_t> seen(label_.size(), 0);
-    std::vector<uint8_t> moved(label_.size(), 0);
     for (uint32_t f = 0; f < label_.size(); ++f) {
-      if (seen[f] != 0 || label_[f] < 0) continue;
-      const Region region = region_from(f, seen, moved);
-      if (region.beside_moved) continue;
+      if (seen[f] == 0 && label_[f] >= 0) regions.push_back(region_from(f, seen));
+    }
+    std::stable_sort(regions.begin(), regions.end(), [](const Region& a, const Region& b) {
+      return a.faces.size() < b.faces.size();
+    });
+    std::vector<uint8_t> moved(label_.size(), 0);
+    for (const Region& region : regions) {
       int best = -1;
       double largest = 0;
       for (size_t v = 0; v < scores_.views; ++v) {
@@ -186,7 +206,7 @@ class Labelling {
         largest = gain;
         best = static_cast<int>(v);
       }
-      if (best < 0) continue;
+      if (best < 0 || touches(region, moved)) continue;
       ++changed;
       for (const uint32_t g : region.faces) {
         label_[g] = best;
@@ -204,7 +224,6 @@ class Labelling {
     std::vector<double> seam;  ///< Length towards each view.
     std::vector<double> cost;  ///< If all of it took each view.
     double own_cost = 0;
-    bool beside_moved = false;  ///< What lies beyond its seams is no longer what was summed.
   };
 
   static bool is_seam(int a, int b) { return a >= 0 && b >= 0 && a != b; }
@@ -225,9 +244,15 @@ class Labelling {
     return energy;
   }
 
-  Region region_from(uint32_t start,
-                     std::vector<uint8_t>& seen,
-                     const std::vector<uint8_t>& moved) {
+  /// What lies beyond the seams of such a region is no longer what was summed.
+  bool touches(const Region& region, const std::vector<uint8_t>& moved) const {
+    return std::any_of(region.faces.begin(), region.faces.end(), [&](uint32_t f) {
+      return std::any_of(
+          adjacent_[f].begin(), adjacent_[f].end(), [&](uint32_t g) { return moved[g] != 0; });
+    });
+  }
+
+  Region region_from(uint32_t start, std::vector<uint8_t>& seen) const {
     Region out;
     out.seam.assign(scores_.views, 0);
     out.cost.assign(scores_.views, 0);
@@ -239,7 +264,6 @@ class Labelling {
       for (size_t v = 0; v < scores_.views; ++v) out.cost[v] += cost(f, v);
       for (size_t k = 0; k < 3; ++k) {
         const uint32_t g = adjacent_[f].at(k);
-        if (moved[g] != 0) out.beside_moved = true;
         if (is_seam(own, label_[g])) {
           out.seam[static_cast<size_t>(label_[g])] += double{length_[f].at(k)};
         }
