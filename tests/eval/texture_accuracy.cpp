@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a viewer of web/asset.glb sees from the cameras of a run, against the photographs.
+// What a viewer of web/asset.glb sees from the cameras of a run, against the photographs: as they
+// are, and with the exposure of the picture, one factor on linear light per channel, matched.
 //
 // usage: texture_accuracy RUN_FOLDER [ASSET.glb [PICTURE_FOLDER]]
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 
@@ -9,6 +11,7 @@
 #include "io/atomic_file.h"
 #include "io/png.h"
 #include "io/scene_reader.h"
+#include "libcgs/core/srgb.h"
 #include "libcgs/train/image_metrics.h"
 #include "tests/support/glb_file.h"
 #include "tests/support/temp_dir.h"
@@ -34,6 +37,26 @@ ColorImage parts_picture(const test::GlbPicture& picture, const test::Glb& glb) 
   return out;
 }
 
+/// The picture at the exposure of the photograph: median ratio over the pixels in use.
+ColorImage exposure_matched(ColorImage picture, const ColorImage& photograph, const MaskMap& use) {
+  for (int c = 0; c < 3; ++c) {
+    std::vector<float> ratios;
+    for (size_t p = 0; p < use.data.size(); ++p) {
+      const float a = picture.data[p][c];
+      const float b = photograph.data[p][c];
+      if (use.data[p] == 0 || std::min(a, b) < 0.04f || std::max(a, b) > 0.98f) continue;
+      ratios.push_back(linear_from_srgb(b) / linear_from_srgb(a));
+    }
+    if (ratios.empty()) continue;
+    const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+    std::nth_element(ratios.begin(), middle, ratios.end());
+    for (Eigen::Vector3f& color : picture.data) {
+      color[c] = std::min(1.0f, srgb_from_linear(*middle * linear_from_srgb(color[c])));
+    }
+  }
+  return picture;
+}
+
 struct Mean {
   double sum = 0;
   int count = 0;
@@ -52,7 +75,7 @@ void measure(const std::filesystem::path& run,
   std::vector<int> views = scene.input;
   views.insert(views.end(), scene.held_out.begin(), scene.held_out.end());
   const test::Glb glb = test::parse_glb(test::read_bytes(asset));
-  std::array<Mean, 2> means;
+  std::array<Mean, 4> means;
   if (!pictures.empty()) make_output_folder(pictures);
   for (size_t k = 0; k < views.size(); ++k) {
     const int i = views[k];
@@ -75,12 +98,17 @@ void measure(const std::filesystem::path& run,
     }
     const bool is_input = k < scene.input.size();
     const double value = psnr(picture.color, view.image, &seen);
-    means.at(is_input ? 0 : 1).add(value);
+    const double matched =
+        psnr(exposure_matched(picture.color, view.image, seen), view.image, &seen);
+    means.at(is_input ? 0 : 2).add(value);
+    means.at(is_input ? 1 : 3).add(matched);
     std::printf(
-        "%s %s  PSNR on seen surface %.2f dB (%.1f %% of pixels), SSIM %.4f; textured %.1f %%",
+        "%s %s  PSNR on seen surface %.2f dB, matched %.2f dB (%.1f %% of pixels), SSIM %.4f; "
+        "textured %.1f %%",
         view.name.c_str(),
         is_input ? "input   " : "held out",
         value,
+        matched,
         100 * n / double(seen.data.size()),
         ssim(picture.color, view.image, &seen),
         100 * n_textured / double(seen.data.size()));
@@ -92,8 +120,10 @@ void measure(const std::filesystem::path& run,
     }
     view.image = {};
   }
-  std::printf("mean input %.2f dB", means[0].value());
-  if (means[1].count > 0) std::printf(", held out %.2f dB", means[1].value());
+  std::printf("mean input %.2f dB, matched %.2f dB", means[0].value(), means[1].value());
+  if (means[2].count > 0) {
+    std::printf("; held out %.2f dB, matched %.2f dB", means[2].value(), means[3].value());
+  }
   std::printf("\n");
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include <Eigen/Geometry>
 
+#include "libcgs/core/photo_texture.h"
 #include "libcgs/core/scene.h"
 #include "libcgs/core/triangle_mesh.h"
 
@@ -112,6 +114,32 @@ inline View photograph(const std::string& name,
     }
   }
   return view;
+}
+
+/// A box with three photographs of it: the sides towards -x, +y and -z show the first, second and
+/// third, the others are not textured. The side towards +x is Inferred, +z SingleView.
+struct TexturedBox {
+  TriangleMesh mesh = box(10);
+  PhotoTexture texture;
+};
+inline TexturedBox textured_box() {
+  TexturedBox out;
+  const Eigen::AlignedBox3d bounds(Eigen::Vector3d::Constant(-0.2), Eigen::Vector3d::Constant(0.2));
+  for (const auto& [name, eye] : {std::pair("left side", Eigen::Vector3d(-1, 0.3, -0.2)),
+                                  std::pair("top", Eigen::Vector3d(0.2, 1.1, -0.2)),
+                                  std::pair("front", Eigen::Vector3d(0.3, 0.2, -0.9))}) {
+    View view = photograph(name, camera_at(eye), {bounds});
+    out.texture.photographs.push_back({view.name, view.camera, std::move(view.image)});
+  }
+  constexpr std::array<int, 6> kPhotographOfSide = {0, -1, -1, 1, 2, -1};
+  for (size_t f = 0; f < out.mesh.faces.size(); ++f) {
+    const size_t side = f / 200;
+    out.texture.of_face.push_back(kPhotographOfSide.at(side));
+    if (side == 1) out.mesh.provenance[f] = Provenance::Inferred;
+    if (side == 5) out.mesh.provenance[f] = Provenance::SingleView;
+  }
+  for (const auto& v : out.mesh.vertices) out.mesh.colors.push_back(checker(v.cast<double>()));
+  return out;
 }
 
 }  // namespace cgs::test
