@@ -2,7 +2,7 @@
 #include "convert/texture.h"
 
 #include <algorithm>
-#include <array>
+#include <filesystem>
 #include <utility>
 
 #include <Eigen/Geometry>

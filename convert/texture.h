@@ -12,9 +12,10 @@ namespace cgs {
 /// The input photographs on a mesh, and what was found on the way.
 struct TexturedFaces {
   PhotoTexture texture;  ///< Empty if a photograph is missing.
-  /// {"views": [{"name", "faces", "area", "gain": [r, g, b], "samples"}], "faces_without_view",
-  /// "area_without_view" (of seen surface), "seam_length", "largest_stretch" [pixels], "units"};
-  /// or {"left_out": "why"}.
+  /// {"views": [{"name", "faces", "area", "gain": [r, g, b], "samples"}], "faces_without_view" and
+  /// "area_without_view" (of seen surface), "largest_stretch" (distance between linear texture
+  /// coordinates and the projection, at the middles of edges) [pixels], "units", "seam_length",
+  /// "seam_length_unsmoothed"}; or {"left_out": "why"}.
   nlohmann::ordered_json report;
 };
 
