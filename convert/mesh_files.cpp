@@ -5,7 +5,6 @@
 
 #include "io/atomic_file.h"
 #include "io/mesh_ply.h"
-#include "io/obj.h"
 #include "io/stl.h"
 #include "io/threemf.h"
 #include "libcgs/core/error.h"
@@ -49,8 +48,7 @@ Json write_mesh_files(const std::filesystem::path& folder,
   make_output_folder(folder);
   write_mesh_ply(folder / "surface.ply", open_surface, frame);
   write_mesh_ply(folder / "watertight.ply", watertight, frame);
-  write_obj(folder / "watertight.obj", watertight, frame);
-  Json files = {"surface.ply", "watertight.ply", "watertight.obj"};
+  Json files = {"surface.ply", "watertight.ply"};
   Json left_out = Json::object();
   for (const char* name : {"watertight.stl", "watertight.3mf"}) {
     if (!frame.has_metric_scale()) {

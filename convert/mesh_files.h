@@ -19,7 +19,8 @@ nlohmann::ordered_json certificate_to_json(const Certificate& certificate,
                                            const TriangleMesh& mesh,
                                            const Frame& frame);
 
-/// Writes surface.ply, watertight.{ply,obj} and, where the scale is known, watertight.{stl,3mf}.
+/// Writes surface.ply, watertight.ply and, where the scale is known, watertight.{stl,3mf}. (The OBJ
+/// may carry photographs, which not every caller has.)
 /// `up` is the world direction that becomes +Z in STL and 3MF.
 /// \return {"files": […], "left_out": {"watertight.stl": "why", …}}
 nlohmann::ordered_json write_mesh_files(const std::filesystem::path& folder,

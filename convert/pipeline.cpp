@@ -13,6 +13,7 @@
 #include "convert/mesh_files.h"
 #include "convert/report.h"
 #include "convert/run_record.h"
+#include "convert/texture.h"
 #include "convert/views.h"
 #include "convert/volume_file.h"
 #include "io/atomic_file.h"
@@ -20,6 +21,7 @@
 #include "io/gltf.h"
 #include "io/image.h"
 #include "io/mesh_ply.h"
+#include "io/obj.h"
 #include "io/png.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
@@ -168,9 +170,17 @@ Json run_web(Run& run, const Progress& progress) {
                                {"certificate", run.record.result("mesh")["certificate"]}})
                              .dump();
   make_output_folder(run.request.output / "web");
-  const GlbReport glb = write_glb(run.request.output / "web/asset.glb", mesh, frame, options);
-  return {{"asset.glb",
+  const TexturedFaces textured = texture_from_photographs(model.scene, mesh);
+  report(progress, 0.5);
+  write_obj(run.request.output / "mesh/watertight.obj", mesh, textured.texture, frame);
+  const GlbReport glb =
+      write_glb(run.request.output / "web/asset.glb", mesh, textured.texture, frame, options);
+  return {{"texture", textured.report},
+          {"asset.glb",
            {{"bytes", glb.bytes},
+            {"texture_bytes", glb.texture_bytes},
+            {"textured_triangles", glb.textured_triangles},
+            {"measured_texture_error", glb.measured_texture_error},
             {"position_bits", glb.position_bits},
             {"measured_max_error", glb.measured_max_error},
             {"units", frame.unit_name()}}}};
@@ -241,13 +251,15 @@ std::vector<Stage> stages_of(const Scene& scene) {
            {"volume.vdb",
             "mesh/surface.ply",
             "mesh/watertight.ply",
-            "mesh/watertight.obj",
             "mesh/front.png",
             "mesh/side.png",
             "mesh/front.provenance.png",
             "mesh/side.provenance.png"},
            run_mesh},
-          {"web", "web asset", {"web/asset.glb"}, run_web},
+          {"web",
+           "textured assets",
+           {"web/asset.glb", "mesh/watertight.obj", "mesh/watertight.mtl"},
+           run_web},
           {"report", "report", {"report.html", "report.json"}, run_report}};
 }
 

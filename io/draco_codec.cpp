@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -36,6 +37,9 @@ class DracoInput {
 
   int add(draco::GeometryAttribute::Type type, const std::vector<Eigen::Vector3f>& values) {
     return add(type, values.data()->data(), 3);
+  }
+  int add(draco::GeometryAttribute::Type type, const std::vector<Eigen::Vector2f>& values) {
+    return add(type, values.data()->data(), 2);
   }
   int add(draco::GeometryAttribute::Type type, const std::vector<float>& values) {
     return add(type, values.data(), 1);
@@ -71,6 +75,18 @@ int whole_bits(const std::vector<float>& values) {
   return bits;
 }
 
+/// As few bits as keep the error of texture coordinates, which lie in [0, 1].
+int texcoord_bits(const GlbPrimitive& primitive) {
+  const double pixels = primitive.texture_size.maxCoeff();
+  const double half_diagonal = std::sqrt(2.0) / 2;  // of a cell: the farthest a value can move
+  int bits = 1;
+  while (bits < kMaxDracoBits &&
+         pixels / double((1 << bits) - 1) * half_diagonal > 0.95 * kDracoTextureError) {
+    ++bits;
+  }
+  return bits;
+}
+
 std::string encode(const GlbPrimitive& primitive,
                    const DracoGrid& grid,
                    int speed,
@@ -79,6 +95,9 @@ std::string encode(const GlbPrimitive& primitive,
   DracoInput input(primitive);
   ids["POSITION"] = input.add(Attribute::POSITION, primitive.positions);
   ids["NORMAL"] = input.add(Attribute::NORMAL, primitive.normals);
+  if (!primitive.texcoords.empty()) {
+    ids["TEXCOORD_0"] = input.add(Attribute::TEX_COORD, primitive.texcoords);
+  }
   if (!primitive.colors.empty()) ids["COLOR_0"] = input.add(Attribute::COLOR, primitive.colors);
   if (!primitive.support.empty())
     ids["_SUPPORT"] = input.add(Attribute::GENERIC, primitive.support);
@@ -91,8 +110,12 @@ std::string encode(const GlbPrimitive& primitive,
   encoder.SetAttributeExplicitQuantization(
       ids["POSITION"], grid.bits, 3, grid.origin.data(), grid.range);
   encoder.SetAttributeQuantization(ids["NORMAL"], kNormalBits);
+  const Eigen::Vector3f black = Eigen::Vector3f::Zero();
+  if (ids.count("TEXCOORD_0") != 0) {
+    encoder.SetAttributeExplicitQuantization(
+        ids["TEXCOORD_0"], texcoord_bits(primitive), 2, black.data(), 1.0f);
+  }
   if (ids.count("COLOR_0") != 0) {
-    const Eigen::Vector3f black = Eigen::Vector3f::Zero();
     encoder.SetAttributeExplicitQuantization(ids["COLOR_0"], kColorBits, 3, black.data(), 1.0f);
   }
   if (ids.count("_SUPPORT") != 0) {
@@ -113,6 +136,7 @@ std::string encode(const GlbPrimitive& primitive,
 /// The geometry in a Draco buffer, as a decoder gives it.
 struct Decoded {
   std::vector<Eigen::Vector3f> positions;
+  std::vector<Eigen::Vector2f> texcoords;  // may be empty
   std::vector<std::array<uint32_t, 3>> faces;
 };
 
@@ -130,6 +154,12 @@ Decoded decode(const std::string& bytes) {
   out.positions.resize(mesh->num_points());
   for (uint32_t i = 0; i < mesh->num_points(); ++i) {
     position->GetMappedValue(draco::PointIndex(i), out.positions[i].data());
+  }
+  const draco::PointAttribute* texcoord =
+      mesh->GetNamedAttribute(draco::GeometryAttribute::TEX_COORD);
+  if (texcoord != nullptr) out.texcoords.resize(mesh->num_points());
+  for (uint32_t i = 0; i < out.texcoords.size(); ++i) {
+    texcoord->GetMappedValue(draco::PointIndex(i), out.texcoords[i].data());
   }
   for (uint32_t i = 0; i < mesh->num_faces(); ++i) {
     const draco::Mesh::Face& f = mesh->face(draco::FaceIndex(i));
@@ -216,24 +246,62 @@ std::vector<std::array<uint32_t, 3>> faces_by_cell(
   return out;
 }
 
-/// \return the largest distance between a vertex and its decoded place
-double compare(const GlbPrimitive& input, const Decoded& decoded, const DracoGrid& grid) {
+/// The largest distance between a decoded texture coordinate and the nearest of those that belong
+/// to its cell [pixels].
+double texture_error(const GlbPrimitive& input,
+                     const std::vector<uint32_t>& cell_of,
+                     const Decoded& decoded,
+                     const Cells& cells) {
+  if (decoded.texcoords.size() != (input.texcoords.empty() ? 0 : decoded.positions.size())) {
+    fail("texture coordinates of '" + input.name + "' are lost");
+  }
+  std::vector<std::pair<uint32_t, uint32_t>> by_cell(input.texcoords.size());
+  for (uint32_t i = 0; i < by_cell.size(); ++i) by_cell[i] = {cell_of[i], i};
+  std::sort(by_cell.begin(), by_cell.end());
+  double worst = 0;
+  for (uint32_t i = 0; i < decoded.texcoords.size(); ++i) {
+    const uint32_t cell = cells.of_decoded(i);
+    double nearest = std::numeric_limits<double>::infinity();
+    auto it = std::lower_bound(by_cell.begin(), by_cell.end(), std::pair(cell, uint32_t{0}));
+    for (; it != by_cell.end() && it->first == cell; ++it) {
+      const Eigen::Vector2d off = (decoded.texcoords[i] - input.texcoords[it->second])
+                                      .cast<double>()
+                                      .cwiseProduct(input.texture_size.cast<double>());
+      nearest = std::min(nearest, off.norm());
+    }
+    worst = std::max(worst, nearest);
+  }
+  return worst;
+}
+
+struct Errors {
+  double position = 0;  // [units of the file]
+  double texture = 0;   // [pixels]
+};
+
+/// \return the largest distances between what went in and what came out
+Errors compare(const GlbPrimitive& input, const Decoded& decoded, const DracoGrid& grid) {
   const Cells cells(decoded.positions, grid);
   std::vector<uint32_t> cell_of(input.positions.size());
   std::vector<bool> hit(cells.size(), false);
-  double worst = 0;
+  Errors worst;
   for (size_t i = 0; i < input.positions.size(); ++i) {
     const std::optional<uint32_t> cell = cells.nearest(input.positions[i]);
     if (!cell) fail("vertex " + std::to_string(i) + " of '" + input.name + "' is lost");
     cell_of[i] = *cell;
     hit[*cell] = true;
     const Eigen::Vector3f move = cells.place(*cell) - input.positions[i];
-    worst = std::max(worst, move.cast<double>().norm());
+    worst.position = std::max(worst.position, move.cast<double>().norm());
   }
   if (std::find(hit.begin(), hit.end(), false) != hit.end()) fail("a vertex appeared");
   const auto before = faces_by_cell(input.faces, [&](uint32_t v) { return cell_of[v]; });
   const auto after = faces_by_cell(decoded.faces, [&](uint32_t v) { return cells.of_decoded(v); });
   if (before != after) fail("faces of '" + input.name + "' changed");
+  worst.texture = texture_error(input, cell_of, decoded, cells);
+  if (!(worst.texture <= kDracoTextureError)) {
+    fail("texture coordinates of '" + input.name + "' moved by " + std::to_string(worst.texture) +
+         " pixels");
+  }
   return worst;
 }
 
@@ -246,7 +314,9 @@ DracoPrimitive draco_compress(const GlbPrimitive& primitive, const DracoGrid& gr
     const Decoded decoded = decode(out.bytes);
     out.vertices = decoded.positions.size();
     out.faces = decoded.faces.size();
-    out.max_error = compare(primitive, decoded, grid);
+    const Errors errors = compare(primitive, decoded, grid);
+    out.max_error = errors.position;
+    out.max_texture_error = errors.texture;
     out.min = out.max = decoded.positions.front();
     for (const Eigen::Vector3f& p : decoded.positions) {
       out.min = out.min.cwiseMin(p);

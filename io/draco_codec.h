@@ -29,11 +29,15 @@ struct DracoPrimitive {
   size_t faces = 0;
   Eigen::Vector3f min = Eigen::Vector3f::Zero();  ///< Bounds of the decoded positions.
   Eigen::Vector3f max = Eigen::Vector3f::Zero();
-  double max_error = 0;  ///< Largest distance of a vertex from its decoded place.
+  double max_error = 0;          ///< Largest distance of a vertex from its decoded place.
+  double max_texture_error = 0;  ///< The same of a texture coordinate [pixels of its image].
 };
 
+/// Largest error of texture coordinates that compression may add [pixels].
+inline constexpr double kDracoTextureError = 0.1;
+
 /// Compresses with the edgebreaker method, decodes again, and compares: every vertex within a step
-/// of its place, every face there, no face added.
+/// of its place, every face there, no face added, texture coordinates within kDracoTextureError.
 ///
 /// Normals keep 10 bits, colours 12, sigma 12; support is exact up to 65535.
 /// \param speed  0 (smallest) to 10 (fastest)

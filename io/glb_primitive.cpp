@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "io/mesh_arrays.h"
+#include "libcgs/core/srgb.h"
 
 namespace cgs {
 
@@ -25,18 +27,32 @@ float unknown_sigma(const TriangleMesh& mesh, double scale) {
 
 class Splitter {
  public:
-  Splitter(const TriangleMesh& mesh, const GlbPlacement& placement)
-      : mesh_(mesh), placement_(placement), unknown_sigma_(unknown_sigma(mesh, placement.scale)) {
+  Splitter(const TriangleMesh& mesh,
+           const GlbPlacement& placement,
+           const PhotoTexture& texture,
+           std::span<const TextureImage> images)
+      : mesh_(mesh),
+        placement_(placement),
+        texture_(texture),
+        images_(images),
+        unknown_sigma_(unknown_sigma(mesh, placement.scale)) {
     positions_.reserve(mesh.vertices.size());
     for (const Eigen::Vector3f& v : mesh.vertices) positions_.push_back(placement(v));
     normals_ = mesh.normals.empty() ? vertex_normals(mesh) : mesh.normals;
   }
 
-  /// Faces for which `wanted(index)` holds.
-  template <typename Wanted>
-  GlbPrimitive part(std::string_view name, const Wanted& wanted) const {
+  /// Faces of a class (all without labels) and a photograph.
+  GlbPrimitive part(std::optional<Provenance> label, int photograph) const {
     GlbPrimitive out;
-    out.name = name;
+    out.name = label ? provenance_name(*label) : "surface";
+    out.photograph = photograph;
+    if (photograph != PhotoTexture::kNone) {
+      out.texture_size = images_[static_cast<size_t>(photograph)].size;
+    }
+    const auto wanted = [&](size_t f) {
+      return (!label || mesh_.provenance[f] == *label) &&
+             (texture_.empty() || texture_.of_face[f] == photograph);
+    };
     std::vector<uint32_t> renumbered(mesh_.vertices.size(), kUnused);
     for (size_t i = 0; i < mesh_.faces.size(); ++i) {
       if (wanted(i) && has_three_places(mesh_.faces[i])) out.faces.push_back(mesh_.faces[i]);
@@ -69,7 +85,12 @@ class Splitter {
     const bool known = normal.allFinite() && normal.norm() > 0;
     out.normals.push_back(known ? Eigen::Vector3f(normal.stableNormalized().cast<float>())
                                 : Eigen::Vector3f::UnitY());
-    if (!mesh_.colors.empty()) {
+    if (out.photograph != PhotoTexture::kNone) {
+      const auto i = static_cast<size_t>(out.photograph);
+      const Camera& camera = texture_.photographs[i].camera;
+      const Eigen::Vector3d uvz = camera.project(mesh_.vertices[v].cast<double>());
+      out.texcoords.push_back(images_[i].texcoord(uvz));
+    } else if (!mesh_.colors.empty()) {
       Eigen::Vector3f color = Eigen::Vector3f::Zero();
       for (int c = 0; c < 3; ++c) {
         const float coded = mesh_.colors[v][c];
@@ -88,6 +109,8 @@ class Splitter {
 
   const TriangleMesh& mesh_;
   const GlbPlacement& placement_;
+  const PhotoTexture& texture_;
+  std::span<const TextureImage> images_;
   float unknown_sigma_;
   std::vector<Eigen::Vector3f> positions_;
   std::vector<Eigen::Vector3f> normals_;
@@ -95,16 +118,23 @@ class Splitter {
 
 }  // namespace
 
-std::vector<GlbPrimitive> glb_primitives(const TriangleMesh& mesh, const GlbPlacement& placement) {
-  const Splitter splitter(mesh, placement);
-  std::vector<GlbPrimitive> out;
+std::vector<GlbPrimitive> glb_primitives(const TriangleMesh& mesh,
+                                         const GlbPlacement& placement,
+                                         const PhotoTexture& texture,
+                                         std::span<const TextureImage> images) {
+  const Splitter splitter(mesh, placement, texture, images);
+  std::vector<std::optional<Provenance>> labels;
   if (mesh.provenance.empty()) {
-    out.push_back(splitter.part("surface", [](size_t) { return true; }));
+    labels.emplace_back();
   } else {
-    for (const Provenance label : kProvenanceOrder) {
-      out.push_back(splitter.part(provenance_name(label),
-                                  [&](size_t i) { return mesh.provenance[i] == label; }));
+    labels.assign(kProvenanceOrder.begin(), kProvenanceOrder.end());
+  }
+  std::vector<GlbPrimitive> out;
+  for (const std::optional<Provenance> label : labels) {
+    for (size_t i = 0; i < images.size(); ++i) {
+      out.push_back(splitter.part(label, static_cast<int>(i)));
     }
+    out.push_back(splitter.part(label, PhotoTexture::kNone));
   }
   std::erase_if(out, [](const GlbPrimitive& part) { return part.faces.empty(); });
   return out;

@@ -3,18 +3,24 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "io/texture_images.h"
+#include "libcgs/core/photo_texture.h"
 #include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {
 
-/// Faces of one provenance class with vertices of their own, as glTF wants them.
+/// Faces of one provenance class and one photograph with vertices of their own, as glTF wants them.
 struct GlbPrimitive {
-  std::string name;                            ///< Of the class; names the material too.
+  std::string name;  ///< Of the class.
+  int photograph = PhotoTexture::kNone;
+  std::vector<Eigen::Vector2f> texcoords;      ///< Into the photograph's image; may be empty.
+  Eigen::Vector2i texture_size = {0, 0};       ///< Of that image [pixels].
   std::vector<Eigen::Vector3f> positions;      ///< [units of the file], glTF axes, local origin
   std::vector<Eigen::Vector3f> normals;        ///< Unit length.
   std::vector<Eigen::Vector3f> colors;         ///< Linear light in [0, 1]; may be empty.
@@ -34,9 +40,14 @@ struct GlbPlacement {
   }
 };
 
-/// Splits a mesh into its provenance classes, from most to least evidence, classes without faces
-/// left out. Vertices keep their order; those without a face are left out.
-/// \pre the arrays of the mesh fit
-std::vector<GlbPrimitive> glb_primitives(const TriangleMesh& mesh, const GlbPlacement& placement);
+/// Splits a mesh into its provenance classes, from most to least evidence, and these by photograph,
+/// faces without one last; what has no faces is left out. Vertices keep their order; those without
+/// a face are left out.
+/// \param images  one for each photograph of the texture
+/// \pre the arrays of the mesh and of the texture fit
+std::vector<GlbPrimitive> glb_primitives(const TriangleMesh& mesh,
+                                         const GlbPlacement& placement,
+                                         const PhotoTexture& texture = {},
+                                         std::span<const TextureImage> images = {});
 
 }  // namespace cgs

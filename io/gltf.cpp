@@ -21,6 +21,7 @@
 #include "io/draco_codec.h"
 #include "io/glb_primitive.h"
 #include "io/mesh_arrays.h"
+#include "io/texture_images.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -28,6 +29,7 @@ namespace cgs {
 namespace {
 
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
+constexpr const char* kUnlit = "KHR_materials_unlit";
 
 tinygltf::Value value_of(const nlohmann::json& json) {
   if (json.is_object()) {
@@ -114,6 +116,31 @@ class GlbBuilder {
     model_.defaultScene = 0;
   }
 
+  /// Adds the images that are used; call it before any primitive.
+  void add_photographs(const PhotoTexture& texture, const std::vector<TextureImage>& images) {
+    if (texture.empty()) return;
+    textured_ = true;
+    tinygltf::Sampler sampler;
+    sampler.minFilter = TINYGLTF_TEXTURE_FILTER_LINEAR_MIPMAP_LINEAR;
+    sampler.magFilter = TINYGLTF_TEXTURE_FILTER_LINEAR;
+    sampler.wrapS = sampler.wrapT = TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE;
+    model_.samplers = {sampler};
+    for (size_t i = 0; i < images.size(); ++i) {
+      names_.push_back(texture.photographs[i].name);
+      texture_of_.push_back(static_cast<int>(model_.textures.size()));
+      if (images[i].jpeg.empty()) continue;
+      tinygltf::Image image;
+      image.name = names_.back();
+      image.mimeType = "image/jpeg";
+      image.bufferView = raw_view(images[i].jpeg.data(), images[i].jpeg.size(), 0);
+      tinygltf::Texture out;
+      out.sampler = 0;
+      out.source = static_cast<int>(model_.images.size());
+      model_.images.push_back(std::move(image));
+      model_.textures.push_back(out);
+    }
+  }
+
   void set_extras(const nlohmann::json& extras) { model_.asset.extras = value_of(extras); }
 
   void add_plain(const GlbPrimitive& in) {
@@ -123,6 +150,10 @@ class GlbBuilder {
         accessor(in.positions.size(), TINYGLTF_TYPE_VEC3, view(in.positions));
     set_bounds(out.attributes["POSITION"], low, high);
     out.attributes["NORMAL"] = accessor(in.normals.size(), TINYGLTF_TYPE_VEC3, view(in.normals));
+    if (!in.texcoords.empty()) {
+      out.attributes["TEXCOORD_0"] =
+          accessor(in.texcoords.size(), TINYGLTF_TYPE_VEC2, view(in.texcoords));
+    }
     if (!in.colors.empty()) {
       out.attributes["COLOR_0"] = accessor(in.colors.size(), TINYGLTF_TYPE_VEC3, view(in.colors));
     }
@@ -145,15 +176,17 @@ class GlbBuilder {
         {"bufferView", raw_view(draco.bytes.data(), draco.bytes.size(), 0)}};
     for (const auto& [name, id] : draco.attribute_ids) {
       const bool scalar = name == "_SUPPORT" || name == "_SIGMA";
-      out.attributes[name] =
-          accessor(draco.vertices, scalar ? TINYGLTF_TYPE_SCALAR : TINYGLTF_TYPE_VEC3, -1);
+      const int type = scalar                 ? TINYGLTF_TYPE_SCALAR
+                       : name == "TEXCOORD_0" ? TINYGLTF_TYPE_VEC2
+                                              : TINYGLTF_TYPE_VEC3;
+      out.attributes[name] = accessor(draco.vertices, type, -1);
       extension["attributes"][name] = id;
     }
     set_bounds(out.attributes["POSITION"], draco.min, draco.max);
     out.indices = accessor(draco.faces * 3, TINYGLTF_TYPE_SCALAR, -1);
     model_.accessors.back().componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
     out.extensions[kDraco] = value_of(extension);
-    model_.extensionsUsed = {kDraco};
+    use_extension(kDraco);
     model_.extensionsRequired = {kDraco};
     model_.meshes[0].primitives.push_back(std::move(out));
   }
@@ -171,21 +204,39 @@ class GlbBuilder {
 
  private:
   tinygltf::Primitive empty_primitive(const GlbPrimitive& in) {
-    tinygltf::Material material;
-    material.name = in.name;
-    material.doubleSided = true;
-    material.pbrMetallicRoughness.metallicFactor = 0;
-    material.pbrMetallicRoughness.roughnessFactor = 1;
-    if (in.name == provenance_name(Provenance::Inferred)) {
-      material.pbrMetallicRoughness.baseColorFactor = {1.0, 0.25, 0.8, 1.0};
-    } else if (in.name == provenance_name(Provenance::Interpolated)) {
-      material.pbrMetallicRoughness.baseColorFactor = {0.55, 0.75, 1.0, 1.0};
-    }
     tinygltf::Primitive out;
     out.mode = TINYGLTF_MODE_TRIANGLES;
     out.material = static_cast<int>(model_.materials.size());
-    model_.materials.push_back(std::move(material));
+    model_.materials.push_back(material_for(in));
     return out;
+  }
+
+  tinygltf::Material material_for(const GlbPrimitive& in) {
+    tinygltf::Material out;
+    out.name = in.name;
+    out.doubleSided = true;
+    out.pbrMetallicRoughness.metallicFactor = 0;
+    out.pbrMetallicRoughness.roughnessFactor = 1;
+    if (in.name == provenance_name(Provenance::Inferred)) {
+      out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.25, 0.8, 1.0};
+    } else if (in.name == provenance_name(Provenance::Interpolated)) {
+      out.pbrMetallicRoughness.baseColorFactor = {0.55, 0.75, 1.0, 1.0};
+    } else if (textured_) {
+      // Also where no photograph fits: beside photographs, lit surface would look like another.
+      out.extensions[kUnlit] = tinygltf::Value(tinygltf::Value::Object());
+      use_extension(kUnlit);
+    }
+    if (in.photograph != PhotoTexture::kNone) {
+      const auto i = static_cast<size_t>(in.photograph);
+      out.name += " " + names_[i];
+      out.pbrMetallicRoughness.baseColorTexture.index = texture_of_[i];
+    }
+    return out;
+  }
+
+  void use_extension(const char* name) {
+    std::vector<std::string>& used = model_.extensionsUsed;
+    if (std::find(used.begin(), used.end(), name) == used.end()) used.emplace_back(name);
   }
 
   template <typename T>
@@ -232,6 +283,9 @@ class GlbBuilder {
   }
 
   tinygltf::Model model_;
+  bool textured_ = false;
+  std::vector<std::string> names_;  // of photographs
+  std::vector<int> texture_of_;     // per photograph
 };
 
 nlohmann::json extras_for(const TriangleMesh& mesh,
@@ -282,6 +336,9 @@ void GlbOptions::validate() const {
   require(speed >= 0 && speed <= 10, "GlbOptions.speed must be 0 to 10", speed);
   const double off = (y_up * y_up.transpose() - Eigen::Matrix3d::Identity()).norm();
   require(off < 1e-6 && y_up.determinant() > 0, "GlbOptions.y_up must be a rotation; error", off);
+  require(jpeg_quality >= 1 && jpeg_quality <= 100,
+          "GlbOptions.jpeg_quality must be 1 to 100",
+          jpeg_quality);
   if (!summary_json.empty()) (void)parsed_summary(summary_json);
 }
 
@@ -289,22 +346,36 @@ GlbReport write_glb(const std::filesystem::path& path,
                     const TriangleMesh& mesh,
                     const Frame& frame,
                     const GlbOptions& options) {
+  return write_glb(path, mesh, PhotoTexture{}, frame, options);
+}
+
+GlbReport write_glb(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const PhotoTexture& texture,
+                    const Frame& frame,
+                    const GlbOptions& options) {
   options.validate();
   require_writable(mesh, "write_glb");
+  require_texture(mesh, texture, "write_glb");
   require(!mesh.faces.empty(), "write_glb: number of faces must be > 0", mesh.faces.size());
   const GlbPlacement placement = placement_for(mesh, frame, options);
-  const std::vector<GlbPrimitive> primitives = glb_primitives(mesh, placement);
+  std::vector<TextureImage> images;
+  if (!texture.empty()) images = texture_images(mesh, texture, options.jpeg_quality);
+  const std::vector<GlbPrimitive> primitives = glb_primitives(mesh, placement, texture, images);
   require(!primitives.empty(), "write_glb: faces with three different corners must be > 0", 0);
   const double world_scale = placement.scale / frame.scale;  // units of the file per world unit
   const double max_error = options.max_error * world_scale;
   GlbReport report;
   GlbBuilder builder;
   builder.set_extras(extras_for(mesh, frame, placement, options));
+  builder.add_photographs(texture, images);
+  for (const TextureImage& image : images) report.texture_bytes += image.jpeg.size();
   const bool draco = options.draco && extent_of(primitives) >= kSmallestDracoExtent;
   const DracoGrid grid = draco ? grid_for(primitives, max_error) : DracoGrid{};
   double worst = 0;
   for (const GlbPrimitive& primitive : primitives) {
     report.triangles += primitive.faces.size();
+    if (!primitive.texcoords.empty()) report.textured_triangles += primitive.faces.size();
     if (!draco) {
       report.vertices += primitive.positions.size();
       builder.add_plain(primitive);
@@ -313,6 +384,8 @@ GlbReport write_glb(const std::filesystem::path& path,
     const DracoPrimitive compressed = draco_compress(primitive, grid, options.speed);
     report.vertices += compressed.vertices;
     worst = std::max(worst, compressed.max_error);
+    report.measured_texture_error =
+        std::max(report.measured_texture_error, compressed.max_texture_error);
     builder.add_compressed(primitive, compressed);
   }
   // Half a rounding error of float coordinates is not the compression's.

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "libcgs/core/frame.h"
+#include "libcgs/core/photo_texture.h"
 #include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {
@@ -20,6 +21,7 @@ struct GlbOptions {
                          ///< 0 = extent / 2^14, else > extent / 2^21.
   int speed = 5;         ///< Of the encoder, 0 (smallest file) to 10 (fastest).
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
+  int jpeg_quality = 90;                               ///< Of textures, 1 to 100.
   std::string summary_json;  ///< JSON text for asset.extras.summary; may be empty.
 
   /// \throws InvalidInput naming the first field out of range.
@@ -29,12 +31,15 @@ struct GlbOptions {
 /// What was written, measured on the decoded content.
 struct GlbReport {
   size_t bytes = 0;       ///< Of the file.
-  size_t primitives = 0;  ///< One per provenance class that has faces.
-  size_t vertices = 0;    ///< Of all primitives; borders between classes count twice.
+  size_t primitives = 0;  ///< One per provenance class and photograph that have faces.
+  size_t vertices = 0;    ///< Of all primitives; borders between them count twice.
   size_t triangles = 0;
   size_t dropped_triangles = 0;   ///< Without area: two corners at one place.
   int position_bits = 0;          ///< Per coordinate; 0 = not compressed.
   double measured_max_error = 0;  ///< Largest distance of a decoded vertex [world units].
+  size_t textured_triangles = 0;
+  size_t texture_bytes = 0;           ///< Of all images.
+  double measured_texture_error = 0;  ///< Largest move of a decoded texture coordinate [pixels].
 };
 
 /// Writes a mesh as .glb: +Y up, in metres where the scale is known, else in world units.
@@ -56,6 +61,22 @@ struct GlbReport {
 /// Source: glTF 2.0 and KHR_draco_mesh_compression, Khronos Group.
 GlbReport write_glb(const std::filesystem::path& path,
                     const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const GlbOptions& options = {});
+
+/// The same with photographs as texture.
+///
+/// - A primitive and material per provenance class and photograph, named "observed <photograph>",
+///   with TEXCOORD_0 and a JPEG of the used part of the photograph; the classes' own primitives
+///   hold the faces without photograph.
+/// - Photographs hold the light of the scene already, so materials of seen surface (Observed and
+///   SingleView) are KHR_materials_unlit; readers that do not know it find a rough non-metal.
+/// - With Draco, texture coordinates move by at most 0.1 pixels, measured.
+///
+/// \throws as above; InvalidInput if the texture does not fit the mesh: see require_texture().
+GlbReport write_glb(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const PhotoTexture& texture,
                     const Frame& frame,
                     const GlbOptions& options = {});
 

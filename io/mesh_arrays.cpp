@@ -75,10 +75,4 @@ uint8_t color_byte(float value) {
   return static_cast<uint8_t>(std::lround(std::min(value, 1.0f) * 255.0f));
 }
 
-float linear_from_srgb(float value) {
-  const double v = std::abs(static_cast<double>(value));
-  const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-  return static_cast<float>(std::copysign(linear, static_cast<double>(value)));
-}
-
 }  // namespace cgs

@@ -38,7 +38,4 @@ std::string_view provenance_name(Provenance provenance);
 /// sRGB-coded value in [0, 1] as a byte; NaN becomes 0.
 uint8_t color_byte(float value);
 
-/// Linear light of an sRGB-coded value; continued beyond 1, odd below 0. IEC 61966-2-1.
-float linear_from_srgb(float value);
-
 }  // namespace cgs

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <vector>
 
 #include "io/atomic_file.h"
 #include "io/byte_writer.h"
 #include "io/mesh_arrays.h"
+#include "io/texture_images.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -21,14 +23,50 @@ std::string group_name(Provenance provenance) {
   return name;
 }
 
-/// Always all four, so that writing it again never changes what an older OBJ refers to.
-std::string materials_text() {
+/// A name that files and materials may have; each but once.
+std::vector<std::string> safe_names(const PhotoTexture& texture) {
+  std::vector<std::string> out;
+  for (const Photograph& photograph : texture.photographs) {
+    std::string name = photograph.name;
+    for (char& c : name) {
+      const bool plain = (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') ||
+                         (c >= 'a' && c <= 'z') || c == '-' || c == '_' || c == '.';
+      if (!plain) c = '_';
+    }
+    while (std::find(out.begin(), out.end(), name) != out.end()) name += '_';
+    out.push_back(std::move(name));
+  }
+  return out;
+}
+
+/// A texture with what belongs to it in files.
+struct ObjTexture {
+  const PhotoTexture& texture;
+  std::vector<std::string> names;
+  std::vector<TextureImage> images;
+
+  int photograph(size_t face) const {
+    return texture.empty() ? PhotoTexture::kNone : texture.of_face[face];
+  }
+};
+
+std::string image_name(const std::filesystem::path& path, const std::string& name) {
+  return path.stem().string() + "." + name + ".jpg";
+}
+
+/// Always all four classes, so that writing it again never changes what an older OBJ refers to.
+std::string materials_text(const std::filesystem::path& path, const ObjTexture& texture) {
   constexpr std::array<const char*, 4> kDiffuse = {
       "0.8 0.8 0.8", "0.8 0.74 0.56", "0.56 0.68 0.8", "0.8 0.28 0.68"};
   std::string out = "# cgs: materials tell where a surface comes from\n";
   for (size_t i = 0; i < kProvenanceOrder.size(); ++i) {
     out +=
         "newmtl " + group_name(kProvenanceOrder.at(i)) + "\nKd " + kDiffuse.at(i) + "\nillum 1\n";
+  }
+  for (size_t i = 0; i < texture.images.size(); ++i) {
+    if (texture.images[i].jpeg.empty()) continue;
+    out += "newmtl view_" + texture.names[i] + "\nKd 1 1 1\nillum 1\nmap_Kd " +
+           image_name(path, texture.names[i]) + "\n";
   }
   return out;
 }
@@ -63,56 +101,137 @@ void write_vertices(AtomicFile& file, const TriangleMesh& mesh, const Frame& fra
   }
 }
 
-void write_face(AtomicFile& file, const std::array<uint32_t, 3>& face, bool has_normals) {
-  std::string line = "f";
-  for (const uint32_t corner : face) {
-    line += ' ';
-    append_number(line, uint64_t{corner} + 1);
-    if (!has_normals) continue;
-    line += "//";
-    append_number(line, uint64_t{corner} + 1);
+/// Writes "vt" lines: one for every vertex of every photograph that a face shows it in.
+/// \return their numbers by photograph and vertex, 0 = none
+std::vector<std::vector<uint64_t>> write_texcoords(AtomicFile& file,
+                                                   const TriangleMesh& mesh,
+                                                   const ObjTexture& texture) {
+  std::vector<std::vector<uint64_t>> number(texture.images.size());
+  uint64_t next = 1;
+  std::string line;
+  for (size_t i = 0; i < number.size(); ++i) {
+    if (texture.images[i].jpeg.empty()) continue;
+    number[i].assign(mesh.vertices.size(), 0);
+    for (size_t f = 0; f < mesh.faces.size(); ++f) {
+      if (texture.photograph(f) != static_cast<int>(i)) continue;
+      for (const uint32_t v : mesh.faces[f]) {
+        if (number[i][v] != 0) continue;
+        number[i][v] = next++;
+        const Camera& camera = texture.texture.photographs[i].camera;
+        Eigen::Vector2f t =
+            texture.images[i].texcoord(camera.project(mesh.vertices[v].cast<double>()));
+        t.y() = 1 - t.y();
+        line.clear();
+        append_line(line, "vt", t);
+        file.write(line + "\n");
+      }
+    }
   }
-  file.write(line + "\n");
+  return number;
 }
 
-void write_faces(AtomicFile& file, const TriangleMesh& mesh) {
-  const bool has_normals = !mesh.normals.empty();
-  if (mesh.provenance.empty()) {
-    for (const auto& face : mesh.faces) write_face(file, face, has_normals);
-    return;
+/// Writes faces; texture coordinates and normals have the numbers in `texcoord` (none where null)
+/// and of the vertices.
+struct FaceWriter {
+  AtomicFile& file;
+  bool has_normals = false;
+
+  void write(const std::array<uint32_t, 3>& face, const std::vector<uint64_t>* texcoord) const {
+    std::string line = "f";
+    for (const uint32_t corner : face) {
+      line += ' ';
+      append_number(line, uint64_t{corner} + 1);
+      if (texcoord != nullptr || has_normals) line += '/';
+      if (texcoord != nullptr) append_number(line, (*texcoord)[corner]);
+      if (!has_normals) continue;
+      line += '/';
+      append_number(line, uint64_t{corner} + 1);
+    }
+    file.write(line + "\n");
   }
-  for (const Provenance group : kProvenanceOrder) {
-    const std::string name = group_name(group);
-    bool open = false;
-    for (size_t i = 0; i < mesh.faces.size(); ++i) {
-      if (mesh.provenance[i] != group) continue;
-      if (!open) file.write(std::string("g ").append(name).append("\nusemtl ").append(name) + "\n");
+};
+
+/// Groups by provenance, materials within.
+void write_faces(AtomicFile& file, const TriangleMesh& mesh, const ObjTexture& texture) {
+  const std::vector<std::vector<uint64_t>> numbers = write_texcoords(file, mesh, texture);
+  const FaceWriter writer{file, !mesh.normals.empty()};
+  std::vector<std::vector<size_t>> faces(4 * (texture.images.size() + 1));
+  const auto slot = [&](size_t group, int photograph) {
+    return group * (texture.images.size() + 1) + static_cast<size_t>(photograph + 1);
+  };
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto group = mesh.provenance.empty() ? 0 : static_cast<size_t>(mesh.provenance[f]);
+    faces[slot(group, texture.photograph(f))].push_back(f);
+  }
+  const size_t groups = mesh.provenance.empty() ? 1 : kProvenanceOrder.size();
+  for (size_t g = 0; g < groups; ++g) {
+    const Provenance group = kProvenanceOrder.at(g);
+    bool open = mesh.provenance.empty();
+    for (int i = -1; i < static_cast<int>(texture.images.size()); ++i) {
+      const std::vector<size_t>& part =
+          faces[slot(mesh.provenance.empty() ? 0 : static_cast<size_t>(group), i)];
+      if (part.empty()) continue;
+      if (!open) file.write("g " + group_name(group) + "\n");
       open = true;
-      write_face(file, mesh.faces[i], has_normals);
+      if (i >= 0) {
+        file.write("usemtl view_" + texture.names[static_cast<size_t>(i)] + "\n");
+      } else if (!mesh.provenance.empty()) {
+        file.write("usemtl " + group_name(group) + "\n");
+      }
+      const auto* texcoord = i >= 0 ? &numbers[static_cast<size_t>(i)] : nullptr;
+      for (const size_t f : part) writer.write(mesh.faces[f], texcoord);
     }
   }
 }
 
+/// Files beside the OBJ; those that were not there before go again unless kept.
+class Companions {
+ public:
+  ~Companions() {
+    std::error_code ignored;
+    for (const auto& path : created_) std::filesystem::remove(path, ignored);
+  }
+  void write(const std::filesystem::path& path, std::string_view bytes) {
+    const bool existed = std::filesystem::exists(path);
+    write_file(path, bytes);
+    if (!existed) created_.push_back(path);
+  }
+  void keep() { created_.clear(); }
+
+ private:
+  std::vector<std::filesystem::path> created_;
+};
+
 }  // namespace
 
 void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh, const Frame& frame) {
+  write_obj(path, mesh, PhotoTexture{}, frame);
+}
+
+void write_obj(const std::filesystem::path& path,
+               const TriangleMesh& mesh,
+               const PhotoTexture& texture,
+               const Frame& frame) {
   require_writable(mesh, "write_obj");
+  require_texture(mesh, texture, "write_obj");
+  constexpr int kQuality = 90;
+  ObjTexture used{texture, safe_names(texture), {}};
+  if (!texture.empty()) used.images = texture_images(mesh, texture, kQuality);
   const std::filesystem::path materials = std::filesystem::path(path).replace_extension(".mtl");
   AtomicFile file(path);
   std::string header = "# cgs\n# unit " + frame.unit_name() + "\n";
   append_line(header, "# file_origin", frame.file_origin);
   file.write(header + "\nmtllib " + materials.filename().string() + "\n");
   write_vertices(file, mesh, frame);
-  write_faces(file, mesh);
-  const bool had_materials = std::filesystem::exists(materials);
-  write_file(materials, materials_text());
-  try {
-    file.commit();
-  } catch (...) {
-    std::error_code ignored;
-    if (!had_materials) std::filesystem::remove(materials, ignored);
-    throw;
+  write_faces(file, mesh, used);
+  Companions companions;
+  for (size_t i = 0; i < used.images.size(); ++i) {
+    if (used.images[i].jpeg.empty()) continue;
+    companions.write(path.parent_path() / image_name(path, used.names[i]), used.images[i].jpeg);
   }
+  companions.write(materials, materials_text(path, used));
+  file.commit();
+  companions.keep();
 }
 
 }  // namespace cgs

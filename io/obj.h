@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "libcgs/core/frame.h"
+#include "libcgs/core/photo_texture.h"
 #include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {
@@ -18,5 +19,16 @@ namespace cgs {
 /// \throws InvalidInput if the mesh is not writable (an array does not fit, a vertex is not
 ///         finite); IoError
 void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh, const Frame& frame);
+
+/// The same with photographs as texture: within their group, faces with a photograph have material
+/// "view_<photograph>" and texture coordinates ("vt u v", v upwards), and the used part of the
+/// photograph lies beside the file as <stem>.<photograph>.jpg. Characters that do not belong in
+/// such names become '_'.
+/// Images are replaced first and the .obj last; what was not there before a failure is removed.
+/// \throws as above; InvalidInput if the texture does not fit the mesh: see require_texture().
+void write_obj(const std::filesystem::path& path,
+               const TriangleMesh& mesh,
+               const PhotoTexture& texture,
+               const Frame& frame);
 
 }  // namespace cgs

@@ -8,6 +8,7 @@
 #include "io/exr.h"
 #include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/srgb.h"
 
 namespace cgs {
 

@@ -9,39 +9,11 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "meshing/projected_faces.h"
 
 namespace cgs {
 
 namespace {
-
-// A face in the picture: corners as (u, v, 1 / z).
-struct Projected {
-  std::array<Eigen::Vector3f, 3> corner;
-  bool visible = false;
-};
-
-std::vector<Projected> projected_faces(const TriangleMesh& mesh, const Camera& camera) {
-  const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
-  std::vector<Eigen::Vector3d> points(mesh.vertices.size());
-  tbb::parallel_for(size_t(0), points.size(), [&](size_t v) {
-    points[v] = camera.project_in_cam(cam_from_world * mesh.vertices[v].cast<double>());
-  });
-  std::vector<Projected> out(mesh.faces.size());
-  tbb::parallel_for(size_t(0), out.size(), [&](size_t f) {
-    out[f].visible = true;
-    for (size_t k = 0; k < 3; ++k) {
-      const Eigen::Vector3d& p = points[mesh.faces[f][k]];
-      out[f].visible =
-          out[f].visible && p.z() > 0 && std::abs(p.x()) < 1e6 && std::abs(p.y()) < 1e6;
-      out[f].corner.at(k) = Eigen::Vector3d(p.x(), p.y(), 1 / p.z()).cast<float>();
-    }
-  });
-  return out;
-}
-
-float edge(const Eigen::Vector3f& a, const Eigen::Vector3f& b, float u, float v) {
-  return (b.x() - a.x()) * (v - a.y()) - (b.y() - a.y()) * (u - a.x());
-}
 
 Eigen::Vector3f base_color(const TriangleMesh& mesh,
                            size_t f,
@@ -82,7 +54,7 @@ class Painter {
     constexpr int kRows = 32;
     tbb::parallel_for(tbb::blocked_range<int>(0, picture_.height, kRows), [&](const auto& rows) {
       for (size_t f = 0; f < faces_.size(); ++f) {
-        if (faces_[f].visible) draw(f, rows.begin(), rows.end());
+        if (faces_[f].in_front) draw(f, rows.begin(), rows.end());
       }
     });
     return std::move(picture_);
@@ -90,38 +62,20 @@ class Painter {
 
  private:
   void draw(size_t f, int first_row, int last_row) {
-    const auto& [a, b, c] = faces_[f].corner;
-    const float area = edge(a, b, c.x(), c.y());
-    if (!(std::abs(area) > 0)) return;
-    const auto span = [](float low, float high, int begin, int end) {
-      return std::pair(std::max(begin, static_cast<int>(std::ceil(low - 0.5f))),
-                       std::min(end - 1, static_cast<int>(std::floor(high - 0.5f))));
-    };
-    const auto [y0, y1] =
-        span(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}), first_row, last_row);
-    const auto [x0, x1] =
-        span(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}), 0, picture_.width);
-    if (y0 > y1 || x0 > x1) return;
-    const float light = brightness(mesh_, f, eye_);
-    for (int y = y0; y <= y1; ++y) {
-      for (int x = x0; x <= x1; ++x) {
-        const float u = static_cast<float>(x) + 0.5f;
-        const float v = static_cast<float>(y) + 0.5f;
-        Eigen::Vector3f w(edge(b, c, u, v), edge(c, a, u, v), edge(a, b, u, v));
-        w /= area;
-        if (w.minCoeff() < 0) continue;
-        const float near = w.x() * a.z() + w.y() * b.z() + w.z() * c.z();
-        if (near <= nearness_(x, y)) continue;
-        nearness_(x, y) = near;
-        picture_(x, y) = light * base_color(mesh_, f, w, by_provenance_);
-      }
-    }
+    for_each_pixel(faces_[f],
+                   {0, first_row, picture_.width, last_row},
+                   [&](int x, int y, const Eigen::Vector3f& weights, float near) {
+                     if (near <= nearness_(x, y)) return;
+                     nearness_(x, y) = near;
+                     picture_(x, y) =
+                         brightness(mesh_, f, eye_) * base_color(mesh_, f, weights, by_provenance_);
+                   });
   }
 
   const TriangleMesh& mesh_;
   Eigen::Vector3d eye_;
   bool by_provenance_;
-  std::vector<Projected> faces_;
+  std::vector<ProjectedFace> faces_;
   ColorImage picture_;
   Raster<float> nearness_;  // 1 / z, 0 = nothing
 };

@@ -9,6 +9,7 @@
 #include "convert/mesh_files.h"
 #include "convert/terminal.h"
 #include "convert/volume_file.h"
+#include "io/obj.h"
 #include "meshing/isosurface.h"
 
 namespace cgs {
@@ -30,8 +31,9 @@ void run_mesh_command(const MeshArgs& args) {
   const TriangleMesh open = open_surface(file.volume, {});
   const WatertightResult closed = watertight_surface(file.volume, {}, part_of(progress, 0.1, 0.9));
   const Eigen::Vector3d up(args.up[0], args.up[1], args.up[2]);
-  const nlohmann::ordered_json files =
-      write_mesh_files(args.output, open, closed.mesh, file.frame, up);
+  nlohmann::ordered_json files = write_mesh_files(args.output, open, closed.mesh, file.frame, up);
+  write_obj(args.output / "watertight.obj", closed.mesh, file.frame);
+  files["files"].push_back("watertight.obj");
   terminal.end(std::to_string(closed.mesh.faces.size()) + " faces, " +
                (closed.certificate.passed() ? "certified watertight" : "NOT certified"));
   for (const auto& [name, reason] : files["left_out"].items()) {

@@ -48,6 +48,8 @@ assert mesh.is_edge_manifold(allow_boundary_edges=False), "not edge-manifold"
 assert mesh.is_vertex_manifold(), "not vertex-manifold"
 assert mesh.is_orientable(), "not orientable"
 assert mesh.is_watertight(), "not watertight"  # includes: does not intersect itself
+textured = o3d.io.read_triangle_mesh(sys.argv[1] + "/mesh/watertight.obj", True)
+assert sum(not image.is_empty() for image in textured.textures) >= 2, "no texture"
 for name, scale in (("stl", 1000), ("obj", 1)):
     other = o3d.io.read_triangle_mesh(f"{sys.argv[1]}/mesh/watertight.{name}")
     assert len(other.triangles) == len(mesh.triangles), name

@@ -40,6 +40,23 @@ TEST(DracoCompress, KeepsEveryFaceAtEverySpeed) {
   }
 }
 
+TEST(DracoCompress, KeepsTextureCoordinatesWithinATenthOfAPixel) {
+  GlbPrimitive part = sphere();
+  part.colors.clear();
+  for (const Eigen::Vector3f& n : part.normals) {
+    part.texcoords.emplace_back(0.5f + 0.5f * n.x(), 0.5f - 0.5f * n.y());
+  }
+  for (const Eigen::Vector2i& size : {Eigen::Vector2i(16, 9), {504, 378}, {4000, 6000}}) {
+    part.texture_size = size;
+    for (int speed = 0; speed <= 10; speed += 5) {
+      const DracoPrimitive out = draco_compress(part, kGrid, speed);
+      EXPECT_LE(out.max_texture_error, kDracoTextureError);
+      EXPECT_GT(out.max_texture_error, kDracoTextureError / 16);  // no bits wasted
+      EXPECT_EQ(out.attribute_ids.count("TEXCOORD_0"), 1u);
+    }
+  }
+}
+
 TEST(DracoCompress, TakesNonManifoldAndRandomTriangles) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> place(-0.4f, 0.4f);

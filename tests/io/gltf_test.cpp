@@ -5,122 +5,24 @@
 #include <map>
 #include <set>
 
-#include <draco/compression/decode.h>
-#include <draco/mesh/mesh.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "io/mesh_arrays.h"
+#include "io/texture_images.h"
+#include "libcgs/core/srgb.h"
 #include "libcgs/core/up_axis.h"
 #include "tests/support/full_disk.h"
+#include "tests/support/glb_file.h"
 #include "tests/support/sample_mesh.h"
+#include "tests/support/textured_cube.h"
 
 namespace cgs {
 namespace {
 
-/// A primitive as an independent reader of the container finds it.
-struct Part {
-  std::string material;
-  std::vector<std::array<uint32_t, 3>> faces;
-  std::map<std::string, std::vector<std::vector<float>>> values;  // attribute, vertex, component
-};
-
-struct Glb {
-  nlohmann::json json;
-  std::string binary;
-  std::vector<Part> parts;
-};
-
-uint32_t word(const std::string& bytes, size_t offset) {
-  uint32_t value = 0;
-  std::memcpy(&value, bytes.data() + offset, 4);
-  return value;
-}
-
-std::string view_bytes(const Glb& glb, size_t view) {
-  const auto& v = glb.json["bufferViews"][view];
-  return glb.binary.substr(v.value("byteOffset", size_t{0}), v["byteLength"]);
-}
-
-size_t components(const Glb& glb, size_t accessor) {
-  return glb.json["accessors"][accessor]["type"] == "VEC3" ? 3 : 1;
-}
-
-void read_plain(const Glb& glb, const nlohmann::json& primitive, Part& part) {
-  const auto raw = [&](size_t accessor) {
-    return view_bytes(glb, glb.json["accessors"][accessor]["bufferView"]);
-  };
-  const std::string indices = raw(primitive["indices"]);
-  part.faces.resize(indices.size() / 12);
-  std::memcpy(part.faces.data(), indices.data(), indices.size());
-  for (const auto& [name, accessor] : primitive["attributes"].items()) {
-    const size_t n = components(glb, accessor);
-    const std::string bytes = raw(accessor);
-    for (size_t at = 0; at < bytes.size(); at += n * 4) {
-      std::vector<float> value(n);
-      std::memcpy(value.data(), bytes.data() + at, n * 4);
-      part.values[name].push_back(value);
-    }
-  }
-}
-
-void read_draco(const Glb& glb, const nlohmann::json& primitive, Part& part) {
-  const auto& extension = primitive["extensions"]["KHR_draco_mesh_compression"];
-  const std::string bytes = view_bytes(glb, extension["bufferView"]);
-  draco::DecoderBuffer buffer;
-  buffer.Init(bytes.data(), bytes.size());
-  const auto mesh = draco::Decoder().DecodeMeshFromBuffer(&buffer).value();
-  for (uint32_t i = 0; i < mesh->num_faces(); ++i) {
-    const auto& f = mesh->face(draco::FaceIndex(i));
-    part.faces.push_back({f[0].value(), f[1].value(), f[2].value()});
-  }
-  EXPECT_EQ(glb.json["accessors"][primitive["indices"].get<size_t>()]["count"],
-            mesh->num_faces() * 3);
-  for (const auto& [name, accessor] : primitive["attributes"].items()) {
-    const auto* attribute = mesh->GetAttributeByUniqueId(extension["attributes"][name]);
-    ASSERT_NE(attribute, nullptr) << name;
-    const size_t n = components(glb, accessor);
-    ASSERT_EQ(static_cast<size_t>(attribute->num_components()), n) << name;
-    EXPECT_EQ(glb.json["accessors"][accessor.get<size_t>()]["count"], mesh->num_points());
-    for (uint32_t i = 0; i < mesh->num_points(); ++i) {
-      std::vector<float> value(n);
-      attribute->GetMappedValue(draco::PointIndex(i), value.data());
-      part.values[name].push_back(value);
-    }
-  }
-}
-
-Glb parse(const std::string& bytes) {
-  Glb glb;
-  EXPECT_EQ(bytes.substr(0, 4), "glTF");
-  EXPECT_EQ(word(bytes, 4), 2u);
-  EXPECT_EQ(word(bytes, 8), bytes.size());
-  const size_t json_size = word(bytes, 12);
-  EXPECT_EQ(word(bytes, 16), 0x4e4f534au);
-  glb.json = nlohmann::json::parse(bytes.substr(20, json_size));
-  EXPECT_EQ(json_size % 4, 0u);
-  EXPECT_EQ(word(bytes, 24 + json_size), 0x004e4942u);
-  glb.binary = bytes.substr(28 + json_size);
-  EXPECT_EQ(glb.binary.size(), word(bytes, 20 + json_size));
-  for (const auto& primitive : glb.json["meshes"][0]["primitives"]) {
-    Part part;
-    part.material = glb.json["materials"][primitive["material"].get<size_t>()]["name"];
-    if (primitive.contains("extensions")) {
-      read_draco(glb, primitive, part);
-    } else {
-      read_plain(glb, primitive, part);
-    }
-    const auto& bounds = glb.json["accessors"][primitive["attributes"]["POSITION"].get<size_t>()];
-    for (const auto& p : part.values["POSITION"]) {
-      for (size_t k = 0; k < 3; ++k) {
-        EXPECT_GE(p[k], bounds["min"][k].get<float>());
-        EXPECT_LE(p[k], bounds["max"][k].get<float>());
-      }
-    }
-    glb.parts.push_back(part);
-  }
-  return glb;
-}
+using test::Glb;
+using test::in_world;
+using Part = test::GlbPart;
 
 struct Written {
   GlbReport report;
@@ -133,18 +35,8 @@ Written written(const TriangleMesh& mesh, const Frame& frame, const GlbOptions& 
   out.report = write_glb(dir / "a.glb", mesh, frame, options);
   const std::string bytes = test::read_bytes(dir / "a.glb");
   EXPECT_EQ(out.report.bytes, bytes.size());
-  out.glb = parse(bytes);
+  out.glb = test::parse_glb(bytes);
   return out;
-}
-
-/// World coordinates of a position in the file, by what its extras say.
-Eigen::Vector3d in_world(const nlohmann::json& extras, const std::vector<float>& p) {
-  Eigen::Matrix3d R;
-  for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = extras["gltf_from_world"][static_cast<size_t>(i)];
-  Eigen::Vector3d origin;
-  for (int k = 0; k < 3; ++k) origin[k] = extras["origin_in_world"][static_cast<size_t>(k)];
-  const double unit = extras["units"] == "m" ? extras["metres_per_unit"].get<double>() : 1.0;
-  return origin + R.transpose() * Eigen::Vector3d(p[0], p[1], p[2]) / unit;
 }
 
 /// Holds a file against the mesh: every face of the class is there, at its place, turned the same
@@ -352,6 +244,130 @@ TEST(WriteGlb, RefusesWhatItCannotWrite) {
   refused(mesh, {});
   mesh.vertices.assign(mesh.vertices.size(), Eigen::Vector3f::Zero());
   refused(mesh, {});
+  EXPECT_EQ(test::entries(dir.path()), 0);
+}
+
+struct WrittenBox {
+  test::TexturedBox box = test::textured_box();
+  GlbReport report;
+  Glb glb;
+  explicit WrittenBox(const GlbOptions& options, const Frame& frame = {}) {
+    const test::TempDir dir;
+    report = write_glb(dir / "a.glb", box.mesh, box.texture, frame, options);
+    glb = test::parse_glb(test::read_bytes(dir / "a.glb"));
+  }
+};
+
+TEST(WriteTexturedGlb, HasAPrimitiveAndMaterialForEachPhotograph) {
+  for (const bool draco : {false, true}) {
+    const WrittenBox out({.draco = draco});
+    std::vector<std::string> names;
+    for (const Part& part : out.glb.parts) {
+      names.push_back(part.material);
+      const auto& pbr = part.material_json["pbrMetallicRoughness"];
+      EXPECT_EQ(pbr["metallicFactor"], 0) << part.material;
+      EXPECT_EQ(pbr.contains("baseColorTexture"), part.values.count("TEXCOORD_0") == 1);
+      EXPECT_NE(part.values.count("TEXCOORD_0"), part.values.count("COLOR_0"));
+      const bool unlit = part.material_json.contains("extensions") &&
+                         part.material_json["extensions"].contains("KHR_materials_unlit");
+      EXPECT_EQ(unlit, part.material != "inferred") << part.material;
+    }
+    EXPECT_EQ(names,
+              (std::vector<std::string>{"observed left side",
+                                        "observed top",
+                                        "observed front",
+                                        "observed",
+                                        "single view",
+                                        "inferred"}));
+    EXPECT_EQ(out.glb.images.size(), 3u);
+    EXPECT_EQ(out.report.textured_triangles, 600u);
+    EXPECT_EQ(out.report.triangles, 1200u);
+    EXPECT_GT(out.report.texture_bytes, 3000u);
+    const auto& sampler = out.glb.json["samplers"][0];
+    EXPECT_EQ(sampler["wrapS"], 33071);  // clamp to edge
+    const auto required = out.glb.json.value("extensionsRequired", std::vector<std::string>());
+    EXPECT_EQ(std::count(required.begin(), required.end(), "KHR_materials_unlit"), 0);
+  }
+}
+
+TEST(WriteTexturedGlb, TextureCoordinatesAreTheProjections) {
+  for (const bool draco : {false, true}) {
+    const WrittenBox out({.draco = draco}, test::centimetre_frame());
+    const auto images = texture_images(out.box.mesh, out.box.texture, 90);
+    double worst = 0;
+    for (const Part& part : out.glb.parts) {
+      if (part.image < 0) continue;
+      const auto i = static_cast<size_t>(part.image);
+      const Photograph& photograph = out.box.texture.photographs[i];
+      EXPECT_EQ(part.material, "observed " + photograph.name);
+      EXPECT_EQ(out.glb.images[i].width, images[i].size.x());
+      EXPECT_EQ(out.glb.images[i].height, images[i].size.y());
+      for (size_t v = 0; v < part.values.at("TEXCOORD_0").size(); ++v) {
+        // The nearest vertex of the mesh, by trying all.
+        const Eigen::Vector3d p = test::centimetre_frame().internal_from_world(
+            in_world(out.glb.json["asset"]["extras"], part.values.at("POSITION")[v]));
+        Eigen::Vector3d nearest = out.box.mesh.vertices[0].cast<double>();
+        for (const auto& q : out.box.mesh.vertices) {
+          if ((q.cast<double>() - p).norm() < (nearest - p).norm()) nearest = q.cast<double>();
+        }
+        const Eigen::Vector3d expected = photograph.camera.project(nearest);
+        const auto& t = part.values.at("TEXCOORD_0")[v];
+        const Eigen::Vector2d found =
+            images[i].corner.cast<double>() +
+            Eigen::Vector2d(t[0] * double(images[i].size.x()), t[1] * double(images[i].size.y()));
+        worst = std::max(worst, (found - expected.head<2>()).norm());
+      }
+    }
+    EXPECT_LE(worst, 0.1);
+    EXPECT_NEAR(worst, out.report.measured_texture_error, 1e-3);
+    if (!draco) EXPECT_LT(worst, 1e-3);
+  }
+}
+
+TEST(WriteTexturedGlb, LooksLikeTheThingFromAnotherCamera) {
+  // A viewer on one side, rays and the formula of the pattern on the other.
+  const WrittenBox out({});
+  const Camera camera = test::camera_at({-0.55, 0.65, -0.8});
+  const test::GlbPicture picture = test::render_glb(out.glb, camera);
+  const View truth = test::photograph(
+      "truth",
+      camera,
+      {Eigen::AlignedBox3d(Eigen::Vector3d::Constant(-0.2), Eigen::Vector3d::Constant(0.2))});
+  double sum = 0;
+  int count = 0;
+  for (size_t p = 0; p < picture.color.data.size(); ++p) {
+    const int part = picture.part.data[p];
+    if (part < 0 || out.glb.parts[static_cast<size_t>(part)].image < 0) continue;
+    // Far from the edges of the pattern, where a picture of another resolution must agree.
+    const Eigen::Vector3f error = (picture.color.data[p] - truth.image.data[p]).cwiseAbs();
+    sum += error.maxCoeff() < 0.04f ? 1 : 0;
+    ++count;
+  }
+  EXPECT_GT(count, 8000);
+  EXPECT_GT(sum / count, 0.85);  // the rest lies on edges
+}
+
+TEST(WriteTexturedGlb, SharesBordersWithTheUntexturedRest) {
+  const WrittenBox out({});
+  std::set<std::vector<float>> places;
+  for (const Part& part : out.glb.parts) {
+    const auto& p = part.values.at("POSITION");
+    places.insert(p.begin(), p.end());
+  }
+  std::set<std::array<float, 3>> before;
+  for (const auto& v : out.box.mesh.vertices) before.insert({v.x(), v.y(), v.z()});
+  EXPECT_EQ(places.size(), before.size());
+}
+
+TEST(WriteTexturedGlb, RefusesWhatDoesNotFit) {
+  const test::TempDir dir;
+  test::TexturedBox box = test::textured_box();
+  EXPECT_THROW(write_glb(dir / "a.glb", box.mesh, box.texture, {}, {.jpeg_quality = 0}),
+               InvalidInput);
+  EXPECT_THROW(write_glb(dir / "a.glb", box.mesh, box.texture, {}, {.jpeg_quality = 101}),
+               InvalidInput);
+  box.texture.of_face[0] = 3;
+  EXPECT_THROW(write_glb(dir / "a.glb", box.mesh, box.texture, {}), InvalidInput);
   EXPECT_EQ(test::entries(dir.path()), 0);
 }
 

@@ -17,15 +17,6 @@ TEST(ColorByte, RoundsAndClamps) {
   EXPECT_EQ(color_byte(std::nanf("")), 0);
 }
 
-TEST(LinearFromSrgb, AgreesWithTheStandard) {
-  EXPECT_EQ(linear_from_srgb(0), 0.0f);
-  EXPECT_FLOAT_EQ(linear_from_srgb(1), 1.0f);
-  EXPECT_NEAR(linear_from_srgb(0.5f), 0.2140411, 1e-6);
-  EXPECT_NEAR(linear_from_srgb(0.04f), 0.04 / 12.92, 1e-8);
-  EXPECT_EQ(linear_from_srgb(-0.5f), -linear_from_srgb(0.5f));
-  EXPECT_GT(linear_from_srgb(1.5f), 2.0f);
-}
-
 TEST(Millimetres, ConvertsFileCoordinates) {
   const Eigen::Vector3d p =
       millimetres({0.5f, 0, 0}, test::centimetre_frame(), Eigen::Matrix3d::Identity());

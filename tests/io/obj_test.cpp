@@ -7,9 +7,12 @@
 
 #include <gtest/gtest.h>
 
+#include "io/image.h"
 #include "io/mesh_arrays.h"
+#include "io/texture_images.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
+#include "tests/support/textured_cube.h"
 
 namespace cgs {
 namespace {
@@ -86,6 +89,107 @@ TEST(WriteObj, HoldsGeometryColoursAndClasses) {
     EXPECT_NE(test::read_bytes(dir / "a.mtl").find("newmtl " + name + "\n"), std::string::npos);
   }
   EXPECT_EQ(test::entries(dir.path()), 2);
+}
+
+/// A textured OBJ as a plain reader of lines sees it.
+struct TexturedObj {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Eigen::Vector2d> texcoords;
+  struct Corner {
+    size_t vertex = 0;
+    size_t texcoord = 0;  // 0 = none
+  };
+  std::map<std::string, std::vector<Corner>> corners;   // by material
+  std::map<std::string, std::set<std::string>> groups;  // materials by group
+};
+
+TexturedObj parse_textured(const std::string& text) {
+  TexturedObj out;
+  std::istringstream lines(text);
+  std::string material;
+  std::string group;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string keyword;
+    words >> keyword;
+    if (keyword == "v") {
+      Eigen::Vector3d p;
+      words >> p.x() >> p.y() >> p.z();
+      out.vertices.push_back(p);
+    } else if (keyword == "vt") {
+      Eigen::Vector2d t;
+      words >> t.x() >> t.y();
+      out.texcoords.push_back(t);
+    } else if (keyword == "g") {
+      words >> group;
+    } else if (keyword == "usemtl") {
+      words >> material;
+      out.groups[group].insert(material);
+    } else if (keyword == "f") {
+      for (std::string token; words >> token;) {
+        TexturedObj::Corner corner{std::stoul(token), 0};
+        const size_t slash = token.find('/');
+        if (slash != std::string::npos) corner.texcoord = std::stoul(token.substr(slash + 1));
+        out.corners[material].push_back(corner);
+      }
+    }
+  }
+  return out;
+}
+
+TEST(WriteTexturedObj, TextureCoordinatesAreTheProjections) {
+  const test::TempDir dir;
+  const test::TexturedBox box = test::textured_box();
+  write_obj(dir / "a.obj", box.mesh, box.texture, {});
+  const TexturedObj obj = parse_textured(test::read_bytes(dir / "a.obj"));
+  EXPECT_EQ(obj.vertices.size(), box.mesh.vertices.size());
+  EXPECT_EQ(obj.groups.at("observed"),
+            (std::set<std::string>{"view_left_side", "view_top", "view_front", "observed"}));
+  EXPECT_EQ(obj.groups.at("single_view"), std::set<std::string>{"single_view"});
+  EXPECT_EQ(obj.groups.at("inferred"), std::set<std::string>{"inferred"});
+  const std::string materials = test::read_bytes(dir / "a.mtl");
+  const auto images = texture_images(box.mesh, box.texture, 90);
+  size_t i = 0;
+  for (const std::string name : {"left_side", "top", "front"}) {
+    EXPECT_NE(materials.find("newmtl view_" + name + "\n"), std::string::npos);
+    EXPECT_NE(materials.find("map_Kd a." + name + ".jpg\n"), std::string::npos);
+    const ColorImage image = read_image(dir / ("a." + name + ".jpg"));
+    EXPECT_EQ(image.width, images[i].size.x());
+    const auto& corners = obj.corners.at("view_" + name);
+    EXPECT_EQ(corners.size(), 600u);
+    const Camera& camera = box.texture.photographs[i].camera;
+    for (const auto& corner : corners) {
+      const Eigen::Vector2d t = obj.texcoords.at(corner.texcoord - 1);
+      const Eigen::Vector2d pixel =
+          images[i].corner.cast<double>() +
+          Eigen::Vector2d(t.x() * image.width, (1 - t.y()) * image.height);  // v points up
+      const Eigen::Vector3d expected = camera.project(obj.vertices.at(corner.vertex - 1));
+      EXPECT_LT((pixel - expected.head<2>()).norm(), 1e-3);
+    }
+    ++i;
+  }
+  EXPECT_EQ(test::entries(dir.path()), 5);
+}
+
+TEST(WriteTexturedObj, KeepsNamesOfPhotographsApart) {
+  const test::TempDir dir;
+  test::TexturedBox box = test::textured_box();
+  box.texture.photographs[0].name = "a b";
+  box.texture.photographs[1].name = "a_b";
+  box.texture.photographs[2].name = "../a/b";
+  write_obj(dir / "x.obj", box.mesh, box.texture, {});
+  for (const char* name : {"x.a_b.jpg", "x.a_b_.jpg", "x..._a_b.jpg"}) {
+    EXPECT_TRUE(std::filesystem::exists(dir / name)) << name;
+  }
+  EXPECT_EQ(test::entries(dir.path()), 5);
+}
+
+TEST(WriteTexturedObj, LeavesNothingIfTheMeshCannotTakeItsPlace) {
+  const test::TempDir dir;
+  std::filesystem::create_directories(dir / "a.obj");
+  const test::TexturedBox box = test::textured_box();
+  EXPECT_THROW(write_obj(dir / "a.obj", box.mesh, box.texture, {}), IoError);
+  EXPECT_EQ(test::entries(dir.path()), 1);
 }
 
 TEST(WriteObj, LeavesNeitherFileOnAFullDisk) {

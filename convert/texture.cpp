@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/texture.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include <Eigen/Geometry>
+
+#include "io/scene_reader.h"
+#include "meshing/exposure.h"
+#include "meshing/face_views.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+double face_area(const TriangleMesh& mesh, size_t f) {
+  const auto& face = mesh.faces[f];
+  const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
+  return 0.5 * (mesh.vertices[face[1]].cast<double>() - a)
+                   .cross(mesh.vertices[face[2]].cast<double>() - a)
+                   .norm();
+}
+
+// Texture coordinates are interpolated linearly over a face, photographs are perspective: the
+// largest distance between the two at the middles of edges [pixels].
+double largest_stretch(const TriangleMesh& mesh, const PhotoTexture& texture) {
+  double worst = 0;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (texture.of_face[f] < 0) continue;
+    const Camera& camera = texture.photographs[static_cast<size_t>(texture.of_face[f])].camera;
+    for (size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3d a = mesh.vertices[mesh.faces[f].at(k)].cast<double>();
+      const Eigen::Vector3d b = mesh.vertices[mesh.faces[f].at((k + 1) % 3)].cast<double>();
+      const Eigen::Vector2d mean = 0.5 * (camera.project(a) + camera.project(b)).head<2>();
+      const Eigen::Vector2d exact = camera.project(0.5 * (a + b)).head<2>();
+      worst = std::max(worst, (mean - exact).norm());
+    }
+  }
+  return worst;
+}
+
+Json report_of(const TriangleMesh& mesh,
+               const PhotoTexture& texture,
+               const ExposureGains& exposure,
+               const Frame& frame) {
+  const double area_unit = frame.scale * frame.scale;
+  std::vector<size_t> faces(texture.photographs.size(), 0);
+  std::vector<double> area(texture.photographs.size(), 0);
+  size_t faces_without = 0;
+  double area_without = 0;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    const int i = texture.of_face[f];
+    if (i >= 0) {
+      ++faces[static_cast<size_t>(i)];
+      area[static_cast<size_t>(i)] += face_area(mesh, f) * area_unit;
+    } else if (mesh.provenance.empty() || mesh.provenance[f] == Provenance::Observed ||
+               mesh.provenance[f] == Provenance::SingleView) {
+      ++faces_without;
+      area_without += face_area(mesh, f) * area_unit;
+    }
+  }
+  Json views = Json::array();
+  for (size_t i = 0; i < faces.size(); ++i) {
+    const Eigen::Vector3f& gain = exposure.gain[i];
+    views.push_back({{"name", texture.photographs[i].name},
+                     {"faces", faces[i]},
+                     {"area", area[i]},
+                     {"gain", {gain.x(), gain.y(), gain.z()}},
+                     {"samples", exposure.samples[i]}});
+  }
+  return {{"views", views},
+          {"faces_without_view", faces_without},
+          {"area_without_view", area_without},
+          {"largest_stretch", largest_stretch(mesh, texture)},
+          {"units", frame.unit_name()}};
+}
+
+}  // namespace
+
+TexturedFaces texture_from_photographs(const Scene& scene, const TriangleMesh& mesh) {
+  Scene loaded = scene;
+  std::vector<View> views;
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (view.image_path.empty() || !std::filesystem::exists(view.image_path)) {
+      return {{}, {{"left_out", "the photograph of " + view.name + " is missing"}}};
+    }
+  }
+  load_images(loaded, scene.input);
+  for (const int i : scene.input) views.push_back(std::move(loaded.views[static_cast<size_t>(i)]));
+  const FaceScores scores = face_scores(mesh, views);
+  const FaceViews chosen = choose_face_views(mesh, scores);
+  const ExposureGains exposure = exposure_gains(mesh, scores, views);
+  TexturedFaces out;
+  out.texture.of_face = chosen.of_face;
+  for (size_t i = 0; i < views.size(); ++i) {
+    apply_gain(views[i].image, exposure.gain[i]);
+    out.texture.photographs.push_back({views[i].name, views[i].camera, std::move(views[i].image)});
+  }
+  out.report = report_of(mesh, out.texture, exposure, scene.frame);
+  out.report["seam_length"] = chosen.seam_length * scene.frame.scale;
+  out.report["seam_length_unsmoothed"] = chosen.best_seam_length * scene.frame.scale;
+  return out;
+}
+
+}  // namespace cgs
