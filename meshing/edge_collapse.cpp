@@ -55,8 +55,10 @@ struct Placement {
 /// A face of the star after a collapse, relative to its new vertex.
 struct NewFace {
   uint32_t face;
+  uint32_t b, c;  ///< Its other corners.
   Provenance label;
-  Vector3f ab, ac;  ///< To the other corners.
+  Vector3f normal, normal_before;  ///< Unit length; 0 for a face without area.
+  Vector3f ab, ac;                 ///< To the other corners.
   float abab, abac, acac;
   Vector3f color, color_ab, color_ac;  ///< At the new vertex, and differences.
 };
@@ -128,15 +130,17 @@ class Collapser {
   bool one_fan(uint32_t v) const;
   void classify();
   Quadric quadric_around(uint32_t v, const std::vector<Neighbor>& neighbors) const;
-  std::vector<Candidate> candidates();
+  void find_candidates();
   bool may_collapse(uint32_t u, uint32_t v) const;
   Placement placement(uint32_t u, uint32_t v) const;
   size_t pass();
   Outcome collapse(uint32_t a, uint32_t b);
   void gather_star(uint32_t u, uint32_t v);
   bool link_allows(uint32_t u, uint32_t v, bool& border);
+  bool reachable(uint32_t u, uint32_t v, const Vector3f& p) const;
   bool border_allows(uint32_t u, uint32_t v, const Vector3f& p);
   bool faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t);
+  bool folds() const;
   bool witnesses_allow(const Vector3f& p);
   void apply(uint32_t u, uint32_t v, const Placement& to);
   void drop_dead_faces();
@@ -155,8 +159,11 @@ class Collapser {
   std::vector<uint32_t> around_;  // as of the beginning of the pass
   std::vector<Kind> kind_;
   std::vector<Quadric> quadric_;
-  std::vector<uint8_t> used_;      // per vertex: merged in this pass
-  std::vector<uint8_t> changed_;   // per vertex: star changed in the last pass
+  std::vector<uint8_t> used_;     // per vertex: merged in this pass
+  std::vector<uint8_t> changed_;  // per vertex: star changed in the last pass
+  std::vector<float> cost_;       // per slot
+  std::vector<Candidate> candidates_;
+  std::vector<uint32_t> cursor_;   // per vertex: where its next face goes in around_
   std::vector<uint32_t> witness_;  // per face: list of original vertices
   std::vector<uint32_t> next_witness_;
   std::vector<uint32_t> next_on_border_;  // per original border vertex: ring of those merged
@@ -205,9 +212,9 @@ void Collapser::index_faces() {
   }
   for (size_t v = 1; v < first_.size(); ++v) first_[v] += first_[v - 1];
   around_.resize(3 * mesh_.faces.size());
-  std::vector<uint32_t> at(first_.begin(), first_.end() - 1);
+  cursor_.assign(first_.begin(), first_.end() - 1);
   for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
-    for (const uint32_t v : mesh_.faces[f]) around_[at[v]++] = f;
+    for (const uint32_t v : mesh_.faces[f]) around_[cursor_[v]++] = f;
   }
 }
 
@@ -336,9 +343,9 @@ Placement Collapser::placement(uint32_t u, uint32_t v) const {
   return best;
 }
 
-std::vector<Collapser::Candidate> Collapser::candidates() {
+void Collapser::find_candidates() {
   constexpr float kNever = std::numeric_limits<float>::infinity();
-  std::vector<float> cost(3 * mesh_.faces.size(), kNever);
+  cost_.assign(3 * mesh_.faces.size(), kNever);
   tbb::parallel_for(tbb::blocked_range<uint32_t>(0, uint32_t(mesh_.faces.size()), 1024),
                     [&](const auto& r) {
                       for (uint32_t f = r.begin(); f != r.end(); ++f) {
@@ -354,36 +361,32 @@ std::vector<Collapser::Candidate> Collapser::candidates() {
                             refused_[f] &= static_cast<uint8_t>(~bit);
                           if ((refused_[f] & bit) != 0) continue;
                           if (kind_[v] > kind_[u]) std::swap(u, v);
-                          cost[3 * f + k] = float(placement(u, v).cost);
+                          cost_[3 * f + k] = float(placement(u, v).cost);
                         }
                       }
                     });
-  std::vector<Candidate> found;
-  for (uint32_t i = 0; i < cost.size(); ++i) {
-    if (cost[i] < kNever) found.push_back({cost[i], i});
+  candidates_.clear();
+  for (uint32_t i = 0; i < cost_.size(); ++i) {
+    if (cost_[i] < kNever) candidates_.push_back({cost_[i], i});
   }
-  return found;
 }
 
 // Collapses the cheapest part of what may be collapsed.
 size_t Collapser::pass() {
   constexpr double kPart = 0.35;
   constexpr size_t kAtLeast = 1000;
-  std::vector<Candidate> order = candidates();
-  if (order.empty()) return 0;
-  const size_t wanted = std::max(kAtLeast, size_t(kPart * double(order.size())));
-  if (wanted < order.size()) {
-    std::nth_element(order.begin(), order.begin() + ptrdiff_t(wanted), order.end());
-    order.resize(wanted);
-  }
-  tbb::parallel_sort(order.begin(), order.end());
+  find_candidates();
+  const auto wanted = ptrdiff_t(
+      std::min(candidates_.size(), std::max(kAtLeast, size_t(kPart * double(candidates_.size())))));
+  std::nth_element(candidates_.begin(), candidates_.begin() + wanted, candidates_.end());
+  tbb::parallel_sort(candidates_.begin(), candidates_.begin() + wanted);
   used_.assign(mesh_.vertices.size(), 0);
-  for (uint8_t& c : changed_) c = 0;
+  changed_.assign(changed_.size(), 0);
   size_t left = mesh_.faces.size();
-  for (const Candidate& candidate : order) {
+  for (auto at = candidates_.begin(); at != candidates_.begin() + wanted; ++at) {
     if (left <= limits_.target_faces) break;
-    const uint32_t f = candidate.slot / 3;
-    const uint32_t k = candidate.slot % 3;
+    const uint32_t f = at->slot / 3;
+    const uint32_t k = at->slot % 3;
     if (dead_[f] != 0) continue;
     const Outcome outcome = collapse(mesh_.faces[f][k], mesh_.faces[f][(k + 1) % 3]);
     if (outcome == Outcome::Refused) refused_[f] |= static_cast<uint8_t>(1U << k);
@@ -391,7 +394,7 @@ size_t Collapser::pass() {
   }
   drop_dead_faces();
   index_faces();
-  return order.size();
+  return size_t(wanted);
 }
 
 void Collapser::gather_star(uint32_t u, uint32_t v) {
@@ -419,12 +422,8 @@ Collapser::Outcome Collapser::collapse(uint32_t a, uint32_t b) {
   const bool both_on_border = kind_[v] == Kind::Border;
   if (both_on_border != border) return Outcome::Refused;
   const Placement to = placement(u, v);
-  // Keeps the new vertex near the old surface, where the witnesses only keep the old one near the new.
-  const double reach = double(std::max(limits_.tolerance[u], limits_.tolerance[v]));
-  if (!(to.cost <= reach * reach * (quadric_[u].weight() + quadric_[v].weight()))) {
-    return Outcome::Refused;
-  }
   const Vector3f p = (to.point + center_).cast<float>();
+  if (!reachable(u, v, p)) return Outcome::Refused;
   if (border && !border_allows(u, v, p)) return Outcome::Refused;
   if (!faces_allow(u, v, p, to.t) || !witnesses_allow(p)) return Outcome::Refused;
   apply(u, v, to);
@@ -458,6 +457,24 @@ bool Collapser::link_allows(uint32_t u, uint32_t v, bool& border) {
   return std::none_of(moving_.begin(), moving_.end(), [&](uint32_t f) {
     return has(mesh_.faces[f], apex[0]) && has(mesh_.faces[f], apex[1]);
   });
+}
+
+// The new vertex must lie near the old star: witnesses keep the old surface near the new one, this
+// keeps the new one near the old.
+bool Collapser::reachable(uint32_t u, uint32_t v, const Vector3f& p) const {
+  const float reach = 0.5f * std::max(limits_.tolerance[u], limits_.tolerance[v]);
+  const auto near = [&](uint32_t f) {
+    const Face& face = mesh_.faces[f];
+    NewFace old{};
+    old.ab = mesh_.vertices[face[1]] - mesh_.vertices[face[0]];
+    old.ac = mesh_.vertices[face[2]] - mesh_.vertices[face[0]];
+    old.abab = old.ab.squaredNorm();
+    old.abac = old.ab.dot(old.ac);
+    old.acac = old.ac.squaredNorm();
+    return foot_on(old, p - mesh_.vertices[face[0]]).squared_distance <= reach * reach;
+  };
+  return std::any_of(dying_.begin(), dying_.end(), near) ||
+         std::any_of(moving_.begin(), moving_.end(), near);
 }
 
 // Original border vertices stay near the border.
@@ -505,24 +522,21 @@ bool Collapser::faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t) 
     const size_t k = face[0] == u || face[0] == v ? 0 : face[1] == u || face[1] == v ? 1 : 2;
     const uint32_t b = face[(k + 1) % 3];
     const uint32_t c = face[(k + 2) % 3];
-    NewFace fresh{f,
-                  mesh_.provenance[f],
-                  mesh_.vertices[b] - p,
-                  mesh_.vertices[c] - p,
-                  0,
-                  0,
-                  0,
-                  color,
-                  Vector3f::Zero(),
-                  Vector3f::Zero()};
+    NewFace fresh;
+    fresh.face = f;
+    fresh.b = b;
+    fresh.c = c;
+    fresh.label = mesh_.provenance[f];
+    fresh.ab = mesh_.vertices[b] - p;
+    fresh.ac = mesh_.vertices[c] - p;
     fresh.abab = fresh.ab.squaredNorm();
     fresh.abac = fresh.ab.dot(fresh.ac);
     fresh.acac = fresh.ac.squaredNorm();
     if (colored) {
+      fresh.color = color;
       fresh.color_ab = mesh_.colors[b] - color;
       fresh.color_ac = mesh_.colors[c] - color;
     }
-    fresh_.push_back(fresh);
     const Vector3d ab = fresh.ab.cast<double>();
     const Vector3d ac = fresh.ac.cast<double>();
     const Vector3d n = ab.cross(ac);
@@ -530,11 +544,36 @@ bool Collapser::faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t) 
     const double size = n.norm();
     const double size_before = before.norm();
     if (!(size > 0) || n.dot(before) < kLeastCosine * size * size_before) return false;
+    fresh.normal = (n / size).cast<float>();
+    fresh.normal_before = size_before > 0 ? Vector3f((before / size_before).cast<float>())
+                                          : Vector3f(Vector3f::Zero());
+    fresh_.push_back(fresh);
     worst_new = std::min(worst_new, quality(size, ab, ac));
     worst_old = std::min(
         worst_old, quality(size_before, vertex(b) - vertex(face[k]), vertex(c) - vertex(face[k])));
   }
-  return !fresh_.empty() && worst_new >= std::min(kLeastQuality, worst_old);
+  return !fresh_.empty() && worst_new >= std::min(kLeastQuality, worst_old) && !folds();
+}
+
+// Whether neighbours come to lie nearly back to back that did not before: a flap of which no
+// witness knows.
+bool Collapser::folds() const {
+  constexpr float kLeastCosine = -0.5f;
+  for (const NewFace& f : fresh_) {
+    for (const NewFace& g : fresh_) {
+      if (f.c != g.b) continue;
+      const float now = f.normal.dot(g.normal);
+      if (now < kLeastCosine && now < f.normal_before.dot(g.normal_before)) return true;
+    }
+    for (uint32_t i = first_[f.b]; i < first_[f.b + 1]; ++i) {
+      const uint32_t g = around_[i];
+      if (dead_[g] != 0 || g == f.face || !has(mesh_.faces[g], f.c)) continue;
+      const Vector3f n = area_vector(mesh_.faces[g]).cast<float>();
+      const float now = f.normal.dot(n);
+      if (now < kLeastCosine * n.norm() && now < f.normal_before.dot(n)) return true;
+    }
+  }
+  return false;
 }
 
 // Every witness of the old star must be near a new face of its label, in place and colour.

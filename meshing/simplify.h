@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 
 #include "libcgs/core/progress.h"
@@ -14,7 +15,7 @@ struct SimplifyOptions {
                          ///< evidence, both ways [internal units]; > 0.
   double max_error_inferred =
       0;  ///< The same for Inferred faces; 0 = max_error, else >= max_error.
-  double max_color_error = 0.15;  ///< Largest change of a colour channel at an input vertex that is
+  double max_color_error = 0.03;  ///< Largest change of a colour channel at an input vertex that is
                                   ///< not on Inferred faces only; in (0, 1]; 1 = any.
   size_t target_faces = 0;        ///< Stop when so few are left; 0 = as few as the errors allow.
 
