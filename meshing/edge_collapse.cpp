@@ -329,9 +329,11 @@ Placement Collapser::placement(uint32_t u, uint32_t v) const {
     const Vector3d step =
         sum.weight() > 0 ? sum.step_from(middle, kDamping) : Vector3d(Vector3d::Zero());
     consider(step.squaredNorm() <= length ? Vector3d(middle + step) : middle);
-    if (!(step.squaredNorm() <= length)) {
-      consider(a);
-      consider(b);
+    // Damping keeps the optimum a little off sharp corners, where an end may be.
+    const double most = 0.5 * best.cost;
+    for (const Vector3d& end : {a, b}) {
+      const double cost = std::max(0.0, sum.at(end));
+      if (cost < most && cost < best.cost) best = {end, cost, 0};
     }
     if (length > 0) {
       best.t = float(std::clamp((best.point - a).dot(along) / length, 0.0, 1.0));
@@ -454,9 +456,9 @@ bool Collapser::link_allows(uint32_t u, uint32_t v, bool& border) {
       if (w != u && w != v) apex.at(i) = w;
     }
   }
-  return std::none_of(moving_.begin(), moving_.end(), [&](uint32_t f) {
-    return has(mesh_.faces[f], apex[0]) && has(mesh_.faces[f], apex[1]);
-  });
+  return std::count_if(moving_.begin(), moving_.end(), [&](uint32_t f) {
+           return has(mesh_.faces[f], apex[0]) && has(mesh_.faces[f], apex[1]);
+         }) < 2;
 }
 
 // The new vertex must lie near the old star: witnesses keep the old surface near the new one, this
