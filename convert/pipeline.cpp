@@ -13,6 +13,7 @@
 #include "convert/mesh_files.h"
 #include "convert/report.h"
 #include "convert/run_record.h"
+#include "convert/simplification.h"
 #include "convert/texture.h"
 #include "convert/views.h"
 #include "convert/volume_file.h"
@@ -66,6 +67,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
           {"training", settings},
           {"voxel_size", request.voxel_size},
           {"max_error", request.max_error},
+          {"simplify", request.simplify},
           {"input_images", inputs},
           {"cameras", cameras_hash}};
 }
@@ -141,9 +143,14 @@ Json run_mesh(Run& run, const Progress& progress) {
   const Frame& frame = model.scene.frame;
   FusedVolume fused = fuse_model(
       model, run.request.voxel_size, run.request.memory_limit, part_of(progress, 0, 0.3));
-  const TriangleMesh open = open_surface(fused.volume, {});
-  const WatertightResult closed =
-      watertight_surface(fused.volume, {}, part_of(progress, 0.35, 0.85));
+  TriangleMesh open = open_surface(fused.volume, {});
+  WatertightResult closed = watertight_surface(fused.volume, {}, part_of(progress, 0.35, 0.6));
+  const Json simplification =
+      simplify_meshes(open,
+                      closed,
+                      simplify_options(run.request.simplify, fused.volume.voxel_size, frame),
+                      frame,
+                      part_of(progress, 0.6, 0.9));
   write_volume(run.request.output / "volume.vdb", fused.volume, frame);
   const Json files = write_mesh_files(
       run.request.output / "mesh", open, closed.mesh, frame, world_up(model.scene));
@@ -152,6 +159,7 @@ Json run_mesh(Run& run, const Progress& progress) {
   return {{"fusion", fusion_to_json(fused.report, frame)},
           {"method", closed.method},
           {"certificate", certificate_to_json(closed.certificate, closed.mesh, frame)},
+          {"simplification", simplification},
           {"open_surface_faces", open.faces.size()},
           {"output", files}};
 }
@@ -335,6 +343,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   refuse_unreadable_images(scene);
   if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, scene.frame);
   if (!request.max_error.empty()) (void)parse_length(request.max_error, scene.frame);
+  (void)simplify_options(request.simplify, 1, scene.frame);
   make_output_folder(request.output);
   RunRecord record(request.output, request_json(request, scene), request.overwrite);
   Run run{request, std::move(record), std::move(scene), {}, {}};

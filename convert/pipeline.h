@@ -24,6 +24,7 @@ struct RunRequest {
   TrainingOptions training;
   std::string voxel_size;   ///< Empty = from the pixel footprint.
   std::string max_error;    ///< Of the compressed mesh; empty = 1/16384 of its size.
+  std::string simplify;     ///< Largest error of simplification; empty = default, "0" = none.
   size_t memory_limit = 0;  ///< [bytes]; 0 = 80 % of what is free.
   bool overwrite = false;
 };

@@ -135,6 +135,37 @@ std::string certificate_section(const Json& report) {
   return html.str();
 }
 
+std::string simplification_section(const Json& simplification) {
+  if (simplification.is_null()) return "";
+  const auto units = simplification["units"].get<std::string>();
+  const std::string unit = escaped(units == "unknown" ? " units" : ' ' + units);
+  std::ostringstream html;
+  html << "<h2>Simplification</h2>\n<p>Largest distance allowed: "
+       << number(simplification["max_error"]) << unit << " where there is evidence, "
+       << number(simplification["max_error_inferred"]) << unit
+       << " where inferred. Distances are measured by samples, both ways.</p>\n<table>\n"
+          "<tr><th>mesh</th><th>faces before</th><th>after</th><th>max, evidence</th>"
+          "<th>RMS, evidence</th><th>max, inferred</th><th>area observed before</th>"
+          "<th>after</th></tr>\n";
+  for (const auto& [key, name] :
+       {std::pair("watertight", "watertight"), std::pair("open_surface", "open surface")}) {
+    const Json& s = simplification[key];
+    if (s.is_null()) {
+      html << "<tr><td>" << name << "</td><td colspan=7>left as it was</td></tr>\n";
+      continue;
+    }
+    const Json& evidence = s["error_with_evidence"];
+    html << "<tr><td>" << name << "</td><td>" << number(s["faces_before"], "%.0f") << "</td><td>"
+         << number(s["faces_after"], "%.0f") << "</td><td>" << number(evidence["max"]) << unit
+         << "</td><td>" << number(evidence["rms_from_simplified"]) << unit << "</td><td>"
+         << number(s["error_inferred"]["max"]) << unit << "</td><td>"
+         << number(s["area_observed_before"]) << unit << "<sup>2</sup></td><td>"
+         << number(s["area_observed_after"]) << unit << "<sup>2</sup></td></tr>\n";
+  }
+  html << "</table>\n";
+  return html.str();
+}
+
 std::string mesh_section(const std::filesystem::path& folder) {
   return "<h2>Mesh</h2>\n<div class=two>\n" +
          figure(folder / "mesh/front.png", "watertight mesh, from the middle input view") +
@@ -241,10 +272,11 @@ void write_html_report(const std::filesystem::path& folder, const Json& report) 
   for (const Json& warning : report["warnings"]) {
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
   }
-  html << certificate_section(report) << mesh_section(folder)
-       << evaluation_section(report["evaluation"]) << views_section(folder, report)
-       << training_section(report["model"]) << timing_section(report["stages"])
-       << "</body></html>\n";
+  html << certificate_section(report) << simplification_section(report["mesh"]["simplification"])
+       << mesh_section(folder) << evaluation_section(report["evaluation"])
+       << views_section(folder, report) << training_section(report["model"])
+       << timing_section(report["stages"]) << "</body></html>
+";
   write_file(folder / "report.html", html.str());
 }
 

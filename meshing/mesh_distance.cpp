@@ -54,13 +54,14 @@ double face_area(const TriangleMesh& mesh, size_t f) {
 
 }  // namespace
 
-std::vector<Eigen::Vector3f> sample_surface(const TriangleMesh& mesh, size_t count) {
+SurfaceSamples sample_faces(const TriangleMesh& mesh, size_t count) {
   std::vector<double> up_to(mesh.faces.size());
   double sum = 0;
   for (size_t f = 0; f < up_to.size(); ++f) up_to[f] = sum += face_area(mesh, f);
-  std::vector<Eigen::Vector3f> points;
-  if (!(sum > 0)) return points;
-  points.reserve(count);
+  SurfaceSamples samples;
+  if (!(sum > 0)) return samples;
+  samples.points.reserve(count);
+  samples.faces.reserve(count);
   // The two-dimensional golden ratio sequence (Roberts 2018).
   constexpr double kStepX = 0.7548776662466927;
   constexpr double kStepY = 0.5698402909980532;
@@ -79,9 +80,14 @@ std::vector<Eigen::Vector3f> sample_surface(const TriangleMesh& mesh, size_t cou
     const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
     const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>();
     const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>();
-    points.emplace_back((a + u * (b - a) + v * (c - a)).cast<float>());
+    samples.points.emplace_back((a + u * (b - a) + v * (c - a)).cast<float>());
+    samples.faces.push_back(static_cast<uint32_t>(f));
   }
-  return points;
+  return samples;
+}
+
+std::vector<Eigen::Vector3f> sample_surface(const TriangleMesh& mesh, size_t count) {
+  return sample_faces(mesh, count).points;
 }
 
 std::vector<float> distances_to(const TriangleMesh& mesh,

@@ -17,6 +17,15 @@ namespace cgs {
 /// low-discrepancy sequence. Empty if the mesh has no area.
 std::vector<Eigen::Vector3f> sample_surface(const TriangleMesh& mesh, size_t count);
 
+/// Points on a mesh and the faces they lie on.
+struct SurfaceSamples {
+  std::vector<Eigen::Vector3f> points;
+  std::vector<uint32_t> faces;
+};
+
+/// The points of sample_surface() with their faces.
+SurfaceSamples sample_faces(const TriangleMesh& mesh, size_t count);
+
 /// Distance from each point to the nearest point of the mesh [internal units].
 /// \pre mesh has faces.
 std::vector<float> distances_to(const TriangleMesh& mesh,

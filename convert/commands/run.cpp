@@ -65,6 +65,11 @@ void add_run(CLI::App& app) {
   cmd->add_option("--voxel-size",
                   args->request.voxel_size,
                   "Edge of a voxel, e.g. 5mm, or in scene units; default: from the pixel size");
+  cmd->add_option(
+      "--simplify",
+      args->request.simplify,
+      "Largest error of simplified meshes where there is evidence, e.g. 2mm; four times "
+      "that where inferred; default: a quarter of a voxel; 0 = do not simplify");
   cmd->add_option("--max-error",
                   args->request.max_error,
                   "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");

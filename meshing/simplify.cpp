@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/simplify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "libcgs/core/error.h"
+#include "meshing/edge_collapse.h"
+#include "meshing/self_intersections.h"
+
+namespace cgs {
+
+namespace {
+
+bool is_inferred(const TriangleMesh& mesh, size_t f) {
+  return !mesh.provenance.empty() && mesh.provenance[f] == Provenance::Inferred;
+}
+
+// Distances from samples of one mesh to another, by whether the sampled face has evidence.
+struct Measured {
+  std::vector<float> evidence;
+  std::vector<float> inferred;
+  std::vector<uint32_t> too_far;  ///< Faces with a sample beyond the limit, ascending.
+};
+
+Measured measure(const TriangleMesh& from, const TriangleMesh& to, const SimplifyOptions& options) {
+  constexpr size_t kLeast = 10000;
+  constexpr size_t kMost = 300000;
+  const SurfaceSamples samples =
+      sample_faces(from, std::clamp(2 * from.faces.size(), kLeast, kMost));
+  const std::vector<float> distances = distances_to(to, samples.points);
+  Measured out;
+  for (size_t i = 0; i < distances.size(); ++i) {
+    const bool inferred = is_inferred(from, samples.faces[i]);
+    (inferred ? out.inferred : out.evidence).push_back(distances[i]);
+    const double limit = inferred ? options.max_error_inferred : options.max_error;
+    if (double(distances[i]) > limit) out.too_far.push_back(samples.faces[i]);
+  }
+  out.too_far.erase(std::unique(out.too_far.begin(), out.too_far.end()), out.too_far.end());
+  return out;
+}
+
+// The engine keeps input vertices within their tolerance, faces between them reach a little
+// farther.
+constexpr double kMargin = 0.8;
+
+std::vector<float> tolerances(const TriangleMesh& mesh, const SimplifyOptions& options) {
+  std::vector<float> out(mesh.vertices.size(), float(kMargin * options.max_error_inferred));
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (is_inferred(mesh, f)) continue;
+    for (const uint32_t v : mesh.faces[f]) out[v] = float(kMargin * options.max_error);
+  }
+  return out;
+}
+
+// Holds input vertices nearer to the result than in the last round.
+class Tightening {
+ public:
+  Tightening(std::vector<float>& tolerance, double least)
+      : tolerance_(tolerance), least_(least), marked_(tolerance.size(), 0) {}
+
+  void input_face(const TriangleMesh& input, uint32_t f) {
+    for (const uint32_t v : input.faces[f]) marked_[v] = 1;
+  }
+  // The input vertices near a face of the result, or near a neighbour of it if it has none.
+  void output_faces(const CollapsedMesh& output, const std::vector<uint32_t>& faces) {
+    std::vector<uint8_t> bad(output.mesh.faces.size(), 0);
+    std::vector<uint8_t> corner(output.mesh.vertices.size(), 0);
+    for (const uint32_t f : faces) {
+      for (const uint32_t v : output.mesh.faces[f]) corner[v] = 1;
+    }
+    for (size_t f = 0; f < bad.size(); ++f) {
+      const auto& face = output.mesh.faces[f];
+      bad[f] = std::any_of(face.begin(), face.end(), [&](uint32_t v) { return corner[v] != 0; });
+    }
+    for (size_t v = 0; v < marked_.size(); ++v) {
+      const uint32_t f = output.witness_of[v];
+      if (f < bad.size() && bad[f] != 0) marked_[v] = 1;
+    }
+  }
+  /// \return how many vertices changed.
+  size_t apply() {
+    size_t count = 0;
+    for (size_t v = 0; v < marked_.size(); ++v) {
+      if (marked_[v] == 0 || !(tolerance_[v] > 0)) continue;
+      tolerance_[v] *= 0.25f;
+      if (double(tolerance_[v]) < least_) tolerance_[v] = 0;
+      ++count;
+    }
+    return count;
+  }
+
+ private:
+  std::vector<float>& tolerance_;
+  double least_;
+  std::vector<uint8_t> marked_;
+};
+
+// Input vertices on faces of labels with evidence whose area has changed too much.
+bool tighten_for_area(const TriangleMesh& mesh,
+                      const SimplifyResult& result,
+                      std::vector<float>& tolerance) {
+  constexpr double kMostChange = 0.01;
+  std::array<bool, 4> changed{};
+  for (size_t label = 0; label < changed.size(); ++label) {
+    const bool counts = mesh.provenance.empty() || Provenance(label) != Provenance::Inferred;
+    const double change = std::abs(result.area_after[label] - result.area_before[label]);
+    changed[label] = counts && change > kMostChange * result.area_before[label];
+  }
+  std::vector<uint8_t> marked(tolerance.size(), 0);
+  bool any = false;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (!changed[mesh.provenance.empty() ? 0 : size_t(mesh.provenance[f])]) continue;
+    any = true;
+    for (const uint32_t v : mesh.faces[f]) marked[v] = 1;
+  }
+  for (size_t v = 0; v < marked.size(); ++v) {
+    if (marked[v] != 0) tolerance[v] *= 0.5f;
+  }
+  return any;
+}
+
+SimplifyResult unchanged(const TriangleMesh& mesh) {
+  SimplifyResult result;
+  result.mesh = mesh;
+  result.faces_before = result.faces_after = mesh.faces.size();
+  result.area_before = result.area_after = area_by_provenance(mesh);
+  return result;
+}
+
+}  // namespace
+
+void SimplifyOptions::validate() const {
+  require(max_error > 0, "SimplifyOptions.max_error must be > 0", max_error);
+  require(max_error_inferred == 0 || max_error_inferred >= max_error,
+          "SimplifyOptions.max_error_inferred must be 0 or >= max_error",
+          max_error_inferred);
+  require(max_color_error > 0 && max_color_error <= 1,
+          "SimplifyOptions.max_color_error must be in (0, 1]",
+          max_color_error);
+}
+
+SimplifyResult simplify(const TriangleMesh& mesh,
+                        const SimplifyOptions& given,
+                        const Progress& progress) {
+  given.validate();
+  SimplifyOptions options = given;
+  if (options.max_error_inferred == 0) options.max_error_inferred = options.max_error;
+  for (const auto& p : mesh.vertices) {
+    require(p.allFinite(), "simplify needs finite vertices, a coordinate", p.sum());
+  }
+  SimplifyResult result = unchanged(mesh);
+  if (mesh.faces.empty()) return result;
+  CollapseLimits limits{
+      tolerances(mesh, options), float(options.max_color_error), options.target_faces};
+  constexpr int kRounds = 8;
+  for (int round = 1; round <= kRounds; ++round) {
+    report(progress, double(round - 1) / kRounds);
+    const CollapsedMesh out = collapse_edges(mesh, limits);
+    result.rounds = round;
+    result.area_after = area_by_provenance(out.mesh);
+    if (tighten_for_area(mesh, result, limits.tolerance)) continue;
+    Tightening tightening(limits.tolerance, options.max_error / 32);
+    std::vector<uint32_t> bad;
+    for (const auto& [f, g] : self_intersections(out.mesh)) bad.insert(bad.end(), {f, g});
+    const Measured forth = measure(out.mesh, mesh, options);
+    const Measured back = measure(mesh, out.mesh, options);
+    bad.insert(bad.end(), forth.too_far.begin(), forth.too_far.end());
+    if (!bad.empty()) tightening.output_faces(out, bad);
+    for (const uint32_t f : back.too_far) tightening.input_face(mesh, f);
+    if (bad.empty() && back.too_far.empty()) {
+      result.mesh = out.mesh;
+      result.faces_after = out.mesh.faces.size();
+      result.evidence = {statistics(forth.evidence), statistics(back.evidence)};
+      result.inferred = {statistics(forth.inferred), statistics(back.inferred)};
+      report(progress, 1);
+      return result;
+    }
+    const size_t changed = tightening.apply();
+    result.tightened += changed;
+    if (changed == 0) break;
+  }
+  const int rounds = result.rounds;
+  result = unchanged(mesh);
+  result.rounds = rounds;
+  return result;
+}
+
+}  // namespace cgs
