@@ -140,7 +140,8 @@ void optimise(TrainedModel& trained, const ModelRequest& request, const Progress
   }
   save();
   model.gaussians = trainer.model().gaussians();
-  for (size_t k = 0; k < model.priors.size(); ++k) model.priors[k].depth = trainer.model().depth(k);
+  // The depth of the priors stays that of the sweep: meshes and support rest on what was measured,
+  // pictures on what was optimised to look right.
   trained.steps = trainer.history();
 }
 

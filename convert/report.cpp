@@ -275,8 +275,7 @@ void write_html_report(const std::filesystem::path& folder, const Json& report) 
   html << certificate_section(report) << simplification_section(report["mesh"]["simplification"])
        << mesh_section(folder) << evaluation_section(report["evaluation"])
        << views_section(folder, report) << training_section(report["model"])
-       << timing_section(report["stages"]) << "</body></html>
-";
+       << timing_section(report["stages"]) << "</body></html>\n";
   write_file(folder / "report.html", html.str());
 }
 
