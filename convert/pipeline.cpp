@@ -18,6 +18,7 @@
 #include "io/atomic_file.h"
 #include "io/gltf.h"
 #include "io/image.h"
+#include "io/json_file.h"
 #include "io/mesh_ply.h"
 #include "io/png.h"
 #include "libcgs/core/error.h"
@@ -53,7 +54,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     const Eigen::Vector3d c = view.camera.center();
     cameras.push_back({view.name, view.camera.fx, c.x(), c.y(), c.z()});
   }
-  const size_t cameras_hash = std::hash<std::string>{}(cameras.dump());
+  const size_t cameras_hash = std::hash<std::string>{}(json_text(cameras, -1));
   return {{"scene", std::filesystem::weakly_canonical(request.scene).string()},
           {"views", request.scene_options.views},
           {"downscale", request.scene_options.downscale},
@@ -80,7 +81,9 @@ Model& loaded_model(Run& run) {
 const TriangleMesh& loaded_mesh(Run& run) {
   if (!run.mesh) {
     const Frame& frame = loaded_model(run).scene.frame;
-    run.mesh = read_mesh_ply(run.request.output / "mesh/watertight.ply", frame).mesh;
+    const std::filesystem::path path = run.request.output / "mesh/watertight.ply";
+    run.mesh = read_mesh_ply(path, frame).mesh;
+    if (run.mesh->faces.empty()) throw BadInput(Defect::Empty, path, "has no faces");
   }
   return *run.mesh;
 }
@@ -94,9 +97,14 @@ std::vector<int> views_with_photograph(const Scene& scene) {
 
 Json run_model(Run& run, const Progress& progress) {
   const TrainedModel trained = train_model(run.scene, PriorsOptions{}, progress);
+  // Pixels were read for the first time: more may be odd than the cameras told.
+  const std::vector<std::string>& found = trained.model.scene.warnings;
+  const Json warnings(std::vector<std::string>(
+      found.begin() + static_cast<std::ptrdiff_t>(run.scene.warnings.size()), found.end()));
   write_model(run.request.output / "model", trained.model);
   return {{"description", kModelDescription},
           {"gaussians", trained.model.gaussians.size()},
+          {"warnings", warnings},
           {"alignment",
            {{"scale", trained.report.alignment.scale},
             {"offset", trained.report.alignment.offset},
@@ -162,7 +170,7 @@ Json run_web(Run& run, const Progress& progress) {
     options.max_error = parse_length(run.request.max_error, frame) * frame.scale;
   }
   options.summary_json = Json({{"model", kModelDescription},
-                               {"certificate", run.record.result("mesh")["certificate"]}})
+                               {"certificate", run.record.result("mesh").at("certificate")}})
                              .dump();
   make_output_folder(run.request.output / "web");
   const GlbReport glb = write_glb(run.request.output / "web/asset.glb", mesh, frame, options);
@@ -183,6 +191,9 @@ Json report_json(const Run& run) {
         {{"stage", name}, {"seconds", stage["seconds"]}, {"peak_memory", stage["peak_memory"]}});
   }
   const Json mesh = run.record.result("mesh");
+  Json warnings = run.scene.warnings;
+  const Json found = run.record.result("model").value("warnings", Json::array());
+  warnings.insert(warnings.end(), found.begin(), found.end());
   Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
               {"folder", run.request.scene.string()},
@@ -193,11 +204,11 @@ Json report_json(const Run& run) {
               {"views", run.record.result("views")},
               {"evaluation", run.record.result("evaluation")},
               {"mesh", mesh},
-              {"certificate", mesh["certificate"]},
+              {"certificate", mesh.at("certificate")},
               {"web", run.record.result("web")},
               {"photographs", photographs},
               {"stages", stages},
-              {"warnings", run.scene.warnings}};
+              {"warnings", warnings}};
   return out;
 }
 
@@ -205,7 +216,7 @@ Json run_report(Run& run, const Progress& progress) {
   loaded_model(run);
   report(progress, 0);
   const Json json = report_json(run);
-  write_file(run.request.output / "report.json", json.dump(2) + "\n");
+  write_file(run.request.output / "report.json", json_text(json) + "\n");
   write_html_report(run.request.output, json);
   return {{"pages", 1}};
 }
@@ -314,15 +325,9 @@ Json fusion_to_json(const TsdfReport& report, const Frame& frame) {
           {"actual_bytes", report.actual_bytes}};
 }
 
-Json run_pipeline(const RunRequest& request, Terminal& terminal) {
-  Scene scene = open_scene(request.scene, request.scene_options, request.assume_unit);
-  for (const std::string& warning : scene.warnings) terminal.warn(warning);
-  refuse_unreadable_images(scene);
-  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, scene.frame);
-  if (!request.max_error.empty()) (void)parse_length(request.max_error, scene.frame);
-  make_output_folder(request.output);
-  RunRecord record(request.output, request_json(request, scene), request.overwrite);
-  Run run{request, std::move(record), std::move(scene), {}, {}};
+namespace {
+
+Json run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
   for (const Stage& stage : stages_of(run.scene)) {
     if (!stale && run.record.is_done(stage.name, stage.files)) {
@@ -332,9 +337,32 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
     stale = true;
     const Json result = stage.work(run, terminal.begin(stage.title));
     run.record.finish(stage.name, terminal.end(""), result);
+    if (!result.is_object() || !result.contains("warnings")) continue;
+    for (const Json& text : result["warnings"]) terminal.warn(text.get<std::string>());
   }
   loaded_model(run);
   return report_json(run);
+}
+
+}  // namespace
+
+Json run_pipeline(const RunRequest& request, Terminal& terminal) {
+  Scene scene = open_scene(request.scene, request.scene_options, request.assume_unit);
+  for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  refuse_unreadable_images(scene);
+  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, scene.frame);
+  if (!request.max_error.empty()) (void)parse_length(request.max_error, scene.frame);
+  make_output_folder(request.output);
+  const FolderLock lock(request.output);
+  RunRecord record(request.output, request_json(request, scene), request.overwrite);
+  Run run{request, std::move(record), std::move(scene), {}, {}};
+  try {
+    return run_stages(run, terminal);
+  } catch (const Json::exception&) {
+    throw BadInput(Defect::Schema,
+                   request.output / "run.json",
+                   "does not hold what finished stages wrote; say --overwrite to begin anew");
+  }
 }
 
 }  // namespace cgs

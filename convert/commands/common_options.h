@@ -23,6 +23,10 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 /// --views, --downscale and --allow-external.
 void add_scene_options(CLI::App& command, SceneOptions& options);
 
+/// Results must not land on what they are made from.
+/// \throws InvalidInput if `output` is `input` or lies in that folder.
+void keep_apart(const std::filesystem::path& output, const std::filesystem::path& input);
+
 /// Keeps every library within the number of threads for the rest of the program.
 /// \throws InvalidInput if it is negative or above 1024.
 void limit_threads(int threads);

@@ -9,6 +9,7 @@
 #include "convert/mesh_files.h"
 #include "convert/terminal.h"
 #include "convert/volume_file.h"
+#include "io/json_file.h"
 #include "meshing/isosurface.h"
 
 namespace cgs {
@@ -42,7 +43,7 @@ void run_mesh_command(const MeshArgs& args) {
       {"certificate", certificate_to_json(closed.certificate, closed.mesh, file.frame)},
       {"method", closed.method},
       {"output", files}};
-  std::cout << report.dump(2) << "\n";
+  std::cout << json_text(report) << "\n";
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "convert/commands/common_options.h"
 #include "convert/length.h"
 #include "convert/pipeline.h"
+#include "io/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -34,6 +35,7 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
 
 void run_run(const RunArgs& args) {
   limit_threads(args.common.threads);
+  keep_apart(args.request.output, args.request.scene);
   RunRequest request = args.request;
   if (!args.common.memory_limit.empty()) {
     request.memory_limit = parse_bytes(args.common.memory_limit);
@@ -41,7 +43,7 @@ void run_run(const RunArgs& args) {
   if (!request.assume_unit.empty()) (void)metres_in(request.assume_unit);
   Terminal terminal(args.common.quiet);
   const nlohmann::ordered_json report = run_pipeline(request, terminal);
-  if (args.common.json) std::cout << report.dump(2) << "\n";
+  if (args.common.json) std::cout << json_text(report) << "\n";
   say_summary(report, args, terminal);
 }
 

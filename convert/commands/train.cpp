@@ -8,6 +8,7 @@
 #include "convert/commands/common_options.h"
 #include "convert/model.h"
 #include "convert/pipeline.h"
+#include "io/json_file.h"
 
 namespace cgs {
 
@@ -23,18 +24,22 @@ struct TrainArgs {
 
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
+  keep_apart(args.output, args.scene);
   Terminal terminal(args.common.quiet);
   Scene scene = open_scene(args.scene, args.scene_options, args.assume_unit);
-  for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  const size_t known = scene.warnings.size();
+  terminal.warn(scene.warnings);
   const TrainedModel trained =
       train_model(std::move(scene), PriorsOptions{}, terminal.begin("depth and Gaussians"));
+  const std::vector<std::string>& warnings = trained.model.scene.warnings;
+  for (size_t i = known; i < warnings.size(); ++i) terminal.warn(warnings[i]);
   write_model(args.output, trained.model);
   const size_t count = trained.model.gaussians.size();
   const double seconds = terminal.end(std::to_string(count) + " Gaussians");
   if (!args.common.json) return;
   const nlohmann::ordered_json report = {
       {"model", kModelDescription}, {"gaussians", count}, {"seconds", seconds}};
-  std::cout << report.dump(2) << "\n";
+  std::cout << json_text(report) << "\n";
 }
 
 }  // namespace
