@@ -32,6 +32,7 @@ Frame frame_from_json(const nlohmann::ordered_json& json) {
   frame.metres_per_unit = json.at("metres_per_unit").get<double>();
   frame.metres_sigma = json.at("metres_sigma").get<double>();
   frame.scale_source = static_cast<ScaleSource>(json.at("scale_source").get<int>());
+  frame.validate();
   return frame;
 }
 

@@ -16,6 +16,7 @@
 #include "io/content_hash.h"
 #include "io/exr.h"
 #include "io/gaussian_ply.h"
+#include "io/scene_path.h"
 #include "io/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/measured_range.h"
@@ -202,12 +203,14 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
 }
 
 Model read_model(const std::filesystem::path& folder) {
-  if (!std::filesystem::is_directory(folder)) {
+  if (!is_folder(folder)) {
     throw BadInput(Defect::Open, folder, "no such folder; give the model folder of a run");
   }
   Model model;
   model.scene = read_cameras_json(folder / "cameras.json");
-  model.gaussians = read_gaussian_ply(folder / "gaussians.ply", model.scene.frame).gaussians;
+  GaussianFile file = read_gaussian_ply(folder / "gaussians.ply", model.scene.frame);
+  model.gaussians = std::move(file.gaussians);
+  model.scene.warnings = std::move(file.warnings);
   for (const int i : model.scene.input) {
     const View& view = model.scene.views[static_cast<size_t>(i)];
     model.priors.push_back(read_priors(priors_path(folder, view), view.camera));

@@ -21,6 +21,7 @@
 #include "io/content_hash.h"
 #include "io/gltf.h"
 #include "io/image.h"
+#include "io/json_file.h"
 #include "io/mesh_ply.h"
 #include "io/obj.h"
 #include "io/png.h"
@@ -57,7 +58,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     const Eigen::Vector3d c = view.camera.center();
     cameras.push_back({view.name, view.camera.fx, c.x(), c.y(), c.z()});
   }
-  const uint64_t cameras_hash = content_hash(cameras.dump());
+  const uint64_t cameras_hash = content_hash(json_text(cameras, -1));
   Json settings = Json::object();
   for (const auto& [name, value] : training_fields(request.training)) settings[name] = value;
   return {{"scene", std::filesystem::weakly_canonical(request.scene).string()},
@@ -88,7 +89,9 @@ Model& loaded_model(Run& run) {
 const TriangleMesh& loaded_mesh(Run& run) {
   if (!run.mesh) {
     const Frame& frame = loaded_model(run).scene.frame;
-    run.mesh = read_mesh_ply(run.request.output / "mesh/watertight.ply", frame).mesh;
+    const std::filesystem::path path = run.request.output / "mesh/watertight.ply";
+    run.mesh = read_mesh_ply(path, frame).mesh;
+    if (run.mesh->faces.empty()) throw BadInput(Defect::Empty, path, "has no faces");
   }
   return *run.mesh;
 }
@@ -104,9 +107,13 @@ Json run_model(Run& run, const Progress& progress) {
   const std::filesystem::path folder = run.request.output / "model";
   const ModelRequest request = {{}, run.request.training, folder};
   const TrainedModel trained = train_model(run.scene, request, progress);
-  const Json report = training_to_json(trained, request);
+  // Pixels were read for the first time: more may be odd than the cameras told.
+  const std::vector<std::string>& found = trained.model.scene.warnings;
+  Json report = training_to_json(trained, request);
+  report["warnings"] = std::vector<std::string>(
+      found.begin() + static_cast<std::ptrdiff_t>(run.scene.warnings.size()), found.end());
   write_model(folder, trained.model);
-  write_file(folder / "training.json", report.dump(2) + "\n");
+  write_file(folder / "training.json", json_text(report) + "\n");
   return report;
 }
 
@@ -174,8 +181,8 @@ Json run_web(Run& run, const Progress& progress) {
   if (!run.request.max_error.empty()) {
     options.max_error = parse_length(run.request.max_error, frame) * frame.scale;
   }
-  options.summary_json = Json({{"model", run.record.result("model")["description"]},
-                               {"certificate", run.record.result("mesh")["certificate"]}})
+  options.summary_json = Json({{"model", run.record.result("model").at("description")},
+                               {"certificate", run.record.result("mesh").at("certificate")}})
                              .dump();
   make_output_folder(run.request.output / "web");
   const TexturedFaces textured = texture_from_photographs(model.scene, mesh);
@@ -204,6 +211,9 @@ Json report_json(const Run& run) {
         {{"stage", name}, {"seconds", stage["seconds"]}, {"peak_memory", stage["peak_memory"]}});
   }
   const Json mesh = run.record.result("mesh");
+  Json warnings = run.scene.warnings;
+  const Json found = run.record.result("model").value("warnings", Json::array());
+  warnings.insert(warnings.end(), found.begin(), found.end());
   Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
               {"folder", run.request.scene.string()},
@@ -214,11 +224,11 @@ Json report_json(const Run& run) {
               {"views", run.record.result("views")},
               {"evaluation", run.record.result("evaluation")},
               {"mesh", mesh},
-              {"certificate", mesh["certificate"]},
+              {"certificate", mesh.at("certificate")},
               {"web", run.record.result("web")},
               {"photographs", photographs},
               {"stages", stages},
-              {"warnings", run.scene.warnings}};
+              {"warnings", warnings}};
   return out;
 }
 
@@ -226,7 +236,7 @@ Json run_report(Run& run, const Progress& progress) {
   loaded_model(run);
   report(progress, 0);
   const Json json = report_json(run);
-  write_file(run.request.output / "report.json", json.dump(2) + "\n");
+  write_file(run.request.output / "report.json", json_text(json) + "\n");
   write_html_report(run.request.output, json);
   return {{"pages", 1}};
 }
@@ -337,16 +347,9 @@ Json fusion_to_json(const TsdfReport& report, const Frame& frame) {
           {"actual_bytes", report.actual_bytes}};
 }
 
-Json run_pipeline(const RunRequest& request, Terminal& terminal) {
-  Scene scene = open_scene(request.scene, request.scene_options, request.assume_unit);
-  for (const std::string& warning : scene.warnings) terminal.warn(warning);
-  refuse_unreadable_images(scene);
-  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, scene.frame);
-  if (!request.max_error.empty()) (void)parse_length(request.max_error, scene.frame);
-  (void)simplify_options(request.simplify, 1, scene.frame);
-  make_output_folder(request.output);
-  RunRecord record(request.output, request_json(request, scene), request.overwrite);
-  Run run{request, std::move(record), std::move(scene), {}, {}};
+namespace {
+
+Json run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
   for (const Stage& stage : stages_of(run.scene)) {
     if (!stale && run.record.is_done(stage.name, stage.files)) {
@@ -356,10 +359,34 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
     stale = true;
     const Json result = stage.work(run, terminal.begin(stage.title));
     run.record.finish(stage.name, terminal.end(""), result);
+    if (!result.is_object() || !result.contains("warnings")) continue;
+    for (const Json& text : result["warnings"]) terminal.warn(text.get<std::string>());
   }
-  forget_checkpoints(request.output / "model");
+  forget_checkpoints(run.request.output / "model");
   loaded_model(run);
   return report_json(run);
+}
+
+}  // namespace
+
+Json run_pipeline(const RunRequest& request, Terminal& terminal) {
+  Scene scene = open_scene(request.scene, request.scene_options, request.assume_unit);
+  for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  refuse_unreadable_images(scene);
+  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, scene.frame);
+  if (!request.max_error.empty()) (void)parse_length(request.max_error, scene.frame);
+  (void)simplify_options(request.simplify, 1, scene.frame);
+  make_output_folder(request.output);
+  const FolderLock lock(request.output);
+  RunRecord record(request.output, request_json(request, scene), request.overwrite);
+  Run run{request, std::move(record), std::move(scene), {}, {}};
+  try {
+    return run_stages(run, terminal);
+  } catch (const Json::exception&) {
+    throw BadInput(Defect::Schema,
+                   request.output / "run.json",
+                   "does not hold what finished stages wrote; say --overwrite to begin anew");
+  }
 }
 
 }  // namespace cgs

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/run_record.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <utility>
@@ -9,6 +10,8 @@
 #include "io/atomic_file.h"
 #include "io/byte_reader.h"
 #include "io/content_hash.h"
+#include "io/json_file.h"
+#include "io/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -26,15 +29,37 @@ std::string difference(const Json& before, const Json& now) {
   return names;
 }
 
+bool is_stage(const Json& stage) {
+  return stage.is_object() && stage.contains("seconds") && stage["seconds"].is_number() &&
+         stage.contains("peak_memory") && stage["peak_memory"].is_number() &&
+         stage.contains("result");
+}
+
+// The record, or null if the file holds none.
+Json read_record(const std::filesystem::path& path) {
+  Json record;
+  try {
+    (void)read_json(path);  // refuses what is nested too deep to be copied
+    record = Json::parse(read_file(path));
+  } catch (const std::exception&) {
+    return nullptr;
+  }
+  const bool is_record = record.is_object() && record.contains("request") &&
+                         record.contains("stages") && record["stages"].is_object();
+  if (!is_record) return nullptr;
+  const Json& stages = record["stages"];
+  return std::all_of(stages.begin(), stages.end(), is_stage) ? record : Json();
+}
+
 }  // namespace
 
 RunRecord::RunRecord(std::filesystem::path folder, Json request, bool overwrite)
     : folder_(std::move(folder)) {
+  request = Json::parse(json_text(request));  // as it reads back from the file
   const std::filesystem::path path = folder_ / "run.json";
-  if (std::filesystem::exists(path)) {
-    const Json old = Json::parse(read_file(path), nullptr, false);
-    const bool readable = old.is_object() && old.contains("request") && old.contains("stages") &&
-                          old["stages"].is_object();
+  if (is_present(path)) {
+    const Json old = read_record(path);
+    const bool readable = !old.is_null();
     if (readable && old["request"] == request) {
       json_ = old;
       return;
@@ -54,7 +79,7 @@ RunRecord::RunRecord(std::filesystem::path folder, Json request, bool overwrite)
 bool RunRecord::is_done(const std::string& stage, const std::vector<std::string>& files) const {
   if (!json_["stages"].contains(stage)) return false;
   for (const std::string& file : files) {
-    if (!std::filesystem::exists(folder_ / file)) return false;
+    if (!is_present(folder_ / file)) return false;
   }
   return true;
 }
@@ -75,7 +100,7 @@ void RunRecord::finish(const std::string& stage, double seconds, const Json& res
   save();
 }
 
-void RunRecord::save() const { write_file(folder_ / "run.json", json_.dump(2) + "\n"); }
+void RunRecord::save() const { write_file(folder_ / "run.json", json_text(json_) + "\n"); }
 
 std::string file_hash(const std::filesystem::path& file) {
   std::array<char, 17> text{};

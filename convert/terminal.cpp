@@ -63,11 +63,15 @@ double Terminal::end(const std::string& remark) {
 }
 
 void Terminal::say(const std::string& line) const {
-  if (!quiet_) std::fprintf(stderr, "%s\n", line.c_str());
+  if (!quiet_) std::fprintf(stderr, "%s\n", one_line(line).c_str());
 }
 
 void Terminal::warn(const std::string& line) const {
-  std::fprintf(stderr, "cgs: warning: %s\n", line.c_str());
+  std::fprintf(stderr, "cgs: warning: %s\n", one_line(line).c_str());
+}
+
+void Terminal::warn(const std::vector<std::string>& lines) const {
+  for (const std::string& line : lines) warn(line);
 }
 
 void catch_interrupts() {

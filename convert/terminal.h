@@ -27,6 +27,7 @@ class Terminal {
   void say(const std::string& line) const;
   /// One line the user must see even when quiet.
   void warn(const std::string& line) const;
+  void warn(const std::vector<std::string>& lines) const;
 
  private:
   bool quiet_;

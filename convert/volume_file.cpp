@@ -81,6 +81,30 @@ Eigen::AlignedBox3d bounds_of(const openvdb::GridBase& grid, const std::filesyst
   }
 }
 
+// NaN or infinite distances would end the program in the middle of meshing.
+template <typename Grid>
+void require_finite(const Grid& grid, const std::filesystem::path& path) {
+  bool is_good = openvdb::math::isFinite(grid.background());
+  for (auto it = grid.cbeginValueAll(); it && is_good; ++it) {
+    is_good = openvdb::math::isFinite(*it);
+  }
+  if (is_good) return;
+  throw BadInput(Defect::Value, path, "grid '" + grid.getName() + "' holds values not finite");
+}
+
+// The box must be that of the grids: memory is planned for it.
+void check_bounds(const Volume& volume, const std::filesystem::path& path) {
+  constexpr double kMostVoxels = 1 << 20;  // along an axis; also the reach of a tree node path
+  const Eigen::AlignedBox3d& box = volume.bounds;
+  const bool is_box = box.min().allFinite() && box.max().allFinite() && !box.isEmpty();
+  const double reach = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+  if (is_box && reach <= kMostVoxels * volume.voxel_size) return;
+  throw BadInput(
+      Defect::Value,
+      path,
+      "the bounds are no box, or reach further than 2^20 voxels (" + std::string(kBoundsKey) + ")");
+}
+
 template <typename Grid>
 openvdb::GridBase::ConstPtr named(typename Grid::Ptr grid, const char* name) {
   grid->setName(name);
@@ -137,6 +161,11 @@ VolumeFile read_volume(const std::filesystem::path& path) {
   plain.operator()<openvdb::Int32Grid>(volume.state, "state");
   volume.bounds = bounds_of(*tsdf, path);
   volume.voxel_size = static_cast<float>(volume.tsdf->voxelSize().x());
+  check_bounds(volume, path);
+  require_finite(*volume.tsdf, path);
+  require_finite(*volume.weight, path);
+  require_finite(*volume.color, path);
+  require_finite(*volume.support, path);
   return file;
 }
 

@@ -42,6 +42,20 @@ class AtomicFile {
   void flush_buffer();
 };
 
+/// Keeps other programs that also ask for it out of a folder while it lives. It leaves no file
+/// behind and ends with the process, however that ends.
+class FolderLock {
+ public:
+  /// \throws IoError if another process holds it.
+  explicit FolderLock(const std::filesystem::path& folder);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_;
+};
+
 /// Writes a whole file atomically. \throws IoError
 void write_file(const std::filesystem::path& path, std::string_view bytes);
 

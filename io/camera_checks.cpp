@@ -32,6 +32,10 @@ Eigen::Isometry3d checked_pose(const Eigen::Matrix3d& rotation,
   if (!rotation.allFinite() || !translation.allFinite()) {
     refuse(Defect::Value, "the pose contains a value that is not finite");
   }
+  constexpr double kFarthest = 1e12;  // [scene units]: beyond, squares of distances lose the scene
+  if (!(translation.cwiseAbs().maxCoeff() <= kFarthest)) {
+    refuse(Defect::Value, "the camera is further away than " + text(kFarthest));
+  }
   constexpr double kTolerance = 1e-3;
   constexpr double kExactEnough = 1e-12;
   const double residual =
@@ -64,8 +68,9 @@ void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimi
   const uint64_t pixels =
       static_cast<uint64_t>(camera.width) * static_cast<uint64_t>(camera.height);
   if (pixels > limits.max_pixels) {
-    throw LimitError("a camera declares " + std::to_string(pixels) + " pixels, allowed are " +
-                     std::to_string(limits.max_pixels));
+    refuse(Defect::Value,
+           "a camera of " + std::to_string(pixels) + " pixels, allowed are " +
+               std::to_string(limits.max_pixels));
   }
   constexpr double kMaxFocal = 1e6;  // image widths: a view of less than 0.00006 degrees
   for (const auto& [value, name] : {std::pair(camera.fx, "fx"), std::pair(camera.fy, "fy")}) {

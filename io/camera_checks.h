@@ -25,7 +25,7 @@ Eigen::Isometry3d checked_pose(const Eigen::Matrix3d& rotation,
                                const Refuse& refuse);
 
 /// Calls refuse(Value) unless sizes and focal lengths are positive, everything is finite and the
-/// principal point lies within ten image sizes of the image. \throws LimitError above max_pixels.
+/// principal point lies within ten image sizes of the image, and that it has at most max_pixels.
 void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimits& limits = {});
 
 /// Distorted radius as a function of the undistorted one (both in units of the focal length)

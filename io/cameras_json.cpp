@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -84,11 +85,15 @@ void read_frame(const JsonValue& value, Scene& scene) {
   Frame& frame = scene.frame;
   frame.origin = read_vector(value.at("origin"));
   frame.scale = value.at("scale").number();
-  if (!(frame.scale > 0)) value.fail(Defect::Value, "scale must be > 0");
   frame.file_origin = read_vector(value.at("file_origin"));
   frame.metres_per_unit = value.at("metres_per_unit").number();
   frame.metres_sigma = value.at("metres_sigma").number();
   frame.scale_source = read_scale_source(value.at("scale_source"));
+  try {
+    frame.validate();
+  } catch (const InvalidInput& error) {
+    value.fail(Defect::Value, error.what());
+  }
   scene.kind = value.at("kind").text();
   scene.folder = value.at("folder").text();
 }
@@ -103,10 +108,20 @@ Eigen::Vector3d read_position(const JsonValue& entry, const Frame& frame) {
   return frame.file_from_internal(internal) == in_file ? internal : from_file;
 }
 
-View read_view(const JsonValue& entry, const Frame& frame, const ReadLimits& limits) {
+// Files are named after views: a name must not lead into another folder.
+std::string read_name(const JsonValue& value, std::set<std::string>& taken) {
+  std::string name = value.text();
+  const bool is_plain = !name.empty() && name != "." && name != ".." &&
+                        name.find('/') == std::string::npos && name.find('\0') == std::string::npos;
+  if (!is_plain) value.fail(Defect::Path, "a view must have the name of a file without a folder");
+  if (!taken.insert(name).second) value.fail(Defect::Syntax, "two views are named " + name);
+  return name;
+}
+
+View read_view(const JsonValue& entry, const Frame& frame, std::set<std::string>& names) {
   const Refuse refuse = [&](Defect defect, const std::string& why) { entry.fail(defect, why); };
   View view;
-  view.name = entry.at("img_name").text();
+  view.name = read_name(entry.at("img_name"), names);
   Camera& camera = view.camera;
   camera.width = entry.at("width").count();
   camera.height = entry.at("height").count();
@@ -116,7 +131,7 @@ View read_view(const JsonValue& entry, const Frame& frame, const ReadLimits& lim
   const auto cy = entry.find("cy");
   camera.cx = cx ? cx->number() : 0.5 * camera.width;
   camera.cy = cy ? cy->number() : 0.5 * camera.height;
-  check_intrinsics(camera, refuse, limits);
+  check_intrinsics(camera, refuse);
   const JsonValue rotation = entry.at("rotation");
   if (rotation.size() != 3) rotation.fail(Defect::Schema, "expected a 3 x 3 matrix");
   Eigen::Matrix3d R;
@@ -167,9 +182,10 @@ Scene read_cameras_json(const std::filesystem::path& path) {
   scene.kind = "cameras.json";
   scene.folder = path.parent_path();
   if (const auto frame = entries.at(size_t{0}).find("frame")) read_frame(*frame, scene);
+  std::set<std::string> names;
   for (size_t i = 0; i < entries.size(); ++i) {
     const JsonValue entry = entries.at(i);
-    View view = read_view(entry, scene.frame, limits);
+    View view = read_view(entry, scene.frame, names);
     read_image_path(entry, view, scene);
     if (const auto role = entry.find("role")) {
       if (role->text() == "input") scene.input.push_back(static_cast<int>(i));

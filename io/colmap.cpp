@@ -16,8 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 
 bool holds_model(const fs::path& folder, const std::string& extension) {
-  return fs::exists(folder / ("cameras" + extension)) &&
-         fs::exists(folder / ("images" + extension));
+  return is_present(folder / ("cameras" + extension)) &&
+         is_present(folder / ("images" + extension));
 }
 
 // Where the model lies below the scene folder.
@@ -44,12 +44,12 @@ Model read_model(const fs::path& folder, Scene& scene) {
     model.cameras = read_colmap_cameras_binary(folder / "cameras.bin");
     model.images = read_colmap_images_binary(folder / "images.bin");
     const fs::path points = folder / "points3D.bin";
-    if (fs::exists(points)) model.points = read_colmap_points_binary(points);
+    if (is_present(points)) model.points = read_colmap_points_binary(points);
   } else {
     model.cameras = read_colmap_cameras_text(folder / "cameras.txt");
     model.images = read_colmap_images_text(folder / "images.txt");
     const fs::path points = folder / "points3D.txt";
-    if (fs::exists(points)) model.points = read_colmap_points_text(points);
+    if (is_present(points)) model.points = read_colmap_points_text(points);
   }
   return model;
 }
@@ -79,7 +79,7 @@ fs::path photograph(const SceneRoot& root,
     return resolve_in_scene(root, (folder / text).lexically_normal().string(), named_in);
   };
   fs::path path = resolve(name);
-  if (fs::exists(path) || name.find('\\') == std::string::npos) return path;
+  if (is_present(path) || name.find('\\') == std::string::npos) return path;
   std::string with_slashes = name;  // written on Windows
   std::replace(with_slashes.begin(), with_slashes.end(), '\\', '/');
   return resolve(with_slashes);
@@ -98,9 +98,9 @@ View view_of(const SceneRoot& root, const Model& model, const ColmapImage& image
   view.camera = camera->second.camera;
   view.distortion = camera->second.distortion;
   view.camera.world_from_cam = pose_of(image, refuse, scene);
-  const char* const folder = fs::is_directory(root.folder / "images") ? "images" : ".";
+  const char* const folder = is_folder(root.folder / "images") ? "images" : ".";
   const fs::path path = photograph(root, folder, image.name, root.folder);
-  if (fs::exists(path)) {
+  if (is_present(path)) {
     view.image_path = path;
   } else {
     scene.missing.push_back(image.name);

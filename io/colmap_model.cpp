@@ -38,8 +38,7 @@ ColmapCamera camera_from(const CameraModel& model,
                          const Refuse& refuse) {
   constexpr uint64_t kMaxSide = (uint64_t{1} << 31) - 1;
   if (width > kMaxSide || height > kMaxSide) {
-    throw LimitError("a camera declares " + std::to_string(width) + " x " + std::to_string(height) +
-                     " pixels");
+    refuse(Defect::Value, "declares " + std::to_string(width) + " x " + std::to_string(height));
   }
   ColmapCamera out;
   out.camera.width = static_cast<int>(width);
@@ -206,7 +205,7 @@ std::vector<ColmapPoint> read_colmap_points_binary(const std::filesystem::path& 
 
 std::vector<ColmapPoint> read_colmap_points_text(const std::filesystem::path& path) {
   std::error_code ignored;
-  if (std::filesystem::is_regular_file(path) && std::filesystem::file_size(path, ignored) == 0) {
+  if (std::filesystem::file_size(path, ignored) == 0) {
     return {};
   }
   const std::string text = read_file(path);

@@ -12,7 +12,9 @@
 #include <string>
 #include <vector>
 
+#include <fcntl.h>
 #include <opencv2/imgcodecs.hpp>
+#include <unistd.h>
 
 #include "io/image_header.h"
 
@@ -103,6 +105,27 @@ ColorImage read_jpeg(std::string_view bytes,
   return image;
 }
 
+/// Sends standard error nowhere while it lives: the decoders behind OpenCV print their complaints
+/// and offer no way to take them.
+class Silence {
+ public:
+  Silence() : saved_(::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3)) {
+    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (saved_ >= 0 && nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
+    if (nowhere >= 0) ::close(nowhere);
+  }
+  ~Silence() {
+    if (saved_ < 0) return;
+    ::dup2(saved_, STDERR_FILENO);
+    ::close(saved_);
+  }
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+
+ private:
+  int saved_;
+};
+
 cv::Mat decode_with_opencv(std::string_view bytes, const std::filesystem::path& path) {
   const cv::Mat buffer(1,
                        static_cast<int>(bytes.size()),
@@ -110,6 +133,7 @@ cv::Mat decode_with_opencv(std::string_view bytes, const std::filesystem::path& 
                        const_cast<char*>(bytes.data()));  // NOLINT: OpenCV has no const matrix
   cv::Mat pixels;
   try {
+    const Silence silence;
     // Unchanged keeps 16 bits and alpha, and does not apply the orientation tag.
     pixels = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
   } catch (const std::exception&) {

@@ -97,6 +97,10 @@ json read_json(const std::filesystem::path& path, const ReadLimits& limits) {
   }
 }
 
+std::string json_text(const nlohmann::ordered_json& value, int indent) {
+  return value.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
 JsonValue::JsonValue(const json& value, std::filesystem::path path, std::string pointer)
     : value_(&value), path_(std::move(path)), pointer_(std::move(pointer)) {}
 

@@ -20,6 +20,10 @@ namespace cgs {
 /// Source: RFC 8259; a UTF-8 byte order mark is skipped.
 nlohmann::json read_json(const std::filesystem::path& path, const ReadLimits& limits = {});
 
+/// JSON as text, in lines indented by two blanks or, with indent -1, in one line. File names need
+/// not be UTF-8 but JSON has to be: other bytes are replaced.
+std::string json_text(const nlohmann::ordered_json& value, int indent = 2);
+
 /// A value inside a JSON file that knows its file and JSON pointer (RFC 6901), so that every
 /// complaint about it names both. Refers to the document: keep that alive.
 class JsonValue {

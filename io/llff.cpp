@@ -68,7 +68,7 @@ std::vector<View> views_of_rows(const NpyArray& array, const fs::path& path) {
 
 std::string image_folder(const SceneRoot& root) {
   for (const char* name : {"images_8", "images_4", "images_2", "images"}) {
-    if (fs::is_directory(root.folder / name)) return name;
+    if (is_folder(root.folder / name)) return name;
   }
   throw BadInput(Defect::Missing,
                  root.folder,
@@ -99,7 +99,7 @@ void pair_by_index(const SceneRoot& root, const std::string& folder, Scene& scen
     View view = scene.views[row];
     view.name = name;
     const fs::path path = resolve_in_scene(root, (fs::path(folder) / name).string(), index);
-    if (fs::exists(path)) {
+    if (is_present(path)) {
       view.image_path = path;
     } else {
       scene.missing.push_back((fs::path(folder) / name).string());
@@ -112,7 +112,7 @@ void pair_by_index(const SceneRoot& root, const std::string& folder, Scene& scen
 void pair_with_images(const SceneRoot& root, Scene& scene) {
   const std::string folder = image_folder(root);
   const std::vector<fs::path> files = image_files(root, folder);
-  if (files.size() != scene.views.size() && fs::exists(root.folder / "INDEX.txt")) {
+  if (files.size() != scene.views.size() && is_present(root.folder / "INDEX.txt")) {
     pair_by_index(root, folder, scene);
     return;
   }
@@ -132,8 +132,8 @@ void pair_with_images(const SceneRoot& root, Scene& scene) {
 // row i. The points are taken only if nearly all of their observations bear that out.
 void add_sparse_points(Scene& scene) {
   fs::path path = scene.folder / "sparse" / "0" / "points3D.bin";
-  if (!fs::exists(path)) path = scene.folder / "sparse" / "points3D.bin";
-  if (!fs::exists(path)) return;
+  if (!is_present(path)) path = scene.folder / "sparse" / "points3D.bin";
+  if (!is_present(path)) return;
   std::vector<SparsePoint> points;
   size_t observations = 0;
   size_t agreeing = 0;
@@ -168,11 +168,13 @@ void add_sparse_points(Scene& scene) {
 
 }  // namespace
 
-bool is_llff(const fs::path& folder) { return fs::exists(folder / "poses_bounds.npy"); }
+bool is_llff(const fs::path& folder) { return is_present(folder / "poses_bounds.npy"); }
 
 Scene read_llff(const SceneRoot& root) {
   const fs::path path = resolve_in_scene(root, "poses_bounds.npy", root.folder);
-  const NpyArray array = read_npy(path);
+  ReadLimits limits;
+  limits.max_file_bytes = limits.max_header_bytes + limits.max_views * kColumns * sizeof(double);
+  const NpyArray array = read_npy(path, limits);
   if (array.shape.size() != 2 || array.shape[1] != kColumns) {
     std::string shape;
     for (const size_t n : array.shape) shape += (shape.empty() ? "" : ", ") + std::to_string(n);

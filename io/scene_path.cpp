@@ -59,6 +59,16 @@ fs::path resolve_in_scene(const SceneRoot& root, std::string_view name, const fs
   return joined;
 }
 
+bool is_present(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(fs::symlink_status(path, ignored));
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
 bool has_image_extension(const fs::path& path) {
   static constexpr std::array<std::string_view, 6> kKnown = {
       ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"};

@@ -24,6 +24,13 @@ std::filesystem::path resolve_in_scene(const SceneRoot& root,
                                        std::string_view name,
                                        const std::filesystem::path& named_in);
 
+/// True if something has that name, even a link that leads nowhere: reading it tells what is wrong.
+/// Never throws, not for names that are too long or links that go round.
+bool is_present(const std::filesystem::path& path);
+
+/// True if the path leads to a folder; never throws.
+bool is_folder(const std::filesystem::path& path);
+
 /// True for the extensions of image files: .png .jpg .jpeg .tif .tiff .webp, in any case.
 bool has_image_extension(const std::filesystem::path& path);
 

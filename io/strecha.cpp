@@ -36,7 +36,7 @@ std::vector<fs::path> camera_files(const fs::path& folder) {
 std::optional<std::string> camera_folder(const fs::path& folder) {
   if (!camera_files(folder).empty()) return ".";
   for (const fs::path& entry : entries_sorted(folder)) {
-    if (fs::is_directory(entry) && !camera_files(entry).empty()) return entry.filename().string();
+    if (is_folder(entry) && !camera_files(entry).empty()) return entry.filename().string();
   }
   return std::nullopt;
 }
@@ -111,7 +111,7 @@ Scene read_strecha(const SceneRoot& root) {
     for (const std::string& place : {*folder, std::string("images"), std::string(".")}) {
       const fs::path image =
           resolve_in_scene(root, (fs::path(place) / view.name).lexically_normal().string(), path);
-      if (!fs::is_regular_file(image)) continue;
+      if (!is_present(image)) continue;
       view.image_path = image;
       break;
     }

@@ -112,10 +112,11 @@ Eigen::Isometry3d read_pose(const JsonValue& matrix) {
 // The file a frame names, whether or not it exists.
 fs::path photograph(const SceneRoot& root, const std::string& name, const fs::path& json) {
   fs::path path = resolve_in_scene(root, name, json);
-  if (fs::is_regular_file(path)) return path;
+  std::error_code ignored;
+  if (fs::is_regular_file(path, ignored)) return path;
   for (const char* extension : {".png", ".jpg", ".jpeg"}) {
     fs::path candidate = resolve_in_scene(root, name + extension, json);
-    if (fs::is_regular_file(candidate)) return candidate;
+    if (fs::is_regular_file(candidate, ignored)) return candidate;
   }
   return path;
 }
@@ -148,11 +149,11 @@ void check_other_paths(const SceneRoot& root, const JsonValue& object, const fs:
 }  // namespace
 
 bool is_transforms_json(const fs::path& folder) {
-  return fs::exists(folder / "transforms.json") || fs::exists(folder / "transforms_train.json");
+  return is_present(folder / "transforms.json") || is_present(folder / "transforms_train.json");
 }
 
 Scene read_transforms_json(const SceneRoot& root) {
-  const bool has_all = fs::exists(root.folder / "transforms.json");
+  const bool has_all = is_present(root.folder / "transforms.json");
   const char* const file_name = has_all ? "transforms.json" : "transforms_train.json";
   const fs::path path = resolve_in_scene(root, file_name, root.folder);
   const nlohmann::json json = read_json(path);
@@ -175,7 +176,7 @@ Scene read_transforms_json(const SceneRoot& root) {
                                "\" occurs twice; the first was taken");
       continue;
     }
-    if (fs::is_regular_file(image)) {
+    if (is_present(image)) {
       view.image_path = image;
     } else {
       scene.missing.push_back(name);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/commands/common_options.h"
 
+#include <algorithm>
 #include <memory>
 #include <thread>
 
@@ -52,6 +53,18 @@ TrainingOptions training_options(const TrainingArguments& arguments) {
   }
   options.validate();
   return options;
+}
+
+void keep_apart(const std::filesystem::path& output, const std::filesystem::path& input) {
+  std::error_code error;
+  const auto from = std::filesystem::weakly_canonical(input, error);
+  const auto to =
+      error ? std::filesystem::path() : std::filesystem::weakly_canonical(output, error);
+  if (error) return;  // reading or writing tells what is wrong
+  const auto end = std::mismatch(from.begin(), from.end(), to.begin(), to.end()).first;
+  if (end != from.end()) return;
+  throw InvalidInput("the output " + printable(output) + " lies in the input " + printable(input) +
+                     "; choose another place");
 }
 
 void limit_threads(int threads) {

@@ -37,6 +37,10 @@ void add_training_options(CLI::App& command, TrainingArguments& arguments);
 /// The preset with the settings applied. \throws InvalidInput
 TrainingOptions training_options(const TrainingArguments& arguments);
 
+/// Results must not land on what they are made from.
+/// \throws InvalidInput if `output` is `input` or lies in that folder.
+void keep_apart(const std::filesystem::path& output, const std::filesystem::path& input);
+
 /// Keeps every library within the number of threads for the rest of the program.
 /// \throws InvalidInput if it is negative or above 1024.
 void limit_threads(int threads);

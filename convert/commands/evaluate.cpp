@@ -10,6 +10,7 @@
 #include "convert/model.h"
 #include "convert/terminal.h"
 #include "convert/views.h"
+#include "io/json_file.h"
 #include "io/scene_reader.h"
 #include "libcgs/core/error.h"
 
@@ -51,6 +52,7 @@ void run_evaluate(const EvaluateArgs& args) {
   limit_threads(args.common.threads);
   Terminal terminal(args.common.quiet);
   Model model = read_model(args.model);
+  terminal.warn(model.scene.warnings);
   if (!args.scene.empty()) relink_images(model.scene, args.scene);
   const std::vector<int> views =
       args.views.empty() ? model.scene.held_out : select_views(model.scene, args.views);
@@ -60,7 +62,7 @@ void run_evaluate(const EvaluateArgs& args) {
   const nlohmann::ordered_json report = evaluate_views(model, views, terminal.begin("evaluate"));
   terminal.end(std::to_string(views.size()) + " views");
   if (args.common.json) {
-    std::cout << report.dump(2) << "\n";
+    std::cout << json_text(report) << "\n";
   } else {
     print_table(report);
   }

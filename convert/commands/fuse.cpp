@@ -9,6 +9,7 @@
 #include "convert/length.h"
 #include "convert/pipeline.h"
 #include "convert/volume_file.h"
+#include "io/json_file.h"
 
 namespace cgs {
 
@@ -23,15 +24,17 @@ struct FuseArgs {
 
 void run_fuse(const FuseArgs& args) {
   limit_threads(args.common.threads);
+  keep_apart(args.output, args.model);
   Terminal terminal(args.common.quiet);
   const size_t memory =
       args.common.memory_limit.empty() ? 0 : parse_bytes(args.common.memory_limit);
   const Model model = read_model(args.model);
+  terminal.warn(model.scene.warnings);
   const FusedVolume fused = fuse_model(model, args.voxel_size, memory, terminal.begin("fuse"));
   write_volume(args.output, fused.volume, model.scene.frame);
   terminal.end("voxel " + format_length(fused.report.voxel_size, model.scene.frame));
   if (args.common.json) {
-    std::cout << fusion_to_json(fused.report, model.scene.frame).dump(2) << "\n";
+    std::cout << json_text(fusion_to_json(fused.report, model.scene.frame)) << "\n";
   }
 }
 

@@ -10,6 +10,8 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/pipeline.h"
+#include "io/json_file.h"
+#include "libcgs/core/error.h"
 
 namespace cgs {
 
@@ -134,7 +136,7 @@ void print_scene(const Json& info) {
     const double near = c["near"].get<double>();
     std::printf("%5d %-24s %-9s %5d x %-5d %7.1f",
                 c["index"].get<int>(),
-                c["name"].get<std::string>().c_str(),
+                one_line(c["name"].get<std::string>()).c_str(),
                 c["role"].get<std::string>().c_str(),
                 c["width"].get<int>(),
                 c["height"].get<int>(),
@@ -145,24 +147,24 @@ void print_scene(const Json& info) {
   std::printf("\nbaselines between input views:\n");
   for (const Json& row : info["baselines"]) {
     std::printf("  %s - %s: %.4g units, %.1f %% of the depth, %.1f degrees\n",
-                row["views"][0].get<std::string>().c_str(),
-                row["views"][1].get<std::string>().c_str(),
+                one_line(row["views"][0].get<std::string>()).c_str(),
+                one_line(row["views"][1].get<std::string>()).c_str(),
                 row["length"].get<double>(),
                 100 * row["baseline_to_depth"].get<double>(),
                 row["angle_degrees"].get<double>());
   }
   for (const Json& name : info["missing"]) {
-    std::printf("missing: %s\n", name.get<std::string>().c_str());
+    std::printf("missing: %s\n", one_line(name.get<std::string>()).c_str());
   }
   for (const Json& text : info["warnings"]) {
-    std::printf("warning: %s\n", text.get<std::string>().c_str());
+    std::printf("warning: %s\n", one_line(text.get<std::string>()).c_str());
   }
 }
 
 void run_info(const InfoArgs& args) {
   const Json info = scene_json(read_scene(args.scene, args.scene_options));
   if (args.json) {
-    std::cout << info.dump(2) << "\n";
+    std::cout << json_text(info) << "\n";
   } else {
     print_scene(info);
   }

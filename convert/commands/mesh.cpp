@@ -10,6 +10,7 @@
 #include "convert/simplification.h"
 #include "convert/terminal.h"
 #include "convert/volume_file.h"
+#include "io/json_file.h"
 #include "io/obj.h"
 #include "meshing/isosurface.h"
 
@@ -50,7 +51,7 @@ void run_mesh_command(const MeshArgs& args) {
       {"method", closed.method},
       {"simplification", simplification},
       {"output", files}};
-  std::cout << report.dump(2) << "\n";
+  std::cout << json_text(report) << "\n";
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "convert/model.h"
 #include "convert/terminal.h"
 #include "convert/views.h"
+#include "io/json_file.h"
 #include "io/scene_reader.h"
 
 namespace cgs {
@@ -25,15 +26,17 @@ struct RenderArgs {
 
 void run_render(const RenderArgs& args) {
   limit_threads(args.common.threads);
+  keep_apart(args.output, args.model);
   Terminal terminal(args.common.quiet);
   const Model model = read_model(args.model);
+  terminal.warn(model.scene.warnings);
   std::vector<int> views(model.scene.views.size());
   std::iota(views.begin(), views.end(), 0);
   if (!args.views.empty()) views = select_views(model.scene, args.views);
   const nlohmann::ordered_json report =
       write_views(model, views, args.output, terminal.begin("render"));
   terminal.end(std::to_string(views.size()) + " views");
-  if (args.common.json) std::cout << report.dump(2) << "\n";
+  if (args.common.json) std::cout << json_text(report) << "\n";
 }
 
 }  // namespace

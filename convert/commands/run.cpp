@@ -8,6 +8,7 @@
 #include "convert/commands/common_options.h"
 #include "convert/length.h"
 #include "convert/pipeline.h"
+#include "io/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -35,6 +36,7 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
 
 void run_run(const RunArgs& args) {
   limit_threads(args.common.threads);
+  keep_apart(args.request.output, args.request.scene);
   RunRequest request = args.request;
   request.training = training_options(args.training);
   if (!args.common.memory_limit.empty()) {
@@ -43,7 +45,7 @@ void run_run(const RunArgs& args) {
   if (!request.assume_unit.empty()) (void)metres_in(request.assume_unit);
   Terminal terminal(args.common.quiet);
   const nlohmann::ordered_json report = run_pipeline(request, terminal);
-  if (args.common.json) std::cout << report.dump(2) << "\n";
+  if (args.common.json) std::cout << json_text(report) << "\n";
   say_summary(report, args, terminal);
 }
 

@@ -9,6 +9,7 @@
 #include "convert/model.h"
 #include "convert/pipeline.h"
 #include "io/atomic_file.h"
+#include "io/json_file.h"
 
 namespace cgs {
 
@@ -25,19 +26,23 @@ struct TrainArgs {
 
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
+  keep_apart(args.output, args.scene);
   const ModelRequest request = {{}, training_options(args.training), args.output};
   Terminal terminal(args.common.quiet);
   Scene scene = open_scene(args.scene, args.scene_options, args.assume_unit);
-  for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  const size_t known = scene.warnings.size();
+  terminal.warn(scene.warnings);
   const TrainedModel trained =
       train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
+  const std::vector<std::string>& warnings = trained.model.scene.warnings;
+  for (size_t i = known; i < warnings.size(); ++i) terminal.warn(warnings[i]);
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);
-  write_file(args.output / "training.json", report.dump(2) + "\n");
+  write_file(args.output / "training.json", json_text(report) + "\n");
   forget_checkpoints(args.output);
   const size_t count = trained.model.gaussians.size();
   report["seconds"] = terminal.end(std::to_string(count) + " Gaussians");
-  if (args.common.json) std::cout << report.dump(2) << "\n";
+  if (args.common.json) std::cout << json_text(report) << "\n";
 }
 
 }  // namespace

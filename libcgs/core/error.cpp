@@ -23,17 +23,41 @@ std::string_view defect_name(Defect defect) {
   return kNames.at(static_cast<size_t>(defect));
 }
 
+namespace {
+
+void append_escaped(std::string& out, unsigned char byte) {
+  std::array<char, 5> escaped{};
+  std::snprintf(escaped.data(), escaped.size(), "\\x%02x", byte);
+  out += escaped.data();
+}
+
+}  // namespace
+
+Error::Error(int exit_code, const std::string& message)
+    : std::runtime_error(one_line(message)), exit_code_(exit_code) {}
+
+std::string one_line(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7f) {
+      append_escaped(out, byte);
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
 std::string printable(const std::filesystem::path& path) {
   std::string out;
   for (const char c : path.string()) {
     const auto byte = static_cast<unsigned char>(c);
     if (byte >= 0x20 && byte < 0x7f) {
       out += c;
-      continue;
+    } else {
+      append_escaped(out, byte);
     }
-    std::array<char, 5> escaped{};
-    std::snprintf(escaped.data(), escaped.size(), "\\x%02x", byte);
-    out += escaped.data();
   }
   return out;
 }

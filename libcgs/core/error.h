@@ -12,8 +12,8 @@ namespace cgs {
 /// Base of everything this project throws on purpose; main() turns it into an exit code.
 class Error : public std::runtime_error {
  public:
-  Error(int exit_code, const std::string& message)
-      : std::runtime_error(message), exit_code_(exit_code) {}
+  /// Control characters of the message, which may quote a file, are escaped.
+  Error(int exit_code, const std::string& message);
   int exit_code() const { return exit_code_; }
 
  private:
@@ -79,6 +79,9 @@ class Cancelled : public Error {
  public:
   Cancelled() : Error(130, "interrupted") {}
 };
+
+/// Text fit for one line on a terminal: control characters are escaped, other bytes stay.
+std::string one_line(std::string_view text);
 
 /// A path fit for one line on a terminal: control characters and invalid bytes are escaped.
 std::string printable(const std::filesystem::path& path);

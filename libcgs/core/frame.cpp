@@ -16,6 +16,28 @@ std::string scale_source_name(ScaleSource source) {
   return kNames.at(static_cast<size_t>(source));
 }
 
+void Frame::validate() const {
+  constexpr double kFarthest = 1e15;  // [world units]
+  constexpr double kLargest = 1e30;
+  const auto is_near = [](const Eigen::Vector3d& p) {
+    return p.cwiseAbs().maxCoeff() <= kFarthest && p.allFinite();
+  };
+  require(is_near(origin), "Frame.origin must lie within 1e15", origin.transpose());
+  require(is_near(file_origin), "Frame.file_origin must lie within 1e15", file_origin.transpose());
+  require(
+      scale >= 1 / kLargest && scale <= kLargest, "Frame.scale must be in 1e-30 ... 1e30", scale);
+  require(metres_per_unit >= 0 && metres_per_unit <= kLargest,
+          "Frame.metres_per_unit must be in 0 ... 1e30",
+          metres_per_unit);
+  require(metres_sigma >= 0 && metres_sigma <= kLargest,
+          "Frame.metres_sigma must be in 0 ... 1e30",
+          metres_sigma);
+  const int source = static_cast<int>(scale_source);
+  require(source >= 0 && source <= static_cast<int>(ScaleSource::DepthSensor),
+          "Frame.scale_source must be known",
+          source);
+}
+
 std::string Frame::unit_name() const {
   static constexpr std::array<std::pair<double, const char*>, 6> kUnits = {
       {{1.0, "m"}, {1e-2, "cm"}, {1e-3, "mm"}, {1e3, "km"}, {0.0254, "in"}, {0.3048, "ft"}}};

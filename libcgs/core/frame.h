@@ -28,6 +28,9 @@ struct Frame {
   double metres_sigma = 0;  ///< Standard deviation of metres_per_unit; 0 = not estimated.
   ScaleSource scale_source = ScaleSource::Unknown;
 
+  /// \throws InvalidInput naming the first field that no scene can have.
+  void validate() const;
+
   bool has_metric_scale() const { return metres_per_unit > 0; }
   /// "m", "mm", … for a known metres_per_unit of that name, "<x> m" for others, "unknown".
   std::string unit_name() const;

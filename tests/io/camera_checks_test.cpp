@@ -66,7 +66,7 @@ TEST(CheckIntrinsics, RefusesEachFieldOutOfRange) {
   EXPECT_EQ(defect_of([&] { check_intrinsics(empty, refuse); }), "VALUE");
   Camera huge = good;
   huge.width = huge.height = 1 << 20;
-  EXPECT_EQ(defect_of([&] { check_intrinsics(huge, refuse); }), "LIMIT");
+  EXPECT_EQ(defect_of([&] { check_intrinsics(huge, refuse); }), "VALUE");
 }
 
 TEST(FoldRadius, IsWhereTheDistortedRadiusStopsGrowing) {

@@ -50,21 +50,24 @@ void add_poses(Cases& cases) {
   cases.push_back(rows_case("L01", "16 columns", "SCHEMA", {"17"}, [](Rows& rows) {
     for (auto& row : rows) row.pop_back();
   }));
-  cases.push_back(rows_case("L02", "4 rows, 3 images", "MISMATCH", {"4", "3"},
-                            [](Rows& rows) { rows.push_back(rows[0]); }));
+  cases.push_back(rows_case("L02", "4 rows, 3 images", "MISMATCH", {"4", "3"}, [](Rows& rows) {
+    rows.push_back(rows[0]);
+  }));
   cases.push_back(rows_case("L03", "near 0", "VALUE", {"row 1"}, [](Rows& r) { r[1][15] = 0; }));
-  cases.push_back(rows_case("L03", "far < near", "VALUE", {"row 1"}, [](Rows& r) { r[1][16] = 0.5; }));
+  cases.push_back(
+      rows_case("L03", "far < near", "VALUE", {"row 1"}, [](Rows& r) { r[1][16] = 0.5; }));
   cases.push_back(rows_case("L03", "NaN", "VALUE", {"row 1"}, [](Rows& r) { r[1][16] = NAN; }));
-  cases.push_back(rows_case("L03", "focal length Inf", "VALUE", {"row 1"},
-                            [](Rows& r) { r[1][14] = INFINITY; }));
+  cases.push_back(rows_case(
+      "L03", "focal length Inf", "VALUE", {"row 1"}, [](Rows& r) { r[1][14] = INFINITY; }));
   cases.push_back(rows_case("L04", "mirrored", "VALUE", {"row 1"}, [](Rows& r) { r[1][1] = -1; }));
-  cases.push_back(rows_case("L04", "not orthonormal", "VALUE", {"row 1"},
-                            [](Rows& r) { r[1][1] = 1.1; }));
+  cases.push_back(
+      rows_case("L04", "not orthonormal", "VALUE", {"row 1"}, [](Rows& r) { r[1][1] = 1.1; }));
 }
 
 void add_npy(Cases& cases) {
   const std::string good = npy_of_rows(llff_rows());
-  cases.push_back(bytes_case("N01", "wrong magic", "MAGIC", {}, [=] { return "X" + good.substr(1); }));
+  cases.push_back(
+      bytes_case("N01", "wrong magic", "MAGIC", {}, [=] { return "X" + good.substr(1); }));
   cases.push_back(bytes_case("N01", "version 9", "MAGIC", {"9"}, [=] {
     std::string bytes = good;
     bytes[6] = 9;
@@ -76,18 +79,18 @@ void add_npy(Cases& cases) {
   cases.push_back(bytes_case("N03", "header past the end", "TRUNCATED", {}, [] {
     return std::string("\x93NUMPY\x01\x00", 8) + packed(uint16_t{500}) + "{'descr'";
   }));
-  const auto shape = [](const std::string& text) {
-    return npy("<f8", text, data_of(llff_rows()));
-  };
-  cases.push_back(bytes_case("N04", "2^33 x 2^33", "COUNT", {},
-                             [=] { return shape("(8589934592, 8589934592)"); }));
-  cases.push_back(bytes_case("N05", "more than there is", "TRUNCATED", {},
-                             [=] { return shape("(9, 17)"); }));
-  cases.push_back(bytes_case("N06", "digits in groups", "TRUNCATED|SCHEMA", {},
-                             [=] { return shape("(2,621, 401)"); }));
+  const auto shape = [](const std::string& text) { return npy("<f8", text, data_of(llff_rows())); };
+  cases.push_back(bytes_case(
+      "N04", "2^33 x 2^33", "COUNT", {}, [=] { return shape("(8589934592, 8589934592)"); }));
+  cases.push_back(
+      bytes_case("N05", "more than there is", "TRUNCATED", {}, [=] { return shape("(9, 17)"); }));
+  cases.push_back(bytes_case(
+      "N06", "digits in groups", "TRUNCATED|SCHEMA", {}, [=] { return shape("(2,621, 401)"); }));
   for (const char* type : {"|O", "<ixy", "", "<i4"}) {
     cases.push_back(bytes_case(std::string(type) == "|O" ? "N07" : "N08",
-                               std::string("type '") + type + "'", "UNSUPPORTED|SYNTAX", {},
+                               std::string("type '") + type + "'",
+                               "UNSUPPORTED|SYNTAX",
+                               {},
                                [=] { return npy(type, "(3, 17)", data_of(llff_rows())); }));
   }
   cases.push_back(bytes_case("N08", "structured type", "UNSUPPORTED|SYNTAX", {}, [] {

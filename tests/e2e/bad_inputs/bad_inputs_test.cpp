@@ -69,9 +69,20 @@ TEST(BadInputs, Outputs) { expect_all_right(output_cases()); }
 
 // Rows per kind of input, as the matrix numbers them.
 TEST(BadInputs, EveryRowIsTriedOrLeftOutForAReason) {
-  const std::map<char, int> matrix = {{'G', 17}, {'P', 37}, {'C', 29}, {'L', 4},  {'N', 12},
-                                      {'T', 23}, {'I', 16}, {'D', 5},  {'X', 10}, {'B', 16},
-                                      {'V', 6},  {'M', 13}, {'K', 5},  {'E', 8}};
+  const std::map<char, int> matrix = {{'G', 17},
+                                      {'P', 37},
+                                      {'C', 29},
+                                      {'L', 4},
+                                      {'N', 12},
+                                      {'T', 23},
+                                      {'I', 16},
+                                      {'D', 5},
+                                      {'X', 10},
+                                      {'B', 16},
+                                      {'V', 6},
+                                      {'M', 13},
+                                      {'K', 5},
+                                      {'E', 8}};
   std::set<std::string> tried;
   for (const auto& cases : {general_cases,
                             gaussian_cases,
@@ -99,8 +110,8 @@ TEST(BadInputs, EveryRowIsTriedOrLeftOutForAReason) {
       EXPECT_EQ(tried.count(name) + left_out.count(name), 1u) << name;
     }
   }
-  std::printf("rows of the matrix: %zu; tried %zu, left out %zu\n",
-              rows, tried.size(), left_out.size());
+  std::printf(
+      "rows of the matrix: %zu; tried %zu, left out %zu\n", rows, tried.size(), left_out.size());
 }
 
 }  // namespace

@@ -21,7 +21,10 @@ Case model_case(const std::string& row,
           }};
 }
 
-std::string one_camera(int32_t model, const std::vector<double>& p, uint64_t w = 32, uint64_t h = 24) {
+std::string one_camera(int32_t model,
+                       const std::vector<double>& p,
+                       uint64_t w = 32,
+                       uint64_t h = 24) {
   return packed(uint64_t{1}) + colmap_camera(1, model, p, w, h);
 }
 
@@ -43,15 +46,20 @@ void add_cameras(Cases& cases) {
   cases.push_back(model_case("C01", "2^63 cameras", "COUNT", {"cameras.bin"}, [](ColmapFiles& f) {
     f.cameras.replace(0, 8, packed(uint64_t{1} << 63));
   }));
-  cases.push_back(
-      model_case("C02", "cut within the parameters", "TRUNCATED|COUNT", {"cameras.bin"},
-                 [](ColmapFiles& f) { f.cameras.resize(f.cameras.size() - 5); }));
+  cases.push_back(model_case(
+      "C02", "cut within the parameters", "TRUNCATED|COUNT", {"cameras.bin"}, [](ColmapFiles& f) {
+        f.cameras.resize(f.cameras.size() - 5);
+      }));
   for (const int32_t model : {99, -1}) {
-    cases.push_back(model_case("C03", "unknown model", "UNSUPPORTED", {"cameras.bin", "PINHOLE"},
-                               [=](ColmapFiles& f) { f.cameras = one_camera(model, {1, 2, 3, 4}); }));
+    cases.push_back(model_case(
+        "C03", "unknown model", "UNSUPPORTED", {"cameras.bin", "PINHOLE"}, [=](ColmapFiles& f) {
+          f.cameras = one_camera(model, {1, 2, 3, 4});
+        }));
   }
-  cases.push_back(model_case("C04", "width 0", "VALUE", {"cameras.bin", "camera 1"},
-                             [](ColmapFiles& f) { f.cameras = one_camera(1, {30, 30, 16, 12}, 0); }));
+  cases.push_back(
+      model_case("C04", "width 0", "VALUE", {"cameras.bin", "camera 1"}, [](ColmapFiles& f) {
+        f.cameras = one_camera(1, {30, 30, 16, 12}, 0);
+      }));
   cases.push_back(model_case(
       "C04", "height 2^40", "LIMIT|VALUE", {"cameras.bin", "camera"}, [](ColmapFiles& f) {
         f.cameras = one_camera(1, {30, 30, 16, 12}, 32, uint64_t{1} << 40);
@@ -61,8 +69,11 @@ void add_cameras(Cases& cases) {
         f.cameras = one_camera(1, {30, 30, 16, 12}, 1 << 30, 1 << 30);
       }));
   for (const double focal : {0.0, -30.0, kNan, kInf}) {
-    cases.push_back(model_case("C05", "focal length " + std::to_string(focal), "VALUE",
-                               {"cameras.bin", "camera 1", "fx"}, [=](ColmapFiles& f) {
+    cases.push_back(model_case("C05",
+                               "focal length " + std::to_string(focal),
+                               "VALUE",
+                               {"cameras.bin", "camera 1", "fx"},
+                               [=](ColmapFiles& f) {
                                  f.cameras = one_camera(1, {focal, 30, 16, 12});
                                }));
   }
@@ -77,10 +88,10 @@ void add_cameras(Cases& cases) {
     f.images = images([](ColmapImageFields& image) { image.id = 1; });
   }));
   for (const int32_t model : {5, 6}) {
-    cases.push_back(model_case("C22", "fisheye or full OpenCV", "UNSUPPORTED", {"undistort"},
-                               [=](ColmapFiles& f) {
-                                 f.cameras = one_camera(model, {30, 30, 16, 12, 0, 0, 0, 0});
-                               }));
+    cases.push_back(model_case(
+        "C22", "fisheye or full OpenCV", "UNSUPPORTED", {"undistort"}, [=](ColmapFiles& f) {
+          f.cameras = one_camera(model, {30, 30, 16, 12, 0, 0, 0, 0});
+        }));
   }
 }
 
@@ -94,34 +105,53 @@ Case image_case(const std::string& row,
 }
 
 void add_images(Cases& cases) {
+  cases.push_back(model_case(
+      "C07", "a name that never ends", "TRUNCATED|LIMIT|COUNT", {"images.bin"}, [](ColmapFiles& f) {
+        f.images.resize(8 + 4 + 7 * 8 + 4 + 3);
+      }));
   cases.push_back(
-      model_case("C07", "a name that never ends", "TRUNCATED|LIMIT|COUNT", {"images.bin"},
-                 [](ColmapFiles& f) { f.images.resize(8 + 4 + 7 * 8 + 4 + 3); }));
-  cases.push_back(image_case("C07", "a name of 5000 bytes", "LIMIT", {"images.bin"},
-                             [](ColmapImageFields& i) { i.name = std::string(5000, 'a'); }));
-  cases.push_back(image_case("C07", "a name of 3000 bytes", "OK+W|OPEN|PATH|MISSING", {},
-                             [](ColmapImageFields& i) { i.name = std::string(3000, 'a'); }));
-  cases.push_back(image_case("C08", "../../etc/passwd", "PATH", {"etc/passwd"},
-                             [](ColmapImageFields& i) { i.name = "../../etc/passwd"; }));
-  cases.push_back(image_case("C09", "/etc/passwd", "PATH", {"etc/passwd", "absolute"},
-                             [](ColmapImageFields& i) { i.name = "/etc/passwd"; }));
-  cases.push_back(image_case("C10", "backslashes in a name", "OK+W|MISSING", {},
-                             [](ColmapImageFields& i) { i.name = "sub\\1.png"; }));
+      image_case("C07", "a name of 5000 bytes", "LIMIT", {"images.bin"}, [](ColmapImageFields& i) {
+        i.name = std::string(5000, 'a');
+      }));
+  cases.push_back(image_case(
+      "C07", "a name of 3000 bytes", "OK+W|OPEN|PATH|MISSING", {}, [](ColmapImageFields& i) {
+        i.name = std::string(3000, 'a');
+      }));
+  cases.push_back(
+      image_case("C08", "../../etc/passwd", "PATH", {"etc/passwd"}, [](ColmapImageFields& i) {
+        i.name = "../../etc/passwd";
+      }));
+  cases.push_back(image_case(
+      "C09", "/etc/passwd", "PATH", {"etc/passwd", "absolute"}, [](ColmapImageFields& i) {
+        i.name = "/etc/passwd";
+      }));
+  cases.push_back(
+      image_case("C10", "backslashes in a name", "OK+W|MISSING", {}, [](ColmapImageFields& i) {
+        i.name = "sub\\1.png";
+      }));
   cases.push_back(model_case("C11", "2^60 keypoints", "COUNT", {"images.bin"}, [](ColmapFiles& f) {
     f.images.replace(f.images.size() - 32, 8, packed(uint64_t{1} << 60));
   }));
-  cases.push_back(image_case("C12", "camera 9 of 1", "REF", {"1.png", "9"},
-                             [](ColmapImageFields& i) { i.camera = 9; }));
-  cases.push_back(image_case("C13", "rotation 0", "VALUE", {"1.png"},
-                             [](ColmapImageFields& i) { i.rotation = {0, 0, 0, 0}; }));
-  cases.push_back(image_case("C13", "rotation NaN", "VALUE", {"1.png"},
-                             [](ColmapImageFields& i) { i.rotation[2] = kNan; }));
-  cases.push_back(image_case("C13", "rotation of length 1.1", "OK+W", {"1.png"},
-                             [](ColmapImageFields& i) { i.rotation[0] = 1.1; }));
-  cases.push_back(image_case("C13", "translation Inf", "VALUE", {"1.png"},
-                             [](ColmapImageFields& i) { i.translation[0] = kInf; }));
-  cases.push_back(image_case("C15", "keypoint without a 3D point", "OK", {},
-                             [](ColmapImageFields& i) { i.point_of_keypoint = ~uint64_t{0}; }));
+  cases.push_back(image_case(
+      "C12", "camera 9 of 1", "REF", {"1.png", "9"}, [](ColmapImageFields& i) { i.camera = 9; }));
+  cases.push_back(image_case("C13", "rotation 0", "VALUE", {"1.png"}, [](ColmapImageFields& i) {
+    i.rotation = {0, 0, 0, 0};
+  }));
+  cases.push_back(image_case("C13", "rotation NaN", "VALUE", {"1.png"}, [](ColmapImageFields& i) {
+    i.rotation[2] = kNan;
+  }));
+  cases.push_back(
+      image_case("C13", "rotation of length 1.1", "OK+W", {"1.png"}, [](ColmapImageFields& i) {
+        i.rotation[0] = 1.1;
+      }));
+  cases.push_back(
+      image_case("C13", "translation Inf", "VALUE", {"1.png"}, [](ColmapImageFields& i) {
+        i.translation[0] = kInf;
+      }));
+  cases.push_back(
+      image_case("C15", "keypoint without a 3D point", "OK", {}, [](ColmapImageFields& i) {
+        i.point_of_keypoint = ~uint64_t{0};
+      }));
   cases.push_back(model_case("C23", "one image", "EMPTY", {"2"}, [](ColmapFiles& f) {
     f.images = packed(uint64_t{1}) + colmap_image({});
     f.points = packed(uint64_t{1}) + colmap_point({0, 0, 1.5}, {{1, 0}});
@@ -135,55 +165,53 @@ void add_images(Cases& cases) {
       f.images += colmap_image(image);
     }
   }));
-  cases.push_back(model_case("C25", "camera of twice the size", "OK+W", {"scaled"},
-                             [](ColmapFiles& f) {
-                               f.cameras = one_camera(1, {60, 60, 32, 24}, 64, 48);
-                             }));
-  cases.push_back(model_case("C25", "camera of another shape", "MISMATCH", {"32 x 24", "64 x 24"},
-                             [](ColmapFiles& f) {
-                               f.cameras = one_camera(1, {60, 60, 32, 12}, 64, 24);
-                             }));
-  cases.push_back(image_case("C26", "one image missing", "OK+W", {"gone.png"},
-                             [](ColmapImageFields& i) { i.name = "gone.png"; }));
   cases.push_back(
-      {"C26", "all images missing", "MISSING", {"0.png"}, [](const fs::path& folder) {
-         write_colmap_scene(folder);
-         fs::remove_all(folder / "scene/images");
-         return info_call(folder);
-       }});
+      model_case("C25", "camera of twice the size", "OK+W", {"scaled"}, [](ColmapFiles& f) {
+        f.cameras = one_camera(1, {60, 60, 32, 24}, 64, 48);
+      }));
+  cases.push_back(model_case(
+      "C25", "camera of another shape", "MISMATCH", {"32 x 24", "64 x 24"}, [](ColmapFiles& f) {
+        f.cameras = one_camera(1, {60, 60, 32, 12}, 64, 24);
+      }));
+  cases.push_back(
+      image_case("C26", "one image missing", "OK+W", {"gone.png"}, [](ColmapImageFields& i) {
+        i.name = "gone.png";
+      }));
+  cases.push_back({"C26", "all images missing", "MISSING", {"0.png"}, [](const fs::path& folder) {
+                     write_colmap_scene(folder);
+                     fs::remove_all(folder / "scene/images");
+                     return info_call(folder);
+                   }});
 }
 
 void add_points(Cases& cases) {
-  cases.push_back(model_case("C14", "some observations name nothing", "OK+W", {"dropped"},
-                             [](ColmapFiles& f) {
-                               f.points = packed(uint64_t{1}) +
-                                          colmap_point({0, 0, 1.5}, {{1, 0}, {99, 0}, {2, 77}});
-                             }));
+  cases.push_back(
+      model_case("C14", "some observations name nothing", "OK+W", {"dropped"}, [](ColmapFiles& f) {
+        f.points = packed(uint64_t{1}) + colmap_point({0, 0, 1.5}, {{1, 0}, {99, 0}, {2, 77}});
+      }));
   cases.push_back(model_case("C14", "no observation names anything", "REF", {}, [](ColmapFiles& f) {
     f.points = packed(uint64_t{1}) + colmap_point({0, 0, 1.5}, {{98, 0}, {99, 0}});
   }));
-  cases.push_back(model_case("C14", "2^60 observations", "COUNT", {"points3D.bin"},
-                             [](ColmapFiles& f) {
-                               f.points = packed(uint64_t{1}) + colmap_point({0, 0, 1.5}, {{1, 0}});
-                               f.points.replace(f.points.size() - 16, 8, packed(uint64_t{1} << 60));
-                             }));
+  cases.push_back(
+      model_case("C14", "2^60 observations", "COUNT", {"points3D.bin"}, [](ColmapFiles& f) {
+        f.points = packed(uint64_t{1}) + colmap_point({0, 0, 1.5}, {{1, 0}});
+        f.points.replace(f.points.size() - 16, 8, packed(uint64_t{1} << 60));
+      }));
   for (const double x : {kNan, kInf}) {
-    cases.push_back(model_case("C16", "a point that is not finite", "OK+W", {"dropped 1"},
-                               [=](ColmapFiles& f) {
-                                 f.points = packed(uint64_t{2}) +
-                                            colmap_point({x, 0, 1.5}, {{1, 0}}) +
-                                            colmap_point({0, 0, 1.5}, {{1, 0}});
-                               }));
+    cases.push_back(
+        model_case("C16", "a point that is not finite", "OK+W", {"dropped 1"}, [=](ColmapFiles& f) {
+          f.points = packed(uint64_t{2}) + colmap_point({x, 0, 1.5}, {{1, 0}}) +
+                     colmap_point({0, 0, 1.5}, {{1, 0}});
+        }));
   }
   // Depth comes from the photographs here: sparse points are welcome, not needed.
-  cases.push_back(model_case("C17", "0 points", "OK|EMPTY", {}, [](ColmapFiles& f) {
-    f.points = packed(uint64_t{0});
-  }));
-  cases.push_back(model_case("C27", "a point at a camera centre", "OK+W", {"camera centre"},
-                             [](ColmapFiles& f) {
-                               f.points = packed(uint64_t{2}) + colmap_point({0, 0, 0}, {{1, 0}}) +
-                                          colmap_point({0, 0, 1.5}, {{1, 0}});
-                             }));
+  cases.push_back(model_case(
+      "C17", "0 points", "OK|EMPTY", {}, [](ColmapFiles& f) { f.points = packed(uint64_t{0}); }));
+  cases.push_back(model_case(
+      "C27", "a point at a camera centre", "OK+W", {"camera centre"}, [](ColmapFiles& f) {
+        f.points = packed(uint64_t{2}) + colmap_point({0, 0, 0}, {{1, 0}}) +
+                   colmap_point({0, 0, 1.5}, {{1, 0}});
+      }));
 }
 
 Case text_case(const std::string& row,
@@ -210,15 +238,22 @@ Cases colmap_cases() {
                      write_colmap_text_scene(folder);
                      return info_call(folder);
                    }});
-  cases.push_back(text_case("C19", "an image without its keypoints", "SYNTAX", {"images.txt", "line"},
+  cases.push_back(text_case("C19",
+                            "an image without its keypoints",
+                            "SYNTAX",
+                            {"images.txt", "line"},
                             {"images.txt", "1 1 0 0 0 0 0 0 1 0.png\n\n2 1 0 0 0 -1 0 0 1 1.png"}));
-  cases.push_back(text_case("C20", "decimal commas", "SYNTAX", {"cameras.txt", "1:"},
+  cases.push_back(text_case("C20",
+                            "decimal commas",
+                            "SYNTAX",
+                            {"cameras.txt", "1:"},
                             {"cameras.txt", "1 PINHOLE 32 24 30,5 30 16 12\n"}));
-  cases.push_back({"C21", "rigs beside the model", "OK|UNSUPPORTED", {}, [](const fs::path& folder) {
-                     write_colmap_scene(folder);
-                     write_bytes(folder / "scene/sparse/0/rigs.bin", std::string(64, '\1'));
-                     return info_call(folder);
-                   }});
+  cases.push_back(
+      {"C21", "rigs beside the model", "OK|UNSUPPORTED", {}, [](const fs::path& folder) {
+         write_colmap_scene(folder);
+         write_bytes(folder / "scene/sparse/0/rigs.bin", std::string(64, '\1'));
+         return info_call(folder);
+       }});
   return cases;
 }
 

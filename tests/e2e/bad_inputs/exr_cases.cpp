@@ -34,7 +34,8 @@ size_t value_of(const std::string& bytes, const std::string& name, const std::st
 }
 
 void set_window(std::string& bytes, const std::array<int32_t, 4>& window) {
-  bytes.replace(value_of(bytes, "dataWindow", "box2i"), 16,
+  bytes.replace(value_of(bytes, "dataWindow", "box2i"),
+                16,
                 packed(window[0], window[1], window[2], window[3]));
 }
 
@@ -54,7 +55,8 @@ void add_headers(Cases& cases) {
   cases.push_back(exr_case("X01", "wrong magic", "MAGIC", {}, [](auto& b) { b[0] = 'X'; }));
   cases.push_back(exr_case("X01", "version 3", "MAGIC", {"3"}, [](auto& b) { b[4] = 3; }));
   cases.push_back(exr_case("X02", "deep", "UNSUPPORTED", {}, [](auto& b) { b[5] = 0x08; }));
-  cases.push_back(exr_case("X02", "several parts", "UNSUPPORTED", {}, [](auto& b) { b[5] = 0x10; }));
+  cases.push_back(
+      exr_case("X02", "several parts", "UNSUPPORTED", {}, [](auto& b) { b[5] = 0x10; }));
   cases.push_back(exr_case("X03", "window of 1e9 x 64", "LIMIT|SYNTAX", {}, [](auto& b) {
     set_window(b, {0, 0, 999999999, 63});
   }));
@@ -67,15 +69,18 @@ void add_headers(Cases& cases) {
   cases.push_back(exr_case("X03", "window far away", "LIMIT|SYNTAX", {}, [](auto& b) {
     set_window(b, {2000000000, 2000000000, 2000000031, 2000000023});
   }));
-  cases.push_back(exr_case("X03", "window just inside the limit", "TRUNCATED|SYNTAX|LIMIT", {},
-                           [](auto& b) { set_window(b, {0, 0, (1 << 24) - 1, 15}); }));
+  cases.push_back(
+      exr_case("X03", "window just inside the limit", "TRUNCATED|SYNTAX|LIMIT", {}, [](auto& b) {
+        set_window(b, {0, 0, (1 << 24) - 1, 15});
+      }));
   for (const char method : {4, 5, 6, 7, 8, 9}) {
-    cases.push_back(exr_case("X04", "compression " + std::to_string(method), "UNSUPPORTED", {"ZIP"},
-                             [=](auto& b) { b[value_of(b, "compression", "compression")] = method; }));
+    cases.push_back(exr_case(
+        "X04", "compression " + std::to_string(method), "UNSUPPORTED", {"ZIP"}, [=](auto& b) {
+          b[value_of(b, "compression", "compression")] = method;
+        }));
   }
-  cases.push_back(exr_case("X05", "cut in half", "TRUNCATED", {}, [](auto& b) {
-    b.resize(b.size() / 2);
-  }));
+  cases.push_back(
+      exr_case("X05", "cut in half", "TRUNCATED", {}, [](auto& b) { b.resize(b.size() / 2); }));
   cases.push_back(exr_case("X05", "cut by a byte", "TRUNCATED", {}, [](auto& b) { b.pop_back(); }));
   cases.push_back(exr_case("X06", "chunk at the end", "SYNTAX|TRUNCATED", {}, [](auto& b) {
     b.replace(chunk_table(b), 8, packed(uint64_t(b.size())));
@@ -101,17 +106,17 @@ void add_attributes(Cases& cases) {
     }
     bytes = bytes.substr(0, at - 1) + attributes + '\0' + table + bytes.substr(at + 16);
   };
-  cases.push_back(exr_case("X08", "channel Z has another name", "SCHEMA|UNSUPPORTED", {"Z"},
-                           [](auto& b) {
-                             const size_t at = value_of(b, "channels", "chlist");
-                             b[b.find(std::string("Z\0", 2), at)] = 'Q';
-                           }));
+  cases.push_back(
+      exr_case("X08", "channel Z has another name", "SCHEMA|UNSUPPORTED", {"Z"}, [](auto& b) {
+        const size_t at = value_of(b, "channels", "chlist");
+        b[b.find(std::string("Z\0", 2), at)] = 'Q';
+      }));
   for (const char sampling : {0, 2}) {
-    cases.push_back(exr_case("X08", "sampling " + std::to_string(sampling),
-                             "SCHEMA|UNSUPPORTED", {}, [=](auto& b) {
-                               const size_t at = value_of(b, "channels", "chlist");
-                               b[b.find(std::string("Z\0", 2), at) + 2 + 12] = sampling;
-                             }));
+    cases.push_back(exr_case(
+        "X08", "sampling " + std::to_string(sampling), "SCHEMA|UNSUPPORTED", {}, [=](auto& b) {
+          const size_t at = value_of(b, "channels", "chlist");
+          b[b.find(std::string("Z\0", 2), at) + 2 + 12] = sampling;
+        }));
   }
   cases.push_back(exr_case("X09", "attribute of 2^31 - 1 bytes", "LIMIT", {}, [](auto& b) {
     b.replace(value_of(b, "compression", "compression") - 4, 4, packed(int32_t{0x7fffffff}));
@@ -124,8 +129,8 @@ void add_attributes(Cases& cases) {
     insert(b, many);
   }));
   cases.push_back(exr_case("X10", "empty multiView", "SYNTAX", {}, [=](auto& b) {
-    insert(b, std::string("zmultiView").substr(1) + '\0' + "stringvector" + '\0' +
-                  packed(int32_t{0}));
+    insert(b,
+           std::string("zmultiView").substr(1) + '\0' + "stringvector" + '\0' + packed(int32_t{0}));
   }));
   cases.push_back(exr_case("X10", "an attribute more", "OK", {}, [=](auto& b) {
     insert(b, std::string("zz") + '\0' + "int" + '\0' + packed(int32_t{4}, int32_t{7}));
@@ -139,17 +144,17 @@ Cases exr_cases() {
   add_headers(cases);
   add_attributes(cases);
   for (const float value : {NAN, INFINITY, -INFINITY, -1.0f, 0.0f, 1e38f}) {
-    cases.push_back({"X07", "depths of " + std::to_string(value), "OK", {},
-                     [value](const fs::path& folder) {
-                       write_model_folder(folder);
-                       ExrImage image = read_exr(folder / kFile);
-                       for (auto& [name, values] : image.channels) {
-                         if (name != "Z" && name != "sigma.Y") continue;
-                         for (size_t i = 0; i < values.size(); i += 3) values[i] = value;
-                       }
-                       write_exr(folder / kFile, image);
-                       return render_call(folder);
-                     }});
+    cases.push_back(
+        {"X07", "depths of " + std::to_string(value), "OK", {}, [value](const fs::path& folder) {
+           write_model_folder(folder);
+           ExrImage image = read_exr(folder / kFile);
+           for (auto& [name, values] : image.channels) {
+             if (name != "Z" && name != "sigma.Y") continue;
+             for (size_t i = 0; i < values.size(); i += 3) values[i] = value;
+           }
+           write_exr(folder / kFile, image);
+           return render_call(folder);
+         }});
   }
   return cases;
 }

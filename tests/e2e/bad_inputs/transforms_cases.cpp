@@ -49,34 +49,36 @@ void add_documents(Cases& cases) {
   cases.push_back(text_case("T01", "trailing comma", "SYNTAX", {":"}, [](const std::string& text) {
     return with(text, "\"cx\": 16,", "\"cx\": 16,,");
   }));
-  cases.push_back(text_case("T02", "200 000 nested arrays", "LIMIT", {"64"},
-                            [](const std::string&) { return std::string(200000, '['); }));
-  cases.push_back({"T03", "a document of 300 MiB", "LIMIT", {"transforms.json"},
-                   [](const fs::path& folder) {
-                     write_transforms_scene(folder);
-                     fs::resize_file(folder / "scene/transforms.json", 300u << 20);
-                     return info_call(folder);
-                   }});
+  cases.push_back(
+      text_case("T02", "200 000 nested arrays", "LIMIT", {"64"}, [](const std::string&) {
+        return std::string(200000, '[');
+      }));
+  cases.push_back(
+      {"T03", "a document of 300 MiB", "LIMIT", {"transforms.json"}, [](const fs::path& folder) {
+         write_transforms_scene(folder);
+         fs::resize_file(folder / "scene/transforms.json", 300u << 20);
+         return info_call(folder);
+       }});
   for (const char* number : {"NaN", "Infinity", "-Infinity", "1e999", "0x10", "1,5"}) {
-    cases.push_back(text_case("T04", std::string("number ") + number, "SYNTAX|VALUE", {},
-                              [=](const std::string& text) {
-                                return with(text, "\"fl_x\": 30.0", std::string("\"fl_x\": ") + number);
-                              }));
+    cases.push_back(text_case(
+        "T04", std::string("number ") + number, "SYNTAX|VALUE", {}, [=](const std::string& text) {
+          return with(text, "\"fl_x\": 30.0", std::string("\"fl_x\": ") + number);
+        }));
   }
   cases.push_back(text_case("T05", "key twice", "SYNTAX", {"frames"}, [](const std::string& text) {
     return with(text, "\"fl_x\"", "\"frames\": [], \"fl_x\"");
   }));
-  cases.push_back(text_case("T05", "key with control characters twice", "SYNTAX", {},
-                            [](const std::string& text) {
-                              return with(text, "\"fl_x\"",
-                                          "\"\\u001b[31m\\n\": 1, \"\\u001b[31m\\n\": 2, \"fl_x\"");
-                            }));
+  cases.push_back(text_case(
+      "T05", "key with control characters twice", "SYNTAX", {}, [](const std::string& text) {
+        return with(text, "\"fl_x\"", "\"\\u001b[31m\\n\": 1, \"\\u001b[31m\\n\": 2, \"fl_x\"");
+      }));
 }
 
 void add_matrices(Cases& cases) {
   const auto matrix = [&](const char* row, const char* damage, const char* expected, Json value) {
-    cases.push_back(json_case(row, damage, expected, {"/frames/1/transform_matrix"},
-                              [=](Json& d) { d["frames"][1]["transform_matrix"] = value; }));
+    cases.push_back(json_case(row, damage, expected, {"/frames/1/transform_matrix"}, [=](Json& d) {
+      d["frames"][1]["transform_matrix"] = value;
+    }));
   };
   const Json r0 = {1, 0, 0, 0.1};
   const Json r1 = {0, 1, 0, 0};
@@ -108,14 +110,15 @@ void add_paths(Cases& cases) {
   path("T13", std::string(5000, 'a'), "PATH|OPEN|MISSING");
   path("T15", "images/1", "OK");
   path("T15", "images/9", "OK+W");
-  cases.push_back({"T14", "link out of the scene", "PATH", {"link.png"}, [](const fs::path& folder) {
-                     Json document = transforms();
-                     document["frames"][1]["file_path"] = "images/link.png";
-                     write_transforms_scene(folder, document);
-                     write_bytes(folder / "secret.png", picture_png(1));
-                     fs::create_symlink(folder / "secret.png", folder / "scene/images/link.png");
-                     return info_call(folder);
-                   }});
+  cases.push_back(
+      {"T14", "link out of the scene", "PATH", {"link.png"}, [](const fs::path& folder) {
+         Json document = transforms();
+         document["frames"][1]["file_path"] = "images/link.png";
+         write_transforms_scene(folder, document);
+         write_bytes(folder / "secret.png", picture_png(1));
+         fs::create_symlink(folder / "secret.png", folder / "scene/images/link.png");
+         return info_call(folder);
+       }});
   for (const char* key : {"ply_file_path", "depth_file_path", "mask_path"}) {
     cases.push_back(json_case("T23", key, "PATH", {"passwd"}, [=](Json& d) {
       (std::string(key) == "ply_file_path" ? d : d["frames"][0])[key] = "../../etc/passwd";
@@ -124,26 +127,28 @@ void add_paths(Cases& cases) {
 }
 
 void add_cameras(Cases& cases) {
-  cases.push_back(json_case("T16", "no focal length", "SCHEMA", {"fl_x", "camera_angle_x"},
-                            [](Json& d) {
-                              d.erase("fl_x");
-                              d.erase("fl_y");
-                            }));
+  cases.push_back(
+      json_case("T16", "no focal length", "SCHEMA", {"fl_x", "camera_angle_x"}, [](Json& d) {
+        d.erase("fl_x");
+        d.erase("fl_y");
+      }));
   for (const double angle : {0.0, 3.141592653589793, -1.0}) {
-    cases.push_back(json_case("T17", "camera_angle_x " + std::to_string(angle), "VALUE",
-                              {"/camera_angle_x"}, [=](Json& d) {
+    cases.push_back(json_case("T17",
+                              "camera_angle_x " + std::to_string(angle),
+                              "VALUE",
+                              {"/camera_angle_x"},
+                              [=](Json& d) {
                                 d.erase("fl_x");
                                 d["camera_angle_x"] = angle;
                               }));
   }
-  cases.push_back(json_case("T18", "w and h of another size", "MISMATCH", {"64 x 48", "32 x 24"},
-                            [](Json& d) {
-                              d["w"] = 64;
-                              d["h"] = 48;
-                            }));
-  cases.push_back(json_case("T19", "no frames", "EMPTY", {}, [](Json& d) {
-    d["frames"] = Json::array();
-  }));
+  cases.push_back(
+      json_case("T18", "w and h of another size", "MISMATCH", {"64 x 48", "32 x 24"}, [](Json& d) {
+        d["w"] = 64;
+        d["h"] = 48;
+      }));
+  cases.push_back(
+      json_case("T19", "no frames", "EMPTY", {}, [](Json& d) { d["frames"] = Json::array(); }));
   Case one = json_case("T19", "one frame", "EMPTY", {}, [](Json& d) {
     d["frames"].erase(2);
     d["frames"].erase(1);
@@ -153,11 +158,11 @@ void add_cameras(Cases& cases) {
   cases.push_back(json_case("T20", "one file twice", "OK+W", {"twice"}, [](Json& d) {
     d["frames"][1]["file_path"] = "images/0.png";
   }));
-  cases.push_back(json_case("T21", "k1 = -10", "VALUE", {"radius"}, [](Json& d) { d["k1"] = -10; }));
+  cases.push_back(
+      json_case("T21", "k1 = -10", "VALUE", {"radius"}, [](Json& d) { d["k1"] = -10; }));
   for (const Json& w : {Json(std::pow(2.0, 70)), Json(1.5), Json("640"), Json(-32)}) {
-    cases.push_back(json_case("T22", "w = " + w.dump(), "SCHEMA", {"/w"}, [=](Json& d) {
-      d["w"] = w;
-    }));
+    cases.push_back(
+        json_case("T22", "w = " + w.dump(), "SCHEMA", {"/w"}, [=](Json& d) { d["w"] = w; }));
   }
 }
 

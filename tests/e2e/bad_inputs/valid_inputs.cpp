@@ -8,6 +8,8 @@
 #include <fcntl.h>
 #include <sys/file.h>
 
+#include "io/scene_reader.h"
+#include "libcgs/core/error.h"
 #include "tests/support/run_cgs.h"
 
 namespace cgs::test {
@@ -26,7 +28,13 @@ std::string picture_png(int view) {
   return png(kWidth, rows);
 }
 
-Call info_call(const fs::path& folder) { return {{"info", folder / "scene", "--json"}, {}}; }
+Call info_call(const fs::path& folder) {
+  return {{"info", folder / "scene", "--json"}, [folder] {
+            for (const std::string& warning : read_scene(folder / "scene").warnings) {
+              std::fprintf(stderr, "cgs: warning: %s\n", one_line(warning).c_str());
+            }
+          }};
+}
 Call train_call(const fs::path& folder) {
   return {{"train", folder / "scene", "-q", "-o", folder / "out"}, {}};
 }
@@ -41,7 +49,7 @@ Call mesh_call(const fs::path& folder) {
 }
 
 void lock_for_good(const fs::path& path) {
-  const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
+  const int file = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (file < 0 || ::flock(file, LOCK_EX | LOCK_NB) != 0) throw std::runtime_error("cannot lock");
 }
 

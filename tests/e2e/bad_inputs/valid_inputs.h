@@ -26,13 +26,13 @@ inline constexpr double kFocal = 30;
 std::string picture_png(int view);
 
 /// Calls that use the input below `folder`.
-Call info_call(const fs::path& folder);   ///< cgs info scene --json
-Call train_call(const fs::path& folder);  ///< cgs train scene -q -o out
-Call run_call(const fs::path& folder);    ///< cgs run scene -q -o out
-Call render_call(const fs::path& folder); ///< cgs render model -q -o out
-Call mesh_call(const fs::path& folder);   ///< cgs mesh volume.vdb -q -o out
+Call info_call(const fs::path& folder);    ///< cgs info scene --json
+Call train_call(const fs::path& folder);   ///< cgs train scene -q -o out
+Call run_call(const fs::path& folder);     ///< cgs run scene -q -o out
+Call render_call(const fs::path& folder);  ///< cgs render model -q -o out
+Call mesh_call(const fs::path& folder);    ///< cgs mesh volume.vdb -q -o out
 
-/// Holds a lock on a file until this process ends, as a running program would.
+/// Holds a lock on a folder until this process ends, as a running program would.
 void lock_for_good(const fs::path& path);
 
 /// transforms.json as a document, for a case to change and write.
@@ -79,7 +79,7 @@ void write_finished_run(const fs::path& folder);  ///< scene, and out with every
 /// PLY of Gaussians.
 struct SplatPly {
   std::string format = "binary_little_endian";
-  std::string before_elements;  ///< More header lines.
+  std::string before_elements;                                  ///< More header lines.
   std::vector<std::pair<std::string, std::string>> properties;  ///< type, name
   std::vector<std::vector<double>> rows;
   std::string count;  ///< As declared; empty = the number of rows.
