@@ -13,9 +13,7 @@ namespace cgs {
 
 namespace {
 
-constexpr size_t kShapeSize = 7;     // three log radii, four quaternion components
-constexpr float kMinLogRadius = -6;  // of a pixel: far below anything visible
-constexpr float kMaxLogRadius = 4;
+constexpr size_t kShapeSize = 7;  // three log radii, four quaternion components
 
 float sigmoid(float x) {
   const float e = std::exp(-std::abs(x));
@@ -37,10 +35,16 @@ void for_each_gaussian(const std::vector<int>& pixels, const Work& work) {
   });
 }
 
-Eigen::Vector3f shape_scale(const float* shape, float unit) {
-  return {unit * std::exp(std::clamp(shape[0], kMinLogRadius, kMaxLogRadius)),
-          unit * std::exp(std::clamp(shape[1], kMinLogRadius, kMaxLogRadius)),
-          unit * std::exp(std::clamp(shape[2], kMinLogRadius, kMaxLogRadius))};
+// Keeps log radii within bounds, so that no optimiser piles up steps beyond them.
+Eigen::Vector3f bounded_scale(float* shape, const CoherenceOptions& options, float unit) {
+  const float least = std::log(options.min_radius);
+  const float most = std::log(options.max_radius);
+  Eigen::Vector3f scale;
+  for (int axis = 0; axis < 3; ++axis) {
+    shape[axis] = std::clamp(shape[axis], least, most);
+    scale[axis] = unit * std::exp(shape[axis]);
+  }
+  return scale;
 }
 
 }  // namespace
@@ -52,6 +56,12 @@ void CoherenceOptions::validate() const {
   require(max_logit_change > 0 && std::isfinite(max_logit_change),
           "CoherenceOptions.max_logit_change must be > 0",
           max_logit_change);
+  require(min_radius > 0 && min_radius <= radius_factor,
+          "CoherenceOptions.min_radius must be in (0, radius_factor]",
+          min_radius);
+  require(max_radius >= radius_factor && std::isfinite(max_radius),
+          "CoherenceOptions.max_radius must be >= radius_factor",
+          max_radius);
   LayeredLatticeOptions{depth_spacing}.validate();
   LayeredLatticeOptions{opacity_spacing}.validate();
   InitialisationOptions{radius_factor, opacity}.validate();
@@ -129,8 +139,8 @@ void CoherentGaussians::decode_view(size_t n) {
       gaussians_.scale[g].setConstant(options_.radius_factor * z * unit);
       return;
     }
-    const float* shape = &parameters[n].shape.value[k * kShapeSize];
-    gaussians_.scale[g] = shape_scale(shape, z * unit);
+    float* shape = &parameters[n].shape.value[k * kShapeSize];
+    gaussians_.scale[g] = bounded_scale(shape, options_, z * unit);
     gaussians_.rotation[g] = Eigen::Vector4f(shape[3], shape[4], shape[5], shape[6]).normalized();
   });
 }

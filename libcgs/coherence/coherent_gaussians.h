@@ -30,7 +30,11 @@ struct CoherenceOptions {
   float max_depth_change = 0.5f;   ///< Bound of |log(depth / starting depth)|; > 0.
   float max_logit_change = 12.0f;  ///< Bound of the change of the opacity's logit; > 0.
   float radius_factor = 0.4f;      ///< As in InitialisationOptions.
-  float opacity = 0;               ///< As in InitialisationOptions.
+  float min_radius = 0.25f;  ///< Of free shapes [pixels of the own view]; in (0, radius_factor].
+                             ///< Gaussians that shrink open gaps in slanted surfaces, which show
+                             ///< from elsewhere and not in the photographs.
+  float max_radius = 4.0f;   ///< Of free shapes; >= radius_factor.
+  float opacity = 0;         ///< As in InitialisationOptions.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

@@ -42,6 +42,8 @@ std::vector<Field> fields_of(TrainingOptions& o) {
           {"max_depth_change", &o.coherence.max_depth_change},
           {"max_logit_change", &o.coherence.max_logit_change},
           {"radius_factor", &o.coherence.radius_factor},
+          {"min_radius", &o.coherence.min_radius},
+          {"max_radius", &o.coherence.max_radius},
           {"opacity", &o.coherence.opacity}};
 }
 
