@@ -85,7 +85,7 @@ class Tightening {
     size_t count = 0;
     for (size_t v = 0; v < marked_.size(); ++v) {
       if (marked_[v] == 0 || !(tolerance_[v] > 0)) continue;
-      tolerance_[v] *= 0.1f;
+      tolerance_[v] *= 0.25f;
       if (double(tolerance_[v]) < least_) tolerance_[v] = 0;
       ++count;
     }
@@ -162,7 +162,7 @@ SimplifyResult simplify(const TriangleMesh& mesh,
     result.rounds = round;
     result.area_after = area_by_provenance(out.mesh);
     if (tighten_for_area(mesh, result, limits.tolerance)) continue;
-    Tightening tightening(limits.tolerance, options.max_error / 8);
+    Tightening tightening(limits.tolerance, options.max_error / 32);
     std::vector<uint32_t> bad;
     for (const auto& [f, g] : self_intersections(out.mesh)) bad.insert(bad.end(), {f, g});
     const Measured forth = measure(out.mesh, mesh, options);

@@ -42,9 +42,9 @@ struct SimplifyResult {
 /// error, topology is kept; see collapse_edges(). A mesh without provenance counts as evidence.
 /// What comes out is then measured: by samples in both directions, by the area of every label with
 /// evidence (which may change by 1 %), and for self-intersections. Where a check fails, the
-/// tolerance of the input vertices nearby is cut to a tenth, then to zero, and the collapses are
-/// run again. If that does not help within a few rounds, the result is the input. \throws
-/// InvalidInput if a vertex is not finite.
+/// tolerance of the input vertices nearby is quartered, finally to zero, and the collapses are run
+/// again. If that does not help within a few rounds, the result is the input.
+/// \throws InvalidInput if a vertex is not finite.
 SimplifyResult simplify(const TriangleMesh& mesh,
                         const SimplifyOptions& options,
                         const Progress& progress = {});
