@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "meshing/collapser.h"
+
+namespace cgs::edge_collapse {
+
+namespace {
+
+/// Where a point lies nearest on a face.
+struct Foot {
+  float squared_distance;
+  float v, w;  ///< Barycentric weights of the second and third corner.
+};
+
+// Nearest point of a triangle with its first corner at the origin (Ericson 2005, 5.1.5).
+Foot foot_on(const NewFace& f, const Vector3f& x) {
+  const float d1 = f.ab.dot(x);
+  const float d2 = f.ac.dot(x);
+  const float d3 = d1 - f.abab;
+  const float d4 = d2 - f.abac;
+  const float d5 = d1 - f.abac;
+  const float d6 = d2 - f.acac;
+  float v = 0;
+  float w = 0;
+  const float vc = d1 * d4 - d3 * d2;
+  const float vb = d5 * d2 - d1 * d6;
+  const float va = d3 * d6 - d5 * d4;
+  if (d1 <= 0 && d2 <= 0) {
+    // the new vertex itself
+  } else if (d3 >= 0 && d4 <= d3) {
+    v = 1;
+  } else if (d6 >= 0 && d5 <= d6) {
+    w = 1;
+  } else if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+    v = d1 / (d1 - d3);
+  } else if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+    w = d2 / (d2 - d6);
+  } else if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    v = 1 - w;
+  } else {
+    v = vb / (va + vb + vc);
+    w = vc / (va + vb + vc);
+  }
+  return {(x - v * f.ab - w * f.ac).squaredNorm(), v, w};
+}
+
+float squared_distance_to_segment(const Vector3f& x, const Vector3f& a, const Vector3f& b) {
+  const Vector3f ab = b - a;
+  const float length = ab.squaredNorm();
+  const float t = length > 0 ? std::clamp(ab.dot(x - a) / length, 0.0f, 1.0f) : 0.0f;
+  return (x - a - t * ab).squaredNorm();
+}
+
+}  // namespace
+
+void Collapser::gather_star(uint32_t u, uint32_t v) {
+  moving_.clear();
+  dying_.clear();
+  for (const uint32_t a : {u, v}) {
+    for (uint32_t i = first_[a]; i < first_[a + 1]; ++i) {
+      const uint32_t f = around_[i];
+      if (dead_[f] != 0) continue;
+      if (!has(mesh_.faces[f], u + v - a)) {
+        moving_.push_back(f);
+      } else if (a == u) {
+        dying_.push_back(f);
+      }
+    }
+  }
+}
+
+Collapser::Outcome Collapser::collapse(uint32_t a, uint32_t b) {
+  if (used_[a] != 0 || used_[b] != 0) return Outcome::Later;
+  const auto [u, v] = kind_[b] > kind_[a] ? std::pair(b, a) : std::pair(a, b);
+  gather_star(u, v);
+  bool border = false;
+  if (!link_allows(u, v, border)) return Outcome::Refused;
+  const bool both_on_border = kind_[v] == Kind::Border;
+  if (both_on_border != border) return Outcome::Refused;
+  const Placement to = placement(u, v);
+  const Vector3f p = (to.point + center_).cast<float>();
+  if (!reachable(u, v, p)) return Outcome::Refused;
+  if (border && !border_allows(u, v, p)) return Outcome::Refused;
+  if (!faces_allow(u, v, p, to.t) || !witnesses_allow(p)) return Outcome::Refused;
+  apply(u, v, to);
+  return Outcome::Done;
+}
+
+// The link condition for the surface, and for the borders drawn on it.
+bool Collapser::link_allows(uint32_t u, uint32_t v, bool& border) {
+  neighbors_of(u, around_u_);
+  neighbors_of(v, around_v_);
+  if (dying_.empty() || dying_.size() > 2) return false;
+  size_t shared = 0;
+  for (const Neighbor& n : around_u_) {
+    if (n.vertex == v) border = n.border;
+    const auto at = std::find_if(
+        around_v_.begin(), around_v_.end(), [&](const auto& m) { return m.vertex == n.vertex; });
+    if (at == around_v_.end()) continue;
+    ++shared;
+    // Two borders would become one: the label between them would vanish.
+    if (n.border && at->border) return false;
+  }
+  if (shared != dying_.size()) return false;
+  if (dying_.size() == 1) return true;
+  // A tetrahedron would become two faces on each other.
+  std::array<uint32_t, 2> apex{};
+  for (size_t i = 0; i < 2; ++i) {
+    for (const uint32_t w : mesh_.faces[dying_[i]]) {
+      if (w != u && w != v) apex.at(i) = w;
+    }
+  }
+  return std::count_if(moving_.begin(), moving_.end(), [&](uint32_t f) {
+           return has(mesh_.faces[f], apex[0]) && has(mesh_.faces[f], apex[1]);
+         }) < 2;
+}
+
+// The new vertex must lie near the old star: witnesses keep the old surface near the new one, this
+// keeps the new one near the old.
+bool Collapser::reachable(uint32_t u, uint32_t v, const Vector3f& p) const {
+  const float reach = 0.5f * std::max(limits_.tolerance[u], limits_.tolerance[v]);
+  const auto near = [&](uint32_t f) {
+    const Face& face = mesh_.faces[f];
+    NewFace old{};
+    old.ab = mesh_.vertices[face[1]] - mesh_.vertices[face[0]];
+    old.ac = mesh_.vertices[face[2]] - mesh_.vertices[face[0]];
+    old.abab = old.ab.squaredNorm();
+    old.abac = old.ab.dot(old.ac);
+    old.acac = old.ac.squaredNorm();
+    return foot_on(old, p - mesh_.vertices[face[0]]).squared_distance <= reach * reach;
+  };
+  return std::any_of(dying_.begin(), dying_.end(), near) ||
+         std::any_of(moving_.begin(), moving_.end(), near);
+}
+
+// Original border vertices stay near the border.
+bool Collapser::border_allows(uint32_t u, uint32_t v, const Vector3f& p) {
+  std::array<uint32_t, 2> ends = {kNone, kNone};
+  for (const Neighbor& n : around_u_) {
+    if (n.border && n.vertex != v && kind_[u] == Kind::Border) ends[0] = n.vertex;
+  }
+  for (const Neighbor& n : around_v_) {
+    if (n.border && n.vertex != u) ends[1] = n.vertex;
+  }
+  const auto near = [&](uint32_t of) {
+    uint32_t w = of;
+    do {
+      const Vector3f& x = original_.vertices[w];
+      float nearest = std::numeric_limits<float>::infinity();
+      for (const uint32_t end : ends) {
+        if (end == kNone) continue;
+        nearest = std::min(nearest, squared_distance_to_segment(x, p, mesh_.vertices[end]));
+      }
+      if (!(nearest <= limits_.tolerance[w] * limits_.tolerance[w])) return false;
+      w = next_on_border_[w];
+    } while (w != of);
+    return true;
+  };
+  return near(v) && (kind_[u] == Kind::Corner || near(u));
+}
+
+// No new face may be turned or thin. Leaves the new faces in fresh_.
+bool Collapser::faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t) {
+  constexpr double kLeastCosine = 0.5;
+  constexpr double kLeastQuality = 0.05;  // 1 = equilateral
+  const auto quality = [](double area, const Vector3d& ab, const Vector3d& ac) {
+    const double edges = ab.squaredNorm() + ac.squaredNorm() + (ac - ab).squaredNorm();
+    return edges > 0 ? 2 * std::sqrt(3.0) * area / edges : 0;
+  };
+  const bool colored = !mesh_.colors.empty();
+  Vector3f color = Vector3f::Zero();
+  if (colored) color = (1 - t) * mesh_.colors[u] + t * mesh_.colors[v];
+  fresh_.clear();
+  double worst_old = 1;
+  double worst_new = 1;
+  for (const uint32_t f : moving_) {
+    const Face& face = mesh_.faces[f];
+    const size_t k = face[0] == u || face[0] == v ? 0 : face[1] == u || face[1] == v ? 1 : 2;
+    const uint32_t b = face[(k + 1) % 3];
+    const uint32_t c = face[(k + 2) % 3];
+    NewFace fresh;
+    fresh.face = f;
+    fresh.b = b;
+    fresh.c = c;
+    fresh.label = mesh_.provenance[f];
+    fresh.ab = mesh_.vertices[b] - p;
+    fresh.ac = mesh_.vertices[c] - p;
+    fresh.abab = fresh.ab.squaredNorm();
+    fresh.abac = fresh.ab.dot(fresh.ac);
+    fresh.acac = fresh.ac.squaredNorm();
+    if (colored) {
+      fresh.color = color;
+      fresh.color_ab = mesh_.colors[b] - color;
+      fresh.color_ac = mesh_.colors[c] - color;
+    }
+    const Vector3d ab = fresh.ab.cast<double>();
+    const Vector3d ac = fresh.ac.cast<double>();
+    const Vector3d n = ab.cross(ac);
+    const Vector3d before = area_vector(face);
+    const double size = n.norm();
+    const double size_before = before.norm();
+    if (!(size > 0) || n.dot(before) < kLeastCosine * size * size_before) return false;
+    fresh.normal = (n / size).cast<float>();
+    fresh.normal_before = size_before > 0 ? Vector3f((before / size_before).cast<float>())
+                                          : Vector3f(Vector3f::Zero());
+    fresh_.push_back(fresh);
+    worst_new = std::min(worst_new, quality(size, ab, ac));
+    worst_old = std::min(
+        worst_old, quality(size_before, vertex(b) - vertex(face[k]), vertex(c) - vertex(face[k])));
+  }
+  return !fresh_.empty() && worst_new >= std::min(kLeastQuality, worst_old) && !folds();
+}
+
+// Whether neighbours come to lie nearly back to back that did not before: a flap of which no
+// witness knows.
+bool Collapser::folds() const {
+  constexpr float kLeastCosine = -0.5f;
+  for (const NewFace& f : fresh_) {
+    for (const NewFace& g : fresh_) {
+      if (f.c != g.b) continue;
+      const float now = f.normal.dot(g.normal);
+      if (now < kLeastCosine && now < f.normal_before.dot(g.normal_before)) return true;
+    }
+    for (uint32_t i = first_[f.b]; i < first_[f.b + 1]; ++i) {
+      const uint32_t g = around_[i];
+      if (dead_[g] != 0 || g == f.face || !has(mesh_.faces[g], f.c)) continue;
+      const Vector3f n = area_vector(mesh_.faces[g]).cast<float>();
+      const float now = f.normal.dot(n);
+      if (now < kLeastCosine * n.norm() && now < f.normal_before.dot(n)) return true;
+    }
+  }
+  return false;
+}
+
+// Every witness of the old star must be near a new face of its label, in place and colour.
+bool Collapser::witnesses_allow(const Vector3f& p) {
+  points_.clear();
+  face_of_point_.clear();
+  const auto find = [&](uint32_t f) {
+    const Provenance label = mesh_.provenance[f];
+    const bool compare_colors = !mesh_.colors.empty() && label != Provenance::Inferred;
+    for (uint32_t w = witness_[f]; w != kNone; w = next_witness_[w]) {
+      const Vector3f x = original_.vertices[w] - p;
+      const NewFace* nearest = nullptr;
+      Foot foot{std::numeric_limits<float>::infinity(), 0, 0};
+      for (const NewFace& fresh : fresh_) {
+        if (fresh.label != label) continue;
+        const Foot other = foot_on(fresh, x);
+        if (!(other.squared_distance < foot.squared_distance)) continue;
+        foot = other;
+        nearest = &fresh;
+      }
+      if (!(foot.squared_distance <= limits_.tolerance[w] * limits_.tolerance[w])) return false;
+      if (compare_colors) {
+        const Vector3f color =
+            nearest->color + foot.v * nearest->color_ab + foot.w * nearest->color_ac;
+        const float change = (color - original_.colors[w]).cwiseAbs().maxCoeff();
+        if (!(change <= limits_.color)) return false;
+      }
+      points_.push_back(w);
+      face_of_point_.push_back(nearest->face);
+    }
+    return true;
+  };
+  return std::all_of(dying_.begin(), dying_.end(), find) &&
+         std::all_of(moving_.begin(), moving_.end(), find);
+}
+
+void Collapser::apply(uint32_t u, uint32_t v, const Placement& to) {
+  mesh_.vertices[u] = (to.point + center_).cast<float>();
+  if (!mesh_.colors.empty()) {
+    mesh_.colors[u] = (1 - to.t) * mesh_.colors[u] + to.t * mesh_.colors[v];
+  }
+  if (!mesh_.support.empty() && to.t > 0.5f) mesh_.support[u] = mesh_.support[v];
+  if (!mesh_.sigma.empty()) {
+    const float mixed = (1 - to.t) * mesh_.sigma[u] + to.t * mesh_.sigma[v];
+    mesh_.sigma[u] = !std::isnan(mixed) ? mixed : to.t > 0.5f ? mesh_.sigma[v] : mesh_.sigma[u];
+  }
+  if (kind_[v] == Kind::Border && kind_[u] == Kind::Border) {
+    std::swap(next_on_border_[u], next_on_border_[v]);  // joins the two rings
+  }
+  quadric_[u] += quadric_[v];
+  used_[u] = used_[v] = 1;
+  for (const uint32_t f : dying_) {
+    dead_[f] = 1;
+    for (const uint32_t w : mesh_.faces[f]) changed_[w] = 1;
+  }
+  for (const uint32_t f : moving_) {
+    witness_[f] = kNone;
+    for (uint32_t& w : mesh_.faces[f]) {
+      if (w == v) w = u;
+      changed_[w] = 1;
+    }
+  }
+  for (size_t i = 0; i < points_.size(); ++i) {
+    uint32_t& head = witness_[face_of_point_[i]];
+    next_witness_[points_[i]] = head;
+    head = points_[i];
+  }
+}
+
+}  // namespace cgs::edge_collapse

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "meshing/edge_collapse.h"
+#include "meshing/quadric.h"
+
+// The inside of collapse_edges(): state in one class, whose functions lie in edge_collapse.cpp
+// (setup and passes) and collapse_rules.cpp (what one collapse must keep).
+namespace cgs::edge_collapse {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+using Face = std::array<uint32_t, 3>;
+
+constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+
+/// How freely a vertex moves, in rising order of constraint.
+enum class Kind : uint8_t {
+  Interior,
+  Border,  ///< On one border, between labels or on the rim: along it only.
+  Corner,  ///< Where borders meet: absorbs neighbours, stays.
+  Fixed    ///< No edge at it is collapsed.
+};
+
+inline bool has(const Face& face, uint32_t v) {
+  return face[0] == v || face[1] == v || face[2] == v;
+}
+
+/// A vertex joined to another by an edge.
+struct Neighbor {
+  uint32_t vertex = 0;
+  int faces = 0;        ///< At the edge.
+  int winding = 0;      ///< Faces that run the edge one way minus those that run it the other way.
+  bool border = false;  ///< One face, or two of different labels.
+  Provenance label = Provenance::Inferred;  ///< Of the first face.
+};
+
+/// Where an edge collapses to.
+struct Placement {
+  Vector3d point = Vector3d::Zero();
+  double cost = std::numeric_limits<double>::infinity();
+  float t = 0;  ///< Position along the edge from the vertex that stays, in [0, 1].
+};
+
+/// A face of the star after a collapse, relative to its new vertex.
+struct NewFace {
+  uint32_t face = 0;
+  uint32_t b = 0, c = 0;  ///< Its other corners.
+  Provenance label = Provenance::Inferred;
+  Vector3f normal, normal_before;  ///< Unit length; 0 for a face without area.
+  Vector3f ab, ac;                 ///< To the other corners.
+  float abab = 0, abac = 0, acac = 0;
+  Vector3f color, color_ab, color_ac;  ///< At the new vertex, and differences.
+};
+
+/// One run of collapse_edges().
+class Collapser {
+ public:
+  Collapser(const TriangleMesh& mesh, const CollapseLimits& limits);
+  CollapsedMesh run();
+
+ private:
+  struct Candidate {
+    float cost;
+    uint32_t slot;  // 3 * face + side
+    bool operator<(const Candidate& o) const {
+      return cost != o.cost ? cost < o.cost : slot < o.slot;
+    }
+  };
+  enum class Outcome { Done, Refused, Later };
+
+  void index_faces();
+  void neighbors_of(uint32_t v, std::vector<Neighbor>& out) const;
+  Kind kind_of(uint32_t v, const std::vector<Neighbor>& neighbors) const;
+  bool one_fan(uint32_t v) const;
+  void classify();
+  Quadric quadric_around(uint32_t v, const std::vector<Neighbor>& neighbors) const;
+  void find_candidates();
+  bool may_collapse(uint32_t u, uint32_t v) const;
+  Placement placement(uint32_t u, uint32_t v) const;
+  size_t pass();
+  Outcome collapse(uint32_t a, uint32_t b);
+  void gather_star(uint32_t u, uint32_t v);
+  bool link_allows(uint32_t u, uint32_t v, bool& border);
+  bool reachable(uint32_t u, uint32_t v, const Vector3f& p) const;
+  bool border_allows(uint32_t u, uint32_t v, const Vector3f& p);
+  bool faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t);
+  bool folds() const;
+  bool witnesses_allow(const Vector3f& p);
+  void apply(uint32_t u, uint32_t v, const Placement& to);
+  void drop_dead_faces();
+  Vector3d vertex(uint32_t v) const { return mesh_.vertices[v].cast<double>() - center_; }
+  Vector3d area_vector(const Face& f) const {
+    return (vertex(f[1]) - vertex(f[0])).cross(vertex(f[2]) - vertex(f[0]));
+  }
+
+  const TriangleMesh& original_;
+  const CollapseLimits& limits_;
+  TriangleMesh mesh_;  // vertex numbers are those of the original
+  Vector3d center_ = Vector3d::Zero();
+  std::vector<uint8_t> dead_;     // per face
+  std::vector<uint8_t> refused_;  // per face, a bit per side
+  std::vector<uint32_t> first_;   // faces around vertex v: around_[first_[v] ... first_[v + 1])
+  std::vector<uint32_t> around_;  // as of the beginning of the pass
+  std::vector<Kind> kind_;
+  std::vector<Quadric> quadric_;
+  std::vector<uint8_t> used_;     // per vertex: merged in this pass
+  std::vector<uint8_t> changed_;  // per vertex: star changed in the last pass
+  std::vector<float> cost_;       // per slot
+  std::vector<Candidate> candidates_;
+  std::vector<uint32_t> cursor_;   // per vertex: where its next face goes in around_
+  std::vector<uint32_t> witness_;  // per face: list of original vertices
+  std::vector<uint32_t> next_witness_;
+  std::vector<uint32_t> next_on_border_;  // per original border vertex: ring of those merged
+  // Of the collapse at hand.
+  std::vector<uint32_t> moving_, dying_, points_, face_of_point_;
+  std::vector<NewFace> fresh_;
+  std::vector<Neighbor> around_u_, around_v_;
+};
+
+}  // namespace cgs::edge_collapse
