@@ -42,9 +42,10 @@ Measured measure(const TriangleMesh& from, const TriangleMesh& to, const Simplif
   return out;
 }
 
-// The engine keeps input vertices within their tolerance, faces between them reach a little
-// farther.
-constexpr double kMargin = 0.8;
+// The engine keeps input vertices within their tolerance; faces between them reach farther. On a
+// portal of 1.6 million faces at four times this value, some forty faces left the bound at first and
+// one after four rounds.
+constexpr double kMargin = 0.2;
 
 std::vector<float> tolerances(const TriangleMesh& mesh, const SimplifyOptions& options) {
   std::vector<float> out(mesh.vertices.size(), float(kMargin * options.max_error_inferred));
@@ -181,7 +182,7 @@ SimplifyResult simplify(const TriangleMesh& mesh,
     result.tightened += tightening.apply();
     // Faces reach beyond their corners in places that change with every round, so that tightening
     // where it happened alone would not come to an end.
-    for (float& tolerance : limits.tolerance) tolerance *= 0.6f;
+    for (float& tolerance : limits.tolerance) tolerance *= 0.7f;
   }
   const int rounds = result.rounds;
   result = unchanged(mesh);
