@@ -71,10 +71,14 @@ inline Ints windows_reached(const BandSplat& s, float ridge_at_top, int row) {
 
 // Bits of all windows of the tile that the support of a splat reaches.
 inline uint32_t windows_reached(const BandSplat& s, float ridge_at_top) {
-  const Ints upper = windows_reached(s, ridge_at_top, 0);
-  const Ints lower = windows_reached(s, ridge_at_top, kTileSize / 2);
-  const auto all = std::bit_cast<__m256i>(upper | lower << 16);
-  __m128i bits = _mm_or_si128(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1));
+  // Most splats are small: often one half of the tile, or eight rows from the middle of one.
+  const int first = std::min(s.rows.first & ~3, kTileSize / 2);
+  Ints all = windows_reached(s, ridge_at_top, first) << (2 * first);
+  if (s.rows.last >= first + kTileSize / 2) {
+    all |= windows_reached(s, ridge_at_top, kTileSize / 2) << kTileSize;
+  }
+  const auto rows = std::bit_cast<__m256i>(all);
+  __m128i bits = _mm_or_si128(_mm256_castsi256_si128(rows), _mm256_extracti128_si256(rows, 1));
   bits = _mm_or_si128(bits, _mm_srli_si128(bits, 8));
   bits = _mm_or_si128(bits, _mm_srli_si128(bits, 4));
   return static_cast<uint32_t>(_mm_cvtsi128_si32(bits));
@@ -128,7 +132,7 @@ inline void list_windows(
   list.splats[slot] = &s;
   list.ridges[slot] = static_cast<float>(s.x - splats.first_column);
   entry.windows = windows_reached(s, list.ridges[slot]) & open;
-  const uint32_t windows = has_wide_lanes() ? window_pairs(entry.windows) : entry.windows;
+  const uint32_t windows = list.pairs ? window_pairs(entry.windows) : entry.windows;
   for (unsigned byte = 0; byte < kWindows / 8; ++byte) {
     const uint32_t bits = windows >> (8 * byte) & 0xff;
     const uint64_t places = kBitPositions[bits] + kEveryByte * (8 * byte);
@@ -147,11 +151,12 @@ void draw_tile(const TileSplats& splats, std::array<int, 2> size, TileEnd& end, 
   uint32_t open = unfinished_windows(end.transmittance);
   size_t visited = 0;
   WindowList list;
+  list.pairs = has_wide_lanes();
   while (visited < splats.nearest_first.size() && open != 0) {
     const size_t count = std::min(WindowList::kSplats, splats.nearest_first.size() - visited);
     list.count = 0;
     for (size_t i = 0; i < count; ++i) list_windows(splats, visited + i, i, open, list);
-    const auto draw = has_wide_lanes() ? draw_wide : draw_windows<Lanes8>;
+    const auto draw = list.pairs ? draw_wide : draw_windows<Lanes8>;
     draw(list, static_cast<int32_t>(visited), end, sums);
     visited += count;
     open = unfinished_windows(end.transmittance);

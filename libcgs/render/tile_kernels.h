@@ -28,6 +28,7 @@ struct WindowList {
   std::array<uint8_t, kSplats * kWindows + 8> window;       ///< Position in the planes / kLanes.
   std::array<uint8_t, kSplats * kWindows + 8> splat_index;  ///< In splats.
   size_t count = 0;
+  bool pairs = false;  ///< Each stands for itself and the next.
 };
 
 /// With AVX-512: 16 pixels at once. Windows are pairs, the first of even position.
