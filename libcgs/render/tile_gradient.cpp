@@ -5,30 +5,45 @@
 #include <cstddef>
 
 #include "libcgs/render/lanes.h"
+#include "libcgs/render/tile_kernels.h"
 
 namespace cgs {
 
 namespace {
 
 constexpr Floats kZero = {};
-constexpr Floats kOne = kZero + 1.0f;
-constexpr int kWindows = static_cast<int>(kTilePixels) / kLanes;  // 4 columns, 2 rows each
 
-// Pixel centres of a tile, in the order of its planes.
-struct PixelCentres {
-  alignas(32) TilePlane x{};    // from the left edge
-  alignas(32) TilePlane row{};  // from the first row of centres
+struct Lanes8 {
+  static constexpr int kCount = kLanes;
+  using Values = Floats;
+  using Mask = Ints;
+
+  static Values load(const float* from) { return cgs::load<Floats>(from); }
+  static void store(Values v, float* to) { cgs::store(v, to); }
+  static Values fill(float v) { return kZero + v; }
+  static Values least(Values a, Values b) { return min(a, b); }
+  static Values multiply_add(Values a, Values b, Values c) { return cgs::multiply_add(a, b, c); }
+  static Values exp2_negative(Values x) { return cgs::exp2_negative(x); }
+  static Mask at_least(Values a, Values b) { return a >= b; }
+  static Mask at_least(const int32_t* a, int32_t b) { return cgs::load<Ints>(a) >= b; }
+  static Mask below(Values a, Values b) { return a < b; }
+  static Mask both(Mask a, Mask b) { return a & b; }
+  static bool any(Mask mask) { return cgs::any(mask); }
+  static Values where(Mask mask, Values v) { return mask ? v : kZero; }
+  static void store_where(Mask mask, int32_t v, int32_t* to) {
+    const Ints old = cgs::load<Ints>(to);
+    cgs::store(mask ? Ints{} + v : old, to);
+  }
+  static void add(Floats& sum, Values v) { sum += v; }
+  static void add_product(Floats& sum, Values a, Values b) { sum = multiply_add(a, b, sum); }
 };
 
-constexpr PixelCentres pixel_centres() {
-  PixelCentres out;
-  for (size_t p = 0; p < kTilePixels; ++p) {
-    out.x[p] = static_cast<float>(p / 16 % 4 * 4 + p % 4) + 0.5f;
-    out.row[p] = static_cast<float>(p / 64 * 4 + p % 16 / 4);
-  }
-  return out;
+bool has_wide_lanes() {
+  static const bool kFound = __builtin_cpu_supports("avx512f") != 0 &&
+                             __builtin_cpu_supports("avx512dq") != 0 &&
+                             __builtin_cpu_supports("avx512vl") != 0;
+  return kFound;
 }
-constexpr PixelCentres kCentres = pixel_centres();
 
 // Bits of the windows in eight pixel rows, from `row` on, that the support of a splat reaches;
 // the bits of one row in each lane.
@@ -56,63 +71,17 @@ inline Ints windows_reached(const BandSplat& s, float ridge_at_top, int row) {
 
 // Bits of all windows of the tile that the support of a splat reaches.
 inline uint32_t windows_reached(const BandSplat& s, float ridge_at_top) {
-  const Ints upper = windows_reached(s, ridge_at_top, 0);
-  const Ints lower = windows_reached(s, ridge_at_top, kTileSize / 2);
-  const auto all = std::bit_cast<__m256i>(upper | lower << 16);
-  __m128i bits = _mm_or_si128(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1));
+  // Most splats are small: often one half of the tile, or eight rows from the middle of one.
+  const int first = std::min(s.rows.first & ~3, kTileSize / 2);
+  Ints all = windows_reached(s, ridge_at_top, first) << (2 * first);
+  if (s.rows.last >= first + kTileSize / 2) {
+    all |= windows_reached(s, ridge_at_top, kTileSize / 2) << kTileSize;
+  }
+  const auto rows = std::bit_cast<__m256i>(all);
+  __m128i bits = _mm_or_si128(_mm256_castsi256_si128(rows), _mm256_extracti128_si256(rows, 1));
   bits = _mm_or_si128(bits, _mm_srli_si128(bits, 8));
   bits = _mm_or_si128(bits, _mm_srli_si128(bits, 4));
   return static_cast<uint32_t>(_mm_cvtsi128_si32(bits));
-}
-
-// Calls visit(index of the first pixel) for every window whose bit is set.
-template <typename Visit>
-inline void for_each_window(uint32_t windows, Visit visit) {
-  for (; windows != 0; windows &= windows - 1) {
-    visit(static_cast<size_t>(std::countr_zero(windows)) * kLanes);
-  }
-}
-
-// Offsets of eight pixels from a splat, in units of its footprint.
-struct Offsets {
-  Floats t, ty;
-};
-
-inline Offsets offsets(const BandSplat& s, float ridge_at_top, size_t at) {
-  const Floats row = load<Floats>(&kCentres.row[at]);
-  const Floats ridge = ridge_at_top + s.slope * row;
-  return {(load<Floats>(&kCentres.x[at]) - ridge) * s.inv_sigma_x, (s.dy + row) * s.inv_sigma_y};
-}
-
-// opacity * exp(-q / 2), not yet clamped.
-inline Floats coverage(const BandSplat& s, const Offsets& d) {
-  constexpr Floats kHighestExponent = kZero + 100.0f;  // far below the cut
-  return s.opacity *
-         exp2_negative(min(d.t * d.t + d.ty * d.ty, kHighestExponent) * kLog2OfGaussian);
-}
-
-inline void add_to(float* plane, size_t at, Floats a, Floats b) {
-  store(multiply_add(a, b, load<Floats>(plane + at)), plane + at);
-}
-
-// One splat in eight pixels.
-inline void draw_window(
-    const BandSplat& s, Floats alpha, size_t at, int32_t position, TileEnd& end, TileSums& sums) {
-  const Floats before = load<Floats>(&end.transmittance[at]);
-  const Ints blended = (alpha >= kMinSplatAlpha) & (before >= kMinTransmittance);
-  alpha = blended ? alpha : kZero;
-  const Floats w = alpha * before;
-  const Floats after = before * (1.0f - alpha);
-  store(after, &end.transmittance[at]);
-  for (int c = 0; c < 3; ++c) add_to(sums.color[c].data(), at, w, kZero + s.color[c]);
-  const Floats wz = w * s.depth;
-  store(load<Floats>(&sums.depth[at]) + wz, &sums.depth[at]);
-  add_to(sums.depth_square.data(), at, wz, kZero + s.depth);
-  const Ints finished = blended & (after < kMinTransmittance);
-  if (any(finished)) {
-    const Ints last = load<Ints>(&end.last[at]);
-    store(finished ? Ints{} + position : last, &end.last[at]);
-  }
 }
 
 // Bits of the windows with a pixel that is not finished.
@@ -140,32 +109,6 @@ void reset(std::array<int, 2> size, TileEnd& end, TileSums& sums) {
   sums.depth_square.fill(0);
 }
 
-// What the way back knows about what lies behind the splats not yet visited.
-struct alignas(32) Behind {
-  TilePlane transmittance;
-  TilePlane weighted;  // sum of w s
-};
-
-// Splats lie in the order of their indices: depth order jumps about, so they are asked for early.
-constexpr ptrdiff_t kAhead = 6;
-
-inline void prefetch(const TileSplats& splats, ptrdiff_t i) {
-  const auto last = static_cast<ptrdiff_t>(splats.nearest_first.size()) - 1;
-  const TileEntry& entry = splats.nearest_first[std::clamp(i, ptrdiff_t{0}, last)];
-  __builtin_prefetch(&splats.band[entry.splat]);
-}
-
-// The windows of a few splats in a row, so that drawing them is one loop without surprises: their
-// number per splat would be guessed wrong most of the time.
-constexpr size_t kChunk = 32;
-struct WindowList {
-  std::array<const BandSplat*, kChunk> splats;
-  std::array<float, kChunk> ridges;
-  std::array<uint8_t, kChunk * kWindows + 8> window;
-  std::array<uint8_t, kChunk * kWindows + 8> entry;  // position in splats
-  size_t count = 0;
-};
-
 // Positions of the bits that are set in a byte, one per byte.
 constexpr std::array<uint64_t, 256> bit_positions() {
   std::array<uint64_t, 256> out{};
@@ -179,7 +122,7 @@ constexpr std::array<uint64_t, 256> bit_positions() {
 }
 constexpr std::array<uint64_t, 256> kBitPositions = bit_positions();
 
-// Appends the open windows of a splat, the `slot`th of its chunk.
+// Appends the open windows of a splat, the `slot`th of the list.
 inline void list_windows(
     const TileSplats& splats, size_t position, size_t slot, uint32_t open, WindowList& list) {
   constexpr uint64_t kEveryByte = 0x0101010101010101;
@@ -189,142 +132,16 @@ inline void list_windows(
   list.splats[slot] = &s;
   list.ridges[slot] = static_cast<float>(s.x - splats.first_column);
   entry.windows = windows_reached(s, list.ridges[slot]) & open;
+  const uint32_t windows = list.pairs ? window_pairs(entry.windows) : entry.windows;
   for (unsigned byte = 0; byte < kWindows / 8; ++byte) {
-    const uint32_t bits = entry.windows >> (8 * byte) & 0xff;
-    const uint64_t windows = kBitPositions[bits] + kEveryByte * (8 * byte);
-    const uint64_t entries = kEveryByte * slot;
-    std::memcpy(&list.window[list.count], &windows, sizeof(windows));
-    std::memcpy(&list.entry[list.count], &entries, sizeof(entries));
+    const uint32_t bits = windows >> (8 * byte) & 0xff;
+    const uint64_t places = kBitPositions[bits] + kEveryByte * (8 * byte);
+    const uint64_t slots = kEveryByte * slot;
+    std::memcpy(&list.window[list.count], &places, sizeof(places));
+    std::memcpy(&list.splat_index[list.count], &slots, sizeof(slots));
     list.count += static_cast<size_t>(std::popcount(bits));
   }
 }
-
-// Sums over the windows of one splat, lane by lane.
-struct MomentLanes {
-  Floats m = {}, t = {}, ty = {}, t_t = {}, t_ty = {}, ty_ty = {}, depth = {};
-  std::array<Floats, 3> color = {};
-};
-
-// Sum over the lanes of each of eight vectors.
-inline Floats lane_sums(const std::array<Floats, 8>& v) {
-  const __m256 a = _mm256_hadd_ps(_mm256_hadd_ps(v[0], v[1]), _mm256_hadd_ps(v[2], v[3]));
-  const __m256 b = _mm256_hadd_ps(_mm256_hadd_ps(v[4], v[5]), _mm256_hadd_ps(v[6], v[7]));
-  return Floats(_mm256_permute2f128_ps(a, b, 0x20)) + Floats(_mm256_permute2f128_ps(a, b, 0x31));
-}
-
-template <bool kColor, bool kDepth, bool kColorDerivative>
-struct Channels {
-  // Derivative of the loss with respect to the weight of a splat, as if other weights stayed, less
-  // that of the anchor.
-  static Floats of_weight(const BandSplat& s,
-                          const BandSplat& anchor,
-                          const TileLoss& loss,
-                          size_t at) {
-    Floats out = {};
-    if constexpr (kColor) {
-      for (int c = 0; c < 3; ++c) {
-        const Floats color = kZero + (s.color[c] - anchor.color[c]);
-        out = multiply_add(load<Floats>(&loss.color[c][at]), color, out);
-      }
-    }
-    if constexpr (kDepth) {
-      const Floats slope = multiply_add(load<Floats>(&loss.depth_square_sum[at]),
-                                        kZero + (s.depth + anchor.depth),
-                                        load<Floats>(&loss.depth_sum[at]));
-      out = multiply_add(slope, kZero + (s.depth - anchor.depth), out);
-    }
-    return out;
-  }
-
-  // The background is the last splat.
-  static Behind behind_everything(const TileEnd& end,
-                                  const BandSplat& anchor,
-                                  const TileLoss& loss) {
-    Behind out;
-    out.transmittance = end.transmittance;
-    for (size_t p = 0; p < kTilePixels; ++p) {
-      float of_weight = loss.transmittance[p];
-      if constexpr (kColor) {
-        for (int c = 0; c < 3; ++c) of_weight -= anchor.color[c] * loss.color[c][p];
-      }
-      if constexpr (kDepth) {
-        of_weight -= anchor.depth * (loss.depth_sum[p] + anchor.depth * loss.depth_square_sum[p]);
-      }
-      out.weighted[p] = end.transmittance[p] * of_weight;
-    }
-    return out;
-  }
-
-  static void add_direct(
-      const BandSplat& s, const TileLoss& loss, size_t at, Floats w, MomentLanes& sum) {
-    if constexpr (kDepth) {
-      const Floats of_depth = multiply_add(load<Floats>(&loss.depth_square_sum[at]),
-                                           kZero + 2 * s.depth,
-                                           load<Floats>(&loss.depth_sum[at]));
-      sum.depth = multiply_add(w, of_depth, sum.depth);
-    }
-    if constexpr (kColorDerivative) {
-      for (int c = 0; c < 3; ++c) {
-        sum.color[c] = multiply_add(w, load<Floats>(&loss.color[c][at]), sum.color[c]);
-      }
-    }
-  }
-
-  static void differentiate(const TileSplats& splats,
-                            const TileEnd& end,
-                            const TileLoss& loss,
-                            const TileRecords& records) {
-    if (end.visited == 0) return;
-    const BandSplat& anchor = splats.band[splats.nearest_first[0].splat];
-    Behind behind = behind_everything(end, anchor, loss);
-    for (auto i = static_cast<int32_t>(end.visited) - 1; i >= 0; --i) {
-      const TileEntry entry = splats.nearest_first[static_cast<size_t>(i)];
-      prefetch(splats, i - kAhead);
-      const BandSplat& s = splats.band[entry.splat];
-      const auto ridge_at_top = static_cast<float>(s.x - splats.first_column);
-      MomentLanes sum;
-      for_each_window(entry.windows, [&](size_t at) {
-        const auto [t, ty] = offsets(s, ridge_at_top, at);
-        const Floats unclamped = coverage(s, {t, ty});
-        const Ints blended = (unclamped >= kMinSplatAlpha) & (load<Ints>(&end.last[at]) >= i);
-        const Floats alpha = blended ? min(unclamped, kZero + kMaxSplatAlpha) : kZero;
-        const Floats inverse = kOne / (1.0f - alpha);
-        const Floats before = load<Floats>(&behind.transmittance[at]) * inverse;
-        const Floats rest = load<Floats>(&behind.weighted[at]);
-        const Floats w = alpha * before;
-        const Floats of_weight = Channels::of_weight(s, anchor, loss, at);
-        const Floats of_alpha = before * of_weight - rest * inverse;
-        // Where alpha is clamped it does not change.
-        const Floats m = unclamped > kMaxSplatAlpha ? kZero : alpha * of_alpha;
-        store(before, &behind.transmittance[at]);
-        store(multiply_add(w, of_weight, rest), &behind.weighted[at]);
-        Channels::add_direct(s, loss, at, w, sum);
-        const Floats mt = m * t;
-        const Floats mty = m * ty;
-        sum.m += m;
-        sum.t += mt;
-        sum.ty += mty;
-        sum.t_t = multiply_add(mt, t, sum.t_t);
-        sum.t_ty = multiply_add(mt, ty, sum.t_ty);
-        sum.ty_ty = multiply_add(mty, ty, sum.ty_ty);
-      });
-      const uint32_t place = records.place[entry.splat] + records.offset;
-      store(lane_sums({sum.m, sum.t, sum.ty, sum.t_t, sum.t_ty, sum.ty_ty, sum.depth, Floats{}}),
-            records.moments[place].sum.data());
-      if constexpr (kColorDerivative) {
-        const Floats c = lane_sums({sum.color[0],
-                                    sum.color[1],
-                                    sum.color[2],
-                                    Floats{},
-                                    Floats{},
-                                    Floats{},
-                                    Floats{},
-                                    Floats{}});
-        std::memcpy(&records.color[place], &c, sizeof(ColorDerivative));
-      }
-    }
-  }
-};
 
 }  // namespace
 
@@ -334,18 +151,13 @@ void draw_tile(const TileSplats& splats, std::array<int, 2> size, TileEnd& end, 
   uint32_t open = unfinished_windows(end.transmittance);
   size_t visited = 0;
   WindowList list;
+  list.pairs = has_wide_lanes();
   while (visited < splats.nearest_first.size() && open != 0) {
-    const size_t count = std::min(kChunk, splats.nearest_first.size() - visited);
+    const size_t count = std::min(WindowList::kSplats, splats.nearest_first.size() - visited);
     list.count = 0;
     for (size_t i = 0; i < count; ++i) list_windows(splats, visited + i, i, open, list);
-    for (size_t n = 0; n < list.count; ++n) {
-      const size_t i = list.entry[n];
-      const BandSplat& s = *list.splats[i];
-      const size_t at = size_t{list.window[n]} * kLanes;
-      const Floats unclamped = coverage(s, offsets(s, list.ridges[i], at));
-      const Floats alpha = min(unclamped, kZero + kMaxSplatAlpha);
-      draw_window(s, alpha, at, static_cast<int32_t>(visited + i), end, sums);
-    }
+    const auto draw = list.pairs ? draw_wide : draw_windows<Lanes8>;
+    draw(list, static_cast<int32_t>(visited), end, sums);
     visited += count;
     open = unfinished_windows(end.transmittance);
   }
@@ -358,21 +170,13 @@ void differentiate_tile(const TileSplats& splats,
                         LossChannels channels,
                         const TileRecords& records) {
   const FlushSubnormals flush;
-  const bool derivative = channels.color && channels.color_derivative;
   for (const TileEntry& entry : splats.nearest_first.subspan(end.visited)) {
     const uint32_t place = records.place[entry.splat] + records.offset;
     records.moments[place] = {};
-    if (derivative) records.color[place] = {};
+    if (channels.color_derivative) records.color[place] = {};
   }
-  const auto run = [&](auto kind) { decltype(kind)::differentiate(splats, end, loss, records); };
-  if (channels.depth) {
-    if (derivative) return run(Channels<true, true, true>{});
-    if (channels.color) return run(Channels<true, true, false>{});
-    return run(Channels<false, true, false>{});
-  }
-  if (derivative) return run(Channels<true, false, true>{});
-  if (channels.color) return run(Channels<true, false, false>{});
-  run(Channels<false, false, false>{});
+  const auto differentiate = has_wide_lanes() ? differentiate_wide : differentiate_with<Lanes8>;
+  differentiate(splats, end, loss, channels, records);
 }
 
 }  // namespace cgs

@@ -99,5 +99,29 @@ TEST(ShColor, StaysFiniteForHugeCoefficientsAndBadDirections) {
   EXPECT_EQ(sh_color(c, 3, Eigen::Vector3f::Constant(nan)), constant_term);
 }
 
+TEST(ShBasis, GivesTheColourAndItsSlope) {
+  Coefficients c;
+  for (size_t k = 0; k < c.size(); ++k) c[k].setConstant(0.1f * float(k % 5) - 0.17f);
+  const Eigen::Vector3f direction = Eigen::Vector3f(1, -2, 3).normalized();
+  for (const int degree : {0, 1, 2, 3}) {
+    const auto color = [&](const ShBasis& basis) {
+      float sum = 0.5f;
+      for (size_t k = 0; k < c.size(); ++k) sum += basis.value[k] * c[k].x();
+      return sum;
+    };
+    const ShBasis basis = sh_basis(degree, direction);
+    EXPECT_NEAR(color(basis), sh_color(c, degree, direction).x(), 1e-6f);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3f step = 0.01f * Eigen::Vector3f::Unit(axis);
+      float slope = 0;
+      for (size_t k = 0; k < c.size(); ++k) slope += basis.slope[k][axis] * c[k].x();
+      const float difference =
+          color(sh_basis(degree, direction + step)) - color(sh_basis(degree, direction - step));
+      EXPECT_NEAR(slope, difference / 0.02f, 1e-3f) << degree << ", " << axis;
+    }
+  }
+  EXPECT_EQ(sh_basis(3, Eigen::Vector3f::Zero()).value[6], 0);
+}
+
 }  // namespace
 }  // namespace cgs

@@ -180,7 +180,7 @@ void expect_differences(const Gaussians& g,
     }
     for (size_t k = 0; k < compared.size(); ++k) {
       const Entry& entry = entries[l][compared[k]];
-      const double room = 1e-4 * std::abs(truth[l][k]) + 2e-6 * largest[entry.kind];
+      const double room = 1e-4 * std::abs(truth[l][k]) + 1e-5 * largest[entry.kind];
       EXPECT_NEAR(entry.got, truth[l][k], room)
           << entry.kind << ", entry " << compared[k] << ", channels " << how.channels[l];
     }
@@ -235,7 +235,7 @@ TEST(TrainingRasterizer, DifferentiatesBallsThatCoverTheImage) {
 
 TEST(TrainingRasterizer, DifferentiatesManySplatsAtOneDepth) {
   const Camera camera{.width = 4, .height = 4, .fx = 4, .fy = 4, .cx = 2, .cy = 2};
-  for (const float opacity : {0.0045f, 0.012f, 0.1f}) {
+  for (const float opacity : {0.006f, 0.012f, 0.1f}) {
     Gaussians g;
     for (int i = 0; i < 1000; ++i) {
       g.position.emplace_back(0.01f * float(i % 10), 0.01f * float(i % 7), 0.5f);
@@ -246,7 +246,7 @@ TEST(TrainingRasterizer, DifferentiatesManySplatsAtOneDepth) {
     }
     // Entry 4 of each Gaussian is the opacity; differences in z would change the order.
     expect_differences(
-        g, {}, {.channels = {1, 8, kEveryChannel}, .camera = camera, .every = 15, .step = 1e-4});
+        g, {}, {.channels = {1, 8, kEveryChannel}, .camera = camera, .every = 15, .step = 1e-3});
   }
 }
 
