@@ -47,6 +47,49 @@ Eigen::Vector3f bounded_scale(float* shape, const CoherenceOptions& options, flo
   return scale;
 }
 
+constexpr int kNormalWindow = 3;  // half the edge [pixels]: depth noise is as large as its steps
+
+// Mean normals of the pixels around that lie on the same layer.
+NormalMap smoothed(const NormalMap& normals, const Raster<uint8_t>& layer, int half) {
+  NormalMap out(normals.width, normals.height, Eigen::Vector3f::Zero());
+  tbb::parallel_for(0, normals.height, [&](int y) {
+    for (int x = 0; x < normals.width; ++x) {
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      for (int v = std::max(0, y - half); v <= std::min(normals.height - 1, y + half); ++v) {
+        for (int u = std::max(0, x - half); u <= std::min(normals.width - 1, x + half); ++u) {
+          if (layer(u, v) == layer(x, y)) sum += normals(u, v);
+        }
+      }
+      if (sum.norm() > 0) out(x, y) = sum.normalized();
+    }
+  });
+  return out;
+}
+
+// A disc-like shape that covers its pixel's piece of a surface: longer where the surface turns away
+// from the camera, so that no gaps show from elsewhere. A ball where the normal is unknown.
+void set_surface_shape(const Eigen::Vector3d& normal,
+                       const Eigen::Vector3d& ray,
+                       float radius,
+                       float* shape) {
+  std::fill_n(shape, 3, std::log(radius));
+  shape[3] = 1;
+  constexpr double kLeastCosine = 0.1;
+  const double cosine = std::abs(normal.dot(ray));
+  const Eigen::Vector3d away = ray - ray.dot(normal) * normal;
+  if (!(normal.norm() > 0.5) || !(away.norm() > 1e-3)) return;
+  Eigen::Matrix3d axes;
+  axes.col(0) = away.normalized();
+  axes.col(2) = normal.normalized();
+  axes.col(1) = axes.col(2).cross(axes.col(0));
+  shape[0] -= static_cast<float>(std::log(std::max(cosine, kLeastCosine)));
+  const Eigen::Quaterniond q(axes);
+  shape[3] = static_cast<float>(q.w());
+  shape[4] = static_cast<float>(q.x());
+  shape[5] = static_cast<float>(q.y());
+  shape[6] = static_cast<float>(q.z());
+}
+
 }  // namespace
 
 void CoherenceOptions::validate() const {
@@ -81,6 +124,7 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
     ViewState view{camera,
                    LayeredLattice(priors[n].layer, {options.depth_spacing}),
                    LayeredLattice(priors[n].layer, {options.opacity_spacing}),
+                   priors[n].layer,
                    depth,
                    depth,
                    Raster<float>(depth.width, depth.height, 0),
@@ -106,13 +150,21 @@ void CoherentGaussians::free_shapes() {
   if (shapes_are_free_) return;
   shapes_are_free_ = true;
   for (size_t n = 0; n < views_.size(); ++n) {
+    const ViewState& view = views_[n];
+    const NormalMap normals =
+        smoothed(normals_from_depth(view.depth, view.camera), view.layer, kNormalWindow);
+    const Eigen::Matrix3d R = view.camera.world_from_cam.linear();
     ParameterBlock& shape = parameters[n].shape;
-    const size_t count = views_[n].pixels.size();
-    shape.resize(count * kShapeSize);
-    for (size_t k = 0; k < count; ++k) {
-      std::fill_n(&shape.value[k * kShapeSize], 3, std::log(options_.radius_factor));
-      shape.value[k * kShapeSize + 3] = 1;
-    }
+    shape.resize(view.pixels.size() * kShapeSize);
+    for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
+      const int x = pixel % view.depth.width;
+      const int y = pixel / view.depth.width;
+      const Eigen::Vector3d ray = R * view.camera.ray_in_cam(x + 0.5, y + 0.5);
+      set_surface_shape(normals.data[pixel].cast<double>(),
+                        ray.normalized(),
+                        options_.radius_factor,
+                        &shape.value[k * kShapeSize]);
+    });
   }
 }
 

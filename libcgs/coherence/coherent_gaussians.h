@@ -66,7 +66,8 @@ class CoherentGaussians {
   };
   std::vector<ViewParameters> parameters;
 
-  /// From now on every Gaussian has a shape of its own, at first the ball it was.
+  /// From now on every Gaussian has a shape of its own, at first one that covers its pixel's piece
+  /// of the surface: longer than the ball it was along the slope.
   void free_shapes();
   bool shapes_are_free() const { return shapes_are_free_; }
 
@@ -101,6 +102,7 @@ class CoherentGaussians {
     Camera camera;
     LayeredLattice depth_lattice;
     LayeredLattice opacity_lattice;
+    Raster<uint8_t> layer;
     DepthMap start;
     DepthMap depth;
     Raster<float> depth_change;  // f, then tanh(f / D)

@@ -69,7 +69,7 @@ TEST(RunRecord, ACutFileCountsAsAnotherRun) {
 TEST(ContentHash, IsFnv1aOfTheBytes) {
   const test::TempDir dir;
   write_file(dir / "a", "a");
-  EXPECT_EQ(content_hash(dir / "a"), "af63dc4c8601ec8c");  // published FNV-1a test vector
+  EXPECT_EQ(file_hash(dir / "a"), "af63dc4c8601ec8c");  // published FNV-1a test vector
 }
 
 }  // namespace

@@ -167,7 +167,8 @@ void expect_gradients(bool free) {
 TEST(CoherentGaussians, StartAsTheInitialOnes) {
   CoherentGaussians model(scene_of(3), priors_of(3), small_lattices());
   model.decode();
-  const Gaussians start = initial_gaussians(scene_of(3), priors_of(3), {0.6f, 0});
+  const Gaussians start =
+      initial_gaussians(scene_of(3), priors_of(3), {small_lattices().radius_factor, 0});
   ASSERT_EQ(model.gaussians().size(), start.size());
   for (size_t i = 0; i < start.size(); ++i) {
     EXPECT_EQ(model.gaussians().position[i], start.position[i]);
@@ -176,18 +177,33 @@ TEST(CoherentGaussians, StartAsTheInitialOnes) {
   }
 }
 
-TEST(CoherentGaussians, FreeingShapesChangesNothingYet) {
-  CoherentGaussians model(scene_of(2), priors_of(2), small_lattices());
-  randomise(model, 1);
-  model.decode();
-  const Gaussians before = model.gaussians();
+// A plane that leans back by 60 degrees: its pieces are twice as long as wide.
+TEST(CoherentGaussians, FreeShapesCoverSlantedSurfaces) {
+  const Scene scene = scene_of(1);
+  std::vector<ViewPriors> priors = priors_of(1);
+  const Camera& camera = scene.views[0].camera;
+  const double slope = std::tan(60 * 3.14159265358979 / 180);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      // z = 0.5 - slope * Y with Y = z * ray.y, in camera axes
+      const double ray_y = camera.ray_in_cam(x + 0.5, y + 0.5).y();
+      priors[0].depth(x, y) = static_cast<float>(0.5 / (1 + slope * ray_y));
+      priors[0].layer(x, y) = 0;
+    }
+  }
+  CoherentGaussians model(scene, priors, small_lattices());
   model.free_shapes();
   model.decode();
-  for (size_t i = 0; i < before.size(); ++i) {
-    EXPECT_EQ(model.gaussians().position[i], before.position[i]);
-    EXPECT_LT((model.gaussians().scale[i] - before.scale[i]).norm(),
-              1e-5f * before.scale[i].norm());
-  }
+  const size_t middle = 5 * kWidth + 7;
+  const Gaussians& g = model.gaussians();
+  const double pixel = double(priors[0].depth(7, 5)) * 2 / (camera.fx + camera.fy);
+  EXPECT_NEAR(double(g.scale[middle].maxCoeff()), 0.4 * pixel * 2, 0.03 * pixel);
+  EXPECT_NEAR(double(g.scale[middle].minCoeff()), 0.4 * pixel, 1e-3 * pixel);
+  // The long axis lies in the plane and leads away from the camera.
+  const Eigen::Vector3f axis = camera.world_from_cam.linear().transpose().cast<float>() *
+                               rotation_matrix(g.rotation[middle]).col(0);
+  EXPECT_NEAR(std::abs(axis.z()), std::sin(60 * 3.14159265358979 / 180), 0.03);
+  EXPECT_NEAR(axis.x(), 0, 0.03);
 }
 
 TEST(CoherentGaussians, StayOnTheRaysOfTheirPixels) {
