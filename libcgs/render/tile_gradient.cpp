@@ -135,7 +135,7 @@ inline void list_windows(
   const uint32_t windows = list.pairs ? window_pairs(entry.windows) : entry.windows;
   for (unsigned byte = 0; byte < kWindows / 8; ++byte) {
     const uint32_t bits = windows >> (8 * byte) & 0xff;
-    const uint64_t places = kBitPositions[bits] + kEveryByte * (8 * byte);
+    const uint64_t places = kBitPositions[bits] + kEveryByte * 8 * byte;
     const uint64_t slots = kEveryByte * slot;
     std::memcpy(&list.window[list.count], &places, sizeof(places));
     std::memcpy(&list.splat_index[list.count], &slots, sizeof(slots));

@@ -16,8 +16,9 @@ inline constexpr size_t kTilePixels = size_t{kTileSize} * kTileSize;
 using TilePlane = std::array<float, kTilePixels>;
 
 /// Position of the pixel in column x, row y of a tile.
-inline size_t tile_index(int x, int y) {
-  return static_cast<size_t>(y / 4 * 64 + x / 4 * 16 + y % 4 * 4 + x % 4);
+constexpr size_t tile_index(int x, int y) {
+  const int block = y / 4 * 4 + x / 4;
+  return static_cast<size_t>(block) * 16 + static_cast<size_t>(y % 4 * 4 + x % 4);
 }
 
 /// A splat of a tile.

@@ -12,10 +12,15 @@
 #include "libcgs/render/lanes.h"
 #include "libcgs/render/tile_gradient.h"
 
+#ifdef __clang__
+#pragma clang attribute push(__attribute__((target("avx512f,avx512dq,avx512vl"))), \
+                             apply_to = function)
+#else
 #pragma GCC push_options
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"  // inside the intrinsics of GCC 12
 #pragma GCC target("avx512f,avx512dq,avx512vl")
+#endif
 
 #include "libcgs/render/tile_kernels.h"
 
@@ -85,5 +90,9 @@ void differentiate_wide(const TileSplats& splats,
 
 }  // namespace cgs
 
+#ifdef __clang__
+#pragma clang attribute pop
+#else
 #pragma GCC diagnostic pop
 #pragma GCC pop_options
+#endif

@@ -53,9 +53,11 @@ struct PixelCentres {
 
 constexpr PixelCentres pixel_centres() {
   PixelCentres out;
-  for (size_t p = 0; p < kTilePixels; ++p) {
-    out.x[p] = static_cast<float>(p / 16 % 4 * 4 + p % 4) + 0.5f;
-    out.row[p] = static_cast<float>(p / 64 * 4 + p % 16 / 4);
+  for (int y = 0; y < kTileSize; ++y) {
+    for (int x = 0; x < kTileSize; ++x) {
+      out.x[tile_index(x, y)] = static_cast<float>(x) + 0.5f;
+      out.row[tile_index(x, y)] = static_cast<float>(y);
+    }
   }
   return out;
 }
