@@ -17,7 +17,7 @@ namespace cgs {
 
 /// Upper bounds that every reader applies before it allocates.
 struct ReadLimits {
-  uint64_t max_file_bytes = uint64_t{16} << 30;
+  uint64_t max_file_bytes = uint64_t{4} << 30;
   uint64_t max_pixels = uint64_t{1} << 28;  ///< Per image.
   uint64_t max_json_bytes = uint64_t{256} << 20;
   int max_json_depth = 64;

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "libcgs/coherence/layered_lattice.h"
+#include "libcgs/core/gaussian_gradients.h"
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/view_priors.h"
-#include "libcgs/render/training_rasterizer.h"
 
 namespace cgs {
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "libcgs/core/camera.h"
+#include "libcgs/core/gaussian_gradients.h"
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/raster.h"
 
@@ -23,17 +24,6 @@ struct TrainingBuffers {
   Raster<float> alpha;             ///< Sum w_i
   Raster<float> depth_sum;         ///< Sum w_i z_i, not divided by alpha.
   Raster<float> depth_square_sum;  ///< Sum w_i z_i^2
-};
-
-/// Derivatives of a loss with respect to the entries of Gaussians of the same names. Arrays that
-/// the rasterizer was not asked for are left empty.
-struct GaussianGradients {
-  std::vector<Eigen::Vector3f> position;
-  std::vector<float> opacity;
-  std::vector<float> radius;              ///< Balls: with respect to the common value of scale.
-  std::vector<Eigen::Vector3f> scale;     ///< Ellipsoids; with respect to the values, not logs.
-  std::vector<Eigen::Vector4f> rotation;  ///< Ellipsoids; orthogonal to the quaternion.
-  std::vector<Eigen::Vector3f> sh;        ///< All sh_count() coefficients, if asked for.
 };
 
 /// What the Gaussians of a set may be, and so which derivatives exist.

@@ -38,11 +38,11 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
 
   const auto m = test::measure_portal(kRun);
-  for (const auto& view : m.inputs) EXPECT_GE(view.depth_within_1_percent, 0.90) << view.name;
+  for (const auto& view : m.inputs) EXPECT_GE(view.depth_within_1_percent, 0.97) << view.name;
   // Splats bleed over holes of one to three pixels, of which the capture has many: even with exact
   // depth 0.76 is what this definition of a hole reaches.
-  EXPECT_GE(m.hole_iou, 0.53);
-  EXPECT_GE(m.hole_iou_inside, 0.73);
+  EXPECT_GE(m.hole_iou, 0.48);
+  EXPECT_GE(m.hole_iou_inside, 0.58);
   EXPECT_LE(std::abs(m.volume.relative_error), 0.02);
   EXPECT_LE(m.volume.missed, 0.01);
 
@@ -54,7 +54,7 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
   }
   EXPECT_EQ(certificate["self_intersections"], 0);
   EXPECT_GT(certificate["area_inferred"].get<double>(), 0);
-  EXPECT_NE(report["model"]["description"].get<std::string>().find("not optimised"),
+  EXPECT_NE(report["model"]["description"].get<std::string>().find("optimised against"),
             std::string::npos);
 }
 

@@ -116,11 +116,6 @@ void add_grids(Cases& cases) {
   using openvdb::Coord;
   using openvdb::FloatGrid;
   using openvdb::Int32Grid;
-  cases.push_back(grids_case("V05", "voxels of 1e-12", "OK|VALUE|LIMIT|SCHEMA", [](auto& grids) {
-    for (const auto& grid : grids) {
-      grid->setTransform(openvdb::math::Transform::createLinearTransform(1e-12));
-    }
-  }));
   for (const char* name : {"tsdf", "weight"}) {
     cases.push_back(
         grids_case("V06", std::string("tile of 4096^3 in ") + name, "OK|LIMIT", [=](auto& grids) {

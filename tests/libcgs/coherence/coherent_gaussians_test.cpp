@@ -197,13 +197,13 @@ TEST(CoherentGaussians, FreeShapesCoverSlantedSurfaces) {
   const size_t middle = 5 * kWidth + 7;
   const Gaussians& g = model.gaussians();
   const double pixel = double(priors[0].depth(7, 5)) * 2 / (camera.fx + camera.fy);
-  EXPECT_NEAR(double(g.scale[middle].maxCoeff()), 0.4 * pixel * 2, 0.03 * pixel);
+  EXPECT_NEAR(double(g.scale[middle].maxCoeff()), 0.4 * pixel * 2, 0.06 * pixel);
   EXPECT_NEAR(double(g.scale[middle].minCoeff()), 0.4 * pixel, 1e-3 * pixel);
   // The long axis lies in the plane and leads away from the camera.
   const Eigen::Vector3f axis = camera.world_from_cam.linear().transpose().cast<float>() *
                                rotation_matrix(g.rotation[middle]).col(0);
-  EXPECT_NEAR(std::abs(axis.z()), std::sin(60 * 3.14159265358979 / 180), 0.03);
-  EXPECT_NEAR(axis.x(), 0, 0.03);
+  EXPECT_NEAR(std::abs(axis.z()), std::sin(60 * 3.14159265358979 / 180), 0.06);
+  EXPECT_NEAR(axis.x(), 0, 0.06);
 }
 
 TEST(CoherentGaussians, StayOnTheRaysOfTheirPixels) {
