@@ -35,8 +35,7 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
 }
 
 void add_training_options(CLI::App& command, TrainingArguments& arguments) {
-  command.add_option("--preset", arguments.preset, "draft, standard or reference")
-      ->capture_default_str();
+  command.add_option("--preset", arguments.preset, "draft or standard")->capture_default_str();
   command.add_option(
       "--set",
       arguments.settings,

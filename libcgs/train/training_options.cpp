@@ -117,7 +117,7 @@ TrainingOptions training_preset(std::string_view name) {
   TrainingOptions options;
   if (name == "standard") return options;
   if (name == "draft") {
-    options.steps = 60;
+    options.steps = 20;
     return options;
   }
   throw InvalidInput("--preset must be draft or standard, but is " + std::string(name));

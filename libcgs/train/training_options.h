@@ -43,7 +43,7 @@ struct TrainingOptions {
   void validate() const;
 };
 
-/// The settings of a name: "draft", "standard" or "reference". \throws InvalidInput
+/// The settings of a name: "draft" or "standard". \throws InvalidInput
 TrainingOptions training_preset(std::string_view name);
 
 /// Sets one field by its name, e.g. ("steps", "500") or ("depth_spacing", "64,16"); the names are

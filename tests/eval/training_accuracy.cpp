@@ -3,7 +3,7 @@
 //
 // usage: training_accuracy MODEL [every=STEPS] [limit=COUNT | views=NAME,NAME] [FIELD=VALUE ...]
 //
-// MODEL is a folder that `cgs train --preset none` wrote. Fields are those of TrainingOptions.
+// MODEL is a folder that `cgs train --set steps=0` wrote. Fields are those of TrainingOptions.
 // Prints one line per evaluation: PSNR and SSIM over all pixels, over the pixels that were seen
 // before training (a fixed set, so that lines can be compared), and over those seen now.
 #include <algorithm>
