@@ -170,9 +170,13 @@ void forget_checkpoints(const std::filesystem::path& folder) {
   remove_checkpoint(folder, kCheckpointName);
 }
 
-nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request) {
+nlohmann::ordered_json settings_to_json(const TrainingOptions& options) {
   nlohmann::ordered_json settings = nlohmann::ordered_json::object();
-  for (const auto& [name, value] : training_fields(request.training)) settings[name] = value;
+  for (const auto& [name, value] : training_fields(options)) settings[name] = value;
+  return settings;
+}
+
+nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request) {
   nlohmann::ordered_json loss = nlohmann::ordered_json::array();
   for (const StepReport& step : trained.steps) loss.push_back(step.total());
   const std::string start = "one Gaussian per pixel at the depth of a multi-view plane sweep; ";
@@ -184,7 +188,7 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
                      "photographs in " +
                      std::to_string(trained.steps.size()) + " steps"},
           {"gaussians", trained.model.gaussians.size()},
-          {"settings", settings},
+          {"settings", settings_to_json(request.training)},
           {"loss", loss},
           {"alignment",
            {{"scale", trained.priors.alignment.scale},

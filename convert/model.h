@@ -48,6 +48,9 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
 /// Removes the checkpoints of finished work. \throws IoError
 void forget_checkpoints(const std::filesystem::path& folder);
 
+/// Every field of the options and its value, as set_training_field() takes them.
+nlohmann::ordered_json settings_to_json(const TrainingOptions& options);
+
 /// What was done, for run.json, the report and OUT/model/training.json: a description in plain
 /// words, the effective settings, and the loss over the steps.
 nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request);

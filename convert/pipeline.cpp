@@ -59,13 +59,11 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     cameras.push_back({view.name, view.camera.fx, c.x(), c.y(), c.z()});
   }
   const uint64_t cameras_hash = content_hash(json_text(cameras, -1));
-  Json settings = Json::object();
-  for (const auto& [name, value] : training_fields(request.training)) settings[name] = value;
   return {{"scene", std::filesystem::weakly_canonical(request.scene).string()},
           {"views", request.scene_options.views},
           {"downscale", request.scene_options.downscale},
           {"assume_unit", request.assume_unit},
-          {"training", settings},
+          {"training", settings_to_json(request.training)},
           {"voxel_size", request.voxel_size},
           {"max_error", request.max_error},
           {"simplify", request.simplify},
@@ -185,12 +183,13 @@ Json run_web(Run& run, const Progress& progress) {
                                {"certificate", run.record.result("mesh").at("certificate")}})
                              .dump();
   make_output_folder(run.request.output / "web");
-  const TexturedFaces textured = texture_from_photographs(model.scene, mesh);
+  Json texture_report;
+  const PhotoTexture texture = texture_from_photographs(model.scene, mesh, texture_report);
   report(progress, 0.5);
-  write_obj(run.request.output / "mesh/watertight.obj", mesh, textured.texture, frame);
+  write_obj(run.request.output / "mesh/watertight.obj", mesh, texture, frame);
   const GlbReport glb =
-      write_glb(run.request.output / "web/asset.glb", mesh, textured.texture, frame, options);
-  return {{"texture", textured.report},
+      write_glb(run.request.output / "web/asset.glb", mesh, texture, frame, options);
+  return {{"texture", texture_report},
           {"asset.glb",
            {{"bytes", glb.bytes},
             {"texture_bytes", glb.texture_bytes},

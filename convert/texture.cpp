@@ -81,13 +81,16 @@ Json report_of(const TriangleMesh& mesh,
 
 }  // namespace
 
-TexturedFaces texture_from_photographs(const Scene& scene, const TriangleMesh& mesh) {
+PhotoTexture texture_from_photographs(const Scene& scene,
+                                      const TriangleMesh& mesh,
+                                      nlohmann::ordered_json& report) {
   Scene loaded = scene;
   std::vector<View> views;
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
     if (view.image_path.empty() || !std::filesystem::exists(view.image_path)) {
-      return {{}, {{"left_out", "the photograph of " + view.name + " is missing"}}};
+      report = {{"left_out", "the photograph of " + view.name + " is missing"}};
+      return {};
     }
   }
   load_images(loaded, scene.input);
@@ -95,16 +98,16 @@ TexturedFaces texture_from_photographs(const Scene& scene, const TriangleMesh& m
   const FaceScores scores = face_scores(mesh, views);
   const FaceViews chosen = choose_face_views(mesh, scores);
   const ExposureGains exposure = exposure_gains(mesh, scores, views);
-  TexturedFaces out;
-  out.texture.of_face = chosen.of_face;
+  PhotoTexture texture;
+  texture.of_face = chosen.of_face;
   for (size_t i = 0; i < views.size(); ++i) {
     apply_gain(views[i].image, exposure.gain[i]);
-    out.texture.photographs.push_back({views[i].name, views[i].camera, std::move(views[i].image)});
+    texture.photographs.push_back({views[i].name, views[i].camera, std::move(views[i].image)});
   }
-  out.report = report_of(mesh, out.texture, exposure, scene.frame);
-  out.report["seam_length"] = chosen.seam_length * scene.frame.scale;
-  out.report["seam_length_unsmoothed"] = chosen.best_seam_length * scene.frame.scale;
-  return out;
+  report = report_of(mesh, texture, exposure, scene.frame);
+  report["seam_length"] = chosen.seam_length * scene.frame.scale;
+  report["seam_length_unsmoothed"] = chosen.best_seam_length * scene.frame.scale;
+  return texture;
 }
 
 }  // namespace cgs

@@ -9,18 +9,15 @@
 
 namespace cgs {
 
-/// The input photographs on a mesh, and what was found on the way.
-struct TexturedFaces {
-  PhotoTexture texture;  ///< Empty if a photograph is missing.
-  /// {"views": [{"name", "faces", "area", "gain": [r, g, b], "samples"}], "faces_without_view" and
-  /// "area_without_view" (of seen surface), "largest_stretch" (distance between linear texture
-  /// coordinates and the projection, at the middles of edges) [pixels], "units", "seam_length",
-  /// "seam_length_unsmoothed"}; or {"left_out": "why"}.
-  nlohmann::ordered_json report;
-};
-
 /// Loads the input photographs of a scene, chooses one for every face, and levels their exposure.
 /// \param scene   in the frame of the mesh
-TexturedFaces texture_from_photographs(const Scene& scene, const TriangleMesh& mesh);
+/// \param report  set to {"views": [{"name", "faces", "area", "gain": [r, g, b], "samples"}],
+///   "faces_without_view" and "area_without_view" (of seen surface), "largest_stretch" (distance
+///   between linear texture coordinates and the projection, at the middles of edges) [pixels],
+///   "units", "seam_length", "seam_length_unsmoothed"}; or to {"left_out": "why"}
+/// \return empty if a photograph is missing
+PhotoTexture texture_from_photographs(const Scene& scene,
+                                      const TriangleMesh& mesh,
+                                      nlohmann::ordered_json& report);
 
 }  // namespace cgs

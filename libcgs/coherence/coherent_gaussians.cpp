@@ -22,8 +22,6 @@ float sigmoid(float x) {
 
 float logit(float p) { return std::log(p) - std::log1p(-p); }
 
-double pixel_size(const Camera& camera) { return 2 / (camera.fx + camera.fy); }
-
 // Calls work(k, pixel) for the k-th Gaussian of a view, in blocks on all threads.
 template <typename Work>
 void for_each_gaussian(const std::vector<int>& pixels, const Work& work) {
@@ -132,7 +130,7 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
                    {},
                    {}};
     for (size_t i = 0; i < depth.data.size(); ++i) {
-      if (depth.data[i] > 0 && !std::isinf(depth.data[i])) {
+      if (has_gaussian(depth.data[i])) {
         view.pixels.push_back(static_cast<int>(i));
       }
     }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/coherence/initialisation.h"
 
-#include <cmath>
-
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -44,11 +42,11 @@ Gaussians initial_gaussians(const Scene& scene,
     const View& view = scene.views[static_cast<size_t>(scene.input[n])];
     require_same_sizes(view, priors[n]);
     const DepthMap& depth = priors[n].depth;
-    const double pixel = 2 / (view.camera.fx + view.camera.fy);  // per unit of depth
+    const double pixel = pixel_size(view.camera);
     for (int y = 0; y < depth.height; ++y) {
       for (int x = 0; x < depth.width; ++x) {
         const auto z = static_cast<double>(depth(x, y));
-        if (!(z > 0) || std::isinf(z)) continue;
+        if (!has_gaussian(depth(x, y))) continue;
         const auto radius = static_cast<float>(double(options.radius_factor) * z * pixel);
         out.position.push_back(view.camera.unproject(x + 0.5, y + 0.5, z).cast<float>());
         out.scale.push_back(Eigen::Vector3f::Constant(radius));

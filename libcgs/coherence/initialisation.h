@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "libcgs/core/gaussians.h"
@@ -17,6 +18,12 @@ struct InitialisationOptions {
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
 };
+
+/// Whether a pixel of this depth gets a Gaussian.
+inline bool has_gaussian(float depth) { return depth > 0 && !std::isinf(depth); }
+
+/// Width of a pixel at depth 1 [internal units].
+inline double pixel_size(const Camera& camera) { return 2 / (camera.fx + camera.fy); }
 
 /// One isotropic Gaussian per pixel with depth, on the ray through the pixel's centre, of the
 /// pixel's colour (SH degree 0).

@@ -400,12 +400,16 @@ void TrainingRasterizerOptions::validate() const {
 
 TrainingRasterizer::TrainingRasterizer(const TrainingRasterizerOptions& options)
     : tape_(std::make_unique<Tape>()) {
-  options.validate();
-  tape_->options = options;
+  set_options(options);
 }
 TrainingRasterizer::~TrainingRasterizer() = default;
 TrainingRasterizer::TrainingRasterizer(TrainingRasterizer&&) noexcept = default;
 TrainingRasterizer& TrainingRasterizer::operator=(TrainingRasterizer&&) noexcept = default;
+
+void TrainingRasterizer::set_options(const TrainingRasterizerOptions& options) {
+  options.validate();
+  tape_->options = options;
+}
 
 const TrainingBuffers& TrainingRasterizer::forward(const Gaussians& gaussians,
                                                    const Camera& camera) {

@@ -60,6 +60,9 @@ class TrainingRasterizer {
   TrainingRasterizer(TrainingRasterizer&&) noexcept;
   TrainingRasterizer& operator=(TrainingRasterizer&&) noexcept;
 
+  /// From the next forward() on. The memory stays. \throws InvalidInput as validate()
+  void set_options(const TrainingRasterizerOptions& options);
+
   /// Draws. Both arguments must stay unchanged until backward() is done with them.
   /// \return owned by this object, valid until the next call
   /// \throws InvalidInput, LimitError as rasterize(); InvalidInput if a set promised as balls

@@ -10,7 +10,6 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "libcgs/render/training_rasterizer.h"
 
 namespace cgs {
 
@@ -179,17 +178,21 @@ float median_depth(const std::vector<ViewPriors>& priors) {
 Trainer::Trainer(const Scene& scene,
                  const std::vector<ViewPriors>& priors,
                  const TrainingOptions& options)
-    : scene_(scene), priors_(priors), options_(options), model_(scene, priors, options.coherence) {
+    : priors_(priors),
+      options_(options),
+      model_(scene, priors, options.coherence),
+      rasterizer_(TrainingRasterizerOptions{}) {
   options.validate();
   for (size_t n = 0; n < priors.size(); ++n) {
     const View& view = scene.views[static_cast<size_t>(scene.input[n])];
     full_.push_back({view.camera, planes_of(view.image), view.valid, priors[n].layer});
+    if (!(options.coarse_until > 0)) continue;
     TrainingView coarse{
         halved(view.camera), {}, every_other(view.valid), every_other(priors[n].layer)};
     for (int c = 0; c < 3; ++c) coarse.photograph[c] = halved(full_.back().photograph[c]);
     coarse_.push_back(std::move(coarse));
   }
-  for (size_t i = 0; i < priors.size(); ++i) {
+  for (size_t i = 0; i < priors.size() && options.flow_weight > 0; ++i) {
     for (size_t j = 0; j < priors.size(); ++j) {
       if (i == j) continue;
       pairs_.push_back(
@@ -203,9 +206,9 @@ Trainer::Trainer(const Scene& scene,
   model_.decode();
 }
 
-Gaussians Trainer::with_dropout(size_t view) const {
-  Gaussians out = model_.gaussians();
-  if (!(options_.dropout > 0)) return out;
+const Gaussians& Trainer::drawn_for(size_t view) {
+  if (!(options_.dropout > 0)) return model_.gaussians();
+  with_gaps_ = model_.gaussians();
   const CoherentGaussians::Range range = model_.range(view);
   const int width = model_.depth(view).width;
   const int block = options_.dropout_block;
@@ -218,9 +221,9 @@ Gaussians Trainer::with_dropout(size_t view) const {
     const int by = (pixel / width + dy) / block;
     const uint64_t hash =
         mixed(static_cast<uint64_t>(step_), view, static_cast<uint64_t>(by) << 32 | uint64_t(bx));
-    if (double(hash >> 11) * 0x1p-53 < options_.dropout) out.opacity[range.first + k] = 0;
+    if (double(hash >> 11) * 0x1p-53 < options_.dropout) with_gaps_.opacity[range.first + k] = 0;
   }
-  return out;
+  return with_gaps_;
 }
 
 void Trainer::add_view(size_t n, GaussianGradients& sum, StepReport& report) {
@@ -230,10 +233,9 @@ void Trainer::add_view(size_t n, GaussianGradients& sum, StepReport& report) {
   TrainingRasterizerOptions how;
   how.background = background(static_cast<uint64_t>(step_), n);
   how.shape = model_.shapes_are_free() ? GaussianShape::Ellipsoids : GaussianShape::Balls;
-  TrainingRasterizer rasterizer(how);
-  const Gaussians drawn = with_dropout(n);
+  rasterizer_.set_options(how);
   const Camera camera = sharp ? doubled(view.camera) : view.camera;
-  const TrainingBuffers* rendered = &rasterizer.forward(drawn, camera);
+  const TrainingBuffers* rendered = &rasterizer_.forward(drawn_for(n), camera);
   TrainingBuffers pooled;
   if (sharp) {
     for (int c = 0; c < 3; ++c) pooled.color[c] = halved(rendered->color[c]);
@@ -266,7 +268,7 @@ void Trainer::add_view(size_t n, GaussianGradients& sum, StepReport& report) {
     loss.alpha = spread(loss.alpha);
     loss.depth_sum = spread(loss.depth_sum);
   }
-  rasterizer.backward(loss, sum);
+  rasterizer_.backward(loss, sum);
 }
 
 void Trainer::add_depth_terms(std::vector<Raster<float>>& sum, StepReport& report) {

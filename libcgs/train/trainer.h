@@ -9,6 +9,7 @@
 #include "libcgs/coherence/coherent_gaussians.h"
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/view_priors.h"
+#include "libcgs/render/training_rasterizer.h"
 #include "libcgs/train/adam.h"
 #include "libcgs/train/losses.h"
 #include "libcgs/train/training_options.h"
@@ -32,7 +33,7 @@ struct StepReport {
 /// done, and on nothing else, so the same call gives the same bits on any number of threads.
 class Trainer {
  public:
-  /// \param scene   canonical, input images loaded; must outlive the trainer
+  /// \param scene   canonical, input images loaded
   /// \param priors  in the order of scene.input; must outlive the trainer
   Trainer(const Scene& scene,
           const std::vector<ViewPriors>& priors,
@@ -63,18 +64,19 @@ class Trainer {
     std::vector<PixelMatch> matches;
   };
   double time() const { return double(step_) / options_.steps; }
-  Gaussians with_dropout(size_t view) const;
+  const Gaussians& drawn_for(size_t view);
   void add_view(size_t n, GaussianGradients& sum, StepReport& report);
   void add_depth_terms(std::vector<Raster<float>>& sum, StepReport& report);
   void update();
 
-  const Scene& scene_;
   const std::vector<ViewPriors>& priors_;
   TrainingOptions options_;
   CoherentGaussians model_;
   std::vector<TrainingView> full_;    // per input view
-  std::vector<TrainingView> coarse_;  // at half size
-  std::vector<Pair> pairs_;
+  std::vector<TrainingView> coarse_;  // at half size; empty unless the schedule has a coarse part
+  std::vector<Pair> pairs_;           // empty unless the flow term has a weight
+  TrainingRasterizer rasterizer_;
+  Gaussians with_gaps_;  // what dropout leaves for one view; unused without it
   std::vector<AdamState> depth_state_, opacity_state_, shape_state_;
   float disparity_unit_ = 1;
   std::vector<StepReport> history_;
