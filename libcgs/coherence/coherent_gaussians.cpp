@@ -13,7 +13,7 @@ namespace cgs {
 
 namespace {
 
-constexpr size_t kShapeSize = 7;  // three log radii, four quaternion components
+constexpr size_t kShapeSize = 3;  // log of the diagonal of a lower triangle, and its corner
 
 float sigmoid(float x) {
   const float e = std::exp(-std::abs(x));
@@ -33,59 +33,62 @@ void for_each_gaussian(const std::vector<int>& pixels, const Work& work) {
   });
 }
 
-// Keeps log radii within bounds, so that no optimiser piles up steps beyond them.
-Eigen::Vector3f bounded_scale(float* shape, const CoherenceOptions& options, float unit) {
-  const float least = std::log(options.min_radius);
-  const float most = std::log(options.max_radius);
-  Eigen::Vector3f scale;
-  for (int axis = 0; axis < 3; ++axis) {
-    shape[axis] = std::clamp(shape[axis], least, most);
-    scale[axis] = unit * std::exp(shape[axis]);
-  }
-  return scale;
+Eigen::Vector3d point_at(const Camera& camera, const DepthMap& depth, int x, int y) {
+  return camera.unproject(x + 0.5, y + 0.5, double(depth(x, y)));
 }
 
-constexpr int kNormalWindow = 3;  // half the edge [pixels]: depth noise is as large as its steps
+// The longer of the steps to the two neighbours along an axis, where they lie on the same surface;
+// a step across the ray where none does. World axes, for depth 1.
+Eigen::Vector3d surface_step(
+    const Camera& camera, const DepthMap& depth, int x, int y, Eigen::Vector2i along) {
+  constexpr double kSteepest = 10;  // depth per pixel [pixels]
+  const double z = depth(x, y);
+  const double steepest = kSteepest * z * pixel_size(camera);
+  const Eigen::Vector3d here = point_at(camera, depth, x, y);
+  Eigen::Vector3d step = camera.unproject(x + 0.5 + along.x(), y + 0.5 + along.y(), z) - here;
+  for (const int side : {-1, 1}) {
+    const int u = x + side * along.x();
+    const int v = y + side * along.y();
+    if (!depth.contains(u, v) || !has_gaussian(depth(u, v))) continue;
+    if (std::abs(depth(u, v) - z) > steepest) continue;
+    const Eigen::Vector3d other = (point_at(camera, depth, u, v) - here) * side;
+    if (other.squaredNorm() > step.squaredNorm()) step = other;
+  }
+  return step / z;
+}
 
-// Mean normals of the pixels around that lie on the same layer.
-NormalMap smoothed(const NormalMap& normals, const Raster<uint8_t>& layer, int half) {
-  NormalMap out(normals.width, normals.height, Eigen::Vector3f::Zero());
-  tbb::parallel_for(0, normals.height, [&](int y) {
-    for (int x = 0; x < normals.width; ++x) {
-      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-      for (int v = std::max(0, y - half); v <= std::min(normals.height - 1, y + half); ++v) {
-        for (int u = std::max(0, x - half); u <= std::min(normals.width - 1, x + half); ++u) {
-          if (layer(u, v) == layer(x, y)) sum += normals(u, v);
-        }
-      }
-      if (sum.norm() > 0) out(x, y) = sum.normalized();
-    }
-  });
+// The lower triangle L of a shape, its parameters kept within bounds so that no optimiser piles up
+// steps beyond them. [pixels]
+Eigen::Matrix2d bounded_triangle(float* shape, const CoherenceOptions& options) {
+  const float least = std::log(options.min_radius);
+  const float most = std::log(options.max_radius);
+  shape[0] = std::clamp(shape[0], least, most);
+  shape[1] = std::clamp(shape[1], least, most);
+  shape[2] = std::clamp(shape[2], -options.max_radius, options.max_radius);
+  Eigen::Matrix2d out;
+  out << std::exp(double(shape[0])), 0, double(shape[2]), std::exp(double(shape[1]));
   return out;
 }
 
-// A disc-like shape that covers its pixel's piece of a surface: longer where the surface turns away
-// from the camera, so that no gaps show from elsewhere. A ball where the normal is unknown.
-void set_surface_shape(const Eigen::Vector3d& normal,
-                       const Eigen::Vector3d& ray,
-                       float radius,
-                       float* shape) {
-  std::fill_n(shape, 3, std::log(radius));
-  shape[3] = 1;
-  constexpr double kLeastCosine = 0.1;
-  const double cosine = std::abs(normal.dot(ray));
-  const Eigen::Vector3d away = ray - ray.dot(normal) * normal;
-  if (!(normal.norm() > 0.5) || !(away.norm() > 1e-3)) return;
+// Scale and rotation of the covariance B B^T + thickness^2 n n^T, with n across the columns of B.
+void set_shape(const Eigen::Matrix<double, 3, 2>& B,
+               double thickness,
+               Eigen::Vector3f& scale,
+               Eigen::Vector4f& rotation) {
+  // The rotation of the columns that makes them orthogonal.
+  const double angle =
+      0.5 * std::atan2(2 * B.col(0).dot(B.col(1)), B.col(0).squaredNorm() - B.col(1).squaredNorm());
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  const Eigen::Vector3d first = c * B.col(0) + s * B.col(1);
+  const Eigen::Vector3d second = c * B.col(1) - s * B.col(0);
   Eigen::Matrix3d axes;
-  axes.col(0) = away.normalized();
-  axes.col(2) = normal.normalized();
+  axes.col(0) = first.normalized();
+  axes.col(2) = axes.col(0).cross(second).normalized();
   axes.col(1) = axes.col(2).cross(axes.col(0));
-  shape[0] -= static_cast<float>(std::log(std::max(cosine, kLeastCosine)));
+  scale = Eigen::Vector3d(first.norm(), second.norm(), thickness).cast<float>();
   const Eigen::Quaterniond q(axes);
-  shape[3] = static_cast<float>(q.w());
-  shape[4] = static_cast<float>(q.x());
-  shape[5] = static_cast<float>(q.y());
-  shape[6] = static_cast<float>(q.z());
+  rotation = Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()).cast<float>();
 }
 
 }  // namespace
@@ -128,6 +131,7 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
                    Raster<float>(depth.width, depth.height, 0),
                    Raster<float>(depth.width, depth.height, 0),
                    {},
+                   {},
                    {}};
     for (size_t i = 0; i < depth.data.size(); ++i) {
       if (has_gaussian(depth.data[i])) {
@@ -148,20 +152,16 @@ void CoherentGaussians::free_shapes() {
   if (shapes_are_free_) return;
   shapes_are_free_ = true;
   for (size_t n = 0; n < views_.size(); ++n) {
-    const ViewState& view = views_[n];
-    const NormalMap normals =
-        smoothed(normals_from_depth(view.depth, view.camera), view.layer, kNormalWindow);
-    const Eigen::Matrix3d R = view.camera.world_from_cam.linear();
+    ViewState& view = views_[n];
+    view.steps.resize(view.pixels.size());
     ParameterBlock& shape = parameters[n].shape;
     shape.resize(view.pixels.size() * kShapeSize);
     for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
       const int x = pixel % view.depth.width;
       const int y = pixel / view.depth.width;
-      const Eigen::Vector3d ray = R * view.camera.ray_in_cam(x + 0.5, y + 0.5);
-      set_surface_shape(normals.data[pixel].cast<double>(),
-                        ray.normalized(),
-                        options_.radius_factor,
-                        &shape.value[k * kShapeSize]);
+      view.steps[k].col(0) = surface_step(view.camera, view.depth, x, y, {1, 0}).cast<float>();
+      view.steps[k].col(1) = surface_step(view.camera, view.depth, x, y, {0, 1}).cast<float>();
+      std::fill_n(&shape.value[k * kShapeSize], 2, std::log(options_.radius_factor));
     });
   }
 }
@@ -190,13 +190,39 @@ void CoherentGaussians::decode_view(size_t n) {
       return;
     }
     float* shape = &parameters[n].shape.value[k * kShapeSize];
-    gaussians_.scale[g] = bounded_scale(shape, options_, z * unit);
-    gaussians_.rotation[g] = Eigen::Vector4f(shape[3], shape[4], shape[5], shape[6]).normalized();
+    const Eigen::Matrix<double, 3, 2> B =
+        double(z) * view.steps[k].cast<double>() * bounded_triangle(shape, options_);
+    const double thickness = double(options_.min_radius * z * unit);
+    set_shape(B, thickness, gaussians_.scale[g], gaussians_.rotation[g]);
   });
 }
 
 void CoherentGaussians::decode() {
   for (size_t n = 0; n < views_.size(); ++n) decode_view(n);
+}
+
+// \return with respect to the log of a common factor of all standard deviations
+float CoherentGaussians::add_shape_gradient(size_t n,
+                                            size_t k,
+                                            const CovarianceGradient& gradient) {
+  const ViewState& view = views_[n];
+  ParameterBlock& shape = parameters[n].shape;
+  const float* value = &shape.value[k * kShapeSize];
+  const auto z = double(view.depth.data[view.pixels[k]]);
+  const Eigen::Matrix<double, 3, 2> P = z * view.steps[k].cast<double>();
+  Eigen::Matrix2d L;
+  L << std::exp(double(value[0])), 0, double(value[2]), std::exp(double(value[1]));
+  const Eigen::Matrix3d G = as_matrix(gradient);
+  const Eigen::Vector3d normal = P.col(0).cross(P.col(1)).normalized();
+  const double thickness = double(options_.min_radius) * z * pixel_size(view.camera);
+  const Eigen::Matrix2d of_L = 2 * P.transpose() * G * P * L;
+  float* sum = &shape.gradient[k * kShapeSize];
+  sum[0] += static_cast<float>(of_L(0, 0) * L(0, 0));
+  sum[1] += static_cast<float>(of_L(1, 1) * L(1, 1));
+  sum[2] += static_cast<float>(of_L(1, 0));
+  const double of_size =
+      of_L.cwiseProduct(L).sum() + 2 * thickness * thickness * normal.dot(G * normal);
+  return static_cast<float>(of_size);
 }
 
 void CoherentGaussians::add_view_gradients(size_t n,
@@ -218,13 +244,7 @@ void CoherentGaussians::add_view_gradients(size_t n,
     if (!shapes_are_free_) {
       by_z += gradients.radius[g] * options_.radius_factor * unit;
     } else {
-      const Eigen::Vector3f by_log_scale = gradients.scale[g].cwiseProduct(gaussians_.scale[g]);
-      by_z += by_log_scale.sum() / z;
-      float* sum = &parameters[n].shape.gradient[k * kShapeSize];
-      for (int axis = 0; axis < 3; ++axis) sum[axis] += by_log_scale[axis];
-      const float* value = &parameters[n].shape.value[k * kShapeSize];
-      const float length = Eigen::Map<const Eigen::Vector4f>(value + 3).norm();
-      for (int c = 0; c < 4; ++c) sum[3 + c] += gradients.rotation[g][c] / length;
+      by_z += add_shape_gradient(n, k, gradients.covariance[g]) / z;
     }
     const float f = view.depth_change.data[pixel];
     const float h = view.logit_change.data[pixel];

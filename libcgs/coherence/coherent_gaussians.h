@@ -30,10 +30,10 @@ struct CoherenceOptions {
   float max_depth_change = 0.5f;   ///< Bound of |log(depth / starting depth)|; > 0.
   float max_logit_change = 12.0f;  ///< Bound of the change of the opacity's logit; > 0.
   float radius_factor = 0.4f;      ///< As in InitialisationOptions.
-  float min_radius = 0.25f;  ///< Of free shapes [pixels of the own view]; in (0, radius_factor].
-                             ///< Gaussians that shrink open gaps in slanted surfaces, which show
-                             ///< from elsewhere and not in the photographs.
-  float max_radius = 4.0f;   ///< Of free shapes; >= radius_factor.
+  float min_radius = 0.15f;  ///< Of free shapes [pixels of the own view]; in (0, radius_factor].
+                             ///< Gaussians that shrink open gaps, which show from elsewhere and
+                             ///< not in the photographs.
+  float max_radius = 2.0f;   ///< Of free shapes; >= radius_factor.
   float opacity = 0;         ///< As in InitialisationOptions.
 
   /// \throws InvalidInput naming the first field out of range.
@@ -45,9 +45,13 @@ struct CoherenceOptions {
 /// For a pixel p of view n with starting depth z0(p):
 ///   z = z0 exp(D tanh(f_n(p) / D)),  logit(opacity) = logit(o0) + L tanh(g_n(p) / L),
 /// with layered lattices f, g and the bounds D, L of CoherenceOptions. Both start at the identity.
-/// Standard deviations are z / focal length * exp(s), s = log(radius_factor) until shapes are free.
-/// Colours are those of the pixels.
-/// Source: Paliwal et al. 2024, "CoherentGS", section 3, with lattices instead of convolutional
+/// Until shapes are free, Gaussians are balls of radius_factor pixels. A free shape is an ellipse
+/// of three numbers in its own picture, laid on the surface: with the steps P = [p_x p_y] (3x2)
+/// from its point to the next pixels' points and a lower triangle L with e^a, e^b on its diagonal,
+/// the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a photograph
+/// cannot show, how far a Gaussian reaches along the ray, thus follows the surface instead of
+/// drifting. Colours are those of the pixels. Source: Paliwal et al. 2024, "CoherentGS", section 3,
+/// with lattices instead of convolutional
 ///         decoders and the residual relative to depth.
 class CoherentGaussians {
  public:
@@ -57,8 +61,8 @@ class CoherentGaussians {
                     const std::vector<ViewPriors>& priors,
                     const CoherenceOptions& options);
 
-  /// What the optimiser may change in one view. `shape` holds log radii relative to the pixel (3)
-  /// and a quaternion (4) per Gaussian; it is empty until free_shapes().
+  /// What the optimiser may change in one view. `shape` holds (a, b, corner of L) per Gaussian; it
+  /// is empty until free_shapes().
   struct ViewParameters {
     ParameterBlock depth;
     ParameterBlock opacity;
@@ -66,8 +70,8 @@ class CoherentGaussians {
   };
   std::vector<ViewParameters> parameters;
 
-  /// From now on every Gaussian has a shape of its own, at first one that covers its pixel's piece
-  /// of the surface: longer than the ball it was along the slope.
+  /// From now on every Gaussian has a shape of its own, at first L = radius_factor: it covers its
+  /// pixel's piece of the surface and is longer than the ball it was along the slope.
   void free_shapes();
   bool shapes_are_free() const { return shapes_are_free_; }
 
@@ -108,9 +112,11 @@ class CoherentGaussians {
     Raster<float> depth_change;  // f, then tanh(f / D)
     Raster<float> logit_change;
     std::vector<int> pixels;
+    std::vector<Eigen::Matrix<float, 3, 2>> steps;  // to the next pixels, for depth 1; if free
     Range range;
   };
   void decode_view(size_t n);
+  float add_shape_gradient(size_t n, size_t k, const CovarianceGradient& gradient);
   void add_view_gradients(size_t n, const GaussianGradients& gaussians, const Raster<float>& depth);
 
   CoherenceOptions options_;

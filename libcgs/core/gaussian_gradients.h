@@ -7,15 +7,26 @@
 
 namespace cgs {
 
+/// Of a loss with respect to the entries xx, yy, zz, yz, xz, xy of a covariance in world axes; the
+/// last three stand for both off-diagonal entries.
+using CovarianceGradient = Eigen::Matrix<float, 6, 1>;
+
+/// G with dL = trace(G dC) for the covariance C.
+inline Eigen::Matrix3d as_matrix(const CovarianceGradient& g) {
+  const Eigen::Matrix<double, 6, 1> d = g.cast<double>();
+  Eigen::Matrix3d out;
+  out << d[0], d[5] / 2, d[4] / 2, d[5] / 2, d[1], d[3] / 2, d[4] / 2, d[3] / 2, d[2];
+  return out;
+}
+
 /// Derivatives of a loss with respect to the entries of Gaussians of the same names. Arrays that
 /// the rasterizer was not asked for are left empty.
 struct GaussianGradients {
   std::vector<Eigen::Vector3f> position;
   std::vector<float> opacity;
-  std::vector<float> radius;              ///< Balls: with respect to the common value of scale.
-  std::vector<Eigen::Vector3f> scale;     ///< Ellipsoids; with respect to the values, not logs.
-  std::vector<Eigen::Vector4f> rotation;  ///< Ellipsoids; orthogonal to the quaternion.
-  std::vector<Eigen::Vector3f> sh;        ///< All sh_count() coefficients, if asked for.
+  std::vector<float> radius;  ///< Balls: with respect to the common value of scale.
+  std::vector<CovarianceGradient> covariance;  ///< Ellipsoids; shape_gradient() goes on from here.
+  std::vector<Eigen::Vector3f> sh;             ///< All sh_count() coefficients, if asked for.
 };
 
 }  // namespace cgs

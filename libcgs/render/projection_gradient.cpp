@@ -82,31 +82,45 @@ EllipsoidGradient ellipsoid_gradient(const ProjectionView& view,
                                      const Eigen::Vector4f& rotation,
                                      const SplatGradient& gradient) {
   const Slopes at(view, splat);
-  const Eigen::Vector4d raw = rotation.cast<double>();
-  const double length = raw.norm();
-  const Eigen::Vector4d q = raw / length;
+  const Eigen::Vector4d q = rotation.cast<double>().normalized();
   const Eigen::Matrix3d R = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
-  const Eigen::Vector3d s = scale.cast<double>();
-  const Eigen::Matrix3d directions = view.cam_from_world * R;  // axes in the camera, as columns
-  const Eigen::Matrix3d axes = directions * s.asDiagonal();
+  // As columns, in the camera.
+  const Eigen::Matrix3d axes = view.cam_from_world * R * scale.cast<double>().asDiagonal();
   const Eigen::RowVector3d in_x = at.jx * (axes.row(0) - at.a * axes.row(2));
   const Eigen::RowVector3d in_y = at.jy * (axes.row(1) - at.b * axes.row(2));
   // C = M M^T with rows in_x, in_y.
   const Eigen::RowVector3d of_in_x = 2 * gradient.cov_xx * in_x + gradient.cov_xy * in_y;
   const Eigen::RowVector3d of_in_y = 2 * gradient.cov_yy * in_y + gradient.cov_xy * in_x;
-  Eigen::Matrix3d of_axes;
-  of_axes.row(0) = at.jx * of_in_x;
-  of_axes.row(1) = at.jy * of_in_y;
-  of_axes.row(2) = -at.a * of_axes.row(0) - at.b * of_axes.row(1);
-  const Eigen::Vector3d of_a_b_z(-of_axes.row(0).dot(axes.row(2)),
-                                 -of_axes.row(1).dot(axes.row(2)),
+  const Eigen::Vector3d of_a_b_z(-at.jx * of_in_x.dot(axes.row(2)),
+                                 -at.jy * of_in_y.dot(axes.row(2)),
                                  -(in_x.dot(of_in_x) + in_y.dot(of_in_y)) * at.inverse_z);
   EllipsoidGradient out;
   out.position = of_position(view, at, gradient, of_a_b_z);
-  out.scale = of_axes.cwiseProduct(directions).colwise().sum().transpose();
-  const Eigen::Matrix3d of_rotation = view.cam_from_world.transpose() * of_axes * s.asDiagonal();
-  out.rotation = of_unit_quaternion(q, of_rotation) / length;
+  // The image covariance is that of x = gx . p, y = gy . p for points p in the world.
+  const Eigen::Matrix3d& W = view.cam_from_world;
+  const Eigen::RowVector3d gx = at.jx * (W.row(0) - at.a * W.row(2));
+  const Eigen::RowVector3d gy = at.jy * (W.row(1) - at.b * W.row(2));
+  const auto of = [&](int i, int j) {
+    return gradient.cov_xx * gx[i] * gx[j] + gradient.cov_yy * gy[i] * gy[j] +
+           gradient.cov_xy * (gx[i] * gy[j] + gx[j] * gy[i]) / 2;
+  };
+  const Eigen::Matrix<double, 6, 1> entries{
+      {of(0, 0), of(1, 1), of(2, 2), 2 * of(1, 2), 2 * of(0, 2), 2 * of(0, 1)}};
+  out.covariance = entries.cast<float>();
   return out;
+}
+
+ShapeGradient shape_gradient(const Eigen::Vector3f& scale,
+                             const Eigen::Vector4f& rotation,
+                             const CovarianceGradient& gradient) {
+  const Eigen::Vector4d raw = rotation.cast<double>();
+  const double length = raw.norm();
+  const Eigen::Vector4d q = raw / length;
+  const Eigen::Matrix3d R = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+  const Eigen::Vector3d s = scale.cast<double>();
+  const Eigen::Matrix3d of_axes = 2 * as_matrix(gradient) * R * s.asDiagonal();  // of R S
+  return {of_axes.cwiseProduct(R).colwise().sum().transpose(),
+          of_unit_quaternion(q, of_axes * s.asDiagonal()) / length};
 }
 
 }  // namespace cgs

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "libcgs/core/gaussian_gradients.h"
 #include "libcgs/core/gaussians.h"
 #include "libcgs/render/projection.h"
 
@@ -26,7 +27,12 @@ struct BallGradient {
 /// With respect to an ellipsoid.
 struct EllipsoidGradient {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< World axes.
-  Eigen::Vector3d scale = Eigen::Vector3d::Zero();
+  CovarianceGradient covariance = CovarianceGradient::Zero();
+};
+
+/// With respect to scale and rotation, which make a covariance.
+struct ShapeGradient {
+  Eigen::Vector3d scale = Eigen::Vector3d::Zero();     ///< Of the values, not of logs.
   Eigen::Vector4d rotation = Eigen::Vector4d::Zero();  ///< Orthogonal to the quaternion.
 };
 
@@ -48,5 +54,11 @@ EllipsoidGradient ellipsoid_gradient(const ProjectionView& view,
                                      const Eigen::Vector3f& scale,
                                      const Eigen::Vector4f& rotation,
                                      const SplatGradient& gradient);
+
+/// Chains through C = R S S^T R^T.
+/// \param rotation  quaternion (w, x, y, z) of any length but 0
+ShapeGradient shape_gradient(const Eigen::Vector3f& scale,
+                             const Eigen::Vector4f& rotation,
+                             const CovarianceGradient& gradient);
 
 }  // namespace cgs

@@ -320,8 +320,7 @@ void TrainingRasterizer::Tape::prepare(GaussianGradients& sum) const {
   if (options.shape == GaussianShape::Balls) {
     match_size(sum.radius, n, 0.0f);
   } else {
-    match_size<Eigen::Vector3f>(sum.scale, n, Eigen::Vector3f::Zero());
-    match_size<Eigen::Vector4f>(sum.rotation, n, Eigen::Vector4f::Zero());
+    match_size<CovarianceGradient>(sum.covariance, n, CovarianceGradient::Zero());
   }
   if (options.sh_gradients) {
     match_size<Eigen::Vector3f>(sum.sh, gaussians->sh.size(), Eigen::Vector3f::Zero());
@@ -371,8 +370,7 @@ void TrainingRasterizer::Tape::add_block(size_t block,
       const EllipsoidGradient of =
           ellipsoid_gradient(view, splat, g.scale[i], g.rotation[i], gradient);
       sum.position[i] += of.position.cast<float>();
-      sum.scale[i] += of.scale.cast<float>();
-      sum.rotation[i] += of.rotation.cast<float>();
+      sum.covariance[i] += of.covariance;
     }
     if (channels.color_derivative) add_color(i, total.color, sum);
   };

@@ -22,7 +22,7 @@ struct TrainingOptions {
 
   double depth_rate = 1e-3;   ///< Of log depth, per step, at the start.
   double opacity_rate = 0.1;  ///< Of the logit.
-  double shape_rate = 0.2;    ///< Of log radius and of the quaternion.
+  double shape_rate = 0.2;    ///< Of the entries of a shape (CoherentGaussians).
   double final_rate = 0.05;   ///< All rates fall to this part of themselves, along a cosine.
 
   double l1_weight = 0.8;

@@ -14,6 +14,8 @@
 #include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/render/projection_gradient.h"
+#include "libcgs/render/projection_gradient.h"
 #include "libcgs/render/rasterizer.h"
 #include "tests/support/reference_rasterizer.h"
 #include "tests/support/reference_training_rasterizer.h"
@@ -98,23 +100,24 @@ std::vector<Entry> entries_of(const Gaussians& g, const GaussianGradients& d) {
   std::vector<Entry> out;
   const auto count = static_cast<size_t>(g.sh_count());
   for (size_t i = 0; i < g.size(); ++i) {
+    const ShapeGradient shape = d.covariance.empty()
+                                    ? ShapeGradient{}
+                                    : shape_gradient(g.scale[i], g.rotation[i], d.covariance[i]);
     for (int k = 0; k < 3; ++k) {
       out.push_back({"position", double(d.position[i][k]), [=](auto& s, double h) {
                        s[i].position[k] += h;
                      }});
-      if (!d.scale.empty()) {
-        out.push_back(
-            {"scale", double(d.scale[i][k]), [=](auto& s, double h) { s[i].scale[k] += h; }});
+      if (!d.covariance.empty()) {
+        out.push_back({"scale", shape.scale[k], [=](auto& s, double h) { s[i].scale[k] += h; }});
       }
       for (size_t c = 0; c < (d.sh.empty() ? 0 : count); ++c) {
         out.push_back(
             {"sh", double(d.sh[i * count + c][k]), [=](auto& s, double h) { s[i].sh[c][k] += h; }});
       }
     }
-    for (int k = 0; k < (d.rotation.empty() ? 0 : 4); ++k) {
-      out.push_back({"rotation", double(d.rotation[i][k]), [=](auto& s, double h) {
-                       s[i].rotation[k] += h;
-                     }});
+    for (int k = 0; k < (d.covariance.empty() ? 0 : 4); ++k) {
+      out.push_back(
+          {"rotation", shape.rotation[k], [=](auto& s, double h) { s[i].rotation[k] += h; }});
     }
     if (!d.radius.empty()) {
       out.push_back(
@@ -307,8 +310,8 @@ bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
 
 bool same_bits(const GaussianGradients& a, const GaussianGradients& b) {
   return same_bits(a.position, b.position) && same_bits(a.opacity, b.opacity) &&
-         same_bits(a.radius, b.radius) && same_bits(a.scale, b.scale) &&
-         same_bits(a.rotation, b.rotation) && same_bits(a.sh, b.sh);
+         same_bits(a.radius, b.radius) && same_bits(a.covariance, b.covariance) &&
+         same_bits(a.sh, b.sh);
 }
 
 GaussianGradients gradients(const Gaussians& g,
@@ -367,7 +370,7 @@ TEST(TrainingRasterizer, AddsToTheDerivativesItIsGiven) {
     EXPECT_FLOAT_EQ(sum.radius[i], 2 * once.radius[i]);
     EXPECT_FLOAT_EQ(sum.opacity[i], 2 * once.opacity[i]);
   }
-  EXPECT_TRUE(sum.scale.empty() && sum.rotation.empty() && sum.sh.empty());
+  EXPECT_TRUE(sum.covariance.empty() && sum.sh.empty());
 }
 
 TEST(TrainingRasterizer, GivesNothingForNothing) {
@@ -409,8 +412,7 @@ TEST(TrainingRasterizer, GivesDeadGaussiansNothingAndOthersTheSame) {
   const TrainingRasterizerOptions options{.shape = GaussianShape::Ellipsoids};
   GaussianGradients expected = gradients(g, camera, options);
   expected.position.resize(with_dead.size(), Eigen::Vector3f::Zero());
-  expected.scale.resize(with_dead.size(), Eigen::Vector3f::Zero());
-  expected.rotation.resize(with_dead.size(), Eigen::Vector4f::Zero());
+  expected.covariance.resize(with_dead.size(), CovarianceGradient::Zero());
   expected.opacity.resize(with_dead.size(), 0);
   EXPECT_TRUE(same_bits(gradients(with_dead, camera, options), expected));
 }
@@ -425,10 +427,14 @@ TEST(TrainingRasterizer, GivesRotationsWhatIsOrthogonalToThemAtAnyLength) {
     for (Eigen::Vector4f& q : scaled.rotation) q *= std::ldexp(1.0f, exponent);
     const GaussianGradients got = gradients(scaled, camera, options);
     EXPECT_TRUE(same_bits(got.position, expected.position)) << exponent;
+    EXPECT_TRUE(same_bits(got.covariance, expected.covariance)) << exponent;
     for (size_t i = 0; i < g.size(); ++i) {
-      const Eigen::Vector4f d = got.rotation[i] * std::ldexp(1.0f, exponent);
-      EXPECT_LE((d - expected.rotation[i]).norm(), 1e-6f * expected.rotation[i].norm());
-      EXPECT_LE(std::abs(d.dot(g.rotation[i].normalized())), 1e-6f * d.norm());
+      const auto of = [&](const Gaussians& set, const GaussianGradients& gradient) {
+        return shape_gradient(g.scale[i], set.rotation[i], gradient.covariance[i]).rotation;
+      };
+      const Eigen::Vector4d d = of(scaled, got) * std::ldexp(1.0, exponent);
+      EXPECT_LE((d - of(g, expected)).norm(), 1e-12 * d.norm());
+      EXPECT_LE(std::abs(d.dot(g.rotation[i].cast<double>().normalized())), 1e-12 * d.norm());
     }
   }
 }
