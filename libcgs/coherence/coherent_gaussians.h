@@ -33,7 +33,7 @@ struct CoherenceOptions {
   float min_radius = 0.15f;  ///< Of free shapes [pixels of the own view]; in (0, radius_factor].
                              ///< Gaussians that shrink open gaps, which show from elsewhere and
                              ///< not in the photographs.
-  float max_radius = 2.0f;   ///< Of free shapes; >= radius_factor.
+  float max_radius = 3.0f;   ///< Of free shapes; >= radius_factor.
   float opacity = 0;         ///< As in InitialisationOptions.
 
   /// \throws InvalidInput naming the first field out of range.

@@ -408,11 +408,15 @@ Raster<RefinedPixel> SlantedRefinement::result() const {
       const Normal n = normal_equations(w, planes_(x, y));
       // Cramer-Rao: residual variance over information on t, the slopes eliminated.
       const float total = std::max(n.weight, 1e-6f);
-      Eigen::Matrix3f H = n.H;
-      H.diagonal().array() += 1e-6f * total;
-      const float variance = std::max(n.residual / total, 1e-4f);
-      const float t_variance = variance * H.inverse()(0, 0);
-      out(x, y) = {planes_(x, y), 1 - data_cost(w, planes_(x, y)), std::sqrt(t_variance)};
+      const double least = 1e-6 * double(total);
+      Eigen::Matrix3d H = n.H.cast<double>();
+      H.diagonal().array() += least;
+      // Without texture H is singular but for rounding, and its inverse may come out negative.
+      const double inverse = H.inverse()(0, 0);
+      const double per_variance = inverse > 0 ? std::min(inverse, 1 / least) : 1 / least;
+      const double variance = std::max(n.residual / total, 1e-4f);
+      const auto sigma = static_cast<float>(std::sqrt(variance * per_variance));
+      out(x, y) = {planes_(x, y), 1 - data_cost(w, planes_(x, y)), sigma};
     }
   });
   return out;

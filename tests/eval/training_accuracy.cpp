@@ -31,12 +31,16 @@ struct HeldOut {
   MaskMap seen_at_start;
 };
 
-MaskMap seen_pixels(const cgs::RenderBuffers& buffers) {
-  MaskMap out(buffers.hole.width, buffers.hole.height, 0);
-  for (size_t i = 0; i < out.data.size(); ++i) {
-    out.data[i] = buffers.hole.data[i] == cgs::Hole::None ? 1 : 0;
+// Pixels of the photograph: undistorting leaves borders that show nothing.
+MaskMap valid_pixels(const cgs::View& view) {
+  return view.valid.empty() ? MaskMap(view.image.width, view.image.height, 1) : view.valid;
+}
+
+MaskMap seen_pixels(const cgs::RenderBuffers& buffers, MaskMap valid) {
+  for (size_t i = 0; i < valid.data.size(); ++i) {
+    if (buffers.hole.data[i] != cgs::Hole::None) valid.data[i] = 0;
   }
-  return out;
+  return valid;
 }
 
 // Exact depth of the input views [internal units], where the scene has a folder truth/.
@@ -88,16 +92,19 @@ Means evaluate(const cgs::Gaussians& gaussians,
   for (HeldOut& h : held_out) {
     cgs::RenderBuffers buffers = cgs::rasterize(gaussians, h.view.camera);
     cgs::annotate_support(buffers, h.view.camera, inputs);
-    const MaskMap seen = seen_pixels(buffers);
+    const MaskMap valid = valid_pixels(h.view);
+    const MaskMap seen = seen_pixels(buffers, valid);
     if (h.seen_at_start.empty()) h.seen_at_start = seen;
     const cgs::ColorImage shown = cgs::picture(buffers);
-    m.psnr += cgs::psnr(shown, h.view.image);
-    m.ssim += cgs::ssim(shown, h.view.image);
+    m.psnr += cgs::psnr(shown, h.view.image, &valid);
+    m.ssim += cgs::ssim(shown, h.view.image, &valid);
     m.psnr_fixed += cgs::psnr(shown, h.view.image, &h.seen_at_start);
     m.ssim_fixed += cgs::ssim(shown, h.view.image, &h.seen_at_start);
     m.psnr_seen += cgs::psnr(shown, h.view.image, &seen);
-    m.holes +=
-        1 - double(std::count(seen.data.begin(), seen.data.end(), 1)) / double(seen.data.size());
+    const auto count = [](const MaskMap& mask) {
+      return double(std::count(mask.data.begin(), mask.data.end(), 1));
+    };
+    m.holes += 1 - count(seen) / count(valid);
   }
   const auto n = double(held_out.size());
   return {m.psnr / n, m.ssim / n, m.psnr_fixed / n, m.ssim_fixed / n, m.psnr_seen / n, m.holes / n};
