@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "io/atomic_file.h"
 #include "io/byte_writer.h"
@@ -195,16 +194,6 @@ class MeshRows {
   int provenance_ = -1;
 };
 
-std::vector<Eigen::Vector3d> corners_of(const std::vector<Eigen::Vector3d>& points) {
-  Eigen::Vector3d low = points.front();
-  Eigen::Vector3d high = points.front();
-  for (const Eigen::Vector3d& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  return {low, high};
-}
-
 }  // namespace
 
 void write_mesh_ply(const std::filesystem::path& path,
@@ -231,24 +220,15 @@ void write_mesh_ply(const std::filesystem::path& path,
   file.commit();
 }
 
-MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame) {
+ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
   const std::string bytes = read_file(path);
-  const PlyHeader header = parse_ply_header(bytes, path);
+  PlyHeader header = parse_ply_header(bytes, path);
   MeshRows rows(header, path);
   const uint64_t trailing = read_ply_rows(
       bytes, path, header, [&](const PlyElement& element, uint64_t i, const PlyRow& row) {
         rows.add(element, i, row);
       });
-  PlyPlacement placement = ply_placement(header.comments, corners_of(rows.positions), frame);
-  MeshFile out{std::move(rows.mesh), placement.frame, std::move(placement.warnings)};
-  out.mesh.vertices.reserve(rows.positions.size());
-  for (const Eigen::Vector3d& p : rows.positions) {
-    out.mesh.vertices.emplace_back(placement.internal(p).cast<float>());
-  }
-  for (float& sigma : out.mesh.sigma) {
-    sigma = sigma >= 0 && std::isfinite(sigma) ? static_cast<float>(sigma / out.frame.scale)
-                                               : std::numeric_limits<float>::quiet_NaN();
-  }
+  ParsedMesh out{std::move(rows.positions), std::move(rows.mesh), std::move(header.comments), {}};
   if (trailing > 0) {
     out.warnings.push_back("trailing " + std::to_string(trailing) + " bytes ignored");
   }
@@ -256,6 +236,20 @@ MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Fr
     out.warnings.push_back("dropped " + std::to_string(rows.dropped_faces) +
                            " faces of fewer than 3 corners");
   }
+  return out;
+}
+
+MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame) {
+  ParsedMesh parsed = parse_mesh_ply(path);
+  PlyPlacement placement =
+      ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
+  MeshFile out{std::move(parsed.mesh), placement.frame, std::move(placement.warnings)};
+  out.mesh.vertices.reserve(parsed.positions.size());
+  for (const Eigen::Vector3d& p : parsed.positions) {
+    out.mesh.vertices.emplace_back(placement.internal(p).cast<float>());
+  }
+  for (float& sigma : out.mesh.sigma) sigma = internal_sigma(sigma, out.frame);
+  out.warnings.insert(out.warnings.end(), parsed.warnings.begin(), parsed.warnings.end());
   return out;
 }
 

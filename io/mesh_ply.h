@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "io/parsed_mesh.h"
 #include "libcgs/core/frame.h"
 #include "libcgs/core/triangle_mesh.h"
 
@@ -42,5 +43,9 @@ struct MeshFile {
 ///         Empty (0 vertices), Value (a coordinate that is not finite), Ref (a face that names a
 ///         vertex that is not there); LimitError
 MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame = {});
+
+/// The content of the file as read_mesh_ply() reads it, in file coordinates and double.
+/// \throws as read_mesh_ply()
+ParsedMesh parse_mesh_ply(const std::filesystem::path& path);
 
 }  // namespace cgs
