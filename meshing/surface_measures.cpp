@@ -119,9 +119,13 @@ MeasuredValue enclosed_volume(const MeasurableMesh& mesh) {
   const Eigen::Vector3d middle = box.center();
   for (size_t f = 0; f < mesh.mesh.faces.size(); ++f) {
     const Corners t = corners(mesh, f);
-    add_part(out, mesh, f, (t.a - middle).dot((t.b - middle).cross(t.c - middle)) / 6);
+    out.value += (t.a - middle).dot((t.b - middle).cross(t.c - middle)) / 6;
   }
-  out.stated = stated_share(mesh);
+  const auto areas = surface_area(mesh);
+  for (size_t i = 0; i < 4 && areas.value > 0; ++i) {
+    out.by_provenance.at(i) = out.value * areas.by_provenance.at(i) / areas.value;
+  }
+  out.stated = areas.stated;
   if (out.stated == 0) return out;
   // A vertex that moves by d sweeps d times its share of the area vectors around it.
   const auto normals = stated_area_vectors(mesh);

@@ -10,6 +10,7 @@ namespace cgs {
 void add_evaluate(CLI::App& app);
 void add_fuse(CLI::App& app);
 void add_info(CLI::App& app);
+void add_measure(CLI::App& app);
 void add_mesh(CLI::App& app);
 void add_render(CLI::App& app);
 void add_run(CLI::App& app);
