@@ -15,7 +15,9 @@ namespace cgs {
 
 namespace {
 
-std::string header_text(const TriangleMesh& mesh, const Frame& frame) {
+std::string header_text(const TriangleMesh& mesh,
+                        const Frame& frame,
+                        const std::vector<VertexScalar>& scalars) {
   std::string out = "ply\nformat binary_little_endian 1.0\ncomment generator cgs\n";
   out += ply_frame_comments(frame);
   if (!mesh.provenance.empty()) {
@@ -29,6 +31,7 @@ std::string header_text(const TriangleMesh& mesh, const Frame& frame) {
   }
   if (!mesh.support.empty()) out += "property float quality\n";
   if (!mesh.sigma.empty()) out += "property float scalar_sigma\n";
+  for (const VertexScalar& scalar : scalars) out += "property float " + scalar.name + "\n";
   out += "element face " + std::to_string(mesh.faces.size()) + "\n";
   out += "property list uchar int vertex_indices\n";
   if (!mesh.provenance.empty()) out += "property uchar scalar_provenance\nproperty float quality\n";
@@ -199,13 +202,26 @@ class MeshRows {
 void write_mesh_ply(const std::filesystem::path& path,
                     const TriangleMesh& mesh,
                     const Frame& frame) {
+  write_mesh_ply(path, mesh, frame, {});
+}
+
+void write_mesh_ply(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const std::vector<VertexScalar>& scalars) {
   require_writable(mesh, "write_mesh_ply");
+  for (const VertexScalar& scalar : scalars) {
+    require(scalar.values.size() == mesh.vertices.size(),
+            "write_mesh_ply: " + scalar.name + " must have a number per vertex",
+            scalar.values.size());
+  }
   AtomicFile file(path);
-  file.write(header_text(mesh, frame));
+  file.write(header_text(mesh, frame, scalars));
   std::string record;
   for (size_t i = 0; i < mesh.vertices.size(); ++i) {
     record.clear();
     append_vertex(record, mesh, frame, i);
+    for (const VertexScalar& scalar : scalars) append_bytes(record, scalar.values[i]);
     file.write(record);
   }
   for (size_t i = 0; i < mesh.faces.size(); ++i) {

@@ -25,6 +25,19 @@ void write_mesh_ply(const std::filesystem::path& path,
                     const TriangleMesh& mesh,
                     const Frame& frame);
 
+/// A number per vertex under a name of its own; CloudCompare shows names that start with "scalar_".
+struct VertexScalar {
+  std::string name;
+  std::vector<float> values;  ///< As they are to stand in the file.
+};
+
+/// The same with further numbers per vertex behind the others.
+/// \throws as above; InvalidInput if there are not as many numbers as vertices
+void write_mesh_ply(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const std::vector<VertexScalar>& scalars);
+
 /// A mesh from a file and the frame it was read into.
 struct MeshFile {
   TriangleMesh mesh;

@@ -40,8 +40,8 @@ Eigen::Vector3d face_normal(const MeasurableMesh& mesh, uint32_t face) {
   return (mesh.points[f[1]] - a).cross(mesh.points[f[2]] - a).stableNormalized();
 }
 
-// The point of a triangle nearest to p, as weights of its corners.
-// Source: C. Ericson 2004, "Real-Time Collision Detection", section 5.1.5.
+}  // namespace
+
 Eigen::Vector3d nearest_weights(const Eigen::Vector3d& a,
                                 const Eigen::Vector3d& b,
                                 const Eigen::Vector3d& c,
@@ -69,8 +69,6 @@ Eigen::Vector3d nearest_weights(const Eigen::Vector3d& a,
   const double sum = va + vb + vc;
   return {1 - vb / sum - vc / sum, vb / sum, vc / sum};
 }
-
-}  // namespace
 
 struct NearestSurface::Parts {
   explicit Parts(const MeasurableMesh& m) : mesh(m) {}

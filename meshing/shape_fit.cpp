@@ -6,8 +6,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <ceres/tiny_solver.h>
-#include <ceres/tiny_solver_autodiff_function.h>
 
 #include "libcgs/core/error.h"
 #include "meshing/surface_measures.h"
@@ -91,46 +89,51 @@ Patch patch_within(const MeasurableMesh& mesh, const Eigen::Vector3d& center, do
   return out;
 }
 
-// Weighted distances to a shape with parameters about a first guess.
-// Plane: two tilts and a shift. Sphere: centre and radius. Cylinder: two tilts of the axis, its
-// shift in two directions, radius.
-template <Shape kShape>
-struct Distances {
-  using Scalar = double;
-  static constexpr int kParameters = kShape == Shape::Plane ? 3 : kShape == Shape::Sphere ? 4 : 5;
-
-  const std::vector<Sample>& samples;
-  Eigen::Matrix3d axes;   // columns; the last one is normal or axis of the first guess
-  Eigen::Vector3d point;  // a point of the first guess
-  int NumResiduals() const { return static_cast<int>(samples.size()); }
-
-  template <typename T>
-  T distance(const Sample& sample, const T* p) const {
-    using std::sqrt;
-    const Eigen::Matrix<T, 3, 1> q = (axes.transpose() * (sample.place - point)).template cast<T>();
-    if constexpr (kShape == Shape::Sphere) {
-      const Eigen::Matrix<T, 3, 1> d = q - Eigen::Matrix<T, 3, 1>(p[0], p[1], p[2]);
-      return sqrt(d.squaredNorm() + T(1e-300)) - p[3];
-    } else {
-      const Eigen::Matrix<T, 3, 1> along =
-          Eigen::Matrix<T, 3, 1>(p[0], p[1], T(1)) / sqrt(p[0] * p[0] + p[1] * p[1] + T(1));
-      if constexpr (kShape == Shape::Plane) {
-        return q.dot(along) - p[2];
-      } else {
-        const Eigen::Matrix<T, 3, 1> d = q - Eigen::Matrix<T, 3, 1>(p[2], p[3], T(0));
-        return sqrt(d.cross(along).squaredNorm() + T(1e-300)) - p[4];
-      }
-    }
-  }
-
-  template <typename T>
-  bool operator()(const T* parameters, T* residuals) const {
-    for (size_t i = 0; i < samples.size(); ++i) {
-      residuals[i] = distance(samples[i], parameters) * std::sqrt(samples[i].area);
-    }
-    return true;
-  }
+// Where a shape is looked for: axes (columns; the last one is normal or axis of the first guess)
+// and a point of the first guess.
+struct Local {
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
 };
+
+int parameter_count(Shape shape) {
+  return shape == Shape::Plane ? 3 : shape == Shape::Sphere ? 4 : 5;
+}
+
+// Distance to a shape and its derivatives by the parameters. Plane: two tilts and a shift. Sphere:
+// centre and radius. Cylinder: two tilts of the axis, its shift in two directions, radius.
+double distance(Shape shape,
+                const Eigen::Vector3d& q,
+                const Eigen::VectorXd& p,
+                Eigen::VectorXd& row) {
+  constexpr double kTiny = 1e-150;  // no division by nothing on a centre or an axis
+  if (shape == Shape::Sphere) {
+    const Eigen::Vector3d d = q - p.head(3);
+    row.head(3) = -d / (d.norm() + kTiny);
+    row[3] = -1;
+    return d.norm() - p[3];
+  }
+  const double length = std::sqrt(p[0] * p[0] + p[1] * p[1] + 1);
+  const Eigen::Vector3d along = Eigen::Vector3d(p[0], p[1], 1) / length;
+  if (shape == Shape::Plane) {
+    const double height = q.dot(along);
+    row[0] = (q[0] - height * along[0]) / length;
+    row[1] = (q[1] - height * along[1]) / length;
+    row[2] = -1;
+    return height - p[2];
+  }
+  const Eigen::Vector3d d = q - Eigen::Vector3d(p[2], p[3], 0);
+  const double height = d.dot(along);
+  const Eigen::Vector3d across = d - height * along;
+  const double radius = across.norm();
+  const Eigen::Vector3d out = across / (radius + kTiny);
+  row[0] = -height * out[0] / length;
+  row[1] = -height * out[1] / length;
+  row[2] = -out[0];
+  row[3] = -out[1];
+  row[4] = -1;
+  return radius - p[4];
+}
 
 Eigen::Vector3d mean_place(const Patch& patch) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -152,15 +155,12 @@ Eigen::Matrix3d scatter_axes(const Patch& patch, const Eigen::Vector3d& mean, bo
 }
 
 // Centre and radius of |p - c|^2 = r^2 by linear least squares in the first `dims` coordinates.
-Eigen::VectorXd algebraic_center(const std::vector<Sample>& samples,
-                                 const Eigen::Matrix3d& axes,
-                                 const Eigen::Vector3d& point,
-                                 int dims) {
+Eigen::VectorXd algebraic_center(const std::vector<Sample>& samples, const Local& local, int dims) {
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(dims + 1, dims + 1);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(dims + 1);
   for (const Sample& s : samples) {
     Eigen::VectorXd row(dims + 1);
-    const Eigen::VectorXd q = (axes.transpose() * (s.place - point)).head(dims);
+    const Eigen::VectorXd q = (local.axes.transpose() * (s.place - local.point)).head(dims);
     row << 2 * q, 1;
     normal += s.area * row * row.transpose();
     right += s.area * q.squaredNorm() * row;
@@ -170,56 +170,77 @@ Eigen::VectorXd algebraic_center(const std::vector<Sample>& samples,
   return out;
 }
 
-template <Shape kShape>
+// The sums of least squares at a set of parameters.
+struct Normal {
+  Eigen::MatrixXd hessian;   // sum of w J J^T
+  Eigen::VectorXd gradient;  // sum of w J r
+  Eigen::VectorXd shift;     // sum of w J sigma: every stated sigma at once
+  double squares = 0;        // sum of w r^2
+  double largest = 0;
+};
+
+Normal normal_equations(Shape shape,
+                        const Patch& patch,
+                        const Local& local,
+                        const Eigen::VectorXd& parameters) {
+  const Eigen::Index n = parameters.size();
+  Normal out{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)};
+  Eigen::VectorXd row(n);
+  for (const Sample& s : patch.samples) {
+    const Eigen::Vector3d q = local.axes.transpose() * (s.place - local.point);
+    const double r = distance(shape, q, parameters, row);
+    out.hessian += s.area * row * row.transpose();
+    out.gradient += s.area * r * row;
+    if (std::isfinite(s.sigma)) out.shift += s.area * s.sigma * row;
+    out.squares += s.area * r * r;
+    out.largest = std::max(out.largest, std::abs(r));
+  }
+  return out;
+}
+
 struct Fitted {
-  Eigen::Matrix<double, Distances<kShape>::kParameters, 1> parameters;
-  Eigen::Matrix<double, Distances<kShape>::kParameters, Distances<kShape>::kParameters> covariance;
+  Eigen::VectorXd parameters;
+  Eigen::MatrixXd covariance;
   double rms = 0;
   double largest = 0;
 };
 
-// Least squares from a first guess, and how well it determines the parameters.
-template <Shape kShape>
-Fitted<kShape> solve(const Patch& patch,
-                     const Distances<kShape>& distances,
-                     const Eigen::VectorXd& guess) {
-  constexpr int kN = Distances<kShape>::kParameters;
-  using Function = ceres::TinySolverAutoDiffFunction<Distances<kShape>, Eigen::Dynamic, kN>;
-  Function function(distances);
-  ceres::TinySolver<Function> solver;
-  Fitted<kShape> out;
-  out.parameters = guess;
-  solver.options.max_num_iterations = 200;
-  solver.options.gradient_tolerance = 1e-14;
-  solver.options.parameter_tolerance = 1e-12;
-  solver.options.function_tolerance = 1e-15;
-  solver.Solve(function, &out.parameters);
-  const auto rows = static_cast<Eigen::Index>(patch.samples.size());
-  Eigen::VectorXd residuals(rows);
-  Eigen::Matrix<double, Eigen::Dynamic, kN> jacobian(rows, kN);
-  function(out.parameters.data(), residuals.data(), jacobian.data());
-  const Eigen::Matrix<double, kN, kN> hessian = jacobian.transpose() * jacobian;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, kN, kN>> eigen(hessian);
+// Levenberg and Marquardt from a first guess, and how well the patch determines the parameters.
+Fitted solve(Shape shape, const Patch& patch, const Local& local, const Eigen::VectorXd& guess) {
+  const int n = parameter_count(shape);
+  Fitted out{guess, {}};
+  Normal at = normal_equations(shape, patch, local, guess);
+  double damping = 1e-3;
+  constexpr int kMostSteps = 200;
+  for (int i = 0; i < kMostSteps && damping < 1e12; ++i) {
+    Eigen::MatrixXd damped = at.hessian;
+    damped.diagonal() *= 1 + damping;
+    const Eigen::VectorXd step = damped.ldlt().solve(-at.gradient);
+    const Eigen::VectorXd next = out.parameters + step;
+    const Normal there = normal_equations(shape, patch, local, next);
+    if (!(there.squares <= at.squares)) {
+      damping *= 10;
+      continue;
+    }
+    out.parameters = next;
+    at = there;
+    damping /= 10;
+    if (step.norm() <= 1e-13 * (1 + next.norm())) break;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(at.hessian);
   constexpr double kSingular = 1e-9;
   if (!out.parameters.allFinite() ||
-      !(eigen.eigenvalues()[0] > kSingular * eigen.eigenvalues()[kN - 1])) {
+      !(eigen.eigenvalues()[0] > kSingular * eigen.eigenvalues()[n - 1])) {
     throw NumericalError(
-        "the surface within the ball does not determine this shape; take a larger "
-        "--radius or another shape");
+        "the surface within the ball does not determine this shape; take a larger --radius or "
+        "another shape");
   }
-  const Eigen::Matrix<double, kN, kN> inverse = hessian.inverse();
-  out.rms = std::sqrt(residuals.squaredNorm() / patch.area);
-  Eigen::VectorXd shifts = Eigen::VectorXd::Zero(rows);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const Sample& s = patch.samples[static_cast<size_t>(i)];
-    const double root = std::sqrt(s.area);
-    out.largest = std::max(out.largest, std::abs(residuals[i] / root));
-    if (std::isfinite(s.sigma)) shifts[i] = s.sigma * root;
-  }
-  const auto points = static_cast<double>(std::max<size_t>(patch.vertices, kN + 1));
-  out.covariance = inverse * (out.rms * out.rms * patch.area / (points - kN));
-  const Eigen::Matrix<double, kN, 1> together = inverse * (jacobian.transpose() * shifts);
-  out.covariance += together * together.transpose();
+  out.rms = std::sqrt(at.squares / patch.area);
+  out.largest = at.largest;
+  const auto points = static_cast<double>(std::max(patch.vertices, static_cast<size_t>(n + 1)));
+  const Eigen::MatrixXd inverse = at.hessian.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::VectorXd together = inverse * at.shift;
+  out.covariance = inverse * (at.squares / (points - n)) + together * together.transpose();
   return out;
 }
 
@@ -247,10 +268,10 @@ void set_radius(ShapeFit& out, double value, double variance, const Patch& patch
 
 ShapeFit fit_plane(const Patch& patch, ShapeFit out) {
   const Eigen::Vector3d mean = mean_place(patch);
-  const Distances<Shape::Plane> distances{patch.samples, scatter_axes(patch, mean, false), mean};
-  const auto fit = solve<Shape::Plane>(patch, distances, Eigen::Vector3d::Zero());
+  const Local local{scatter_axes(patch, mean, false), mean};
+  const Fitted fit = solve(Shape::Plane, patch, local, Eigen::VectorXd::Zero(3));
   const Eigen::Vector3d along =
-      distances.axes * Eigen::Vector3d(fit.parameters[0], fit.parameters[1], 1).normalized();
+      local.axes * Eigen::Vector3d(fit.parameters[0], fit.parameters[1], 1).normalized();
   double facing = 0;
   for (const Sample& s : patch.samples) facing += s.area * s.normal.dot(along);
   out.point = mean + fit.parameters[2] * along;
@@ -263,13 +284,10 @@ ShapeFit fit_plane(const Patch& patch, ShapeFit out) {
 }
 
 ShapeFit fit_sphere(const Patch& patch, ShapeFit out) {
-  const Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
-  const Distances<Shape::Sphere> distances{patch.samples, axes, zero};
-  const auto fit =
-      solve<Shape::Sphere>(patch, distances, algebraic_center(patch.samples, axes, zero, 3));
-  out.point = fit.parameters.template head<3>();
-  out.point_sigma = std::sqrt(fit.covariance.template topLeftCorner<3, 3>().trace());
+  const Local local;
+  const Fitted fit = solve(Shape::Sphere, patch, local, algebraic_center(patch.samples, local, 3));
+  out.point = fit.parameters.head(3);
+  out.point_sigma = std::sqrt(fit.covariance.topLeftCorner(3, 3).trace());
   set_radius(out, fit.parameters[3], fit.covariance(3, 3), patch);
   out.rms = fit.rms;
   out.largest = fit.largest;
@@ -279,11 +297,10 @@ ShapeFit fit_sphere(const Patch& patch, ShapeFit out) {
 ShapeFit fit_cylinder(const Patch& patch, ShapeFit out) {
   const Eigen::Vector3d mean = mean_place(patch);
   const Eigen::Matrix3d axes = scatter_axes(patch, mean, true);  // normals avoid the axis
-  const Distances<Shape::Cylinder> distances{patch.samples, axes, mean};
-  const Eigen::VectorXd circle = algebraic_center(patch.samples, axes, mean, 2);
+  const Local local{axes, mean};
   Eigen::VectorXd guess(5);
-  guess << 0, 0, circle;
-  const auto fit = solve<Shape::Cylinder>(patch, distances, guess);
+  guess << 0, 0, algebraic_center(patch.samples, local, 2);
+  const Fitted fit = solve(Shape::Cylinder, patch, local, guess);
   out.direction = axes * Eigen::Vector3d(fit.parameters[0], fit.parameters[1], 1).normalized();
   const Eigen::Vector3d on_axis =
       mean + axes * Eigen::Vector3d(fit.parameters[2], fit.parameters[3], 0);
