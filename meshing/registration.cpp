@@ -89,8 +89,13 @@ Vector7 step(const std::vector<Pair>& all,
     const double weight = tukey_weight(p.distance, width);
     if (weight == 0) continue;
     const Eigen::Vector3d q = (p.place - center) / radius;
+    const Eigen::Vector3d turning = q.cross(p.normal);
     Vector7 row;
-    row << q.cross(p.normal), p.normal, with_scale ? q.dot(p.normal) : 0;
+    for (int k = 0; k < 3; ++k) {
+      row[k] = turning[k];
+      row[k + 3] = p.normal[k];
+    }
+    row[6] = with_scale ? q.dot(p.normal) : 0;
     normal += weight * row * row.transpose();
     right -= weight * p.distance / radius * row;
   }
