@@ -48,6 +48,8 @@ int run_program(int argc, char** argv) {
   cgs::add_render(app);
   cgs::add_fuse(app);
   cgs::add_mesh(app);
+  cgs::add_measure(app);
+  cgs::add_compare(app);
   try {
     app.parse(with_dashes(argc, argv));
   } catch (const CLI::ParseError& error) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/mesh_files.h"
 
+#include <numbers>
+
 #include <nlohmann/json.hpp>
 
 #include "io/atomic_file.h"
@@ -26,6 +28,8 @@ Json certificate_to_json(const Certificate& certificate,
           {"self_intersections", certificate.self_intersections},
           {"components", certificate.components},
           {"genus", certificate.genus},
+          {"euler_number", certificate.euler_number},
+          {"smallest_angle_degrees", certificate.smallest_angle * 180 / std::numbers::pi},
           {"volume", certificate.volume * area_unit * frame.scale},
           {"area_observed", certificate.observed_area * area_unit},
           {"area_single_view", certificate.single_view_area * area_unit},

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "io/atomic_file.h"
 #include "io/byte_writer.h"
@@ -16,7 +15,9 @@ namespace cgs {
 
 namespace {
 
-std::string header_text(const TriangleMesh& mesh, const Frame& frame) {
+std::string header_text(const TriangleMesh& mesh,
+                        const Frame& frame,
+                        const std::vector<VertexScalar>& scalars) {
   std::string out = "ply\nformat binary_little_endian 1.0\ncomment generator cgs\n";
   out += ply_frame_comments(frame);
   if (!mesh.provenance.empty()) {
@@ -30,6 +31,7 @@ std::string header_text(const TriangleMesh& mesh, const Frame& frame) {
   }
   if (!mesh.support.empty()) out += "property float quality\n";
   if (!mesh.sigma.empty()) out += "property float scalar_sigma\n";
+  for (const VertexScalar& scalar : scalars) out += "property float " + scalar.name + "\n";
   out += "element face " + std::to_string(mesh.faces.size()) + "\n";
   out += "property list uchar int vertex_indices\n";
   if (!mesh.provenance.empty()) out += "property uchar scalar_provenance\nproperty float quality\n";
@@ -195,28 +197,31 @@ class MeshRows {
   int provenance_ = -1;
 };
 
-std::vector<Eigen::Vector3d> corners_of(const std::vector<Eigen::Vector3d>& points) {
-  Eigen::Vector3d low = points.front();
-  Eigen::Vector3d high = points.front();
-  for (const Eigen::Vector3d& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  return {low, high};
-}
-
 }  // namespace
 
 void write_mesh_ply(const std::filesystem::path& path,
                     const TriangleMesh& mesh,
                     const Frame& frame) {
+  write_mesh_ply(path, mesh, frame, {});
+}
+
+void write_mesh_ply(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const std::vector<VertexScalar>& scalars) {
   require_writable(mesh, "write_mesh_ply");
+  for (const VertexScalar& scalar : scalars) {
+    require(scalar.values.size() == mesh.vertices.size(),
+            "write_mesh_ply: " + scalar.name + " must have a number per vertex",
+            scalar.values.size());
+  }
   AtomicFile file(path);
-  file.write(header_text(mesh, frame));
+  file.write(header_text(mesh, frame, scalars));
   std::string record;
   for (size_t i = 0; i < mesh.vertices.size(); ++i) {
     record.clear();
     append_vertex(record, mesh, frame, i);
+    for (const VertexScalar& scalar : scalars) append_bytes(record, scalar.values[i]);
     file.write(record);
   }
   for (size_t i = 0; i < mesh.faces.size(); ++i) {
@@ -231,24 +236,15 @@ void write_mesh_ply(const std::filesystem::path& path,
   file.commit();
 }
 
-MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame) {
+ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
   const std::string bytes = read_file(path);
-  const PlyHeader header = parse_ply_header(bytes, path);
+  PlyHeader header = parse_ply_header(bytes, path);
   MeshRows rows(header, path);
   const uint64_t trailing = read_ply_rows(
       bytes, path, header, [&](const PlyElement& element, uint64_t i, const PlyRow& row) {
         rows.add(element, i, row);
       });
-  PlyPlacement placement = ply_placement(header.comments, corners_of(rows.positions), frame);
-  MeshFile out{std::move(rows.mesh), placement.frame, std::move(placement.warnings)};
-  out.mesh.vertices.reserve(rows.positions.size());
-  for (const Eigen::Vector3d& p : rows.positions) {
-    out.mesh.vertices.emplace_back(placement.internal(p).cast<float>());
-  }
-  for (float& sigma : out.mesh.sigma) {
-    sigma = sigma >= 0 && std::isfinite(sigma) ? static_cast<float>(sigma / out.frame.scale)
-                                               : std::numeric_limits<float>::quiet_NaN();
-  }
+  ParsedMesh out{std::move(rows.positions), std::move(rows.mesh), std::move(header.comments), {}};
   if (trailing > 0) {
     out.warnings.push_back("trailing " + std::to_string(trailing) + " bytes ignored");
   }
@@ -256,6 +252,20 @@ MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Fr
     out.warnings.push_back("dropped " + std::to_string(rows.dropped_faces) +
                            " faces of fewer than 3 corners");
   }
+  return out;
+}
+
+MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame) {
+  ParsedMesh parsed = parse_mesh_ply(path);
+  PlyPlacement placement =
+      ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
+  MeshFile out{std::move(parsed.mesh), placement.frame, std::move(placement.warnings)};
+  out.mesh.vertices.reserve(parsed.positions.size());
+  for (const Eigen::Vector3d& p : parsed.positions) {
+    out.mesh.vertices.emplace_back(placement.internal(p).cast<float>());
+  }
+  for (float& sigma : out.mesh.sigma) sigma = internal_sigma(sigma, out.frame);
+  out.warnings.insert(out.warnings.end(), parsed.warnings.begin(), parsed.warnings.end());
   return out;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "io/parsed_mesh.h"
 #include "libcgs/core/frame.h"
 #include "libcgs/core/triangle_mesh.h"
 
@@ -23,6 +24,19 @@ namespace cgs {
 void write_mesh_ply(const std::filesystem::path& path,
                     const TriangleMesh& mesh,
                     const Frame& frame);
+
+/// A number per vertex under a name of its own; CloudCompare shows names that start with "scalar_".
+struct VertexScalar {
+  std::string name;
+  std::vector<float> values;  ///< As they are to stand in the file.
+};
+
+/// The same with further numbers per vertex behind the others.
+/// \throws as above; InvalidInput if there are not as many numbers as vertices
+void write_mesh_ply(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const std::vector<VertexScalar>& scalars);
 
 /// A mesh from a file and the frame it was read into.
 struct MeshFile {
@@ -42,5 +56,9 @@ struct MeshFile {
 ///         Empty (0 vertices), Value (a coordinate that is not finite), Ref (a face that names a
 ///         vertex that is not there); LimitError
 MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame = {});
+
+/// The content of the file as read_mesh_ply() reads it, in file coordinates and double.
+/// \throws as read_mesh_ply()
+ParsedMesh parse_mesh_ply(const std::filesystem::path& path);
 
 }  // namespace cgs

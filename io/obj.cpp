@@ -9,6 +9,7 @@
 #include "io/atomic_file.h"
 #include "io/byte_writer.h"
 #include "io/mesh_arrays.h"
+#include "io/ply_frame.h"
 #include "io/texture_images.h"
 #include "libcgs/core/error.h"
 
@@ -219,9 +220,8 @@ void write_obj(const std::filesystem::path& path,
   if (!texture.empty()) used.images = texture_images(mesh, texture, kQuality);
   const std::filesystem::path materials = std::filesystem::path(path).replace_extension(".mtl");
   AtomicFile file(path);
-  std::string header = "# cgs\n# unit " + frame.unit_name() + "\n";
-  append_line(header, "# file_origin", frame.file_origin);
-  file.write(header + "\nmtllib " + materials.filename().string() + "\n");
+  file.write("# cgs\n" + frame_comments(frame, "# ") + "mtllib " + materials.filename().string() +
+             "\n");
   write_vertices(file, mesh, frame);
   write_faces(file, mesh, used);
   Companions companions;

@@ -44,13 +44,15 @@ ScaleSource scale_source_in(const std::vector<std::string>& comments) {
 
 }  // namespace
 
-std::string ply_frame_comments(const Frame& frame) {
-  std::string out = "comment unit " + frame.unit_name() + "\ncomment metres_per_unit ";
+std::string ply_frame_comments(const Frame& frame) { return frame_comments(frame, "comment "); }
+
+std::string frame_comments(const Frame& frame, const std::string& mark) {
+  std::string out = mark + "unit " + frame.unit_name() + "\n" + mark + "metres_per_unit ";
   append_number(out, frame.metres_per_unit);
-  out += "\ncomment metres_sigma ";
+  out += "\n" + mark + "metres_sigma ";
   append_number(out, frame.metres_sigma);
-  out += "\ncomment scale_source " + scale_source_name(frame.scale_source);
-  out += "\ncomment file_origin";
+  out += "\n" + mark + "scale_source " + scale_source_name(frame.scale_source);
+  out += "\n" + mark + "file_origin";
   for (const double value : frame.file_origin) {
     out += ' ';
     append_number(out, value);

@@ -16,6 +16,9 @@ namespace cgs {
 /// "comment scale_source …", "comment file_origin x y z", the numbers exact.
 std::string ply_frame_comments(const Frame& frame);
 
+/// The same for other text formats, where lines start with `mark` instead of "comment ".
+std::string frame_comments(const Frame& frame, const std::string& mark);
+
 /// Where the coordinates of a PLY file belong.
 struct PlyPlacement {
   Frame frame;                  ///< The frame the content is read into.

@@ -2,6 +2,8 @@
 #include "meshing/certificate.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <numeric>
 #include <vector>
 
@@ -135,6 +137,19 @@ size_t used_vertices(const TriangleMesh& mesh) {
   return size_t(std::count(used.begin(), used.end(), uint8_t(1)));
 }
 
+double smallest_angle(const TriangleMesh& mesh) {
+  double smallest = mesh.faces.empty() ? 0 : std::numbers::pi;
+  for (const auto& f : mesh.faces) {
+    for (size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3d p = mesh.vertices[f.at(k)].cast<double>();
+      const Eigen::Vector3d u = mesh.vertices[f.at((k + 1) % 3)].cast<double>() - p;
+      const Eigen::Vector3d v = mesh.vertices[f.at((k + 2) % 3)].cast<double>() - p;
+      smallest = std::min(smallest, std::atan2(u.cross(v).norm(), u.dot(v)));
+    }
+  }
+  return smallest;
+}
+
 }  // namespace
 
 Certificate certify(const TriangleMesh& mesh) {
@@ -147,13 +162,14 @@ Certificate certify(const TriangleMesh& mesh) {
   out.vertex_manifold = vertex_manifold(mesh, edges);
   out.components = parts.area.size();
   out.area = std::accumulate(parts.area.begin(), parts.area.end(), 0.0);
+  out.euler_number = static_cast<long>(used_vertices(mesh)) - static_cast<long>(facts.count) +
+                     static_cast<long>(mesh.faces.size());
+  out.smallest_angle = smallest_angle(mesh);
   if (out.closed) {
     out.volume = std::accumulate(parts.volume.begin(), parts.volume.end(), 0.0);
     out.oriented_outward = facts.consistent && cavities_are_inside(mesh, parts);
     if (out.edge_manifold && out.vertex_manifold) {
-      const auto euler = static_cast<long>(used_vertices(mesh)) - static_cast<long>(facts.count) +
-                         static_cast<long>(mesh.faces.size());
-      out.genus = static_cast<int>((2 * static_cast<long>(out.components) - euler) / 2);
+      out.genus = static_cast<int>((2 * static_cast<long>(out.components) - out.euler_number) / 2);
     }
   }
   out.self_intersections = self_intersections(mesh).size();

@@ -18,6 +18,8 @@ struct Certificate {
   size_t components = 0;          ///< Parts that share no vertex.
   int genus = 0;                  ///< Number of handles over all components; 0 unless closed
                                   ///< and manifold.
+  long euler_number = 0;          ///< Vertices in use - edges + faces.
+  double smallest_angle = 0;      ///< Of any corner of any face [radians]; 0 for no faces.
   double volume = 0;              ///< Signed sum [internal units cubed]; 0 unless closed.
   double area = 0;                ///< [internal units squared], as are those below.
   double observed_area = 0;       ///< Seen by two or more views.

@@ -9,6 +9,8 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/measured_file.h"
+#include "convert/mesh_files.h"
 #include "convert/pipeline.h"
 #include "io/json_file.h"
 #include "libcgs/core/error.h"
@@ -161,7 +163,68 @@ void print_scene(const Json& info) {
   }
 }
 
+Json mesh_json(const MeasurableFile& file, const Json& certificate) {
+  const MeasurableMesh& mesh = file.content;
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : mesh.points) box.extend(mesh.file_from_internal(p));
+  return {{"kind", mesh.mesh.faces.empty() ? "point cloud" : "mesh"},
+          {"counts", {{"vertices", mesh.points.size()}, {"faces", mesh.mesh.faces.size()}}},
+          {"bounds", {{"min", vector_json(box.min())}, {"max", vector_json(box.max())}}},
+          {"units", mesh.frame.unit_name()},
+          {"states",
+           {{"provenance", mesh.states_provenance()},
+            {"sigma", mesh.states_sigma()},
+            {"colors", !mesh.mesh.colors.empty()}}},
+          {"certificate", certificate},
+          {"warnings", file.warnings}};
+}
+
+void print_mesh(const Json& info, const Certificate& certificate) {
+  const Json& box = info["bounds"];
+  std::printf("%s: %zu vertices, %zu faces, unit %s\n",
+              info["kind"].get<std::string>().c_str(),
+              info["counts"]["vertices"].get<size_t>(),
+              info["counts"]["faces"].get<size_t>(),
+              info["units"].get<std::string>().c_str());
+  std::printf("bounds: %s ... %s\n", box["min"].dump().c_str(), box["max"].dump().c_str());
+  std::printf("provenance %s, sigma %s\n",
+              info["states"]["provenance"].get<bool>() ? "stated" : "not stated",
+              info["states"]["sigma"].get<bool>() ? "stated" : "not stated");
+  if (!info["certificate"].is_null()) {
+    std::printf("%s: %s, Euler number %ld, smallest angle %.3g degrees, volume %.6g\n",
+                certificate.passed() ? "certified watertight" : "NOT watertight",
+                certificate_line(certificate).c_str(),
+                certificate.euler_number,
+                certificate.smallest_angle * 180 / M_PI,
+                info["certificate"]["volume"].get<double>());
+  }
+  for (const Json& text : info["warnings"]) {
+    std::printf("warning: %s\n", one_line(text.get<std::string>()).c_str());
+  }
+}
+
+void run_mesh_info(const InfoArgs& args) {
+  const MeasurableFile file = read_mesh_file(args.scene);
+  const TriangleMesh& mesh = file.content.mesh;
+  Certificate certificate;
+  Json proved = nullptr;
+  if (!mesh.faces.empty()) {
+    certificate = certify(mesh);
+    proved = certificate_to_json(certificate, mesh, file.content.frame);
+  }
+  const Json info = mesh_json(file, proved);
+  if (args.json) {
+    std::cout << json_text(info) << "\n";
+  } else {
+    print_mesh(info, certificate);
+  }
+}
+
 void run_info(const InfoArgs& args) {
+  if (is_mesh_name(args.scene) && !std::filesystem::is_directory(args.scene)) {
+    run_mesh_info(args);
+    return;
+  }
   const Json info = scene_json(read_scene(args.scene, args.scene_options));
   if (args.json) {
     std::cout << json_text(info) << "\n";
@@ -175,11 +238,18 @@ void run_info(const InfoArgs& args) {
 void add_info(CLI::App& app) {
   auto args = std::make_shared<InfoArgs>();
   auto* cmd = app.add_subcommand(
-      "info", "What a scene holds and what is wrong with it (exit code 3 if it cannot be used)");
-  cmd->add_option("scene", args->scene, "Folder of a scene, as for run")->required();
+      "info",
+      "What a scene or mesh holds and what is wrong with it (exit code 3 if it cannot be used)");
+  cmd->add_option("scene",
+                  args->scene,
+                  "Folder of a scene, as for run, or a mesh (.ply, .obj, .stl, .off), which gets a "
+                  "certificate")
+      ->required();
   add_scene_options(*cmd, args->scene_options);
   cmd->add_flag("--json", args->json, "Print JSON on standard output");
-  cmd->footer("Example: cgs info photos/portal --views 1,10,19");
+  cmd->footer(
+      "Example: cgs info photos/portal --views 1,10,19\n"
+      "         cgs info part.stl");
   cmd->callback([args] { run_info(*args); });
 }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Opens the files of a finished run with other people's programs and checks what they see:
-# vdb_print, exrheader, Open3D, and the Khronos glTF validator where npm has it installed.
+# vdb_print, exrheader, Open3D, ezdxf, and the Khronos glTF validator where npm has it installed.
 #
 # usage: other_readers.sh OUT        (a folder that cgs run --assume-unit m wrote)
 #
@@ -56,6 +56,27 @@ for name, scale in (("stl", 1000), ("obj", 1)):
     size = sorted(other.get_max_bound() - other.get_min_bound())
     assert len(size) == 3 and size[0] > 0, name
 PY
+
+drawing=$(mktemp -d)
+cgs="${CGS_BINARY:-$(dirname "$0")/../../build/release/bin/cgs}"
+expect "cgs measure draws a section" sh -c '"$1" measure "$2" --section z=1 --dxf "$3/a.dxf" --json >"$3/a.json"' \
+  sh "$cgs" "$out/mesh/watertight.ply" "$drawing"
+expect "ezdxf: a section has no fault and the length that cgs states" /usr/bin/python3 - "$drawing" <<'PY'
+import json, sys
+import ezdxf
+doc = ezdxf.readfile(sys.argv[1] + "/a.dxf")
+audit = doc.audit()
+assert not audit.errors and not audit.fixes, audit.errors
+assert doc.layers.get("INFERRED").dxf.linetype == "DASHED"
+length = 0
+for line in doc.modelspace():
+    places = [v.dxf.location for v in line.vertices]
+    if line.is_closed: places.append(places[0])
+    length += sum((b - a).magnitude for a, b in zip(places, places[1:]))
+stated = json.load(open(sys.argv[1] + "/a.json"))["figures"]["section_length"]["value"]
+assert abs(length / stated - 1) < 1e-9, (length, stated)
+PY
+rm -rf "$drawing"
 
 expect "Open3D: gaussians.ply opens as points" /usr/bin/python3 - "$out" <<'PY'
 import sys

@@ -151,5 +151,16 @@ TEST(Certify, CountsHandles) {
 
 TEST(Certify, DoesNotPassAnEmptyMesh) { EXPECT_FALSE(certify({}).passed()); }
 
+TEST(Certificate, TellsEulerNumberAndSmallestAngle) {
+  TriangleMesh mesh;
+  EXPECT_EQ(certify(mesh).euler_number, 0);
+  EXPECT_EQ(certify(mesh).smallest_angle, 0);
+  // A right triangle with legs 1 and 2, beside it an unused vertex.
+  mesh.vertices = {{0, 0, 0}, {2, 0, 0}, {0, 1, 0}, {5, 5, 5}};
+  mesh.faces = {{0, 1, 2}};
+  EXPECT_EQ(certify(mesh).euler_number, 1);
+  EXPECT_NEAR(certify(mesh).smallest_angle, std::atan(0.5), 1e-12);
+}
+
 }  // namespace
 }  // namespace cgs

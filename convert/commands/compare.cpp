@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/commands/commands.h"
+#include "convert/commands/common_options.h"
+#include "convert/comparison.h"
+#include "convert/length.h"
+#include "convert/measured_file.h"
+#include "convert/terminal.h"
+#include "io/json_file.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+struct CompareArgs {
+  std::filesystem::path a;
+  std::filesystem::path b;
+  size_t samples = 200'000;
+  bool icp = false;
+  bool scale = false;
+  std::string threshold;
+  std::filesystem::path ply;
+  std::filesystem::path svg;
+  std::string unit;
+  std::string assume_unit;
+  CommonOptions common;
+};
+
+double share_within(const std::vector<Deviation>& deviations, double threshold) {
+  const auto count = std::count_if(deviations.begin(), deviations.end(), [&](const Deviation& d) {
+    return std::abs(d.distance) <= threshold;
+  });
+  return static_cast<double>(count) / static_cast<double>(std::max<size_t>(1, deviations.size()));
+}
+
+double range_of(const std::vector<Deviation>& deviations) {
+  std::vector<double> sizes;
+  for (const Deviation& d : deviations) sizes.push_back(std::abs(d.distance));
+  std::sort(sizes.begin(), sizes.end());
+  const double most = sizes.empty() ? 0 : sizes[(sizes.size() - 1) * 98 / 100];
+  return std::max(most, 1e-9);
+}
+
+Agreement agreement(const CompareArgs& args,
+                    const MeasurableMesh& a,
+                    const MeasurableMesh& b,
+                    const std::vector<Deviation>& a_to_b) {
+  Agreement out;
+  out.threshold = parse_length(args.threshold, a.frame);
+  out.accuracy = share_within(a_to_b, out.threshold);
+  if (a.mesh.faces.empty()) {
+    throw InvalidInput("--threshold needs a surface on both sides, but " + printable(args.a) +
+                       " is a point cloud");
+  }
+  out.completeness = share_within(deviations(points_by_area(b, args.samples), a, NearestSurface(a)),
+                                  out.threshold);
+  return out;
+}
+
+void run_compare(const CompareArgs& args) {
+  limit_threads(args.common.threads);
+  require(args.samples >= 100 && args.samples <= 100'000'000,
+          "--samples must be in 100 ... 100000000",
+          args.samples);
+  Terminal terminal(args.common.quiet);
+  MeasurableFile first = read_measured(args.a, args.assume_unit);
+  MeasurableFile second = read_measured(args.b, args.assume_unit);
+  terminal.warn(first.warnings);
+  terminal.warn(second.warnings);
+  if (second.content.mesh.faces.empty()) {
+    throw InvalidInput(printable(args.b) +
+                       " is a point cloud; distances need a surface: name the cloud first");
+  }
+  MeasurableMesh a = std::move(first.content);
+  const MeasurableMesh b = in_frame_of(second.content, a.frame);
+  const FigureUnit unit = figure_unit(a.frame, args.unit);
+  const NearestSurface surface(b);
+  Comparison comparison;
+  if (args.icp) {
+    constexpr size_t kPoints = 20'000;
+    comparison.registration =
+        register_points(points_by_area(a, kPoints).places, b, surface, args.scale);
+    a = moved(a, *comparison.registration);
+  }
+  comparison.by_area = deviations(points_by_area(a, args.samples), b, surface);
+  comparison.summary = summarize(comparison.by_area);
+  comparison.half_range = range_of(comparison.by_area);
+  if (!args.threshold.empty()) {
+    comparison.agreement = agreement(args, a, b, comparison.by_area);
+  }
+  if (!args.ply.empty()) {
+    write_colored(args.ply, a, deviations(points_by_vertex(a), b, surface), comparison.half_range);
+  }
+  const std::string title = args.a.filename().string() + " against " + args.b.filename().string();
+  if (!args.svg.empty()) write_histogram_svg(args.svg, comparison, unit, title);
+  if (args.common.json) {
+    nlohmann::ordered_json report = {{"a", measured_json(args.a, a, unit)},
+                                     {"b", measured_json(args.b, b, unit)}};
+    report.update(comparison_json(comparison, a, unit));
+    std::cout << json_text(report) << "\n";
+  } else {
+    std::printf("%s, %zu points\n%s",
+                one_line(title).c_str(),
+                comparison.summary.count,
+                comparison_text(comparison, unit).c_str());
+  }
+}
+
+}  // namespace
+
+void add_compare(CLI::App& app) {
+  auto args = std::make_shared<CompareArgs>();
+  auto* cmd = app.add_subcommand(
+      "compare", "Signed distances of a mesh or point cloud to a mesh, and what really changed");
+  cmd->add_option("a", args->a, "Mesh or point cloud: .ply, .obj, .stl, .off")->required();
+  cmd->add_option("b", args->b, "Mesh to measure from: reference, or the earlier date")->required();
+  cmd->add_option("--samples", args->samples, "Points on A, evenly by area (of a cloud: all)")
+      ->capture_default_str();
+  auto* icp = cmd->add_flag("--icp", args->icp, "Lay A onto B first, from where it is");
+  cmd->add_flag("--scale", args->scale, "Let it grow or shrink, too")->needs(icp);
+  cmd->add_option(
+      "--threshold", args->threshold, "Accuracy, completeness and F-score within this length");
+  cmd->add_option("--ply", args->ply, "Write A with the distance as colour and scalar");
+  cmd->add_option("--svg", args->svg, "Draw the histogram");
+  cmd->add_option("--unit", args->unit, "Unit of the figures; default m");
+  cmd->add_option(
+      "--assume-unit", args->assume_unit, "What a unit of a file is, where it does not say");
+  add_common_options(*cmd, args->common);
+  cmd->footer(
+      "Positive distances lie on the side that B's faces look to.\n"
+      "Example: cgs compare 2026.ply 2024.ply --icp --unit mm --ply change.ply --threshold 5mm");
+  cmd->callback([args] { run_compare(*args); });
+}
+
+}  // namespace cgs

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "convert/figures.h"
+#include "meshing/deviation.h"
+#include "meshing/registration.h"
+
+namespace cgs {
+
+/// A mesh in the frame of another: units are matched where both state them, else taken as equal.
+MeasurableMesh in_frame_of(const MeasurableMesh& mesh, const Frame& frame);
+
+/// The mesh after a motion of its points; sigma grows with the scale.
+MeasurableMesh moved(const MeasurableMesh& mesh, const Registration& motion);
+
+/// How much of both surfaces lies within a distance of the other.
+struct Agreement {
+  double threshold = 0;     ///< [internal units]
+  double accuracy = 0;      ///< Share of A's points within it of B.
+  double completeness = 0;  ///< Share of B's points within it of A.
+  double f_score() const {
+    const double sum = accuracy + completeness;
+    return sum > 0 ? 2 * accuracy * completeness / sum : 0;
+  }
+};
+
+/// What was found of A against B.
+struct Comparison {
+  std::vector<Deviation> by_area;
+  DeviationSummary summary;
+  std::optional<Registration> registration;
+  std::optional<Agreement> agreement;
+  double half_range = 0;  ///< Of histogram and colours [internal units]: 98 % lie within.
+};
+
+/// {"unit", "distance": {…}, "histogram": {"low", "high", "counts"}, "change": shares of A's
+/// points, "registration", "agreement"}; see the README.
+nlohmann::ordered_json comparison_json(const Comparison& comparison,
+                                       const MeasurableMesh& a,
+                                       const FigureUnit& unit);
+
+/// The same for people, with the histogram as bars.
+std::string comparison_text(const Comparison& comparison, const FigureUnit& unit);
+
+/// The histogram as a picture.
+void write_histogram_svg(const std::filesystem::path& path,
+                         const Comparison& comparison,
+                         const FigureUnit& unit,
+                         const std::string& title);
+
+/// The mesh with every vertex coloured by its distance (blue on the inner side of B, white on it,
+/// red on the outer side), scalar_distance [world units] and scalar_change (the numbers of Change).
+void write_colored(const std::filesystem::path& path,
+                   const MeasurableMesh& mesh,
+                   const std::vector<Deviation>& of_vertices,
+                   double half_range);
+
+}  // namespace cgs

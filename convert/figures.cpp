@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/figures.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/length.h"
+#include "io/mesh_arrays.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+std::string unit_text(const FigureUnit& unit, int dimension) {
+  return dimension == 1 ? unit.name : unit.name + "^" + std::to_string(dimension);
+}
+
+std::string number(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value);
+  return text.data();
+}
+
+}  // namespace
+
+FigureUnit figure_unit(const Frame& frame, const std::string& wanted) {
+  if (!frame.has_metric_scale()) {
+    if (!wanted.empty()) {
+      throw InvalidInput(
+          "--unit " + wanted +
+          ": nobody said how long a unit of this file is; say it with --assume-unit");
+    }
+    return {"units", frame.scale, 0};
+  }
+  const std::string name = wanted.empty() ? "m" : wanted;
+  return {name,
+          frame.scale * frame.metres_per_unit / metres_in(name),
+          frame.metres_sigma / frame.metres_per_unit};
+}
+
+double figure_value(const MeasuredValue& value, const FigureUnit& unit) {
+  return value.value * std::pow(unit.length, value.dimension);
+}
+
+double figure_sigma(const MeasuredValue& value, const FigureUnit& unit) {
+  // A scale that is off by a share is off by d times that in a figure of d dimensions.
+  return std::hypot(value.sigma * std::pow(unit.length, value.dimension),
+                    value.dimension * figure_value(value, unit) * unit.relative_sigma);
+}
+
+nlohmann::ordered_json figure_json(const MeasuredValue& value,
+                                   const FigureUnit& unit,
+                                   bool states_provenance) {
+  const double sigma = figure_sigma(value, unit);
+  nlohmann::ordered_json out = {{"value", figure_value(value, unit)},
+                                {"sigma", nullptr},
+                                {"unit", unit_text(unit, value.dimension)}};
+  if (std::isfinite(sigma)) out["sigma"] = sigma;
+  constexpr std::array<const char*, 4> kKeys = {
+      "observed", "single_view", "interpolated", "inferred"};
+  for (size_t i = 0; i < kKeys.size(); ++i) {
+    const auto label = static_cast<size_t>(kProvenanceOrder.at(i));
+    out[kKeys.at(i)] = nullptr;
+    if (!states_provenance) continue;
+    out[kKeys.at(i)] = value.by_provenance.at(label) * std::pow(unit.length, value.dimension);
+  }
+  out["sigma_share"] = value.stated;
+  return out;
+}
+
+std::string figure_text(const MeasuredValue& value,
+                        const FigureUnit& unit,
+                        bool states_provenance) {
+  const double sigma = figure_sigma(value, unit);
+  std::string out = number(figure_value(value, unit));
+  out += std::isfinite(sigma) ? " ± " + number(sigma) : " (no sigma stated)";
+  out += ' ' + unit_text(unit, value.dimension);
+  if (!states_provenance) return out;
+  std::string parts;
+  for (const Provenance label : kProvenanceOrder) {
+    const double part = value.by_provenance.at(static_cast<size_t>(label));
+    if (part == 0) continue;
+    parts += (parts.empty() ? "" : ", ") + std::string(provenance_name(label)) + ' ' +
+             number(part * std::pow(unit.length, value.dimension));
+  }
+  return parts.empty() ? out : out + "  (" + parts + ")";
+}
+
+}  // namespace cgs

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/mesh_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "io/mesh_ply.h"
+#include "io/obj_reader.h"
+#include "io/off.h"
+#include "io/ply_frame.h"
+#include "io/stl_reader.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+std::string lower_extension(const std::filesystem::path& path) {
+  std::string out = path.extension().string();
+  std::transform(out.begin(), out.end(), out.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return out;
+}
+
+ParsedMesh parse(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".ply") return parse_mesh_ply(path);
+  if (extension == ".obj") return read_obj(path);
+  if (extension == ".stl") return read_stl(path);
+  if (extension == ".off") return read_off(path);
+  throw BadInput(Defect::Unsupported,
+                 path,
+                 "'" + extension +
+                     "' is not a mesh format that is read; known are .ply, .obj, "
+                     ".stl and .off");
+}
+
+// Three corners in one place or on one line: no area. Others keep such faces, so do we.
+size_t faces_without_area(const MeasurableMesh& content) {
+  size_t count = 0;
+  for (const auto& f : content.mesh.faces) {
+    const Eigen::Vector3d u = content.points[f[1]] - content.points[f[0]];
+    const Eigen::Vector3d v = content.points[f[2]] - content.points[f[0]];
+    if (u.cross(v).squaredNorm() == 0) ++count;
+  }
+  return count;
+}
+
+}  // namespace
+
+bool is_mesh_name(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  return extension == ".ply" || extension == ".obj" || extension == ".stl" || extension == ".off";
+}
+
+MeasurableFile read_mesh_file(const std::filesystem::path& path,
+                              const std::optional<Frame>& frame) {
+  ParsedMesh parsed = parse(path);
+  const PlyPlacement placement =
+      ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
+  placement.frame.validate();
+  MeasurableFile out{
+      {std::move(parsed.mesh), std::move(parsed.positions), placement.frame, placement.file_origin},
+      std::move(parsed.warnings)};
+  out.warnings.insert(out.warnings.end(), placement.warnings.begin(), placement.warnings.end());
+  out.content.mesh.vertices.reserve(out.content.points.size());
+  for (Eigen::Vector3d& p : out.content.points) {
+    p = out.content.internal_from_file(p);
+    out.content.mesh.vertices.emplace_back(p.cast<float>());
+  }
+  for (float& sigma : out.content.mesh.sigma) sigma = internal_sigma(sigma, placement.frame);
+  if (const size_t flat = faces_without_area(out.content); flat > 0) {
+    out.warnings.push_back(std::to_string(flat) + " faces have no area");
+  }
+  return out;
+}
+
+}  // namespace cgs

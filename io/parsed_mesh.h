@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "io/text_lines.h"
+#include "libcgs/core/frame.h"
+#include "libcgs/core/triangle_mesh.h"
+
+namespace cgs {
+
+/// What a mesh file says, before it is placed in a frame.
+struct ParsedMesh {
+  std::vector<Eigen::Vector3d> positions;  ///< In file coordinates; finite.
+  TriangleMesh mesh;                       ///< All but the vertices; sigma in units of the file.
+  std::vector<std::string> comments;  ///< Unit and origin, in the words of ply_frame_comments().
+  std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
+};
+
+/// Appends a polygon as a fan of triangles.
+void append_fan(const std::vector<uint32_t>& corners,
+                std::vector<std::array<uint32_t, 3>>& triangles);
+
+/// The next line of a text file that is neither blank nor a comment.
+/// \throws BadInput Truncated where the file ends instead; LimitError for lines above 4 MiB
+std::string_view expect_line(TextLines& lines, std::string_view what);
+
+/// Two opposite corners of the bounding box. \pre there is a point.
+std::vector<Eigen::Vector3d> opposite_corners(const std::vector<Eigen::Vector3d>& points);
+
+/// A standard deviation of a file in internal units; NaN where it is negative or not finite.
+float internal_sigma(float sigma_in_file, const Frame& frame);
+
+}  // namespace cgs

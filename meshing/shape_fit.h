@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "libcgs/core/measurable_mesh.h"
+#include "meshing/measured_value.h"
+
+namespace cgs {
+
+enum class Shape { Plane, Sphere, Cylinder };
+
+/// A shape laid through a patch of surface by least squares of the distances, weighted by area.
+///
+/// Standard deviations have two parts: residuals, as if every vertex erred on its own, and the
+/// sigma that the vertices state, as if they all erred the same way.
+struct ShapeFit {
+  Shape shape = Shape::Plane;
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< Of the plane or the axis, nearest to the
+                                                    ///< middle of the patch; centre of the sphere.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Unit; normal of the plane, outwards, or
+                                                        ///< axis of the cylinder.
+  MeasuredValue radius;                                 ///< Of sphere and cylinder.
+  double point_sigma = 0;      ///< Of the plane along its normal; of centre and axis, any way.
+  double direction_sigma = 0;  ///< [radians]
+  double rms = 0;              ///< Of the distances to the shape [internal units].
+  double largest = 0;
+  MeasuredValue area;   ///< Of the patch.
+  size_t vertices = 0;  ///< That the patch has a part in.
+};
+
+/// Fits a shape to the part of the surface within a ball.
+///
+/// \throws InvalidInput if the ball holds too little surface; NumericalError if the patch does not
+///         determine the shape (a sphere on a flat wall)
+ShapeFit fit_shape(const MeasurableMesh& mesh,
+                   Shape shape,
+                   const Eigen::Vector3d& center,
+                   double radius);
+
+}  // namespace cgs

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// cgs measure, cgs compare and cgs info MESH as a user calls them.
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/run_cgs.h"
+#include "tests/support/solid_meshes.h"
+
+namespace cgs {
+namespace {
+
+using nlohmann::json;
+using test::run_cgs;
+using test::TempDir;
+
+std::string obj_text(const MeasurableMesh& mesh, const Eigen::Vector3d& shift = {0, 0, 0}) {
+  std::ostringstream out;
+  out.precision(17);
+  for (const Eigen::Vector3d& p : mesh.points) {
+    const Eigen::Vector3d q = p + shift;
+    out << "v " << q.x() << ' ' << q.y() << ' ' << q.z() << '\n';
+  }
+  for (const auto& f : mesh.mesh.faces) {
+    out << "f " << f[0] + 1 << ' ' << f[1] + 1 << ' ' << f[2] + 1 << '\n';
+  }
+  return out.str();
+}
+
+json json_of(const std::string& arguments) {
+  const auto result = run_cgs(arguments + " --json");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  return json::parse(result.out);
+}
+
+TEST(Measure, VolumeAndAreaAreTheSameFarAway) {
+  const TempDir dir;
+  for (const MeasurableMesh& mesh :
+       {test::sphere_mesh(0.7), test::torus_mesh(0.6, 0.2), test::cube_mesh(1.3)}) {
+    test::write_bytes(dir / "near.obj", obj_text(mesh));
+    test::write_bytes(dir / "far.obj", obj_text(mesh, {5e6, 450000.123456, -100.7}));
+    const json near = json_of("measure " + (dir / "near.obj").string());
+    const json far = json_of("measure " + (dir / "far.obj").string());
+    for (const char* figure : {"area", "volume"}) {
+      const double a = near["figures"][figure]["value"];
+      const double b = far["figures"][figure]["value"];
+      EXPECT_NEAR(b / a, 1, 1e-9) << figure;
+    }
+    EXPECT_TRUE(far["figures"]["certificate"]["passed"]);
+    EXPECT_TRUE(far["figures"]["area"]["sigma"].is_null());
+    EXPECT_EQ(far["mesh"]["provenance"], "not stated");
+  }
+}
+
+TEST(Measure, FiguresOfACubeInMillimetres) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));
+  const json out = json_of("measure " + (dir / "a.obj").string() +
+                           " --assume-unit cm --unit mm --distance 1,1,-5 1,1,9 --along 1,1,0 "
+                           "1,1,2 --section z=0.5 --svg " +
+                           (dir / "s.svg").string() + " --dxf " + (dir / "s.dxf").string() +
+                           " --fit plane --at 1,1,2 --radius 5mm --volume");
+  const json& figures = out["figures"];
+  EXPECT_NEAR(figures["distance"]["value"].get<double>(), 20, 1e-9);
+  EXPECT_EQ(figures["distance"]["unit"], "mm");
+  EXPECT_NEAR(figures["distance"]["from"]["moved"].get<double>(), 50, 1e-9);
+  EXPECT_NEAR(figures["along"]["value"].get<double>(), 40, 1e-9);
+  EXPECT_NEAR(figures["section_length"]["value"].get<double>(), 80, 1e-9);
+  EXPECT_NEAR(figures["section_area"]["value"].get<double>(), 400, 1e-9);
+  EXPECT_NEAR(figures["volume"]["value"].get<double>(), 8000, 1e-9);
+  EXPECT_EQ(figures["volume"]["unit"], "mm^3");
+  EXPECT_NEAR(figures["fit"]["direction"][2].get<double>(), 1, 1e-9);
+  EXPECT_NE(test::read_bytes(dir / "s.dxf").find("$EXTMAX\n10\n20\n20\n20\n"), std::string::npos);
+  EXPECT_NE(test::read_bytes(dir / "s.svg").find("10 mm"), std::string::npos);
+}
+
+TEST(Measure, DegenerateInputsEndWithOneLine) {
+  const TempDir dir;
+  const auto expect = [&](const std::string& content, const std::string& figure, int code) {
+    test::write_bytes(dir / "a.obj", content);
+    const auto result = run_cgs("measure " + (dir / "a.obj").string() + figure);
+    EXPECT_EQ(result.exit_code, code) << content << figure << result.err << result.out;
+    if (code != 0) {
+      EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    }
+  };
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const std::string flat = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
+  expect("", "", 3);
+  expect("v 0 0 0\n", "", 3);
+  expect("v 0 0 0\n", " --bounds", 0);
+  expect(triangle, "", 0);
+  expect(triangle, " --volume", 0);
+  expect(triangle, " --distance 0,0,0 1,0,0 --along 0,0,0 1,0,0 --section x=0.2", 0);
+  expect(triangle, " --distance 0,0,0 1,0", 2);
+  expect(triangle, " --section w=1", 2);
+  expect(triangle, " --section x=9 --svg " + (dir / "no.svg").string(), 2);
+  expect(triangle, " --unit mm", 2);
+  expect(flat, "", 0);
+  EXPECT_EQ(test::entries(dir.path()), 1);
+  test::write_bytes(dir / "flat.obj", flat);
+  EXPECT_EQ(run_cgs("measure " + (dir / "flat.obj").string() + " --distance 0,0,0 1,0,0").exit_code,
+            2);
+}
+
+TEST(Compare, MovedSphereAndBack) {
+  const TempDir dir;
+  const auto torus = test::torus_mesh(0.6, 0.2);
+  auto waves = torus;  // no symmetry left to slide along
+  for (Eigen::Vector3d& p : waves.points) {
+    p *= 1 + 0.1 * std::sin(5 * p.x() + 1) * std::cos(4 * p.y());
+  }
+  test::write_bytes(dir / "b.obj", obj_text(waves));
+  test::write_bytes(dir / "a.obj", obj_text(waves, {0.01, -0.02, 0.015}));
+  const std::string both = (dir / "a.obj").string() + " " + (dir / "b.obj").string();
+  const json apart = json_of("compare " + both + " --threshold 0.0001");
+  EXPECT_GT(apart["distance"]["rms"], 0.005);
+  EXPECT_LT(apart["agreement"]["f_score"], 0.1);
+  EXPECT_EQ(apart["change"]["not_comparable"], 1.0);
+  const json joined = json_of("compare " + both + " --icp --threshold 0.0001 --ply " +
+                              (dir / "c.ply").string() + " --svg " + (dir / "h.svg").string());
+  EXPECT_LT(joined["distance"]["rms"], 1e-6);
+  EXPECT_EQ(joined["agreement"]["f_score"], 1.0);
+  EXPECT_NEAR(joined["registration"]["matrix"][0][3].get<double>(), -0.01, 1e-6);
+  EXPECT_NEAR(joined["registration"]["matrix"][1][3].get<double>(), 0.02, 1e-6);
+  EXPECT_NE(test::read_bytes(dir / "c.ply").find("property float scalar_distance"),
+            std::string::npos);
+}
+
+TEST(Compare, MatchesUnits) {
+  const TempDir dir;
+  const std::string ply = "ply\nformat ascii 1.0\ncomment metres_per_unit ";
+  const std::string rest =
+      "\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  test::write_bytes(dir / "m.ply", ply + "1" + rest + "0 0 0.001\n1 0 0.001\n0 1 0.001\n3 0 1 2\n");
+  test::write_bytes(dir / "mm.ply", ply + "0.001" + rest + "0 0 0\n1000 0 0\n0 1000 0\n3 0 1 2\n");
+  const json out = json_of("compare " + (dir / "m.ply").string() + " " + (dir / "mm.ply").string() +
+                           " --unit mm");
+  EXPECT_NEAR(out["distance"]["mean"].get<double>(), 1, 1e-9);
+}
+
+TEST(Info, CertifiesAMesh) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::torus_mesh(0.6, 0.2)));
+  const json out = json_of("info " + (dir / "a.obj").string());
+  EXPECT_EQ(out["kind"], "mesh");
+  EXPECT_EQ(out["certificate"]["genus"], 1);
+  EXPECT_EQ(out["certificate"]["euler_number"], 0);
+  EXPECT_TRUE(out["certificate"]["passed"]);
+  EXPECT_EQ(out["counts"]["faces"], 2 * 128 * 64);
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/obj_reader.h"
+
+#include <gtest/gtest.h>
+
+#include "io/obj.h"
+#include "tests/support/full_disk.h"
+#include "tests/support/sample_mesh.h"
+
+namespace cgs {
+namespace {
+
+std::string defect(const std::string& text) {
+  return test::defect_of(text, [](const auto& path) { (void)read_obj(path); });
+}
+
+ParsedMesh parsed(const std::string& text) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.obj", text);
+  return read_obj(dir / "a.obj");
+}
+
+TEST(ReadObj, GivesBackWhatWriteObjWrote) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::labelled_sphere();
+  Frame frame = test::centimetre_frame();
+  frame.file_origin = frame.origin;
+  write_obj(dir / "a.obj", mesh, frame);
+  const ParsedMesh back = read_obj(dir / "a.obj");
+  ASSERT_EQ(back.positions.size(), mesh.vertices.size());
+  for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+    EXPECT_EQ(Eigen::Vector3f(back.positions[i].cast<float>()), 64 * mesh.vertices[i]);
+  }
+  EXPECT_EQ(back.mesh.colors.size(), mesh.colors.size());
+  EXPECT_EQ(back.mesh.provenance, mesh.provenance);
+  EXPECT_EQ(back.mesh.faces, mesh.faces);  // the sphere's belts are in the order of the groups
+}
+
+TEST(ReadObj, UnderstandsEveryWayToNameACorner) {
+  const ParsedMesh mesh = parsed(
+      "v 0 0 0\nv 1 0 0\r\nv +1 1e0 0 1.0\n  v 0 1 0\nvt 0 0\nvn 0 0 1\n"
+      "f 1/1 2/1/1 3//1 4\nf -4 -3 -1\nf 1 \\\n 2 3\nl 1 2\np 1\nwhatever 1 2\n");
+  EXPECT_EQ(mesh.positions.size(), 4U);
+  const std::vector<std::array<uint32_t, 3>> faces = {{0, 1, 2}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
+  EXPECT_EQ(mesh.mesh.faces, faces);
+  EXPECT_TRUE(mesh.mesh.provenance.empty());
+  EXPECT_TRUE(mesh.mesh.colors.empty());
+}
+
+TEST(ReadObj, RefusesWhatIsDamaged) {
+  EXPECT_EQ(defect("# nothing\n"), "EMPTY");
+  EXPECT_EQ(defect("v 1 2\n"), "SYNTAX");
+  EXPECT_EQ(defect("v 1 2 x\n"), "SYNTAX");
+  EXPECT_EQ(defect("v 1 2 nan\n"), "VALUE");
+  EXPECT_EQ(defect("v 0 0 0\nf 0 1 1\n"), "REF");
+  EXPECT_EQ(defect("v 0 0 0\nf 1 1 2\n"), "REF");
+  EXPECT_EQ(defect("v 0 0 0\nf 1 1 -2\n"), "REF");
+  EXPECT_EQ(defect("v 0 0 0\nf 1 1 /1\n"), "SYNTAX");
+  EXPECT_EQ(defect("v 0 0 0\nf 1 1 99999999999999999999\n"), "SYNTAX");
+  EXPECT_EQ(defect("v 0 0 0\nf " + std::string(5 << 20, '1') + "\n"), "LIMIT");
+}
+
+TEST(ReadObj, AGroupOfAnotherNameLeavesProvenanceUnstated) {
+  const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  EXPECT_EQ(parsed(vertices + "g observed\nf 1 2 3\n").mesh.provenance.size(), 1U);
+  EXPECT_TRUE(parsed(vertices + "g observed\nf 1 2 3\ng door\nf 1 2 3\n").mesh.provenance.empty());
+}
+
+}  // namespace
+}  // namespace cgs

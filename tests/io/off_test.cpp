@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/off.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/full_disk.h"
+
+namespace cgs {
+namespace {
+
+std::string defect(const std::string& text) {
+  return test::defect_of(text, [](const auto& path) { (void)read_off(path); });
+}
+
+const std::string kPoints = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+
+TEST(ReadOff, ReadsCountsOnEitherLineCommentsAndColours) {
+  const test::TempDir dir;
+  for (const std::string head :
+       {"OFF\n4 2 0\n", "COFF 4 2 # both\n\n", "# first\nNOFF\n# x\n4 2 9\n"}) {
+    test::write_bytes(dir / "a.off", head + kPoints + "4 0 1 2 3 255 0 0\n3 0 1 3 # last\n");
+    const ParsedMesh mesh = read_off(dir / "a.off");
+    EXPECT_EQ(mesh.positions.size(), 4U);
+    const std::vector<std::array<uint32_t, 3>> faces = {{0, 1, 2}, {0, 2, 3}, {0, 1, 3}};
+    EXPECT_EQ(mesh.mesh.faces, faces);
+  }
+}
+
+TEST(ReadOff, RefusesWhatIsDamaged) {
+  EXPECT_EQ(defect("PLY\n4 2 0\n"), "MAGIC");
+  EXPECT_EQ(defect("4OFF\n4 2 0\n"), "UNSUPPORTED");
+  EXPECT_EQ(defect("OFF BINARY\n"), "UNSUPPORTED");
+  EXPECT_EQ(defect("OFF\n-1 2 0\n"), "SYNTAX");
+  EXPECT_EQ(defect("OFF\n0 0 0\n"), "EMPTY");
+  EXPECT_EQ(defect("OFF\n4000000000 2 0\n" + kPoints), "COUNT");
+  EXPECT_EQ(defect("OFF\n4 3 0\n" + kPoints + "3 0 1 2\n"), "TRUNCATED");
+  EXPECT_EQ(defect("OFF\n4 1 0\n" + kPoints + "3 0 1 4\n"), "REF");
+  EXPECT_EQ(defect("OFF\n4 1 0\n" + kPoints + "9 0 1 2\n"), "COUNT");
+  EXPECT_EQ(defect("OFF\n4 1 0\n1 inf 0\n" + kPoints + "3 0 1 2\n"), "VALUE");
+}
+
+}  // namespace
+}  // namespace cgs

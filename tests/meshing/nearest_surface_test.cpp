@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/nearest_surface.h"
+
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+#include "tests/support/solid_meshes.h"
+
+namespace cgs {
+namespace {
+
+// Distance to the cube [0, 1]^3, negative inside.
+double cube_distance(const Eigen::Vector3d& p) {
+  const Eigen::Vector3d q = (p.array() - 0.5).abs() - 0.5;
+  return q.cwiseMax(0).norm() + std::min(0.0, q.maxCoeff());
+}
+
+TEST(NearestSurface, SignedDistanceToACube) {
+  const MeasurableMesh mesh = test::cube_mesh();
+  const NearestSurface surface(mesh);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> place(-1, 2);
+  for (int i = 0; i < 5000; ++i) {
+    const Eigen::Vector3d p(place(random), place(random), place(random));
+    const SurfacePoint nearest = surface.nearest(p);
+    EXPECT_NEAR(surface.signed_distance(p, nearest), cube_distance(p), 1e-14);
+    EXPECT_NEAR(nearest.weights.sum(), 1, 1e-14);
+    EXPECT_GE(nearest.weights.minCoeff(), 0);
+  }
+}
+
+// At a sharp tip the nearest faces look away from points that lie outside of them.
+TEST(NearestSurface, SignNearASharpTip) {
+  MeasurableMesh mesh;
+  mesh.points = {{0, 0, 0}, {1, 0.05, 0}, {1, -0.05, 0.05}, {1, -0.05, -0.05}};
+  mesh.mesh.faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  const NearestSurface surface(mesh);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(-0.3, 0.3);
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector3d p(-0.01 - std::abs(place(random)), place(random), place(random));
+    EXPECT_GT(surface.signed_distance(p, surface.nearest(p)), 0);
+  }
+}
+
+TEST(NearestSurface, IgnoresFacesWithoutAreaAndNeedsOneWith) {
+  MeasurableMesh mesh;
+  mesh.points = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 1, 0}};
+  mesh.mesh.faces = {{0, 1, 2}};
+  EXPECT_THROW(NearestSurface{mesh}, InvalidInput);
+  mesh.mesh.faces.push_back({0, 1, 3});
+  EXPECT_EQ(NearestSurface(mesh).nearest({0.2, 0.2, 1}).face, 1U);
+}
+
+TEST(EvidenceAt, InterpolatesSigma) {
+  MeasurableMesh mesh;
+  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.mesh.faces = {{0, 1, 2}};
+  EXPECT_TRUE(std::isnan(evidence_at(mesh, {0, {0, 0, 0}, {1, 0, 0}}).sigma));
+  mesh.mesh.sigma = {0.25f, 0.5f, NAN};
+  mesh.mesh.provenance = {Provenance::SingleView};
+  const SurfaceEvidence at = evidence_at(mesh, {0, {0.5, 0, 0}, {0.5, 0.5, 0}});
+  EXPECT_EQ(at.sigma, 0.375);
+  EXPECT_EQ(at.provenance, Provenance::SingleView);
+  EXPECT_EQ(at.normal, Eigen::Vector3d(0, 0, 1));
+}
+
+}  // namespace
+}  // namespace cgs

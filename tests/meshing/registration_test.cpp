@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/registration.h"
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+#include "tests/support/solid_meshes.h"
+
+namespace cgs {
+namespace {
+
+// Waves that hold in every direction, a part of which may stand out.
+MeasurableMesh relief(double bump = 0) {
+  return test::grid_mesh(80, 80, [=](double s, double t) {
+    double z = 0.05 * std::sin(9 * s) * std::cos(7 * t) + 0.1 * s * t;
+    if (s > 0.7 && t > 0.7) z += bump;
+    return Eigen::Vector3d(s, t, z);
+  });
+}
+
+TEST(RegisterPoints, UndoesAMotion) {
+  const auto mesh = relief();
+  const NearestSurface surface(mesh);
+  const Eigen::AngleAxisd turn(0.06, Eigen::Vector3d(1, -2, 1).normalized());
+  const double grown = 1.03;
+  for (const bool with_scale : {false, true}) {
+    std::vector<Eigen::Vector3d> points;
+    for (const Eigen::Vector3d& p : points_by_area(mesh, 4000).places) {
+      points.push_back((with_scale ? grown : 1.0) * (turn * p) +
+                       Eigen::Vector3d(0.01, 0.02, -0.015));
+    }
+    const Registration r = register_points(points, mesh, surface, with_scale);
+    EXPECT_LT((r.rotation * turn.toRotationMatrix() - Eigen::Matrix3d::Identity()).norm(), 1e-6);
+    EXPECT_NEAR(r.scale, with_scale ? 1 / grown : 1, 1e-6);
+    EXPECT_LT(r.rms_after, 1e-7);
+    EXPECT_GT(r.rms_before, 1e-3);
+  }
+}
+
+TEST(RegisterPoints, WhatChangedPullsLittle) {
+  const auto before = relief();
+  const auto after = relief(0.05);
+  const Registration r =
+      register_points(points_by_area(after, 8000).places, before, NearestSurface(before), false);
+  for (const Eigen::Vector3d& p : before.points) EXPECT_LT((r.apply(p) - p).norm(), 1e-3);
+}
+
+TEST(RegisterPoints, SaysWhatSlides) {
+  const auto plane =
+      test::grid_mesh(20, 20, [](double s, double t) { return Eigen::Vector3d(s, t, 0); });
+  std::vector<Eigen::Vector3d> points;
+  for (const Eigen::Vector3d& p : points_by_area(plane, 1000).places) {
+    points.emplace_back(0.5 * p.x() + 0.2, 0.5 * p.y() + 0.2, 0.01);
+  }
+  EXPECT_THROW(register_points(points, plane, NearestSurface(plane), false), NumericalError);
+  points.resize(10);
+  EXPECT_THROW(register_points(points, plane, NearestSurface(plane), false), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/section.h"
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+#include "tests/support/solid_meshes.h"
+
+namespace cgs {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+TEST(Section, OfACubeIsItsSquare) {
+  const MeasurableMesh mesh = test::cube_mesh();
+  const Section cut = section(mesh, cut_plane({0, 0, 0.25}, {0, 0, 1}));
+  ASSERT_EQ(cut.lines.size(), 1U);
+  EXPECT_TRUE(cut.lines[0].closed);
+  EXPECT_NEAR(cut.length.value, 4, 1e-14);
+  EXPECT_NEAR(cut.area.value, 1, 1e-14);
+  double turning = 0;
+  const auto& p = cut.lines[0].points;
+  for (size_t i = 0; i < p.size(); ++i) {
+    const Eigen::Vector2d& q = p[(i + 1) % p.size()];
+    turning += p[i].x() * q.y() - p[i].y() * q.x();
+  }
+  EXPECT_NEAR(turning / 2, 1, 1e-14) << "counter-clockwise around the normal";
+}
+
+TEST(Section, ThroughVerticesStaysClosed) {
+  const MeasurableMesh mesh = test::cube_mesh();
+  // Diagonal plane through four vertices; and one that holds a whole side of the cube.
+  const Section diagonal = section(mesh, cut_plane({0, 0, 0}, {1, -1, 0}));
+  ASSERT_EQ(diagonal.lines.size(), 1U);
+  EXPECT_TRUE(diagonal.lines[0].closed);
+  EXPECT_NEAR(diagonal.area.value, std::sqrt(2), 1e-12);
+  const Section side = section(mesh, cut_plane({0, 0, 1}, {0, 0, 1}));
+  EXPECT_NEAR(side.area.value, 1, 1e-12);
+  EXPECT_TRUE(section(mesh, cut_plane({0, 0, 2}, {0, 0, 1})).lines.empty());
+}
+
+TEST(Section, OfATorusIsARing) {
+  const MeasurableMesh mesh = test::torus_mesh(0.3, 0.1, 256, 128);
+  const Section flat = section(mesh, cut_plane({0, 0, 0}, {0, 0, 1}));
+  ASSERT_EQ(flat.lines.size(), 2U);
+  EXPECT_NEAR(flat.area.value / (kPi * (0.16 - 0.04)), 1, 1e-3);
+  EXPECT_NEAR(flat.length.value / (2 * kPi * 0.6), 1, 1e-3);
+  const Section upright = section(mesh, cut_plane({0, 0, 0}, {1, 0.3, 0}));
+  ASSERT_EQ(upright.lines.size(), 2U);
+  EXPECT_NEAR(upright.area.value / (2 * kPi * 0.01), 1, 2e-3);
+}
+
+TEST(Section, OfAnOpenTubeAcrossAndAlong) {
+  const MeasurableMesh mesh = test::tube_mesh(0.2, 0.6);
+  const Section along = section(mesh, cut_plane({0.01, 0, 0}, {1, 0, 0}));
+  EXPECT_EQ(along.lines.size(), 2U);
+  EXPECT_EQ(along.open_lines, 2U);
+  EXPECT_NEAR(along.length.value, 1.2, 1e-12);
+  EXPECT_EQ(along.area.value, 0);
+}
+
+TEST(Section, LabelsEverySegment) {
+  const auto mesh = test::with_labels(test::sphere_mesh(0.4), [](const Eigen::Vector3d& p) {
+    return p.x() > 0 ? Provenance::Observed : Provenance::Inferred;
+  });
+  const Section cut = section(mesh, cut_plane({0, 0, 0.01}, {0, 0, 1}));
+  ASSERT_EQ(cut.lines.size(), 1U);
+  ASSERT_EQ(cut.lines[0].of_segment.size(), cut.lines[0].points.size());
+  for (size_t i = 0; i < cut.lines[0].points.size(); ++i) {
+    const auto& p = cut.lines[0].points;
+    const double middle = (p[i].x() + p[(i + 1) % p.size()].x()) / 2;
+    if (std::abs(middle) < 0.02) continue;
+    EXPECT_EQ(cut.lines[0].of_segment[i], middle > 0 ? Provenance::Observed : Provenance::Inferred);
+  }
+  EXPECT_NEAR(cut.length.by_provenance[2] / cut.length.value, 0.5, 0.02);
+}
+
+// The truth of a common error: cut a sphere that is larger by it.
+TEST(Section, SigmaIsWhatALargerSphereShows) {
+  const double sigma = 1e-4;
+  const auto mesh = test::with_sigma(test::sphere_mesh(0.4, 128, 256), float(sigma));
+  const CutPlane plane = cut_plane({0, 0, 0.1}, {0, 0, 1});
+  const Section cut = section(mesh, plane);
+  const Section larger = section(test::sphere_mesh(0.4 + sigma, 128, 256), plane);
+  EXPECT_NEAR(cut.area.sigma / (larger.area.value - cut.area.value), 1, 0.03);
+  EXPECT_NEAR(cut.length.sigma / (larger.length.value - cut.length.value), 1, 0.03);
+}
+
+TEST(CutPlane, AxesAreThoseOfTheFile) {
+  EXPECT_EQ(cut_plane({0, 0, 0}, {0, 3, 0}).right, Eigen::Vector3d::UnitX());
+  EXPECT_EQ(cut_plane({0, 0, 0}, {0, 3, 0}).up, Eigen::Vector3d::UnitZ());
+  EXPECT_EQ(cut_plane({0, 0, 0}, {-2, 0, 0}).right, Eigen::Vector3d::UnitY());
+  const CutPlane tilted = cut_plane({0, 0, 0}, {1, 2, 3});
+  EXPECT_NEAR(tilted.up.dot(tilted.normal), 0, 1e-15);
+  EXPECT_GT(tilted.up.z(), 0);
+  EXPECT_THROW(cut_plane({0, 0, 0}, {0, 0, 0}), InvalidInput);
+  EXPECT_THROW(cut_plane({0, 0, 0}, {NAN, 0, 1}), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/shape_fit.h"
+
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+#include "tests/support/solid_meshes.h"
+
+namespace cgs {
+namespace {
+
+const Eigen::Quaterniond kTurn(Eigen::AngleAxisd(0.8, Eigen::Vector3d(3, -1, 2).normalized()));
+
+// Moved along its normals by independent errors.
+MeasurableMesh noisy(MeasurableMesh mesh,
+                     double sigma,
+                     uint32_t seed,
+                     const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& normal) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> error(0, sigma);
+  for (Eigen::Vector3d& p : mesh.points) p += error(random) * normal(p);
+  return mesh;
+}
+
+MeasurableMesh turned(MeasurableMesh mesh) {
+  for (Eigen::Vector3d& p : mesh.points) p = kTurn * p + Eigen::Vector3d(0.1, -0.2, 0.3);
+  return mesh;
+}
+
+Eigen::Vector3d turned(const Eigen::Vector3d& p) {
+  return kTurn * p + Eigen::Vector3d(0.1, -0.2, 0.3);
+}
+
+TEST(FitShape, PlaneOnTwoTriangles) {
+  const MeasurableMesh mesh = turned(test::cube_mesh());
+  const ShapeFit fit = fit_shape(mesh, Shape::Plane, turned(Eigen::Vector3d(0.5, 0.5, 1)), 0.3);
+  EXPECT_LT((fit.direction - kTurn * Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((fit.point - turned(Eigen::Vector3d(0.5, 0.5, 1))).norm(), 0.01);
+  EXPECT_LT(fit.rms, 1e-14);
+  EXPECT_NEAR(fit.area.value / (std::numbers::pi * 0.09), 1, 0.02);
+}
+
+TEST(FitShape, SphereAndCylinderOfFineMeshes) {
+  const auto ball = turned(test::sphere_mesh(0.4, 200, 400));
+  const ShapeFit sphere = fit_shape(ball, Shape::Sphere, turned(Eigen::Vector3d(0.4, 0, 0)), 0.3);
+  EXPECT_NEAR(sphere.radius.value, 0.4, 1e-4);
+  EXPECT_LT((sphere.point - turned(Eigen::Vector3d(0, 0, 0))).norm(), 1e-4);
+  const auto tube = turned(test::tube_mesh(0.2, 0.6, 400, 50));
+  const ShapeFit cylinder =
+      fit_shape(tube, Shape::Cylinder, turned(Eigen::Vector3d(0.2, 0, 0.3)), 0.25);
+  EXPECT_NEAR(cylinder.radius.value, 0.2, 1e-4);
+  EXPECT_NEAR(std::abs(cylinder.direction.dot(kTurn * Eigen::Vector3d::UnitZ())), 1, 1e-8);
+  EXPECT_LT((cylinder.point - turned(Eigen::Vector3d(0, 0, 0)))
+                .cross(kTurn * Eigen::Vector3d::UnitZ())
+                .norm(),
+            1e-4);
+}
+
+// Monte Carlo: the stated sigma of the radius against the scatter of many fits.
+TEST(FitShape, SigmaOfTheRadiusIsItsScatter) {
+  constexpr int kRuns = 60;
+  double squares = 0;
+  double stated = 0;
+  for (uint32_t run = 0; run < kRuns; ++run) {
+    const auto ball =
+        noisy(test::sphere_mesh(0.4, 48, 96), 2e-3, run, [](const Eigen::Vector3d& p) {
+          return Eigen::Vector3d(p.normalized());
+        });
+    const ShapeFit fit = fit_shape(ball, Shape::Sphere, {0.4, 0, 0}, 0.25);
+    squares += std::pow(fit.radius.value - 0.4, 2);
+    stated += fit.radius.sigma;
+    EXPECT_NEAR(fit.rms, 2e-3 * std::sqrt(0.5), 5e-4);  // between vertices errors average
+  }
+  const double scatter = std::sqrt(squares / kRuns);
+  EXPECT_NEAR(stated / kRuns / scatter, 1, 0.5) << scatter;
+}
+
+TEST(FitShape, ACommonErrorReachesThePlane) {
+  const auto mesh = test::with_sigma(test::cube_mesh(), 5e-3f);
+  const ShapeFit fit = fit_shape(mesh, Shape::Plane, {0.5, 0.5, 1}, 0.3);
+  EXPECT_NEAR(fit.point_sigma, 5e-3, 1e-6);
+  EXPECT_NEAR(fit.area.stated, 1, 1e-12);
+}
+
+TEST(FitShape, RefusesWhatDeterminesNothing) {
+  const MeasurableMesh mesh = test::cube_mesh();
+  EXPECT_THROW(fit_shape(mesh, Shape::Sphere, {0.5, 0.5, 1}, 0.3), NumericalError);
+  EXPECT_THROW(fit_shape(mesh, Shape::Cylinder, {0.5, 0.5, 1}, 0.3), NumericalError);
+  EXPECT_THROW(fit_shape(mesh, Shape::Plane, {5, 5, 5}, 0.3), InvalidInput);
+  EXPECT_THROW(fit_shape(mesh, Shape::Plane, {0, 0, 0}, 0), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs
