@@ -11,13 +11,14 @@ namespace cgs {
 struct LensPrior {
   double focal = 0;  ///< [working pixels]; 0 = nothing known.
   double sigma = 0;  ///< Standard deviation of log(focal); 0 = exact.
+  double side = 0;   ///< Larger side of the photographs [working pixels].
 };
 
 struct BundleOptions {
   int first = 0;             ///< Photograph whose pose is held: the world's axes are its own.
   int second = 1;            ///< Photograph whose distance from it is held.
   bool solve_focal = false;  ///< Of lenses whose prior is not exact.
-  bool solve_k1 = false;
+  bool solve_shape = false;  ///< Distortion and principal point, which are small in any camera.
   double loss_scale = 1;  ///< Of the Cauchy loss [working pixels].
   int most_iterations = 50;
 };

@@ -72,7 +72,7 @@ int use_what_agrees(const Reconstruction& scene, double most_error, Track& track
 }  // namespace
 
 Eigen::Vector2d direction_at(const Lens& lens, const Eigen::Vector2d& at) {
-  const Eigen::Vector2d distorted = at / lens.focal;
+  const Eigen::Vector2d distorted = (at - lens.centre) / lens.focal;
   Eigen::Vector2d direction = distorted;
   constexpr int kSteps = 20;  // each gains a factor of about k1 r²
   for (int i = 0; i < kSteps && lens.k1 != 0; ++i) {
@@ -88,7 +88,7 @@ double reprojection_error(const Reconstruction& scene,
   if (!(p.z() > 0)) return std::numeric_limits<double>::infinity();
   const Lens& lens = scene.lens(sighting.photo);
   const Eigen::Vector2d direction = p.hnormalized();
-  return (through_lens(lens.focal, lens.k1, direction) - sighting.at).norm();
+  return (through_lens(lens.focal, lens.k1, lens.centre, direction) - sighting.at).norm();
 }
 
 void triangulate(Reconstruction& scene, double most_error, double least_angle) {

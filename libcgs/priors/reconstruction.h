@@ -13,6 +13,7 @@ namespace cgs {
 struct Lens {
   double focal = 0;  ///< [working pixels]
   double k1 = 0;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Principal point [working pixels].
 };
 
 /// cam_from_world of a photograph.
@@ -61,8 +62,9 @@ struct Reconstruction {
 template <typename T>
 Eigen::Matrix<T, 2, 1> through_lens(const T& focal,
                                     const T& k1,
+                                    const Eigen::Matrix<T, 2, 1>& centre,
                                     const Eigen::Matrix<T, 2, 1>& direction) {
-  return direction * (focal * (T(1) + k1 * direction.squaredNorm()));
+  return centre + direction * (focal * (T(1) + k1 * direction.squaredNorm()));
 }
 
 /// The direction x/z, y/z that a lens shows at a place; the inverse of through_lens().

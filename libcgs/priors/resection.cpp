@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
@@ -11,7 +12,6 @@ namespace cgs {
 
 namespace {
 
-constexpr double kLeastParallax = 1.5;  // [working pixels], of pairs to begin with
 constexpr int kFewestPoints = 12;       // to place a photograph by
 
 // Pairs to begin with, the most promising first.
@@ -165,28 +165,37 @@ std::optional<FirstPair> place_photos(Reconstruction& scene,
                                       const std::vector<LensPrior>& priors,
                                       const std::vector<PhotoPair>& pairs) {
   std::optional<FirstPair> begun;
+  double least = std::numeric_limits<double>::infinity();
+  Reconstruction best = scene;
+  forget(best);
+  constexpr int kMostTries = 3;
+  int tries = 0;
   for (const PhotoPair* pair : ranked_pairs(scene, pairs)) {
     if (!begin_with(*pair, priors, scene)) continue;
-    begun = FirstPair{pair->a, pair->b};
-    break;
+    place_more(scene, priors, {pair->a, pair->b});
+    const double error = capped_error(scene);
+    if (error < least) {
+      least = error;
+      best = scene;
+      begun = FirstPair{pair->a, pair->b};
+    }
+    if (++tries == kMostTries) break;
   }
-  if (!begun) {
-    forget(scene);
-    return std::nullopt;
-  }
+  scene = best;
+  return begun;
+}
+
+void place_more(Reconstruction& scene,
+                const std::vector<LensPrior>& priors,
+                const FirstPair& begun) {
+  triangulate(scene, kMostError, kLeastAngle);
   std::vector<char> has_failed(scene.poses.size(), 0);
   for (int photo = 0; (photo = next_photo(scene, has_failed)) >= 0;) {
-    if (!resect(scene, photo)) {
-      has_failed[static_cast<size_t>(photo)] = 1;
-      continue;
-    }
-    settle(scene, priors, {.first = begun->first, .second = begun->second});
-    std::fill(has_failed.begin(), has_failed.end(), char{0});  // there are more points now
-    if (points_in(scene, photo) >= kFewestPoints) continue;
-    scene.poses[static_cast<size_t>(photo)].reset();
     has_failed[static_cast<size_t>(photo)] = 1;
+    if (!resect(scene, photo)) continue;
+    settle(scene, priors, {.first = begun.first, .second = begun.second});
+    if (points_in(scene, photo) < kFewestPoints) scene.poses[static_cast<size_t>(photo)].reset();
   }
-  return begun;
 }
 
 }  // namespace cgs

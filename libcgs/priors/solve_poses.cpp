@@ -13,6 +13,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/priors/bundle_adjustment.h"
 #include "libcgs/priors/photo_pairs.h"
+#include "libcgs/priors/pose_checks.h"
 #include "libcgs/priors/resection.h"
 
 namespace cgs {
@@ -23,12 +24,6 @@ namespace {
 // widest lenses (13 mm as on film) to short telephoto lenses (115 mm).
 constexpr std::array<double, 8> kFocals = {0.36, 0.5, 0.7, 0.9, 1.15, 1.5, 2.2, 3.2};
 
-struct Solved {
-  Reconstruction scene;
-  FirstPair begun;
-  std::vector<double> focal_sigma;  // per lens
-};
-
 double larger_side(const UnposedPhoto& photo) {
   return std::max(photo.width, photo.height) / photo.features.pixel;
 }
@@ -38,25 +33,17 @@ std::vector<LensPrior> lens_priors(const std::vector<UnposedPhoto>& photos) {
   for (const UnposedPhoto& photo : photos) {
     const auto lens = static_cast<size_t>(photo.lens);
     if (priors.size() <= lens) priors.resize(lens + 1);
-    priors[lens] = {photo.focal / photo.features.pixel, photo.focal_sigma};
+    priors[lens] = {photo.focal / photo.features.pixel, photo.focal_sigma, larger_side(photo)};
   }
   return priors;
 }
 
-Reconstruction begin(const std::vector<UnposedPhoto>& photos,
-                     const std::vector<LensPrior>& priors,
-                     double focal_of_side) {
+/// A reconstruction on the way, and how well it explains its tracks.
+struct Attempt {
   Reconstruction scene;
-  scene.lenses.resize(priors.size());
-  scene.poses.resize(photos.size());
-  for (const UnposedPhoto& photo : photos) {
-    scene.lens_of.push_back(photo.lens);
-    const LensPrior& prior = priors[static_cast<size_t>(photo.lens)];
-    scene.lenses[static_cast<size_t>(photo.lens)] = {
-        prior.focal > 0 ? prior.focal : focal_of_side * larger_side(photo), 0};
-  }
-  return scene;
-}
+  std::optional<FirstPair> begun;
+  double error = std::numeric_limits<double>::infinity();
+};
 
 // Up to `most` of the tracks, those that most photographs show first, else evenly.
 std::vector<Track> sample(const std::vector<Track>& tracks, size_t most) {
@@ -65,59 +52,129 @@ std::vector<Track> sample(const std::vector<Track>& tracks, size_t most) {
     return a.seen.size() > b.seen.size();
   });
   if (sorted.size() <= most) return sorted;
-  const auto is_long = [](const Track& track) { return track.seen.size() > 2; };
-  const auto longer = static_cast<size_t>(std::count_if(sorted.begin(), sorted.end(), is_long));
-  const size_t from = std::max(most, std::min(longer, 2 * most));
   std::vector<Track> out;
-  for (size_t i = 0; i < most; ++i) out.push_back(sorted[i * from / most]);
+  // Half of them the longest, which tie photographs together; half from all the rest.
+  const size_t longest = most / 2;
+  out.assign(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(longest));
+  for (size_t i = 0; i < most - longest; ++i) {
+    out.push_back(sorted[longest + i * (sorted.size() - longest) / (most - longest)]);
+  }
   return out;
 }
 
-// The focal length, in units of the larger side, from which a part of the points is explained best.
-double best_focal(const std::vector<UnposedPhoto>& photos,
-                  const std::vector<LensPrior>& priors,
-                  const std::vector<PhotoPair>& pairs,
-                  const std::vector<Track>& tracks) {
+Attempt attempt_at(double focal_of_side,
+                   const std::vector<int>& lens_of,
+                   const std::vector<LensPrior>& priors,
+                   const std::vector<PhotoPair>& pairs,
+                   const std::vector<Track>& tracks) {
+  Attempt out;
+  out.scene.tracks = tracks;
+  out.scene.lens_of = lens_of;
+  out.scene.poses.resize(lens_of.size());
+  for (const LensPrior& prior : priors) {
+    out.scene.lenses.push_back({prior.focal > 0 ? prior.focal : focal_of_side * prior.side, 0});
+  }
+  out.begun = place_photos(out.scene, priors, pairs);
+  if (!out.begun) return out;
+  const BundleOptions options{
+      .first = out.begun->first, .second = out.begun->second, .solve_focal = true};
+  adjust_bundle(out.scene, priors, options);
+  drop_outliers(out.scene, kMostError, kLeastAngle);
+  out.error = capped_error(out.scene);
+  return out;
+}
+
+// Placed at the focal length from which a part of the points is explained best.
+Attempt best_attempt(const std::vector<int>& lens_of,
+                     const std::vector<LensPrior>& priors,
+                     const std::vector<PhotoPair>& pairs,
+                     const std::vector<Track>& tracks) {
   constexpr size_t kTracks = 600;
   const std::vector<Track> some = sample(tracks, kTracks);
-  std::array<double, kFocals.size()> error = {};
-  std::array<double, kFocals.size()> found = {};
-  tbb::parallel_for(size_t{0}, kFocals.size(), [&](size_t i) {
-    Reconstruction scene = begin(photos, priors, kFocals[i]);
-    scene.tracks = some;
-    error[i] = std::numeric_limits<double>::infinity();
-    const auto begun = place_photos(scene, priors, pairs);
-    if (!begun) return;
-    adjust_bundle(scene,
-                  priors,
-                  {.first = begun->first, .second = begun->second, .solve_focal = true});
-    error[i] = capped_error(scene);
-    for (const UnposedPhoto& photo : photos) {
-      if (priors[static_cast<size_t>(photo.lens)].focal > 0) continue;
-      found[i] = scene.lenses[static_cast<size_t>(photo.lens)].focal / larger_side(photo);
-      break;
-    }
-    if (std::getenv("CGS_DEBUG_POSES")) fprintf(stderr, "focal %.3f -> %.4f error %.4f\n", kFocals[i], found[i], error[i]);
+  const bool is_known = std::all_of(
+      priors.begin(), priors.end(), [](const LensPrior& prior) { return prior.focal > 0; });
+  std::vector<Attempt> attempts(is_known ? 1 : kFocals.size());
+  tbb::parallel_for(size_t{0}, attempts.size(), [&](size_t i) {
+    attempts[i] = attempt_at(kFocals[i], lens_of, priors, pairs, some);
   });
-  const auto best = static_cast<size_t>(std::min_element(error.begin(), error.end()) - error.begin());
-  constexpr double kWidest = 0.2;
-  constexpr double kLongest = 20;
-  return found[best] > kWidest && found[best] < kLongest ? found[best] : kFocals[best];
+  return *std::min_element(
+      attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
+        return a.error < b.error;
+      });
 }
 
 // Rounds of adjusting everything and looking again what agrees.
-void polish(const std::vector<LensPrior>& priors, bool solve_k1, Solved& solved) {
-  BundleOptions options{.first = solved.begun.first,
-                        .second = solved.begun.second,
-                        .solve_focal = true,
-                        .solve_k1 = solve_k1};
-  for (const double most_error : {4.0, 3.0, 2.5, 2.5}) {
-    triangulate(solved.scene, most_error, kLeastAngle);
-    adjust_bundle(solved.scene, priors, options);
-    drop_outliers(solved.scene, most_error, kLeastAngle);
+// \return relative standard deviations of the focal lengths, per lens
+std::vector<double> polish(const std::vector<LensPrior>& priors,
+                           const FirstPair& begun,
+                           Reconstruction& scene) {
+  BundleOptions options{.first = begun.first, .second = begun.second, .solve_focal = true};
+  for (const double most_error : {kMostError, 3.0, 2.5}) {
+    adjust_bundle(scene, priors, options);
+    drop_outliers(scene, most_error, kLeastAngle);
+    triangulate(scene, most_error, kLeastAngle);
+    options.solve_shape = true;
   }
-  options.most_iterations = 200;
-  solved.focal_sigma = adjust_bundle(solved.scene, priors, options, true);
+  constexpr int kUntilSettled = 200;
+  options.most_iterations = kUntilSettled;
+  return adjust_bundle(scene, priors, options, true);
+}
+
+// Makes the first placed photograph the origin and its distance to the second the unit.
+void move_to_first(Reconstruction& scene) {
+  std::vector<size_t> placed;
+  for (size_t i = 0; i < scene.poses.size(); ++i) {
+    if (scene.poses[i]) placed.push_back(i);
+  }
+  const PhotoPose origin = *scene.poses[placed[0]];
+  const double unit = (scene.poses[placed[1]]->center() - origin.center()).norm();
+  for (auto& pose : scene.poses) {
+    if (!pose) continue;
+    const Eigen::Quaterniond rotation = (pose->rotation * origin.rotation.conjugate()).normalized();
+    pose = PhotoPose{rotation, (pose->translation - rotation * origin.translation) / unit};
+  }
+  scene.poses[placed[0]] = PhotoPose{};
+  for (Track& track : scene.tracks) track.position = origin * track.position / unit;
+}
+
+SolvedPhoto solved_photo(const UnposedPhoto& photo, const Lens& lens, const PhotoPose& pose) {
+  SolvedPhoto out;
+  const double pixel = photo.features.pixel;
+  out.is_placed = true;
+  out.camera.width = photo.width;
+  out.camera.height = photo.height;
+  out.camera.fx = out.camera.fy = lens.focal * pixel;
+  out.camera.cx = 0.5 * photo.width + lens.centre.x() * pixel;
+  out.camera.cy = 0.5 * photo.height + lens.centre.y() * pixel;
+  out.camera.world_from_cam.linear() = pose.rotation.conjugate().toRotationMatrix();
+  out.camera.world_from_cam.translation() = pose.center();
+  out.k1 = lens.k1;
+  out.rotation = pose.rotation;
+  out.translation = pose.translation;
+  return out;
+}
+
+void add_points(const std::vector<UnposedPhoto>& photos,
+                const Reconstruction& scene,
+                PoseSolution& out) {
+  double sum = 0;
+  size_t count = 0;
+  for (const Track& track : scene.tracks) {
+    if (!track.is_known) continue;
+    SolvedPoint point{track.position, {}, 0};
+    for (const Sighting& s : track.seen) {
+      if (!s.is_used || !scene.pose(s.photo)) continue;
+      const double error = reprojection_error(scene, track.position, s) *
+                           photos[static_cast<size_t>(s.photo)].features.pixel;
+      point.track.emplace_back(s.photo, s.feature);
+      point.error += error;
+      sum += error * error;
+      ++count;
+    }
+    point.error /= static_cast<double>(point.track.size());
+    out.points.push_back(std::move(point));
+  }
+  out.rms = count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
 }
 
 }  // namespace
@@ -125,48 +182,34 @@ void polish(const std::vector<LensPrior>& priors, bool solve_k1, Solved& solved)
 PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress) {
   require(photos.size() >= 2, "poses need at least 2 photographs", photos.size());
   const std::vector<LensPrior> priors = lens_priors(photos);
+  std::vector<int> lens_of;
+  for (const UnposedPhoto& photo : photos) lens_of.push_back(photo.lens);
   const std::vector<PhotoPair> pairs = match_photos(photos, part_of(progress, 0, 0.5));
-  if (std::getenv("CGS_DEBUG_POSES")) for (auto& p : pairs) fprintf(stderr, "pair %d %d: %zu %d\n", p.a, p.b, p.matches.size(), p.is_connected);
+  refuse_unconnected(photos, pairs);
+  refuse_turned_only(photos, priors, pairs);
+
   const std::vector<Track> tracks = chain_matches(photos, pairs);
-  const bool is_known = std::all_of(
-      priors.begin(), priors.end(), [](const LensPrior& prior) { return prior.focal > 0; });
-  const double focal = is_known ? 1 : best_focal(photos, priors, pairs, tracks);
-  Solved solved{begin(photos, priors, focal), {}, {}};
-  solved.scene.tracks = tracks;
-  const auto begun = place_photos(solved.scene, priors, pairs);
-  if (!begun) throw NumericalError("no pair of photographs could be placed");
-  solved.begun = *begun;
-  polish(priors, false, solved);
-  if (std::getenv("CGS_DEBUG_POSES")) {
-    Solved with = solved;
-    polish(priors, true, with);
-    fprintf(stderr, "f %.2f sigma %.5f error %.4f | k1: f %.2f sigma %.5f k1 %.5f error %.4f\n", solved.scene.lenses[0].focal, solved.focal_sigma[0], capped_error(solved.scene),
-    with.scene.lenses[0].focal, with.focal_sigma[0], with.scene.lenses[0].k1, capped_error(with.scene));
-  }
+  report(progress, 0.5);
+  Attempt attempt = best_attempt(lens_of, priors, pairs, tracks);
+  report(progress, 0.8);
+  if (!attempt.begun) throw NumericalError(unexplained_matches(photos, pairs));
+  Reconstruction scene = std::move(attempt.scene);
+  scene.tracks = tracks;
+  place_more(scene, priors, *attempt.begun);
+  const std::vector<double> sigmas = polish(priors, *attempt.begun, scene);
+  refuse_unsure(photos, priors, pairs, scene, sigmas);
+  move_to_first(scene);
+
   PoseSolution out;
-  out.photos.resize(photos.size());
   for (size_t i = 0; i < photos.size(); ++i) {
-    SolvedPhoto& p = out.photos[i];
-    const double unit = photos[i].features.pixel;
-    const auto lens = static_cast<size_t>(photos[i].lens);
-    p.is_placed = solved.scene.poses[i].has_value();
-    p.width = photos[i].width;
-    p.height = photos[i].height;
-    p.focal = solved.scene.lenses[lens].focal * unit;
-    p.k1 = solved.scene.lenses[lens].k1;
-    p.focal_sigma = solved.focal_sigma[lens];
-    if (!p.is_placed) continue;
-    p.rotation = solved.scene.poses[i]->rotation;
-    p.translation = solved.scene.poses[i]->translation;
+    const auto lens = static_cast<size_t>(lens_of[i]);
+    out.photos.push_back(scene.poses[i]
+                             ? solved_photo(photos[i], scene.lenses[lens], *scene.poses[i])
+                             : SolvedPhoto{});
+    out.photos.back().focal_sigma = sigmas[lens];
   }
-  for (const Track& track : solved.scene.tracks) {
-    if (!track.is_known) continue;
-    SolvedPoint point{track.position, {}, 0};
-    for (const Sighting& s : track.seen) {
-      if (s.is_used && solved.scene.pose(s.photo)) point.track.emplace_back(s.photo, s.feature);
-    }
-    out.points.push_back(point);
-  }
+  add_points(photos, scene, out);
+  report(progress, 1);
   return out;
 }
 

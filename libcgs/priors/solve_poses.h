@@ -22,16 +22,16 @@ struct UnposedPhoto {
   double focal_sigma = 0;  ///< Relative standard deviation of `focal`; 0 = exact.
 };
 
-/// A camera as solved; principal point in the image centre.
+/// A photograph's camera as solved.
 struct SolvedPhoto {
   bool is_placed = false;
-  int width = 0;
-  int height = 0;
-  double focal = 0;  ///< [pixels]
-  double k1 = 0;     ///< Distorted = (1 + k1 r²) undistorted, in units of the focal length.
-  double focal_sigma = 0;                                            ///< Relative; 0 = given.
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();      ///< cam_from_world
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();             ///< cam_from_world
+  /// Undistorted = as if k1 were 0. fx = fy.
+  Camera camera;
+  double k1 = 0;           ///< Distorted = (1 + k1 r²) undistorted, in units of the focal length.
+  double focal_sigma = 0;  ///< Relative standard deviation of the focal length; 0 = it was given.
+  /// cam_from_world as solved; camera.world_from_cam is its inverse, with rounding.
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 };
 
 /// A point that at least two photographs agree on.
@@ -46,18 +46,19 @@ struct SolvedPoint {
 struct PoseSolution {
   std::vector<SolvedPhoto> photos;  ///< As given.
   std::vector<SolvedPoint> points;
-  double rms = 0;                 ///< Of the distances between points and features [pixels].
-  std::vector<std::string> left;  ///< One line per photograph that could not be placed.
+  double rms = 0;  ///< Of the distances between points and features [pixels].
 };
 
-/// Cameras of photographs from nothing but what they show: matched features, relative pose of the
-/// pair that shows the most depth, resection of the others, bundle adjustment.
+/// Cameras of photographs from nothing but what they show: matched features, relative pose of a
+/// pair that shows much depth, resection of the others, bundle adjustment. Where a focal length is
+/// unknown, the one from which the matches are explained best.
 ///
 /// The result does not depend on the number of threads, and on the order of the photographs only
 /// by rounding and by the choice of world axes.
-/// \pre at least two photographs; equal lens means equal focal, focal_sigma and larger side
-/// \throws NumericalError where the photographs cannot say: too few matches (naming the pair), no
-///         parallax (the camera was only turned), focal length not determined.
+/// \pre lens counts from 0; equal lens means equal size, focal and focal_sigma
+/// \throws InvalidInput for fewer than two photographs; NumericalError where they cannot say: too
+///         few matches (naming the pair), no parallax (the camera was only turned), focal length
+///         not determined, matches that no cameras explain.
 PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress = {});
 
 }  // namespace cgs

@@ -69,13 +69,10 @@ void compare(const Scene& scene, const PoseSolution& solution) {
     const SolvedPhoto& photo = solution.photos[k];
     const Camera& camera = scene.views[static_cast<size_t>(scene.input[k])].camera;
     if (!photo.is_placed) continue;
-    Eigen::Isometry3d cam_from_world = Eigen::Isometry3d::Identity();
-    cam_from_world.linear() = photo.rotation.toRotationMatrix();
-    cam_from_world.translation() = photo.translation;
-    solved.push_back(cam_from_world.inverse());
+    solved.push_back(photo.camera.world_from_cam);
     given.push_back(camera.world_from_cam);
-    const double focal = resized(camera, photo.width, photo.height).fx;
-    focal_error = std::max(focal_error, 100 * std::abs(photo.focal / focal - 1));
+    const double focal = resized(camera, photo.camera.width, photo.camera.height).fx;
+    focal_error = std::max(focal_error, 100 * std::abs(photo.camera.fx / focal - 1));
   }
   const Eigen::Matrix3d align = common_rotation(solved, given);
   double rotation_error = 0;
@@ -118,7 +115,6 @@ int main(int argc, char** argv) {
     const PoseSolution solution = solve_poses(photos);
     const auto end = std::chrono::steady_clock::now();
     compare(scene, solution);
-    for (const std::string& line : solution.left) std::printf("%s\n", line.c_str());
     std::printf("features %.1f s, poses %.1f s\n",
                 std::chrono::duration<double>(middle - start).count(),
                 std::chrono::duration<double>(end - middle).count());
