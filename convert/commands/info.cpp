@@ -20,8 +20,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct InfoArgs {
-  std::filesystem::path scene;
-  SceneOptions scene_options;
+  SceneRequest scene;
   bool json = false;
 };
 
@@ -162,7 +161,8 @@ void print_scene(const Json& info) {
 }
 
 void run_info(const InfoArgs& args) {
-  const Json info = scene_json(read_scene(args.scene, args.scene_options));
+  Terminal terminal(args.json);
+  const Json info = scene_json(open_scene(args.scene, {}, terminal).scene);
   if (args.json) {
     std::cout << json_text(info) << "\n";
   } else {
@@ -176,8 +176,9 @@ void add_info(CLI::App& app) {
   auto args = std::make_shared<InfoArgs>();
   auto* cmd = app.add_subcommand(
       "info", "What a scene holds and what is wrong with it (exit code 3 if it cannot be used)");
-  cmd->add_option("scene", args->scene, "Folder of a scene, as for run")->required();
-  add_scene_options(*cmd, args->scene_options);
+  cmd->add_option("scene", args->scene.path, "Folder of a scene, as for run")->required();
+  add_scene_options(*cmd, args->scene.options);
+  add_focal_option(*cmd, args->scene.focal);
   cmd->add_flag("--json", args->json, "Print JSON on standard output");
   cmd->footer("Example: cgs info photos/portal --views 1,10,19");
   cmd->callback([args] { run_info(*args); });
