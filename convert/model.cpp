@@ -226,9 +226,9 @@ Model read_model(const std::filesystem::path& folder) {
 namespace {
 
 // Photographs whose cameras were solved for have their file names as names of views.
-void relink_photographs(Scene& scene, const std::vector<Photograph>& photographs) {
+void relink_photographs(Scene& scene, const std::vector<PhotoFile>& photographs) {
   for (View& view : scene.views) {
-    for (const Photograph& photograph : photographs) {
+    for (const PhotoFile& photograph : photographs) {
       if (photograph.path.stem() == view.name) view.image_path = photograph.path;
     }
   }

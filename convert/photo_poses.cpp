@@ -28,8 +28,8 @@ namespace {
 // Every pair is compared.
 constexpr size_t kMostPhotographs = 16;
 
-std::vector<Photograph> checked_photographs(const SceneRoot& root) {
-  std::vector<Photograph> photographs = list_photographs(root);
+std::vector<PhotoFile> checked_photographs(const SceneRoot& root) {
+  std::vector<PhotoFile> photographs = list_photographs(root);
   if (photographs.size() < 2) {
     throw BadInput(Defect::Empty, root.folder, "need at least 2 photographs");
   }
@@ -42,9 +42,9 @@ std::vector<Photograph> checked_photographs(const SceneRoot& root) {
   return photographs;
 }
 
-std::string inputs_text(const std::vector<Photograph>& photographs, double focal) {
+std::string inputs_text(const std::vector<PhotoFile>& photographs, double focal) {
   Json hashes = Json::object();
-  for (const Photograph& photograph : photographs) {
+  for (const PhotoFile& photograph : photographs) {
     hashes[photograph.path.filename().string()] = file_hash(photograph.path);
   }
   return json_text({{"program", kProgramVersion}, {"focal", focal}, {"photographs", hashes}}, -1);
@@ -72,16 +72,16 @@ std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
 }
 
 // Photographs of one camera, size and stated focal length share a lens.
-int lens_of(const Photograph& photograph, std::vector<const Photograph*>& lenses) {
-  const auto key = [](const Photograph& p) {
+int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) {
+  const auto key = [](const PhotoFile& p) {
     return std::tie(p.size.width, p.size.height, p.hint.camera, p.hint.focal);
   };
-  const auto same = std::find_if(lenses.begin(), lenses.end(), [&](const Photograph* other) {
+  const auto same = std::find_if(lenses.begin(), lenses.end(), [&](const PhotoFile* other) {
     return key(*other) == key(photograph);
   });
   if (same == lenses.end()) lenses.push_back(&photograph);
   return static_cast<int>(
-      std::find_if(lenses.begin(), lenses.end(), [&](const Photograph* other) {
+      std::find_if(lenses.begin(), lenses.end(), [&](const PhotoFile* other) {
         return key(*other) == key(photograph);
       }) -
       lenses.begin());
@@ -89,7 +89,7 @@ int lens_of(const Photograph& photograph, std::vector<const Photograph*>& lenses
 
 using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255
 
-UnposedPhoto unposed_photo(const Photograph& photograph, double focal, Colors& colors) {
+UnposedPhoto unposed_photo(const PhotoFile& photograph, double focal, Colors& colors) {
   const ColorImage image = read_image(photograph.path);
   UnposedPhoto out;
   out.name = photograph.path.filename().string();
@@ -175,11 +175,11 @@ PhotoPoses photo_poses(const SceneRoot& root,
                        double focal,
                        const std::filesystem::path& stored,
                        Terminal& terminal) {
-  const std::vector<Photograph> photographs = checked_photographs(root);
+  const std::vector<PhotoFile> photographs = checked_photographs(root);
   const std::string inputs = inputs_text(photographs, focal);
   if (auto poses = stored_poses(stored, inputs)) return *poses;
   const Progress progress = terminal.begin("cameras of photographs");
-  std::vector<const Photograph*> lenses;
+  std::vector<const PhotoFile*> lenses;
   std::vector<UnposedPhoto> photos;
   std::vector<Colors> colors(photographs.size());
   constexpr double kShare = 0.4;  // of the time, for finding features

@@ -25,8 +25,8 @@ bool is_photographs(const fs::path& folder) {
   return false;
 }
 
-std::vector<Photograph> list_photographs(const SceneRoot& root) {
-  std::vector<Photograph> out;
+std::vector<PhotoFile> list_photographs(const SceneRoot& root) {
+  std::vector<PhotoFile> out;
   for (const fs::path& path : image_files(root, ".")) {
     const std::string name = path.filename().string();
     const bool is_plain = std::none_of(

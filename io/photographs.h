@@ -10,7 +10,7 @@
 namespace cgs {
 
 /// A photograph whose camera is not known.
-struct Photograph {
+struct PhotoFile {
   std::filesystem::path path;
   ImageSize size;
   LensHint hint;
@@ -23,6 +23,6 @@ bool is_photographs(const std::filesystem::path& folder);
 /// The image files directly in a folder, in the order of their names.
 /// \throws BadInput Path (names with control characters, links that leave the folder), and as
 ///         image_size(); LimitError
-std::vector<Photograph> list_photographs(const SceneRoot& root);
+std::vector<PhotoFile> list_photographs(const SceneRoot& root);
 
 }  // namespace cgs
