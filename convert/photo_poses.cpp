@@ -81,9 +81,9 @@ int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) 
   });
   if (same == lenses.end()) lenses.push_back(&photograph);
   return static_cast<int>(
-      std::find_if(lenses.begin(), lenses.end(), [&](const PhotoFile* other) {
-        return key(*other) == key(photograph);
-      }) -
+      std::find_if(lenses.begin(),
+                   lenses.end(),
+                   [&](const PhotoFile* other) { return key(*other) == key(photograph); }) -
       lenses.begin());
 }
 
@@ -127,11 +127,12 @@ std::vector<std::string> remarks(const std::vector<UnposedPhoto>& photos,
                     " was left out: too little of what it shows is in the others");
     } else if (solved.focal_sigma > 0 && photo.lens > told) {
       told = photo.lens;
-      out.push_back("focal length of " + printable(photo.name) + " solved for: " +
-                    std::to_string(std::lround(solved.camera.fx)) + " pixels, uncertain by " +
-                    percent(solved.focal_sigma) +
-                    (photo.focal > 0 ? " (Exif says " + std::to_string(std::lround(photo.focal)) + ")"
-                                     : " (the file does not say)"));
+      out.push_back("focal length of " + printable(photo.name) +
+                    " solved for: " + std::to_string(std::lround(solved.camera.fx)) +
+                    " pixels, uncertain by " + percent(solved.focal_sigma) +
+                    (photo.focal > 0
+                         ? " (Exif says " + std::to_string(std::lround(photo.focal)) + ")"
+                         : " (the file does not say)"));
     }
   }
   return out;

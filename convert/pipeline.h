@@ -20,8 +20,9 @@ namespace cgs {
 struct SceneRequest {
   std::filesystem::path path;
   SceneOptions options;
-  std::string assume_unit;  ///< Unit of one scene unit where the scene does not say; empty = unknown.
-  double focal = 0;         ///< Of photographs without cameras [pixels]; 0 = not given.
+  std::string
+      assume_unit;   ///< Unit of one scene unit where the scene does not say; empty = unknown.
+  double focal = 0;  ///< Of photographs without cameras [pixels]; 0 = not given.
 };
 
 /// What `cgs run` is asked for; lengths are as the user typed them, with or without a unit.

@@ -54,8 +54,8 @@ double pixels_per_millimetre(ExifData* exif, const ImageSize& size) {
   // Stated for the picture as it was taken; programs that shrink it leave the tag.
   const double width = number(exif, EXIF_IFD_EXIF, EXIF_TAG_PIXEL_X_DIMENSION);
   const double height = number(exif, EXIF_IFD_EXIF, EXIF_TAG_PIXEL_Y_DIMENSION);
-  const bool is_same_shape = std::abs(width * size.height - height * size.width) <=
-                             2 * std::max(size.width, size.height);
+  const bool is_same_shape =
+      std::abs(width * size.height - height * size.width) <= 2 * std::max(size.width, size.height);
   if (!(resolution > 0 && millimetres > 0 && width > 0 && is_same_shape)) return 0;
   return resolution / millimetres * size.width / width;
 }
@@ -77,9 +77,9 @@ LensHint from_film(double millimetres, const ImageSize& size) {
   }
   // Wider pictures keep the sensor's longer side, others the shorter one: the mean of what it is
   // on a sensor of 3:2 and on one of 4:3 with the same diagonal.
-  const double focal =
-      shape > 1.5 ? longer * millimetres * 0.5 * (1 / 36.0 + 1 / (0.8 * diagonal))
-                  : shorter * millimetres * 0.5 * (1 / 24.0 + 1 / (0.6 * diagonal));
+  const double focal = shape > 1.5
+                           ? longer * millimetres * 0.5 * (1 / 36.0 + 1 / (0.8 * diagonal))
+                           : shorter * millimetres * 0.5 * (1 / 24.0 + 1 / (0.6 * diagonal));
   return {"", focal, std::hypot(rounding, kCut)};
 }
 

@@ -35,10 +35,11 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
 }
 
 void add_focal_option(CLI::App& command, double& focal) {
-  command.add_option("--focal",
-                     focal,
-                     "Focal length of photographs without cameras, in pixels of the files; default: "
-                     "what they say (Exif), else solved for");
+  command.add_option(
+      "--focal",
+      focal,
+      "Focal length of photographs without cameras, in pixels of the files; default: "
+      "what they say (Exif), else solved for");
 }
 
 void add_training_options(CLI::App& command, TrainingArguments& arguments) {

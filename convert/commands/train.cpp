@@ -54,7 +54,8 @@ void add_train(CLI::App& app) {
   cmd->add_option("-o,--output", args->output, "Model folder to write")->required();
   add_scene_options(*cmd, args->scene.options);
   add_focal_option(*cmd, args->scene.focal);
-  cmd->add_option("--assume-unit", args->scene.assume_unit, "What one scene unit is: m, cm, mm, in, ft");
+  cmd->add_option(
+      "--assume-unit", args->scene.assume_unit, "What one scene unit is: m, cm, mm, in, ft");
   add_training_options(*cmd, args->training);
   add_common_options(*cmd, args->common);
   cmd->footer(

@@ -13,7 +13,8 @@ namespace cgs {
 
 namespace {
 
-// Doubles of a photograph: quaternion x y z w, translation; of a lens: log(focal), k1, principal point.
+// Doubles of a photograph: quaternion x y z w, translation; of a lens: log(focal), k1, principal
+// point.
 constexpr size_t kRotation = 0;
 constexpr size_t kTranslation = 4;
 constexpr size_t kPerPhoto = 7;
@@ -25,8 +26,8 @@ struct Reprojection {
   Eigen::Vector2d at;
 
   template <typename T>
-  bool operator()(const T* rotation, const T* translation, const T* lens, const T* point, T* out)
-      const {
+  bool operator()(
+      const T* rotation, const T* translation, const T* lens, const T* point, T* out) const {
     const Eigen::Map<const Eigen::Quaternion<T>> q(rotation);
     const Eigen::Map<const Eigen::Matrix<T, 3, 1>> t(translation);
     const Eigen::Map<const Eigen::Matrix<T, 3, 1>> x(point);
@@ -125,14 +126,13 @@ void add_sightings(const Reconstruction& scene,
     for (const Sighting& s : scene.tracks[k].seen) {
       const auto photo = static_cast<size_t>(s.photo);
       if (!s.is_used || !scene.poses[photo]) continue;
-      problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<Reprojection, 2, 4, 3, kPerLens, 3>(
-              new Reprojection{s.at}),
-          loss,
-          unknowns.rotation(photo),
-          unknowns.translation(photo),
-          unknowns.lens(static_cast<size_t>(scene.lens_of[photo])),
-          unknowns.point(k));
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Reprojection, 2, 4, 3, kPerLens, 3>(
+                                   new Reprojection{s.at}),
+                               loss,
+                               unknowns.rotation(photo),
+                               unknowns.translation(photo),
+                               unknowns.lens(static_cast<size_t>(scene.lens_of[photo])),
+                               unknowns.point(k));
     }
   }
 }
@@ -283,9 +283,9 @@ std::vector<double> focal_sigmas(const Reconstruction& scene,
   ceres::CRSMatrix jacobian;
   std::vector<double> sigmas(scene.lenses.size(), 0.0);
   const bool is_evaluated = problem.Evaluate(options, nullptr, nullptr, nullptr, &jacobian);
-  const Eigen::LDLT<Eigen::MatrixXd> H(
-      is_evaluated ? reduced_normal_equations(jacobian, cameras.count)
-                   : Eigen::MatrixXd::Zero(cameras.count, cameras.count));
+  const Eigen::LDLT<Eigen::MatrixXd> H(is_evaluated
+                                           ? reduced_normal_equations(jacobian, cameras.count)
+                                           : Eigen::MatrixXd::Zero(cameras.count, cameras.count));
   for (size_t i = 0; i < scene.lenses.size(); ++i) {
     const int column = cameras.column_of_lens[i];
     if (column < 0) continue;

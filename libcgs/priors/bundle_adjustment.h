@@ -19,7 +19,7 @@ struct BundleOptions {
   int second = 1;            ///< Photograph whose distance from it is held.
   bool solve_focal = false;  ///< Of lenses whose prior is not exact.
   bool solve_shape = false;  ///< Distortion and principal point, which are small in any camera.
-  double loss_scale = 1;  ///< Of the Cauchy loss [working pixels].
+  double loss_scale = 1;     ///< Of the Cauchy loss [working pixels].
   int most_iterations = 50;
 };
 

@@ -15,8 +15,8 @@ struct PhotoPair {
   int a = 0;
   int b = 0;
   std::vector<FeatureMatch> matches;
-  MatchedPoints points;      ///< Of the matches.
-  bool is_connected = false; ///< More of them than chance brings.
+  MatchedPoints points;       ///< Of the matches.
+  bool is_connected = false;  ///< More of them than chance brings.
 };
 
 /// Fewest matches that say that two photographs show the same.

@@ -33,9 +33,7 @@ std::string decimals(double value, int digits) {
 }
 
 // The least that turning the camera leaves unexplained, over focal lengths where none is known.
-double least_parallax(const PhotoPair& pair,
-                      const LensPrior& prior_a,
-                      const LensPrior& prior_b) {
+double least_parallax(const PhotoPair& pair, const LensPrior& prior_a, const LensPrior& prior_b) {
   constexpr double kShortest = 0.3;  // [larger sides]
   constexpr double kStep = 1.05;
   constexpr int kSteps = 54;  // up to 4
@@ -70,9 +68,10 @@ void refuse_unconnected(const std::vector<UnposedPhoto>& photos,
                         const std::vector<PhotoPair>& pairs) {
   for (const UnposedPhoto& photo : photos) {
     if (photo.features.points.size() >= kFewestMatches) continue;
-    throw NumericalError("photograph " + printable(photo.name) + " shows too little to find again: " +
-                         std::to_string(photo.features.points.size()) + " distinct points, need " +
-                         std::to_string(kFewestMatches));
+    throw NumericalError(
+        "photograph " + printable(photo.name) +
+        " shows too little to find again: " + std::to_string(photo.features.points.size()) +
+        " distinct points, need " + std::to_string(kFewestMatches));
   }
   const auto is_connected = [](const PhotoPair& pair) { return pair.is_connected; };
   if (std::any_of(pairs.begin(), pairs.end(), is_connected)) return;
@@ -117,13 +116,12 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
     if (focal_sigmas[lens] <= kMostSigma) continue;
     constexpr double kPlanar = 0.9;
     const bool is_planar = share_on_planes(pairs) >= kPlanar;
-    throw NumericalError(
-        std::string("the focal length cannot be told from these photographs") +
-        (is_planar ? ", since what they share lies in one plane" : "") +
-        (std::isfinite(focal_sigmas[lens])
-             ? " (uncertain by " + decimals(100 * focal_sigmas[lens], 0) + " %)"
-             : "") +
-        "; give it with --focal, in pixels");
+    throw NumericalError(std::string("the focal length cannot be told from these photographs") +
+                         (is_planar ? ", since what they share lies in one plane" : "") +
+                         (std::isfinite(focal_sigmas[lens])
+                              ? " (uncertain by " + decimals(100 * focal_sigmas[lens], 0) + " %)"
+                              : "") +
+                         "; give it with --focal, in pixels");
   }
 }
 

@@ -106,8 +106,8 @@ void triangulate(Reconstruction& scene, double most_error, double least_angle) {
 void drop_outliers(Reconstruction& scene, double most_error, double least_angle) {
   for (Track& track : scene.tracks) {
     if (!track.is_known) continue;
-    track.is_known = use_what_agrees(scene, most_error, track) >= 2 &&
-                     ray_angle(scene, track) >= least_angle;
+    track.is_known =
+        use_what_agrees(scene, most_error, track) >= 2 && ray_angle(scene, track) >= least_angle;
   }
 }
 

@@ -46,8 +46,8 @@ struct Track {
 /// which features were found, so that errors of all photographs are comparable.
 struct Reconstruction {
   std::vector<Lens> lenses;
-  std::vector<int> lens_of;                      ///< Per photograph.
-  std::vector<std::optional<PhotoPose>> poses;   ///< Per photograph; nothing = not yet placed.
+  std::vector<int> lens_of;                     ///< Per photograph.
+  std::vector<std::optional<PhotoPose>> poses;  ///< Per photograph; nothing = not yet placed.
   std::vector<Track> tracks;
 
   const Lens& lens(int photo) const {

@@ -12,7 +12,7 @@ namespace cgs {
 
 namespace {
 
-constexpr int kFewestPoints = 12;       // to place a photograph by
+constexpr int kFewestPoints = 12;  // to place a photograph by
 
 // Pairs to begin with, the most promising first.
 std::vector<const PhotoPair*> ranked_pairs(const Reconstruction& scene,
@@ -40,9 +40,8 @@ std::vector<const PhotoPair*> ranked_pairs(const Reconstruction& scene,
 }
 
 int known_points(const Reconstruction& scene) {
-  return static_cast<int>(std::count_if(scene.tracks.begin(),
-                                        scene.tracks.end(),
-                                        [](const Track& track) { return track.is_known; }));
+  return static_cast<int>(std::count_if(
+      scene.tracks.begin(), scene.tracks.end(), [](const Track& track) { return track.is_known; }));
 }
 
 void forget(Reconstruction& scene) {
@@ -154,7 +153,8 @@ double capped_error(const Reconstruction& scene) {
     for (const Sighting& s : track.seen) {
       ++count;
       const bool is_comparable = track.is_known && scene.pose(s.photo);
-      const double error = is_comparable ? reprojection_error(scene, track.position, s) : kMostError;
+      const double error =
+          is_comparable ? reprojection_error(scene, track.position, s) : kMostError;
       sum += std::min(error * error, kCap);
     }
   }

@@ -97,10 +97,9 @@ Attempt best_attempt(const std::vector<int>& lens_of,
   tbb::parallel_for(size_t{0}, attempts.size(), [&](size_t i) {
     attempts[i] = attempt_at(kFocals[i], lens_of, priors, pairs, some);
   });
-  return *std::min_element(
-      attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
-        return a.error < b.error;
-      });
+  return *std::min_element(attempts.begin(),
+                           attempts.end(),
+                           [](const Attempt& a, const Attempt& b) { return a.error < b.error; });
 }
 
 // Rounds of adjusting everything and looking again what agrees.

@@ -1,35 +1,95 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// How accurate poses solved from photographs alone are, beside the cameras given with them.
+// How accurate cameras solved from photographs alone are, beside those given with the data sets.
 //
-//   pose_accuracy SCENE [VIEWS [FOCAL]]
+//   pose_accuracy FOLDER [SET]     FOLDER holds the data sets of kSets; SET = a part of the name
 //
-// SCENE is a scene folder with known cameras, VIEWS what --views takes. FOCAL: "given" uses the
-// given focal length, "unknown" (default) solves for it. Prints, after the similarity that brings
-// the cameras together best, the largest errors: rotation [degrees], direction between any two
-// cameras [degrees], focal length [%], and the time.
+// Prints per set and source of the focal length (given = of the data set, Exif, solved = unknown):
+// photographs placed, largest error of rotation and of the direction between any two cameras
+// [degrees] after the rotation that brings all cameras together best, of the focal length [%], the
+// standard deviation claimed for it [%], and seconds.
+#include <array>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <string>
 
-#include <Eigen/Dense>
-
+#include "io/exif.h"
 #include "io/image.h"
 #include "io/scene_reader.h"
+#include "io/text_lines.h"
 #include "libcgs/core/error.h"
-#include "libcgs/priors/solve_poses.h"
+#include "tests/support/unposed_photos.h"
 
 namespace {
 
 using namespace cgs;
 
-double degrees(double radians) { return radians * 180 / M_PI; }
+struct Set {
+  const char* folder;
+  const char* views;
+};
 
-double angle(const Eigen::Matrix3d& R) { return degrees(Eigen::AngleAxisd(R).angle()); }
+constexpr std::array<Set, 10> kSets = {{{"strecha_herzjesu_p8", "0,1,2"},
+                                        {"strecha_herzjesu_p8", "3,4,5"},
+                                        {"strecha_herzjesu_p8", "5,6,7"},
+                                        {"strecha_herzjesu_p8", "1,3,5"},
+                                        {"templeSparseRing", "0,1,2"},
+                                        {"templeSparseRing", "8,9,10"},
+                                        {"heritage_ethiopian_head", "0,1,2,3"},
+                                        {"mvimgnet_5views/dense", "0,1,2,3,4"},
+                                        {"llff_fern", "1,10,19"},
+                                        {"llff_fern", "5,6,7"}}};
 
-std::vector<UnposedPhoto> photographs(const Scene& scene, bool with_focal) {
-  std::vector<UnposedPhoto> out;
+// Rows "name K R t" with P = K [R | t], all row-major; pixel centres at whole numbers.
+Scene read_middlebury(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / "templeSR_par.txt";
+  const std::string text = read_file(path);
+  TextLines lines(text, path);
+  (void)lines.next_data();  // the number of rows
+  Scene scene;
+  while (const auto line = lines.next_data()) {
+    const auto parts = tokens(*line);
+    std::array<double, 21> p = {};
+    for (size_t i = 0; i < p.size(); ++i) p[i] = lines.number(parts.at(i + 1));
+    View view;
+    view.name = std::filesystem::path(parts[0]).stem();
+    view.image_path = folder / parts[0];
+    const ImageSize size = image_size(view.image_path);
+    view.camera = {.width = size.width,
+                   .height = size.height,
+                   .fx = p[0],
+                   .fy = p[4],
+                   .cx = p[2] + 0.5,
+                   .cy = p[5] + 0.5};
+    using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    Eigen::Isometry3d cam_from_world = Eigen::Isometry3d::Identity();
+    cam_from_world.linear() = Eigen::Map<const RowMajor>(p.data() + 9);
+    cam_from_world.translation() = Eigen::Map<const Eigen::Vector3d>(p.data() + 18);
+    view.camera.world_from_cam = cam_from_world.inverse();
+    scene.views.push_back(std::move(view));
+  }
+  return scene;
+}
+
+Scene read_set(const std::filesystem::path& data, const Set& set) {
+  const std::filesystem::path folder = data / set.folder;
+  if (!std::filesystem::exists(folder / "templeSR_par.txt")) {
+    return read_scene(folder, {.views = set.views});
+  }
+  Scene scene = read_middlebury(folder);
+  scene.input = select_views(scene, set.views);
+  return scene;
+}
+
+struct Photos {
+  std::vector<UnposedPhoto> photos;
+  std::vector<Camera> given;  // at the size of the files
+  double exif_focal = 0;
+  double exif_sigma = 0;
+};
+
+Photos photos_of(const Scene& scene) {
+  Photos out;
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
     const ColorImage image = read_image(view.image_path);
@@ -38,89 +98,86 @@ std::vector<UnposedPhoto> photographs(const Scene& scene, bool with_focal) {
     photo.width = image.width;
     photo.height = image.height;
     photo.features = detect_features(image);
-    if (with_focal) photo.focal = resized(view.camera, image.width, image.height).fx;
-    std::printf("%s: %d x %d, %zu features\n",
-                view.name.c_str(),
-                image.width,
-                image.height,
-                photo.features.points.size());
-    out.push_back(std::move(photo));
+    out.photos.push_back(std::move(photo));
+    out.given.push_back(resized(view.camera, image.width, image.height));
+    const LensHint hint = lens_hint(view.image_path, {image.width, image.height});
+    out.exif_focal = hint.focal;
+    out.exif_sigma = hint.sigma;
   }
   return out;
 }
 
-// The rotation that best takes the axes of solved cameras to those of given ones.
-Eigen::Matrix3d common_rotation(const std::vector<Eigen::Isometry3d>& solved,
-                                const std::vector<Eigen::Isometry3d>& given) {
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  for (size_t i = 0; i < solved.size(); ++i) {
-    H += given[i].rotation() * solved[i].rotation().transpose();
+void measure(const Set& set,
+             const char* source,
+             std::vector<UnposedPhoto> photos,
+             double focal,
+             double sigma,
+             const std::vector<Camera>& given) {
+  for (UnposedPhoto& photo : photos) {
+    photo.focal = focal;
+    photo.focal_sigma = sigma;
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant());
-  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  std::printf("%-24s %-10s %-7s", set.folder, set.views, source);
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    const PoseSolution solution = solve_poses(photos);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    std::vector<Camera> solved;
+    std::vector<Camera> truth;
+    for (size_t i = 0; i < photos.size(); ++i) {
+      if (!solution.photos[i].is_placed) continue;
+      solved.push_back(solution.photos[i].camera);
+      truth.push_back(given[i]);
+    }
+    const test::PoseErrors errors = test::pose_errors(solved, truth);
+    std::printf(" %2zu of %zu %9.3f %9.3f %8.2f %8.2f %7.1f\n",
+                solved.size(),
+                photos.size(),
+                errors.rotation,
+                errors.direction,
+                100 * errors.focal,
+                100 * solution.photos[0].focal_sigma,
+                seconds.count());
+  } catch (const NumericalError& error) {
+    std::printf(" refused: %s\n", error.what());
+  }
+  std::fflush(stdout);
 }
 
-void compare(const Scene& scene, const PoseSolution& solution) {
-  std::vector<Eigen::Isometry3d> solved;
-  std::vector<Eigen::Isometry3d> given;
-  double focal_error = 0;
-  for (size_t k = 0; k < scene.input.size(); ++k) {
-    const SolvedPhoto& photo = solution.photos[k];
-    const Camera& camera = scene.views[static_cast<size_t>(scene.input[k])].camera;
-    if (!photo.is_placed) continue;
-    solved.push_back(photo.camera.world_from_cam);
-    given.push_back(camera.world_from_cam);
-    const double focal = resized(camera, photo.camera.width, photo.camera.height).fx;
-    focal_error = std::max(focal_error, 100 * std::abs(photo.camera.fx / focal - 1));
-  }
-  const Eigen::Matrix3d align = common_rotation(solved, given);
-  double rotation_error = 0;
-  double relative_error = 0;
-  double direction_error = 0;
-  for (size_t i = 0; i < solved.size(); ++i) {
-    rotation_error = std::max(
-        rotation_error,
-        angle(given[i].rotation().transpose() * align * solved[i].rotation()));
-    for (size_t j = i + 1; j < solved.size(); ++j) {
-      const Eigen::Matrix3d a = given[j].rotation().transpose() * given[i].rotation();
-      const Eigen::Matrix3d b = solved[j].rotation().transpose() * solved[i].rotation();
-      relative_error = std::max(relative_error, angle(a.transpose() * b));
-      const Eigen::Vector3d u = given[j].translation() - given[i].translation();
-      const Eigen::Vector3d v = align * (solved[j].translation() - solved[i].translation());
-      direction_error =
-          std::max(direction_error, degrees(std::atan2(u.cross(v).norm(), u.dot(v))));
+int run(const std::filesystem::path& data, const std::string& wanted) {
+  std::printf("%-24s %-10s %-7s %7s %9s %9s %8s %8s %7s\n",
+              "set",
+              "views",
+              "focal",
+              "placed",
+              "rotation",
+              "direction",
+              "focal %",
+              "sigma %",
+              "s");
+  for (const Set& set : kSets) {
+    if (std::string(set.folder).find(wanted) == std::string::npos) continue;
+    const Photos photos = photos_of(read_set(data, set));
+    measure(set, "given", photos.photos, photos.given[0].fx, 0, photos.given);
+    if (photos.exif_focal > 0) {
+      measure(set, "Exif", photos.photos, photos.exif_focal, photos.exif_sigma, photos.given);
     }
+    measure(set, "solved", photos.photos, 0, 0, photos.given);
   }
-  std::printf("placed %zu of %zu, points %zu, rms %.3f px\n", solved.size(), scene.input.size(),
-              solution.points.size(), solution.rms);
-  std::printf("rotation %.4f deg (relative %.4f), direction %.4f deg, focal %.3f %% (sigma %.3f %%) k1 %.5f\n",
-              rotation_error, relative_error, direction_error, focal_error,
-              100 * solution.photos[0].focal_sigma, solution.photos[0].k1);
+  return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::fprintf(stderr, "usage: pose_accuracy SCENE [VIEWS [given|unknown]]\n");
+    std::fprintf(stderr, "usage: pose_accuracy FOLDER [SET]\n");
     return 2;
   }
   try {
-    const Scene scene = read_scene(argv[1], {.views = argc > 2 ? argv[2] : ""});
-    const auto start = std::chrono::steady_clock::now();
-    const std::string focal = argc > 3 ? argv[3] : "unknown";
-    const std::vector<UnposedPhoto> photos = photographs(scene, focal == "given");
-    const auto middle = std::chrono::steady_clock::now();
-    const PoseSolution solution = solve_poses(photos);
-    const auto end = std::chrono::steady_clock::now();
-    compare(scene, solution);
-    std::printf("features %.1f s, poses %.1f s\n",
-                std::chrono::duration<double>(middle - start).count(),
-                std::chrono::duration<double>(end - middle).count());
-  } catch (const Error& error) {
+    return run(argv[1], argc > 2 ? argv[2] : "");
+  } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
-    return error.exit_code();
+    return 1;
   }
-  return 0;
 }

@@ -94,9 +94,12 @@ TEST_F(ExifFile, IsLessSureOfPicturesThatWereCut) {
 
 TEST_F(ExifFile, PrefersTheResolutionOfTheFocalPlane) {
   // 10 mm at 2540 pixels per inch = 100 per millimetre, halved since.
-  const std::vector<Entry> entries = {
-      {kFocalLength, 5, 100}, {kPixelX, 4, 2000}, {kPixelY, 4, 1500}, {kPlaneX, 5, 25400},
-      {kPlaneUnit, 3, 2},     {kFilm, 3, 90}};
+  const std::vector<Entry> entries = {{kFocalLength, 5, 100},
+                                      {kPixelX, 4, 2000},
+                                      {kPixelY, 4, 1500},
+                                      {kPlaneX, 5, 25400},
+                                      {kPlaneUnit, 3, 2},
+                                      {kFilm, 3, 90}};
   EXPECT_NEAR(hint(entries, {2000, 1500}).focal, 1000, 1e-6);
   EXPECT_NEAR(hint(entries, {1000, 750}).focal, 500, 1e-6);
   EXPECT_NEAR(hint(entries, {1500, 1500}).focal, 1500 * 90 / 25, 300);  // cut: says nothing

@@ -18,9 +18,9 @@ namespace cgs::test {
 struct PointScene {
   std::vector<Camera> cameras;
   std::vector<Eigen::Vector3d> points;
-  double noise = 0.3;     ///< Of each coordinate of a feature [pixels].
-  double outliers = 0;    ///< Share of features that look like a point they do not show.
-  double k1 = 0;          ///< Distortion of the lens.
+  double noise = 0.3;   ///< Of each coordinate of a feature [pixels].
+  double outliers = 0;  ///< Share of features that look like a point they do not show.
+  double k1 = 0;        ///< Distortion of the lens.
   unsigned seed = 1;
 };
 
@@ -57,7 +57,8 @@ inline UnposedPhoto unposed_photo(const PointScene& scene, size_t camera_index) 
     if (p.z() <= 0) continue;
     const Eigen::Vector2d direction = p.hnormalized();
     const Eigen::Vector2d distorted = direction * (1 + scene.k1 * direction.squaredNorm());
-    Eigen::Vector2d at(camera.fx * distorted.x() + camera.cx, camera.fy * distorted.y() + camera.cy);
+    Eigen::Vector2d at(camera.fx * distorted.x() + camera.cx,
+                       camera.fy * distorted.y() + camera.cy);
     at += scene.noise * Eigen::Vector2d(normal(random), normal(random));
     if (uniform(random) < scene.outliers) {
       at = {uniform(random) * camera.width, uniform(random) * camera.height};

@@ -42,9 +42,8 @@ TEST(AdjustBundle, ReturnsToTheTruthFromNearby) {
   const Reconstruction truth = scene;
   scene.lenses[0].focal = 930;
   scene.poses[2]->translation += Eigen::Vector3d(0.05, -0.04, 0.1);
-  scene.poses[2]->rotation =
-      Eigen::Quaterniond(Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitY())) *
-      scene.poses[2]->rotation;
+  scene.poses[2]->rotation = Eigen::Quaterniond(Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitY())) *
+                             scene.poses[2]->rotation;
   for (Track& track : scene.tracks) track.position += Eigen::Vector3d(0.01, 0.02, -0.03);
   adjust_bundle(scene, {{0, 0, 1200}}, {.solve_focal = true, .most_iterations = 200});
   EXPECT_NEAR(scene.lenses[0].focal, 900, 0.01);

@@ -68,8 +68,7 @@ TEST(PhotoFeatures, LieWherePixelCentresAreAtOneHalf) {
 
 TEST(PhotoFeatures, OfAShrunkenPhotographAreInItsOwnPixels) {
   const auto centres = scattered_centres(60, 900);
-  const PhotoFeatures features =
-      detect_features(spots(centres, 6, 900), {.largest_side = 300});
+  const PhotoFeatures features = detect_features(spots(centres, 6, 900), {.largest_side = 300});
   EXPECT_EQ(features.pixel, 3);
   EXPECT_LT(mean_offset(features, centres).cwiseAbs().maxCoeff(), 0.15);
 }
@@ -100,7 +99,8 @@ TEST(MatchFeatures, FindsWhatASlowSearchFinds) {
   const auto unit_rows = [](int rows, int seed) {
     Eigen::MatrixXf m(rows, 16);
     for (int i = 0; i < rows; ++i) {
-      for (int k = 0; k < 16; ++k) m(i, k) = float(test::solid_noise({i * 1.0, k * 1.0, seed * 1.0}, 1));
+      for (int k = 0; k < 16; ++k)
+        m(i, k) = float(test::solid_noise({i * 1.0, k * 1.0, seed * 1.0}, 1));
     }
     return m.rowwise().normalized().eval();
   };

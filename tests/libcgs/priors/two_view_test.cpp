@@ -22,7 +22,8 @@ MatchedPoints matched(const std::vector<Eigen::Vector3d>& points,
     const Eigen::Vector2d centre(a.cx, a.cy);
     out.a.push_back(a.project(p).head<2>() - centre);
     out.b.push_back(b.project(p).head<2>() - centre);
-    if (uniform(random) < 2 * wrong - 1) out.b.back() = {500 * uniform(random), 400 * uniform(random)};
+    if (uniform(random) < 2 * wrong - 1)
+      out.b.back() = {500 * uniform(random), 400 * uniform(random)};
   }
   return out;
 }
@@ -41,9 +42,7 @@ TEST(RelativePose, IsThatOfTheCameras) {
   }
 }
 
-TEST(RelativePose, NeedsMatches) {
-  EXPECT_FALSE(relative_pose({}, 900, 900, 2));
-}
+TEST(RelativePose, NeedsMatches) { EXPECT_FALSE(relative_pose({}, 900, 900, 2)); }
 
 TEST(Parallax, IsWhatTurningDoesNotExplain) {
   const auto points = test::scattered_points(200, {2, 1.5, 1.5});
