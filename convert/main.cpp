@@ -9,6 +9,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <glog/logging.h>
 
 #include "convert/commands/commands.h"
 #include "convert/terminal.h"
@@ -37,6 +38,7 @@ std::vector<std::string> with_dashes(int argc, char** argv) {
 }
 
 int run_program(int argc, char** argv) {
+  FLAGS_minloglevel = google::GLOG_FATAL;  // steps that Ceres tries in vain are no news to a user
   CLI::App app(kDescription, "cgs");
   app.footer(kFooter);
   app.require_subcommand(1);

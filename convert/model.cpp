@@ -16,6 +16,7 @@
 #include "io/content_hash.h"
 #include "io/exr.h"
 #include "io/gaussian_ply.h"
+#include "io/photographs.h"
 #include "io/scene_path.h"
 #include "io/scene_reader.h"
 #include "libcgs/core/error.h"
@@ -222,7 +223,24 @@ Model read_model(const std::filesystem::path& folder) {
   return model;
 }
 
+namespace {
+
+// Photographs whose cameras were solved for have their file names as names of views.
+void relink_photographs(Scene& scene, const std::vector<PhotoFile>& photographs) {
+  for (View& view : scene.views) {
+    for (const PhotoFile& photograph : photographs) {
+      if (photograph.path.stem() == view.name) view.image_path = photograph.path;
+    }
+  }
+}
+
+}  // namespace
+
 void relink_images(Scene& scene, const std::filesystem::path& folder) {
+  if (is_photographs(folder)) {
+    relink_photographs(scene, list_photographs({folder, false}));
+    return;
+  }
   const Scene found = read_scene(folder);
   for (View& view : scene.views) {
     const auto match = std::find_if(found.views.begin(), found.views.end(), [&](const View& other) {

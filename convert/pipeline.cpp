@@ -2,6 +2,7 @@
 #include "convert/pipeline.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <optional>
 #include <utility>
@@ -24,6 +25,7 @@
 #include "io/json_file.h"
 #include "io/mesh_ply.h"
 #include "io/obj.h"
+#include "io/photographs.h"
 #include "io/png.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
@@ -35,6 +37,8 @@ namespace cgs {
 using Json = nlohmann::ordered_json;
 
 namespace {
+
+constexpr const char* kPosesFolder = "colmap";  // below the folder of the model
 
 /// One run: the request, what is in memory so far, and the record on disk.
 struct Run {
@@ -59,10 +63,10 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     cameras.push_back({view.name, view.camera.fx, c.x(), c.y(), c.z()});
   }
   const uint64_t cameras_hash = content_hash(json_text(cameras, -1));
-  return {{"scene", std::filesystem::weakly_canonical(request.scene).string()},
-          {"views", request.scene_options.views},
-          {"downscale", request.scene_options.downscale},
-          {"assume_unit", request.assume_unit},
+  return {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
+          {"views", request.scene.options.views},
+          {"downscale", request.scene.options.downscale},
+          {"assume_unit", request.scene.assume_unit},
           {"training", settings_to_json(request.training)},
           {"voxel_size", request.voxel_size},
           {"max_error", request.max_error},
@@ -215,7 +219,7 @@ Json report_json(const Run& run) {
   warnings.insert(warnings.end(), found.begin(), found.end());
   Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
-              {"folder", run.request.scene.string()},
+              {"folder", run.request.scene.path.string()},
               {"units", scene.frame.unit_name()},
               {"scale_source", scale_source_name(scene.frame.scale_source)},
               {"frame", frame_to_json(scene.frame)},
@@ -282,15 +286,37 @@ std::vector<Stage> stages_of(const Scene& scene) {
 
 }  // namespace
 
-Scene open_scene(const std::filesystem::path& path,
-                 const SceneOptions& options,
-                 const std::string& assume_unit) {
-  Scene scene = read_scene(path, options);
-  if (!assume_unit.empty()) {
-    scene.frame.metres_per_unit = metres_in(assume_unit);
-    scene.frame.scale_source = ScaleSource::Assumed;
+void OpenedScene::keep(const std::filesystem::path& model) const {
+  if (poses) write_photo_poses(model / kPosesFolder, *poses);
+}
+
+OpenedScene open_scene(const SceneRequest& request,
+                       const std::filesystem::path& model,
+                       Terminal& terminal) {
+  require(request.focal >= 0 && std::isfinite(request.focal),
+          "--focal must be a number of pixels above 0",
+          request.focal);
+  OpenedScene out;
+  if (is_photographs(request.path)) {
+    request.options.validate();
+    const SceneRoot root{request.path, request.options.allow_external};
+    const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
+    out.poses = photo_poses(root, request.focal, stored, terminal);
+    out.scene = scene_of_photographs(request.path, out.poses->model, request.options);
+    auto& warnings = out.scene.warnings;
+    warnings.insert(warnings.end(), out.poses->warnings.begin(), out.poses->warnings.end());
+  } else {
+    out.scene = read_scene(request.path, request.options);
+    if (request.focal > 0) {
+      throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
+                         " states them (" + out.scene.kind + ")");
+    }
   }
-  return scene;
+  if (!request.assume_unit.empty()) {
+    out.scene.frame.metres_per_unit = metres_in(request.assume_unit);
+    out.scene.frame.scale_source = ScaleSource::Assumed;
+  }
+  return out;
 }
 
 size_t memory_budget(size_t limit) {
@@ -369,7 +395,8 @@ Json run_stages(Run& run, Terminal& terminal) {
 }  // namespace
 
 Json run_pipeline(const RunRequest& request, Terminal& terminal) {
-  Scene scene = open_scene(request.scene, request.scene_options, request.assume_unit);
+  OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
+  Scene& scene = opened.scene;
   for (const std::string& warning : scene.warnings) terminal.warn(warning);
   refuse_unreadable_images(scene);
   if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, scene.frame);
@@ -378,6 +405,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   make_output_folder(request.output);
   const FolderLock lock(request.output);
   RunRecord record(request.output, request_json(request, scene), request.overwrite);
+  opened.keep(request.output / "model");
   Run run{request, std::move(record), std::move(scene), {}, {}};
   try {
     return run_stages(run, terminal);

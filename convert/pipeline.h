@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "convert/model.h"
+#include "convert/photo_poses.h"
 #include "convert/terminal.h"
 #include "io/scene_reader.h"
 #include "libcgs/train/training_options.h"
@@ -14,13 +16,19 @@
 
 namespace cgs {
 
+/// A scene as the user names it.
+struct SceneRequest {
+  std::filesystem::path path;
+  SceneOptions options;
+  std::string
+      assume_unit;   ///< Unit of one scene unit where the scene does not say; empty = unknown.
+  double focal = 0;  ///< Of photographs without cameras [pixels]; 0 = not given.
+};
+
 /// What `cgs run` is asked for; lengths are as the user typed them, with or without a unit.
 struct RunRequest {
-  std::filesystem::path scene;
+  SceneRequest scene;
   std::filesystem::path output;
-  SceneOptions scene_options;
-  std::string
-      assume_unit;  ///< Unit of one scene unit where the scene does not say; empty = unknown.
   TrainingOptions training;
   std::string voxel_size;   ///< Empty = from the pixel footprint.
   std::string max_error;    ///< Of the compressed mesh; empty = 1/16384 of its size.
@@ -29,10 +37,23 @@ struct RunRequest {
   bool overwrite = false;
 };
 
-/// Reads a scene and gives it the unit the user assumes, if any.
-Scene open_scene(const std::filesystem::path& path,
-                 const SceneOptions& options,
-                 const std::string& assume_unit);
+/// Reads a scene, solving for the cameras of a folder that holds nothing but photographs, and gives
+/// it the unit the user assumes, if any.
+///
+/// \param model  folder of the model the scene is for; cameras stored there by OpenedScene::keep()
+///               are taken where they were solved from the same. Empty = none.
+/// \throws InvalidInput where a focal length is given for a scene with cameras; as read_scene() and
+///         photo_poses()
+struct OpenedScene {
+  Scene scene;
+  std::optional<PhotoPoses> poses;  ///< If they were solved for.
+
+  /// Stores solved cameras below the folder of the model, for other programs and for the next time.
+  void keep(const std::filesystem::path& model) const;
+};
+OpenedScene open_scene(const SceneRequest& request,
+                       const std::filesystem::path& model,
+                       Terminal& terminal);
 
 /// Photographs to every asset, in stages that are skipped when their output is there already.
 /// \return the content of OUT/report.json.

@@ -28,14 +28,8 @@ std::optional<fs::path> model_folder(const fs::path& folder) {
   return std::nullopt;
 }
 
-struct Model {
-  ColmapCameras cameras;
-  std::vector<ColmapImage> images;
-  std::vector<ColmapPoint> points;
-};
-
-Model read_model(const fs::path& folder, Scene& scene) {
-  Model model;
+ColmapModel read_model(const fs::path& folder, Scene& scene) {
+  ColmapModel model;
   const bool is_binary = holds_model(folder, ".bin");
   if (is_binary && holds_model(folder, ".txt")) {
     scene.warnings.emplace_back("the model is there as .bin and as .txt; .bin was read");
@@ -85,7 +79,11 @@ fs::path photograph(const SceneRoot& root,
   return resolve(with_slashes);
 }
 
-View view_of(const SceneRoot& root, const Model& model, const ColmapImage& image, Scene& scene) {
+View view_of(const SceneRoot& root,
+             const fs::path& folder,
+             const ColmapModel& model,
+             const ColmapImage& image,
+             Scene& scene) {
   const Refuse refuse = [&](Defect defect, const std::string& reason) {
     throw BadInput(defect, root.folder, "image " + printable(image.name) + ": " + reason);
   };
@@ -98,7 +96,6 @@ View view_of(const SceneRoot& root, const Model& model, const ColmapImage& image
   view.camera = camera->second.camera;
   view.distortion = camera->second.distortion;
   view.camera.world_from_cam = pose_of(image, refuse, scene);
-  const char* const folder = is_folder(root.folder / "images") ? "images" : ".";
   const fs::path path = photograph(root, folder, image.name, root.folder);
   if (is_present(path)) {
     view.image_path = path;
@@ -114,7 +111,7 @@ struct DropCounts {
   size_t bad_points = 0;
 };
 
-void add_points(const Model& model, Scene& scene) {
+void add_points(const ColmapModel& model, Scene& scene) {
   std::map<uint32_t, size_t> index_of_id;
   for (size_t i = 0; i < model.images.size(); ++i) index_of_id[model.images[i].id] = i;
   DropCounts counts;
@@ -156,6 +153,16 @@ void add_points(const Model& model, Scene& scene) {
   }
 }
 
+void add_model(const SceneRoot& root,
+               const fs::path& photographs,
+               const ColmapModel& model,
+               Scene& scene) {
+  for (const ColmapImage& image : model.images) {
+    scene.views.push_back(view_of(root, photographs, model, image, scene));
+  }
+  add_points(model, scene);
+}
+
 }  // namespace
 
 bool is_colmap(const fs::path& folder) { return model_folder(folder).has_value(); }
@@ -166,11 +173,17 @@ Scene read_colmap(const SceneRoot& root) {
   Scene scene;
   scene.kind = "COLMAP";
   scene.folder = root.folder;
-  const Model model = read_model(resolve_in_scene(root, folder->string(), root.folder), scene);
-  for (const ColmapImage& image : model.images) {
-    scene.views.push_back(view_of(root, model, image, scene));
-  }
-  add_points(model, scene);
+  const ColmapModel model =
+      read_model(resolve_in_scene(root, folder->string(), root.folder), scene);
+  add_model(root, is_folder(root.folder / "images") ? "images" : ".", model, scene);
+  return scene;
+}
+
+Scene scene_of_colmap(const SceneRoot& root, const ColmapModel& model) {
+  Scene scene;
+  scene.kind = "COLMAP";
+  scene.folder = root.folder;
+  add_model(root, ".", model, scene);
   return scene;
 }
 

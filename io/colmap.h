@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "io/colmap_model.h"
 #include "io/scene_path.h"
 #include "libcgs/core/scene.h"
 
@@ -20,5 +21,9 @@ bool is_colmap(const std::filesystem::path& folder);
 ///         colmap_model.h.
 /// Source: COLMAP documentation, "Output format"; poses are cam_from_world.
 Scene read_colmap(const SceneRoot& root);
+
+/// The scene of a model in memory whose photographs lie in the folder itself.
+/// \throws BadInput as read_colmap()
+Scene scene_of_colmap(const SceneRoot& root, const ColmapModel& model);
 
 }  // namespace cgs

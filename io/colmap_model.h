@@ -28,14 +28,23 @@ struct ColmapImage {
   Eigen::Vector4d rotation = Eigen::Vector4d::UnitX();    ///< cam_from_world, (w, x, y, z)
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< cam_from_world
   uint64_t keypoints = 0;                                 ///< Number of 2D points.
+  std::vector<Eigen::Vector2d> points;  ///< Their places, for writing; readers leave them out.
 };
 
 struct ColmapPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< May be not finite: check.
   std::vector<std::pair<uint32_t, uint32_t>> track;    ///< (image id, keypoint index)
+  std::array<int, 3> color = {};  ///< 0 ... 255, for writing; readers leave it out.
+  double error = 0;               ///< Mean reprojection error [pixels], likewise.
 };
 
 using ColmapCameras = std::map<uint32_t, ColmapCamera>;
+
+struct ColmapModel {
+  ColmapCameras cameras;
+  std::vector<ColmapImage> images;
+  std::vector<ColmapPoint> points;
+};
 
 /// Readers of COLMAP's model files. Camera models SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL
 /// and OPENCV are understood.

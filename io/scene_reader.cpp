@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "io/byte_reader.h"
 #include "io/colmap.h"
@@ -37,8 +38,8 @@ Scene read_layout(const SceneRoot& root) {
   throw BadInput(Defect::Schema,
                  root.folder,
                  "no known layout: understood are LLFF (poses_bounds.npy), transforms.json "
-                 "(nerfstudio, instant-ngp), COLMAP (sparse/0/cameras.bin or .txt) and Strecha "
-                 "(<image>.camera)");
+                 "(nerfstudio, instant-ngp), COLMAP (sparse/0/cameras.bin or .txt), Strecha "
+                 "(<image>.camera) and photographs with nothing else");
 }
 
 std::string without_extension(const std::string& name) {
@@ -293,6 +294,16 @@ void warn_of_identical_images(Scene& scene, const std::vector<int>& views) {
   }
 }
 
+Scene prepared(Scene scene, const SceneOptions& options) {
+  name_views(scene);
+  sort_views(scene);
+  check_presence(scene);
+  fit_cameras(scene, options.downscale);
+  choose_views(scene, options.views);
+  check_baselines(scene);
+  return scene;
+}
+
 }  // namespace
 
 void SceneOptions::validate() const {
@@ -321,14 +332,16 @@ std::vector<int> select_views(const Scene& scene, const std::string& list) {
 
 Scene read_scene(const fs::path& folder, const SceneOptions& options) {
   options.validate();
-  Scene scene = read_layout({folder, options.allow_external});
-  name_views(scene);
-  sort_views(scene);
-  check_presence(scene);
-  fit_cameras(scene, options.downscale);
-  choose_views(scene, options.views);
-  check_baselines(scene);
-  return scene;
+  return prepared(read_layout({folder, options.allow_external}), options);
+}
+
+Scene scene_of_photographs(const fs::path& folder,
+                           const ColmapModel& model,
+                           const SceneOptions& options) {
+  options.validate();
+  Scene scene = scene_of_colmap({folder, options.allow_external}, model);
+  scene.kind = "photographs";
+  return prepared(std::move(scene), options);
 }
 
 void load_images(Scene& scene, const std::vector<int>& views, const Progress& progress) {

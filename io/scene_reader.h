@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "io/colmap_model.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/core/scene.h"
 
@@ -36,6 +37,15 @@ struct SceneOptions {
 ///         views), Missing (no image at all), Mismatch (image of another shape than its camera),
 ///         Value (input cameras in one place), and as the readers of the layouts.
 Scene read_scene(const std::filesystem::path& folder, const SceneOptions& options = {});
+
+/// The scene of photographs whose cameras were solved for, as read_scene() gives it for a folder
+/// that states them; `kind` is "photographs".
+///
+/// \param folder  holds the photographs
+/// \throws as read_scene()
+Scene scene_of_photographs(const std::filesystem::path& folder,
+                           const ColmapModel& model,
+                           const SceneOptions& options = {});
 
 /// The views a list names: comma-separated file stems or indices in name order, as in
 /// SceneOptions::views. \return indices into scene.views, ascending

@@ -34,6 +34,14 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
                    "Follow links and absolute paths that leave the scene folder");
 }
 
+void add_focal_option(CLI::App& command, double& focal) {
+  command.add_option(
+      "--focal",
+      focal,
+      "Focal length of photographs without cameras, in pixels of the files; default: "
+      "what they say (Exif), else solved for");
+}
+
 void add_training_options(CLI::App& command, TrainingArguments& arguments) {
   command.add_option("--preset", arguments.preset, "draft or standard")->capture_default_str();
   command.add_option(

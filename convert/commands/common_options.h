@@ -25,6 +25,9 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 /// --views, --downscale and --allow-external.
 void add_scene_options(CLI::App& command, SceneOptions& options);
 
+/// --focal.
+void add_focal_option(CLI::App& command, double& focal);
+
 /// How to train, as typed.
 struct TrainingArguments {
   std::string preset = "standard";

@@ -22,8 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct InfoArgs {
-  std::filesystem::path scene;
-  SceneOptions scene_options;
+  SceneRequest scene;
   bool json = false;
 };
 
@@ -204,7 +203,7 @@ void print_mesh(const Json& info, const Certificate& certificate) {
 }
 
 void run_mesh_info(const InfoArgs& args) {
-  const MeasurableFile file = read_mesh_file(args.scene);
+  const MeasurableFile file = read_mesh_file(args.scene.path);
   const TriangleMesh& mesh = file.content.mesh;
   Certificate certificate;
   Json proved = nullptr;
@@ -221,11 +220,12 @@ void run_mesh_info(const InfoArgs& args) {
 }
 
 void run_info(const InfoArgs& args) {
-  if (is_mesh_name(args.scene) && !std::filesystem::is_directory(args.scene)) {
+  if (is_mesh_name(args.scene.path) && !std::filesystem::is_directory(args.scene.path)) {
     run_mesh_info(args);
     return;
   }
-  const Json info = scene_json(read_scene(args.scene, args.scene_options));
+  Terminal terminal(args.json);
+  const Json info = scene_json(open_scene(args.scene, {}, terminal).scene);
   if (args.json) {
     std::cout << json_text(info) << "\n";
   } else {
@@ -241,11 +241,12 @@ void add_info(CLI::App& app) {
       "info",
       "What a scene or mesh holds and what is wrong with it (exit code 3 if it cannot be used)");
   cmd->add_option("scene",
-                  args->scene,
+                  args->scene.path,
                   "Folder of a scene, as for run, or a mesh (.ply, .obj, .stl, .off), which gets a "
                   "certificate")
       ->required();
-  add_scene_options(*cmd, args->scene_options);
+  add_scene_options(*cmd, args->scene.options);
+  add_focal_option(*cmd, args->scene.focal);
   cmd->add_flag("--json", args->json, "Print JSON on standard output");
   cmd->footer(
       "Example: cgs info photos/portal --views 1,10,19\n"

@@ -36,13 +36,13 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
 
 void run_run(const RunArgs& args) {
   limit_threads(args.common.threads);
-  keep_apart(args.request.output, args.request.scene);
+  keep_apart(args.request.output, args.request.scene.path);
   RunRequest request = args.request;
   request.training = training_options(args.training);
   if (!args.common.memory_limit.empty()) {
     request.memory_limit = parse_bytes(args.common.memory_limit);
   }
-  if (!request.assume_unit.empty()) (void)metres_in(request.assume_unit);
+  if (!request.scene.assume_unit.empty()) (void)metres_in(request.scene.assume_unit);
   Terminal terminal(args.common.quiet);
   const nlohmann::ordered_json report = run_pipeline(request, terminal);
   if (args.common.json) std::cout << json_text(report) << "\n";
@@ -53,15 +53,17 @@ void run_run(const RunArgs& args) {
 
 void add_run(CLI::App& app) {
   auto args = std::make_shared<RunArgs>();
-  auto* cmd = app.add_subcommand("run", "Photographs with known cameras to every asset, resumable");
+  auto* cmd = app.add_subcommand("run", "Photographs to every asset, resumable");
   cmd->add_option("scene",
-                  args->request.scene,
-                  "Folder: LLFF, COLMAP, transforms.json (nerfstudio, instant-ngp) or Strecha")
+                  args->request.scene.path,
+                  "Folder: LLFF, COLMAP, transforms.json (nerfstudio, instant-ngp), Strecha, or "
+                  "nothing but photographs")
       ->required();
   cmd->add_option("-o,--output", args->request.output, "Folder to write")->required();
-  add_scene_options(*cmd, args->request.scene_options);
+  add_scene_options(*cmd, args->request.scene.options);
+  add_focal_option(*cmd, args->request.scene.focal);
   cmd->add_option("--assume-unit",
-                  args->request.assume_unit,
+                  args->request.scene.assume_unit,
                   "What one scene unit is (m, cm, mm, in, ft), where the scene does not say; STL "
                   "and 3MF need it");
   cmd->add_option("--voxel-size",

@@ -16,20 +16,20 @@ namespace cgs {
 namespace {
 
 struct TrainArgs {
-  std::filesystem::path scene;
+  SceneRequest scene;
   std::filesystem::path output;
-  SceneOptions scene_options;
-  std::string assume_unit;
   TrainingArguments training;
   CommonOptions common;
 };
 
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
-  keep_apart(args.output, args.scene);
+  keep_apart(args.output, args.scene.path);
   const ModelRequest request = {{}, training_options(args.training), args.output};
   Terminal terminal(args.common.quiet);
-  Scene scene = open_scene(args.scene, args.scene_options, args.assume_unit);
+  OpenedScene opened = open_scene(args.scene, args.output, terminal);
+  opened.keep(args.output);
+  Scene& scene = opened.scene;
   const size_t known = scene.warnings.size();
   terminal.warn(scene.warnings);
   const TrainedModel trained =
@@ -50,10 +50,12 @@ void run_train(const TrainArgs& args) {
 void add_train(CLI::App& app) {
   auto args = std::make_shared<TrainArgs>();
   auto* cmd = app.add_subcommand("train", "Photographs to coherent Gaussians (a model folder)");
-  cmd->add_option("scene", args->scene, "Folder of a scene, as for run")->required();
+  cmd->add_option("scene", args->scene.path, "Folder of a scene, as for run")->required();
   cmd->add_option("-o,--output", args->output, "Model folder to write")->required();
-  add_scene_options(*cmd, args->scene_options);
-  cmd->add_option("--assume-unit", args->assume_unit, "What one scene unit is: m, cm, mm, in, ft");
+  add_scene_options(*cmd, args->scene.options);
+  add_focal_option(*cmd, args->scene.focal);
+  cmd->add_option(
+      "--assume-unit", args->scene.assume_unit, "What one scene unit is: m, cm, mm, in, ft");
   add_training_options(*cmd, args->training);
   add_common_options(*cmd, args->common);
   cmd->footer(

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/photo_poses.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <tuple>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/run_record.h"
+#include "io/atomic_file.h"
+#include "io/colmap_writer.h"
+#include "io/image.h"
+#include "io/json_file.h"
+#include "io/photographs.h"
+#include "libcgs/core/error.h"
+#include "libcgs/priors/solve_poses.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+// Every pair is compared.
+constexpr size_t kMostPhotographs = 16;
+
+std::vector<PhotoFile> checked_photographs(const SceneRoot& root) {
+  std::vector<PhotoFile> photographs = list_photographs(root);
+  if (photographs.size() < 2) {
+    throw BadInput(Defect::Empty, root.folder, "need at least 2 photographs");
+  }
+  if (photographs.size() > kMostPhotographs) {
+    throw LimitError(printable(root.folder) + ": " + std::to_string(photographs.size()) +
+                     " photographs without cameras; poses are solved for at most " +
+                     std::to_string(kMostPhotographs) +
+                     ": put the best into a folder of their own, or solve with COLMAP");
+  }
+  return photographs;
+}
+
+std::string inputs_text(const std::vector<PhotoFile>& photographs, double focal) {
+  Json hashes = Json::object();
+  for (const PhotoFile& photograph : photographs) {
+    hashes[photograph.path.filename().string()] = file_hash(photograph.path);
+  }
+  return json_text({{"program", kProgramVersion}, {"focal", focal}, {"photographs", hashes}}, -1);
+}
+
+std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
+                                       const std::string& inputs) {
+  if (folder.empty() || !is_present(folder / "poses.json")) return std::nullopt;
+  try {
+    const nlohmann::json document = read_json(folder / "poses.json");
+    const JsonValue record(document, folder / "poses.json");
+    if (record.at("inputs").text() != inputs) return std::nullopt;
+    PhotoPoses out;
+    out.inputs = inputs;
+    const JsonValue warnings = record.at("warnings");
+    for (size_t i = 0; i < warnings.size(); ++i) out.warnings.push_back(warnings.at(i).text());
+    const std::filesystem::path model = folder / "sparse/0";
+    out.model.cameras = read_colmap_cameras_text(model / "cameras.txt");
+    out.model.images = read_colmap_images_text(model / "images.txt");
+    out.model.points = read_colmap_points_text(model / "points3D.txt");
+    return out;
+  } catch (const BadInput&) {
+    return std::nullopt;  // damaged: solve again
+  }
+}
+
+// Photographs of one camera, size and stated focal length share a lens.
+int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) {
+  const auto key = [](const PhotoFile& p) {
+    return std::tie(p.size.width, p.size.height, p.hint.camera, p.hint.focal);
+  };
+  const auto same = std::find_if(lenses.begin(), lenses.end(), [&](const PhotoFile* other) {
+    return key(*other) == key(photograph);
+  });
+  if (same == lenses.end()) lenses.push_back(&photograph);
+  return static_cast<int>(
+      std::find_if(lenses.begin(),
+                   lenses.end(),
+                   [&](const PhotoFile* other) { return key(*other) == key(photograph); }) -
+      lenses.begin());
+}
+
+using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255
+
+UnposedPhoto unposed_photo(const PhotoFile& photograph, double focal, Colors& colors) {
+  const ColorImage image = read_image(photograph.path);
+  UnposedPhoto out;
+  out.name = photograph.path.filename().string();
+  out.width = image.width;
+  out.height = image.height;
+  out.features = detect_features(image);
+  out.focal = focal > 0 ? focal : photograph.hint.focal;
+  out.focal_sigma = focal > 0 ? 0 : photograph.hint.sigma;
+  for (const Eigen::Vector2d& p : out.features.points) {
+    const int x = std::clamp(static_cast<int>(p.x()), 0, image.width - 1);
+    const int y = std::clamp(static_cast<int>(p.y()), 0, image.height - 1);
+    const Eigen::Vector3f color = 255 * image(x, y);
+    colors.push_back({static_cast<int>(std::lround(color.x())),
+                      static_cast<int>(std::lround(color.y())),
+                      static_cast<int>(std::lround(color.z()))});
+  }
+  return out;
+}
+
+std::string percent(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f %%", 100 * share);
+  return text;
+}
+
+std::vector<std::string> remarks(const std::vector<UnposedPhoto>& photos,
+                                 const PoseSolution& solution) {
+  std::vector<std::string> out;
+  int told = -1;  // lens
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const SolvedPhoto& solved = solution.photos[i];
+    const UnposedPhoto& photo = photos[i];
+    if (!solved.is_placed) {
+      out.push_back("photograph " + printable(photo.name) +
+                    " was left out: too little of what it shows is in the others");
+    } else if (solved.focal_sigma > 0 && photo.lens > told) {
+      told = photo.lens;
+      out.push_back("focal length of " + printable(photo.name) +
+                    " solved for: " + std::to_string(std::lround(solved.camera.fx)) +
+                    " pixels, uncertain by " + percent(solved.focal_sigma) +
+                    (photo.focal > 0
+                         ? " (Exif says " + std::to_string(std::lround(photo.focal)) + ")"
+                         : " (the file does not say)"));
+    }
+  }
+  return out;
+}
+
+ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
+                         const std::vector<Colors>& colors,
+                         const PoseSolution& solution) {
+  ColmapModel model;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const SolvedPhoto& solved = solution.photos[i];
+    if (!solved.is_placed) continue;
+    const auto camera_id = static_cast<uint32_t>(photos[i].lens + 1);
+    model.cameras[camera_id] = {solved.camera, {solved.k1, 0, 0, 0, 0}};
+    ColmapImage image;
+    image.id = static_cast<uint32_t>(i + 1);
+    image.camera_id = camera_id;
+    image.name = photos[i].name;
+    const Eigen::Quaterniond& q = solved.rotation;
+    image.rotation = {q.w(), q.x(), q.y(), q.z()};
+    image.translation = solved.translation;
+    image.points = photos[i].features.points;
+    image.keypoints = image.points.size();
+    model.images.push_back(std::move(image));
+  }
+  for (const SolvedPoint& point : solution.points) {
+    ColmapPoint out{point.position, {}, {}, point.error};
+    const auto& [photo, feature] = point.track.front();
+    out.color = colors[static_cast<size_t>(photo)][static_cast<size_t>(feature)];
+    for (const auto& [seen_by, place] : point.track) {
+      out.track.emplace_back(static_cast<uint32_t>(seen_by + 1), static_cast<uint32_t>(place));
+    }
+    model.points.push_back(std::move(out));
+  }
+  return model;
+}
+
+}  // namespace
+
+PhotoPoses photo_poses(const SceneRoot& root,
+                       double focal,
+                       const std::filesystem::path& stored,
+                       Terminal& terminal) {
+  const std::vector<PhotoFile> photographs = checked_photographs(root);
+  const std::string inputs = inputs_text(photographs, focal);
+  if (auto poses = stored_poses(stored, inputs)) return *poses;
+  const Progress progress = terminal.begin("cameras of photographs");
+  std::vector<const PhotoFile*> lenses;
+  std::vector<UnposedPhoto> photos;
+  std::vector<Colors> colors(photographs.size());
+  constexpr double kShare = 0.4;  // of the time, for finding features
+  for (size_t i = 0; i < photographs.size(); ++i) {
+    report(progress, kShare * double(i) / double(photographs.size()));
+    photos.push_back(unposed_photo(photographs[i], focal, colors[i]));
+    photos.back().lens = lens_of(photographs[i], lenses);
+  }
+  const PoseSolution solution = solve_poses(photos, part_of(progress, kShare, 1));
+  PhotoPoses out{colmap_model(photos, colors, solution), inputs, remarks(photos, solution)};
+  char rms[32];
+  std::snprintf(rms, sizeof rms, "%.2f", solution.rms);
+  terminal.end(std::to_string(out.model.images.size()) + " of " +
+               std::to_string(photographs.size()) + " placed, " +
+               std::to_string(solution.points.size()) + " points, " + rms + " pixels rms");
+  return out;
+}
+
+void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& poses) {
+  write_colmap_text(folder / "sparse/0", poses.model);
+  const Json record = {{"inputs", poses.inputs}, {"warnings", poses.warnings}};
+  write_file(folder / "poses.json", json_text(record) + "\n");  // last: it says the model is whole
+}
+
+}  // namespace cgs

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "convert/terminal.h"
+#include "io/colmap_model.h"
+#include "io/scene_path.h"
+
+namespace cgs {
+
+/// Cameras of a folder of photographs, and what they were solved from.
+struct PhotoPoses {
+  ColmapModel model;
+  std::string inputs;                 ///< Names and hashes of the photographs, options, program.
+  std::vector<std::string> warnings;  ///< How the focal length was found; who is left out.
+};
+
+/// Solves for the cameras of the photographs in a folder, or reads what write_photo_poses() stored
+/// in `stored` if that was solved from the same.
+///
+/// \param focal   [pixels] of every photograph as stored; 0 = from Exif, else solved for
+/// \param stored  may be empty or not exist
+/// \throws BadInput Empty (fewer than two photographs), and as read_image(); LimitError for more
+///         photographs than can be compared in reasonable time; NumericalError as solve_poses()
+PhotoPoses photo_poses(const SceneRoot& root,
+                       double focal,
+                       const std::filesystem::path& stored,
+                       Terminal& terminal);
+
+/// Stores them as a COLMAP model in sparse/0 below the folder, with poses.json beside it.
+/// \throws IoError
+void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& poses);
+
+}  // namespace cgs

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "io/image.h"
+
+namespace cgs {
+
+/// What a photograph says about the lens that took it.
+struct LensHint {
+  std::string camera;  ///< Maker and model, as printable text; empty = not said.
+  double focal = 0;    ///< [pixels of the stored image]; 0 = not said.
+  double sigma = 0;    ///< Relative standard deviation of `focal`.
+};
+
+/// Reads the Exif part of a JPEG: focal length from the resolution of the focal plane, else from
+/// the focal length as on 35 mm film. What is damaged or absurd counts as not said.
+///
+/// The film equivalent compares diagonals and is rounded to whole millimetres. Where the picture
+/// has another shape than the usual sensors (3:2 and 4:3) it was cut, and sigma is larger.
+/// \param size  of the stored image
+/// \throws BadInput as read_file_start()
+/// Source: CIPA DC-008 (Exif 2.32) 4.6.5; CIPA DCG-001, "equivalent focal length".
+LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size);
+
+}  // namespace cgs

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/photographs.h"
+
+#include <algorithm>
+
+#include "io/colmap.h"
+#include "io/llff.h"
+#include "io/strecha.h"
+#include "io/transforms_json.h"
+
+namespace cgs {
+
+namespace fs = std::filesystem;
+
+bool is_photographs(const fs::path& folder) {
+  if (!is_folder(folder)) return false;
+  if (is_llff(folder) || is_transforms_json(folder) || is_colmap(folder) || is_strecha(folder)) {
+    return false;
+  }
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (has_image_extension(entry->path())) return true;
+  }
+  return false;
+}
+
+std::vector<PhotoFile> list_photographs(const SceneRoot& root) {
+  std::vector<PhotoFile> out;
+  for (const fs::path& path : image_files(root, ".")) {
+    const std::string name = path.filename().string();
+    const bool is_plain = std::none_of(
+        name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; });
+    if (!is_plain) throw BadInput(Defect::Path, path, "the name holds control characters");
+    const ImageSize size = image_size(path);
+    out.push_back({path, size, lens_hint(path, size)});
+  }
+  return out;
+}
+
+}  // namespace cgs

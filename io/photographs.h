@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "io/exif.h"
+#include "io/scene_path.h"
+
+namespace cgs {
+
+/// A photograph whose camera is not known.
+struct PhotoFile {
+  std::filesystem::path path;
+  ImageSize size;
+  LensHint hint;
+};
+
+/// True if the folder holds image files and no file that states cameras in a layout that
+/// read_scene() knows.
+bool is_photographs(const std::filesystem::path& folder);
+
+/// The image files directly in a folder, in the order of their names.
+/// \throws BadInput Path (names with control characters, links that leave the folder), and as
+///         image_size(); LimitError
+std::vector<PhotoFile> list_photographs(const SceneRoot& root);
+
+}  // namespace cgs

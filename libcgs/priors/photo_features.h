@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "libcgs/core/raster.h"
+
+namespace cgs {
+
+/// Points of a photograph that can be found again in others, and what they look like.
+struct PhotoFeatures {
+  std::vector<Eigen::Vector2d> points;  ///< [pixels], pixel centres at +0.5.
+  /// One row of unit length per point (SIFT, square-rooted).
+  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> descriptors;
+  double pixel = 1;  ///< Side of a pixel of the picture searched, in pixels of the photograph.
+};
+
+struct FeatureOptions {
+  int largest_side = 1600;  ///< Larger photographs are searched at this size [pixels].
+  int most = 8000;          ///< Points kept, those of the highest contrast.
+
+  /// \throws InvalidInput naming the first field out of range.
+  void validate() const;
+};
+
+/// Finds SIFT features. The same for any number of threads.
+///
+/// \param image  at least 8 pixels wide and high
+/// Source: Lowe 2004, "Distinctive image features from scale-invariant keypoints"; Arandjelovic and
+///         Zisserman 2012, "Three things everyone should know to improve object retrieval"
+///         (square root).
+PhotoFeatures detect_features(const ColorImage& image, const FeatureOptions& options = {});
+
+/// A pair of features of two photographs.
+struct FeatureMatch {
+  int a = 0;
+  int b = 0;
+};
+
+/// Features that are each other's nearest, and nearer than `ratio` times the second nearest, seen
+/// from both sides; in the order of a.
+std::vector<FeatureMatch> match_features(const PhotoFeatures& a,
+                                         const PhotoFeatures& b,
+                                         double ratio = 0.8);
+
+}  // namespace cgs

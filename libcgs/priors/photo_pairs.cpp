@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/photo_pairs.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include <tbb/parallel_for.h>
+
+namespace cgs {
+
+namespace {
+
+constexpr double kEpipolarError = 2.5;  // [working pixels]
+
+Eigen::Vector2d from_centre(const UnposedPhoto& photo, int feature) {
+  const Eigen::Vector2d centre(0.5 * photo.width, 0.5 * photo.height);
+  return (photo.features.points[static_cast<size_t>(feature)] - centre) / photo.features.pixel;
+}
+
+PhotoPair matched_pair(const std::vector<UnposedPhoto>& photos, int a, int b) {
+  const UnposedPhoto& photo_a = photos[static_cast<size_t>(a)];
+  const UnposedPhoto& photo_b = photos[static_cast<size_t>(b)];
+  const std::vector<FeatureMatch> matches = match_features(photo_a.features, photo_b.features);
+  MatchedPoints points;
+  for (const FeatureMatch& m : matches) {
+    points.a.push_back(from_centre(photo_a, m.a));
+    points.b.push_back(from_centre(photo_b, m.b));
+  }
+  const std::vector<char> is_inlier = epipolar_inliers(points, kEpipolarError);
+  PhotoPair pair{a, b, {}, {}, false};
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (is_inlier[i] == 0) continue;
+    pair.matches.push_back(matches[i]);
+    pair.points.a.push_back(points.a[i]);
+    pair.points.b.push_back(points.b[i]);
+  }
+  // Seven matches always fit; among wrong ones, a few per cent more do.
+  constexpr double kLeastShare = 0.25;
+  pair.is_connected = pair.matches.size() >= kFewestMatches &&
+                      double(pair.matches.size()) >= kLeastShare * double(matches.size());
+  return pair;
+}
+
+/// Sets of features that belong together.
+class Chains {
+ public:
+  explicit Chains(size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), size_t{0});
+  }
+  size_t root(size_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(size_t i, size_t j) {
+    i = root(i);
+    j = root(j);
+    parent_[std::max(i, j)] = std::min(i, j);
+  }
+
+ private:
+  std::vector<size_t> parent_;
+};
+
+bool shows_no_photo_twice(const Track& track) {
+  for (size_t i = 1; i < track.seen.size(); ++i) {
+    if (track.seen[i].photo == track.seen[i - 1].photo) return false;
+  }
+  return track.seen.size() >= 2;
+}
+
+}  // namespace
+
+std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,
+                                    const Progress& progress) {
+  const int count = static_cast<int>(photos.size());
+  std::vector<PhotoPair> pairs;
+  for (int a = 0; a < count; ++a) {
+    for (int b = a + 1; b < count; ++b) pairs.push_back({a, b, {}, {}, false});
+  }
+  constexpr size_t kAtOnce = 8;
+  for (size_t begin = 0; begin < pairs.size(); begin += kAtOnce) {
+    report(progress, double(begin) / double(pairs.size()));
+    tbb::parallel_for(begin, std::min(begin + kAtOnce, pairs.size()), [&](size_t i) {
+      pairs[i] = matched_pair(photos, pairs[i].a, pairs[i].b);
+    });
+  }
+  return pairs;
+}
+
+std::vector<Track> chain_matches(const std::vector<UnposedPhoto>& photos,
+                                 const std::vector<PhotoPair>& pairs) {
+  std::vector<size_t> first(photos.size() + 1, 0);  // feature of a photograph -> place in chains
+  for (size_t i = 0; i < photos.size(); ++i) {
+    first[i + 1] = first[i] + photos[i].features.points.size();
+  }
+  Chains chains(first.back());
+  for (const PhotoPair& pair : pairs) {
+    if (!pair.is_connected) continue;
+    for (const FeatureMatch& m : pair.matches) {
+      chains.join(first[static_cast<size_t>(pair.a)] + static_cast<size_t>(m.a),
+                  first[static_cast<size_t>(pair.b)] + static_cast<size_t>(m.b));
+    }
+  }
+  std::vector<Track> of_root(first.back());
+  for (size_t i = 0; i < photos.size(); ++i) {
+    for (size_t k = 0; k < photos[i].features.points.size(); ++k) {
+      const int feature = static_cast<int>(k);
+      of_root[chains.root(first[i] + k)].seen.push_back(
+          {static_cast<int>(i), feature, from_centre(photos[i], feature), true});
+    }
+  }
+  std::erase_if(of_root, [](const Track& track) { return !shows_no_photo_twice(track); });
+  return of_root;
+}
+
+}  // namespace cgs

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "libcgs/priors/bundle_adjustment.h"
+#include "libcgs/priors/photo_pairs.h"
+
+namespace cgs {
+
+/// What photographs cannot tell is refused, with the reason a user can act on.
+/// \throws NumericalError if no two photographs share enough, naming the pair that shares most.
+void refuse_unconnected(const std::vector<UnposedPhoto>& photos,
+                        const std::vector<PhotoPair>& pairs);
+
+/// \throws NumericalError if turning the camera explains every connected pair, at a known focal
+///         length or at any.
+void refuse_turned_only(const std::vector<UnposedPhoto>& photos,
+                        const std::vector<LensPrior>& priors,
+                        const std::vector<PhotoPair>& pairs);
+
+/// \throws NumericalError if a focal length that was solved for is not determined, or most matches
+///         disagree with the solution.
+/// \param focal_sigmas  per lens, as from adjust_bundle()
+void refuse_unsure(const std::vector<UnposedPhoto>& photos,
+                   const std::vector<LensPrior>& priors,
+                   const std::vector<PhotoPair>& pairs,
+                   const Reconstruction& scene,
+                   const std::vector<double>& focal_sigmas);
+
+/// The reason to give where matches exist that no two cameras explain.
+std::string unexplained_matches(const std::vector<UnposedPhoto>& photos,
+                                const std::vector<PhotoPair>& pairs);
+
+}  // namespace cgs

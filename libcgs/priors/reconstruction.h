@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+namespace cgs {
+
+/// What photographs of one camera share. Distorted = (1 + k1 r²) undistorted, both in units of the
+/// focal length.
+struct Lens {
+  double focal = 0;  ///< [working pixels]
+  double k1 = 0;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Principal point [working pixels].
+};
+
+/// cam_from_world of a photograph.
+struct PhotoPose {
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& world) const {
+    return rotation * world + translation;
+  }
+  Eigen::Vector3d center() const { return -(rotation.conjugate() * translation); }
+};
+
+/// A feature that shows the point of its track.
+struct Sighting {
+  int photo = 0;
+  int feature = 0;
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< From the image centre [working pixels].
+  bool is_used = true;                           ///< False once found to be a wrong match.
+};
+
+/// One point of the scene, in at most one place of each photograph.
+struct Track {
+  std::vector<Sighting> seen;  ///< In the order of photographs.
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  bool is_known = false;  ///< position is triangulated.
+};
+
+/// Cameras and points while they are being solved. A working pixel is the pixel of the picture in
+/// which features were found, so that errors of all photographs are comparable.
+struct Reconstruction {
+  std::vector<Lens> lenses;
+  std::vector<int> lens_of;                     ///< Per photograph.
+  std::vector<std::optional<PhotoPose>> poses;  ///< Per photograph; nothing = not yet placed.
+  std::vector<Track> tracks;
+
+  const Lens& lens(int photo) const {
+    return lenses[static_cast<size_t>(lens_of[static_cast<size_t>(photo)])];
+  }
+  const std::optional<PhotoPose>& pose(int photo) const {
+    return poses[static_cast<size_t>(photo)];
+  }
+};
+
+/// Where a lens puts a direction x/z, y/z, from the image centre [working pixels].
+template <typename T>
+Eigen::Matrix<T, 2, 1> through_lens(const T& focal,
+                                    const T& k1,
+                                    const Eigen::Matrix<T, 2, 1>& centre,
+                                    const Eigen::Matrix<T, 2, 1>& direction) {
+  return centre + direction * (focal * (T(1) + k1 * direction.squaredNorm()));
+}
+
+/// The direction x/z, y/z that a lens shows at a place; the inverse of through_lens().
+Eigen::Vector2d direction_at(const Lens& lens, const Eigen::Vector2d& at);
+
+/// Distance between a sighting and its point's image [working pixels]; infinite behind the camera.
+/// \pre the photograph is placed
+double reprojection_error(const Reconstruction& scene,
+                          const Eigen::Vector3d& position,
+                          const Sighting& sighting);
+
+/// Gives every track a position that has none and can have one: seen by two placed photographs
+/// under an angle of at least `least_angle` [rad], and within `most_error` of where it is seen
+/// there. Sightings further off are no longer used.
+void triangulate(Reconstruction& scene, double most_error, double least_angle);
+
+/// Stops using sightings further than `most_error` from their point, and forgets the positions of
+/// tracks that two photographs no longer vouch for.
+void drop_outliers(Reconstruction& scene, double most_error, double least_angle);
+
+/// Largest angle [rad] between the rays of the used sightings in placed photographs.
+double ray_angle(const Reconstruction& scene, const Track& track);
+
+}  // namespace cgs

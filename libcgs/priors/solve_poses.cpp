@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/solve_poses.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <optional>
+
+#include <tbb/parallel_for.h>
+
+#include "libcgs/core/error.h"
+#include "libcgs/priors/bundle_adjustment.h"
+#include "libcgs/priors/photo_pairs.h"
+#include "libcgs/priors/pose_checks.h"
+#include "libcgs/priors/resection.h"
+
+namespace cgs {
+
+namespace {
+
+// Focal lengths to begin with where nothing is known, in units of the larger side: from phones'
+// widest lenses (13 mm as on film) to short telephoto lenses (115 mm).
+constexpr std::array<double, 8> kFocals = {0.36, 0.5, 0.7, 0.9, 1.15, 1.5, 2.2, 3.2};
+
+double larger_side(const UnposedPhoto& photo) {
+  return std::max(photo.width, photo.height) / photo.features.pixel;
+}
+
+std::vector<LensPrior> lens_priors(const std::vector<UnposedPhoto>& photos) {
+  std::vector<LensPrior> priors;
+  for (const UnposedPhoto& photo : photos) {
+    const auto lens = static_cast<size_t>(photo.lens);
+    if (priors.size() <= lens) priors.resize(lens + 1);
+    priors[lens] = {photo.focal / photo.features.pixel, photo.focal_sigma, larger_side(photo)};
+  }
+  return priors;
+}
+
+/// A reconstruction on the way, and how well it explains its tracks.
+struct Attempt {
+  Reconstruction scene;
+  std::optional<FirstPair> begun;
+  double error = std::numeric_limits<double>::infinity();
+};
+
+// Up to `most` of the tracks, those that most photographs show first, else evenly.
+std::vector<Track> sample(const std::vector<Track>& tracks, size_t most) {
+  std::vector<Track> sorted = tracks;
+  std::stable_sort(sorted.begin(), sorted.end(), [](const Track& a, const Track& b) {
+    return a.seen.size() > b.seen.size();
+  });
+  if (sorted.size() <= most) return sorted;
+  std::vector<Track> out;
+  // Half of them the longest, which tie photographs together; half from all the rest.
+  const size_t longest = most / 2;
+  out.assign(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(longest));
+  for (size_t i = 0; i < most - longest; ++i) {
+    out.push_back(sorted[longest + i * (sorted.size() - longest) / (most - longest)]);
+  }
+  return out;
+}
+
+Attempt attempt_at(double focal_of_side,
+                   const std::vector<int>& lens_of,
+                   const std::vector<LensPrior>& priors,
+                   const std::vector<PhotoPair>& pairs,
+                   const std::vector<Track>& tracks) {
+  Attempt out;
+  out.scene.tracks = tracks;
+  out.scene.lens_of = lens_of;
+  out.scene.poses.resize(lens_of.size());
+  for (const LensPrior& prior : priors) {
+    out.scene.lenses.push_back({prior.focal > 0 ? prior.focal : focal_of_side * prior.side, 0});
+  }
+  out.begun = place_photos(out.scene, priors, pairs);
+  if (!out.begun) return out;
+  const BundleOptions options{
+      .first = out.begun->first, .second = out.begun->second, .solve_focal = true};
+  adjust_bundle(out.scene, priors, options);
+  drop_outliers(out.scene, kMostError, kLeastAngle);
+  out.error = capped_error(out.scene);
+  return out;
+}
+
+// Placed at the focal length from which a part of the points is explained best.
+Attempt best_attempt(const std::vector<int>& lens_of,
+                     const std::vector<LensPrior>& priors,
+                     const std::vector<PhotoPair>& pairs,
+                     const std::vector<Track>& tracks) {
+  constexpr size_t kTracks = 600;
+  const std::vector<Track> some = sample(tracks, kTracks);
+  const bool is_known = std::all_of(
+      priors.begin(), priors.end(), [](const LensPrior& prior) { return prior.focal > 0; });
+  std::vector<Attempt> attempts(is_known ? 1 : kFocals.size());
+  tbb::parallel_for(size_t{0}, attempts.size(), [&](size_t i) {
+    attempts[i] = attempt_at(kFocals[i], lens_of, priors, pairs, some);
+  });
+  return *std::min_element(attempts.begin(),
+                           attempts.end(),
+                           [](const Attempt& a, const Attempt& b) { return a.error < b.error; });
+}
+
+// Rounds of adjusting everything and looking again what agrees.
+// \return relative standard deviations of the focal lengths, per lens
+std::vector<double> polish(const std::vector<LensPrior>& priors,
+                           const FirstPair& begun,
+                           Reconstruction& scene) {
+  BundleOptions options{.first = begun.first, .second = begun.second, .solve_focal = true};
+  for (const double most_error : {kMostError, 3.0, 2.5}) {
+    adjust_bundle(scene, priors, options);
+    drop_outliers(scene, most_error, kLeastAngle);
+    triangulate(scene, most_error, kLeastAngle);
+    options.solve_shape = true;
+  }
+  constexpr int kUntilSettled = 200;
+  options.most_iterations = kUntilSettled;
+  return adjust_bundle(scene, priors, options, true);
+}
+
+// Makes the first placed photograph the origin and its distance to the second the unit.
+void move_to_first(Reconstruction& scene) {
+  std::vector<size_t> placed;
+  for (size_t i = 0; i < scene.poses.size(); ++i) {
+    if (scene.poses[i]) placed.push_back(i);
+  }
+  const PhotoPose origin = *scene.poses[placed[0]];
+  const double unit = (scene.poses[placed[1]]->center() - origin.center()).norm();
+  for (auto& pose : scene.poses) {
+    if (!pose) continue;
+    const Eigen::Quaterniond rotation = (pose->rotation * origin.rotation.conjugate()).normalized();
+    pose = PhotoPose{rotation, (pose->translation - rotation * origin.translation) / unit};
+  }
+  scene.poses[placed[0]] = PhotoPose{};
+  for (Track& track : scene.tracks) track.position = origin * track.position / unit;
+}
+
+SolvedPhoto solved_photo(const UnposedPhoto& photo, const Lens& lens, const PhotoPose& pose) {
+  SolvedPhoto out;
+  const double pixel = photo.features.pixel;
+  out.is_placed = true;
+  out.camera.width = photo.width;
+  out.camera.height = photo.height;
+  out.camera.fx = out.camera.fy = lens.focal * pixel;
+  out.camera.cx = 0.5 * photo.width + lens.centre.x() * pixel;
+  out.camera.cy = 0.5 * photo.height + lens.centre.y() * pixel;
+  out.camera.world_from_cam.linear() = pose.rotation.conjugate().toRotationMatrix();
+  out.camera.world_from_cam.translation() = pose.center();
+  out.k1 = lens.k1;
+  out.rotation = pose.rotation;
+  out.translation = pose.translation;
+  return out;
+}
+
+void add_points(const std::vector<UnposedPhoto>& photos,
+                const Reconstruction& scene,
+                PoseSolution& out) {
+  double sum = 0;
+  size_t count = 0;
+  for (const Track& track : scene.tracks) {
+    if (!track.is_known) continue;
+    SolvedPoint point{track.position, {}, 0};
+    for (const Sighting& s : track.seen) {
+      if (!s.is_used || !scene.pose(s.photo)) continue;
+      const double error = reprojection_error(scene, track.position, s) *
+                           photos[static_cast<size_t>(s.photo)].features.pixel;
+      point.track.emplace_back(s.photo, s.feature);
+      point.error += error;
+      sum += error * error;
+      ++count;
+    }
+    point.error /= static_cast<double>(point.track.size());
+    out.points.push_back(std::move(point));
+  }
+  out.rms = count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
+}
+
+}  // namespace
+
+PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress) {
+  require(photos.size() >= 2, "poses need at least 2 photographs", photos.size());
+  const std::vector<LensPrior> priors = lens_priors(photos);
+  std::vector<int> lens_of;
+  for (const UnposedPhoto& photo : photos) lens_of.push_back(photo.lens);
+  const std::vector<PhotoPair> pairs = match_photos(photos, part_of(progress, 0, 0.5));
+  refuse_unconnected(photos, pairs);
+  refuse_turned_only(photos, priors, pairs);
+
+  const std::vector<Track> tracks = chain_matches(photos, pairs);
+  report(progress, 0.5);
+  Attempt attempt = best_attempt(lens_of, priors, pairs, tracks);
+  report(progress, 0.8);
+  if (!attempt.begun) throw NumericalError(unexplained_matches(photos, pairs));
+  Reconstruction scene = std::move(attempt.scene);
+  scene.tracks = tracks;
+  place_more(scene, priors, *attempt.begun);
+  const std::vector<double> sigmas = polish(priors, *attempt.begun, scene);
+  refuse_unsure(photos, priors, pairs, scene, sigmas);
+  move_to_first(scene);
+
+  PoseSolution out;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const auto lens = static_cast<size_t>(lens_of[i]);
+    out.photos.push_back(scene.poses[i]
+                             ? solved_photo(photos[i], scene.lenses[lens], *scene.poses[i])
+                             : SolvedPhoto{});
+    out.photos.back().focal_sigma = sigmas[lens];
+  }
+  add_points(photos, scene, out);
+  report(progress, 1);
+  return out;
+}
+
+}  // namespace cgs

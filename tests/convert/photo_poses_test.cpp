@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/photo_poses.h"
+
+#include <gtest/gtest.h>
+
+#include "io/image.h"
+#include "io/png.h"
+#include "io/scene_reader.h"
+#include "libcgs/core/error.h"
+#include "samples/capture/render.h"
+#include "samples/capture/truth.h"
+#include "tests/support/scene_files.h"
+#include "tests/support/temp_dir.h"
+#include "tests/support/unposed_photos.h"
+
+namespace cgs {
+namespace {
+
+namespace fs = std::filesystem;
+using test::message_of;
+
+struct Portal {
+  PortalScene scene = portal_scene();
+  std::vector<float> sky = sky_visibility(scene);
+};
+
+const Portal& portal() {
+  static const Portal built;
+  return built;
+}
+
+void photograph(const fs::path& path, const Camera& camera, uint32_t seed) {
+  fs::create_directories(path.parent_path());
+  write_png(path, render_view(portal().scene, portal().sky, camera, seed));
+}
+
+PhotoPoses solved(const fs::path& folder, double focal = 0, const fs::path& stored = {}) {
+  Terminal terminal(true);
+  return photo_poses({folder, false}, focal, stored, terminal);
+}
+
+std::vector<Camera> cameras_of(const Scene& scene) {
+  std::vector<Camera> out;
+  for (const View& view : scene.views) out.push_back(view.camera);
+  return out;
+}
+
+TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
+  const test::TempDir dir;
+  std::vector<Camera> truth;
+  for (const CaptureView& view : capture_views()) {
+    if (!view.input) continue;
+    photograph(dir / ("photos/" + view.name + ".png"), view.camera, view.seed);
+    truth.push_back(view.camera);
+  }
+  const PhotoPoses poses = solved(dir / "photos");
+  const Scene scene = scene_of_photographs(dir / "photos", poses.model);
+  EXPECT_EQ(scene.kind, "photographs");
+  EXPECT_FALSE(scene.frame.has_metric_scale());
+  ASSERT_EQ(scene.views.size(), truth.size());
+  const auto errors = test::pose_errors(cameras_of(scene), truth);
+  EXPECT_LT(errors.rotation, 0.1);
+  EXPECT_LT(errors.direction, 0.5);
+  EXPECT_LT(errors.focal, 0.01);
+  ASSERT_EQ(poses.warnings.size(), 1u);
+  EXPECT_NE(poses.warnings[0].find("focal length"), std::string::npos);
+
+  // Stored, they are taken from there, bit for bit, until something changes.
+  write_photo_poses(dir / "model", poses);
+  const PhotoPoses again = solved(dir / "photos", 0, dir / "model");
+  EXPECT_EQ(again.warnings, poses.warnings);
+  EXPECT_TRUE(again.model.images[0].points.empty());  // as readers leave them: not solved anew
+  const Scene same = scene_of_photographs(dir / "photos", again.model);
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    EXPECT_EQ(same.views[i].camera.world_from_cam.matrix(),
+              scene.views[i].camera.world_from_cam.matrix());
+    EXPECT_EQ(same.views[i].camera.intrinsics(), scene.views[i].camera.intrinsics());
+    EXPECT_EQ(same.views[i].distortion, scene.views[i].distortion);
+  }
+  ASSERT_EQ(same.points.size(), scene.points.size());
+  EXPECT_EQ(same.points[5].position, scene.points[5].position);
+  const PhotoPoses other = solved(dir / "photos", truth[0].fx, dir / "model");
+  EXPECT_FALSE(other.model.images[0].points.empty());
+  EXPECT_EQ(other.model.cameras.begin()->second.camera.fx, truth[0].fx);
+  EXPECT_TRUE(other.warnings.empty());
+}
+
+TEST(PhotoPoses, AreRefusedForACameraThatWasOnlyTurned) {
+  const test::TempDir dir;
+  Camera camera = capture_views()[1].camera;
+  for (const int i : {0, 1, 2}) {
+    photograph(dir / ("photos/" + std::to_string(i) + ".png"), camera, uint32_t(i));
+    camera.world_from_cam.linear() =
+        camera.world_from_cam.linear() * Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY());
+  }
+  EXPECT_NE(message_of([&] { solved(dir / "photos"); }).find("turned"), std::string::npos);
+}
+
+TEST(PhotoPoses, AreRefusedForABlankWall) {
+  const test::TempDir dir;
+  std::mt19937 random(4);
+  fs::create_directories(dir / "photos");
+  for (const int i : {0, 1, 2}) {
+    ColorImage wall(400, 300, Eigen::Vector3f::Constant(0.7f));
+    std::normal_distribution<float> noise(0, 0.004f);  // of a sensor
+    for (Eigen::Vector3f& c : wall.data) c += Eigen::Vector3f(noise(random), noise(random), 0);
+    write_png(dir / ("photos/" + std::to_string(i) + ".png"), wall);
+  }
+  EXPECT_THROW(solved(dir / "photos"), NumericalError);
+  EXPECT_NE(message_of([&] { solved(dir / "photos"); }).find("shows too little"),
+            std::string::npos);
+}
+
+TEST(PhotoPoses, NeedTwoPhotographsAndNotTooMany) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "photos/0.png", test::rgb_png(64, 64));
+  EXPECT_EQ(test::defect_of([&] { solved(dir / "photos"); }), "EMPTY");
+  for (int i = 1; i <= 16; ++i) {
+    test::write_bytes(dir / ("photos/" + std::to_string(i) + ".png"), test::rgb_png(64, 64, i));
+  }
+  EXPECT_EQ(test::defect_of([&] { solved(dir / "photos"); }), "LIMIT");
+}
+
+}  // namespace
+}  // namespace cgs

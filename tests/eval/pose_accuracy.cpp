@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// How accurate cameras solved from photographs alone are, beside those given with the data sets.
+//
+//   pose_accuracy FOLDER [SET]     FOLDER holds the data sets of kSets; SET = a part of the name
+//
+// Prints per set and source of the focal length (given = of the data set, Exif, solved = unknown):
+// photographs placed, largest error of rotation and of the direction between any two cameras
+// [degrees] after the rotation that brings all cameras together best, of the focal length [%], the
+// standard deviation claimed for it [%], and seconds.
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <string>
+
+#include "io/exif.h"
+#include "io/image.h"
+#include "io/scene_reader.h"
+#include "io/text_lines.h"
+#include "libcgs/core/error.h"
+#include "tests/support/unposed_photos.h"
+
+namespace {
+
+using namespace cgs;
+
+struct Set {
+  const char* folder;
+  const char* views;
+};
+
+constexpr std::array<Set, 10> kSets = {{{"strecha_herzjesu_p8", "0,1,2"},
+                                        {"strecha_herzjesu_p8", "3,4,5"},
+                                        {"strecha_herzjesu_p8", "5,6,7"},
+                                        {"strecha_herzjesu_p8", "1,3,5"},
+                                        {"templeSparseRing", "0,1,2"},
+                                        {"templeSparseRing", "8,9,10"},
+                                        {"heritage_ethiopian_head", "0,1,2,3"},
+                                        {"mvimgnet_5views/dense", "0,1,2,3,4"},
+                                        {"llff_fern", "1,10,19"},
+                                        {"llff_fern", "5,6,7"}}};
+
+// Rows "name K R t" with P = K [R | t], all row-major; pixel centres at whole numbers.
+Scene read_middlebury(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / "templeSR_par.txt";
+  const std::string text = read_file(path);
+  TextLines lines(text, path);
+  (void)lines.next_data();  // the number of rows
+  Scene scene;
+  while (const auto line = lines.next_data()) {
+    const auto parts = tokens(*line);
+    std::array<double, 21> p = {};
+    for (size_t i = 0; i < p.size(); ++i) p[i] = lines.number(parts.at(i + 1));
+    View view;
+    view.name = std::filesystem::path(parts[0]).stem();
+    view.image_path = folder / parts[0];
+    const ImageSize size = image_size(view.image_path);
+    view.camera = {.width = size.width,
+                   .height = size.height,
+                   .fx = p[0],
+                   .fy = p[4],
+                   .cx = p[2] + 0.5,
+                   .cy = p[5] + 0.5};
+    using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    Eigen::Isometry3d cam_from_world = Eigen::Isometry3d::Identity();
+    cam_from_world.linear() = Eigen::Map<const RowMajor>(p.data() + 9);
+    cam_from_world.translation() = Eigen::Map<const Eigen::Vector3d>(p.data() + 18);
+    view.camera.world_from_cam = cam_from_world.inverse();
+    scene.views.push_back(std::move(view));
+  }
+  return scene;
+}
+
+Scene read_set(const std::filesystem::path& data, const Set& set) {
+  const std::filesystem::path folder = data / set.folder;
+  if (!std::filesystem::exists(folder / "templeSR_par.txt")) {
+    return read_scene(folder, {.views = set.views});
+  }
+  Scene scene = read_middlebury(folder);
+  scene.input = select_views(scene, set.views);
+  return scene;
+}
+
+struct Photos {
+  std::vector<UnposedPhoto> photos;
+  std::vector<Camera> given;  // at the size of the files
+  double exif_focal = 0;
+  double exif_sigma = 0;
+};
+
+Photos photos_of(const Scene& scene) {
+  Photos out;
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    const ColorImage image = read_image(view.image_path);
+    UnposedPhoto photo;
+    photo.name = view.name;
+    photo.width = image.width;
+    photo.height = image.height;
+    photo.features = detect_features(image);
+    out.photos.push_back(std::move(photo));
+    out.given.push_back(resized(view.camera, image.width, image.height));
+    const LensHint hint = lens_hint(view.image_path, {image.width, image.height});
+    out.exif_focal = hint.focal;
+    out.exif_sigma = hint.sigma;
+  }
+  return out;
+}
+
+void measure(const Set& set,
+             const char* source,
+             std::vector<UnposedPhoto> photos,
+             double focal,
+             double sigma,
+             const std::vector<Camera>& given) {
+  for (UnposedPhoto& photo : photos) {
+    photo.focal = focal;
+    photo.focal_sigma = sigma;
+  }
+  std::printf("%-24s %-10s %-7s", set.folder, set.views, source);
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    const PoseSolution solution = solve_poses(photos);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    std::vector<Camera> solved;
+    std::vector<Camera> truth;
+    for (size_t i = 0; i < photos.size(); ++i) {
+      if (!solution.photos[i].is_placed) continue;
+      solved.push_back(solution.photos[i].camera);
+      truth.push_back(given[i]);
+    }
+    const test::PoseErrors errors = test::pose_errors(solved, truth);
+    std::printf(" %2zu of %zu %9.3f %9.3f %8.2f %8.2f %7.1f\n",
+                solved.size(),
+                photos.size(),
+                errors.rotation,
+                errors.direction,
+                100 * errors.focal,
+                100 * solution.photos[0].focal_sigma,
+                seconds.count());
+  } catch (const NumericalError& error) {
+    std::printf(" refused: %s\n", error.what());
+  }
+  std::fflush(stdout);
+}
+
+int run(const std::filesystem::path& data, const std::string& wanted) {
+  std::printf("%-24s %-10s %-7s %7s %9s %9s %8s %8s %7s\n",
+              "set",
+              "views",
+              "focal",
+              "placed",
+              "rotation",
+              "direction",
+              "focal %",
+              "sigma %",
+              "s");
+  for (const Set& set : kSets) {
+    if (std::string(set.folder).find(wanted) == std::string::npos) continue;
+    const Photos photos = photos_of(read_set(data, set));
+    measure(set, "given", photos.photos, photos.given[0].fx, 0, photos.given);
+    if (photos.exif_focal > 0) {
+      measure(set, "Exif", photos.photos, photos.exif_focal, photos.exif_sigma, photos.given);
+    }
+    measure(set, "solved", photos.photos, 0, 0, photos.given);
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: pose_accuracy FOLDER [SET]\n");
+    return 2;
+  }
+  try {
+    return run(argv[1], argc > 2 ? argv[2] : "");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}

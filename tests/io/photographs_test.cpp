@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/photographs.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/scene_files.h"
+#include "tests/support/temp_dir.h"
+
+namespace cgs {
+namespace {
+
+using test::defect_of;
+
+TEST(Photographs, AreAFolderOfImagesWithoutCameras) {
+  const test::TempDir dir;
+  EXPECT_FALSE(is_photographs(dir.path()));
+  EXPECT_FALSE(is_photographs(dir / "missing"));
+  test::write_bytes(dir / "notes.txt", "not a photograph");
+  EXPECT_FALSE(is_photographs(dir.path()));
+  test::write_bytes(dir / "b.JPG", test::jpeg(40, 30));
+  test::write_bytes(dir / "a.png", test::rgb_png(20, 10));
+  EXPECT_TRUE(is_photographs(dir.path()));
+  const auto photographs = list_photographs({dir.path(), false});
+  ASSERT_EQ(photographs.size(), 2u);
+  EXPECT_EQ(photographs[0].path.filename(), "a.png");
+  EXPECT_EQ(photographs[1].size.width, 40);
+  EXPECT_EQ(photographs[1].hint.focal, 0);
+}
+
+TEST(Photographs, WithCamerasBesideThemAreAnotherLayout) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.png", test::rgb_png(20, 10));
+  test::write_bytes(dir / "transforms.json", "{}");
+  EXPECT_FALSE(is_photographs(dir.path()));
+}
+
+TEST(Photographs, ThatCannotBeReadAreRefused) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.png", test::rgb_png(20, 10));
+  test::write_bytes(dir / "b.png", "no image");
+  EXPECT_EQ(defect_of([&] { list_photographs({dir.path(), false}); }), "MAGIC");
+  std::filesystem::remove(dir / "b.png");
+  test::write_bytes(dir / "new\nline.png", test::rgb_png(20, 10));
+  EXPECT_EQ(defect_of([&] { list_photographs({dir.path(), false}); }), "PATH");
+  std::filesystem::remove(dir / "new\nline.png");
+  std::filesystem::create_symlink("/etc/hostname", dir / "link.jpg");
+  EXPECT_EQ(defect_of([&] { list_photographs({dir.path(), false}); }), "PATH");
+}
+
+}  // namespace
+}  // namespace cgs

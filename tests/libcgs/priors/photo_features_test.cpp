@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/photo_features.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <opencv2/core/utility.hpp>
+
+#include "libcgs/core/error.h"
+#include "tests/support/stereo_scene.h"
+
+namespace cgs {
+namespace {
+
+// Round spots on a grey ground, at places that are no multiple of anything.
+ColorImage spots(const std::vector<Eigen::Vector2d>& centres, double sigma, int side) {
+  ColorImage image(side, side, Eigen::Vector3f::Constant(0.4f));
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      double level = 0.4;
+      for (const Eigen::Vector2d& c : centres) {
+        const double r2 = (Eigen::Vector2d(x + 0.5, y + 0.5) - c).squaredNorm();
+        level += 0.5 * std::exp(-r2 / (2 * sigma * sigma));
+      }
+      image(x, y).setConstant(float(level));
+    }
+  }
+  return image;
+}
+
+// Mean offset of the nearest feature from the spots; all but a few must have one.
+Eigen::Vector2d mean_offset(const PhotoFeatures& features,
+                            const std::vector<Eigen::Vector2d>& centres) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  int found = 0;
+  for (const Eigen::Vector2d& c : centres) {
+    Eigen::Vector2d best = Eigen::Vector2d::Constant(1e9);
+    for (const Eigen::Vector2d& p : features.points) {
+      if ((p - c).norm() < best.norm()) best = p - c;
+    }
+    if (best.norm() > 1) continue;
+    sum += best;
+    ++found;
+  }
+  EXPECT_GT(found, 0.8 * double(centres.size()));
+  return sum / found;
+}
+
+std::vector<Eigen::Vector2d> scattered_centres(double step, int side) {
+  std::vector<Eigen::Vector2d> centres;
+  for (double y = step; y < side - step; y += step) {
+    for (double x = step; x < side - step; x += step) {
+      centres.emplace_back(x + std::fmod(7.31 * x + 3.7 * y, 1.9),
+                           y + std::fmod(5.17 * y + 2.3 * x, 1.7));
+    }
+  }
+  return centres;
+}
+
+TEST(PhotoFeatures, LieWherePixelCentresAreAtOneHalf) {
+  for (const double sigma : {2.0, 4.0, 7.0}) {
+    const auto centres = scattered_centres(9 * sigma, 400);
+    const Eigen::Vector2d offset =
+        mean_offset(detect_features(spots(centres, sigma, 400)), centres);
+    EXPECT_LT(offset.cwiseAbs().maxCoeff(), 0.05) << sigma << ": " << offset.transpose();
+  }
+}
+
+TEST(PhotoFeatures, OfAShrunkenPhotographAreInItsOwnPixels) {
+  const auto centres = scattered_centres(60, 900);
+  const PhotoFeatures features = detect_features(spots(centres, 6, 900), {.largest_side = 300});
+  EXPECT_EQ(features.pixel, 3);
+  EXPECT_LT(mean_offset(features, centres).cwiseAbs().maxCoeff(), 0.15);
+}
+
+TEST(PhotoFeatures, AreTheSameForAnyNumberOfThreads) {
+  const std::vector<test::TexturedPatch> wall = {
+      {{0, 0, 4}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()}};
+  const Camera camera = test::looking_at({0, 0, 0}, {0, 0, 4}, 320, 240, 300);
+  const ColorImage image = test::photograph(wall, camera, 0.03, 1);
+  cv::setNumThreads(1);
+  const PhotoFeatures one = detect_features(image, {.most = 200});
+  cv::setNumThreads(4);
+  const PhotoFeatures four = detect_features(image, {.most = 200});
+  ASSERT_EQ(one.points.size(), 200u);
+  EXPECT_EQ(one.points, four.points);
+  EXPECT_EQ(one.descriptors, four.descriptors);
+}
+
+TEST(PhotoFeatures, OfABlankWallAreNone) {
+  const ColorImage blank(200, 150, Eigen::Vector3f::Constant(0.7f));
+  EXPECT_TRUE(detect_features(blank).points.empty());
+  EXPECT_TRUE(match_features(detect_features(blank), detect_features(blank)).empty());
+}
+
+TEST(MatchFeatures, FindsWhatASlowSearchFinds) {
+  PhotoFeatures a;
+  PhotoFeatures b;
+  const auto unit_rows = [](int rows, int seed) {
+    Eigen::MatrixXf m(rows, 16);
+    for (int i = 0; i < rows; ++i) {
+      for (int k = 0; k < 16; ++k)
+        m(i, k) = float(test::solid_noise({i * 1.0, k * 1.0, seed * 1.0}, 1));
+    }
+    return m.rowwise().normalized().eval();
+  };
+  a.descriptors = unit_rows(700, 1);
+  b.descriptors = unit_rows(600, 2);
+  for (int i = 0; i < 300; ++i) {  // true pairs, disturbed
+    b.descriptors.row(i) = (a.descriptors.row(2 * i) + 0.2f * b.descriptors.row(i)).normalized();
+  }
+  a.points.resize(700);
+  b.points.resize(600);
+  const auto nearest = [](const auto& from, const auto& in, int i, double ratio) {
+    std::vector<std::pair<float, int>> all;
+    for (int j = 0; j < in.rows(); ++j) all.emplace_back((from.row(i) - in.row(j)).norm(), j);
+    std::sort(all.begin(), all.end());
+    return double(all[0].first) < ratio * double(all[1].first) ? all[0].second : -1;
+  };
+  std::vector<std::pair<int, int>> expected;
+  for (int i = 0; i < 700; ++i) {
+    const int j = nearest(a.descriptors, b.descriptors, i, 0.8);
+    if (j >= 0 && nearest(b.descriptors, a.descriptors, j, 0.8) == i) expected.emplace_back(i, j);
+  }
+  ASSERT_GT(expected.size(), 50u);
+  std::vector<std::pair<int, int>> found;
+  for (const FeatureMatch& m : match_features(a, b, 0.8)) found.emplace_back(m.a, m.b);
+  EXPECT_EQ(found, expected);
+}
+
+TEST(FeatureOptions, NameTheFieldOutOfRange) {
+  EXPECT_THROW(FeatureOptions{.largest_side = 10}.validate(), InvalidInput);
+  EXPECT_THROW(FeatureOptions{.most = 0}.validate(), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs
