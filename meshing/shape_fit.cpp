@@ -108,8 +108,8 @@ double distance(Shape shape,
                 Eigen::VectorXd& row) {
   constexpr double kTiny = 1e-150;  // no division by nothing on a centre or an axis
   if (shape == Shape::Sphere) {
-    const Eigen::Vector3d d = q - p.head(3);
-    row.head(3) = -d / (d.norm() + kTiny);
+    const Eigen::Vector3d d = q - p.head<3>();
+    row.head<3>() = -d / (d.norm() + kTiny);
     row[3] = -1;
     return d.norm() - p[3];
   }
