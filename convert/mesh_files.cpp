@@ -35,6 +35,7 @@ Json certificate_to_json(const Certificate& certificate,
           {"area_single_view", certificate.single_view_area * area_unit},
           {"area_interpolated", certificate.interpolated_area * area_unit},
           {"area_inferred", certificate.inferred_area * area_unit},
+          {"area_virtual", certificate.virtual_area * area_unit},
           {"units", frame.unit_name()},
           {"vertices", mesh.vertices.size()},
           {"faces", mesh.faces.size()}};

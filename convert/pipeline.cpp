@@ -18,6 +18,7 @@
 #include "convert/texture.h"
 #include "convert/views.h"
 #include "convert/volume_file.h"
+#include "convert/web_splats.h"
 #include "io/atomic_file.h"
 #include "io/content_hash.h"
 #include "io/gltf.h"
@@ -194,6 +195,7 @@ Json run_web(Run& run, const Progress& progress) {
   const GlbReport glb =
       write_glb(run.request.output / "web/asset.glb", mesh, texture, frame, options);
   return {{"texture", texture_report},
+          {"splats", write_web_splats(run.request.output / "web", model)},
           {"asset.glb",
            {{"bytes", glb.bytes},
             {"texture_bytes", glb.texture_bytes},
@@ -279,7 +281,7 @@ std::vector<Stage> stages_of(const Scene& scene) {
            run_mesh},
           {"web",
            "textured assets",
-           {"web/asset.glb", "mesh/watertight.obj", "mesh/watertight.mtl"},
+           {"web/asset.glb", "web/splats.glb", "mesh/watertight.obj", "mesh/watertight.mtl"},
            run_web},
           {"report", "report", {"report.html", "report.json"}, run_report}};
 }

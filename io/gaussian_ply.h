@@ -3,9 +3,9 @@
 
 #include <filesystem>
 #include <optional>
-#include <string>
-#include <vector>
+#include <string_view>
 
+#include "io/splat_doctor.h"
 #include "libcgs/core/frame.h"
 #include "libcgs/core/gaussians.h"
 
@@ -23,25 +23,17 @@ void write_gaussian_ply(const std::filesystem::path& path,
                         const Gaussians& gaussians,
                         const Frame& frame);
 
-/// Gaussians from a file and the frame they were read into.
-struct GaussianFile {
-  Gaussians gaussians;
-  Frame frame;
-  std::vector<std::string> warnings;  ///< One line each: what was dropped, clamped, or looks odd.
-};
-
-/// Reads the 3DGS layout, ASCII or binary, with or without normals, of any degree up to 3.
+/// Reads the 3DGS layout, ASCII or binary, properties in any order and of any type, others ignored.
 ///
-/// Gaussians with a value that is not finite, without rotation, of opacity 0, or too wide for float
-/// are dropped; opacity 1 becomes 0.99 and vanishing scales the smallest that can be squared. Both
-/// are counted in warnings. Quaternions are normalised.
-/// \param frame  read into exactly this frame; without it a canonical frame is made from the 1st
-///               to 99th percentile of the positions, so that stray splats do not shrink the scene,
-///               with unit and origin from the comments
+/// Normals and f_rest_* may be absent; degree 4 is read as degree 3. Without scale_2 (2DGS) splats
+/// become a thousandth of their smaller width thick. Colour may be red, green, blue instead of
+/// f_dc_*.
 /// \throws BadInput as parse_ply_header() and read_ply_rows(); Schema (a property is missing, or
 /// the
-///         number of f_rest_* is none of the four), Unsupported (2D splats, without scale_2), Empty
-///         (0 vertices), Value (no finite splat); LimitError
+///         number of f_rest_* is none of the five), Empty (0 vertices); LimitError
+RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path& path);
+
+/// The same from a file, judged by examine_splats().
 GaussianFile read_gaussian_ply(const std::filesystem::path& path,
                                const std::optional<Frame>& frame = {});
 

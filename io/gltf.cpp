@@ -221,8 +221,9 @@ class GlbBuilder {
       out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.25, 0.8, 1.0};
     } else if (in.name == provenance_name(Provenance::Interpolated)) {
       out.pbrMetallicRoughness.baseColorFactor = {0.55, 0.75, 1.0, 1.0};
-    } else if (textured_) {
-      // Also where no photograph fits: beside photographs, lit surface would look like another.
+    } else if (textured_ || in.name == provenance_name(Provenance::Virtual)) {
+      // Splats hold the light of the scene, as photographs do. Also where no photograph fits:
+      // beside photographs, lit surface would look like another.
       out.extensions[kUnlit] = tinygltf::Value(tinygltf::Value::Object());
       use_extension(kUnlit);
     }
@@ -302,7 +303,7 @@ nlohmann::json extras_for(const TriangleMesh& mesh,
                         {"origin_in_world", {origin.x(), origin.y(), origin.z()}},
                         {"gltf_from_world", rotation}};
   if (!mesh.provenance.empty()) {
-    const std::array<double, 4> area = area_by_provenance(mesh);
+    const auto area = area_by_provenance(mesh);
     for (const Provenance label : kProvenanceOrder) {
       out["area"][std::string(provenance_name(label))] =
           area.at(static_cast<size_t>(label)) * placement.scale * placement.scale;

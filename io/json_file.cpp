@@ -74,7 +74,12 @@ class DuplicateKeys {
 json read_json(const std::filesystem::path& path, const ReadLimits& limits) {
   ReadLimits file_limits = limits;
   file_limits.max_file_bytes = std::min(limits.max_file_bytes, limits.max_json_bytes);
-  const std::string bytes = read_file(path, file_limits);
+  return parse_json(read_file(path, file_limits), path, limits);
+}
+
+json parse_json(std::string_view bytes,
+                const std::filesystem::path& path,
+                const ReadLimits& limits) {
   refuse_foreign_content(path, bytes, "JSON");
   std::string_view text = bytes;
   if (text.substr(0, 3) == "\xef\xbb\xbf") text.remove_prefix(3);

@@ -20,6 +20,11 @@ namespace cgs {
 /// Source: RFC 8259; a UTF-8 byte order mark is skipped.
 nlohmann::json read_json(const std::filesystem::path& path, const ReadLimits& limits = {});
 
+/// The same for the content of a file that is part of another one. \pre within max_json_bytes
+nlohmann::json parse_json(std::string_view bytes,
+                          const std::filesystem::path& path,
+                          const ReadLimits& limits = {});
+
 /// JSON as text, in lines indented by two blanks or, with indent -1, in one line. File names need
 /// not be UTF-8 but JSON has to be: other bytes are replaced.
 std::string json_text(const nlohmann::ordered_json& value, int indent = 2);

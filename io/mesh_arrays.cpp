@@ -37,7 +37,7 @@ void require_writable(const TriangleMesh& mesh, std::string_view writer) {
     require(largest < n, prefix + "faces must name vertices below " + std::to_string(n), largest);
   }
   for (const Provenance label : mesh.provenance) {
-    require(label <= Provenance::Interpolated,
+    require(label <= Provenance::Virtual,
             prefix + "provenance must be a Provenance",
             static_cast<int>(label));
   }
@@ -65,8 +65,8 @@ Eigen::Vector3d millimetres(const Eigen::Vector3f& point,
 }
 
 std::string_view provenance_name(Provenance provenance) {
-  static constexpr std::array<std::string_view, 4> kNames = {
-      "inferred", "single view", "observed", "interpolated"};
+  static constexpr std::array<std::string_view, kProvenanceCount> kNames = {
+      "inferred", "single view", "observed", "interpolated", "virtual"};
   return kNames.at(static_cast<size_t>(provenance));
 }
 

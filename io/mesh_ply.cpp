@@ -21,7 +21,7 @@ std::string header_text(const TriangleMesh& mesh,
   std::string out = "ply\nformat binary_little_endian 1.0\ncomment generator cgs\n";
   out += ply_frame_comments(frame);
   if (!mesh.provenance.empty()) {
-    out += "comment provenance 0 inferred 1 single view 2 observed 3 interpolated\n";
+    out += "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual\n";
   }
   out += "element vertex " + std::to_string(mesh.vertices.size()) + "\n";
   out += "property float x\nproperty float y\nproperty float z\n";
@@ -181,13 +181,14 @@ class MeshRows {
     for (const Provenance known : {Provenance::Inferred,
                                    Provenance::SingleView,
                                    Provenance::Observed,
-                                   Provenance::Interpolated}) {
+                                   Provenance::Interpolated,
+                                   Provenance::Virtual}) {
       if (value == static_cast<double>(known)) return known;
     }
     throw BadInput(Defect::Value,
                    path_,
                    "face " + std::to_string(row_number) + " has scalar_provenance " +
-                       std::to_string(value) + ", allowed are 0 to 3");
+                       std::to_string(value) + ", allowed are 0 to 4");
   }
 
   const std::filesystem::path& path_;

@@ -55,10 +55,10 @@ std::string image_name(const std::filesystem::path& path, const std::string& nam
   return path.stem().string() + "." + name + ".jpg";
 }
 
-/// Always all four classes, so that writing it again never changes what an older OBJ refers to.
+/// Always all classes, so that writing it again never changes what an older OBJ refers to.
 std::string materials_text(const std::filesystem::path& path, const ObjTexture& texture) {
-  constexpr std::array<const char*, 4> kDiffuse = {
-      "0.8 0.8 0.8", "0.8 0.74 0.56", "0.56 0.68 0.8", "0.8 0.28 0.68"};
+  constexpr std::array<const char*, kProvenanceCount> kDiffuse = {
+      "0.8 0.8 0.8", "0.8 0.74 0.56", "0.56 0.68 0.8", "0.8 0.28 0.68", "0.74 0.7 0.8"};
   std::string out = "# cgs: materials tell where a surface comes from\n";
   for (size_t i = 0; i < kProvenanceOrder.size(); ++i) {
     out +=

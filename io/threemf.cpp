@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <numeric>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,8 +45,8 @@ void check(HRESULT result, const char* step) {
 
 /// "Surface by origin: observed 61.2 %, …", by area.
 std::string description(const TriangleMesh& mesh) {
-  const std::array<double, 4> area = area_by_provenance(mesh);
-  const double total = area[0] + area[1] + area[2] + area[3];
+  const auto area = area_by_provenance(mesh);
+  const double total = std::accumulate(area.begin(), area.end(), 0.0);
   std::string out = "Surface by origin:";
   for (const Provenance label : kProvenanceOrder) {
     std::array<char, 64> text{};
@@ -81,12 +82,12 @@ void set_geometry(NMR::PLib3MFBase* object,
 }
 
 void set_materials(NMR::PLib3MFBase* model, NMR::PLib3MFBase* object, const TriangleMesh& mesh) {
-  constexpr std::array<std::array<BYTE, 3>, 4> kColors = {
+  constexpr std::array<std::array<BYTE, 3>, kProvenanceCount> kColors = {
       // by label
-      {{255, 90, 217}, {255, 235, 179}, {200, 200, 200}, {179, 217, 255}}};
+      {{255, 90, 217}, {255, 235, 179}, {200, 200, 200}, {179, 217, 255}, {226, 214, 240}}};
   Handle group;
   check(NMR::lib3mf_model_addbasematerialgroup(model, group.out()), "add materials");
-  std::array<DWORD, 4> index{};
+  std::array<DWORD, kProvenanceCount> index{};
   for (const Provenance label : kProvenanceOrder) {
     const auto i = static_cast<size_t>(label);
     const auto& [red, green, blue] = kColors.at(i);

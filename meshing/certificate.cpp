@@ -178,6 +178,7 @@ Certificate certify(const TriangleMesh& mesh) {
   out.single_view_area = areas[size_t(Provenance::SingleView)];
   out.interpolated_area = areas[size_t(Provenance::Interpolated)];
   out.inferred_area = areas[size_t(Provenance::Inferred)];
+  out.virtual_area = areas[size_t(Provenance::Virtual)];
   return out;
 }
 

@@ -26,6 +26,7 @@ struct Certificate {
   double single_view_area = 0;
   double interpolated_area = 0;
   double inferred_area = 0;  ///< Everything, if the mesh has no provenance.
+  double virtual_area = 0;
 
   /// Closed, manifold, oriented and free of self-intersection: bounds a volume.
   bool passed() const {

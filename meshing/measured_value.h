@@ -4,6 +4,8 @@
 #include <array>
 #include <limits>
 
+#include "libcgs/core/triangle_mesh.h"
+
 namespace cgs {
 
 /// A figure taken from a mesh, with what it rests on.
@@ -13,7 +15,8 @@ struct MeasuredValue {
   double sigma = std::numeric_limits<double>::quiet_NaN();  ///< Standard deviation of the part
                                                             ///< with statement; NaN = none has one.
   double stated = 0;  ///< Share of what the figure rests on whose vertices state a sigma.
-  std::array<double, 4> by_provenance = {};  ///< Index = label; 0 if the mesh states none.
+  std::array<double, kProvenanceCount> by_provenance =
+      {};  ///< Index = label; 0 if the mesh states none.
 };
 
 }  // namespace cgs

@@ -153,6 +153,7 @@ struct Patch {
   Eigen::Vector3d rim_direction = Eigen::Vector3d::Zero();
   double area = 0;
   bool at_border = false;
+  bool rim_is_virtual = false;  // nobody observed it, so nobody can vouch for what bridges it
 };
 
 class PatchLabeller {
@@ -166,7 +167,9 @@ class PatchLabeller {
       const Patch patch = patch_from(f);
       const bool alike = patch.direction.dot(patch.rim_direction) >
                          0.5 * patch.direction.norm() * patch.rim_direction.norm();
-      if (patch.at_border || !(patch.area <= gap * gap) || !alike || !is_disc(patch)) continue;
+      if (patch.at_border || patch.rim_is_virtual || !(patch.area <= gap * gap) || !alike ||
+          !is_disc(patch))
+        continue;
       for (const uint32_t g : patch.faces) interpolated_.push_back(g);
     }
     for (const uint32_t f : interpolated_) mesh_.provenance[f] = Provenance::Interpolated;
@@ -187,6 +190,7 @@ class PatchLabeller {
       for (const uint32_t g : adjacent_[f]) {
         if (g == f) patch.at_border = true;
         if (has_evidence(g)) patch.rim_direction += area_vector(mesh_, g);
+        if (mesh_.provenance[g] == Provenance::Virtual) patch.rim_is_virtual = true;
         if (seen_[g] != 0 || has_evidence(g)) continue;
         seen_[g] = 1;
         patch.faces.push_back(g);
@@ -246,7 +250,9 @@ void label_faces(TriangleMesh& mesh, const std::vector<Evidence>& evidence, doub
       support = std::min(support, mesh.support[v]);
     }
     if (!seen) continue;
-    mesh.provenance[f] = support >= 2 ? Provenance::Observed : Provenance::SingleView;
+    mesh.provenance[f] = support >= 2   ? Provenance::Observed
+                         : support >= 1 ? Provenance::SingleView
+                                        : Provenance::Virtual;
   }
   PatchLabeller(mesh).label(gap);
 }

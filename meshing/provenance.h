@@ -26,10 +26,10 @@ std::vector<Evidence> annotate_vertices(TriangleMesh& mesh, const Volume& volume
 
 /// Fills the provenance of every face from its vertices.
 ///
-/// Observed or SingleView where all three vertices have evidence, by the smallest support. Other
-/// faces are Interpolated if they form a disc of at most gap x gap area, rimmed by observed faces
-/// only and facing as these do; else Inferred.
-/// \param gap   [internal units]
+/// Observed, SingleView or Virtual (no support at all) where all three vertices have evidence, by
+/// the smallest support. Other faces are Interpolated if they form a disc of at most gap x gap
+/// area, rimmed by observed faces only and facing as these do; else Inferred. \param gap [internal
+/// units]
 void label_faces(TriangleMesh& mesh, const std::vector<Evidence>& evidence, double gap);
 
 }  // namespace cgs

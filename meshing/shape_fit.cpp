@@ -26,7 +26,7 @@ struct Patch {
   std::vector<Sample> samples;
   size_t vertices = 0;
   double area = 0;
-  std::array<double, 4> area_of_label = {};
+  std::array<double, kProvenanceCount> area_of_label = {};
   double stated_area = 0;
 };
 

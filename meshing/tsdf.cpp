@@ -171,7 +171,8 @@ struct Block {
 struct Evidence {
   double weight = 0, distance = 0, spread = 0, variance = 0;  // weighted sums
   float free_weight = 0;
-  int support = 0;
+  int count = 0;    // of views in the band
+  int support = 0;  // of those that are photographs
   bool hidden = false, has_sigma = true;
   double color_weight = 0;
   Eigen::Vector3d color = Eigen::Vector3d::Zero();
@@ -187,7 +188,8 @@ struct Evidence {
     spread += w * d * d;
     variance += w * w * double(s.sigma) * double(s.sigma);
     has_sigma = has_sigma && s.sigma > 0;
-    ++support;
+    ++count;
+    if (!view.is_virtual) ++support;
     if (view.color.empty()) return;
     color += w * view.color(s.x, s.y).cast<double>();
     color_weight += w;
@@ -196,9 +198,9 @@ struct Evidence {
   // The larger of what the views promise and how far they disagree.
   double sigma() const {
     const double promised = variance / (weight * weight);
-    if (support < 2) return std::sqrt(promised);
+    if (count < 2) return std::sqrt(promised);
     const double between = std::max(0.0, spread / weight - mean() * mean());
-    return std::sqrt(std::max(promised, between / (support - 1)));
+    return std::sqrt(std::max(promised, between / (count - 1)));
   }
 };
 

@@ -20,7 +20,9 @@ struct TsdfView {
   DepthMap sigma;    ///< Standard deviation of depth [internal units]; empty or NaN = none
                      ///< known, the pixel then counts as exact.
   ColorImage color;  ///< Empty = no colour.
-  Raster<uint8_t> usable;  ///< 0 where depth must be ignored; empty = use all.
+  Raster<uint8_t> usable;   ///< 0 where depth must be ignored; empty = use all.
+  bool is_virtual = false;  ///< Rendered from splats, not measured: adds to the surface but not to
+                            ///< its support.
 };
 
 /// How depth maps are fused into a truncated signed distance field (TSDF).

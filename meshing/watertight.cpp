@@ -135,6 +135,7 @@ WatertightResult watertight_surface(Volume& volume,
   result.certificate.single_view_area = areas[size_t(Provenance::SingleView)];
   result.certificate.interpolated_area = areas[size_t(Provenance::Interpolated)];
   result.certificate.inferred_area = areas[size_t(Provenance::Inferred)];
+  result.certificate.virtual_area = areas[size_t(Provenance::Virtual)];
   report(progress, 1.0);
   return result;
 }

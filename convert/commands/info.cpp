@@ -9,10 +9,13 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/conversion.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
 #include "convert/pipeline.h"
 #include "io/json_file.h"
+#include "io/ply_header.h"
+#include "io/splat_reader.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -202,6 +205,28 @@ void print_mesh(const Json& info, const Certificate& certificate) {
   }
 }
 
+void print_splats(const Json& info) {
+  const Json& counts = info["counts"];
+  std::printf("%s: %zu splats of %zu in the file, harmonics of degree %d\nunits: %s\n",
+              info["format"].get<std::string>().c_str(),
+              counts["splats"].get<size_t>(),
+              counts["in_file"].get<size_t>(),
+              counts["sh_degree"].get<int>(),
+              info["units"].get<std::string>().c_str());
+  for (const char* corner : {"min", "max"}) {
+    const Json& p = info["bounds"][corner];
+    std::printf("%s %12.6g %12.6g %12.6g\n",
+                corner,
+                p[0].get<double>(),
+                p[1].get<double>(),
+                p[2].get<double>());
+  }
+  std::printf("fill ratio %.3g\n", info["findings"]["fill_ratio"].get<double>());
+  for (const Json& text : info["warnings"]) {
+    std::printf("warning: %s\n", one_line(text.get<std::string>()).c_str());
+  }
+}
+
 void run_mesh_info(const InfoArgs& args) {
   const MeasurableFile file = read_mesh_file(args.scene.path);
   const TriangleMesh& mesh = file.content.mesh;
@@ -219,7 +244,25 @@ void run_mesh_info(const InfoArgs& args) {
   }
 }
 
+/// Files that no mesh reader takes, and PLY files with what makes a splat.
+bool holds_splats(const std::filesystem::path& path) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) return false;
+  if (!is_mesh_name(path)) return true;
+  const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
+  if (start.substr(0, 3) != "ply") return false;
+  const PlyHeader header = parse_ply_header(start, path);
+  const PlyElement* vertex = header.find("vertex");
+  return vertex != nullptr && (vertex->find("packed_position") >= 0 || vertex->find("rot_0") >= 0);
+}
+
 void run_info(const InfoArgs& args) {
+  if (holds_splats(args.scene.path)) {
+    const Json info = splat_file_to_json(read_splats(args.scene.path));
+    if (args.json) std::cout << json_text(info) << "\n";
+    if (!args.json) print_splats(info);
+    return;
+  }
   if (is_mesh_name(args.scene.path) && !std::filesystem::is_directory(args.scene.path)) {
     run_mesh_info(args);
     return;
@@ -239,11 +282,12 @@ void add_info(CLI::App& app) {
   auto args = std::make_shared<InfoArgs>();
   auto* cmd = app.add_subcommand(
       "info",
-      "What a scene or mesh holds and what is wrong with it (exit code 3 if it cannot be used)");
+      "What a scene, mesh or file of splats holds and what is wrong with it (exit code 3 if it "
+      "cannot be used)");
   cmd->add_option("scene",
                   args->scene.path,
-                  "Folder of a scene, as for run, or a mesh (.ply, .obj, .stl, .off), which gets a "
-                  "certificate")
+                  "Folder of a scene, as for run, a mesh (.ply, .obj, .stl, .off), which gets a "
+                  "certificate, or splats (.ply, .spz, .splat, .sog)")
       ->required();
   add_scene_options(*cmd, args->scene.options);
   add_focal_option(*cmd, args->scene.focal);

@@ -31,8 +31,8 @@ std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh) {
   return normals;
 }
 
-std::array<double, 4> area_by_provenance(const TriangleMesh& mesh) {
-  std::array<double, 4> area = {};
+std::array<double, kProvenanceCount> area_by_provenance(const TriangleMesh& mesh) {
+  std::array<double, kProvenanceCount> area = {};
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     const auto label =
         static_cast<size_t>(mesh.provenance.empty() ? Provenance::Inferred : mesh.provenance[f]);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -15,7 +16,10 @@ enum class Provenance : uint8_t {
   SingleView = 1,    ///< One input view saw it: its depth rests on the prior.
   Observed = 2,      ///< Two or more input views saw it.
   Interpolated = 3,  ///< Bridges a hole whose whole rim was observed.
+  Virtual = 4,       ///< Seen by virtual cameras alone, in splats that came without photographs:
+                     ///< nobody can vouch for it.
 };
+inline constexpr size_t kProvenanceCount = 5;
 
 /// An indexed triangle mesh with its evidence. Optional arrays are empty or as long as vertices.
 struct TriangleMesh {
@@ -33,6 +37,6 @@ struct TriangleMesh {
 std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh);
 
 /// Total face area per provenance label, index = label [internal units squared].
-std::array<double, 4> area_by_provenance(const TriangleMesh& mesh);
+std::array<double, kProvenanceCount> area_by_provenance(const TriangleMesh& mesh);
 
 }  // namespace cgs

@@ -205,7 +205,8 @@ TEST(Output, AFolderThatCannotBeMadeEndsWithExitCode5) {
 }
 
 TEST(Help, EveryCommandEndsWithAWorkedExample) {
-  for (const auto* command : {"run", "info", "train", "evaluate", "render", "fuse", "mesh"}) {
+  for (const auto* command :
+       {"run", "info", "train", "evaluate", "render", "fuse", "mesh", "convert"}) {
     const ProgramResult result = run_cgs(std::string(command) + " --help");
     EXPECT_EQ(result.exit_code, 0) << command;
     EXPECT_NE(result.out.find("Example: cgs " + std::string(command)), std::string::npos)

@@ -22,6 +22,8 @@
 #include "io/mesh_ply.h"
 #include "io/npy.h"
 #include "io/png.h"
+#include "io/splat_reader.h"
+#include "io/spz.h"
 #include "io/strecha.h"
 #include "io/transforms_json.h"
 #include "io/vdb.h"
@@ -327,6 +329,15 @@ TEST(Sweep, Ply) {
   sweep("ascii PLY of Gaussians", dir / "g.ply", read_splats);
   write_mesh_ply(dir / "m.ply", test::labelled_sphere(4, 4), test::centimetre_frame());
   sweep("PLY of a mesh", dir / "m.ply", [](const fs::path& file) { (void)read_mesh_ply(file); });
+}
+
+TEST(Sweep, Spz) {
+  const TempDir dir;
+  const auto read = [](const fs::path& file) { (void)read_splats(file); };
+  for (const int version : {2, 3}) {
+    write_spz(dir / "g.spz", few_splats(), test::centimetre_frame(), {.version = version});
+    sweep("SPZ " + std::to_string(version), dir / "g.spz", read);
+  }
 }
 
 TEST(Sweep, CamerasJson) {

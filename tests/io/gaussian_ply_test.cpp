@@ -214,8 +214,15 @@ TEST(GaussianPly, SaysWhatLooksOdd) {
   };
   EXPECT_TRUE(warns(read(), "trailing 3 bytes"));
   EXPECT_FALSE(warns(read(), "linear"));
-  for (RawSplat& s : splats) s.scale = 9;  // wider than the scene
+  for (RawSplat& s : splats) s.scale = 9;  // absurd as logarithms, not as lengths
+  const GaussianFile lengths = read();
+  EXPECT_TRUE(warns(lengths, "read as lengths"));
+  EXPECT_TRUE(lengths.findings.linear_scales);
+  EXPECT_NEAR(lengths.gaussians.scale[0].x() * lengths.frame.scale, 9, 1e-4);
+  EXPECT_NEAR(lengths.gaussians.scale[0].z() * lengths.frame.scale, 7, 1e-4);
+  for (RawSplat& s : splats) s.x *= 1e-3f;  // absurd as both
   EXPECT_TRUE(warns(read(), "fill ratio"));
+  for (RawSplat& s : splats) s.x *= 1e3f;
   for (RawSplat& s : splats) s.scale = 2.5f;
   for (RawSplat& s : splats) s.opacity = 0.5f;
   EXPECT_TRUE(warns(read(), "scale_* look linear"));
@@ -228,7 +235,6 @@ TEST(GaussianPly, NamesWhatIsMissing) {
   for (const char* name : {"x", "scale_1", "rot_3", "opacity", "f_dc_2"}) {
     EXPECT_EQ(defect(without_line(good, std::string("property float ") + name + "\n")), "SCHEMA");
   }
-  EXPECT_EQ(defect(without_line(good, "property float scale_2\n")), "UNSUPPORTED");
   EXPECT_EQ(defect("ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n"),
             "EMPTY");
   RawSplat bad;
@@ -241,6 +247,75 @@ TEST(GaussianPly, NamesWhatIsMissing) {
   std::string gap = full;
   gap.replace(gap.find("f_rest_1\n"), 9, "f_rest_x\n");
   EXPECT_EQ(defect(gap), "SCHEMA");
+}
+
+/// The same splat in the words of other programs.
+GaussianFile read_dialect(const std::string& properties, const std::string& row) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 2\n" + properties + "end_header\n" +
+                        row + "\n" + row + "\n");
+  return read_gaussian_ply(dir / "a.ply", Frame{});
+}
+
+std::string lines_of(const std::vector<std::string>& names, const std::string& type = "float") {
+  std::string out;
+  for (const std::string& name : names) out.append("property " + type + " " + name + "\n");
+  return out;
+}
+
+TEST(GaussianPly, ReadsPropertiesInAnyOrderAndType) {
+  const GaussianFile out =
+      read_dialect(lines_of({"rot_3", "rot_2", "rot_1", "rot_0", "opacity"}, "double") +
+                       lines_of({"scale_2", "scale_1", "scale_0", "z", "y", "x", "label"}) +
+                       lines_of({"f_dc_2", "f_dc_1", "f_dc_0"}),
+                   "0 0 0 2e200 -1 -3 -2 -1 0.3 0.2 0.1 7 6 5 4");
+  const Gaussians& g = out.gaussians;
+  ASSERT_EQ(g.size(), 2u);
+  EXPECT_EQ(g.position[0], Eigen::Vector3f(0.1f, 0.2f, 0.3f));
+  EXPECT_EQ(g.rotation[0], Eigen::Vector4f(1, 0, 0, 0));
+  EXPECT_EQ(g.sh[0], Eigen::Vector3f(4, 5, 6));
+  EXPECT_FLOAT_EQ(g.scale[0].x(), std::exp(-1.0f));
+  EXPECT_FLOAT_EQ(g.scale[0].z(), std::exp(-3.0f));
+  EXPECT_FLOAT_EQ(g.opacity[0], 1 / (1 + std::exp(1.0f)));
+}
+
+TEST(GaussianPly, Reads2DSplatsAsThinOnes) {
+  const GaussianFile out =
+      read_dialect(lines_of({"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"}) +
+                       lines_of({"scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3"}),
+                   "0 0 0 0 0 0 2 -3 -4 1 0 0 0");
+  EXPECT_EQ(out.format, "2DGS PLY");
+  EXPECT_TRUE(warns(out, "2D splats"));
+  EXPECT_NEAR(out.gaussians.scale[0].z(), std::exp(-4.0f) / 1000, 1e-8f);
+}
+
+TEST(GaussianPly, ReadsColourInsteadOfHarmonics) {
+  const std::string before = lines_of({"x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2"});
+  const std::string after = lines_of({"rot_0", "rot_1", "rot_2", "rot_3"});
+  const GaussianFile bytes =
+      read_dialect(before + lines_of({"red", "green", "blue"}, "uchar") + after,
+                   "0 0 0 2 -3 -3 -3 255 0 51 1 0 0 0");
+  const Eigen::Vector3f color = bytes.gaussians.sh[0].array() * kShC0 + 0.5f;
+  EXPECT_LT((color - Eigen::Vector3f(1, 0, 0.2f)).norm(), 1e-6f);
+  const GaussianFile floats = read_dialect(before + lines_of({"red", "green", "blue"}) + after,
+                                           "0 0 0 2 -3 -3 -3 1 0 0.2 1 0 0 0");
+  EXPECT_LT((floats.gaussians.sh[0] - bytes.gaussians.sh[0]).norm(), 1e-6f);
+}
+
+TEST(GaussianPly, LeavesOutHarmonicsOfDegreeFour) {
+  std::vector<std::string> names = {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"};
+  std::string row = "0 0 0 9 9 9";
+  for (int i = 0; i < 72; ++i) {
+    names.push_back("f_rest_" + std::to_string(i));
+    row += " " + std::to_string(i);
+  }
+  for (const char* name : {"opacity", "scale_0", "scale_1", "scale_2"}) names.emplace_back(name);
+  for (const char* name : {"rot_0", "rot_1", "rot_2", "rot_3"}) names.emplace_back(name);
+  const GaussianFile out = read_dialect(lines_of(names), row + " 2 -3 -3 -3 1 0 0 0");
+  EXPECT_TRUE(warns(out, "degree 4"));
+  ASSERT_EQ(out.gaussians.sh.size(), 32u);
+  EXPECT_EQ(out.gaussians.sh[15], Eigen::Vector3f(14, 24 + 14, 48 + 14));
 }
 
 TEST(GaussianPly, RefusesEveryTruncation) {

@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/conversion.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <optional>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/length.h"
+#include "convert/mesh_files.h"
+#include "convert/model.h"
+#include "convert/pipeline.h"
+#include "convert/simplification.h"
+#include "convert/volume_file.h"
+#include "io/byte_reader.h"
+#include "io/dot_splat.h"
+#include "io/gaussian_ply.h"
+#include "io/gltf.h"
+#include "io/json_file.h"
+#include "io/mesh_ply.h"
+#include "io/obj.h"
+#include "io/ply_header.h"
+#include "io/scene_path.h"
+#include "io/splat_glb.h"
+#include "io/splat_reader.h"
+#include "io/spz.h"
+#include "io/stl.h"
+#include "io/threemf.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/up_axis.h"
+#include "meshing/isosurface.h"
+#include "meshing/watertight.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+/// What a file can hold, each made from those before it.
+enum class Content { Splats, Volume, Mesh };
+
+/// The input, of which only what it holds is filled.
+struct Source {
+  Content content = Content::Splats;
+  std::optional<GaussianFile> splats;
+  std::optional<Model> model;  ///< Splats with their photographs' cameras.
+  std::optional<VolumeFile> volume;
+  TriangleMesh mesh;
+  Frame frame;
+  Eigen::Vector3d up = -Eigen::Vector3d::UnitY();
+};
+
+std::string extension_of(const std::filesystem::path& path) {
+  std::string out = path.extension().string();
+  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return out;
+}
+
+/// PLY files that are no splats: with faces, or without what makes a splat.
+bool is_mesh_ply(const std::filesystem::path& path) {
+  const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
+  if (start.substr(0, 3) != "ply") return false;
+  const PlyHeader header = parse_ply_header(start, path);
+  const PlyElement* face = header.find("face");
+  return face != nullptr && face->count > 0;
+}
+
+Source read_source(const std::filesystem::path& path) {
+  Source out;
+  if (is_folder(path)) {
+    out.model = read_model(path);
+    out.frame = out.model->scene.frame;
+    out.up = world_up(out.model->scene);
+  } else if (extension_of(path) == ".vdb") {
+    out.content = Content::Volume;
+    out.volume = read_volume(path);
+    out.frame = out.volume->frame;
+  } else if (is_mesh_ply(path)) {
+    out.content = Content::Mesh;
+    MeshFile file = read_mesh_ply(path);
+    out.mesh = std::move(file.mesh);
+    out.frame = file.frame;
+  } else {
+    out.splats = read_splats(path);
+    out.frame = out.splats->frame;
+  }
+  return out;
+}
+
+/// What the output is to hold, by its name, the flag, and for .ply and .glb the input.
+Content wanted_content(const ConversionRequest& request, Content from) {
+  const std::string extension = extension_of(request.output);
+  const auto is = [&](std::initializer_list<const char*> names) {
+    return std::find(names.begin(), names.end(), extension) != names.end();
+  };
+  const bool known_as = request.as.empty() || request.as == "mesh" || request.as == "splats";
+  require(known_as, "--as must be mesh or splats", request.as);
+  Content out = Content::Mesh;
+  if (is({".splat", ".spz"})) {
+    out = Content::Splats;
+  } else if (is({".vdb"})) {
+    out = Content::Volume;
+  } else if (is({".ply"})) {
+    const bool stays = request.as.empty() && from == Content::Splats;
+    out = stays || request.as == "splats" ? Content::Splats : Content::Mesh;
+  } else if (extension == ".glb" && request.as == "splats") {
+    out = Content::Splats;
+  } else {
+    require(is({".obj", ".stl", ".3mf", ".glb"}),
+            "the output must end in .ply, .splat, .spz, .vdb, .obj, .stl, .3mf or .glb",
+            extension.empty() ? "without an ending" : extension);
+  }
+  const bool asked_other = (request.as == "mesh" && out != Content::Mesh) ||
+                           (request.as == "splats" && out != Content::Splats);
+  require(!asked_other, "--as must fit the output: " + extension + " cannot hold that", request.as);
+  constexpr std::array<const char*, 3> kNames = {"splats", "a volume", "a mesh"};
+  require(
+      from == Content::Splats || out == Content::Mesh,
+      std::string("convert goes from splats to volume to mesh, not back: the output would be ") +
+          kNames.at(static_cast<size_t>(out)) + "; the input",
+      kNames.at(static_cast<size_t>(from)));
+  return out;
+}
+
+Json write_splats(const ConversionRequest& request, const Source& source) {
+  const Gaussians& g = source.model ? source.model->gaussians : source.splats->gaussians;
+  const std::string extension = extension_of(request.output);
+  if (extension == ".splat") {
+    const DotSplatReport made = write_dot_splat(request.output, g, source.frame);
+    return {{"format", ".splat"},
+            {"splats", g.size()},
+            {"bytes", made.bytes},
+            {"clamped_colors", made.clamped_colors},
+            {"dropped_harmonics", made.dropped_sh}};
+  }
+  if (extension == ".spz") {
+    const SpzReport made =
+        write_spz(request.output, g, source.frame, {.version = request.spz_version});
+    return {{"format", "SPZ " + std::to_string(request.spz_version)},
+            {"splats", g.size()},
+            {"bytes", made.bytes},
+            {"fractional_bits", made.fractional_bits},
+            {"clamped_splats", made.clamped}};
+  }
+  if (extension == ".glb") {
+    const size_t bytes =
+        write_splat_glb(request.output, g, source.frame, {.y_up = y_up_from(source.up)});
+    return {{"format", "KHR_gaussian_splatting"}, {"splats", g.size()}, {"bytes", bytes}};
+  }
+  write_gaussian_ply(request.output, g, source.frame);
+  return {{"format", "3DGS PLY"}, {"splats", g.size()}};
+}
+
+/// Splats to volume; the splats are gone afterwards.
+Volume make_volume(const ConversionRequest& request,
+                   Source& source,
+                   Terminal& terminal,
+                   Json& report) {
+  if (source.volume) return std::move(source.volume->volume);
+  const SplatVolumeRequest& wanted = request.volume;
+  const Progress progress = terminal.begin("fuse");
+  FusedVolume fused;
+  if (source.model) {
+    fused = fuse_model(*source.model, wanted.voxel_size, wanted.memory_limit, progress);
+    report["fusion"] = fusion_to_json(fused.report, source.frame);
+  } else {
+    Gaussians gaussians = std::move(source.splats->gaussians);
+    SplatVolume made = splat_volume(std::move(gaussians), source.frame, wanted, progress);
+    report["fusion"] = splat_volume_to_json(made, source.frame);
+    fused = std::move(made.fused);
+  }
+  terminal.end("voxel " + format_length(fused.report.voxel_size, source.frame));
+  return std::move(fused.volume);
+}
+
+TriangleMesh make_mesh(const ConversionRequest& request,
+                       Volume& volume,
+                       const Frame& frame,
+                       Terminal& terminal,
+                       Json& report) {
+  const Progress progress = terminal.begin("mesh");
+  const auto options = simplify_options(request.simplify, volume.voxel_size, frame);
+  TriangleMesh mesh;
+  if (request.open_surface) {
+    mesh = open_surface(volume, {});
+    if (options && !mesh.faces.empty()) mesh = simplify(mesh, *options, progress).mesh;
+  } else {
+    WatertightOptions closing;
+    closing.memory_limit = memory_budget(request.volume.memory_limit);
+    WatertightResult closed = watertight_surface(volume, closing, part_of(progress, 0, 0.5));
+    TriangleMesh none;
+    if (!closed.mesh.faces.empty()) {
+      simplify_meshes(none, closed, options, frame, part_of(progress, 0.5, 1));
+    }
+    report["certificate"] = certificate_to_json(closed.certificate, closed.mesh, frame);
+    report["method"] = closed.method;
+    mesh = std::move(closed.mesh);
+  }
+  if (mesh.faces.empty()) {
+    throw NumericalError("no surface was found; a smaller --voxel-size may hold thin parts");
+  }
+  terminal.end(std::to_string(mesh.faces.size()) + " faces");
+  return mesh;
+}
+
+void write_mesh(const ConversionRequest& request,
+                const Source& source,
+                const TriangleMesh& mesh,
+                const Json& report) {
+  const std::string extension = extension_of(request.output);
+  const Frame& frame = source.frame;
+  if (extension == ".stl" || extension == ".3mf") {
+    require(frame.has_metric_scale(),
+            "CAD files are in millimetres; --assume-unit m (cm, mm, in, ft) says what a unit is; "
+            "the scale of this input",
+            "unknown");
+    const Eigen::Matrix3d z_up = z_up_from(source.up);
+    if (extension == ".stl") return write_stl(request.output, mesh, frame, z_up);
+    return write_3mf(request.output, mesh, frame, z_up);
+  }
+  if (extension == ".obj") return write_obj(request.output, mesh, frame);
+  if (extension == ".ply") return write_mesh_ply(request.output, mesh, frame);
+  GlbOptions options;
+  options.y_up = y_up_from(source.up);
+  if (!request.max_error.empty()) {
+    options.max_error = parse_length(request.max_error, frame) * frame.scale;
+  }
+  options.summary_json = json_text(report, -1);
+  write_glb(request.output, mesh, frame, options);
+}
+
+/// Refuses at once what would be refused after minutes of work.
+void check_before_work(const ConversionRequest& request, const Source& source, Content wanted) {
+  const std::string extension = extension_of(request.output);
+  if (extension == ".stl" || extension == ".3mf") {
+    require(source.frame.has_metric_scale(),
+            "CAD files are in millimetres; --assume-unit m (cm, mm, in, ft) says what a unit is; "
+            "the scale of this input",
+            "unknown");
+  }
+  if (wanted == Content::Splats) return;
+  if (!request.volume.voxel_size.empty())
+    (void)parse_length(request.volume.voxel_size, source.frame);
+  if (!request.max_error.empty()) (void)parse_length(request.max_error, source.frame);
+  (void)simplify_options(request.simplify, 1, source.frame);
+}
+
+Json bounds_json(const Gaussians& gaussians, const Frame& frame) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3f& p : gaussians.position) {
+    box.extend(frame.file_from_internal(p.cast<double>()));
+  }
+  const Eigen::Vector3d& a = box.min();
+  const Eigen::Vector3d& b = box.max();
+  return {{"min", {a.x(), a.y(), a.z()}}, {"max", {b.x(), b.y(), b.z()}}};
+}
+
+}  // namespace
+
+Json splat_file_to_json(const GaussianFile& file) {
+  const SplatFindings& f = file.findings;
+  return {{"kind", "splats"},
+          {"format", file.format},
+          {"counts",
+           {{"in_file", f.in_file},
+            {"splats", file.gaussians.size()},
+            {"sh_degree", file.gaussians.sh_degree}}},
+          {"bounds", bounds_json(file.gaussians, file.frame)},
+          {"units", file.frame.unit_name()},
+          {"findings",
+           {{"not_finite", f.not_finite},
+            {"without_rotation", f.without_rotation},
+            {"transparent", f.transparent},
+            {"out_of_range", f.out_of_range},
+            {"clamped", f.clamped},
+            {"flyaways", f.flyaways},
+            {"linear_scales", f.linear_scales},
+            {"linear_opacity", f.linear_opacity},
+            {"fill_ratio", f.fill_ratio}}},
+          {"warnings", file.warnings}};
+}
+
+std::string conversion_table() {
+  return "from                                 to splats        to .vdb  to a mesh\n"
+         "                                     .ply .splat      volume   .ply .obj .stl\n"
+         "                                     .spz .glb                 .3mf .glb\n"
+         "3DGS, 2DGS or packed .ply, .splat,\n"
+         "  .spz 2 to 4, .sog 2                yes              yes      yes, virtual cameras\n"
+         "model folder of train or run         yes              yes      yes, its own cameras\n"
+         ".vdb of fuse, run or convert         no               no       yes\n"
+         ".ply with faces                      no               no       yes\n"
+         "Where the ending can be both, .ply stays splats and .glb becomes a mesh; --as mesh and\n"
+         "--as splats say otherwise. .stl and .3mf need a known scale, or --assume-unit.\n";
+}
+
+Json convert_file(const ConversionRequest& given, Terminal& terminal) {
+  ConversionRequest request = given;
+  Source source = read_source(request.input);
+  // Splats of others are rough at the size of a voxel: hardly a face could go within a part of one.
+  if (source.splats && request.simplify.empty()) request.simplify = "0";
+  if (!request.up.empty()) source.up = {request.up[0], request.up[1], request.up[2]};
+  if (!request.assume_unit.empty()) {
+    source.frame.metres_per_unit = metres_in(request.assume_unit);
+    source.frame.scale_source = ScaleSource::Assumed;
+  }
+  const Content wanted = wanted_content(request, source.content);
+  check_before_work(request, source, wanted);
+  Json report = {{"input", request.input.filename().string()}};
+  if (source.splats) {
+    report["splats"] = splat_file_to_json(*source.splats);
+    terminal.warn(source.splats->warnings);
+  }
+  if (source.model) terminal.warn(source.model->scene.warnings);
+  if (wanted == Content::Splats) {
+    report["output"] = write_splats(request, source);
+    return report;
+  }
+  const bool from_splats_alone = source.splats.has_value();
+  if (source.content != Content::Mesh) {
+    Volume volume = make_volume(request, source, terminal, report);
+    if (wanted == Content::Volume) {
+      write_volume(request.output, volume, source.frame);
+      return report;
+    }
+    source.mesh = make_mesh(request, volume, source.frame, terminal, report);
+  }
+  if (from_splats_alone) {
+    report["evidence"] = "none: the surface was seen by virtual cameras only";
+    terminal.say(
+        "no photograph vouches for this surface: all of it is labelled virtual or inferred");
+  }
+  write_mesh(request, source, source.mesh, report);
+  return report;
+}
+
+}  // namespace cgs

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "convert/splat_volume.h"
+#include "convert/terminal.h"
+#include "io/splat_doctor.h"
+
+namespace cgs {
+
+/// What `cgs convert` is asked for; lengths are as the user typed them.
+struct ConversionRequest {
+  std::filesystem::path input;
+  std::filesystem::path output;
+  std::string as;  ///< "mesh" or "splats" for .ply and .glb, which can be both; empty = rule.
+  bool open_surface = false;  ///< Leave meshes open where nothing was seen.
+  std::string simplify;     ///< Largest error; "0" = none; empty = none for splats without cameras,
+                            ///< else a quarter of a voxel.
+  std::string max_error;    ///< Of a compressed .glb; empty = 1/16384 of its size.
+  std::string assume_unit;  ///< Unit of one scene unit where the input does not say.
+  std::vector<double>
+      up;  ///< World direction; empty = of the input, else -y, the way 3DGS files lie.
+  int spz_version = 3;
+  SplatVolumeRequest volume;
+};
+
+/// Reads the input, runs the stages between, and writes the output.
+/// \return what was found and made, for a report
+/// \throws InvalidInput (no such pair; a printable file of unknown scale), BadInput, LimitError,
+///         NumericalError (no surface), IoError
+nlohmann::ordered_json convert_file(const ConversionRequest& request, Terminal& terminal);
+
+/// The pairs that convert_file() knows, as a table for people.
+std::string conversion_table();
+
+/// What a file of splats holds and what is wrong with it: {"kind", "format", "counts", "bounds",
+/// "units", "findings", "warnings"}.
+nlohmann::ordered_json splat_file_to_json(const GaussianFile& file);
+
+}  // namespace cgs

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "convert/model.h"
+
+namespace cgs {
+
+/// Writes the splats of a model for viewers in browsers: splats.glb and splats.spz. Splats that
+/// reach too far for SPZ are no reason to end a run: it is left out then.
+/// \return {"splats.glb": {…}, "splats.spz": {…}, "left_out": {"splats.spz": "why"}}
+nlohmann::ordered_json write_web_splats(const std::filesystem::path& folder, const Model& model);
+
+}  // namespace cgs

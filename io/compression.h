@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace cgs {
+
+/// How a deflate stream is wrapped.
+enum class DeflateWrapping { Gzip, None };
+
+/// The content of a deflate stream that must hold exactly `size` bytes.
+/// \param what  names the content in the message
+/// \throws BadInput Truncated (it holds less, or is cut), Mismatch (it holds more), Syntax (it is
+///         damaged, or its checksum is wrong), Count (more than any stream of that length can hold;
+///         told before memory is taken)
+std::string inflate(std::string_view bytes,
+                    DeflateWrapping wrapping,
+                    size_t size,
+                    const std::filesystem::path& path,
+                    std::string_view what);
+
+/// The first `size` bytes of a gzip file; what follows them is not looked at.
+/// \throws BadInput Truncated, Syntax, Count as above
+std::string gunzip_start(std::string_view bytes,
+                         size_t size,
+                         const std::filesystem::path& path,
+                         std::string_view what);
+
+/// A gzip file of these bytes, without name and time: the same bytes give the same file.
+std::string gzip(std::string_view bytes);
+
+/// The content of a Zstandard frame that must hold exactly `size` bytes.
+/// \throws BadInput Syntax, Mismatch (it holds more or less)
+std::string zstd_decompress(std::string_view bytes,
+                            size_t size,
+                            const std::filesystem::path& path,
+                            std::string_view what);
+
+}  // namespace cgs

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/splat_glb.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <nlohmann/json.hpp>
+
+#include "io/atomic_file.h"
+#include "io/byte_writer.h"
+#include "io/json_file.h"
+#include "io/splat_arrays.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/srgb.h"
+
+namespace cgs {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kExtension = "KHR_gaussian_splatting";
+constexpr int kFloat = 5126;  // glTF's number of the component type
+constexpr int kArrayBuffer = 34962;
+
+Eigen::Vector3f median_position(const Gaussians& g) {
+  Eigen::Vector3f out = Eigen::Vector3f::Zero();
+  std::vector<float> values(g.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    std::transform(g.position.begin(), g.position.end(), values.begin(), [&](const auto& p) {
+      return p[axis];
+    });
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    out[axis] = *middle;
+  }
+  return out;
+}
+
+/// Attributes one after the other in one buffer, each with its view and accessor.
+class SplatBuffer {
+ public:
+  explicit SplatBuffer(size_t count) : count_(count) {}
+
+  /// \param value  the floats of splat i
+  template <typename Value>
+  void add(const std::string& attribute, const char* type, const Value& value) {
+    const size_t begin = bytes_.size();
+    for (size_t i = 0; i < count_; ++i) {
+      for (const float c : value(i)) append_bytes(bytes_, c);
+    }
+    attributes_[attribute] = accessors_.size();
+    views_.push_back({{"buffer", 0},
+                      {"byteOffset", begin},
+                      {"byteLength", bytes_.size() - begin},
+                      {"target", kArrayBuffer}});
+    accessors_.push_back({{"bufferView", views_.size() - 1},
+                          {"componentType", kFloat},
+                          {"count", count_},
+                          {"type", type}});
+  }
+
+  void set_bounds_of_last(const Eigen::AlignedBox3f& box) {
+    const auto corner = [](const Eigen::Vector3f& p) { return Json{p.x(), p.y(), p.z()}; };
+    accessors_.back()["min"] = corner(box.min());
+    accessors_.back()["max"] = corner(box.max());
+  }
+
+  Json document() const {
+    const Json primitive = {
+        {"mode", 0},
+        {"attributes", attributes_},
+        {"extensions",
+         {{kExtension, {{"kernel", "ellipse"}, {"colorSpace", "srgb_rec709_display"}}}}}};
+    return {{"asset", {{"version", "2.0"}, {"generator", "cgs"}}},
+            {"extensionsUsed", {kExtension}},
+            {"scene", 0},
+            {"scenes", {{{"nodes", {0}}}}},
+            {"nodes", {{{"name", "splats"}, {"mesh", 0}}}},
+            {"meshes", {{{"primitives", {primitive}}}}},
+            {"buffers", {{{"byteLength", bytes_.size()}}}},
+            {"bufferViews", views_},
+            {"accessors", accessors_}};
+  }
+
+  std::string take_bytes() { return std::move(bytes_); }
+
+ private:
+  size_t count_;
+  std::string bytes_;
+  Json views_ = Json::array();
+  Json accessors_ = Json::array();
+  Json attributes_ = Json::object();
+};
+
+void add_harmonics(SplatBuffer& buffer, const Gaussians& g) {
+  const auto count = static_cast<size_t>(g.sh_count());
+  for (int degree = 0, k = 0; degree <= g.sh_degree; ++degree) {
+    for (int order = 0; order <= 2 * degree; ++order, ++k) {
+      const std::string name = std::string(kExtension) + ":SH_DEGREE_" + std::to_string(degree) +
+                               "_COEF_" + std::to_string(order);
+      buffer.add(name, "VEC3", [&](size_t i) { return g.sh[i * count + static_cast<size_t>(k)]; });
+    }
+  }
+}
+
+void append_chunk(std::string& out, std::string_view type, const std::string& content) {
+  append_bytes(out, static_cast<uint32_t>(content.size()));
+  out += type;
+  out += content;
+}
+
+}  // namespace
+
+void SplatGlbOptions::validate() const {
+  const double off = (y_up * y_up.transpose() - Eigen::Matrix3d::Identity()).norm();
+  require(
+      off < 1e-6 && y_up.determinant() > 0, "SplatGlbOptions.y_up must be a rotation; error", off);
+}
+
+size_t write_splat_glb(const std::filesystem::path& path,
+                       const Gaussians& g,
+                       const Frame& frame,
+                       const SplatGlbOptions& options) {
+  options.validate();
+  require_writable(g);
+  require(g.size() > 0, "write_splat_glb: number of splats must be > 0", 0);
+  const double unit = frame.scale * (frame.has_metric_scale() ? frame.metres_per_unit : 1.0);
+  const Eigen::Vector3f center = median_position(g);
+  const auto placed = [&](size_t i) {
+    return Eigen::Vector3f((unit * (g.position[i] - center).cast<double>()).cast<float>());
+  };
+  const auto length = [&](size_t i) {
+    return Eigen::Vector3f((unit * g.scale[i].cast<double>()).cast<float>());
+  };
+  Eigen::AlignedBox3f box;
+  for (size_t i = 0; i < g.size(); ++i) {
+    box.extend(placed(i));
+    require(placed(i).allFinite() && length(i).allFinite(),
+            "write_splat_glb: splats must stay in the range of float; index",
+            i);
+  }
+  constexpr size_t kRoomForJson = size_t{1} << 20;
+  const size_t floats = 15 + 3 * static_cast<size_t>(g.sh_count());
+  if (g.size() > (std::numeric_limits<uint32_t>::max() - kRoomForJson) / (4 * floats)) {
+    throw LimitError("write_splat_glb: glTF binary files end at 4 GiB");
+  }
+  SplatBuffer buffer(g.size());
+  const auto named = [](const char* what) { return std::string(kExtension) + ":" + what; };
+  buffer.add("POSITION", "VEC3", placed);
+  buffer.set_bounds_of_last(box);
+  buffer.add("COLOR_0", "VEC4", [&](size_t i) {
+    const Eigen::Vector3f& dc = g.sh[i * static_cast<size_t>(g.sh_count())];
+    Eigen::Vector4f out = Eigen::Vector4f::Constant(g.opacity[i]);
+    for (int k = 0; k < 3; ++k) {
+      out[k] = linear_from_srgb(std::clamp(kShC0 * dc[k] + 0.5f, 0.0f, 1.0f));
+    }
+    return out;
+  });
+  buffer.add(named("ROTATION"), "VEC4", [&](size_t i) {
+    const Eigen::Vector4f q = g.rotation[i].normalized();
+    return Eigen::Vector4f(q[1], q[2], q[3], q[0]);
+  });
+  buffer.add(named("SCALE"), "VEC3", length);
+  buffer.add(named("OPACITY"), "SCALAR", [&](size_t i) { return std::array{g.opacity[i]}; });
+  add_harmonics(buffer, g);
+  Json document = buffer.document();
+  const Eigen::Quaterniond turn(options.y_up);
+  document["nodes"][0]["rotation"] = {turn.x(), turn.y(), turn.z(), turn.w()};
+  const Eigen::Vector3d origin = frame.world_from_internal(center.cast<double>());
+  document["asset"]["extras"] = {{"units", frame.has_metric_scale() ? "m" : "unknown"},
+                                 {"metres_per_unit", frame.metres_per_unit},
+                                 {"scale_source", scale_source_name(frame.scale_source)},
+                                 {"origin_in_world", {origin.x(), origin.y(), origin.z()}}};
+  std::string json = json_text(document, -1);
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const std::string binary = buffer.take_bytes();  // all floats: a multiple of four
+  std::string out = "glTF";
+  append_bytes(out, uint32_t{2});
+  append_bytes(out, static_cast<uint32_t>(12 + 8 + json.size() + 8 + binary.size()));
+  append_chunk(out, "JSON", json);
+  append_chunk(out, std::string_view("BIN\0", 4), binary);
+  write_file(path, out);
+  return out.size();
+}
+
+}  // namespace cgs

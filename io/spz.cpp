@@ -1,0 +1,374 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/spz.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "io/atomic_file.h"
+#include "io/byte_reader.h"
+#include "io/byte_writer.h"
+#include "io/compression.h"
+#include "io/splat_arrays.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr std::string_view kMagic = "NGSP";
+constexpr std::string_view kGzipMagic = "\x1f\x8b";
+constexpr size_t kHeaderBytes = 16;   // of versions 2 and 3
+constexpr size_t kHeader4Bytes = 32;  // of version 4
+constexpr double kColorScale = 0.15;
+constexpr int kMostFractionalBits = 23;
+
+/// Signs of the harmonics beyond degree 0 when y and z change theirs.
+constexpr std::array<float, 15> kShSigns = {-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1};
+
+struct Header {
+  uint32_t version = 0;
+  uint32_t count = 0;
+  int degree = 0;
+  int fractional_bits = 0;
+  uint8_t flags = 0;
+  uint8_t streams = 0;  // version 4
+
+  size_t sh_in_file() const {
+    constexpr std::array<size_t, 5> kCoefficients = {0, 3, 8, 15, 24};
+    return kCoefficients.at(static_cast<size_t>(degree));
+  }
+  size_t rotation_bytes() const { return version == 2 ? 3 : 4; }
+};
+
+Header header_of(ByteReader& reader) {
+  if (reader.take(4, "magic") != kMagic) reader.fail(Defect::Magic, "expected SPZ, no NGSP");
+  Header out;
+  out.version = reader.get<uint32_t>("version");
+  if (out.version < 2 || out.version > 4) {
+    reader.fail(Defect::Unsupported,
+                "SPZ version " + std::to_string(out.version) + ", known are 2, 3 and 4");
+  }
+  out.count = reader.get<uint32_t>("number of splats");
+  out.degree = reader.get<uint8_t>("degree");
+  out.fractional_bits = reader.get<uint8_t>("fractional bits");
+  out.flags = reader.get<uint8_t>("flags");
+  out.streams = reader.get<uint8_t>("reserved");
+  if (out.count == 0) reader.fail(Defect::Empty, "0 splats");
+  if (out.degree > 4) {
+    reader.fail(Defect::Schema, "degree " + std::to_string(out.degree) + ", allowed are 0 to 4");
+  }
+  if (out.fractional_bits > kMostFractionalBits) {
+    reader.fail(Defect::Schema,
+                std::to_string(out.fractional_bits) + " fractional bits, allowed are 0 to 23");
+  }
+  return out;
+}
+
+/// The parts of a file in their order: all of one attribute, then all of the next.
+enum Part : size_t { Positions, Opacities, Colors, Scales, Rotations, Harmonics, PartCount };
+
+constexpr std::array<const char*, PartCount> kPartNames = {
+    "positions", "opacities", "colours", "scales", "rotations", "harmonics"};
+
+std::array<size_t, PartCount> part_sizes(const Header& header) {
+  const size_t n = header.count;
+  return {9 * n, n, 3 * n, 3 * n, header.rotation_bytes() * n, 3 * header.sh_in_file() * n};
+}
+
+/// What the bytes of each part are once they are not compressed.
+struct Parts {
+  std::string storage;
+  std::array<std::string, PartCount> own;
+  std::array<std::string_view, PartCount> bytes;
+};
+
+Parts parts_of_one_stream(std::string_view file,
+                          const Header& header,
+                          const std::filesystem::path& path) {
+  const std::array<size_t, PartCount> sizes = part_sizes(header);
+  size_t total = kHeaderBytes;
+  for (const size_t size : sizes) total += size;
+  Parts out;
+  std::string_view all = file;
+  if (file.substr(0, 2) == kGzipMagic) {
+    out.storage = inflate(file, DeflateWrapping::Gzip, total, path, "SPZ content");
+    all = out.storage;
+  }
+  ByteReader reader(all, path);
+  (void)reader.take(kHeaderBytes, "header");
+  for (size_t k = 0; k < PartCount; ++k) out.bytes.at(k) = reader.take(sizes[k], kPartNames.at(k));
+  return out;
+}
+
+Parts parts_of_streams(std::string_view file,
+                       const Header& header,
+                       const std::filesystem::path& path) {
+  const std::array<size_t, PartCount> sizes = part_sizes(header);
+  ByteReader reader(file, path);
+  (void)reader.take(kHeaderBytes, "header");
+  const auto table_at = reader.get<uint32_t>("place of the table of streams");
+  if (table_at < kHeader4Bytes || table_at > file.size()) {
+    reader.fail(Defect::Schema, "the table of streams cannot begin at " + std::to_string(table_at));
+  }
+  const size_t needed = header.degree > 0 ? PartCount : size_t{Harmonics};
+  if (header.streams < needed) {
+    reader.fail(Defect::Schema,
+                std::to_string(header.streams) + " streams, needed are " + std::to_string(needed));
+  }
+  (void)reader.take(table_at - reader.offset(), "header");
+  ByteReader streams = reader;
+  (void)streams.take(16 * size_t{header.streams}, "table of streams");
+  Parts out;
+  for (size_t k = 0; k < needed; ++k) {
+    const auto packed = reader.get<uint64_t>("length of a stream");
+    const auto unpacked = reader.get<uint64_t>("length of a stream");
+    if (unpacked != sizes[k]) {
+      reader.fail(Defect::Count,
+                  std::string(kPartNames.at(k)) + " have " + std::to_string(unpacked) +
+                      " bytes, needed are " + std::to_string(sizes[k]));
+    }
+    const std::string_view stream = streams.take(packed, kPartNames.at(k));
+    out.own.at(k) = zstd_decompress(stream, sizes[k], path, kPartNames.at(k));
+    out.bytes.at(k) = out.own.at(k);
+  }
+  return out;
+}
+
+double byte_at(std::string_view bytes, size_t i) { return static_cast<uint8_t>(bytes[i]); }
+
+double fixed_point(std::string_view bytes, size_t i, double step) {
+  const uint32_t value = static_cast<uint8_t>(bytes[3 * i]) |
+                         uint32_t{static_cast<uint8_t>(bytes[3 * i + 1])} << 8 |
+                         uint32_t{static_cast<uint8_t>(bytes[3 * i + 2])} << 16;
+  return step * (static_cast<int32_t>(value << 8) >> 8);
+}
+
+/// (w, x, y, z) from three bytes x y z; w is what is left of the unit length.
+Eigen::Vector4f three_byte_rotation(std::string_view bytes, size_t i) {
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();
+  for (size_t k = 0; k < 3; ++k) v[static_cast<int>(k)] = byte_at(bytes, 3 * i + k) / 127.5 - 1;
+  const double w = std::sqrt(std::max(0.0, 1 - v.squaredNorm()));
+  return Eigen::Vector4d(w, v.x(), v.y(), v.z()).cast<float>();
+}
+
+/// The same from 32 bits: the index of the largest of (x, y, z, w) in two, the others, last one
+/// lowest, as sign and nine bits of up to 1 / sqrt 2.
+Eigen::Vector4f four_byte_rotation(std::string_view bytes, size_t i) {
+  uint32_t packed = 0;
+  std::memcpy(&packed, bytes.data() + 4 * i, 4);
+  const auto largest = static_cast<int>(packed >> 30);
+  Eigen::Vector4d q = Eigen::Vector4d::Zero();  // x, y, z, w
+  double rest = 1;
+  for (int k = 3; k >= 0; --k) {
+    if (k == largest) continue;
+    const double value = (packed & 511U) / 511.0 / std::numbers::sqrt2;
+    q[k] = (packed >> 9 & 1U) != 0 ? -value : value;
+    rest -= value * value;
+    packed >>= 10;
+  }
+  q[largest] = std::sqrt(std::max(0.0, rest));
+  return Eigen::Vector4d(q[3], q[0], q[1], q[2]).cast<float>();
+}
+
+RawSplats splats_of(const Parts& parts, const Header& header) {
+  RawSplats out;
+  out.format = "SPZ " + std::to_string(header.version);
+  out.sh_degree = std::min(header.degree, 3);
+  out.reserve(header.count);
+  if (header.degree > 3) out.notes.emplace_back("spherical harmonics of degree 4 left out");
+  if ((header.flags & 1U) != 0) out.notes.emplace_back("trained with antialiasing");
+  const double step = std::ldexp(1.0, -header.fractional_bits);
+  const size_t kept = out.sh_count() - 1;
+  for (size_t i = 0; i < header.count; ++i) {
+    const auto coordinate = [&](size_t k) {
+      return fixed_point(parts.bytes[Positions], 3 * i + k, step);
+    };
+    out.position.emplace_back(coordinate(0), -coordinate(1), -coordinate(2));
+    out.logit.push_back(logit_of_byte(static_cast<uint8_t>(parts.bytes[Opacities][i])));
+    Eigen::Vector3f color = Eigen::Vector3f::Zero();
+    Eigen::Vector3f scale = Eigen::Vector3f::Zero();
+    for (size_t k = 0; k < 3; ++k) {
+      const double c = byte_at(parts.bytes[Colors], 3 * i + k);
+      color[static_cast<int>(k)] = static_cast<float>((c / 255 - 0.5) / kColorScale);
+      const double s = byte_at(parts.bytes[Scales], 3 * i + k);
+      scale[static_cast<int>(k)] = static_cast<float>(s / 16 - 10);
+    }
+    out.log_scale.push_back(scale);
+    Eigen::Vector4f q = header.version == 2 ? three_byte_rotation(parts.bytes[Rotations], i)
+                                            : four_byte_rotation(parts.bytes[Rotations], i);
+    q.tail<2>() *= -1;
+    out.rotation.push_back(q);
+    out.sh.push_back(color);
+    for (size_t k = 0; k < kept; ++k) {
+      const size_t at = 3 * (i * header.sh_in_file() + k);
+      Eigen::Vector3f c = Eigen::Vector3f::Zero();
+      for (size_t channel = 0; channel < 3; ++channel) {
+        const double byte = byte_at(parts.bytes[Harmonics], at + channel);
+        c[static_cast<int>(channel)] = static_cast<float>((byte - 128) / 128);
+      }
+      out.sh.emplace_back(kShSigns.at(k) * c);
+    }
+  }
+  return out;
+}
+
+/// Fills the parts splat by splat and counts what had to be clamped.
+class Packer {
+ public:
+  Packer(const Gaussians& gaussians, const Frame& frame, int version, int bits)
+      : g_(gaussians), frame_(frame), version_(version), steps_(std::ldexp(1.0, bits)) {}
+
+  void add(size_t i) {
+    clamped_ = false;
+    Eigen::Vector3d p = frame_.file_from_internal(g_.position[i].cast<double>());
+    p.tail<2>() *= -1;
+    for (const double c : p) {
+      const auto value = static_cast<uint32_t>(std::lround(c * steps_));
+      for (const int shift : {0, 8, 16}) {
+        append_bytes(parts_[Positions], static_cast<uint8_t>(value >> shift));
+      }
+    }
+    append_bytes(parts_[Opacities], unit_byte(g_.opacity[i]));
+    const auto sh_count = static_cast<size_t>(g_.sh_count());
+    const Eigen::Vector3f* const sh = g_.sh.data() + i * sh_count;
+    for (const float c : sh[0]) add_byte(Colors, 255 * (kColorScale * c + 0.5));
+    for (const float s : g_.scale[i]) add_byte(Scales, 16 * (std::log(s * frame_.scale) + 10));
+    add_rotation(g_.rotation[i].cast<double>().normalized());
+    for (size_t k = 1; k < sh_count; ++k) {
+      for (const float c : sh[k]) add_byte(Harmonics, 128 + 128 * kShSigns.at(k - 1) * double{c});
+    }
+    clamped_splats_ += clamped_ ? 1 : 0;
+  }
+
+  std::string bytes(int bits) const {
+    std::string out(kMagic);
+    append_bytes(out, static_cast<uint32_t>(version_));
+    append_bytes(out, static_cast<uint32_t>(g_.size()));
+    append_bytes(out, static_cast<uint8_t>(g_.sh_degree));
+    append_bytes(out, static_cast<uint8_t>(bits));
+    append_bytes(out, uint16_t{0});  // flags, reserved
+    for (const std::string& part : parts_) out += part;
+    return out;
+  }
+
+  uint64_t clamped_splats() const { return clamped_splats_; }
+
+ private:
+  void add_byte(Part part, double value) {
+    const double rounded = std::round(value);
+    clamped_ = clamped_ || rounded < 0 || rounded > 255;
+    append_bytes(parts_.at(part), static_cast<uint8_t>(std::clamp(rounded, 0.0, 255.0)));
+  }
+
+  void add_rotation(const Eigen::Vector4d& wxyz) {
+    Eigen::Vector4d q(wxyz[1], -wxyz[2], -wxyz[3], wxyz[0]);  // x, y, z, w
+    if (version_ == 2) {
+      if (q[3] < 0) q = -q;
+      for (int k = 0; k < 3; ++k) add_byte(Rotations, 127.5 * (q[k] + 1));
+      return;
+    }
+    int largest = 0;
+    (void)q.cwiseAbs().maxCoeff(&largest);
+    if (q[largest] < 0) q = -q;
+    auto packed = static_cast<uint32_t>(largest);
+    for (int k = 0; k < 4; ++k) {
+      if (k == largest) continue;
+      const double magnitude =
+          std::min(511.0, std::round(511 * std::numbers::sqrt2 * std::abs(q[k])));
+      packed = packed << 10 | (q[k] < 0 ? 512U : 0U) | static_cast<uint32_t>(magnitude);
+    }
+    append_bytes(parts_[Rotations], packed);
+  }
+
+  const Gaussians& g_;
+  const Frame& frame_;
+  int version_;
+  double steps_;
+  std::array<std::string, PartCount> parts_;
+  uint64_t clamped_splats_ = 0;
+  bool clamped_ = false;
+};
+
+/// Fractional bits with which every position fits into 24 bits, see write_spz().
+int fitting_bits(const Gaussians& g, const Frame& frame) {
+  double farthest = 0;
+  std::array<std::vector<float>, 3> axes;
+  for (const Eigen::Vector3f& position : g.position) {
+    const Eigen::Vector3d p = frame.file_from_internal(position.cast<double>());
+    farthest = std::max(farthest, p.cwiseAbs().maxCoeff());
+    for (size_t k = 0; k < 3; ++k) axes.at(k).push_back(position[static_cast<int>(k)]);
+  }
+  double extent = 0;  // of the inner 98 %
+  for (std::vector<float>& values : axes) {
+    const auto cut = static_cast<ptrdiff_t>(values.size() / 100);
+    std::nth_element(values.begin(), values.begin() + cut, values.end());
+    const float low = values[static_cast<size_t>(cut)];
+    std::nth_element(values.begin(), values.end() - 1 - cut, values.end());
+    extent = std::max(extent, double{*(values.end() - 1 - cut)} - double{low});
+  }
+  extent *= frame.scale;
+  constexpr double kReach = (1 << 23) - 1;  // steps to either side
+  constexpr double kFineSteps = 1 << 16;    // across the scene, wanted
+  constexpr double kCoarseSteps = 1 << 10;  // needed
+  int bits = 12;
+  while (bits < kMostFractionalBits && std::ldexp(extent, bits) < kFineSteps) ++bits;
+  while (bits > 0 && std::ldexp(farthest, bits) > kReach) --bits;
+  const bool fits = std::ldexp(farthest, bits) <= kReach &&
+                    (extent == 0 || std::ldexp(extent, bits) >= kCoarseSteps || bits >= 12);
+  require(fits,
+          "write_spz: splats must lie within what 24 bits can tell apart; the farthest coordinate",
+          farthest);
+  return bits;
+}
+
+}  // namespace
+
+bool looks_like_spz(std::string_view bytes) {
+  return bytes.substr(0, 4) == kMagic || bytes.substr(0, 2) == kGzipMagic;
+}
+
+RawSplats parse_spz(std::string_view bytes, const std::filesystem::path& path) {
+  std::string start;
+  if (bytes.substr(0, 2) == kGzipMagic) {
+    start = gunzip_start(bytes, kHeaderBytes, path, "SPZ header");
+  }
+  ByteReader reader(start.empty() ? bytes : std::string_view(start), path);
+  const Header header = header_of(reader);
+  if (header.version == 4 && !start.empty()) {
+    throw BadInput(Defect::Schema, path, "SPZ 4 inside a gzip stream");
+  }
+  // Nothing compresses better than this; told before memory is taken.
+  constexpr size_t kSplatsPerByte = 1 << 12;
+  if (header.count / kSplatsPerByte > bytes.size()) {
+    reader.fail(Defect::Count,
+                "declares " + std::to_string(header.count) + " splats, " +
+                    std::to_string(bytes.size()) + " bytes cannot hold them");
+  }
+  return splats_of(header.version == 4 ? parts_of_streams(bytes, header, path)
+                                       : parts_of_one_stream(bytes, header, path),
+                   header);
+}
+
+void SpzOptions::validate() const {
+  require(version == 2 || version == 3, "SpzOptions.version must be 2 or 3", version);
+}
+
+SpzReport write_spz(const std::filesystem::path& path,
+                    const Gaussians& gaussians,
+                    const Frame& frame,
+                    const SpzOptions& options) {
+  options.validate();
+  require_writable(gaussians);
+  SpzReport report;
+  report.fractional_bits = fitting_bits(gaussians, frame);
+  Packer packer(gaussians, frame, options.version, report.fractional_bits);
+  for (size_t i = 0; i < gaussians.size(); ++i) packer.add(i);
+  report.clamped = packer.clamped_splats();
+  const std::string bytes = gzip(packer.bytes(report.fractional_bits));
+  report.bytes = bytes.size();
+  write_file(path, bytes);
+  return report;
+}
+
+}  // namespace cgs

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/splat_doctor.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+#include "tests/support/sample_splats.h"
+
+namespace cgs {
+namespace {
+
+/// A healthy file of the sample splats.
+RawSplats healthy(int count = 400) {
+  const Gaussians g = test::varied_splats(count, 1);
+  RawSplats out;
+  out.sh_degree = 1;
+  for (size_t i = 0; i < g.size(); ++i) {
+    out.position.emplace_back(g.position[i].cast<double>());
+    out.log_scale.emplace_back(g.scale[i].array().log());
+    out.rotation.push_back(g.rotation[i]);
+    out.logit.push_back(std::log(g.opacity[i] / (1 - g.opacity[i])));
+  }
+  out.sh = g.sh;
+  return out;
+}
+
+template <typename Damage>
+GaussianFile examined(const Damage& damage, int count = 400) {
+  RawSplats raw = healthy(count);
+  damage(raw);
+  return examine_splats(std::move(raw), "a.spz", Frame{});
+}
+
+bool warns(const GaussianFile& file, const std::string& text) {
+  for (const std::string& warning : file.warnings) {
+    if (warning.find(text) != std::string::npos) return true;
+  }
+  return false;
+}
+
+TEST(SplatDoctor, FindsNothingInAHealthyFile) {
+  const GaussianFile out = examined([](RawSplats&) {});
+  EXPECT_TRUE(out.warnings.empty());
+  EXPECT_EQ(out.findings.in_file, 400u);
+  EXPECT_EQ(out.findings.dropped(), 0u);
+  EXPECT_EQ(out.gaussians.sh, test::varied_splats(400, 1).sh);
+}
+
+TEST(SplatDoctor, CountsEveryDefectApart) {
+  const GaussianFile out = examined([](RawSplats& raw) {
+    raw.position[0].x() = std::numeric_limits<double>::quiet_NaN();
+    raw.sh[4 * 1 + 3].y() = std::numeric_limits<float>::infinity();
+    for (const size_t i : {2, 3, 4}) raw.rotation[i].setZero();
+    raw.logit[5] = -std::numeric_limits<float>::infinity();
+    raw.log_scale[6].x() = 300;
+    raw.logit[7] = std::numeric_limits<float>::infinity();
+    raw.log_scale[8].z() = -std::numeric_limits<float>::infinity();
+  });
+  EXPECT_EQ(out.findings.not_finite, 2u);
+  EXPECT_EQ(out.findings.without_rotation, 3u);
+  EXPECT_EQ(out.findings.transparent, 1u);
+  EXPECT_EQ(out.findings.out_of_range, 1u);
+  EXPECT_EQ(out.findings.clamped, 2u);
+  EXPECT_EQ(out.gaussians.size(), 393u);
+  EXPECT_TRUE(warns(out, "dropped 7 splats"));
+  EXPECT_TRUE(warns(out, "3 without rotation"));
+  // The others stay what they were, in their order.
+  const Gaussians g = test::varied_splats(400, 1);
+  EXPECT_EQ(out.gaussians.position[2], g.position[9]);
+  EXPECT_EQ(out.gaussians.rotation[2], g.rotation[9]);
+  EXPECT_EQ(out.gaussians.sh[4 * 2 + 3], g.sh[4 * 9 + 3]);
+}
+
+// Rows that were never written: drawn, they would be opaque balls at the origin.
+TEST(SplatDoctor, DropsRowsOfZeros) {
+  const GaussianFile out = examined([](RawSplats& raw) {
+    const size_t good = raw.size();
+    raw.position.resize(5000, Eigen::Vector3d::Zero());
+    raw.log_scale.resize(5000, Eigen::Vector3f::Zero());
+    raw.rotation.resize(5000, Eigen::Vector4f::Zero());
+    raw.logit.resize(5000, 0);
+    raw.sh.resize(4 * 5000, Eigen::Vector3f::Zero());
+    EXPECT_EQ(good, 400u);
+  });
+  EXPECT_EQ(out.gaussians.size(), 400u);
+  EXPECT_EQ(out.findings.without_rotation, 4600u);
+}
+
+TEST(SplatDoctor, ReadsLengthsAndProbabilitiesAsWhatTheyAre) {
+  const Gaussians g = test::varied_splats(3000, 1);
+  const GaussianFile out = examined(
+      [&](RawSplats& raw) {
+        for (size_t i = 0; i < raw.size(); ++i) {
+          raw.log_scale[i] = g.scale[i];
+          raw.logit[i] = g.opacity[i];
+        }
+      },
+      3000);
+  EXPECT_TRUE(out.findings.linear_scales);
+  EXPECT_TRUE(out.findings.linear_opacity);
+  for (size_t i = 0; i < g.size(); ++i) {
+    EXPECT_NEAR(out.gaussians.scale[i].x(), g.scale[i].x(), 1e-6f);
+    EXPECT_NEAR(out.gaussians.opacity[i], g.opacity[i], 1e-6f);
+  }
+}
+
+TEST(SplatDoctor, DoesNotTakeLargeSplatsForLengths) {
+  const GaussianFile out = examined([](RawSplats& raw) {  // a few, as wide as the scene
+    raw.position = {{0, 0, 0}, {10, 0, 0}, {0, 10, 0}};
+    raw.log_scale.assign(3, Eigen::Vector3f(1, 0.5f, 0.5f));
+    raw.rotation.resize(3);
+    raw.logit.resize(3);
+    raw.sh.resize(12);
+  });
+  EXPECT_FALSE(out.findings.linear_scales);
+  EXPECT_FLOAT_EQ(out.gaussians.scale[0].x(), std::exp(1.0f));
+  EXPECT_TRUE(warns(out, "read as logarithms"));
+}
+
+TEST(SplatDoctor, CountsFlyawaysAndKeepsThem) {
+  const GaussianFile out = examined([](RawSplats& raw) {
+    raw.position[3].x() = 100;
+    raw.position[4].z() = -1e6;
+  });
+  EXPECT_EQ(out.findings.flyaways, 2u);
+  EXPECT_EQ(out.gaussians.size(), 400u);
+  EXPECT_TRUE(warns(out, "2 splats more than ten times"));
+}
+
+TEST(SplatDoctor, RefusesAFileOfNothing) {
+  const auto nothing = [](RawSplats& raw) {
+    for (auto& q : raw.rotation) q.setZero();
+  };
+  EXPECT_THROW(examined(nothing), BadInput);
+}
+
+}  // namespace
+}  // namespace cgs

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/spz.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+#include <zstd.h>
+
+#include "io/byte_writer.h"
+#include "io/splat_reader.h"
+#include "libcgs/render/spherical_harmonics.h"
+#include "tests/support/full_disk.h"
+#include "tests/support/sample_mesh.h"
+#include "tests/support/sample_splats.h"
+
+namespace cgs {
+namespace {
+
+/// The bytes of a gzip file by zlib's own reader.
+std::string unzipped(const std::filesystem::path& path) {
+  gzFile file = gzopen(path.c_str(), "rb");
+  std::string out(size_t{1} << 20, '\0');
+  const int n = gzread(file, out.data(), static_cast<unsigned>(out.size()));
+  gzclose(file);
+  out.resize(static_cast<size_t>(std::max(n, 0)));
+  return out;
+}
+
+struct SpzBytes {
+  uint32_t version = 2, count = 2;
+  uint8_t degree = 0, fractional_bits = 8, flags = 0, last = 0;
+  std::string header() const {
+    std::string out = "NGSP";
+    append_bytes(out, version);
+    append_bytes(out, count);
+    for (const uint8_t byte : {degree, fractional_bits, flags, last}) append_bytes(out, byte);
+    return out;
+  }
+};
+
+std::string text(std::initializer_list<int> bytes) {
+  std::string out;
+  for (const int byte : bytes) out.push_back(static_cast<char>(byte));
+  return out;
+}
+
+/// Two splats: (1, -2, 0.5) and (-1/256, 0, 3) in the axes of SPZ, 8 fractional bits.
+const std::string kPositions =
+    text({0, 1, 0, 0, 254, 255, 128, 0, 0, 255, 255, 255, 0, 0, 0, 0, 3, 0});
+const std::string kOpacities = text({255, 51});
+const std::string kColors = text({255, 0, 128, 0, 255, 51});
+const std::string kScales = text({160, 144, 0, 255, 128, 160});
+const std::string kRotations2 = text({255, 128, 128, 128, 255, 128});  // half a turn about x, y
+// The largest entry in the two highest bits; identity, and 511 / 511 / sqrt 2 about y with w.
+const std::string kRotations3 = text({0, 0, 0, 192, 0, 0xfc, 0x07, 192});
+
+RawSplats parsed(const std::string& bytes) { return parse_spz(bytes, "a.spz"); }
+
+std::string defect(const std::string& bytes) {
+  return test::defect_of(bytes, [](const auto& path) { (void)read_splats(path); });
+}
+
+void expect_the_two_splats(const RawSplats& out) {
+  ASSERT_EQ(out.size(), 2u);
+  EXPECT_EQ(out.position[0], Eigen::Vector3d(1, 2, -0.5));
+  EXPECT_EQ(out.position[1], Eigen::Vector3d(-1.0 / 256, 0, -3));
+  EXPECT_GT(out.logit[0], std::log(254.5 / 0.5));
+  EXPECT_NEAR(out.logit[1], std::log(0.2 / 0.8), 1e-6);
+  EXPECT_LT((out.sh[0] - Eigen::Vector3f(0.5f, -0.5f, 0.5f / 255) / 0.15f).norm(), 1e-5f);
+  EXPECT_EQ(out.log_scale[0], Eigen::Vector3f(0, -1, -10));
+}
+
+TEST(Spz, ReadsVersions2And3InOneStreamCompressedOrNot) {
+  SpzBytes two;
+  const std::string v2 = two.header() + kPositions + kOpacities + kColors + kScales + kRotations2;
+  const RawSplats a = parsed(v2);
+  expect_the_two_splats(a);
+  EXPECT_LT(test::angle_between(a.rotation[0], {0, 1, 0, 0}), 0.02);
+  EXPECT_LT(test::angle_between(a.rotation[1], {0, 0, 1, 0}), 0.02);
+  SpzBytes three;
+  three.version = 3;
+  const std::string v3 = three.header() + kPositions + kOpacities + kColors + kScales + kRotations3;
+  const RawSplats b = parsed(v3);
+  expect_the_two_splats(b);
+  EXPECT_EQ(b.rotation[0], Eigen::Vector4f(1, 0, 0, 0));
+  // A quarter turn about +y of SPZ is one about -y of PLY axes.
+  EXPECT_LT(test::angle_between(b.rotation[1], {1, 0, -1, 0}), 1e-3);
+  EXPECT_EQ(b.format, "SPZ 3");
+}
+
+TEST(Spz, ReadsTheStreamsOfVersion4) {
+  SpzBytes four;
+  four.version = 4;
+  four.last = 5;
+  std::string out = four.header();
+  append_bytes(out, uint32_t{32});
+  out.resize(32, '\0');
+  std::string streams;
+  for (const std::string& part : {kPositions, kOpacities, kColors, kScales, kRotations3}) {
+    std::string packed(ZSTD_compressBound(part.size()), '\0');
+    packed.resize(ZSTD_compress(packed.data(), packed.size(), part.data(), part.size(), 3));
+    append_bytes(out, uint64_t{packed.size()});
+    append_bytes(out, uint64_t{part.size()});
+    streams += packed;
+  }
+  out += streams;
+  expect_the_two_splats(parsed(out));
+  test::expect_every_truncation_is_refused(out, [](const auto& path) { (void)read_splats(path); });
+  std::string wrong = out;
+  wrong[40] = 17;  // bytes of the positions
+  EXPECT_EQ(defect(wrong), "COUNT");
+  std::string late = out;
+  late[17] = 1;  // the table of streams beyond the file
+  EXPECT_EQ(defect(late), "SCHEMA");
+}
+
+TEST(Spz, RefusesWhatItDoesNotKnow) {
+  const auto with = [](const auto& change) {
+    SpzBytes header;
+    change(header);
+    return defect(header.header() + kPositions + kOpacities + kColors + kScales + kRotations2);
+  };
+  EXPECT_EQ(with([](SpzBytes&) {}), "OK");
+  EXPECT_EQ(with([](SpzBytes& h) { h.version = 1; }), "UNSUPPORTED");
+  EXPECT_EQ(with([](SpzBytes& h) { h.version = 5; }), "UNSUPPORTED");
+  EXPECT_EQ(with([](SpzBytes& h) { h.count = 0; }), "EMPTY");
+  EXPECT_EQ(with([](SpzBytes& h) { h.count = 3; }), "TRUNCATED");
+  EXPECT_EQ(with([](SpzBytes& h) { h.count = 4'000'000'000; }), "COUNT");
+  EXPECT_EQ(with([](SpzBytes& h) { h.degree = 5; }), "SCHEMA");
+  EXPECT_EQ(with([](SpzBytes& h) { h.fractional_bits = 24; }), "SCHEMA");
+}
+
+TEST(Spz, ComesBackWithinHalfAStep) {
+  const Frame frame = test::centimetre_frame();
+  for (const int version : {2, 3}) {
+    for (const int degree : {0, 3}) {
+      const test::TempDir dir;
+      const Gaussians g = test::varied_splats(500, degree);
+      const SpzReport report = write_spz(dir / "a.spz", g, frame, {.version = version});
+      EXPECT_EQ(report.clamped, 0u);
+      EXPECT_EQ(report.bytes, std::filesystem::file_size(dir / "a.spz"));
+      Frame back_frame = frame;
+      const GaussianFile back = read_splats(dir / "a.spz", back_frame);
+      ASSERT_EQ(back.gaussians.size(), g.size());
+      const double half = std::ldexp(0.5, -report.fractional_bits) / frame.scale * 1.001 + 1e-7;
+      for (size_t i = 0; i < g.size(); ++i) {
+        EXPECT_LT((back.gaussians.position[i] - g.position[i]).cwiseAbs().maxCoeff(), half);
+        const Eigen::Array3f ratio = back.gaussians.scale[i].array() / g.scale[i].array();
+        EXPECT_LT(ratio.log().abs().maxCoeff(), 0.5f / 16 * 1.001f);
+        EXPECT_LT(std::abs(back.gaussians.opacity[i] - g.opacity[i]), 0.5f / 255 * 1.001f);
+        // Three entries within half a step each; the fourth follows, badly where it is small.
+        EXPECT_LT(test::angle_between(back.gaussians.rotation[i], g.rotation[i]),
+                  version == 3 ? 0.004 : 0.3);
+      }
+      for (size_t k = 0; k < g.sh.size(); ++k) {
+        const bool constant = k % static_cast<size_t>(g.sh_count()) == 0;
+        const float step = constant ? 1 / (255 * 0.15f) : 1.0f / 128;
+        EXPECT_LT((back.gaussians.sh[k] - g.sh[k]).cwiseAbs().maxCoeff(), 0.5f * step * 1.001f);
+      }
+    }
+  }
+}
+
+// The file is in right-up-back axes: colours must be those of the same splat seen in them.
+TEST(Spz, TurnsHarmonicsWithTheAxes) {
+  const test::TempDir dir;
+  const Gaussians g = test::varied_splats(4, 3);
+  write_spz(dir / "a.spz", g, Frame{});
+  const std::string bytes = unzipped(dir / "a.spz");
+  const size_t at = 16 + 4 * (9 + 1 + 3 + 3 + 4);
+  ASSERT_EQ(bytes.size(), at + 4 * 45);
+  const Eigen::Vector3f direction = Eigen::Vector3f(0.3f, -0.8f, 0.5f).normalized();
+  const Eigen::Vector3f turned(direction.x(), -direction.y(), -direction.z());
+  for (size_t i = 0; i < 4; ++i) {
+    std::vector<Eigen::Vector3f> in_file = {g.sh[16 * i]};
+    for (size_t k = 0; k < 15; ++k) {
+      Eigen::Vector3f c = Eigen::Vector3f::Zero();
+      for (size_t channel = 0; channel < 3; ++channel) {
+        const auto byte = static_cast<uint8_t>(bytes[at + 45 * i + 3 * k + channel]);
+        c[static_cast<int>(channel)] = (static_cast<float>(byte) - 128) / 128;
+      }
+      in_file.push_back(c);
+    }
+    const Eigen::Vector3f expected = sh_color({g.sh.data() + 16 * i, 16}, 3, direction);
+    EXPECT_LT((sh_color(in_file, 3, turned) - expected).norm(), 0.05f);
+  }
+}
+
+TEST(Spz, FitsTheFractionalBitsToTheScene) {
+  const test::TempDir dir;
+  const Gaussians g = test::varied_splats(300, 0);
+  const auto bits = [&](double scale, double origin) {
+    Frame frame;
+    frame.scale = scale;
+    frame.origin = Eigen::Vector3d::Constant(origin);
+    return write_spz(dir / "a.spz", g, frame).fractional_bits;
+  };
+  EXPECT_EQ(bits(32, 0), 12);
+  EXPECT_EQ(bits(12'000, 0), 10);   // beyond +-2048
+  EXPECT_EQ(bits(0.0625, 0), 21);   // a step of 2^-16 of the scene
+  EXPECT_EQ(bits(64, 100'000), 6);  // coarse, but a thousandth of the scene
+  EXPECT_THROW(bits(1, 100'000), InvalidInput);
+  EXPECT_THROW(bits(1, 1e9), InvalidInput);
+}
+
+TEST(Spz, CountsWhatBytesCannotHold) {
+  const test::TempDir dir;
+  Gaussians g = test::varied_splats(5, 0);
+  g.sh[1].x() = 9;
+  g.scale[3].y() = 1e-9f;
+  EXPECT_EQ(write_spz(dir / "a.spz", g, Frame{}).clamped, 2u);
+}
+
+TEST(Spz, SameSplatsGiveTheSameFile) {
+  const test::TempDir dir;
+  const Gaussians g = test::varied_splats(100, 1);
+  write_spz(dir / "a.spz", g, Frame{});
+  write_spz(dir / "b.spz", g, Frame{});
+  EXPECT_EQ(test::read_bytes(dir / "a.spz"), test::read_bytes(dir / "b.spz"));
+  test::expect_every_truncation_is_refused(
+      test::read_bytes(dir / "a.spz"), [](const auto& path) { (void)read_splats(path); }, 16);
+}
+
+TEST(Spz, NoticesAFullDisk) {
+  test::expect_full_disk_is_noticed(
+      [](const auto& path) { write_spz(path, test::varied_splats(100, 0), Frame{}); });
+}
+
+}  // namespace
+}  // namespace cgs

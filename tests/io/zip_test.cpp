@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/zip.h"
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+#include "tests/support/zip_bytes.h"
+
+namespace cgs {
+namespace {
+
+const std::string kText(5000, 'a');
+
+std::string defect(const std::string& bytes, const std::string& name = "a.txt") {
+  try {
+    (void)ZipArchive(bytes, "x.sog").read(name, 10'000);
+  } catch (const BadInput& error) {
+    return std::string(defect_name(error.defect()));
+  } catch (const LimitError&) {
+    return "LIMIT";
+  }
+  return "OK";
+}
+
+TEST(Zip, ReadsStoredAndDeflatedFiles) {
+  for (const uint16_t method : {uint16_t{0}, uint16_t{8}}) {
+    const std::string bytes = test::zip_bytes({{"a.txt", kText}, {"b/c.bin", "xyz"}},
+                                              {.method = method, .comment = "hi"});
+    const ZipArchive archive(bytes, "x.sog");
+    EXPECT_EQ(archive.read("a.txt", 5000), kText);
+    EXPECT_EQ(archive.read("b/c.bin", 5000), "xyz");
+    EXPECT_TRUE(archive.has("b/c.bin"));
+    EXPECT_FALSE(archive.has("c.bin"));
+  }
+}
+
+TEST(Zip, RefusesWhatItCannotTrust) {
+  using Files = std::vector<std::pair<std::string, std::string>>;
+  const Files files = {{"a.txt", kText}};
+  EXPECT_EQ(defect(test::zip_bytes(files)), "OK");
+  EXPECT_EQ(defect(test::zip_bytes(files), "b.txt"), "MISSING");
+  EXPECT_EQ(defect(test::zip_bytes(files, {.checksum_change = 1})), "MISMATCH");
+  EXPECT_EQ(defect(test::zip_bytes(files, {.method = 12})), "UNSUPPORTED");
+  EXPECT_EQ(defect(test::zip_bytes(files, {.flags = 1})), "UNSUPPORTED");
+  EXPECT_EQ(defect(test::zip_bytes({{"a.txt", kText}, {"a.txt", "b"}})), "SCHEMA");
+  EXPECT_EQ(defect(test::zip_bytes({{"a.txt", std::string(20'000, 'a')}})), "LIMIT");
+  EXPECT_EQ(defect("PK\x03\x04 and nothing more"), "TRUNCATED");
+}
+
+TEST(Zip, RefusesEveryTruncation) {
+  const std::string whole = test::zip_bytes({{"a.txt", kText}}, {.method = 8});
+  for (size_t n = 0; n < whole.size(); ++n) {
+    EXPECT_NE(defect(whole.substr(0, n)), "OK") << n;
+  }
+}
+
+}  // namespace
+}  // namespace cgs
