@@ -30,7 +30,8 @@ struct SimplifyResult {
   MeshDistance evidence;  ///< Measured from samples of all faces but the Inferred ones to the other
                           ///< mesh: accuracy from the result, completeness from the input.
   MeshDistance inferred;  ///< The same from samples of Inferred faces.
-  std::array<double, kProvenanceCount> area_before = {};  ///< By provenance [internal units squared].
+  std::array<double, kProvenanceCount> area_before =
+      {};  ///< By provenance [internal units squared].
   std::array<double, kProvenanceCount> area_after = {};
   int rounds = 0;        ///< Times the collapses were run.
   size_t tightened = 0;  ///< Input vertices held nearer, to end a violation found by measuring.

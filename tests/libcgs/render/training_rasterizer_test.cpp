@@ -15,7 +15,6 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/render/projection_gradient.h"
-#include "libcgs/render/projection_gradient.h"
 #include "libcgs/render/rasterizer.h"
 #include "tests/support/reference_rasterizer.h"
 #include "tests/support/reference_training_rasterizer.h"
