@@ -156,7 +156,7 @@ struct FaceWriter {
 void write_faces(AtomicFile& file, const TriangleMesh& mesh, const ObjTexture& texture) {
   const std::vector<std::vector<uint64_t>> numbers = write_texcoords(file, mesh, texture);
   const FaceWriter writer{file, !mesh.normals.empty()};
-  std::vector<std::vector<size_t>> faces(4 * (texture.images.size() + 1));
+  std::vector<std::vector<size_t>> faces(kProvenanceCount * (texture.images.size() + 1));
   const auto slot = [&](size_t group, int photograph) {
     return group * (texture.images.size() + 1) + static_cast<size_t>(photograph + 1);
   };

@@ -98,6 +98,11 @@ struct Unknowns {
   double* lens(size_t i) { return cameras.data() + kPerPhoto * photos + kPerLens * i; }
   double* point(size_t i) { return points.data() + 3 * i; }
 
+  // A length that was held keeps its last bit.
+  double focal(size_t i, const Lens& before) {
+    return lens(i)[0] == std::log(before.focal) ? before.focal : std::exp(lens(i)[0]);
+  }
+
   void write_to(Reconstruction& scene) {
     for (size_t i = 0; i < photos; ++i) {
       if (!scene.poses[i]) continue;
@@ -107,7 +112,7 @@ struct Unknowns {
     }
     for (size_t i = 0; i < scene.lenses.size(); ++i) {
       scene.lenses[i] = {
-          std::exp(lens(i)[0]), lens(i)[1], Eigen::Map<Eigen::Vector2d>(lens(i) + 2)};
+          focal(i, scene.lenses[i]), lens(i)[1], Eigen::Map<Eigen::Vector2d>(lens(i) + 2)};
     }
     for (size_t i = 0; i < scene.tracks.size(); ++i) {
       if (scene.tracks[i].is_known) {
@@ -151,15 +156,18 @@ void hold_gauge(const BundleOptions& options, Unknowns& unknowns, ceres::Problem
   }
 }
 
-void hold_lenses(const std::vector<LensPrior>& priors,
-                 const BundleOptions& options,
-                 Unknowns& unknowns,
-                 ceres::Problem& problem) {
+// \return per lens, whether its focal length is held
+std::vector<bool> hold_lenses(const std::vector<LensPrior>& priors,
+                              const BundleOptions& options,
+                              Unknowns& unknowns,
+                              ceres::Problem& problem) {
+  std::vector<bool> held(priors.size(), true);
   for (size_t i = 0; i < priors.size(); ++i) {
     double* const lens = unknowns.lens(i);
     if (!problem.HasParameterBlock(lens)) continue;
     const bool is_exact = priors[i].focal > 0 && priors[i].sigma == 0;
     const bool solve_focal = options.solve_focal && !is_exact;
+    held[i] = !solve_focal;
     if (!solve_focal && !options.solve_shape) {
       problem.SetParameterBlockConstant(lens);
     } else if (!solve_focal) {
@@ -180,6 +188,7 @@ void hold_lenses(const std::vector<LensPrior>& priors,
           lens);
     }
   }
+  return held;
 }
 
 ceres::Solver::Options solver_options(const BundleOptions& options,
@@ -218,7 +227,9 @@ struct CameraColumns {
   int count = 0;
 };
 
-CameraColumns camera_columns(Unknowns& unknowns, size_t lenses, const ceres::Problem& problem) {
+CameraColumns camera_columns(Unknowns& unknowns,
+                             const std::vector<bool>& held_focal,
+                             const ceres::Problem& problem) {
   CameraColumns out;
   const auto add = [&](double* block) {
     if (!problem.HasParameterBlock(block) || problem.IsParameterBlockConstant(block)) return false;
@@ -230,9 +241,10 @@ CameraColumns camera_columns(Unknowns& unknowns, size_t lenses, const ceres::Pro
     add(unknowns.rotation(i));
     add(unknowns.translation(i));
   }
-  for (size_t i = 0; i < lenses; ++i) {
+  for (size_t i = 0; i < held_focal.size(); ++i) {
     const int column = out.count;
-    out.column_of_lens.push_back(add(unknowns.lens(i)) ? column : -1);
+    const bool is_free = add(unknowns.lens(i)) && !held_focal[i];
+    out.column_of_lens.push_back(is_free ? column : -1);
   }
   return out;
 }
@@ -269,9 +281,10 @@ Eigen::MatrixXd reduced_normal_equations(const ceres::CRSMatrix& jacobian, int c
 }
 
 std::vector<double> focal_sigmas(const Reconstruction& scene,
+                                 const std::vector<bool>& held_focal,
                                  Unknowns& unknowns,
                                  ceres::Problem& problem) {
-  const CameraColumns cameras = camera_columns(unknowns, scene.lenses.size(), problem);
+  const CameraColumns cameras = camera_columns(unknowns, held_focal, problem);
   ceres::Problem::EvaluateOptions options;
   options.num_threads = 1;
   options.parameter_blocks = cameras.blocks;
@@ -310,12 +323,12 @@ std::vector<double> adjust_bundle(Reconstruction& scene,
   add_sightings(scene, unknowns, &loss, problem);
   if (problem.NumResidualBlocks() == 0) return std::vector<double>(scene.lenses.size(), 0.0);
   hold_gauge(options, unknowns, problem);
-  hold_lenses(priors, options, unknowns, problem);
+  const std::vector<bool> held_focal = hold_lenses(priors, options, unknowns, problem);
   ceres::Solver::Summary summary;
   ceres::Solve(solver_options(options, scene, unknowns, problem), &problem, &summary);
   if (summary.IsSolutionUsable()) unknowns.write_to(scene);
   if (!with_sigma) return std::vector<double>(scene.lenses.size(), 0.0);
-  return focal_sigmas(scene, unknowns, problem);
+  return focal_sigmas(scene, held_focal, unknowns, problem);
 }
 
 }  // namespace cgs

@@ -89,7 +89,8 @@ Camera camera_towards(const Eigen::Vector3d& eye,
 }
 
 std::vector<Camera> cameras_outside(const Ball& ball, int views, int size) {
-  const double distance = ball.radius / std::sin(0.5 * kFieldOfView);
+  // The corners of the box around the ball must be seen, too: what nobody sees may be solid.
+  const double distance = std::sqrt(2.0) * ball.radius / std::sin(0.5 * kFieldOfView);
   const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
   std::vector<Camera> out;
   for (int i = 0; i < views; ++i) {

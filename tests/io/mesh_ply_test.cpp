@@ -177,7 +177,7 @@ TEST(MeshPly, RefusesArraysThatDoNotFit) {
   refused([](TriangleMesh& m) { m.support.pop_back(); });
   refused([](TriangleMesh& m) { m.sigma.pop_back(); });
   refused([](TriangleMesh& m) { m.provenance.pop_back(); });
-  refused([](TriangleMesh& m) { m.provenance[0] = static_cast<Provenance>(4); });
+  refused([](TriangleMesh& m) { m.provenance[0] = static_cast<Provenance>(kProvenanceCount); });
   refused([](TriangleMesh& m) { m.vertices[3].x() = std::nanf(""); });
   refused([](TriangleMesh& m) { m.faces[3][1] = static_cast<uint32_t>(m.vertices.size()); });
   EXPECT_EQ(test::entries(dir.path()), 0);
