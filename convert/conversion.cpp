@@ -101,21 +101,14 @@ Content wanted_content(const ConversionRequest& request, Content from) {
   };
   const bool known_as = request.as.empty() || request.as == "mesh" || request.as == "splats";
   require(known_as, "--as must be mesh or splats", request.as);
+  require(is({".ply", ".splat", ".spz", ".vdb", ".obj", ".stl", ".3mf", ".glb"}),
+          "the output must end in .ply, .splat, .spz, .vdb, .obj, .stl, .3mf or .glb",
+          extension.empty() ? "without an ending" : extension);
+  const bool stays = is({".ply"}) && request.as.empty() && from == Content::Splats;
+  const bool asked = is({".ply", ".glb"}) && request.as == "splats";
   Content out = Content::Mesh;
-  if (is({".splat", ".spz"})) {
-    out = Content::Splats;
-  } else if (is({".vdb"})) {
-    out = Content::Volume;
-  } else if (is({".ply"})) {
-    const bool stays = request.as.empty() && from == Content::Splats;
-    out = stays || request.as == "splats" ? Content::Splats : Content::Mesh;
-  } else if (extension == ".glb" && request.as == "splats") {
-    out = Content::Splats;
-  } else {
-    require(is({".obj", ".stl", ".3mf", ".glb"}),
-            "the output must end in .ply, .splat, .spz, .vdb, .obj, .stl, .3mf or .glb",
-            extension.empty() ? "without an ending" : extension);
-  }
+  if (is({".vdb"})) out = Content::Volume;
+  if (is({".splat", ".spz"}) || stays || asked) out = Content::Splats;
   const bool asked_other = (request.as == "mesh" && out != Content::Mesh) ||
                            (request.as == "splats" && out != Content::Splats);
   require(!asked_other, "--as must fit the output: " + extension + " cannot hold that", request.as);

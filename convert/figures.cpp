@@ -77,8 +77,9 @@ std::string figure_text(const MeasuredValue& value,
                         bool states_provenance) {
   const double sigma = figure_sigma(value, unit);
   std::string out = number(figure_value(value, unit));
-  out += std::isfinite(sigma) ? " ± " + number(sigma) : " (no sigma stated)";
+  if (std::isfinite(sigma)) out += " ± " + number(sigma);
   out += ' ' + unit_text(unit, value.dimension);
+  if (!std::isfinite(sigma)) out += " (no sigma stated)";
   if (!states_provenance) return out;
   std::string parts;
   for (const Provenance label : kProvenanceOrder) {

@@ -43,6 +43,7 @@ double share_within(const std::vector<Deviation>& deviations, double threshold) 
 
 double range_of(const std::vector<Deviation>& deviations) {
   std::vector<double> sizes;
+  sizes.reserve(deviations.size());
   for (const Deviation& d : deviations) sizes.push_back(std::abs(d.distance));
   std::sort(sizes.begin(), sizes.end());
   const double most = sizes.empty() ? 0 : sizes[(sizes.size() - 1) * 98 / 100];

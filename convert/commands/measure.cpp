@@ -60,7 +60,9 @@ class Measuring {
   Measuring(MeasurableMesh mesh, FigureUnit unit, bool json)
       : mesh_(std::move(mesh)), unit_(std::move(unit)), json_(json) {}
 
-  void figure(const std::string& name, const MeasuredValue& value, Json more = Json::object()) {
+  void figure(const std::string& name,
+              const MeasuredValue& value,
+              const Json& more = Json::object()) {
     Json out = figure_json(value, unit_, mesh_.states_provenance());
     out.update(more);
     figures[name] = std::move(out);
