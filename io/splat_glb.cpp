@@ -114,6 +114,17 @@ void append_chunk(std::string& out, std::string_view type, const std::string& co
   out += content;
 }
 
+/// \pre binary has a multiple of four bytes
+std::string glb_bytes(std::string json, const std::string& binary) {
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  std::string out = "glTF";
+  append_bytes(out, uint32_t{2});
+  append_bytes(out, static_cast<uint32_t>(12 + 8 + json.size() + 8 + binary.size()));
+  append_chunk(out, "JSON", json);
+  append_chunk(out, std::string_view("BIN\0", 4), binary);
+  return out;
+}
+
 }  // namespace
 
 void SplatGlbOptions::validate() const {
@@ -176,14 +187,7 @@ size_t write_splat_glb(const std::filesystem::path& path,
                                  {"metres_per_unit", frame.metres_per_unit},
                                  {"scale_source", scale_source_name(frame.scale_source)},
                                  {"origin_in_world", {origin.x(), origin.y(), origin.z()}}};
-  std::string json = json_text(document, -1);
-  json.resize((json.size() + 3) / 4 * 4, ' ');
-  const std::string binary = buffer.take_bytes();  // all floats: a multiple of four
-  std::string out = "glTF";
-  append_bytes(out, uint32_t{2});
-  append_bytes(out, static_cast<uint32_t>(12 + 8 + json.size() + 8 + binary.size()));
-  append_chunk(out, "JSON", json);
-  append_chunk(out, std::string_view("BIN\0", 4), binary);
+  const std::string out = glb_bytes(json_text(document, -1), buffer.take_bytes());
   write_file(path, out);
   return out.size();
 }
