@@ -215,13 +215,13 @@ float CoherentGaussians::add_shape_gradient(size_t n,
   const Eigen::Matrix3d G = as_matrix(gradient);
   const Eigen::Vector3d normal = P.col(0).cross(P.col(1)).normalized();
   const double thickness = double(options_.min_radius) * z * pixel_size(view.camera);
-  const Eigen::Matrix2d of_L = 2 * P.transpose() * G * P * L;
+  const Eigen::Matrix2d of_triangle = 2 * P.transpose() * G * P * L;
   float* sum = &shape.gradient[k * kShapeSize];
-  sum[0] += static_cast<float>(of_L(0, 0) * L(0, 0));
-  sum[1] += static_cast<float>(of_L(1, 1) * L(1, 1));
-  sum[2] += static_cast<float>(of_L(1, 0));
+  sum[0] += static_cast<float>(of_triangle(0, 0) * L(0, 0));
+  sum[1] += static_cast<float>(of_triangle(1, 1) * L(1, 1));
+  sum[2] += static_cast<float>(of_triangle(1, 0));
   const double of_size =
-      of_L.cwiseProduct(L).sum() + 2 * thickness * thickness * normal.dot(G * normal);
+      of_triangle.cwiseProduct(L).sum() + 2 * thickness * thickness * normal.dot(G * normal);
   return static_cast<float>(of_size);
 }
 
