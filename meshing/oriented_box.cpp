@@ -51,10 +51,10 @@ Eigen::Vector3d extents_along(const MeasurableMesh& mesh,
 
 Eigen::Matrix3d smallest_box_axes(const MeasurableMesh& mesh,
                                   const std::vector<uint32_t>& vertices) {
-  const Eigen::Matrix3d principal = principal_axes(mesh, vertices);
-  const Eigen::Vector3d sizes = extents_along(mesh, vertices, principal);
+  Eigen::Matrix3d axes = principal_axes(mesh, vertices);
+  const Eigen::Vector3d sizes = extents_along(mesh, vertices, axes);
   constexpr double kFlat = 1e-9;  // of the largest extent
-  if (sizes.minCoeff() <= kFlat * sizes.maxCoeff()) return principal;
+  if (sizes.minCoeff() <= kFlat * sizes.maxCoeff()) return axes;
   std::vector<Kernel::Point_3> points;
   points.reserve(vertices.size());
   for (const uint32_t v : vertices) {
@@ -66,7 +66,7 @@ Eigen::Matrix3d smallest_box_axes(const MeasurableMesh& mesh,
     const Kernel::Vector_3 d = box.at(to) - box[0];
     return Eigen::Vector3d(d.x(), d.y(), d.z()).normalized();
   };
-  Eigen::Matrix3d axes;  // of CGAL's corners, 1, 3 and 5 are the neighbours of 0
+  // Of CGAL's corners, 1, 3 and 5 are the neighbours of 0.
   axes << direction(1), direction(3), direction(5);
   return axes;
 }

@@ -232,15 +232,21 @@ double shift_in_plane(const MeasurableMesh& mesh, const CutPlane& plane, uint32_
   return 1 / std::max(kFlattest, std::sqrt(std::max(0.0, 1 - across * across)));
 }
 
-// Adds a line's share to sigma of length and area, and to the stated shares.
-void add_uncertainty(const Chain& chain,
-                     int side,
-                     const Crossings& crossings,
-                     const MeasurableMesh& mesh,
-                     const CutPlane& plane,
-                     Section& out,
-                     SigmaSum& lengths,
-                     SigmaSum& areas) {
+struct Cut {
+  const MeasurableMesh& mesh;
+  const CutPlane& plane;
+  const Crossings& crossings;
+};
+
+struct Uncertainty {
+  double stated_length = 0;
+  SigmaSum lengths;
+  SigmaSum areas;
+};
+
+// Adds a line's share to sigma of length and area, and to the stated length.
+void add_uncertainty(const Cut& cut, const Chain& chain, int side, Uncertainty& sum) {
+  const auto& [mesh, plane, crossings] = cut;
   const size_t count = chain.faces.size();
   for (size_t i = 0; i < count; ++i) {
     const auto& a = crossings.nodes[chain.nodes[i]];
@@ -250,15 +256,15 @@ void add_uncertainty(const Chain& chain,
     const bool invented =
         mesh.states_provenance() && mesh.mesh.provenance[chain.faces[i]] == Provenance::Inferred;
     if (!std::isfinite(sigma) || invented) continue;
-    out.length.stated += along.norm();
-    if (side != 0) areas.add(side * sigma * along.norm());
+    sum.stated_length += along.norm();
+    if (side != 0) sum.areas.add(side * sigma * along.norm());
     if (i + 1 == count && !chain.closed) continue;
     const auto& c = crossings.nodes[chain.nodes[(i + 2) % chain.nodes.size()]];
     const Eigen::Vector2d before = along.stableNormalized();
     const Eigen::Vector2d after = (c.place - b.place).stableNormalized();
     const Eigen::Vector2d middle = (before + after).stableNormalized();
     const Eigen::Vector2d outwards(middle.y(), -middle.x());
-    lengths.add(sigma * (before - after).dot(outwards));
+    sum.lengths.add(sigma * (before - after).dot(outwards));
   }
 }
 
@@ -302,18 +308,17 @@ Section section(const MeasurableMesh& mesh, const CutPlane& plane) {
     kept.push_back(&chain);
   }
   const std::vector<int> sides = nesting(out.lines);
-  SigmaSum lengths;
-  SigmaSum areas;
+  Uncertainty sum;
   out.area.dimension = 2;
   for (size_t i = 0; i < out.lines.size(); ++i) {
     if (out.lines[i].closed) out.area.value += sides[i] * std::abs(signed_area(out.lines[i]));
-    add_uncertainty(*kept[i], sides[i], crossings, mesh, plane, out, lengths, areas);
+    add_uncertainty({mesh, plane, crossings}, *kept[i], sides[i], sum);
   }
-  out.length.stated /= out.length.value > 0 ? out.length.value : 1;
+  out.length.stated = sum.stated_length / (out.length.value > 0 ? out.length.value : 1);
   out.area.stated = out.length.stated;
   if (out.length.stated > 0) {
-    out.length.sigma = lengths.sigma();
-    out.area.sigma = areas.sigma();
+    out.length.sigma = sum.lengths.sigma();
+    out.area.sigma = sum.areas.sigma();
   }
   return out;
 }

@@ -35,6 +35,7 @@ std::vector<const PhotoPair*> ranked_pairs(const Reconstruction& scene,
     return x.score > y.score;
   });
   std::vector<const PhotoPair*> out;
+  out.reserve(ranked.size());
   for (const Ranked& r : ranked) out.push_back(r.pair);
   return out;
 }

@@ -182,6 +182,7 @@ PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress
   require(photos.size() >= 2, "poses need at least 2 photographs", photos.size());
   const std::vector<LensPrior> priors = lens_priors(photos);
   std::vector<int> lens_of;
+  lens_of.reserve(photos.size());
   for (const UnposedPhoto& photo : photos) lens_of.push_back(photo.lens);
   const std::vector<PhotoPair> pairs = match_photos(photos, part_of(progress, 0, 0.5));
   refuse_unconnected(photos, pairs);

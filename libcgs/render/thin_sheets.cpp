@@ -53,6 +53,7 @@ std::vector<DepthMap> thickened_sheets(const std::vector<SheetView>& views,
                                        double thickness,
                                        size_t& moved) {
   std::vector<Observer> observers;
+  observers.reserve(views.size());
   for (const SheetView& view : views) observers.push_back({view, view.camera.cam_from_world()});
   std::vector<DepthMap> out;
   moved = 0;

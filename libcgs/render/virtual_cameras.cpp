@@ -109,8 +109,8 @@ std::vector<Eigen::Vector3d> free_places(const Gaussians& g, const Ball& ball, s
   constexpr size_t kMostSamples = 20'000;
   std::vector<Eigen::Vector3d> grid;
   for (int i = 0; i < kSteps * kSteps * kSteps; ++i) {
-    const Eigen::Vector3d step(i % kSteps, i / kSteps % kSteps, i / kSteps / kSteps);
-    const Eigen::Vector3d part = (step.array() + 0.5) / kSteps;
+    const Eigen::Vector3i step(i % kSteps, i / kSteps % kSteps, i / kSteps / kSteps);
+    const Eigen::Vector3d part = (step.cast<double>().array() + 0.5) / kSteps;
     grid.emplace_back(ball.inner.min() + part.cwiseProduct(ball.inner.sizes()));
   }
   std::vector<double> clearance(grid.size(), std::numeric_limits<double>::max());
