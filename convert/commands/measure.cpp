@@ -124,7 +124,7 @@ void Measuring::volume() {
     more["interval"] = {figure_value(value, unit_) - 2 * sigma,
                         figure_value(value, unit_) + 2 * sigma};
   }
-  figure("volume", value, std::move(more));
+  figure("volume", value, more);
   if (value.stated > 0 && value.stated < 1) {
     char text[200];  // NOLINT(modernize-avoid-c-arrays)
     std::snprintf(text,
