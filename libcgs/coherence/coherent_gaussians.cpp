@@ -57,17 +57,20 @@ Eigen::Vector3d surface_step(
   return step / z;
 }
 
-// The lower triangle L of a shape, its parameters kept within bounds so that no optimiser piles up
-// steps beyond them. [pixels]
-Eigen::Matrix2d bounded_triangle(float* shape, const CoherenceOptions& options) {
+// The lower triangle L of a shape [pixels].
+Eigen::Matrix2d triangle(const float* shape) {
+  Eigen::Matrix2d out;
+  out << std::exp(double(shape[0])), 0, double(shape[2]), std::exp(double(shape[1]));
+  return out;
+}
+
+// Keeps a shape within bounds, so that no optimiser piles up steps beyond them.
+void bound_shape(float* shape, const CoherenceOptions& options) {
   const float least = std::log(options.min_radius);
   const float most = std::log(options.max_radius);
   shape[0] = std::clamp(shape[0], least, most);
   shape[1] = std::clamp(shape[1], least, most);
   shape[2] = std::clamp(shape[2], -options.max_radius, options.max_radius);
-  Eigen::Matrix2d out;
-  out << std::exp(double(shape[0])), 0, double(shape[2]), std::exp(double(shape[1]));
-  return out;
 }
 
 // Scale and rotation of the covariance B B^T + thickness^2 n n^T, with n across the columns of B.
@@ -125,7 +128,6 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
     ViewState view{camera,
                    LayeredLattice(priors[n].layer, {options.depth_spacing}),
                    LayeredLattice(priors[n].layer, {options.opacity_spacing}),
-                   priors[n].layer,
                    depth,
                    depth,
                    Raster<float>(depth.width, depth.height, 0),
@@ -190,8 +192,9 @@ void CoherentGaussians::decode_view(size_t n) {
       return;
     }
     float* shape = &parameters[n].shape.value[k * kShapeSize];
+    bound_shape(shape, options_);
     const Eigen::Matrix<double, 3, 2> B =
-        double(z) * view.steps[k].cast<double>() * bounded_triangle(shape, options_);
+        double(z) * view.steps[k].cast<double>() * triangle(shape);
     const double thickness = double(options_.min_radius * z * unit);
     set_shape(B, thickness, gaussians_.scale[g], gaussians_.rotation[g]);
   });
@@ -210,8 +213,7 @@ float CoherentGaussians::add_shape_gradient(size_t n,
   const float* value = &shape.value[k * kShapeSize];
   const auto z = double(view.depth.data[view.pixels[k]]);
   const Eigen::Matrix<double, 3, 2> P = z * view.steps[k].cast<double>();
-  Eigen::Matrix2d L;
-  L << std::exp(double(value[0])), 0, double(value[2]), std::exp(double(value[1]));
+  const Eigen::Matrix2d L = triangle(value);
   const Eigen::Matrix3d G = as_matrix(gradient);
   const Eigen::Vector3d normal = P.col(0).cross(P.col(1)).normalized();
   const double thickness = double(options_.min_radius) * z * pixel_size(view.camera);

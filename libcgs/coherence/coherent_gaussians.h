@@ -50,8 +50,9 @@ struct CoherenceOptions {
 /// from its point to the next pixels' points and a lower triangle L with e^a, e^b on its diagonal,
 /// the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a photograph
 /// cannot show, how far a Gaussian reaches along the ray, thus follows the surface instead of
-/// drifting. Colours are those of the pixels. Source: Paliwal et al. 2024, "CoherentGS", section 3,
-/// with lattices instead of convolutional
+/// drifting. Colours are those of the pixels.
+///
+/// Source: Paliwal et al. 2024, "CoherentGS", section 3, with lattices instead of convolutional
 ///         decoders and the residual relative to depth.
 class CoherentGaussians {
  public:
@@ -106,7 +107,6 @@ class CoherentGaussians {
     Camera camera;
     LayeredLattice depth_lattice;
     LayeredLattice opacity_lattice;
-    Raster<uint8_t> layer;
     DepthMap start;
     DepthMap depth;
     Raster<float> depth_change;  // f, then tanh(f / D)
