@@ -66,7 +66,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
   const uint64_t cameras_hash = content_hash(json_text(cameras, -1));
   return {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
           {"views", request.scene.options.views},
-          {"downscale", request.scene.options.downscale},
+          {"downscale", request.scene.options.downscale.value_or(0)},
           {"assume_unit", request.scene.assume_unit},
           {"training", settings_to_json(request.training)},
           {"voxel_size", request.voxel_size},

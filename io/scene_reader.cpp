@@ -132,7 +132,25 @@ std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-void fit_cameras(Scene& scene, int downscale) {
+// The divisor the options leave open, of the largest photograph.
+int chosen_downscale(Scene& scene) {
+  const auto longest = [](const View& view) {
+    return view.image_path.empty() ? 0 : std::max(view.camera.width, view.camera.height);
+  };
+  const auto is_shorter = [&](const View& a, const View& b) { return longest(a) < longest(b); };
+  const View& largest = *std::max_element(scene.views.begin(), scene.views.end(), is_shorter);
+  constexpr int kLongest = SceneOptions::kLongestSide;
+  const int downscale = std::max(1, (longest(largest) + kLongest - 1) / kLongest);
+  if (downscale > 1) {
+    scene.warnings.push_back("photographs of " +
+                             size_text(largest.camera.width, largest.camera.height) +
+                             " pixels are worked on at 1/" + std::to_string(downscale) +
+                             " of their size; --downscale 1 takes all of it, and longer");
+  }
+  return downscale;
+}
+
+void fit_cameras(Scene& scene) {
   int rescaled = 0;
   for (View& view : scene.views) {
     Camera& camera = view.camera;
@@ -147,6 +165,18 @@ void fit_cameras(Scene& scene, int downscale) {
       rescaled += camera.width != size.width ? 1 : 0;
       camera = resized(camera, size.width, size.height);
     }
+  }
+  const bool is_expected = scene.kind == "LLFF";  // states the size of the full photographs
+  if (rescaled > 0 && !is_expected) {
+    scene.warnings.push_back(std::to_string(rescaled) +
+                             " images are of another size than their camera states; intrinsics "
+                             "were scaled to the images");
+  }
+}
+
+void divide_sizes(Scene& scene, int downscale) {
+  for (View& view : scene.views) {
+    Camera& camera = view.camera;
     const int width = camera.width / downscale;
     const int height = camera.height / downscale;
     constexpr int kSmallest = 8;  // below, no stage has anything to work on
@@ -155,12 +185,6 @@ void fit_cameras(Scene& scene, int downscale) {
                          size_text(width, height) + " pixels of view " + printable(view.name));
     }
     camera = resized(camera, width, height);
-  }
-  const bool is_expected = scene.kind == "LLFF";  // states the size of the full photographs
-  if (rescaled > 0 && !is_expected) {
-    scene.warnings.push_back(std::to_string(rescaled) +
-                             " images are of another size than their camera states; intrinsics "
-                             "were scaled to the images");
   }
 }
 
@@ -298,7 +322,8 @@ Scene prepared(Scene scene, const SceneOptions& options) {
   name_views(scene);
   sort_views(scene);
   check_presence(scene);
-  fit_cameras(scene, options.downscale);
+  fit_cameras(scene);
+  divide_sizes(scene, options.downscale ? *options.downscale : chosen_downscale(scene));
   choose_views(scene, options.views);
   check_baselines(scene);
   return scene;
@@ -307,7 +332,8 @@ Scene prepared(Scene scene, const SceneOptions& options) {
 }  // namespace
 
 void SceneOptions::validate() const {
-  require(downscale >= 1, "SceneOptions.downscale must be >= 1", downscale);
+  require(
+      !downscale || *downscale >= 1, "SceneOptions.downscale must be >= 1", downscale.value_or(1));
 }
 
 std::vector<int> select_views(const Scene& scene, const std::string& list) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,13 @@ struct SceneOptions {
   /// Input views: comma-separated names (file stems) or indices in name order; a name wins where
   /// both fit. Empty = choose: all of at most four, else the LLFF protocol.
   std::string views;
-  int downscale = 1;            ///< Divide image sizes by this; >= 1.
+  /// Divide image sizes by this; >= 1. Empty = choose: the smallest that leaves no side above
+  /// kLongestSide; what was chosen becomes a warning.
+  std::optional<int> downscale;
   bool allow_external = false;  ///< Follow links and absolute paths that leave the scene folder.
+
+  /// Three photographs of this size take minutes on two cores; time grows with their pixels.
+  static constexpr int kLongestSide = 1024;  // [pixels]
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

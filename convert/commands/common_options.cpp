@@ -27,8 +27,11 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
                      options.views,
                      "Input views: indices in name order or file stems, e.g. 1,10,19; the rest is "
                      "held out. Default: all of up to four, else three evenly spaced");
-  command.add_option("--downscale", options.downscale, "Divide the image size by this")
-      ->capture_default_str();
+  command.add_option(
+      "--downscale",
+      options.downscale,
+      "Divide the image size by this; default: the smallest that leaves no side above " +
+          std::to_string(SceneOptions::kLongestSide) + " pixels");
   command.add_flag("--allow-external",
                    options.allow_external,
                    "Follow links and absolute paths that leave the scene folder");

@@ -116,6 +116,22 @@ TEST_F(ReadScene, CopesWithSomeMissingImagesButNotWithAll) {
   EXPECT_EQ(refused(), "MISSING");
 }
 
+TEST_F(ReadScene, ChoosesASizeThatEndsInMinutesAndSaysSo) {
+  write(3, "SIMPLE_PINHOLE 2049 32 3000 1024.5 16");
+  for (const char* name : {"v00", "v01", "v02"}) {
+    test::write_bytes(dir_ / "images" / (std::string(name) + ".png"), test::rgb_png(2049, 32, 1));
+  }
+  const Scene chosen = read();
+  EXPECT_EQ(chosen.views[0].camera.width, 683);
+  EXPECT_EQ(chosen.views[0].camera.height, 10);
+  EXPECT_EQ(chosen.views[0].camera.fx, 3000. * 683 / 2049);
+  ASSERT_EQ(chosen.warnings.size(), 1u);
+  EXPECT_NE(chosen.warnings[0].find("2049 x 32 pixels are worked on at 1/3"), std::string::npos);
+  const Scene whole = read({.downscale = 1});
+  EXPECT_EQ(whole.views[0].camera.width, 2049);
+  EXPECT_TRUE(whole.warnings.empty());
+}
+
 TEST_F(ReadScene, ScalesIntrinsicsToTheImageAndRefusesOtherShapes) {
   write(2, "SIMPLE_PINHOLE 320 240 400 160 120");
   const Scene scene = read({.downscale = 2});
