@@ -406,6 +406,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   (void)simplify_options(request.simplify, 1, scene.frame);
   make_output_folder(request.output);
   const FolderLock lock(request.output);
+  remove_abandoned_files(request.output);
   RunRecord record(request.output, request_json(request, scene), request.overwrite);
   opened.keep(request.output / "model");
   Run run{request, std::move(record), std::move(scene), {}, {}};

@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -16,6 +17,14 @@ namespace cgs {
 namespace {
 
 constexpr size_t kBufferSize = size_t{1} << 20;
+constexpr std::string_view kPart = ".part";  // followed by the number of the process
+
+bool is_temporary(const std::string& name) {
+  const size_t at = name.rfind(kPart);
+  const size_t digits = at + kPart.size();
+  return at != std::string::npos && digits < name.size() &&
+         name.find_first_not_of("0123456789", digits) == std::string::npos;
+}
 
 void write_all(int descriptor, std::string_view bytes, const std::filesystem::path& path) {
   while (!bytes.empty()) {
@@ -35,7 +44,7 @@ void sync_to_disk(int descriptor, const std::filesystem::path& path) {
 }  // namespace
 
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), part_(path_) {
-  part_ += ".part" + std::to_string(::getpid());
+  part_ += std::string(kPart) + std::to_string(::getpid());
   descriptor_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (descriptor_ < 0) throw IoError(path_, std::generic_category().message(errno));
 }
@@ -97,6 +106,24 @@ FolderLock::FolderLock(const std::filesystem::path& folder)
 
 FolderLock::~FolderLock() {
   if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void remove_abandoned_files(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::vector<std::filesystem::path> found;
+  std::filesystem::recursive_directory_iterator entry(folder, error);
+  for (; !error && entry != std::filesystem::recursive_directory_iterator();
+       entry.increment(error)) {
+    std::error_code ignored;  // what has gone is no temporary
+    if (entry->is_regular_file(ignored) && is_temporary(entry->path().filename().string())) {
+      found.push_back(entry->path());
+    }
+  }
+  if (error) throw IoError(folder, error.message());
+  for (const std::filesystem::path& path : found) {
+    std::filesystem::remove(path, error);
+    if (error) throw IoError(path, error.message());
+  }
 }
 
 void write_file(const std::filesystem::path& path, std::string_view bytes) {

@@ -56,6 +56,10 @@ class FolderLock {
   int descriptor_;
 };
 
+/// Removes the temporaries that killed processes left in a folder and below. Only for a folder
+/// whose lock is held: another process that writes there would lose its files. \throws IoError
+void remove_abandoned_files(const std::filesystem::path& folder);
+
 /// Writes a whole file atomically. \throws IoError
 void write_file(const std::filesystem::path& path, std::string_view bytes);
 

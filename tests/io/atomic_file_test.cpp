@@ -51,6 +51,21 @@ TEST(AtomicFile, SaysSoWhenTheFileCannotGrow) {
   EXPECT_EQ(test::entries(dir.path()), 1);
 }
 
+TEST(AtomicFile, TemporariesOfKilledProcessesAreRemovedAndNothingElse) {
+  const test::TempDir dir;
+  for (const char* name : {"a.ply.part12", "views/b.exr.part345"}) {
+    test::write_bytes(dir / name, "half");
+  }
+  for (const char* name : {"a.ply", "a.part", "b.part1x", "views/.part", "views/part7"}) {
+    test::write_bytes(dir / name, "whole");
+  }
+  std::filesystem::create_directories(dir / "folder.part8");
+  remove_abandoned_files(dir.path());
+  EXPECT_EQ(test::entries(dir.path()), 5);
+  EXPECT_EQ(test::entries(dir / "views"), 2);
+  EXPECT_THROW(remove_abandoned_files(dir / "missing"), IoError);
+}
+
 TEST(AtomicFile, CommitsWhatALibraryWrote) {
   const test::TempDir dir;
   AtomicFile file(dir / "a.txt");
