@@ -57,6 +57,11 @@ double parse_length(const std::string& text, const Frame& frame) {
   return metres / frame.metres_per_unit / frame.scale;
 }
 
+double parse_metres(const std::string& text) {
+  const auto [value, unit] = number_and_suffix(text, "length");
+  return value * metres_in(unit);
+}
+
 std::string format_length(double internal_length, const Frame& frame) {
   std::array<char, 64> text{};
   const double units = internal_length * frame.scale;

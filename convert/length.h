@@ -17,6 +17,9 @@ double metres_in(const std::string& unit);
 /// \throws InvalidInput for what is no positive length, or for a unit in a scene without scale.
 double parse_length(const std::string& text, const Frame& frame);
 
+/// A length with its unit, "1.2m", in metres. \throws InvalidInput
+double parse_metres(const std::string& text);
+
 /// A length [internal units] for people: "3.2 mm", or "0.0031 units" without scale.
 std::string format_length(double internal_length, const Frame& frame);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -46,6 +47,7 @@ struct Run {
   const RunRequest& request;
   RunRecord record;
   Scene scene;  ///< As opened: world coordinates.
+  std::vector<KnownDistance> distances;
   // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
   // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
   std::optional<Model> model;
@@ -68,6 +70,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
           {"views", request.scene.options.views},
           {"downscale", request.scene.options.downscale.value_or(0)},
           {"assume_unit", request.scene.assume_unit},
+          {"known_distances", request.scene.known_distances},
           {"training", settings_to_json(request.training)},
           {"voxel_size", request.voxel_size},
           {"max_error", request.max_error},
@@ -118,6 +121,23 @@ Json run_model(Run& run, const Progress& progress) {
   write_model(folder, trained.model);
   write_file(folder / "training.json", json_text(report) + "\n");
   return report;
+}
+
+// The scale is told apart from the model: people learn a length after they saw a first result.
+Json run_scale(Run& run, const Progress& progress) {
+  Model& model = loaded_model(run);
+  report(progress, 0);
+  Frame& frame = model.scene.frame;
+  const Frame before = frame;
+  frame.metres_per_unit = run.scene.frame.metres_per_unit;
+  frame.metres_sigma = run.scene.frame.metres_sigma;
+  frame.scale_source = run.scene.frame.scale_source;
+  const Json result = scale_by(run.distances, model);
+  const bool is_new = frame.metres_per_unit != before.metres_per_unit ||
+                      frame.metres_sigma != before.metres_sigma ||
+                      frame.scale_source != before.scale_source;
+  if (is_new) write_model(run.request.output / "model", model);
+  return result;
 }
 
 Json run_views(Run& run, const Progress& progress) {
@@ -217,14 +237,19 @@ Json report_json(const Run& run) {
   }
   const Json mesh = run.record.result("mesh");
   Json warnings = run.scene.warnings;
-  const Json found = run.record.result("model").value("warnings", Json::array());
-  warnings.insert(warnings.end(), found.begin(), found.end());
+  for (const char* stage : {"model", "scale"}) {
+    const Json result = run.record.result(stage);
+    if (!result.is_object()) continue;
+    const Json found = result.value("warnings", Json::array());
+    warnings.insert(warnings.end(), found.begin(), found.end());
+  }
   Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
               {"folder", run.request.scene.path.string()},
               {"units", scene.frame.unit_name()},
               {"scale_source", scale_source_name(scene.frame.scale_source)},
               {"frame", frame_to_json(scene.frame)},
+              {"scale", run.record.result("scale")},
               {"model", run.record.result("model")},
               {"views", run.record.result("views")},
               {"evaluation", run.record.result("evaluation")},
@@ -244,6 +269,16 @@ Json run_report(Run& run, const Progress& progress) {
   write_file(run.request.output / "report.json", json_text(json) + "\n");
   write_html_report(run.request.output, json);
   return {{"pages", 1}};
+}
+
+/// Which stage a part of the request first has a say in; what is not here decides all.
+const std::map<std::string, std::string>& decided_stages() {
+  static const std::map<std::string, std::string> kStages = {{"assume_unit", "scale"},
+                                                             {"known_distances", "scale"},
+                                                             {"voxel_size", "mesh"},
+                                                             {"simplify", "mesh"},
+                                                             {"max_error", "web"}};
+  return kStages;
 }
 
 /// A stage: its files (whose absence means it must run), what it does, and a remark for the user.
@@ -267,6 +302,7 @@ std::vector<Stage> stages_of(const Scene& scene) {
     model_files.push_back("model/priors/" + scene.views[static_cast<size_t>(i)].name + ".exr");
   }
   return {{"model", "depth and Gaussians", model_files, run_model},
+          {"scale", "scale", {}, run_scale},
           {"views", "views", view_files, run_views},
           {"evaluation", "held-out views", {}, run_evaluation},
           {"mesh",
@@ -313,6 +349,9 @@ OpenedScene open_scene(const SceneRequest& request,
       throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
                          " states them (" + out.scene.kind + ")");
     }
+  }
+  if (!request.assume_unit.empty() && !request.known_distances.empty()) {
+    throw InvalidInput("--assume-unit and --known-distance both state the scale; give one");
   }
   if (!request.assume_unit.empty()) {
     out.scene.frame.metres_per_unit = metres_in(request.assume_unit);
@@ -394,6 +433,15 @@ Json run_stages(Run& run, Terminal& terminal) {
   return report_json(run);
 }
 
+// Refuses lengths that cannot be read before anything is computed. Where the scale will be known,
+// any stands for it.
+void check_lengths(const RunRequest& request, Frame frame) {
+  if (!request.scene.known_distances.empty()) frame.metres_per_unit = 1;
+  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, frame);
+  if (!request.max_error.empty()) (void)parse_length(request.max_error, frame);
+  (void)simplify_options(request.simplify, 1, frame);
+}
+
 }  // namespace
 
 Json run_pipeline(const RunRequest& request, Terminal& terminal) {
@@ -401,15 +449,15 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   Scene& scene = opened.scene;
   for (const std::string& warning : scene.warnings) terminal.warn(warning);
   refuse_unreadable_images(scene);
-  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, scene.frame);
-  if (!request.max_error.empty()) (void)parse_length(request.max_error, scene.frame);
-  (void)simplify_options(request.simplify, 1, scene.frame);
+  std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
+  check_lengths(request, scene.frame);
   make_output_folder(request.output);
   const FolderLock lock(request.output);
   remove_abandoned_files(request.output);
-  RunRecord record(request.output, request_json(request, scene), request.overwrite);
+  RunRecord record(
+      request.output, request_json(request, scene), request.overwrite, decided_stages());
   opened.keep(request.output / "model");
-  Run run{request, std::move(record), std::move(scene), {}, {}};
+  Run run{request, std::move(record), std::move(scene), std::move(distances), {}, {}};
   try {
     return run_stages(run, terminal);
   } catch (const Json::exception&) {

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "convert/known_distances.h"
 #include "convert/model.h"
 #include "convert/photo_poses.h"
 #include "convert/terminal.h"
@@ -23,6 +24,7 @@ struct SceneRequest {
   std::string
       assume_unit;   ///< Unit of one scene unit where the scene does not say; empty = unknown.
   double focal = 0;  ///< Of photographs without cameras [pixels]; 0 = not given.
+  std::vector<DistanceWords> known_distances;  ///< Where they are given, no assume_unit.
 };
 
 /// What `cgs run` is asked for; lengths are as the user typed them, with or without a unit.

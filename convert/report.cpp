@@ -135,6 +135,25 @@ std::string certificate_section(const Json& report) {
   return html.str();
 }
 
+// Where the scale came from, if from known distances.
+std::string scale_section(const Json& scale) {
+  if (scale.is_null()) return "";
+  std::ostringstream html;
+  html << "<h2>Scale</h2>\n<p>One scene unit is " << number(scale["metres_per_unit"], "%.6g")
+       << " m, with a standard deviation of " << number(scale["metres_sigma"], "%.2g")
+       << " m.</p>\n<table>\n<tr><th>known distance</th><th>known [m]</th><th>measured [m]</th>"
+          "<th>sigma</th><th>residual</th><th>used</th></tr>\n";
+  for (const Json& d : scale["distances"]) {
+    html << "<tr><td>" << escaped(d["distance"].get<std::string>()) << "</td><td>"
+         << number(d["known"], "%.6g") << "</td><td>" << number(d["measured"], "%.6g")
+         << "</td><td>" << number(d["sigma"], "%.2g") << "</td><td>"
+         << number(d["residual"], "%.2g") << "</td><td>"
+         << verdict(d["used"].get<bool>(), "yes", "no, an outlier") << "</td></tr>\n";
+  }
+  html << "</table>\n";
+  return html.str();
+}
+
 std::string simplification_section(const Json& simplification) {
   if (simplification.is_null()) return "";
   const auto units = simplification["units"].get<std::string>();
@@ -272,10 +291,11 @@ void write_html_report(const std::filesystem::path& folder, const Json& report) 
   for (const Json& warning : report["warnings"]) {
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
   }
-  html << certificate_section(report) << simplification_section(report["mesh"]["simplification"])
-       << mesh_section(folder) << evaluation_section(report["evaluation"])
-       << views_section(folder, report) << training_section(report["model"])
-       << timing_section(report["stages"]) << "</body></html>\n";
+  html << scale_section(report["scale"]) << certificate_section(report)
+       << simplification_section(report["mesh"]["simplification"]) << mesh_section(folder)
+       << evaluation_section(report["evaluation"]) << views_section(folder, report)
+       << training_section(report["model"]) << timing_section(report["stages"])
+       << "</body></html>\n";
   write_file(folder / "report.html", html.str());
 }
 

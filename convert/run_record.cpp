@@ -20,13 +20,33 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-std::string difference(const Json& before, const Json& now) {
-  std::string names;
+std::vector<std::string> differing_keys(const Json& before, const Json& now) {
+  std::vector<std::string> keys;
   for (const auto& [key, value] : now.items()) {
-    if (before.contains(key) && before[key] == value) continue;
-    names += (names.empty() ? "" : ", ") + key;
+    if (!before.contains(key) || before[key] != value) keys.push_back(key);
   }
-  return names;
+  return keys;
+}
+
+std::string listed(const std::vector<std::string>& keys) {
+  std::string out;
+  for (const std::string& key : keys) out += (out.empty() ? "" : ", ") + key;
+  return out;
+}
+
+// The stages before the first that one of the keys has a say in.
+Json unaffected_stages(const Json& stages,
+                       const std::vector<std::string>& keys,
+                       const std::map<std::string, std::string>& decides) {
+  Json kept = Json::object();
+  for (const auto& [name, stage] : stages.items()) {
+    for (const std::string& key : keys) {
+      const auto first = decides.find(key);
+      if (first == decides.end() || first->second == name) return kept;
+    }
+    kept[name] = stage;
+  }
+  return kept;
 }
 
 bool is_stage(const Json& stage) {
@@ -53,10 +73,14 @@ Json read_record(const std::filesystem::path& path) {
 
 }  // namespace
 
-RunRecord::RunRecord(std::filesystem::path folder, Json request, bool overwrite)
+RunRecord::RunRecord(std::filesystem::path folder,
+                     Json request,
+                     bool overwrite,
+                     const std::map<std::string, std::string>& decides)
     : folder_(std::move(folder)) {
   request = Json::parse(json_text(request));  // as it reads back from the file
   const std::filesystem::path path = folder_ / "run.json";
+  Json stages = Json::object();
   if (is_present(path)) {
     const Json old = read_record(path);
     const bool readable = !old.is_null();
@@ -64,15 +88,18 @@ RunRecord::RunRecord(std::filesystem::path folder, Json request, bool overwrite)
       json_ = old;
       return;
     }
+    const auto keys =
+        readable ? differing_keys(old["request"], request) : std::vector<std::string>();
+    if (readable) stages = unaffected_stages(old["stages"], keys, decides);
     if (!overwrite) {
-      throw InvalidInput(
-          printable(folder_) + " holds the results of another run" +
-          (readable ? " (different: " + difference(old["request"], request) + ")" : "") +
-          "; choose another folder, or say --overwrite");
+      throw InvalidInput(printable(folder_) + " holds the results of another run" +
+                         (readable ? " (different: " + listed(keys) + ")" : "") +
+                         "; choose another folder, or say --overwrite" +
+                         (stages.empty() ? "" : ", which keeps what this does not change"));
     }
   }
   json_ = {
-      {"program", kProgramVersion}, {"request", std::move(request)}, {"stages", Json::object()}};
+      {"program", kProgramVersion}, {"request", std::move(request)}, {"stages", std::move(stages)}};
   save();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,9 +17,13 @@ class RunRecord {
   /// Opens the record of `folder`, or begins one if there is none.
   ///
   /// `request` is everything that decides the result: arguments and hashes of the input files.
+  /// \param decides  for keys of the request the first stage they have a say in; others decide all
   /// \throws InvalidInput if the folder holds another request's results and `overwrite` is not
-  ///         set; with it, the old stages are forgotten.
-  RunRecord(std::filesystem::path folder, nlohmann::ordered_json request, bool overwrite);
+  ///         set; with it, the stages that another answer would come from are forgotten.
+  RunRecord(std::filesystem::path folder,
+            nlohmann::ordered_json request,
+            bool overwrite,
+            const std::map<std::string, std::string>& decides = {});
 
   /// True if the stage was finished and each of its files is still there.
   bool is_done(const std::string& stage, const std::vector<std::string>& files) const;

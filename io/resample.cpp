@@ -88,14 +88,18 @@ bool is_covered(const MaskMap& valid, double u, double v) {
   return valid(x0, y0) != 0 && valid(x1, y0) != 0 && valid(x0, y1) != 0 && valid(x1, y1) != 0;
 }
 
+// OpenCV counts pixel centres from 0, this project from 0.5.
+cv::Matx33d opencv_intrinsics(const Camera& camera) {
+  return {camera.fx, 0, camera.cx - 0.5, 0, camera.fy, camera.cy - 0.5, 0, 0, 1};
+}
+
 }  // namespace
 
 void undistort(ColorImage& image,
                MaskMap& valid,
                const Camera& camera,
                const std::array<double, 5>& distortion) {
-  // OpenCV counts pixel centres from 0, this project from 0.5.
-  const cv::Matx33d K(camera.fx, 0, camera.cx - 0.5, 0, camera.fy, camera.cy - 0.5, 0, 0, 1);
+  const cv::Matx33d K = opencv_intrinsics(camera);
   const cv::Vec<double, 5> coefficients(distortion.data());
   const cv::Size size(image.width, image.height);
   cv::Mat map_u;
@@ -121,6 +125,16 @@ void undistort(ColorImage& image,
   const bool is_all =
       std::all_of(reached.data.begin(), reached.data.end(), [](uint8_t set) { return set != 0; });
   valid = is_all ? MaskMap() : std::move(reached);
+}
+
+Eigen::Vector2d undistorted(const Eigen::Vector2d& point,
+                            const Camera& camera,
+                            const std::array<double, 5>& distortion) {
+  const cv::Matx33d K = opencv_intrinsics(camera);
+  const std::vector<cv::Point2d> from = {{point.x() - 0.5, point.y() - 0.5}};
+  std::vector<cv::Point2d> to;
+  cv::undistortPoints(from, to, K, cv::Vec<double, 5>(distortion.data()), cv::noArray(), K);
+  return {to[0].x + 0.5, to[0].y + 0.5};
 }
 
 void area_downscale(ColorImage& image, MaskMap& valid, int width, int height) {

@@ -20,6 +20,11 @@ void undistort(ColorImage& image,
                const Camera& camera,
                const std::array<double, 5>& distortion);
 
+/// Where a point of a photograph lies in the picture undistort() makes of it [pixels].
+Eigen::Vector2d undistorted(const Eigen::Vector2d& point,
+                            const Camera& camera,
+                            const std::array<double, 5>& distortion);
+
 /// Averages the usable pixels under each pixel of a smaller image, in place. A pixel is usable if
 /// at least half of its area is; `valid` is emptied if every pixel is.
 /// \pre 0 < width <= image.width, 0 < height <= image.height

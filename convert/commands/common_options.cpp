@@ -37,6 +37,20 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
                    "Follow links and absolute paths that leave the scene folder");
 }
 
+void add_scale_options(CLI::App& command, SceneRequest& request) {
+  command.add_option("--assume-unit",
+                     request.assume_unit,
+                     "What one scene unit is (m, cm, mm, in, ft), where the scene does not say; "
+                     "STL and 3MF need it");
+  command
+      .add_option("--known-distance",
+                  request.known_distances,
+                  "Two pixels of input photographs and how far apart these points really are: "
+                  "VIEW:X,Y VIEW:X,Y 1.2m, or 1.2m+-3mm; gives the scene its scale; several are "
+                  "weighed against each other")
+      ->allow_extra_args(false);
+}
+
 void add_focal_option(CLI::App& command, double& focal) {
   command.add_option(
       "--focal",

@@ -6,6 +6,7 @@
 
 #include <CLI/App.hpp>
 
+#include "convert/pipeline.h"
 #include "io/scene_reader.h"
 #include "libcgs/train/training_options.h"
 
@@ -21,6 +22,9 @@ struct CommonOptions {
 
 /// Adds them to a command; limit_threads() must be called when the command runs.
 void add_common_options(CLI::App& command, CommonOptions& options);
+
+/// --assume-unit and --known-distance.
+void add_scale_options(CLI::App& command, SceneRequest& request);
 
 /// --views, --downscale and --allow-external.
 void add_scene_options(CLI::App& command, SceneOptions& options);

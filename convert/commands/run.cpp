@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <iomanip>
 #include <iostream>
 #include <memory>
+#include <sstream>
 
 #include <nlohmann/json.hpp>
 
@@ -23,6 +25,15 @@ struct RunArgs {
 
 // One paragraph a user reads after a run: what was made, how far to trust it, what to open.
 void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Terminal& terminal) {
+  const auto& scale = report["scale"];
+  if (!scale.is_null()) {
+    std::ostringstream text;
+    text << "scale: one scene unit is " << scale["metres_per_unit"].get<double>() << " m +- "
+         << std::setprecision(2)
+         << 100 * scale["metres_sigma"].get<double>() / scale["metres_per_unit"].get<double>()
+         << " %";
+    terminal.say(text.str());
+  }
   const auto& certificate = report["certificate"];
   terminal.say(std::string("watertight mesh: ") +
                (certificate["passed"].get<bool>() ? "closed, manifold, no self-intersection"
@@ -62,10 +73,7 @@ void add_run(CLI::App& app) {
   cmd->add_option("-o,--output", args->request.output, "Folder to write")->required();
   add_scene_options(*cmd, args->request.scene.options);
   add_focal_option(*cmd, args->request.scene.focal);
-  cmd->add_option("--assume-unit",
-                  args->request.scene.assume_unit,
-                  "What one scene unit is (m, cm, mm, in, ft), where the scene does not say; STL "
-                  "and 3MF need it");
+  add_scale_options(*cmd, args->request.scene);
   cmd->add_option("--voxel-size",
                   args->request.voxel_size,
                   "Edge of a voxel, e.g. 5mm, or in scene units; default: from the pixel size");

@@ -30,13 +30,15 @@ void run_train(const TrainArgs& args) {
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   opened.keep(args.output);
   Scene& scene = opened.scene;
+  const auto distances = known_distances(args.scene.known_distances, scene);
   const size_t known = scene.warnings.size();
   terminal.warn(scene.warnings);
-  const TrainedModel trained =
+  TrainedModel trained =
       train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
   for (size_t i = known; i < warnings.size(); ++i) terminal.warn(warnings[i]);
   nlohmann::ordered_json report = training_to_json(trained, request);
+  report["scale"] = scale_by(distances, trained.model);
   write_model(args.output, trained.model);
   write_file(args.output / "training.json", json_text(report) + "\n");
   forget_checkpoints(args.output);
@@ -54,8 +56,7 @@ void add_train(CLI::App& app) {
   cmd->add_option("-o,--output", args->output, "Model folder to write")->required();
   add_scene_options(*cmd, args->scene.options);
   add_focal_option(*cmd, args->scene.focal);
-  cmd->add_option(
-      "--assume-unit", args->scene.assume_unit, "What one scene unit is: m, cm, mm, in, ft");
+  add_scale_options(*cmd, args->scene);
   add_training_options(*cmd, args->training);
   add_common_options(*cmd, args->common);
   cmd->footer(

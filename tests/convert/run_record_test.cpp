@@ -49,6 +49,34 @@ TEST(RunRecord, OverwriteForgetsTheOldStages) {
   EXPECT_FALSE(record.is_done("model", {}));
 }
 
+TEST(RunRecord, OverwriteKeepsTheStagesAnotherAnswerDoesNotChange) {
+  const test::TempDir dir;
+  const Json request = {{"views", "1,2"}, {"voxel_size", ""}, {"max_error", ""}};
+  {
+    RunRecord record(dir.path(), request, false);
+    for (const char* stage : {"model", "mesh", "web"}) record.finish(stage, 1, nullptr);
+  }
+  const std::map<std::string, std::string> decides = {{"voxel_size", "mesh"}, {"max_error", "web"}};
+  Json changed = request;
+  changed["max_error"] = "1mm";
+  EXPECT_THROW(RunRecord(dir.path(), changed, false, decides), InvalidInput);
+  {
+    const RunRecord record(dir.path(), changed, true, decides);
+    EXPECT_TRUE(record.is_done("mesh", {}));
+    EXPECT_FALSE(record.is_done("web", {}));
+  }
+  changed["voxel_size"] = "1cm";
+  changed["max_error"] = "2mm";
+  {
+    const RunRecord record(dir.path(), changed, true, decides);
+    EXPECT_TRUE(record.is_done("model", {}));
+    EXPECT_FALSE(record.is_done("mesh", {}));
+  }
+  changed["views"] = "1,3";
+  const RunRecord record(dir.path(), changed, true, decides);
+  EXPECT_FALSE(record.is_done("model", {}));
+}
+
 TEST(RunRecord, RunningAStageAgainForgetsWhatFollowed) {
   const test::TempDir dir;
   RunRecord record(dir.path(), {}, false);

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/known_distances.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <tuple>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/length.h"
+#include "io/image.h"
+#include "io/resample.h"
+#include "io/scene_reader.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/scale_bars.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+double pixel_number(const std::string& text, const std::string& pick) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) {
+    return value;
+  }
+  throw InvalidInput("--known-distance: '" + printable(pick) +
+                     "' is not VIEW:X,Y, a pixel of a photograph such as church_02:1510,842");
+}
+
+KnownDistance::Pick pick_of(const std::string& text, const Scene& scene) {
+  const size_t colon = text.rfind(':');
+  const size_t comma = text.find(',', colon == std::string::npos ? 0 : colon);
+  if (colon == std::string::npos || comma == std::string::npos) (void)pixel_number("", text);
+  KnownDistance::Pick pick;
+  const std::string name = text.substr(0, colon);
+  pick.view = select_views(scene, name).front();
+  pick.x = pixel_number(text.substr(colon + 1, comma - colon - 1), text);
+  pick.y = pixel_number(text.substr(comma + 1), text);
+  const View& view = scene.views[static_cast<size_t>(pick.view)];
+  if (std::find(scene.input.begin(), scene.input.end(), pick.view) == scene.input.end()) {
+    throw InvalidInput("--known-distance: view " + printable(name) +
+                       " is held out, so no depth is measured there; pick in an input view");
+  }
+  const ImageSize size = image_size(view.image_path);
+  if (pick.x < 0 || pick.y < 0 || pick.x > size.width - 1 || pick.y > size.height - 1) {
+    throw InvalidInput("--known-distance: " + printable(text) + " lies outside of the " +
+                       std::to_string(size.width) + " x " + std::to_string(size.height) +
+                       " pixels of " + printable(view.image_path));
+  }
+  return pick;
+}
+
+// "1.2m" or "1.2m+-3mm" into metres and their sigma.
+std::pair<double, double> metres_and_sigma(std::string text) {
+  const std::string plus_minus = "±";
+  const size_t sign = text.find(plus_minus);
+  if (sign != std::string::npos) text.replace(sign, plus_minus.size(), "+-");
+  const size_t split = text.find("+-");
+  const double metres = parse_metres(text.substr(0, split));
+  return {metres, split == std::string::npos ? 0 : parse_metres(text.substr(split + 2))};
+}
+
+/// A picked point of the surface [internal units].
+struct Picked {
+  Eigen::Vector3d point;
+  Eigen::Vector3d along_ray;  ///< Change of the point with its depth.
+  double depth_sigma;
+  double sideways_sigma;  ///< Across the ray.
+};
+
+Picked picked_point(const KnownDistance::Pick& pick, const Model& model, const std::string& text) {
+  const auto& input = model.scene.input;
+  const auto k =
+      static_cast<size_t>(std::find(input.begin(), input.end(), pick.view) - input.begin());
+  const View& view = model.scene.views[static_cast<size_t>(pick.view)];
+  const ViewPriors& priors = model.priors.at(k);
+  const ImageSize size = image_size(view.image_path);
+  const Camera in_file = resized(view.camera, size.width, size.height);
+  const Eigen::Vector2d pinhole =
+      undistorted({pick.x + 0.5, pick.y + 0.5}, in_file, view.distortion);
+  const Eigen::Vector2d at(pinhole.x() * view.camera.width / size.width,
+                           pinhole.y() * view.camera.height / size.height);
+  const int x = static_cast<int>(std::floor(at.x()));
+  const int y = static_cast<int>(std::floor(at.y()));
+  const bool is_inside = x >= 0 && y >= 0 && x < view.camera.width && y < view.camera.height;
+  if (!is_inside || priors.origin(x, y) != DepthOrigin::Measured) {
+    throw InvalidInput("--known-distance " + printable(text) + ": no depth was measured at " +
+                       printable(view.name) + ":" + std::to_string(std::lround(pick.x)) + "," +
+                       std::to_string(std::lround(pick.y)) +
+                       "; pick a point with texture that a second photograph shows, too");
+  }
+  constexpr double kPickSigma = 0.5;  // [pixels of the image worked on]
+  const double z = priors.depth(x, y);
+  return {view.camera.unproject(at.x(), at.y(), z),
+          view.camera.world_from_cam.linear() * view.camera.ray_in_cam(at.x(), at.y()),
+          priors.sigma(x, y),
+          kPickSigma * z / std::sqrt(view.camera.fx * view.camera.fy)};
+}
+
+// Variance of a length by one of its ends; `direction` is that of the length.
+double variance_of_end(const Picked& end, const Eigen::Vector3d& direction) {
+  const double along = direction.dot(end.along_ray);
+  const double across = 1 - std::pow(direction.dot(end.along_ray.normalized()), 2);
+  return std::pow(along * end.depth_sigma, 2) + across * std::pow(end.sideways_sigma, 2);
+}
+
+ScaleBar bar_of(const KnownDistance& distance, const Model& model) {
+  const Picked a = picked_point(distance.a, model, distance.text);
+  const Picked b = picked_point(distance.b, model, distance.text);
+  const Eigen::Vector3d between = b.point - a.point;
+  const double length = between.norm();
+  if (!(length > 0)) {
+    throw InvalidInput("--known-distance " + printable(distance.text) +
+                       ": both ends are one point");
+  }
+  const double variance =
+      variance_of_end(a, between / length) + variance_of_end(b, between / length);
+  const double scale = model.scene.frame.scale;
+  return {scale * length, scale * std::sqrt(variance), distance.metres, distance.sigma};
+}
+
+Json warnings_of(const BarScale& scale, const std::vector<KnownDistance>& distances) {
+  Json out = Json::array();
+  for (size_t i = 0; i < distances.size(); ++i) {
+    if (scale.used[i]) continue;
+    out.push_back("known distance " + printable(distances[i].text) +
+                  " disagrees with the others by more than 3 sigma and is left out");
+  }
+  if (!scale.is_consistent) {
+    out.push_back(
+        "the known distances disagree by more than 3 sigma; the uncertainty of the scale "
+        "is widened to cover it, and a third distance may tell which is wrong");
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typed,
+                                           const Scene& scene) {
+  std::vector<KnownDistance> out;
+  out.reserve(typed.size());
+  for (const DistanceWords& words : typed) {
+    KnownDistance distance;
+    distance.a = pick_of(words[0], scene);
+    distance.b = pick_of(words[1], scene);
+    std::tie(distance.metres, distance.sigma) = metres_and_sigma(words[2]);
+    distance.text = words[0] + " " + words[1] + " " + words[2];
+    out.push_back(std::move(distance));
+  }
+  return out;
+}
+
+Json scale_by(const std::vector<KnownDistance>& distances, Model& model) {
+  if (distances.empty()) return nullptr;
+  std::vector<ScaleBar> bars;
+  bars.reserve(distances.size());
+  for (const KnownDistance& distance : distances) bars.push_back(bar_of(distance, model));
+  const BarScale scale = scale_of(bars);
+  Frame& frame = model.scene.frame;
+  frame.metres_per_unit = scale.metres_per_unit;
+  frame.metres_sigma = scale.sigma;
+  frame.scale_source = ScaleSource::KnownDistance;
+  Json list = Json::array();
+  for (size_t i = 0; i < bars.size(); ++i) {
+    list.push_back({{"distance", distances[i].text},
+                    {"known", bars[i].known},
+                    {"measured", bars[i].measured * scale.metres_per_unit},
+                    {"sigma", bars[i].measured_sigma * scale.metres_per_unit},
+                    {"residual", scale.residuals[i]},
+                    {"used", static_cast<bool>(scale.used[i])}});
+  }
+  return {{"metres_per_unit", scale.metres_per_unit},
+          {"metres_sigma", scale.sigma},
+          {"distances", list},
+          {"warnings", warnings_of(scale, distances)}};
+}
+
+}  // namespace cgs
