@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include <nlohmann/json.hpp>
@@ -72,6 +73,26 @@ struct Picked {
   double sideways_sigma;  ///< Across the ray.
 };
 
+// The pixel with a measured depth that is next to a point of the image, within reach; -1 if none.
+int next_measured(const ViewPriors& priors, const Eigen::Vector2d& at) {
+  constexpr int kReach = 2;  // [pixels]; corners, which people pick, are often not matched
+  const int x0 = static_cast<int>(std::floor(at.x()));
+  const int y0 = static_cast<int>(std::floor(at.y()));
+  int best = -1;
+  double least = std::numeric_limits<double>::infinity();
+  for (int y = std::max(0, y0 - kReach); y <= std::min(priors.origin.height - 1, y0 + kReach);
+       ++y) {
+    for (int x = std::max(0, x0 - kReach); x <= std::min(priors.origin.width - 1, x0 + kReach);
+         ++x) {
+      const double distance = (Eigen::Vector2d(x + 0.5, y + 0.5) - at).squaredNorm();
+      if (priors.origin(x, y) != DepthOrigin::Measured || distance >= least) continue;
+      least = distance;
+      best = y * priors.origin.width + x;
+    }
+  }
+  return best;
+}
+
 Picked picked_point(const KnownDistance::Pick& pick, const Model& model, const std::string& text) {
   const auto& input = model.scene.input;
   const auto k =
@@ -84,20 +105,18 @@ Picked picked_point(const KnownDistance::Pick& pick, const Model& model, const s
       undistorted({pick.x + 0.5, pick.y + 0.5}, in_file, view.distortion);
   const Eigen::Vector2d at(pinhole.x() * view.camera.width / size.width,
                            pinhole.y() * view.camera.height / size.height);
-  const int x = static_cast<int>(std::floor(at.x()));
-  const int y = static_cast<int>(std::floor(at.y()));
-  const bool is_inside = x >= 0 && y >= 0 && x < view.camera.width && y < view.camera.height;
-  if (!is_inside || priors.origin(x, y) != DepthOrigin::Measured) {
+  const int pixel = next_measured(priors, at);
+  if (pixel < 0) {
     throw InvalidInput("--known-distance " + printable(text) + ": no depth was measured at " +
                        printable(view.name) + ":" + std::to_string(std::lround(pick.x)) + "," +
                        std::to_string(std::lround(pick.y)) +
                        "; pick a point with texture that a second photograph shows, too");
   }
   constexpr double kPickSigma = 0.5;  // [pixels of the image worked on]
-  const double z = priors.depth(x, y);
+  const double z = priors.depth.data[static_cast<size_t>(pixel)];
   return {view.camera.unproject(at.x(), at.y(), z),
           view.camera.world_from_cam.linear() * view.camera.ray_in_cam(at.x(), at.y()),
-          priors.sigma(x, y),
+          priors.sigma.data[static_cast<size_t>(pixel)],
           kPickSigma * z / std::sqrt(view.camera.fx * view.camera.fy)};
 }
 

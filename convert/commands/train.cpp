@@ -38,8 +38,9 @@ void run_train(const TrainArgs& args) {
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
   for (size_t i = known; i < warnings.size(); ++i) terminal.warn(warnings[i]);
   nlohmann::ordered_json report = training_to_json(trained, request);
+  write_model(args.output, trained.model);  // first, as a distance may be refused
   report["scale"] = scale_by(distances, trained.model);
-  write_model(args.output, trained.model);
+  if (!distances.empty()) write_model(args.output, trained.model);
   write_file(args.output / "training.json", json_text(report) + "\n");
   forget_checkpoints(args.output);
   const size_t count = trained.model.gaussians.size();
