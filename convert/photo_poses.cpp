@@ -59,6 +59,7 @@ std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
     if (record.at("inputs").text() != inputs) return std::nullopt;
     PhotoPoses out;
     out.inputs = inputs;
+    out.is_stored = true;
     const JsonValue warnings = record.at("warnings");
     for (size_t i = 0; i < warnings.size(); ++i) out.warnings.push_back(warnings.at(i).text());
     const std::filesystem::path model = folder / "sparse/0";

@@ -16,6 +16,7 @@ struct PhotoPoses {
   ColmapModel model;
   std::string inputs;                 ///< Names and hashes of the photographs, options, program.
   std::vector<std::string> warnings;  ///< How the focal length was found; who is left out.
+  bool is_stored = false;  ///< Read, not solved; the places of features are then not known.
 };
 
 /// Solves for the cameras of the photographs in a folder, or reads what write_photo_poses() stored

@@ -325,7 +325,7 @@ std::vector<Stage> stages_of(const Scene& scene) {
 }  // namespace
 
 void OpenedScene::keep(const std::filesystem::path& model) const {
-  if (poses) write_photo_poses(model / kPosesFolder, *poses);
+  if (poses && !poses->is_stored) write_photo_poses(model / kPosesFolder, *poses);
 }
 
 OpenedScene open_scene(const SceneRequest& request,

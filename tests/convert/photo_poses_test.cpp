@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "convert/pipeline.h"
 #include "io/image.h"
 #include "io/png.h"
 #include "io/scene_reader.h"
@@ -66,8 +67,8 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   EXPECT_NE(poses.warnings[0].find("focal length"), std::string::npos);
 
   // Stored, they are taken from there, bit for bit, until something changes.
-  write_photo_poses(dir / "model", poses);
-  const PhotoPoses again = solved(dir / "photos", 0, dir / "model");
+  write_photo_poses(dir / "model/colmap", poses);
+  const PhotoPoses again = solved(dir / "photos", 0, dir / "model/colmap");
   EXPECT_EQ(again.warnings, poses.warnings);
   EXPECT_TRUE(again.model.images[0].points.empty());  // as readers leave them: not solved anew
   const Scene same = scene_of_photographs(dir / "photos", again.model);
@@ -79,7 +80,11 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   }
   ASSERT_EQ(same.points.size(), scene.points.size());
   EXPECT_EQ(same.points[5].position, scene.points[5].position);
-  const PhotoPoses other = solved(dir / "photos", truth[0].fx, dir / "model");
+  const std::string stored = test::read_bytes(dir / "model/colmap/sparse/0/images.txt");
+  Terminal terminal(true);
+  open_scene({.path = dir / "photos"}, dir / "model", terminal).keep(dir / "model");
+  EXPECT_EQ(test::read_bytes(dir / "model/colmap/sparse/0/images.txt"), stored);
+  const PhotoPoses other = solved(dir / "photos", truth[0].fx, dir / "model/colmap");
   EXPECT_FALSE(other.model.images[0].points.empty());
   EXPECT_EQ(other.model.cameras.begin()->second.camera.fx, truth[0].fx);
   EXPECT_TRUE(other.warnings.empty());
