@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/length.h"
-#include "io/image.h"
+#include "io/orientation.h"
 #include "io/resample.h"
 #include "io/scene_reader.h"
 #include "libcgs/core/error.h"
@@ -46,7 +46,7 @@ KnownDistance::Pick pick_of(const std::string& text, const Scene& scene) {
     throw InvalidInput("--known-distance: view " + printable(name) +
                        " is held out, so no depth is measured there; pick in an input view");
   }
-  const ImageSize size = image_size(view.image_path);
+  const ImageSize size = photograph_size(view);
   if (pick.x < 0 || pick.y < 0 || pick.x > size.width - 1 || pick.y > size.height - 1) {
     throw InvalidInput("--known-distance: " + printable(text) + " lies outside of the " +
                        std::to_string(size.width) + " x " + std::to_string(size.height) +
@@ -99,7 +99,7 @@ Picked picked_point(const KnownDistance::Pick& pick, const Model& model, const s
       static_cast<size_t>(std::find(input.begin(), input.end(), pick.view) - input.begin());
   const View& view = model.scene.views[static_cast<size_t>(pick.view)];
   const ViewPriors& priors = model.priors.at(k);
-  const ImageSize size = image_size(view.image_path);
+  const ImageSize size = photograph_size(view);
   const Camera in_file = resized(view.camera, size.width, size.height);
   const Eigen::Vector2d pinhole =
       undistorted({pick.x + 0.5, pick.y + 0.5}, in_file, view.distortion);

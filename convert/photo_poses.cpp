@@ -15,6 +15,7 @@
 #include "io/colmap_writer.h"
 #include "io/image.h"
 #include "io/json_file.h"
+#include "io/orientation.h"
 #include "io/photographs.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/solve_poses.h"
@@ -91,7 +92,7 @@ int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) 
 using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255
 
 UnposedPhoto unposed_photo(const PhotoFile& photograph, double focal, Colors& colors) {
-  const ColorImage image = read_image(photograph.path);
+  const ColorImage image = turned(read_image(photograph.path), photograph.orientation);
   UnposedPhoto out;
   out.name = photograph.path.filename().string();
   out.width = image.width;

@@ -62,6 +62,7 @@ json camera_json(const Scene& scene, size_t index) {
     return std::find(list.begin(), list.end(), static_cast<int>(index)) != list.end();
   };
   entry["role"] = contains(scene.input) ? "input" : contains(scene.held_out) ? "held_out" : "";
+  if (view.orientation != 1) entry["orientation"] = view.orientation;
   if (!view.image_path.empty()) {
     entry["image_path"] = std::filesystem::absolute(view.image_path).lexically_normal().string();
   }
@@ -143,6 +144,12 @@ View read_view(const JsonValue& entry, const Frame& frame, std::set<std::string>
     if (distortion->size() != 5) distortion->fail(Defect::Schema, "expected k1 k2 p1 p2 k3");
     for (size_t i = 0; i < 5; ++i) view.distortion[i] = distortion->at(i).number();
     check_distortion(camera, view.distortion, refuse);
+  }
+  if (const auto orientation = entry.find("orientation")) {
+    view.orientation = orientation->count();
+    if (view.orientation < 1 || view.orientation > 8) {
+      orientation->fail(Defect::Value, "must be 1 ... 8, as Exif counts");
+    }
   }
   return view;
 }

@@ -83,16 +83,21 @@ LensHint from_film(double millimetres, const ImageSize& size) {
   return {"", focal, std::hypot(rounding, kCut)};
 }
 
-}  // namespace
-
-LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size) {
+// The Exif part of a JPEG; null for what is none or has none.
+Exif read_exif(const std::filesystem::path& path) {
   // A JPEG segment has at most 64 KiB, and Exif is to be among the first.
   constexpr uint64_t kEnough = uint64_t{256} << 10;
   const std::string bytes = read_file_start(path, kEnough);
-  if (!bytes.starts_with("\xff\xd8")) return {};
-  const Exif exif(exif_data_new_from_data(reinterpret_cast<const unsigned char*>(bytes.data()),
-                                          static_cast<unsigned>(bytes.size())),
-                  &exif_data_unref);
+  if (!bytes.starts_with("\xff\xd8")) return {nullptr, &exif_data_unref};
+  return {exif_data_new_from_data(reinterpret_cast<const unsigned char*>(bytes.data()),
+                                  static_cast<unsigned>(bytes.size())),
+          &exif_data_unref};
+}
+
+}  // namespace
+
+LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size) {
+  const Exif exif = read_exif(path);
   if (!exif) return {};
   LensHint hint;
   const double plane = pixels_per_millimetre(exif.get(), size);
@@ -110,6 +115,15 @@ LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size) {
   if (!(hint.focal >= kShortest * side && hint.focal <= kLongest * side)) hint = {};
   hint.camera = text(exif.get(), EXIF_TAG_MAKE) + " " + text(exif.get(), EXIF_TAG_MODEL);
   return hint;
+}
+
+int exif_orientation(const std::filesystem::path& path) {
+  constexpr int kUpright = 1;
+  constexpr int kLast = 8;
+  const Exif exif = read_exif(path);
+  if (!exif) return kUpright;
+  const double value = number(exif.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION);
+  return value >= kUpright && value <= kLast ? static_cast<int>(value) : kUpright;
 }
 
 }  // namespace cgs

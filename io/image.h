@@ -14,7 +14,7 @@ struct ImageSize {
 };
 
 /// The size of a PNG, JPEG, TIFF or WebP file from its header; the format is told from the content,
-/// not the name. Orientation tags are ignored, as cameras are calibrated on the stored pixels.
+/// not the name. Orientation tags are ignored here: see orientation.h.
 /// \throws BadInput as parse_image_header(); LimitError above max_pixels.
 ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits = {});
 

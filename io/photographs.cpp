@@ -5,6 +5,7 @@
 
 #include "io/colmap.h"
 #include "io/llff.h"
+#include "io/orientation.h"
 #include "io/strecha.h"
 #include "io/transforms_json.h"
 
@@ -32,8 +33,9 @@ std::vector<PhotoFile> list_photographs(const SceneRoot& root) {
     const bool is_plain = std::none_of(
         name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; });
     if (!is_plain) throw BadInput(Defect::Path, path, "the name holds control characters");
-    const ImageSize size = image_size(path);
-    out.push_back({path, size, lens_hint(path, size)});
+    const ImageSize stored = image_size(path);
+    const int orientation = exif_orientation(path);
+    out.push_back({path, turned(stored, orientation), orientation, lens_hint(path, stored)});
   }
   return out;
 }

@@ -12,7 +12,8 @@ namespace cgs {
 /// A photograph whose camera is not known.
 struct PhotoFile {
   std::filesystem::path path;
-  ImageSize size;
+  ImageSize size;       ///< Upright.
+  int orientation = 1;  ///< As exif_orientation().
   LensHint hint;
 };
 

@@ -11,8 +11,10 @@
 
 #include "io/byte_reader.h"
 #include "io/colmap.h"
+#include "io/exif.h"
 #include "io/image.h"
 #include "io/llff.h"
+#include "io/orientation.h"
 #include "io/resample.h"
 #include "io/strecha.h"
 #include "io/transforms_json.h"
@@ -155,7 +157,7 @@ void fit_cameras(Scene& scene) {
   for (View& view : scene.views) {
     Camera& camera = view.camera;
     if (!view.image_path.empty()) {
-      const ImageSize size = image_size(view.image_path);
+      const ImageSize size = photograph_size(view);
       if (!have_same_shape(camera.width, camera.height, size.width, size.height)) {
         throw BadInput(Defect::Mismatch,
                        view.image_path,
@@ -282,7 +284,7 @@ void load_image(Scene& scene, View& view) {
     throw BadInput(Defect::Missing, scene.folder, "view " + printable(view.name) + " has no image");
   }
   Camera& camera = view.camera;
-  view.image = read_image(view.image_path, &view.valid);
+  view.image = read_photograph(view, &view.valid);
   const int width = view.image.width;
   const int height = view.image.height;
   if (width < camera.width || height < camera.height ||
@@ -367,6 +369,9 @@ Scene scene_of_photographs(const fs::path& folder,
   options.validate();
   Scene scene = scene_of_colmap({folder, options.allow_external}, model);
   scene.kind = "photographs";
+  for (View& view : scene.views) {
+    if (!view.image_path.empty()) view.orientation = exif_orientation(view.image_path);
+  }
   return prepared(std::move(scene), options);
 }
 

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/orientation.h"
+
+#include <utility>
+
+namespace cgs {
+
+namespace {
+
+constexpr int kUpright = 1;
+constexpr int kFirstTransposed = 5;  // from here on rows of the file are columns of the picture
+
+// Where a pixel of the upright picture lies in the file.
+std::pair<int, int> stored_place(int x, int y, const ImageSize& stored, int orientation) {
+  const int last_x = stored.width - 1;
+  const int last_y = stored.height - 1;
+  switch (orientation) {
+    case 2:
+      return {last_x - x, y};
+    case 3:
+      return {last_x - x, last_y - y};
+    case 4:
+      return {x, last_y - y};
+    case 5:
+      return {y, x};
+    case 6:
+      return {y, last_y - x};
+    case 7:
+      return {last_x - y, last_y - x};
+    case 8:
+      return {last_x - y, x};
+    default:
+      return {x, y};
+  }
+}
+
+template <typename T>
+Raster<T> turned_raster(const Raster<T>& stored, int orientation) {
+  if (orientation == kUpright || stored.empty()) return stored;
+  const ImageSize from = {stored.width, stored.height};
+  const ImageSize to = turned(from, orientation);
+  Raster<T> out(to.width, to.height, stored.data.front());
+  for (int y = 0; y < to.height; ++y) {
+    for (int x = 0; x < to.width; ++x) {
+      const auto [u, v] = stored_place(x, y, from, orientation);
+      out(x, y) = stored(u, v);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+ColorImage turned(const ColorImage& stored, int orientation) {
+  return turned_raster(stored, orientation);
+}
+
+MaskMap turned(const MaskMap& stored, int orientation) {
+  return turned_raster(stored, orientation);
+}
+
+ImageSize turned(const ImageSize& stored, int orientation) {
+  if (orientation < kFirstTransposed) return stored;
+  return {stored.height, stored.width};
+}
+
+ImageSize photograph_size(const View& view) {
+  return turned(image_size(view.image_path), view.orientation);
+}
+
+ColorImage read_photograph(const View& view, MaskMap* usable) {
+  ColorImage stored = read_image(view.image_path, usable);
+  if (view.orientation == kUpright) return stored;
+  if (usable != nullptr) *usable = turned(*usable, view.orientation);
+  return turned(stored, view.orientation);
+}
+
+}  // namespace cgs
