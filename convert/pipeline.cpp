@@ -132,7 +132,7 @@ Json run_scale(Run& run, const Progress& progress) {
   frame.metres_per_unit = run.scene.frame.metres_per_unit;
   frame.metres_sigma = run.scene.frame.metres_sigma;
   frame.scale_source = run.scene.frame.scale_source;
-  const Json result = scale_by(run.distances, model);
+  Json result = scale_by(run.distances, model);
   const bool is_new = frame.metres_per_unit != before.metres_per_unit ||
                       frame.metres_sigma != before.metres_sigma ||
                       frame.scale_source != before.scale_source;

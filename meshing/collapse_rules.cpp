@@ -16,7 +16,7 @@ struct Foot {
 };
 
 // Nearest point of a triangle with its first corner at the origin (Ericson 2005, 5.1.5).
-Foot foot_on(const NewFace& f, const Vector3f& x) {
+Foot foot_on(const Triangle& f, const Vector3f& x) {
   const float d1 = f.ab.dot(x);
   const float d2 = f.ac.dot(x);
   const float d3 = d1 - f.abab;
@@ -85,7 +85,9 @@ Collapser::Outcome Collapser::collapse(uint32_t a, uint32_t b) {
   const Vector3f p = (to.point + center_).cast<float>();
   if (!reachable(u, v, p)) return Outcome::Refused;
   if (border && !border_allows(u, v, p)) return Outcome::Refused;
-  if (!faces_allow(u, v, p, to.t) || !witnesses_allow(p)) return Outcome::Refused;
+  if (!faces_allow(u, v, p, to.t) || !witnesses_allow(p) || !stays_near(p)) {
+    return Outcome::Refused;
+  }
   apply(u, v, to);
   return Outcome::Done;
 }
@@ -125,12 +127,7 @@ bool Collapser::reachable(uint32_t u, uint32_t v, const Vector3f& p) const {
   const float reach = 0.5f * std::max(limits_.tolerance[u], limits_.tolerance[v]);
   const auto near = [&](uint32_t f) {
     const Face& face = mesh_.faces[f];
-    NewFace old{};
-    old.ab = mesh_.vertices[face[1]] - mesh_.vertices[face[0]];
-    old.ac = mesh_.vertices[face[2]] - mesh_.vertices[face[0]];
-    old.abab = old.ab.squaredNorm();
-    old.abac = old.ab.dot(old.ac);
-    old.acac = old.ac.squaredNorm();
+    const Triangle old(mesh_.vertices[face[0]], mesh_.vertices[face[1]], mesh_.vertices[face[2]]);
     return foot_on(old, p - mesh_.vertices[face[0]]).squared_distance <= reach * reach;
   };
   return std::any_of(dying_.begin(), dying_.end(), near) ||
@@ -183,15 +180,11 @@ bool Collapser::faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t) 
     const uint32_t b = face[(k + 1) % 3];
     const uint32_t c = face[(k + 2) % 3];
     NewFace fresh;
+    static_cast<Triangle&>(fresh) = {p, mesh_.vertices[b], mesh_.vertices[c]};
     fresh.face = f;
     fresh.b = b;
     fresh.c = c;
     fresh.label = mesh_.provenance[f];
-    fresh.ab = mesh_.vertices[b] - p;
-    fresh.ac = mesh_.vertices[c] - p;
-    fresh.abab = fresh.ab.squaredNorm();
-    fresh.abac = fresh.ab.dot(fresh.ac);
-    fresh.acac = fresh.ac.squaredNorm();
     if (colored) {
       fresh.color = color;
       fresh.color_ab = mesh_.colors[b] - color;
@@ -268,6 +261,39 @@ bool Collapser::witnesses_allow(const Vector3f& p) {
   };
   return std::all_of(dying_.begin(), dying_.end(), find) &&
          std::all_of(moving_.begin(), moving_.end(), find);
+}
+
+// Whether a point lies near the input around its nearest witness of the star.
+bool Collapser::is_near_original(const Vector3f& x) const {
+  uint32_t nearest = kNone;
+  float least = std::numeric_limits<float>::infinity();
+  for (const uint32_t w : points_) {
+    const float squared_distance = (original_.vertices[w] - x).squaredNorm();
+    if (squared_distance >= least) continue;
+    least = squared_distance;
+    nearest = w;
+  }
+  if (nearest == kNone) return true;  // nothing is left to compare with
+  constexpr float kBetween = 0.75f;  // a face may be farther off between what is looked at
+  const float reach = kBetween * limits_.tolerance[nearest];
+  if (least <= reach * reach) return true;
+  for (uint32_t i = original_first_[nearest]; i < original_first_[nearest + 1]; ++i) {
+    const Face& face = original_.faces[original_around_[i]];
+    const Triangle triangle(
+        original_.vertices[face[0]], original_.vertices[face[1]], original_.vertices[face[2]]);
+    if (foot_on(triangle, x - original_.vertices[face[0]]).squared_distance <= reach * reach) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// Witnesses keep the input near the new faces; this keeps the new faces near the input, between
+// their corners, too.
+bool Collapser::stays_near(const Vector3f& p) const {
+  return std::all_of(fresh_.begin(), fresh_.end(), [&](const NewFace& f) {
+    return is_near_original(p + (f.ab + f.ac) / 3) && is_near_original(p + f.ab / 2);
+  });
 }
 
 void Collapser::apply(uint32_t u, uint32_t v, const Placement& to) {

@@ -50,14 +50,22 @@ struct Placement {
   float t = 0;  ///< Position along the edge from the vertex that stays, in [0, 1].
 };
 
-/// A face of the star after a collapse, relative to its new vertex.
-struct NewFace {
+/// A triangle by the edges at its first corner.
+struct Triangle {
+  Triangle() = default;
+  Triangle(const Vector3f& a, const Vector3f& b, const Vector3f& c)
+      : ab(b - a), ac(c - a), abab(ab.squaredNorm()), abac(ab.dot(ac)), acac(ac.squaredNorm()) {}
+  Vector3f ab = Vector3f::Zero();
+  Vector3f ac = Vector3f::Zero();
+  float abab = 0, abac = 0, acac = 0;
+};
+
+/// A face of the star after a collapse; its first corner is the new vertex.
+struct NewFace : Triangle {
   uint32_t face = 0;
   uint32_t b = 0, c = 0;  ///< Its other corners.
   Provenance label = Provenance::Inferred;
-  Vector3f normal, normal_before;  ///< Unit length; 0 for a face without area.
-  Vector3f ab, ac;                 ///< To the other corners.
-  float abab = 0, abac = 0, acac = 0;
+  Vector3f normal, normal_before;      ///< Unit length; 0 for a face without area.
   Vector3f color, color_ab, color_ac;  ///< At the new vertex, and differences.
 };
 
@@ -86,7 +94,8 @@ class Collapser {
   void find_candidates();
   bool may_collapse(uint32_t u, uint32_t v) const;
   Placement placement(uint32_t u, uint32_t v) const;
-  size_t pass();
+  float pass_cost();
+  bool pass();
   Outcome collapse(uint32_t a, uint32_t b);
   void gather_star(uint32_t u, uint32_t v);
   bool link_allows(uint32_t u, uint32_t v, bool& border);
@@ -95,6 +104,8 @@ class Collapser {
   bool faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t);
   bool folds() const;
   bool witnesses_allow(const Vector3f& p);
+  bool is_near_original(const Vector3f& x) const;
+  bool stays_near(const Vector3f& p) const;
   void apply(uint32_t u, uint32_t v, const Placement& to);
   void drop_dead_faces();
   Vector3d vertex(uint32_t v) const { return mesh_.vertices[v].cast<double>() - center_; }
@@ -110,12 +121,14 @@ class Collapser {
   std::vector<uint8_t> refused_;  // per face, a bit per side
   std::vector<uint32_t> first_;   // faces around vertex v: around_[first_[v] ... first_[v + 1])
   std::vector<uint32_t> around_;  // as of the beginning of the pass
+  std::vector<uint32_t> original_first_, original_around_;  // the same of the input
   std::vector<Kind> kind_;
   std::vector<Quadric> quadric_;
   std::vector<uint8_t> used_;     // per vertex: merged in this pass
   std::vector<uint8_t> changed_;  // per vertex: star changed in the last pass
   std::vector<float> cost_;       // per slot
   std::vector<Candidate> candidates_;
+  std::vector<float> pass_costs_;
   std::vector<uint32_t> cursor_;   // per vertex: where its next face goes in around_
   std::vector<uint32_t> witness_;  // per face: list of original vertices
   std::vector<uint32_t> next_witness_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <tbb/blocked_range.h>
@@ -31,6 +32,8 @@ Collapser::Collapser(const TriangleMesh& mesh, const CollapseLimits& limits)
   kind_.assign(n, Kind::Fixed);
   quadric_.resize(n);
   index_faces();
+  original_first_ = first_;
+  original_around_ = around_;
   classify();
   witness_.assign(mesh.faces.size(), kNone);
   next_witness_.assign(n, kNone);
@@ -217,19 +220,33 @@ void Collapser::find_candidates() {
   }
 }
 
-// Collapses the cheapest part of what may be collapsed.
-size_t Collapser::pass() {
+// The cost up to which this pass goes: that of an earlier run, else of the cheapest third.
+float Collapser::pass_cost() {
+  const size_t pass = pass_costs_.size();
+  if (pass < limits_.pass_costs.size()) return limits_.pass_costs[pass];
+  if (!limits_.pass_costs.empty()) return std::numeric_limits<float>::infinity();
   constexpr double kPart = 0.35;
   constexpr size_t kAtLeast = 1000;
+  const size_t wanted = std::max(kAtLeast, size_t(kPart * double(candidates_.size())));
+  if (wanted >= candidates_.size()) return std::numeric_limits<float>::infinity();
+  std::nth_element(candidates_.begin(), candidates_.begin() + ptrdiff_t(wanted), candidates_.end());
+  return candidates_[wanted].cost;
+}
+
+// Collapses the cheapest part of what may be collapsed. False if there is nothing.
+bool Collapser::pass() {
   find_candidates();
-  const auto wanted = ptrdiff_t(
-      std::min(candidates_.size(), std::max(kAtLeast, size_t(kPart * double(candidates_.size())))));
-  std::nth_element(candidates_.begin(), candidates_.begin() + wanted, candidates_.end());
-  tbb::parallel_sort(candidates_.begin(), candidates_.begin() + wanted);
+  if (candidates_.empty()) return false;
+  const float most = pass_cost();
+  pass_costs_.push_back(most);
+  const auto wanted = std::partition(candidates_.begin(),
+                                     candidates_.end(),
+                                     [most](const Candidate& c) { return c.cost <= most; });
+  tbb::parallel_sort(candidates_.begin(), wanted);
   used_.assign(mesh_.vertices.size(), 0);
   changed_.assign(changed_.size(), 0);
   size_t left = mesh_.faces.size();
-  for (auto at = candidates_.begin(); at != candidates_.begin() + wanted; ++at) {
+  for (auto at = candidates_.begin(); at != wanted; ++at) {
     if (left <= limits_.target_faces) break;
     const uint32_t f = at->slot / 3;
     const uint32_t k = at->slot % 3;
@@ -240,7 +257,7 @@ size_t Collapser::pass() {
   }
   drop_dead_faces();
   index_faces();
-  return size_t(wanted);
+  return true;
 }
 
 void Collapser::drop_dead_faces() {
@@ -261,9 +278,10 @@ void Collapser::drop_dead_faces() {
 }
 
 CollapsedMesh Collapser::run() {
-  while (mesh_.faces.size() > limits_.target_faces && pass() > 0) {
+  while (mesh_.faces.size() > limits_.target_faces && pass()) {
   }
   CollapsedMesh out;
+  out.pass_costs = pass_costs_;
   out.witness_of.assign(original_.vertices.size(), kNone);
   for (uint32_t f = 0; f < witness_.size(); ++f) {
     for (uint32_t w = witness_[f]; w != kNone; w = next_witness_[w]) out.witness_of[w] = f;

@@ -16,11 +16,15 @@ struct CollapseLimits {
   float color = 1;               ///< Largest change of a colour channel at a witness on a face that
                                  ///< is not Inferred.
   size_t target_faces = 0;       ///< Stop when so few are left.
+  /// How far each pass goes, as an earlier run gave it; empty = the cheapest third of what is left.
+  /// Two runs that go as far differ only near the vertices whose limits differ.
+  std::vector<float> pass_costs;
 };
 
 struct CollapsedMesh {
   TriangleMesh mesh;                 ///< Attributes as in the input; unused vertices are gone.
   std::vector<uint32_t> witness_of;  ///< Per input vertex the output face it is near; ~0 = none.
+  std::vector<float> pass_costs;     ///< Highest cost that each pass tried.
 };
 
 /// Collapses edges, cheapest quadric error first, as long as the limits allow.

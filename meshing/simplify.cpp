@@ -154,12 +154,13 @@ SimplifyResult simplify(const TriangleMesh& mesh,
   SimplifyResult result = unchanged(mesh);
   if (mesh.faces.empty()) return result;
   CollapseLimits limits{
-      tolerances(mesh, options), float(options.max_color_error), options.target_faces};
+      tolerances(mesh, options), float(options.max_color_error), options.target_faces, {}};
   constexpr int kRounds = 6;
   for (int round = 1; round <= kRounds; ++round) {
     report(progress, double(round - 1) / kRounds);
     const CollapsedMesh out = collapse_edges(mesh, limits);
     result.rounds = round;
+    if (round == 1) limits.pass_costs = out.pass_costs;
     result.area_after = area_by_provenance(out.mesh);
     if (tighten_for_area(mesh, result, limits.tolerance)) continue;
     Tightening tightening(limits.tolerance, options.max_error / 32);
@@ -179,10 +180,6 @@ SimplifyResult simplify(const TriangleMesh& mesh,
       return result;
     }
     result.tightened += tightening.apply();
-    // Faces reach beyond their corners in places that change with every round: where tightening
-    // around them has not helped at once, it would not come to an end.
-    if (round == 1) continue;
-    for (float& tolerance : limits.tolerance) tolerance *= 0.5f;
   }
   const int rounds = result.rounds;
   result = unchanged(mesh);

@@ -292,14 +292,14 @@ TEST(Simplify, KeepsColoursThatTheFacesCarry) {
 }
 
 TEST(Simplify, DoesNotLetTwoNearSheetsIntersect) {
-  // Bumpy sheets half the error apart: simplified on their own they would cross.
+  // Bumpy sheets an eighth of the error apart: simplified on their own they would cross.
   const auto bumpy = [](float lift) {
     return grid(32, 32, false, false, [lift](float u, float v) {
       return Vector3f(u, v, lift + 8e-3f * std::sin(40 * u) * std::sin(33 * v));
     });
   };
   TriangleMesh mesh = bumpy(0);
-  const TriangleMesh upper = bumpy(4e-3f);
+  const TriangleMesh upper = bumpy(1e-3f);
   const auto n = static_cast<uint32_t>(mesh.vertices.size());
   mesh.vertices.insert(mesh.vertices.end(), upper.vertices.begin(), upper.vertices.end());
   for (const auto& f : upper.faces) mesh.faces.push_back({f[0] + n, f[1] + n, f[2] + n});
