@@ -1,0 +1,575 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The viewer of the report page. It reads the JSON in #viewer-scene, as viewer_scene() writes it,
+// and fills the markup of viewer.html. Everything is in internal units of the scene; what people
+// read is in coordinates of the files, as `cgs measure` takes them, and in the unit of figures.
+'use strict';
+(() => {
+  const part = (id) => document.getElementById('viewer-' + id);
+  const root = document.getElementById('viewer');
+  const canvas = part('canvas');
+  const context = canvas.getContext('webgl', { antialias: true, alpha: true });
+  if (!context) {
+    root.dataset.state = 'failed';
+    return;
+  }
+
+  // ---- The scene ----------------------------------------------------------------------------
+
+  function bytes(base64) {
+    const text = atob(base64);
+    const out = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; ++i) out[i] = text.charCodeAt(i);
+    return out;
+  }
+  let pending = 0;  // photographs that the browser has not decoded yet
+  const floats = (base64) => new Float32Array(bytes(base64).buffer);
+
+  const scene = JSON.parse(document.getElementById('viewer-scene').textContent);
+  const vertices = floats(scene.mesh.vertices);
+  const faces = new Uint32Array(bytes(scene.mesh.faces).buffer);
+  const vertexColors = bytes(scene.mesh.colors);
+  const sigmas = floats(scene.mesh.sigma);        // empty: not stated
+  const provenance = bytes(scene.mesh.provenance);  // empty: not stated
+  const corners = faces.length;
+  const INFERRED = 0;
+  const looksOfLabel = {  // by number, as Provenance has them
+    0: [242, 26, 217], 1: [91, 155, 213], 2: [196, 200, 204], 3: [255, 153, 26], 4: [154, 127, 209],
+  };
+  const unknownColor = [128, 128, 128];
+  const ramp = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
+  const nameOf = {};
+  for (const label of scene.labels) nameOf[label.number] = label.name;
+
+  const vector = (i) => new THREE.Vector3(vertices[3 * i], vertices[3 * i + 1], vertices[3 * i + 2]);
+  const statesLabels = provenance.length > 0;
+  const isInvented = (face) => statesLabels && provenance[face] === INFERRED;
+  // What is not stated at every corner is not stated between them.
+  function statesSigma(face) {
+    if (!sigmas.length || isInvented(face)) return false;
+    return [0, 1, 2].every((k) => Number.isFinite(sigmas[faces[3 * face + k]]));
+  }
+  function smoothNormals() {
+    const out = new Float32Array(vertices.length);
+    for (let c = 0; c < corners; c += 3) {
+      const [a, b, d] = [faces[c], faces[c + 1], faces[c + 2]].map(vector);
+      const n = b.sub(a).cross(d.sub(a));  // as long as twice the area
+      for (let k = 0; k < 3; ++k) {
+        out[3 * faces[c + k]] += n.x;
+        out[3 * faces[c + k] + 1] += n.y;
+        out[3 * faces[c + k] + 2] += n.z;
+      }
+    }
+    return out;
+  }
+
+  // ---- What is drawn ------------------------------------------------------------------------
+
+  const clip = { value: new THREE.Vector4(0, 0, 0, -1) };  // n, d: gone where n.p + d > 0
+  const lit = { value: 0 };
+  const textured = { value: 0 };
+
+  function surfaceMaterial(map) {
+    return new THREE.ShaderMaterial({
+      side: THREE.DoubleSide,
+      uniforms: { clip, lit, textured, map: { value: map }, hasMap: { value: map ? 1 : 0 } },
+      vertexShader: `
+        attribute vec3 paint;
+        varying vec3 vPaint, vNormal, vPlace, vEye;
+        varying vec2 vUv;
+        void main() {
+          vec4 eye = modelViewMatrix * vec4(position, 1.0);
+          vPaint = paint; vNormal = normalMatrix * normal; vPlace = position; vEye = eye.xyz; vUv = uv;
+          gl_Position = projectionMatrix * eye;
+        }`,
+      fragmentShader: `
+        uniform vec4 clip;
+        uniform float lit, textured, hasMap;
+        uniform sampler2D map;
+        varying vec3 vPaint, vNormal, vPlace, vEye;
+        varying vec2 vUv;
+        void main() {
+          if (dot(clip, vec4(vPlace, 1.0)) > 0.0) discard;
+          if (!gl_FrontFacing) {  // the inside of a closed surface: where it is cut
+            float hatch = step(mod(gl_FragCoord.x + gl_FragCoord.y, 12.0), 1.5);
+            gl_FragColor = vec4(mix(vec3(0.33, 0.37, 0.42), vec3(0.5, 0.54, 0.59), hatch), 1.0);
+            return;
+          }
+          vec3 color = textured * hasMap > 0.5 ? texture2D(map, vUv).rgb : vPaint;
+          float toEye = abs(dot(normalize(vNormal), normalize(vEye)));
+          gl_FragColor = vec4(color * mix(1.0, 0.35 + 0.65 * toEye, lit), 1.0);
+        }`,
+    });
+  }
+  function cloudMaterial() {
+    return new THREE.ShaderMaterial({
+      uniforms: { clip, size: { value: 2 } },
+      vertexShader: `
+        attribute vec3 paint;
+        uniform float size;
+        varying vec3 vPaint, vPlace;
+        void main() {
+          vPaint = paint; vPlace = position;
+          gl_PointSize = size;
+          gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+        }`,
+      fragmentShader: `
+        uniform vec4 clip;
+        varying vec3 vPaint, vPlace;
+        void main() {
+          if (dot(clip, vec4(vPlace, 1.0)) > 0.0) discard;
+          gl_FragColor = vec4(vPaint, 1.0);
+        }`,
+    });
+  }
+
+  const renderer = new THREE.WebGLRenderer({ canvas, context, antialias: true, alpha: true });
+  const world = new THREE.Scene();
+  const camera = new THREE.PerspectiveCamera(45, 1, 0.002, 40);
+  camera.up.fromArray(scene.up).normalize();
+
+  // Corners of their own for every face: labels and photographs change from face to face.
+  const paint = new THREE.BufferAttribute(new Uint8Array(3 * corners), 3, true);
+  const surface = (() => {
+    const normals = smoothNormals();
+    const place = new Float32Array(3 * corners);
+    const normal = new Float32Array(3 * corners);
+    const uv = new Float32Array(2 * corners);
+    for (let c = 0; c < corners; ++c) {
+      for (let k = 0; k < 3; ++k) {
+        place[3 * c + k] = vertices[3 * faces[c] + k];
+        normal[3 * c + k] = normals[3 * faces[c] + k];
+      }
+    }
+    const geometry = new THREE.BufferGeometry();
+    const materials = [];
+    let begin = 0;
+    scene.mesh.faces_of_photograph.forEach((count, i) => {
+      const photograph = scene.photographs[i];
+      if (photograph && count) writeCoordinates(uv, begin, begin + 3 * count, photograph);
+      geometry.addGroup(begin, 3 * count, i);
+      materials.push(surfaceMaterial(photograph && count ? loaded(photograph) : null));
+      begin += 3 * count;
+    });
+    geometry.setAttribute('position', new THREE.BufferAttribute(place, 3));
+    geometry.setAttribute('normal', new THREE.BufferAttribute(normal, 3));
+    geometry.setAttribute('uv', new THREE.BufferAttribute(uv, 2));
+    geometry.setAttribute('paint', paint);
+    return new THREE.Mesh(geometry, materials);
+  })();
+  function writeCoordinates(uv, begin, end, photograph) {
+    const shot = photograph.camera;
+    const toCamera = new THREE.Matrix4().getInverse(poseOf(shot));
+    for (let c = begin; c < end; ++c) {
+      const p = vector(faces[c]).applyMatrix4(toCamera);
+      uv[2 * c] = (shot.fx * p.x / p.z + shot.cx - photograph.corner[0]) / photograph.size[0];
+      uv[2 * c + 1] = (shot.fy * p.y / p.z + shot.cy - photograph.corner[1]) / photograph.size[1];
+    }
+  }
+  function loaded(photograph) {
+    const texture = new THREE.Texture(new Image());
+    texture.flipY = false;
+    texture.generateMipmaps = false;
+    texture.minFilter = THREE.LinearFilter;
+    texture.image.onload = () => {
+      texture.needsUpdate = true;
+      pending -= 1;
+      redraw();
+    };
+    texture.image.src = 'data:image/jpeg;base64,' + photograph.jpeg;
+    pending += 1;
+    return texture;
+  }
+  function poseOf(shot) {
+    return new THREE.Matrix4().set(...shot.world_from_cam, 0, 0, 0, 1);
+  }
+
+  const cloud = (() => {
+    const geometry = new THREE.BufferGeometry();
+    const places = floats(scene.gaussians.positions);
+    geometry.setAttribute('position', new THREE.BufferAttribute(places, 3));
+    geometry.setAttribute('paint', new THREE.BufferAttribute(bytes(scene.gaussians.colors), 3, true));
+    return new THREE.Points(geometry, cloudMaterial());
+  })();
+  const between = new THREE.Line(
+    new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]),
+    new THREE.LineBasicMaterial({ color: 0xf21ad9, depthTest: false, transparent: true }));
+  for (const object of [surface, cloud, between]) object.frustumCulled = false;
+  world.add(surface, cloud, between);
+
+  // ---- The camera ---------------------------------------------------------------------------
+
+  const controls = new THREE.OrbitControls(camera, canvas);
+  controls.enableKeys = false;
+  controls.screenSpacePanning = true;
+  controls.enableZoom = false;  // until the canvas has the focus: the wheel belongs to the page
+  controls.addEventListener('change', redraw);
+  canvas.addEventListener('focus', () => { controls.enableZoom = true; });
+  canvas.addEventListener('blur', () => { controls.enableZoom = false; });
+
+  let lens = null;  // of the photograph whose place was taken; null = our own
+  function applyLens() {
+    const width = canvas.parentElement.clientWidth;
+    const height = canvas.parentElement.clientHeight;
+    renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    renderer.setSize(width, height, false);
+    cloud.material.uniforms.size.value = 2 * renderer.getPixelRatio();
+    camera.fov = 45;
+    camera.aspect = width / height;
+    camera.clearViewOffset();
+    if (lens) {  // as large as it fits, its principal point where it belongs
+      const scale = Math.min(width / lens.width, height / lens.height);
+      camera.fov = 2 * Math.atan(height / 2 / (lens.fy * scale)) * 180 / Math.PI;
+      camera.aspect *= lens.fy / lens.fx;
+      camera.setViewOffset(width, height, (lens.width / 2 - lens.cx) * scale,
+        (lens.height / 2 - lens.cy) * scale, width, height);
+    }
+    camera.updateProjectionMatrix();
+    redraw();
+  }
+
+  const forwardOf = (shot) => new THREE.Vector3(0, 0, 1).transformDirection(poseOf(shot));
+
+  // From the side of the middle photograph, as far away as shows all that is not invented.
+  function standBack() {
+    const seen = new Uint8Array(vertices.length / 3);
+    for (let c = 0; c < corners; ++c) {
+      if (!isInvented(Math.floor(c / 3))) seen[faces[c]] = 1;
+    }
+    const box = new THREE.Box3();
+    for (let v = 0; v < seen.length; ++v) if (seen[v]) box.expandByPoint(vector(v));
+    if (box.isEmpty()) box.setFromArray(vertices);
+    const center = box.getCenter(new THREE.Vector3());
+    const middle = scene.cameras[scene.cameras.length >> 1].camera;
+    lens = null;
+    applyLens();
+    camera.position.copy(center).sub(forwardOf(middle));
+    camera.lookAt(center);
+    const toCamera = camera.quaternion.clone().inverse();
+    const tanY = 0.95 * Math.tan(camera.fov * Math.PI / 360);
+    const tanX = tanY * camera.aspect;
+    let distance = 0;
+    for (let v = 0; v < seen.length; ++v) {
+      if (!seen[v]) continue;
+      const p = vector(v).sub(center).applyQuaternion(toCamera);
+      distance = Math.max(distance, Math.abs(p.x) / tanX + p.z, Math.abs(p.y) / tanY + p.z);
+    }
+    camera.position.copy(center).addScaledVector(forwardOf(middle), -distance);
+    controls.target.copy(center);
+    controls.update();
+  }
+
+  // Exactly as the photograph was taken; the first turn makes up upright again.
+  function standAt(shot) {
+    lens = shot;
+    applyLens();
+    const pose = poseOf(shot).multiply(new THREE.Matrix4().makeScale(1, -1, -1));
+    pose.decompose(camera.position, camera.quaternion, new THREE.Vector3());
+    const hit = firstHit(camera.position, forwardOf(shot));
+    controls.target.copy(camera.position).addScaledVector(forwardOf(shot), hit ? hit.distance : 0.5);
+    redraw();
+  }
+
+  function turn(byLongitude, byLatitude) {
+    const upright = new THREE.Quaternion().setFromUnitVectors(camera.up, new THREE.Vector3(0, 1, 0));
+    const offset = camera.position.clone().sub(controls.target).applyQuaternion(upright);
+    const place = new THREE.Spherical().setFromVector3(offset);
+    place.theta += byLongitude;
+    place.phi += byLatitude;
+    offset.setFromSpherical(place.makeSafe()).applyQuaternion(upright.inverse());
+    camera.position.copy(controls.target).add(offset);
+    controls.update();
+  }
+  function zoom(factor) {
+    camera.position.sub(controls.target).multiplyScalar(factor).add(controls.target);
+    controls.update();
+  }
+
+  // ---- Looks --------------------------------------------------------------------------------
+
+  const share = (value) => (100 * value).toPrecision(value < 0.1 ? 2 : 3) + ' %';
+  const scaleOfSigma = (() => {  // the 95th percentile of what is stated
+    const stated = sigmas.filter((s) => Number.isFinite(s)).sort();
+    return stated.length ? stated[Math.floor(0.95 * (stated.length - 1))] || 1e-9 : 0;
+  })();
+
+  function paintEach(colorOf) {
+    for (let c = 0; c < corners; ++c) paint.array.set(colorOf(c), 3 * c);
+    paint.needsUpdate = true;
+  }
+  function rampColor(t) {
+    const at = Math.min(Math.max(t, 0), 1) * (ramp.length - 1);
+    const i = Math.min(Math.floor(at), ramp.length - 2);
+    return ramp[i].map((low, k) => low + (ramp[i + 1][k] - low) * (at - i));
+  }
+  const colorOfVertex = (c) => (vertexColors.length
+    ? vertexColors.subarray(3 * faces[c], 3 * faces[c] + 3) : [190, 190, 190]);
+
+  const legend = part('legend');
+  function explain(color, text) {
+    const entry = document.createElement('span');
+    const swatch = document.createElement('i');
+    swatch.style.background = `rgb(${color})`;
+    entry.append(swatch, text);
+    legend.append(entry);
+  }
+  function explainLabels() {
+    const area = {};
+    let all = 0;
+    for (let f = 0; f < provenance.length; ++f) {
+      const [a, b, c] = [0, 1, 2].map((k) => vector(faces[3 * f + k]));
+      const size = b.sub(a).cross(c.sub(a)).length();
+      area[provenance[f]] = (area[provenance[f]] || 0) + size;
+      all += size;
+    }
+    const means = { observed: 'two or more photographs saw it', 'single view': 'one photograph saw it',
+      interpolated: 'between observed rims', inferred: 'never seen, invented',
+      virtual: 'seen in splats only' };
+    for (const { number, name } of scene.labels) {
+      const part = area[number] ? share(area[number] / all) + ' of the area' : 'none';
+      explain(looksOfLabel[number], `${name} (${means[name]}): ${part}`);
+    }
+  }
+  function explainSigma() {
+    const bar = document.createElement('i');
+    bar.className = 'ramp';
+    bar.style.background = `linear-gradient(to right, ${ramp.map((c) => `rgb(${c})`)})`;
+    const line = document.createElement('span');
+    const most = scaleOfSigma * scene.unit.length;
+    line.append('standard deviation 0', bar, `${most.toPrecision(2)} ${scene.unit.name} or more`);
+    legend.append(line);
+    explain(unknownColor, 'unknown: nobody saw it');
+  }
+
+  const looks = [
+    { name: 'Photographs', there: scene.photographs.length > 0, lit: 0, textured: 1, paint: colorOfVertex,
+      explain: () => legend.append('Every face shows the photograph that sees it best; what none shows has estimated colours.') },
+    { name: 'Colour', there: true, lit: 0.6, paint: colorOfVertex,
+      explain: () => legend.append('Colours of the vertices, under a light at the camera.') },
+    { name: 'Provenance', there: statesLabels, lit: 0.7, explain: explainLabels,
+      paint: (c) => looksOfLabel[provenance[Math.floor(c / 3)]] },
+    { name: 'Sigma', there: sigmas.length > 0, lit: 0.5, explain: explainSigma,
+      paint: (c) => (statesSigma(Math.floor(c / 3)) ? rampColor(sigmas[faces[c]] / scaleOfSigma) : unknownColor) },
+    { name: 'Gaussians', there: scene.gaussians.count > 0, points: true,
+      explain: () => legend.append(`${cloud.geometry.attributes.position.count} of ${scene.gaussians.count} Gaussians, as points of their colour without size and opacity.`) },
+  ].filter((look) => look.there);
+
+  function show(look) {
+    surface.visible = !look.points;
+    cloud.visible = !surface.visible;
+    lit.value = look.lit || 0;
+    textured.value = look.textured || 0;
+    if (look.paint) paintEach(look.paint);
+    legend.textContent = '';
+    look.explain();
+    for (const other of looks) other.button.setAttribute('aria-pressed', other === look);
+    redraw();
+  }
+
+  function button(group, text, act) {
+    const out = document.createElement('button');
+    out.type = 'button';
+    out.textContent = text;
+    out.addEventListener('click', act);
+    part(group).append(out);
+    return out;
+  }
+
+  // ---- Measuring ----------------------------------------------------------------------------
+
+  // Where a ray first meets what is shown of the surface; null = nowhere, or its inside.
+  function firstHit(origin, direction) {
+    const { x: dx, y: dy, z: dz } = direction;
+    let best = null;
+    let front = false;
+    let nearest = Infinity;
+    for (let c = 0; c < corners; c += 3) {
+      const a = 3 * faces[c], b = 3 * faces[c + 1], d = 3 * faces[c + 2];
+      const ax = vertices[a], ay = vertices[a + 1], az = vertices[a + 2];
+      const ux = vertices[b] - ax, uy = vertices[b + 1] - ay, uz = vertices[b + 2] - az;
+      const vx = vertices[d] - ax, vy = vertices[d + 1] - ay, vz = vertices[d + 2] - az;
+      const px = dy * vz - dz * vy, py = dz * vx - dx * vz, pz = dx * vy - dy * vx;
+      const det = ux * px + uy * py + uz * pz;
+      if (det === 0) continue;
+      const tx = origin.x - ax, ty = origin.y - ay, tz = origin.z - az;
+      const s = (tx * px + ty * py + tz * pz) / det;
+      if (s < 0 || s > 1) continue;
+      const qx = ty * uz - tz * uy, qy = tz * ux - tx * uz, qz = tx * uy - ty * ux;
+      const t = (dx * qx + dy * qy + dz * qz) / det;
+      if (t < 0 || s + t > 1) continue;
+      const distance = (vx * qx + vy * qy + vz * qz) / det;
+      if (distance <= 0 || distance >= nearest) continue;
+      const place = new THREE.Vector3(ax + s * ux + t * vx, ay + s * uy + t * vy, az + s * uz + t * vz);
+      const { x, y, z, w } = clip.value;
+      if (x * place.x + y * place.y + z * place.z + w > 0) continue;
+      nearest = distance;
+      front = det > 0;
+      best = { place, distance, face: c / 3, weights: [1 - s - t, s, t] };
+    }
+    return front ? best : null;
+  }
+
+  // Standard deviation at a point of a face, in internal units; NaN = no statement.
+  function sigmaAt({ face, weights }) {
+    if (!sigmas.length || isInvented(face)) return NaN;
+    return weights.reduce((sum, weight, k) => (weight > 0 ? sum + weight * sigmas[faces[3 * face + k]] : sum), 0);
+  }
+  function toFile(place) {
+    const decimals = Math.max(0, 7 - Math.floor(Math.log10(scene.file.scale)));
+    return place.toArray().map((value, k) => (scene.file.origin[k] + scene.file.scale * value).toFixed(decimals));
+  }
+  // Two digits of sigma decide how many the value has.
+  function withSigma(value, sigma) {
+    const stated = Number.isFinite(sigma) && sigma > 0;
+    const decimals = stated ? 1 - Math.floor(Math.log10(sigma)) : 3 - Math.floor(Math.log10(value || 1));
+    const text = (x) => x.toFixed(Math.min(Math.max(decimals, 0), 12));
+    return stated ? `${text(value)} ± ${text(sigma)} ${scene.unit.name}` : `${text(value)} ${scene.unit.name}`;
+  }
+
+  const measured = part('measured');
+  let ends = [];
+  function line(tag, text) {
+    const out = document.createElement(tag);
+    out.textContent = text;
+    const paragraph = document.createElement('p');
+    paragraph.append(out);
+    measured.append(paragraph);
+  }
+  function describe(name, end) {
+    const sigma = sigmaAt(end);
+    const label = statesLabels ? nameOf[provenance[end.face]] : 'provenance not stated';
+    let text = `${name} (${toFile(end.place).join(', ')}): ${label}`;
+    if (isInvented(end.face)) text += '. No photograph saw this place: it was invented and has no sigma';
+    else if (Number.isFinite(sigma)) text += `, ± ${(sigma * scene.unit.length).toPrecision(2)} ${scene.unit.name}`;
+    else text += ', no sigma stated';
+    line('span', text + '.');
+  }
+  function tell() {
+    measured.textContent = '';
+    between.visible = ends.length === 2;
+    if (ends.length < 2) line('span', ends.length ? 'Pick the second point.' : 'Pick two points to measure their distance.');
+    if (ends.length === 2) {
+      const [a, b] = ends;
+      between.geometry.setFromPoints([a.place, b.place]);
+      const value = a.place.distanceTo(b.place) * scene.unit.length;
+      const own = Math.hypot(sigmaAt(a), sigmaAt(b)) * scene.unit.length;
+      const sigma = Math.hypot(own, value * scene.unit.sigma);
+      line('strong', `Distance ${withSigma(value, sigma)}`);
+      if (!Number.isFinite(sigma)) line('span', 'This distance has no sigma: an end of it has none.');
+      if (scene.unit.name === 'units') line('span', 'The scale of the scene is unknown: units are those of the files.');
+    }
+    ends.forEach((end, i) => describe('AB'[i], end));
+    if (ends.length === 2) {
+      line('code', 'cgs measure mesh/watertight.ply --distance ' + ends.map((end) => toFile(end.place).join()).join(' '));
+    }
+    redraw();
+  }
+  function clearEnds() {
+    for (const end of ends) end.mark.remove();
+    ends = [];
+    tell();
+  }
+  function pick(x, y) {  // in [-1, 1]
+    if (!surface.visible) return;
+    camera.updateMatrixWorld();
+    const direction = new THREE.Vector3(x, y, 0.5).unproject(camera).sub(camera.position).normalize();
+    const hit = firstHit(camera.position, direction);
+    if (!hit) return;
+    if (ends.length === 2) clearEnds();
+    hit.mark = document.createElement('div');
+    hit.mark.className = 'end' + (isInvented(hit.face) ? ' invented' : '');
+    hit.mark.setAttribute('aria-hidden', 'true');
+    hit.mark.append(document.createElement('span'));
+    hit.mark.firstChild.textContent = 'AB'[ends.length];
+    canvas.parentElement.append(hit.mark);
+    ends.push(hit);
+    tell();
+  }
+  function placeMarks() {
+    const size = renderer.getSize(new THREE.Vector2());
+    for (const end of ends) {
+      const p = end.place.clone().project(camera);
+      end.mark.hidden = p.z > 1;
+      end.mark.style.transform = `translate(${(p.x + 1) / 2 * size.x}px, ${(1 - p.y) / 2 * size.y}px)`;
+    }
+  }
+
+  // ---- Section ------------------------------------------------------------------------------
+
+  const axis = part('axis');
+  const cut = part('cut');
+  const side = part('side');
+  const bounds = new THREE.Box3().setFromArray(vertices);
+  function section() {
+    const name = axis.value;
+    cut.disabled = side.disabled = !name;
+    const text = part('cut-text');
+    text.textContent = '';
+    clip.value.set(0, 0, 0, -1);
+    if (name) {
+      const sign = side.getAttribute('aria-pressed') === 'true' ? -1 : 1;
+      const at = bounds.min[name] + (bounds.max[name] - bounds.min[name]) * cut.value / 1000;
+      clip.value.set(0, 0, 0, -sign * at)[name] = sign;
+      text.textContent = `${name} = ${toFile(new THREE.Vector3(at, at, at))['xyz'.indexOf(name)].slice(0, -4)}`;
+      cut.setAttribute('aria-valuetext', text.textContent);
+    }
+    redraw();
+  }
+  axis.addEventListener('change', section);
+  cut.addEventListener('input', section);
+  side.addEventListener('click', () => {
+    side.setAttribute('aria-pressed', side.getAttribute('aria-pressed') !== 'true');
+    section();
+  });
+
+  // ---- Mouse, touch and keys ----------------------------------------------------------------
+
+  let pressed = null;
+  canvas.addEventListener('pointerdown', (event) => {
+    pressed = event.isPrimary && event.button === 0 ? event : null;
+    controls.enableZoom = true;
+  });
+  canvas.addEventListener('pointerup', (event) => {
+    const still = pressed && Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) < 5;
+    pressed = null;
+    if (!still) return;
+    const frame = canvas.getBoundingClientRect();
+    pick((event.clientX - frame.left) / frame.width * 2 - 1, 1 - (event.clientY - frame.top) / frame.height * 2);
+  });
+  const STEP = Math.PI / 36;
+  const keys = {
+    ArrowLeft: () => turn(-STEP, 0), ArrowRight: () => turn(STEP, 0),
+    ArrowUp: () => turn(0, -STEP), ArrowDown: () => turn(0, STEP),
+    '+': () => zoom(0.9), '=': () => zoom(0.9), '-': () => zoom(1 / 0.9),
+    Enter: () => pick(0, 0), Escape: clearEnds,
+  };
+  canvas.addEventListener('keydown', (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || !keys[event.key]) return;
+    event.preventDefault();
+    keys[event.key]();
+  });
+
+  // ---- Drawing ------------------------------------------------------------------------------
+
+  let asked = false;
+  function redraw() {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      renderer.render(world, camera);
+      placeMarks();
+      if (pending || root.dataset.state) return;
+      root.dataset.state = 'ready';
+      root.dataset.milliseconds = Math.round(performance.now());  // since the page was asked for
+    });
+  }
+
+  for (const look of looks) look.button = button('looks', look.name, () => show(look));
+  button('places', 'All', standBack);
+  for (const { name, camera: shot } of scene.cameras) button('places', name, () => standAt(shot));
+  show(looks[0]);
+  clearEnds();
+  standBack();
+  new ResizeObserver(applyLens).observe(canvas.parentElement);
+})();
