@@ -9,6 +9,7 @@
 
 CGS_EMBED("cgs_page_style", CGS_PAGE_STYLE);
 CGS_EMBED("cgs_viewer_markup", CGS_VIEWER_MARKUP);
+CGS_EMBED("cgs_scene_script", CGS_SCENE_SCRIPT);
 CGS_EMBED("cgs_viewer_script", CGS_VIEWER_SCRIPT);
 CGS_EMBED("cgs_three_licence", CGS_THREE_LICENCE);
 #ifdef CGS_THREE
@@ -20,6 +21,7 @@ extern "C" {
 // NOLINTBEGIN(modernize-avoid-c-arrays): places the assembler names
 extern const char cgs_page_style_begin[], cgs_page_style_end[];
 extern const char cgs_viewer_markup_begin[], cgs_viewer_markup_end[];
+extern const char cgs_scene_script_begin[], cgs_scene_script_end[];
 extern const char cgs_viewer_script_begin[], cgs_viewer_script_end[];
 extern const char cgs_three_licence_begin[], cgs_three_licence_end[];
 #ifdef CGS_THREE
@@ -35,6 +37,7 @@ PageFiles page_files() {
   PageFiles out;
   out.style = {cgs_page_style_begin, cgs_page_style_end};
   out.viewer_markup = {cgs_viewer_markup_begin, cgs_viewer_markup_end};
+  out.scene_script = {cgs_scene_script_begin, cgs_scene_script_end};
   out.viewer_script = {cgs_viewer_script_begin, cgs_viewer_script_end};
   out.three_licence = {cgs_three_licence_begin, cgs_three_licence_end};
 #ifdef CGS_THREE

@@ -9,6 +9,7 @@ namespace cgs {
 struct PageFiles {
   std::string_view style;           ///< convert/viewer/page.css
   std::string_view viewer_markup;   ///< convert/viewer/viewer.html
+  std::string_view scene_script;    ///< convert/viewer/scene.js
   std::string_view viewer_script;   ///< convert/viewer/viewer.js
   std::string_view three;           ///< three.js; empty if it was not there when this was built.
   std::string_view orbit_controls;  ///< OrbitControls.js of three.js; likewise.

@@ -173,7 +173,7 @@ std::string inert(std::string json) {
 ShownMesh shown_mesh(const TriangleMesh& mesh, size_t most_faces, const Progress& progress) {
   ShownMesh out{mesh, mesh.faces.size(), {}, {}};
   if (mesh.faces.size() <= most_faces) return out;
-  constexpr double kFirstError = 1.0 / 3200;  // of the size of the mesh
+  constexpr double kFirstError = 1.0 / 1600;  // of the size of the mesh
   constexpr double kLastError = 1.0 / 100;
   constexpr double kFactor = 4;
   constexpr double kNearEnough = 1.1;
@@ -238,7 +238,7 @@ std::string viewer_section(const Model& model,
        << files.three_licence << "*/\n"
        << files.three << "\n"
        << files.orbit_controls << "\n</script>\n<script>\n"
-       << files.viewer_script << "</script>\n";
+       << files.scene_script << files.viewer_script << "</script>\n";
   return html.str();
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The viewer of the report page. It reads the JSON in #viewer-scene, as viewer_scene() writes it,
-// and fills the markup of viewer.html. Everything is in internal units of the scene; what people
-// read is in coordinates of the files, as `cgs measure` takes them, and in the unit of figures.
+// The viewer of the report page: fills the markup of viewer.html and acts on mouse, touch and keys.
+// Everything is in internal units of the scene; what people read is in coordinates of the files, as
+// `cgs measure` takes them, and in the unit of figures.
 'use strict';
 (() => {
   const part = (id) => document.getElementById('viewer-' + id);
@@ -14,183 +14,18 @@
     return;
   }
 
-  // ---- The scene ----------------------------------------------------------------------------
-
-  function bytes(base64) {
-    const text = atob(base64);
-    const out = new Uint8Array(text.length);
-    for (let i = 0; i < text.length; ++i) out[i] = text.charCodeAt(i);
-    return out;
-  }
-  let pending = 0;  // photographs that the browser has not decoded yet
-  const floats = (base64) => new Float32Array(bytes(base64).buffer);
-
   const scene = JSON.parse(document.getElementById('viewer-scene').textContent);
-  const vertices = floats(scene.mesh.vertices);
-  const faces = new Uint32Array(bytes(scene.mesh.faces).buffer);
-  const vertexColors = bytes(scene.mesh.colors);
-  const sigmas = floats(scene.mesh.sigma);        // empty: not stated
-  const provenance = bytes(scene.mesh.provenance);  // empty: not stated
-  const corners = faces.length;
-  const INFERRED = 0;
-  const looksOfLabel = {  // by number, as Provenance has them
-    0: [242, 26, 217], 1: [91, 155, 213], 2: [196, 200, 204], 3: [255, 153, 26], 4: [154, 127, 209],
-  };
-  const unknownColor = [128, 128, 128];
-  const ramp = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
-  const nameOf = {};
-  for (const label of scene.labels) nameOf[label.number] = label.name;
-
-  const vector = (i) => new THREE.Vector3(vertices[3 * i], vertices[3 * i + 1], vertices[3 * i + 2]);
-  const statesLabels = provenance.length > 0;
-  const isInvented = (face) => statesLabels && provenance[face] === INFERRED;
-  // What is not stated at every corner is not stated between them.
-  function statesSigma(face) {
-    if (!sigmas.length || isInvented(face)) return false;
-    return [0, 1, 2].every((k) => Number.isFinite(sigmas[faces[3 * face + k]]));
-  }
-  function smoothNormals() {
-    const out = new Float32Array(vertices.length);
-    for (let c = 0; c < corners; c += 3) {
-      const [a, b, d] = [faces[c], faces[c + 1], faces[c + 2]].map(vector);
-      const n = b.sub(a).cross(d.sub(a));  // as long as twice the area
-      for (let k = 0; k < 3; ++k) {
-        out[3 * faces[c + k]] += n.x;
-        out[3 * faces[c + k] + 1] += n.y;
-        out[3 * faces[c + k] + 2] += n.z;
-      }
-    }
-    return out;
-  }
-
-  // ---- What is drawn ------------------------------------------------------------------------
-
-  const clip = { value: new THREE.Vector4(0, 0, 0, -1) };  // n, d: gone where n.p + d > 0
-  const lit = { value: 0 };
-  const textured = { value: 0 };
-
-  function surfaceMaterial(map) {
-    return new THREE.ShaderMaterial({
-      side: THREE.DoubleSide,
-      uniforms: { clip, lit, textured, map: { value: map }, hasMap: { value: map ? 1 : 0 } },
-      vertexShader: `
-        attribute vec3 paint;
-        varying vec3 vPaint, vNormal, vPlace, vEye;
-        varying vec2 vUv;
-        void main() {
-          vec4 eye = modelViewMatrix * vec4(position, 1.0);
-          vPaint = paint; vNormal = normalMatrix * normal; vPlace = position; vEye = eye.xyz; vUv = uv;
-          gl_Position = projectionMatrix * eye;
-        }`,
-      fragmentShader: `
-        uniform vec4 clip;
-        uniform float lit, textured, hasMap;
-        uniform sampler2D map;
-        varying vec3 vPaint, vNormal, vPlace, vEye;
-        varying vec2 vUv;
-        void main() {
-          if (dot(clip, vec4(vPlace, 1.0)) > 0.0) discard;
-          if (!gl_FrontFacing) {  // the inside of a closed surface: where it is cut
-            float hatch = step(mod(gl_FragCoord.x + gl_FragCoord.y, 12.0), 1.5);
-            gl_FragColor = vec4(mix(vec3(0.33, 0.37, 0.42), vec3(0.5, 0.54, 0.59), hatch), 1.0);
-            return;
-          }
-          vec3 color = textured * hasMap > 0.5 ? texture2D(map, vUv).rgb : vPaint;
-          float toEye = abs(dot(normalize(vNormal), normalize(vEye)));
-          gl_FragColor = vec4(color * mix(1.0, 0.35 + 0.65 * toEye, lit), 1.0);
-        }`,
-    });
-  }
-  function cloudMaterial() {
-    return new THREE.ShaderMaterial({
-      uniforms: { clip, size: { value: 2 } },
-      vertexShader: `
-        attribute vec3 paint;
-        uniform float size;
-        varying vec3 vPaint, vPlace;
-        void main() {
-          vPaint = paint; vPlace = position;
-          gl_PointSize = size;
-          gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-        }`,
-      fragmentShader: `
-        uniform vec4 clip;
-        varying vec3 vPaint, vPlace;
-        void main() {
-          if (dot(clip, vec4(vPlace, 1.0)) > 0.0) discard;
-          gl_FragColor = vec4(vPaint, 1.0);
-        }`,
-    });
-  }
+  const {
+    vertices, faces, vertexColors, sigmas, provenance, statesLabels, corners,
+    vector, isInvented, statesSigma, poseOf, firstHit, sigmaAt,
+    surface, paint, cloud, clip, lit, textured, pointSize, isComplete,
+  } = viewerScene(scene, () => redraw());
 
   const renderer = new THREE.WebGLRenderer({ canvas, context, antialias: true, alpha: true });
   const world = new THREE.Scene();
   const camera = new THREE.PerspectiveCamera(45, 1, 0.002, 40);
   camera.up.fromArray(scene.up).normalize();
 
-  // Corners of their own for every face: labels and photographs change from face to face.
-  const paint = new THREE.BufferAttribute(new Uint8Array(3 * corners), 3, true);
-  const surface = (() => {
-    const normals = smoothNormals();
-    const place = new Float32Array(3 * corners);
-    const normal = new Float32Array(3 * corners);
-    const uv = new Float32Array(2 * corners);
-    for (let c = 0; c < corners; ++c) {
-      for (let k = 0; k < 3; ++k) {
-        place[3 * c + k] = vertices[3 * faces[c] + k];
-        normal[3 * c + k] = normals[3 * faces[c] + k];
-      }
-    }
-    const geometry = new THREE.BufferGeometry();
-    const materials = [];
-    let begin = 0;
-    scene.mesh.faces_of_photograph.forEach((count, i) => {
-      const photograph = scene.photographs[i];
-      if (photograph && count) writeCoordinates(uv, begin, begin + 3 * count, photograph);
-      geometry.addGroup(begin, 3 * count, i);
-      materials.push(surfaceMaterial(photograph && count ? loaded(photograph) : null));
-      begin += 3 * count;
-    });
-    geometry.setAttribute('position', new THREE.BufferAttribute(place, 3));
-    geometry.setAttribute('normal', new THREE.BufferAttribute(normal, 3));
-    geometry.setAttribute('uv', new THREE.BufferAttribute(uv, 2));
-    geometry.setAttribute('paint', paint);
-    return new THREE.Mesh(geometry, materials);
-  })();
-  function writeCoordinates(uv, begin, end, photograph) {
-    const shot = photograph.camera;
-    const toCamera = new THREE.Matrix4().getInverse(poseOf(shot));
-    for (let c = begin; c < end; ++c) {
-      const p = vector(faces[c]).applyMatrix4(toCamera);
-      uv[2 * c] = (shot.fx * p.x / p.z + shot.cx - photograph.corner[0]) / photograph.size[0];
-      uv[2 * c + 1] = (shot.fy * p.y / p.z + shot.cy - photograph.corner[1]) / photograph.size[1];
-    }
-  }
-  function loaded(photograph) {
-    const texture = new THREE.Texture(new Image());
-    texture.flipY = false;
-    texture.generateMipmaps = false;
-    texture.minFilter = THREE.LinearFilter;
-    texture.image.onload = () => {
-      texture.needsUpdate = true;
-      pending -= 1;
-      redraw();
-    };
-    texture.image.src = 'data:image/jpeg;base64,' + photograph.jpeg;
-    pending += 1;
-    return texture;
-  }
-  function poseOf(shot) {
-    return new THREE.Matrix4().set(...shot.world_from_cam, 0, 0, 0, 1);
-  }
-
-  const cloud = (() => {
-    const geometry = new THREE.BufferGeometry();
-    const places = floats(scene.gaussians.positions);
-    geometry.setAttribute('position', new THREE.BufferAttribute(places, 3));
-    geometry.setAttribute('paint', new THREE.BufferAttribute(bytes(scene.gaussians.colors), 3, true));
-    return new THREE.Points(geometry, cloudMaterial());
-  })();
   const between = new THREE.Line(
     new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]),
     new THREE.LineBasicMaterial({ color: 0xf21ad9, depthTest: false, transparent: true }));
@@ -213,7 +48,7 @@
     const height = canvas.parentElement.clientHeight;
     renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     renderer.setSize(width, height, false);
-    cloud.material.uniforms.size.value = 2 * renderer.getPixelRatio();
+    pointSize.value = 2.5 * renderer.getPixelRatio();
     camera.fov = 45;
     camera.aspect = width / height;
     camera.clearViewOffset();
@@ -287,11 +122,21 @@
 
   // ---- Looks --------------------------------------------------------------------------------
 
+  const looksOfLabel = {  // by number, as Provenance has them
+    0: [242, 26, 217], 1: [91, 155, 213], 2: [196, 200, 204], 3: [255, 153, 26], 4: [154, 127, 209],
+  };
+  const unknownColor = [128, 128, 128];
+  const ramp = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
+  const nameOf = {};
+  for (const label of scene.labels) nameOf[label.number] = label.name;
+
   const share = (value) => (100 * value).toPrecision(value < 0.1 ? 2 : 3) + ' %';
-  const scaleOfSigma = (() => {  // the 95th percentile of what is stated
-    const stated = sigmas.filter((s) => Number.isFinite(s)).sort();
-    return stated.length ? stated[Math.floor(0.95 * (stated.length - 1))] || 1e-9 : 0;
+  const [leastSigma, mostSigma] = (() => {  // what all but the extreme 2 % lie between
+    const stated = sigmas.filter((s) => s > 0).sort();
+    const at = (part) => stated[Math.floor(part * (stated.length - 1))] || 1e-9;
+    return [at(0.02), Math.max(at(0.98), 1.01 * at(0.02))];
   })();
+  const onSigmaScale = (s) => Math.log(s / leastSigma) / Math.log(mostSigma / leastSigma);
 
   function paintEach(colorOf) {
     for (let c = 0; c < corners; ++c) paint.array.set(colorOf(c), 3 * c);
@@ -335,10 +180,10 @@
     bar.className = 'ramp';
     bar.style.background = `linear-gradient(to right, ${ramp.map((c) => `rgb(${c})`)})`;
     const line = document.createElement('span');
-    const most = scaleOfSigma * scene.unit.length;
-    line.append('standard deviation 0', bar, `${most.toPrecision(2)} ${scene.unit.name} or more`);
+    const text = (s) => `${(s * scene.unit.length).toPrecision(2)} ${scene.unit.name}`;
+    line.append(`standard deviation ${text(leastSigma)} or less`, bar, `${text(mostSigma)} or more (logarithmic)`);
     legend.append(line);
-    explain(unknownColor, 'unknown: nobody saw it');
+    explain(unknownColor, 'unknown: inferred, no photograph saw it');
   }
 
   const looks = [
@@ -349,9 +194,9 @@
     { name: 'Provenance', there: statesLabels, lit: 0.7, explain: explainLabels,
       paint: (c) => looksOfLabel[provenance[Math.floor(c / 3)]] },
     { name: 'Sigma', there: sigmas.length > 0, lit: 0.5, explain: explainSigma,
-      paint: (c) => (statesSigma(Math.floor(c / 3)) ? rampColor(sigmas[faces[c]] / scaleOfSigma) : unknownColor) },
+      paint: (c) => (statesSigma(Math.floor(c / 3)) ? rampColor(onSigmaScale(sigmas[faces[c]])) : unknownColor) },
     { name: 'Gaussians', there: scene.gaussians.count > 0, points: true,
-      explain: () => legend.append(`${cloud.geometry.attributes.position.count} of ${scene.gaussians.count} Gaussians, as points of their colour without size and opacity.`) },
+      explain: () => legend.append(`${cloud.geometry.attributes.position.count} of ${scene.gaussians.count} Gaussians, as points of their colour without size and opacity. Measuring needs the surface.`) },
   ].filter((look) => look.there);
 
   function show(look) {
@@ -377,43 +222,6 @@
 
   // ---- Measuring ----------------------------------------------------------------------------
 
-  // Where a ray first meets what is shown of the surface; null = nowhere, or its inside.
-  function firstHit(origin, direction) {
-    const { x: dx, y: dy, z: dz } = direction;
-    let best = null;
-    let front = false;
-    let nearest = Infinity;
-    for (let c = 0; c < corners; c += 3) {
-      const a = 3 * faces[c], b = 3 * faces[c + 1], d = 3 * faces[c + 2];
-      const ax = vertices[a], ay = vertices[a + 1], az = vertices[a + 2];
-      const ux = vertices[b] - ax, uy = vertices[b + 1] - ay, uz = vertices[b + 2] - az;
-      const vx = vertices[d] - ax, vy = vertices[d + 1] - ay, vz = vertices[d + 2] - az;
-      const px = dy * vz - dz * vy, py = dz * vx - dx * vz, pz = dx * vy - dy * vx;
-      const det = ux * px + uy * py + uz * pz;
-      if (det === 0) continue;
-      const tx = origin.x - ax, ty = origin.y - ay, tz = origin.z - az;
-      const s = (tx * px + ty * py + tz * pz) / det;
-      if (s < 0 || s > 1) continue;
-      const qx = ty * uz - tz * uy, qy = tz * ux - tx * uz, qz = tx * uy - ty * ux;
-      const t = (dx * qx + dy * qy + dz * qz) / det;
-      if (t < 0 || s + t > 1) continue;
-      const distance = (vx * qx + vy * qy + vz * qz) / det;
-      if (distance <= 0 || distance >= nearest) continue;
-      const place = new THREE.Vector3(ax + s * ux + t * vx, ay + s * uy + t * vy, az + s * uz + t * vz);
-      const { x, y, z, w } = clip.value;
-      if (x * place.x + y * place.y + z * place.z + w > 0) continue;
-      nearest = distance;
-      front = det > 0;
-      best = { place, distance, face: c / 3, weights: [1 - s - t, s, t] };
-    }
-    return front ? best : null;
-  }
-
-  // Standard deviation at a point of a face, in internal units; NaN = no statement.
-  function sigmaAt({ face, weights }) {
-    if (!sigmas.length || isInvented(face)) return NaN;
-    return weights.reduce((sum, weight, k) => (weight > 0 ? sum + weight * sigmas[faces[3 * face + k]] : sum), 0);
-  }
   function toFile(place) {
     const decimals = Math.max(0, 7 - Math.floor(Math.log10(scene.file.scale)));
     return place.toArray().map((value, k) => (scene.file.origin[k] + scene.file.scale * value).toFixed(decimals));
@@ -559,7 +367,7 @@
       asked = false;
       renderer.render(world, camera);
       placeMarks();
-      if (pending || root.dataset.state) return;
+      if (!isComplete() || root.dataset.state) return;
       root.dataset.state = 'ready';
       root.dataset.milliseconds = Math.round(performance.now());  // since the page was asked for
     });
