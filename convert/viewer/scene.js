@@ -30,6 +30,10 @@ function viewerScene(scene, changed) {
     if (!sigmas.length || isInvented(face)) return false;
     return [0, 1, 2].every((k) => Number.isFinite(sigmas[faces[3 * face + k]]));
   }
+  function areaOf(face) {
+    const [a, b, c] = [0, 1, 2].map((k) => vector(faces[3 * face + k]));
+    return b.sub(a).cross(c.sub(a)).length() / 2;
+  }
   function smoothNormals() {
     const out = new Float32Array(vertices.length);
     for (let c = 0; c < corners; c += 3) {
@@ -51,7 +55,7 @@ function viewerScene(scene, changed) {
   const clip = { value: new THREE.Vector4(0, 0, 0, -1) };  // n, d: gone where n.p + d > 0
   const lit = { value: 0 };       // 0: colours as they are; 1: under a light at the camera
   const textured = { value: 0 };  // 1: photographs where a face has one
-  const pointSize = { value: 2 };
+  const pixelsPerTangent = { value: 500 };  // of the canvas: how large a thing is at distance 1
 
   function surfaceMaterial(map) {
     return new THREE.ShaderMaterial({
@@ -85,17 +89,24 @@ function viewerScene(scene, changed) {
         }`,
     });
   }
+  // So large that the points about cover the surface that was seen.
+  function pointSize() {
+    let area = 0;
+    for (let f = 0; f < corners / 3; ++f) if (!isInvented(f)) area += areaOf(f);
+    const points = scene.gaussians.positions.length / 16;  // 12 bytes each, in base64
+    return 1.5 * Math.sqrt(area / Math.max(1, points));
+  }
   function cloudMaterial() {
     return new THREE.ShaderMaterial({
-      uniforms: { clip, size: pointSize },
+      uniforms: { clip, size: { value: pointSize() }, pixelsPerTangent },
       vertexShader: `
         attribute vec3 paint;
-        uniform float size;
+        uniform float size, pixelsPerTangent;
         varying vec3 vPaint, vPlace;
         void main() {
           vPaint = paint; vPlace = position;
-          gl_PointSize = size;
           gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+          gl_PointSize = max(2.0, size * pixelsPerTangent / gl_Position.w);
         }`,
       fragmentShader: `
         uniform vec4 clip;
@@ -212,8 +223,8 @@ function viewerScene(scene, changed) {
   }
   return {
     vertices, faces, vertexColors, sigmas, provenance, statesLabels, corners,
-    vector, isInvented, statesSigma, poseOf, firstHit, sigmaAt,
-    surface, paint, cloud, clip, lit, textured, pointSize,
+    vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt,
+    surface, paint, cloud, clip, lit, textured, pixelsPerTangent,
     isComplete: () => pending === 0,
   };
 }

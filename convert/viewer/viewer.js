@@ -17,8 +17,8 @@
   const scene = JSON.parse(document.getElementById('viewer-scene').textContent);
   const {
     vertices, faces, vertexColors, sigmas, provenance, statesLabels, corners,
-    vector, isInvented, statesSigma, poseOf, firstHit, sigmaAt,
-    surface, paint, cloud, clip, lit, textured, pointSize, isComplete,
+    vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt,
+    surface, paint, cloud, clip, lit, textured, pixelsPerTangent, isComplete,
   } = viewerScene(scene, () => redraw());
 
   const renderer = new THREE.WebGLRenderer({ canvas, context, antialias: true, alpha: true });
@@ -48,7 +48,6 @@
     const height = canvas.parentElement.clientHeight;
     renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     renderer.setSize(width, height, false);
-    pointSize.value = 2.5 * renderer.getPixelRatio();
     camera.fov = 45;
     camera.aspect = width / height;
     camera.clearViewOffset();
@@ -60,6 +59,7 @@
         (lens.height / 2 - lens.cy) * scale, width, height);
     }
     camera.updateProjectionMatrix();
+    pixelsPerTangent.value = renderer.getPixelRatio() * height / 2 * camera.projectionMatrix.elements[5];
     redraw();
   }
 
@@ -162,10 +162,8 @@
     const area = {};
     let all = 0;
     for (let f = 0; f < provenance.length; ++f) {
-      const [a, b, c] = [0, 1, 2].map((k) => vector(faces[3 * f + k]));
-      const size = b.sub(a).cross(c.sub(a)).length();
-      area[provenance[f]] = (area[provenance[f]] || 0) + size;
-      all += size;
+      area[provenance[f]] = (area[provenance[f]] || 0) + areaOf(f);
+      all += areaOf(f);
     }
     const means = { observed: 'two or more photographs saw it', 'single view': 'one photograph saw it',
       interpolated: 'between observed rims', inferred: 'never seen, invented',
@@ -196,7 +194,7 @@
     { name: 'Sigma', there: sigmas.length > 0, lit: 0.5, explain: explainSigma,
       paint: (c) => (statesSigma(Math.floor(c / 3)) ? rampColor(onSigmaScale(sigmas[faces[c]])) : unknownColor) },
     { name: 'Gaussians', there: scene.gaussians.count > 0, points: true,
-      explain: () => legend.append(`${cloud.geometry.attributes.position.count} of ${scene.gaussians.count} Gaussians, as points of their colour without size and opacity. Measuring needs the surface.`) },
+      explain: () => legend.append(`${cloud.geometry.attributes.position.count} of ${scene.gaussians.count} Gaussians, as points of their colour, all of one size and opaque. Measuring needs the surface.`) },
   ].filter((look) => look.there);
 
   function show(look) {
