@@ -161,8 +161,8 @@ function viewerScene(scene, changed) {
     texture.flipY = false;
     texture.generateMipmaps = false;
     texture.minFilter = THREE.LinearFilter;
-    texture.image.onload = () => {
-      texture.needsUpdate = true;
+    texture.image.onload = texture.image.onerror = (event) => {
+      texture.needsUpdate = event.type === 'load';
       pending -= 1;
       changed();
     };

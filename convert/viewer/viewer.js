@@ -65,32 +65,46 @@
 
   const forwardOf = (shot) => new THREE.Vector3(0, 0, 1).transformDirection(poseOf(shot));
 
-  // From the side of the middle photograph, as far away as shows all that is not invented.
-  function standBack() {
+  // The vertices that are not on invented faces alone; all, if there are no others.
+  function seenVertices() {
     const seen = new Uint8Array(vertices.length / 3);
-    for (let c = 0; c < corners; ++c) {
-      if (!isInvented(Math.floor(c / 3))) seen[faces[c]] = 1;
-    }
-    const box = new THREE.Box3();
-    for (let v = 0; v < seen.length; ++v) if (seen[v]) box.expandByPoint(vector(v));
-    if (box.isEmpty()) box.setFromArray(vertices);
-    const center = box.getCenter(new THREE.Vector3());
-    const middle = scene.cameras[scene.cameras.length >> 1].camera;
+    for (let c = 0; c < corners; ++c) if (!isInvented(Math.floor(c / 3))) seen[faces[c]] = 1;
+    const all = Array.from(seen.keys());
+    const some = all.filter((v) => seen[v]);
+    return (some.length ? some : all).map(vector);
+  }
+
+  // From the side of the middle photograph, as far away as shows all that was seen, in the middle.
+  function standBack() {
     lens = null;
     applyLens();
-    camera.position.copy(center).sub(forwardOf(middle));
-    camera.lookAt(center);
+    const forward = forwardOf(scene.cameras[scene.cameras.length >> 1].camera);
+    const points = seenVertices();
+    const target = new THREE.Box3().setFromPoints(points).getCenter(new THREE.Vector3());
+    camera.position.copy(target).sub(forward);
+    camera.lookAt(target);
     const toCamera = camera.quaternion.clone().inverse();
+    for (const p of points) p.sub(target).applyQuaternion(toCamera);
     const tanY = 0.95 * Math.tan(camera.fov * Math.PI / 360);
     const tanX = tanY * camera.aspect;
+    const shift = new THREE.Vector3();
     let distance = 0;
-    for (let v = 0; v < seen.length; ++v) {
-      if (!seen[v]) continue;
-      const p = vector(v).sub(center).applyQuaternion(toCamera);
-      distance = Math.max(distance, Math.abs(p.x) / tanX + p.z, Math.abs(p.y) / tanY + p.z);
+    for (let round = 0; round < 3; ++round) {  // moving sideways changes how far away is enough
+      distance = 0;
+      for (const p of points) {
+        distance = Math.max(distance, Math.abs(p.x - shift.x) / tanX + p.z, Math.abs(p.y - shift.y) / tanY + p.z);
+      }
+      const onScreen = new THREE.Box2();
+      for (const p of points) {
+        const depth = distance - p.z;
+        onScreen.expandByPoint(new THREE.Vector2((p.x - shift.x) / depth, (p.y - shift.y) / depth));
+      }
+      const middle = onScreen.getCenter(new THREE.Vector2()).multiplyScalar(distance);
+      if (round < 2) shift.add(new THREE.Vector3(middle.x, middle.y, 0));
     }
-    camera.position.copy(center).addScaledVector(forwardOf(middle), -distance);
-    controls.target.copy(center);
+    target.add(shift.applyQuaternion(camera.quaternion));
+    camera.position.copy(target).addScaledVector(forward, -distance);
+    controls.target.copy(target);
     controls.update();
   }
 
@@ -139,7 +153,10 @@
   const onSigmaScale = (s) => Math.log(s / leastSigma) / Math.log(mostSigma / leastSigma);
 
   function paintEach(colorOf) {
-    for (let c = 0; c < corners; ++c) paint.array.set(colorOf(c), 3 * c);
+    for (let c = 0; c < corners; ++c) {
+      const color = colorOf(c);
+      for (let k = 0; k < 3; ++k) paint.array[3 * c + k] = color[k];
+    }
     paint.needsUpdate = true;
   }
   function rampColor(t) {
@@ -147,8 +164,8 @@
     const i = Math.min(Math.floor(at), ramp.length - 2);
     return ramp[i].map((low, k) => low + (ramp[i + 1][k] - low) * (at - i));
   }
-  const colorOfVertex = (c) => (vertexColors.length
-    ? vertexColors.subarray(3 * faces[c], 3 * faces[c] + 3) : [190, 190, 190]);
+  const vertexPalette = Array.from({ length: vertexColors.length / 3 }, (_, v) => vertexColors.subarray(3 * v, 3 * v + 3));
+  const colorOfVertex = (c) => vertexPalette[faces[c]] || [190, 190, 190];
 
   const legend = part('legend');
   function explain(color, text) {
@@ -363,9 +380,10 @@
     asked = true;
     requestAnimationFrame(() => {
       asked = false;
+      if (!isComplete()) return;  // the last photograph asks again
       renderer.render(world, camera);
       placeMarks();
-      if (!isComplete() || root.dataset.state) return;
+      if (root.dataset.state) return;
       root.dataset.state = 'ready';
       root.dataset.milliseconds = Math.round(performance.now());  // since the page was asked for
     });
