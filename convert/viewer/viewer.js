@@ -146,7 +146,7 @@
 
   const share = (value) => (100 * value).toPrecision(value < 0.1 ? 2 : 3) + ' %';
   const [leastSigma, mostSigma] = (() => {  // what all but the extreme 2 % lie between
-    const stated = sigmas.filter((s) => s > 0).sort();
+    const stated = sigmas.filter((s) => s > 0 && Number.isFinite(s)).sort();
     const at = (part) => stated[Math.floor(part * (stated.length - 1))] || 1e-9;
     return [at(0.02), Math.max(at(0.98), 1.01 * at(0.02))];
   })();

@@ -25,6 +25,9 @@ from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.actions import interaction
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.actions.pointer_input import PointerInput
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
@@ -92,6 +95,16 @@ class Page:
     def click(self, right, down):
         """Clicks on the canvas, so far from its middle [pixels]."""
         ActionChains(self.driver).move_to_element_with_offset(self.canvas(), right, down).click().perform()
+        self.settle()
+
+    def touch(self, right):
+        """Puts a finger on the middle of the canvas and moves it [pixels]; 0 = a tap."""
+        actions = ActionBuilder(self.driver, mouse=PointerInput(interaction.POINTER_TOUCH, 'finger'))
+        actions.pointer_action.move_to(self.canvas()).pointer_down()
+        if right:
+            actions.pointer_action.move_to(self.canvas(), right, 0)
+        actions.pointer_action.pointer_up()
+        actions.perform()
         self.settle()
 
     def measured(self):
@@ -319,6 +332,14 @@ class OtherBrowsers(unittest.TestCase):
         overflow = page.driver.execute_script(
             'return document.documentElement.scrollWidth - document.documentElement.clientWidth')
         self.assertEqual(overflow, 0)
+        page.driver.execute_script('arguments[0].scrollIntoView({block: "center"})', page.canvas())
+        before = page.picture()
+        page.touch(40)
+        self.assertGreater(changed(before, page.picture()), 0.1)
+        self.assertIn('Pick two points', page.measured())
+        page.touch(0)
+        self.assertIn('Pick the second point', page.measured())
+        page.driver.save_screenshot(str(SCREENS / 'phone_touched.png'))
 
     def test_without_webgl(self):
         page = self.open('no_webgl', '--disable-3d-apis')
