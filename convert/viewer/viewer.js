@@ -54,9 +54,9 @@
     if (lens) {  // as large as it fits, its principal point where it belongs
       const scale = Math.min(width / lens.width, height / lens.height);
       camera.fov = 2 * Math.atan(height / 2 / (lens.fy * scale)) * 180 / Math.PI;
-      camera.aspect *= lens.fy / lens.fx;
       camera.setViewOffset(width, height, (lens.width / 2 - lens.cx) * scale,
         (lens.height / 2 - lens.cy) * scale, width, height);
+      camera.aspect *= lens.fy / lens.fx;
     }
     camera.updateProjectionMatrix();
     pixelsPerTangent.value = renderer.getPixelRatio() * height / 2 * camera.projectionMatrix.elements[5];

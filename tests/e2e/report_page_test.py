@@ -43,9 +43,23 @@ def setUpModule():
     SCREENS.mkdir(parents=True)
     capture = FOLDER / 'capture'
     subprocess.run([MAKE_CAPTURE, capture, '--downscale', '3'], check=True)
+    crop_and_stretch(capture, 'view_02')
     # Metres that are not the units of the files, so that no figure is right by chance.
     subprocess.run([CGS, 'run', capture, '--views', 'view_01,view_02,view_03', '--assume-unit', 'ft',
                     '--set', 'steps=0', '--voxel-size', '3cm', '-q', '-o', OUT], check=True)
+
+
+def crop_and_stretch(capture, name):
+    """Makes a photograph whose principal point is off its middle and whose pixels are not square."""
+    left, top, wider = 24, 9, 1.25
+    document = json.loads((capture / 'transforms.json').read_text())
+    frame = next(f for f in document['frames'] if name in f['file_path'])
+    picture = Image.open(capture / frame['file_path']).crop((left, top, frame['w'], frame['h']))
+    picture = picture.resize((int(picture.width * wider), picture.height), Image.BILINEAR)
+    picture.save(capture / frame['file_path'])
+    frame.update(w=picture.width, h=picture.height, fl_x=frame['fl_x'] * wider,
+                 cx=(frame['cx'] - left) * wider, cy=frame['cy'] - top)
+    (capture / 'transforms.json').write_text(json.dumps(document))
 
 
 def browser(*more, phone=False):
@@ -202,7 +216,7 @@ class ReportPage(unittest.TestCase):
         middle = (slice(h // 6, -h // 6), slice(w // 6, -w // 6))
         error = np.abs(seen - photograph)[middle].mean()
         mirrored = np.abs(seen[:, ::-1] - photograph)[middle].mean()
-        self.assertLess(error, 0.05)
+        self.assertLess(error, 0.03)
         self.assertGreater(mirrored, 2 * error)
 
     def test_two_clicks_measure_what_cgs_measures(self):
