@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/figures.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -26,6 +27,12 @@ std::string number(double value) {
 }
 
 }  // namespace
+
+std::string provenance_key(Provenance label) {
+  std::string key(provenance_name(label));
+  std::replace(key.begin(), key.end(), ' ', '_');
+  return key;
+}
 
 FigureUnit figure_unit(const Frame& frame, const std::string& wanted) {
   if (!frame.has_metric_scale()) {
@@ -60,13 +67,11 @@ nlohmann::ordered_json figure_json(const MeasuredValue& value,
                                 {"sigma", nullptr},
                                 {"unit", unit_text(unit, value.dimension)}};
   if (std::isfinite(sigma)) out["sigma"] = sigma;
-  constexpr std::array<const char*, 4> kKeys = {
-      "observed", "single_view", "interpolated", "inferred"};
-  for (size_t i = 0; i < kKeys.size(); ++i) {
-    const auto label = static_cast<size_t>(kProvenanceOrder.at(i));
-    out[kKeys.at(i)] = nullptr;
+  for (const Provenance label : kProvenanceOrder) {
+    nlohmann::ordered_json& part = out[provenance_key(label)];
     if (!states_provenance) continue;
-    out[kKeys.at(i)] = value.by_provenance.at(label) * std::pow(unit.length, value.dimension);
+    part =
+        value.by_provenance.at(static_cast<size_t>(label)) * std::pow(unit.length, value.dimension);
   }
   out["sigma_share"] = value.stated;
   return out;

@@ -26,9 +26,12 @@ double figure_sigma(const MeasuredValue& value, const FigureUnit& unit);
 /// A figure in its unit.
 double figure_value(const MeasuredValue& value, const FigureUnit& unit);
 
+/// The name of a label as a key in JSON: "single_view".
+std::string provenance_key(Provenance label);
+
 /// {"value", "sigma" (null = no statement), "unit" ("m", "m^2", …), "observed", "single_view",
-/// "interpolated", "inferred" (null where nothing is stated), "sigma_share" (share of what the
-/// figure rests on that states a sigma)}
+/// "interpolated", "inferred", "virtual" (null where nothing is stated), "sigma_share" (share of
+/// what the figure rests on that states a sigma)}
 nlohmann::ordered_json figure_json(const MeasuredValue& value,
                                    const FigureUnit& unit,
                                    bool states_provenance);

@@ -14,6 +14,7 @@
 #include "convert/length.h"
 #include "convert/mesh_files.h"
 #include "convert/report.h"
+#include "convert/report_viewer.h"
 #include "convert/run_record.h"
 #include "convert/simplification.h"
 #include "convert/texture.h"
@@ -267,7 +268,8 @@ Json run_report(Run& run, const Progress& progress) {
   report(progress, 0);
   const Json json = report_json(run);
   write_file(run.request.output / "report.json", json_text(json) + "\n");
-  write_html_report(run.request.output, json);
+  const std::string viewer = viewer_section(loaded_model(run), loaded_mesh(run), progress);
+  write_html_report(run.request.output, json, viewer);
   return {{"pages", 1}};
 }
 

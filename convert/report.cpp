@@ -2,13 +2,14 @@
 #include "convert/report.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
 
+#include "convert/html.h"
+#include "convert/page_files.h"
 #include "io/atomic_file.h"
+#include "io/byte_reader.h"
 #include "io/image.h"
 #include "io/png.h"
 #include "io/resample.h"
@@ -20,71 +21,20 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kStyle = R"(
-:root { color-scheme: light dark; --line: #8884; --good: #2a7d46; --bad: #b3261e; }
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 1280px; margin: 2rem auto; padding: 0 1rem; }
-h1 { margin-bottom: 0; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); }
-.note { border-left: 4px solid #c90; padding: .4rem .8rem; background: #c901; }
-table { border-collapse: collapse; } td, th { padding: .2rem .8rem; border-bottom: 1px solid var(--line); text-align: right; }
-td:first-child, th:first-child { text-align: left; }
-.row { display: grid; grid-template-columns: repeat(5, 1fr); gap: 6px; margin: .3rem 0 1.2rem; }
-.two { display: grid; grid-template-columns: 1fr 1fr; gap: 8px; }
-img { width: 100%; display: block; background: #777; } figure { margin: 0; }
-figcaption { font-size: 13px; opacity: .8; }
-.bar { background: #4a7fb5; height: .9em; display: inline-block; }
-.good { color: var(--good); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; }
-@media (max-width: 800px) { .row { grid-template-columns: 1fr 1fr; } .two { grid-template-columns: 1fr; } }
-)";
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '&':
-        out += "&amp;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
+// A mask that lies over the picture of a figure where the page is told to show it.
+std::string overlay(const std::filesystem::path& mask) {
+  try {
+    return "<img class=hole alt=\"\" src=\"data:image/png;base64," + base64(read_file(mask)) +
+           "\">";
+  } catch (const Error&) {
+    return "";  // the mask has a figure of its own, which says why
   }
-  return out;
-}
-
-std::string number(const Json& value, const char* format = "%.4g") {
-  if (!value.is_number()) return "-";
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), format, value.get<double>());  // NOLINT: fixed formats
-  return text.data();
-}
-
-std::string base64(const std::string& bytes) {
-  static constexpr const char* kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  out.reserve(bytes.size() * 4 / 3 + 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t group = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      group = group << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    }
-    for (size_t k = 0; k < 4; ++k) {
-      out += i + k <= bytes.size() ? kDigits[group >> (18 - 6 * k) & 63] : '=';
-    }
-  }
-  return out;
 }
 
 // A picture file as a figure with the picture inside; a line of text where it cannot be read.
-std::string figure(const std::filesystem::path& file, const std::string& caption) {
+std::string figure(const std::filesystem::path& file,
+                   const std::string& caption,
+                   const std::string& over = "") {
   constexpr int kQuality = 85;
   constexpr int kWidest = 1000;  // [pixels]
   std::string content;
@@ -95,19 +45,16 @@ std::string figure(const std::filesystem::path& file, const std::string& caption
       area_downscale(image, all_usable, kWidest, std::max(1, image.height * kWidest / image.width));
     }
     content = "<img alt=\"" + escaped(caption) + "\" src=\"data:image/jpeg;base64," +
-              base64(encode_jpeg(image, kQuality)) + "\">";
+              base64(encode_jpeg(image, kQuality)) + "\">" + over;
   } catch (const Error& error) {
     content = "<p>" + escaped(error.what()) + "</p>";
   }
-  return "<figure>" + content + "<figcaption>" + escaped(caption) + "</figcaption></figure>\n";
+  return "<figure><div class=picture>" + content + "</div><figcaption>" + escaped(caption) +
+         "</figcaption></figure>\n";
 }
 
 std::string verdict(bool good, const std::string& yes, const std::string& no) {
   return good ? "<span class=good>" + yes + "</span>" : "<span class=bad>" + no + "</span>";
-}
-
-std::string table_row(const std::string& name, const std::string& value) {
-  return "<tr><td>" + escaped(name) + "</td><td>" + value + "</td></tr>\n";
 }
 
 std::string certificate_section(const Json& report) {
@@ -196,14 +143,20 @@ std::string mesh_section(const std::filesystem::path& folder) {
 
 std::string views_section(const std::filesystem::path& folder, const Json& report) {
   std::ostringstream html;
-  html << "<h2>Views</h2>\n";
+  html << "<h2>Views</h2>\n"
+          "<svg width=0 height=0 aria-hidden=true style=\"position:absolute\"><filter id=tint "
+          "color-interpolation-filters=sRGB><feColorMatrix values=\"0 0 0 0 .95 0 0 0 0 .1 "
+          "0 0 0 0 .85 1 0 0 0 0\"/></filter></svg>\n"  // white to magenta, black to nothing
+          "<input type=checkbox id=holes><label for=holes>Show in magenta what no input photograph "
+          "saw</label>\n";
   for (const Json& view : report["views"]) {
     const auto name = view["name"].get<std::string>();
+    const std::string holes = overlay(folder / "views" / (name + ".hole.png"));
     html << "<h3>" << escaped(name) << " (" << view["role"].get<std::string>() << "), "
          << number(100 * view["hole_fraction"].get<double>(), "%.1f")
          << " % holes</h3>\n<div class=row>\n"
-         << figure(report["photographs"].value(name, ""), "photograph")
-         << figure(folder / "views" / (name + ".color.png"), "rendered")
+         << figure(report["photographs"].value(name, ""), "photograph", holes)
+         << figure(folder / "views" / (name + ".color.png"), "rendered", holes)
          << figure(folder / "views" / (name + ".depth.png"), "depth (red = near)")
          << figure(folder / "views" / (name + ".normal.png"), "normals")
          << figure(folder / "views" / (name + ".hole.png"), "holes (white = no input saw this)")
@@ -268,7 +221,7 @@ std::string timing_section(const Json& stages) {
     html << "<tr><td>" << stage["stage"].get<std::string>() << "</td><td>"
          << number(stage["seconds"], "%.1f") << "</td><td>"
          << number(stage["peak_memory"].get<double>() / (1 << 20), "%.0f")
-         << "</td><td style=\"text-align:left;width:400px\"><span class=bar style=\"width:"
+         << "</td><td class=bars><span class=bar style=\"width:"
          << number(100 * seconds / longest, "%.1f") << "%\"></span></td></tr>\n";
   }
   html << "</table>\n";
@@ -277,21 +230,26 @@ std::string timing_section(const Json& stages) {
 
 }  // namespace
 
-void write_html_report(const std::filesystem::path& folder, const Json& report) {
+void write_html_report(const std::filesystem::path& folder,
+                       const Json& report,
+                       const std::string& viewer) {
   std::ostringstream html;
   const auto title = report["folder"].get<std::string>();
+  // The browser itself is told that the page loads nothing.
   html << "<!doctype html>\n<html lang=en><head><meta charset=utf-8>"
-          "<meta name=viewport content=\"width=device-width\"><title>"
-       << escaped(title) << "</title>\n<style>" << kStyle << "</style></head><body>\n<h1>"
-       << escaped(std::filesystem::path(title).filename().string()) << "</h1>\n<p>"
-       << escaped(report["scene"].get<std::string>())
+          "<meta name=viewport content=\"width=device-width,initial-scale=1\">"
+          "<meta http-equiv=Content-Security-Policy content=\"default-src 'none'; img-src data:; "
+          "style-src 'unsafe-inline'; script-src 'unsafe-inline'\"><title>"
+       << escaped(title) << "</title>\n<style>" << page_files().style
+       << "</style></head><body>\n<h1>" << escaped(std::filesystem::path(title).filename().string())
+       << "</h1>\n<p>" << escaped(report["scene"].get<std::string>())
        << " scene, units: " << escaped(report["units"].get<std::string>()) << " (scale "
        << escaped(report["scale_source"].get<std::string>()) << ")</p>\n<p class=note>Model: "
        << escaped(report["model"]["description"].get<std::string>()) << ".</p>\n";
   for (const Json& warning : report["warnings"]) {
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
   }
-  html << scale_section(report["scale"]) << certificate_section(report)
+  html << viewer << scale_section(report["scale"]) << certificate_section(report)
        << simplification_section(report["mesh"]["simplification"]) << mesh_section(folder)
        << evaluation_section(report["evaluation"]) << views_section(folder, report)
        << training_section(report["model"]) << timing_section(report["stages"])

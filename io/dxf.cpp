@@ -23,11 +23,12 @@ struct Layer {
 };
 
 // By label, the one for drawings without labels last.
-constexpr std::array<Layer, 5> kLayers = {{{"INFERRED", 6, "DASHED"},
-                                           {"SINGLE_VIEW", 4, "CONTINUOUS"},
-                                           {"OBSERVED", 7, "CONTINUOUS"},
-                                           {"INTERPOLATED", 3, "DOT"},
-                                           {"SECTION", 7, "CONTINUOUS"}}};
+constexpr std::array<Layer, kProvenanceCount + 1> kLayers = {{{"INFERRED", 6, "DASHED"},
+                                                              {"SINGLE_VIEW", 4, "CONTINUOUS"},
+                                                              {"OBSERVED", 7, "CONTINUOUS"},
+                                                              {"INTERPOLATED", 3, "DOT"},
+                                                              {"VIRTUAL", 5, "DASHED"},
+                                                              {"SECTION", 7, "CONTINUOUS"}}};
 
 const Layer& layer_of(int label) {
   return label < 0 ? kLayers.back() : kLayers.at(static_cast<size_t>(label));

@@ -21,13 +21,14 @@ path { fill: none; stroke: #1d2733; stroke-width: 1.6px; vector-effect: non-scal
 .single_view { stroke: #4a7fb5; stroke-width: 1px; }
 .interpolated { stroke: #2a7d46; stroke-dasharray: 1.5 3; }
 .inferred { stroke: #c02a8a; stroke-dasharray: 7 4; }
+.virtual { stroke: #7a5fb5; stroke-dasharray: 7 2; }
 text { font-family: system-ui, sans-serif; fill: #1d2733; }
 </style>
 )";
 
 // By label, the one for drawings without labels last.
-constexpr std::array<const char*, 5> kClasses = {
-    "inferred", "single_view", "observed", "interpolated", "section"};
+constexpr std::array<const char*, kProvenanceCount + 1> kClasses = {
+    "inferred", "single_view", "observed", "interpolated", "virtual", "section"};
 
 // Coordinates of the picture: to the lower left corner of the lines, y downwards.
 struct Picture {

@@ -8,6 +8,13 @@
 
 namespace cgs {
 
+/// How much evidence a label stands for: the more, the higher. Inferred surface has none, virtual
+/// surface at least splats.
+inline int evidence_rank(Provenance label) {
+  constexpr std::array<int, kProvenanceCount> kRank = {0, 3, 4, 2, 1};  // index = label
+  return kRank.at(static_cast<size_t>(label));
+}
+
 /// A figure taken from a mesh, with what it rests on.
 struct MeasuredValue {
   double value = 0;   ///< [internal units to the power of `dimension`], as sigma and the parts.

@@ -177,15 +177,17 @@ SurfaceEvidence evidence_at(const MeasurableMesh& mesh, const SurfacePoint& poin
   SurfaceEvidence out;
   out.normal = face_normal(mesh, point.face);
   const auto& f = mesh.mesh.faces[point.face];
+  if (mesh.states_provenance()) out.provenance = mesh.mesh.provenance[point.face];
   out.sigma = std::numeric_limits<double>::quiet_NaN();
-  if (mesh.states_sigma()) {
+  // Invented surface between observed corners is no better known for their sigma.
+  const bool invented = mesh.states_provenance() && out.provenance == Provenance::Inferred;
+  if (mesh.states_sigma() && !invented) {
     out.sigma = 0;
     for (size_t k = 0; k < 3; ++k) {
       const double weight = point.weights[static_cast<Eigen::Index>(k)];
       if (weight > 0) out.sigma += weight * double(mesh.mesh.sigma[f.at(k)]);
     }
   }
-  if (mesh.states_provenance()) out.provenance = mesh.mesh.provenance[point.face];
   return out;
 }
 

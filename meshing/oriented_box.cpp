@@ -85,13 +85,12 @@ Eigen::Matrix3d sorted_axes(const Eigen::Matrix3d& axes, const Eigen::Vector3d& 
 
 // A vertex belongs to the best evidence around it: an observed vertex on the rim of invented
 // surface was observed.
-std::vector<uint8_t> vertex_labels(const MeasurableMesh& mesh) {
-  std::vector<uint8_t> out(mesh.points.size(), 0);
-  constexpr std::array<uint8_t, 4> kRank = {0, 2, 3, 1};  // per label
+std::vector<Provenance> vertex_labels(const MeasurableMesh& mesh) {
+  std::vector<Provenance> out(mesh.points.size(), Provenance::Inferred);
   for (size_t f = 0; f < mesh.mesh.provenance.size(); ++f) {
-    const auto label = static_cast<uint8_t>(mesh.mesh.provenance[f]);
+    const Provenance label = mesh.mesh.provenance[f];
     for (const uint32_t v : mesh.mesh.faces[f]) {
-      if (kRank.at(label) > kRank.at(out[v])) out[v] = label;
+      if (evidence_rank(label) > evidence_rank(out[v])) out[v] = label;
     }
   }
   return out;
@@ -121,7 +120,7 @@ OrientedBox oriented_box(const MeasurableMesh& mesh) {
   if (upright.prod() <= extents_along(mesh, vertices, axes).prod() * (1 + 1e-9)) axes.setIdentity();
   OrientedBox out;
   out.axes = sorted_axes(axes, extents_along(mesh, vertices, axes));
-  const std::vector<uint8_t> labels = vertex_labels(mesh);
+  const std::vector<Provenance> labels = vertex_labels(mesh);
   Eigen::Vector3d middle;
   for (int k = 0; k < 3; ++k) {
     const auto along = [&](uint32_t v) { return out.axes.col(k).dot(mesh.points[v]); };
@@ -133,10 +132,9 @@ OrientedBox oriented_box(const MeasurableMesh& mesh) {
     MeasuredValue& value = out.extents.at(static_cast<size_t>(k));
     value = extent(mesh, *low, *high, along(*high) - along(*low));
     if (mesh.states_provenance()) {
-      constexpr std::array<uint8_t, 4> kRank = {0, 2, 3, 1};
-      const uint8_t weaker =
-          kRank.at(labels[*low]) < kRank.at(labels[*high]) ? labels[*low] : labels[*high];
-      value.by_provenance.at(weaker) = value.value;
+      const bool low_is_weaker = evidence_rank(labels[*low]) < evidence_rank(labels[*high]);
+      const Provenance weaker = low_is_weaker ? labels[*low] : labels[*high];
+      value.by_provenance.at(static_cast<size_t>(weaker)) = value.value;
     }
   }
   out.center = out.axes * middle;

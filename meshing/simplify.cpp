@@ -103,7 +103,7 @@ bool tighten_for_area(const TriangleMesh& mesh,
                       const SimplifyResult& result,
                       std::vector<float>& tolerance) {
   constexpr double kMostChange = 0.01;
-  std::array<bool, 4> changed{};
+  std::array<bool, kProvenanceCount> changed{};
   for (size_t label = 0; label < changed.size(); ++label) {
     const bool counts = mesh.provenance.empty() || Provenance(label) != Provenance::Inferred;
     const double change = std::abs(result.area_after[label] - result.area_before[label]);

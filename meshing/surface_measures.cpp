@@ -75,14 +75,7 @@ std::vector<Eigen::Vector3d> area_gradients(const MeasurableMesh& mesh) {
 }
 
 Provenance weaker(Provenance a, Provenance b) {
-  // From no evidence to the best.
-  const auto rank = [](Provenance p) {
-    return p == Provenance::Inferred       ? 0
-           : p == Provenance::Interpolated ? 1
-           : p == Provenance::SingleView   ? 2
-                                           : 3;
-  };
-  return rank(a) < rank(b) ? a : b;
+  return evidence_rank(a) < evidence_rank(b) ? a : b;
 }
 
 }  // namespace
@@ -122,7 +115,7 @@ MeasuredValue enclosed_volume(const MeasurableMesh& mesh) {
     out.value += (t.a - middle).dot((t.b - middle).cross(t.c - middle)) / 6;
   }
   const auto areas = surface_area(mesh);
-  for (size_t i = 0; i < 4 && areas.value > 0; ++i) {
+  for (size_t i = 0; i < kProvenanceCount && areas.value > 0; ++i) {
     out.by_provenance.at(i) = out.value * areas.by_provenance.at(i) / areas.value;
   }
   out.stated = areas.stated;

@@ -197,9 +197,8 @@ void Measuring::section(const MeasureArgs& args) {
   const Section cut = cgs::section(mesh_, plane);
   figure("section_length", cut.length, {{"lines", cut.lines.size()}, {"open", cut.open_lines}});
   figure("section_area", cut.area);
-  figures["section_area"].erase("observed");
-  for (const char* key : {"single_view", "interpolated", "inferred"}) {
-    figures["section_area"].erase(key);
+  for (const Provenance label : kProvenanceOrder) {
+    figures["section_area"].erase(provenance_key(label));
   }
   if (args.svg.empty() && args.dxf.empty()) return;
   if (cut.lines.empty())

@@ -39,6 +39,17 @@ TEST(WriteSvg, DrawsLabelsApartWithYDownwards) {
   EXPECT_NE(text.find(".inferred { stroke: #c02a8a; stroke-dasharray"), std::string::npos);
 }
 
+TEST(WriteSvg, HasAClassForEveryLabel) {
+  const test::TempDir dir;
+  Drawing drawing = triangle();
+  drawing.lines[0].of_segment.assign(3, Provenance::Virtual);
+  write_svg(dir / "a.svg", drawing);
+  EXPECT_NE(test::read_bytes(dir / "a.svg").find("class=\"virtual\""), std::string::npos);
+  drawing.lines[0].of_segment.clear();
+  write_svg(dir / "a.svg", drawing);
+  EXPECT_NE(test::read_bytes(dir / "a.svg").find("class=\"section\""), std::string::npos);
+}
+
 TEST(WriteSvg, NeedsALineAndADisk) {
   const test::TempDir dir;
   EXPECT_THROW(write_svg(dir / "a.svg", Drawing{}), InvalidInput);

@@ -117,6 +117,24 @@ TEST(OrientedBox, FindsATurnedBox) {
   EXPECT_NEAR(box.extents[0].sigma, 1e-3 * std::sqrt(2), 1e-9);
 }
 
+// Surface that only virtual cameras saw has parts of its own, and is better than invented surface.
+TEST(SurfaceMeasures, KnowVirtualSurface) {
+  MeasurableMesh mesh = test::cube_mesh(0.5);
+  mesh.mesh.provenance.assign(12, Provenance::Virtual);
+  mesh.mesh.provenance[0] = Provenance::Inferred;
+  mesh.mesh.provenance[1] = Provenance::Inferred;
+  const auto part = [](const MeasuredValue& value, Provenance label) {
+    return value.by_provenance.at(static_cast<size_t>(label));
+  };
+  EXPECT_DOUBLE_EQ(part(surface_area(mesh), Provenance::Virtual), 1.25);
+  EXPECT_NEAR(part(enclosed_volume(mesh), Provenance::Virtual), 0.125 * 5 / 6, 1e-15);
+  EXPECT_DOUBLE_EQ(part(oriented_box(mesh).extents[0], Provenance::Virtual), 0.5);
+  const SurfacePoint below{0, {0, 0, 0}, {1, 0, 0}};
+  const SurfacePoint above{2, {0, 0, 0.5}, {1, 0, 0}};
+  EXPECT_DOUBLE_EQ(part(straight_distance(mesh, below, above), Provenance::Inferred), 0.5);
+  EXPECT_DOUBLE_EQ(part(straight_distance(mesh, above, above), Provenance::Inferred), 0);
+}
+
 TEST(OrientedBox, OfFlatAndSinglePoints) {
   MeasurableMesh mesh;
   EXPECT_THROW(oriented_box(mesh), InvalidInput);

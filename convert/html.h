@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json_fwd.hpp>
+
+namespace cgs {
+
+/// Text as it may stand in HTML, in and outside of attributes.
+std::string escaped(std::string_view text);
+
+/// A number by a printf format; "-" for what is none.
+std::string number(const nlohmann::ordered_json& value, const char* format = "%.4g");
+
+/// Bytes as base64 with padding (RFC 4648, section 4).
+std::string base64(std::string_view bytes);
+
+/// A row of a table: a name, which is escaped, and a value, which is HTML.
+std::string table_row(std::string_view name, std::string_view value);
+
+}  // namespace cgs

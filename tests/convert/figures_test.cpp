@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/figures.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+namespace {
+
+MeasuredValue area_by_label() {
+  MeasuredValue value;
+  value.dimension = 2;
+  value.by_provenance = {1, 2, 4, 8, 16};  // index = label
+  value.value = 31;
+  value.sigma = 0.5;
+  value.stated = 0.25;
+  return value;
+}
+
+TEST(FigureJson, NamesThePartOfEveryLabel) {
+  const FigureUnit unit{"cm", 10, 0};
+  const auto json = figure_json(area_by_label(), unit, true);
+  EXPECT_EQ(json["unit"], "cm^2");
+  EXPECT_DOUBLE_EQ(json["value"].get<double>(), 3100);
+  EXPECT_DOUBLE_EQ(json["sigma"].get<double>(), 50);
+  EXPECT_DOUBLE_EQ(json["inferred"].get<double>(), 100);
+  EXPECT_DOUBLE_EQ(json["single_view"].get<double>(), 200);
+  EXPECT_DOUBLE_EQ(json["observed"].get<double>(), 400);
+  EXPECT_DOUBLE_EQ(json["interpolated"].get<double>(), 800);
+  EXPECT_DOUBLE_EQ(json["virtual"].get<double>(), 1600);
+  const auto unstated = figure_json(area_by_label(), unit, false);
+  for (const char* key : {"inferred", "single_view", "observed", "interpolated", "virtual"}) {
+    EXPECT_TRUE(unstated.at(key).is_null()) << key;
+  }
+}
+
+TEST(FigureText, NamesThePartOfEveryLabel) {
+  EXPECT_EQ(figure_text(area_by_label(), {"m", 1, 0}, true),
+            "31 ± 0.5 m^2  (observed 4, single view 2, interpolated 8, inferred 1, virtual 16)");
+}
+
+TEST(FigureSigma, HoldsTheScaleOncePerDimension) {
+  // 31 with 2 * 10 % of the scale, and 0.5 of its own.
+  EXPECT_NEAR(figure_sigma(area_by_label(), {"m", 1, 0.1}), std::hypot(0.5, 6.2), 1e-12);
+  EXPECT_THROW(figure_unit(Frame{}, "mm"), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs
