@@ -269,7 +269,7 @@ Json run_report(Run& run, const Progress& progress) {
   const Json json = report_json(run);
   write_file(run.request.output / "report.json", json_text(json) + "\n");
   const std::string viewer = viewer_section(loaded_model(run), loaded_mesh(run), progress);
-  write_html_report(run.request.output, json, viewer);
+  write_html_report(run.request.output, json, run.model->scene, viewer);
   return {{"pages", 1}};
 }
 

@@ -11,8 +11,10 @@
 #include "io/atomic_file.h"
 #include "io/byte_reader.h"
 #include "io/image.h"
+#include "io/orientation.h"
 #include "io/png.h"
 #include "io/resample.h"
+#include "io/scene_reader.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -31,15 +33,14 @@ std::string overlay(const std::filesystem::path& mask) {
   }
 }
 
-// A picture file as a figure with the picture inside; a line of text where it cannot be read.
-std::string figure(const std::filesystem::path& file,
-                   const std::string& caption,
-                   const std::string& over = "") {
+// A figure with the picture inside; a line of text where `read` cannot give one.
+template <typename Read>
+std::string figure_of(Read read, const std::string& caption, const std::string& over) {
   constexpr int kQuality = 85;
   constexpr int kWidest = 1000;  // [pixels]
   std::string content;
   try {
-    ColorImage image = read_image(file, nullptr, {});
+    ColorImage image = read();
     if (image.width > kWidest) {
       MaskMap all_usable;
       area_downscale(image, all_usable, kWidest, std::max(1, image.height * kWidest / image.width));
@@ -51,6 +52,12 @@ std::string figure(const std::filesystem::path& file,
   }
   return "<figure><div class=picture>" + content + "</div><figcaption>" + escaped(caption) +
          "</figcaption></figure>\n";
+}
+
+std::string figure(const std::filesystem::path& file,
+                   const std::string& caption,
+                   const std::string& over = "") {
+  return figure_of([&] { return read_image(file); }, caption, over);
 }
 
 std::string verdict(bool good, const std::string& yes, const std::string& no) {
@@ -141,7 +148,9 @@ std::string mesh_section(const std::filesystem::path& folder) {
          figure(folder / "mesh/side.provenance.png", "the same from the side") + "</div>\n";
 }
 
-std::string views_section(const std::filesystem::path& folder, const Json& report) {
+std::string views_section(const std::filesystem::path& folder,
+                          const Json& views,
+                          const Scene& scene) {
   std::ostringstream html;
   html << "<h2>Views</h2>\n"
           "<svg width=0 height=0 aria-hidden=true style=\"position:absolute\"><filter id=tint "
@@ -149,13 +158,14 @@ std::string views_section(const std::filesystem::path& folder, const Json& repor
           "0 0 0 0 .85 1 0 0 0 0\"/></filter></svg>\n"  // white to magenta, black to nothing
           "<input type=checkbox id=holes><label for=holes>Show in magenta what no input photograph "
           "saw</label>\n";
-  for (const Json& view : report["views"]) {
+  for (const Json& view : views) {
     const auto name = view["name"].get<std::string>();
+    const View& photograph = scene.views.at(static_cast<size_t>(select_views(scene, name)[0]));
     const std::string holes = overlay(folder / "views" / (name + ".hole.png"));
     html << "<h3>" << escaped(name) << " (" << view["role"].get<std::string>() << "), "
          << number(100 * view["hole_fraction"].get<double>(), "%.1f")
          << " % holes</h3>\n<div class=row>\n"
-         << figure(report["photographs"].value(name, ""), "photograph", holes)
+         << figure_of([&] { return read_photograph(photograph); }, "photograph", holes)
          << figure(folder / "views" / (name + ".color.png"), "rendered", holes)
          << figure(folder / "views" / (name + ".depth.png"), "depth (red = near)")
          << figure(folder / "views" / (name + ".normal.png"), "normals")
@@ -232,6 +242,7 @@ std::string timing_section(const Json& stages) {
 
 void write_html_report(const std::filesystem::path& folder,
                        const Json& report,
+                       const Scene& scene,
                        const std::string& viewer) {
   std::ostringstream html;
   const auto title = report["folder"].get<std::string>();
@@ -251,7 +262,7 @@ void write_html_report(const std::filesystem::path& folder,
   }
   html << viewer << scale_section(report["scale"]) << certificate_section(report)
        << simplification_section(report["mesh"]["simplification"]) << mesh_section(folder)
-       << evaluation_section(report["evaluation"]) << views_section(folder, report)
+       << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
        << training_section(report["model"]) << timing_section(report["stages"])
        << "</body></html>\n";
   write_file(folder / "report.html", html.str());
