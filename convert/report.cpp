@@ -2,6 +2,7 @@
 #include "convert/report.h"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
@@ -64,13 +65,38 @@ std::string verdict(bool good, const std::string& yes, const std::string& no) {
   return good ? "<span class=good>" + yes + "</span>" : "<span class=bad>" + no + "</span>";
 }
 
+/// What lengths of the report are shown in: the units of the files, or metres where those have no
+/// name.
+class ShownUnit {
+ public:
+  explicit ShownUnit(const Json& report) {
+    const auto units = report["units"].get<std::string>();
+    const double metres = report["frame"]["metres_per_unit"].get<double>();
+    const bool has_name = units.find(' ') == std::string::npos;
+    factor_ = has_name ? 1 : metres;
+    name_ = units == "unknown" ? "units" : has_name ? units : "m";
+  }
+  std::string length(const Json& value) const { return power(value, 1) + " " + escaped(name_); }
+  std::string area(const Json& value) const {
+    return power(value, 2) + " " + escaped(name_) + "<sup>2</sup>";
+  }
+  std::string volume(const Json& value) const {
+    return power(value, 3) + " " + escaped(name_) + "<sup>3</sup>";
+  }
+
+ private:
+  std::string power(const Json& value, int exponent) const {
+    return number(std::pow(factor_, exponent) * value.get<double>());
+  }
+  double factor_ = 1;
+  std::string name_;
+};
+
 std::string certificate_section(const Json& report) {
   const Json& c = report["certificate"];
-  const std::string unit = c["units"] == "unknown" ? "units" : c["units"].get<std::string>();
+  const ShownUnit unit(report);
   const auto yes = [&](const char* key) { return verdict(c[key].get<bool>(), "yes", "no"); };
-  const auto area = [&](const char* key) {
-    return number(c[key]) + " " + escaped(unit) + "<sup>2</sup>";
-  };
+  const auto area = [&](const char* key) { return unit.area(c[key]); };
   std::ostringstream html;
   html << "<h2>Certificate of the watertight mesh</h2>\n<p>Made by: "
        << escaped(report["mesh"]["method"].get<std::string>()) << "</p>\n<table>\n"
@@ -80,7 +106,7 @@ std::string certificate_section(const Json& report) {
        << table_row("self-intersections", number(c["self_intersections"], "%.0f"))
        << table_row("components", number(c["components"], "%.0f"))
        << table_row("genus", number(c["genus"], "%.0f"))
-       << table_row("volume", number(c["volume"]) + " " + escaped(unit) + "<sup>3</sup>")
+       << table_row("volume", unit.volume(c["volume"]))
        << table_row("area seen by two or more views", area("area_observed"))
        << table_row("area seen by one view", area("area_single_view"))
        << table_row("area interpolated", area("area_interpolated"))
@@ -108,14 +134,14 @@ std::string scale_section(const Json& scale) {
   return html.str();
 }
 
-std::string simplification_section(const Json& simplification) {
+std::string simplification_section(const Json& report) {
+  const Json& simplification = report["mesh"]["simplification"];
   if (simplification.is_null()) return "";
-  const auto units = simplification["units"].get<std::string>();
-  const std::string unit = escaped(units == "unknown" ? " units" : ' ' + units);
+  const ShownUnit unit(report);
   std::ostringstream html;
   html << "<h2>Simplification</h2>\n<p>Largest distance allowed: "
-       << number(simplification["max_error"]) << unit << " where there is evidence, "
-       << number(simplification["max_error_inferred"]) << unit
+       << unit.length(simplification["max_error"]) << " where there is evidence, "
+       << unit.length(simplification["max_error_inferred"])
        << " where inferred. Distances are measured by samples, both ways.</p>\n<table>\n"
           "<tr><th>mesh</th><th>faces before</th><th>after</th><th>max, evidence</th>"
           "<th>RMS, evidence</th><th>max, inferred</th><th>area observed before</th>"
@@ -129,11 +155,11 @@ std::string simplification_section(const Json& simplification) {
     }
     const Json& evidence = s["error_with_evidence"];
     html << "<tr><td>" << name << "</td><td>" << number(s["faces_before"], "%.0f") << "</td><td>"
-         << number(s["faces_after"], "%.0f") << "</td><td>" << number(evidence["max"]) << unit
-         << "</td><td>" << number(evidence["rms_from_simplified"]) << unit << "</td><td>"
-         << number(s["error_inferred"]["max"]) << unit << "</td><td>"
-         << number(s["area_observed_before"]) << unit << "<sup>2</sup></td><td>"
-         << number(s["area_observed_after"]) << unit << "<sup>2</sup></td></tr>\n";
+         << number(s["faces_after"], "%.0f") << "</td><td>" << unit.length(evidence["max"])
+         << "</td><td>" << unit.length(evidence["rms_from_simplified"]) << "</td><td>"
+         << unit.length(s["error_inferred"]["max"]) << "</td><td>"
+         << unit.area(s["area_observed_before"]) << "</td><td>"
+         << unit.area(s["area_observed_after"]) << "</td></tr>\n";
   }
   html << "</table>\n";
   return html.str();
@@ -254,14 +280,14 @@ void write_html_report(const std::filesystem::path& folder,
        << escaped(title) << "</title>\n<style>" << page_files().style
        << "</style></head><body>\n<h1>" << escaped(std::filesystem::path(title).filename().string())
        << "</h1>\n<p>" << escaped(report["scene"].get<std::string>())
-       << " scene, units: " << escaped(report["units"].get<std::string>()) << " (scale "
+       << " scene, units of files: " << escaped(report["units"].get<std::string>()) << " (scale "
        << escaped(report["scale_source"].get<std::string>()) << ")</p>\n<p class=note>Model: "
        << escaped(report["model"]["description"].get<std::string>()) << ".</p>\n";
   for (const Json& warning : report["warnings"]) {
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
   }
   html << viewer << scale_section(report["scale"]) << certificate_section(report)
-       << simplification_section(report["mesh"]["simplification"]) << mesh_section(folder)
+       << simplification_section(report) << mesh_section(folder)
        << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
        << training_section(report["model"]) << timing_section(report["stages"])
        << "</body></html>\n";
