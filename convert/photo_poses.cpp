@@ -91,13 +91,20 @@ int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) 
 
 using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255
 
-UnposedPhoto unposed_photo(const PhotoFile& photograph, double focal, Colors& colors) {
-  const ColorImage image = turned(read_image(photograph.path), photograph.orientation);
+UnposedPhoto unposed_photo(const SceneRoot& root,
+                           const PhotoFile& photograph,
+                           double focal,
+                           Colors& colors) {
+  View view;
+  view.image_path = photograph.path;
+  view.orientation = photograph.orientation;
+  MaskMap usable;
+  const ColorImage image = read_photograph(view, root, usable);
   UnposedPhoto out;
   out.name = photograph.path.filename().string();
   out.width = image.width;
   out.height = image.height;
-  out.features = detect_features(image);
+  out.features = detect_features(image, usable);
   out.focal = focal > 0 ? focal : photograph.hint.focal;
   out.focal_sigma = focal > 0 ? 0 : photograph.hint.sigma;
   for (const Eigen::Vector2d& p : out.features.points) {
@@ -188,7 +195,7 @@ PhotoPoses photo_poses(const SceneRoot& root,
   constexpr double kShare = 0.4;  // of the time, for finding features
   for (size_t i = 0; i < photographs.size(); ++i) {
     report(progress, kShare * double(i) / double(photographs.size()));
-    photos.push_back(unposed_photo(photographs[i], focal, colors[i]));
+    photos.push_back(unposed_photo(root, photographs[i], focal, colors[i]));
     photos.back().lens = lens_of(photographs[i], lenses);
   }
   const PoseSolution solution = solve_poses(photos, part_of(progress, kShare, 1));

@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "io/masks.h"
+
 namespace cgs {
 
 namespace {
@@ -68,10 +70,14 @@ ImageSize photograph_size(const View& view) {
   return turned(image_size(view.image_path), view.orientation);
 }
 
-ColorImage read_photograph(const View& view, MaskMap* usable) {
-  ColorImage stored = read_image(view.image_path, usable);
-  if (view.orientation == kUpright) return stored;
-  if (usable != nullptr) *usable = turned(*usable, view.orientation);
+ColorImage read_photograph(const View& view) {
+  return turned(read_image(view.image_path), view.orientation);
+}
+
+ColorImage read_photograph(const View& view, const SceneRoot& root, MaskMap& usable) {
+  const ColorImage stored = read_image(view.image_path, &usable);
+  apply_mask(root, view.image_path, stored.width, stored.height, usable);
+  usable = turned(usable, view.orientation);
   return turned(stored, view.orientation);
 }
 

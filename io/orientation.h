@@ -2,6 +2,7 @@
 #pragma once
 
 #include "io/image.h"
+#include "io/scene_path.h"
 #include "libcgs/core/raster.h"
 #include "libcgs/core/scene.h"
 
@@ -13,8 +14,11 @@ MaskMap turned(const MaskMap& stored, int orientation);
 ImageSize turned(const ImageSize& stored, int orientation);
 
 /// Size of the photograph of a view [pixels] and the photograph itself, turned as the view says.
-/// \throws BadInput, LimitError as image_size() and read_image()
+/// \param usable  where not null: pixels neither transparent nor masked, as read_image() gives them
+/// \param root    of the scene, where masks are looked for
+/// \throws BadInput, LimitError as image_size(), read_image() and apply_mask()
 ImageSize photograph_size(const View& view);
-ColorImage read_photograph(const View& view, MaskMap* usable = nullptr);
+ColorImage read_photograph(const View& view);
+ColorImage read_photograph(const View& view, const SceneRoot& root, MaskMap& usable);
 
 }  // namespace cgs

@@ -284,7 +284,7 @@ void load_image(Scene& scene, View& view) {
     throw BadInput(Defect::Missing, scene.folder, "view " + printable(view.name) + " has no image");
   }
   Camera& camera = view.camera;
-  view.image = read_photograph(view, &view.valid);
+  view.image = read_photograph(view, {scene.folder, false}, view.valid);
   const int width = view.image.width;
   const int height = view.image.height;
   if (width < camera.width || height < camera.height ||

@@ -33,6 +33,16 @@ cv::Mat grey_picture(const ColorImage& image, int largest_side) {
   return small;
 }
 
+// Pixels of the picture searched that may be used; no matrix where all may.
+cv::Mat mask_of(const MaskMap& usable, const cv::Size& size) {
+  if (usable.empty()) return {};
+  const cv::Mat whole(
+      usable.height, usable.width, CV_8UC1, const_cast<uint8_t*>(usable.data.data()));
+  cv::Mat small;
+  cv::resize(whole, small, size, 0, 0, cv::INTER_NEAREST);
+  return small;
+}
+
 // Strongest first. Every field takes part: the order, and with it what is kept, must not depend on
 // the order in which threads found them.
 void sort_and_cut(std::vector<cv::KeyPoint>& points, int most) {
@@ -76,7 +86,9 @@ void FeatureOptions::validate() const {
   require(most >= 1, "FeatureOptions.most must be >= 1", most);
 }
 
-PhotoFeatures detect_features(const ColorImage& image, const FeatureOptions& options) {
+PhotoFeatures detect_features(const ColorImage& image,
+                              const MaskMap& usable,
+                              const FeatureOptions& options) {
   options.validate();
   const cv::Mat picture = grey_picture(image, options.largest_side);
   // Half of the usual contrast: photographs of stone and plaster have few strong corners, and
@@ -85,7 +97,7 @@ PhotoFeatures detect_features(const ColorImage& image, const FeatureOptions& opt
   constexpr double kContrast = 0.02;
   const auto sift = cv::SIFT::create(0, kOctaveLayers, kContrast);
   std::vector<cv::KeyPoint> found;
-  sift->detect(picture, found);
+  sift->detect(picture, found, mask_of(usable, picture.size()));
   sort_and_cut(found, options.most);
   cv::Mat descriptors;
   sift->compute(picture, found, descriptors);

@@ -27,11 +27,14 @@ struct FeatureOptions {
 
 /// Finds SIFT features. The same for any number of threads.
 ///
-/// \param image  at least 8 pixels wide and high
+/// \param image   at least 8 pixels wide and high
+/// \param usable  where features may lie, of the size of the image; empty = everywhere
 /// Source: Lowe 2004, "Distinctive image features from scale-invariant keypoints"; Arandjelovic and
 ///         Zisserman 2012, "Three things everyone should know to improve object retrieval"
 ///         (square root).
-PhotoFeatures detect_features(const ColorImage& image, const FeatureOptions& options = {});
+PhotoFeatures detect_features(const ColorImage& image,
+                              const MaskMap& usable = {},
+                              const FeatureOptions& options = {});
 
 /// A pair of features of two photographs.
 struct FeatureMatch {

@@ -68,7 +68,7 @@ TEST(PhotoFeatures, LieWherePixelCentresAreAtOneHalf) {
 
 TEST(PhotoFeatures, OfAShrunkenPhotographAreInItsOwnPixels) {
   const auto centres = scattered_centres(60, 900);
-  const PhotoFeatures features = detect_features(spots(centres, 6, 900), {.largest_side = 300});
+  const PhotoFeatures features = detect_features(spots(centres, 6, 900), {}, {.largest_side = 300});
   EXPECT_EQ(features.pixel, 3);
   EXPECT_LT(mean_offset(features, centres).cwiseAbs().maxCoeff(), 0.15);
 }
@@ -79,9 +79,9 @@ TEST(PhotoFeatures, AreTheSameForAnyNumberOfThreads) {
   const Camera camera = test::looking_at({0, 0, 0}, {0, 0, 4}, 320, 240, 300);
   const ColorImage image = test::photograph(wall, camera, 0.03, 1);
   cv::setNumThreads(1);
-  const PhotoFeatures one = detect_features(image, {.most = 200});
+  const PhotoFeatures one = detect_features(image, {}, {.most = 200});
   cv::setNumThreads(4);
-  const PhotoFeatures four = detect_features(image, {.most = 200});
+  const PhotoFeatures four = detect_features(image, {}, {.most = 200});
   ASSERT_EQ(one.points.size(), 200u);
   EXPECT_EQ(one.points, four.points);
   EXPECT_EQ(one.descriptors, four.descriptors);
@@ -131,6 +131,20 @@ TEST(MatchFeatures, FindsWhatASlowSearchFinds) {
 TEST(FeatureOptions, NameTheFieldOutOfRange) {
   EXPECT_THROW(FeatureOptions{.largest_side = 10}.validate(), InvalidInput);
   EXPECT_THROW(FeatureOptions{.most = 0}.validate(), InvalidInput);
+}
+
+TEST(PhotoFeatures, LieWhereTheMaskLetsThem) {
+  const std::vector<Eigen::Vector2d> centres = {{60, 60}, {60, 200}, {200, 60}, {200, 200}};
+  const ColorImage image = spots(centres, 6, 260);
+  MaskMap left(image.width, image.height, 0);
+  for (int y = 0; y < left.height; ++y) {
+    for (int x = 0; x < left.width / 2; ++x) left(x, y) = 1;
+  }
+  const PhotoFeatures all = detect_features(image);
+  const PhotoFeatures some = detect_features(image, left);
+  EXPECT_GT(some.points.size(), 1u);
+  EXPECT_LT(some.points.size(), all.points.size());
+  for (const Eigen::Vector2d& p : some.points) EXPECT_LT(p.x(), image.width / 2 + 1);
 }
 
 }  // namespace

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/masks.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "io/image.h"
+#include "io/png.h"
+#include "io/scene_reader.h"
+#include "tests/support/scene_files.h"
+#include "tests/support/temp_dir.h"
+
+namespace cgs {
+namespace {
+
+constexpr int kWidth = 32;
+constexpr int kHeight = 24;
+
+/// Two photographs with cameras, in images/.
+class Masks : public testing::Test {
+ protected:
+  Masks() {
+    std::string images;
+    for (const int i : {1, 2}) {
+      const std::string name = "v" + std::to_string(i) + ".jpg";
+      images += std::to_string(i) + " 1 0 0 0 " + std::to_string(i) + " 0 0 1 " + name + "\n\n";
+      test::write_bytes(dir_ / "images" / name, test::jpeg(kWidth, kHeight));
+    }
+    test::write_bytes(dir_ / "sparse/0/cameras.txt", "1 SIMPLE_PINHOLE 32 24 40 16 12\n");
+    test::write_bytes(dir_ / "sparse/0/images.txt", images);
+  }
+
+  /// Bright from `first` on, dark before.
+  void write_mask(const std::string& name, int first, int width = kWidth) {
+    ColorImage mask(width, kHeight, Eigen::Vector3f::Zero());
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = first; x < width; ++x) mask(x, y).setOnes();
+    }
+    std::filesystem::create_directories((dir_ / name).parent_path());
+    write_png(dir_ / name, mask);
+  }
+
+  std::optional<std::string> found() const {
+    const auto file = mask_file({dir_.path(), false}, dir_ / "images/v1.jpg");
+    if (!file) return std::nullopt;
+    return std::filesystem::relative(*file, dir_.path()).string();
+  }
+
+  /// Columns of the first view that may be used.
+  int usable_columns() {
+    Scene scene = read_scene(dir_.path());
+    load_images(scene, scene.input);
+    const MaskMap& valid = scene.views[0].valid;
+    if (valid.empty()) return kWidth;
+    return static_cast<int>(std::count(valid.data.begin(), valid.data.begin() + kWidth, 1));
+  }
+
+  test::TempDir dir_;
+};
+
+TEST_F(Masks, AreFoundByTheNamesProgramsGiveThem) {
+  EXPECT_FALSE(found());
+  write_mask("masks/v2.png", 1);
+  EXPECT_FALSE(found());
+  write_mask("masks/v1.png", 1);
+  EXPECT_EQ(found(), "masks/v1.png");  // nerfstudio, Brush
+  write_mask("masks/v1.jpg.png", 1);
+  EXPECT_EQ(found(), "masks/v1.jpg.png");  // COLMAP
+  write_mask("images/masks/v1.png", 1);
+  EXPECT_EQ(found(), "images/masks/v1.png");
+}
+
+TEST_F(Masks, LeaveOutWhatIsDark) {
+  EXPECT_EQ(usable_columns(), kWidth);
+  write_mask("masks/v1.png", 12);
+  EXPECT_EQ(usable_columns(), kWidth - 12);
+  write_mask("masks/v1.png", 0);
+  EXPECT_EQ(usable_columns(), kWidth);
+}
+
+TEST_F(Masks, AddToWhatIsTransparent) {
+  MaskMap usable(kWidth, kHeight, 1);
+  usable(20, 3) = 0;
+  write_mask("masks/v1.png", 12);
+  apply_mask({dir_.path(), false}, dir_ / "images/v1.jpg", kWidth, kHeight, usable);
+  EXPECT_EQ(usable(20, 3), 0);
+  EXPECT_EQ(usable(11, 3), 0);
+  EXPECT_EQ(usable(12, 3), 1);
+}
+
+TEST_F(Masks, OfAnotherSizeAreRefused) {
+  write_mask("masks/v1.png", 4, kWidth / 2);
+  EXPECT_EQ(test::defect_of([&] { usable_columns(); }), "MISMATCH");
+}
+
+TEST_F(Masks, OutsideOfTheSceneAreNotLookedAt) {
+  write_mask("masks/v1.png", 4);
+  const std::filesystem::path images = dir_ / "images";
+  EXPECT_FALSE(mask_file({images, false}, images / "v1.jpg"));
+  std::filesystem::rename(dir_ / "masks", dir_ / "elsewhere");
+  std::filesystem::create_directories(images / "masks");
+  std::filesystem::create_symlink(dir_ / "elsewhere/v1.png", images / "masks/v1.png");
+  EXPECT_EQ(test::defect_of([&] { mask_file({images, false}, images / "v1.jpg"); }), "PATH");
+}
+
+}  // namespace
+}  // namespace cgs
