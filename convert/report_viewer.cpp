@@ -229,7 +229,7 @@ std::string viewer_section(const Model& model,
             "(Debian package libjs-three).</p>\n";
     return html.str();
   }
-  constexpr size_t kMostFaces = 150000;  // a page with as many is there within 2 s
+  constexpr size_t kMostFaces = 160000;  // a page with as many is there within some 2 s
   const ShownMesh shown = shown_mesh(watertight, kMostFaces, part_of(progress, 0, 0.7));
   const Json scene = viewer_scene(model, shown.mesh);
   html << files.viewer_markup << shown_text(shown, model.scene.frame)
