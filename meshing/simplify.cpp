@@ -117,7 +117,7 @@ bool tighten_for_area(const TriangleMesh& mesh,
     for (const uint32_t v : mesh.faces[f]) marked[v] = 1;
   }
   for (size_t v = 0; v < marked.size(); ++v) {
-    if (marked[v] != 0) tolerance[v] *= 0.5f;
+    if (marked[v] != 0) tolerance[v] *= 0.25f;
   }
   return any;
 }
