@@ -22,20 +22,23 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
+[[noreturn]] void refuse_pick(const std::string& pick) {
+  throw InvalidInput("--known-distance: '" + printable(pick) +
+                     "' is not VIEW:X,Y, a pixel of a photograph such as church_02:1510,842");
+}
+
 double pixel_number(const std::string& text, const std::string& pick) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) {
-    return value;
-  }
-  throw InvalidInput("--known-distance: '" + printable(pick) +
-                     "' is not VIEW:X,Y, a pixel of a photograph such as church_02:1510,842");
+  const bool is_all = error == std::errc() && end == text.data() + text.size();
+  if (!is_all || !std::isfinite(value)) refuse_pick(pick);
+  return value;
 }
 
 KnownDistance::Pick pick_of(const std::string& text, const Scene& scene) {
   const size_t colon = text.rfind(':');
   const size_t comma = text.find(',', colon == std::string::npos ? 0 : colon);
-  if (colon == std::string::npos || comma == std::string::npos) (void)pixel_number("", text);
+  if (colon == std::string::npos || comma == std::string::npos) refuse_pick(text);
   KnownDistance::Pick pick;
   const std::string name = text.substr(0, colon);
   pick.view = select_views(scene, name).front();
