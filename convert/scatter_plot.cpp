@@ -35,7 +35,7 @@ svg { --paper: #ffffff; --ink: #1d2733; --line: #d5dae0; --grey: #75808c; --fron
 @media (prefers-color-scheme: dark) {
   svg { --paper: #14191f; --ink: #e4e8ec; --line: #333c46; --grey: #8b96a2; --front: #6db4f2; }
 }
-.paper { fill: var(--paper); } text { fill: var(--ink); } .grid { stroke: var(--line); }
+.paper { fill: var(--paper); } text { fill: var(--ink); stroke: var(--paper); stroke-width: 3px; stroke-linejoin: round; paint-order: stroke; } .grid { stroke: var(--line); }
 .stairs { fill: none; stroke: var(--front); stroke-width: 1.6; } .leader { stroke: var(--grey); stroke-width: 0.8; }
 circle { fill: var(--grey); stroke: var(--paper); } circle.front { fill: var(--front); }
 text.off { fill: var(--grey); } text.front { font-weight: 600; } text.title { font-weight: 600; font-size: 15px; }
@@ -69,15 +69,21 @@ struct Axis {
     return from + t * (to - from);
   }
 
+  std::vector<double> round_numbers(const std::vector<double>& digits) const {
+    std::vector<double> out;
+    for (double power = std::pow(10, std::floor(std::log10(low))); power <= high; power *= 10) {
+      for (const double digit : digits) {
+        if (digit * power >= low && digit * power <= high) out.push_back(digit * power);
+      }
+    }
+    return out;
+  }
+
   std::vector<double> ticks() const {
     std::vector<double> out;
     if (logarithmic) {
-      for (double power = std::pow(10, std::floor(std::log10(low))); power <= high; power *= 10) {
-        for (const double digit : {1, 2, 5}) {
-          if (digit * power >= low && digit * power <= high) out.push_back(digit * power);
-        }
-      }
-      return out;
+      const std::vector<double> few = round_numbers({1, 2, 5});
+      return few.size() > 3 ? few : round_numbers({1, 1.5, 2, 3, 4, 5, 6, 8});
     }
     const double power = std::pow(10, std::floor(std::log10((high - low) / 5)));
     const double rest = (high - low) / 5 / power;
@@ -144,10 +150,37 @@ Box place_label(const Vector2d& point,
   return fallback;
 }
 
+// The corners of the line that joins the front: everything above and right of it is beaten.
+std::vector<Vector2d> stairs(const std::vector<ScatterPlot::Point>& points,
+                             const std::vector<Vector2d>& places) {
+  std::vector<Vector2d> front;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (points[i].on_front) front.push_back(places[i]);
+  }
+  std::sort(front.begin(), front.end(), [](const auto& a, const auto& b) { return a.x() < b.x(); });
+  std::vector<Vector2d> out;
+  for (const Vector2d& p : front) {
+    if (!out.empty()) out.emplace_back(p.x(), out.back().y());
+    out.push_back(p);
+  }
+  return out;
+}
+
+std::string line_through(const std::vector<Vector2d>& corners) {
+  std::string out = "<polyline class=\"stairs\" points=\"";
+  for (const Vector2d& p : corners)
+    out.append(pixel(p.x())).append(",").append(pixel(p.y())) += ' ';
+  return out + "\"/>\n";
+}
+
 std::string labels(const std::vector<ScatterPlot::Point>& points,
                    const std::vector<Vector2d>& places,
+                   const std::vector<Vector2d>& corners,
                    const Box& inside) {
   std::vector<Box> taken;
+  for (size_t i = 1; i < corners.size(); ++i) {
+    taken.emplace_back(corners[i - 1].cwiseMin(corners[i]), corners[i - 1].cwiseMax(corners[i]));
+  }
   for (const Vector2d& p : places) {
     taken.emplace_back(p.array() - kDot, p.array() + kDot);
   }
@@ -173,22 +206,6 @@ std::string labels(const std::vector<ScatterPlot::Point>& points,
   return out;
 }
 
-std::string stairs(const std::vector<ScatterPlot::Point>& points,
-                   const std::vector<Vector2d>& places) {
-  std::vector<Vector2d> front;
-  for (size_t i = 0; i < points.size(); ++i) {
-    if (points[i].on_front) front.push_back(places[i]);
-  }
-  std::sort(front.begin(), front.end(), [](const auto& a, const auto& b) { return a.x() < b.x(); });
-  std::string out = "<path class=\"stairs\" d=\"";
-  for (const Vector2d& p : front) {
-    const bool first = &p == &front.front();
-    out.append(first ? "M" : " H").append(pixel(p.x()));
-    out.append(first ? " " : " V").append(pixel(p.y()));
-  }
-  return out + "\"/>\n";
-}
-
 std::string panel(const ScatterPlot& plot) {
   std::string out = text_at({kLeft, 26}, plot.title, "class=\"title\"");
   if (plot.points.empty()) return out + text_at({kLeft, 80}, "nothing was measured", "");
@@ -208,8 +225,9 @@ std::string panel(const ScatterPlot& plot) {
   for (const ScatterPlot::Point& p : plot.points) {
     places.emplace_back(x.pixel_of(p.x), y.pixel_of(p.y));
   }
-  out += grid(x, y) + stairs(plot.points, places);
-  out += labels(plot.points, places, Box(Vector2d(x.from, y.to), Vector2d(x.to, y.from)));
+  const std::vector<Vector2d> corners = stairs(plot.points, places);
+  out += grid(x, y) + line_through(corners);
+  out += labels(plot.points, places, corners, Box(Vector2d(x.from, y.to), Vector2d(x.to, y.from)));
   for (size_t i = 0; i < places.size(); ++i) {
     out += "<circle cx=\"" + pixel(places[i].x()) + "\" cy=\"" + pixel(places[i].y()) + "\" r=\"" +
            pixel(kDot) + "\"" + (plot.points[i].on_front ? " class=\"front\"" : "") + "/>\n";

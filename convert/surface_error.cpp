@@ -2,6 +2,7 @@
 #include "convert/surface_error.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "libcgs/core/error.h"
 #include "meshing/mesh_distance.h"
@@ -33,36 +34,31 @@ std::vector<int> times_seen(const TriangleMesh& mesh,
   return out;
 }
 
-std::vector<Eigen::Vector3f> shown_points(const TriangleMesh& mesh,
-                                          const std::vector<Camera>& inputs) {
+}  // namespace
+
+ShownSurface shown_surface(TriangleMesh mesh, const std::vector<Camera>& inputs) {
   const SurfaceSamples samples = sample_faces(mesh, kSamples);
   const bool labelled = !mesh.provenance.empty();
   const std::vector<int> seen =
       labelled ? std::vector<int>() : times_seen(mesh, samples.points, inputs);
-  std::vector<Eigen::Vector3f> out;
+  ShownSurface out;
   for (size_t i = 0; i < samples.points.size(); ++i) {
     const bool shown =
         labelled ? mesh.provenance[samples.faces[i]] != Provenance::Inferred : seen[i] >= 2;
-    if (shown) out.push_back(samples.points[i]);
+    if (shown) out.points.push_back(samples.points[i]);
   }
+  if (out.points.empty()) {
+    throw InvalidInput("the photographs show nothing of a mesh: does it lie where the scene does?");
+  }
+  out.mesh = std::move(mesh);
   return out;
 }
 
-}  // namespace
-
-SurfaceError surface_error(const TriangleMesh& mesh,
-                           const TriangleMesh& reference,
-                           const std::vector<Camera>& inputs) {
-  const std::vector<Eigen::Vector3f> forth = shown_points(mesh, inputs);
-  const std::vector<Eigen::Vector3f> back = shown_points(reference, inputs);
-  if (forth.empty()) throw InvalidInput("the mesh has no surface that photographs show");
-  if (back.empty()) {
-    throw InvalidInput(
-        "the cameras see nothing of the reference: does it lie where the scene does?");
-  }
-  const DistanceStatistics a = statistics(distances_to(reference, forth));
-  const DistanceStatistics b = statistics(distances_to(mesh, back));
-  return {std::max(a.rms, b.rms), std::max(a.p95, b.p95), std::max(a.max, b.max)};
+SurfaceError surface_error(const ShownSurface& a, const ShownSurface& b) {
+  const DistanceStatistics forth = statistics(distances_to(b.mesh, a.points));
+  const DistanceStatistics back = statistics(distances_to(a.mesh, b.points));
+  return {
+      std::max(forth.rms, back.rms), std::max(forth.p95, back.p95), std::max(forth.max, back.max)};
 }
 
 }  // namespace cgs

@@ -16,14 +16,19 @@ struct SurfaceError {
   double max = 0;
 };
 
-/// Distance of what photographs show of a mesh to a reference, and back.
-///
-/// Invented surface has no error to speak of: only samples on faces that are not Inferred count. A
-/// reference without provenance counts where two cameras or more see it.
-/// \param inputs  the cameras of the input views, in the frame of the meshes
-/// \throws InvalidInput if nothing is left to compare on either side
-SurfaceError surface_error(const TriangleMesh& mesh,
-                           const TriangleMesh& reference,
-                           const std::vector<Camera>& inputs);
+/// A surface and samples of what photographs show of it.
+struct ShownSurface {
+  TriangleMesh mesh;
+  std::vector<Eigen::Vector3f> points;
+};
+
+/// Invented surface has no error to speak of: only samples on faces that are not Inferred are taken
+/// or, of a mesh without provenance, those that two cameras or more see.
+/// \param inputs  the cameras of the input views, in the frame of the mesh
+/// \throws InvalidInput if nothing is shown
+ShownSurface shown_surface(TriangleMesh mesh, const std::vector<Camera>& inputs);
+
+/// Distances of what is shown of either surface from the other one. \pre both in one frame
+SurfaceError surface_error(const ShownSurface& a, const ShownSurface& b);
 
 }  // namespace cgs

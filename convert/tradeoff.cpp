@@ -196,66 +196,75 @@ void fold_repeats(Tradeoff& out) {
   }
 }
 
-// Distances of a setting's surface from another, kept like a stage.
-std::optional<SurfaceError> error_from(Bench& bench,
-                                       const MeasuredSetting& m,
-                                       const std::string& key,
-                                       const Model& model,
-                                       const std::function<const TriangleMesh&()>& reference) {
-  const double scale = model.scene.frame.scale;
-  const Json result = stage(bench, key, label(m.setting) + ": error", [&](const Progress& p) {
-    report(p, 0);
-    std::vector<Camera> inputs;
-    for (const int i : model.scene.input) {
-      inputs.push_back(model.scene.views[static_cast<size_t>(i)].camera);
-    }
-    const TriangleMesh mesh = read_watertight(bench.folder(mesh_key(m.setting)), model.scene.frame);
-    const SurfaceError e = surface_error(mesh, reference(), inputs);
-    return Json{{"rms", e.rms * scale}, {"p95", e.p95 * scale}, {"max", e.max * scale}};
-  });
-  if (result.contains("failed")) throw InvalidInput(result.at("failed").get<std::string>());
-  return SurfaceError{result.at("rms"), result.at("p95"), result.at("max")};
-}
+using SurfaceOf = std::function<ShownSurface(const Model&, const std::vector<Camera>&)>;
 
-void measure_errors(Bench& bench, Tradeoff& out) {
-  bench.deadline = Clock::time_point::max();  // soon done, and without it nothing can be told
+/// What errors are measured from; read when the first of them is not known yet.
+class Ruler {
+ public:
+  Ruler(std::string name, SurfaceOf read) : name_(std::move(name)), read_(std::move(read)) {}
+
+  // Distances of a setting's surface, kept like a stage.
+  SurfaceError error_of(Bench& bench,
+                        const MeasuredSetting& m,
+                        const Model& model,
+                        const std::vector<Camera>& inputs) {
+    const std::string key = mesh_key(m.setting);
+    const Json result =
+        stage(bench, key + " from " + name_, label(m.setting) + ": error", [&](const Progress& p) {
+          report(p, 0);
+          if (!surface_) surface_ = read_(model, inputs);
+          const Frame& frame = model.scene.frame;
+          const SurfaceError e = surface_error(
+              shown_surface(read_watertight(bench.folder(key), frame), inputs), *surface_);
+          return Json{{"rms", e.rms * frame.scale},
+                      {"p95", e.p95 * frame.scale},
+                      {"max", e.max * frame.scale}};
+        });
+    if (result.contains("failed")) throw InvalidInput(result.at("failed").get<std::string>());
+    return {result.at("rms"), result.at("p95"), result.at("max")};
+  }
+
+ private:
+  std::string name_;
+  SurfaceOf read_;
+  std::optional<ShownSurface> surface_;
+};
+
+Setting finest_of(const std::vector<MeasuredSetting>& settings) {
   const auto fineness = [](const MeasuredSetting& m) {
     constexpr double kUsual = 0.25;  // voxels that simplification is allowed by default
     return std::pair(m.setting.voxel * m.setting.coarser, m.setting.simplify.value_or(kUsual));
   };
-  const MeasuredSetting* finest = nullptr;
-  for (const MeasuredSetting& m : out.settings) {
-    if (m.failed.empty() && (finest == nullptr || fineness(m) < fineness(*finest))) finest = &m;
+  const MeasuredSetting* finest = &settings.front();
+  for (const MeasuredSetting& m : settings) {
+    if (m.failed.empty() && fineness(m) < fineness(*finest)) finest = &m;
   }
-  out.finest = label(finest->setting);
-  const std::string finest_key = mesh_key(finest->setting);
+  return finest->setting;
+}
+
+void measure_errors(Bench& bench, Tradeoff& out) {
+  bench.deadline = Clock::time_point::max();  // soon done, and without it nothing can be told
+  const Setting finest = finest_of(out.settings);
+  out.finest = label(finest);
   const Model model = read_model(bench.folder(model_key(Setting())));
-  std::optional<TriangleMesh> finest_mesh;
-  std::optional<TriangleMesh> truth;
-  const auto load_finest = [&]() -> const TriangleMesh& {
-    if (!finest_mesh) {
-      finest_mesh = read_watertight(bench.folder(finest_key), model.scene.frame);
-    }
-    return *finest_mesh;
-  };
+  std::vector<Camera> inputs;
+  for (const int i : model.scene.input) {
+    inputs.push_back(model.scene.views[static_cast<size_t>(i)].camera);
+  }
+  Ruler from_finest(mesh_key(finest), [&](const Model& m, const auto& cameras) {
+    return shown_surface(read_watertight(bench.folder(mesh_key(finest)), m.scene.frame), cameras);
+  });
   const fs::path& path = bench.request.reference;
-  const auto load_truth = [&]() -> const TriangleMesh& {
-    if (!truth) {
-      const MeasurableFile file = read_measured(path, bench.request.scene.assume_unit);
-      truth = in_frame_of(file.content, model.scene.frame).mesh;
-    }
-    return *truth;
-  };
-  const std::string truth_key = path.empty() ? "" : file_hash(path);
+  Ruler from_truth(path.empty() ? "" : file_hash(path), [&](const Model& m, const auto& cameras) {
+    const MeasurableFile file = read_measured(path, bench.request.scene.assume_unit);
+    return shown_surface(in_frame_of(file.content, m.scene.frame).mesh, cameras);
+  });
   for (MeasuredSetting& m : out.settings) {
     if (!m.failed.empty()) continue;
-    const std::string key = mesh_key(m.setting);
-    m.deviation = key == finest_key
+    m.deviation = mesh_key(m.setting) == mesh_key(finest)
                       ? SurfaceError()
-                      : error_from(bench, m, key + " from " + finest_key, model, load_finest);
-    if (!path.empty()) {
-      m.truth = error_from(bench, m, key + " from truth " + truth_key, model, load_truth);
-    }
+                      : from_finest.error_of(bench, m, model, inputs);
+    if (!path.empty()) m.truth = from_truth.error_of(bench, m, model, inputs);
   }
 }
 

@@ -14,10 +14,10 @@ struct Setting {
   int coarser = 1;   ///< Image sizes are divided by this on top of what the user asked for.
   int steps = 60;    ///< Of the training.
   double voxel = 1;  ///< Voxel edge, in parts of what the program chooses for the image size.
-  std::optional<double> simplify =
-      {};  ///< Largest error [voxels of the standard setting]; 0 = none.
-  std::optional<double> max_error =
-      {};          ///< Of the compressed mesh [voxels of the standard setting].
+  /// Largest error of simplification [voxels of the standard setting]; 0 = none.
+  std::optional<double> simplify = {};
+  /// Largest error of the compressed mesh [voxels of the standard setting].
+  std::optional<double> max_error = {};
   int repeat = 0;  ///< The same once more, to see how far times differ by themselves.
 
   bool operator==(const Setting&) const = default;

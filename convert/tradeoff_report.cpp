@@ -124,7 +124,7 @@ std::string table(const Trade& trade, std::vector<std::string> head, const Cells
   return out;
 }
 
-std::string mebibytes(double bytes) { return text_of("%.2f", bytes / (1 << 20)); }
+std::string mebibytes(double bytes) { return text_of("%.3g", bytes / (1 << 20)); }
 
 std::string pictures_text(const Tradeoff& tradeoff) {
   const Trade t = pictures(tradeoff);
@@ -198,7 +198,7 @@ std::string files_text(const Tradeoff& tradeoff) {
 }
 
 std::string figures_line(const MeasuredSetting& m, const std::string& unit) {
-  std::string out = text_of("%.0f", m.cpu()) + " s CPU, " + text_of("%.0f", m.wall()) +
+  std::string out = text_of("%.3g", m.cpu()) + " s CPU, " + text_of("%.3g", m.wall()) +
                     " s, error " + text_of("%.3g", m.error()) + ' ' + unit;
   if (m.pictures) out += ", PSNR " + text_of("%.2f", m.pictures->psnr) + " dB";
   return out + ", asset.glb " + mebibytes(double(m.asset_bytes)) + " MiB";
@@ -222,7 +222,7 @@ std::string recommendation_text(const TradeoffReport& report) {
   if (!r.next_better) return out + "Nothing that was measured is better.\n";
   const MeasuredSetting& next = report.tradeoff.settings[*r.next_better];
   out += "The next step up, " + label(next.setting) + ", costs " +
-         text_of("%+.0f", next.cpu() - best.cpu()) + " s CPU (" +
+         text_of("%+.3g", next.cpu() - best.cpu()) + " s CPU (" +
          text_of("%+.0f", 100 * (next.cpu() / best.cpu() - 1)) + " %) and brings error " +
          text_of("%.3g", best.error()) + " -> " + text_of("%.3g", next.error()) + ' ' + unit;
   if (best.pictures && next.pictures) {
