@@ -2,6 +2,7 @@
 #include "convert/tradeoff.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <functional>
@@ -84,12 +85,9 @@ StageCost cost_of(const Json& result) {
   return {cost.at("cpu"), cost.at("wall"), cost.at("peak_memory")};
 }
 
-// The stages of one setting, in what they brought; null = not reached as the one before failed.
-struct StageResults {
-  Json model;
-  Json mesh;
-  Json assets;
-};
+// What the stages of one setting brought; null = not reached as the one before failed.
+enum StageOfRun : size_t { kModel, kMesh, kAssets };
+using StageResults = std::array<Json, 3>;
 
 StageResults run_setting(Bench& bench, const Setting& setting) {
   StageResults out;
@@ -101,25 +99,25 @@ StageResults run_setting(Bench& bench, const Setting& setting) {
   const std::string name = label(setting);
   const fs::path model = bench.folder(model_key(setting));
   const fs::path mesh = bench.folder(mesh_key(setting));
-  out.model = stage(bench, model_key(setting), name + ": model", [&](const Progress& progress) {
+  out[kModel] = stage(bench, model_key(setting), name + ": model", [&](const Progress& progress) {
     return make_model(request(model_key(setting)), bench.request.output, bench.scene, progress);
   });
-  if (out.model.contains("failed")) return out;
-  out.mesh = stage(bench, mesh_key(setting), name + ": meshes", [&](const Progress& progress) {
+  if (out[kModel].contains("failed")) return out;
+  out[kMesh] = stage(bench, mesh_key(setting), name + ": meshes", [&](const Progress& progress) {
     return make_meshes(model, request(mesh_key(setting)), progress);
   });
-  if (out.mesh.contains("failed")) return out;
-  out.assets = stage(bench, asset_key(setting), name + ": assets", [&](const Progress& progress) {
-    const Json summary = {{"model", out.model.at("description")},
-                          {"certificate", out.mesh.at("certificate")}};
+  if (out[kMesh].contains("failed")) return out;
+  out[kAssets] = stage(bench, asset_key(setting), name + ": assets", [&](const Progress& progress) {
+    const Json summary = {{"model", out[kModel].at("description")},
+                          {"certificate", out[kMesh].at("certificate")}};
     return make_assets(model, mesh, request(asset_key(setting)), summary, progress);
   });
   return out;
 }
 
 std::string failure(const StageResults& results) {
-  for (const Json* result : {&results.model, &results.mesh, &results.assets}) {
-    if (result->contains("failed")) return result->at("failed");
+  for (const Json& result : results) {
+    if (result.contains("failed")) return result.at("failed");
   }
   return "";
 }
@@ -132,18 +130,18 @@ MeasuredSetting measured(const Bench& bench, const Setting& setting, const Stage
   out.command = command_line(request);
   out.failed = failure(results);
   if (!out.failed.empty()) return out;
-  out.model = cost_of(results.model);
-  out.mesh = cost_of(results.mesh);
-  out.assets = cost_of(results.assets);
-  const Json& e = results.model.at("evaluation");
+  out.model = cost_of(results[kModel]);
+  out.mesh = cost_of(results[kMesh]);
+  out.assets = cost_of(results[kAssets]);
+  const Json& e = results[kModel].at("evaluation");
   if (e.is_object())
     out.pictures = {e.at("psnr"), e.at("ssim"), e.at("psnr_seen"), e.at("ssim_seen")};
-  out.voxel = results.mesh.at("voxel");
-  out.faces = results.mesh.at("certificate").at("faces");
-  out.asset_error = results.assets.at("error");
-  out.model_bytes = results.model.at("bytes");
-  out.mesh_bytes = results.mesh.at("bytes");
-  out.asset_bytes = results.assets.at("bytes");
+  out.voxel = results[kMesh].at("voxel");
+  out.faces = results[kMesh].at("certificate").at("faces");
+  out.asset_error = results[kAssets].at("error");
+  out.model_bytes = results[kModel].at("bytes");
+  out.mesh_bytes = results[kMesh].at("bytes");
+  out.asset_bytes = results[kAssets].at("bytes");
   return out;
 }
 
@@ -153,7 +151,7 @@ void measure_all(Bench& bench, const StageCost& opening, Tradeoff& out) {
   for (const Setting& setting : design) {
     try {
       const StageResults results = run_setting(bench, setting);
-      if (!bench.standard_is_done()) bench.voxel = results.mesh.at("voxel");
+      if (!bench.standard_is_done()) bench.voxel = results[kMesh].at("voxel");
       out.settings.push_back(measured(bench, setting, results));
       out.settings.back().model.cpu += opening.cpu;
       out.settings.back().model.wall += opening.wall;
@@ -322,6 +320,8 @@ Tradeoff measure_tradeoff(const TradeoffRequest& request,
     }
     fold_repeats(out);
     measure_errors(bench, out);
+  } catch (const fs::filesystem_error& error) {
+    throw IoError(error.path1(), error.code().message());
   } catch (const Json::exception&) {
     throw BadInput(Defect::Schema,
                    request.output / "run.json",

@@ -264,7 +264,7 @@ ScatterPlot plot(const Trade& trade, std::string title, std::string x_axis, std:
   for (size_t i = 0; i < trade.points.size(); ++i) {
     const CostAndLoss& p = trade.points[i];
     if (out.y_is_logarithmic && !(p.loss > 0)) continue;  // the ruler itself
-    out.points.push_back({trade.key == "files" ? p.cost / 1e6 : p.cost,
+    out.points.push_back({trade.key == "files" ? p.cost / (1 << 20) : p.cost,
                           out.y_is_logarithmic ? p.loss : -p.loss,
                           trade.labels[i],
                           trade.on_front(i)});
@@ -284,7 +284,7 @@ std::string plots_svg(const Tradeoff& tradeoff) {
             "Geometry: down and left is better",
             "processor time, photographs to meshes [s]",
             error),
-       plot(files(tradeoff), "Files: down and left is better", "size of asset.glb [MB]", error)});
+       plot(files(tradeoff), "Files: down and left is better", "size of asset.glb [MiB]", error)});
 }
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
