@@ -86,7 +86,9 @@ StageCost cost_of(const Json& result) {
 }
 
 // What the stages of one setting brought; null = not reached as the one before failed.
-enum StageOfRun : size_t { kModel, kMesh, kAssets };
+constexpr size_t kModel = 0;
+constexpr size_t kMesh = 1;
+constexpr size_t kAssets = 2;
 using StageResults = std::array<Json, 3>;
 
 StageResults run_setting(Bench& bench, const Setting& setting) {
