@@ -6,16 +6,15 @@
 #include <cmath>
 #include <cstdio>
 #include <set>
-#include <sstream>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "convert/html.h"
 #include "convert/pareto.h"
 #include "convert/scatter_plot.h"
 #include "io/atomic_file.h"
 #include "io/json_file.h"
-#include "io/svg.h"
 
 namespace cgs {
 
@@ -322,14 +321,6 @@ Json setting_json(const MeasuredSetting& m) {
   return out;
 }
 
-// xml_text() makes blanks of ends of lines.
-std::string lines_of_xml(const std::string& text) {
-  std::istringstream lines(text);
-  std::string out;
-  for (std::string line; std::getline(lines, line);) out += xml_text(line) + "\n";
-  return out;
-}
-
 }  // namespace
 
 Json tradeoff_json(const TradeoffReport& report) {
@@ -389,7 +380,7 @@ void write_tradeoff(const std::filesystem::path& folder, const TradeoffReport& r
                  "system-ui, sans-serif; max-width: 1100px; margin: 2rem auto; padding: 0 1rem; } "
                  "svg { max-width: 100%; height: auto; } pre { overflow-x: auto; font-size: 12px; "
                  "}</style></head><body>\n<h1>" +
-                 title + "</h1>\n" + svg + "<pre>" + lines_of_xml(tradeoff_text(report)) +
+                 title + "</h1>\n" + svg + "<pre>" + escaped(tradeoff_text(report)) +
                  "</pre>\n</body></html>\n");
 }
 
