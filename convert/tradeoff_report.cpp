@@ -369,7 +369,7 @@ std::string tradeoff_text(const TradeoffReport& report) {
 void write_tradeoff(const std::filesystem::path& folder, const TradeoffReport& report) {
   const std::string svg = plots_svg(report.tradeoff);
   const std::string title =
-      xml_text("Speed against accuracy: " + report.tradeoff.scene.folder.filename().string());
+      escaped("Speed against accuracy: " + report.tradeoff.scene.folder.filename().string());
   write_file(folder / "tradeoff.json", json_text(tradeoff_json(report)) + "\n");
   write_file(folder / "tradeoff.svg", svg);
   write_file(folder / "tradeoff.html",
