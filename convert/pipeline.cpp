@@ -12,28 +12,18 @@
 
 #include "convert/frame_json.h"
 #include "convert/length.h"
-#include "convert/mesh_files.h"
 #include "convert/report.h"
 #include "convert/report_viewer.h"
 #include "convert/run_record.h"
+#include "convert/run_stages.h"
 #include "convert/simplification.h"
-#include "convert/texture.h"
 #include "convert/views.h"
-#include "convert/volume_file.h"
-#include "convert/web_splats.h"
 #include "io/atomic_file.h"
 #include "io/content_hash.h"
-#include "io/gltf.h"
 #include "io/image.h"
 #include "io/json_file.h"
-#include "io/mesh_ply.h"
-#include "io/obj.h"
 #include "io/photographs.h"
-#include "io/png.h"
 #include "libcgs/core/error.h"
-#include "libcgs/core/up_axis.h"
-#include "meshing/isosurface.h"
-#include "meshing/preview.h"
 
 namespace cgs {
 
@@ -55,31 +45,6 @@ struct Run {
   std::optional<TriangleMesh> mesh;  ///< Watertight.
 };
 
-Json request_json(const RunRequest& request, const Scene& scene) {
-  Json inputs = Json::object();
-  for (const int i : scene.input) {
-    const View& view = scene.views[static_cast<size_t>(i)];
-    inputs[view.name] = file_hash(view.image_path);
-  }
-  Json cameras = Json::array();
-  for (const View& view : scene.views) {
-    const Eigen::Vector3d c = view.camera.center();
-    cameras.push_back({view.name, view.camera.fx, c.x(), c.y(), c.z()});
-  }
-  const uint64_t cameras_hash = content_hash(json_text(cameras, -1));
-  return {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
-          {"views", request.scene.options.views},
-          {"downscale", request.scene.options.downscale.value_or(0)},
-          {"assume_unit", request.scene.assume_unit},
-          {"known_distances", request.scene.known_distances},
-          {"training", settings_to_json(request.training)},
-          {"voxel_size", request.voxel_size},
-          {"max_error", request.max_error},
-          {"simplify", request.simplify},
-          {"input_images", inputs},
-          {"cameras", cameras_hash}};
-}
-
 // Decodes every photograph once before anything is written: a run must not stop halfway, or leave
 // a folder behind, because of a damaged file.
 void refuse_unreadable_images(const Scene& scene) {
@@ -95,19 +60,9 @@ Model& loaded_model(Run& run) {
 
 const TriangleMesh& loaded_mesh(Run& run) {
   if (!run.mesh) {
-    const Frame& frame = loaded_model(run).scene.frame;
-    const std::filesystem::path path = run.request.output / "mesh/watertight.ply";
-    run.mesh = read_mesh_ply(path, frame).mesh;
-    if (run.mesh->faces.empty()) throw BadInput(Defect::Empty, path, "has no faces");
+    run.mesh = read_watertight(run.request.output, loaded_model(run).scene.frame);
   }
   return *run.mesh;
-}
-
-std::vector<int> views_with_photograph(const Scene& scene) {
-  std::vector<int> views = scene.input;
-  views.insert(views.end(), scene.held_out.begin(), scene.held_out.end());
-  std::sort(views.begin(), views.end());
-  return views;
 }
 
 Json run_model(Run& run, const Progress& progress) {
@@ -153,78 +108,15 @@ Json run_evaluation(Run& run, const Progress& progress) {
   return evaluate_views(model, model.scene.held_out, progress);
 }
 
-// Two pictures of the mesh for the report: as the middle input camera sees it, and from the side.
-void write_mesh_pictures(const Run& run, const TriangleMesh& mesh) {
-  const Scene& scene = run.model->scene;
-  const Camera& reference =
-      scene.views[static_cast<size_t>(scene.input[scene.input.size() / 2])].camera;
-  constexpr double kSide = 0.6;       // [rad]
-  constexpr double kFromAbove = 0.3;  // [rad]
-  const Camera front = overview_camera(mesh, reference, 0, 0);
-  const Camera side = overview_camera(mesh, reference, kSide, kFromAbove);
-  const std::filesystem::path folder = run.request.output / "mesh";
-  write_png(folder / "front.png", preview(mesh, front, {}));
-  write_png(folder / "side.png", preview(mesh, side, {}));
-  write_png(folder / "front.provenance.png", preview(mesh, front, {.by_provenance = true}));
-  write_png(folder / "side.provenance.png", preview(mesh, side, {.by_provenance = true}));
-}
-
 Json run_mesh(Run& run, const Progress& progress) {
-  const Model& model = loaded_model(run);
-  const Frame& frame = model.scene.frame;
-  FusedVolume fused = fuse_model(
-      model, run.request.voxel_size, run.request.memory_limit, part_of(progress, 0, 0.3));
-  TriangleMesh open = open_surface(fused.volume, {});
-  WatertightResult closed = watertight_surface(fused.volume, {}, part_of(progress, 0.35, 0.6));
-  const Json simplification =
-      simplify_meshes(open,
-                      closed,
-                      simplify_options(run.request.simplify, fused.volume.voxel_size, frame),
-                      frame,
-                      part_of(progress, 0.6, 0.9));
-  write_volume(run.request.output / "volume.vdb", fused.volume, frame);
-  const Json files = write_mesh_files(
-      run.request.output / "mesh", open, closed.mesh, frame, world_up(model.scene));
-  write_mesh_pictures(run, closed.mesh);
-  report(progress, 1);
-  return {{"fusion", fusion_to_json(fused.report, frame)},
-          {"method", closed.method},
-          {"certificate", certificate_to_json(closed.certificate, closed.mesh, frame)},
-          {"simplification", simplification},
-          {"open_surface_faces", open.faces.size()},
-          {"output", files}};
+  return write_meshes(loaded_model(run), run.request, progress);
 }
 
 Json run_web(Run& run, const Progress& progress) {
   const Model& model = loaded_model(run);
-  const Frame& frame = model.scene.frame;
-  const TriangleMesh& mesh = loaded_mesh(run);
-  report(progress, 0);
-  GlbOptions options;
-  options.y_up = y_up_from(world_up(model.scene));
-  if (!run.request.max_error.empty()) {
-    options.max_error = parse_length(run.request.max_error, frame) * frame.scale;
-  }
-  options.summary_json = Json({{"model", run.record.result("model").at("description")},
-                               {"certificate", run.record.result("mesh").at("certificate")}})
-                             .dump();
-  make_output_folder(run.request.output / "web");
-  Json texture_report;
-  const PhotoTexture texture = texture_from_photographs(model.scene, mesh, texture_report);
-  report(progress, 0.5);
-  write_obj(run.request.output / "mesh/watertight.obj", mesh, texture, frame);
-  const GlbReport glb =
-      write_glb(run.request.output / "web/asset.glb", mesh, texture, frame, options);
-  return {{"texture", texture_report},
-          {"splats", write_web_splats(run.request.output / "web", model)},
-          {"asset.glb",
-           {{"bytes", glb.bytes},
-            {"texture_bytes", glb.texture_bytes},
-            {"textured_triangles", glb.textured_triangles},
-            {"measured_texture_error", glb.measured_texture_error},
-            {"position_bits", glb.position_bits},
-            {"measured_max_error", glb.measured_max_error},
-            {"units", frame.unit_name()}}}};
+  const Json summary = {{"model", run.record.result("model").at("description")},
+                        {"certificate", run.record.result("mesh").at("certificate")}};
+  return write_assets(model, loaded_mesh(run), run.request, summary, progress);
 }
 
 Json report_json(const Run& run) {
@@ -325,6 +217,38 @@ std::vector<Stage> stages_of(const Scene& scene) {
 }
 
 }  // namespace
+
+Json request_json(const RunRequest& request, const Scene& scene) {
+  Json inputs = Json::object();
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    inputs[view.name] = file_hash(view.image_path);
+  }
+  Json cameras = Json::array();
+  for (const View& view : scene.views) {
+    const Eigen::Vector3d c = view.camera.center();
+    cameras.push_back({view.name, view.camera.fx, c.x(), c.y(), c.z()});
+  }
+  const uint64_t cameras_hash = content_hash(json_text(cameras, -1));
+  return {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
+          {"views", request.scene.options.views},
+          {"downscale", request.scene.options.downscale.value_or(0)},
+          {"assume_unit", request.scene.assume_unit},
+          {"known_distances", request.scene.known_distances},
+          {"training", settings_to_json(request.training)},
+          {"voxel_size", request.voxel_size},
+          {"max_error", request.max_error},
+          {"simplify", request.simplify},
+          {"input_images", inputs},
+          {"cameras", cameras_hash}};
+}
+
+std::vector<int> views_with_photograph(const Scene& scene) {
+  std::vector<int> views = scene.input;
+  views.insert(views.end(), scene.held_out.begin(), scene.held_out.end());
+  std::sort(views.begin(), views.end());
+  return views;
+}
 
 void OpenedScene::keep(const std::filesystem::path& model) const {
   if (poses && !poses->is_stored) write_photo_poses(model / kPosesFolder, *poses);

@@ -61,6 +61,12 @@ OpenedScene open_scene(const SceneRequest& request,
 /// \return the content of OUT/report.json.
 nlohmann::ordered_json run_pipeline(const RunRequest& request, Terminal& terminal);
 
+/// Everything that decides the result of a request: arguments, and hashes of what goes in.
+nlohmann::ordered_json request_json(const RunRequest& request, const Scene& scene);
+
+/// The input views and those held out, ascending.
+std::vector<int> views_with_photograph(const Scene& scene);
+
 /// Fuses what the input views of a model see. `voxel_size` as in RunRequest.
 FusedVolume fuse_model(const Model& model,
                        const std::string& voxel_size,

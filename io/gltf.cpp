@@ -87,9 +87,21 @@ float extent_of(const std::vector<GlbPrimitive>& primitives) {
   return box_of(primitives).sizes().maxCoeff();
 }
 
+/// The nearest number at or below (above) that survives the encoder, which passes the grid on as
+/// decimals of six places: on any other grid it would not round positions as we expect it to.
+float decimal_below(float value) {
+  constexpr float kPlace = 1e-6f;
+  const auto stored = [](float v) { return std::stof(std::to_string(v)); };
+  const float nearest = stored(value);
+  return nearest <= value ? nearest : stored(nearest - kPlace);
+}
+float decimal_above(float value) { return -decimal_below(-value); }
+
 /// The cube that holds every position, and as few bits as keep the error.
 DracoGrid grid_for(const std::vector<GlbPrimitive>& primitives, double max_error) {
-  DracoGrid grid{box_of(primitives).min(), extent_of(primitives), 1};
+  const Eigen::AlignedBox3f box = box_of(primitives);
+  const Eigen::Vector3f origin = box.min().unaryExpr(&decimal_below);
+  DracoGrid grid{origin, decimal_above((box.max() - origin).maxCoeff()), 1};
   const double half_diagonal = std::sqrt(3.0) / 2;  // of a cell: the farthest a vertex can move
   const double wanted = max_error > 0 ? max_error : std::ldexp(double{grid.range}, -14);
   while (grid.bits < kMaxDracoBits && grid.step() * half_diagonal > wanted) ++grid.bits;

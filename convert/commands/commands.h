@@ -16,6 +16,7 @@ void add_measure(CLI::App& app);
 void add_mesh(CLI::App& app);
 void add_render(CLI::App& app);
 void add_run(CLI::App& app);
+void add_tradeoff(CLI::App& app);
 void add_train(CLI::App& app);
 
 }  // namespace cgs

@@ -198,6 +198,27 @@ TEST(WriteGlb, WritesBareMeshesAndLeavesOutEmptyClasses) {
   }
 }
 
+TEST(WriteGlb, PacksVerticesDenserThanTheGrid) {
+  // A ribbon with many vertices to a cell, so that many lie where rounding decides between two
+  // cells that both hold others, and of sizes that no decimal number of six places is.
+  for (const float length : {8.3128417f, 2.7182818f, 0.0123456789f}) {
+    TriangleMesh ribbon;
+    constexpr uint32_t kPairs = 20'000;
+    for (uint32_t i = 0; i < kPairs; ++i) {
+      const float x = length * (float(i) + 0.37f) / float(kPairs);
+      ribbon.vertices.emplace_back(x, 0.001f * length, 0.0f);
+      ribbon.vertices.emplace_back(x, 0.002f * length, 0.3f * length);
+      if (i == 0) continue;
+      const uint32_t k = 2 * i;
+      ribbon.faces.push_back({k - 2, k, k - 1});
+      ribbon.faces.push_back({k - 1, k, k + 1});
+    }
+    const Written out = written(ribbon, {}, {});
+    EXPECT_EQ(out.report.triangles, ribbon.faces.size());
+    EXPECT_LE(out.report.measured_max_error, length / 16384 * 1.01);
+  }
+}
+
 TEST(WriteGlb, WorksAtTheExtremesOfScale) {
   const TriangleMesh mesh = test::labelled_sphere();
   for (const int exponent : {-50, -21, -20, -19, 0, 20, 50}) {

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/tradeoff_design.h"
+
+#include <array>
+#include <cstdio>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+std::string number(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.4g", value);
+  return text.data();
+}
+
+std::string optional_number(const std::optional<double>& value) {
+  return value ? number(*value) : "default";
+}
+
+// A word of a command line as a shell takes it.
+std::string shell_word(const std::string& text) {
+  static constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-=,:+%@";
+  if (!text.empty() && text.find_first_not_of(kPlain) == std::string::npos) return text;
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+}  // namespace
+
+std::string label(const Setting& setting) {
+  std::string out;
+  const auto add = [&](const std::string& text) { out += (out.empty() ? "" : ", ") + text; };
+  if (setting.coarser != 1) add("1/" + std::to_string(setting.coarser) + " size");
+  if (setting.steps == training_preset("draft").steps) {
+    add("draft");
+  } else if (setting.steps != TrainingOptions().steps) {
+    add(std::to_string(setting.steps) + " steps");
+  }
+  if (setting.voxel != 1) add("voxel x" + number(setting.voxel));
+  if (setting.simplify) {
+    add(*setting.simplify == 0 ? "not simplified"
+                               : "simplified " + number(*setting.simplify) + " voxel");
+  }
+  if (setting.max_error) add("packed " + number(*setting.max_error) + " voxel");
+  if (setting.repeat != 0) add("repeat " + std::to_string(setting.repeat));
+  return out.empty() ? "standard" : out;
+}
+
+std::string model_key(const Setting& setting) {
+  return "d" + std::to_string(setting.coarser) + "_s" + std::to_string(setting.steps) +
+         (setting.repeat != 0 ? "_r" + std::to_string(setting.repeat) : "");
+}
+
+std::string mesh_key(const Setting& setting) {
+  return model_key(setting) + "_v" + number(setting.voxel) + "_e" +
+         optional_number(setting.simplify);
+}
+
+std::string asset_key(const Setting& setting) {
+  return mesh_key(setting) + "_q" + optional_number(setting.max_error);
+}
+
+std::vector<Setting> tradeoff_design() {
+  const int draft = training_preset("draft").steps;
+  const int more = 2 * TrainingOptions().steps;
+  return {
+      {},
+      {.steps = draft},
+      {.coarser = 2},
+      {.voxel = 0.7, .simplify = 0},  // the finest surface: what the others are held against
+      {.simplify = 0},
+      {.voxel = 1.5},
+      {.steps = 0},
+      {.steps = 0, .simplify = 0},
+      {.repeat = 1},
+      {.max_error = 0.1},
+      {.max_error = 0.4},
+      {.voxel = 2},
+      {.coarser = 2, .steps = draft},
+      {.steps = more},
+      {.simplify = 1},
+      {.voxel = 1.5, .simplify = 1, .max_error = 0.4},  // for the smallest file
+      {.coarser = 2, .steps = 0, .simplify = 0},        // for the shortest time
+      {.coarser = 2, .voxel = 0.5},
+      {.coarser = 4},
+      {.steps = draft, .voxel = 1.5},
+      {.simplify = 0.5},
+      {.repeat = 2},
+      {.voxel = 0.7},
+  };
+}
+
+RunRequest request_of(const Setting& setting,
+                      const RunRequest& standard,
+                      int downscale,
+                      double standard_voxel) {
+  RunRequest out = standard;
+  out.scene.options.downscale = downscale * setting.coarser;
+  out.training.steps = setting.steps;
+  const auto length = [&](double voxels) {
+    require(standard_voxel > 0, "the standard voxel must be known", standard_voxel);
+    return number(voxels * standard_voxel);
+  };
+  if (setting.voxel != 1) out.voxel_size = length(setting.voxel * setting.coarser);
+  if (setting.simplify) out.simplify = *setting.simplify == 0 ? "0" : length(*setting.simplify);
+  if (setting.max_error) out.max_error = length(*setting.max_error);
+  return out;
+}
+
+std::string command_line(const RunRequest& request) {
+  const SceneRequest& scene = request.scene;
+  std::string out = "cgs run " + shell_word(scene.path.string());
+  const auto add = [&](const char* name, const std::string& value) {
+    if (!value.empty()) out += std::string(" ") + name + " " + shell_word(value);
+  };
+  add("--views", scene.options.views);
+  if (scene.options.downscale) add("--downscale", std::to_string(*scene.options.downscale));
+  if (scene.options.allow_external) out += " --allow-external";
+  if (scene.focal > 0) add("--focal", number(scene.focal));
+  add("--assume-unit", scene.assume_unit);
+  if (request.training.steps == training_preset("draft").steps) {
+    add("--preset", "draft");
+  } else if (request.training.steps != TrainingOptions().steps) {
+    add("--set", "steps=" + std::to_string(request.training.steps));
+  }
+  add("--voxel-size", request.voxel_size);
+  add("--simplify", request.simplify);
+  add("--max-error", request.max_error);
+  add("-o", request.output.string());
+  return out;
+}
+
+}  // namespace cgs
