@@ -274,7 +274,7 @@ bool Collapser::is_near_original(const Vector3f& x) const {
     nearest = w;
   }
   if (nearest == kNone) return true;  // nothing is left to compare with
-  constexpr float kBetween = 0.75f;  // a face may be farther off between what is looked at
+  constexpr float kBetween = 0.75f;   // a face may be farther off between what is looked at
   const float reach = kBetween * limits_.tolerance[nearest];
   if (least <= reach * reach) return true;
   for (uint32_t i = original_first_[nearest]; i < original_first_[nearest + 1]; ++i) {

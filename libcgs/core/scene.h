@@ -20,7 +20,7 @@ struct View {
   /// How the picture lies in its file, as Exif counts (1 = upright); load_images() turns it. Only
   /// for cameras solved for here: others are calibrated on the pixels as they are stored.
   int orientation = 1;
-  Camera camera;                     ///< Undistorted, at the size the image is (or will be) used.
+  Camera camera;  ///< Undistorted, at the size the image is (or will be) used.
   /// Lens distortion k1 k2 p1 p2 k3 (Brown-Conrady, as OpenCV defines it) of the image file, which
   /// load_images() takes out of the pixels; all zero = none.
   std::array<double, 5> distortion = {};
