@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/length.h"
+#include "io/exif.h"
 #include "io/orientation.h"
 #include "io/resample.h"
 #include "io/scene_reader.h"
@@ -41,7 +42,7 @@ KnownDistance::Pick pick_of(const std::string& text, const Scene& scene) {
   if (colon == std::string::npos || comma == std::string::npos) refuse_pick(text);
   KnownDistance::Pick pick;
   const std::string name = text.substr(0, colon);
-  pick.view = select_views(scene, name).front();
+  pick.view = find_view(scene, name);
   pick.x = pixel_number(text.substr(colon + 1, comma - colon - 1), text);
   pick.y = pixel_number(text.substr(comma + 1), text);
   const View& view = scene.views[static_cast<size_t>(pick.view)];
@@ -49,11 +50,19 @@ KnownDistance::Pick pick_of(const std::string& text, const Scene& scene) {
     throw InvalidInput("--known-distance: view " + printable(name) +
                        " is held out, so no depth is measured there; pick in an input view");
   }
-  const ImageSize size = photograph_size(view);
+  // Viewers turn pictures as Exif says; cameras that came with the photographs do not.
+  const int shown = exif_orientation(view.image_path);
+  const ImageSize stored = image_size(view.image_path);
+  const ImageSize size = turned(stored, shown);
   if (pick.x < 0 || pick.y < 0 || pick.x > size.width - 1 || pick.y > size.height - 1) {
     throw InvalidInput("--known-distance: " + printable(text) + " lies outside of the " +
                        std::to_string(size.width) + " x " + std::to_string(size.height) +
                        " pixels of " + printable(view.image_path));
+  }
+  if (shown != view.orientation) {
+    const Eigen::Vector2d at = stored_pixel({pick.x, pick.y}, stored, shown);
+    pick.x = at.x();
+    pick.y = at.y();
   }
   return pick;
 }
@@ -153,9 +162,11 @@ Json warnings_of(const BarScale& scale, const std::vector<KnownDistance>& distan
                   " disagrees with the others by more than 3 sigma and is left out");
   }
   if (!scale.is_consistent) {
-    out.push_back(
-        "the known distances disagree by more than 3 sigma; the uncertainty of the scale "
-        "is widened to cover it, and a third distance may tell which is wrong");
+    std::string text =
+        "the known distances disagree by more than 3 sigma; the uncertainty of the scale is "
+        "widened to cover it";
+    if (distances.size() == 2) text += ", and a third distance may tell which is wrong";
+    out.push_back(std::move(text));
   }
   return out;
 }

@@ -203,8 +203,8 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
     const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
     write_priors(priors_path(folder, view), model.priors[k]);
   }
-  write_cameras_json(folder / "cameras.json", model.scene);
   write_gaussian_ply(folder / "gaussians.ply", model.gaussians, model.scene.frame);
+  write_cameras_json(folder / "cameras.json", model.scene);  // last: by it the scale is told
 }
 
 Model read_model(const std::filesystem::path& folder) {

@@ -15,6 +15,7 @@
 #include "io/colmap_writer.h"
 #include "io/image.h"
 #include "io/json_file.h"
+#include "io/masks.h"
 #include "io/orientation.h"
 #include "io/photographs.h"
 #include "libcgs/core/error.h"
@@ -43,10 +44,15 @@ std::vector<PhotoFile> checked_photographs(const SceneRoot& root) {
   return photographs;
 }
 
-std::string inputs_text(const std::vector<PhotoFile>& photographs, double focal) {
+std::string inputs_text(const SceneRoot& root,
+                        const std::vector<PhotoFile>& photographs,
+                        double focal) {
   Json hashes = Json::object();
   for (const PhotoFile& photograph : photographs) {
-    hashes[photograph.path.filename().string()] = file_hash(photograph.path);
+    const std::string name = photograph.path.filename().string();
+    hashes[name] = file_hash(photograph.path);
+    if (const auto mask = mask_file(root, photograph.path))
+      hashes[name + ", mask"] = file_hash(*mask);
   }
   return json_text({{"program", kProgramVersion}, {"focal", focal}, {"photographs", hashes}}, -1);
 }
@@ -186,7 +192,7 @@ PhotoPoses photo_poses(const SceneRoot& root,
                        const std::filesystem::path& stored,
                        Terminal& terminal) {
   const std::vector<PhotoFile> photographs = checked_photographs(root);
-  const std::string inputs = inputs_text(photographs, focal);
+  const std::string inputs = inputs_text(root, photographs, focal);
   if (auto poses = stored_poses(stored, inputs)) return *poses;
   const Progress progress = terminal.begin("cameras of photographs");
   std::vector<const PhotoFile*> lenses;

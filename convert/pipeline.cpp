@@ -22,6 +22,7 @@
 #include "io/content_hash.h"
 #include "io/image.h"
 #include "io/json_file.h"
+#include "io/masks.h"
 #include "io/photographs.h"
 #include "libcgs/core/error.h"
 
@@ -169,6 +170,7 @@ Json run_report(Run& run, const Progress& progress) {
 const std::map<std::string, std::string>& decided_stages() {
   static const std::map<std::string, std::string> kStages = {{"assume_unit", "scale"},
                                                              {"known_distances", "scale"},
+                                                             {"held_out_images", "evaluation"},
                                                              {"voxel_size", "mesh"},
                                                              {"simplify", "mesh"},
                                                              {"max_error", "web"}};
@@ -223,11 +225,23 @@ Json request_json(const RunRequest& request, const Scene& scene) {
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
     inputs[view.name] = file_hash(view.image_path);
+    const auto mask =
+        mask_file({request.scene.path, request.scene.options.allow_external}, view.image_path);
+    if (mask) inputs[view.name + ", mask"] = file_hash(*mask);
+  }
+  Json held_out = Json::object();
+  for (const int i : scene.held_out) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    held_out[view.name] = file_hash(view.image_path);
   }
   Json cameras = Json::array();
   for (const View& view : scene.views) {
-    const Eigen::Vector3d c = view.camera.center();
-    cameras.push_back({view.name, view.camera.fx, c.x(), c.y(), c.z()});
+    const Camera& c = view.camera;
+    const Eigen::Matrix4d pose = c.world_from_cam.matrix();
+    cameras.push_back({view.name,
+                       {c.width, c.height, c.fx, c.fy, c.cx, c.cy},
+                       std::vector<double>(pose.data(), pose.data() + pose.size()),
+                       view.distortion});
   }
   const uint64_t cameras_hash = content_hash(json_text(cameras, -1));
   return {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
@@ -240,6 +254,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
           {"max_error", request.max_error},
           {"simplify", request.simplify},
           {"input_images", inputs},
+          {"held_out_images", held_out},
           {"cameras", cameras_hash}};
 }
 
@@ -379,9 +394,11 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   check_lengths(request, scene.frame);
   make_output_folder(request.output);
   const FolderLock lock(request.output);
-  remove_abandoned_files(request.output);
   RunRecord record(
       request.output, request_json(request, scene), request.overwrite, decided_stages());
+  for (const char* folder : {"", "model", "model/priors", "views", "mesh", "web"}) {
+    remove_abandoned_files(request.output / folder);
+  }
   opened.keep(request.output / "model");
   Run run{request, std::move(record), std::move(scene), std::move(distances), {}, {}};
   try {

@@ -12,7 +12,6 @@
 #include "io/atomic_file.h"
 #include "io/byte_reader.h"
 #include "io/image.h"
-#include "io/orientation.h"
 #include "io/png.h"
 #include "io/resample.h"
 #include "io/scene_reader.h"
@@ -174,6 +173,15 @@ std::string mesh_section(const std::filesystem::path& folder) {
          figure(folder / "mesh/side.provenance.png", "the same from the side") + "</div>\n";
 }
 
+// The photograph as the camera of the view sees it, which is what the mask of holes fits on.
+ColorImage photograph_of(const Scene& scene, int index) {
+  Scene one;
+  one.folder = scene.folder;
+  one.views = {scene.views[static_cast<size_t>(index)]};
+  load_images(one, {0});
+  return one.views[0].image;
+}
+
 std::string views_section(const std::filesystem::path& folder,
                           const Json& views,
                           const Scene& scene) {
@@ -186,12 +194,12 @@ std::string views_section(const std::filesystem::path& folder,
           "saw</label>\n";
   for (const Json& view : views) {
     const auto name = view["name"].get<std::string>();
-    const View& photograph = scene.views.at(static_cast<size_t>(select_views(scene, name)[0]));
+    const int index = find_view(scene, name);
     const std::string holes = overlay(folder / "views" / (name + ".hole.png"));
     html << "<h3>" << escaped(name) << " (" << view["role"].get<std::string>() << "), "
          << number(100 * view["hole_fraction"].get<double>(), "%.1f")
          << " % holes</h3>\n<div class=row>\n"
-         << figure_of([&] { return read_photograph(photograph); }, "photograph", holes)
+         << figure_of([&] { return photograph_of(scene, index); }, "photograph", holes)
          << figure(folder / "views" / (name + ".color.png"), "rendered", holes)
          << figure(folder / "views" / (name + ".depth.png"), "depth (red = near)")
          << figure(folder / "views" / (name + ".normal.png"), "normals")

@@ -17,7 +17,7 @@
 #include "convert/run_stages.h"
 #include "convert/tradeoff_stages.h"
 #include "io/atomic_file.h"
-#include "io/image.h"
+#include "io/orientation.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -62,21 +62,27 @@ Json stage(Bench& bench, const std::string& key, const std::string& title, const
     stop_in_time();
   };
   Json result;
+  bool is_lasting = true;  // memory may be free another time
   try {
     result = work(progress);
   } catch (const Cancelled&) {
     throw;
   } catch (const IoError&) {
     throw;
+  } catch (const LimitError& error) {
+    if (!bench.standard_is_done()) throw;
+    result = {{"failed", error.what()}};
+    is_lasting = false;
   } catch (const Error& error) {
     if (!bench.standard_is_done()) throw;
     result = {{"failed", error.what()}};
   } catch (const std::bad_alloc&) {
     if (!bench.standard_is_done()) throw;
     result = {{"failed", "out of memory"}};
+    is_lasting = false;
   }
   const double seconds = bench.terminal.end(result.contains("failed") ? "failed" : "");
-  bench.record.finish(key, seconds, result);
+  if (is_lasting) bench.record.finish(key, seconds, result);
   return result;
 }
 
@@ -136,8 +142,12 @@ MeasuredSetting measured(const Bench& bench, const Setting& setting, const Stage
   out.mesh = cost_of(results[kMesh]);
   out.assets = cost_of(results[kAssets]);
   const Json& e = results[kModel].at("evaluation");
-  if (e.is_object())
-    out.pictures = {e.at("psnr"), e.at("ssim"), e.at("psnr_seen"), e.at("ssim_seen")};
+  if (e.is_object()) {
+    const auto figure = [&](const char* key) {
+      return e.at(key).is_number() ? e.at(key).get<double>() : kNotMeasured;
+    };
+    out.pictures = {figure("psnr"), figure("ssim"), figure("psnr_seen"), figure("ssim_seen")};
+  }
   out.voxel = results[kMesh].at("voxel");
   out.faces = results[kMesh].at("certificate").at("faces");
   out.asset_error = results[kAssets].at("error");
@@ -167,11 +177,12 @@ void measure_all(Bench& bench, const StageCost& opening, Tradeoff& out) {
 // The cost of the standard setting becomes the mean of its repeats, which leave the table.
 void fold_repeats(Tradeoff& out) {
   const auto is_repeat = [](const MeasuredSetting& m) {
-    return m.setting.repeat != 0 || m.setting == Setting();
+    return m.failed.empty() && (m.setting.repeat != 0 || m.setting == Setting());
   };
   std::vector<MeasuredSetting> repeats;
   std::copy_if(out.settings.begin(), out.settings.end(), std::back_inserter(repeats), is_repeat);
-  std::erase_if(out.settings, [](const MeasuredSetting& m) { return m.setting.repeat != 0; });
+  std::erase_if(out.settings,
+                [](const MeasuredSetting& m) { return m.setting.repeat != 0 && m.failed.empty(); });
   out.repeats = static_cast<int>(repeats.size());
   const auto spread = [&](double (MeasuredSetting::*figure)() const) {
     double least = (repeats.front().*figure)();
@@ -203,11 +214,12 @@ class Ruler {
  public:
   Ruler(std::string name, SurfaceOf read) : name_(std::move(name)), read_(std::move(read)) {}
 
-  // Distances of a setting's surface, kept like a stage.
-  SurfaceError error_of(Bench& bench,
-                        const MeasuredSetting& m,
-                        const Model& model,
-                        const std::vector<Camera>& inputs) {
+  // Distances of a setting's surface, kept like a stage. A surface that cannot be compared fails
+  // its setting; where that is the standard one, the reference is to blame.
+  std::optional<SurfaceError> error_of(Bench& bench,
+                                       MeasuredSetting& m,
+                                       const Model& model,
+                                       const std::vector<Camera>& inputs) {
     const std::string key = mesh_key(m.setting);
     const Json result =
         stage(bench, key + " from " + name_, label(m.setting) + ": error", [&](const Progress& p) {
@@ -220,8 +232,12 @@ class Ruler {
                       {"p95", e.p95 * frame.scale},
                       {"max", e.max * frame.scale}};
         });
-    if (result.contains("failed")) throw InvalidInput(result.at("failed").get<std::string>());
-    return {result.at("rms"), result.at("p95"), result.at("max")};
+    if (!result.contains("failed")) {
+      return SurfaceError{result.at("rms"), result.at("p95"), result.at("max")};
+    }
+    m.failed = result.at("failed").get<std::string>();
+    if (m.setting == Setting()) throw InvalidInput(m.failed);
+    return std::nullopt;
   }
 
  private:
@@ -261,9 +277,8 @@ void measure_errors(Bench& bench, Tradeoff& out) {
   });
   for (MeasuredSetting& m : out.settings) {
     if (!m.failed.empty()) continue;
-    m.deviation = mesh_key(m.setting) == mesh_key(finest)
-                      ? SurfaceError()
-                      : from_finest.error_of(bench, m, model, inputs);
+    const bool is_finest = mesh_key(m.setting) == mesh_key(finest);
+    m.deviation = is_finest ? SurfaceError() : from_finest.error_of(bench, m, model, inputs);
     if (!path.empty()) m.truth = from_truth.error_of(bench, m, model, inputs);
   }
 }
@@ -271,7 +286,7 @@ void measure_errors(Bench& bench, Tradeoff& out) {
 int downscale_of(const SceneRequest& request, const Scene& scene) {
   if (request.options.downscale) return *request.options.downscale;
   const View& view = scene.views[static_cast<size_t>(scene.input.front())];
-  return std::max(1, image_size(view.image_path).width / view.camera.width);
+  return std::max(1, photograph_size(view).width / view.camera.width);
 }
 
 RunRequest standard_request(const TradeoffRequest& request) {
@@ -337,7 +352,8 @@ std::vector<TradeoffFigures> figures_of(const Tradeoff& tradeoff) {
   for (const MeasuredSetting& m : tradeoff.settings) {
     TradeoffFigures& f = out.emplace_back();
     if (!m.failed.empty()) continue;
-    f = {m.cpu(), m.wall(), m.error(), kNotMeasured, double(m.asset_bytes)};
+    // What is promised holds for every file, the compressed one too.
+    f = {m.cpu(), m.wall(), m.error() + m.asset_error, kNotMeasured, double(m.asset_bytes)};
     if (m.pictures) f.psnr = m.pictures->psnr;
   }
   return out;

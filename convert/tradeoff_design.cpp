@@ -2,6 +2,7 @@
 #include "convert/tradeoff_design.h"
 
 #include <array>
+#include <charconv>
 #include <cstdio>
 
 #include "libcgs/core/error.h"
@@ -14,6 +15,13 @@ std::string number(double value) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.4g", value);
   return text.data();
+}
+
+// As many digits as read back to the same number.
+std::string exact(double value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
 }
 
 std::string optional_number(const std::optional<double>& value) {
@@ -121,7 +129,7 @@ std::string command_line(const RunRequest& request) {
   add("--views", scene.options.views);
   if (scene.options.downscale) add("--downscale", std::to_string(*scene.options.downscale));
   if (scene.options.allow_external) out += " --allow-external";
-  if (scene.focal > 0) add("--focal", number(scene.focal));
+  if (scene.focal > 0) add("--focal", exact(scene.focal));
   add("--assume-unit", scene.assume_unit);
   if (request.training.steps == training_preset("draft").steps) {
     add("--preset", "draft");

@@ -81,11 +81,16 @@ Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, c
   const MaskMap everywhere(seen.width, seen.height, 1);
   const MaskMap all = intersection(everywhere, view.valid);
   const MaskMap use = intersection(seen, view.valid);
+  // Null where there is nothing to compare.
+  const auto figure = [&](const auto& metric, const MaskMap& pixels) -> Json {
+    const bool any = std::find(pixels.data.begin(), pixels.data.end(), 1) != pixels.data.end();
+    return any ? Json(metric(shown, view.image, &pixels)) : Json();
+  };
   return {{"name", view.name},
-          {"psnr", psnr(shown, view.image, &all)},
-          {"ssim", ssim(shown, view.image, &all)},
-          {"psnr_seen", psnr(shown, view.image, &use)},
-          {"ssim_seen", ssim(shown, view.image, &use)},
+          {"psnr", figure(psnr, all)},
+          {"ssim", figure(ssim, all)},
+          {"psnr_seen", figure(psnr, use)},
+          {"ssim_seen", figure(ssim, use)},
           {"hole_fraction", 1 - fraction(buffers.hole, Hole::None)},
           {"ms_ssim", ms_ssim(completed(shown, view), view.image)}};
 }
@@ -127,8 +132,13 @@ Json evaluate_views(Model& model, const std::vector<int>& views, const Progress&
   Json mean;
   for (const char* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}) {
     double sum = 0;
-    for (const Json& row : rows) sum += row[key].get<double>();
-    mean[key] = sum / static_cast<double>(rows.size());
+    size_t count = 0;
+    for (const Json& row : rows) {
+      if (!row[key].is_number()) continue;
+      sum += row[key].get<double>();
+      ++count;
+    }
+    mean[key] = count > 0 ? Json(sum / static_cast<double>(count)) : Json();
   }
   report(progress, 1);
   return {{"mean", mean}, {"views", rows}};

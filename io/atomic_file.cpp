@@ -2,6 +2,8 @@
 #include "io/atomic_file.h"
 
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -19,12 +21,19 @@ namespace {
 constexpr size_t kBufferSize = size_t{1} << 20;
 constexpr std::string_view kPart = ".part";  // followed by the number of the process
 
-bool is_temporary(const std::string& name) {
+// The process a temporary belongs to; 0 if the name is not that of one. Numbers with a leading
+// zero are the parts of an archive.
+pid_t process_of(const std::string& name) {
   const size_t at = name.rfind(kPart);
-  const size_t digits = at + kPart.size();
-  return at != std::string::npos && digits < name.size() &&
-         name.find_first_not_of("0123456789", digits) == std::string::npos;
+  if (at == std::string::npos) return 0;
+  const char* const first = name.data() + at + kPart.size();
+  const char* const end = name.data() + name.size();
+  pid_t process = 0;
+  const auto [rest, error] = std::from_chars(first, end, process);
+  return error == std::errc() && rest == end && *first != '0' && process > 0 ? process : 0;
 }
+
+bool is_gone(pid_t process) { return ::kill(process, 0) != 0 && errno == ESRCH; }
 
 void write_all(int descriptor, std::string_view bytes, const std::filesystem::path& path) {
   while (!bytes.empty()) {
@@ -110,12 +119,13 @@ FolderLock::~FolderLock() {
 
 void remove_abandoned_files(const std::filesystem::path& folder) {
   std::error_code error;
+  if (!std::filesystem::is_directory(folder, error)) return;
   std::vector<std::filesystem::path> found;
-  std::filesystem::recursive_directory_iterator entry(folder, error);
-  for (; !error && entry != std::filesystem::recursive_directory_iterator();
-       entry.increment(error)) {
+  std::filesystem::directory_iterator entry(folder, error);
+  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    const pid_t process = process_of(entry->path().filename().string());
     std::error_code ignored;  // what has gone is no temporary
-    if (entry->is_regular_file(ignored) && is_temporary(entry->path().filename().string())) {
+    if (process > 0 && is_gone(process) && entry->is_regular_file(ignored)) {
       found.push_back(entry->path());
     }
   }

@@ -56,8 +56,8 @@ class FolderLock {
   int descriptor_;
 };
 
-/// Removes the temporaries that killed processes left in a folder and below. Only for a folder
-/// whose lock is held: another process that writes there would lose its files. \throws IoError
+/// Removes the temporaries of AtomicFile that processes which are gone left in a folder, not below
+/// it. Does nothing if there is no such folder. \throws IoError
 void remove_abandoned_files(const std::filesystem::path& folder);
 
 /// Writes a whole file atomically. \throws IoError

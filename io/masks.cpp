@@ -43,6 +43,10 @@ std::optional<fs::path> mask_file(const SceneRoot& root, const fs::path& photogr
   return std::nullopt;
 }
 
+bool lacks_mask(const SceneRoot& root, const fs::path& photograph) {
+  return !mask_folders(root, photograph).empty() && !mask_file(root, photograph);
+}
+
 void apply_mask(
     const SceneRoot& root, const fs::path& photograph, int width, int height, MaskMap& usable) {
   const auto file = mask_file(root, photograph);

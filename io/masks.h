@@ -17,6 +17,9 @@ namespace cgs {
 std::optional<std::filesystem::path> mask_file(const SceneRoot& root,
                                                const std::filesystem::path& photograph);
 
+/// True if there is a folder of masks, and none in it is for this photograph.
+bool lacks_mask(const SceneRoot& root, const std::filesystem::path& photograph);
+
 /// Leaves usable only the pixels where the mask of a photograph, if it has one, is at least half as
 /// bright as white.
 ///

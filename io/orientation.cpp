@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/orientation.h"
 
-#include <utility>
-
 #include "io/masks.h"
 
 namespace cgs {
@@ -12,8 +10,41 @@ namespace {
 constexpr int kUpright = 1;
 constexpr int kFirstTransposed = 5;  // from here on rows of the file are columns of the picture
 
-// Where a pixel of the upright picture lies in the file.
-std::pair<int, int> stored_place(int x, int y, const ImageSize& stored, int orientation) {
+template <typename T>
+Raster<T> turned_raster(const Raster<T>& stored, int orientation) {
+  if (orientation == kUpright || stored.empty()) return stored;
+  const ImageSize from = {stored.width, stored.height};
+  const ImageSize to = turned(from, orientation);
+  Raster<T> out(to.width, to.height, stored.data.front());
+  for (int y = 0; y < to.height; ++y) {
+    for (int x = 0; x < to.width; ++x) {
+      const Eigen::Vector2d at = stored_pixel({x, y}, from, orientation);
+      out(x, y) = stored(static_cast<int>(at.x()), static_cast<int>(at.y()));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+ColorImage turned(const ColorImage& stored, int orientation) {
+  return turned_raster(stored, orientation);
+}
+
+MaskMap turned(const MaskMap& stored, int orientation) {
+  return turned_raster(stored, orientation);
+}
+
+ImageSize turned(const ImageSize& stored, int orientation) {
+  if (orientation < kFirstTransposed) return stored;
+  return {stored.height, stored.width};
+}
+
+Eigen::Vector2d stored_pixel(const Eigen::Vector2d& upright,
+                             const ImageSize& stored,
+                             int orientation) {
+  const double x = upright.x();
+  const double y = upright.y();
   const int last_x = stored.width - 1;
   const int last_y = stored.height - 1;
   switch (orientation) {
@@ -34,36 +65,6 @@ std::pair<int, int> stored_place(int x, int y, const ImageSize& stored, int orie
     default:
       return {x, y};
   }
-}
-
-template <typename T>
-Raster<T> turned_raster(const Raster<T>& stored, int orientation) {
-  if (orientation == kUpright || stored.empty()) return stored;
-  const ImageSize from = {stored.width, stored.height};
-  const ImageSize to = turned(from, orientation);
-  Raster<T> out(to.width, to.height, stored.data.front());
-  for (int y = 0; y < to.height; ++y) {
-    for (int x = 0; x < to.width; ++x) {
-      const auto [u, v] = stored_place(x, y, from, orientation);
-      out(x, y) = stored(u, v);
-    }
-  }
-  return out;
-}
-
-}  // namespace
-
-ColorImage turned(const ColorImage& stored, int orientation) {
-  return turned_raster(stored, orientation);
-}
-
-MaskMap turned(const MaskMap& stored, int orientation) {
-  return turned_raster(stored, orientation);
-}
-
-ImageSize turned(const ImageSize& stored, int orientation) {
-  if (orientation < kFirstTransposed) return stored;
-  return {stored.height, stored.width};
 }
 
 ImageSize photograph_size(const View& view) {

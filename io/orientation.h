@@ -13,6 +13,11 @@ ColorImage turned(const ColorImage& stored, int orientation);
 MaskMap turned(const MaskMap& stored, int orientation);
 ImageSize turned(const ImageSize& stored, int orientation);
 
+/// Where a pixel of the upright picture lies in the file; both numbered from 0.
+Eigen::Vector2d stored_pixel(const Eigen::Vector2d& upright,
+                             const ImageSize& stored,
+                             int orientation);
+
 /// Size of the photograph of a view [pixels] and the photograph itself, turned as the view says.
 /// \param usable  where not null: pixels neither transparent nor masked, as read_image() gives them
 /// \param root    of the scene, where masks are looked for

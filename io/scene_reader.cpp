@@ -14,6 +14,7 @@
 #include "io/exif.h"
 #include "io/image.h"
 #include "io/llff.h"
+#include "io/masks.h"
 #include "io/orientation.h"
 #include "io/resample.h"
 #include "io/strecha.h"
@@ -232,18 +233,6 @@ std::vector<int> llff_protocol(const std::vector<int>& usable) {
   return out;
 }
 
-int find_view(const Scene& scene, const std::string& token) {
-  for (size_t i = 0; i < scene.views.size(); ++i) {
-    if (scene.views[i].name == token) return static_cast<int>(i);
-  }
-  uint64_t index = 0;
-  if (parse_number(token, index) && index < scene.views.size()) return static_cast<int>(index);
-  std::vector<std::string> names;
-  for (const View& view : scene.views) names.push_back(view.name);
-  throw InvalidInput("SceneOptions.views: there is no view \"" + printable(token) + "\" among " +
-                     std::to_string(names.size()) + ": " + first_of(names));
-}
-
 void choose_views(Scene& scene, const std::string& list) {
   constexpr size_t kTakeAll = 4;
   const std::vector<int> usable = views_with_files(scene);
@@ -284,7 +273,12 @@ void load_image(Scene& scene, View& view) {
     throw BadInput(Defect::Missing, scene.folder, "view " + printable(view.name) + " has no image");
   }
   Camera& camera = view.camera;
-  view.image = read_photograph(view, {scene.folder, false}, view.valid);
+  const SceneRoot root = {scene.folder, false};
+  view.image = read_photograph(view, root, view.valid);
+  if (lacks_mask(root, view.image_path)) {
+    scene.warnings.push_back("there are masks, but none for view " + printable(view.name) +
+                             ", of which everything is used");
+  }
   const int width = view.image.width;
   const int height = view.image.height;
   if (width < camera.width || height < camera.height ||
@@ -336,6 +330,18 @@ Scene prepared(Scene scene, const SceneOptions& options) {
 void SceneOptions::validate() const {
   require(
       !downscale || *downscale >= 1, "SceneOptions.downscale must be >= 1", downscale.value_or(1));
+}
+
+int find_view(const Scene& scene, const std::string& token) {
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    if (scene.views[i].name == token) return static_cast<int>(i);
+  }
+  uint64_t index = 0;
+  if (parse_number(token, index) && index < scene.views.size()) return static_cast<int>(index);
+  std::vector<std::string> names;
+  for (const View& view : scene.views) names.push_back(view.name);
+  throw InvalidInput("SceneOptions.views: there is no view \"" + printable(token) + "\" among " +
+                     std::to_string(names.size()) + ": " + first_of(names));
 }
 
 std::vector<int> select_views(const Scene& scene, const std::string& list) {

@@ -53,6 +53,11 @@ Scene scene_of_photographs(const std::filesystem::path& folder,
                            const ColmapModel& model,
                            const SceneOptions& options = {});
 
+/// The view of a name, or of an index in name order where no name fits.
+/// \return index into scene.views
+/// \throws InvalidInput if there is none
+int find_view(const Scene& scene, const std::string& token);
+
 /// The views a list names: comma-separated file stems or indices in name order, as in
 /// SceneOptions::views. \return indices into scene.views, ascending
 /// \throws InvalidInput for a view that does not exist or is named twice

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -35,14 +36,17 @@ void print_table(const nlohmann::ordered_json& report) {
               "holes",
               "MS-SSIM");
   const auto row = [](const std::string& name, const nlohmann::ordered_json& r) {
+    const auto figure = [&](const char* key) {
+      return r[key].is_number() ? r[key].get<double>() : std::nan("");
+    };
     std::printf("%-24s %8.2f %8.3f %10.2f %10.3f %7.1f%% %8.3f\n",
                 name.c_str(),
-                r["psnr"].get<double>(),
-                r["ssim"].get<double>(),
-                r["psnr_seen"].get<double>(),
-                r["ssim_seen"].get<double>(),
+                figure("psnr"),
+                figure("ssim"),
+                figure("psnr_seen"),
+                figure("ssim_seen"),
                 100 * r["hole_fraction"].get<double>(),
-                r["ms_ssim"].get<double>());
+                figure("ms_ssim"));
   };
   for (const auto& view : report["views"]) row(view["name"].get<std::string>(), view);
   row("mean", report["mean"]);

@@ -33,24 +33,22 @@ Ratio ratio_of(const ScaleBar& bar) {
   return {value, value * relative};
 }
 
-double median(std::vector<Ratio> ratios) {
-  const size_t middle = ratios.size() / 2;
-  const auto is_less = [](const Ratio& a, const Ratio& b) { return a.value < b.value; };
-  std::sort(ratios.begin(), ratios.end(), is_less);
-  if (ratios.size() % 2 == 1) return ratios[middle].value;
-  return (ratios[middle - 1].value + ratios[middle].value) / 2;
+bool agree(const Ratio& a, const Ratio& b) {
+  return std::abs(a.value - b.value) <= kSigmas * std::hypot(a.sigma, b.sigma);
 }
 
+// Bars that most others speak for. All of them where there is no such majority: of two that
+// disagree, or three that all do, nobody can tell which is wrong.
 std::vector<bool> inliers(const std::vector<Ratio>& ratios) {
-  constexpr size_t kFewest = 3;  // of two that disagree, nobody can tell which is wrong
   std::vector<bool> out(ratios.size(), true);
-  if (ratios.size() < kFewest) return out;
-  const double centre = median(ratios);
+  size_t outliers = 0;
   for (size_t i = 0; i < ratios.size(); ++i) {
-    out[i] = std::abs(ratios[i].value - centre) <= kSigmas * ratios[i].sigma;
+    size_t against = 0;
+    for (const Ratio& other : ratios) against += agree(ratios[i], other) ? 0 : 1;
+    out[i] = against < 2 || 2 * against <= ratios.size() - 1;
+    outliers += out[i] ? 0 : 1;
   }
-  const bool any = std::find(out.begin(), out.end(), true) != out.end();
-  return any ? out : std::vector<bool>(ratios.size(), true);
+  return 2 * outliers < ratios.size() ? out : std::vector<bool>(ratios.size(), true);
 }
 
 }  // namespace

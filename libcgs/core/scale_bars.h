@@ -22,9 +22,10 @@ struct BarScale {
   bool is_consistent = true;      ///< The bars used agree within 3 sigma.
 };
 
-/// Weighted mean of known / measured. With three bars or more, those further than 3 sigma from the
-/// median are outliers; two that disagree are both kept, as nobody can tell which is wrong. Where
-/// bars scatter more than their sigmas say, the sigma of the mean grows by as much (Birge ratio).
+/// Weighted mean of known / measured. A bar that disagrees, by more than 3 sigma of both, with two
+/// others and with most is an outlier, if a majority is left; else all are kept, as nobody can tell
+/// which is wrong. Where bars scatter more than their sigmas say, the sigma of the mean grows by as
+/// much (Birge ratio).
 ///
 /// Source: Birge 1932, "The calculation of errors by the method of least squares".
 /// \throws InvalidInput if there is no bar, or one has a length or sigma that none can have.

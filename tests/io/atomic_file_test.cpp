@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
@@ -53,17 +55,28 @@ TEST(AtomicFile, SaysSoWhenTheFileCannotGrow) {
 
 TEST(AtomicFile, TemporariesOfKilledProcessesAreRemovedAndNothingElse) {
   const test::TempDir dir;
-  for (const char* name : {"a.ply.part12", "views/b.exr.part345"}) {
-    test::write_bytes(dir / name, "half");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const auto* left = new AtomicFile(dir / "a.ply");  // as a kill leaves it
+    ::_exit(left == nullptr ? 1 : 0);
   }
-  for (const char* name : {"a.ply", "a.part", "b.part1x", "views/.part", "views/part7"}) {
+  ::waitpid(child, nullptr, 0);
+  ASSERT_EQ(test::entries(dir.path()), 1);
+  const std::string ours = "b.ply.part" + std::to_string(::getpid());
+  for (const std::string& name : {ours,
+                                  std::string("a.ply"),
+                                  std::string("a.part"),
+                                  std::string("b.part1x"),
+                                  std::string("movie.part02"),
+                                  std::string(".part"),
+                                  std::string("part7")}) {
     test::write_bytes(dir / name, "whole");
   }
-  std::filesystem::create_directories(dir / "folder.part8");
+  std::filesystem::create_directories(dir / ("folder.part" + std::to_string(child)));
   remove_abandoned_files(dir.path());
-  EXPECT_EQ(test::entries(dir.path()), 5);
-  EXPECT_EQ(test::entries(dir / "views"), 2);
-  EXPECT_THROW(remove_abandoned_files(dir / "missing"), IoError);
+  EXPECT_EQ(test::entries(dir.path()), 8);
+  EXPECT_FALSE(std::filesystem::exists(dir / ("a.ply.part" + std::to_string(child))));
+  EXPECT_NO_THROW(remove_abandoned_files(dir / "missing"));
 }
 
 TEST(AtomicFile, CommitsWhatALibraryWrote) {

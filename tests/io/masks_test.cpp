@@ -79,6 +79,14 @@ TEST_F(Masks, LeaveOutWhatIsDark) {
   EXPECT_EQ(usable_columns(), kWidth);
 }
 
+TEST_F(Masks, ThatAreMissingForOneViewAreTold) {
+  write_mask("masks/v1.png", 12);
+  Scene scene = read_scene(dir_.path());
+  load_images(scene, scene.input);
+  ASSERT_EQ(scene.warnings.size(), 1u);
+  EXPECT_NE(scene.warnings[0].find("none for view v2"), std::string::npos);
+}
+
 TEST_F(Masks, AddToWhatIsTransparent) {
   MaskMap usable(kWidth, kHeight, 1);
   usable(20, 3) = 0;

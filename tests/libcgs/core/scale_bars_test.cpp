@@ -43,6 +43,19 @@ TEST(ScaleBars, TwoThatDisagreeAreBothKeptAndWidenTheSigma) {
   EXPECT_GT(scale.sigma, 0.09);  // each is 0.1 from the middle
 }
 
+TEST(ScaleBars, KeepAPreciseOneThatRoughOnesAgreeWith) {
+  const BarScale scale = scale_of({{1, 0, 1, 0.001}, {1, 0, 1.05, 0.05}, {1, 0, 1.06, 0.05}});
+  EXPECT_EQ(scale.used, (std::vector<bool>{true, true, true}));
+  EXPECT_NEAR(scale.metres_per_unit, 1, 0.001);
+}
+
+TEST(ScaleBars, ThreeThatAllDisagreeAreKeptAndWidenTheSigma) {
+  const BarScale scale = scale_of({{1, 0, 1.00, 0.001}, {1, 0, 1.01, 0.001}, {1, 0, 1.02, 0.001}});
+  EXPECT_EQ(scale.used, (std::vector<bool>{true, true, true}));
+  EXPECT_FALSE(scale.is_consistent);
+  EXPECT_GT(scale.sigma, 0.005);
+}
+
 TEST(ScaleBars, SigmaIsThatOfManyDraws) {
   std::mt19937 random(3);
   std::normal_distribution<> normal;
