@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "libcgs/core/error.h"
+#include "tests/support/exif_segment.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
@@ -89,6 +90,26 @@ TEST_F(KnownDistances, MayEndInTwoPhotographsAndBeTakenThroughALens) {
   for (View& view : model_.scene.views) view.distortion = {-0.12, 0.03, 0.002, -0.001, 0.01};
   scale({{pixel_of(0, -0.1, 0.05), pixel_of(2, 0.15, -0.05), "2m"}});
   EXPECT_NEAR(model_.scene.frame.metres_per_unit, 2 / (kUnit * std::hypot(0.25, 0.1)), 1e-5);
+}
+
+TEST_F(KnownDistances, ArePickedAsViewersTurnThePicture) {
+  // Cameras that came with the photographs are for the pixels as stored; the tag says upside down.
+  std::string jpeg = test::jpeg(kFileWidth, kFileHeight);
+  jpeg.insert(2, test::orientation_segment(3));
+  model_.scene.views[0].image_path = dir_ / "left.jpg";
+  test::write_bytes(dir_ / "left.jpg", jpeg);
+  const auto turned_pick = [&](double x, double y) {
+    const KnownDistance::Pick pick =
+        known_distances({{pixel_of(2, x, y), pixel_of(2, x, y), "1m"}}, model_.scene)[0].a;
+    // The same point is seen 0.2 / 0.5 * 50 pixels further right, four of the file each.
+    return "left:" + std::to_string(kFileWidth - 1 - (pick.x + 80)) + "," +
+           std::to_string(kFileHeight - 1 - pick.y);
+  };
+  scale({{turned_pick(-0.1, 0.02), turned_pick(0.05, 0.02), "3m"}});
+  EXPECT_NEAR(model_.scene.frame.metres_per_unit, 3 / (kUnit * 0.15), 1e-4);
+  EXPECT_NEAR(known_distances({{turned_pick(-0.1, 0.02), "right:1,1", "3m"}}, model_.scene)[0].a.y,
+              (52 * 0.02 / kDepth + 19) * kDownscale - 0.5,
+              1e-3);
 }
 
 TEST_F(KnownDistances, SigmaIsThatOfDepthAndPixel) {

@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "io/exif.h"
+#include "tests/support/exif_segment.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
@@ -13,17 +14,6 @@ namespace {
 
 constexpr int kWidth = 24;
 constexpr int kHeight = 16;
-
-// A little-endian Exif segment that states nothing but the orientation.
-std::string orientation_segment(int orientation) {
-  const std::string tiff = std::string("II\x2a\0\x08\0\0\0", 8) + std::string("\x01\0", 2) +
-                           std::string("\x12\x01\x03\0\x01\0\0\0", 8) +
-                           std::string(1, static_cast<char>(orientation)) +
-                           std::string("\0\0\0\0\0\0\0", 7);
-  const std::string body = std::string("Exif\0\0", 6) + tiff;
-  const auto size = static_cast<char>(body.size() + 2);
-  return std::string("\xff\xe1\0", 3) + size + body;
-}
 
 /// A JPEG whose pixels all differ, with a tag.
 class OrientedJpeg : public testing::TestWithParam<int> {
@@ -38,7 +28,7 @@ class OrientedJpeg : public testing::TestWithParam<int> {
     std::vector<unsigned char> bytes;
     cv::imencode(".jpg", pixels, bytes, {cv::IMWRITE_JPEG_QUALITY, 95});
     std::string jpeg(bytes.begin(), bytes.end());
-    jpeg.insert(2, orientation_segment(GetParam()));
+    jpeg.insert(2, test::orientation_segment(GetParam()));
     view_.image_path = dir_ / "photo.jpg";
     test::write_bytes(view_.image_path, jpeg);
   }
@@ -86,7 +76,7 @@ TEST(Orientation, IsUprightWhereNothingValidIsSaid) {
   EXPECT_EQ(exif_orientation(dir / "a.jpg"), 1);
   for (const int absurd : {0, 9, 77}) {
     std::string tagged = jpeg;
-    tagged.insert(2, orientation_segment(absurd));
+    tagged.insert(2, test::orientation_segment(absurd));
     test::write_bytes(dir / "b.jpg", tagged);
     EXPECT_EQ(exif_orientation(dir / "b.jpg"), 1) << absurd;
   }
