@@ -82,9 +82,11 @@ Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, c
   const MaskMap all = intersection(everywhere, view.valid);
   const MaskMap use = intersection(seen, view.valid);
   // Null where there is nothing to compare.
-  const auto figure = [&](const auto& metric, const MaskMap& pixels) -> Json {
-    const bool any = std::find(pixels.data.begin(), pixels.data.end(), 1) != pixels.data.end();
-    return any ? Json(metric(shown, view.image, &pixels)) : Json();
+  const auto has_any = [](const MaskMap& pixels) {
+    return std::find(pixels.data.begin(), pixels.data.end(), 1) != pixels.data.end();
+  };
+  const auto figure = [&](const auto& metric, const MaskMap& pixels) {
+    return has_any(pixels) ? Json(metric(shown, view.image, &pixels)) : Json();
   };
   return {{"name", view.name},
           {"psnr", figure(psnr, all)},
@@ -92,7 +94,7 @@ Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, c
           {"psnr_seen", figure(psnr, use)},
           {"ssim_seen", figure(ssim, use)},
           {"hole_fraction", 1 - fraction(buffers.hole, Hole::None)},
-          {"ms_ssim", ms_ssim(completed(shown, view), view.image)}};
+          {"ms_ssim", has_any(all) ? Json(ms_ssim(completed(shown, view), view.image)) : Json()}};
 }
 
 }  // namespace
