@@ -396,7 +396,14 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   const FolderLock lock(request.output);
   RunRecord record(
       request.output, request_json(request, scene), request.overwrite, decided_stages());
-  for (const char* folder : {"", "model", "model/priors", "views", "mesh", "web"}) {
+  for (const char* folder : {"",
+                             "model",
+                             "model/colmap",
+                             "model/colmap/sparse/0",
+                             "model/priors",
+                             "views",
+                             "mesh",
+                             "web"}) {
     remove_abandoned_files(request.output / folder);
   }
   opened.keep(request.output / "model");
