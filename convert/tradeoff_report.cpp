@@ -2,9 +2,7 @@
 #include "convert/tradeoff_report.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <set>
 #include <utility>
 
@@ -85,10 +83,7 @@ Trade files(const Tradeoff& tradeoff) {
 }
 
 std::string text_of(const char* format, double value) {
-  if (!std::isfinite(value)) return "-";
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), format, value);  // NOLINT: fixed formats
-  return text.data();
+  return std::isfinite(value) ? number(value, format) : "-";
 }
 
 std::string unit_of(const Tradeoff& tradeoff) {
