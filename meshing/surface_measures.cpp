@@ -158,6 +158,13 @@ Eigen::Vector3d volume_centroid(const MeasurableMesh& mesh) {
   return middle + sum / all;
 }
 
+// Standard deviation of a point of the surface along a unit direction.
+double sigma_along(const Eigen::Vector3d& direction, const SurfaceEvidence& at) {
+  constexpr double kTangential = 0.65;
+  const double cosine = at.normal.dot(direction);
+  return at.sigma * std::sqrt(std::lerp(kTangential * kTangential, 1.0, cosine * cosine));
+}
+
 MeasuredValue straight_distance(const MeasurableMesh& mesh,
                                 const SurfacePoint& from,
                                 const SurfacePoint& to) {
@@ -166,7 +173,8 @@ MeasuredValue straight_distance(const MeasurableMesh& mesh,
   const SurfaceEvidence a = evidence_at(mesh, from);
   const SurfaceEvidence b = evidence_at(mesh, to);
   out.stated = (std::isfinite(a.sigma) ? 0.5 : 0) + (std::isfinite(b.sigma) ? 0.5 : 0);
-  out.sigma = std::hypot(a.sigma, b.sigma);  // NaN if either has no statement
+  const Eigen::Vector3d along = (to.position - from.position).stableNormalized();
+  out.sigma = std::hypot(sigma_along(along, a), sigma_along(along, b));  // NaN: no statement
   if (mesh.states_provenance()) {
     out.by_provenance.at(static_cast<size_t>(weaker(a.provenance, b.provenance))) = out.value;
   }

@@ -221,9 +221,17 @@ function viewerScene(scene, changed) {
     if (!sigmas.length || isInvented(face)) return NaN;
     return weights.reduce((sum, weight, k) => (weight > 0 ? sum + weight * sigmas[faces[3 * face + k]] : sum), 0);
   }
+  // The same along the line between two ends, by the formula of cgs measure.
+  function sigmaAlong(end, other) {
+    const [a, b, c] = [0, 1, 2].map((k) => vector(faces[3 * end.face + k]));
+    const normal = b.sub(a).cross(c.sub(a)).normalize();
+    const cosine = normal.dot(other.place.clone().sub(end.place).normalize());
+    const tangential = 0.65;
+    return sigmaAt(end) * Math.sqrt(tangential ** 2 + (1 - tangential ** 2) * cosine ** 2);
+  }
   return {
     vertices, faces, vertexColors, sigmas, provenance, statesLabels, corners,
-    vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt,
+    vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt, sigmaAlong,
     surface, paint, cloud, clip, lit, textured, pixelsPerTangent,
     isComplete: () => pending === 0,
   };

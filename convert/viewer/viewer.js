@@ -17,7 +17,7 @@
   const scene = JSON.parse(document.getElementById('viewer-scene').textContent);
   const {
     vertices, faces, vertexColors, sigmas, provenance, statesLabels, corners,
-    vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt,
+    vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt, sigmaAlong,
     surface, paint, cloud, clip, lit, textured, pixelsPerTangent, isComplete,
   } = viewerScene(scene, () => redraw());
 
@@ -275,7 +275,7 @@
       const [a, b] = ends;
       between.geometry.setFromPoints([a.place, b.place]);
       const value = a.place.distanceTo(b.place) * scene.unit.length;
-      const own = Math.hypot(sigmaAt(a), sigmaAt(b)) * scene.unit.length;
+      const own = Math.hypot(sigmaAlong(a, b), sigmaAlong(b, a)) * scene.unit.length;
       const sigma = Math.hypot(own, value * scene.unit.sigma);
       line('strong', `Distance ${withSigma(value, sigma)}`);
       if (!Number.isFinite(sigma)) line('span', 'This distance has no sigma: an end of it has none.');

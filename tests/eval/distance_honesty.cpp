@@ -8,7 +8,8 @@
 // The same point of the truth is (a) the one nearest to the measured point, (b) the one that the
 // input camera nearest to it sees in its direction. Prints the shares of distances within 1, 2, 3
 // and 5 sigma of the truth, for errors along the line between the points, with sigma as cgs measure
-// states it and as it would be if only the part of the normal along the line counted.
+// states it and as it would be if only the part of the normal along the line counted. (a) knows no
+// error along the surface; (b) counts a point beyond an edge as wrong by all the way behind it.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -100,6 +100,9 @@ TEST(StraightDistance, AddsTheVariancesOfItsEnds) {
   const MeasuredValue d = straight_distance(mesh, a, b);
   EXPECT_DOUBLE_EQ(d.value, 0.5);
   EXPECT_NEAR(d.sigma, 3e-3 * std::sqrt(2), 1e-9);
+  // Along the surface a point is better known: both ends lie on faces that the line runs along.
+  const auto c = surface.nearest({0.1, 0.25, -1});
+  EXPECT_NEAR(straight_distance(mesh, a, c).sigma, 0.65 * 3e-3 * std::sqrt(2), 1e-9);
   mesh.mesh.sigma[0] = NAN;
   EXPECT_TRUE(std::isnan(straight_distance(mesh, surface.nearest({-1, -1, -1}), b).sigma));
 }
