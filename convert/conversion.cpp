@@ -20,6 +20,7 @@
 #include "io/gaussian_ply.h"
 #include "io/gltf.h"
 #include "io/json_file.h"
+#include "io/mesh_file.h"
 #include "io/mesh_ply.h"
 #include "io/obj.h"
 #include "io/ply_header.h"
@@ -50,6 +51,7 @@ struct Source {
   std::optional<Model> model;  ///< Splats with their photographs' cameras.
   std::optional<VolumeFile> volume;
   TriangleMesh mesh;
+  std::vector<std::string> warnings;  ///< Of reading the mesh.
   Frame frame;
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY();
 };
@@ -62,8 +64,10 @@ std::string extension_of(const std::filesystem::path& path) {
   return out;
 }
 
-/// PLY files that are no splats: with faces, or without what makes a splat.
-bool is_mesh_ply(const std::filesystem::path& path) {
+/// Files of a mesh: PLY has to be looked into, it may hold splats.
+bool holds_mesh(const std::filesystem::path& path) {
+  if (!is_mesh_name(path)) return false;
+  if (extension_of(path) != ".ply") return true;
   const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
   if (start.substr(0, 3) != "ply") return false;
   const PlyHeader header = parse_ply_header(start, path);
@@ -81,11 +85,13 @@ Source read_source(const std::filesystem::path& path) {
     out.content = Content::Volume;
     out.volume = read_volume(path);
     out.frame = out.volume->frame;
-  } else if (is_mesh_ply(path)) {
+  } else if (holds_mesh(path)) {
     out.content = Content::Mesh;
-    MeshFile file = read_mesh_ply(path);
-    out.mesh = std::move(file.mesh);
-    out.frame = file.frame;
+    MeasurableFile file = read_mesh_file(path);
+    out.mesh = std::move(file.content.mesh);
+    out.frame = file.content.frame;
+    out.warnings = std::move(file.warnings);
+    if (file.up) out.up = *file.up;
   } else {
     out.splats = read_splats(path);
     out.frame = out.splats->frame;
@@ -287,7 +293,8 @@ std::string conversion_table() {
          "  .spz 2 to 4, .sog 2                yes              yes      yes, virtual cameras\n"
          "model folder of train or run         yes              yes      yes, its own cameras\n"
          ".vdb of fuse, run or convert         no               no       yes\n"
-         ".ply with faces                      no               no       yes\n"
+         ".ply with faces, .obj, .stl, .off,\n"
+         "  .glb                               no               no       yes\n"
          "Where the ending can be both, .ply stays splats and .glb becomes a mesh; --as mesh and\n"
          "--as splats say otherwise. .stl and .3mf need a known scale, or --assume-unit.\n";
 }
@@ -310,6 +317,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
     terminal.warn(source.splats->warnings);
   }
   if (source.model) terminal.warn(source.model->scene.warnings);
+  terminal.warn(source.warnings);
   if (wanted == Content::Splats) {
     report["output"] = write_splats(request, source);
     return report;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "io/glb_reader.h"
 #include "io/mesh_ply.h"
 #include "io/obj_reader.h"
 #include "io/off.h"
@@ -24,17 +25,25 @@ std::string lower_extension(const std::filesystem::path& path) {
   return out;
 }
 
-ParsedMesh parse(const std::filesystem::path& path) {
+ParsedMesh parse(const std::filesystem::path& path, std::optional<Eigen::Vector3d>& up) {
   const std::string extension = lower_extension(path);
+  if (extension == ".glb") {
+    GlbMesh glb = read_glb(path);
+    up = glb.up;
+    return std::move(glb.parsed);
+  }
   if (extension == ".ply") return parse_mesh_ply(path);
   if (extension == ".obj") return read_obj(path);
-  if (extension == ".stl") return read_stl(path);
+  if (extension == ".stl") {
+    up = Eigen::Vector3d::UnitZ();  // no rule of the format, but of the programs that print it
+    return read_stl(path);
+  }
   if (extension == ".off") return read_off(path);
   throw BadInput(Defect::Unsupported,
                  path,
                  "'" + extension +
                      "' is not a mesh format that is read; known are .ply, .obj, "
-                     ".stl and .off");
+                     ".stl, .off and .glb");
 }
 
 // Three corners in one place or on one line: no area. Others keep such faces, so do we.
@@ -52,18 +61,21 @@ size_t faces_without_area(const MeasurableMesh& content) {
 
 bool is_mesh_name(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
-  return extension == ".ply" || extension == ".obj" || extension == ".stl" || extension == ".off";
+  const auto known = {".ply", ".obj", ".stl", ".off", ".glb"};
+  return std::find(known.begin(), known.end(), extension) != known.end();
 }
 
 MeasurableFile read_mesh_file(const std::filesystem::path& path,
                               const std::optional<Frame>& frame) {
-  ParsedMesh parsed = parse(path);
+  std::optional<Eigen::Vector3d> up;
+  ParsedMesh parsed = parse(path, up);
   const PlyPlacement placement =
       ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
   placement.frame.validate();
   MeasurableFile out{
       {std::move(parsed.mesh), std::move(parsed.positions), placement.frame, placement.file_origin},
-      std::move(parsed.warnings)};
+      std::move(parsed.warnings),
+      up};
   out.warnings.insert(out.warnings.end(), placement.warnings.begin(), placement.warnings.end());
   out.content.mesh.vertices.reserve(out.content.points.size());
   for (Eigen::Vector3d& p : out.content.points) {

@@ -14,12 +14,14 @@ namespace cgs {
 struct MeasurableFile {
   MeasurableMesh content;
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
+  std::optional<Eigen::Vector3d> up;  ///< In file axes, where the format tells.
 };
 
-/// True for the endings that read_mesh_file() takes: .ply, .obj, .stl, .off, in any case.
+/// True for the endings that read_mesh_file() takes: .ply, .obj, .stl, .off, .glb, in any case.
 bool is_mesh_name(const std::filesystem::path& path);
 
-/// Reads a mesh or point cloud that we or others wrote, as PLY, OBJ, STL or OFF.
+/// Reads a mesh or point cloud that we or others wrote, as PLY, OBJ, STL, OFF or
+/// binary glTF.
 ///
 /// Coordinates stay double from the file to the canonical frame, so that a far-away origin costs
 /// no digit.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/parsed_mesh.h"
 
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -11,6 +12,15 @@ void append_fan(const std::vector<uint32_t>& corners,
   for (size_t k = 2; k < corners.size(); ++k) {
     triangles.push_back({corners[0], corners[k - 1], corners[k]});
   }
+}
+
+size_t PlaceNumbers::Hash::operator()(const Eigen::Vector3d& place) const {
+  uint64_t hash = 0;
+  for (const double c : place) {
+    hash = (hash ^ std::bit_cast<uint64_t>(c)) * 0x9E3779B97F4A7C15ULL;
+    hash ^= hash >> 29;
+  }
+  return hash;
 }
 
 std::string_view expect_line(TextLines& lines, std::string_view what) {

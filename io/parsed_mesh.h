@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include <Eigen/Core>
@@ -24,6 +25,22 @@ struct ParsedMesh {
 /// Appends a polygon as a fan of triangles.
 void append_fan(const std::vector<uint32_t>& corners,
                 std::vector<std::array<uint32_t, 3>>& triangles);
+
+/// Numbers places in the order they first appear, for formats that repeat a vertex per face.
+class PlaceNumbers {
+ public:
+  /// \pre finite
+  uint32_t number(Eigen::Vector3d place) {
+    place.array() += 0.0;  // -0 and 0 are one place
+    return known_.try_emplace(place, static_cast<uint32_t>(known_.size())).first->second;
+  }
+
+ private:
+  struct Hash {
+    size_t operator()(const Eigen::Vector3d& place) const;
+  };
+  std::unordered_map<Eigen::Vector3d, uint32_t, Hash> known_;
+};
 
 /// The next line of a text file that is neither blank nor a comment.
 /// \throws BadInput Truncated where the file ends instead; LimitError for lines above 4 MiB

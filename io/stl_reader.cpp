@@ -2,7 +2,6 @@
 #include "io/stl_reader.h"
 
 #include <cmath>
-#include <unordered_map>
 
 #include "io/byte_reader.h"
 
@@ -13,31 +12,19 @@ namespace {
 constexpr size_t kHeaderBytes = 84;
 constexpr size_t kFacetBytes = 50;
 
-struct PointHash {
-  size_t operator()(const Eigen::Vector3d& p) const {
-    uint64_t hash = 0;
-    for (const double c : p) {
-      hash = (hash ^ std::bit_cast<uint64_t>(c)) * 0x9E3779B97F4A7C15ULL;
-      hash ^= hash >> 29;
-    }
-    return hash;
-  }
-};
-
 /// Numbers corners by place, in the order they first appear.
 class Corners {
  public:
   explicit Corners(ParsedMesh& out) : out_(out) {}
-  uint32_t number(Eigen::Vector3d p) {
-    p.array() += 0.0;  // -0 and 0 are one place
-    const auto [it, is_new] = known_.try_emplace(p, static_cast<uint32_t>(out_.positions.size()));
-    if (is_new) out_.positions.push_back(p);
-    return it->second;
+  uint32_t number(const Eigen::Vector3d& p) {
+    const uint32_t out = places_.number(p);
+    if (out == out_.positions.size()) out_.positions.push_back(p);
+    return out;
   }
 
  private:
   ParsedMesh& out_;
-  std::unordered_map<Eigen::Vector3d, uint32_t, PointHash> known_;
+  PlaceNumbers places_;
 };
 
 ParsedMesh read_binary(const std::string& bytes, const std::filesystem::path& path) {

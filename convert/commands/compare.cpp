@@ -121,7 +121,7 @@ void add_compare(CLI::App& app) {
   auto args = std::make_shared<CompareArgs>();
   auto* cmd = app.add_subcommand(
       "compare", "Signed distances of a mesh or point cloud to a mesh, and what really changed");
-  cmd->add_option("a", args->a, "Mesh or point cloud: .ply, .obj, .stl, .off")->required();
+  cmd->add_option("a", args->a, "Mesh or point cloud: .ply, .obj, .stl, .off, .glb")->required();
   cmd->add_option("b", args->b, "Mesh to measure from: reference, or the earlier date")->required();
   cmd->add_option("--samples", args->samples, "Points on A, evenly by area (of a cloud: all)")
       ->capture_default_str();

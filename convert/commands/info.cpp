@@ -284,10 +284,11 @@ void add_info(CLI::App& app) {
       "info",
       "What a scene, mesh or file of splats holds and what is wrong with it (exit code 3 if it "
       "cannot be used)");
-  cmd->add_option("scene",
-                  args->scene.path,
-                  "Folder of a scene, as for run, a mesh (.ply, .obj, .stl, .off), which gets a "
-                  "certificate, or splats (.ply, .spz, .splat, .sog)")
+  cmd->add_option(
+         "scene",
+         args->scene.path,
+         "Folder of a scene, as for run, a mesh (.ply, .obj, .stl, .off, .glb), which gets a "
+         "certificate, or splats (.ply, .spz, .splat, .sog)")
       ->required();
   add_scene_options(*cmd, args->scene.options);
   add_focal_option(*cmd, args->scene.focal);

@@ -318,7 +318,7 @@ void add_measure(CLI::App& app) {
   auto args = std::make_shared<MeasureArgs>();
   auto* cmd = app.add_subcommand(
       "measure", "Distances, areas, volumes, sections and fits on a mesh, each with its sigma");
-  cmd->add_option("mesh", args->mesh, "Mesh, ours or of others: .ply, .obj, .stl, .off")
+  cmd->add_option("mesh", args->mesh, "Mesh, ours or of others: .ply, .obj, .stl, .off, .glb")
       ->required();
   add_figures(*cmd, *args);
   cmd->add_option("--unit", args->unit, "Unit of the figures; default m");

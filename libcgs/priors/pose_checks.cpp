@@ -114,15 +114,20 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
   constexpr double kMostSigma = 0.1;
   for (size_t lens = 0; lens < priors.size(); ++lens) {
     if (focal_sigmas[lens] <= kMostSigma) continue;
-    constexpr double kPlanar = 0.9;
-    const bool is_planar = share_on_planes(pairs) >= kPlanar;
-    throw NumericalError(std::string("the focal length cannot be told from these photographs") +
-                         (is_planar ? ", since what they share lies in one plane" : "") +
-                         (std::isfinite(focal_sigmas[lens])
-                              ? " (uncertain by " + decimals(100 * focal_sigmas[lens], 0) + " %)"
-                              : "") +
-                         "; give it with --focal, in pixels");
+    throw NumericalError(
+        undetermined_focal(pairs,
+                           std::isfinite(focal_sigmas[lens])
+                               ? "uncertain by " + decimals(100 * focal_sigmas[lens], 0) + " %"
+                               : ""));
   }
+}
+
+std::string undetermined_focal(const std::vector<PhotoPair>& pairs, const std::string& detail) {
+  constexpr double kPlanar = 0.9;
+  const bool is_planar = share_on_planes(pairs) >= kPlanar;
+  return std::string("the focal length cannot be told from these photographs") +
+         (is_planar ? ", since what they share lies in one plane" : "") +
+         (detail.empty() ? "" : " (" + detail + ")") + "; give it with --focal, in pixels";
 }
 
 std::string unexplained_matches(const std::vector<UnposedPhoto>& photos,

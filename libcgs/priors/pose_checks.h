@@ -29,6 +29,9 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
                    const Reconstruction& scene,
                    const std::vector<double>& focal_sigmas);
 
+/// The reason to give where the photographs fit more than one focal length; `detail` may be empty.
+std::string undetermined_focal(const std::vector<PhotoPair>& pairs, const std::string& detail);
+
 /// The reason to give where matches exist that no two cameras explain.
 std::string unexplained_matches(const std::vector<UnposedPhoto>& photos,
                                 const std::vector<PhotoPair>& pairs);

@@ -61,17 +61,27 @@ void settle(Reconstruction& scene,
   drop_outliers(scene, kMostError, kLeastAngle);
 }
 
+// Of the poses that the pair may mean, the one from which adjusting explains most.
 bool begin_with(const PhotoPair& pair,
                 const std::vector<LensPrior>& priors,
                 Reconstruction& scene) {
   forget(scene);
-  const std::optional<PhotoPose> pose = relative_pose(
-      pair.points, scene.lens(pair.a).focal, scene.lens(pair.b).focal, 0.5 * kMostError);
-  if (!pose) return false;
-  scene.poses[static_cast<size_t>(pair.a)] = PhotoPose{};
-  scene.poses[static_cast<size_t>(pair.b)] = pose;
-  settle(scene, priors, {.first = pair.a, .second = pair.b});
-  return known_points(scene) >= kFewestPoints;
+  std::optional<Reconstruction> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const PhotoPose& pose : relative_poses(
+           pair.points, scene.lens(pair.a).focal, scene.lens(pair.b).focal, 0.5 * kMostError)) {
+    Reconstruction candidate = scene;
+    candidate.poses[static_cast<size_t>(pair.a)] = PhotoPose{};
+    candidate.poses[static_cast<size_t>(pair.b)] = pose;
+    settle(candidate, priors, {.first = pair.a, .second = pair.b});
+    const double error = capped_error(candidate);
+    if (known_points(candidate) < kFewestPoints || !(error < least)) continue;
+    least = error;
+    best = std::move(candidate);
+  }
+  if (!best) return false;
+  scene = std::move(*best);
+  return true;
 }
 
 // The photograph not yet placed that shows the most known points; -1 if none shows enough.

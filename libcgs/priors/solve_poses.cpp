@@ -84,7 +84,24 @@ Attempt attempt_at(double focal_of_side,
   return out;
 }
 
+// Whether the points are explained about as well at quite another focal length.
+bool has_rival(const Attempt& best,
+               const std::vector<Attempt>& attempts,
+               const std::vector<LensPrior>& priors) {
+  constexpr double kAsWell = 1.4;  // times the error; right solutions win by more than twice that
+  const double kOther = std::log(1.25);
+  return std::any_of(attempts.begin(), attempts.end(), [&](const Attempt& attempt) {
+    if (!attempt.begun || attempt.error > kAsWell * best.error) return false;
+    for (size_t i = 0; i < priors.size(); ++i) {
+      const double ratio = attempt.scene.lenses[i].focal / best.scene.lenses[i].focal;
+      if (priors[i].focal == 0 && std::abs(std::log(ratio)) > kOther) return true;
+    }
+    return false;
+  });
+}
+
 // Placed at the focal length from which a part of the points is explained best.
+// \throws NumericalError if quite another one does nearly as well
 Attempt best_attempt(const std::vector<int>& lens_of,
                      const std::vector<LensPrior>& priors,
                      const std::vector<PhotoPair>& pairs,
@@ -97,26 +114,51 @@ Attempt best_attempt(const std::vector<int>& lens_of,
   tbb::parallel_for(size_t{0}, attempts.size(), [&](size_t i) {
     attempts[i] = attempt_at(kFocals[i], lens_of, priors, pairs, some);
   });
-  return *std::min_element(attempts.begin(),
-                           attempts.end(),
-                           [](const Attempt& a, const Attempt& b) { return a.error < b.error; });
+  const Attempt& best =
+      *std::min_element(attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
+        return a.error < b.error;
+      });
+  if (best.begun && has_rival(best, attempts, priors)) {
+    throw NumericalError(undetermined_focal(pairs, "several explain them equally well"));
+  }
+  return best;
 }
 
 // Rounds of adjusting everything and looking again what agrees.
 // \return relative standard deviations of the focal lengths, per lens
 std::vector<double> polish(const std::vector<LensPrior>& priors,
-                           const FirstPair& begun,
+                           const BundleOptions& wanted,
                            Reconstruction& scene) {
-  BundleOptions options{.first = begun.first, .second = begun.second, .solve_focal = true};
+  BundleOptions options = wanted;
+  options.solve_shape = false;
   for (const double most_error : {kMostError, 3.0, 2.5}) {
     adjust_bundle(scene, priors, options);
     drop_outliers(scene, most_error, kLeastAngle);
     triangulate(scene, most_error, kLeastAngle);
-    options.solve_shape = true;
+    options.solve_shape = wanted.solve_shape;
   }
   constexpr int kUntilSettled = 200;
   options.most_iterations = kUntilSettled;
   return adjust_bundle(scene, priors, options, true);
+}
+
+// The same with the shape of the lenses, unless that pulls a focal length away from where plain
+// lenses have it: then the photographs cannot tell one from the other, and plain lenses stay.
+std::vector<double> polish_with_shape(const std::vector<LensPrior>& priors,
+                                      const FirstPair& begun,
+                                      Reconstruction& scene) {
+  constexpr double kMostPull = 0.1;  // of log(focal); distortion of real lenses does less
+  BundleOptions options{.first = begun.first, .second = begun.second, .solve_focal = true};
+  Reconstruction plain = scene;
+  std::vector<double> plain_sigmas = polish(priors, options, plain);
+  options.solve_shape = true;
+  std::vector<double> sigmas = polish(priors, options, scene);
+  for (size_t i = 0; i < scene.lenses.size(); ++i) {
+    if (std::abs(std::log(scene.lenses[i].focal / plain.lenses[i].focal)) <= kMostPull) continue;
+    scene = std::move(plain);
+    return plain_sigmas;
+  }
+  return sigmas;
 }
 
 // Makes the first placed photograph the origin and its distance to the second the unit.
@@ -196,7 +238,7 @@ PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress
   Reconstruction scene = std::move(attempt.scene);
   scene.tracks = tracks;
   place_more(scene, priors, *attempt.begun);
-  const std::vector<double> sigmas = polish(priors, *attempt.begun, scene);
+  const std::vector<double> sigmas = polish_with_shape(priors, *attempt.begun, scene);
   refuse_unsure(photos, priors, pairs, scene, sigmas);
   move_to_first(scene);
 

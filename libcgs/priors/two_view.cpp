@@ -141,6 +141,51 @@ std::optional<PhotoPose> pose_of(const Eigen::Matrix3d& essential, const Rays& r
   return best;
 }
 
+bool is_before_both_of_most(const Rays& rays,
+                            const std::vector<char>& used,
+                            const PhotoPose& pose) {
+  size_t before = 0;
+  size_t all = 0;
+  for (size_t i = 0; i < rays.a.size(); ++i) {
+    if (used[i] == 0) continue;
+    ++all;
+    before += is_before_both(rays.a[i], rays.b[i], pose) ? 1 : 0;
+  }
+  return 2 * before > all;
+}
+
+// Where most matches lie on a plane, the poses that its homography can mean: up to two, as seen
+// from before it. `limit` is a distance at z = 1.
+std::vector<PhotoPose> poses_of_plane(const Rays& rays, double limit) {
+  constexpr double kPlanar = 0.6;
+  std::vector<cv::Point2d> a;
+  std::vector<cv::Point2d> b;
+  for (size_t i = 0; i < rays.a.size(); ++i) {
+    a.emplace_back(rays.a[i].x(), rays.a[i].y());
+    b.emplace_back(rays.b[i].x(), rays.b[i].y());
+  }
+  cv::Mat mask;
+  const cv::Mat plane =
+      cv::findHomography(a, b, cv::RANSAC, 2 * limit, mask, kMostTrials, kConfidence);
+  const std::vector<char> used = mask_of(mask, a.size());
+  const auto on_plane = std::count(used.begin(), used.end(), char{1});
+  if (plane.empty() || double(on_plane) < kPlanar * double(a.size())) return {};
+  std::vector<cv::Mat> rotations;
+  std::vector<cv::Mat> translations;
+  std::vector<cv::Mat> normals;
+  cv::decomposeHomographyMat(plane, cv::Mat::eye(3, 3, CV_64F), rotations, translations, normals);
+  std::vector<PhotoPose> out;
+  for (size_t k = 0; k < rotations.size(); ++k) {
+    using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    const Eigen::Matrix3d R = Eigen::Map<const RowMajor>(rotations[k].ptr<double>());
+    const Eigen::Vector3d t = Eigen::Map<const Eigen::Vector3d>(translations[k].ptr<double>());
+    if (!R.allFinite() || !(t.norm() > 0)) continue;
+    const PhotoPose pose{Eigen::Quaterniond(R).normalized(), t.normalized()};
+    if (is_before_both_of_most(rays, used, pose)) out.push_back(pose);
+  }
+  return out;
+}
+
 // Rotation that takes rays a to rays b, each pair weighted.
 Eigen::Matrix3d best_rotation(const Rays& rays, const std::vector<double>& weights) {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -182,11 +227,11 @@ std::vector<char> homography_inliers(const MatchedPoints& matches, double thresh
   return mask_of(mask, matches.a.size());
 }
 
-std::optional<PhotoPose> relative_pose(const MatchedPoints& matches,
-                                       double focal_a,
-                                       double focal_b,
-                                       double threshold) {
-  if (matches.a.size() < kSample + 3) return std::nullopt;
+std::vector<PhotoPose> relative_poses(const MatchedPoints& matches,
+                                      double focal_a,
+                                      double focal_b,
+                                      double threshold) {
+  if (matches.a.size() < kSample + 3) return {};
   const Rays rays = rays_of(matches, focal_a, focal_b);
   const double limit = 2 * threshold / (focal_a + focal_b);
   std::optional<Eigen::Matrix3d> best;
@@ -202,14 +247,17 @@ std::optional<PhotoPose> relative_pose(const MatchedPoints& matches,
       best = essential;
     }
   }
-  if (!best) return std::nullopt;
+  if (!best) return {};
   Rays agreeing;
   for (size_t i = 0; i < rays.a.size(); ++i) {
     if (epipolar_error2(*best, rays.a[i], rays.b[i]) > limit * limit) continue;
     agreeing.a.push_back(rays.a[i]);
     agreeing.b.push_back(rays.b[i]);
   }
-  return pose_of(*best, agreeing);
+  const std::optional<PhotoPose> pose = pose_of(*best, agreeing);
+  std::vector<PhotoPose> out = poses_of_plane(rays, limit);
+  if (pose) out.insert(out.begin(), *pose);
+  return out;
 }
 
 double parallax(const MatchedPoints& matches, double focal_a, double focal_b) {

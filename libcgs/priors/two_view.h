@@ -22,13 +22,16 @@ std::vector<char> epipolar_inliers(const MatchedPoints& matches, double threshol
 /// Which matches a homography explains; likewise.
 std::vector<char> homography_inliers(const MatchedPoints& matches, double threshold);
 
-/// Pose of b (of a: identity; |translation| = 1) from matches that are mostly right.
+/// Poses of b (of a: identity; |translation| = 1) that matches, mostly right, may mean: the one
+/// that explains them best, and where they lie near a plane, those that the plane allows. There,
+/// noise decides which of two explains them better; only a full adjustment tells them apart.
 /// \return nothing where no essential matrix puts at least half of the points before both cameras
-/// Source: Nistér 2004, "An efficient solution to the five-point relative pose problem".
-std::optional<PhotoPose> relative_pose(const MatchedPoints& matches,
-                                       double focal_a,
-                                       double focal_b,
-                                       double threshold);
+/// Source: Nistér 2004, "An efficient solution to the five-point relative pose problem"; Malis and
+/// Vargas 2007, "Deeper understanding of the homography decomposition for vision-based control".
+std::vector<PhotoPose> relative_poses(const MatchedPoints& matches,
+                                      double focal_a,
+                                      double focal_b,
+                                      double threshold);
 
 /// Median distance between matches once the best rotation of the camera has been taken out
 /// [working pixels]: what is left shows depth. Zero for a camera that was only turned.

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/glb_reader.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "io/byte_writer.h"
+#include "io/gltf.h"
+#include "io/mesh_file.h"
+#include "libcgs/core/up_axis.h"
+#include "tests/support/full_disk.h"
+#include "tests/support/sample_mesh.h"
+
+namespace cgs {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string glb(const Json& json, const std::string& binary) {
+  std::string text = json.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  std::string out = "glTF";
+  append_bytes(out, uint32_t{2});
+  append_bytes(out, static_cast<uint32_t>(12 + 8 + text.size() + 8 + binary.size()));
+  append_bytes(out, static_cast<uint32_t>(text.size()));
+  out += "JSON" + text;
+  append_bytes(out, static_cast<uint32_t>(binary.size()));
+  out += std::string("BIN\0", 4) + binary;
+  return out;
+}
+
+/// A triangle (0,0,0), (1,0,0), (0,2,0): 16-bit indices, then positions of 12 bytes that lie 16
+/// apart, with a colour of four bytes in between.
+struct Triangle {
+  Json json;
+  std::string binary;
+
+  Triangle() {
+    for (const uint16_t i : {0, 1, 2, 0}) append_bytes(binary, i);  // the last one pads
+    for (const std::array<float, 3>& p : {std::array<float, 3>{0, 0, 0}, {1, 0, 0}, {0, 2, 0}}) {
+      for (const float c : p) append_bytes(binary, c);
+      for (const uint8_t c : {255, 0, 55, 255}) append_bytes(binary, c);
+    }
+    json = Json::parse(R"({
+      "asset": {"version": "2.0"},
+      "scenes": [{"nodes": [0]}],
+      "nodes": [{"mesh": 0}],
+      "meshes": [{"primitives": [{"indices": 0, "attributes": {"POSITION": 1, "COLOR_0": 2}}]}],
+      "accessors": [
+        {"bufferView": 0, "componentType": 5123, "count": 3, "type": "SCALAR"},
+        {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC3"},
+        {"bufferView": 1, "byteOffset": 12, "componentType": 5121, "normalized": true,
+         "count": 3, "type": "VEC4"}],
+      "bufferViews": [{"buffer": 0, "byteLength": 6},
+                      {"buffer": 0, "byteOffset": 8, "byteLength": 48, "byteStride": 16}],
+      "buffers": [{"byteLength": 56}]})");
+  }
+  std::string bytes() const { return glb(json, binary); }
+  GlbMesh read() const {
+    const test::TempDir dir;
+    test::write_bytes(dir / "a.glb", bytes());
+    return read_glb(dir / "a.glb");
+  }
+};
+
+std::string defect(const std::string& bytes) {
+  return test::defect_of(bytes, [](const auto& path) { (void)read_glb(path); });
+}
+
+void expect_near(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  EXPECT_LT((a - b).norm(), 1e-12) << a.transpose() << " is not " << b.transpose();
+}
+
+TEST(ReadGlb, InterleavedVerticesWithColoursOfBytes) {
+  const GlbMesh mesh = Triangle().read();
+  ASSERT_EQ(mesh.parsed.positions.size(), 3U);
+  expect_near(mesh.parsed.positions[2], {0, 2, 0});
+  ASSERT_EQ(mesh.parsed.mesh.faces.size(), 1U);
+  ASSERT_EQ(mesh.parsed.mesh.colors.size(), 3U);
+  EXPECT_FLOAT_EQ(mesh.parsed.mesh.colors[0].x(), 1);
+  // IEC 61966-2-1 of 55 / 255.
+  EXPECT_NEAR(mesh.parsed.mesh.colors[0].z(), 1.055 * std::pow(55 / 255.0, 1 / 2.4) - 0.055, 1e-6);
+  EXPECT_TRUE(mesh.parsed.mesh.provenance.empty());
+  expect_near(mesh.up, {0, 1, 0});
+}
+
+TEST(ReadGlb, NodesPlaceTurnScaleAndMirror) {
+  Triangle t;
+  const double h = std::sqrt(0.5);  // 90 degrees about z
+  t.json["nodes"] = {{{"children", {1}}, {"translation", {10, 0, 0}}, {"rotation", {0, 0, h, h}}},
+                     {{"mesh", 0}, {"scale", {-1, 3, 1}}}};
+  const GlbMesh mesh = t.read();
+  expect_near(mesh.parsed.positions[0], {10, 0, 0});
+  expect_near(mesh.parsed.positions[1], {10, -1, 0});  // (1,0,0) -> (-1,0,0) -> (0,-1,0)
+  expect_near(mesh.parsed.positions[2], {4, 0, 0});    // (0,2,0) -> (0,6,0) -> (-6,0,0)
+  const std::array<uint32_t, 3> turned = {0, 2, 1};
+  EXPECT_EQ(mesh.parsed.mesh.faces[0], turned);
+}
+
+TEST(ReadGlb, AMatrixIsByColumns) {
+  Triangle t;
+  t.json["nodes"][0]["matrix"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1};
+  expect_near(t.read().parsed.positions[0], {5, 6, 7});
+}
+
+TEST(ReadGlb, StripsTurnEverySecondTriangle) {
+  Triangle t;
+  t.json["meshes"][0]["primitives"][0]["mode"] = 5;
+  t.json["accessors"][0]["count"] = 4;
+  t.json["bufferViews"][0]["byteLength"] = 8;
+  const auto faces = t.read().parsed.mesh.faces;
+  ASSERT_EQ(faces.size(), 2U);
+  EXPECT_EQ(faces[0], (std::array<uint32_t, 3>{0, 1, 2}));
+  EXPECT_EQ(faces[1], (std::array<uint32_t, 3>{1, 0, 2}) /* (1,2,0) turned */)
+      << faces[1][0] << faces[1][1] << faces[1][2];
+}
+
+TEST(ReadGlb, NamesWhatIsWrong) {
+  const std::string good = Triangle().bytes();
+  const auto broken = [](const char* pointer, const Json& value) {
+    Triangle t;
+    t.json[Json::json_pointer(pointer)] = value;
+    return defect(t.bytes());
+  };
+  EXPECT_EQ(defect("glTX" + good.substr(4)), "MAGIC");
+  EXPECT_EQ(defect(good.substr(0, 4) + '\1' + good.substr(5)), "UNSUPPORTED");
+  EXPECT_EQ(defect(good.substr(0, good.size() - 1)), "TRUNCATED");
+  EXPECT_EQ(broken("/accessors/1/count", 4), "COUNT");
+  EXPECT_EQ(broken("/accessors/1/count", -1), "SCHEMA");
+  EXPECT_EQ(broken("/accessors/1/type", "VEC2"), "SCHEMA");
+  EXPECT_EQ(broken("/accessors/1/componentType", 5130), "SCHEMA");
+  EXPECT_EQ(broken("/accessors/1/sparse", Json::object()), "UNSUPPORTED");
+  EXPECT_EQ(broken("/bufferViews/1/byteOffset", 9), "COUNT");
+  EXPECT_EQ(broken("/bufferViews/1/byteOffset", 9007199254740992.0), "COUNT");
+  EXPECT_EQ(broken("/bufferViews/1/byteStride", 4), "VALUE");
+  EXPECT_EQ(broken("/buffers/0/uri", "/etc/passwd"), "UNSUPPORTED");
+  EXPECT_EQ(broken("/nodes/0/children", {0}), "REF");
+  EXPECT_EQ(broken("/nodes/0/mesh", 1), "REF");
+  EXPECT_EQ(broken("/extensionsRequired", {"EXT_meshopt_compression"}), "UNSUPPORTED");
+  EXPECT_EQ(broken("/meshes/0/primitives/0/mode", 0), "EMPTY");
+  Triangle t;
+  t.binary[2] = 3;  // an index
+  EXPECT_EQ(defect(t.bytes()), "REF");
+}
+
+/// What write_glb() wrote, plain or compressed, read as any mesh.
+void expect_round_trip(const GlbOptions& options, double tolerance) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::labelled_sphere();
+  const Frame frame = test::centimetre_frame();
+  write_glb(dir / "a.glb", mesh, frame, options);
+  const MeasurableFile back = read_mesh_file(dir / "a.glb");
+  EXPECT_EQ(back.content.points.size(), mesh.vertices.size());  // welded across materials
+  ASSERT_EQ(back.content.mesh.faces.size(), mesh.faces.size());
+  EXPECT_DOUBLE_EQ(back.content.frame.metres_per_unit, 0.01);
+  EXPECT_DOUBLE_EQ(back.content.frame.metres_sigma, 0.0001);
+  EXPECT_EQ(back.content.frame.scale_source, ScaleSource::KnownDistance);
+  expect_near(*back.up, -Eigen::Vector3d::UnitY());
+  const double ratio = back.content.frame.scale / frame.scale;
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const Eigen::Vector3d wanted = frame.world_from_internal(mesh.vertices[v].cast<double>());
+    double nearest = 1e300;
+    size_t best = 0;
+    for (size_t i = 0; i < back.content.points.size(); ++i) {
+      const Eigen::Vector3d p = back.content.frame.world_from_internal(back.content.points[i]);
+      if ((p - wanted).norm() < nearest) best = i;
+      nearest = std::min(nearest, (p - wanted).norm());
+    }
+    ASSERT_LT(nearest, tolerance);
+    EXPECT_LT((back.content.mesh.colors[best] - mesh.colors[v]).norm(), 0.01f);
+    EXPECT_FLOAT_EQ(back.content.mesh.support[best], mesh.support[v]);
+    if (std::isnan(mesh.sigma[v])) {
+      EXPECT_TRUE(std::isnan(back.content.mesh.sigma[best]));
+    } else {
+      EXPECT_NEAR(double{back.content.mesh.sigma[best]} * ratio, double{mesh.sigma[v]}, 5e-6);
+    }
+  }
+  const auto before = area_by_provenance(mesh);
+  const auto after = area_by_provenance(back.content.mesh);
+  for (size_t label = 0; label < before.size(); ++label) {
+    EXPECT_NEAR(after.at(label) * ratio * ratio, before.at(label), 1e-3 * before.at(label));
+  }
+}
+
+TEST(ReadGlb, LeadsOurFilesBackToTheWorld) {
+  const Eigen::Matrix3d y_up = y_up_from(-Eigen::Vector3d::UnitY());
+  expect_round_trip({.draco = false, .y_up = y_up}, 1e-4);
+  expect_round_trip({.draco = true, .y_up = y_up}, 64 * 0.8 / 8192);
+}
+
+TEST(ReadGlb, SurvivesDamagedCompression) {
+  const test::TempDir dir;
+  write_glb(dir / "a.glb", test::labelled_sphere(), test::centimetre_frame());
+  const std::string good = test::read_bytes(dir / "a.glb");
+  const size_t binary = good.find(std::string("BIN\0", 4)) + 4;
+  int refused = 0;
+  constexpr int kTries = 60;
+  for (int i = 0; i < kTries; ++i) {
+    std::string bad = good;
+    const size_t at = binary + (good.size() - binary) * static_cast<size_t>(i) / kTries;
+    bad[at] = static_cast<char>(bad[at] ^ (1 << i % 8 | 0x40));
+    test::write_bytes(dir / "b.glb", bad);
+    try {
+      (void)read_glb(dir / "b.glb");
+    } catch (const Error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 0);
+}
+
+}  // namespace
+}  // namespace cgs

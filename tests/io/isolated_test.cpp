@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/isolated.h"
+
+#include <cstdlib>
+#include <stdexcept>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+namespace {
+
+TEST(RunIsolated, HandsOverWhatTheChildReturns) {
+  const std::string large(3'000'000, 'x');  // more than a pipe holds
+  EXPECT_EQ(run_isolated([&] { return large + "y"; }, "a"), large + "y");
+  EXPECT_EQ(run_isolated([] { return std::string(); }, "a"), "");
+}
+
+TEST(RunIsolated, TurnsACrashIntoAMessage) {
+  EXPECT_THROW(run_isolated([]() -> std::string { std::abort(); }, "a"), BadInput);
+  try {
+    run_isolated([]() -> std::string { throw std::runtime_error("no such thing"); }, "a.glb");
+    FAIL();
+  } catch (const BadInput& error) {
+    EXPECT_NE(std::string(error.what()).find("a.glb"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("no such thing"), std::string::npos) << error.what();
+  }
+}
+
+#ifndef __SANITIZE_ADDRESS__  // which needs the addresses for itself
+TEST(RunIsolated, LimitsMemory) {
+  const auto greedy = [] { return std::to_string(std::vector<char>(size_t{1} << 30, 'x').size()); };
+  EXPECT_THROW(run_isolated(greedy, "a", {.memory = size_t{64} << 20}), LimitError);
+  EXPECT_EQ(run_isolated(greedy, "a"), std::to_string(1 << 30));
+}
+#endif
+
+TEST(RunIsolated, LimitsTime) {
+  volatile bool forever = true;
+  const auto endless = [&]() -> std::string {
+    while (forever) {
+    }
+    return "";
+  };
+  EXPECT_THROW(run_isolated(endless, "a", {.seconds = 1}), LimitError);
+}
+
+}  // namespace
+}  // namespace cgs
