@@ -58,6 +58,7 @@ bool is_mesh_name(const std::filesystem::path& path) {
 MeasurableFile read_mesh_file(const std::filesystem::path& path,
                               const std::optional<Frame>& frame) {
   ParsedMesh parsed = parse(path);
+  check_significance(parsed, path);
   const PlyPlacement placement =
       ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
   placement.frame.validate();

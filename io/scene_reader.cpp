@@ -17,6 +17,7 @@
 #include "io/masks.h"
 #include "io/orientation.h"
 #include "io/resample.h"
+#include "io/significance.h"
 #include "io/strecha.h"
 #include "io/transforms_json.h"
 #include "libcgs/core/error.h"
@@ -256,7 +257,7 @@ void choose_views(Scene& scene, const std::string& list) {
 }
 
 void check_baselines(const Scene& scene) {
-  constexpr double kRounding = 1e-12;
+  constexpr double kRounding = 0x1p-49;  // eight steps of double
   const auto& first = scene.views[static_cast<size_t>(scene.input[0])].camera;
   for (const int i : scene.input) {
     const auto& camera = scene.views[static_cast<size_t>(i)].camera;
@@ -266,6 +267,12 @@ void check_baselines(const Scene& scene) {
   throw BadInput(Defect::Value,
                  scene.folder,
                  "all input cameras share one centre (baseline 0), so no depth can be measured");
+}
+
+void check_places(const Scene& scene) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : subject_points(scene)) box.extend(p);
+  (void)check_significance(scene.folder, box, kDoubleDigits);
 }
 
 void load_image(Scene& scene, View& view) {
@@ -322,6 +329,7 @@ Scene prepared(Scene scene, const SceneOptions& options) {
   divide_sizes(scene, options.downscale ? *options.downscale : chosen_downscale(scene));
   choose_views(scene, options.views);
   check_baselines(scene);
+  check_places(scene);
   return scene;
 }
 

@@ -82,7 +82,7 @@ bool Cell::is_exact() const {
   const double grid = std::ldexp(scale, -8);  // the scene is between 2 and 4 wide
   const Eigen::Vector3d cells = move / grid;
   return is_power && cells == Eigen::Vector3d(cells.array().round()) &&
-         (move.isZero(0) || bits(1) > 30);
+         (move.isZero(0) || bits(1) > 29);
 }
 
 const std::vector<Cell>& cells() {

@@ -45,7 +45,6 @@ struct Finding {
 /// before a wall, as transforms.json with images.
 void write_scene(const std::filesystem::path& folder, const Cell& cell);
 constexpr const char* kInputViews = "v11,v12,v13";
-constexpr const char* kHeldOutViews = "v08,v16";
 
 /// The true z-depth in plain units that a view of the scene shows.
 DepthMap true_depth_of(int view);
