@@ -17,6 +17,8 @@
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
 #include "convert/simplification.h"
+#include "convert/stage_cost.h"
+#include "convert/verification.h"
 #include "convert/views.h"
 #include "io/atomic_file.h"
 #include "io/content_hash.h"
@@ -364,12 +366,15 @@ Json run_stages(Run& run, Terminal& terminal) {
       continue;
     }
     stale = true;
+    const CostMeter meter;  // from here on the peak of memory is that of the stage
     const Json result = stage.work(run, terminal.begin(stage.title));
     run.record.finish(stage.name, terminal.end(""), result);
     if (!result.is_object() || !result.contains("warnings")) continue;
     for (const Json& text : result["warnings"]) terminal.warn(text.get<std::string>());
   }
   forget_checkpoints(run.request.output / "model");
+  run.record.note("focal", run.request.scene.focal);
+  run.record.note("outputs", output_hashes(run.request.output));
   loaded_model(run);
   return report_json(run);
 }

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
+#include <sstream>
 #include <utility>
 
 #include "io/byte_reader.h"
@@ -269,9 +271,25 @@ void check_baselines(const Scene& scene) {
                  "all input cameras share one centre (baseline 0), so no depth can be measured");
 }
 
+// Refuses cameras that stand too near to each other for what they look at, or too far from the
+// origin for any of it.
 void check_places(const Scene& scene) {
+  const std::vector<Eigen::Vector3d> points = subject_points(scene);  // camera, subject, camera, …
+  double baseline = 0;
+  double distance = std::numeric_limits<double>::infinity();
   Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& p : subject_points(scene)) box.extend(p);
+  for (size_t i = 0; i < points.size(); i += 2) {
+    baseline = std::max(baseline, (points[i] - points[0]).norm());
+    distance = std::min(distance, (points[i + 1] - points[i]).norm());
+    box.extend(points[i]).extend(points[i + 1]);
+  }
+  constexpr double kSmallest = 1e-6;  // less than a hundredth of a pixel at any focal length
+  if (baseline < kSmallest * distance) {
+    std::ostringstream text;
+    text << "the input cameras are at most " << baseline << " apart and their subject is "
+         << distance << " away, so no depth can be measured; choose views from different places";
+    throw BadInput(Defect::Value, scene.folder, text.str());
+  }
   (void)check_significance(scene.folder, box, kDoubleDigits);
 }
 
