@@ -12,6 +12,7 @@
 
 #include "convert/frame_json.h"
 #include "convert/length.h"
+#include "convert/memory_plan.h"
 #include "convert/report.h"
 #include "convert/report_viewer.h"
 #include "convert/run_record.h"
@@ -394,6 +395,9 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   Scene& scene = opened.scene;
   for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  const std::vector<StageMemory> plan = memory_plan(scene);
+  terminal.say("memory: " + memory_plan_text(plan));
+  check_memory_plan(plan, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
   check_lengths(request, scene.frame);
@@ -412,6 +416,9 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
     remove_abandoned_files(request.output / folder);
   }
   opened.keep(request.output / "model");
+  Json predicted = Json::object();
+  for (const StageMemory& stage : plan) predicted[stage.stage] = stage.bytes;
+  record.note("predicted_memory", predicted);
   Run run{request, std::move(record), std::move(scene), std::move(distances), {}, {}};
   try {
     return run_stages(run, terminal);

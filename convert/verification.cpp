@@ -70,7 +70,10 @@ void compare(const Json& before, const Json& now, const std::string& kind, Verif
   }
 }
 
-void verify_inputs(const Json& record, const fs::path& output, Terminal& terminal, Verification& out) {
+void verify_inputs(const Json& record,
+                   const fs::path& output,
+                   Terminal& terminal,
+                   Verification& out) {
   RunRequest request;
   request.scene = scene_request(record);
   const OpenedScene opened = open_scene(request.scene, output / "model", terminal);

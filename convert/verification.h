@@ -24,7 +24,8 @@ struct Verification {
 
 /// Reads the inputs and outputs of a finished run again and compares them with what its run.json
 /// says. Nothing is computed or written; files that the run did not make are not looked at.
-/// \throws BadInput Missing, Schema (no record of a finished run), and as open_scene() where a scene
+/// \throws BadInput Missing, Schema (no record of a finished run), and as open_scene() where a
+/// scene
 ///         cannot be read any more
 Verification verify_run(const std::filesystem::path& output, Terminal& terminal);
 

@@ -165,8 +165,7 @@ void write_volume(const std::filesystem::path& path, const Volume& volume, const
     surface->setGridClass(openvdb::GRID_LEVEL_SET);
     grids.push_back(named<openvdb::FloatGrid>(surface, "surface"));
   }
-  std::map<std::string, std::string> about = {{"creator", "cgs"},
-                                              {"cgs_units", frame.unit_name()}};
+  std::map<std::string, std::string> about = {{"creator", "cgs"}, {"cgs_units", frame.unit_name()}};
   if (stretch != 1) about[kStretchKey] = stretch_text;
   write_vdb(path, grids, about);
 }

@@ -25,8 +25,9 @@ void write_cameras_json(const std::filesystem::path& path, const Scene& scene);
 /// internal cameras come back bit for bit. A position that was edited in the file counts.
 ///
 /// In files of other programs the principal point is the centre, the frame the identity, the kind
-/// kForeignCameras, and neither input nor held-out views are known. Images that no longer exist are listed as missing.
-/// \throws BadInput Syntax, Schema, Value, naming the JSON pointer; Empty (no camera); LimitError.
+/// kForeignCameras, and neither input nor held-out views are known. Images that no longer exist are
+/// listed as missing. \throws BadInput Syntax, Schema, Value, naming the JSON pointer; Empty (no
+/// camera); LimitError.
 Scene read_cameras_json(const std::filesystem::path& path);
 
 }  // namespace cgs

@@ -20,8 +20,8 @@ std::string check_significance(const std::filesystem::path& path,
   if (extent == 0 || bits >= odd_below) return "";
   std::ostringstream text;
   text << "input has only " << std::max(0, static_cast<int>(std::floor(bits)))
-       << " significant bits: it is " << extent << " wide, and its coordinates are stored in steps of "
-       << extent * std::exp2(-bits);
+       << " significant bits: it is " << extent
+       << " wide, and its coordinates are stored in steps of " << extent * std::exp2(-bits);
   if (bits >= refused_below) return text.str();
   text << "; at least " << refused_below
        << " bits are needed, so move it nearer to the origin where it is made";

@@ -35,10 +35,10 @@ void run_verify(const VerifyArgs& args) {
     std::cout << found.outputs << " outputs checked, " << found.differing.size() << " differ\n";
   }
   if (found.differing.empty()) return;
-  throw BadInput(Defect::Mismatch,
-                 args.output,
-                 std::to_string(found.differing.size()) + " differ, the first is " +
-                     found.differing.front());
+  throw BadInput(
+      Defect::Mismatch,
+      args.output,
+      std::to_string(found.differing.size()) + " differ, the first is " + found.differing.front());
 }
 
 }  // namespace

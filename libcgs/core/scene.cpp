@@ -86,8 +86,7 @@ DepthRange depth_range(const Scene& scene, int view) {
                    "the input cameras share one centre (baseline 0), so no depth can be measured; "
                    "choose views taken from different places");
   }
-  const Eigen::Vector3d uvz =
-      project_offset(v.camera, convergence_from(v.camera.center(), scene));
+  const Eigen::Vector3d uvz = project_offset(v.camera, convergence_from(v.camera.center(), scene));
   // Axes that (nearly) meet in front of the camera say where the subject is; parallel axes leave
   // only the baseline as a unit of length.
   if (std::isfinite(uvz.z()) && uvz.z() > baseline * 0.5 && uvz.z() < baseline * 100) {

@@ -310,10 +310,13 @@ size_t Trainer::update() {
   size_t skipped = 0;
   for (size_t n = 0; n < model_.view_count(); ++n) {
     CoherentGaussians::ViewParameters& own = model_.parameters[n];
-    skipped += adam_step(own.depth, depth_state_[n], static_cast<float>(rate * options_.depth_rate));
-    skipped += adam_step(own.opacity, opacity_state_[n], static_cast<float>(rate * options_.opacity_rate));
+    skipped +=
+        adam_step(own.depth, depth_state_[n], static_cast<float>(rate * options_.depth_rate));
+    skipped +=
+        adam_step(own.opacity, opacity_state_[n], static_cast<float>(rate * options_.opacity_rate));
     if (model_.shapes_are_free()) {
-      skipped += adam_step(own.shape, shape_state_[n], static_cast<float>(rate * options_.shape_rate));
+      skipped +=
+          adam_step(own.shape, shape_state_[n], static_cast<float>(rate * options_.shape_rate));
     }
   }
   return skipped;
@@ -329,7 +332,8 @@ StepReport Trainer::step() {
   model_.add_gradients(gaussians, depth);
   report.bending = model_.add_bending(options_.depth_bending, options_.opacity_bending) +
                    model_.add_opacity_prior(options_.opacity_prior);
-  // The state is still that of the last good step; a NaN in every parameter would look like a result.
+  // The state is still that of the last good step; a NaN in every parameter would look like a
+  // result.
   if (!std::isfinite(report.total())) {
     throw NumericalError("the loss is not finite in step " + std::to_string(step_ + 1) +
                          " of the training; --set steps=0 leaves it out");

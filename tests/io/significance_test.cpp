@@ -87,8 +87,9 @@ TEST(CheckSignificance, KnowsHowFormatsStoreCoordinates) {
   test::write_bytes(dir / "text.off", off);
   test::write_bytes(dir / "doubles.ply", ply("double", doubles));
   test::write_bytes(dir / "singles.ply", ply("float", singles));
-  test::write_bytes(dir / "singles.stl",
-                    std::string(80, ' ') + test::packed(uint32_t(sphere.mesh.faces.size())) + facets);
+  test::write_bytes(
+      dir / "singles.stl",
+      std::string(80, ' ') + test::packed(uint32_t(sphere.mesh.faces.size())) + facets);
   EXPECT_EQ(defect_of([&] { read_mesh_file(dir / "singles.ply"); }), "VALUE");
   EXPECT_EQ(defect_of([&] { read_mesh_file(dir / "singles.stl"); }), "VALUE");
   EXPECT_TRUE(read_mesh_file(dir / "doubles.ply").warnings.empty());
@@ -98,16 +99,28 @@ TEST(CheckSignificance, KnowsHowFormatsStoreCoordinates) {
 // Splats as other programs would write them where no origin is told.
 std::string splats_at(const Eigen::Vector3d& place, double extent) {
   std::string out = "ply\nformat binary_little_endian 1.0\nelement vertex 27\n";
-  for (const char* name : {"x",       "y",       "z",       "f_dc_0",  "f_dc_1",
-                           "f_dc_2",  "opacity", "scale_0", "scale_1", "scale_2",
-                           "rot_0",   "rot_1",   "rot_2",   "rot_3"}) {
+  for (const char* name : {"x",
+                           "y",
+                           "z",
+                           "f_dc_0",
+                           "f_dc_1",
+                           "f_dc_2",
+                           "opacity",
+                           "scale_0",
+                           "scale_1",
+                           "scale_2",
+                           "rot_0",
+                           "rot_1",
+                           "rot_2",
+                           "rot_3"}) {
     out += std::string("property float ") + name + "\n";
   }
   out += "end_header\n";
   const auto log_scale = float(std::log(extent / 10));
   for (int i = 0; i < 27; ++i) {
     const Eigen::Vector3d p = place + extent / 2 * Eigen::Vector3d(i % 3, i / 3 % 3, i / 9);
-    out += test::packed(float(p.x()), float(p.y()), float(p.z()), 0.1f, 0.2f, 0.3f, 2.0f * float(i));
+    out +=
+        test::packed(float(p.x()), float(p.y()), float(p.z()), 0.1f, 0.2f, 0.3f, 2.0f * float(i));
     out += test::packed(log_scale, log_scale, log_scale, 1.0f, 0.0f, 0.0f, 0.0f);
   }
   return out;

