@@ -7,6 +7,8 @@
 #include <limits>
 #include <sstream>
 
+#include <nlohmann/json.hpp>
+
 #include "tests/support/scene_files.h"
 #include "tests/support/solid_meshes.h"
 #include "tests/support/stereo_scene.h"
@@ -237,6 +239,53 @@ std::vector<Eigen::Vector3d> read_stl_corners(const fs::path& file) {
     }
   }
   return out;
+}
+
+void write_moved_model(const fs::path& plain, const fs::path& folder, const Cell& cell) {
+  std::string ply = read_bytes(plain / "gaussians.ply");
+  const PlyColumns columns = read_ply_columns(plain / "gaussians.ply");
+  const size_t data = ply.find("end_header\n") + 11;
+  const size_t count = columns.columns.at("x").size();
+  const size_t stride = (ply.size() - data) / count / 4;  // all are floats
+  std::vector<float> values(count * stride);
+  std::memcpy(values.data(), ply.data() + data, 4 * values.size());
+  std::istringstream header(ply.substr(0, data));
+  std::string head;
+  std::map<std::string, size_t> place;
+  for (std::string line; std::getline(header, line);) {
+    if (line.rfind("comment", 0) == 0) continue;
+    if (line.rfind("property float ", 0) == 0) place.emplace(line.substr(15), place.size());
+    head += line + "\n";
+    if (line.rfind("format ", 0) == 0 && !cell.is_refused()) {
+      head += "comment file_origin " + number(cell.move.x()) + " " + number(cell.move.y()) + " " +
+              number(cell.move.z()) + "\n";
+    }
+  }
+  const Eigen::Vector3d offset = cell.is_refused() ? cell.move : Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < count; ++i) {
+    float* row = &values[i * stride];
+    for (int k = 0; k < 3; ++k) {
+      float& p = row[place.at(std::string(1, char('x' + k)))];
+      p = float(cell.scale * p + offset[k]);
+      float& s = row[place.at("scale_" + std::to_string(k))];
+      s = float(s + std::log(cell.scale));
+    }
+  }
+  write_bytes(folder / "gaussians.ply",
+              head + std::string(reinterpret_cast<const char*>(values.data()), 4 * values.size()));
+  nlohmann::json cameras = nlohmann::json::parse(read_bytes(plain / "cameras.json"));
+  nlohmann::json moved = nlohmann::json::array();
+  for (nlohmann::json& camera : cameras) {
+    for (const char* ours : {"frame", "internal_position", "role", "image_path", "near", "far"}) {
+      camera.erase(ours);
+    }
+    for (int k = 0; k < 3; ++k) {
+      camera["position"][size_t(k)] =
+          cell.scale * camera["position"][size_t(k)].get<double>() + offset[k];
+    }
+    moved.push_back(camera);
+  }
+  write_bytes(folder / "cameras.json", moved.dump());
 }
 
 }  // namespace cgs::test

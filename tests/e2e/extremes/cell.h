@@ -70,4 +70,11 @@ std::vector<Eigen::Vector3d> read_obj_points(const std::filesystem::path& file);
 /// Corners of a binary STL as they are stored, three per facet.
 std::vector<Eigen::Vector3d> read_stl_corners(const std::filesystem::path& file);
 
+/// A trained plain model moved to a cell, in the layout of 3DGS: a PLY of splats and cameras.json,
+/// the origin told in a comment. Where double cannot hold the scene it comes as programs without
+/// such a comment write it, in world coordinates.
+void write_moved_model(const std::filesystem::path& plain,
+                       const std::filesystem::path& folder,
+                       const Cell& cell);
+
 }  // namespace cgs::test

@@ -16,6 +16,7 @@
 
 #include "io/exr.h"
 #include "tests/e2e/extremes/cell.h"
+#include "tests/e2e/extremes/closeness.h"
 #include "tests/support/glb_file.h"
 
 namespace cgs::test {
@@ -23,7 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-using Points = std::vector<Eigen::Vector3d>;
 
 int passed_cells = 0;
 int tried_cells = 0;
@@ -55,40 +55,6 @@ json json_of(const std::string& arguments) {
   const ProgramResult result = run_cgs(arguments + " -q --json");
   if (result.exit_code != 0) throw std::runtime_error(result.err);
   return json::parse(result.out);
-}
-
-double largest(double a, double b) { return std::isnan(a) || std::isnan(b) ? NAN : std::max(a, b); }
-
-/// Largest distance between points in the world of a cell and plain points, in plain units.
-double largest_error(const Points& in_world, const Points& plain, const Cell& cell) {
-  if (in_world.size() != plain.size() || plain.empty()) return NAN;
-  double out = 0;
-  for (size_t i = 0; i < plain.size(); ++i) {
-    out = largest(out, (cell.plain(in_world[i]) - plain[i]).norm());
-  }
-  return out;
-}
-
-double nearest_distance(const Eigen::Vector3d& p, const Points& points) {
-  double best = INFINITY;
-  for (const Eigen::Vector3d& q : points) best = std::min(best, (p - q).squaredNorm());
-  return std::sqrt(best);
-}
-
-/// Share of points that have no point of the other set within `tolerance`, the worse way round.
-double share_apart(const Points& a, const Points& b, double tolerance) {
-  const auto one_way = [&](const Points& from, const Points& to) {
-    size_t apart = 0;
-    for (const auto& p : from) apart += nearest_distance(p, to) > tolerance ? 1 : 0;
-    return from.empty() ? 1.0 : double(apart) / double(from.size());
-  };
-  return std::max(one_way(a, b), one_way(b, a));
-}
-
-Points plain_points(const Points& in_world, const Cell& cell) {
-  Points out;
-  for (const auto& p : in_world) out.push_back(cell.plain(p));
-  return out;
 }
 
 std::string text(const char* format, double a, double b = 0) {
@@ -148,65 +114,13 @@ Finding train(const Cell& cell) {
           text("%.4f dB, %.2f %% of places beyond 1 % %", decibels, 100 * apart)};
 }
 
-// The layout of 3DGS: a PLY of splats and cameras.json, with the origin told in a comment.
-void write_moved_model(const fs::path& folder, const Cell& cell) {
-  const fs::path plain = trained(plain_cell(), 0).model();
-  std::string ply = read_bytes(plain / "gaussians.ply");
-  const PlyColumns columns = read_ply_columns(plain / "gaussians.ply");
-  const size_t data = ply.find("end_header\n") + 11;
-  const size_t count = columns.columns.at("x").size();
-  const size_t stride = (ply.size() - data) / count / 4;  // all are floats
-  std::vector<float> values(count * stride);
-  std::memcpy(values.data(), ply.data() + data, 4 * values.size());
-  std::istringstream header(ply.substr(0, data));
-  std::string head;
-  std::map<std::string, size_t> place;
-  for (std::string line; std::getline(header, line);) {
-    if (line.rfind("comment", 0) == 0) continue;
-    if (line.rfind("property float ", 0) == 0) place.emplace(line.substr(15), place.size());
-    head += line + "\n";
-    if (head.find("format") == head.rfind("format") && line.rfind("format", 0) == 0) {
-      std::ostringstream origin;
-      origin.precision(17);
-      origin << "comment file_origin " << cell.move.transpose() << "\n";
-      // Where double cannot hold the scene it comes as others write it: in world coordinates.
-      if (!cell.is_refused()) head += origin.str();
-    }
-  }
-  const Eigen::Vector3d offset = cell.is_refused() ? cell.move : Eigen::Vector3d::Zero();
-  for (size_t i = 0; i < count; ++i) {
-    float* row = &values[i * stride];
-    for (int k = 0; k < 3; ++k) {
-      float& p = row[place.at(std::string(1, char('x' + k)))];
-      p = float(cell.scale * p + offset[k]);
-      float& s = row[place.at("scale_" + std::to_string(k))];
-      s = float(s + std::log(cell.scale));
-    }
-  }
-  write_bytes(folder / "gaussians.ply",
-              head + std::string(reinterpret_cast<const char*>(values.data()), 4 * values.size()));
-  json cameras = json::parse(read_bytes(plain / "cameras.json"));
-  json moved = json::array();
-  for (json& camera : cameras) {
-    for (const char* ours : {"frame", "internal_position", "role", "image_path", "near", "far"}) {
-      camera.erase(ours);
-    }
-    for (int k = 0; k < 3; ++k) {
-      camera["position"][size_t(k)] =
-          cell.scale * camera["position"][size_t(k)].get<double>() + offset[k];
-    }
-    moved.push_back(camera);
-  }
-  write_bytes(folder / "cameras.json", moved.dump());
-}
-
 /// Channels of the views that `cgs render` makes of a model moved to a cell.
 struct Rendered {
   std::vector<ExrImage> views;
 
   explicit Rendered(const Cell& cell) {
     const TempDir dir;
-    write_moved_model(dir / "model", cell);
+    write_moved_model(trained(plain_cell(), 0).model(), dir / "model", cell);
     must_run("render " + (dir / "model").string() + " --views v12,v08 -o " +
              (dir / "views").string());
     for (const char* name : {"v12.exr", "v08.exr"}) views.push_back(read_exr(dir / "views" / name));
@@ -242,23 +156,6 @@ Finding render(const Cell& cell) {
   mean /= double(values);
   return {largest(largest(colour * 255 / 3, mean / 5e-5), depth / 1e-3),
           text("colour off by %.1e, depth by %.1e", colour, depth)};
-}
-
-double distance_to_triangle(const Eigen::Vector3d& p,
-                            const Eigen::Vector3d& a,
-                            const Eigen::Vector3d& b,
-                            const Eigen::Vector3d& c) {
-  const Eigen::Vector3d normal = (b - a).cross(c - a);
-  const bool inside = normal.squaredNorm() > 0 && (b - a).cross(p - a).dot(normal) >= 0 &&
-                      (c - b).cross(p - b).dot(normal) >= 0 &&
-                      (a - c).cross(p - c).dot(normal) >= 0;
-  if (inside) return std::abs((p - a).dot(normal.normalized()));
-  const auto to_segment = [&](const Eigen::Vector3d& s, const Eigen::Vector3d& e) {
-    const Eigen::Vector3d d = e - s;
-    const double t = d.squaredNorm() > 0 ? (p - s).dot(d) / d.squaredNorm() : 0;
-    return (p - s - std::clamp(t, 0.0, 1.0) * d).norm();
-  };
-  return std::min({to_segment(a, b), to_segment(b, c), to_segment(c, a)});
 }
 
 /// `cgs fuse` and `cgs mesh` of the depth of a cell.
