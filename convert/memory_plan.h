@@ -18,10 +18,11 @@ struct StageMemory {
 /// Predicts what the stages of a run will need, from the sizes of its pictures alone.
 ///
 /// What a stage holds grows with the pixels of the input views: a Gaussian, a few voxels and a few
-/// faces come of each. The factors are measured; see the README for how well they hold. Where the
-/// user chose a voxel size, what depends on voxels is not foreseen, and the volume itself refuses
-/// what does not fit.
-std::vector<StageMemory> memory_plan(const Scene& scene);
+/// faces come of each. The factors are measured; see the README for how well they hold.
+/// \param chooses_voxels  false where the user says how large voxels are: stages that depend on
+/// them
+///                        are then left out, and the volume itself refuses what does not fit
+std::vector<StageMemory> memory_plan(const Scene& scene, bool chooses_voxels);
 
 /// "depth and Gaussians 410 MiB, views 320 MiB, …"
 std::string memory_plan_text(const std::vector<StageMemory>& plan);

@@ -395,7 +395,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   Scene& scene = opened.scene;
   for (const std::string& warning : scene.warnings) terminal.warn(warning);
-  const std::vector<StageMemory> plan = memory_plan(scene);
+  const std::vector<StageMemory> plan = memory_plan(scene, request.voxel_size.empty());
   terminal.say("memory: " + memory_plan_text(plan));
   check_memory_plan(plan, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
