@@ -48,6 +48,7 @@ std::vector<StageMemory> memory_plan(const Scene& scene, bool chooses_voxels) {
   double pixels = 0;
   for (const int i : scene.input) pixels += pixels_of(scene.views[static_cast<size_t>(i)]);
   std::vector<StageMemory> plan;
+  plan.reserve(kFactors.size());
   for (const StageFactors& f : kFactors) {
     const std::string stage = f.stage;
     if (stage == "held-out views" && scene.held_out.empty()) continue;
