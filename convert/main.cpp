@@ -54,6 +54,7 @@ int run_program(int argc, char** argv) {
   cgs::add_compare(app);
   cgs::add_convert(app);
   cgs::add_tradeoff(app);
+  cgs::add_verify(app);
   try {
     app.parse(with_dashes(argc, argv));
   } catch (const CLI::ParseError& error) {

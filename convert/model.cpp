@@ -94,6 +94,18 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
   return priors;
 }
 
+// Cameras in the coordinates of the splats' file go where the splats went.
+void move_foreign_cameras(Scene& scene, const GaussianFile& splats) {
+  scene.frame = splats.frame;
+  for (View& view : scene.views) {
+    Eigen::Isometry3d& pose = view.camera.world_from_cam;
+    const Eigen::Vector3d from_origin = scene.frame.origin - splats.file_origin;
+    pose.translation() = (pose.translation() - from_origin) / scene.frame.scale;
+    view.near /= scene.frame.scale;
+    view.far /= scene.frame.scale;
+  }
+}
+
 // Everything the training depends on.
 uint64_t training_key(const Model& model, const TrainingOptions& options) {
   uint64_t key = content_hash(kProgramVersion);
@@ -179,7 +191,11 @@ nlohmann::ordered_json settings_to_json(const TrainingOptions& options) {
 
 nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request) {
   nlohmann::ordered_json loss = nlohmann::ordered_json::array();
-  for (const StepReport& step : trained.steps) loss.push_back(step.total());
+  size_t skipped = 0;
+  for (const StepReport& step : trained.steps) {
+    loss.push_back(step.total());
+    skipped += step.skipped;
+  }
   const std::string start = "one Gaussian per pixel at the depth of a multi-view plane sweep; ";
   return {{"description",
            trained.steps.empty()
@@ -191,6 +207,7 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
           {"gaussians", trained.model.gaussians.size()},
           {"settings", settings_to_json(request.training)},
           {"loss", loss},
+          {"gradients_not_finite", skipped},
           {"alignment",
            {{"scale", trained.priors.alignment.scale},
             {"offset", trained.priors.alignment.offset},
@@ -213,7 +230,10 @@ Model read_model(const std::filesystem::path& folder) {
   }
   Model model;
   model.scene = read_cameras_json(folder / "cameras.json");
-  GaussianFile file = read_gaussian_ply(folder / "gaussians.ply", model.scene.frame);
+  const bool has_frame = model.scene.kind != kForeignCameras;
+  const auto frame = has_frame ? std::optional(model.scene.frame) : std::nullopt;
+  GaussianFile file = read_gaussian_ply(folder / "gaussians.ply", frame);
+  if (!has_frame) move_foreign_cameras(model.scene, file);
   model.gaussians = std::move(file.gaussians);
   model.scene.warnings = std::move(file.warnings);
   for (const int i : model.scene.input) {

@@ -58,7 +58,8 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
 /// Writes gaussians.ply, cameras.json and priors/<view>.exr. \throws IoError
 void write_model(const std::filesystem::path& folder, const Model& model);
 
-/// Reads what write_model() wrote. \throws BadInput
+/// Reads what write_model() wrote, or gaussians.ply and cameras.json of 3DGS, which state no frame:
+/// it is then the canonical one of the splats. \throws BadInput
 Model read_model(const std::filesystem::path& folder);
 
 /// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model

@@ -12,11 +12,14 @@
 
 #include "convert/frame_json.h"
 #include "convert/length.h"
+#include "convert/memory_plan.h"
 #include "convert/report.h"
 #include "convert/report_viewer.h"
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
 #include "convert/simplification.h"
+#include "convert/stage_cost.h"
+#include "convert/verification.h"
 #include "convert/views.h"
 #include "io/atomic_file.h"
 #include "io/content_hash.h"
@@ -364,12 +367,15 @@ Json run_stages(Run& run, Terminal& terminal) {
       continue;
     }
     stale = true;
+    const CostMeter meter;  // from here on the peak of memory is that of the stage
     const Json result = stage.work(run, terminal.begin(stage.title));
     run.record.finish(stage.name, terminal.end(""), result);
     if (!result.is_object() || !result.contains("warnings")) continue;
     for (const Json& text : result["warnings"]) terminal.warn(text.get<std::string>());
   }
   forget_checkpoints(run.request.output / "model");
+  run.record.note("focal", run.request.scene.focal);
+  run.record.note("outputs", output_hashes(run.request.output));
   loaded_model(run);
   return report_json(run);
 }
@@ -389,6 +395,9 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   Scene& scene = opened.scene;
   for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  const std::vector<StageMemory> plan = memory_plan(scene, request.voxel_size.empty());
+  terminal.say("memory: " + memory_plan_text(plan));
+  check_memory_plan(plan, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
   check_lengths(request, scene.frame);
@@ -407,6 +416,9 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
     remove_abandoned_files(request.output / folder);
   }
   opened.keep(request.output / "model");
+  Json predicted = Json::object();
+  for (const StageMemory& stage : plan) predicted[stage.stage] = stage.bytes;
+  record.note("predicted_memory", predicted);
   Run run{request, std::move(record), std::move(scene), std::move(distances), {}, {}};
   try {
     return run_stages(run, terminal);

@@ -123,7 +123,14 @@ void RunRecord::finish(const std::string& stage, double seconds, const Json& res
     kept[name] = value;
   }
   stages = kept;
+  json_.erase("outputs");
   stages[stage] = {{"seconds", seconds}, {"peak_memory", peak_memory()}, {"result", result}};
+  save();
+}
+
+void RunRecord::note(const std::string& key, const Json& value) {
+  if (json_.contains(key) && json_[key] == value) return;
+  json_[key] = value;
   save();
 }
 

@@ -32,6 +32,9 @@ class RunRecord {
   /// Records a finished stage. Stages after it, done from older data, are forgotten.
   void finish(const std::string& stage, double seconds, const nlohmann::ordered_json& result);
 
+  /// Keeps something else that is known of the run beside its stages; finish() forgets "outputs".
+  void note(const std::string& key, const nlohmann::ordered_json& value);
+
   const nlohmann::ordered_json& json() const { return json_; }
 
  private:

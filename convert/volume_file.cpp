@@ -2,12 +2,15 @@
 #include "convert/volume_file.h"
 
 #include <array>
+#include <cmath>
+#include <map>
 
 #include <nlohmann/json.hpp>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/ValueTransformer.h>
 
 #include "convert/frame_json.h"
+#include "io/byte_reader.h"
 #include "io/vdb.h"
 #include "libcgs/core/error.h"
 
@@ -41,6 +44,7 @@ openvdb::FloatGrid::Ptr scaled_lengths(const openvdb::FloatGrid::Ptr& grid,
 }
 
 constexpr const char* kFrameKey = "cgs_frame";
+constexpr const char* kStretchKey = "cgs_stretch";
 constexpr const char* kBoundsKey = "cgs_bounds";  // min and max corner [internal units]
 
 template <typename Grid>
@@ -61,6 +65,28 @@ Frame frame_of(const openvdb::GridBase& grid, const std::filesystem::path& path)
     throw BadInput(
         Defect::Schema, path, "grid 'tsdf' has no readable frame (" + std::string(kFrameKey) + ")");
   }
+}
+
+// What lengths must be multiplied by for OpenVDB to take voxels of this edge.
+double stretch_for(double voxel_size) {
+  constexpr double kSmallest = 1e-4;  // the library wants the cube of it to be above 3e-15
+  double stretch = 1;
+  while (voxel_size * stretch < kSmallest) stretch *= 1024;
+  return stretch;
+}
+
+double stretch_of(const openvdb::GridBase& grid, const std::filesystem::path& path) {
+  const auto text = grid.getMetadata<openvdb::StringMetadata>(kStretchKey);
+  if (!text) return 1;
+  double stretch = 0;
+  int exponent = 0;
+  const bool is_power = parse_number(text->value(), stretch) && std::isfinite(stretch) &&
+                        stretch >= 1 && std::frexp(stretch, &exponent) == 0.5;
+  if (is_power) return stretch;
+  throw BadInput(Defect::Value,
+                 path,
+                 "is stretched by '" + text->value() + "', which must be a power of two (" +
+                     kStretchKey + ")");
 }
 
 std::string bounds_text(const Eigen::AlignedBox3d& box) {
@@ -114,14 +140,17 @@ openvdb::GridBase::ConstPtr named(typename Grid::Ptr grid, const char* name) {
 }  // namespace
 
 void write_volume(const std::filesystem::path& path, const Volume& volume, const Frame& frame) {
-  const double scale = frame.scale;
-  const Eigen::Vector3d offset = frame.origin - frame.file_origin;
+  const double stretch = stretch_for(volume.voxel_size * frame.scale);
+  const double scale = stretch * frame.scale;
+  const Eigen::Vector3d offset = stretch * (frame.origin - frame.file_origin);
   const auto values = [&](const auto& grid) {
     using Grid = typename std::decay_t<decltype(grid)>::element_type;
     return placed<Grid>(grid, scale, offset, false);
   };
   auto tsdf = scaled_lengths(volume.tsdf, scale, offset);
   tsdf->insertMeta(kFrameKey, openvdb::StringMetadata(frame_to_json(frame).dump()));
+  const std::string stretch_text = nlohmann::json(stretch).dump();
+  if (stretch != 1) tsdf->insertMeta(kStretchKey, openvdb::StringMetadata(stretch_text));
   tsdf->insertMeta(kBoundsKey, openvdb::StringMetadata(bounds_text(volume.bounds)));
   tsdf->setGridClass(openvdb::GRID_UNKNOWN);  // one-sided and open: no valid level set
   std::vector<openvdb::GridBase::ConstPtr> grids = {
@@ -136,7 +165,9 @@ void write_volume(const std::filesystem::path& path, const Volume& volume, const
     surface->setGridClass(openvdb::GRID_LEVEL_SET);
     grids.push_back(named<openvdb::FloatGrid>(surface, "surface"));
   }
-  write_vdb(path, grids, {{"creator", "cgs"}, {"cgs_units", frame.unit_name()}});
+  std::map<std::string, std::string> about = {{"creator", "cgs"}, {"cgs_units", frame.unit_name()}};
+  if (stretch != 1) about[kStretchKey] = stretch_text;
+  write_vdb(path, grids, about);
 }
 
 VolumeFile read_volume(const std::filesystem::path& path) {
@@ -144,8 +175,8 @@ VolumeFile read_volume(const std::filesystem::path& path) {
   VolumeFile file;
   const auto tsdf = find_grid<openvdb::FloatGrid>(grids, "tsdf", path);
   file.frame = frame_of(*tsdf, path);
-  const double scale = 1 / file.frame.scale;
-  const Eigen::Vector3d offset = -(file.frame.origin - file.frame.file_origin) * scale;
+  const double scale = 1 / (stretch_of(*tsdf, path) * file.frame.scale);
+  const Eigen::Vector3d offset = (file.frame.file_origin - file.frame.origin) / file.frame.scale;
   const auto lengths = [&](const char* name) {
     return scaled_lengths(find_grid<openvdb::FloatGrid>(grids, name, path), scale, offset);
   };

@@ -11,6 +11,10 @@ namespace cgs {
 /// Writes the grids of a volume as OpenVDB in file coordinates and file units, so that Blender and
 /// Houdini place it where the mesh is; internal lengths are scaled by a power of two, so
 /// read_volume() restores the same bits. The frame travels in the metadata.
+///
+/// OpenVDB cannot hold voxels below some hundred-thousandth of a unit. Smaller ones, and with them
+/// all places and lengths of the file, are multiplied by the power of 1024 that the metadata call
+/// "cgs_stretch", of the file and of its grid tsdf.
 void write_volume(const std::filesystem::path& path, const Volume& volume, const Frame& frame);
 
 struct VolumeFile {

@@ -186,7 +186,7 @@ Scene read_cameras_json(const std::filesystem::path& path) {
     throw LimitError(printable(path) + ": " + std::to_string(entries.size()) + " cameras");
   }
   Scene scene;
-  scene.kind = "cameras.json";
+  scene.kind = kForeignCameras;
   scene.folder = path.parent_path();
   if (const auto frame = entries.at(size_t{0}).find("frame")) read_frame(*frame, scene);
   std::set<std::string> names;

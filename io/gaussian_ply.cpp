@@ -228,6 +228,8 @@ RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path
       });
   RawSplats out = rows.take();
   out.comments = header.comments;
+  const PlyProperty& x = vertex.properties[static_cast<size_t>(vertex.find("x"))];
+  if (x.type == PlyType::Float64) out.digits = kDoubleDigits;
   if (trailing > 0) {
     out.notes.push_back("trailing " + std::to_string(trailing) + " bytes ignored");
   }

@@ -69,6 +69,7 @@ MeasurableFile read_mesh_file(const std::filesystem::path& path,
                               const std::optional<Frame>& frame) {
   std::optional<Eigen::Vector3d> up;
   ParsedMesh parsed = parse(path, up);
+  check_significance(parsed, path);
   const PlyPlacement placement =
       ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
   placement.frame.validate();

@@ -246,6 +246,13 @@ ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
         rows.add(element, i, row);
       });
   ParsedMesh out{std::move(rows.positions), std::move(rows.mesh), std::move(header.comments), {}};
+  if (const PlyElement* vertex = header.find("vertex")) {
+    const int x = vertex->find("x");
+    const bool is_double =
+        x >= 0 && vertex->properties[static_cast<size_t>(x)].type == PlyType::Float64;
+    const bool is_text = header.format == PlyFormat::Ascii;
+    out.digits = is_double || is_text ? kDoubleDigits : kFloatDigits;
+  }
   if (trailing > 0) {
     out.warnings.push_back("trailing " + std::to_string(trailing) + " bytes ignored");
   }
@@ -258,6 +265,7 @@ ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
 
 MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame) {
   ParsedMesh parsed = parse_mesh_ply(path);
+  check_significance(parsed, path);
   PlyPlacement placement =
       ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
   MeshFile out{std::move(parsed.mesh), placement.frame, std::move(placement.warnings)};

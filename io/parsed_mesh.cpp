@@ -43,6 +43,12 @@ std::vector<Eigen::Vector3d> opposite_corners(const std::vector<Eigen::Vector3d>
   return {low, high};
 }
 
+void check_significance(ParsedMesh& parsed, const std::filesystem::path& path) {
+  const std::vector<Eigen::Vector3d> corners = opposite_corners(parsed.positions);
+  const std::string odd = check_significance(path, {corners[0], corners[1]}, parsed.digits);
+  if (!odd.empty()) parsed.warnings.push_back(odd);
+}
+
 float internal_sigma(float sigma_in_file, const Frame& frame) {
   return sigma_in_file >= 0 && std::isfinite(sigma_in_file)
              ? static_cast<float>(sigma_in_file / frame.scale)

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "io/significance.h"
 #include "io/text_lines.h"
 #include "libcgs/core/frame.h"
 #include "libcgs/core/triangle_mesh.h"
@@ -20,6 +21,7 @@ struct ParsedMesh {
   TriangleMesh mesh;                       ///< All but the vertices; sigma in units of the file.
   std::vector<std::string> comments;  ///< Unit and origin, in the words of ply_frame_comments().
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
+  int digits = kDoubleDigits;         ///< Binary digits of the coordinates as stored.
 };
 
 /// Appends a polygon as a fan of triangles.
@@ -48,6 +50,10 @@ std::string_view expect_line(TextLines& lines, std::string_view what);
 
 /// Two opposite corners of the bounding box. \pre there is a point.
 std::vector<Eigen::Vector3d> opposite_corners(const std::vector<Eigen::Vector3d>& points);
+
+/// Refuses positions that were rounded too much, and warns of some: as the function of that name
+/// for boxes. \pre there is a point.
+void check_significance(ParsedMesh& parsed, const std::filesystem::path& path);
 
 /// A standard deviation of a file in internal units; NaN where it is negative or not finite.
 float internal_sigma(float sigma_in_file, const Frame& frame);

@@ -9,6 +9,8 @@
 
 #include <Eigen/Core>
 
+#include "io/significance.h"
+
 namespace cgs {
 
 /// Splats as their file holds them, before anything is judged or repaired: any value may be NaN or
@@ -22,6 +24,7 @@ struct RawSplats {
   std::vector<Eigen::Vector4f> rotation;   ///< (w, x, y, z)
   std::vector<float> logit;                ///< Of the opacity.
   std::vector<Eigen::Vector3f> sh;         ///< Gaussian-major, (sh_degree + 1)^2 for each.
+  int digits = kFloatDigits;               ///< Binary digits of a position as stored.
   std::vector<std::string> comments;       ///< Of a PLY header.
   std::vector<std::string> notes;          ///< One line each: what was left out, or looks odd.
 

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
+#include <sstream>
 #include <utility>
 
 #include "io/byte_reader.h"
@@ -17,6 +19,7 @@
 #include "io/masks.h"
 #include "io/orientation.h"
 #include "io/resample.h"
+#include "io/significance.h"
 #include "io/strecha.h"
 #include "io/transforms_json.h"
 #include "libcgs/core/error.h"
@@ -256,7 +259,7 @@ void choose_views(Scene& scene, const std::string& list) {
 }
 
 void check_baselines(const Scene& scene) {
-  constexpr double kRounding = 1e-12;
+  constexpr double kRounding = 0x1p-49;  // eight steps of double
   const auto& first = scene.views[static_cast<size_t>(scene.input[0])].camera;
   for (const int i : scene.input) {
     const auto& camera = scene.views[static_cast<size_t>(i)].camera;
@@ -266,6 +269,28 @@ void check_baselines(const Scene& scene) {
   throw BadInput(Defect::Value,
                  scene.folder,
                  "all input cameras share one centre (baseline 0), so no depth can be measured");
+}
+
+// Refuses cameras that stand too near to each other for what they look at, or too far from the
+// origin for any of it.
+void check_places(const Scene& scene) {
+  const std::vector<Eigen::Vector3d> points = subject_points(scene);  // camera, subject, camera, …
+  double baseline = 0;
+  double distance = std::numeric_limits<double>::infinity();
+  Eigen::AlignedBox3d box;
+  for (size_t i = 0; i < points.size(); i += 2) {
+    baseline = std::max(baseline, (points[i] - points[0]).norm());
+    distance = std::min(distance, (points[i + 1] - points[i]).norm());
+    box.extend(points[i]).extend(points[i + 1]);
+  }
+  constexpr double kSmallest = 1e-6;  // less than a hundredth of a pixel at any focal length
+  if (baseline < kSmallest * distance) {
+    std::ostringstream text;
+    text << "the input cameras are at most " << baseline << " apart and their subject is "
+         << distance << " away, so no depth can be measured; choose views from different places";
+    throw BadInput(Defect::Value, scene.folder, text.str());
+  }
+  (void)check_significance(scene.folder, box, kDoubleDigits);
 }
 
 void load_image(Scene& scene, View& view) {
@@ -322,6 +347,7 @@ Scene prepared(Scene scene, const SceneOptions& options) {
   divide_sizes(scene, options.downscale ? *options.downscale : chosen_downscale(scene));
   choose_views(scene, options.views);
   check_baselines(scene);
+  check_places(scene);
   return scene;
 }
 

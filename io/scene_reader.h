@@ -41,7 +41,8 @@ struct SceneOptions {
 /// \throws InvalidInput (options; a view that does not exist, is named twice or has no file),
 ///         BadInput Open (no such folder), Schema (layout not recognised), Empty (fewer than two
 ///         views), Missing (no image at all), Mismatch (image of another shape than its camera),
-///         Value (input cameras in one place), and as the readers of the layouts.
+///         Value (input cameras in one place; as check_significance()), and as the readers of the
+///         layouts.
 Scene read_scene(const std::filesystem::path& folder, const SceneOptions& options = {});
 
 /// The scene of photographs whose cameras were solved for, as read_scene() gives it for a folder

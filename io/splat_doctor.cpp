@@ -67,6 +67,7 @@ class Examination {
     const std::vector<Eigen::Vector3d> corners = inner_corners(raw_.position);
     const double extent = (corners[1] - corners[0]).maxCoeff();
     judge_coding(extent);
+    const std::string odd = check_significance(path_, widened(corners), raw_.digits);
     count_flyaways(corners, extent);
     PlyPlacement placement = ply_placement(raw_.comments, corners, frame);
     GaussianFile out;
@@ -75,14 +76,26 @@ class Examination {
       throw BadInput(Defect::Value, path_, "no finite splats: every one leaves the range of float");
     }
     out.frame = placement.frame;
+    out.file_origin = placement.file_origin;
     out.format = std::move(raw_.format);
     out.warnings = std::move(placement.warnings);
+    if (!odd.empty()) out.warnings.push_back(odd);
     add_warnings(out.warnings);
     out.findings = findings_;
     return out;
   }
 
  private:
+  /// The box of the splats. Where rounding has put all of them in one place, they tell how large it
+  /// was.
+  Eigen::AlignedBox3d widened(const std::vector<Eigen::Vector3d>& corners) const {
+    Eigen::AlignedBox3d box(corners[0], corners[1]);
+    if (raw_.size() == 1 || !box.sizes().isZero(0)) return box;
+    const double radius = std::exp(double{raw_.log_scale.front().maxCoeff()});
+    if (radius < box.min().cwiseAbs().maxCoeff()) box.max().x() += radius;
+    return box;
+  }
+
   /// Where the judgement of splat i is counted; null for a good one.
   uint64_t* defect_of(size_t i) {
     const size_t sh_count = raw_.sh_count();

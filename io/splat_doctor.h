@@ -33,6 +33,7 @@ struct SplatFindings {
 struct GaussianFile {
   Gaussians gaussians;
   Frame frame;
+  Eigen::Vector3d file_origin = Eigen::Vector3d::Zero();  ///< World point of (0, 0, 0) of the file.
   std::vector<std::string> warnings;  ///< One line each: what was dropped, clamped, or looks odd.
   std::string format;                 ///< For people.
   SplatFindings findings;
@@ -53,7 +54,7 @@ struct GaussianFile {
 /// \param frame  read into exactly this frame; without it a canonical frame is made from the 1st
 ///               to 99th percentile of the positions, so that stray splats do not shrink the scene,
 ///               with unit and origin from the comments
-/// \throws BadInput Value (no splat is left)
+/// \throws BadInput Value (no splat is left; as check_significance())
 GaussianFile examine_splats(RawSplats raw,
                             const std::filesystem::path& path,
                             const std::optional<Frame>& frame);

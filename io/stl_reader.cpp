@@ -33,6 +33,7 @@ ParsedMesh read_binary(const std::string& bytes, const std::filesystem::path& pa
   const auto count = reader.get<uint32_t>("number of facets");
   reader.expect_records(count, kFacetBytes, "facets");
   ParsedMesh out;
+  out.digits = kFloatDigits;
   if (header.starts_with("cgs binary STL, unit mm")) {
     out.comments.emplace_back("metres_per_unit 0.001");
   }

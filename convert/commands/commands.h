@@ -18,5 +18,6 @@ void add_render(CLI::App& app);
 void add_run(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 void add_train(CLI::App& app);
+void add_verify(CLI::App& app);
 
 }  // namespace cgs

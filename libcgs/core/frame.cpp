@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/core/frame.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -66,12 +68,20 @@ Frame canonical_frame(const std::vector<Eigen::Vector3d>& points_in_world) {
     frame.scale = std::ldexp(1.0, exponent);
   }
   // A grid of 2^-10 of the scale: fine enough to centre the scene, coarse enough that the
-  // subtraction is exact and that moving the world by whole cells changes nothing inside.
+  // subtraction is exact and that moving the world by whole cells changes nothing inside. Halves go
+  // up on both sides of zero: rounded away from it, they would depend on the place.
   const double cell = std::ldexp(frame.scale, -10);
-  frame.origin = (box.center() / cell).array().round() * cell;
+  frame.origin = (box.center() / cell + Eigen::Vector3d::Constant(0.5)).array().floor() * cell;
   constexpr double kFarAway = 256;  // of the extent: float coordinates then keep < 16 bits of it
   if (frame.origin.norm() > kFarAway * frame.scale) frame.file_origin = frame.origin;
   return frame;
+}
+
+double significant_bits(const Eigen::AlignedBox3d& box, int digits) {
+  const double farthest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
+  if (farthest == 0) return -std::numeric_limits<double>::infinity();
+  const double spacing = std::ldexp(1.0, std::ilogb(farthest) + 1 - digits);
+  return std::min<double>(digits, std::log2(box.sizes().maxCoeff() / spacing));
 }
 
 Eigen::Isometry3d internal_from_world(const Frame& frame, const Eigen::Isometry3d& world_from_cam) {

@@ -53,6 +53,13 @@ struct Frame {
 /// \throws InvalidInput if there is no point, or one is not finite.
 Frame canonical_frame(const std::vector<Eigen::Vector3d>& points_in_world);
 
+/// How many binary digits of the coordinates in a box tell its points apart: log2 of its largest
+/// side over the spacing of numbers where the box is farthest from zero.
+///
+/// \param digits  of a coordinate as it was stored: 53 = double, 24 = float
+/// \return -infinity for a box without extent; at most `digits`
+double significant_bits(const Eigen::AlignedBox3d& box, int digits);
+
 /// The same pose with its translation moved into (or out of) the canonical frame; axes stay.
 Eigen::Isometry3d internal_from_world(const Frame& frame, const Eigen::Isometry3d& world_from_cam);
 Eigen::Isometry3d world_from_internal(const Frame& frame,

@@ -21,19 +21,25 @@ double quantile(std::vector<double> values, double q) {
   return values[k];
 }
 
+// Coordinates may be large and the scene small: points are subtracted before they are turned, which
+// loses nothing, while rotating each by itself would round both.
+Eigen::Vector3d project_offset(const Camera& camera, const Eigen::Vector3d& from_center) {
+  return camera.project_in_cam(camera.world_from_cam.linear().transpose() * from_center);
+}
+
 // z-depths of the sparse points in front of a camera and inside its image.
 std::vector<double> point_depths(const Scene& scene, const Camera& camera) {
   std::vector<double> depths;
-  const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
   for (const SparsePoint& point : scene.points) {
-    const Eigen::Vector3d uvz = camera.project_in_cam(cam_from_world * point.position);
+    const Eigen::Vector3d uvz = project_offset(camera, point.position - camera.center());
     if (camera.sees(uvz)) depths.push_back(uvz.z());
   }
   return depths;
 }
 
-// Least-squares point closest to all optical axes; nullopt-like NaN if they are parallel.
-Eigen::Vector3d convergence_point(const Scene& scene) {
+// Least-squares point closest to all optical axes, seen from a place near the cameras;
+// nullopt-like NaN if they are parallel.
+Eigen::Vector3d convergence_from(const Eigen::Vector3d& place, const Scene& scene) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   for (const int i : scene.input) {
@@ -41,7 +47,7 @@ Eigen::Vector3d convergence_point(const Scene& scene) {
     const Eigen::Vector3d axis = camera.world_from_cam.rotation().col(2);
     const Eigen::Matrix3d P = Eigen::Matrix3d::Identity() - axis * axis.transpose();
     A += P;
-    b += P * camera.center();
+    b += P * (camera.center() - place);
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(A);
   if (eigen.eigenvalues()[0] < 1e-4 * eigen.eigenvalues()[2]) {
@@ -80,7 +86,7 @@ DepthRange depth_range(const Scene& scene, int view) {
                    "the input cameras share one centre (baseline 0), so no depth can be measured; "
                    "choose views taken from different places");
   }
-  const Eigen::Vector3d uvz = v.camera.project(convergence_point(scene));
+  const Eigen::Vector3d uvz = project_offset(v.camera, convergence_from(v.camera.center(), scene));
   // Axes that (nearly) meet in front of the camera say where the subject is; parallel axes leave
   // only the baseline as a unit of length.
   if (std::isfinite(uvz.z()) && uvz.z() > baseline * 0.5 && uvz.z() < baseline * 100) {
@@ -89,7 +95,7 @@ DepthRange depth_range(const Scene& scene, int view) {
   return {2 * baseline, 100 * baseline};
 }
 
-void to_canonical(Scene& scene) {
+std::vector<Eigen::Vector3d> subject_points(const Scene& scene) {
   std::vector<Eigen::Vector3d> points;
   for (const int i : scene.input) {
     const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
@@ -100,10 +106,14 @@ void to_canonical(Scene& scene) {
     const double middle = 2 / (1 / range.near + 1 / range.far);
     points.push_back(camera.unproject(camera.cx, camera.cy, middle));
   }
+  return points;
+}
+
+void to_canonical(Scene& scene) {
   const double metres_per_unit = scene.frame.metres_per_unit;
   const double metres_sigma = scene.frame.metres_sigma;
   const ScaleSource source = scene.frame.scale_source;
-  scene.frame = canonical_frame(points);
+  scene.frame = canonical_frame(subject_points(scene));
   scene.frame.metres_per_unit = metres_per_unit;
   scene.frame.metres_sigma = metres_sigma;
   scene.frame.scale_source = source;

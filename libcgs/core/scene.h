@@ -52,6 +52,10 @@ struct Scene {
   Frame frame;
 };
 
+/// Where the input cameras stand and what they look at, on their axes [scene units].
+/// \throws as depth_range()
+std::vector<Eigen::Vector3d> subject_points(const Scene& scene);
+
 /// Moves cameras, depth ranges and sparse points of a scene into its canonical frame.
 ///
 /// The frame is taken from the camera centres and, where the depth range or sparse points are

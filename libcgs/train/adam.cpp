@@ -2,14 +2,16 @@
 #include "libcgs/train/adam.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include <tbb/parallel_for.h>
 
 namespace cgs {
 
-void adam_step(ParameterBlock& block, AdamState& state, float rate) {
+size_t adam_step(ParameterBlock& block, AdamState& state, float rate) {
   const size_t count = block.value.size();
+  std::atomic<size_t> skipped = 0;
   if (rate > 0) {
     state.mean.resize(count, 0);
     state.square.resize(count, 0);
@@ -18,6 +20,7 @@ void adam_step(ParameterBlock& block, AdamState& state, float rate) {
     constexpr double kSquareDecay = 0.999;
     // Gradients of a mean over some 10^5 pixels are small: the usual 1e-8 would hold them back.
     constexpr float kTiny = 1e-12f;
+    constexpr float kLargest = 1e15f;
     const auto steps = static_cast<double>(state.steps);
     const auto unbias_mean = static_cast<float>(1 / (1 - std::pow(kMeanDecay, steps)));
     const auto unbias_square = static_cast<float>(1 / (1 - std::pow(kSquareDecay, steps)));
@@ -26,17 +29,25 @@ void adam_step(ParameterBlock& block, AdamState& state, float rate) {
     constexpr size_t kBlock = 1 << 15;
     tbb::parallel_for(size_t{0}, (count + kBlock - 1) / kBlock, [&](size_t b) {
       const size_t end = std::min(count, (b + 1) * kBlock);
+      size_t skipped_here = 0;
       for (size_t i = b * kBlock; i < end; ++i) {
-        const float g = block.gradient[i];
         float& m = state.mean[i];
         float& s = state.square[i];
+        if (!std::isfinite(block.gradient[i])) {
+          m = s = 0;
+          ++skipped_here;
+          continue;
+        }
+        const float g = std::clamp(block.gradient[i], -kLargest, kLargest);
         m = kB1 * m + (1 - kB1) * g;
         s = kB2 * s + (1 - kB2) * g * g;
         block.value[i] -= rate * m * unbias_mean / (std::sqrt(s * unbias_square) + kTiny);
       }
+      skipped += skipped_here;
     });
   }
   std::fill(block.gradient.begin(), block.gradient.end(), 0.0f);
+  return skipped;
 }
 
 }  // namespace cgs

@@ -19,8 +19,11 @@ struct AdamState {
 /// gradient is set to zero afterwards. Entries whose gradient and mean are both zero stay as they
 /// are. The state is created on first use.
 ///
-/// \param rate  length of a step where gradients agree; 0 leaves values and state alone
-/// Source: Kingma and Ba 2015, "Adam", algorithm 1.
-void adam_step(ParameterBlock& block, AdamState& state, float rate);
+/// A gradient that is not finite must not end a training: its entry keeps its value for this step
+/// and its means begin anew. One above 1e15 counts as 1e15, so that its square stays in range and
+/// does not hold the entry back for ever. \param rate  length of a step where gradients agree; 0
+/// leaves values and state alone \return number of entries whose gradient was not finite Source:
+/// Kingma and Ba 2015, "Adam", algorithm 1.
+size_t adam_step(ParameterBlock& block, AdamState& state, float rate);
 
 }  // namespace cgs

@@ -304,17 +304,22 @@ void Trainer::add_depth_terms(std::vector<Raster<float>>& sum, StepReport& repor
   }
 }
 
-void Trainer::update() {
+size_t Trainer::update() {
   const double fall = 0.5 * (1 + std::cos(std::numbers::pi * time()));
   const double rate = options_.final_rate + (1 - options_.final_rate) * fall;
+  size_t skipped = 0;
   for (size_t n = 0; n < model_.view_count(); ++n) {
     CoherentGaussians::ViewParameters& own = model_.parameters[n];
-    adam_step(own.depth, depth_state_[n], static_cast<float>(rate * options_.depth_rate));
-    adam_step(own.opacity, opacity_state_[n], static_cast<float>(rate * options_.opacity_rate));
+    skipped +=
+        adam_step(own.depth, depth_state_[n], static_cast<float>(rate * options_.depth_rate));
+    skipped +=
+        adam_step(own.opacity, opacity_state_[n], static_cast<float>(rate * options_.opacity_rate));
     if (model_.shapes_are_free()) {
-      adam_step(own.shape, shape_state_[n], static_cast<float>(rate * options_.shape_rate));
+      skipped +=
+          adam_step(own.shape, shape_state_[n], static_cast<float>(rate * options_.shape_rate));
     }
   }
+  return skipped;
 }
 
 StepReport Trainer::step() {
@@ -327,7 +332,13 @@ StepReport Trainer::step() {
   model_.add_gradients(gaussians, depth);
   report.bending = model_.add_bending(options_.depth_bending, options_.opacity_bending) +
                    model_.add_opacity_prior(options_.opacity_prior);
-  update();
+  // The state is still that of the last good step; a NaN in every parameter would look like a
+  // result.
+  if (!std::isfinite(report.total())) {
+    throw NumericalError("the loss is not finite in step " + std::to_string(step_ + 1) +
+                         " of the training; --set steps=0 leaves it out");
+  }
+  report.skipped = update();
   ++step_;
   model_.decode();
   history_.push_back(report);

@@ -24,6 +24,7 @@ struct StepReport {
   double flow = 0;
   double prior = 0;
   double bending = 0;
+  size_t skipped = 0;  ///< Parameters left alone because their gradient was not finite.
   double total() const { return l1 + ssim + tv + flow + prior + bending; }
 };
 
@@ -67,7 +68,7 @@ class Trainer {
   const Gaussians& drawn_for(size_t view);
   void add_view(size_t n, GaussianGradients& sum, StepReport& report);
   void add_depth_terms(std::vector<Raster<float>>& sum, StepReport& report);
-  void update();
+  size_t update();  ///< \return gradients that were not finite
 
   const std::vector<ViewPriors>& priors_;
   TrainingOptions options_;

@@ -86,5 +86,31 @@ TEST(VolumeFile, RefusesAVolumeOfAnotherProgram) {
   EXPECT_THROW(read_volume(dir / "v.vdb"), BadInput);
 }
 
+// OpenVDB refuses transforms of such voxels; what it is given instead is told.
+TEST(VolumeFile, HoldsVoxelsOfAMillionthOfAUnitStretched) {
+  const test::TempDir dir;
+  const Volume volume = small_volume();
+  Frame frame;
+  frame.scale = 0x1p-24;
+  frame.origin = Eigen::Vector3d(0x1p-26, 0, -0x1p-25);
+  write_volume(dir / "v.vdb", volume, frame);
+  const openvdb::Coord at(3, -2, 7);
+  const VolumeFile file = read_volume(dir / "v.vdb");
+  EXPECT_EQ(file.volume.tsdf->tree().getValue(at), 0.07f);
+  EXPECT_EQ(file.volume.sigma->tree().getValue(at), 0.01f);
+  EXPECT_EQ(file.volume.voxel_size, volume.voxel_size);
+  EXPECT_EQ(file.frame.origin, frame.origin);
+  EXPECT_NEAR(file.volume.tsdf->indexToWorld(at).x(), 0.3, 1e-12);
+  for (const auto& grid : read_vdb(dir / "v.vdb")) {
+    if (grid->getName() != "tsdf") continue;
+    const double stretch = std::stod(grid->metaValue<std::string>("cgs_stretch"));
+    const openvdb::Vec3d in_file = grid->indexToWorld(at) / stretch;
+    const Eigen::Vector3d world = frame.world_from_internal({0.3, -0.2, 0.7});
+    EXPECT_NEAR(in_file.x(), world.x(), 1e-20);
+    EXPECT_NEAR(in_file.y(), world.y(), 1e-20);
+    EXPECT_NEAR(in_file.z(), world.z(), 1e-20);
+  }
+}
+
 }  // namespace
 }  // namespace cgs

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/byte_writer.h"
 
+#include <bit>
+#include <cmath>
 #include <limits>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -24,6 +27,22 @@ TEST(AppendNumber, ReadsBackExactly) {
     double back = 1;
     EXPECT_TRUE(parse_number(out, back)) << out;
     EXPECT_EQ(back, value);
+  }
+  std::mt19937_64 random(5);
+  for (int i = 0; i < 100'000; ++i) {
+    const uint64_t bits = random();
+    const auto value = std::bit_cast<double>(bits);
+    const auto single = std::bit_cast<float>(static_cast<uint32_t>(bits));
+    if (!std::isfinite(value) || !std::isfinite(single)) continue;
+    std::string wide;
+    std::string narrow;
+    append_number(wide, value);
+    append_number(narrow, single);
+    double back = 0;
+    ASSERT_TRUE(parse_number(wide, back)) << wide;
+    ASSERT_EQ(back, value) << wide;
+    ASSERT_TRUE(parse_number(narrow, back)) << narrow;
+    ASSERT_EQ(static_cast<float>(back), single) << narrow;
   }
   std::string shortest;
   append_number(shortest, 0.1f);

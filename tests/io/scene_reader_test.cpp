@@ -103,6 +103,33 @@ TEST_F(ReadScene, RefusesOneViewAndNoBaseline) {
   EXPECT_EQ(refused(), "VALUE");
 }
 
+TEST_F(ReadScene, RefusesCamerasTooNearToEachOtherForTheirSubject) {
+  write(3);  // 2 apart in all
+  for (int power = 1; power <= 7; ++power) {
+    const std::string z = "1e" + std::to_string(power);
+    std::string points;
+    for (int i = 1; i <= 30; ++i) {
+      points += std::to_string(i) + " 0 0 " + z + " 1 1 1 0.1 1 0 2 0 3 0\n";
+    }
+    test::write_bytes(dir_ / "sparse/0/points3D.txt", points);
+    EXPECT_EQ(refused(), power == 7 ? "VALUE" : "") << z;
+  }
+}
+
+TEST_F(ReadScene, RefusesPlacesWhoseCoordinatesHoldNothingOfThem) {
+  write(3);
+  const std::string near = test::read_bytes(dir_ / "sparse/0/images.txt");
+  for (const auto& [far, expected] : {std::pair("1e8", ""), {"1e11", "VALUE"}}) {
+    std::string images = near;
+    for (size_t at = 0; (at = images.find(" 0 0 1 v", at)) != std::string::npos; ++at) {
+      images.replace(at, 2, std::string(" ") + far);
+    }
+    test::write_bytes(dir_ / "sparse/0/images.txt", images);
+    EXPECT_EQ(refused(), expected) << far;
+  }
+  EXPECT_NE(message_of([&] { read(); }).find("significant bits"), std::string::npos);
+}
+
 TEST_F(ReadScene, CopesWithSomeMissingImagesButNotWithAll) {
   write(6);
   std::filesystem::remove(dir_ / "images/v00.png");

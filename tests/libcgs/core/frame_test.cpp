@@ -44,6 +44,33 @@ TEST(CanonicalFrame, InternalNumbersAreBitIdenticalUnderPowerOfTwoScaling) {
   }
 }
 
+TEST(CanonicalFrame, InternalNumbersAreBitIdenticalWhereverTheSceneIs) {
+  // Halves of the grid that origins snap to, where rounding must not depend on the sign.
+  const std::vector<Eigen::Vector3d> base = {{0, 0, 0}, {1 + 0x1p-10, 0.5, 0.25 + 0x1p-10}};
+  const Frame frame = canonical_frame(base);
+  for (const Eigen::Vector3d& move : {Eigen::Vector3d(-2.49e6, -4.68e6, 3.53e6),
+                                      Eigen::Vector3d(4.5e5, 5.4e6, 100),
+                                      Eigen::Vector3d(-2, -2, -2)}) {
+    const Frame moved = canonical_frame({base[0] + move, base[1] + move});
+    for (const Eigen::Vector3d& p : base) {
+      EXPECT_EQ(frame.internal_from_world(p), moved.internal_from_world(p + move));
+    }
+  }
+}
+
+TEST(SignificantBits, AreStepsOfTheFarthestCoordinate) {
+  const auto bits = [](double extent, double place, int digits) {
+    const Eigen::Vector3d low(place, 0, 0);
+    return significant_bits({low, low + Eigen::Vector3d(extent, extent / 2, 0)}, digits);
+  };
+  EXPECT_EQ(bits(1, 0x1p20, 53), 32);  // in steps of 2^-32
+  EXPECT_EQ(bits(1, 0x1p20, 24), 3);
+  EXPECT_EQ(bits(1, -0x1.8p20, 24), 3);
+  EXPECT_EQ(bits(1024, 0x1p20, 24), 13);
+  EXPECT_EQ(bits(0, 5, 24), -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(bits(0, 0, 24), -std::numeric_limits<double>::infinity());
+}
+
 TEST(CanonicalFrame, FarScenesKeepTheirDetailInFiles) {
   const Eigen::Vector3d utm(4.5e5, 5.4e6, 100);
   const auto points = cloud(1, utm);

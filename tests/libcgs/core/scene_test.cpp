@@ -69,5 +69,27 @@ TEST(ToCanonical, KeepsProjections) {
   EXPECT_NEAR(before.z(), after.z() * scene.frame.scale, 1e-12);
 }
 
+TEST(ToCanonical, OfAFarSceneGivesTheSameBits) {
+  Scene near = converging_scene();
+  for (View& view : near.views) {  // few bits, so that moving by whole numbers rounds nothing
+    Eigen::Vector3d t = view.camera.center();
+    view.camera.world_from_cam.translation() = (t * 1024).array().round() / 1024;
+  }
+  Scene far = near;
+  const Eigen::Vector3d ecef(-2.49e6, -4.68e6, 3.53e6);
+  for (View& view : far.views) view.camera.world_from_cam.translation() += ecef;
+  const DepthRange range = depth_range(near, 0);
+  EXPECT_EQ(depth_range(far, 0).near, range.near);
+  EXPECT_EQ(depth_range(far, 0).far, range.far);
+  to_canonical(near);
+  to_canonical(far);
+  EXPECT_EQ(near.frame.scale, far.frame.scale);
+  EXPECT_EQ(near.frame.origin + ecef, far.frame.origin);
+  for (size_t i = 0; i < near.views.size(); ++i) {
+    EXPECT_EQ(near.views[i].camera.world_from_cam.matrix(),
+              far.views[i].camera.world_from_cam.matrix());
+  }
+}
+
 }  // namespace
 }  // namespace cgs

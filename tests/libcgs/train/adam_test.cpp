@@ -58,6 +58,58 @@ TEST(Adam, LeavesWhatHasNoGradient) {
   EXPECT_NE(block.value[1], 2.0f);
 }
 
+TEST(Adam, SkipsWhatIsNotFiniteAndOnlyThat) {
+  const auto values_after = [](float odd, size_t* skipped) {
+    ParameterBlock block;
+    block.resize(3);
+    AdamState state;
+    *skipped = 0;
+    for (int step = 0; step < 20; ++step) {
+      block.gradient = {0.5f, step == 10 ? odd : 0.25f, -2};
+      *skipped += adam_step(block, state, 0.01f);
+    }
+    return block.value;
+  };
+  size_t none = 0;
+  const std::vector<float> usual = values_after(0.25f, &none);
+  EXPECT_EQ(none, 0u);
+  for (const float odd : {std::nanf(""), INFINITY, -INFINITY}) {
+    size_t skipped = 0;
+    const std::vector<float> values = values_after(odd, &skipped);
+    EXPECT_EQ(skipped, 1u);
+    EXPECT_EQ(values[0], usual[0]);
+    EXPECT_EQ(values[2], usual[2]);
+    // Its steps grow to the length of the rate again, as they did in the beginning.
+    EXPECT_NEAR(values[1], usual[1], 0.03);
+  }
+}
+
+TEST(Adam, AHugeGradientDoesNotFreezeAnEntry) {
+  ParameterBlock block;
+  block.resize(1);
+  AdamState state;
+  block.gradient = {3e38f};
+  adam_step(block, state, 0.01f);
+  EXPECT_NEAR(block.value[0], -0.01f, 1e-4f);
+  EXPECT_TRUE(std::isfinite(state.square[0]));
+}
+
+TEST(Adam, TakesTheSameStepsForGradientsOfAnyPowerOfTwo) {
+  const auto values_after = [](int power) {
+    ParameterBlock block;
+    block.resize(1);
+    AdamState state;
+    for (int step = 0; step < 20; ++step) {
+      block.gradient = {std::ldexp(1.0f + 0.1f * float(step % 3), power)};
+      adam_step(block, state, 0.01f);
+    }
+    return block.value[0];
+  };
+  for (const int power : {-20, -10, 10, 20}) {
+    EXPECT_NEAR(values_after(power), values_after(0), 1e-6f) << power;
+  }
+}
+
 TEST(Adam, RateZeroDoesNothing) {
   ParameterBlock block;
   block.resize(1);

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <iostream>
+#include <memory>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/commands/commands.h"
+#include "convert/terminal.h"
+#include "convert/verification.h"
+#include "io/json_file.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+struct VerifyArgs {
+  std::filesystem::path output;
+  std::filesystem::path other;
+  bool json = false;
+};
+
+void run_verify(const VerifyArgs& args) {
+  Terminal terminal(true);
+  const Verification found = args.other.empty() ? verify_run(args.output, terminal)
+                                                : compare_runs(args.output, args.other);
+  if (args.json) {
+    std::cout << json_text(nlohmann::ordered_json{{"inputs", found.inputs},
+                                                  {"outputs", found.outputs},
+                                                  {"differing", found.differing}})
+              << "\n";
+  } else {
+    for (const std::string& line : found.differing) std::cout << one_line(line) << "\n";
+    if (args.other.empty()) std::cout << found.inputs << " inputs and ";
+    std::cout << found.outputs << " outputs checked, " << found.differing.size() << " differ\n";
+  }
+  if (found.differing.empty()) return;
+  throw BadInput(
+      Defect::Mismatch,
+      args.output,
+      std::to_string(found.differing.size()) + " differ, the first is " + found.differing.front());
+}
+
+}  // namespace
+
+void add_verify(CLI::App& app) {
+  auto args = std::make_shared<VerifyArgs>();
+  auto* cmd = app.add_subcommand(
+      "verify", "Inputs and outputs of a run against the hashes in its run.json; exit 3 = changed");
+  cmd->add_option("output", args->output, "Folder that run wrote")->required();
+  cmd->add_option(
+      "other", args->other, "Folder of another run that should have given the same files");
+  cmd->add_flag("--json", args->json, "Report on standard output, as JSON");
+  cmd->footer("Example: cgs verify out/portal");
+  cmd->callback([args] { run_verify(*args); });
+}
+
+}  // namespace cgs

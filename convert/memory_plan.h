@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "libcgs/core/scene.h"
+
+namespace cgs {
+
+/// Largest memory of the process while a stage of a run works [bytes].
+struct StageMemory {
+  std::string stage;
+  size_t bytes = 0;
+};
+
+/// Predicts what the stages of a run will need, from the sizes of its pictures alone.
+///
+/// What a stage holds grows with the pixels of the input views: a Gaussian, a few voxels and a few
+/// faces come of each. The factors are measured; see the README for how well they hold.
+/// \param chooses_voxels  false where the user says how large voxels are: stages that depend on
+/// them
+///                        are then left out, and the volume itself refuses what does not fit
+std::vector<StageMemory> memory_plan(const Scene& scene, bool chooses_voxels);
+
+/// "depth and Gaussians 410 MiB, views 320 MiB, …"
+std::string memory_plan_text(const std::vector<StageMemory>& plan);
+
+/// \throws LimitError naming the stage that needs most and what to lower, if it needs more than
+///         `budget` [bytes].
+void check_memory_plan(const std::vector<StageMemory>& plan, size_t budget);
+
+}  // namespace cgs

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/verification.h"
+
+#include <algorithm>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/run_record.h"
+#include "io/byte_reader.h"
+#include "io/json_file.h"
+#include "io/scene_path.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+// The record of a run that came to its end.
+Json finished_record(const fs::path& output) {
+  const fs::path path = output / "run.json";
+  if (!is_present(path)) {
+    throw BadInput(Defect::Missing, path, "no such file; give the folder of a run");
+  }
+  (void)read_json(path);  // refuses what is nested too deep to be copied
+  Json record = Json::parse(read_file(path));
+  const bool is_finished = record.is_object() && record.contains("outputs") &&
+                           record["outputs"].is_object() && record.contains("request") &&
+                           record["request"].is_object();
+  if (is_finished) return record;
+  throw BadInput(Defect::Schema,
+                 path,
+                 "is not of a finished run: it does not say what the outputs were; run it again");
+}
+
+std::string text_at(const Json& json, const char* key) {
+  return json.contains(key) && json[key].is_string() ? json[key].get<std::string>() : "";
+}
+
+SceneRequest scene_request(const Json& record) {
+  const Json& request = record["request"];
+  SceneRequest out;
+  out.path = text_at(request, "scene");
+  out.options.views = text_at(request, "views");
+  const Json downscale = request.value("downscale", Json(0));
+  if (downscale.is_number_integer() && downscale.get<int>() > 0) {
+    out.options.downscale = downscale.get<int>();
+  }
+  out.options.allow_external = true;  // the run was allowed what it needed
+  const Json focal = record.value("focal", Json(0));
+  if (focal.is_number()) out.focal = focal.get<double>();
+  return out;
+}
+
+// Adds what two sets of named hashes do not have in common.
+void compare(const Json& before, const Json& now, const std::string& kind, Verification& out) {
+  std::set<std::string> names;
+  for (const Json* side : {&before, &now}) {
+    if (!side->is_object()) continue;
+    for (const auto& [name, hash] : side->items()) names.insert(name);
+  }
+  for (const std::string& name : names) {
+    const bool was = before.is_object() && before.contains(name);
+    const bool is = now.is_object() && now.contains(name);
+    if (was && is && before[name] == now[name]) continue;
+    out.differing.push_back(kind + name + (!is ? ": missing" : !was ? ": new" : ": changed"));
+  }
+}
+
+void verify_inputs(const Json& record,
+                   const fs::path& output,
+                   Terminal& terminal,
+                   Verification& out) {
+  RunRequest request;
+  request.scene = scene_request(record);
+  const OpenedScene opened = open_scene(request.scene, output / "model", terminal);
+  const Json now = request_json(request, opened.scene);
+  const Json& before = record["request"];
+  for (const char* kind : {"input_images", "held_out_images"}) {
+    compare(before.value(kind, Json::object()), now[kind], "input ", out);
+    out.inputs += now[kind].size();
+  }
+  if (before.value("cameras", Json()) != now["cameras"]) {
+    out.differing.emplace_back("input cameras: changed");
+  }
+  ++out.inputs;
+}
+
+}  // namespace
+
+Json output_hashes(const fs::path& output) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(output)) {
+    if (entry.is_regular_file() && !entry.is_symlink()) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  Json out = Json::object();
+  for (const fs::path& file : files) {
+    const std::string name = fs::relative(file, output).generic_string();
+    const bool is_ours = name != "run.json" && file.filename().string().front() != '.';
+    if (is_ours) out[name] = file_hash(file);
+  }
+  return out;
+}
+
+Verification verify_run(const fs::path& output, Terminal& terminal) {
+  const Json record = finished_record(output);
+  Verification out;
+  verify_inputs(record, output, terminal, out);
+  Json now = Json::object();
+  for (const auto& [name, hash] : record["outputs"].items()) {
+    ++out.outputs;
+    // A name that leads out of the folder is none of ours.
+    const fs::path relative(name);
+    const bool is_inside = relative.is_relative() && name.find("..") == std::string::npos;
+    if (is_inside && is_present(output / relative)) now[name] = file_hash(output / relative);
+  }
+  compare(record["outputs"], now, "", out);
+  return out;
+}
+
+Verification compare_runs(const fs::path& one, const fs::path& other) {
+  const auto hashes = [](const fs::path& folder) {
+    (void)finished_record(folder);
+    Json out = output_hashes(folder);
+    for (const char* name : {"report.json", "report.html"}) out.erase(name);
+    return out;
+  };
+  const Json first = hashes(one);
+  Verification out;
+  out.outputs = first.size();
+  compare(first, hashes(other), "", out);
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "convert/pipeline.h"
+
+namespace cgs {
+
+/// Path below the folder and hash of every file of a finished run but run.json itself, in order of
+/// the paths. \throws IoError
+nlohmann::ordered_json output_hashes(const std::filesystem::path& output);
+
+/// What became of the files of a run.
+struct Verification {
+  size_t inputs = 0;   ///< Photographs and masks held against their hashes, and the cameras as one.
+  size_t outputs = 0;  ///< Files held against theirs.
+  std::vector<std::string> differing;  ///< "input view_03: changed", "web/asset.glb: missing", …
+};
+
+/// Reads the inputs and outputs of a finished run again and compares them with what its run.json
+/// says. Nothing is computed or written; files that the run did not make are not looked at.
+/// \throws BadInput Missing, Schema (no record of a finished run), and as open_scene() where a
+/// scene
+///         cannot be read any more
+Verification verify_run(const std::filesystem::path& output, Terminal& terminal);
+
+/// Compares the outputs of two finished runs, as they are now. Left out are report.json and
+/// report.html, which state times.
+Verification compare_runs(const std::filesystem::path& one, const std::filesystem::path& other);
+
+}  // namespace cgs

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The same photographs give the same files for any number of threads, and `cgs verify` notices when
+// an input or an output of a run is not what it was.
+#include <map>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/e2e/extremes/cell.h"
+
+namespace cgs::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string run_arguments(const fs::path& scene, const fs::path& out) {
+  return "run " + scene.string() + " --views " + kInputViews +
+         " --assume-unit m --set steps=20 -q -o " + out.string();
+}
+
+// Content of every file by its path; times and memory are not results.
+std::map<std::string, std::string> results_in(const fs::path& folder) {
+  std::map<std::string, std::string> out;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string name = fs::relative(entry.path(), folder).string();
+    const bool states_times = name == "run.json" || name == "report.json" || name == "report.html";
+    if (entry.is_regular_file() && !states_times) out[name] = read_bytes(entry.path());
+  }
+  return out;
+}
+
+class Verify : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    dir_ = new TempDir;
+    write_scene(scene(), {1, Eigen::Vector3d::Zero(), "plain"});
+    const auto result = run_cgs(run_arguments(scene(), out()) + " --threads 2");
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  static void TearDownTestSuite() { delete dir_; }
+
+  static fs::path scene() { return *dir_ / "scene"; }
+  static fs::path out() { return *dir_ / "out"; }
+  static ProgramResult verify() { return run_cgs("verify " + out().string()); }
+
+  /// Changes a file, says what verify says, and puts it back.
+  static ProgramResult verify_with(const fs::path& file, const std::string& content) {
+    const std::string before = read_bytes(file);
+    write_bytes(file, content);
+    ProgramResult result = verify();
+    write_bytes(file, before);
+    return result;
+  }
+
+  static TempDir* dir_;
+};
+TempDir* Verify::dir_ = nullptr;
+
+TEST_F(Verify, AnyNumberOfThreadsAndAnyRepetitionGiveTheSameFiles) {
+  const auto expected = results_in(out());
+  EXPECT_GE(expected.size(), 100u);
+  for (const int threads : {1, 2, 3, 4}) {
+    const fs::path again = *dir_ / ("threads_" + std::to_string(threads));
+    const auto result =
+        run_cgs(run_arguments(scene(), again) + " --threads " + std::to_string(threads));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const auto files = results_in(again);
+    ASSERT_EQ(files.size(), expected.size());
+    for (const auto& [name, bytes] : expected) {
+      EXPECT_TRUE(files.at(name) == bytes) << name << " with " << threads << " threads";
+    }
+    EXPECT_EQ(run_cgs("verify " + out().string() + " " + again.string()).exit_code, 0);
+    fs::remove_all(again);
+  }
+}
+
+TEST_F(Verify, FindsNothingWhereNothingChanged) {
+  const auto result = verify();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("25 inputs"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find(" 0 differ"), std::string::npos) << result.out;
+}
+
+TEST_F(Verify, NamesTheOutputThatChangedOrIsMissing) {
+  std::string glb = read_bytes(out() / "web/asset.glb");
+  glb[glb.size() / 2] = char(glb[glb.size() / 2] ^ 1);
+  const auto changed = verify_with(out() / "web/asset.glb", glb);
+  EXPECT_EQ(changed.exit_code, 3);
+  EXPECT_NE(changed.out.find("web/asset.glb: changed"), std::string::npos) << changed.out;
+  EXPECT_NE(changed.err.find("MISMATCH"), std::string::npos) << changed.err;
+
+  fs::rename(out() / "volume.vdb", *dir_ / "volume.vdb");
+  const auto missing = verify();
+  fs::rename(*dir_ / "volume.vdb", out() / "volume.vdb");
+  EXPECT_EQ(missing.exit_code, 3);
+  EXPECT_NE(missing.out.find("volume.vdb: missing"), std::string::npos) << missing.out;
+  EXPECT_EQ(verify().exit_code, 0);
+}
+
+TEST_F(Verify, NamesTheInputThatChanged) {
+  const auto photograph =
+      verify_with(scene() / "images/v12.png", read_bytes(scene() / "images/v11.png"));
+  EXPECT_EQ(photograph.exit_code, 3);
+  EXPECT_NE(photograph.out.find("input v12: changed"), std::string::npos) << photograph.out;
+
+  const auto cameras = verify_with(scene() / "transforms.json", [] {
+    auto json = nlohmann::json::parse(read_bytes(scene() / "transforms.json"));
+    json["fl_x"] = 70.001;
+    return json.dump();
+  }());
+  EXPECT_EQ(cameras.exit_code, 3);
+  EXPECT_NE(cameras.out.find("input cameras: changed"), std::string::npos) << cameras.out;
+  EXPECT_EQ(verify().exit_code, 0);
+}
+
+TEST_F(Verify, RefusesWhatIsNoFinishedRun) {
+  const auto none = run_cgs("verify " + scene().string());
+  EXPECT_EQ(none.exit_code, 3);
+  EXPECT_NE(none.err.find("MISSING"), std::string::npos) << none.err;
+  for (const char* text : {"{}", "[1]", "nonsense", R"({"outputs":{},"request":[]})"}) {
+    const auto result = verify_with(out() / "run.json", text);
+    EXPECT_EQ(result.exit_code, 3) << text;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+  // Names and values that no run writes.
+  auto json = nlohmann::json::parse(read_bytes(out() / "run.json"));
+  json["outputs"] = {{"../scene/transforms.json", 7}};
+  EXPECT_EQ(verify_with(out() / "run.json", json.dump()).exit_code, 3);
+}
+
+// Two runs are the same if their results are, and told apart otherwise.
+TEST_F(Verify, ComparesTwoRuns) {
+  const fs::path other = *dir_ / "other";
+  const auto result = run_cgs(run_arguments(scene(), other) + " --set steps=21");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto compared = run_cgs("verify " + out().string() + " " + other.string() + " --json");
+  EXPECT_EQ(compared.exit_code, 3);
+  const auto report = nlohmann::json::parse(compared.out);
+  bool names_splats = false;
+  for (const std::string line : report["differing"]) {
+    names_splats = names_splats || line == "model/gaussians.ply: changed";
+  }
+  EXPECT_TRUE(names_splats) << compared.out;
+}
+
+}  // namespace
+}  // namespace cgs::test
