@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <numeric>
+
+#include "convert/filter/operations.h"
+#include "libcgs/core/error.h"
+#include "meshing/components.h"
+#include "meshing/cropping.h"
+#include "meshing/vertex_attributes.h"
+
+namespace cgs {
+
+namespace {
+
+FilterStep prepare_crop_box(FilterArguments& arguments) {
+  const Eigen::Vector3d a = arguments.point();
+  const Eigen::Vector3d b = arguments.point();
+  if (!(a.array() < b.array()).all()) arguments.fail("the first corner must be the lower one");
+  return [a, b](FilterState& state, const Progress&) {
+    const Eigen::AlignedBox3d box(state.internal_from_file(a), state.internal_from_file(b));
+    state.mesh = cropped_by_box(state.mesh, box);
+    return std::string();
+  };
+}
+
+FilterStep prepare_crop_ball(FilterArguments& arguments) {
+  const Eigen::Vector3d center = arguments.point();
+  const double radius = arguments.length();
+  return [center, radius](FilterState& state, const Progress&) {
+    state.mesh =
+        cropped_by_ball(state.mesh, state.internal_from_file(center), radius / state.frame.scale);
+    return std::string();
+  };
+}
+
+FilterStep prepare_crop_plane(FilterArguments& arguments) {
+  const Eigen::Vector3d point = arguments.point();
+  const Eigen::Vector3d normal = arguments.direction();
+  return [point, normal](FilterState& state, const Progress&) {
+    state.mesh = cropped_by_plane(state.mesh, state.internal_from_file(point), normal);
+    return std::string();
+  };
+}
+
+void require_mesh(const FilterState& state, const char* operation, const char* instead) {
+  if (!state.is_cloud()) return;
+  throw InvalidInput(std::string("--op ") + operation +
+                     " needs faces; for a point cloud there is " + instead);
+}
+
+// Keeps the parts for which the rule says so.
+template <typename Rule>
+std::string keep_parts(FilterState& state, const MeshComponents& parts, const Rule& rule) {
+  std::vector<uint8_t> keep(state.mesh.faces.size());
+  for (size_t f = 0; f < keep.size(); ++f) keep[f] = rule(parts.of_face[f]) ? 1 : 0;
+  state.mesh = with_faces(state.mesh, keep);
+  size_t kept = 0;
+  for (uint32_t part = 0; part < parts.area.size(); ++part) kept += rule(part) ? 1 : 0;
+  return std::to_string(parts.area.size()) + " -> " + std::to_string(kept) + " parts";
+}
+
+FilterStep prepare_largest(FilterArguments& arguments) {
+  const size_t count = arguments.more() ? arguments.count(1, 1'000'000'000) : 1;
+  return [count](FilterState& state, const Progress&) {
+    require_mesh(state, "largest", "dbscan");
+    const MeshComponents parts = components(state.mesh);
+    std::vector<uint32_t> order(parts.area.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+      return parts.area[a] > parts.area[b];
+    });
+    std::vector<uint8_t> wanted(order.size(), 0);
+    for (size_t i = 0; i < std::min(count, order.size()); ++i) wanted[order[i]] = 1;
+    return keep_parts(state, parts, [&](uint32_t part) { return wanted[part] != 0; });
+  };
+}
+
+FilterStep prepare_min_area(FilterArguments& arguments) {
+  const double share = arguments.number(0, 1);
+  return [share](FilterState& state, const Progress&) {
+    require_mesh(state, "min-area", "dbscan");
+    const MeshComponents parts = components(state.mesh);
+    const double least = share * *std::max_element(parts.area.begin(), parts.area.end());
+    return keep_parts(state, parts, [&](uint32_t part) { return parts.area[part] >= least; });
+  };
+}
+
+FilterStep prepare_min_faces(FilterArguments& arguments) {
+  const size_t least = arguments.count(1, 1'000'000'000);
+  return [least](FilterState& state, const Progress&) {
+    require_mesh(state, "min-faces", "dbscan");
+    const MeshComponents parts = components(state.mesh);
+    std::vector<size_t> faces(parts.area.size(), 0);
+    for (const uint32_t part : parts.of_face) ++faces[part];
+    return keep_parts(state, parts, [&](uint32_t part) { return faces[part] >= least; });
+  };
+}
+
+}  // namespace
+
+std::vector<FilterOperation> selection_operations() {
+  return {{"crop-box",
+           "X0,Y0,Z0,X1,Y1,Z1",
+           "Keep what lies in a box; faces are cut",
+           "crop-box=0,0,0,1m,1m,50cm",
+           prepare_crop_box},
+          {"crop-ball",
+           "X,Y,Z,RADIUS",
+           "Keep vertices within a ball, and faces between them",
+           "crop-ball=0,0,1.5,20cm",
+           prepare_crop_ball},
+          {"crop-plane",
+           "X,Y,Z,NX,NY,NZ",
+           "Keep what lies on the side of a plane that the normal points to; faces are cut",
+           "crop-plane=0,0,3mm,0,0,1",
+           prepare_crop_plane},
+          {"largest",
+           "[=N]",
+           "Keep the N parts of largest area, else one",
+           "largest=2",
+           prepare_largest},
+          {"min-area",
+           "SHARE",
+           "Drop parts below this share of the largest part's area",
+           "min-area=0.01",
+           prepare_min_area},
+          {"min-faces", "N", "Drop parts of fewer faces", "min-faces=100", prepare_min_faces}};
+}
+
+}  // namespace cgs
