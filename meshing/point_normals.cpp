@@ -12,6 +12,7 @@
 #include <tbb/parallel_sort.h>
 
 #include "libcgs/core/error.h"
+#include "meshing/disjoint_sets.h"
 #include "meshing/kd_tree.h"
 
 namespace cgs {
@@ -73,25 +74,6 @@ std::vector<Link> sorted_links(const std::vector<Eigen::Vector3f>& normals,
   return links;
 }
 
-/// Disjoint parts of points, each numbered by one of its members.
-class Parts {
- public:
-  explicit Parts(size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
-  uint32_t root(uint32_t v) {
-    while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
-    return v;
-  }
-  bool join(uint32_t a, uint32_t b) {
-    const uint32_t ra = root(a);
-    const uint32_t rb = root(b);
-    parent_[std::max(ra, rb)] = std::min(ra, rb);
-    return ra != rb;
-  }
-
- private:
-  std::vector<uint32_t> parent_;
-};
-
 // Walks the tree from `start` and turns what disagrees with the point it was reached from.
 void turn_part(std::vector<Eigen::Vector3f>& normals,
                const std::vector<std::vector<uint32_t>>& tree,
@@ -148,7 +130,7 @@ void turn_consistently(std::vector<Eigen::Vector3f>& normals,
                        const std::vector<Eigen::Vector3f>& points,
                        size_t neighbors) {
   require(neighbors >= 1, "turning normals needs 1 neighbour or more; the number", neighbors);
-  Parts parts(points.size());
+  DisjointSets parts(points.size());
   std::vector<std::vector<uint32_t>> tree(points.size());
   for (const Link& link : sorted_links(normals, points, neighbors)) {
     if (!parts.join(link.a, link.b)) continue;

@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/filter/operations.h"
 
+#include "libcgs/core/error.h"
+
 namespace cgs {
 
 std::string FilterOperation::syntax() const {
   std::string out(name);
   if (!arguments.empty() && arguments[0] != '[') out += '=';
   return out.append(arguments);
+}
+
+void require_faces(const FilterState& state, const char* operation) {
+  if (!state.is_cloud()) return;
+  throw InvalidInput(std::string("--op ") + operation + " needs faces, this is a point cloud");
 }
 
 const std::vector<FilterOperation>& filter_operations() {

@@ -29,6 +29,9 @@ std::vector<FilterOperation> point_operations();
 std::vector<FilterOperation> surface_operations();
 std::vector<FilterOperation> repair_operations();
 
+/// \throws InvalidInput that names the operation if the state is a point cloud
+void require_faces(const FilterState& state, const char* operation);
+
 /// All of them, in the order in which the help lists them.
 const std::vector<FilterOperation>& filter_operations();
 

@@ -4,6 +4,7 @@
 
 #include "convert/filter/operations.h"
 #include "libcgs/core/error.h"
+#include "meshing/clusters.h"
 #include "meshing/components.h"
 #include "meshing/cropping.h"
 #include "meshing/vertex_attributes.h"
@@ -42,12 +43,6 @@ FilterStep prepare_crop_plane(FilterArguments& arguments) {
   };
 }
 
-void require_mesh(const FilterState& state, const char* operation, const char* instead) {
-  if (!state.is_cloud()) return;
-  throw InvalidInput(std::string("--op ") + operation +
-                     " needs faces; for a point cloud there is " + instead);
-}
-
 // Keeps the parts for which the rule says so.
 template <typename Rule>
 std::string keep_parts(FilterState& state, const MeshComponents& parts, const Rule& rule) {
@@ -59,18 +54,24 @@ std::string keep_parts(FilterState& state, const MeshComponents& parts, const Ru
   return std::to_string(parts.area.size()) + " -> " + std::to_string(kept) + " parts";
 }
 
+// Which ones are the `count` largest; of equal ones the first.
+template <typename Size>
+std::vector<uint8_t> largest_of(const std::vector<Size>& sizes, size_t count) {
+  std::vector<uint32_t> order(sizes.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(
+      order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return sizes[a] > sizes[b]; });
+  std::vector<uint8_t> wanted(order.size(), 0);
+  for (size_t i = 0; i < std::min(count, order.size()); ++i) wanted[order[i]] = 1;
+  return wanted;
+}
+
 FilterStep prepare_largest(FilterArguments& arguments) {
   const size_t count = arguments.more() ? arguments.count(1, 1'000'000'000) : 1;
   return [count](FilterState& state, const Progress&) {
-    require_mesh(state, "largest", "dbscan");
+    require_faces(state, "largest");
     const MeshComponents parts = components(state.mesh);
-    std::vector<uint32_t> order(parts.area.size());
-    std::iota(order.begin(), order.end(), 0U);
-    std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-      return parts.area[a] > parts.area[b];
-    });
-    std::vector<uint8_t> wanted(order.size(), 0);
-    for (size_t i = 0; i < std::min(count, order.size()); ++i) wanted[order[i]] = 1;
+    const std::vector<uint8_t> wanted = largest_of(parts.area, count);
     return keep_parts(state, parts, [&](uint32_t part) { return wanted[part] != 0; });
   };
 }
@@ -78,7 +79,7 @@ FilterStep prepare_largest(FilterArguments& arguments) {
 FilterStep prepare_min_area(FilterArguments& arguments) {
   const double share = arguments.number(0, 1);
   return [share](FilterState& state, const Progress&) {
-    require_mesh(state, "min-area", "dbscan");
+    require_faces(state, "min-area");
     const MeshComponents parts = components(state.mesh);
     const double least = share * *std::max_element(parts.area.begin(), parts.area.end());
     return keep_parts(state, parts, [&](uint32_t part) { return parts.area[part] >= least; });
@@ -88,11 +89,32 @@ FilterStep prepare_min_area(FilterArguments& arguments) {
 FilterStep prepare_min_faces(FilterArguments& arguments) {
   const size_t least = arguments.count(1, 1'000'000'000);
   return [least](FilterState& state, const Progress&) {
-    require_mesh(state, "min-faces", "dbscan");
+    require_faces(state, "min-faces");
     const MeshComponents parts = components(state.mesh);
     std::vector<size_t> faces(parts.area.size(), 0);
     for (const uint32_t part : parts.of_face) ++faces[part];
     return keep_parts(state, parts, [&](uint32_t part) { return faces[part] >= least; });
+  };
+}
+
+FilterStep prepare_dbscan(FilterArguments& arguments) {
+  const double radius = arguments.length();
+  const size_t neighbors = arguments.count(1, 1'000'000);
+  const size_t count = arguments.more() ? arguments.count(1, 1'000'000'000) : 1;
+  return [=](FilterState& state, const Progress&) {
+    const PointClusters clusters =
+        dense_clusters(state.mesh.vertices, radius / state.frame.scale, neighbors);
+    const std::vector<uint8_t> wanted = largest_of(clusters.size, count);
+    std::vector<uint8_t> keep(clusters.of_point.size(), 0);
+    size_t noise = 0;
+    for (size_t v = 0; v < keep.size(); ++v) {
+      const uint32_t cluster = clusters.of_point[v];
+      noise += cluster == PointClusters::kNoise ? 1 : 0;
+      if (cluster != PointClusters::kNoise) keep[v] = wanted[cluster];
+    }
+    state.mesh = with_vertices(state.mesh, keep);
+    return std::to_string(clusters.size.size()) + " clusters, " + std::to_string(noise) +
+           " points of noise";
   };
 }
 
@@ -124,7 +146,12 @@ std::vector<FilterOperation> selection_operations() {
            "Drop parts below this share of the largest part's area",
            "min-area=0.01",
            prepare_min_area},
-          {"min-faces", "N", "Drop parts of fewer faces", "min-faces=100", prepare_min_faces}};
+          {"min-faces", "N", "Drop parts of fewer faces", "min-faces=100", prepare_min_faces},
+          {"dbscan",
+           "RADIUS,NEIGHBOURS[,N]",
+           "Keep the N largest clusters of points, else one",
+           "dbscan=1cm,10",
+           prepare_dbscan}};
 }
 
 }  // namespace cgs

@@ -13,11 +13,6 @@ namespace cgs {
 
 namespace {
 
-void require_faces(const FilterState& state, const char* operation) {
-  if (!state.is_cloud()) return;
-  throw InvalidInput(std::string("--op ") + operation + " needs faces, this is a point cloud");
-}
-
 FilterStep smoothing_step(const char* name, const SmoothingOptions& options) {
   return [=](FilterState& state, const Progress& progress) {
     require_faces(state, name);
