@@ -11,6 +11,7 @@
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Polygon_mesh_processing/repair_degeneracies.h>
+#include <Eigen/Geometry>
 
 #include "meshing/certificate.h"
 #include "meshing/components.h"

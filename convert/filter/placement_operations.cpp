@@ -54,14 +54,15 @@ Eigen::Affine3d motion_in(const std::filesystem::path& path) {
   Eigen::Index count = 0;
   for (; words >> word; ++count) {
     double value = 0;
-    if (count == 16) break;
     if (!parse_number(word, value) || !std::isfinite(value)) {
       throw BadInput(Defect::Value, path, "'" + word + "' is not a number");
     }
-    matrix(count / 4, count % 4) = value;
+    if (count < 16) matrix(count / 4, count % 4) = value;
   }
-  if (count != 16 || words >> word) {
-    throw BadInput(Defect::Count, path, "a motion has 16 numbers, four rows of four");
+  if (count != 16) {
+    throw BadInput(Defect::Count,
+                   path,
+                   "a motion has 16 numbers, four rows of four, here are " + std::to_string(count));
   }
   if (matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
     throw BadInput(Defect::Value, path, "the last row of a motion must be 0 0 0 1");

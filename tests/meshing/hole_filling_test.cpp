@@ -67,7 +67,7 @@ TEST(HolesFilled, NothingIsClaimedOfNewVertices) {
 
 TEST(HolesFilled, LeavesWiderHolesOpen) {
   const TriangleMesh open = punctured_ball();
-  const FilledMesh out = holes_filled(open, 0.2);
+  const FilledMesh out = holes_filled(open, 0.35);
   EXPECT_EQ(out.filled, 1U);
   EXPECT_EQ(out.left_open, 1U);
   EXPECT_FALSE(certify(out.mesh).closed);
