@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
+#include <unordered_map>
+#include <vector>
 
 #include <Eigen/Geometry>
-#include <tbb/parallel_sort.h>
 
 #include "libcgs/core/error.h"
 
@@ -15,47 +15,48 @@ namespace cgs {
 
 namespace {
 
-// Cube and point, so that sorting brings the points of a cube together, first ones first.
-using Member = std::pair<uint64_t, uint32_t>;
+// Which cube each point lies in; cubes are numbered by their first point.
+struct Cubes {
+  std::vector<uint32_t> of_point;
+  uint32_t count = 0;
+};
 
-std::vector<Member> sorted_members(const TriangleMesh& cloud, double side) {
+Cubes cubes_of(const TriangleMesh& cloud, double side) {
   Eigen::AlignedBox3d box;
   for (const auto& p : cloud.vertices) box.extend(p.cast<double>());
   constexpr double kMostCubes = 1 << 21;
-  require(box.sizes().maxCoeff() / side < kMostCubes,
+  require(box.isEmpty() || box.sizes().maxCoeff() / side < kMostCubes,
           "cubes must be larger; along the longest side there may be 2097151, the number",
           box.sizes().maxCoeff() / side);
-  std::vector<Member> members(cloud.vertices.size());
-  for (uint32_t v = 0; v < members.size(); ++v) {
+  Cubes out;
+  out.of_point.reserve(cloud.vertices.size());
+  std::unordered_map<uint64_t, uint32_t> number;
+  for (const auto& p : cloud.vertices) {
     const Eigen::Vector3d cell =
-        ((cloud.vertices[v].cast<double>() - box.min()) / side).array().floor();
-    const auto key = static_cast<uint64_t>(cell.x()) << 42 | static_cast<uint64_t>(cell.y()) << 21 |
-                     static_cast<uint64_t>(cell.z());
-    members[v] = {key, v};
+        (p.cast<double>() - box.min()) / side;  // >= 0, so casts round down
+    const uint64_t key = static_cast<uint64_t>(cell.x()) << 42 |
+                         static_cast<uint64_t>(cell.y()) << 21 | static_cast<uint64_t>(cell.z());
+    const auto [at, is_new] = number.try_emplace(key, out.count);
+    if (is_new) ++out.count;
+    out.of_point.push_back(at->second);
   }
-  tbb::parallel_sort(members.begin(), members.end());
-  return members;
+  return out;
 }
 
-bool states_sigma(const TriangleMesh& cloud, uint32_t v) {
+bool states_sigma(const TriangleMesh& cloud, size_t v) {
   return !cloud.sigma.empty() && !std::isnan(cloud.sigma[v]);
 }
 
-// Appends the mean of the points [begin, end), of which those without a sigma are left out if
-// `only_sure`.
-void append_mean(TriangleMesh& to,
-                 const TriangleMesh& from,
-                 std::pair<const Member*, const Member*> members,
-                 bool only_sure) {
+/// Sums over the points of a cube.
+struct Sums {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   Eigen::Vector3d color = Eigen::Vector3d::Zero();
-  double squares = 0;
-  float support = std::numeric_limits<float>::infinity();
+  double squares = 0;  // of sigma
   double count = 0;
-  for (const Member* m = members.first; m != members.second; ++m) {
-    const uint32_t v = m->second;
-    if (only_sure && !states_sigma(from, v)) continue;
+  float support = std::numeric_limits<float>::infinity();
+
+  void add(const TriangleMesh& from, size_t v) {
     count += 1;
     place += from.vertices[v].cast<double>();
     if (!from.normals.empty()) normal += from.normals[v].cast<double>();
@@ -63,15 +64,15 @@ void append_mean(TriangleMesh& to,
     if (!from.support.empty()) support = std::min(support, from.support[v]);
     if (!from.sigma.empty()) squares += double(from.sigma[v]) * double(from.sigma[v]);
   }
-  to.vertices.emplace_back((place / count).cast<float>());
-  if (!from.normals.empty()) {
-    const double length = normal.norm();
-    to.normals.emplace_back((length > 0 ? Eigen::Vector3d(normal / length) : normal).cast<float>());
+
+  void append_mean(TriangleMesh& to, const TriangleMesh& from) const {
+    to.vertices.emplace_back((place / count).cast<float>());
+    if (!from.normals.empty()) to.normals.emplace_back(normal.stableNormalized().cast<float>());
+    if (!from.colors.empty()) to.colors.emplace_back((color / count).cast<float>());
+    if (!from.support.empty()) to.support.push_back(support);
+    if (!from.sigma.empty()) to.sigma.push_back(static_cast<float>(std::sqrt(squares / count)));
   }
-  if (!from.colors.empty()) to.colors.emplace_back((color / count).cast<float>());
-  if (!from.support.empty()) to.support.push_back(support);
-  if (!from.sigma.empty()) to.sigma.push_back(static_cast<float>(std::sqrt(squares / count)));
-}
+};
 
 }  // namespace
 
@@ -80,21 +81,18 @@ TriangleMesh down_sampled(const TriangleMesh& cloud, double side) {
   require(cloud.faces.empty(),
           "only point clouds can be thinned by cubes (meshes: simplify); the number of faces",
           cloud.faces.size());
-  const std::vector<Member> members = sorted_members(cloud, side);
-  std::vector<std::pair<uint32_t, std::pair<const Member*, const Member*>>> cubes;
-  for (size_t begin = 0; begin < members.size();) {
-    size_t end = begin;
-    while (end < members.size() && members[end].first == members[begin].first) ++end;
-    cubes.push_back({members[begin].second, {members.data() + begin, members.data() + end}});
-    begin = end;
+  const Cubes cubes = cubes_of(cloud, side);
+  std::vector<uint8_t> only_sure(cubes.count, 0);
+  for (size_t v = 0; v < cloud.vertices.size(); ++v) {
+    if (states_sigma(cloud, v)) only_sure[cubes.of_point[v]] = 1;
   }
-  std::sort(cubes.begin(), cubes.end());
+  std::vector<Sums> sums(cubes.count);
+  for (size_t v = 0; v < cloud.vertices.size(); ++v) {
+    const uint32_t cube = cubes.of_point[v];
+    if (only_sure[cube] == 0 || states_sigma(cloud, v)) sums[cube].add(cloud, v);
+  }
   TriangleMesh out;
-  for (const auto& [first, range] : cubes) {
-    const bool any_sure = std::any_of(
-        range.first, range.second, [&](const Member& m) { return states_sigma(cloud, m.second); });
-    append_mean(out, cloud, range, any_sure);
-  }
+  for (const Sums& cube : sums) cube.append_mean(out, cloud);
   return out;
 }
 

@@ -3,10 +3,12 @@
 #include <numeric>
 
 #include "convert/filter/operations.h"
+#include "convert/length.h"
 #include "libcgs/core/error.h"
 #include "meshing/clusters.h"
 #include "meshing/components.h"
 #include "meshing/cropping.h"
+#include "meshing/plane_search.h"
 #include "meshing/vertex_attributes.h"
 
 namespace cgs {
@@ -118,6 +120,26 @@ FilterStep prepare_dbscan(FilterArguments& arguments) {
   };
 }
 
+// Keeps or drops the points on the plane that holds most of them.
+FilterStep plane_step(double distance, bool keeps) {
+  return [=](FilterState& state, const Progress&) {
+    const FoundPlane found = largest_plane(state.mesh.vertices, distance / state.frame.scale);
+    std::vector<uint8_t> keep = found.on_plane;
+    for (uint8_t& k : keep) k = (k != 0) == keeps ? 1 : 0;
+    state.mesh = with_vertices(state.mesh, keep);
+    return std::to_string(found.count) + " points on the plane, " +
+           format_length(found.rms, state.frame) + " rms";
+  };
+}
+
+FilterStep prepare_keep_plane(FilterArguments& arguments) {
+  return plane_step(arguments.length(), true);
+}
+
+FilterStep prepare_drop_plane(FilterArguments& arguments) {
+  return plane_step(arguments.length(), false);
+}
+
 }  // namespace
 
 std::vector<FilterOperation> selection_operations() {
@@ -151,7 +173,17 @@ std::vector<FilterOperation> selection_operations() {
            "RADIUS,NEIGHBOURS[,N]",
            "Keep the N largest clusters of points, else one",
            "dbscan=1cm,10",
-           prepare_dbscan}};
+           prepare_dbscan},
+          {"keep-plane",
+           "DISTANCE",
+           "Keep points this near to the plane that holds most",
+           "keep-plane=5mm",
+           prepare_keep_plane},
+          {"drop-plane",
+           "DISTANCE",
+           "Drop them, such as a floor or a table",
+           "drop-plane=5mm",
+           prepare_drop_plane}};
 }
 
 }  // namespace cgs

@@ -6,6 +6,7 @@
 #include "convert/filter/operations.h"
 #include "convert/length.h"
 #include "libcgs/core/error.h"
+#include "meshing/remeshing.h"
 #include "meshing/simplify.h"
 #include "meshing/smoothing.h"
 
@@ -68,21 +69,42 @@ FilterStep prepare_simplify_to(FilterArguments& arguments) {
   };
 }
 
+FilterStep prepare_remesh(FilterArguments& arguments) {
+  const double edge = arguments.length();
+  return [edge](FilterState& state, const Progress&) {
+    require_faces(state, "remesh");
+    state.mesh = remeshed(state.mesh, edge / state.frame.scale);
+    return std::string();
+  };
+}
+
+FilterStep prepare_subdivide(FilterArguments& arguments) {
+  const size_t times = arguments.count(1, 10);
+  return [times](FilterState& state, const Progress&) {
+    require_faces(state, "subdivide");
+    state.mesh = subdivided(state.mesh, times);
+    return std::string();
+  };
+}
+
 }  // namespace
 
 std::vector<FilterOperation> surface_operations() {
-  return {{"laplacian", "N", "Smooth N times; shrinks", "laplacian=3", prepare_laplacian},
-          {"taubin", "N", "Smooth N times without shrinking", "taubin=10", prepare_taubin},
-          {"simplify",
-           "ERROR",
-           "Fewer faces, nowhere farther off than this (measured)",
-           "simplify=2mm",
-           prepare_simplify},
-          {"simplify-to",
-           "FACES",
-           "So many faces, whatever the error",
-           "simplify-to=100000",
-           prepare_simplify_to}};
+  return {
+      {"laplacian", "N", "Smooth N times; shrinks", "laplacian=3", prepare_laplacian},
+      {"taubin", "N", "Smooth N times without shrinking", "taubin=10", prepare_taubin},
+      {"simplify",
+       "ERROR",
+       "Fewer faces, nowhere farther off than this (measured)",
+       "simplify=2mm",
+       prepare_simplify},
+      {"simplify-to",
+       "FACES",
+       "So many faces, whatever the error",
+       "simplify-to=100000",
+       prepare_simplify_to},
+      {"remesh", "EDGE", "Triangles with sides of about this length", "remesh=5mm", prepare_remesh},
+      {"subdivide", "N", "Split every face into four, N times", "subdivide=1", prepare_subdivide}};
 }
 
 }  // namespace cgs
