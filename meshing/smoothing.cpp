@@ -84,6 +84,8 @@ Neighborhood neighborhood(const TriangleMesh& mesh) {
 
 using Points = std::vector<Eigen::Vector3f>;
 
+constexpr float kNoLength = 1e-12f;  // keeps the weight of an edge of length 0 finite
+
 // Every vertex `share` of the way to the mean of its neighbours, all at once.
 void step(const Neighborhood& around, float share, const Points& from, Points& to) {
   tbb::parallel_for(tbb::blocked_range<size_t>(0, from.size(), kGrain), [&](const auto& range) {
@@ -95,8 +97,14 @@ void step(const Neighborhood& around, float share, const Points& from, Points& t
         continue;
       }
       Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-      for (uint32_t k = begin; k < end; ++k) sum += from[around.to[k]];
-      to[v] = from[v] + share * (sum / static_cast<float>(end - begin) - from[v]);
+      float weights = 0;
+      for (uint32_t k = begin; k < end; ++k) {
+        const Eigen::Vector3f edge = from[around.to[k]] - from[v];
+        const float weight = 1 / (edge.norm() + kNoLength);
+        sum += weight * edge;
+        weights += weight;
+      }
+      to[v] = from[v] + share / weights * sum;
     }
   });
 }

@@ -27,13 +27,15 @@ struct SmoothedMesh {
   double most = 0;    ///< The longest of them.
 };
 
-/// Moves every vertex towards the mean of its neighbours, again and again.
+/// Moves every vertex towards the mean of its neighbours, again and again. Neighbours weigh the
+/// more the nearer they are (by 1 / distance), so that uneven meshes drift less along themselves.
 ///
 /// Held in place are the vertices on open rims, on edges of more than two faces, and where faces
 /// with evidence (Observed, SingleView) meet others, so that what was invented neither grows nor
 /// drags what was measured. Labels, colours, support and sigma stay with their vertices: a smoother
 /// surface is not a better known one. Normals, if any, are made anew from the faces.
-/// Source: Taubin 1995, "A signal processing approach to fair surface design".
+/// Source: Taubin 1995, "A signal processing approach to fair surface design", with the weights of
+/// Fujiwara 1995, "Eigenvalues of Laplacians on a closed Riemannian manifold and its nets".
 SmoothedMesh smoothed(const TriangleMesh& mesh,
                       const SmoothingOptions& options,
                       const Progress& progress = {});

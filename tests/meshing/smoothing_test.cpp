@@ -46,7 +46,9 @@ std::vector<Eigen::Vector3d> reference(const TriangleMesh& mesh,
     for (uint32_t v = 0; v < points.size(); ++v) {
       if (held.count(v) != 0) continue;
       Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-      for (const uint32_t n : around[v]) mean += from[n] / double(around[v].size());
+      double weights = 0;
+      for (const uint32_t n : around[v]) weights += 1 / (from[n] - from[v]).norm();
+      for (const uint32_t n : around[v]) mean += from[n] / (from[n] - from[v]).norm() / weights;
       points[v] = from[v] + share * (mean - from[v]);
     }
   }
