@@ -105,8 +105,9 @@ void KdTree::visit(const Eigen::Vector3f& query,
         if (!on_leaf(at.node - first_leaf)) return;
         break;
       }
-      Visit near{2 * at.node, boxes_[2 * at.node].squared_distance(p)};
-      Visit far{2 * at.node + 1, boxes_[2 * at.node + 1].squared_distance(p)};
+      const uint32_t child = 2 * at.node;
+      Visit near{child, boxes_[child].squared_distance(p)};
+      Visit far{child + 1, boxes_[child + 1].squared_distance(p)};
       if (far.squared_distance < near.squared_distance) std::swap(near, far);
       stack[height++] = far;
       at = near;

@@ -42,7 +42,11 @@ std::string simplify_state(FilterState& state,
                            const Progress& progress) {
   SimplifyResult result = simplify(state.mesh, options, progress);
   state.mesh = std::move(result.mesh);
-  if (result.faces_after == result.faces_before) return "nothing could be left out";
+  if (result.faces_after == result.faces_before) {
+    return "nothing left out, as the result would be too far off or cut itself; where the input "
+           "cuts "
+           "itself, cut-self-intersections goes before";
+  }
   return "largest error measured " +
          format_length(std::max(result.evidence.hausdorff(), result.inferred.hausdorff()),
                        state.frame);
