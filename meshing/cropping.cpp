@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "meshing/components.h"
 #include "meshing/vertex_attributes.h"
 
 namespace cgs {
@@ -69,14 +70,9 @@ class PlaneCut {
   std::unordered_map<uint64_t, uint32_t> crossings_;
 };
 
-// Points of a cloud all stay; of a mesh, those that no face uses are of no use.
-TriangleMesh without_unused(const TriangleMesh& cut, bool was_cloud) {
-  if (was_cloud) return cut;
-  std::vector<uint8_t> used(cut.vertices.size(), 0);
-  for (const auto& face : cut.faces) {
-    for (const uint32_t v : face) used[v] = 1;
-  }
-  return with_vertices(cut, used);
+// Of a mesh, vertices that no face uses are of no use.
+TriangleMesh without_unused(TriangleMesh cut, bool was_cloud) {
+  return was_cloud ? cut : with_faces(cut, std::vector<uint8_t>(cut.faces.size(), 1));
 }
 
 }  // namespace
@@ -117,7 +113,7 @@ TriangleMesh cropped_by_ball(const TriangleMesh& mesh,
   for (const auto& p : mesh.vertices) {
     keep.push_back((p.cast<double>() - center).norm() <= radius ? 1 : 0);
   }
-  return without_unused(with_vertices(mesh, keep), mesh.faces.empty());
+  return with_vertices(mesh, keep);
 }
 
 }  // namespace cgs

@@ -66,7 +66,7 @@ void move_mesh(TriangleMesh& mesh,
   frame = moved;
 }
 
-double move_to_frame(TriangleMesh& mesh, const Frame& from, const Frame& to) {
+void move_to_frame(TriangleMesh& mesh, const Frame& from, const Frame& to) {
   const bool known = from.has_metric_scale() && to.has_metric_scale();
   const double ratio = known ? from.metres_per_unit / to.metres_per_unit : 1;
   for (Eigen::Vector3f& p : mesh.vertices) {
@@ -74,7 +74,6 @@ double move_to_frame(TriangleMesh& mesh, const Frame& from, const Frame& to) {
     p = to.internal_from_world(in_world).cast<float>();
   }
   for (float& s : mesh.sigma) s *= static_cast<float>(ratio * from.scale / to.scale);
-  return ratio;
 }
 
 }  // namespace cgs

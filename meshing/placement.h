@@ -22,7 +22,6 @@ void move_mesh(TriangleMesh& mesh,
                const Eigen::Vector3d& zero);
 
 /// Moves a mesh from its frame into another one; units are matched where both state them.
-/// \return the factor by which lengths in world units changed
-double move_to_frame(TriangleMesh& mesh, const Frame& from, const Frame& to);
+void move_to_frame(TriangleMesh& mesh, const Frame& from, const Frame& to);
 
 }  // namespace cgs

@@ -264,10 +264,9 @@ RepairedMesh repaired(const TriangleMesh& mesh) {
   return out;
 }
 
-TriangleMesh without_self_intersections(const TriangleMesh& mesh, size_t& removed) {
+TriangleMesh without_self_intersections(const TriangleMesh& mesh) {
   std::vector<uint8_t> keep(mesh.faces.size(), 1);
   for (const auto& [f, g] : self_intersections(mesh)) keep[f] = keep[g] = 0;
-  removed = static_cast<size_t>(std::count(keep.begin(), keep.end(), 0));
   return with_faces(mesh, keep);
 }
 

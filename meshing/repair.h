@@ -31,7 +31,7 @@ struct RepairedMesh {
 /// \pre face indices are below mesh.vertices.size()
 RepairedMesh repaired(const TriangleMesh& mesh);
 
-/// The mesh without the faces that cut others, and their number; the gaps are open.
-TriangleMesh without_self_intersections(const TriangleMesh& mesh, size_t& removed);
+/// The mesh without the faces that cut others; the gaps are open.
+TriangleMesh without_self_intersections(const TriangleMesh& mesh);
 
 }  // namespace cgs

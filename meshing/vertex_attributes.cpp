@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "meshing/components.h"
+
 namespace cgs {
 
 namespace {
@@ -66,17 +68,15 @@ void append_blend(TriangleMesh& to, const TriangleMesh& from, std::span<const Ve
 
 TriangleMesh with_vertices(const TriangleMesh& mesh, const std::vector<uint8_t>& keep) {
   assert(keep.size() == mesh.vertices.size());
-  TriangleMesh out;
-  std::vector<uint32_t> renamed(mesh.vertices.size());
-  for (uint32_t v = 0; v < keep.size(); ++v) {
-    renamed[v] = static_cast<uint32_t>(out.vertices.size());
-    if (keep[v] != 0) append_vertex(out, mesh, v);
+  if (!mesh.faces.empty()) {
+    std::vector<uint8_t> keep_face;
+    keep_face.reserve(mesh.faces.size());
+    for (const auto& [a, b, c] : mesh.faces) keep_face.push_back(keep[a] & keep[b] & keep[c]);
+    return with_faces(mesh, keep_face);
   }
-  for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    const auto& [a, b, c] = mesh.faces[f];
-    if (keep[a] == 0 || keep[b] == 0 || keep[c] == 0) continue;
-    out.faces.push_back({renamed[a], renamed[b], renamed[c]});
-    if (!mesh.provenance.empty()) out.provenance.push_back(mesh.provenance[f]);
+  TriangleMesh out;
+  for (uint32_t v = 0; v < keep.size(); ++v) {
+    if (keep[v] != 0) append_vertex(out, mesh, v);
   }
   return out;
 }

@@ -25,8 +25,9 @@ void append_vertex(TriangleMesh& to, const TriangleMesh& from, uint32_t v);
 /// takes part states none.
 void append_blend(TriangleMesh& to, const TriangleMesh& from, std::span<const VertexShare> shares);
 
-/// The vertices where `keep` is set, with all attributes, and the faces whose corners all stay.
-/// \pre keep is as long as mesh.vertices
+/// Of a mesh the faces all of whose corners are kept, and the vertices these use; of a point cloud
+/// the points that are kept. All attributes stay.
+/// \pre keep holds 0 or 1 for every vertex
 TriangleMesh with_vertices(const TriangleMesh& mesh, const std::vector<uint8_t>& keep);
 
 /// Two meshes in the same frame as one.

@@ -90,7 +90,7 @@ FilterStep prepare_merge(FilterArguments& arguments) {
     if (mesh.provenance.empty() != state.mesh.provenance.empty()) {
       remark += "; only one file says what was observed: all of the other counts as inferred";
     }
-    (void)move_to_frame(mesh, second.content.frame, state.frame);
+    move_to_frame(mesh, second.content.frame, state.frame);
     state.mesh = joined(state.mesh, mesh);
     return remark;
   };

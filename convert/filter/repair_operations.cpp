@@ -40,9 +40,9 @@ FilterStep prepare_repair(FilterArguments&) {
 FilterStep prepare_cut_self_intersections(FilterArguments&) {
   return [](FilterState& state, const Progress&) {
     require_faces(state, "cut-self-intersections");
-    size_t removed = 0;
-    state.mesh = without_self_intersections(state.mesh, removed);
-    return std::to_string(removed) + " faces removed";
+    const size_t before = state.mesh.faces.size();
+    state.mesh = without_self_intersections(state.mesh);
+    return std::to_string(before - state.mesh.faces.size()) + " faces removed";
   };
 }
 
