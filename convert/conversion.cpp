@@ -22,14 +22,11 @@
 #include "io/json_file.h"
 #include "io/mesh_file.h"
 #include "io/mesh_ply.h"
-#include "io/obj.h"
 #include "io/ply_header.h"
 #include "io/scene_path.h"
 #include "io/splat_glb.h"
 #include "io/splat_reader.h"
 #include "io/spz.h"
-#include "io/stl.h"
-#include "io/threemf.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
 #include "meshing/isosurface.h"
@@ -212,37 +209,17 @@ void write_mesh(const ConversionRequest& request,
                 const Source& source,
                 const TriangleMesh& mesh,
                 const Json& report) {
-  const std::string extension = extension_of(request.output);
-  const Frame& frame = source.frame;
-  if (extension == ".stl" || extension == ".3mf") {
-    require(frame.has_metric_scale(),
-            "CAD files are in millimetres; --assume-unit m (cm, mm, in, ft) says what a unit is; "
-            "the scale of this input",
-            "unknown");
-    const Eigen::Matrix3d z_up = z_up_from(source.up);
-    if (extension == ".stl") return write_stl(request.output, mesh, frame, z_up);
-    return write_3mf(request.output, mesh, frame, z_up);
-  }
-  if (extension == ".obj") return write_obj(request.output, mesh, frame);
-  if (extension == ".ply") return write_mesh_ply(request.output, mesh, frame);
   GlbOptions options;
-  options.y_up = y_up_from(source.up);
   if (!request.max_error.empty()) {
-    options.max_error = parse_length(request.max_error, frame) * frame.scale;
+    options.max_error = parse_length(request.max_error, source.frame) * source.frame.scale;
   }
   options.summary_json = json_text(report, -1);
-  write_glb(request.output, mesh, frame, options);
+  write_mesh_as(request.output, mesh, source.frame, source.up, options);
 }
 
 /// Refuses at once what would be refused after minutes of work.
 void check_before_work(const ConversionRequest& request, const Source& source, Content wanted) {
-  const std::string extension = extension_of(request.output);
-  if (extension == ".stl" || extension == ".3mf") {
-    require(source.frame.has_metric_scale(),
-            "CAD files are in millimetres; --assume-unit m (cm, mm, in, ft) says what a unit is; "
-            "the scale of this input",
-            "unknown");
-  }
+  require_writable_as(request.output, source.frame);
   if (wanted == Content::Splats) return;
   if (!request.volume.voxel_size.empty())
     (void)parse_length(request.volume.voxel_size, source.frame);

@@ -50,6 +50,7 @@ int run_program(int argc, char** argv) {
   cgs::add_render(app);
   cgs::add_fuse(app);
   cgs::add_mesh(app);
+  cgs::add_filter(app);
   cgs::add_measure(app);
   cgs::add_compare(app);
   cgs::add_convert(app);

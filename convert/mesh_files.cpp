@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/mesh_files.h"
 
+#include <algorithm>
+#include <array>
+#include <cctype>
 #include <numbers>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
 #include "io/atomic_file.h"
 #include "io/mesh_ply.h"
+#include "io/obj.h"
 #include "io/stl.h"
 #include "io/threemf.h"
 #include "libcgs/core/error.h"
@@ -15,6 +20,18 @@
 namespace cgs {
 
 using Json = nlohmann::ordered_json;
+
+namespace {
+
+std::string lower_extension(const std::filesystem::path& path) {
+  std::string out = path.extension().string();
+  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return out;
+}
+
+}  // namespace
 
 Json certificate_to_json(const Certificate& certificate,
                          const TriangleMesh& mesh,
@@ -71,6 +88,35 @@ Json write_mesh_files(const std::filesystem::path& folder,
     files.push_back(name);
   }
   return {{"files", files}, {"left_out", left_out}};
+}
+
+bool is_writable_mesh_name(const std::filesystem::path& path) {
+  constexpr std::array<const char*, 5> kKnown = {".ply", ".obj", ".stl", ".3mf", ".glb"};
+  return std::find(kKnown.begin(), kKnown.end(), lower_extension(path)) != kKnown.end();
+}
+
+void require_writable_as(const std::filesystem::path& path, const Frame& frame) {
+  const std::string extension = lower_extension(path);
+  if (extension != ".stl" && extension != ".3mf") return;
+  require(frame.has_metric_scale(),
+          "CAD files are in millimetres; --assume-unit m (cm, mm, in, ft) says what a unit is; "
+          "the scale of this input",
+          "unknown");
+}
+
+void write_mesh_as(const std::filesystem::path& path,
+                   const TriangleMesh& mesh,
+                   const Frame& frame,
+                   const Eigen::Vector3d& up,
+                   GlbOptions options) {
+  require_writable_as(path, frame);
+  const std::string extension = lower_extension(path);
+  if (extension == ".stl") return write_stl(path, mesh, frame, z_up_from(up));
+  if (extension == ".3mf") return write_3mf(path, mesh, frame, z_up_from(up));
+  if (extension == ".obj") return write_obj(path, mesh, frame);
+  if (extension == ".ply") return write_mesh_ply(path, mesh, frame);
+  options.y_up = y_up_from(up);
+  write_glb(path, mesh, frame, options);
 }
 
 }  // namespace cgs

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "io/gltf.h"
 #include "libcgs/core/frame.h"
 #include "libcgs/core/triangle_mesh.h"
 #include "meshing/certificate.h"
@@ -28,5 +29,22 @@ nlohmann::ordered_json write_mesh_files(const std::filesystem::path& folder,
                                         const TriangleMesh& watertight,
                                         const Frame& frame,
                                         const Eigen::Vector3d& up);
+
+/// True for the endings that write_mesh_as() takes: .ply, .obj, .stl, .3mf, .glb, in any case.
+bool is_writable_mesh_name(const std::filesystem::path& path);
+
+/// What can be refused before any work: STL and 3MF of a scene of unknown scale.
+/// \throws InvalidInput
+void require_writable_as(const std::filesystem::path& path, const Frame& frame);
+
+/// Writes a mesh in the format that the ending of the path names.
+/// \param up       world direction that becomes +Z in STL and 3MF, +Y in GLB
+/// \param options  for a GLB; its y_up is set from `up`
+/// \throws as the writers and require_writable_as()
+void write_mesh_as(const std::filesystem::path& path,
+                   const TriangleMesh& mesh,
+                   const Frame& frame,
+                   const Eigen::Vector3d& up,
+                   GlbOptions options = {});
 
 }  // namespace cgs

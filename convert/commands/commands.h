@@ -10,6 +10,7 @@ namespace cgs {
 void add_compare(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_evaluate(CLI::App& app);
+void add_filter(CLI::App& app);
 void add_fuse(CLI::App& app);
 void add_info(CLI::App& app);
 void add_measure(CLI::App& app);

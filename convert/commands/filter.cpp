@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <iostream>
+#include <memory>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/commands/commands.h"
+#include "convert/commands/common_options.h"
+#include "convert/filter/chain.h"
+#include "convert/measured_file.h"
+#include "convert/mesh_files.h"
+#include "convert/terminal.h"
+#include "io/json_file.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+struct FilterArgs {
+  std::filesystem::path input;
+  std::filesystem::path output;
+  std::vector<std::string> operations;
+  std::string assume_unit;
+  std::vector<double> up = {0, 0, 1};
+  CommonOptions common;
+};
+
+// Whether what is left can be written under that name.
+void check_content(const std::filesystem::path& output, const FilterState& state) {
+  if (!state.is_cloud() || output.extension() == ".ply" || output.extension() == ".PLY") return;
+  throw InvalidInput("a point cloud can only be written as .ply, not as " + printable(output));
+}
+
+void run_filter_command(const FilterArgs& args) {
+  limit_threads(args.common.threads);
+  keep_apart(args.output, args.input);
+  require(is_writable_mesh_name(args.output),
+          "the output must end in .ply, .obj, .stl, .3mf or .glb",
+          printable(args.output.filename()));
+  Terminal terminal(args.common.quiet);
+  (void)prepare_filters(args.operations, Frame{.metres_per_unit = 1});  // before a long read
+  MeasurableFile file = read_measured(args.input, args.assume_unit);
+  terminal.warn(file.warnings);
+  FilterState state{std::move(file.content.mesh), file.content.frame, file.content.file_origin};
+  const std::vector<PreparedFilter> filters = prepare_filters(args.operations, state.frame);
+  for (const PreparedFilter& filter : filters) {
+    for (const auto& named : filter.files) keep_apart(args.output, named);
+  }
+  require_writable_as(args.output, state.frame);
+  const nlohmann::ordered_json report = run_filters(state, filters, terminal);
+  check_content(args.output, state);
+  write_mesh_as(
+      args.output, state.mesh, state.frame, Eigen::Vector3d(args.up[0], args.up[1], args.up[2]));
+  if (state.frame.file_origin != state.file_origin) {
+    terminal.warn("coordinates in " + printable(args.output) +
+                  " are from another origin, which the file states: floats would lose digits");
+  }
+  if (args.common.json) std::cout << json_text({{"operations", report}}) << "\n";
+}
+
+}  // namespace
+
+void add_filter(CLI::App& app) {
+  auto args = std::make_shared<FilterArgs>();
+  auto* cmd = app.add_subcommand(
+      "filter", "Clean, crop, smooth, simplify ... meshes and point clouds; labels and sigma stay");
+  cmd->add_option("input", args->input, "Mesh or point cloud: .ply, .obj, .stl, .off")->required();
+  cmd->add_option("output", args->output, "File to write: .ply, .obj, .stl, .3mf, .glb")
+      ->required();
+  cmd->add_option("--op", args->operations, "An operation, name=arguments; may be repeated")
+      ->required()
+      ->allow_extra_args(false);
+  cmd->add_option(
+      "--assume-unit", args->assume_unit, "What a unit of the file is, where it does not say");
+  cmd->add_option("--up", args->up, "Direction that is up, for .stl, .3mf and .glb")
+      ->expected(3)
+      ->capture_default_str();
+  add_common_options(*cmd, args->common);
+  cmd->footer(filter_help() +
+              "Coordinates are those of the file. Lengths and coordinates take a unit (2mm, -3cm) "
+              "or are in units of the file.\n"
+              "Example: cgs filter scan.ply clean.ply --op statistical-outliers=20,2 "
+              "--op largest=1 --op taubin=10 --op simplify=2mm");
+  cmd->callback([args] { run_filter_command(*args); });
+}
+
+}  // namespace cgs

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/filter/operations.h"
+#include "libcgs/core/error.h"
+#include "meshing/down_sampling.h"
+#include "meshing/outliers.h"
+#include "meshing/point_normals.h"
+#include "meshing/vertex_attributes.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr size_t kMostNeighbors = 10'000;
+
+FilterStep prepare_statistical_outliers(FilterArguments& arguments) {
+  const size_t neighbors = arguments.count(1, kMostNeighbors);
+  const double deviations = arguments.number(0, 1e6);
+  return [=](FilterState& state, const Progress&) {
+    state.mesh = with_vertices(
+        state.mesh, without_statistical_outliers(state.mesh.vertices, neighbors, deviations));
+    return std::string();
+  };
+}
+
+FilterStep prepare_radius_outliers(FilterArguments& arguments) {
+  const size_t neighbors = arguments.count(1, 1'000'000);
+  const double radius = arguments.length();
+  return [=](FilterState& state, const Progress&) {
+    state.mesh = with_vertices(
+        state.mesh,
+        without_lonely_points(state.mesh.vertices, neighbors, radius / state.frame.scale));
+    return std::string();
+  };
+}
+
+FilterStep prepare_voxel(FilterArguments& arguments) {
+  const double side = arguments.length();
+  return [side](FilterState& state, const Progress&) {
+    state.mesh = down_sampled(state.mesh, side / state.frame.scale);
+    return std::string();
+  };
+}
+
+FilterStep prepare_normals(FilterArguments& arguments) {
+  const bool given = arguments.more();
+  constexpr size_t kDefault = 30;
+  const size_t neighbors = given ? arguments.count(3, kMostNeighbors) : kDefault;
+  return [=](FilterState& state, const Progress&) -> std::string {
+    TriangleMesh& mesh = state.mesh;
+    if (!state.is_cloud()) {
+      if (given)
+        throw InvalidInput("--op normals: those of a mesh come from its faces; write normals");
+      mesh.normals = vertex_normals(mesh);
+      return "from the faces";
+    }
+    std::vector<Eigen::Vector3f> normals = estimated_normals(mesh.vertices, neighbors);
+    const bool had_normals = !mesh.normals.empty();
+    constexpr size_t kJoined = 10;
+    if (had_normals) turn_like(normals, mesh.normals);
+    if (!had_normals) turn_consistently(normals, mesh.vertices, kJoined);
+    mesh.normals = std::move(normals);
+    return had_normals ? "on the side of those before" : "neighbours turned alike";
+  };
+}
+
+FilterStep prepare_normals_towards(FilterArguments& arguments) {
+  const Eigen::Vector3d eye = arguments.point();
+  return [eye](FilterState& state, const Progress&) {
+    if (state.mesh.normals.empty()) {
+      throw InvalidInput("--op normals-towards: there are no normals; put --op normals before it");
+    }
+    turn_towards(
+        state.mesh.normals, state.mesh.vertices, state.internal_from_file(eye).cast<float>());
+    return std::string();
+  };
+}
+
+}  // namespace
+
+std::vector<FilterOperation> point_operations() {
+  return {
+      {"statistical-outliers",
+       "NEIGHBOURS,SIGMAS",
+       "Drop points farther from their neighbours than usual",
+       "statistical-outliers=20,2",
+       prepare_statistical_outliers},
+      {"radius-outliers",
+       "NEIGHBOURS,RADIUS",
+       "Drop points with fewer neighbours within the radius",
+       "radius-outliers=16,5mm",
+       prepare_radius_outliers},
+      {"voxel", "SIDE", "One point per cube of a grid (point clouds)", "voxel=2mm", prepare_voxel},
+      {"normals",
+       "[=NEIGHBOURS]",
+       "Normals of points from their neighbours (30), of a mesh from its faces",
+       "normals=30",
+       prepare_normals},
+      {"normals-towards",
+       "X,Y,Z",
+       "Turn normals to where the scanner stood",
+       "normals-towards=0,0,2m",
+       prepare_normals_towards}};
+}
+
+}  // namespace cgs

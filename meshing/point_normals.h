@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace cgs {
+
+/// Unit normals of a point cloud: per point the direction in which it and its nearest neighbours
+/// spread least; which of the two is open. 0 where the neighbours are one point or on a line.
+/// \param neighbors  the point included, >= 3
+/// Source: Hoppe et al. 1992, "Surface reconstruction from unorganized points", section 3.2.
+/// \throws InvalidInput for fewer neighbours
+std::vector<Eigen::Vector3f> estimated_normals(const std::vector<Eigen::Vector3f>& points,
+                                               size_t neighbors);
+
+/// Turns each normal to the side of the hint for its point; where they are at right angles it
+/// stays.
+void turn_like(std::vector<Eigen::Vector3f>& normals, const std::vector<Eigen::Vector3f>& hints);
+
+/// Turns each normal to the side on which `eye` lies.
+void turn_towards(std::vector<Eigen::Vector3f>& normals,
+                  const std::vector<Eigen::Vector3f>& points,
+                  const Eigen::Vector3f& eye);
+
+/// Turns normals so that neighbours agree: along the tree of neighbours whose normals differ least,
+/// from the topmost (+z) point of every part, which looks up.
+/// \param neighbors  of every point that may be joined to it, >= 1
+/// Source: Hoppe et al. 1992, section 3.3.
+void turn_consistently(std::vector<Eigen::Vector3f>& normals,
+                       const std::vector<Eigen::Vector3f>& points,
+                       size_t neighbors);
+
+}  // namespace cgs

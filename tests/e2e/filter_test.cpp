@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// `cgs filter` as a user calls it.
+#include <filesystem>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "io/mesh_file.h"
+#include "io/mesh_ply.h"
+#include "tests/support/run_cgs.h"
+#include "tests/support/sample_mesh.h"
+
+namespace cgs {
+namespace {
+
+using test::ProgramResult;
+using test::run_cgs;
+
+class Filter : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_mesh_ply(dir_ / "ball.ply", test::labelled_sphere(32, 48), test::centimetre_frame());
+    TriangleMesh cloud = test::labelled_sphere(32, 48);
+    cloud.faces.clear();
+    cloud.provenance.clear();
+    write_mesh_ply(dir_ / "cloud.ply", cloud, test::centimetre_frame());
+  }
+  ProgramResult filter(const std::string& in, const std::string& out, const std::string& rest) {
+    return run_cgs("filter " + (dir_ / in).string() + " " + (dir_ / out).string() + " " + rest);
+  }
+  bool exists(const std::string& name) const { return std::filesystem::exists(dir_ / name); }
+  test::TempDir dir_;
+};
+
+TEST_F(Filter, RunsAChainAndSaysWhatEachOperationDid) {
+  const ProgramResult result = filter("ball.ply",
+                                      "out.ply",
+                                      "--op crop-plane=3,-6,0,0,0,1 --op taubin=5 "
+                                      "--op simplify=1mm --op fill-holes --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto report = nlohmann::json::parse(result.out);
+  ASSERT_EQ(report["operations"].size(), 4U);
+  EXPECT_EQ(report["operations"][3]["remark"], "1 holes filled, 0 left open");
+  for (const char* part : {"crop-plane", "taubin=5", "faces", "observed", "m2"}) {
+    EXPECT_NE(result.err.find(part), std::string::npos) << part;
+  }
+  const MeasurableFile out = read_mesh_file(dir_ / "out.ply");
+  EXPECT_EQ(out.content.mesh.faces.size(), report["operations"][3]["after"]["faces"]);
+  EXPECT_TRUE(out.content.states_provenance() && out.content.states_sigma());
+  EXPECT_EQ(out.content.frame.metres_per_unit, 0.01);
+}
+
+TEST_F(Filter, WritesEveryFormat) {
+  for (const char* name : {"a.ply", "a.obj", "a.stl", "a.3mf", "a.glb", "a.STL"}) {
+    const ProgramResult result = filter("ball.ply", name, "--op repair");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_TRUE(exists(name)) << name;
+  }
+  const MeasurableFile stl = read_mesh_file(dir_ / "a.stl");
+  EXPECT_EQ(stl.content.mesh.faces.size(), test::labelled_sphere(32, 48).faces.size());
+}
+
+TEST_F(Filter, TakesPointCloudsAndWritesThemAsPly) {
+  const std::string chain =
+      "--op statistical-outliers=10,4 --op voxel=2cm --op normals=12 --op translate=1m,0,0";
+  EXPECT_EQ(filter("cloud.ply", "thin.ply", chain).exit_code, 0);
+  const MeasurableFile thin = read_mesh_file(dir_ / "thin.ply");
+  EXPECT_TRUE(thin.content.mesh.faces.empty());
+  EXPECT_GT(thin.content.points.size(), 100U);
+  EXPECT_LT(thin.content.points.size(), 1400U);
+  const ProgramResult as_stl = filter("cloud.ply", "thin.stl", chain);
+  EXPECT_EQ(as_stl.exit_code, 2);
+  EXPECT_NE(as_stl.err.find("only be written as .ply"), std::string::npos);
+  EXPECT_FALSE(exists("thin.stl"));
+}
+
+TEST_F(Filter, SameBytesForAnyNumberOfThreads) {
+  const std::string chain = "--op radius-outliers=3,8cm --op taubin=3 --op simplify=2mm --op hull";
+  for (const char* threads : {"1", "2", "4"}) {
+    const ProgramResult result =
+        filter("ball.ply", std::string(threads) + ".ply", chain + " -q --threads " + threads);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+  }
+  EXPECT_EQ(test::read_bytes(dir_ / "1.ply"), test::read_bytes(dir_ / "2.ply"));
+  EXPECT_EQ(test::read_bytes(dir_ / "1.ply"), test::read_bytes(dir_ / "4.ply"));
+}
+
+TEST_F(Filter, RefusesInOneLineAndWritesNothing) {
+  const auto refused = [&](const std::string& rest, int code, const std::string& part) {
+    const ProgramResult result = filter("ball.ply", "no.ply", "-q " + rest);
+    EXPECT_EQ(result.exit_code, code) << rest << result.err;
+    EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(exists("no.ply"));
+  };
+  refused("--op polish", 2, "there is no operation 'polish'; known are translate");
+  refused("--op taubin=many", 2, "'many' is not a whole number in 1 ... 10000; write taubin=N");
+  refused("--op simplify=3furlong", 2, "not a unit of length");
+  refused("--op voxel=1cm", 2, "only point clouds");
+  refused("--op crop-ball=0,0,9m,1cm", 6, "nothing is left");
+  refused("--op merge=" + (dir_ / "none.ply").string(), 3, "none.ply");
+  refused("--op merge=" + (dir_ / "no.ply").string(), 2, "lies in the input");
+  const ProgramResult over_itself = filter("ball.ply", "ball.ply", "--op repair");
+  EXPECT_EQ(over_itself.exit_code, 2);
+  EXPECT_EQ(filter("ball.ply", "no.xyz", "--op repair").exit_code, 2);
+  EXPECT_EQ(filter("ball.ply", "no.ply", "").exit_code, 2);
+}
+
+TEST_F(Filter, MergesInTheUnitOfTheFirst) {
+  Frame metres = test::centimetre_frame();
+  metres.metres_per_unit = 1;
+  metres.scale = 0.5;
+  metres.origin = metres.file_origin = {0, 0, 0};
+  TriangleMesh bare = test::labelled_sphere(8, 8);
+  bare.provenance.clear();
+  bare.sigma.clear();
+  write_mesh_ply(dir_ / "bare.ply", bare, metres);
+  const ProgramResult result =
+      filter("ball.ply", "both.ply", "--op merge=" + (dir_ / "bare.ply").string());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("all of the other counts as inferred"), std::string::npos);
+  const MeasurableFile both = read_mesh_file(dir_ / "both.ply");
+  const auto& points = both.content.points;
+  // Diameters: 0.8 internal units of 64 cm, and of half a metre.
+  const auto across = [&](size_t a, size_t b) {
+    return (points[b] - points[a]).norm() * both.content.frame.scale;
+  };
+  const size_t first = test::labelled_sphere(32, 48).vertices.size();
+  EXPECT_NEAR(across(0, first - 1), 0.8 * 64, 1e-3);
+  EXPECT_NEAR(across(first, points.size() - 1), 0.8 * 50, 1e-3);
+  EXPECT_EQ(both.content.mesh.provenance.back(), Provenance::Inferred);
+}
+
+}  // namespace
+}  // namespace cgs
