@@ -45,6 +45,9 @@ struct TrainedModel {
 };
 TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress);
 
+/// Gives a frame without scale the one that metric depth of the photographs tells, if it does.
+void take_sensor_scale(const GivenDepthReport& given, Frame& frame);
+
 /// Removes the checkpoints of finished work. \throws IoError
 void forget_checkpoints(const std::filesystem::path& folder);
 
@@ -64,6 +67,9 @@ Model read_model(const std::filesystem::path& folder);
 /// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model
 /// or photographs that were moved. \throws BadInput as read_scene()
 void relink_images(Scene& scene, const std::filesystem::path& folder);
+
+/// 1 where the depth of a view is a guess from that view alone; empty if it is nowhere.
+MaskMap guessed_pixels(const ViewPriors& priors);
 
 /// The input views with their depth and its uncertainty: who can vouch for a rendered pixel.
 std::vector<SupportView> support_views(const Model& model);
