@@ -27,9 +27,12 @@ constexpr std::string_view kStart = "#name,";
 bool has_cameras(const fs::path& file) {
   constexpr uint64_t kEnough = 4096;
   try {
-    const std::string start = "\n" + read_file_start(file, kEnough);
-    return start.find("\n" + std::string(kStart)) != std::string::npos ||
-           start.starts_with("\n\xef\xbb\xbf" + std::string(kStart));
+    const std::string start = read_file_start(file, kEnough);
+    TextLines lines(start, file);
+    while (const auto line = lines.next()) {
+      if (line->starts_with(kStart)) return true;
+    }
+    return false;
   } catch (const Error&) {
     return false;  // what cannot be read has none
   }

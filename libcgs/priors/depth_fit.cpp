@@ -44,6 +44,24 @@ double spread_of(const std::vector<FitPoint>& points) {
   return std::sqrt(std::max(0.0, squares / count - sum * sum / (count * count)));
 }
 
+// Mean relative distance, each at most `cap`: the same for all outliers.
+double capped_loss(const LineFit& line, const std::vector<FitPoint>& points, double cap) {
+  double sum = 0;
+  for (const FitPoint& p : points) sum += std::min(cap, off(line, p));
+  return sum / static_cast<double>(points.size());
+}
+
+// What is left if the given values are not looked at: that of the best single y.
+double loss_of_constant(const std::vector<FitPoint>& points, double cap) {
+  constexpr size_t kCandidates = 200;
+  const size_t step = std::max(size_t{1}, points.size() / kCandidates);
+  double best = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < points.size(); i += step) {
+    best = std::min(best, capped_loss({0, points[i].y, 0}, points, cap));
+  }
+  return best;
+}
+
 // Through two points; of many pairs, the line with the least median residual.
 LineFit least_median_line(const std::vector<FitPoint>& points) {
   constexpr size_t kJudges = 1000;
@@ -120,7 +138,9 @@ std::optional<LineFit> fit_line(const std::vector<FitPoint>& points) {
     if (!reweighted(points, line)) return std::nullopt;
   }
   constexpr double kExplained = 0.5;
-  return line.scatter < kExplained * spread_of(points) ? std::optional(line) : std::nullopt;
+  const double cap = spread_of(points);
+  const bool tells = capped_loss(line, points, cap) < kExplained * loss_of_constant(points, cap);
+  return tells ? std::optional(line) : std::nullopt;
 }
 
 std::optional<LineFit> fit_scale(const std::vector<FitPoint>& points) {

@@ -85,8 +85,7 @@ class Estimator {
     for (size_t i = 0; i < out.size(); ++i) {
       cameras.push_back(view(i).camera);
       if (given.views[i].depth.empty()) continue;
-      out[i] = guess_depth(
-          given.views[i], view(i), out_.views[i], [&](ViewPriors& priors) { complete(i, priors); });
+      out[i] = guess_depth(given.views[i], view(i), out_.views[i]);
     }
     remove_contradictions(cameras, out_.views, out);
     return out;

@@ -17,6 +17,7 @@ namespace cgs {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr double kFloor = 0.005;  // relative sigma that no guess goes below
 
 constexpr std::array<std::pair<int, int>, 16> kDirections = {{{1, 0},
                                                               {-1, 0},
@@ -46,7 +47,11 @@ struct Bent {
 };
 
 // Fitted depth at one pixel, corrected by what is measured around it.
-Bent bent_at(const DepthMap& fitted, const ViewPriors& priors, int x, int y) {
+Bent bent_at(const FittedDepth& given, const ViewPriors& priors, int x, int y) {
+  const DepthMap& fitted = given.depth;
+  // Deviations beyond are no bend of the given depth: one of the two is wrong there.
+  constexpr double kDeviations = 3;
+  const double largest = kDeviations * std::max(kFloor, given.scatter);
   constexpr double kSameSurface = 0.1;  // relative change of the given depth
   constexpr double kReach = 0.25;       // of the diagonal: farther off, a deviation says little
   const auto rho = 1 / double(fitted(x, y));
@@ -66,10 +71,13 @@ Bent bent_at(const DepthMap& fitted, const ViewPriors& priors, int x, int y) {
     nearest = std::min(nearest, distance);
     if (!(fitted(u, v) > 0)) continue;
     const auto there = 1 / double(fitted(u, v));
-    const double change = std::log(there / rho) / kSameSurface;
-    const double w = std::exp(-change * change) / (distance * distance);
     // Relative, so that a deviation by a factor stays one.
-    sum += w * (1 / double(priors.depth(u, v)) / there - 1);
+    const double deviation = 1 / double(priors.depth(u, v)) / there - 1;
+    if (!(std::abs(deviation) < largest)) continue;
+    const double trust = 1 - std::pow(deviation / largest, 2);
+    const double change = std::log(there / rho) / kSameSurface;
+    const double w = trust * trust * std::exp(-change * change) / (distance * distance);
+    sum += w * deviation;
     weight += w;
   }
   const double corrected = rho * (1 + sum / weight);
@@ -83,7 +91,7 @@ Raster<Bent> bend(const FittedDepth& fitted, const View& view, const ViewPriors&
     for (int x = 0; x < out.width; ++x) {
       const bool wanted = is_usable(view, x, y) && fitted.depth(x, y) > 0 &&
                           priors.origin(x, y) != DepthOrigin::Measured;
-      if (wanted) out(x, y) = bent_at(fitted.depth, priors, x, y);
+      if (wanted) out(x, y) = bent_at(fitted, priors, x, y);
     }
   });
   return out;
@@ -98,8 +106,9 @@ class ErrorByDistance {
   }
   void add(float distance, double error) { errors_[bin(distance)].push_back(error); }
 
-  // Relative standard deviation per bin: from the median and, as tails count, from the 95th
-  // percentile. Bins with too few errors are as bad as the one before, grown as a random walk.
+  // Relative standard deviation per bin: from the median and, as tails count, from the 80th
+  // percentile; beyond, it is more often what was hidden that errs. Bins with too few errors are as
+  // bad as the one before, grown as a random walk.
   void settle() {
     constexpr size_t kFewest = 200;
     constexpr double kGrowth = 1.41;
@@ -108,7 +117,7 @@ class ErrorByDistance {
       std::vector<double>& e = errors_[k];
       if (e.size() >= kFewest) {
         std::sort(e.begin(), e.end());
-        last = std::max(last, std::max(1.4826 * e[e.size() / 2], e[e.size() * 95 / 100] / 1.96));
+        last = std::max(last, std::max(1.4826 * e[e.size() / 2], e[e.size() * 4 / 5] / 1.2816));
       } else {
         last *= kGrowth;
       }
@@ -145,40 +154,23 @@ bool is_in_patch(int x, int y, int width, int height) {
   return false;
 }
 
-struct Trial {
-  ErrorByDistance guessed;
-  ErrorByDistance completed;
-};
-
-// Hides measured pixels and looks how well both ways find them again.
-Trial try_out(const FittedDepth& fitted,
-              const View& view,
-              const ViewPriors& priors,
-              const Completion& complete) {
+// Hides measured pixels and looks how well guesses find them again.
+ErrorByDistance try_out(const FittedDepth& fitted, const View& view, const ViewPriors& priors) {
   ViewPriors hidden = priors;
   for (int y = 0; y < priors.depth.height; ++y) {
     for (int x = 0; x < priors.depth.width; ++x) {
       if (!is_in_patch(x, y, priors.depth.width, priors.depth.height)) continue;
-      hidden.depth(x, y) = hidden.sigma(x, y) = kNaN;
       hidden.origin(x, y) = DepthOrigin::Unknown;
-      hidden.matched_views(x, y) = 0;
     }
   }
   const Raster<Bent> bent = bend(fitted, view, hidden);
-  complete(hidden);
-  Trial out;
+  ErrorByDistance out;
   for (size_t i = 0; i < bent.data.size(); ++i) {
-    const bool was_hidden = priors.origin.data[i] == DepthOrigin::Measured &&
-                            hidden.origin.data[i] == DepthOrigin::Completed;
-    if (!was_hidden || !(bent.data[i].depth > 0)) continue;
-    const auto error = [&](float z) {
-      return std::abs(std::log(double(z / priors.depth.data[i])));
-    };
-    out.guessed.add(bent.data[i].distance, error(bent.data[i].depth));
-    out.completed.add(bent.data[i].distance, error(hidden.depth.data[i]));
+    const auto& [depth, distance] = bent.data[i];
+    if (priors.origin.data[i] != DepthOrigin::Measured || !(depth > 0)) continue;
+    out.add(distance, std::abs(std::log(double(depth / priors.depth.data[i]))));
   }
-  out.guessed.settle();
-  out.completed.settle();
+  out.settle();
   return out;
 }
 
@@ -207,20 +199,20 @@ bool floats(double z, double sigma, const Shown& shown) {
 
 }  // namespace
 
-DepthGuess guess_depth(const FittedDepth& fitted,
-                       const View& view,
-                       const ViewPriors& priors,
-                       const Completion& complete) {
-  constexpr double kFloor = 0.005;  // relative sigma
+DepthGuess guess_depth(const FittedDepth& fitted, const View& view, const ViewPriors& priors) {
   DepthGuess out{DepthMap(fitted.depth.width, fitted.depth.height, kNaN),
                  DepthMap(fitted.depth.width, fitted.depth.height, kNaN)};
-  const Trial trial = try_out(fitted, view, priors, complete);
+  const ErrorByDistance errors = try_out(fitted, view, priors);
   const Raster<Bent> bent = bend(fitted, view, priors);
+  // What measured pixels around correct is theirs to correct; soon after, the fit is all there is.
+  constexpr double kCorrected = 0.01;  // of the diagonal
+  const double reach = kCorrected * std::hypot(fitted.depth.width, fitted.depth.height);
   for (size_t i = 0; i < bent.data.size(); ++i) {
-    const auto [depth, distance] = bent.data[i];
-    const double sigma = trial.guessed.sigma(distance);
-    const bool is_better = sigma > 0 && sigma < trial.completed.sigma(distance);
-    if (!(depth > 0) || !is_better) continue;
+    const auto& [depth, distance] = bent.data[i];
+    const double found = errors.sigma(distance);
+    if (!(depth > 0) || !(found > 0)) continue;
+    const double sigma =
+        std::hypot(found, fitted.scatter * (1 - std::exp(-double(distance) / reach)));
     out.depth.data[i] = depth;
     out.sigma.data[i] = static_cast<float>(std::max(kFloor, sigma) * double(depth));
   }
@@ -260,7 +252,9 @@ void remove_contradictions(const std::vector<Camera>& cameras,
 size_t enter_guess(const DepthGuess& guess, ViewPriors& priors) {
   size_t count = 0;
   for (size_t i = 0; i < guess.depth.data.size(); ++i) {
-    if (priors.origin.data[i] != DepthOrigin::Completed || !(guess.depth.data[i] > 0)) continue;
+    const bool is_better = guess.sigma.data[i] / guess.depth.data[i] <
+                           priors.sigma.data[i] / priors.depth.data[i];  // not where there is none
+    if (priors.origin.data[i] != DepthOrigin::Completed || !is_better) continue;
     priors.depth.data[i] = guess.depth.data[i];
     priors.sigma.data[i] = guess.sigma.data[i];
     priors.origin.data[i] = DepthOrigin::Guessed;

@@ -123,7 +123,7 @@ TEST(FitGivenDepth, LeavesOutWhatDoesNotFit) {
   Example e;
   e.give([](double, int) { return 3.0; });
   EXPECT_EQ(fit_given_depth(e.scene, e.priors).kind, DepthKind::Unknown);
-  e.give([](double z, int) { return 10 - z; });
+  e.give([](double z, int) { return 2 + std::sin(40 * z); });
   EXPECT_EQ(fit_given_depth(e.scene, e.priors).kind, DepthKind::Unknown);
   e.scene.depth_kind = DepthKind::Metric;
   e.give([](double z, int) { return std::exp(3 * z); });
