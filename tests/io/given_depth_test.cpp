@@ -59,7 +59,7 @@ class GivenDepthFiles : public testing::Test {
   size_t warnings_ = 0;
 };
 
-double ramp(double u, double v) { return 2 + 0.01 * u + 0.02 * v; }
+double ramp(double u, double v) { return 2 + 0.005 * u + 0.01 * v; }
 
 TEST_F(GivenDepthFiles, AreFoundWhereTheyLie) {
   EXPECT_TRUE(first().given_depth.empty());
