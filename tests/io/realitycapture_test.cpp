@@ -106,7 +106,7 @@ TEST_F(ReadRealityCapture, IsRecognisedByItsHeader) {
 
 TEST_F(ReadRealityCapture, RefusesWhatItCannotUse) {
   EXPECT_EQ(refused("pitch,", ""), "SCHEMA");
-  EXPECT_EQ(refused("#name", "#nam"), "SCHEMA");
+  EXPECT_EQ(refused("#name", "#nam"), "OPEN") << "no file is recognised";
   EXPECT_EQ(refused(",0.001,-0.0005", ""), "SCHEMA");
   EXPECT_EQ(refused(",30,", ",north,"), "SYNTAX");
   EXPECT_EQ(refused(",30,", ",nan,"), "VALUE");
