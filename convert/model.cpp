@@ -21,6 +21,7 @@
 #include "io/scene_path.h"
 #include "io/scene_reader.h"
 #include "libcgs/core/error.h"
+#include "libcgs/priors/depth_network.h"
 #include "libcgs/priors/measured_range.h"
 #include "libcgs/render/rasterizer.h"
 
@@ -148,6 +149,14 @@ void optimise(TrainedModel& trained, const ModelRequest& request, const Progress
   trained.steps = trainer.history();
 }
 
+void guess_by_network(const std::filesystem::path& file, Scene& scene) {
+  DepthNetwork network(read_file(file), file);
+  for (const int i : scene.input) {
+    View& view = scene.views[static_cast<size_t>(i)];
+    view.given_depth = network(view);
+  }
+}
+
 }  // namespace
 
 void take_sensor_scale(const GivenDepthReport& given, Frame& frame) {
@@ -162,6 +171,7 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   request.training.validate();
   constexpr double kPriorsShare = 0.2;
   load_images(scene, scene.input, part_of(progress, 0, 0.01));
+  if (!request.depth_network.empty()) guess_by_network(request.depth_network, scene);
   to_canonical(scene);
   narrow_depth_ranges(scene, request.priors.sweep);
   EstimatedPriors estimated =

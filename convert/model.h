@@ -33,6 +33,8 @@ struct ModelRequest {
   TrainingOptions training;
   /// Where checkpoints of the training go; empty = none. They stay until forget_checkpoints().
   std::filesystem::path checkpoints;
+  /// A network that guesses the depth of the photographs, as depth_network.h; empty = none.
+  std::filesystem::path depth_network;
 };
 
 /// Scene -> model. Loads the images of the input views, moves the scene to its canonical frame,

@@ -73,7 +73,8 @@ const TriangleMesh& loaded_mesh(Run& run) {
 
 Json run_model(Run& run, const Progress& progress) {
   const std::filesystem::path folder = run.request.output / "model";
-  const ModelRequest request = {{}, run.request.training, folder};
+  const ModelRequest request = {
+      {}, run.request.training, folder, run.request.scene.options.depth.network};
   const TrainedModel trained = train_model(run.scene, request, progress);
   // Pixels were read for the first time: more may be odd than the cameras told.
   const std::vector<std::string>& found = trained.model.scene.warnings;
@@ -246,6 +247,8 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     if (mask) inputs[view.name + ", mask"] = file_hash(*mask);
     if (!view.depth_path.empty()) inputs[view.name + ", depth"] = file_hash(view.depth_path);
   }
+  const std::filesystem::path& network = request.scene.options.depth.network;
+  if (!network.empty()) inputs["depth network"] = file_hash(network);
   Json held_out = Json::object();
   for (const int i : scene.held_out) {
     const View& view = scene.views[static_cast<size_t>(i)];

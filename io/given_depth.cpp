@@ -184,11 +184,21 @@ DepthMap resampled(const Raster<float>& values, const View& view) {
 
 void DepthOptions::validate() const {
   require(scale >= 0 && std::isfinite(scale), "DepthOptions.scale must be >= 0", scale);
+  if (network.empty()) return;
+  require(folder.empty(), "give depth files or a network, not both; files", folder);
+  require(kind != DepthKind::Metric,
+          "a network measures nothing: its kind is depth or disparity, the network",
+          network);
 }
 
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external) {
   if (options.kind != DepthKind::Unknown) scene.depth_kind = options.kind;
   if (options.scale > 0) scene.depth_scale = options.scale;
+  if (!options.network.empty()) {
+    for (View& view : scene.views) view.depth_path.clear();
+    if (scene.depth_kind != DepthKind::Relative) scene.depth_kind = DepthKind::Disparity;
+    return;
+  }
   for (View& view : scene.views) {
     if (view.image_path.empty()) continue;
     if (!options.folder.empty()) {

@@ -13,9 +13,11 @@ struct DepthOptions {
   std::filesystem::path folder;  ///< Holds a file per photograph, of the same stem; empty = where
                                  ///< the scene says, else a folder "depth" beside the photographs.
   DepthKind kind = DepthKind::Unknown;
+  std::filesystem::path
+      network;       ///< An .onnx file that guesses depth; then no files are looked for.
   double scale = 0;  ///< Values per metre; 0 = 1000 in files of whole numbers, else 1.
 
-  /// \throws InvalidInput naming the first field out of range.
+  /// \throws InvalidInput naming the first field out of range, or what excludes each other.
   void validate() const;
 };
 

@@ -49,6 +49,10 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
                   "metric (of a sensor), depth or disparity (up to scale and offset, of a "
                   "network); default auto: whichever fits what the photographs show")
       ->transform(CLI::CheckedTransformer(kinds).description("auto, metric, depth, disparity"));
+  command.add_option("--depth-model",
+                     options.depth.network,
+                     "Network (.onnx, in the form of MiDaS small) that guesses disparity where "
+                     "photographs measure none; depth with --depth-kind depth");
   command.add_option("--depth-scale",
                      options.depth.scale,
                      "Values of metric depth files per metre; default: 1000 where they are whole "

@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "libcgs/core/error.h"
+#include "libcgs/priors/onnx_input.h"
 
 namespace cgs {
 
@@ -69,31 +70,30 @@ struct DepthNetwork::Net {
   [[noreturn]] void fail(Defect defect, const std::string& why) const {
     throw BadInput(defect, file, why);
   }
-  void read_size() {
-    constexpr int kUsual = 256;
-    std::vector<cv::dnn::MatShape> in;  // empty: what goes into the layer of the input itself
-    std::vector<cv::dnn::MatShape> out;
-    net.getLayerShapes(cv::dnn::MatShape(), 0, in, out);
-    const cv::dnn::MatShape shape = out.empty() ? cv::dnn::MatShape() : out.front();
-    size = {kUsual, kUsual};
-    if (shape.empty()) return;
-    if (shape.size() != 4 || shape[1] != 3) fail(Defect::Schema, "expected an input 1 x 3 x H x W");
-    if (shape[2] > 0 && shape[3] > 0) size = {shape[3], shape[2]};
-    constexpr int kLargest = 4096;
-    if (std::max(size.width, size.height) > kLargest) {
-      fail(Defect::Schema, "takes pictures of more than 4096 pixels");
+  void read_size(const std::vector<int64_t>& shape) {
+    constexpr int64_t kUsual = 256;
+    constexpr int64_t kLargest = 4096;
+    if (!shape.empty() && (shape.size() != 4 || (shape[1] != 3 && shape[1] != 0))) {
+      fail(Defect::Schema, "expected an input 1 x 3 x H x W");
     }
+    const bool is_stated = shape.size() == 4 && shape[2] != 0 && shape[3] != 0;
+    const int64_t height = is_stated ? shape[2] : kUsual;
+    const int64_t width = is_stated ? shape[3] : kUsual;
+    if (std::min(height, width) < 1 || std::max(height, width) > kLargest) {
+      fail(Defect::Schema, "the sides of the input must be in [1, 4096]");
+    }
+    size = {static_cast<int>(width), static_cast<int>(height)};
   }
 };
 
 DepthNetwork::DepthNetwork(const std::string& onnx, const std::filesystem::path& file)
     : net_(std::make_unique<Net>()) {
   net_->file = file;
+  net_->read_size(onnx_input_shape(onnx));
   const Quietly quietly;
   try {
     net_->net = cv::dnn::readNetFromONNX(onnx.data(), onnx.size());
     net_->net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
-    net_->read_size();
   } catch (const cv::Exception& error) {
     net_->fail(Defect::Unsupported, "OpenCV cannot run this network: " + reason_of(error));
   }

@@ -154,8 +154,26 @@ bool is_in_patch(int x, int y, int width, int height) {
   return false;
 }
 
+// How steep given depth is: the largest relative step to a neighbour [1 / pixel].
+double steepness(const DepthMap& depth, int x, int y) {
+  double out = 0;
+  for (size_t k = 0; k < 4; ++k) {
+    const auto [dx, dy] = kDirections[k];
+    if (!depth.contains(x + dx, y + dy)) continue;
+    const float there = depth(x + dx, y + dy);
+    if (there > 0) out = std::max(out, std::abs(std::log(double(there / depth(x, y)))));
+  }
+  return out;
+}
+
+// How far guesses are off.
+struct GuessErrors {
+  ErrorByDistance by_distance;
+  double edge_shift = 0;  // standard deviation of the places of depth edges [pixels]
+};
+
 // Hides measured pixels and looks how well guesses find them again.
-ErrorByDistance try_out(const FittedDepth& fitted, const View& view, const ViewPriors& priors) {
+GuessErrors try_out(const FittedDepth& fitted, const View& view, const ViewPriors& priors) {
   ViewPriors hidden = priors;
   for (int y = 0; y < priors.depth.height; ++y) {
     for (int x = 0; x < priors.depth.width; ++x) {
@@ -164,13 +182,34 @@ ErrorByDistance try_out(const FittedDepth& fitted, const View& view, const ViewP
     }
   }
   const Raster<Bent> bent = bend(fitted, view, hidden);
-  ErrorByDistance out;
+  const auto error_at = [&](size_t i) {
+    const bool is_known = priors.origin.data[i] == DepthOrigin::Measured && bent.data[i].depth > 0;
+    return is_known ? std::abs(std::log(double(bent.data[i].depth / priors.depth.data[i]))) : -1;
+  };
+  GuessErrors out;
   for (size_t i = 0; i < bent.data.size(); ++i) {
-    const auto& [depth, distance] = bent.data[i];
-    if (priors.origin.data[i] != DepthOrigin::Measured || !(depth > 0)) continue;
-    out.add(distance, std::abs(std::log(double(depth / priors.depth.data[i]))));
+    if (error_at(i) >= 0) out.by_distance.add(bent.data[i].distance, error_at(i));
   }
-  out.settle();
+  out.by_distance.settle();
+  // What is left near depth edges, over their steepness, is how far they are out of place.
+  constexpr double kSteep = 0.01;
+  constexpr size_t kFewest = 100;
+  std::vector<double> shifts;
+  for (int y = 0; y < bent.height; ++y) {
+    for (int x = 0; x < bent.width; ++x) {
+      const size_t i = bent.index(x, y);
+      const double error = error_at(i);
+      if (error < 0) continue;
+      const double steep = steepness(fitted.depth, x, y);
+      if (steep < kSteep) continue;
+      const double expected = out.by_distance.sigma(bent.data[i].distance);
+      shifts.push_back(std::sqrt(std::max(0.0, error * error - expected * expected)) / steep);
+    }
+  }
+  if (shifts.size() >= kFewest) {
+    std::sort(shifts.begin(), shifts.end());
+    out.edge_shift = shifts[shifts.size() * 4 / 5] / 1.2816;
+  }
   return out;
 }
 
@@ -202,17 +241,20 @@ bool floats(double z, double sigma, const Shown& shown) {
 DepthGuess guess_depth(const FittedDepth& fitted, const View& view, const ViewPriors& priors) {
   DepthGuess out{DepthMap(fitted.depth.width, fitted.depth.height, kNaN),
                  DepthMap(fitted.depth.width, fitted.depth.height, kNaN)};
-  const ErrorByDistance errors = try_out(fitted, view, priors);
+  const GuessErrors errors = try_out(fitted, view, priors);
   const Raster<Bent> bent = bend(fitted, view, priors);
   // What measured pixels around correct is theirs to correct; soon after, the fit is all there is.
   constexpr double kCorrected = 0.01;  // of the diagonal
   const double reach = kCorrected * std::hypot(fitted.depth.width, fitted.depth.height);
   for (size_t i = 0; i < bent.data.size(); ++i) {
     const auto& [depth, distance] = bent.data[i];
-    const double found = errors.sigma(distance);
+    const double found = errors.by_distance.sigma(distance);
     if (!(depth > 0) || !(found > 0)) continue;
-    const double sigma =
-        std::hypot(found, fitted.scatter * (1 - std::exp(-double(distance) / reach)));
+    const int x = static_cast<int>(i) % bent.width;
+    const int y = static_cast<int>(i) / bent.width;
+    const double sigma = std::hypot(found,
+                                    fitted.scatter * (1 - std::exp(-double(distance) / reach)),
+                                    errors.edge_shift * steepness(fitted.depth, x, y));
     out.depth.data[i] = depth;
     out.sigma.data[i] = static_cast<float>(std::max(kFloor, sigma) * double(depth));
   }

@@ -22,7 +22,8 @@ struct DepthGuess {
 /// given depth changes on the way; deviations beyond what the fit leaves are errors of one of the
 /// two, and stay where they are. Sigma is found by trying: patches of measured pixels are hidden
 /// and guessed, and the guesses compared to what was hidden, by distance to the next pixel that was
-/// not. \param priors  of plane_sweep() after alignment, not completed
+/// not, and by how steep the given depth is: networks put depth edges beside their place.
+/// \param priors  of plane_sweep() after alignment, not completed
 DepthGuess guess_depth(const FittedDepth& fitted, const View& view, const ViewPriors& priors);
 
 /// Takes out guesses that contradict another view: those that would stand before what it measured,
