@@ -125,19 +125,14 @@ float interpolated(const Raster<float>& values, double u, double v) {
 }
 
 // Of the values under a pixel of the given size around a point; NaN if most of them are.
-float averaged(const Raster<float>& values,
-               double u,
-               double v,
-               double width,
-               double height,
-               std::vector<float>& under) {
+float averaged(const Raster<float>& values, double u, double v, double width, double height) {
   const auto first = [](double at, double size) {
     return std::max(0, static_cast<int>(std::ceil(at - 0.5 * size - 0.5)));
   };
   const auto end = [](double at, double size, int side) {
     return std::min(side, static_cast<int>(std::ceil(at + 0.5 * size - 0.5)));
   };
-  under.clear();
+  std::vector<float> under;
   size_t all = 0;
   for (int y = first(v, height); y < end(v, height, values.height); ++y) {
     for (int x = first(u, width); x < end(u, width, values.width); ++x) {
@@ -164,7 +159,6 @@ DepthMap resampled(const Raster<float>& values, const View& view) {
   const double across = double(values.width) / camera.width;
   const double down = double(values.height) / camera.height;
   DepthMap out(camera.width, camera.height, kNaN);
-  std::vector<float> under;
   for (int y = 0; y < out.height; ++y) {
     for (int x = 0; x < out.width; ++x) {
       const Eigen::Vector2d at = lens(x + 0.5, y + 0.5);
@@ -173,7 +167,7 @@ DepthMap resampled(const Raster<float>& values, const View& view) {
       if (!(u >= 0 && v >= 0 && u < values.width && v < values.height)) continue;
       constexpr double kFiner = 1.01;
       out(x, y) = across > kFiner || down > kFiner
-                      ? averaged(values, u, v, std::max(across, 1.0), std::max(down, 1.0), under)
+                      ? averaged(values, u, v, std::max(across, 1.0), std::max(down, 1.0))
                       : interpolated(values, u, v);
     }
   }

@@ -32,32 +32,19 @@ double median_off(const LineFit& line, const std::vector<FitPoint>& points) {
   return median_of(std::move(all));
 }
 
-// Standard deviation of log y.
-double spread_of(const std::vector<FitPoint>& points) {
-  double sum = 0;
-  double squares = 0;
-  for (const FitPoint& p : points) {
-    sum += std::log(p.y);
-    squares += std::log(p.y) * std::log(p.y);
-  }
-  const auto count = static_cast<double>(points.size());
-  return std::sqrt(std::max(0.0, squares / count - sum * sum / (count * count)));
+// Number of points within a relative distance.
+size_t count_near(const LineFit& line, const std::vector<FitPoint>& points, double distance) {
+  return static_cast<size_t>(std::count_if(
+      points.begin(), points.end(), [&](const FitPoint& p) { return off(line, p) < distance; }));
 }
 
-// Mean relative distance, each at most `cap`: the same for all outliers.
-double capped_loss(const LineFit& line, const std::vector<FitPoint>& points, double cap) {
-  double sum = 0;
-  for (const FitPoint& p : points) sum += std::min(cap, off(line, p));
-  return sum / static_cast<double>(points.size());
-}
-
-// What is left if the given values are not looked at: that of the best single y.
-double loss_of_constant(const std::vector<FitPoint>& points, double cap) {
+// The same for the best constant, which does not look at the given values.
+size_t count_near_constant(const std::vector<FitPoint>& points, double distance) {
   constexpr size_t kCandidates = 200;
   const size_t step = std::max(size_t{1}, points.size() / kCandidates);
-  double best = std::numeric_limits<double>::infinity();
+  size_t best = 0;
   for (size_t i = 0; i < points.size(); i += step) {
-    best = std::min(best, capped_loss({0, points[i].y, 0}, points, cap));
+    best = std::max(best, count_near({0, points[i].y, 0}, points, distance));
   }
   return best;
 }
@@ -137,16 +124,20 @@ std::optional<LineFit> fit_line(const std::vector<FitPoint>& points) {
   for (int i = 0; i < kRounds; ++i) {
     if (!reweighted(points, line)) return std::nullopt;
   }
-  constexpr double kExplained = 0.5;
-  const double cap = spread_of(points);
-  const bool tells = capped_loss(line, points, cap) < kExplained * loss_of_constant(points, cap);
+  constexpr double kDeviations = 3;
+  constexpr double kGain = 1.25;
+  const double near = kDeviations * line.scatter;
+  const bool tells = static_cast<double>(count_near(line, points, near)) >
+                     kGain * static_cast<double>(count_near_constant(points, near));
   return tells ? std::optional(line) : std::nullopt;
 }
 
 std::optional<LineFit> fit_scale(const std::vector<FitPoint>& points) {
   if (points.size() < kFewest) return std::nullopt;
-  std::vector<double> logs;
-  for (const FitPoint& p : points) logs.push_back(std::log(p.y / p.x));
+  std::vector<double> logs(points.size());
+  std::transform(points.begin(), points.end(), logs.begin(), [](const FitPoint& p) {
+    return std::log(p.y / p.x);
+  });
   LineFit line;
   line.scale = std::exp(median_of(logs));
   line.scatter = robust_deviation(std::move(logs));

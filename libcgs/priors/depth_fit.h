@@ -28,7 +28,7 @@ struct LineFit {
 /// closed form. The same bits every time.
 ///
 /// \return nothing where there are fewer than 50 points, where the slope would not be positive, or
-///         where more than half of the distances are left that the best constant would leave
+///         where the line does not come near a quarter more of the points than the best constant
 std::optional<LineFit> fit_line(const std::vector<FitPoint>& points);
 
 /// The same through the origin: y = scale * x, the median of log(y / x). Nothing for fewer than 50

@@ -87,7 +87,7 @@ class Estimator {
       if (given.views[i].depth.empty()) continue;
       out[i] = guess_depth(given.views[i], view(i), out_.views[i]);
     }
-    remove_contradictions(cameras, out_.views, out);
+    remove_contradictions(cameras, given.views, out_.views, out);
     return out;
   }
 

@@ -17,7 +17,8 @@ namespace cgs {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr double kFloor = 0.005;  // relative sigma that no guess goes below
+constexpr double kFloor = 0.005;   // relative sigma that no guess goes below
+constexpr double kDeviations = 3;  // of the fit: beyond, given or measured depth is wrong
 
 constexpr std::array<std::pair<int, int>, 16> kDirections = {{{1, 0},
                                                               {-1, 0},
@@ -50,7 +51,6 @@ struct Bent {
 Bent bent_at(const FittedDepth& given, const ViewPriors& priors, int x, int y) {
   const DepthMap& fitted = given.depth;
   // Deviations beyond are no bend of the given depth: one of the two is wrong there.
-  constexpr double kDeviations = 3;
   const double largest = kDeviations * std::max(kFloor, given.scatter);
   constexpr double kSameSurface = 0.1;  // relative change of the given depth
   constexpr double kReach = 0.25;       // of the diagonal: farther off, a deviation says little
@@ -220,8 +220,17 @@ struct Shown {
   bool is_guess = false;
 };
 
-Shown shown_at(const ViewPriors& priors, const DepthGuess& guess, int x, int y) {
+// True where measured and given depth contradict each other by more than the fit leaves.
+bool is_disputed(const FittedDepth& fitted, const ViewPriors& priors, int x, int y) {
+  if (fitted.depth.empty() || !(fitted.depth(x, y) > 0)) return false;
+  const double off = std::log(double(fitted.depth(x, y) / priors.depth(x, y)));
+  return std::abs(off) > kDeviations * std::max(kFloor, fitted.scatter);
+}
+
+Shown shown_at(
+    const FittedDepth& fitted, const ViewPriors& priors, const DepthGuess& guess, int x, int y) {
   if (priors.origin(x, y) == DepthOrigin::Measured) {
+    if (is_disputed(fitted, priors, x, y)) return {};
     return {priors.depth(x, y), priors.sigma(x, y), false};
   }
   if (guess.depth.empty()) return {};
@@ -262,6 +271,7 @@ DepthGuess guess_depth(const FittedDepth& fitted, const View& view, const ViewPr
 }
 
 void remove_contradictions(const std::vector<Camera>& cameras,
+                           const std::vector<FittedDepth>& fitted,
                            const std::vector<ViewPriors>& priors,
                            std::vector<DepthGuess>& guesses) {
   std::vector<std::pair<size_t, size_t>> contradicted;  // view and pixel
@@ -278,7 +288,7 @@ void remove_contradictions(const std::vector<Camera>& cameras,
           if (!cameras[j].sees(uvz)) continue;
           const auto u = static_cast<int>(uvz.x());
           const auto v = static_cast<int>(uvz.y());
-          const Shown shown = shown_at(priors[j], guesses[j], u, v);
+          const Shown shown = shown_at(fitted[j], priors[j], guesses[j], u, v);
           if (!floats(uvz.z(), double(guesses[i].sigma(x, y)), shown)) continue;
           contradicted.emplace_back(i, depth.index(x, y));
           if (shown.is_guess) contradicted.emplace_back(j, guesses[j].depth.index(u, v));

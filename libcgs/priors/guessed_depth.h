@@ -27,10 +27,12 @@ struct DepthGuess {
 DepthGuess guess_depth(const FittedDepth& fitted, const View& view, const ViewPriors& priors);
 
 /// Takes out guesses that contradict another view: those that would stand before what it measured,
-/// and both where two guesses contradict each other.
+/// and both where two guesses contradict each other. Measured pixels that the given depth of their
+/// own view contradicts have no say: beside surfaces without texture they are often wrong.
 ///
-/// \param cameras, priors  of the input views, in one order; priors not completed
+/// \param cameras, fitted, priors  of the input views, in one order; priors not completed
 void remove_contradictions(const std::vector<Camera>& cameras,
+                           const std::vector<FittedDepth>& fitted,
                            const std::vector<ViewPriors>& priors,
                            std::vector<DepthGuess>& guesses);
 

@@ -210,7 +210,13 @@ TEST(RemoveContradictions, TakesOutWhatFloatsBeforeOtherViews) {
   guess(0, 20, 3);  // lands at 10, where the other view
   guess(1, 10, 6);  // guesses that nothing stands
   guess(0, 25, 3);  // lands where nothing is known
-  remove_contradictions(cameras, priors, guesses);
+  // The given depth of the second view contradicts what it measured at one pixel.
+  std::vector<FittedDepth> fitted(2);
+  fitted[1] = {DepthMap(60, 20, 5), 0.01};
+  fitted[1].depth(48, 10) = 4;
+  guess(0, 57, 3.3f);  // lands there, at 48
+  remove_contradictions(cameras, fitted, priors, guesses);
+  EXPECT_EQ(guesses[0].depth(57, 10), 3.3f);
   EXPECT_EQ(guesses[0].depth(50, 10), 5);
   EXPECT_TRUE(std::isnan(guesses[0].depth(59, 10)));
   EXPECT_TRUE(std::isnan(guesses[0].sigma(59, 10)));
