@@ -3,7 +3,8 @@
 // How accurate the plane sweep is on stereo pairs with known disparity (Middlebury 2014 at quarter
 // size and 2006 at third size), as scenes of two views.
 //
-//   stereo_accuracy FOLDER        FOLDER holds middlebury2014Q/ and middlebury2006T/
+//   stereo_accuracy FOLDER [PAIR]   FOLDER holds middlebury2014Q/ and middlebury2006T/; PAIR is one
+//                                   of them, such as Piano
 //
 // Prints per pair, over pixels that both photographs show: the share that a depth was measured
 // for, the share of those whose disparity is wrong by more than 0.5, 1 and 2 pixels, the same
@@ -12,8 +13,8 @@
 // the 2006 pairs comes in steps of a third of a pixel.
 //
 // Then what given depth brings where nothing was measured: the true disparity, brought to another
-// scale and offset; the same with waves of 4 % and blurred edges, as networks err; and with bumps of
-// 20 %, inverted blocks and outliers.
+// scale and offset; the same with waves of 4 % and blurred edges, as networks err; and with bumps
+// of 20 %, inverted blocks and outliers.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -23,6 +24,7 @@
 #include <iterator>
 #include <regex>
 #include <string>
+#include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -305,38 +307,38 @@ void evaluate_given(Pair pair) {
   std::printf("\n");
 }
 
+Pair read_pair(const std::filesystem::path& root, const std::string& name) {
+  const std::filesystem::path newer = root / "middlebury2014Q" / name;
+  return is_directory(newer) ? read_2014(newer) : read_2006(root / "middlebury2006T" / name);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: stereo_accuracy FOLDER\n");
+  if (argc != 2 && argc != 3) {
+    std::fprintf(stderr, "usage: stereo_accuracy FOLDER [PAIR]\n");
     return 2;
   }
   try {
     const std::filesystem::path root = argv[1];
+    std::vector<std::string> names = {
+        "Motorcycle", "Piano", "Playroom", "Aloe", "Cloth3", "Lampshade2"};
+    if (argc == 3) names = {argv[2]};
     std::printf(
         "pair            measured |  bad0.5  bad1  bad2 |  completed: the same |     within 1, 2, "
         "3, 5 sigma |   time\n");
     std::printf(
         "                  [%%]    |       [%%]            |       [%%]            |           "
         "[%%]           |   [s]\n");
-    for (const char* name : {"Motorcycle", "Piano", "Playroom"}) {
-      evaluate(read_2014(root / "middlebury2014Q" / name));
-    }
-    for (const char* name : {"Aloe", "Cloth3", "Lampshade2"}) {
-      evaluate(read_2006(root / "middlebury2006T" / name));
-    }
+    for (const std::string& name : names) evaluate(read_pair(root, name));
     std::printf(
-        "\npixels that were not measured, bad1 and bad2 [%%]; share guessed [%%]; measured ");
-    std::printf("pixels that changed\n");
-    std::printf("pair           |         alone |      other scale and offset |");
-    std::printf("      waves, blurred edges | bumps, inverted, outliers |\n");
-    for (const char* name : {"Motorcycle", "Piano", "Playroom"}) {
-      evaluate_given(read_2014(root / "middlebury2014Q" / name));
-    }
-    for (const char* name : {"Aloe", "Cloth3", "Lampshade2"}) {
-      evaluate_given(read_2006(root / "middlebury2006T" / name));
-    }
+        "\npixels that were not measured, bad1 and bad2 [%%]; share guessed [%%]; measured pixels "
+        "that changed\n");
+    std::printf(
+        "pair           |         alone |  other scale and offset |    waves, blurred edges | "
+        "bumps, "
+        "inverted, outliers |\n");
+    for (const std::string& name : names) evaluate_given(read_pair(root, name));
   } catch (const Error& error) {
     std::fprintf(stderr, "stereo_accuracy: %s\n", error.what());
     return error.exit_code();
