@@ -2,6 +2,7 @@
 #include "convert/model.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -20,6 +21,7 @@
 #include "io/scene_path.h"
 #include "io/scene_reader.h"
 #include "libcgs/core/error.h"
+#include "libcgs/priors/depth_network.h"
 #include "libcgs/priors/measured_range.h"
 #include "libcgs/render/rasterizer.h"
 
@@ -89,7 +91,7 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
   const Raster<uint8_t> origin = as_raster<uint8_t>(image, "origin.Y", file);
   priors.origin = Raster<DepthOrigin>(image.width, image.height, DepthOrigin::Unknown);
   std::transform(origin.data.begin(), origin.data.end(), priors.origin.data.begin(), [](uint8_t v) {
-    return v > 2 ? DepthOrigin::Unknown : static_cast<DepthOrigin>(v);
+    return v > 3 ? DepthOrigin::Unknown : static_cast<DepthOrigin>(v);
   });
   return priors;
 }
@@ -159,17 +161,36 @@ void optimise(TrainedModel& trained, const ModelRequest& request, const Progress
   trained.steps = trainer.history();
 }
 
+void guess_by_network(const std::filesystem::path& file, Scene& scene) {
+  DepthNetwork network(read_file(file), file);
+  for (const int i : scene.input) {
+    View& view = scene.views[static_cast<size_t>(i)];
+    view.given_depth = network(view);
+  }
+}
+
 }  // namespace
+
+void take_sensor_scale(const GivenDepthReport& given, Frame& frame) {
+  if (frame.has_metric_scale() || !(given.metres_per_unit > 0)) return;
+  frame.metres_per_unit = given.metres_per_unit;
+  frame.metres_sigma = given.metres_sigma;
+  frame.scale_source = ScaleSource::DepthSensor;
+}
 
 TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress) {
   request.priors.validate();
   request.training.validate();
   constexpr double kPriorsShare = 0.2;
   load_images(scene, scene.input, part_of(progress, 0, 0.01));
+  if (!request.depth_network.empty()) guess_by_network(request.depth_network, scene);
   to_canonical(scene);
   narrow_depth_ranges(scene, request.priors.sweep);
   EstimatedPriors estimated =
       estimate_priors(scene, request.priors, part_of(progress, 0.01, kPriorsShare));
+  const GivenDepthReport& given = estimated.report.given;
+  scene.warnings.insert(scene.warnings.end(), given.remarks.begin(), given.remarks.end());
+  take_sensor_scale(given, scene.frame);
   TrainedModel trained;
   trained.priors = estimated.report;
   trained.model.priors = std::move(estimated.views);
@@ -188,6 +209,28 @@ nlohmann::ordered_json settings_to_json(const TrainingOptions& options) {
   for (const auto& [name, value] : training_fields(options)) settings[name] = value;
   return settings;
 }
+
+namespace {
+
+// Null where there was none; scale null where it tells none.
+nlohmann::ordered_json given_depth_to_json(const PriorsReport& priors) {
+  static constexpr std::array<const char*, 4> kKinds = {"", "metric", "depth", "disparity"};
+  const GivenDepthReport& given = priors.given;
+  if (given.kind == DepthKind::Unknown) return nullptr;
+  nlohmann::ordered_json out = {{"kind", kKinds.at(static_cast<size_t>(given.kind))}};
+  if (given.metres_per_unit > 0) {
+    out["metres_per_unit"] = given.metres_per_unit;
+    out["metres_sigma"] = given.metres_sigma;
+  }
+  for (const PriorsCoverage& coverage : priors.coverage) {
+    out["views"].push_back({{"measured", coverage.measured},
+                            {"guessed", coverage.guessed},
+                            {"completed", coverage.completed}});
+  }
+  return out;
+}
+
+}  // namespace
 
 nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request) {
   nlohmann::ordered_json loss = nlohmann::ordered_json::array();
@@ -211,7 +254,8 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
           {"alignment",
            {{"scale", trained.priors.alignment.scale},
             {"offset", trained.priors.alignment.offset},
-            {"correspondences", trained.priors.alignment.correspondences}}}};
+            {"correspondences", trained.priors.alignment.correspondences}}},
+          {"given_depth", given_depth_to_json(trained.priors)}};
 }
 
 void write_model(const std::filesystem::path& folder, const Model& model) {
@@ -270,11 +314,21 @@ void relink_images(Scene& scene, const std::filesystem::path& folder) {
   }
 }
 
+MaskMap guessed_pixels(const ViewPriors& priors) {
+  const auto is_guess = [](DepthOrigin origin) { return origin == DepthOrigin::Guessed; };
+  const std::vector<DepthOrigin>& origins = priors.origin.data;
+  if (std::none_of(origins.begin(), origins.end(), is_guess)) return {};
+  MaskMap out(priors.origin.width, priors.origin.height, 0);
+  std::transform(origins.begin(), origins.end(), out.data.begin(), is_guess);
+  return out;
+}
+
 std::vector<SupportView> support_views(const Model& model) {
   std::vector<SupportView> views;
   for (size_t k = 0; k < model.priors.size(); ++k) {
     const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
-    views.push_back({view.camera, model.priors[k].depth, model.priors[k].sigma});
+    const ViewPriors& priors = model.priors[k];
+    views.push_back({view.camera, priors.depth, priors.sigma, guessed_pixels(priors)});
   }
   return views;
 }

@@ -33,6 +33,8 @@ struct ModelRequest {
   TrainingOptions training;
   /// Where checkpoints of the training go; empty = none. They stay until forget_checkpoints().
   std::filesystem::path checkpoints;
+  /// A network that guesses the depth of the photographs, as depth_network.h; empty = none.
+  std::filesystem::path depth_network;
 };
 
 /// Scene -> model. Loads the images of the input views, moves the scene to its canonical frame,
@@ -44,6 +46,9 @@ struct TrainedModel {
   std::vector<StepReport> steps;  ///< Of the training; empty = aligned initialisation.
 };
 TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress);
+
+/// Gives a frame without scale the one that metric depth of the photographs tells, if it does.
+void take_sensor_scale(const GivenDepthReport& given, Frame& frame);
 
 /// Removes the checkpoints of finished work. \throws IoError
 void forget_checkpoints(const std::filesystem::path& folder);
@@ -65,6 +70,9 @@ Model read_model(const std::filesystem::path& folder);
 /// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model
 /// or photographs that were moved. \throws BadInput as read_scene()
 void relink_images(Scene& scene, const std::filesystem::path& folder);
+
+/// 1 where the depth of a view is a guess from that view alone; empty if it is nowhere.
+MaskMap guessed_pixels(const ViewPriors& priors);
 
 /// The input views with their depth and its uncertainty: who can vouch for a rendered pixel.
 std::vector<SupportView> support_views(const Model& model);

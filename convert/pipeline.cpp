@@ -23,6 +23,7 @@
 #include "convert/views.h"
 #include "io/atomic_file.h"
 #include "io/content_hash.h"
+#include "io/depth_file.h"
 #include "io/image.h"
 #include "io/json_file.h"
 #include "io/masks.h"
@@ -55,6 +56,10 @@ void refuse_unreadable_images(const Scene& scene) {
   for (const View& view : scene.views) {
     if (!view.image_path.empty()) (void)read_image(view.image_path, nullptr, {});
   }
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (!view.depth_path.empty()) (void)read_depth_file(view.depth_path);
+  }
 }
 
 Model& loaded_model(Run& run) {
@@ -71,7 +76,8 @@ const TriangleMesh& loaded_mesh(Run& run) {
 
 Json run_model(Run& run, const Progress& progress) {
   const std::filesystem::path folder = run.request.output / "model";
-  const ModelRequest request = {{}, run.request.training, folder};
+  const ModelRequest request = {
+      {}, run.request.training, folder, run.request.scene.options.depth.network};
   const TrainedModel trained = train_model(run.scene, request, progress);
   // Pixels were read for the first time: more may be odd than the cameras told.
   const std::vector<std::string>& found = trained.model.scene.warnings;
@@ -83,6 +89,16 @@ Json run_model(Run& run, const Progress& progress) {
   return report;
 }
 
+// What the model stage found, as it wrote it down.
+GivenDepthReport sensor_scale(const Json& model) {
+  GivenDepthReport out;
+  const Json given = model.value("given_depth", Json());
+  if (!given.is_object() || !given.contains("metres_per_unit")) return out;
+  out.metres_per_unit = given["metres_per_unit"].get<double>();
+  out.metres_sigma = given["metres_sigma"].get<double>();
+  return out;
+}
+
 // The scale is told apart from the model: people learn a length after they saw a first result.
 Json run_scale(Run& run, const Progress& progress) {
   Model& model = loaded_model(run);
@@ -92,6 +108,7 @@ Json run_scale(Run& run, const Progress& progress) {
   frame.metres_per_unit = run.scene.frame.metres_per_unit;
   frame.metres_sigma = run.scene.frame.metres_sigma;
   frame.scale_source = run.scene.frame.scale_source;
+  take_sensor_scale(sensor_scale(run.record.result("model")), frame);
   Json result = scale_by(run.distances, model);
   const bool is_new = frame.metres_per_unit != before.metres_per_unit ||
                       frame.metres_sigma != before.metres_sigma ||
@@ -231,7 +248,10 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     const auto mask =
         mask_file({request.scene.path, request.scene.options.allow_external}, view.image_path);
     if (mask) inputs[view.name + ", mask"] = file_hash(*mask);
+    if (!view.depth_path.empty()) inputs[view.name + ", depth"] = file_hash(view.depth_path);
   }
+  const std::filesystem::path& network = request.scene.options.depth.network;
+  if (!network.empty()) inputs["depth network"] = file_hash(network);
   Json held_out = Json::object();
   for (const int i : scene.held_out) {
     const View& view = scene.views[static_cast<size_t>(i)];
@@ -250,6 +270,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
   return {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
           {"views", request.scene.options.views},
           {"downscale", request.scene.options.downscale.value_or(0)},
+          {"depth", {static_cast<int>(scene.depth_kind), scene.depth_scale}},
           {"assume_unit", request.scene.assume_unit},
           {"known_distances", request.scene.known_distances},
           {"training", settings_to_json(request.training)},
@@ -329,6 +350,7 @@ FusedVolume fuse_model(const Model& model,
     view.camera = camera;
     view.depth = model.priors[k].depth;
     view.sigma = model.priors[k].sigma;
+    view.guessed = inputs[k].guessed;
     view.color = picture(buffers);
     views.push_back(std::move(view));
   }

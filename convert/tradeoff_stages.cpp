@@ -43,7 +43,7 @@ Json make_model(const RunRequest& request,
   const CostMeter meter;
   Terminal silent(true);
   Scene scene = open_scene(request.scene, poses, silent).scene;
-  const ModelRequest training = {{}, request.training, {}};
+  const ModelRequest training = {{}, request.training, {}, request.scene.options.depth.network};
   const TrainedModel trained = train_model(std::move(scene), training, part_of(progress, 0, 0.85));
   write_model(request.output, trained.model);
   Model model = read_model(request.output);

@@ -143,6 +143,35 @@ cv::Mat decode_with_opencv(std::string_view bytes, const std::filesystem::path& 
   return pixels;
 }
 
+std::string read_image_file(const std::filesystem::path& path, const ReadLimits& limits) {
+  constexpr uint64_t kDecoderLimit = (uint64_t{1} << 31) - 1;  // OpenCV counts bytes in int
+  ReadLimits file_limits = limits;
+  file_limits.max_file_bytes = std::min(limits.max_file_bytes, kDecoderLimit);
+  return read_file(path, file_limits);
+}
+
+cv::Mat decode_as_announced(std::string_view bytes,
+                            const ImageHeader& header,
+                            const std::filesystem::path& path) {
+  cv::Mat pixels = decode_with_opencv(bytes, path);
+  if (pixels.cols != header.width || pixels.rows != header.height || pixels.channels() > 4) {
+    throw BadInput(Defect::Syntax, path, "the decoded image is not what its header announces");
+  }
+  return pixels;
+}
+
+template <typename T>
+Raster<float> first_channel(const cv::Mat& pixels) {
+  Raster<float> out(pixels.cols, pixels.rows, 0);
+  for (int y = 0; y < out.height; ++y) {
+    const T* p = pixels.ptr<T>(y);
+    for (int x = 0; x < out.width; ++x, p += pixels.channels()) {
+      out(x, y) = static_cast<float>(*p);
+    }
+  }
+  return out;
+}
+
 // Copies samples of type T, OpenCV's BGR order, scaled by 1 / full. \return usable pixels
 template <typename T>
 void convert(const cv::Mat& pixels, double full, ColorImage& image, MaskMap& usable) {
@@ -184,19 +213,13 @@ ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits
 ColorImage read_image(const std::filesystem::path& path,
                       MaskMap* alpha_mask,
                       const ReadLimits& limits) {
-  constexpr uint64_t kDecoderLimit = (uint64_t{1} << 31) - 1;  // OpenCV counts bytes in int
-  ReadLimits file_limits = limits;
-  file_limits.max_file_bytes = std::min(limits.max_file_bytes, kDecoderLimit);
-  const std::string bytes = read_file(path, file_limits);
+  const std::string bytes = read_image_file(path, limits);
   const ImageHeader header = parse_image_header(bytes, path, limits);
   check_image_is_whole(bytes, header, path);
   if (alpha_mask != nullptr) *alpha_mask = {};
   if (header.format == ImageFormat::Jpeg) return read_jpeg(bytes, header, path);
 
-  const cv::Mat pixels = decode_with_opencv(bytes, path);
-  if (pixels.cols != header.width || pixels.rows != header.height || pixels.channels() > 4) {
-    throw BadInput(Defect::Syntax, path, "the decoded image is not what its header announces");
-  }
+  const cv::Mat pixels = decode_as_announced(bytes, header, path);
   ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
   MaskMap usable(header.width, header.height, 1);
   switch (pixels.depth()) {
@@ -219,6 +242,31 @@ ColorImage read_image(const std::filesystem::path& path,
       std::all_of(usable.data.begin(), usable.data.end(), [](uint8_t set) { return set != 0; });
   if (alpha_mask != nullptr && !is_all) *alpha_mask = std::move(usable);
   return image;
+}
+
+StoredSamples read_samples(const std::filesystem::path& path, const ReadLimits& limits) {
+  const std::string bytes = read_image_file(path, limits);
+  const ImageHeader header = parse_image_header(bytes, path, limits);
+  check_image_is_whole(bytes, header, path);
+  if (header.format != ImageFormat::Png && header.format != ImageFormat::Tiff) {
+    throw BadInput(Defect::Unsupported, path, "only PNG and TIFF keep values as they are");
+  }
+  const cv::Mat pixels = decode_as_announced(bytes, header, path);
+  if (pixels.channels() > 2) {
+    throw BadInput(Defect::Unsupported, path, "holds colours, expected one value per pixel");
+  }
+  switch (pixels.depth()) {
+    case CV_8U:
+      return {first_channel<uint8_t>(pixels), 8};
+    case CV_16U:
+      return {first_channel<uint16_t>(pixels), 16};
+    case CV_32F:
+      return {first_channel<float>(pixels), 0};
+    case CV_64F:
+      return {first_channel<double>(pixels), 0};
+    default:
+      throw BadInput(Defect::Unsupported, path, "signed whole-number samples are not read");
+  }
 }
 
 }  // namespace cgs

@@ -29,4 +29,17 @@ ColorImage read_image(const std::filesystem::path& path,
                       MaskMap* alpha_mask = nullptr,
                       const ReadLimits& limits = {});
 
+/// The first channel of an image as stored, neither scaled nor clamped: what depth maps are kept
+/// in.
+struct StoredSamples {
+  Raster<float> values;
+  int whole_bits = 0;  ///< 8 or 16 if samples are whole numbers, else 0.
+};
+
+/// Decodes a PNG or TIFF (one page) of grey levels.
+/// \throws as read_image(); BadInput Unsupported for JPEG and WebP, which do not keep values, and
+/// for
+///         more than one channel beside alpha
+StoredSamples read_samples(const std::filesystem::path& path, const ReadLimits& limits = {});
+
 }  // namespace cgs

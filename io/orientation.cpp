@@ -35,6 +35,10 @@ MaskMap turned(const MaskMap& stored, int orientation) {
   return turned_raster(stored, orientation);
 }
 
+Raster<float> turned(const Raster<float>& stored, int orientation) {
+  return turned_raster(stored, orientation);
+}
+
 ImageSize turned(const ImageSize& stored, int orientation) {
   if (orientation < kFirstTransposed) return stored;
   return {stored.height, stored.width};

@@ -11,6 +11,7 @@ namespace cgs {
 /// A picture as it lies in the file, turned upright; `orientation` as exif_orientation() gives it.
 ColorImage turned(const ColorImage& stored, int orientation);
 MaskMap turned(const MaskMap& stored, int orientation);
+Raster<float> turned(const Raster<float>& stored, int orientation);
 ImageSize turned(const ImageSize& stored, int orientation);
 
 /// Where a pixel of the upright picture lies in the file; both numbered from 0.

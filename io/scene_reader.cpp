@@ -12,12 +12,16 @@
 #include <utility>
 
 #include "io/byte_reader.h"
+#include "io/cameras_json_scene.h"
 #include "io/colmap.h"
 #include "io/exif.h"
 #include "io/image.h"
 #include "io/llff.h"
 #include "io/masks.h"
+#include "io/metashape.h"
 #include "io/orientation.h"
+#include "io/polycam.h"
+#include "io/realitycapture.h"
 #include "io/resample.h"
 #include "io/significance.h"
 #include "io/strecha.h"
@@ -41,11 +45,16 @@ Scene read_layout(const SceneRoot& root) {
   if (is_transforms_json(root.folder)) return read_transforms_json(root);
   if (is_colmap(root.folder)) return read_colmap(root);
   if (is_strecha(root.folder)) return read_strecha(root);
+  if (is_polycam(root.folder)) return read_polycam(root);
+  if (is_metashape(root.folder)) return read_metashape(root);
+  if (is_realitycapture(root.folder)) return read_realitycapture(root);
+  if (is_cameras_json(root.folder)) return read_cameras_json_scene(root);
   throw BadInput(Defect::Schema,
                  root.folder,
                  "no known layout: understood are LLFF (poses_bounds.npy), transforms.json "
                  "(nerfstudio, instant-ngp), COLMAP (sparse/0/cameras.bin or .txt), Strecha "
-                 "(<image>.camera) and photographs with nothing else");
+                 "(<image>.camera), Polycam (keyframes/), Metashape (.xml), RealityCapture (.csv), "
+                 "cameras.json (3DGS) and photographs with nothing else");
 }
 
 std::string without_extension(const std::string& name) {
@@ -317,6 +326,7 @@ void load_image(Scene& scene, View& view) {
     undistort(view.image, view.valid, resized(camera, width, height), view.distortion);
   }
   area_downscale(view.image, view.valid, camera.width, camera.height);
+  load_given_depth(scene, view, {width, height});
   const auto is_set = [](uint8_t set) { return set != 0; };
   const bool is_masked =
       !view.valid.empty() && std::none_of(view.valid.data.begin(), view.valid.data.end(), is_set);
@@ -348,6 +358,7 @@ Scene prepared(Scene scene, const SceneOptions& options) {
   choose_views(scene, options.views);
   check_baselines(scene);
   check_places(scene);
+  find_given_depth(scene, options.depth, options.allow_external);
   return scene;
 }
 
@@ -356,6 +367,7 @@ Scene prepared(Scene scene, const SceneOptions& options) {
 void SceneOptions::validate() const {
   require(
       !downscale || *downscale >= 1, "SceneOptions.downscale must be >= 1", downscale.value_or(1));
+  depth.validate();
 }
 
 int find_view(const Scene& scene, const std::string& token) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "io/colmap_model.h"
+#include "io/given_depth.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/core/scene.h"
 
@@ -21,6 +22,7 @@ struct SceneOptions {
   /// kLongestSide; what was chosen becomes a warning.
   std::optional<int> downscale;
   bool allow_external = false;  ///< Follow links and absolute paths that leave the scene folder.
+  DepthOptions depth;
 
   /// Three photographs of this size take minutes on two cores; time grows with their pixels.
   static constexpr int kLongestSide = 1024;  // [pixels]

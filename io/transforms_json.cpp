@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/camera_checks.h"
+#include "io/depth_file.h"
 #include "io/image.h"
 #include "io/json_file.h"
 
@@ -182,6 +183,10 @@ Scene read_transforms_json(const SceneRoot& root) {
       scene.missing.push_back(name);
     }
     view.name = view.image_path.empty() ? name : image.lexically_relative(root.folder).string();
+    if (const auto depth = frame.find("depth_file_path")) {
+      const fs::path file = resolve_in_scene(root, depth->text(), path);
+      if (is_present(file) && has_depth_extension(file)) view.depth_path = file;
+    }
     read_size(document, frame, view);
     view.camera.world_from_cam = read_pose(frame.at("transform_matrix"));
     const bool has_size = view.camera.width > 0 && view.camera.height > 0;

@@ -33,7 +33,8 @@ void validate_views(std::span<const TsdfView> views) {
       return raster.width == v.camera.width && raster.height == v.camera.height;
     };
     const bool ok = fits(v.depth) && (v.sigma.empty() || fits(v.sigma)) &&
-                    (v.color.empty() || fits(v.color)) && (v.usable.empty() || fits(v.usable));
+                    (v.color.empty() || fits(v.color)) && (v.usable.empty() || fits(v.usable)) &&
+                    (v.guessed.empty() || fits(v.guessed));
     require(ok && v.camera.width > 1 && v.camera.height > 1,
             "every raster must have the size of its camera, the view where one has not",
             i);
@@ -171,8 +172,9 @@ struct Block {
 struct Evidence {
   double weight = 0, distance = 0, spread = 0, variance = 0;  // weighted sums
   float free_weight = 0;
-  int count = 0;    // of views in the band
-  int support = 0;  // of those that are photographs
+  int count = 0;  // of views in the band
+  int known = 0;  // of those that are photographs and no guess
+  bool is_guessed = false;
   bool hidden = false, has_sigma = true;
   double color_weight = 0;
   Eigen::Vector3d color = Eigen::Vector3d::Zero();
@@ -189,12 +191,16 @@ struct Evidence {
     variance += w * w * double(s.sigma) * double(s.sigma);
     has_sigma = has_sigma && s.sigma > 0;
     ++count;
-    if (!view.is_virtual) ++support;
+    const bool is_guess = !view.guessed.empty() && view.guessed(s.x, s.y) != 0;
+    if (!view.is_virtual && !is_guess) ++known;
+    is_guessed = is_guessed || is_guess;
     if (view.color.empty()) return;
     color += w * view.color(s.x, s.y).cast<double>();
     color_weight += w;
   }
   double mean() const { return distance / weight; }
+  // Guesses that agree still rest on one view each.
+  float support() const { return static_cast<float>(std::max(known, is_guessed ? 1 : 0)); }
   // The larger of what the views promise and how far they disagree.
   double sigma() const {
     const double promised = variance / (weight * weight);
@@ -264,7 +270,7 @@ class BlockFuser {
     };
     leaf(block.tsdf).setValueOn(n, static_cast<float>(e.mean()));
     leaf(block.weight).setValueOn(n, static_cast<float>(e.weight));
-    leaf(block.support).setValueOn(n, static_cast<float>(e.support));
+    leaf(block.support).setValueOn(n, e.support());
     if (e.has_sigma) leaf(block.sigma).setValueOn(n, static_cast<float>(e.sigma()));
     if (e.color_weight <= 0) return;
     const Eigen::Vector3f c = (e.color / e.color_weight).cast<float>();

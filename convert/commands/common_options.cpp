@@ -2,7 +2,9 @@
 #include "convert/commands/common_options.h"
 
 #include <algorithm>
+#include <map>
 #include <memory>
+#include <string>
 #include <thread>
 
 #include <opencv2/core/utility.hpp>
@@ -32,6 +34,29 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
       options.downscale,
       "Divide the image size by this; default: the smallest that leaves no side above " +
           std::to_string(SceneOptions::kLongestSide) + " pixels");
+  const std::map<std::string, DepthKind> kinds = {{"auto", DepthKind::Unknown},
+                                                  {"metric", DepthKind::Metric},
+                                                  {"depth", DepthKind::Relative},
+                                                  {"disparity", DepthKind::Disparity}};
+  command.add_option("--depth",
+                     options.depth.folder,
+                     "Folder with a depth file per photograph, of the same stem: .exr .pfm .npy "
+                     ".tif .png; default: what the scene says, else a folder \"depth\" beside the "
+                     "photographs");
+  command
+      .add_option("--depth-kind",
+                  options.depth.kind,
+                  "metric (of a sensor), depth or disparity (up to scale and offset, of a "
+                  "network); default auto: whichever fits what the photographs show")
+      ->transform(CLI::CheckedTransformer(kinds).description("auto, metric, depth, disparity"));
+  command.add_option("--depth-model",
+                     options.depth.network,
+                     "Network (.onnx, in the form of MiDaS small) that guesses disparity where "
+                     "photographs measure none; depth with --depth-kind depth");
+  command.add_option("--depth-scale",
+                     options.depth.scale,
+                     "Values of metric depth files per metre; default: 1000 where they are whole "
+                     "numbers (5000 in TUM data sets), else 1");
   command.add_flag("--allow-external",
                    options.allow_external,
                    "Follow links and absolute paths that leave the scene folder");

@@ -26,7 +26,8 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 /// --assume-unit and --known-distance.
 void add_scale_options(CLI::App& command, SceneRequest& request);
 
-/// --views, --downscale and --allow-external.
+/// --views, --downscale, --depth, --depth-kind, --depth-model, --depth-scale
+/// and --allow-external.
 void add_scene_options(CLI::App& command, SceneOptions& options);
 
 /// --focal.

@@ -25,7 +25,8 @@ struct TrainArgs {
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.scene.path);
-  const ModelRequest request = {{}, training_options(args.training), args.output};
+  const ModelRequest request = {
+      {}, training_options(args.training), args.output, args.scene.options.depth.network};
   Terminal terminal(args.common.quiet);
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   opened.keep(args.output);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -12,6 +13,15 @@
 #include "libcgs/core/raster.h"
 
 namespace cgs {
+
+/// What the values of a given depth mean; where that is not known, how they fit the depth that the
+/// photographs show tells.
+enum class DepthKind : uint8_t {
+  Unknown,    ///< One of the following.
+  Metric,     ///< z-depth, by a sensor.
+  Relative,   ///< z-depth up to scale and offset, as networks guess it.
+  Disparity,  ///< Inverse z-depth up to scale and offset, likewise.
+};
 
 /// One photograph and the camera that took it.
 struct View {
@@ -24,10 +34,15 @@ struct View {
   /// Lens distortion k1 k2 p1 p2 k3 (Brown-Conrady, as OpenCV defines it) of the image file, which
   /// load_images() takes out of the pixels; all zero = none.
   std::array<double, 5> distortion = {};
-  ColorImage image;  ///< Empty until loaded; same size as camera.
-  MaskMap valid;     ///< Empty = every pixel; else 1 where the image may be used.
-  double near = 0;   ///< Smallest z-depth of the scene seen here; 0 = unknown.
-  double far = 0;    ///< Largest z-depth; 0 = unknown.
+  ColorImage image;                  ///< Empty until loaded; same size as camera.
+  MaskMap valid;                     ///< Empty = every pixel; else 1 where the image may be used.
+  std::filesystem::path depth_path;  ///< File with depth from elsewhere; empty = none.
+  /// Depth from elsewhere, in metres if it is metric; NaN = none. Empty until loaded, and where
+  /// there is none; same size as camera.
+  DepthMap given_depth;
+  bool depth_states_metres = false;  ///< The file has 16-bit whole numbers, as sensors write them.
+  double near = 0;                   ///< Smallest z-depth of the scene seen here; 0 = unknown.
+  double far = 0;                    ///< Largest z-depth; 0 = unknown.
 };
 
 /// A point known before reconstruction, from structure from motion.
@@ -41,14 +56,17 @@ struct SparsePoint {
 /// Readers return it in world coordinates with the identity frame; to_canonical() moves it into
 /// its canonical frame, and everything after that works in internal units.
 struct Scene {
-  std::string kind;                   ///< "LLFF", "COLMAP", "transforms.json", "Strecha".
-  std::filesystem::path folder;       ///< What was opened.
-  std::vector<View> views;            ///< All of them, sorted by name.
-  std::vector<int> input;             ///< Views to reconstruct from.
-  std::vector<int> held_out;          ///< Views kept for evaluation.
-  std::vector<SparsePoint> points;    ///< May be empty.
-  std::vector<std::string> missing;   ///< Image files that cameras name but the disk lacks.
-  std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
+  std::string kind;                 ///< "LLFF", "COLMAP", "transforms.json", "Strecha".
+  std::filesystem::path folder;     ///< What was opened.
+  std::vector<View> views;          ///< All of them, sorted by name.
+  std::vector<int> input;           ///< Views to reconstruct from.
+  std::vector<int> held_out;        ///< Views kept for evaluation.
+  std::vector<SparsePoint> points;  ///< May be empty.
+  double depth_scale = 0;  ///< Values of depth files per metre; 0 = 1000 where they are whole
+                           ///< numbers, else 1.
+  DepthKind depth_kind = DepthKind::Unknown;  ///< Of View::given_depth.
+  std::vector<std::string> missing;           ///< Image files that cameras name but the disk lacks.
+  std::vector<std::string> warnings;          ///< One line each: what is odd but usable.
   Frame frame;
 };
 

@@ -2,6 +2,9 @@
 #include "libcgs/priors/estimate_priors.h"
 
 #include <algorithm>
+#include <utility>
+
+#include "libcgs/priors/guessed_depth.h"
 
 namespace cgs {
 
@@ -14,7 +17,9 @@ PriorsCoverage coverage(const ViewPriors& priors) {
   };
   const double valid = static_cast<double>(origin.size()) - share(DepthOrigin::Unknown);
   if (!(valid > 0)) return {};
-  return {share(DepthOrigin::Measured) / valid, share(DepthOrigin::Completed) / valid};
+  return {share(DepthOrigin::Measured) / valid,
+          share(DepthOrigin::Completed) / valid,
+          share(DepthOrigin::Guessed) / valid};
 }
 
 }  // namespace
@@ -26,32 +31,78 @@ void PriorsOptions::validate() const {
   layers.validate();
 }
 
+namespace {
+
+class Estimator {
+ public:
+  Estimator(const Scene& scene, const PriorsOptions& options) : scene_(scene), options_(options) {}
+
+  EstimatedPriors run(const Progress& progress) {
+    constexpr double kSweepShare = 0.95;  // of the time
+    out_.views = plane_sweep(scene_, options_.sweep, part_of(progress, 0, kSweepShare));
+    out_.report.alignment = align_depths(scene_, out_.views, options_.alignment);
+    const GivenDepth given = fit_given_depth(scene_, out_.views);
+    out_.report.given = {given.kind, given.metres_per_unit, given.metres_sigma, given.remarks};
+    if (given.kind == DepthKind::Metric) {
+      for (size_t i = 0; i < out_.views.size(); ++i) {
+        merge_sensor_depth(given.views[i], view(i), out_.views[i]);
+      }
+    }
+    const std::vector<DepthGuess> guesses = guesses_of(given);
+    for (size_t i = 0; i < out_.views.size(); ++i) {
+      complete(i, out_.views[i]);
+      enter_guess(guesses[i], out_.views[i]);
+      out_.views[i].layer = depth_layers(out_.views[i].depth, options_.layers);
+      out_.report.coverage.push_back(coverage(out_.views[i]));
+    }
+    report(progress, 1);
+    return std::move(out_);
+  }
+
+ private:
+  const View& view(size_t i) const { return scene_.views[static_cast<size_t>(scene_.input[i])]; }
+
+  // Of a view, which may be a copy of it that knows less; others are as they are now.
+  void complete(size_t i, ViewPriors& priors) const {
+    DepthCompletionOptions completion = options_.completion;
+    if (!(completion.fallback_depth > 0)) {
+      const DepthRange range = depth_range(scene_, scene_.input[i]);
+      completion.fallback_depth = 2 / (1 / range.near + 1 / range.far);
+    }
+    std::vector<CompletionWitness> witnesses;
+    for (size_t j = 0; j < out_.views.size(); ++j) {
+      if (j != i) witnesses.push_back({&view(j).camera, &out_.views[j]});
+    }
+    complete_depth(priors, view(i), completion, witnesses);
+  }
+
+  std::vector<DepthGuess> guesses_of(const GivenDepth& given) const {
+    std::vector<DepthGuess> out(out_.views.size());
+    const bool are_guesses =
+        given.kind == DepthKind::Relative || given.kind == DepthKind::Disparity;
+    if (!are_guesses) return out;
+    std::vector<Camera> cameras;
+    for (size_t i = 0; i < out.size(); ++i) {
+      cameras.push_back(view(i).camera);
+      if (given.views[i].depth.empty()) continue;
+      out[i] = guess_depth(given.views[i], view(i), out_.views[i]);
+    }
+    remove_contradictions(cameras, given.views, out_.views, out);
+    return out;
+  }
+
+  const Scene& scene_;
+  const PriorsOptions& options_;
+  EstimatedPriors out_;
+};
+
+}  // namespace
+
 EstimatedPriors estimate_priors(const Scene& scene,
                                 const PriorsOptions& options,
                                 const Progress& progress) {
   options.validate();
-  EstimatedPriors out;
-  constexpr double kSweepShare = 0.95;  // of the time
-  out.views = plane_sweep(scene, options.sweep, part_of(progress, 0, kSweepShare));
-  out.report.alignment = align_depths(scene, out.views, options.alignment);
-  for (size_t i = 0; i < out.views.size(); ++i) {
-    DepthCompletionOptions completion = options.completion;
-    if (!(completion.fallback_depth > 0)) {
-      const DepthRange range = depth_range(scene, scene.input[i]);
-      completion.fallback_depth = 2 / (1 / range.near + 1 / range.far);
-    }
-    const View& view = scene.views[static_cast<size_t>(scene.input[i])];
-    std::vector<CompletionWitness> witnesses;
-    for (size_t j = 0; j < out.views.size(); ++j) {
-      const View& other = scene.views[static_cast<size_t>(scene.input[j])];
-      if (j != i) witnesses.push_back({&other.camera, &out.views[j]});
-    }
-    complete_depth(out.views[i], view, completion, witnesses);
-    out.views[i].layer = depth_layers(out.views[i].depth, options.layers);
-    out.report.coverage.push_back(coverage(out.views[i]));
-  }
-  report(progress, 1);
-  return out;
+  return Estimator(scene, options).run(progress);
 }
 
 }  // namespace cgs

@@ -8,6 +8,7 @@
 #include "libcgs/priors/alignment.h"
 #include "libcgs/priors/depth_completion.h"
 #include "libcgs/priors/depth_layers.h"
+#include "libcgs/priors/given_depth.h"
 #include "libcgs/priors/plane_sweep.h"
 #include "libcgs/priors/view_priors.h"
 
@@ -27,10 +28,20 @@ struct PriorsOptions {
 struct PriorsCoverage {
   double measured = 0;
   double completed = 0;
+  double guessed = 0;
+};
+
+/// What became of depth that came with the photographs.
+struct GivenDepthReport {
+  DepthKind kind = DepthKind::Unknown;  ///< Unknown = there was none, or it was of no use.
+  double metres_per_unit = 0;           ///< As GivenDepth.
+  double metres_sigma = 0;
+  std::vector<std::string> remarks;
 };
 
 struct PriorsReport {
   AlignmentReport alignment;
+  GivenDepthReport given;
   std::vector<PriorsCoverage> coverage;  ///< In the order of Scene::input.
 };
 
@@ -39,7 +50,8 @@ struct EstimatedPriors {
   PriorsReport report;
 };
 
-/// Everything known about the input views before training: sweep, align, complete, layers.
+/// Everything known about the input views before training: sweep, align, enter the depth of
+/// sensors, complete, put guesses of given depth where they are better, layers.
 /// Preconditions and errors as plane_sweep().
 EstimatedPriors estimate_priors(const Scene& scene,
                                 const PriorsOptions& options,

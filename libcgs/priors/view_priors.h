@@ -11,8 +11,11 @@ namespace cgs {
 /// How the depth of a pixel became known.
 enum class DepthOrigin : uint8_t {
   Unknown = 0,    ///< No depth at all (masked out).
-  Measured = 1,   ///< Matched in at least one other view and confirmed from there.
+  Measured = 1,   ///< Matched in at least one other view and confirmed from there, or measured by
+                  ///< a depth sensor (then possibly with no matched view).
   Completed = 2,  ///< Filled in from measured neighbours; no evidence of its own.
+  Guessed = 3,    ///< By a given depth that rests on this photograph alone, such as a network's,
+                  ///< fitted to the measured pixels.
 };
 
 /// What is known about one input view before training; every raster has the size of its image.

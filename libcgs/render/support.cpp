@@ -37,6 +37,7 @@ float change_over_pixel(const DepthMap& depth, int x, int y, const SupportOption
 struct Witness {
   DepthMap depth;
   DepthMap tolerance;
+  MaskMap guessed;  // empty = nowhere
 };
 
 // Uncertain depth is not torn by its own noise.
@@ -54,11 +55,13 @@ DepthMap gaps(const SupportView& view, const SupportOptions& options) {
 
 Witness make_witness(const SupportView& view, const Camera& camera, const SupportOptions& options) {
   const SeenSurface surface = seen_surface({view.camera, view.depth, gaps(view, options)}, camera);
-  Witness out{surface.depth, surface.depth};
+  Witness out{surface.depth, surface.depth, {}};
+  if (!view.guessed.empty()) out.guessed = MaskMap(camera.width, camera.height, 0);
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       if (surface.pixel(x, y) < 0) continue;
       const auto pixel = static_cast<size_t>(surface.pixel(x, y));
+      if (!view.guessed.empty()) out.guessed(x, y) = view.guessed.data[pixel];
       float tolerance = options.relative_tolerance * surface.depth(x, y);
       if (!view.sigma.empty() && std::isfinite(view.sigma.data[pixel])) {
         tolerance = std::max(tolerance, options.sigma_factor * view.sigma.data[pixel]);
@@ -87,13 +90,19 @@ struct Judge {
 
   // Number of views that show a surface of depth z at pixel (x, y).
   int count(int x, int y, float z) const {
-    int out = 0;
+    int known = 0;
+    bool is_guessed = false;
     for (const Witness& witness : witnesses) {
       if (!witness.depth.contains(x, y)) continue;
       const float off = std::abs(witness.depth(x, y) - z);
-      out += off <= witness.tolerance(x, y) ? 1 : 0;  // not if unknown
+      if (!(off <= witness.tolerance(x, y))) continue;  // also if unknown
+      if (!witness.guessed.empty() && witness.guessed(x, y) != 0) {
+        is_guessed = true;
+      } else {
+        ++known;
+      }
     }
-    return out;
+    return std::max(known, is_guessed ? 1 : 0);
   }
 
   int support(int x, int y) const {
@@ -132,8 +141,10 @@ void check_arguments(const RenderBuffers& buffers,
           "annotate_support: number of views must be <= 255",
           views.size());
   for (const SupportView& view : views) {
-    require(fits(view.depth, view.camera) && (view.sigma.empty() || fits(view.sigma, view.camera)),
-            "annotate_support: depth and sigma must have the size of their camera",
+    require(fits(view.depth, view.camera) &&
+                (view.sigma.empty() || fits(view.sigma, view.camera)) &&
+                (view.guessed.empty() || fits(view.guessed, view.camera)),
+            "annotate_support: depth, sigma and guessed must have the size of their camera",
             view.depth.width);
   }
 }

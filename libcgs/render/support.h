@@ -13,6 +13,9 @@ struct SupportView {
   Camera camera;
   DepthMap depth;  ///< Of the size of the camera [internal units]; NaN = saw nothing here.
   DepthMap sigma;  ///< Standard deviation of depth [internal units]; NaN, or empty, = no statement.
+  /// 1 where depth is a guess from this view alone: guesses of several views count as one view.
+  /// Empty = nowhere.
+  MaskMap guessed;
 };
 
 /// When an input view counts as having seen a rendered pixel.

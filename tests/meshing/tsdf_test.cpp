@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/tsdf.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -171,6 +172,20 @@ TEST(Fuse, LabelsTheOverlapOfTwoViewsObserved) {
   EXPECT_EQ(area[size_t(Provenance::Inferred)], 0);
   ASSERT_EQ(mesh.colors.size(), mesh.vertices.size());
   EXPECT_LT((mesh.colors[0] - Eigen::Vector3f(0.2f, 0.5f, 0.8f)).norm(), 1e-4f);
+}
+
+TEST(Fuse, GuessesOfSeveralViewsAreLabelledAsSeenByOne) {
+  std::vector<TsdfView> views = three_views(test::plane({0, 0, 1}, 0.1));
+  const auto largest_support = [&] {
+    const TriangleMesh mesh = open_surface(fuse(views, {}).volume, {});
+    EXPECT_GT(mesh.support.size(), 1000U);
+    return *std::max_element(mesh.support.begin(), mesh.support.end());
+  };
+  EXPECT_EQ(largest_support(), 3);
+  views[0].guessed = MaskMap(views[0].camera.width, views[0].camera.height, 1);
+  EXPECT_EQ(largest_support(), 2);
+  for (TsdfView& view : views) view.guessed = MaskMap(view.camera.width, view.camera.height, 1);
+  EXPECT_EQ(largest_support(), 1);
 }
 
 TEST(Fuse, CarriesTheUncertaintyOfTheViews) {

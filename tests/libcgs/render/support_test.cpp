@@ -235,6 +235,24 @@ TEST(AnnotateSupport, DoesNotTakeAFloaterForASurface) {
   EXPECT_EQ(facing.buffers.hole(12, 7), Hole::None);
 }
 
+TEST(AnnotateSupport, CountsGuessesOfSeveralViewsAsOneView) {
+  Facing facing(1, 1);
+  std::vector<SupportView> views(3, facing.view);
+  const auto support = [&] {
+    annotate_support(facing.buffers, facing.camera, views);
+    return int(facing.buffers.support(9, 7));
+  };
+  EXPECT_EQ(support(), 3);
+  const MaskMap guessed(facing.camera.width, facing.camera.height, 1);
+  views[0].guessed = guessed;
+  EXPECT_EQ(support(), 2) << "a guess adds nothing to what views know";
+  views[1].guessed = views[2].guessed = guessed;
+  EXPECT_EQ(support(), 1);
+  EXPECT_EQ(facing.buffers.hole(9, 7), Hole::None);
+  views[2].guessed = MaskMap(3, 3, 1);
+  EXPECT_THROW(support(), InvalidInput);
+}
+
 TEST(AnnotateSupport, FindsNoWitnessBehindOrBesideItsImage) {
   Facing facing(1, 1);
   facing.view.camera.world_from_cam.translation().z() = 2;

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/cameras_json_scene.h"
+
+#include "io/byte_reader.h"
+#include "io/cameras_json.h"
+#include "io/photograph_index.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr const char* kName = "cameras.json";
+
+}  // namespace
+
+bool is_cameras_json(const std::filesystem::path& folder) { return is_present(folder / kName); }
+
+Scene read_cameras_json_scene(const SceneRoot& root) {
+  Scene scene = read_cameras_json(resolve_in_scene(root, kName, root.folder));
+  const PhotographIndex photographs(root);
+  scene.kind = kName;
+  scene.folder = root.folder;
+  scene.input.clear();
+  scene.held_out.clear();
+  scene.missing.clear();
+  for (View& view : scene.views) {
+    view.image_path = photographs.find(view.name);
+    if (view.image_path.empty()) scene.missing.push_back(view.name);
+    // What this program wrote is in its internal frame.
+    Camera& camera = view.camera;
+    camera.world_from_cam = world_from_internal(scene.frame, camera.world_from_cam);
+    view.near *= scene.frame.scale;
+    view.far *= scene.frame.scale;
+  }
+  Frame world;
+  world.metres_per_unit = scene.frame.metres_per_unit;
+  world.metres_sigma = scene.frame.metres_sigma;
+  world.scale_source = scene.frame.scale_source;
+  scene.frame = world;
+  return scene;
+}
+
+}  // namespace cgs

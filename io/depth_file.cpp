@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/depth_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "io/exr.h"
+#include "io/npy.h"
+#include "io/pfm.h"
+
+namespace cgs {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// What keeps values as they are comes before what may be a picture to look at.
+constexpr std::array<const char*, 6> kExtensions = {
+    ".exr", ".pfm", ".npy", ".tiff", ".tif", ".png"};
+
+std::string lower_extension(const fs::path& path) {
+  std::string out = path.extension().string();
+  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) {
+    return static_cast<char>(c >= 'A' && c <= 'Z' ? c + ('a' - 'A') : c);
+  });
+  return out;
+}
+
+Raster<float> from_exr(const fs::path& path, const ReadLimits& limits) {
+  const ExrImage image = read_exr(path, limits);
+  const std::vector<float>* values = nullptr;
+  for (const char* name : {"Z", "depth.Z", "depth.V", "Y", "R"}) {
+    if (values == nullptr) values = image.find(name);
+  }
+  if (values == nullptr && image.channels.size() == 1) values = &image.channels.front().second;
+  if (values == nullptr) {
+    throw BadInput(Defect::Schema, path, "has none of the channels Z, depth.Z, depth.V, Y and R");
+  }
+  Raster<float> out;
+  out.width = image.width;
+  out.height = image.height;
+  out.data = *values;
+  return out;
+}
+
+Raster<float> from_npy(const fs::path& path, const ReadLimits& limits) {
+  const NpyArray array = read_npy(path, limits);
+  std::vector<size_t> sides = array.shape;
+  if (sides.size() > 2) std::erase(sides, size_t{1});
+  if (sides.size() != 2 || sides[0] == 0 || sides[1] == 0) {
+    throw BadInput(Defect::Schema, path, "expected an array of height x width values");
+  }
+  if (array.values.size() > limits.max_pixels) {
+    throw LimitError(printable(path) + ": " + std::to_string(array.values.size()) +
+                     " pixels, allowed are " + std::to_string(limits.max_pixels));
+  }
+  Raster<float> out(static_cast<int>(sides[1]), static_cast<int>(sides[0]), 0);
+  std::transform(array.values.begin(), array.values.end(), out.data.begin(), [](double value) {
+    return static_cast<float>(value);
+  });
+  return out;
+}
+
+}  // namespace
+
+bool has_depth_extension(const fs::path& path) {
+  const std::string extension = lower_extension(path);
+  return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
+}
+
+fs::path depth_file_of(const SceneRoot& folder, const fs::path& photograph) {
+  for (const std::string extension : kExtensions) {
+    const std::string name = photograph.stem().string() + extension;
+    if (is_present(folder.folder / name)) return resolve_in_scene(folder, name, folder.folder);
+  }
+  return {};
+}
+
+StoredSamples read_depth_file(const fs::path& path, const ReadLimits& limits) {
+  const std::string extension = lower_extension(path);
+  StoredSamples out;
+  if (extension == ".exr") {
+    out.values = from_exr(path, limits);
+  } else if (extension == ".pfm") {
+    out.values = read_pfm(path, limits);
+  } else if (extension == ".npy") {
+    out.values = from_npy(path, limits);
+  } else if (has_depth_extension(path)) {
+    out = read_samples(path, limits);
+  } else {
+    throw BadInput(
+        Defect::Unsupported, path, "no depth file; read are .exr .pfm .npy .tif .tiff .png");
+  }
+  for (float& value : out.values.data) {
+    if (!(value > 0 && std::isfinite(value))) value = std::numeric_limits<float>::quiet_NaN();
+  }
+  return out;
+}
+
+}  // namespace cgs

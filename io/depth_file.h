@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "io/image.h"
+#include "io/scene_path.h"
+
+namespace cgs {
+
+/// True for what read_depth_file() reads, by extension in any case: .exr .pfm .npy .tif .tiff .png
+bool has_depth_extension(const std::filesystem::path& path);
+
+/// The file of a photograph in a folder of depth files: of the same stem, and of several the one
+/// whose format comes first in has_depth_extension(); empty if there is none.
+/// \param folder  in which links must not lead elsewhere unless allow_external
+/// \throws BadInput Path
+std::filesystem::path depth_file_of(const SceneRoot& folder,
+                                    const std::filesystem::path& photograph);
+
+/// Reads one value per pixel; NaN where there is none: where the file has 0, a negative number,
+/// NaN or infinity.
+///
+/// Of an EXR the channel Z, else depth.Z, depth.V, Y, R or the only one is taken; of an NPY arrays
+/// with two sides beside any of length 1.
+/// \throws BadInput as read_exr(), read_pfm(), read_npy() and read_samples(); Schema (no such
+///         channel, another shape), Unsupported (another extension); LimitError
+StoredSamples read_depth_file(const std::filesystem::path& path, const ReadLimits& limits = {});
+
+}  // namespace cgs

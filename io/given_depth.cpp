@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/given_depth.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "io/camera_checks.h"
+#include "io/depth_file.h"
+#include "io/orientation.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kSameSurface = 0.05f;  // relative step between values that may be averaged
+
+// The file in a folder "depth" in or beside the folder of a photograph, beneath the scene.
+fs::path depth_beside(const SceneRoot& root, const fs::path& photograph) {
+  std::error_code ignored;  // what cannot be resolved stays as it is, and is not found
+  const fs::path top = fs::weakly_canonical(root.folder, ignored);
+  const fs::path folder = fs::weakly_canonical(photograph.parent_path(), ignored);
+  for (const fs::path& candidate : {folder / "depth", folder.parent_path() / "depth"}) {
+    const std::string below = candidate.lexically_relative(top).generic_string();
+    const bool is_below = !below.empty() && !below.starts_with("..");
+    if (!is_below || !is_folder(candidate)) continue;
+    const fs::path inside = resolve_in_scene(root, below, root.folder);
+    fs::path file = depth_file_of({inside, root.allow_external}, photograph);
+    if (!file.empty()) return file;
+  }
+  return {};
+}
+
+// Takes out what a file in a folder "confidence" beside that of the depth calls 0: low.
+void drop_low_confidence(const fs::path& depth_file, Raster<float>& values) {
+  const fs::path folder = depth_file.parent_path().parent_path() / "confidence";
+  if (!is_folder(folder)) return;
+  const fs::path file = depth_file_of({folder, false}, depth_file);
+  if (file.empty()) return;
+  const Raster<float> confidence = read_samples(file).values;
+  if (confidence.width != values.width || confidence.height != values.height) {
+    throw BadInput(Defect::Mismatch, file, "is not of the size of its depth");
+  }
+  for (size_t i = 0; i < values.data.size(); ++i) {
+    if (!(confidence.data[i] > 0)) values.data[i] = kNaN;
+  }
+}
+
+// Values whose shape is that of the photograph: as it is stored, or already upright.
+Raster<float> upright(const Raster<float>& values, const View& view, const ImageSize& photograph) {
+  const auto fits = [&](const ImageSize& size) {
+    const double difference =
+        double(size.height) * values.width - double(size.width) * values.height;
+    const int longest = std::max({size.width, size.height, values.width, values.height});
+    return std::abs(difference) <= longest;  // one size is the other, rounded to whole pixels
+  };
+  const bool is_turned = view.orientation >= 5;
+  const ImageSize stored = is_turned ? ImageSize{photograph.height, photograph.width} : photograph;
+  if (fits(stored)) return turned(values, view.orientation);
+  if (fits(photograph)) return values;
+  throw BadInput(Defect::Mismatch,
+                 view.depth_path,
+                 "the depth has " + std::to_string(values.width) + " x " +
+                     std::to_string(values.height) + " pixels, its photograph " +
+                     std::to_string(photograph.width) + " x " + std::to_string(photograph.height) +
+                     ", which is another shape");
+}
+
+// Where a pixel of the undistorted picture lies in the photograph, both of the camera's size; NaN
+// where the lens never put it.
+class Lens {
+ public:
+  explicit Lens(const View& view)
+      : camera_(view.camera), k_(view.distortion), fold_(fold_radius(view.distortion)) {}
+
+  Eigen::Vector2d operator()(double u, double v) const {
+    if (k_ == std::array<double, 5>{}) return {u, v};
+    const Eigen::Vector2d p = camera_.ray_in_cam(u, v).head<2>();
+    if (!(p.norm() < fold_)) return Eigen::Vector2d::Constant(double(kNaN));
+    const double r2 = p.squaredNorm();
+    const double radial = 1 + r2 * (k_[0] + r2 * (k_[1] + r2 * k_[4]));
+    const double xy = p.x() * p.y();
+    const Eigen::Vector2d tangential(2 * k_[2] * xy + k_[3] * (r2 + 2 * p.x() * p.x()),
+                                     k_[2] * (r2 + 2 * p.y() * p.y()) + 2 * k_[3] * xy);
+    const Eigen::Vector2d q = radial * p + tangential;
+    return {camera_.fx * q.x() + camera_.cx, camera_.fy * q.y() + camera_.cy};
+  }
+
+ private:
+  const Camera& camera_;
+  const std::array<double, 5>& k_;
+  double fold_;
+};
+
+bool is_like(float value, float reference) {
+  return std::abs(value - reference) <= kSameSurface * reference;  // not if NaN
+}
+
+// Between the four values around a point, of those that go with the nearest. 0 <= u < width.
+float interpolated(const Raster<float>& values, double u, double v) {
+  const float nearest = values(static_cast<int>(u), static_cast<int>(v));
+  if (std::isnan(nearest)) return kNaN;
+  const double left = std::floor(u - 0.5);
+  const double top = std::floor(v - 0.5);
+  const double s = u - 0.5 - left;
+  const double t = v - 0.5 - top;
+  double sum = 0;
+  double weight = 0;
+  for (int k = 0; k < 4; ++k) {
+    const int x = std::clamp(static_cast<int>(left) + k % 2, 0, values.width - 1);
+    const int y = std::clamp(static_cast<int>(top) + k / 2, 0, values.height - 1);
+    if (!is_like(values(x, y), nearest)) continue;
+    const double w = (k % 2 == 1 ? s : 1 - s) * (k / 2 == 1 ? t : 1 - t);
+    sum += w * double(values(x, y));
+    weight += w;
+  }
+  return static_cast<float>(sum / weight);  // the nearest weighs at least a quarter
+}
+
+// Of the values under a pixel of the given size around a point; NaN if most of them are.
+float averaged(const Raster<float>& values, double u, double v, double width, double height) {
+  const auto first = [](double at, double size) {
+    return std::max(0, static_cast<int>(std::ceil(at - 0.5 * size - 0.5)));
+  };
+  const auto end = [](double at, double size, int side) {
+    return std::min(side, static_cast<int>(std::ceil(at + 0.5 * size - 0.5)));
+  };
+  std::vector<float> under;
+  size_t all = 0;
+  for (int y = first(v, height); y < end(v, height, values.height); ++y) {
+    for (int x = first(u, width); x < end(u, width, values.width); ++x) {
+      ++all;
+      if (!std::isnan(values(x, y))) under.push_back(values(x, y));
+    }
+  }
+  if (under.empty() || 2 * under.size() < all) return kNaN;
+  std::sort(under.begin(), under.end());
+  const float median = under[(under.size() - 1) / 2];
+  double sum = 0;
+  int count = 0;
+  for (const float value : under) {
+    if (!is_like(value, median)) continue;
+    sum += double(value);
+    ++count;
+  }
+  return static_cast<float>(sum / count);
+}
+
+DepthMap resampled(const Raster<float>& values, const View& view) {
+  const Camera& camera = view.camera;
+  const Lens lens(view);
+  const double across = double(values.width) / camera.width;
+  const double down = double(values.height) / camera.height;
+  DepthMap out(camera.width, camera.height, kNaN);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      const Eigen::Vector2d at = lens(x + 0.5, y + 0.5);
+      const double u = at.x() * across;
+      const double v = at.y() * down;
+      if (!(u >= 0 && v >= 0 && u < values.width && v < values.height)) continue;
+      constexpr double kFiner = 1.01;
+      out(x, y) = across > kFiner || down > kFiner
+                      ? averaged(values, u, v, std::max(across, 1.0), std::max(down, 1.0))
+                      : interpolated(values, u, v);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+void DepthOptions::validate() const {
+  require(scale >= 0 && std::isfinite(scale), "DepthOptions.scale must be >= 0", scale);
+  if (network.empty()) return;
+  require(folder.empty(), "give depth files or a network, not both; files", folder);
+  require(kind != DepthKind::Metric,
+          "a network measures nothing: its kind is depth or disparity, the network",
+          network);
+}
+
+void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external) {
+  if (options.kind != DepthKind::Unknown) scene.depth_kind = options.kind;
+  if (options.scale > 0) scene.depth_scale = options.scale;
+  if (!options.network.empty()) {
+    for (View& view : scene.views) view.depth_path.clear();
+    if (scene.depth_kind != DepthKind::Relative) scene.depth_kind = DepthKind::Disparity;
+    return;
+  }
+  for (View& view : scene.views) {
+    if (view.image_path.empty()) continue;
+    if (!options.folder.empty()) {
+      view.depth_path = depth_file_of({options.folder, allow_external}, view.image_path);
+    } else if (view.depth_path.empty()) {
+      view.depth_path = depth_beside({scene.folder, allow_external}, view.image_path);
+    }
+  }
+  const auto has_depth = [&](int i) {
+    return !scene.views[static_cast<size_t>(i)].depth_path.empty();
+  };
+  const auto count = std::count_if(scene.input.begin(), scene.input.end(), has_depth);
+  if (count == 0 && !options.folder.empty()) {
+    throw BadInput(Defect::Missing,
+                   options.folder,
+                   "holds no depth named as an input photograph: .exr .pfm .npy .tif or .png");
+  }
+  if (count == 0) return;
+  for (const int i : scene.input) {
+    if (has_depth(i)) continue;
+    scene.warnings.push_back("there is depth for other views, but none for view " +
+                             printable(scene.views[static_cast<size_t>(i)].name));
+  }
+}
+
+void load_given_depth(const Scene& scene, View& view, const ImageSize& photograph) {
+  if (view.depth_path.empty()) return;
+  StoredSamples file = read_depth_file(view.depth_path);
+  drop_low_confidence(view.depth_path, file.values);
+  constexpr double kMillimetres = 1000;
+  const double scale = scene.depth_scale > 0 ? scene.depth_scale
+                       : file.whole_bits > 0 ? kMillimetres
+                                             : 1;
+  for (float& value : file.values.data) value = static_cast<float>(double(value) / scale);
+  view.given_depth = resampled(upright(file.values, view, photograph), view);
+  view.depth_states_metres = file.whole_bits == 16 || scene.depth_scale > 0;
+}
+
+}  // namespace cgs

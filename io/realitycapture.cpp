@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/realitycapture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/byte_reader.h"
+#include "io/camera_checks.h"
+#include "io/image.h"
+#include "io/photograph_index.h"
+#include "io/text_lines.h"
+
+namespace cgs {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::string_view kStart = "#name,";
+
+bool has_cameras(const fs::path& file) {
+  constexpr uint64_t kEnough = 4096;
+  try {
+    const std::string start = read_file_start(file, kEnough);
+    TextLines lines(start, file);
+    while (const auto line = lines.next()) {
+      if (line->starts_with(kStart)) return true;
+    }
+    return false;
+  } catch (const Error&) {
+    return false;  // what cannot be read has none
+  }
+}
+
+std::optional<std::string> csv_name(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".csv") files.push_back(entry->path());
+  }
+  std::sort(files.begin(), files.end());
+  const auto found = std::find_if(files.begin(), files.end(), has_cameras);
+  if (found == files.end()) return std::nullopt;
+  return found->filename().string();
+}
+
+std::vector<std::string_view> fields(std::string_view line) {
+  std::vector<std::string_view> out;
+  for (size_t at = 0; at <= line.size();) {
+    const size_t end = std::min(line.find(',', at), line.size());
+    std::string_view field = line.substr(at, end - at);
+    field.remove_prefix(std::min(field.find_first_not_of(" \t"), field.size()));
+    field.remove_suffix(field.size() - (field.find_last_not_of(" \t") + 1));
+    out.push_back(field);
+    at = end + 1;
+  }
+  return out;
+}
+
+// One line with the columns of the table.
+class Row {
+ public:
+  Row(const std::map<std::string, size_t>& columns, const TextLines& lines, std::string_view line)
+      : columns_(columns), lines_(lines), fields_(fields(line)) {
+    if (fields_.size() < columns.size()) {
+      lines.fail(Defect::Schema,
+                 "has " + std::to_string(fields_.size()) + " of " + std::to_string(columns.size()) +
+                     " fields");
+    }
+  }
+  std::string_view text(const std::string& column) const { return fields_[columns_.at(column)]; }
+  double number(const std::string& column) const { return lines_.number(text(column)); }
+  double number_or_0(const std::string& column) const {
+    return columns_.contains(column) ? number(column) : 0;
+  }
+
+ private:
+  const std::map<std::string, size_t>& columns_;
+  const TextLines& lines_;
+  std::vector<std::string_view> fields_;
+};
+
+Eigen::Isometry3d read_pose(const Row& row, const Refuse& refuse) {
+  const auto turn = [&](const std::string& column, double sign, const Eigen::Vector3d& axis) {
+    constexpr double kDegree = std::numbers::pi / 180;
+    return Eigen::AngleAxisd(sign * row.number(column) * kDegree, axis);
+  };
+  const Eigen::Matrix3d world_from_opengl =
+      (turn("heading", -1, Eigen::Vector3d::UnitZ()) * turn("pitch", 1, Eigen::Vector3d::UnitX()) *
+       turn("roll", 1, Eigen::Vector3d::UnitY()))
+          .toRotationMatrix();
+  const Eigen::Matrix3d opengl_from_opencv = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  return checked_pose(world_from_opengl * opengl_from_opencv,
+                      {row.number("x"), row.number("y"), row.number("alt")},
+                      refuse);
+}
+
+void read_intrinsics(const Row& row, const Refuse& refuse, View& view) {
+  constexpr double kFilm = 36;  // [mm]
+  Camera& camera = view.camera;
+  const ImageSize size = image_size(view.image_path);
+  camera.width = size.width;
+  camera.height = size.height;
+  const double longer = std::max(size.width, size.height);
+  camera.fx = camera.fy = row.number("f") * longer / kFilm;
+  camera.cx = 0.5 * size.width + row.number_or_0("px") * longer;
+  camera.cy = 0.5 * size.height + row.number_or_0("py") * longer;
+  view.distortion = {row.number_or_0("k1"),
+                     row.number_or_0("k2"),
+                     row.number_or_0("t1"),
+                     row.number_or_0("t2"),
+                     row.number_or_0("k3")};
+  if (row.number_or_0("k4") != 0) {
+    refuse(Defect::Unsupported, "k4 is not read: export undistorted images, or with fewer terms");
+  }
+  check_intrinsics(camera, refuse);
+  check_distortion(camera, view.distortion, refuse);
+}
+
+std::map<std::string, size_t> read_columns(TextLines& lines) {
+  while (const auto line = lines.next()) {
+    if (!line->starts_with(kStart)) continue;
+    std::map<std::string, size_t> out;
+    const std::vector<std::string_view> names = fields(line->substr(1));
+    for (size_t i = 0; i < names.size(); ++i) out.emplace(names[i], i);
+    for (const char* needed : {"name", "x", "y", "alt", "heading", "pitch", "roll", "f"}) {
+      if (!out.contains(needed)) {
+        lines.fail(Defect::Schema,
+                   "there is no column " + std::string(needed) +
+                       "; export \"Internal/External camera parameters\"");
+      }
+    }
+    return out;
+  }
+  throw BadInput(Defect::Schema, lines.path(), "no line starts with #name");
+}
+
+}  // namespace
+
+bool is_realitycapture(const fs::path& folder) { return csv_name(folder).has_value(); }
+
+Scene read_realitycapture(const SceneRoot& root) {
+  const std::string name = csv_name(root.folder).value_or("cameras.csv");
+  const fs::path path = resolve_in_scene(root, name, root.folder);
+  ReadLimits limits;
+  limits.max_file_bytes = limits.max_json_bytes;
+  const std::string bytes = read_file(path, limits);
+  TextLines lines(bytes, path);
+  const std::map<std::string, size_t> columns = read_columns(lines);
+  const PhotographIndex photographs(root);
+  const Refuse refuse = [&](Defect defect, const std::string& why) { lines.fail(defect, why); };
+  Scene scene;
+  scene.kind = "RealityCapture";
+  scene.folder = root.folder;
+  while (const auto line = lines.next_data()) {
+    const Row row(columns, lines, *line);
+    View view;
+    view.camera.world_from_cam = read_pose(row, refuse);
+    view.image_path = photographs.find(row.text("name"));
+    if (view.image_path.empty()) {
+      scene.missing.emplace_back(row.text("name"));  // nothing would ever tell its size
+      continue;
+    }
+    view.name = view.image_path.filename().string();
+    read_intrinsics(row, refuse, view);
+    if (scene.views.size() >= limits.max_views) lines.fail(Defect::Count, "too many cameras");
+    scene.views.push_back(std::move(view));
+  }
+  if (scene.views.empty() && scene.missing.empty()) {
+    throw BadInput(Defect::Empty, path, "there is no camera");
+  }
+  return scene;
+}
+
+}  // namespace cgs

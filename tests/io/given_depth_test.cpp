@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/given_depth.h"
+
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "io/scene_reader.h"
+#include "tests/support/scene_files.h"
+#include "tests/support/temp_dir.h"
+
+namespace cgs {
+namespace {
+
+constexpr int kWidth = 64;
+constexpr int kHeight = 48;
+
+/// Two photographs in images/, with a lens of some distortion if asked for.
+class GivenDepthFiles : public testing::Test {
+ protected:
+  explicit GivenDepthFiles(const std::string& camera = "PINHOLE 64 48 60 60 32 24") {
+    std::string images;
+    for (const int i : {1, 2}) {
+      const std::string name = "v" + std::to_string(i) + ".png";
+      images += std::to_string(i) + " 1 0 0 0 " + std::to_string(i) + " 0 0 1 " + name + "\n\n";
+      test::write_bytes(dir_ / "images" / name, test::rgb_png(kWidth, kHeight, i));
+    }
+    test::write_bytes(dir_ / "sparse/0/cameras.txt", "1 " + camera + "\n");
+    test::write_bytes(dir_ / "sparse/0/images.txt", images);
+  }
+
+  /// A float depth file of any size; the value is f at the pixel's centre in units of the
+  /// photograph.
+  void write(const std::string& name,
+             int width,
+             int height,
+             const std::function<double(double, double)>& f) {
+    std::string values;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const double u = (x + 0.5) * kWidth / width;
+        const double v = (y + 0.5) * kHeight / height;
+        values += test::packed(static_cast<float>(f(u, v)));
+      }
+    }
+    const std::string shape = "(" + std::to_string(height) + ", " + std::to_string(width) + ")";
+    test::write_bytes(dir_ / name, test::npy("<f4", shape, values));
+  }
+
+  View first(SceneOptions options = {}) {
+    Scene scene = read_scene(dir_.path(), options);
+    warnings_ = scene.warnings.size();
+    load_images(scene, scene.input);
+    return scene.views[0];
+  }
+
+  test::TempDir dir_;
+  size_t warnings_ = 0;
+};
+
+double ramp(double u, double v) { return 2 + 0.005 * u + 0.01 * v; }
+
+TEST_F(GivenDepthFiles, AreFoundWhereTheyLie) {
+  EXPECT_TRUE(first().given_depth.empty());
+  EXPECT_EQ(warnings_, 0u);
+  write("depth/v1.npy", kWidth, kHeight, ramp);
+  EXPECT_FALSE(first().given_depth.empty());
+  EXPECT_EQ(warnings_, 1u) << "the second view has none";
+  write("elsewhere/v1.npy", kWidth, kHeight, [](double, double) { return 7; });
+  SceneOptions options;
+  options.depth.folder = dir_ / "elsewhere";
+  EXPECT_EQ(first(options).given_depth(5, 5), 7);
+  options.depth.folder = dir_ / "images";  // the photographs have these names, but no values
+  EXPECT_EQ(test::defect_of([&] { first(options); }), "UNSUPPORTED");
+  options.depth.folder = dir_ / "nowhere";
+  EXPECT_EQ(test::defect_of([&] { first(options); }), "MISSING");
+}
+
+TEST_F(GivenDepthFiles, OfOtherSizesKeepTheirPlace) {
+  const std::vector<std::pair<int, int>> sizes = {
+      {64, 48}, {32, 24}, {16, 12}, {256, 192}, {96, 72}};
+  for (const auto& [width, height] : sizes) {
+    write("depth/v1.npy", width, height, ramp);
+    for (const int downscale : {1, 2, 3}) {
+      SceneOptions options;
+      options.downscale = downscale;
+      const View view = first(options);
+      ASSERT_EQ(view.given_depth.width, view.camera.width);
+      const double across = double(kWidth) / view.camera.width;
+      const double down = double(kHeight) / view.camera.height;
+      for (int y = 4; y < view.camera.height - 4; ++y) {
+        for (int x = 4; x < view.camera.width - 4; ++x) {
+          const double expected = ramp((x + 0.5) * across, (y + 0.5) * down);
+          // A pixel of the finer one off where the other's borders cut through it.
+          const double slack = width > view.camera.width ? 0.03 * kWidth / width : 1e-5;
+          ASSERT_NEAR(view.given_depth(x, y), expected, slack)
+              << width << ' ' << downscale << ' ' << x << ' ' << y;
+        }
+      }
+    }
+  }
+}
+
+TEST_F(GivenDepthFiles, NeverMixBothSidesOfADepthEdge) {
+  const auto step = [](double u, double) { return u < 21.7 ? 2.0 : 5.0; };
+  for (const int width : {16, 32, 64, 128, 256}) {
+    write("depth/v1.npy", width, width * 3 / 4, step);
+    for (const int downscale : {1, 2, 4}) {
+      SceneOptions options;
+      options.downscale = downscale;
+      for (const float z : first(options).given_depth.data) {
+        ASSERT_TRUE(z == 2 || z == 5) << z << " at " << width << " / " << downscale;
+      }
+    }
+  }
+}
+
+TEST_F(GivenDepthFiles, NothingIsInventedWhereThereIsNone) {
+  write("depth/v1.npy", 32, 24, [](double u, double) { return u < 32 ? 0.0 : 4.0; });
+  const View view = first();
+  EXPECT_TRUE(std::isnan(view.given_depth(31, 20)));
+  EXPECT_EQ(view.given_depth(32, 20), 4);
+}
+
+TEST_F(GivenDepthFiles, WholeNumbersAreMillimetres) {
+  std::vector<std::string> rows(kHeight);
+  for (std::string& row : rows) {
+    for (int x = 0; x < kWidth; ++x) row += {char(1250 >> 8), char(1250 & 0xff)};
+  }
+  const std::string bytes = test::png(kWidth, rows, {.color_type = 0, .bit_depth = 16});
+  test::write_bytes(dir_ / "depth/v1.png", bytes);
+  View view = first();
+  EXPECT_EQ(view.given_depth(9, 9), 1.25f);
+  EXPECT_TRUE(view.depth_states_metres);
+  SceneOptions options;
+  options.depth.scale = 5000;
+  EXPECT_EQ(first(options).given_depth(9, 9), 0.25f);
+  write("depth/v1.npy", kWidth, kHeight, ramp);
+  EXPECT_FALSE(first().depth_states_metres);
+}
+
+TEST_F(GivenDepthFiles, LowConfidenceIsNone) {
+  write("depth/v1.npy", 4, 3, ramp);
+  std::vector<std::string> rows(3, std::string("\x00\x7f\xff\xff", 4));
+  test::write_bytes(dir_ / "confidence/v1.png", test::png(4, rows, {.color_type = 0}));
+  const View view = first();
+  EXPECT_TRUE(std::isnan(view.given_depth(8, 20)));
+  EXPECT_FALSE(std::isnan(view.given_depth(24, 20)));
+  rows.resize(2);
+  test::write_bytes(dir_ / "confidence/v1.png", test::png(4, rows, {.color_type = 0}));
+  EXPECT_EQ(test::defect_of([&] { first(); }), "MISMATCH");
+}
+
+TEST_F(GivenDepthFiles, OfAnotherShapeAreRefused) {
+  write("depth/v1.npy", 40, 40, ramp);
+  EXPECT_EQ(test::defect_of([&] { first(); }), "MISMATCH");
+  test::write_bytes(dir_ / "depth/v1.npy", "no array");
+  EXPECT_EQ(test::defect_of([&] { first(); }), "MAGIC");
+}
+
+class DistortedGivenDepth : public GivenDepthFiles {
+ protected:
+  DistortedGivenDepth() : GivenDepthFiles("OPENCV 64 48 60 60 32 24 -0.2 0.05 0.01 -0.02") {}
+};
+
+// A slanted plane as the lens saw it comes out as a pinhole camera would have seen it.
+TEST_F(DistortedGivenDepth, LosesTheDistortionAsThePhotographDoes) {
+  // Distorted to undistorted by fixed-point iteration of the model's definition.
+  const auto undistort = [](double u, double v) {
+    const double xd = (u - 32) / 60;
+    const double yd = (v - 24) / 60;
+    double x = xd;
+    double y = yd;
+    for (int i = 0; i < 100; ++i) {
+      const double r2 = x * x + y * y;
+      const double radial = 1 - 0.2 * r2 + 0.05 * r2 * r2;
+      const double dx = 2 * 0.01 * x * y - 0.02 * (r2 + 2 * x * x);
+      const double dy = 0.01 * (r2 + 2 * y * y) - 2 * 0.02 * x * y;
+      x = (xd - dx) / radial;
+      y = (yd - dy) / radial;
+    }
+    return std::pair(60 * x + 32, 60 * y + 24);
+  };
+  write("depth/v1.npy", kWidth, kHeight, [&](double u, double v) {
+    const auto [x, y] = undistort(u, v);
+    return ramp(x, y);
+  });
+  const View view = first();
+  int known = 0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      if (std::isnan(view.given_depth(x, y))) continue;
+      ++known;
+      const bool is_inside = x > 3 && y > 3 && x < kWidth - 4 && y < kHeight - 4;
+      if (is_inside) ASSERT_NEAR(view.given_depth(x, y), ramp(x + 0.5, y + 0.5), 1e-3);
+    }
+  }
+  EXPECT_GT(known, kWidth * kHeight * 9 / 10);
+}
+
+TEST(DepthOptions, RefusesAScaleOutOfRange) {
+  EXPECT_NO_THROW(DepthOptions{}.validate());
+  EXPECT_THROW((DepthOptions{.scale = -1}.validate()), InvalidInput);
+  EXPECT_THROW((DepthOptions{.scale = NAN}.validate()), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs

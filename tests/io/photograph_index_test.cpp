@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/photograph_index.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/temp_dir.h"
+
+namespace cgs {
+namespace {
+
+TEST(PhotographIndex, FindsPhotographsByTheNamesProgramsGiveThem) {
+  const test::TempDir dir;
+  for (const char* name : {"images/a.jpg", "b.01.png", "b.02.png", "images/c.png", "c.png"}) {
+    test::write_bytes(dir / name, "");
+  }
+  const PhotographIndex index({dir.path(), false});
+  const auto found = [&](const std::string& name) {
+    const auto path = index.find(name);
+    return path.empty() ? "" : std::filesystem::relative(path, dir.path()).string();
+  };
+  EXPECT_EQ(found("a.jpg"), "images/a.jpg");
+  EXPECT_EQ(found("a"), "images/a.jpg");
+  EXPECT_EQ(found("a.tif"), "images/a.jpg");
+  EXPECT_EQ(found("C:\\shots\\a.JPG"), "images/a.jpg");
+  EXPECT_EQ(found("x/y/b.01.png"), "b.01.png");
+  EXPECT_EQ(found("b.02"), "b.02.png");
+  EXPECT_EQ(found("b.03"), "");
+  EXPECT_EQ(found("c"), "images/c.png");
+  EXPECT_EQ(found(""), "");
+}
+
+}  // namespace
+}  // namespace cgs
