@@ -4,9 +4,9 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstring>
 #include <fstream>
 #include <new>
+#include <system_error>
 
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -88,10 +88,10 @@ std::string run_isolated(const std::function<std::string()>& work,
                          const std::filesystem::path& path,
                          const IsolationLimits& limits) {
   std::array<int, 2> ends{};
-  if (pipe(ends.data()) != 0) throw IoError(path, std::strerror(errno));
+  if (pipe(ends.data()) != 0) throw IoError(path, std::generic_category().message(errno));
   const pid_t child = fork();
   if (child < 0) {
-    const std::string reason = std::strerror(errno);
+    const std::string reason = std::generic_category().message(errno);
     close(ends[0]);
     close(ends[1]);
     throw IoError(path, "no process can be started to decode it: " + reason);
