@@ -112,7 +112,15 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
                          " of " + std::to_string(scene.tracks.size()) + " points fit)");
   }
   constexpr double kMostSigma = 0.1;
+  constexpr double kShortest = 0.32;  // [larger sides] phones' widest lenses have 0.36,
+  constexpr double kLongest = 8;      // telephoto lenses of 300 mm 8.3
   for (size_t lens = 0; lens < priors.size(); ++lens) {
+    const double focal = scene.lenses[lens].focal / priors[lens].side;
+    if (priors[lens].focal == 0 && !(focal >= kShortest && focal <= kLongest)) {
+      constexpr double kFilm = 36;  // [mm] wide
+      throw NumericalError(undetermined_focal(
+          pairs, "they ask for a lens of " + decimals(kFilm * focal, 0) + " mm as on film"));
+    }
     if (focal_sigmas[lens] <= kMostSigma) continue;
     throw NumericalError(
         undetermined_focal(pairs,

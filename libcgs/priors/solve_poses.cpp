@@ -84,14 +84,30 @@ Attempt attempt_at(double focal_of_side,
   return out;
 }
 
-// Whether the points are explained about as well at quite another focal length.
+// Share of the sightings that a reconstruction has no point or no pose for.
+double unexplained_share(const Reconstruction& scene) {
+  size_t unexplained = 0;
+  size_t all = 0;
+  for (const Track& track : scene.tracks) {
+    for (const Sighting& s : track.seen) {
+      ++all;
+      unexplained += track.is_known && scene.pose(s.photo) ? 0 : 1;
+    }
+  }
+  return all > 0 ? double(unexplained) / double(all) : 0;
+}
+
+// Whether the points are explained about as well at quite another focal length. What the best
+// attempt explains counts: what nothing explains would make all look alike.
 bool has_rival(const Attempt& best,
                const std::vector<Attempt>& attempts,
                const std::vector<LensPrior>& priors) {
-  constexpr double kAsWell = 1.4;  // times the error; right solutions win by more than twice that
-  const double kOther = std::log(1.25);
+  constexpr double kAsWell = 1.2;  // times the error; right solutions win by more
+  const double kOther = std::log(1.2);
+  const double common = kMostError * kMostError * unexplained_share(best.scene);
+  const double most = common + kAsWell * (best.error - common);
   return std::any_of(attempts.begin(), attempts.end(), [&](const Attempt& attempt) {
-    if (!attempt.begun || attempt.error > kAsWell * best.error) return false;
+    if (!attempt.begun || attempt.error > most) return false;
     for (size_t i = 0; i < priors.size(); ++i) {
       const double ratio = attempt.scene.lenses[i].focal / best.scene.lenses[i].focal;
       if (priors[i].focal == 0 && std::abs(std::log(ratio)) > kOther) return true;
