@@ -114,8 +114,8 @@ void read_intrinsics(const Row& row, const Refuse& refuse, View& view) {
   camera.cy = 0.5 * size.height + row.number_or_0("py") * longer;
   view.distortion = {row.number_or_0("k1"),
                      row.number_or_0("k2"),
+                     row.number_or_0("t2"),  // t1 goes with r^2 + 2 x^2: it is p2 of OpenCV
                      row.number_or_0("t1"),
-                     row.number_or_0("t2"),
                      row.number_or_0("k3")};
   if (row.number_or_0("k4") != 0) {
     refuse(Defect::Unsupported, "k4 is not read: export undistorted images, or with fewer terms");
@@ -129,7 +129,10 @@ std::map<std::string, size_t> read_columns(TextLines& lines) {
     if (!line->starts_with(kStart)) continue;
     std::map<std::string, size_t> out;
     const std::vector<std::string_view> names = fields(line->substr(1));
-    for (size_t i = 0; i < names.size(); ++i) out.emplace(names[i], i);
+    for (size_t i = 0; i < names.size(); ++i) {
+      if (out.emplace(names[i], i).second) continue;
+      lines.fail(Defect::Schema, "two columns are called " + std::string(names[i]));
+    }
     for (const char* needed : {"name", "x", "y", "alt", "heading", "pitch", "roll", "f"}) {
       if (!out.contains(needed)) {
         lines.fail(Defect::Schema,
