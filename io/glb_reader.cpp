@@ -64,9 +64,7 @@ class SceneReader {
     refuse_unknown_extensions(root);
     const auto nodes = root.find("nodes");
     visited_.assign(nodes ? nodes->size() : 0, false);
-    const auto chosen = root.find("scene");
-    const JsonValue scene = chosen ? file_.element("scenes", *chosen) : root.at("scenes").at(0);
-    if (const auto roots = scene.find("nodes")) visit_all(*roots, Eigen::Affine3d::Identity(), 0);
+    visit_scene(root);
     TriangleMesh& mesh = out_.parsed.mesh;
     if (mesh.faces.empty()) {
       throw BadInput(
@@ -98,15 +96,43 @@ class SceneReader {
     }
   }
 
+  // The scene that is to be shown, else the first; a file without scenes is a library of nodes.
+  void visit_scene(const JsonValue& root) {
+    const auto scenes = root.find("scenes");
+    const auto chosen = root.find("scene");
+    if (!scenes && !chosen) return visit_roots(root);
+    if (!chosen && scenes->size() == 0) return;
+    const JsonValue scene = chosen ? file_.element("scenes", *chosen) : scenes->at(size_t{0});
+    if (const auto nodes = scene.find("nodes")) visit_all(*nodes, Eigen::Affine3d::Identity(), 0);
+  }
+
+  void visit_roots(const JsonValue& root) {
+    std::vector<bool> is_child(visited_.size(), false);
+    for (size_t i = 0; i < visited_.size(); ++i) {
+      const auto children = root.at("nodes").at(i).find("children");
+      for (size_t k = 0; children && k < children->size(); ++k) {
+        const uint64_t child = whole_number(children->at(k));
+        if (child < is_child.size()) is_child[child] = true;  // others are refused on the way
+      }
+    }
+    for (size_t i = 0; i < visited_.size(); ++i) {
+      if (!is_child[i]) visit_node(root.at("nodes").at(i), i, Eigen::Affine3d::Identity(), 0);
+    }
+  }
+
   void visit_all(const JsonValue& indices, const Eigen::Affine3d& parent, int depth) {
     for (size_t i = 0; i < indices.size(); ++i) visit(indices.at(i), parent, depth);
   }
 
   void visit(const JsonValue& index, const Eigen::Affine3d& parent, int depth) {
-    constexpr int kDeepest = 256;
     const JsonValue node = file_.element("nodes", index);
     const auto number = static_cast<size_t>(whole_number(index));
     if (visited_[number]) index.fail(Defect::Ref, "names a node that has a parent already");
+    visit_node(node, number, parent, depth);
+  }
+
+  void visit_node(const JsonValue& node, size_t number, const Eigen::Affine3d& parent, int depth) {
+    constexpr int kDeepest = 256;
     visited_[number] = true;
     if (depth > kDeepest) throw LimitError(printable(file_.path()) + ": nodes nest too deeply");
     const Eigen::Affine3d world = parent * node_matrix(node);
@@ -144,6 +170,7 @@ class SceneReader {
   }
 
   void add(const GlbFaces& in, const Eigen::Affine3d& world, Provenance label) {
+    if (in.faces.empty()) return;  // points and lines neither add vertices nor lack colours
     TriangleMesh& mesh = out_.parsed.mesh;
     const bool is_mirrored = world.linear().determinant() < 0;
     std::vector<uint32_t> numbers(in.positions.size() / 3);

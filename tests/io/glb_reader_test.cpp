@@ -117,6 +117,31 @@ TEST(ReadGlb, StripsTurnEverySecondTriangle) {
       << faces[1][0] << faces[1][1] << faces[1][2];
 }
 
+TEST(ReadGlb, AFileWithoutScenesShowsItsRoots) {
+  Triangle t;
+  t.json.erase("scenes");
+  t.json["nodes"] = {{{"mesh", 0}}, {{"children", {0}}, {"translation", {5, 0, 0}}}};
+  const GlbMesh mesh = t.read();
+  ASSERT_EQ(mesh.parsed.mesh.faces.size(), 1U) << "the child is shown once, where its parent is";
+  expect_near(mesh.parsed.positions[0], {5, 0, 0});
+  t.json["nodes"] = {{{"children", {1}}}, {{"mesh", 0}, {"children", {0}}}};
+  EXPECT_EQ(defect(t.bytes()), "EMPTY") << "nodes that are each other's children";
+  t.json["nodes"] = {{{"mesh", 0}, {"children", {7}}}};
+  EXPECT_EQ(defect(t.bytes()), "REF");
+  t.json.erase("nodes");
+  EXPECT_EQ(defect(t.bytes()), "EMPTY");
+}
+
+TEST(ReadGlb, PointsBesideTrianglesAddNothing) {
+  Triangle t;
+  t.json["meshes"][0]["primitives"].push_back({{"mode", 0}, {"attributes", {{"POSITION", 3}}}});
+  t.json["accessors"].push_back(t.json["accessors"][1]);
+  t.json["accessors"][3]["byteOffset"] = 4;  // (0,0,c), …: other places than the triangle's
+  const GlbMesh mesh = t.read();
+  EXPECT_EQ(mesh.parsed.positions.size(), 3U);
+  EXPECT_EQ(mesh.parsed.mesh.colors.size(), 3U);
+}
+
 TEST(ReadGlb, NamesWhatIsWrong) {
   const std::string good = Triangle().bytes();
   const auto broken = [](const char* pointer, const Json& value) {
@@ -138,6 +163,9 @@ TEST(ReadGlb, NamesWhatIsWrong) {
   EXPECT_EQ(broken("/buffers/0/uri", "/etc/passwd"), "UNSUPPORTED");
   EXPECT_EQ(broken("/nodes/0/children", {0}), "REF");
   EXPECT_EQ(broken("/nodes/0/mesh", 1), "REF");
+  EXPECT_EQ(broken("/scenes", Json::array()), "EMPTY");
+  EXPECT_EQ(broken("/scenes", Json::object()), "SCHEMA");
+  EXPECT_EQ(broken("/scene", 1), "REF");
   EXPECT_EQ(broken("/extensionsRequired", {"EXT_meshopt_compression"}), "UNSUPPORTED");
   EXPECT_EQ(broken("/meshes/0/primitives/0/mode", 0), "EMPTY");
   Triangle t;
