@@ -10,6 +10,7 @@
 #include "io/glb_container.h"
 #include "io/glb_faces.h"
 #include "io/mesh_arrays.h"
+#include "io/significance.h"
 #include "libcgs/core/srgb.h"
 
 namespace cgs {
@@ -70,6 +71,8 @@ class SceneReader {
       throw BadInput(
           Defect::Empty, file_.path(), "holds no triangles (splats in glTF are not read)");
     }
+    const std::string odd = check_significance(file_.path(), stored_, kFloatDigits);
+    if (!odd.empty()) out_.parsed.warnings.push_back(odd);
     if (!all_have_colors_) mesh.colors.clear();
     if (!all_have_support_) mesh.support.clear();
     if (!all_have_sigma_) mesh.sigma.clear();
@@ -178,6 +181,7 @@ class SceneReader {
       const Eigen::Vector3f p(
           in.positions[3 * v], in.positions[3 * v + 1], in.positions[3 * v + 2]);
       const Eigen::Vector3d place = origin_.world(world * p.cast<double>());
+      stored_.extend(world.linear() * p.cast<double>());
       if (!place.allFinite()) {
         throw BadInput(Defect::Value, file_.path(), "a vertex is not finite");
       }
@@ -221,6 +225,8 @@ class SceneReader {
   const Origin& origin_;
   GlbMesh out_;
   PlaceNumbers places_;
+  // Of the positions as they were rounded to float: nodes have scaled but not moved them yet.
+  Eigen::AlignedBox3d stored_;
   std::vector<bool> visited_;
   size_t collapsed_ = 0;  // faces
   bool all_have_colors_ = true;

@@ -2,6 +2,7 @@
 #include "io/glb_reader.h"
 
 #include <cmath>
+#include <cstring>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -140,6 +141,34 @@ TEST(ReadGlb, PointsBesideTrianglesAddNothing) {
   const GlbMesh mesh = t.read();
   EXPECT_EQ(mesh.parsed.positions.size(), 3U);
   EXPECT_EQ(mesh.parsed.mesh.colors.size(), 3U);
+}
+
+TEST(ReadGlb, RefusesFloatsThatKeepTooLittle) {
+  const auto moved = [](float by) {  // along x, and back by the node
+    Triangle t;
+    const float one = by + 1;
+    std::memcpy(t.binary.data() + 8, &by, sizeof by);
+    std::memcpy(t.binary.data() + 24, &one, sizeof one);
+    std::memcpy(t.binary.data() + 40, &by, sizeof by);
+    t.json["nodes"][0]["translation"] = {-by, 0, 0};
+    return t;
+  };
+  EXPECT_EQ(defect(moved(2e6f).bytes()), "VALUE") << "steps of 1/8, the triangle is 2 wide";
+  EXPECT_EQ(moved(5e3f).read().parsed.warnings.size(), 1U) << "steps of 1/2048";
+  EXPECT_TRUE(moved(100).read().parsed.warnings.empty());
+  Triangle t;  // the other way round, nothing is lost
+  t.json["nodes"][0]["translation"] = {2e6, 0, 0};
+  EXPECT_TRUE(t.read().parsed.warnings.empty());
+}
+
+TEST(ReadGlb, LimitsTheSizeOfItsJson) {
+  const test::TempDir dir;
+  constexpr uint32_t kTooMany = (256u << 20) + 4;
+  std::string head = "glTF";
+  for (const uint32_t number : {2u, 28 + kTooMany, kTooMany}) append_bytes(head, number);
+  test::write_bytes(dir / "a.glb", head + "JSON{}");
+  std::filesystem::resize_file(dir / "a.glb", 28 + kTooMany);  // sparse
+  EXPECT_THROW((void)read_glb(dir / "a.glb"), LimitError);
 }
 
 TEST(ReadGlb, NamesWhatIsWrong) {
