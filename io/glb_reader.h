@@ -17,8 +17,8 @@ struct GlbMesh {
 
 /// Reads every triangle of the default scene of a binary glTF file (of all nodes, if it has no
 /// scenes), plain, quantised (KHR_mesh_quantization) or compressed (KHR_draco_mesh_compression),
-/// nodes placed as the file says. Vertices at one place become one: the format repeats them wherever normals, textures or
-/// materials change.
+/// nodes placed as the file says. Vertices at one place become one: the format repeats them
+/// wherever normals, textures or materials change.
 ///
 /// Files of ours lead back to world coordinates, with unit, labels and sigma. Others are in metres
 /// with +Y up, as the format demands. Colours are taken where every primitive has COLOR_0; textures
