@@ -17,14 +17,14 @@ bool is_cameras_json(const std::filesystem::path& folder) { return is_present(fo
 
 Scene read_cameras_json_scene(const SceneRoot& root) {
   Scene scene = read_cameras_json(resolve_in_scene(root, kName, root.folder));
-  const PhotographIndex photographs(root);
+  PhotographIndex photographs(root);
   scene.kind = kName;
   scene.folder = root.folder;
   scene.input.clear();
   scene.held_out.clear();
   scene.missing.clear();
   for (View& view : scene.views) {
-    view.image_path = photographs.find(view.name);
+    view.image_path = photographs.take(view.name);
     if (view.image_path.empty()) scene.missing.push_back(view.name);
     // What this program wrote is in its internal frame.
     Camera& camera = view.camera;

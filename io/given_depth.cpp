@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -162,18 +163,52 @@ float averaged(const Raster<float>& values, double u, double v, double width, do
   return static_cast<float>(sum / count);
 }
 
+// How many views would find each file beside their photograph: names repeat in folders of rigs.
+std::map<fs::path, int> uses_of_files_beside(const Scene& scene, const SceneRoot& root) {
+  std::map<fs::path, int> out;
+  for (const View& view : scene.views) {
+    if (view.image_path.empty() || !view.depth_path.empty()) continue;
+    try {
+      ++out[depth_beside(root, view.image_path)];
+    } catch (const Error&) {
+      continue;  // told of input views
+    }
+  }
+  return out;
+}
+
 // Gives a view the file that lies beside its photograph, if it can be its depth. Nobody named it,
 // so what is wrong with it is no reason to stop. \return that, or nothing
-std::string find_depth_beside(View& view, const SceneRoot& root) {
+std::string find_depth_beside(View& view,
+                              const SceneRoot& root,
+                              const std::map<fs::path, int>& uses) {
   try {
-    view.depth_path = depth_beside(root, view.image_path);
-    if (view.depth_path.empty()) return "";
-    (void)upright(read_depth_file(view.depth_path).values, view, photograph_size(view));
+    const fs::path file = depth_beside(root, view.image_path);
+    if (file.empty()) return "";
+    if (uses.at(file) > 1) throw BadInput(Defect::Ref, file, "lies beside several photographs");
+    view.depth_path = file;
+    (void)upright(read_depth_file(file).values, view, photograph_size(view));
     return "";
   } catch (const Error& error) {
     view.depth_path.clear();
     return error.what();
   }
+}
+
+// \return the input views whose file was left out, with a warning
+std::set<int> find_all_beside(Scene& scene, const SceneRoot& root) {
+  const std::map<fs::path, int> uses = uses_of_files_beside(scene, root);
+  std::set<int> out;
+  for (const int i : scene.input) {
+    View& view = scene.views[static_cast<size_t>(i)];
+    if (view.image_path.empty() || !view.depth_path.empty()) continue;
+    const std::string why = find_depth_beside(view, root, uses);
+    if (why.empty()) continue;
+    scene.warnings.push_back("the depth beside view " + printable(view.name) +
+                             " is not used: " + why);
+    out.insert(i);
+  }
+  return out;
 }
 
 DepthMap resampled(const Raster<float>& values, const View& view) {
@@ -197,6 +232,20 @@ DepthMap resampled(const Raster<float>& values, const View& view) {
   return out;
 }
 
+// Of two photographs with one file of depth, it belongs to one at most.
+void refuse_shared_files(const Scene& scene) {
+  std::map<fs::path, const View*> owners;
+  for (const View& view : scene.views) {
+    if (view.depth_path.empty()) continue;
+    const auto [owner, is_new] = owners.emplace(view.depth_path.lexically_normal(), &view);
+    if (is_new) continue;
+    throw BadInput(Defect::Ref,
+                   view.depth_path,
+                   "would be the depth of two views, " + printable(owner->second->name) + " and " +
+                       printable(view.name));
+  }
+}
+
 }  // namespace
 
 void DepthOptions::validate() const {
@@ -216,24 +265,17 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
     if (scene.depth_kind != DepthKind::Relative) scene.depth_kind = DepthKind::Disparity;
     return;
   }
-  std::set<int> explained;
-  for (size_t i = 0; i < scene.views.size(); ++i) {
-    View& view = scene.views[i];
+  for (View& view : scene.views) {
     if (view.image_path.empty()) continue;
-    const auto number = static_cast<int>(i);
-    const bool is_input = std::count(scene.input.begin(), scene.input.end(), number) > 0;
     if (!options.folder.empty()) {
       view.depth_path = depth_file_of({options.folder, allow_external}, view.image_path);
     } else if (!view.depth_path.empty()) {
       (void)confidence_file(scene, view, allow_external);  // refused here or never
-    } else if (is_input) {
-      const std::string why = find_depth_beside(view, {scene.folder, allow_external});
-      if (why.empty()) continue;
-      scene.warnings.push_back("the depth beside view " + printable(view.name) +
-                               " is not used: " + why);
-      explained.insert(number);
     }
   }
+  refuse_shared_files(scene);
+  std::set<int> explained;
+  if (options.folder.empty()) explained = find_all_beside(scene, {scene.folder, allow_external});
   const auto has_depth = [&](int i) {
     return !scene.views[static_cast<size_t>(i)].depth_path.empty();
   };

@@ -26,7 +26,8 @@ struct DepthOptions {
 /// the photograph, or in it. There only input views get one, and a file that cannot be used (of
 /// colours, of another shape, damaged) becomes a warning, as do input views that have none while
 /// others do.
-/// \throws BadInput Missing (the folder of the options holds no file for an input view), Path
+/// \throws BadInput Missing (the folder of the options holds no file for an input view), Path,
+///         Ref (one file for two views)
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external);
 
 /// Reads the depth of a view at the size of its camera, which has no distortion. In Polycam's

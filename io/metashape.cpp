@@ -314,7 +314,7 @@ class MetashapeReader {
     View view;
     const std::string label = node.attribute("label").value();
     if (label.empty()) file_.fail(Defect::Schema, node, "has no label");
-    view.image_path = photographs_.find(label);
+    view.image_path = photographs_.take(label);
     view.name = view.image_path.empty() ? label : view.image_path.filename().string();
     if (view.image_path.empty()) scene_.missing.push_back(label);
     const auto sensor = sensors_.find(node.attribute("sensor_id").value());

@@ -157,7 +157,7 @@ Scene read_realitycapture(const SceneRoot& root) {
   const std::string bytes = read_file(path, limits);
   TextLines lines(bytes, path);
   const std::map<std::string, size_t> columns = read_columns(lines);
-  const PhotographIndex photographs(root);
+  PhotographIndex photographs(root);
   const Refuse refuse = [&](Defect defect, const std::string& why) { lines.fail(defect, why); };
   Scene scene;
   scene.kind = "RealityCapture";
@@ -166,7 +166,7 @@ Scene read_realitycapture(const SceneRoot& root) {
     const Row row(columns, lines, *line);
     View view;
     view.camera.world_from_cam = read_pose(row, refuse);
-    view.image_path = photographs.find(row.text("name"));
+    view.image_path = photographs.take(row.text("name"));
     if (view.image_path.empty()) {
       scene.missing.emplace_back(row.text("name"));  // nothing would ever tell its size
       continue;

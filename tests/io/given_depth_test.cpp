@@ -171,6 +171,25 @@ TEST_F(GivenDepthFiles, OfAnotherShapeAreRefusedOrLeftOut) {
   expect_unusable("PATH");
 }
 
+TEST_F(GivenDepthFiles, AFileIsTheDepthOfOnePhotograph) {
+  // A rig: two folders with the same names.
+  std::string images;
+  for (const int i : {1, 2}) {
+    const std::string name = "c" + std::to_string(i) + "/v1.png";
+    images += std::to_string(i) + " 1 0 0 0 " + std::to_string(i) + " 0 0 1 " + name + "\n\n";
+    test::write_bytes(dir_ / "images" / name, test::rgb_png(kWidth, kHeight, i));
+  }
+  test::write_bytes(dir_ / "sparse/0/images.txt", images);
+  write("images/depth/v1.npy", kWidth, kHeight, ramp);
+  EXPECT_TRUE(first().given_depth.empty());
+  EXPECT_EQ(warnings_, 2u);
+  SceneOptions options;
+  options.depth.folder = dir_ / "images/depth";
+  EXPECT_EQ(test::defect_of([&] { first(options); }), "REF");
+  std::filesystem::rename(dir_ / "images/depth", dir_ / "images/c1/depth");
+  EXPECT_FALSE(first().given_depth.empty());
+}
+
 class DistortedGivenDepth : public GivenDepthFiles {
  protected:
   DistortedGivenDepth() : GivenDepthFiles("OPENCV 64 48 60 60 32 24 -0.2 0.05 0.01 -0.02") {}
