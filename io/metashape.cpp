@@ -37,7 +37,11 @@ std::optional<std::string> xml_name(const fs::path& folder) {
       const std::string start = read_file_start(file, kEnough);
       const bool is_chunk =
           start.find("<document") != std::string::npos && start.find("<chunk") != std::string::npos;
-      if (is_chunk) return file.filename().string();
+      // Cameras come after sensors, of which there may be many.
+      if (is_chunk && read_file_start(file, ReadLimits{}.max_json_bytes).find("<cameras") !=
+                          std::string::npos) {
+        return file.filename().string();
+      }
     } catch (const Error&) {
       continue;  // what cannot be read is none
     }

@@ -2,6 +2,7 @@
 #include "io/realitycapture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -24,13 +25,26 @@ namespace {
 
 constexpr std::string_view kStart = "#name,";
 
+std::vector<std::string_view> fields(std::string_view line);
+
+constexpr std::array<std::string_view, 8> kNeeded = {
+    "name", "x", "y", "alt", "heading", "pitch", "roll", "f"};
+
+// Tables of points on the ground start alike, but do not turn.
+bool has_needed_columns(std::string_view header) {
+  const std::vector<std::string_view> names = fields(header.substr(1));
+  return std::all_of(kNeeded.begin(), kNeeded.end(), [&](std::string_view needed) {
+    return std::find(names.begin(), names.end(), needed) != names.end();
+  });
+}
+
 bool has_cameras(const fs::path& file) {
   constexpr uint64_t kEnough = 4096;
   try {
     const std::string start = read_file_start(file, kEnough);
     TextLines lines(start, file);
     while (const auto line = lines.next()) {
-      if (line->starts_with(kStart)) return true;
+      if (line->starts_with(kStart)) return has_needed_columns(*line);
     }
     return false;
   } catch (const Error&) {
@@ -133,8 +147,8 @@ std::map<std::string, size_t> read_columns(TextLines& lines) {
       if (out.emplace(names[i], i).second) continue;
       lines.fail(Defect::Schema, "two columns are called " + std::string(names[i]));
     }
-    for (const char* needed : {"name", "x", "y", "alt", "heading", "pitch", "roll", "f"}) {
-      if (!out.contains(needed)) {
+    for (const std::string_view needed : kNeeded) {
+      if (!out.contains(std::string(needed))) {
         lines.fail(Defect::Schema,
                    "there is no column " + std::string(needed) +
                        "; export \"Internal/External camera parameters\"");

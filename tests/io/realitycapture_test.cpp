@@ -105,7 +105,7 @@ TEST_F(ReadRealityCapture, IsRecognisedByItsHeader) {
 }
 
 TEST_F(ReadRealityCapture, RefusesWhatItCannotUse) {
-  EXPECT_EQ(refused("pitch,", ""), "SCHEMA");
+  EXPECT_EQ(refused("pitch,", ""), "OPEN") << "no file is recognised";
   EXPECT_EQ(refused("px,py", "px,px"), "SCHEMA");
   EXPECT_EQ(refused("k1,k2", ","), "SCHEMA") << "two columns without a name";
   EXPECT_EQ(refused("#name", "#nam"), "OPEN") << "no file is recognised";
