@@ -13,18 +13,29 @@ constexpr const char* kName = "cameras.json";
 
 }  // namespace
 
-bool is_cameras_json(const std::filesystem::path& folder) { return is_present(folder / kName); }
+bool is_cameras_json(const std::filesystem::path& folder) {
+  constexpr uint64_t kEnough = 65536;
+  if (!is_present(folder / kName)) return false;
+  try {
+    const std::string start = read_file_start(folder / kName, kEnough);
+    const size_t first = start.find_first_not_of(" \t\r\n\xef\xbb\xbf");
+    return first != std::string::npos && start[first] == '[' &&
+           start.find("\"img_name\"") != std::string::npos;
+  } catch (const Error&) {
+    return false;  // what cannot be read states no cameras
+  }
+}
 
 Scene read_cameras_json_scene(const SceneRoot& root) {
   Scene scene = read_cameras_json(resolve_in_scene(root, kName, root.folder));
-  const PhotographIndex photographs(root);
+  PhotographIndex photographs(root);
   scene.kind = kName;
   scene.folder = root.folder;
   scene.input.clear();
   scene.held_out.clear();
   scene.missing.clear();
   for (View& view : scene.views) {
-    view.image_path = photographs.find(view.name);
+    view.image_path = photographs.take(view.name);
     if (view.image_path.empty()) scene.missing.push_back(view.name);
     // What this program wrote is in its internal frame.
     Camera& camera = view.camera;

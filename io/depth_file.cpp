@@ -29,6 +29,19 @@ std::string lower_extension(const fs::path& path) {
   return out;
 }
 
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+
+// False for what programs write where a ray meets nothing: 0, infinity, or the largest value there
+// is in the file's type or in anybody's mind.
+bool is_depth(float value, const std::string& extension, int whole_bits) {
+  constexpr float kBeyondAll = 1e9f;     // Blender writes 1e10
+  constexpr float kLargestHalf = 65504;  // of 16-bit floats in EXR, which clamp what is more
+  constexpr float kLargestWhole = 65535;
+  if (!(value > 0 && value < kBeyondAll)) return false;
+  if (extension == ".exr" && value == kLargestHalf) return false;
+  return whole_bits != 16 || value < kLargestWhole;
+}
+
 Raster<float> from_exr(const fs::path& path, const ReadLimits& limits) {
   const ExrImage image = read_exr(path, limits);
   const std::vector<float>* values = nullptr;
@@ -95,7 +108,7 @@ StoredSamples read_depth_file(const fs::path& path, const ReadLimits& limits) {
         Defect::Unsupported, path, "no depth file; read are .exr .pfm .npy .tif .tiff .png");
   }
   for (float& value : out.values.data) {
-    if (!(value > 0 && std::isfinite(value))) value = std::numeric_limits<float>::quiet_NaN();
+    if (!is_depth(value, extension, out.whole_bits)) value = kNone;
   }
   return out;
 }

@@ -17,7 +17,8 @@ std::filesystem::path depth_file_of(const SceneRoot& folder,
                                     const std::filesystem::path& photograph);
 
 /// Reads one value per pixel; NaN where there is none: where the file has 0, a negative number,
-/// NaN or infinity.
+/// NaN, infinity or what stands for it: 1e9 and more, 65504 in EXR (the largest 16-bit float) and
+/// 65535 among 16-bit whole numbers.
 ///
 /// Of an EXR the channel Z, else depth.Z, depth.V, Y, R or the only one is taken; of an NPY arrays
 /// with two sides beside any of length 1.

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -38,12 +40,20 @@ fs::path depth_beside(const SceneRoot& root, const fs::path& photograph) {
   return {};
 }
 
-// Takes out what a file in a folder "confidence" beside that of the depth calls 0: low.
-void drop_low_confidence(const fs::path& depth_file, Raster<float>& values) {
-  const fs::path folder = depth_file.parent_path().parent_path() / "confidence";
-  if (!is_folder(folder)) return;
-  const fs::path file = depth_file_of({folder, false}, depth_file);
-  if (file.empty()) return;
+// The file that goes with the depth of a view as Polycam lays it out; empty if there is none.
+fs::path confidence_file(const Scene& scene, const View& view, bool allow_external) {
+  if (scene.kind != "Polycam") return {};
+  const fs::path depth = view.depth_path.lexically_relative(scene.folder).parent_path();
+  if (depth.filename() != "depth" || *depth.begin() == "..") return {};
+  const fs::path name = depth.parent_path() / "confidence";
+  if (!is_folder(scene.folder / name)) return {};
+  const SceneRoot root = {scene.folder, allow_external};
+  const fs::path folder = resolve_in_scene(root, name.string(), scene.folder);
+  return depth_file_of({folder, allow_external}, view.depth_path);
+}
+
+// Takes out what a file calls 0: low.
+void drop_low_confidence(const fs::path& file, Raster<float>& values) {
   const Raster<float> confidence = read_samples(file).values;
   if (confidence.width != values.width || confidence.height != values.height) {
     throw BadInput(Defect::Mismatch, file, "is not of the size of its depth");
@@ -153,6 +163,54 @@ float averaged(const Raster<float>& values, double u, double v, double width, do
   return static_cast<float>(sum / count);
 }
 
+// How many views would find each file beside their photograph: names repeat in folders of rigs.
+std::map<fs::path, int> uses_of_files_beside(const Scene& scene, const SceneRoot& root) {
+  std::map<fs::path, int> out;
+  for (const View& view : scene.views) {
+    if (view.image_path.empty() || !view.depth_path.empty()) continue;
+    try {
+      ++out[depth_beside(root, view.image_path)];
+    } catch (const Error&) {
+      continue;  // told of input views
+    }
+  }
+  return out;
+}
+
+// Gives a view the file that lies beside its photograph, if it can be its depth. Nobody named it,
+// so what is wrong with it is no reason to stop. \return that, or nothing
+std::string find_depth_beside(View& view,
+                              const SceneRoot& root,
+                              const std::map<fs::path, int>& uses) {
+  try {
+    const fs::path file = depth_beside(root, view.image_path);
+    if (file.empty()) return "";
+    if (uses.at(file) > 1) throw BadInput(Defect::Ref, file, "lies beside several photographs");
+    view.depth_path = file;
+    (void)upright(read_depth_file(file).values, view, photograph_size(view));
+    return "";
+  } catch (const Error& error) {
+    view.depth_path.clear();
+    return error.what();
+  }
+}
+
+// \return the input views whose file was left out, with a warning
+std::set<int> find_all_beside(Scene& scene, const SceneRoot& root) {
+  const std::map<fs::path, int> uses = uses_of_files_beside(scene, root);
+  std::set<int> out;
+  for (const int i : scene.input) {
+    View& view = scene.views[static_cast<size_t>(i)];
+    if (view.image_path.empty() || !view.depth_path.empty()) continue;
+    const std::string why = find_depth_beside(view, root, uses);
+    if (why.empty()) continue;
+    scene.warnings.push_back("the depth beside view " + printable(view.name) +
+                             " is not used: " + why);
+    out.insert(i);
+  }
+  return out;
+}
+
 DepthMap resampled(const Raster<float>& values, const View& view) {
   const Camera& camera = view.camera;
   const Lens lens(view);
@@ -172,6 +230,20 @@ DepthMap resampled(const Raster<float>& values, const View& view) {
     }
   }
   return out;
+}
+
+// Of two photographs with one file of depth, it belongs to one at most.
+void refuse_shared_files(const Scene& scene) {
+  std::map<fs::path, const View*> owners;
+  for (const View& view : scene.views) {
+    if (view.depth_path.empty()) continue;
+    const auto [owner, is_new] = owners.emplace(view.depth_path.lexically_normal(), &view);
+    if (is_new) continue;
+    throw BadInput(Defect::Ref,
+                   view.depth_path,
+                   "would be the depth of two views, " + printable(owner->second->name) + " and " +
+                       printable(view.name));
+  }
 }
 
 }  // namespace
@@ -197,10 +269,13 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
     if (view.image_path.empty()) continue;
     if (!options.folder.empty()) {
       view.depth_path = depth_file_of({options.folder, allow_external}, view.image_path);
-    } else if (view.depth_path.empty()) {
-      view.depth_path = depth_beside({scene.folder, allow_external}, view.image_path);
+    } else if (!view.depth_path.empty()) {
+      (void)confidence_file(scene, view, allow_external);  // refused here or never
     }
   }
+  refuse_shared_files(scene);
+  std::set<int> explained;
+  if (options.folder.empty()) explained = find_all_beside(scene, {scene.folder, allow_external});
   const auto has_depth = [&](int i) {
     return !scene.views[static_cast<size_t>(i)].depth_path.empty();
   };
@@ -212,7 +287,7 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
   }
   if (count == 0) return;
   for (const int i : scene.input) {
-    if (has_depth(i)) continue;
+    if (has_depth(i) || explained.contains(i)) continue;
     scene.warnings.push_back("there is depth for other views, but none for view " +
                              printable(scene.views[static_cast<size_t>(i)].name));
   }
@@ -221,7 +296,8 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
 void load_given_depth(const Scene& scene, View& view, const ImageSize& photograph) {
   if (view.depth_path.empty()) return;
   StoredSamples file = read_depth_file(view.depth_path);
-  drop_low_confidence(view.depth_path, file.values);
+  const fs::path confidence = confidence_file(scene, view, true);
+  if (!confidence.empty()) drop_low_confidence(confidence, file.values);
   constexpr double kMillimetres = 1000;
   const double scale = scene.depth_scale > 0 ? scene.depth_scale
                        : file.whole_bits > 0 ? kMillimetres

@@ -23,11 +23,15 @@ struct DepthOptions {
 
 /// Gives every view that has a photograph the file with its depth, if there is one: in the folder
 /// of the options, else where the layout of the scene says, else in a folder "depth" beside that of
-/// the photograph, or in it. Input views that have none while others do become a warning.
-/// \throws BadInput Missing (the folder of the options holds no file for an input view), Path
+/// the photograph, or in it. There only input views get one, and a file that cannot be used (of
+/// colours, of another shape, damaged) becomes a warning, as do input views that have none while
+/// others do.
+/// \throws BadInput Missing (the folder of the options holds no file for an input view), Path,
+///         Ref (one file for two views)
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external);
 
-/// Reads the depth of a view at the size of its camera, which has no distortion.
+/// Reads the depth of a view at the size of its camera, which has no distortion. In Polycam's
+/// layout there is none where a file in the folder "confidence" says 0.
 ///
 /// Depth files may have another size than the photograph, but its shape. Where they are coarser,
 /// values are interpolated between neighbours that differ by at most 5 %; where they are finer, the

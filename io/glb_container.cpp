@@ -103,6 +103,10 @@ GlbContainer::GlbContainer(const std::filesystem::path& path)
   if (in.get<uint32_t>("type of the first chunk") != kJsonChunk) {
     throw BadInput(Defect::Syntax, path, "the first chunk is not JSON");
   }
+  if (json_bytes > ReadLimits{}.max_json_bytes) {
+    throw LimitError(printable(path) + ": " + std::to_string(json_bytes) +
+                     " bytes of JSON, allowed are " + std::to_string(ReadLimits{}.max_json_bytes));
+  }
   json_ = parse_json(in.take(json_bytes, "JSON chunk"), path);
   constexpr size_t kChunkHeader = 8;
   if (in.remaining() < kChunkHeader) return;

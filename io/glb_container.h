@@ -16,7 +16,8 @@ namespace cgs {
 /// A binary glTF file, taken apart but not yet believed: numbers are checked where they are used.
 class GlbContainer {
  public:
-  /// \throws BadInput Magic, Unsupported (another version), Truncated, Syntax; as read_json()
+  /// \throws BadInput Magic, Unsupported (another version), Truncated, Syntax; as read_json(),
+  /// LimitError included
   /// Source: glTF 2.0, section 4.4 (GLB file format), Khronos Group.
   explicit GlbContainer(const std::filesystem::path& path);
 

@@ -10,6 +10,7 @@
 #include "io/glb_container.h"
 #include "io/glb_faces.h"
 #include "io/mesh_arrays.h"
+#include "io/significance.h"
 #include "libcgs/core/srgb.h"
 
 namespace cgs {
@@ -64,14 +65,14 @@ class SceneReader {
     refuse_unknown_extensions(root);
     const auto nodes = root.find("nodes");
     visited_.assign(nodes ? nodes->size() : 0, false);
-    const auto chosen = root.find("scene");
-    const JsonValue scene = chosen ? file_.element("scenes", *chosen) : root.at("scenes").at(0);
-    if (const auto roots = scene.find("nodes")) visit_all(*roots, Eigen::Affine3d::Identity(), 0);
+    visit_scene(root);
     TriangleMesh& mesh = out_.parsed.mesh;
     if (mesh.faces.empty()) {
       throw BadInput(
           Defect::Empty, file_.path(), "holds no triangles (splats in glTF are not read)");
     }
+    const std::string odd = check_significance(file_.path(), stored_, kFloatDigits);
+    if (!odd.empty()) out_.parsed.warnings.push_back(odd);
     if (!all_have_colors_) mesh.colors.clear();
     if (!all_have_support_) mesh.support.clear();
     if (!all_have_sigma_) mesh.sigma.clear();
@@ -98,15 +99,43 @@ class SceneReader {
     }
   }
 
+  // The scene that is to be shown, else the first; a file without scenes is a library of nodes.
+  void visit_scene(const JsonValue& root) {
+    const auto scenes = root.find("scenes");
+    const auto chosen = root.find("scene");
+    if (!scenes && !chosen) return visit_roots(root);
+    if (!chosen && scenes->size() == 0) return;
+    const JsonValue scene = chosen ? file_.element("scenes", *chosen) : scenes->at(size_t{0});
+    if (const auto nodes = scene.find("nodes")) visit_all(*nodes, Eigen::Affine3d::Identity(), 0);
+  }
+
+  void visit_roots(const JsonValue& root) {
+    std::vector<bool> is_child(visited_.size(), false);
+    for (size_t i = 0; i < visited_.size(); ++i) {
+      const auto children = root.at("nodes").at(i).find("children");
+      for (size_t k = 0; children && k < children->size(); ++k) {
+        const uint64_t child = whole_number(children->at(k));
+        if (child < is_child.size()) is_child[child] = true;  // others are refused on the way
+      }
+    }
+    for (size_t i = 0; i < visited_.size(); ++i) {
+      if (!is_child[i]) visit_node(root.at("nodes").at(i), i, Eigen::Affine3d::Identity(), 0);
+    }
+  }
+
   void visit_all(const JsonValue& indices, const Eigen::Affine3d& parent, int depth) {
     for (size_t i = 0; i < indices.size(); ++i) visit(indices.at(i), parent, depth);
   }
 
   void visit(const JsonValue& index, const Eigen::Affine3d& parent, int depth) {
-    constexpr int kDeepest = 256;
     const JsonValue node = file_.element("nodes", index);
     const auto number = static_cast<size_t>(whole_number(index));
     if (visited_[number]) index.fail(Defect::Ref, "names a node that has a parent already");
+    visit_node(node, number, parent, depth);
+  }
+
+  void visit_node(const JsonValue& node, size_t number, const Eigen::Affine3d& parent, int depth) {
+    constexpr int kDeepest = 256;
     visited_[number] = true;
     if (depth > kDeepest) throw LimitError(printable(file_.path()) + ": nodes nest too deeply");
     const Eigen::Affine3d world = parent * node_matrix(node);
@@ -144,6 +173,7 @@ class SceneReader {
   }
 
   void add(const GlbFaces& in, const Eigen::Affine3d& world, Provenance label) {
+    if (in.faces.empty()) return;  // points and lines neither add vertices nor lack colours
     TriangleMesh& mesh = out_.parsed.mesh;
     const bool is_mirrored = world.linear().determinant() < 0;
     std::vector<uint32_t> numbers(in.positions.size() / 3);
@@ -151,6 +181,7 @@ class SceneReader {
       const Eigen::Vector3f p(
           in.positions[3 * v], in.positions[3 * v + 1], in.positions[3 * v + 2]);
       const Eigen::Vector3d place = origin_.world(world * p.cast<double>());
+      stored_.extend(world.linear() * p.cast<double>());
       if (!place.allFinite()) {
         throw BadInput(Defect::Value, file_.path(), "a vertex is not finite");
       }
@@ -194,6 +225,8 @@ class SceneReader {
   const Origin& origin_;
   GlbMesh out_;
   PlaceNumbers places_;
+  // Of the positions as they were rounded to float: nodes have scaled but not moved them yet.
+  Eigen::AlignedBox3d stored_;
   std::vector<bool> visited_;
   size_t collapsed_ = 0;  // faces
   bool all_have_colors_ = true;

@@ -15,17 +15,18 @@ struct GlbMesh {
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();  ///< Unit length, in the axes of the positions.
 };
 
-/// Reads every triangle of the default scene of a binary glTF file, plain, quantised
-/// (KHR_mesh_quantization) or compressed (KHR_draco_mesh_compression), nodes placed as the file
-/// says. Vertices at one place become one: the format repeats them wherever normals, textures or
-/// materials change.
+/// Reads every triangle of the default scene of a binary glTF file (of all nodes, if it has no
+/// scenes), plain, quantised (KHR_mesh_quantization) or compressed (KHR_draco_mesh_compression),
+/// nodes placed as the file says. Vertices at one place become one: the format repeats them
+/// wherever normals, textures or materials change.
 ///
 /// Files of ours lead back to world coordinates, with unit, labels and sigma. Others are in metres
 /// with +Y up, as the format demands. Colours are taken where every primitive has COLOR_0; textures
 /// are not read.
 ///
 /// \throws BadInput as GlbContainer; Empty without triangles; Unsupported for an extension that
-///         changes the geometry; Ref for a node with two parents; LimitError
+///         changes the geometry; Ref for a node with two parents; Value for positions that are
+///         infinite or that floats round too much, as check_significance(); LimitError
 /// Source: glTF 2.0, KHR_mesh_quantization and KHR_draco_mesh_compression, Khronos Group.
 GlbMesh read_glb(const std::filesystem::path& path);
 

@@ -58,9 +58,12 @@ void answer(int to, char kind, const std::string& bytes) {
 }
 
 [[noreturn]] void run_child(int to, const std::function<std::string()>& work) {
-  for (const int number : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGINT, SIGTERM}) {
+  for (const int number : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL}) {
     std::signal(number, SIG_DFL);
   }
+  // A terminal interrupts parent and child alike: a child that ends of it would look damaged. The
+  // parent decides, and the limits end the child in any case.
+  for (const int number : {SIGINT, SIGTERM}) std::signal(number, SIG_IGN);
   try {
     answer(to, kDone, work());
   } catch (const std::bad_alloc&) {

@@ -37,7 +37,11 @@ std::optional<std::string> xml_name(const fs::path& folder) {
       const std::string start = read_file_start(file, kEnough);
       const bool is_chunk =
           start.find("<document") != std::string::npos && start.find("<chunk") != std::string::npos;
-      if (is_chunk) return file.filename().string();
+      // Cameras come after sensors, of which there may be many.
+      if (is_chunk && read_file_start(file, ReadLimits{}.max_json_bytes).find("<cameras") !=
+                          std::string::npos) {
+        return file.filename().string();
+      }
     } catch (const Error&) {
       continue;  // what cannot be read is none
     }
@@ -238,14 +242,9 @@ class MetashapeReader {
     for (const auto& node : file_.child(chunk, "sensors").children("sensor")) {
       sensors_[node.attribute("id").value()] = node;
     }
-    for (const auto& node : chunk.child("components").children("component")) {
-      components_[node.attribute("id").value()] = read_similarity(file_, node);
-    }
+    choose_component(chunk);
     whole_ = read_similarity(file_, chunk);  // of versions without components
-    add_cameras(chunk.child("cameras"));
-    for (const pugi::xml_node& group : chunk.child("cameras").children("group")) {
-      add_cameras(group);
-    }
+    for (const pugi::xml_node& node : cameras_of(chunk)) add_camera(node);
     if (scene_.views.empty()) {
       throw BadInput(Defect::Empty, file_.path(), "no camera has a <transform>: none is aligned");
     }
@@ -253,30 +252,73 @@ class MetashapeReader {
       scene_.warnings.push_back(std::to_string(left_out_) +
                                 " cameras are not aligned or disabled, and were left out");
     }
+    if (elsewhere_ > 0) {
+      scene_.warnings.push_back(std::to_string(elsewhere_) +
+                                " cameras were aligned apart from the others (in another component "
+                                "than " +
+                                component_ + "), and were left out");
+    }
     return std::move(scene_);
   }
 
  private:
-  void add_cameras(const pugi::xml_node& parent) {
-    for (const pugi::xml_node& node : parent.children("camera")) {
-      const std::string_view enabled = node.attribute("enabled").as_string("true");
-      if (!node.child("transform") || enabled == "false" || enabled == "0") {
-        ++left_out_;
-        continue;
-      }
-      if (scene_.views.size() >= ReadLimits{}.max_views) {
-        throw LimitError(printable(file_.path()) + ": more than " +
-                         std::to_string(ReadLimits{}.max_views) + " cameras");
-      }
-      scene_.views.push_back(read_view(node));
+  static std::vector<pugi::xml_node> cameras_of(const pugi::xml_node& chunk) {
+    std::vector<pugi::xml_node> out;
+    const auto add = [&](const pugi::xml_node& parent) {
+      for (const pugi::xml_node& node : parent.children("camera")) out.push_back(node);
+    };
+    add(chunk.child("cameras"));
+    for (const pugi::xml_node& group : chunk.child("cameras").children("group")) add(group);
+    return out;
+  }
+
+  static bool is_used(const pugi::xml_node& camera) {
+    const std::string_view enabled = camera.attribute("enabled").as_string("true");
+    return camera.child("transform") && enabled != "false" && enabled != "0";
+  }
+
+  // Components do not know where they lie relative to each other: one of them is the scene. That is
+  // the active one, or else the one with most cameras.
+  void choose_component(const pugi::xml_node& chunk) {
+    const pugi::xml_node list = chunk.child("components");
+    for (const pugi::xml_node& node : list.children("component")) {
+      components_[node.attribute("id").value()] = read_similarity(file_, node);
     }
+    std::map<std::string, size_t> sizes;  // by component
+    for (const pugi::xml_node& camera : cameras_of(chunk)) {
+      const std::string id = camera.attribute("component_id").value();
+      if (is_used(camera) && components_.contains(id)) ++sizes[id];
+    }
+    const std::string active = list.attribute("active_id").value();
+    size_t most = 0;
+    for (const auto& [id, count] : sizes) {
+      if (count > most) component_ = id;
+      most = std::max(most, count);
+    }
+    if (sizes.contains(active)) component_ = active;
+  }
+
+  void add_camera(const pugi::xml_node& node) {
+    if (!is_used(node)) {
+      ++left_out_;
+      return;
+    }
+    if (!component_.empty() && node.attribute("component_id").value() != component_) {
+      ++elsewhere_;
+      return;
+    }
+    if (scene_.views.size() >= ReadLimits{}.max_views) {
+      throw LimitError(printable(file_.path()) + ": more than " +
+                       std::to_string(ReadLimits{}.max_views) + " cameras");
+    }
+    scene_.views.push_back(read_view(node));
   }
 
   View read_view(const pugi::xml_node& node) {
     View view;
     const std::string label = node.attribute("label").value();
     if (label.empty()) file_.fail(Defect::Schema, node, "has no label");
-    view.image_path = photographs_.find(label);
+    view.image_path = photographs_.take(label);
     view.name = view.image_path.empty() ? label : view.image_path.filename().string();
     if (view.image_path.empty()) scene_.missing.push_back(label);
     const auto sensor = sensors_.find(node.attribute("sensor_id").value());
@@ -314,7 +356,9 @@ class MetashapeReader {
   std::map<std::string, pugi::xml_node> sensors_;
   std::map<std::string, Similarity> components_;
   Similarity whole_;
+  std::string component_;  // whose cameras are read; empty if the file has none
   size_t left_out_ = 0;
+  size_t elsewhere_ = 0;  // aligned, in other components
   Scene scene_;
 };
 

@@ -16,7 +16,9 @@ bool is_metashape(const std::filesystem::path& folder);
 /// component, whose scale, rotation and translation lead on to the world; cx and cy count from the
 /// middle of the picture; p1 and p2 change places with those of OpenCV. The coordinates are those
 /// of the chunk (metres on the globe if it is georeferenced); nothing says that they are metres.
-/// Cameras that were not aligned or are disabled are left out with a warning.
+/// Cameras that were not aligned or are disabled are left out with a warning, and so are those of
+/// other components than the active one (the one with most cameras if none is), as nothing says
+/// where components lie relative to each other.
 /// \throws BadInput Syntax, Schema (what is missing), Value (matrices, intrinsics), Unsupported
 ///         (fisheye and other sensors; k4, p3, p4 or b2 that move a pixel), Empty; LimitError
 /// Source: Agisoft Metashape Professional manual, appendices "Camera models" and "Coordinate

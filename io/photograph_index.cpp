@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/photograph_index.h"
 
+#include "libcgs/core/error.h"
+
 namespace cgs {
 
 namespace fs = std::filesystem;
@@ -13,6 +15,17 @@ PhotographIndex::PhotographIndex(const SceneRoot& root) {
       stems_.emplace(file.stem().string(), file);
     }
   }
+}
+
+fs::path PhotographIndex::take(std::string_view name) {
+  const fs::path file = find(name);
+  if (file.empty()) return file;
+  const auto [owner, is_new] = taken_.emplace(file, name);
+  if (is_new) return file;
+  throw BadInput(Defect::Ref,
+                 file,
+                 "is the photograph of two cameras, \"" + owner->second + "\" and \"" +
+                     std::string(name) + "\"; give every photograph a name of its own");
 }
 
 fs::path PhotographIndex::find(std::string_view name) const {

@@ -17,6 +17,15 @@ namespace fs = std::filesystem;
 
 namespace {
 
+bool has_pose(const fs::path& file) {
+  constexpr uint64_t kEnough = 65536;
+  try {
+    return read_file_start(file, kEnough).find("\"t_00\"") != std::string::npos;
+  } catch (const Error&) {
+    return false;  // what cannot be read has none
+  }
+}
+
 // Name, relative to the scene, of the folder that holds cameras/; empty if there is none.
 std::string keyframes(const fs::path& folder) {
   for (const std::string name : {"keyframes", "."}) {
@@ -25,7 +34,7 @@ std::string keyframes(const fs::path& folder) {
       std::error_code error;
       for (fs::directory_iterator entry(candidate, error), end; !error && entry != end;
            entry.increment(error)) {
-        if (entry->path().extension() == ".json") return name;
+        if (entry->path().extension() == ".json" && has_pose(entry->path())) return name;
       }
     }
   }

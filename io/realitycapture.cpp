@@ -2,6 +2,7 @@
 #include "io/realitycapture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -24,13 +25,26 @@ namespace {
 
 constexpr std::string_view kStart = "#name,";
 
+std::vector<std::string_view> fields(std::string_view line);
+
+constexpr std::array<std::string_view, 8> kNeeded = {
+    "name", "x", "y", "alt", "heading", "pitch", "roll", "f"};
+
+// Tables of points on the ground start alike, but do not turn.
+bool has_needed_columns(std::string_view header) {
+  const std::vector<std::string_view> names = fields(header.substr(1));
+  return std::all_of(kNeeded.begin(), kNeeded.end(), [&](std::string_view needed) {
+    return std::find(names.begin(), names.end(), needed) != names.end();
+  });
+}
+
 bool has_cameras(const fs::path& file) {
   constexpr uint64_t kEnough = 4096;
   try {
     const std::string start = read_file_start(file, kEnough);
     TextLines lines(start, file);
     while (const auto line = lines.next()) {
-      if (line->starts_with(kStart)) return true;
+      if (line->starts_with(kStart)) return has_needed_columns(*line);
     }
     return false;
   } catch (const Error&) {
@@ -114,8 +128,8 @@ void read_intrinsics(const Row& row, const Refuse& refuse, View& view) {
   camera.cy = 0.5 * size.height + row.number_or_0("py") * longer;
   view.distortion = {row.number_or_0("k1"),
                      row.number_or_0("k2"),
+                     row.number_or_0("t2"),  // t1 goes with r^2 + 2 x^2: it is p2 of OpenCV
                      row.number_or_0("t1"),
-                     row.number_or_0("t2"),
                      row.number_or_0("k3")};
   if (row.number_or_0("k4") != 0) {
     refuse(Defect::Unsupported, "k4 is not read: export undistorted images, or with fewer terms");
@@ -129,9 +143,12 @@ std::map<std::string, size_t> read_columns(TextLines& lines) {
     if (!line->starts_with(kStart)) continue;
     std::map<std::string, size_t> out;
     const std::vector<std::string_view> names = fields(line->substr(1));
-    for (size_t i = 0; i < names.size(); ++i) out.emplace(names[i], i);
-    for (const char* needed : {"name", "x", "y", "alt", "heading", "pitch", "roll", "f"}) {
-      if (!out.contains(needed)) {
+    for (size_t i = 0; i < names.size(); ++i) {
+      if (out.emplace(names[i], i).second) continue;
+      lines.fail(Defect::Schema, "two columns are called " + std::string(names[i]));
+    }
+    for (const std::string_view needed : kNeeded) {
+      if (!out.contains(std::string(needed))) {
         lines.fail(Defect::Schema,
                    "there is no column " + std::string(needed) +
                        "; export \"Internal/External camera parameters\"");
@@ -154,7 +171,7 @@ Scene read_realitycapture(const SceneRoot& root) {
   const std::string bytes = read_file(path, limits);
   TextLines lines(bytes, path);
   const std::map<std::string, size_t> columns = read_columns(lines);
-  const PhotographIndex photographs(root);
+  PhotographIndex photographs(root);
   const Refuse refuse = [&](Defect defect, const std::string& why) { lines.fail(defect, why); };
   Scene scene;
   scene.kind = "RealityCapture";
@@ -163,7 +180,7 @@ Scene read_realitycapture(const SceneRoot& root) {
     const Row row(columns, lines, *line);
     View view;
     view.camera.world_from_cam = read_pose(row, refuse);
-    view.image_path = photographs.find(row.text("name"));
+    view.image_path = photographs.take(row.text("name"));
     if (view.image_path.empty()) {
       scene.missing.emplace_back(row.text("name"));  // nothing would ever tell its size
       continue;

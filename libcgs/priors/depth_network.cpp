@@ -89,6 +89,8 @@ struct DepthNetwork::Net {
 DepthNetwork::DepthNetwork(const std::string& onnx, const std::filesystem::path& file)
     : net_(std::make_unique<Net>()) {
   net_->file = file;
+  const std::string defect = onnx_weights_defect(onnx);
+  if (!defect.empty()) net_->fail(Defect::Unsupported, defect);
   net_->read_size(onnx_input_shape(onnx));
   const Quietly quietly;
   try {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/onnx_input.h"
 
+#include <algorithm>
+#include <array>
 #include <optional>
 #include <set>
 #include <string>
@@ -14,6 +16,7 @@ struct Field {
   uint64_t number = 0;
   uint64_t value = 0;
   std::string_view bytes;
+  bool has_bytes = false;
 };
 
 /// The fields of a message, which cannot lead out of its bytes.
@@ -40,6 +43,7 @@ class Message {
         const auto length = varint();
         if (!length || *length > rest_.size()) return std::nullopt;
         out.bytes = rest_.substr(0, *length);
+        out.has_bytes = true;
         rest_.remove_prefix(*length);
         return out;
       }
@@ -50,12 +54,7 @@ class Message {
     }
   }
 
- private:
-  bool skip(size_t bytes) {
-    if (bytes > rest_.size()) return false;
-    rest_.remove_prefix(bytes);
-    return true;
-  }
+  // The next number of a packed field, or of a key.
   std::optional<uint64_t> varint() {
     uint64_t out = 0;
     for (unsigned shift = 0; shift < 64 && !rest_.empty(); shift += 7) {
@@ -65,6 +64,13 @@ class Message {
       if (byte < 0x80) return out;
     }
     return std::nullopt;
+  }
+
+ private:
+  bool skip(size_t bytes) {
+    if (bytes > rest_.size()) return false;
+    rest_.remove_prefix(bytes);
+    return true;
   }
   std::string_view rest_;
 };
@@ -96,7 +102,132 @@ std::vector<int64_t> shape_of(std::string_view value_info) {
   return out;
 }
 
+// Numbers without field keys, as packed fields hold them.
+uint64_t count_of_varints(std::string_view bytes) {
+  return static_cast<uint64_t>(std::count_if(
+      bytes.begin(), bytes.end(), [](char c) { return static_cast<unsigned char>(c) < 0x80; }));
+}
+
+// Bytes of a value by data_type of onnx.proto; 0 for what is no plain number.
+uint64_t bytes_each(uint64_t data_type) {
+  constexpr std::array<uint64_t, 17> kBytes = {0, 4, 1, 1, 2, 2, 4, 8, 0, 1, 2, 8, 4, 8, 0, 0, 2};
+  return data_type < kBytes.size() ? kBytes[data_type] : 0;
+}
+
+// What a tensor says that it holds, and what it does.
+class Tensor {
+ public:
+  explicit Tensor(std::string_view message) {
+    Message fields(message);
+    while (const auto field = fields.next()) read(*field);
+  }
+
+  std::string defect() const {
+    if (is_external_) return "the weights lie in another file; only networks in one file are read";
+    const uint64_t each = bytes_each(data_type_);
+    if (each == 0) return "";  // whoever runs the network refuses what is no number
+    const bool fits =
+        raw_.empty() ? values_ == count_ : raw_.size() % each == 0 && raw_.size() / each == count_;
+    if (fits) return "";
+    const uint64_t found = raw_.empty() ? values_ : raw_.size() / each;
+    return "a tensor holds " + std::to_string(found) + " values, which is not its shape";
+  }
+
+ private:
+  void read(const Field& field) {
+    enum Number : uint64_t {
+      kSide = 1,
+      kDataType = 2,
+      kFloat = 4,
+      kInt32 = 5,
+      kInt64 = 7,
+      kRaw = 9,
+      kDouble = 10,
+      kUint64 = 11,
+      kLocation = 14
+    };
+    switch (field.number) {
+      case kSide:
+        if (!field.has_bytes) return multiply(field.value);
+        return multiply_all(field.bytes);
+      case kDataType:
+        data_type_ = field.value;
+        return;
+      case kFloat:
+        values_ += field.has_bytes ? field.bytes.size() / sizeof(float) : 1;
+        return;
+      case kInt32:
+      case kInt64:
+      case kUint64:
+        values_ += field.has_bytes ? count_of_varints(field.bytes) : 1;
+        return;
+      case kDouble:
+        values_ += field.has_bytes ? field.bytes.size() / sizeof(double) : 1;
+        return;
+      case kRaw:
+        raw_ = field.bytes;
+        return;
+      case kLocation:
+        is_external_ = field.value != 0;
+        return;
+      default:
+        return;
+    }
+  }
+  void multiply_all(std::string_view packed) {
+    Message sides(packed);
+    while (const auto side = sides.varint()) multiply(*side);
+  }
+  // Stays at what no file can hold once it is there.
+  void multiply(uint64_t side) {
+    constexpr uint64_t kMost = uint64_t{1} << 40;
+    const bool is_too_large = side != 0 && count_ > kMost / side;
+    count_ = is_too_large ? kMost : count_ * side;
+  }
+
+  std::string_view raw_;
+  uint64_t data_type_ = 0;
+  uint64_t count_ = 1;   // of the shape
+  uint64_t values_ = 0;  // that are not raw
+  bool is_external_ = false;
+};
+
+// Of the tensors that the attributes of a node hold, as those of Constant do.
+std::string node_defect(std::string_view node) {
+  constexpr uint64_t kAttribute = 5;
+  constexpr uint64_t kTensor = 5;
+  Message attributes(node);
+  while (const auto attribute = attributes.next()) {
+    if (attribute->number != kAttribute) continue;
+    Message fields(attribute->bytes);
+    while (const auto field = fields.next()) {
+      if (field->number != kTensor || !field->has_bytes) continue;
+      std::string found = Tensor(field->bytes).defect();
+      if (!found.empty()) return found;
+    }
+  }
+  return "";
+}
+
 }  // namespace
+
+std::string onnx_weights_defect(std::string_view onnx) {
+  constexpr uint64_t kGraph = 7;
+  constexpr uint64_t kNode = 1;
+  constexpr uint64_t kWeights = 5;
+  Message model(onnx);
+  while (const auto graph = model.next()) {
+    if (graph->number != kGraph) continue;
+    Message fields(graph->bytes);
+    while (const auto field = fields.next()) {
+      std::string found;
+      if (field->number == kNode) found = node_defect(field->bytes);
+      if (field->number == kWeights) found = Tensor(field->bytes).defect();
+      if (!found.empty()) return found;
+    }
+  }
+  return "";
+}
 
 std::vector<int64_t> onnx_input_shape(std::string_view onnx) {
   constexpr uint64_t kGraph = 7;

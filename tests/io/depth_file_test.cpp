@@ -75,6 +75,30 @@ TEST_F(DepthFile, WhatIsNoDepthIsNone) {
   EXPECT_EQ(read(4, 0), 1e-3f);
 }
 
+TEST_F(DepthFile, WhatStandsForInfinityIsNone) {
+  const auto usable = [&](const std::string& name) {
+    std::vector<bool> out;
+    for (const float v : read_depth_file(dir_ / name).values.data) out.push_back(!std::isnan(v));
+    return out;
+  };
+  test::write_bytes(dir_ / "a.npy",
+                    test::npy("<f4", "(1, 4)", packed(1e9f, 1e10f, 65504.f, 65535.f)));
+  EXPECT_EQ(usable("a.npy"), (std::vector{false, false, true, true}));
+  ExrImage exr;
+  exr.width = 4;
+  exr.height = 1;
+  exr.channels = {{"Z", {65504, INFINITY, 65472, 2}}};  // 65472 is the next smaller half
+  write_exr(dir_ / "a.exr", exr);
+  EXPECT_EQ(usable("a.exr"), (std::vector{false, false, true, true}));
+  cv::Mat stored(1, 2, CV_16UC1);
+  stored.at<uint16_t>(0, 0) = 65535;
+  stored.at<uint16_t>(0, 1) = 65534;
+  cv::imwrite((dir_ / "a.png").string(), stored);
+  EXPECT_EQ(usable("a.png"), (std::vector{false, true}));
+  cv::imwrite((dir_ / "a.tif").string(), stored);
+  EXPECT_EQ(usable("a.tif"), (std::vector{false, true}));
+}
+
 TEST_F(DepthFile, TakesTheChannelThatIsDepth) {
   const auto first = [&](const std::vector<std::string>& channels) {
     write_exr_with(channels);

@@ -140,23 +140,54 @@ TEST_F(GivenDepthFiles, WholeNumbersAreMillimetres) {
   EXPECT_FALSE(first().depth_states_metres);
 }
 
-TEST_F(GivenDepthFiles, LowConfidenceIsNone) {
+TEST_F(GivenDepthFiles, OnlyPolycamHasConfidence) {
   write("depth/v1.npy", 4, 3, ramp);
-  std::vector<std::string> rows(3, std::string("\x00\x7f\xff\xff", 4));
+  const std::vector<std::string> rows(3, std::string(4, '\0'));
   test::write_bytes(dir_ / "confidence/v1.png", test::png(4, rows, {.color_type = 0}));
-  const View view = first();
-  EXPECT_TRUE(std::isnan(view.given_depth(8, 20)));
-  EXPECT_FALSE(std::isnan(view.given_depth(24, 20)));
-  rows.resize(2);
-  test::write_bytes(dir_ / "confidence/v1.png", test::png(4, rows, {.color_type = 0}));
-  EXPECT_EQ(test::defect_of([&] { first(); }), "MISMATCH");
+  EXPECT_FALSE(std::isnan(first().given_depth(8, 20)));
 }
 
-TEST_F(GivenDepthFiles, OfAnotherShapeAreRefused) {
+TEST_F(GivenDepthFiles, OfAnotherShapeAreRefusedOrLeftOut) {
+  SceneOptions named;
+  named.depth.folder = dir_ / "depth";
+  write("depth/v2.npy", kWidth, kHeight, ramp);
+  const auto expect_unusable = [&](const std::string& defect) {
+    EXPECT_EQ(test::defect_of([&] { first(named); }), defect);
+    EXPECT_TRUE(first().given_depth.empty());
+    const std::vector<std::string> warnings = read_scene(dir_.path()).warnings;
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find(defect), std::string::npos) << warnings[0];
+    EXPECT_NE(warnings[0].find("v1"), std::string::npos) << warnings[0];
+  };
   write("depth/v1.npy", 40, 40, ramp);
-  EXPECT_EQ(test::defect_of([&] { first(); }), "MISMATCH");
+  expect_unusable("MISMATCH");
   test::write_bytes(dir_ / "depth/v1.npy", "no array");
-  EXPECT_EQ(test::defect_of([&] { first(); }), "MAGIC");
+  expect_unusable("MAGIC");
+  std::filesystem::remove(dir_ / "depth/v1.npy");
+  test::write_bytes(dir_ / "depth/v1.png", test::rgb_png(kWidth, kHeight));
+  expect_unusable("UNSUPPORTED");
+  std::filesystem::remove(dir_ / "depth/v1.png");
+  std::filesystem::create_symlink("/etc/hostname", dir_ / "depth/v1.npy");
+  expect_unusable("PATH");
+}
+
+TEST_F(GivenDepthFiles, AFileIsTheDepthOfOnePhotograph) {
+  // A rig: two folders with the same names.
+  std::string images;
+  for (const int i : {1, 2}) {
+    const std::string name = "c" + std::to_string(i) + "/v1.png";
+    images += std::to_string(i) + " 1 0 0 0 " + std::to_string(i) + " 0 0 1 " + name + "\n\n";
+    test::write_bytes(dir_ / "images" / name, test::rgb_png(kWidth, kHeight, i));
+  }
+  test::write_bytes(dir_ / "sparse/0/images.txt", images);
+  write("images/depth/v1.npy", kWidth, kHeight, ramp);
+  EXPECT_TRUE(first().given_depth.empty());
+  EXPECT_EQ(warnings_, 2u);
+  SceneOptions options;
+  options.depth.folder = dir_ / "images/depth";
+  EXPECT_EQ(test::defect_of([&] { first(options); }), "REF");
+  std::filesystem::rename(dir_ / "images/depth", dir_ / "images/c1/depth");
+  EXPECT_FALSE(first().given_depth.empty());
 }
 
 class DistortedGivenDepth : public GivenDepthFiles {

@@ -2,6 +2,7 @@
 #include "io/glb_reader.h"
 
 #include <cmath>
+#include <cstring>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -117,6 +118,59 @@ TEST(ReadGlb, StripsTurnEverySecondTriangle) {
       << faces[1][0] << faces[1][1] << faces[1][2];
 }
 
+TEST(ReadGlb, AFileWithoutScenesShowsItsRoots) {
+  Triangle t;
+  t.json.erase("scenes");
+  t.json["nodes"] = {{{"mesh", 0}}, {{"children", {0}}, {"translation", {5, 0, 0}}}};
+  const GlbMesh mesh = t.read();
+  ASSERT_EQ(mesh.parsed.mesh.faces.size(), 1U) << "the child is shown once, where its parent is";
+  expect_near(mesh.parsed.positions[0], {5, 0, 0});
+  t.json["nodes"] = {{{"children", {1}}}, {{"mesh", 0}, {"children", {0}}}};
+  EXPECT_EQ(defect(t.bytes()), "EMPTY") << "nodes that are each other's children";
+  t.json["nodes"] = {{{"mesh", 0}, {"children", {7}}}};
+  EXPECT_EQ(defect(t.bytes()), "REF");
+  t.json.erase("nodes");
+  EXPECT_EQ(defect(t.bytes()), "EMPTY");
+}
+
+TEST(ReadGlb, PointsBesideTrianglesAddNothing) {
+  Triangle t;
+  t.json["meshes"][0]["primitives"].push_back({{"mode", 0}, {"attributes", {{"POSITION", 3}}}});
+  t.json["accessors"].push_back(t.json["accessors"][1]);
+  t.json["accessors"][3]["byteOffset"] = 4;  // (0,0,c), …: other places than the triangle's
+  const GlbMesh mesh = t.read();
+  EXPECT_EQ(mesh.parsed.positions.size(), 3U);
+  EXPECT_EQ(mesh.parsed.mesh.colors.size(), 3U);
+}
+
+TEST(ReadGlb, RefusesFloatsThatKeepTooLittle) {
+  const auto moved = [](float by) {  // along x, and back by the node
+    Triangle t;
+    const float one = by + 1;
+    std::memcpy(t.binary.data() + 8, &by, sizeof by);
+    std::memcpy(t.binary.data() + 24, &one, sizeof one);
+    std::memcpy(t.binary.data() + 40, &by, sizeof by);
+    t.json["nodes"][0]["translation"] = {-by, 0, 0};
+    return t;
+  };
+  EXPECT_EQ(defect(moved(2e6f).bytes()), "VALUE") << "steps of 1/8, the triangle is 2 wide";
+  EXPECT_EQ(moved(5e3f).read().parsed.warnings.size(), 1U) << "steps of 1/2048";
+  EXPECT_TRUE(moved(100).read().parsed.warnings.empty());
+  Triangle t;  // the other way round, nothing is lost
+  t.json["nodes"][0]["translation"] = {2e6, 0, 0};
+  EXPECT_TRUE(t.read().parsed.warnings.empty());
+}
+
+TEST(ReadGlb, LimitsTheSizeOfItsJson) {
+  const test::TempDir dir;
+  constexpr uint32_t kTooMany = (256u << 20) + 4;
+  std::string head = "glTF";
+  for (const uint32_t number : {2u, 28 + kTooMany, kTooMany}) append_bytes(head, number);
+  test::write_bytes(dir / "a.glb", head + "JSON{}");
+  std::filesystem::resize_file(dir / "a.glb", 28 + kTooMany);  // sparse
+  EXPECT_THROW((void)read_glb(dir / "a.glb"), LimitError);
+}
+
 TEST(ReadGlb, NamesWhatIsWrong) {
   const std::string good = Triangle().bytes();
   const auto broken = [](const char* pointer, const Json& value) {
@@ -138,6 +192,9 @@ TEST(ReadGlb, NamesWhatIsWrong) {
   EXPECT_EQ(broken("/buffers/0/uri", "/etc/passwd"), "UNSUPPORTED");
   EXPECT_EQ(broken("/nodes/0/children", {0}), "REF");
   EXPECT_EQ(broken("/nodes/0/mesh", 1), "REF");
+  EXPECT_EQ(broken("/scenes", Json::array()), "EMPTY");
+  EXPECT_EQ(broken("/scenes", Json::object()), "SCHEMA");
+  EXPECT_EQ(broken("/scene", 1), "REF");
   EXPECT_EQ(broken("/extensionsRequired", {"EXT_meshopt_compression"}), "UNSUPPORTED");
   EXPECT_EQ(broken("/meshes/0/primitives/0/mode", 0), "EMPTY");
   Triangle t;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/isolated.h"
 
+#include <csignal>
 #include <cstdlib>
 #include <stdexcept>
 #include <vector>
@@ -27,6 +28,15 @@ TEST(RunIsolated, TurnsACrashIntoAMessage) {
     EXPECT_NE(std::string(error.what()).find("a.glb"), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find("no such thing"), std::string::npos) << error.what();
   }
+}
+
+TEST(RunIsolated, LeavesInterruptsToTheParent) {
+  const auto interrupted = [] {
+    std::raise(SIGINT);
+    std::raise(SIGTERM);
+    return std::string("whole");
+  };
+  EXPECT_EQ(run_isolated(interrupted, "a"), "whole");
 }
 
 #ifndef __SANITIZE_ADDRESS__  // which needs the addresses for itself

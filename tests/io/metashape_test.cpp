@@ -146,6 +146,31 @@ TEST_F(ReadMetashape, LeavesOutWhatIsNotAligned) {
   EXPECT_NE(scene.warnings[0].find("1 cameras are not aligned"), std::string::npos);
 }
 
+TEST_F(ReadMetashape, TakesOneComponent) {
+  const std::string identity = text_of(Eigen::Matrix4d::Identity());
+  const auto names = [&](const std::string& active, int in_second) {
+    std::string xml = with("  </components>", "<component id=\"1\"/></components>");
+    xml.replace(xml.find("<components"), 11, "<components" + active);
+    std::string added;
+    for (int i = 3; i < 3 + in_second; ++i) {
+      added += "<camera id=\"" + std::to_string(i) +
+               "\" sensor_id=\"0\" component_id=\"1\" label=\"c" + std::to_string(i) +
+               "\"><transform>" + identity + "</transform></camera>";
+    }
+    xml.insert(xml.find("  </cameras>"), added);
+    const Scene scene = read(xml);
+    std::string out;
+    for (const View& view : scene.views) out += view.name + " ";
+    return out + (scene.warnings.empty() ? "" : scene.warnings.back().substr(0, 20));
+  };
+  EXPECT_EQ(names("", 0), "IMG_1.png IMG_2.png ");
+  EXPECT_EQ(names("", 1), "IMG_1.png IMG_2.png 1 cameras were align");
+  EXPECT_EQ(names("", 3), "c3 c4 c5 2 cameras were align");
+  EXPECT_EQ(names(" active_id=\"0\"", 3), "IMG_1.png IMG_2.png 3 cameras were align");
+  EXPECT_EQ(names(" active_id=\"1\"", 1), "c3 2 cameras were align");
+  EXPECT_EQ(names(" active_id=\"7\"", 1), "IMG_1.png IMG_2.png 1 cameras were align");
+}
+
 TEST_F(ReadMetashape, RefusesWhatItCannotUse) {
   const std::string matrix = text_of(camera_matrix(1));
   const std::string first = matrix.substr(0, matrix.find(' '));

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs {
@@ -13,9 +14,8 @@ TEST(PhotographIndex, FindsPhotographsByTheNamesProgramsGiveThem) {
   for (const char* name : {"images/a.jpg", "b.01.png", "b.02.png", "images/c.png", "c.png"}) {
     test::write_bytes(dir / name, "");
   }
-  const PhotographIndex index({dir.path(), false});
   const auto found = [&](const std::string& name) {
-    const auto path = index.find(name);
+    const auto path = PhotographIndex({dir.path(), false}).take(name);
     return path.empty() ? "" : std::filesystem::relative(path, dir.path()).string();
   };
   EXPECT_EQ(found("a.jpg"), "images/a.jpg");
@@ -27,6 +27,18 @@ TEST(PhotographIndex, FindsPhotographsByTheNamesProgramsGiveThem) {
   EXPECT_EQ(found("b.03"), "");
   EXPECT_EQ(found("c"), "images/c.png");
   EXPECT_EQ(found(""), "");
+}
+
+TEST(PhotographIndex, GivesAPhotographToOneCamera) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "images/a.jpg", "");
+  test::write_bytes(dir / "images/b.jpg", "");
+  PhotographIndex index({dir.path(), false});
+  EXPECT_FALSE(index.take("left/a.jpg").empty());
+  EXPECT_FALSE(index.take("left/b.jpg").empty());
+  EXPECT_TRUE(index.take("c").empty());
+  EXPECT_TRUE(index.take("c").empty());
+  EXPECT_EQ(test::defect_of([&] { index.take("right/a.jpg"); }), "REF");
 }
 
 }  // namespace

@@ -34,6 +34,26 @@ TEST(Photographs, WithCamerasBesideThemAreAnotherLayout) {
   EXPECT_FALSE(is_photographs(dir.path()));
 }
 
+TEST(Photographs, MayHaveOtherFilesBesideThem) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.png", test::rgb_png(20, 10));
+  test::write_bytes(dir / "project.xml", "<document><chunk><markers/></chunk></document>");
+  test::write_bytes(dir / "ground.csv", "#name,x,y,alt\np1,1,2,3\n");
+  test::write_bytes(dir / "cameras.json", R"({"cameras": ["Nikon"]})");
+  test::write_bytes(dir / "cameras/nikon.json", R"({"serial": 7})");
+  EXPECT_TRUE(is_photographs(dir.path()));
+  const auto expect_cameras = [&](const char* name, const std::string& text) {
+    const std::string before = test::read_bytes(dir / name);
+    test::write_bytes(dir / name, text);
+    EXPECT_FALSE(is_photographs(dir.path())) << name;
+    test::write_bytes(dir / name, before);
+  };
+  expect_cameras("project.xml", "<document><chunk><cameras/></chunk></document>");
+  expect_cameras("ground.csv", "#name,x,y,alt,heading,pitch,roll,f\n");
+  expect_cameras("cameras.json", R"([{"img_name": "a"}])");
+  expect_cameras("cameras/nikon.json", R"({"t_00": 1})");
+}
+
 TEST(Photographs, ThatCannotBeReadAreRefused) {
   const test::TempDir dir;
   test::write_bytes(dir / "a.png", test::rgb_png(20, 10));

@@ -94,6 +94,23 @@ TEST_F(ReadPolycam, BringsItsDepthInMetres) {
   load_images(scene, scene.input);
   EXPECT_TRUE(std::isnan(scene.views[0].given_depth(10, 20)));
   EXPECT_EQ(scene.views[0].given_depth(50, 20), 1.5f);
+  rows.resize(11);
+  test::write_bytes(dir_ / ("keyframes/confidence/" + name(0) + ".png"),
+                    test::png(16, rows, {.color_type = 0}));
+  EXPECT_EQ(test::defect_of([&] { load_images(scene, scene.input); }), "MISMATCH");
+}
+
+TEST_F(ReadPolycam, KeepsConfidenceInTheScene) {
+  const test::TempDir outside;
+  std::vector<std::string> rows(12, std::string(16, '\0'));
+  test::write_bytes(outside / (name(0) + ".png"), test::png(16, rows, {.color_type = 0}));
+  std::filesystem::create_directory_symlink(outside.path(), dir_ / "keyframes/confidence");
+  EXPECT_EQ(test::defect_of([&] { read_scene(dir_.path()); }), "PATH");
+  SceneOptions options;
+  options.allow_external = true;
+  Scene scene = read_scene(dir_.path(), options);
+  load_images(scene, scene.input);
+  EXPECT_TRUE(std::isnan(scene.views[0].given_depth(30, 20)));
 }
 
 TEST_F(ReadPolycam, TakesPlainCamerasWhereNoneAreCorrected) {

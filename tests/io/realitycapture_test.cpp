@@ -51,8 +51,8 @@ Eigen::Vector2d photographed(const Eigen::Vector3d& world) {
   const double y = -at.dot(up) / -at.dot(back);
   const double r2 = x * x + y * y;
   const double radial = 1 - 0.05 * r2 + 0.01 * r2 * r2 - 0.002 * r2 * r2 * r2;
-  const double xd = x * radial + 2 * 0.001 * x * y - 0.0005 * (r2 + 2 * x * x);
-  const double yd = y * radial + 0.001 * (r2 + 2 * y * y) - 2 * 0.0005 * x * y;
+  const double xd = x * radial + 0.001 * (r2 + 2 * x * x) - 2 * 0.0005 * x * y;
+  const double yd = y * radial - 0.0005 * (r2 + 2 * y * y) + 2 * 0.001 * x * y;
   const double f = 28.5 / 36 * 80;
   return {40 + 0.01 * 80 + f * xd, 30 - 0.02 * 80 + f * yd};
 }
@@ -105,7 +105,9 @@ TEST_F(ReadRealityCapture, IsRecognisedByItsHeader) {
 }
 
 TEST_F(ReadRealityCapture, RefusesWhatItCannotUse) {
-  EXPECT_EQ(refused("pitch,", ""), "SCHEMA");
+  EXPECT_EQ(refused("pitch,", ""), "OPEN") << "no file is recognised";
+  EXPECT_EQ(refused("px,py", "px,px"), "SCHEMA");
+  EXPECT_EQ(refused("k1,k2", ","), "SCHEMA") << "two columns without a name";
   EXPECT_EQ(refused("#name", "#nam"), "OPEN") << "no file is recognised";
   EXPECT_EQ(refused(",0.001,-0.0005", ""), "SCHEMA");
   EXPECT_EQ(refused(",30,", ",north,"), "SYNTAX");

@@ -110,5 +110,15 @@ TEST(DepthNetwork, RefusesWhatOpenCvCannotRunInOneLine) {
   EXPECT_EQ(refused(test::onnx_network(100000, 12)), "SCHEMA");
 }
 
+TEST(DepthNetwork, RefusesWeightsThatAreNotThere) {
+  const std::string weights = test::tensor("w", {1, 3, 1, 1}, {}) + test::field(14, 1);
+  try {
+    DepthNetwork(test::field(7, test::field(5, weights)), "n.onnx");
+    FAIL();
+  } catch (const BadInput& error) {
+    EXPECT_NE(std::string(error.what()).find("another file"), std::string::npos) << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace cgs
