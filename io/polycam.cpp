@@ -28,7 +28,7 @@ bool has_pose(const fs::path& file) {
 
 // Name, relative to the scene, of the folder that holds cameras/; empty if there is none.
 std::string keyframes(const fs::path& folder) {
-  for (const std::string name : {"keyframes", "."}) {
+  for (const char* name : {"keyframes", "."}) {
     for (const char* cameras : {"corrected_cameras", "cameras"}) {
       const fs::path candidate = folder / name / cameras;
       std::error_code error;

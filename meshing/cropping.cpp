@@ -71,7 +71,7 @@ class PlaneCut {
 };
 
 // Of a mesh, vertices that no face uses are of no use.
-TriangleMesh without_unused(TriangleMesh cut, bool was_cloud) {
+TriangleMesh without_unused(const TriangleMesh& cut, bool was_cloud) {
   return was_cloud ? cut : with_faces(cut, std::vector<uint8_t>(cut.faces.size(), 1));
 }
 
