@@ -18,7 +18,7 @@ PhotographIndex::PhotographIndex(const SceneRoot& root) {
 }
 
 fs::path PhotographIndex::take(std::string_view name) {
-  const fs::path file = find(name);
+  fs::path file = find(name);
   if (file.empty()) return file;
   const auto [owner, is_new] = taken_.emplace(file, name);
   if (is_new) return file;

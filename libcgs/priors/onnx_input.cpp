@@ -135,17 +135,15 @@ class Tensor {
 
  private:
   void read(const Field& field) {
-    enum Number : uint64_t {
-      kSide = 1,
-      kDataType = 2,
-      kFloat = 4,
-      kInt32 = 5,
-      kInt64 = 7,
-      kRaw = 9,
-      kDouble = 10,
-      kUint64 = 11,
-      kLocation = 14
-    };
+    constexpr uint64_t kSide = 1;
+    constexpr uint64_t kDataType = 2;
+    constexpr uint64_t kFloat = 4;
+    constexpr uint64_t kInt32 = 5;
+    constexpr uint64_t kInt64 = 7;
+    constexpr uint64_t kRaw = 9;
+    constexpr uint64_t kDouble = 10;
+    constexpr uint64_t kUint64 = 11;
+    constexpr uint64_t kLocation = 14;
     switch (field.number) {
       case kSide:
         if (!field.has_bytes) return multiply(field.value);
