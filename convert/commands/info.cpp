@@ -14,7 +14,6 @@
 #include "convert/mesh_files.h"
 #include "convert/pipeline.h"
 #include "io/json_file.h"
-#include "io/ply_header.h"
 #include "io/splat_reader.h"
 #include "libcgs/core/error.h"
 
