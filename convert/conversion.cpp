@@ -239,6 +239,17 @@ Json bounds_json(const Gaussians& gaussians, const Frame& frame) {
 
 }  // namespace
 
+bool is_splat_ply(const std::filesystem::path& path) {
+  if (extension_of(path) != ".ply" || is_folder(path)) return false;
+  const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
+  if (start.substr(0, 3) != "ply") return false;
+  const PlyHeader header = parse_ply_header(start, path);
+  const PlyElement* vertex = header.find("vertex");
+  if (vertex == nullptr) return false;
+  const auto has = [&](const char* name) { return vertex->find(name) >= 0; };
+  return has("packed_position") || has("rot_0") || (has("scale_0") && has("f_dc_0"));
+}
+
 Json splat_file_to_json(const GaussianFile& file) {
   const SplatFindings& f = file.findings;
   return {{"kind", "splats"},

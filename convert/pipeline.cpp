@@ -6,6 +6,7 @@
 #include <fstream>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -203,6 +204,7 @@ struct Stage {
   std::string title;
   std::vector<std::string> files;
   Json (*work)(Run&, const Progress&);
+  std::vector<std::string> further = {};  ///< What it may write besides, as output_hashes() says.
 };
 
 std::vector<Stage> stages_of(const Scene& scene) {
@@ -217,7 +219,15 @@ std::vector<Stage> stages_of(const Scene& scene) {
   for (const int i : scene.input) {
     model_files.push_back("model/priors/" + scene.views[static_cast<size_t>(i)].name + ".exr");
   }
-  return {{"model", "depth and Gaussians", model_files, run_model},
+  return {{"model",
+           "depth and Gaussians",
+           model_files,
+           run_model,
+           {"model/training.json",
+            "model/colmap/poses.json",
+            "model/colmap/sparse/0/cameras.txt",
+            "model/colmap/sparse/0/images.txt",
+            "model/colmap/sparse/0/points3D.txt"}},
           {"scale", "scale", {}, run_scale},
           {"views", "views", view_files, run_views},
           {"evaluation", "held-out views", {}, run_evaluation},
@@ -234,8 +244,15 @@ std::vector<Stage> stages_of(const Scene& scene) {
           {"web",
            "textured assets",
            {"web/asset.glb", "web/splats.glb", "mesh/watertight.obj", "mesh/watertight.mtl"},
-           run_web},
+           run_web,
+           {"web/splats.spz", "mesh/watertight."}},  // other formats, pictures of the texture
           {"report", "report", {"report.html", "report.json"}, run_report}};
+}
+
+// What load_given_depth() reads beside a depth file; empty if there is none.
+std::filesystem::path confidence_file(const std::filesystem::path& depth) {
+  const std::filesystem::path folder = depth.parent_path().parent_path() / "confidence";
+  return is_folder(folder) ? depth_file_of({folder, false}, depth) : std::filesystem::path();
 }
 
 }  // namespace
@@ -248,7 +265,10 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     const auto mask =
         mask_file({request.scene.path, request.scene.options.allow_external}, view.image_path);
     if (mask) inputs[view.name + ", mask"] = file_hash(*mask);
-    if (!view.depth_path.empty()) inputs[view.name + ", depth"] = file_hash(view.depth_path);
+    if (view.depth_path.empty()) continue;
+    inputs[view.name + ", depth"] = file_hash(view.depth_path);
+    const std::filesystem::path confidence = confidence_file(view.depth_path);
+    if (!confidence.empty()) inputs[view.name + ", confidence"] = file_hash(confidence);
   }
   const std::filesystem::path& network = request.scene.options.depth.network;
   if (!network.empty()) inputs["depth network"] = file_hash(network);
@@ -267,19 +287,26 @@ Json request_json(const RunRequest& request, const Scene& scene) {
                        view.distortion});
   }
   const uint64_t cameras_hash = content_hash(json_text(cameras, -1));
-  return {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
-          {"views", request.scene.options.views},
-          {"downscale", request.scene.options.downscale.value_or(0)},
-          {"depth", {static_cast<int>(scene.depth_kind), scene.depth_scale}},
-          {"assume_unit", request.scene.assume_unit},
-          {"known_distances", request.scene.known_distances},
-          {"training", settings_to_json(request.training)},
-          {"voxel_size", request.voxel_size},
-          {"max_error", request.max_error},
-          {"simplify", request.simplify},
-          {"input_images", inputs},
-          {"held_out_images", held_out},
-          {"cameras", cameras_hash}};
+  Json out = {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
+              {"views", request.scene.options.views},
+              {"downscale", request.scene.options.downscale.value_or(0)},
+              {"assume_unit", request.scene.assume_unit},
+              {"known_distances", request.scene.known_distances},
+              {"training", settings_to_json(request.training)},
+              {"voxel_size", request.voxel_size},
+              {"max_error", request.max_error},
+              {"simplify", request.simplify},
+              {"input_images", inputs},
+              {"held_out_images", held_out},
+              {"cameras", cameras_hash}};
+  // Only where it decides something: folders of runs without depth go on as before.
+  const bool has_depth = std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
+    return !scene.views[static_cast<size_t>(i)].depth_path.empty();
+  });
+  if (has_depth || !network.empty()) {
+    out["depth"] = {static_cast<int>(scene.depth_kind), scene.depth_scale};
+  }
+  return out;
 }
 
 std::vector<int> views_with_photograph(const Scene& scene) {
@@ -381,6 +408,18 @@ Json fusion_to_json(const TsdfReport& report, const Frame& frame) {
 
 namespace {
 
+// Hashes of what is on disk tell what the stages wrote only right after they did; later,
+// verify_run() holds the disk against them.
+void note_outputs(Run& run, bool is_fresh) {
+  if (!is_fresh && run.record.json().contains("outputs")) return;
+  std::set<std::string> names;
+  for (const Stage& stage : stages_of(run.scene)) {
+    names.insert(stage.files.begin(), stage.files.end());
+    names.insert(stage.further.begin(), stage.further.end());
+  }
+  run.record.note("outputs", output_hashes(run.request.output, names));
+}
+
 Json run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
   for (const Stage& stage : stages_of(run.scene)) {
@@ -397,7 +436,8 @@ Json run_stages(Run& run, Terminal& terminal) {
   }
   forget_checkpoints(run.request.output / "model");
   run.record.note("focal", run.request.scene.focal);
-  run.record.note("outputs", output_hashes(run.request.output));
+  run.record.note("depth_options", depth_options_json(run.request.scene.options.depth));
+  note_outputs(run, stale);
   loaded_model(run);
   return report_json(run);
 }

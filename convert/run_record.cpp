@@ -25,6 +25,9 @@ std::vector<std::string> differing_keys(const Json& before, const Json& now) {
   for (const auto& [key, value] : now.items()) {
     if (!before.contains(key) || before[key] != value) keys.push_back(key);
   }
+  for (const auto& [key, value] : before.items()) {
+    if (!now.contains(key)) keys.push_back(key);
+  }
   return keys;
 }
 

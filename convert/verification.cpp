@@ -40,6 +40,21 @@ std::string text_at(const Json& json, const char* key) {
   return json.contains(key) && json[key].is_string() ? json[key].get<std::string>() : "";
 }
 
+// As depth_options_json() wrote them; runs of before have none.
+DepthOptions depth_options_from(const Json& json) {
+  DepthOptions out;
+  if (!json.is_object()) return out;
+  out.folder = text_at(json, "folder");
+  out.network = text_at(json, "network");
+  const Json kind = json.value("kind", Json(0));
+  const bool is_kind = kind.is_number_integer() && kind.get<int64_t>() >= 0 &&
+                       kind.get<int64_t>() <= static_cast<int64_t>(DepthKind::Disparity);
+  if (is_kind) out.kind = static_cast<DepthKind>(kind.get<int>());
+  const Json scale = json.value("scale", Json(0));
+  if (scale.is_number()) out.scale = scale.get<double>();
+  return out;
+}
+
 SceneRequest scene_request(const Json& record) {
   const Json& request = record["request"];
   SceneRequest out;
@@ -52,6 +67,7 @@ SceneRequest scene_request(const Json& record) {
   out.options.allow_external = true;  // the run was allowed what it needed
   const Json focal = record.value("focal", Json(0));
   if (focal.is_number()) out.focal = focal.get<double>();
+  out.options.depth = depth_options_from(record.value("depth_options", Json()));
   return out;
 }
 
@@ -89,9 +105,31 @@ void verify_inputs(const Json& record,
   ++out.inputs;
 }
 
+// Hashes of the outputs that a record names and that are there.
+Json hashes_now(const Json& record, const fs::path& output) {
+  Json now = Json::object();
+  for (const auto& [name, hash] : record["outputs"].items()) {
+    // A name that leads out of the folder is none of ours.
+    const fs::path relative(name);
+    const bool is_inside = relative.is_relative() && name.find("..") == std::string::npos;
+    if (is_inside && is_present(output / relative)) now[name] = file_hash(output / relative);
+  }
+  return now;
+}
+
 }  // namespace
 
-Json output_hashes(const fs::path& output) {
+Json depth_options_json(const DepthOptions& options) {
+  const auto whole = [](const fs::path& path) {
+    return path.empty() ? std::string() : fs::weakly_canonical(path).string();
+  };
+  return {{"folder", whole(options.folder)},
+          {"kind", static_cast<int>(options.kind)},
+          {"scale", options.scale},
+          {"network", whole(options.network)}};
+}
+
+Json output_hashes(const fs::path& output, const std::set<std::string>& names) {
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(output)) {
     if (entry.is_regular_file() && !entry.is_symlink()) files.push_back(entry.path());
@@ -100,7 +138,10 @@ Json output_hashes(const fs::path& output) {
   Json out = Json::object();
   for (const fs::path& file : files) {
     const std::string name = fs::relative(file, output).generic_string();
-    const bool is_ours = name != "run.json" && file.filename().string().front() != '.';
+    const bool is_ours = names.count(name) > 0 ||
+                         std::any_of(names.begin(), names.end(), [&](const std::string& known) {
+                           return known.back() == '.' && name.starts_with(known);
+                         });
     if (is_ours) out[name] = file_hash(file);
   }
   return out;
@@ -110,22 +151,15 @@ Verification verify_run(const fs::path& output, Terminal& terminal) {
   const Json record = finished_record(output);
   Verification out;
   verify_inputs(record, output, terminal, out);
-  Json now = Json::object();
-  for (const auto& [name, hash] : record["outputs"].items()) {
-    ++out.outputs;
-    // A name that leads out of the folder is none of ours.
-    const fs::path relative(name);
-    const bool is_inside = relative.is_relative() && name.find("..") == std::string::npos;
-    if (is_inside && is_present(output / relative)) now[name] = file_hash(output / relative);
-  }
+  const Json now = hashes_now(record, output);
+  out.outputs = record["outputs"].size();
   compare(record["outputs"], now, "", out);
   return out;
 }
 
 Verification compare_runs(const fs::path& one, const fs::path& other) {
   const auto hashes = [](const fs::path& folder) {
-    (void)finished_record(folder);
-    Json out = output_hashes(folder);
+    Json out = hashes_now(finished_record(folder), folder);
     for (const char* name : {"report.json", "report.html"}) out.erase(name);
     return out;
   };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -11,9 +12,16 @@
 
 namespace cgs {
 
-/// Path below the folder and hash of every file of a finished run but run.json itself, in order of
-/// the paths. \throws IoError
-nlohmann::ordered_json output_hashes(const std::filesystem::path& output);
+/// How depth was given, for run.json: it must be known to read the inputs again, while what it
+/// leads to is part of the request already.
+nlohmann::ordered_json depth_options_json(const DepthOptions& options);
+
+/// Path below the folder and hash of the files of a finished run, in order of the paths.
+///
+/// \param names  paths of what a run writes; one that ends in a dot stands for all that begin so.
+///               Other files are the user's, who may change them. \throws IoError
+nlohmann::ordered_json output_hashes(const std::filesystem::path& output,
+                                     const std::set<std::string>& names);
 
 /// What became of the files of a run.
 struct Verification {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <Eigen/Geometry>
 
@@ -76,7 +77,7 @@ class SceneReader {
     if (!all_have_colors_) mesh.colors.clear();
     if (!all_have_support_) mesh.support.clear();
     if (!all_have_sigma_) mesh.sigma.clear();
-    if (!origin_.is_ours) mesh.provenance.clear();
+    if (!origin_.is_ours || !all_have_labels_) mesh.provenance.clear();
     if (has_textures_) {
       out_.parsed.warnings.emplace_back("textures are not read; a mesh keeps colours of vertices");
     }
@@ -155,10 +156,11 @@ class SceneReader {
     }
   }
 
-  // Materials of ours are named "<class>" or "<class> <photograph>".
-  Provenance label_of(const JsonValue& primitive) {
+  // Materials of ours are named "<class>" or "<class> <photograph>"; of a mesh that does not say
+  // what was observed, otherwise.
+  std::optional<Provenance> label_of(const JsonValue& primitive) {
     const auto index = primitive.find("material");
-    if (!index) return Provenance::Inferred;
+    if (!index) return std::nullopt;
     const JsonValue material = file_.element("materials", *index);
     if (const auto pbr = material.find("pbrMetallicRoughness")) {
       has_textures_ = has_textures_ || pbr->find("baseColorTexture").has_value();
@@ -169,10 +171,12 @@ class SceneReader {
         return label;
       }
     }
-    return Provenance::Inferred;
+    return std::nullopt;
   }
 
-  void add(const GlbFaces& in, const Eigen::Affine3d& world, Provenance label) {
+  void add(const GlbFaces& in,
+           const Eigen::Affine3d& world,
+           const std::optional<Provenance>& label) {
     if (in.faces.empty()) return;  // points and lines neither add vertices nor lack colours
     TriangleMesh& mesh = out_.parsed.mesh;
     const bool is_mirrored = world.linear().determinant() < 0;
@@ -196,8 +200,9 @@ class SceneReader {
         continue;
       }
       mesh.faces.push_back(corners);
-      mesh.provenance.push_back(label);
+      mesh.provenance.push_back(label.value_or(Provenance::Inferred));
     }
+    all_have_labels_ = all_have_labels_ && label.has_value();
     all_have_colors_ = all_have_colors_ && !in.colors.empty();
     all_have_support_ = all_have_support_ && !in.support.empty();
     all_have_sigma_ = all_have_sigma_ && !in.sigma.empty();
@@ -230,6 +235,7 @@ class SceneReader {
   std::vector<bool> visited_;
   size_t collapsed_ = 0;  // faces
   bool all_have_colors_ = true;
+  bool all_have_labels_ = true;
   bool all_have_support_ = true;
   bool all_have_sigma_ = true;
   bool has_textures_ = false;

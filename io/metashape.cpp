@@ -54,7 +54,10 @@ std::string place(const pugi::xml_node& node) {
   std::string out;
   for (pugi::xml_node n = node; n.type() == pugi::node_element; n = n.parent()) {
     const std::string id = n.attribute("id").value();
-    out = std::string("/") + n.name() + (id.empty() ? "" : "[" + id + "]") + out;
+    std::string step = "/";
+    step += n.name();
+    if (!id.empty()) step.append("[").append(id).append("]");
+    out.insert(0, step);
   }
   return out;
 }

@@ -296,16 +296,24 @@ bool Collapser::stays_near(const Vector3f& p) const {
   });
 }
 
+// A vertex between two is known no better than the worse of them; at one of them, as that one is.
+void Collapser::merge_knowledge(uint32_t u, uint32_t v, float t) {
+  if (t <= 0) return;
+  if (!mesh_.support.empty()) {
+    const float least = std::min(mesh_.support[u], mesh_.support[v]);
+    mesh_.support[u] = t >= 1 ? mesh_.support[v] : least;
+  }
+  if (mesh_.sigma.empty()) return;
+  const float mixed = (1 - t) * mesh_.sigma[u] + t * mesh_.sigma[v];  // NaN where either is
+  mesh_.sigma[u] = t >= 1 ? mesh_.sigma[v] : mixed;
+}
+
 void Collapser::apply(uint32_t u, uint32_t v, const Placement& to) {
   mesh_.vertices[u] = (to.point + center_).cast<float>();
   if (!mesh_.colors.empty()) {
     mesh_.colors[u] = (1 - to.t) * mesh_.colors[u] + to.t * mesh_.colors[v];
   }
-  if (!mesh_.support.empty() && to.t > 0.5f) mesh_.support[u] = mesh_.support[v];
-  if (!mesh_.sigma.empty()) {
-    const float mixed = (1 - to.t) * mesh_.sigma[u] + to.t * mesh_.sigma[v];
-    mesh_.sigma[u] = !std::isnan(mixed) ? mixed : to.t > 0.5f ? mesh_.sigma[v] : mesh_.sigma[u];
-  }
+  merge_knowledge(u, v, to.t);
   if (kind_[v] == Kind::Border && kind_[u] == Kind::Border) {
     std::swap(next_on_border_[u], next_on_border_[v]);  // joins the two rings
   }

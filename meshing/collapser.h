@@ -107,6 +107,7 @@ class Collapser {
   bool is_near_original(const Vector3f& x) const;
   bool stays_near(const Vector3f& p) const;
   void apply(uint32_t u, uint32_t v, const Placement& to);
+  void merge_knowledge(uint32_t u, uint32_t v, float t);
   void drop_dead_faces();
   Vector3d vertex(uint32_t v) const { return mesh_.vertices[v].cast<double>() - center_; }
   Vector3d area_vector(const Face& f) const {

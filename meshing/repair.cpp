@@ -180,6 +180,11 @@ bool is_flat(const TriangleMesh& mesh, const Face& f) {
                          polygon_mesh::point_of(mesh.vertices[f[2]]));
 }
 
+size_t count_flat(const TriangleMesh& mesh) {
+  return static_cast<size_t>(std::count_if(
+      mesh.faces.begin(), mesh.faces.end(), [&](const Face& f) { return is_flat(mesh, f); }));
+}
+
 // A flip hands part of a neighbour to the flat face: it then claims no more than that neighbour.
 void weaken_flat_faces(TriangleMesh& mesh, const PolygonMesh& halfedges) {
   if (mesh.provenance.empty()) return;
@@ -198,8 +203,7 @@ void weaken_flat_faces(TriangleMesh& mesh, const PolygonMesh& halfedges) {
 
 void remove_flat_faces(RepairedMesh& out) {
   TriangleMesh& mesh = out.mesh;
-  const auto flat = std::count_if(
-      mesh.faces.begin(), mesh.faces.end(), [&](const Face& f) { return is_flat(mesh, f); });
+  const size_t flat = count_flat(mesh);
   if (flat == 0) return;
   PolygonMesh halfedges = polygon_mesh::from_triangles(mesh, "repair");
   weaken_flat_faces(mesh, halfedges);
@@ -211,7 +215,11 @@ void remove_flat_faces(RepairedMesh& out) {
   for (uint32_t f = 0; f < mesh.provenance.size(); ++f) {
     label[PolygonMesh::Face_index(f)] = mesh.provenance[f];
   }
-  if (!pmp::remove_degenerate_faces(halfedges)) return;  // what remains is told as flat
+  (void)pmp::remove_degenerate_faces(halfedges);          // what it cannot remove is counted below
+  if (halfedges.num_vertices() > mesh.vertices.size()) {  // of a new vertex nothing would be known
+    out.flat_left = flat;
+    return;
+  }
   const bool labelled = !mesh.provenance.empty();
   mesh.faces.clear();
   mesh.provenance.clear();
@@ -224,7 +232,8 @@ void remove_flat_faces(RepairedMesh& out) {
     mesh.faces.push_back(face);
     if (labelled) mesh.provenance.push_back(label[f]);
   }
-  out.flat_faces += static_cast<size_t>(flat);
+  out.flat_left = count_flat(mesh);
+  out.flat_faces += flat - std::min(flat, out.flat_left);
 }
 
 // Only a closed surface that does not cut itself has an outside.

@@ -13,6 +13,7 @@ struct RepairedMesh {
   size_t merged_vertices = 0;  ///< That lay exactly where another one does.
   size_t unused_vertices = 0;  ///< That no face names.
   size_t flat_faces = 0;       ///< Without area, collapsed or flipped away.
+  size_t flat_left = 0;        ///< Without area, that could be neither collapsed nor flipped.
   size_t duplicate_faces = 0;  ///< With the corners of another one.
   size_t turned_faces = 0;     ///< Whose corners now run the other way.
   size_t split_vertices = 0;   ///< Added where more than two faces met at an edge, or only corners

@@ -144,6 +144,10 @@ SmoothedMesh smoothed(const TriangleMesh& mesh,
   for (size_t v = 0; v < points.size(); ++v) {
     const double square = (points[v] - mesh.vertices[v]).cast<double>().squaredNorm();
     squares += square;
+    float* sigma = mesh.sigma.empty() ? nullptr : &out.mesh.sigma[v];
+    if (sigma != nullptr && square > 0) {
+      *sigma = static_cast<float>(std::hypot(double{*sigma}, std::sqrt(square)));
+    }
     out.most = std::max(out.most, std::sqrt(square));
   }
   const size_t free = points.size() - around.locked;

@@ -32,8 +32,9 @@ struct SmoothedMesh {
 ///
 /// Held in place are the vertices on open rims, on edges of more than two faces, and where faces
 /// with evidence (Observed, SingleView) meet others, so that what was invented neither grows nor
-/// drags what was measured. Labels, colours, support and sigma stay with their vertices: a smoother
-/// surface is not a better known one. Normals, if any, are made anew from the faces.
+/// drags what was measured. Labels, colours and support stay with their vertices; sigma becomes the
+/// root of sigma^2 + distance moved^2: a smoother surface is not a better known one, and no longer
+/// where it was measured. Normals, if any, are made anew from the faces.
 /// Source: Taubin 1995, "A signal processing approach to fair surface design", with the weights of
 /// Fujiwara 1995, "Eigenvalues of Laplacians on a closed Riemannian manifold and its nets".
 SmoothedMesh smoothed(const TriangleMesh& mesh,

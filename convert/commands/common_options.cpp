@@ -15,11 +15,15 @@
 namespace cgs {
 
 void add_common_options(CLI::App& command, CommonOptions& options) {
-  command.add_option("--threads", options.threads, "Threads to use; 0 = one per core")
-      ->capture_default_str();
   command.add_option("--memory-limit",
                      options.memory_limit,
                      "Memory to stay below, e.g. 4G; default 80 % of what is free");
+  add_output_options(command, options);
+}
+
+void add_output_options(CLI::App& command, CommonOptions& options) {
+  command.add_option("--threads", options.threads, "Threads to use; 0 = one per core")
+      ->capture_default_str();
   command.add_flag("--json", options.json, "Print the report as JSON on standard output");
   command.add_flag("-q,--quiet", options.quiet, "No progress on standard error");
 }

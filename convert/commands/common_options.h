@@ -23,6 +23,9 @@ struct CommonOptions {
 /// Adds them to a command; limit_threads() must be called when the command runs.
 void add_common_options(CLI::App& command, CommonOptions& options);
 
+/// The same without --memory-limit, for commands that plan no memory.
+void add_output_options(CLI::App& command, CommonOptions& options);
+
 /// --assume-unit and --known-distance.
 void add_scale_options(CLI::App& command, SceneRequest& request);
 

@@ -6,6 +6,7 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/conversion.h"
 #include "convert/filter/chain.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
@@ -22,7 +23,7 @@ struct FilterArgs {
   std::filesystem::path output;
   std::vector<std::string> operations;
   std::string assume_unit;
-  std::vector<double> up = {0, 0, 1};
+  std::vector<double> up;
   CommonOptions common;
 };
 
@@ -30,6 +31,11 @@ struct FilterArgs {
 void check_content(const std::filesystem::path& output, const FilterState& state) {
   if (!state.is_cloud() || output.extension() == ".ply" || output.extension() == ".PLY") return;
   throw InvalidInput("a point cloud can only be written as .ply, not as " + printable(output));
+}
+
+Eigen::Vector3d up_of(const FilterArgs& args, const MeasurableFile& file) {
+  if (!args.up.empty()) return {args.up[0], args.up[1], args.up[2]};
+  return file.up.value_or(Eigen::Vector3d::UnitZ());
 }
 
 void run_filter_command(const FilterArgs& args) {
@@ -40,6 +46,10 @@ void run_filter_command(const FilterArgs& args) {
           printable(args.output.filename()));
   Terminal terminal(args.common.quiet);
   (void)prepare_filters(args.operations, Frame{.metres_per_unit = 1});  // before a long read
+  if (is_splat_ply(args.input)) {
+    throw InvalidInput(printable(args.input) +
+                       " holds splats, not a mesh or points; cgs convert makes a mesh of them");
+  }
   MeasurableFile file = read_measured(args.input, args.assume_unit);
   terminal.warn(file.warnings);
   FilterState state{std::move(file.content.mesh), file.content.frame, file.content.file_origin};
@@ -50,8 +60,7 @@ void run_filter_command(const FilterArgs& args) {
   require_writable_as(args.output, state.frame);
   const nlohmann::ordered_json report = run_filters(state, filters, terminal);
   check_content(args.output, state);
-  write_mesh_as(
-      args.output, state.mesh, state.frame, Eigen::Vector3d(args.up[0], args.up[1], args.up[2]));
+  write_mesh_as(args.output, state.mesh, state.frame, up_of(args, file));
   if (state.frame.file_origin != state.file_origin) {
     terminal.warn("coordinates in " + printable(args.output) +
                   " are from another origin, which the file states: floats would lose digits");
@@ -65,7 +74,8 @@ void add_filter(CLI::App& app) {
   auto args = std::make_shared<FilterArgs>();
   auto* cmd = app.add_subcommand(
       "filter", "Clean, crop, smooth, simplify ... meshes and point clouds; labels and sigma stay");
-  cmd->add_option("input", args->input, "Mesh or point cloud: .ply, .obj, .stl, .off")->required();
+  cmd->add_option("input", args->input, "Mesh or point cloud: .ply, .obj, .stl, .off, .glb")
+      ->required();
   cmd->add_option("output", args->output, "File to write: .ply, .obj, .stl, .3mf, .glb")
       ->required();
   cmd->add_option("--op", args->operations, "An operation, name=arguments; may be repeated")
@@ -73,10 +83,13 @@ void add_filter(CLI::App& app) {
       ->allow_extra_args(false);
   cmd->add_option(
       "--assume-unit", args->assume_unit, "What a unit of the file is, where it does not say");
-  cmd->add_option("--up", args->up, "Direction that is up, for .stl, .3mf and .glb")
-      ->expected(3)
-      ->capture_default_str();
-  add_common_options(*cmd, args->common);
+  cmd->add_option(
+         "--up",
+         args->up,
+         "Direction that is up, for .stl, .3mf and .glb; default: as the file says (.glb), "
+         "else 0 0 1")
+      ->expected(3);
+  add_output_options(*cmd, args->common);
   cmd->footer(filter_help() +
               "Coordinates are those of the file. Lengths and coordinates take a unit (2mm, -3cm) "
               "or are in units of the file.\n"

@@ -14,7 +14,6 @@
 #include "convert/mesh_files.h"
 #include "convert/pipeline.h"
 #include "io/json_file.h"
-#include "io/ply_header.h"
 #include "io/splat_reader.h"
 #include "libcgs/core/error.h"
 
@@ -248,12 +247,7 @@ void run_mesh_info(const InfoArgs& args) {
 bool holds_splats(const std::filesystem::path& path) {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) return false;
-  if (!is_mesh_name(path)) return true;
-  const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
-  if (start.substr(0, 3) != "ply") return false;
-  const PlyHeader header = parse_ply_header(start, path);
-  const PlyElement* vertex = header.find("vertex");
-  return vertex != nullptr && (vertex->find("packed_position") >= 0 || vertex->find("rot_0") >= 0);
+  return !is_mesh_name(path) || is_splat_ply(path);
 }
 
 void run_info(const InfoArgs& args) {

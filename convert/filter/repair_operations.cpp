@@ -17,6 +17,7 @@ std::string repair_remark(const RepairedMesh& result) {
       {result.merged_vertices, " vertices merged"},
       {result.unused_vertices, " unused vertices dropped"},
       {result.flat_faces, " faces without area removed"},
+      {result.flat_left, " faces without area LEFT"},
       {result.duplicate_faces, " duplicate faces removed"},
       {result.turned_faces, " faces turned round"},
       {result.split_vertices, " vertices split off"},

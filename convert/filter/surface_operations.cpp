@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -37,10 +39,7 @@ FilterStep prepare_taubin(FilterArguments& arguments) {
                         {.iterations = arguments.count(1, kMostIterations), .outward = kBack});
 }
 
-std::string simplify_state(FilterState& state,
-                           const SimplifyOptions& options,
-                           const Progress& progress) {
-  SimplifyResult result = simplify(state.mesh, options, progress);
+std::string take_simplified(FilterState& state, SimplifyResult result) {
   state.mesh = std::move(result.mesh);
   if (result.faces_after == result.faces_before) {
     return "nothing left out, as the result would be too far off or cut itself; where the input "
@@ -56,7 +55,8 @@ FilterStep prepare_simplify(FilterArguments& arguments) {
   const double error = arguments.length();
   return [error](FilterState& state, const Progress& progress) {
     require_faces(state, "simplify");
-    return simplify_state(state, {.max_error = error / state.frame.scale}, progress);
+    const SimplifyOptions options{.max_error = error / state.frame.scale};
+    return take_simplified(state, simplify(state.mesh, options, progress));
   };
 }
 
@@ -69,7 +69,13 @@ FilterStep prepare_simplify_to(FilterArguments& arguments) {
     const SimplifyOptions options{.max_error = std::max(1e-30, double(box.diagonal().norm())),
                                   .max_color_error = 1,
                                   .target_faces = faces};
-    return simplify_state(state, options, progress);
+    SimplifyResult result = simplify(state.mesh, options, progress);
+    // The error is not bounded here, so that it has to be told where sigma is.
+    const double rms = std::max(result.evidence.accuracy.rms, result.evidence.completeness.rms);
+    for (float& sigma : result.mesh.sigma) {
+      if (!std::isnan(sigma)) sigma = static_cast<float>(std::hypot(double{sigma}, rms));
+    }
+    return take_simplified(state, std::move(result));
   };
 }
 

@@ -132,5 +132,56 @@ TEST_F(Filter, MergesInTheUnitOfTheFirst) {
   EXPECT_EQ(both.content.mesh.provenance.back(), Provenance::Inferred);
 }
 
+TEST_F(Filter, MergesOnlyWhereBothOrNoneStateTheirUnit) {
+  Frame unknown;
+  unknown.scale = 0.5;
+  write_mesh_ply(dir_ / "unknown.ply", test::labelled_sphere(8, 8), unknown);
+  const auto merge = [&](const std::string& a, const std::string& b, const std::string& more) {
+    return filter(a, "both.ply", "-q --op merge=" + (dir_ / b).string() + more);
+  };
+  for (const auto& result :
+       {merge("ball.ply", "unknown.ply", ""), merge("unknown.ply", "ball.ply", "")}) {
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("--assume-unit"), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+  EXPECT_FALSE(exists("both.ply"));
+  EXPECT_EQ(merge("unknown.ply", "ball.ply", " --assume-unit m").exit_code, 0);
+  EXPECT_EQ(merge("unknown.ply", "unknown.ply", "").exit_code, 0);
+}
+
+TEST_F(Filter, PassesOnWarningsOfTheSecondFile) {
+  test::write_bytes(dir_ / "flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n");
+  const ProgramResult result =
+      filter("flat.obj", "both.ply", "--op merge=" + (dir_ / "flat.obj").string() + " --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string remark = nlohmann::json::parse(result.out)["operations"][0]["remark"];
+  EXPECT_NE(remark.find("1 faces have no area"), std::string::npos) << remark;
+}
+
+// What is up in a file is up in what is made of it.
+TEST_F(Filter, KeepsWhatIsUp) {
+  ASSERT_EQ(filter("ball.ply", "y.glb", "-q --op repair --up 0 1 0").exit_code, 0);
+  ASSERT_EQ(filter("y.glb", "again.glb", "-q --op repair").exit_code, 0);
+  EXPECT_LT((*read_mesh_file(dir_ / "again.glb").up - Eigen::Vector3d::UnitY()).norm(), 1e-9);
+  ASSERT_EQ(filter("y.glb", "x.glb", "-q --op repair --up 1 0 0").exit_code, 0);
+  EXPECT_LT((*read_mesh_file(dir_ / "x.glb").up - Eigen::Vector3d::UnitX()).norm(), 1e-9);
+  ASSERT_EQ(filter("ball.ply", "z.glb", "-q --op repair").exit_code, 0);
+  EXPECT_LT((*read_mesh_file(dir_ / "z.glb").up - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+}
+
+TEST_F(Filter, RefusesSplatsAndOptionsWithoutEffect) {
+  test::write_bytes(dir_ / "splats.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                    "property float z\nproperty float f_dc_0\nproperty float scale_0\nend_header\n"
+                    "0 0 0 1 1\n");
+  const ProgramResult splats = filter("splats.ply", "no.ply", "-q --op voxel=1");
+  EXPECT_EQ(splats.exit_code, 2);
+  EXPECT_NE(splats.err.find("cgs convert"), std::string::npos) << splats.err;
+  EXPECT_EQ(std::count(splats.err.begin(), splats.err.end(), '\n'), 1) << splats.err;
+  EXPECT_FALSE(exists("no.ply"));
+  EXPECT_EQ(filter("ball.ply", "no.ply", "--op repair --memory-limit 1G").exit_code, 2);
+}
+
 }  // namespace
 }  // namespace cgs

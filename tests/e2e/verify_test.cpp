@@ -113,6 +113,71 @@ TEST_F(Verify, NamesTheInputThatChanged) {
   EXPECT_EQ(verify().exit_code, 0);
 }
 
+// A second run does nothing, so it must not vouch for what happened to the files since the first.
+TEST_F(Verify, ARunThatDoesNothingLeavesTheHashes) {
+  const std::string before = read_bytes(out() / "web/asset.glb");
+  std::string glb = before;
+  glb[glb.size() / 2] = char(glb[glb.size() / 2] ^ 1);
+  write_bytes(out() / "web/asset.glb", glb);
+  const auto again = run_cgs(run_arguments(scene(), out()));
+  const auto changed = verify();
+  write_bytes(out() / "web/asset.glb", before);
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(changed.exit_code, 3) << changed.out;
+  EXPECT_NE(changed.out.find("web/asset.glb: changed"), std::string::npos) << changed.out;
+}
+
+void write_depth(const fs::path& folder) {
+  fs::create_directories(folder);
+  for (const int v : {11, 12, 13}) {
+    const DepthMap depth = true_depth_of(v);
+    std::string pfm =
+        "Pf\n" + std::to_string(depth.width) + " " + std::to_string(depth.height) + "\n-1\n";
+    for (int y = depth.height - 1; y >= 0; --y) {
+      const float* row = depth.data.data() + size_t(y) * size_t(depth.width);
+      pfm.append(reinterpret_cast<const char*>(row), sizeof(float) * size_t(depth.width));
+    }
+    write_bytes(folder / ("v" + std::to_string(v) + ".pfm"), pfm);
+  }
+}
+
+// Folders of runs without depth know nothing of it, whichever version wrote them.
+TEST_F(Verify, TheRequestStatesDepthOnlyWhereThereIsSome) {
+  const auto record = nlohmann::json::parse(read_bytes(out() / "run.json"));
+  EXPECT_FALSE(record.at("request").contains("depth"));
+}
+
+TEST_F(Verify, FindsDepthThatWasGivenAndLeavesOutFilesOfTheUser) {
+  const fs::path depth = *dir_ / "sensor/depths";
+  write_depth(depth);
+  const fs::path with_depth = *dir_ / "with_depth";
+  fs::create_directories(with_depth);
+  write_bytes(with_depth / "remarks.txt", "of the user");
+  const std::string run = run_arguments(scene(), with_depth) + " --depth " + depth.string() +
+                          " --depth-kind metric --depth-scale 1";
+  const auto result = run_cgs(run);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  write_bytes(with_depth / "remarks.txt", "by the user");
+  EXPECT_TRUE(
+      nlohmann::json::parse(read_bytes(with_depth / "run.json"))["request"].contains("depth"));
+  const auto same = run_cgs("verify " + with_depth.string());
+  EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
+  EXPECT_NE(same.out.find("28 inputs"), std::string::npos) << same.out;
+
+  // What low confidence takes out is no longer the same depth.
+  fs::create_directories(*dir_ / "sensor/confidence");
+  fs::copy_file(depth / "v12.pfm", *dir_ / "sensor/confidence/v12.pfm");
+  const auto doubted = run_cgs("verify " + with_depth.string());
+  EXPECT_NE(doubted.out.find("input v12, confidence: new"), std::string::npos) << doubted.out;
+  EXPECT_EQ(run_cgs(run).exit_code, 2);
+  fs::remove_all(*dir_ / "sensor/confidence");
+
+  fs::copy_file(depth / "v11.pfm", depth / "v12.pfm", fs::copy_options::overwrite_existing);
+  const auto changed = run_cgs("verify " + with_depth.string());
+  EXPECT_EQ(changed.exit_code, 3);
+  EXPECT_NE(changed.out.find("input v12, depth: changed"), std::string::npos) << changed.out;
+}
+
 TEST_F(Verify, RefusesWhatIsNoFinishedRun) {
   const auto none = run_cgs("verify " + scene().string());
   EXPECT_EQ(none.exit_code, 3);

@@ -247,6 +247,16 @@ TEST(ReadGlb, LeadsOurFilesBackToTheWorld) {
   expect_round_trip({.draco = true, .y_up = y_up}, 64 * 0.8 / 8192);
 }
 
+TEST(ReadGlb, AMeshOfOursWithoutLabelsHasNone) {
+  const test::TempDir dir;
+  TriangleMesh mesh = test::labelled_sphere();
+  mesh.provenance.clear();
+  write_glb(dir / "a.glb", mesh, test::centimetre_frame());
+  const MeasurableFile back = read_mesh_file(dir / "a.glb");
+  EXPECT_EQ(back.content.mesh.faces.size(), mesh.faces.size());
+  EXPECT_TRUE(back.content.mesh.provenance.empty());
+}
+
 TEST(ReadGlb, SurvivesDamagedCompression) {
   const test::TempDir dir;
   write_glb(dir / "a.glb", test::labelled_sphere(), test::centimetre_frame());

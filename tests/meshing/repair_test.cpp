@@ -114,6 +114,25 @@ TEST(Repaired, AFlatFaceBesideAnInferredOneClaimsNothing) {
   EXPECT_EQ(certify(out.mesh).self_intersections, 0U);
 }
 
+// Faces that cannot be removed are told, whatever else was done.
+TEST(Repaired, CountsEveryFaceWithoutArea) {
+  // A flat face beside a good one, and a closed body of four points on a line.
+  TriangleMesh mesh;
+  mesh.vertices = {
+      {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.5f, 0.5f, 0}, {3, 0, 0}, {4, 0, 0}, {5, 0, 0}, {6, 0, 0}};
+  mesh.faces = {{0, 1, 2}, {2, 1, 3}, {4, 5, 6}, {4, 6, 7}, {4, 7, 5}, {5, 7, 6}};
+  const RepairedMesh out = repaired(mesh);
+  size_t left = 0;
+  for (const auto& f : out.mesh.faces) {
+    const Eigen::Vector3f a = out.mesh.vertices[f[1]] - out.mesh.vertices[f[0]];
+    const Eigen::Vector3f b = out.mesh.vertices[f[2]] - out.mesh.vertices[f[0]];
+    if (a.cross(b).isZero(0)) ++left;
+  }
+  EXPECT_EQ(out.flat_left, left);
+  EXPECT_EQ(left, 4U);
+  EXPECT_EQ(out.flat_faces, 1U);
+}
+
 TEST(WithoutSelfIntersections, DropsTheFacesThatCut) {
   TriangleMesh mesh = test::cube_mesh(1).mesh;
   const auto n = static_cast<uint32_t>(mesh.vertices.size());

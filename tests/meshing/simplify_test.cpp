@@ -278,6 +278,34 @@ TEST(Simplify, InterpolatesAttributesThatAreLinear) {
   }
 }
 
+// A vertex between one that is known and one that is not is not known, nor does it keep the better
+// support of the two: where known ones are far apart, only they themselves stay known.
+TEST(Simplify, KnowledgeDoesNotSpread) {
+  TriangleMesh mesh = labelled_square(32, [](float) { return 2.0f; });
+  std::vector<Vector3f> known;
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+    Vector3f& p = mesh.vertices[v];
+    p.z() = 0.02f * std::sin(9 * p.x()) * std::cos(7 * p.y());
+    const bool is_known = v % 7 == 3;
+    if (is_known) known.push_back(p);
+    mesh.sigma.push_back(is_known ? 0.1f : std::nanf(""));
+    mesh.support.push_back(is_known ? 5 : 2);
+  }
+  const SimplifyResult result = simplify(mesh, {.max_error = 5e-4});
+  EXPECT_LT(result.faces_after, result.faces_before * 2 / 3);
+  size_t kept = 0;
+  for (size_t v = 0; v < result.mesh.vertices.size(); ++v) {
+    const bool is_known = result.mesh.support[v] > 2;
+    EXPECT_EQ(is_known, !std::isnan(result.mesh.sigma[v])) << v;
+    if (!is_known) continue;
+    ++kept;
+    EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const Vector3f& p) {
+      return (p - result.mesh.vertices[v]).norm() < 1e-6f;
+    })) << v;
+  }
+  EXPECT_GT(kept, 10U);
+}
+
 TEST(Simplify, KeepsColoursThatTheFacesCarry) {
   TriangleMesh mesh = labelled_square(40, [](float) { return 0.5f; });
   for (const Vector3f& p : mesh.vertices) {

@@ -67,6 +67,14 @@ TEST(Smoothed, MovesVerticesAsTheDefinitionSays) {
   for (uint32_t v = 0; v < expected.size(); ++v) {
     EXPECT_NEAR((out.mesh.vertices[v].cast<double>() - expected[v]).norm(), 0, 1e-6) << v;
     if (held.count(v) != 0) EXPECT_EQ(out.mesh.vertices[v], mesh.vertices[v]);
+    const double moved = (expected[v] - mesh.vertices[v].cast<double>()).norm();
+    if (std::isnan(mesh.sigma[v])) {
+      EXPECT_TRUE(std::isnan(out.mesh.sigma[v]));
+    } else if (held.count(v) != 0) {
+      EXPECT_EQ(out.mesh.sigma[v], mesh.sigma[v]);
+    } else {
+      EXPECT_NEAR(out.mesh.sigma[v], std::sqrt(std::pow(mesh.sigma[v], 2) + moved * moved), 2e-6);
+    }
   }
 }
 

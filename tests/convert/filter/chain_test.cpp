@@ -14,6 +14,7 @@
 #include "io/mesh_ply.h"
 #include "libcgs/core/error.h"
 #include "meshing/components.h"
+#include "meshing/simplify.h"
 #include "tests/support/sample_mesh.h"
 #include "tests/support/temp_dir.h"
 
@@ -223,6 +224,21 @@ TEST_P(EveryOperation, ExampleOfTheHelpCanBeRead) {
   metres.metres_per_unit = 1;
   EXPECT_EQ(prepare_filters({std::string(GetParam().example)}, metres).size(), 1U);
   EXPECT_NE(filter_help().find(GetParam().example), std::string::npos);
+}
+
+// However far off the result may be, sigma says so.
+TEST(SimplifyTo, SigmaHoldsTheErrorThatWasMeasured) {
+  const FilterState before = labelled_mesh();
+  const SimplifyResult plain =
+      simplify(before.mesh, {.max_error = 10, .max_color_error = 1, .target_faces = 700});
+  const double rms = std::max(plain.evidence.accuracy.rms, plain.evidence.completeness.rms);
+  ASSERT_GT(rms, 1e-4);
+  const FilterState after = filtered(before, "simplify-to=700", 2);
+  ASSERT_LT(after.mesh.faces.size(), before.mesh.faces.size() / 2);
+  for (const float sigma : after.mesh.sigma) {
+    if (!std::isnan(sigma)) EXPECT_GE(sigma, 0.9 * rms);
+  }
+  EXPECT_GT(smallest_sigma(after), smallest_sigma(before));
 }
 
 INSTANTIATE_TEST_SUITE_P(Filter,
