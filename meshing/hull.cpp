@@ -77,7 +77,9 @@ std::vector<Face> unique_faces(const std::vector<Face>& faces, const std::vector
     for (size_t k = 0; k < 3; ++k) face_at[{faces[f][k], faces[f][(k + 1) % 3]}] = f;
   }
   DisjointSets parts(faces.size());
-  for (const auto& [edge, f] : face_at) {
+  for (const auto& entry : face_at) {
+    const auto& edge = entry.first;  // not a binding: lambdas cannot capture one
+    const auto& f = entry.second;
     const uint32_t g = face_at.at({edge.second, edge.first});
     const auto& tip = *std::find_if(faces[g].begin(), faces[g].end(), [&](uint32_t v) {
       return v != edge.first && v != edge.second;
