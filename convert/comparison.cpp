@@ -34,7 +34,8 @@ std::array<size_t, 4> change_counts(const std::vector<Deviation>& deviations) {
 
 double share(size_t count, const Comparison& comparison) {
   return static_cast<double>(count) /
-         static_cast<double>(std::max<size_t>(1, comparison.summary.count));
+         static_cast<double>(
+             std::max<size_t>(1, comparison.summary.count + comparison.without_distance));
 }
 
 std::array<std::pair<const char*, double>, 9> summary_rows(const DeviationSummary& s) {
@@ -47,15 +48,6 @@ std::array<std::pair<const char*, double>, 9> summary_rows(const DeviationSummar
            {"p95", s.p95},
            {"p95_absolute", s.p95_absolute},
            {"max_absolute", s.max_absolute}}};
-}
-
-// Blue, white, red.
-Eigen::Vector3f diverging(double t) {
-  const Eigen::Vector3f cold(0.13f, 0.30f, 0.68f);
-  const Eigen::Vector3f warm(0.75f, 0.12f, 0.14f);
-  const Eigen::Vector3f white = Eigen::Vector3f::Constant(0.96f);
-  const auto amount = static_cast<float>(std::sqrt(std::min(1.0, std::abs(t))));
-  return white + amount * ((t < 0 ? cold : warm) - white);
 }
 
 Json registration_json(const Registration& r, const MeasurableMesh& a, const FigureUnit& unit) {
@@ -77,6 +69,23 @@ Json registration_json(const Registration& r, const MeasurableMesh& a, const Fig
 }
 
 }  // namespace
+
+double range_of(const std::vector<Deviation>& deviations) {
+  std::vector<double> sizes;
+  sizes.reserve(deviations.size());
+  for (const Deviation& d : deviations) sizes.push_back(std::abs(d.distance));
+  std::sort(sizes.begin(), sizes.end());
+  const double most = sizes.empty() ? 0 : sizes[(sizes.size() - 1) * 98 / 100];
+  return std::max(most, 1e-9);
+}
+
+Eigen::Vector3f diverging_color(double t) {
+  const Eigen::Vector3f cold(0.13f, 0.30f, 0.68f);
+  const Eigen::Vector3f warm(0.75f, 0.12f, 0.14f);
+  const Eigen::Vector3f white = Eigen::Vector3f::Constant(0.96f);
+  const auto amount = static_cast<float>(std::sqrt(std::min(1.0, std::abs(t))));
+  return white + amount * ((t < 0 ? cold : warm) - white);
+}
 
 MeasurableMesh in_frame_of(const MeasurableMesh& mesh, const Frame& frame) {
   const bool known = mesh.frame.has_metric_scale() && frame.has_metric_scale();
@@ -124,7 +133,7 @@ Json comparison_json(const Comparison& comparison,
        {{"unchanged", share(changes[1], comparison)},
         {"nearer", share(changes[2], comparison)},
         {"farther", share(changes[3], comparison)},
-        {"not_comparable", share(changes[0], comparison)}}},
+        {"not_comparable", share(changes[0] + comparison.without_distance, comparison)}}},
       {"registration", nullptr},
       {"agreement", nullptr}};
   if (comparison.registration) {
@@ -162,12 +171,14 @@ std::string comparison_text(const Comparison& comparison, const FigureUnit& unit
   }
   const auto changes = change_counts(comparison.by_area);
   if (changes[0] == comparison.summary.count) {
-    out += "change: cannot be told, as no place has a sigma in both and was observed in both\n";
+    out += "change: cannot be told, as " + comparison.no_change_rule + "\n";
   } else {
-    out += "change beyond 2 sigma: " + text_of("%.2f", 100 * share(changes[2], comparison)) +
-           " % nearer, " + text_of("%.2f", 100 * share(changes[3], comparison)) +
-           " % farther; unchanged " + text_of("%.2f", 100 * share(changes[1], comparison)) +
-           " %; not comparable " + text_of("%.2f", 100 * share(changes[0], comparison)) + " %\n";
+    out += "change " + comparison.change_rule + ": " +
+           text_of("%.2f", 100 * share(changes[2], comparison)) + " % nearer, " +
+           text_of("%.2f", 100 * share(changes[3], comparison)) + " % farther; unchanged " +
+           text_of("%.2f", 100 * share(changes[1], comparison)) + " %; not comparable " +
+           text_of("%.2f", 100 * share(changes[0] + comparison.without_distance, comparison)) +
+           " %\n";
   }
   const auto counts =
       histogram(comparison.by_area, -comparison.half_range, comparison.half_range, kBins / 2);
@@ -196,7 +207,7 @@ void write_histogram_svg(const std::filesystem::path& path,
       xml_text(title) + "</text>\n";
   for (size_t i = 0; i < counts.size(); ++i) {
     const double middle = (2.0 * static_cast<double>(i) + 1) / kBins - 1;
-    const Eigen::Vector3f color = 255 * diverging(middle);
+    const Eigen::Vector3f color = 255 * diverging_color(middle);
     const double height = 310.0 * static_cast<double>(counts[i]) / static_cast<double>(most);
     out += "<rect x=\"" + text_of("%.1f", 50 + 20 * static_cast<double>(i)) + "\" y=\"" +
            text_of("%.1f", 360 - height) + "\" width=\"19\" height=\"" + text_of("%.1f", height) +
@@ -225,7 +236,7 @@ void write_colored(const std::filesystem::path& path,
   for (const Deviation& d : of_vertices) {
     distance.values.push_back(static_cast<float>(d.distance * mesh.frame.scale));
     change.values.push_back(static_cast<float>(d.change));
-    out.colors.push_back(diverging(d.distance / half_range));
+    out.colors.push_back(diverging_color(d.distance / half_range));
   }
   write_mesh_ply(path, out, mesh.frame, {distance, change});
 }

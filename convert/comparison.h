@@ -36,8 +36,18 @@ struct Comparison {
   DeviationSummary summary;
   std::optional<Registration> registration;
   std::optional<Agreement> agreement;
-  double half_range = 0;  ///< Of histogram and colours [internal units]: 98 % lie within.
+  double half_range = 0;        ///< Of histogram and colours [internal units]: 98 % lie within.
+  size_t without_distance = 0;  ///< Points of A that are not in by_area, as B has nothing there.
+  std::string change_rule = "beyond 2 sigma";  ///< What counts as change, for people.
+  std::string no_change_rule =                 ///< Why no change can be told where it cannot.
+      "no place has a sigma in both and was observed in both";
 };
+
+/// Half the width of a histogram that holds 98 % of the distances; > 0 [internal units].
+double range_of(const std::vector<Deviation>& deviations);
+
+/// Blue for -1, white for 0, red for 1, and what lies between.
+Eigen::Vector3f diverging_color(double t);
 
 /// {"unit", "distance": {…}, "histogram": {"low", "high", "counts"}, "change": shares of A's
 /// points, "registration", "agreement"}; see the README.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <optional>
 #include <utility>
 
@@ -14,6 +13,7 @@
 #include "convert/model.h"
 #include "convert/pipeline.h"
 #include "convert/simplification.h"
+#include "convert/stated_frame.h"
 #include "convert/volume_file.h"
 #include "io/byte_reader.h"
 #include "io/dot_splat.h"
@@ -50,21 +50,12 @@ struct Source {
   TriangleMesh mesh;
   std::vector<std::string> warnings;  ///< Of reading the mesh.
   Frame frame;
-  Eigen::Vector3d up = -Eigen::Vector3d::UnitY();
 };
-
-std::string extension_of(const std::filesystem::path& path) {
-  std::string out = path.extension().string();
-  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return out;
-}
 
 /// Files of a mesh: PLY has to be looked into, it may hold splats.
 bool holds_mesh(const std::filesystem::path& path) {
   if (!is_mesh_name(path)) return false;
-  if (extension_of(path) != ".ply") return true;
+  if (lower_extension(path) != ".ply") return true;
   const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
   if (start.substr(0, 3) != "ply") return false;
   const PlyHeader header = parse_ply_header(start, path);
@@ -77,8 +68,7 @@ Source read_source(const std::filesystem::path& path) {
   if (is_folder(path)) {
     out.model = read_model(path);
     out.frame = out.model->scene.frame;
-    out.up = world_up(out.model->scene);
-  } else if (extension_of(path) == ".vdb") {
+  } else if (lower_extension(path) == ".vdb") {
     out.content = Content::Volume;
     out.volume = read_volume(path);
     out.frame = out.volume->frame;
@@ -88,7 +78,6 @@ Source read_source(const std::filesystem::path& path) {
     out.mesh = std::move(file.content.mesh);
     out.frame = file.content.frame;
     out.warnings = std::move(file.warnings);
-    if (file.up) out.up = *file.up;
   } else {
     out.splats = read_splats(path);
     out.frame = out.splats->frame;
@@ -98,7 +87,7 @@ Source read_source(const std::filesystem::path& path) {
 
 /// What the output is to hold, by its name, the flag, and for .ply and .glb the input.
 Content wanted_content(const ConversionRequest& request, Content from) {
-  const std::string extension = extension_of(request.output);
+  const std::string extension = lower_extension(request.output);
   const auto is = [&](std::initializer_list<const char*> names) {
     return std::find(names.begin(), names.end(), extension) != names.end();
   };
@@ -126,7 +115,7 @@ Content wanted_content(const ConversionRequest& request, Content from) {
 
 Json write_splats(const ConversionRequest& request, const Source& source) {
   const Gaussians& g = source.model ? source.model->gaussians : source.splats->gaussians;
-  const std::string extension = extension_of(request.output);
+  const std::string extension = lower_extension(request.output);
   if (extension == ".splat") {
     const DotSplatReport made = write_dot_splat(request.output, g, source.frame);
     return {{"format", ".splat"},
@@ -146,7 +135,7 @@ Json write_splats(const ConversionRequest& request, const Source& source) {
   }
   if (extension == ".glb") {
     const size_t bytes =
-        write_splat_glb(request.output, g, source.frame, {.y_up = y_up_from(source.up)});
+        write_splat_glb(request.output, g, source.frame, {.y_up = y_up_from(source.frame.up)});
     return {{"format", "KHR_gaussian_splatting"}, {"splats", g.size()}, {"bytes", bytes}};
   }
   write_gaussian_ply(request.output, g, source.frame);
@@ -205,25 +194,56 @@ TriangleMesh make_mesh(const ConversionRequest& request,
   return mesh;
 }
 
+void simplify_mesh(const ConversionRequest& request, Source& source, Terminal& terminal) {
+  const auto options = simplify_options(request.simplify, 1, source.frame);
+  if (!options || source.mesh.faces.empty()) return;
+  const Progress progress = terminal.begin("simplify");
+  source.mesh = simplify(source.mesh, *options, progress).mesh;
+  terminal.end(std::to_string(source.mesh.faces.size()) + " faces");
+}
+
 void write_mesh(const ConversionRequest& request,
                 const Source& source,
                 const TriangleMesh& mesh,
                 const Json& report) {
   GlbOptions options;
-  if (!request.max_error.empty()) {
-    options.max_error = parse_length(request.max_error, source.frame) * source.frame.scale;
+  if (!request.compression_error.empty()) {
+    options.max_error = parse_length(request.compression_error, source.frame) * source.frame.scale;
   }
   options.summary_json = json_text(report, -1);
-  write_mesh_as(request.output, mesh, source.frame, source.up, options);
+  write_mesh_as(request.output, mesh, source.frame, options);
+}
+
+void refuse_for_splats(const ConversionRequest& request) {
+  const char* const given = request.open_surface                 ? "--open"
+                            : !request.simplify.empty()          ? "--simplify"
+                            : !request.volume.voxel_size.empty() ? "--voxel-size"
+                                                                 : nullptr;
+  if (given != nullptr) throw InvalidInput(std::string(given) + " has no effect on splats");
 }
 
 /// Refuses at once what would be refused after minutes of work.
 void check_before_work(const ConversionRequest& request, const Source& source, Content wanted) {
   require_writable_as(request.output, source.frame);
-  if (wanted == Content::Splats) return;
+  if (source.content == Content::Mesh && request.open_surface) {
+    throw InvalidInput("--open has no effect on an input that is a mesh already");
+  }
+  if (source.content != Content::Splats && !request.volume.voxel_size.empty()) {
+    throw InvalidInput("--voxel-size has no effect on an input that holds no splats");
+  }
+  if (!request.compression_error.empty() &&
+      (wanted != Content::Mesh || lower_extension(request.output) != ".glb")) {
+    throw InvalidInput("--compression-error is for meshes in .glb alone");
+  }
+  if (wanted == Content::Splats) {
+    refuse_for_splats(request);
+    return;
+  }
   if (!request.volume.voxel_size.empty())
     (void)parse_length(request.volume.voxel_size, source.frame);
-  if (!request.max_error.empty()) (void)parse_length(request.max_error, source.frame);
+  if (!request.compression_error.empty()) {
+    (void)parse_length(request.compression_error, source.frame);
+  }
   (void)simplify_options(request.simplify, 1, source.frame);
 }
 
@@ -240,7 +260,7 @@ Json bounds_json(const Gaussians& gaussians, const Frame& frame) {
 }  // namespace
 
 bool is_splat_ply(const std::filesystem::path& path) {
-  if (extension_of(path) != ".ply" || is_folder(path)) return false;
+  if (lower_extension(path) != ".ply" || is_folder(path)) return false;
   const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
   if (start.substr(0, 3) != "ply") return false;
   const PlyHeader header = parse_ply_header(start, path);
@@ -290,15 +310,15 @@ std::string conversion_table() {
 Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   ConversionRequest request = given;
   Source source = read_source(request.input);
-  // Splats of others are rough at the size of a voxel: hardly a face could go within a part of one.
-  if (source.splats && request.simplify.empty()) request.simplify = "0";
-  if (!request.up.empty()) source.up = {request.up[0], request.up[1], request.up[2]};
+  settle_up(source.frame, request.up, source.content == Content::Splats);
   if (!request.assume_unit.empty()) {
-    source.frame.metres_per_unit = metres_in(request.assume_unit);
-    source.frame.scale_source = ScaleSource::Assumed;
+    const std::string refused = assume_unit(source.frame, request.assume_unit);
+    if (!refused.empty()) source.warnings.push_back(refused);
   }
   const Content wanted = wanted_content(request, source.content);
   check_before_work(request, source, wanted);
+  // Splats of others are rough at the size of a voxel: hardly a face could go within a part of one.
+  if (source.splats && request.simplify.empty()) request.simplify = "0";
   Json report = {{"input", request.input.filename().string()}};
   if (source.splats) {
     report["splats"] = splat_file_to_json(*source.splats);
@@ -318,6 +338,8 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
       return report;
     }
     source.mesh = make_mesh(request, volume, source.frame, terminal, report);
+  } else if (!request.simplify.empty()) {
+    simplify_mesh(request, source, terminal);
   }
   if (from_splats_alone) {
     report["evidence"] = "none: the surface was seen by virtual cameras only";

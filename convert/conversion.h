@@ -19,12 +19,12 @@ struct ConversionRequest {
   std::filesystem::path output;
   std::string as;  ///< "mesh" or "splats" for .ply and .glb, which can be both; empty = rule.
   bool open_surface = false;  ///< Leave meshes open where nothing was seen.
-  std::string simplify;     ///< Largest error; "0" = none; empty = none for splats without cameras,
-                            ///< else a quarter of a voxel.
-  std::string max_error;    ///< Of a compressed .glb; empty = 1/16384 of its size.
-  std::string assume_unit;  ///< Unit of one scene unit where the input does not say.
+  std::string simplify;  ///< Largest error; "0" = none; empty = a quarter of a voxel for meshes
+                         ///< from volumes, none for meshes and for splats without cameras.
+  std::string compression_error;  ///< Of a .glb; empty = 1/16384 of its size.
+  std::string assume_unit;        ///< Unit of one scene unit where the input does not say.
   std::vector<double>
-      up;  ///< World direction; empty = of the input, else -y, the way 3DGS files lie.
+      up;  ///< World direction; empty = of the input, else +z for meshes, -y as 3DGS files lie.
   int spz_version = 3;
   SplatVolumeRequest volume;
 };

@@ -21,7 +21,8 @@ nlohmann::ordered_json frame_to_json(const Frame& frame) {
           {"file_origin", vector_to_json(frame.file_origin)},
           {"metres_per_unit", frame.metres_per_unit},
           {"metres_sigma", frame.metres_sigma},
-          {"scale_source", static_cast<int>(frame.scale_source)}};
+          {"scale_source", static_cast<int>(frame.scale_source)},
+          {"up", vector_to_json(frame.up)}};
 }
 
 Frame frame_from_json(const nlohmann::ordered_json& json) {
@@ -32,6 +33,7 @@ Frame frame_from_json(const nlohmann::ordered_json& json) {
   frame.metres_per_unit = json.at("metres_per_unit").get<double>();
   frame.metres_sigma = json.at("metres_sigma").get<double>();
   frame.scale_source = static_cast<ScaleSource>(json.at("scale_source").get<int>());
+  if (json.contains("up")) frame.up = vector_from_json(json["up"]);
   frame.validate();
   return frame;
 }

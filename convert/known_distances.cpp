@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/length.h"
-#include "io/exif.h"
 #include "io/orientation.h"
 #include "io/resample.h"
 #include "io/scene_reader.h"
@@ -50,31 +49,16 @@ KnownDistance::Pick pick_of(const std::string& text, const Scene& scene) {
     throw InvalidInput("--known-distance: view " + printable(name) +
                        " is held out, so no depth is measured there; pick in an input view");
   }
-  // Viewers turn pictures as Exif says; cameras that came with the photographs do not.
-  const int shown = exif_orientation(view.image_path);
-  const ImageSize stored = image_size(view.image_path);
-  const ImageSize size = turned(stored, shown);
-  if (pick.x < 0 || pick.y < 0 || pick.x > size.width - 1 || pick.y > size.height - 1) {
+  const auto at = picked_pixel(view, {pick.x, pick.y});
+  if (!at) {
+    const ImageSize size = shown_size(view);
     throw InvalidInput("--known-distance: " + printable(text) + " lies outside of the " +
                        std::to_string(size.width) + " x " + std::to_string(size.height) +
                        " pixels of " + printable(view.image_path));
   }
-  if (shown != view.orientation) {
-    const Eigen::Vector2d at = stored_pixel({pick.x, pick.y}, stored, shown);
-    pick.x = at.x();
-    pick.y = at.y();
-  }
+  pick.x = at->x();
+  pick.y = at->y();
   return pick;
-}
-
-// "1.2m" or "1.2m+-3mm" into metres and their sigma.
-std::pair<double, double> metres_and_sigma(std::string text) {
-  const std::string plus_minus = "±";
-  const size_t sign = text.find(plus_minus);
-  if (sign != std::string::npos) text.replace(sign, plus_minus.size(), "+-");
-  const size_t split = text.find("+-");
-  const double metres = parse_metres(text.substr(0, split));
-  return {metres, split == std::string::npos ? 0 : parse_metres(text.substr(split + 2))};
 }
 
 /// A picked point of the surface [internal units].
@@ -139,6 +123,12 @@ double variance_of_end(const Picked& end, const Eigen::Vector3d& direction) {
   return std::pow(along * end.depth_sigma, 2) + across * std::pow(end.sideways_sigma, 2);
 }
 
+/// A scale bar as messages call it.
+struct NamedBar {
+  std::string name;
+  ScaleBar bar;
+};
+
 ScaleBar bar_of(const KnownDistance& distance, const Model& model) {
   const Picked a = picked_point(distance.a, model, distance.text);
   const Picked b = picked_point(distance.b, model, distance.text);
@@ -154,18 +144,18 @@ ScaleBar bar_of(const KnownDistance& distance, const Model& model) {
   return {scale * length, scale * std::sqrt(variance), distance.metres, distance.sigma};
 }
 
-Json warnings_of(const BarScale& scale, const std::vector<KnownDistance>& distances) {
+Json warnings_of(const BarScale& scale, const std::vector<NamedBar>& bars) {
   Json out = Json::array();
-  for (size_t i = 0; i < distances.size(); ++i) {
+  for (size_t i = 0; i < bars.size(); ++i) {
     if (scale.used[i]) continue;
-    out.push_back("known distance " + printable(distances[i].text) +
+    out.push_back("known distance " + printable(bars[i].name) +
                   " disagrees with the others by more than 3 sigma and is left out");
   }
   if (!scale.is_consistent) {
     std::string text =
         "the known distances disagree by more than 3 sigma; the uncertainty of the scale is "
         "widened to cover it";
-    if (distances.size() == 2) text += ", and a third distance may tell which is wrong";
+    if (bars.size() == 2) text += ", and a third distance may tell which is wrong";
     out.push_back(std::move(text));
   }
   return out;
@@ -181,18 +171,29 @@ std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typ
     KnownDistance distance;
     distance.a = pick_of(words[0], scene);
     distance.b = pick_of(words[1], scene);
-    std::tie(distance.metres, distance.sigma) = metres_and_sigma(words[2]);
+    std::tie(distance.metres, distance.sigma) = parse_metres_with_sigma(words[2]);
     distance.text = words[0] + " " + words[1] + " " + words[2];
     out.push_back(std::move(distance));
   }
   return out;
 }
 
-Json scale_by(const std::vector<KnownDistance>& distances, Model& model) {
-  if (distances.empty()) return nullptr;
+Json scale_by(const std::vector<KnownDistance>& distances,
+              const std::vector<MarkerBar>& markers,
+              Model& model) {
+  std::vector<NamedBar> named;
+  named.reserve(distances.size() + markers.size());
+  for (const KnownDistance& distance : distances) {
+    named.push_back({distance.text, bar_of(distance, model)});
+  }
+  for (const MarkerBar& marker : markers) {
+    const std::string shown = std::to_string(marker.photographs) + " photographs";
+    named.push_back({"side of marker " + marker.name + ", " + shown, marker.bar});
+  }
+  if (named.empty()) return nullptr;
   std::vector<ScaleBar> bars;
-  bars.reserve(distances.size());
-  for (const KnownDistance& distance : distances) bars.push_back(bar_of(distance, model));
+  bars.reserve(named.size());
+  for (const NamedBar& bar : named) bars.push_back(bar.bar);
   const BarScale scale = scale_of(bars);
   Frame& frame = model.scene.frame;
   frame.metres_per_unit = scale.metres_per_unit;
@@ -200,7 +201,7 @@ Json scale_by(const std::vector<KnownDistance>& distances, Model& model) {
   frame.scale_source = ScaleSource::KnownDistance;
   Json list = Json::array();
   for (size_t i = 0; i < bars.size(); ++i) {
-    list.push_back({{"distance", distances[i].text},
+    list.push_back({{"distance", named[i].name},
                     {"known", bars[i].known},
                     {"measured", bars[i].measured * scale.metres_per_unit},
                     {"sigma", bars[i].measured_sigma * scale.metres_per_unit},
@@ -210,7 +211,7 @@ Json scale_by(const std::vector<KnownDistance>& distances, Model& model) {
   return {{"metres_per_unit", scale.metres_per_unit},
           {"metres_sigma", scale.sigma},
           {"distances", list},
-          {"warnings", warnings_of(scale, distances)}};
+          {"warnings", warnings_of(scale, named)}};
 }
 
 }  // namespace cgs

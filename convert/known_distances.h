@@ -7,6 +7,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "convert/marker_bars.h"
 #include "convert/model.h"
 
 namespace cgs {
@@ -35,13 +36,16 @@ using DistanceWords = std::array<std::string, 3>;
 std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typed,
                                            const Scene& scene);
 
-/// Gives a model the scale by which its depths fit the distances; with none, does nothing.
+/// Gives a model the scale by which its depths fit the distances, and its cameras the markers; with
+/// none of both, does nothing.
 ///
-/// The sigma of a length in the scene is that of the depths at both ends and of half a pixel of the
-/// images worked on.
+/// The sigma of a picked length in the scene is that of the depths at both ends and of half a pixel
+/// of the images worked on.
 /// \return {"metres_per_unit", "metres_sigma", "distances": [{"distance", "known", "measured",
-///          "sigma", "residual", "used"}], "warnings"}, lengths in metres; null for no distance
+///          "sigma", "residual", "used"}], "warnings"}, lengths in metres; null for neither
 /// \throws InvalidInput where no depth was measured at a pixel, or both ends fall together
-nlohmann::ordered_json scale_by(const std::vector<KnownDistance>& distances, Model& model);
+nlohmann::ordered_json scale_by(const std::vector<KnownDistance>& distances,
+                                const std::vector<MarkerBar>& markers,
+                                Model& model);
 
 }  // namespace cgs

@@ -62,6 +62,15 @@ double parse_metres(const std::string& text) {
   return value * metres_in(unit);
 }
 
+std::pair<double, double> parse_metres_with_sigma(std::string text) {
+  const std::string plus_minus = "±";
+  const size_t sign = text.find(plus_minus);
+  if (sign != std::string::npos) text.replace(sign, plus_minus.size(), "+-");
+  const size_t split = text.find("+-");
+  const double metres = parse_metres(text.substr(0, split));
+  return {metres, split == std::string::npos ? 0 : parse_metres(text.substr(split + 2))};
+}
+
 std::string format_length(double internal_length, const Frame& frame) {
   std::array<char, 64> text{};
   const double units = internal_length * frame.scale;
@@ -88,6 +97,53 @@ size_t parse_bytes(const std::string& text) {
     throw InvalidInput("'" + text + "' is not an amount of memory; write 512M or 4G");
   }
   return static_cast<size_t>(std::ldexp(value, 10 * (static_cast<int>(power) + 1)));
+}
+
+size_t parse_file_size(const std::string& text) {
+  const auto [value, suffix] = number_and_suffix(text, "size of a file");
+  static constexpr std::array<std::pair<std::string_view, double>, 9> kSizes = {{{"", 1},
+                                                                                 {"B", 1},
+                                                                                 {"kB", 1e3},
+                                                                                 {"KB", 1e3},
+                                                                                 {"MB", 1e6},
+                                                                                 {"GB", 1e9},
+                                                                                 {"KiB", 0x1p10},
+                                                                                 {"MiB", 0x1p20},
+                                                                                 {"GiB", 0x1p30}}};
+  for (const auto& [name, bytes] : kSizes) {
+    const double size = value * bytes;
+    if (suffix == name && size >= 1 && size < 0x1p53) return static_cast<size_t>(size);
+  }
+  throw InvalidInput("'" + text + "' is not the size of a file; write 800kB, 2MB or 1.5MiB");
+}
+
+double parse_seconds(const std::string& text) {
+  const auto [value, unit] = number_and_suffix(text, "time");
+  for (const auto& [name, seconds] :
+       {std::pair("", 1.0), std::pair("s", 1.0), std::pair("min", 60.0), std::pair("h", 3600.0)}) {
+    if (unit == name) return value * seconds;
+  }
+  throw InvalidInput("'" + text + "' is not a time; write 90s, 3min or 1.5h");
+}
+
+std::string format_seconds(double seconds) {
+  const auto whole = std::llround(seconds);
+  if (whole < 60) return std::to_string(whole) + " s";
+  if (whole < 3600) {
+    return std::to_string(whole / 60) + " min " + std::to_string(whole % 60) + " s";
+  }
+  return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
+}
+
+std::string format_file_size(size_t bytes) {
+  std::array<char, 40> text{};
+  const auto size = double(bytes);
+  if (size >= 1e6) {
+    std::snprintf(text.data(), text.size(), "%.2f MB", size * 1e-6);
+  } else {
+    std::snprintf(text.data(), text.size(), "%.1f kB", size * 1e-3);
+  }
+  return text.data();
 }
 
 }  // namespace cgs

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <new>
 #include <string>
 #include <vector>
@@ -76,6 +77,10 @@ int main(int argc, char** argv) {
   } catch (const cgs::Error& error) {
     std::fprintf(stderr, "cgs: %s\n", error.what());
     return error.exit_code();
+  } catch (const std::filesystem::filesystem_error& error) {
+    const cgs::IoError io(error.path1(), error.code().message());
+    std::fprintf(stderr, "cgs: %s\n", io.what());
+    return io.exit_code();
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "cgs: LIMIT: out of memory; try --downscale 2 or a larger --voxel-size\n");
     return 4;

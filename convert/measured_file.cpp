@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/length.h"
+#include "convert/stated_frame.h"
 #include "io/byte_reader.h"
 #include "libcgs/core/error.h"
 
@@ -38,15 +38,8 @@ MeasurableFile read_measured(const std::filesystem::path& path,
                              const std::optional<Frame>& frame) {
   MeasurableFile out = read_mesh_file(path, frame);
   if (assume_unit.empty()) return out;
-  Frame& read = out.content.frame;
-  const double metres = metres_in(assume_unit);
-  if (!read.has_metric_scale()) {
-    read.metres_per_unit = metres;
-    read.scale_source = ScaleSource::Assumed;
-  } else if (std::abs(read.metres_per_unit / metres - 1) > 1e-9) {
-    out.warnings.push_back("--assume-unit " + assume_unit +
-                           " left out: the file says its unit is " + read.unit_name());
-  }
+  const std::string refused = cgs::assume_unit(out.content.frame, assume_unit);
+  if (!refused.empty()) out.warnings.push_back(refused);
   return out;
 }
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
 
 #include "libcgs/core/error.h"
@@ -21,13 +20,14 @@ struct StageFactors {
   double base;      ///< [bytes]
   double of_pixel;  ///< [bytes]
   double of_voxel;  ///< [bytes per pixel], up to kMostPixels
+  double of_fused;  ///< The same on top, where files are held against the fused surface.
 };
-constexpr std::array<StageFactors, 6> kFactors = {{{"depth and Gaussians", 150 * kMebi, 520, 0},
-                                                   {"views", 103 * kMebi, 200, 0},
-                                                   {"held-out views", 103 * kMebi, 200, 0},
-                                                   {"volume and mesh", 160 * kMebi, 100, 1700},
-                                                   {"textured assets", 95 * kMebi, 100, 570},
-                                                   {"report", 131 * kMebi, 130, 0}}};
+constexpr std::array<StageFactors, 6> kFactors = {{{"depth and Gaussians", 150 * kMebi, 520, 0, 0},
+                                                   {"views", 103 * kMebi, 200, 0, 0},
+                                                   {"held-out views", 103 * kMebi, 200, 0, 0},
+                                                   {"volume and mesh", 160 * kMebi, 100, 1700, 720},
+                                                   {"textured assets", 95 * kMebi, 100, 570, 1500},
+                                                   {"report", 131 * kMebi, 130, 0, 0}}};
 
 // Above, voxels grow with the pixels: TsdfOptions::max_voxels.
 constexpr double kMostPixels = 570e3;
@@ -44,16 +44,24 @@ std::string mebibytes(size_t bytes) {
 
 }  // namespace
 
-std::vector<StageMemory> memory_plan(const Scene& scene, bool chooses_voxels) {
+std::vector<StageMemory> memory_plan(const Scene& scene,
+                                     bool chooses_voxels,
+                                     const MeasuredFiles& measured,
+                                     int downscale) {
   double pixels = 0;
   for (const int i : scene.input) pixels += pixels_of(scene.views[static_cast<size_t>(i)]);
+  pixels /= double(downscale) * downscale;
   std::vector<StageMemory> plan;
   plan.reserve(kFactors.size());
   for (const StageFactors& f : kFactors) {
     const std::string stage = f.stage;
     if (stage == "held-out views" && scene.held_out.empty()) continue;
     if (f.of_voxel > 0 && !chooses_voxels) continue;
-    const double bytes = f.base + f.of_pixel * pixels + f.of_voxel * std::min(pixels, kMostPixels);
+    const bool measures = stage == "volume and mesh" ? measured.meshes : measured.asset;
+    const double of_voxel = f.of_voxel + (measures ? f.of_fused : 0);
+    // Voxels that must keep an error are not made coarser to save memory.
+    const double voxel_pixels = measured.meshes ? pixels : std::min(pixels, kMostPixels);
+    const double bytes = f.base + f.of_pixel * pixels + of_voxel * voxel_pixels;
     plan.push_back({stage, static_cast<size_t>(bytes)});
   }
   return plan;
@@ -67,15 +75,26 @@ std::string memory_plan_text(const std::vector<StageMemory>& plan) {
   return out;
 }
 
-void check_memory_plan(const std::vector<StageMemory>& plan, size_t budget) {
-  const auto most = std::max_element(
-      plan.begin(), plan.end(), [](const auto& a, const auto& b) { return a.bytes < b.bytes; });
-  if (most == plan.end() || most->bytes <= budget) return;
-  const double factor = std::sqrt(double(most->bytes) / double(budget));
-  throw LimitError(
-      "'" + most->stage + "' needs about " + mebibytes(most->bytes) + " and " + mebibytes(budget) +
-      " may be used; a --downscale " + std::to_string(static_cast<int>(std::ceil(factor))) +
-      " times as large or fewer --views make it fit, a larger --memory-limit allows it");
+void check_memory_plan(const Scene& scene,
+                       bool chooses_voxels,
+                       const MeasuredFiles& measured,
+                       size_t budget) {
+  constexpr int kMostDownscale = 32;  // beyond, nothing can be made out in a photograph
+  const auto largest = [&](int downscale) {
+    const auto plan = memory_plan(scene, chooses_voxels, measured, downscale);
+    return *std::max_element(
+        plan.begin(), plan.end(), [](const auto& a, const auto& b) { return a.bytes < b.bytes; });
+  };
+  const StageMemory most = largest(1);
+  if (most.bytes <= budget) return;
+  int factor = 2;
+  while (factor <= kMostDownscale && largest(factor).bytes > budget) ++factor;
+  const std::string fits = factor <= kMostDownscale
+                               ? "a --downscale " + std::to_string(factor) +
+                                     " times as large or fewer --views make it fit, a "
+                               : "no --downscale makes it fit, only a ";
+  throw LimitError("'" + most.stage + "' needs about " + mebibytes(most.bytes) + " and " +
+                   mebibytes(budget) + " may be used; " + fits + "larger --memory-limit allows it");
 }
 
 }  // namespace cgs

@@ -15,6 +15,12 @@ struct StageMemory {
   size_t bytes = 0;
 };
 
+/// What a run holds against the fused surface, which it then needs beside it.
+struct MeasuredFiles {
+  bool meshes = false;  ///< RunRequest::max_error
+  bool asset = false;   ///< RunRequest::max_error or max_size
+};
+
 /// Predicts what the stages of a run will need, from the sizes of its pictures alone.
 ///
 /// What a stage holds grows with the pixels of the input views: a Gaussian, a few voxels and a few
@@ -22,13 +28,20 @@ struct StageMemory {
 /// \param chooses_voxels  false where the user says how large voxels are: stages that depend on
 /// them
 ///                        are then left out, and the volume itself refuses what does not fit
-std::vector<StageMemory> memory_plan(const Scene& scene, bool chooses_voxels);
+/// \param downscale       divides the sides of the pictures once more
+std::vector<StageMemory> memory_plan(const Scene& scene,
+                                     bool chooses_voxels,
+                                     const MeasuredFiles& measured = {},
+                                     int downscale = 1);
 
 /// "depth and Gaussians 410 MiB, views 320 MiB, …"
 std::string memory_plan_text(const std::vector<StageMemory>& plan);
 
-/// \throws LimitError naming the stage that needs most and what to lower, if it needs more than
-///         `budget` [bytes].
-void check_memory_plan(const std::vector<StageMemory>& plan, size_t budget);
+/// \throws LimitError naming the stage of memory_plan() that needs most and by how much to scale
+///         the pictures down, if it needs more than `budget` [bytes].
+void check_memory_plan(const Scene& scene,
+                       bool chooses_voxels,
+                       const MeasuredFiles& measured,
+                       size_t budget);
 
 }  // namespace cgs

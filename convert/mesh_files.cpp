@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <numbers>
 #include <string>
 
@@ -12,6 +11,7 @@
 #include "io/atomic_file.h"
 #include "io/mesh_ply.h"
 #include "io/obj.h"
+#include "io/scene_path.h"
 #include "io/stl.h"
 #include "io/threemf.h"
 #include "libcgs/core/error.h"
@@ -20,18 +20,6 @@
 namespace cgs {
 
 using Json = nlohmann::ordered_json;
-
-namespace {
-
-std::string lower_extension(const std::filesystem::path& path) {
-  std::string out = path.extension().string();
-  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return out;
-}
-
-}  // namespace
 
 Json certificate_to_json(const Certificate& certificate,
                          const TriangleMesh& mesh,
@@ -61,8 +49,7 @@ Json certificate_to_json(const Certificate& certificate,
 Json write_mesh_files(const std::filesystem::path& folder,
                       const TriangleMesh& open_surface,
                       const TriangleMesh& watertight,
-                      const Frame& frame,
-                      const Eigen::Vector3d& up) {
+                      const Frame& frame) {
   if (watertight.faces.empty()) {
     throw NumericalError(
         "no surface was found: the views agree on no depth; choose views that overlap more");
@@ -79,7 +66,7 @@ Json write_mesh_files(const std::filesystem::path& folder,
           "--assume-unit m writes them as if one scene unit were a metre";
       continue;
     }
-    const Eigen::Matrix3d z_up = z_up_from(up);
+    const Eigen::Matrix3d z_up = z_up_from(frame.up);
     if (std::string(name) == "watertight.stl") {
       write_stl(folder / name, watertight, frame, z_up);
     } else {
@@ -107,15 +94,14 @@ void require_writable_as(const std::filesystem::path& path, const Frame& frame) 
 void write_mesh_as(const std::filesystem::path& path,
                    const TriangleMesh& mesh,
                    const Frame& frame,
-                   const Eigen::Vector3d& up,
                    GlbOptions options) {
   require_writable_as(path, frame);
   const std::string extension = lower_extension(path);
-  if (extension == ".stl") return write_stl(path, mesh, frame, z_up_from(up));
-  if (extension == ".3mf") return write_3mf(path, mesh, frame, z_up_from(up));
+  if (extension == ".stl") return write_stl(path, mesh, frame, z_up_from(frame.up));
+  if (extension == ".3mf") return write_3mf(path, mesh, frame, z_up_from(frame.up));
   if (extension == ".obj") return write_obj(path, mesh, frame);
   if (extension == ".ply") return write_mesh_ply(path, mesh, frame);
-  options.y_up = y_up_from(up);
+  options.y_up = y_up_from(frame.up);
   write_glb(path, mesh, frame, options);
 }
 

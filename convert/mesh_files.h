@@ -22,13 +22,12 @@ nlohmann::ordered_json certificate_to_json(const Certificate& certificate,
 
 /// Writes surface.ply, watertight.ply and, where the scale is known, watertight.{stl,3mf}. (The OBJ
 /// may carry photographs, which not every caller has.)
-/// `up` is the world direction that becomes +Z in STL and 3MF.
+/// In STL and 3MF frame.up, which must be known, becomes +Z.
 /// \return {"files": […], "left_out": {"watertight.stl": "why", …}}
 nlohmann::ordered_json write_mesh_files(const std::filesystem::path& folder,
                                         const TriangleMesh& open_surface,
                                         const TriangleMesh& watertight,
-                                        const Frame& frame,
-                                        const Eigen::Vector3d& up);
+                                        const Frame& frame);
 
 /// True for the endings that write_mesh_as() takes: .ply, .obj, .stl, .3mf, .glb, in any case.
 bool is_writable_mesh_name(const std::filesystem::path& path);
@@ -38,13 +37,12 @@ bool is_writable_mesh_name(const std::filesystem::path& path);
 void require_writable_as(const std::filesystem::path& path, const Frame& frame);
 
 /// Writes a mesh in the format that the ending of the path names.
-/// \param up       world direction that becomes +Z in STL and 3MF, +Y in GLB
-/// \param options  for a GLB; its y_up is set from `up`
+/// \param frame    whose `up` becomes +Z in STL and 3MF, +Y in GLB, and must be known for these
+/// \param options  for a GLB; its y_up is set from there
 /// \throws as the writers and require_writable_as()
 void write_mesh_as(const std::filesystem::path& path,
                    const TriangleMesh& mesh,
                    const Frame& frame,
-                   const Eigen::Vector3d& up,
                    GlbOptions options = {});
 
 }  // namespace cgs

@@ -278,6 +278,7 @@ Model read_model(const std::filesystem::path& folder) {
   const auto frame = has_frame ? std::optional(model.scene.frame) : std::nullopt;
   GaussianFile file = read_gaussian_ply(folder / "gaussians.ply", frame);
   if (!has_frame) move_foreign_cameras(model.scene, file);
+  if (!model.scene.frame.knows_up()) model.scene.frame.up = world_up(model.scene);
   model.gaussians = std::move(file.gaussians);
   model.scene.warnings = std::move(file.warnings);
   for (const int i : model.scene.input) {

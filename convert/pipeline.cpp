@@ -13,13 +13,13 @@
 
 #include "convert/frame_json.h"
 #include "convert/length.h"
-#include "convert/memory_plan.h"
 #include "convert/report.h"
 #include "convert/report_viewer.h"
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
 #include "convert/simplification.h"
 #include "convert/stage_cost.h"
+#include "convert/stated_frame.h"
 #include "convert/verification.h"
 #include "convert/views.h"
 #include "io/atomic_file.h"
@@ -37,14 +37,14 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr const char* kPosesFolder = "colmap";  // below the folder of the model
-
 /// One run: the request, what is in memory so far, and the record on disk.
 struct Run {
   const RunRequest& request;
   RunRecord record;
   Scene scene;  ///< As opened: world coordinates.
   std::vector<KnownDistance> distances;
+  std::vector<MarkerBar> markers;
+  Json control;  ///< Of OpenedScene.
   // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
   // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
   std::optional<Model> model;
@@ -109,11 +109,13 @@ Json run_scale(Run& run, const Progress& progress) {
   frame.metres_per_unit = run.scene.frame.metres_per_unit;
   frame.metres_sigma = run.scene.frame.metres_sigma;
   frame.scale_source = run.scene.frame.scale_source;
+  frame.up = run.scene.frame.up;
   take_sensor_scale(sensor_scale(run.record.result("model")), frame);
-  Json result = scale_by(run.distances, model);
+  Json result = run.control;
+  if (result.is_null()) result = scale_by(run.distances, run.markers, model);
   const bool is_new = frame.metres_per_unit != before.metres_per_unit ||
                       frame.metres_sigma != before.metres_sigma ||
-                      frame.scale_source != before.scale_source;
+                      frame.scale_source != before.scale_source || frame.up != before.up;
   if (is_new) write_model(run.request.output / "model", model);
   return result;
 }
@@ -174,6 +176,7 @@ Json report_json(const Run& run) {
               {"photographs", photographs},
               {"stages", stages},
               {"warnings", warnings}};
+  if (!run.request.settings_reason.empty()) out["settings_reason"] = run.request.settings_reason;
   return out;
 }
 
@@ -187,14 +190,24 @@ Json run_report(Run& run, const Progress& progress) {
   return {{"pages", 1}};
 }
 
+// Whether lengths in the scene tell its scale.
+bool states_lengths(const SceneRequest& request) {
+  return !request.known_distances.empty() || !request.marker_size.empty();
+}
+
 /// Which stage a part of the request first has a say in; what is not here decides all.
 const std::map<std::string, std::string>& decided_stages() {
   static const std::map<std::string, std::string> kStages = {{"assume_unit", "scale"},
+                                                             {"up", "scale"},
                                                              {"known_distances", "scale"},
+                                                             {"marker_size", "scale"},
+                                                             {"control_points", "scale"},
                                                              {"held_out_images", "evaluation"},
                                                              {"voxel_size", "mesh"},
                                                              {"simplify", "mesh"},
-                                                             {"max_error", "web"}};
+                                                             {"max_error", "mesh"},
+                                                             {"compression_error", "web"},
+                                                             {"max_size", "web"}};
   return kStages;
 }
 
@@ -291,14 +304,23 @@ Json request_json(const RunRequest& request, const Scene& scene) {
               {"views", request.scene.options.views},
               {"downscale", request.scene.options.downscale.value_or(0)},
               {"assume_unit", request.scene.assume_unit},
+              {"up", request.scene.up},
               {"known_distances", request.scene.known_distances},
+              {"marker_size", request.scene.marker_size},
               {"training", settings_to_json(request.training)},
               {"voxel_size", request.voxel_size},
               {"max_error", request.max_error},
               {"simplify", request.simplify},
+              {"compression_error", request.compression_error},
+              {"max_size", request.max_size},
               {"input_images", inputs},
               {"held_out_images", held_out},
               {"cameras", cameras_hash}};
+  // The cameras have moved with it; what is left is the sigma of the scale.
+  const ControlRequest& control = request.scene.control;
+  if (!control.file.empty()) {
+    out["control_points"] = {{"table", file_hash(control.file)}, {"unit", control.unit}};
+  }
   // Only where it decides something: folders of runs without depth go on as before.
   const bool has_depth = std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
     return !scene.views[static_cast<size_t>(i)].depth_path.empty();
@@ -320,9 +342,39 @@ void OpenedScene::keep(const std::filesystem::path& model) const {
   if (poses && !poses->is_stored) write_photo_poses(model / kPosesFolder, *poses);
 }
 
+std::vector<MarkerBar> scale_markers(const SceneRequest& request, const Scene& scene) {
+  if (request.marker_size.empty()) return {};
+  return marker_bars(scene, request.marker_size);
+}
+
+namespace {
+
+void refuse_two_scales(const SceneRequest& request) {
+  const ControlRequest& control = request.control;
+  if (control.file.empty() && !control.unit.empty()) {
+    throw InvalidInput("--control-unit is the unit of --control-points, which is not given");
+  }
+  for (const auto& [option, is_given] :
+       {std::pair("--known-distance", !request.known_distances.empty()),
+        std::pair("--marker-size", !request.marker_size.empty()),
+        std::pair("--assume-unit", !request.assume_unit.empty()),
+        std::pair("--up", !request.up.empty())}) {
+    if (control.file.empty() || !is_given) continue;
+    throw InvalidInput(std::string("--control-points tells scale, unit and up of the scene, and ") +
+                       option + " would tell it once more; leave that out");
+  }
+  if (!request.assume_unit.empty() && states_lengths(request)) {
+    throw InvalidInput(
+        "--assume-unit states the scale that --known-distance or --marker-size measures; give one");
+  }
+}
+
+}  // namespace
+
 OpenedScene open_scene(const SceneRequest& request,
                        const std::filesystem::path& model,
                        Terminal& terminal) {
+  refuse_two_scales(request);
   require(request.focal >= 0 && std::isfinite(request.focal),
           "--focal must be a number of pixels above 0",
           request.focal);
@@ -342,14 +394,21 @@ OpenedScene open_scene(const SceneRequest& request,
                          " states them (" + out.scene.kind + ")");
     }
   }
-  if (!request.assume_unit.empty() && !request.known_distances.empty()) {
-    throw InvalidInput("--assume-unit and --known-distance both state the scale; give one");
+  if (!request.control.file.empty()) {
+    out.control = move_to_control_frame(request.control, out.scene);
+    return out;
   }
   if (!request.assume_unit.empty()) {
-    out.scene.frame.metres_per_unit = metres_in(request.assume_unit);
-    out.scene.frame.scale_source = ScaleSource::Assumed;
+    const std::string refused = assume_unit(out.scene.frame, request.assume_unit);
+    if (!refused.empty()) out.scene.warnings.push_back(refused);
   }
+  out.scene.frame.up = request.up.empty() ? world_up(out.scene) : up_direction(request.up);
   return out;
+}
+
+MeasuredFiles measured_files(const RunRequest& request) {
+  return {.meshes = !request.max_error.empty(),
+          .asset = !request.max_error.empty() || request.max_size > 0};
 }
 
 size_t memory_budget(size_t limit) {
@@ -367,7 +426,8 @@ size_t memory_budget(size_t limit) {
 FusedVolume fuse_model(const Model& model,
                        const std::string& voxel_size,
                        size_t memory_limit,
-                       const Progress& progress) {
+                       const Progress& progress,
+                       double coarsest_voxel) {
   std::vector<TsdfView> views;
   const std::vector<SupportView> inputs = support_views(model);
   for (size_t k = 0; k < model.scene.input.size(); ++k) {
@@ -382,6 +442,7 @@ FusedVolume fuse_model(const Model& model,
     views.push_back(std::move(view));
   }
   TsdfOptions options;
+  options.coarsest_voxel = coarsest_voxel;
   if (!voxel_size.empty()) options.voxel_size = parse_length(voxel_size, model.scene.frame);
   options.memory_limit = memory_budget(memory_limit);
   return fuse(views, options, progress);
@@ -420,6 +481,20 @@ void note_outputs(Run& run, bool is_fresh) {
   run.record.note("outputs", output_hashes(run.request.output, names));
 }
 
+// What later stages made of other settings must not stand beside what comes now, as if it belonged
+// to it, should this run end before them.
+void remove_outputs_after(const Stage& first, const Run& run) {
+  bool is_later = false;
+  for (const Stage& stage : stages_of(run.scene)) {
+    if (is_later) {
+      for (const std::string& name : stage.files) {
+        std::filesystem::remove(run.request.output / name);
+      }
+    }
+    is_later = is_later || stage.name == first.name;
+  }
+}
+
 Json run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
   for (const Stage& stage : stages_of(run.scene)) {
@@ -427,6 +502,7 @@ Json run_stages(Run& run, Terminal& terminal) {
       terminal.say(stage.title + ": done before");
       continue;
     }
+    if (!stale) remove_outputs_after(stage, run);
     stale = true;
     const CostMeter meter;  // from here on the peak of memory is that of the stage
     const Json result = stage.work(run, terminal.begin(stage.title));
@@ -436,6 +512,10 @@ Json run_stages(Run& run, Terminal& terminal) {
   }
   forget_checkpoints(run.request.output / "model");
   run.record.note("focal", run.request.scene.focal);
+  const std::filesystem::path& control = run.request.scene.control.file;
+  if (!control.empty()) {
+    run.record.note("control_points", std::filesystem::weakly_canonical(control).string());
+  }
   run.record.note("depth_options", depth_options_json(run.request.scene.options.depth));
   note_outputs(run, stale);
   loaded_model(run);
@@ -445,23 +525,42 @@ Json run_stages(Run& run, Terminal& terminal) {
 // Refuses lengths that cannot be read before anything is computed. Where the scale will be known,
 // any stands for it.
 void check_lengths(const RunRequest& request, Frame frame) {
-  if (!request.scene.known_distances.empty()) frame.metres_per_unit = 1;
+  if (states_lengths(request.scene)) frame.metres_per_unit = 1;
   if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, frame);
-  if (!request.max_error.empty()) (void)parse_length(request.max_error, frame);
+  for (const std::string& length : {request.max_error, request.compression_error}) {
+    if (!length.empty()) (void)parse_length(length, frame);
+  }
   (void)simplify_options(request.simplify, 1, frame);
+}
+
+// A promise is about all that is done to the fused surface; its parts are then no longer free.
+void refuse_contradictions(const RunRequest& request) {
+  if (request.max_error.empty()) return;
+  for (const auto& [option, value] :
+       {std::pair("--simplify", request.simplify),
+        std::pair("--compression-error", request.compression_error)}) {
+    if (value.empty()) continue;
+    throw InvalidInput(
+        std::string("--max-error is the largest sum of all errors of the meshes and ") + option +
+        " one of them; give one of the two");
+  }
 }
 
 }  // namespace
 
 Json run_pipeline(const RunRequest& request, Terminal& terminal) {
+  refuse_contradictions(request);
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   Scene& scene = opened.scene;
   for (const std::string& warning : scene.warnings) terminal.warn(warning);
-  const std::vector<StageMemory> plan = memory_plan(scene, request.voxel_size.empty());
+  const bool chooses_voxels = request.voxel_size.empty();
+  const MeasuredFiles measured = measured_files(request);
+  const std::vector<StageMemory> plan = memory_plan(scene, chooses_voxels, measured);
   terminal.say("memory: " + memory_plan_text(plan));
-  check_memory_plan(plan, memory_budget(request.memory_limit));
+  check_memory_plan(scene, chooses_voxels, measured, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
+  std::vector<MarkerBar> markers = scale_markers(request.scene, scene);
   check_lengths(request, scene.frame);
   make_output_folder(request.output);
   const FolderLock lock(request.output);
@@ -481,7 +580,14 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   Json predicted = Json::object();
   for (const StageMemory& stage : plan) predicted[stage.stage] = stage.bytes;
   record.note("predicted_memory", predicted);
-  Run run{request, std::move(record), std::move(scene), std::move(distances), {}, {}};
+  Run run{request,
+          std::move(record),
+          std::move(scene),
+          std::move(distances),
+          std::move(markers),
+          std::move(opened.control),
+          {},
+          {}};
   try {
     return run_stages(run, terminal);
   } catch (const Json::exception&) {

@@ -50,7 +50,7 @@ double limit_of(Quantity quantity, const std::string& text, const Frame& frame) 
     case Quantity::Psnr:
       return amount(text, {{"dB", 1}}, "24dB");
     default:
-      return amount(text, {{"s", 1}, {"min", 60}, {"h", 3600}}, "90s, 3min or 1h");
+      return parse_seconds(text);
   }
 }
 

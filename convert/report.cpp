@@ -114,9 +114,62 @@ std::string certificate_section(const Json& report) {
   return html.str();
 }
 
-// Where the scale came from, if from known distances.
+std::string control_row(const Json& point) {
+  std::ostringstream html;
+  const bool is_check = point["role"] == "check";
+  html << "<tr><td>" << escaped(point["name"].get<std::string>()) << "</td><td>"
+       << (is_check ? "check" : "control") << "</td>";
+  for (int k = 0; k < 3; ++k) {
+    const Json off = point["residual"].is_null() ? Json() : point["residual"][size_t(k)];
+    html << "<td>" << number(off, "%.3g") << "</td>";
+  }
+  const bool is_good = point["used"].get<bool>() || (is_check && !point["residual"].is_null());
+  const std::string use = is_check ? "to check by" : "yes";
+  html << "<td>" << number(point["sigmas"], "%.2f") << "</td><td>"
+       << number(point["photographs"], "%.0f") << "</td><td>"
+       << number(point["reprojection"], "%.2f") << "</td><td>"
+       << verdict(is_good, use, "no: " + escaped(point["remark"].get<std::string>()))
+       << "</td></tr>\n";
+  return html.str();
+}
+
+std::string rms_row(const std::string& name, const Json& rms) {
+  if (rms.is_null()) return "";
+  std::ostringstream html;
+  html << "<tr><td>" << name << "</td><td>rms of " << number(rms["points"], "%.0f") << "</td>";
+  for (const char* axis : {"x", "y", "z"}) {
+    html << "<td>" << number(rms[axis], "%.3g") << "</td>";
+  }
+  html << "<td colspan=4>" << number(rms["all"], "%.3g") << " together</td></tr>\n";
+  return html.str();
+}
+
+std::string control_section(const Json& scale) {
+  const Json& control = scale["control_points"];
+  const std::string unit = escaped(control["unit"].get<std::string>());
+  std::ostringstream html;
+  html << "<h2>Control points</h2>\n<p>Every file is in the coordinates of "
+       << escaped(control["file"].get<std::string>())
+       << ", z up. Standard deviations of the frame: "
+       << "scale "
+       << number(100 * scale["metres_sigma"].get<double>() / scale["metres_per_unit"].get<double>(),
+                 "%.2g")
+       << " %, rotation " << number(control["rotation_sigma"], "%.2g")
+       << " degrees. Residuals are measured minus known; check points had no say in the frame, so "
+          "theirs say how accurate it is.</p>\n<table>\n<tr><th>point</th><th>role</th><th>x ["
+       << unit << "]</th><th>y [" << unit << "]</th><th>z [" << unit
+       << "]</th><th>in sigmas</th><th>photographs</th><th>picks off by [pixels]</th>"
+          "<th>used</th></tr>\n";
+  for (const Json& point : control["points"]) html << control_row(point);
+  html << rms_row("control points", control["control_rms"])
+       << rms_row("check points", control["check_rms"]) << "</table>\n";
+  return html.str();
+}
+
+// Where the scale came from, if from known distances or control points.
 std::string scale_section(const Json& scale) {
   if (scale.is_null()) return "";
+  if (scale.contains("control_points")) return control_section(scale);
   std::ostringstream html;
   html << "<h2>Scale</h2>\n<p>One scene unit is " << number(scale["metres_per_unit"], "%.6g")
        << " m, with a standard deviation of " << number(scale["metres_sigma"], "%.2g")
@@ -161,6 +214,65 @@ std::string simplification_section(const Json& report) {
          << unit.area(s["area_observed_after"]) << "</td></tr>\n";
   }
   html << "</table>\n";
+  return html.str();
+}
+
+std::string promises_section(const Json& report) {
+  const std::vector<std::string> promises = promise_words(report);
+  if (promises.empty()) return "";
+  std::string html = "<h2>Promises</h2>\n";
+  for (const std::string& words : promises) html += "<p>" + escaped(words) + ".</p>\n";
+  return html;
+}
+
+// Three figures of one kind of deviation as cells of a table.
+std::string deviation_cells(const Json& figures, const ShownUnit& unit) {
+  std::string out;
+  for (const char* key : {"max", "rms", "p95"}) {
+    out += "<td>" + (figures.is_null() ? "-" : unit.length(figures[key])) + "</td>";
+  }
+  return out;
+}
+
+// What each step from depth to delivered mesh moved; nothing for runs before this was measured.
+std::string deviation_section(const Json& report) {
+  Json steps = report["mesh"].value("deviations", Json::array());
+  for (const Json& step : report["web"].value("deviations", Json::array())) steps.push_back(step);
+  if (steps.empty()) return "";
+  const auto p95 = [](const Json& figures) {
+    return figures.is_null() ? 0.0 : figures["p95"].get<double>();
+  };
+  double longest = 1e-300;
+  size_t samples = 0;
+  for (const Json& s : steps) {
+    longest = std::max({longest, p95(s["with_evidence"]), p95(s["from_measured"])});
+    samples = std::max(samples, s["samples"].get<size_t>());
+  }
+  const ShownUnit unit(report);
+  const auto bar = [&](const Json& figures) {
+    return "<span class=bar style=\"display:block;margin:2px 0;width:" +
+           number(100 * p95(figures) / longest, "%.1f") + "%\"></span>";
+  };
+  std::ostringstream html;
+  html
+      << "<h2>Deviations</h2>\n<p>How far each step moved the surface from the step before it, and "
+         "how far the depth that was measured lies from each step, by up to "
+      << samples
+      << " samples of each surface. Bars: 95 % lie within, from the step before (upper) and from "
+         "measured depth (lower).</p>\n<div style=\"overflow-x:auto;white-space:nowrap\"><table>\n"
+         "<tr><th rowspan=2>step</th><th rowspan=2>against</th><th colspan=3>seen surface</th>"
+         "<th colspan=3>inferred surface</th><th colspan=3>measured depth to this step</th>"
+         "<th rowspan=2></th></tr>\n<tr>"
+         "<th>max</th><th>RMS</th><th>95 %</th><th>max</th><th>RMS</th><th>95 %</th>"
+         "<th>max</th><th>RMS</th><th>95 %</th></tr>\n";
+  for (const Json& s : steps) {
+    html << "<tr><td>" << escaped(s["step"].get<std::string>()) << "</td><td>"
+         << escaped(s["against"].get<std::string>()) << "</td>"
+         << deviation_cells(s["with_evidence"], unit) << deviation_cells(s["inferred"], unit)
+         << deviation_cells(s["from_measured"], unit) << "<td class=bars>"
+         << bar(s["with_evidence"]) << bar(s["from_measured"]) << "</td></tr>\n";
+  }
+  html << "</table></div>\n";
   return html.str();
 }
 
@@ -274,6 +386,14 @@ std::string timing_section(const Json& stages) {
 
 }  // namespace
 
+std::vector<std::string> promise_words(const Json& report) {
+  std::vector<std::string> out;
+  for (const Json& part : {report["mesh"].value("promise", Json()), report["web"]["asset.glb"]}) {
+    if (part.is_object() && part.contains("words")) out.push_back(part["words"].get<std::string>());
+  }
+  return out;
+}
+
 void write_html_report(const std::filesystem::path& folder,
                        const Json& report,
                        const Scene& scene,
@@ -291,14 +411,17 @@ void write_html_report(const std::filesystem::path& folder,
        << " scene, units of files: " << escaped(report["units"].get<std::string>()) << " (scale "
        << escaped(report["scale_source"].get<std::string>()) << ")</p>\n<p class=note>Model: "
        << escaped(report["model"]["description"].get<std::string>()) << ".</p>\n";
+  if (report.contains("settings_reason")) {
+    html << "<p class=note>" << escaped(report["settings_reason"].get<std::string>()) << ".</p>\n";
+  }
   for (const Json& warning : report["warnings"]) {
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
   }
-  html << viewer << scale_section(report["scale"]) << certificate_section(report)
-       << simplification_section(report) << mesh_section(folder)
-       << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
-       << training_section(report["model"]) << timing_section(report["stages"])
-       << "</body></html>\n";
+  html << viewer << scale_section(report["scale"]) << promises_section(report)
+       << certificate_section(report) << simplification_section(report) << deviation_section(report)
+       << mesh_section(folder) << evaluation_section(report["evaluation"])
+       << views_section(folder, report["views"], scene) << training_section(report["model"])
+       << timing_section(report["stages"]) << "</body></html>\n";
   write_file(folder / "report.html", html.str());
 }
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -19,5 +20,8 @@ void write_html_report(const std::filesystem::path& folder,
                        const nlohmann::ordered_json& report,
                        const Scene& scene,
                        const std::string& viewer);
+
+/// A sentence for each promise of a run and how it was kept. \param report content of report.json
+std::vector<std::string> promise_words(const nlohmann::ordered_json& report);
 
 }  // namespace cgs

@@ -210,7 +210,7 @@ Json viewer_scene(const Model& model, const TriangleMesh& mesh) {
   return {
       {"unit", {{"name", unit.name}, {"length", unit.length}, {"sigma", unit.relative_sigma}}},
       {"file", {{"origin", vector_json(frame.origin - frame.file_origin)}, {"scale", frame.scale}}},
-      {"up", vector_json(world_up(model.scene))},
+      {"up", vector_json(frame.up)},
       {"labels", labels},
       {"mesh", mesh_json(mesh, texture)},
       {"photographs", photographs_json(mesh, texture)},

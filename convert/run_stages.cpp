@@ -1,16 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/run_stages.h"
 
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
 #include <nlohmann/json.hpp>
 
+#include "convert/asset.h"
+#include "convert/deviation_ledger.h"
+#include "convert/html.h"
 #include "convert/length.h"
 #include "convert/mesh_files.h"
 #include "convert/simplification.h"
 #include "convert/texture.h"
 #include "convert/volume_file.h"
 #include "convert/web_splats.h"
+#include "convert/written_surface.h"
 #include "io/atomic_file.h"
-#include "io/gltf.h"
+#include "io/mesh_file.h"
 #include "io/mesh_ply.h"
 #include "io/obj.h"
 #include "io/png.h"
@@ -24,6 +34,29 @@ namespace cgs {
 using Json = nlohmann::ordered_json;
 
 namespace {
+
+// Nothing to compare is left to the writers of meshes, which say so in words for people.
+DeviationLedger fusion_ledger(const Model& model,
+                              const Volume& volume,
+                              const TriangleMesh& open_surface,
+                              const TriangleMesh& watertight) {
+  DeviationLedger ledger(measured_points(model, DeviationLedger::kSamples));
+  ledger.add("volume", volume);
+  if (!open_surface.faces.empty()) ledger.add("open surface", open_surface);
+  if (!watertight.faces.empty()) ledger.add("watertight mesh", watertight);
+  return ledger;
+}
+
+// What compression of asset.glb moves, told by the file itself.
+Json asset_deviations(const Model& model,
+                      const TriangleMesh& mesh,
+                      const std::filesystem::path& asset) {
+  const Frame& frame = model.scene.frame;
+  DeviationLedger ledger(measured_points(model, DeviationLedger::kSamples));
+  ledger.go_on_from("watertight.ply", mesh);
+  ledger.add("asset.glb", read_mesh_file(asset, frame).content.mesh);
+  return ledger.json(frame);
+}
 
 // Two pictures of the mesh for the report: as the middle input camera sees it, and from the side.
 void write_mesh_pictures(const Scene& scene,
@@ -41,31 +74,149 @@ void write_mesh_pictures(const Scene& scene,
   write_png(folder / "side.provenance.png", preview(mesh, side, {.by_provenance = true}));
 }
 
+/// The two meshes of a volume.
+struct Surfaces {
+  TriangleMesh open;
+  WatertightResult closed;
+};
+
+/// What became of them on disk, for the report.
+struct WrittenSurfaces {
+  Surfaces surfaces;
+  Json simplification;
+  Json files;
+  Json promise;  ///< null without one
+};
+
+WrittenSurfaces write_surfaces(Surfaces surfaces,
+                               const std::optional<SimplifyOptions>& options,
+                               const Scene& scene,
+                               const std::filesystem::path& folder,
+                               const Progress& progress) {
+  WrittenSurfaces out{std::move(surfaces), {}, {}, {}};
+  TriangleMesh& open = out.surfaces.open;
+  WatertightResult& closed = out.surfaces.closed;
+  out.simplification = simplify_meshes(open, closed, options, scene.frame, progress);
+  out.files = write_mesh_files(folder, open, closed.mesh, scene.frame);
+  return out;
+}
+
+/// Largest distance of each mesh file, as it reads, from what was fused [internal units].
+std::map<std::string, double> deviations_of_files(const Surfaces& fused,
+                                                  const WrittenSurfaces& written,
+                                                  const Scene& scene,
+                                                  const std::filesystem::path& folder) {
+  const Frame& frame = scene.frame;
+  std::map<std::string, double> out;
+  if (!fused.open.faces.empty()) {
+    const TriangleMesh read = read_mesh_ply(folder / "surface.ply", frame).mesh;
+    out["surface.ply"] = surface_deviation(read, fused.open).max();
+  }
+  const TriangleMesh read = read_mesh_ply(folder / "watertight.ply", frame).mesh;
+  out["watertight.ply"] = surface_deviation(read, fused.closed.mesh).max();
+  for (const Json& file : written.files["files"]) {
+    if (file != "watertight.stl") continue;
+    // The same mesh: it is as far off, and what its vertices were rounded by.
+    out["watertight.stl"] =
+        out["watertight.ply"] + vertex_moves(folder / "watertight.stl", read, frame);
+  }
+  return out;
+}
+
+std::string words_for(const std::map<std::string, double>& deviations,
+                      double promise,
+                      const KnownArea& known,
+                      const Frame& frame) {
+  std::string out;
+  for (const auto& [file, deviation] : deviations) {
+    out += (out.empty() ? "" : ", ") + file + " is at most " + format_length(deviation, frame);
+  }
+  return out + " off the fused surface, " + format_length(promise, frame) +
+         " were asked for. That is the conversion; what the photographs tell is another matter: "
+         "of the surface they show, " +
+         number(100 * known.share(), "%.1f") + " % is known to " + format_length(promise, frame) +
+         " (one standard deviation)";
+}
+
+// Simplifies less and less until what was written, read again, lies within the promise.
+WrittenSurfaces write_surfaces_within(const Surfaces& fused,
+                                      double promise,
+                                      const Scene& scene,
+                                      const std::filesystem::path& folder,
+                                      const Progress& progress) {
+  const Frame& frame = scene.frame;
+  for (const double share : {0.7, 0.35, 0.0}) {
+    std::optional<SimplifyOptions> options;
+    if (share > 0) options = SimplifyOptions{.max_error = share * promise};
+    WrittenSurfaces out = write_surfaces(fused, options, scene, folder, progress);
+    const std::map<std::string, double> deviations = deviations_of_files(fused, out, scene, folder);
+    double worst = 0;
+    for (const auto& [file, deviation] : deviations) worst = std::max(worst, deviation);
+    // Twice the room: other samples of the same surface may lie somewhat farther off.
+    if (worst > (1 - 2 * kRoomForRounding) * promise) continue;
+    const KnownArea known = known_within(fused.closed.mesh, promise);
+    const double area_unit = frame.scale * frame.scale;
+    out.promise = {{"promised", promise * frame.scale},
+                   {"units", frame.unit_name()},
+                   {"files", Json::object()},
+                   {"area_seen", known.seen * area_unit},
+                   {"area_known_as_well", known.within * area_unit},
+                   {"words", words_for(deviations, promise, known, frame)}};
+    for (const auto& [file, deviation] : deviations) {
+      out.promise["files"][file] = deviation * frame.scale;
+    }
+    return out;
+  }
+  for (const char* name : {"surface.ply", "watertight.ply", "watertight.stl", "watertight.3mf"}) {
+    std::filesystem::remove(folder / name);  // they are none of what was asked for
+  }
+  throw NumericalError("--max-error: the files hold no coordinates as fine as " +
+                       format_length(promise, frame));
+}
+
+// The OBJ is written from the mesh that was held against the promise before; its decimals may not
+// take up what that left.
+void require_obj_in_place(const RunRequest& request, const TriangleMesh& mesh, const Frame& frame) {
+  const double moved = vertex_moves(request.output / "mesh/watertight.obj", mesh, frame);
+  if (moved <= kRoomForRounding * parse_length(request.max_error, frame)) return;
+  throw NumericalError("--max-error: watertight.obj was rounded by " + format_length(moved, frame));
+}
+
 }  // namespace
 
 Json write_meshes(const Model& model, const RunRequest& request, const Progress& progress) {
-  const Frame& frame = model.scene.frame;
-  FusedVolume fused =
-      fuse_model(model, request.voxel_size, request.memory_limit, part_of(progress, 0, 0.3));
-  TriangleMesh open = open_surface(fused.volume, {});
-  WatertightResult closed = watertight_surface(fused.volume, {}, part_of(progress, 0.35, 0.6));
-  const Json simplification =
-      simplify_meshes(open,
-                      closed,
-                      simplify_options(request.simplify, fused.volume.voxel_size, frame),
-                      frame,
-                      part_of(progress, 0.6, 0.9));
-  write_volume(request.output / "volume.vdb", fused.volume, frame);
+  const Scene& scene = model.scene;
+  const Frame& frame = scene.frame;
+  const double promise = request.max_error.empty() ? 0 : parse_length(request.max_error, frame);
+  FusedVolume fused = fuse_model(
+      model, request.voxel_size, request.memory_limit, part_of(progress, 0, 0.3), promise);
+  Surfaces surfaces;
+  surfaces.open = open_surface(fused.volume, {});
+  surfaces.closed = watertight_surface(fused.volume, {}, part_of(progress, 0.35, 0.6));
+  DeviationLedger ledger = fusion_ledger(model, fused.volume, surfaces.open, surfaces.closed.mesh);
   const std::filesystem::path folder = request.output / "mesh";
-  const Json files = write_mesh_files(folder, open, closed.mesh, frame, world_up(model.scene));
-  write_mesh_pictures(model.scene, closed.mesh, folder);
+  const Progress rest = part_of(progress, 0.6, 0.9);
+  const WrittenSurfaces written =
+      promise > 0
+          ? write_surfaces_within(surfaces, promise, scene, folder, rest)
+          : write_surfaces(std::move(surfaces),
+                           simplify_options(request.simplify, fused.volume.voxel_size, frame),
+                           scene,
+                           folder,
+                           rest);
+  write_volume(request.output / "volume.vdb", fused.volume, frame);
+  const WatertightResult& closed = written.surfaces.closed;
+  if (!written.simplification.is_null()) ledger.add("simplified", closed.mesh);
+  write_mesh_pictures(scene, closed.mesh, folder);
   report(progress, 1);
   return {{"fusion", fusion_to_json(fused.report, frame)},
           {"method", closed.method},
           {"certificate", certificate_to_json(closed.certificate, closed.mesh, frame)},
-          {"simplification", simplification},
-          {"open_surface_faces", open.faces.size()},
-          {"output", files}};
+          {"simplification", written.simplification},
+          {"promise", written.promise},
+          {"deviations", ledger.json(frame)},
+          {"open_surface_faces", written.surfaces.open.faces.size()},
+          {"output", written.files}};
 }
 
 TriangleMesh read_watertight(const std::filesystem::path& output, const Frame& frame) {
@@ -80,30 +231,20 @@ Json write_assets(const Model& model,
                   const RunRequest& request,
                   const Json& summary,
                   const Progress& progress) {
-  const Frame& frame = model.scene.frame;
   report(progress, 0);
-  GlbOptions options;
-  options.y_up = y_up_from(world_up(model.scene));
-  if (!request.max_error.empty()) {
-    options.max_error = parse_length(request.max_error, frame) * frame.scale;
-  }
-  options.summary_json = summary.dump();
   make_output_folder(request.output / "web");
   Json texture_report;
   const PhotoTexture texture = texture_from_photographs(model.scene, mesh, texture_report);
-  report(progress, 0.5);
-  write_obj(request.output / "mesh/watertight.obj", mesh, texture, frame);
-  const GlbReport glb = write_glb(request.output / "web/asset.glb", mesh, texture, frame, options);
+  report(progress, 0.3);
+  write_obj(request.output / "mesh/watertight.obj", mesh, texture, model.scene.frame);
+  if (!request.max_error.empty()) require_obj_in_place(request, mesh, model.scene.frame);
+  const Json splats = write_web_splats(request.output / "web", model);
+  const Json asset =
+      write_asset(model, {mesh, texture, summary}, request, part_of(progress, 0.4, 0.9));
   return {{"texture", texture_report},
-          {"splats", write_web_splats(request.output / "web", model)},
-          {"asset.glb",
-           {{"bytes", glb.bytes},
-            {"texture_bytes", glb.texture_bytes},
-            {"textured_triangles", glb.textured_triangles},
-            {"measured_texture_error", glb.measured_texture_error},
-            {"position_bits", glb.position_bits},
-            {"measured_max_error", glb.measured_max_error},
-            {"units", frame.unit_name()}}}};
+          {"splats", splats},
+          {"deviations", asset_deviations(model, mesh, request.output / "web/asset.glb")},
+          {"asset.glb", asset}};
 }
 
 }  // namespace cgs

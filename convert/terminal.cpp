@@ -30,6 +30,12 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 Terminal::Terminal(bool quiet) : quiet_(quiet), rewrites_(::isatty(STDERR_FILENO) == 1), start_() {}
 
+Terminal Terminal::silent() {
+  Terminal out(true);
+  out.is_silent_ = true;
+  return out;
+}
+
 Progress Terminal::begin(const std::string& stage) {
   stage_ = stage;
   start_ = std::chrono::steady_clock::now();
@@ -67,7 +73,7 @@ void Terminal::say(const std::string& line) const {
 }
 
 void Terminal::warn(const std::string& line) const {
-  std::fprintf(stderr, "cgs: warning: %s\n", one_line(line).c_str());
+  if (!is_silent_) std::fprintf(stderr, "cgs: warning: %s\n", one_line(line).c_str());
 }
 
 void Terminal::warn(const std::vector<std::string>& lines) const {

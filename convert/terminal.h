@@ -17,6 +17,8 @@ inline constexpr const char* kProgramVersion = "cgs 0.1.0";
 class Terminal {
  public:
   explicit Terminal(bool quiet);
+  /// One that says nothing, not even warnings: for work whose result nobody sees.
+  static Terminal silent();
 
   /// Begins a named stage and returns the function that shows how far it is. The function throws
   /// Cancelled after SIGINT or SIGTERM.
@@ -31,6 +33,7 @@ class Terminal {
 
  private:
   bool quiet_;
+  bool is_silent_ = false;
   bool rewrites_;
   std::string stage_;
   std::chrono::steady_clock::time_point start_;

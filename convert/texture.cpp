@@ -2,11 +2,13 @@
 #include "convert/texture.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 
 #include <Eigen/Geometry>
 
+#include "io/resample.h"
 #include "io/scene_reader.h"
 #include "meshing/exposure.h"
 #include "meshing/face_views.h"
@@ -79,7 +81,45 @@ Json report_of(const TriangleMesh& mesh,
           {"units", frame.unit_name()}};
 }
 
+// Median size of a pixel of a photograph on the faces that show it [internal units]; 0 = no face.
+double pixel_size(const TriangleMesh& mesh, const PhotoTexture& texture, size_t photograph) {
+  const Camera& camera = texture.photographs[photograph].camera;
+  std::vector<double> sizes;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (texture.of_face[f] != static_cast<int>(photograph)) continue;
+    const double depth = camera.project(mesh.vertices[mesh.faces[f][0]].cast<double>()).z();
+    sizes.push_back(2 * depth / (camera.fx + camera.fy));
+  }
+  if (sizes.empty()) return 0;
+  const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return *middle;
+}
+
 }  // namespace
+
+double coarsen_texture(PhotoTexture& texture, const TriangleMesh& mesh, double texel) {
+  constexpr int kSmallest = 16;  // [pixels]
+  double largest_share = 0;
+  for (size_t i = 0; i < texture.photographs.size(); ++i) {
+    const double pixel = pixel_size(mesh, texture, i);
+    if (pixel == 0) continue;
+    Photograph& photograph = texture.photographs[i];
+    const int before = photograph.image.width;
+    const double share = std::min(1.0, pixel / texel);
+    const auto reduced = [&](int size) {
+      return std::min(size, std::max(kSmallest, int(std::lround(share * size))));
+    };
+    const int width = reduced(photograph.image.width);
+    const int height = reduced(photograph.image.height);
+    largest_share = std::max(largest_share, double(width) / before);
+    if (width == before && height == photograph.image.height) continue;
+    MaskMap all_usable;
+    area_downscale(photograph.image, all_usable, width, height);
+    photograph.camera = resized(photograph.camera, width, height);
+  }
+  return largest_share > 0 ? largest_share : 1;
+}
 
 PhotoTexture texture_from_photographs(const Scene& scene,
                                       const TriangleMesh& mesh,

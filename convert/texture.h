@@ -20,4 +20,9 @@ PhotoTexture texture_from_photographs(const Scene& scene,
                                       const TriangleMesh& mesh,
                                       nlohmann::ordered_json& report);
 
+/// Makes photographs smaller whose pixels cover less of the surface than `texel` [internal units],
+/// by the median over the faces that show them, until they cover that; none below 16 pixels.
+/// \return the largest share of its width that a photograph in use keeps, 1 if there is none
+double coarsen_texture(PhotoTexture& texture, const TriangleMesh& mesh, double texel);
+
 }  // namespace cgs

@@ -337,8 +337,6 @@ Tradeoff measure_tradeoff(const TradeoffRequest& request,
     }
     fold_repeats(out);
     measure_errors(bench, out);
-  } catch (const fs::filesystem_error& error) {
-    throw IoError(error.path1(), error.code().message());
   } catch (const Json::exception&) {
     throw BadInput(Defect::Schema,
                    request.output / "run.json",

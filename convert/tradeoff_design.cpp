@@ -116,7 +116,7 @@ RunRequest request_of(const Setting& setting,
   };
   if (setting.voxel != 1) out.voxel_size = length(setting.voxel * setting.coarser);
   if (setting.simplify) out.simplify = *setting.simplify == 0 ? "0" : length(*setting.simplify);
-  if (setting.max_error) out.max_error = length(*setting.max_error);
+  if (setting.max_error) out.compression_error = length(*setting.max_error);
   return out;
 }
 
@@ -131,6 +131,9 @@ std::string command_line(const RunRequest& request) {
   if (scene.options.allow_external) out += " --allow-external";
   if (scene.focal > 0) add("--focal", exact(scene.focal));
   add("--assume-unit", scene.assume_unit);
+  add("--marker-size", scene.marker_size);
+  if (!scene.up.empty()) out += " --up";
+  for (const double number : scene.up) out += " " + exact(number);
   if (request.training.steps == training_preset("draft").steps) {
     add("--preset", "draft");
   } else if (request.training.steps != TrainingOptions().steps) {
@@ -138,7 +141,7 @@ std::string command_line(const RunRequest& request) {
   }
   add("--voxel-size", request.voxel_size);
   add("--simplify", request.simplify);
-  add("--max-error", request.max_error);
+  add("--compression-error", request.compression_error);
   add("-o", request.output.string());
   return out;
 }

@@ -68,6 +68,10 @@ SceneRequest scene_request(const Json& record) {
   const Json focal = record.value("focal", Json(0));
   if (focal.is_number()) out.focal = focal.get<double>();
   out.options.depth = depth_options_from(record.value("depth_options", Json()));
+  out.control.file = text_at(record, "control_points");
+  if (request.contains("control_points") && request["control_points"].is_object()) {
+    out.control.unit = text_at(request["control_points"], "unit");
+  }
   return out;
 }
 
@@ -98,6 +102,12 @@ void verify_inputs(const Json& record,
   for (const char* kind : {"input_images", "held_out_images"}) {
     compare(before.value(kind, Json::object()), now[kind], "input ", out);
     out.inputs += now[kind].size();
+  }
+  if (now.contains("control_points")) {
+    if (before.value("control_points", Json()) != now["control_points"]) {
+      out.differing.emplace_back("input control points: changed");
+    }
+    ++out.inputs;
   }
   if (before.value("cameras", Json()) != now["cameras"]) {
     out.differing.emplace_back("input cameras: changed");

@@ -14,7 +14,7 @@ using Json = nlohmann::ordered_json;
 
 Json write_web_splats(const std::filesystem::path& folder, const Model& model) {
   const Frame& frame = model.scene.frame;
-  const Eigen::Matrix3d y_up = y_up_from(world_up(model.scene));
+  const Eigen::Matrix3d y_up = y_up_from(model.scene.frame.up);
   const size_t glb_bytes =
       write_splat_glb(folder / "splats.glb", model.gaussians, frame, {.y_up = y_up});
   Json out = {{"splats.glb", {{"bytes", glb_bytes}}}};

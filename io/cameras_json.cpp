@@ -28,6 +28,7 @@ json frame_json(const Scene& scene) {
           {"metres_per_unit", frame.metres_per_unit},
           {"metres_sigma", frame.metres_sigma},
           {"scale_source", scale_source_name(frame.scale_source)},
+          {"up", vector_json(frame.up)},
           {"kind", scene.kind},
           {"folder", std::filesystem::absolute(scene.folder).lexically_normal().string()}};
 }
@@ -90,6 +91,7 @@ void read_frame(const JsonValue& value, Scene& scene) {
   frame.metres_per_unit = value.at("metres_per_unit").number();
   frame.metres_sigma = value.at("metres_sigma").number();
   frame.scale_source = read_scale_source(value.at("scale_source"));
+  if (const auto up = value.find("up")) frame.up = read_vector(*up);
   try {
     frame.validate();
   } catch (const InvalidInput& error) {

@@ -21,14 +21,6 @@ namespace {
 constexpr std::array<const char*, 6> kExtensions = {
     ".exr", ".pfm", ".npy", ".tiff", ".tif", ".png"};
 
-std::string lower_extension(const fs::path& path) {
-  std::string out = path.extension().string();
-  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) {
-    return static_cast<char>(c >= 'A' && c <= 'Z' ? c + ('a' - 'A') : c);
-  });
-  return out;
-}
-
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 // False for what programs write where a ray meets nothing: 0, infinity, or the largest value there

@@ -15,8 +15,12 @@ namespace cgs {
 
 namespace {
 
+constexpr const char* kGenerator = "generator cgs";
+
 std::string header_text(const Gaussians& g, const Frame& frame) {
-  std::string out = "ply\nformat binary_little_endian 1.0\ncomment generator cgs\n";
+  std::string out = "ply\nformat binary_little_endian 1.0\ncomment ";
+  out += kGenerator;
+  out += '\n';
   out += ply_frame_comments(frame);
   out += "element vertex " + std::to_string(g.size()) + "\n";
   const auto add = [&](const std::string& name) { out += "property float " + name + "\n"; };
@@ -228,6 +232,8 @@ RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path
       });
   RawSplats out = rows.take();
   out.comments = header.comments;
+  out.may_be_linear =
+      std::find(out.comments.begin(), out.comments.end(), kGenerator) == out.comments.end();
   const PlyProperty& x = vertex.properties[static_cast<size_t>(vertex.find("x"))];
   if (x.type == PlyType::Float64) out.digits = kDoubleDigits;
   if (trailing > 0) {

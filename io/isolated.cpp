@@ -12,6 +12,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "io/sanitized.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -35,9 +36,7 @@ void limit(const IsolationLimits& limits) {
   const rlimit space = {memory, memory};
   const rlimit time = {limits.seconds, limits.seconds + 1};
   const rlimit none = {0, 0};
-#ifndef __SANITIZE_ADDRESS__  // its shadow takes terabytes of addresses
-  setrlimit(RLIMIT_AS, &space);
-#endif
+  if (!kIsSanitized) setrlimit(RLIMIT_AS, &space);
   setrlimit(RLIMIT_CPU, &time);
   setrlimit(RLIMIT_CORE, &none);  // a crash is expected, its core is of no use
 }

@@ -159,7 +159,7 @@ void add_sparse_points(Scene& scene) {
   }
   constexpr double kNearlyAll = 0.95;
   if (static_cast<double>(agreeing) < kNearlyAll * static_cast<double>(observations)) {
-    scene.warnings.push_back(
+    scene.warnings.emplace_back(
         "points3D.bin does not fit the cameras of poses_bounds.npy and was not used");
     return;
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <string>
 
@@ -62,6 +63,16 @@ Eigen::Vector3d millimetres(const Eigen::Vector3f& point,
                             const Eigen::Matrix3d& up_rotation) {
   return 1e3 * frame.metres_per_unit *
          (up_rotation * frame.file_from_internal(point.cast<double>()));
+}
+
+std::string origin_in_millimetres(const Frame& frame, const Eigen::Matrix3d& up_rotation) {
+  if (frame.file_origin.isZero(0)) return "";
+  const Eigen::Vector3d p = 1e3 * frame.metres_per_unit * (up_rotation * frame.file_origin);
+  std::array<char, 100> text{};
+  // Micrometres, or nine digits where those would be too many for the header of an STL.
+  const char* const format = p.cwiseAbs().maxCoeff() < 1e11 ? "%.3f %.3f %.3f" : "%.9g %.9g %.9g";
+  std::snprintf(text.data(), text.size(), format, p.x(), p.y(), p.z());
+  return text.data();
 }
 
 std::string_view provenance_name(Provenance provenance) {

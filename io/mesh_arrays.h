@@ -22,6 +22,11 @@ void require_writable(const TriangleMesh& mesh, std::string_view writer);
 /// \throws InvalidInput that starts with `writer`
 void require_printable_solid(const TriangleMesh& mesh, const Frame& frame, std::string_view writer);
 
+/// Three numbers to add to the coordinates that millimetres() makes, for scenes so far from their
+/// origin that files leave it out: "448000500.000 5411000250.000 120000.000"; else empty.
+/// \pre frame.has_metric_scale()
+std::string origin_in_millimetres(const Frame& frame, const Eigen::Matrix3d& up_rotation);
+
 /// A point in file coordinates, in millimetres along target axes.
 /// \pre frame.has_metric_scale()
 Eigen::Vector3d millimetres(const Eigen::Vector3f& point,

@@ -10,6 +10,7 @@
 #include "io/obj_reader.h"
 #include "io/off.h"
 #include "io/ply_frame.h"
+#include "io/scene_path.h"
 #include "io/stl_reader.h"
 #include "libcgs/core/error.h"
 
@@ -17,15 +18,8 @@ namespace cgs {
 
 namespace {
 
-std::string lower_extension(const std::filesystem::path& path) {
-  std::string out = path.extension().string();
-  std::transform(out.begin(), out.end(), out.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return out;
-}
-
-ParsedMesh parse(const std::filesystem::path& path, std::optional<Eigen::Vector3d>& up) {
+// \param up  what the format says, in file axes; stays where it says nothing
+ParsedMesh parse(const std::filesystem::path& path, Eigen::Vector3d& up) {
   const std::string extension = lower_extension(path);
   if (extension == ".glb") {
     GlbMesh glb = read_glb(path);
@@ -67,16 +61,16 @@ bool is_mesh_name(const std::filesystem::path& path) {
 
 MeasurableFile read_mesh_file(const std::filesystem::path& path,
                               const std::optional<Frame>& frame) {
-  std::optional<Eigen::Vector3d> up;
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
   ParsedMesh parsed = parse(path, up);
   check_significance(parsed, path);
-  const PlyPlacement placement =
+  PlyPlacement placement =
       ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
+  if (!frame && !up.isZero(0)) placement.frame.up = up.normalized();
   placement.frame.validate();
   MeasurableFile out{
       {std::move(parsed.mesh), std::move(parsed.positions), placement.frame, placement.file_origin},
-      std::move(parsed.warnings),
-      up};
+      std::move(parsed.warnings)};
   out.warnings.insert(out.warnings.end(), placement.warnings.begin(), placement.warnings.end());
   out.content.mesh.vertices.reserve(out.content.points.size());
   for (Eigen::Vector3d& p : out.content.points) {

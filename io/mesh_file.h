@@ -14,7 +14,6 @@ namespace cgs {
 struct MeasurableFile {
   MeasurableMesh content;
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
-  std::optional<Eigen::Vector3d> up;  ///< In file axes, where the format tells.
 };
 
 /// True for the endings that read_mesh_file() takes: .ply, .obj, .stl, .off, .glb, in any case.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/orientation.h"
 
+#include "io/exif.h"
 #include "io/masks.h"
 
 namespace cgs {
@@ -69,6 +70,21 @@ Eigen::Vector2d stored_pixel(const Eigen::Vector2d& upright,
     default:
       return {x, y};
   }
+}
+
+ImageSize shown_size(const View& view) {
+  return turned(image_size(view.image_path), exif_orientation(view.image_path));
+}
+
+std::optional<Eigen::Vector2d> picked_pixel(const View& view, const Eigen::Vector2d& shown) {
+  const ImageSize size = shown_size(view);
+  const bool is_inside = shown.x() >= 0 && shown.y() >= 0 && shown.x() <= size.width - 1 &&
+                         shown.y() <= size.height - 1;
+  if (!is_inside) return std::nullopt;
+  // Cameras that came with the photographs do not turn as viewers do.
+  const int orientation = exif_orientation(view.image_path);
+  if (orientation == view.orientation) return shown;
+  return stored_pixel(shown, image_size(view.image_path), orientation);
 }
 
 ImageSize photograph_size(const View& view) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
+
 #include "io/image.h"
 #include "io/scene_path.h"
 #include "libcgs/core/raster.h"
@@ -18,6 +20,16 @@ ImageSize turned(const ImageSize& stored, int orientation);
 Eigen::Vector2d stored_pixel(const Eigen::Vector2d& upright,
                              const ImageSize& stored,
                              int orientation);
+
+/// Size of the photograph of a view as image viewers show it, which turn pictures as Exif says
+/// [pixels]. \throws BadInput as image_size()
+ImageSize shown_size(const View& view);
+
+/// Where a pixel that was picked in an image viewer lies in the photograph that the camera of the
+/// view is for; both numbered from 0.
+/// \return nothing outside of the photograph
+/// \throws BadInput as image_size()
+std::optional<Eigen::Vector2d> picked_pixel(const View& view, const Eigen::Vector2d& shown);
 
 /// Size of the photograph of a view [pixels] and the photograph itself, turned as the view says.
 /// \param usable  where not null: pixels neither transparent nor masked, as read_image() gives them

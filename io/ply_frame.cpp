@@ -52,11 +52,15 @@ std::string frame_comments(const Frame& frame, const std::string& mark) {
   out += "\n" + mark + "metres_sigma ";
   append_number(out, frame.metres_sigma);
   out += "\n" + mark + "scale_source " + scale_source_name(frame.scale_source);
-  out += "\n" + mark + "file_origin";
-  for (const double value : frame.file_origin) {
-    out += ' ';
-    append_number(out, value);
-  }
+  const auto append_vector = [&](const char* key, const Eigen::Vector3d& vector) {
+    out += "\n" + mark + key;
+    for (const double value : vector) {
+      out += ' ';
+      append_number(out, value);
+    }
+  };
+  append_vector("file_origin", frame.file_origin);
+  if (frame.knows_up()) append_vector("up", frame.up);
   return out + "\n";
 }
 
@@ -81,6 +85,8 @@ PlyPlacement ply_placement(const std::vector<std::string>& comments,
   for (const Eigen::Vector3d& corner : bounds) in_world.emplace_back(corner + file_origin);
   PlyPlacement out{canonical_frame(in_world), file_origin, {}};
   if (origin) out.frame.file_origin = file_origin;
+  const auto up = numbers_after(comments, "up", 3);
+  if (up && up->norm() > 0) out.frame.up = up->normalized();
   if (has_unit) {
     out.frame.metres_per_unit = metres->x();
     const auto sigma = numbers_after(comments, "metres_sigma", 1);

@@ -13,7 +13,8 @@ namespace cgs {
 
 /// Header lines that say in which unit the coordinates of a PLY file are and where its origin lies:
 /// "comment unit …", "comment metres_per_unit …", "comment metres_sigma …",
-/// "comment scale_source …", "comment file_origin x y z", the numbers exact.
+/// "comment scale_source …", "comment file_origin x y z", "comment up x y z" where it is known, the
+/// numbers exact.
 std::string ply_frame_comments(const Frame& frame);
 
 /// The same for other text formats, where lines start with `mark` instead of "comment ".

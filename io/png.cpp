@@ -108,6 +108,20 @@ std::string encode_png(const ColorImage& image) {
   return png_bytes(image.width, image.height, PNG_FORMAT_RGB, rgb_bytes(image));
 }
 
+std::string encode_png(const ColorImage& image, const MaskMap& shown) {
+  require_size(image, PNG_USER_WIDTH_MAX);
+  require(shown.width == image.width && shown.height == image.height,
+          "a picture's mask must be as wide and high as the picture, its width",
+          shown.width);
+  std::string bytes;
+  bytes.reserve(image.data.size() * 4);
+  for (size_t i = 0; i < image.data.size(); ++i) {
+    for (const float c : image.data[i]) bytes += static_cast<char>(color_byte(c));
+    bytes += shown.data[i] != 0 ? '\xff' : '\0';
+  }
+  return png_bytes(image.width, image.height, PNG_FORMAT_RGBA, bytes);
+}
+
 std::string encode_png(const MaskMap& mask) {
   require_size(mask, PNG_USER_WIDTH_MAX);
   std::string grey;

@@ -12,6 +12,10 @@ namespace cgs {
 /// \throws InvalidInput for an empty raster or one wider or higher than PNG allows.
 std::string encode_png(const ColorImage& image);
 
+/// The same with an alpha channel: transparent where `shown` is 0.
+/// \throws as above; InvalidInput if the sizes differ
+std::string encode_png(const ColorImage& image, const MaskMap& shown);
+
 /// An 8-bit grey PNG file in memory: 0 stays 0, everything else becomes 255.
 std::string encode_png(const MaskMap& mask);
 

@@ -25,6 +25,8 @@ struct RawSplats {
   std::vector<float> logit;                ///< Of the opacity.
   std::vector<Eigen::Vector3f> sh;         ///< Gaussian-major, (sh_degree + 1)^2 for each.
   int digits = kFloatDigits;               ///< Binary digits of a position as stored.
+  bool may_be_linear = false;              ///< Programs differ: scales may really be lengths, and
+                                           ///< opacities probabilities.
   std::vector<std::string> comments;       ///< Of a PLY header.
   std::vector<std::string> notes;          ///< One line each: what was left out, or looks odd.
 

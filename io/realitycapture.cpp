@@ -25,14 +25,12 @@ namespace {
 
 constexpr std::string_view kStart = "#name,";
 
-std::vector<std::string_view> fields(std::string_view line);
-
 constexpr std::array<std::string_view, 8> kNeeded = {
     "name", "x", "y", "alt", "heading", "pitch", "roll", "f"};
 
 // Tables of points on the ground start alike, but do not turn.
 bool has_needed_columns(std::string_view header) {
-  const std::vector<std::string_view> names = fields(header.substr(1));
+  const std::vector<std::string_view> names = fields(header.substr(1), ',');
   return std::all_of(kNeeded.begin(), kNeeded.end(), [&](std::string_view needed) {
     return std::find(names.begin(), names.end(), needed) != names.end();
   });
@@ -65,24 +63,11 @@ std::optional<std::string> csv_name(const fs::path& folder) {
   return found->filename().string();
 }
 
-std::vector<std::string_view> fields(std::string_view line) {
-  std::vector<std::string_view> out;
-  for (size_t at = 0; at <= line.size();) {
-    const size_t end = std::min(line.find(',', at), line.size());
-    std::string_view field = line.substr(at, end - at);
-    field.remove_prefix(std::min(field.find_first_not_of(" \t"), field.size()));
-    field.remove_suffix(field.size() - (field.find_last_not_of(" \t") + 1));
-    out.push_back(field);
-    at = end + 1;
-  }
-  return out;
-}
-
 // One line with the columns of the table.
 class Row {
  public:
   Row(const std::map<std::string, size_t>& columns, const TextLines& lines, std::string_view line)
-      : columns_(columns), lines_(lines), fields_(fields(line)) {
+      : columns_(columns), lines_(lines), fields_(fields(line, ',')) {
     if (fields_.size() < columns.size()) {
       lines.fail(Defect::Schema,
                  "has " + std::to_string(fields_.size()) + " of " + std::to_string(columns.size()) +
@@ -142,7 +127,7 @@ std::map<std::string, size_t> read_columns(TextLines& lines) {
   while (const auto line = lines.next()) {
     if (!line->starts_with(kStart)) continue;
     std::map<std::string, size_t> out;
-    const std::vector<std::string_view> names = fields(line->substr(1));
+    const std::vector<std::string_view> names = fields(line->substr(1), ',');
     for (size_t i = 0; i < names.size(); ++i) {
       if (out.emplace(names[i], i).second) continue;
       lines.fail(Defect::Schema, "two columns are called " + std::string(names[i]));

@@ -31,6 +31,9 @@ bool is_present(const std::filesystem::path& path);
 /// True if the path leads to a folder; never throws.
 bool is_folder(const std::filesystem::path& path);
 
+/// The ending of a name with its dot, ASCII letters in lower case.
+std::string lower_extension(const std::filesystem::path& path);
+
 /// True for the extensions of image files: .png .jpg .jpeg .tif .tiff .webp, in any case.
 bool has_image_extension(const std::filesystem::path& path);
 

@@ -144,9 +144,10 @@ class Examination {
   /// Decides whether scales are logarithms and opacities logits, as the format has them.
   void judge_coding(double extent) {
     const auto& scales = raw_.log_scale;
+    findings_.fill_ratio = fill_ratio(scales, extent, [](double s) { return std::exp(s); });
+    if (!raw_.may_be_linear) return;
     all_scales_positive_ =
         std::all_of(scales.begin(), scales.end(), [](const auto& s) { return s.minCoeff() > 0; });
-    findings_.fill_ratio = fill_ratio(scales, extent, [](double s) { return std::exp(s); });
     if (all_scales_positive_ && !(findings_.fill_ratio < kSuspiciousFill)) {
       const double as_lengths = fill_ratio(scales, extent, [](double s) { return s; });
       if (as_lengths < kSuspiciousFill) {

@@ -20,6 +20,8 @@ void write_stl(const std::filesystem::path& path,
   require_writable(mesh, "write_stl");
   require_printable_solid(mesh, frame, "write_stl");
   std::string header = "cgs binary STL, unit mm";  // must not begin with "solid"
+  const std::string origin = origin_in_millimetres(frame, up_rotation);
+  if (!origin.empty()) header += ", add " + origin;
   header.resize(80, ' ');
   append_bytes(header, static_cast<uint32_t>(mesh.faces.size()));
   AtomicFile file(path);

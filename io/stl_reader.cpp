@@ -34,8 +34,14 @@ ParsedMesh read_binary(const std::string& bytes, const std::filesystem::path& pa
   reader.expect_records(count, kFacetBytes, "facets");
   ParsedMesh out;
   out.digits = kFloatDigits;
-  if (header.starts_with("cgs binary STL, unit mm")) {
+  constexpr std::string_view kOurs = "cgs binary STL, unit mm";
+  constexpr std::string_view kAdd = ", add ";
+  if (header.starts_with(kOurs)) {
     out.comments.emplace_back("metres_per_unit 0.001");
+    const std::string_view rest = header.substr(kOurs.size());
+    if (rest.starts_with(kAdd)) {
+      out.comments.push_back("file_origin " + std::string(rest.substr(kAdd.size())));
+    }
   }
   Corners corners(out);
   out.mesh.faces.reserve(count);

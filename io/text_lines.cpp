@@ -66,4 +66,17 @@ std::vector<std::string_view> tokens(std::string_view line) {
   return out;
 }
 
+std::vector<std::string_view> fields(std::string_view line, char separator) {
+  std::vector<std::string_view> out;
+  for (size_t at = 0; at <= line.size();) {
+    const size_t end = std::min(line.find(separator, at), line.size());
+    std::string_view field = line.substr(at, end - at);
+    field.remove_prefix(std::min(field.find_first_not_of(" \t"), field.size()));
+    field.remove_suffix(field.size() - (field.find_last_not_of(" \t") + 1));
+    out.push_back(field);
+    at = end + 1;
+  }
+  return out;
+}
+
 }  // namespace cgs

@@ -23,6 +23,8 @@ class TextLines {
   std::optional<std::string_view> next_data();
 
   const std::filesystem::path& path() const { return path_; }
+  /// Of the line that next() gave last; the first is 1.
+  size_t line_number() const { return line_number_; }
   /// \throws BadInput Syntax naming line and column unless the token is a finite number.
   double number(std::string_view token) const;
   /// \throws BadInput Syntax likewise for a whole number >= 0.
@@ -41,5 +43,8 @@ class TextLines {
 
 /// The parts of a line between spaces and tabs.
 std::vector<std::string_view> tokens(std::string_view line);
+
+/// The parts of a line between separators, without spaces and tabs around them; may be empty.
+std::vector<std::string_view> fields(std::string_view line, char separator);
 
 }  // namespace cgs

@@ -44,7 +44,7 @@ void check(HRESULT result, const char* step) {
 }
 
 /// "Surface by origin: observed 61.2 %, …", by area.
-std::string description(const TriangleMesh& mesh) {
+std::string shares_by_origin(const TriangleMesh& mesh) {
   const auto area = area_by_provenance(mesh);
   const double total = std::accumulate(area.begin(), area.end(), 0.0);
   std::string out = "Surface by origin:";
@@ -57,6 +57,13 @@ std::string description(const TriangleMesh& mesh) {
     out += text.data();
   }
   out.back() = '.';
+  return out;
+}
+
+std::string description(const TriangleMesh& mesh, const std::string& origin) {
+  std::string out = mesh.provenance.empty() ? "What of the surface was observed is not stated."
+                                            : shares_by_origin(mesh);
+  if (!origin.empty()) out += " Coordinates of the scene: add " + origin + " mm.";
   return out;
 }
 
@@ -172,12 +179,10 @@ void write_3mf(const std::filesystem::path& path,
   Handle object;
   check(NMR::lib3mf_model_addmeshobject(model.get(), object.out()), "add a mesh");
   set_geometry(object.get(), mesh, frame, up_rotation);
-  if (!mesh.provenance.empty()) {
-    const std::string text = description(mesh);
-    check(NMR::lib3mf_model_addmetadatautf8(model.get(), "Description", text.c_str()),
-          "add metadata");
-    set_materials(model.get(), object.get(), mesh);
-  }
+  if (!mesh.provenance.empty()) set_materials(model.get(), object.get(), mesh);
+  const std::string text = description(mesh, origin_in_millimetres(frame, up_rotation));
+  check(NMR::lib3mf_model_addmetadatautf8(model.get(), "Description", text.c_str()),
+        "add metadata");
   Handle item;
   check(NMR::lib3mf_model_addbuilditem(model.get(), object.get(), nullptr, item.out()), "build");
   set_uuids(model.get(), object.get(), item.get(), mesh);

@@ -6,8 +6,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "libcgs/core/disjoint_sets.h"
 #include "libcgs/core/error.h"
-#include "meshing/disjoint_sets.h"
 #include "meshing/kd_tree.h"
 
 namespace cgs {

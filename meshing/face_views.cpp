@@ -50,7 +50,7 @@ class ViewScorer {
     const auto slope = static_cast<float>(std::sqrt(std::max(0.0, 1 - cosine * cosine)) / cosine);
     if (!is_clear(faces_[f], slope)) return 0;
     const auto& [a, b, c] = faces_[f].corner;
-    const double pixels = std::abs(edge_function(a, b, c.x(), c.y()));
+    const double pixels = std::abs(edge_function<float>(a, b, c.x(), c.y()));
     return static_cast<float>(pixels / normal.norm() * cosine);
   }
 

@@ -9,9 +9,9 @@
 
 #include <CGAL/convex_hull_3.h>
 
+#include "libcgs/core/disjoint_sets.h"
 #include "libcgs/core/error.h"
 #include "meshing/components.h"
-#include "meshing/disjoint_sets.h"
 #include "meshing/polygon_mesh.h"
 
 namespace cgs {

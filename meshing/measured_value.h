@@ -15,6 +15,10 @@ inline int evidence_rank(Provenance label) {
   return kRank.at(static_cast<size_t>(label));
 }
 
+inline Provenance weaker_evidence(Provenance a, Provenance b) {
+  return evidence_rank(a) < evidence_rank(b) ? a : b;
+}
+
 /// A figure taken from a mesh, with what it rests on.
 struct MeasuredValue {
   double value = 0;   ///< [internal units to the power of `dimension`], as sigma and the parts.

@@ -90,17 +90,32 @@ std::vector<Eigen::Vector3f> sample_surface(const TriangleMesh& mesh, size_t cou
   return sample_faces(mesh, count).points;
 }
 
-std::vector<float> distances_to(const TriangleMesh& mesh,
-                                const std::vector<Eigen::Vector3f>& points) {
-  const Triangles soup = triangles(mesh);
-  Tree tree(soup.begin(), soup.end());
-  tree.build();
-  tree.accelerate_distance_queries();
+struct DistanceToMesh::Parts {
+  explicit Parts(const TriangleMesh& mesh)
+      : soup(triangles(mesh)), tree(soup.cbegin(), soup.cend()) {
+    tree.build();
+    tree.accelerate_distance_queries();
+  }
+  Triangles soup;  // the tree points into it
+  Tree tree;
+};
+
+DistanceToMesh::DistanceToMesh(const TriangleMesh& mesh) : parts_(std::make_unique<Parts>(mesh)) {}
+DistanceToMesh::~DistanceToMesh() = default;
+DistanceToMesh::DistanceToMesh(DistanceToMesh&& other) noexcept = default;
+DistanceToMesh& DistanceToMesh::operator=(DistanceToMesh&& other) noexcept = default;
+
+std::vector<float> DistanceToMesh::of(const std::vector<Eigen::Vector3f>& points) const {
   std::vector<float> out(points.size());
   tbb::parallel_for(size_t(0), points.size(), [&](size_t i) {
-    out[i] = static_cast<float>(std::sqrt(tree.squared_distance(to_cgal(points[i]))));
+    out[i] = static_cast<float>(std::sqrt(parts_->tree.squared_distance(to_cgal(points[i]))));
   });
   return out;
+}
+
+std::vector<float> distances_to(const TriangleMesh& mesh,
+                                const std::vector<Eigen::Vector3f>& points) {
+  return DistanceToMesh(mesh).of(points);
 }
 
 DistanceStatistics statistics(std::vector<float> distances) {

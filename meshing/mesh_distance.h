@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include <Eigen/Core>
@@ -26,8 +27,23 @@ struct SurfaceSamples {
 /// The points of sample_surface() with their faces.
 SurfaceSamples sample_faces(const TriangleMesh& mesh, size_t count);
 
-/// Distance from each point to the nearest point of the mesh [internal units].
-/// \pre mesh has faces.
+/// Answers how far points are from a mesh that is asked more than once.
+class DistanceToMesh {
+ public:
+  explicit DistanceToMesh(const TriangleMesh& mesh);  ///< \pre a face has an area
+  ~DistanceToMesh();
+  DistanceToMesh(DistanceToMesh&& other) noexcept;
+  DistanceToMesh& operator=(DistanceToMesh&& other) noexcept;
+
+  /// Distance from each point to the nearest point of the mesh [internal units].
+  std::vector<float> of(const std::vector<Eigen::Vector3f>& points) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// The same for points that are all known at once. \pre mesh has faces.
 std::vector<float> distances_to(const TriangleMesh& mesh,
                                 const std::vector<Eigen::Vector3f>& points);
 

@@ -83,6 +83,7 @@ struct NearestSurface::Parts {
   void add_triangles();
   void add_pseudonormals();
   Eigen::Vector3d edge_normal(uint32_t a, uint32_t b) const;
+  SurfacePoint on_triangle(Triangles::const_iterator triangle, const Eigen::Vector3d& point) const;
 };
 
 void NearestSurface::Parts::add_triangles() {
@@ -141,17 +142,32 @@ NearestSurface::NearestSurface(const MeasurableMesh& mesh) : parts_(std::make_un
 
 NearestSurface::~NearestSurface() = default;
 
-SurfacePoint NearestSurface::nearest(const Eigen::Vector3d& point) const {
-  const auto found = parts_->tree.closest_point_and_primitive(to_cgal(point));
+SurfacePoint NearestSurface::Parts::on_triangle(Triangles::const_iterator triangle,
+                                                const Eigen::Vector3d& point) const {
   SurfacePoint out;
-  out.face = parts_->face_of[static_cast<size_t>(found.second - parts_->triangles.cbegin())];
-  const auto& f = parts_->mesh.mesh.faces[out.face];
-  const Eigen::Vector3d& a = parts_->mesh.points[f[0]];
-  const Eigen::Vector3d& b = parts_->mesh.points[f[1]];
-  const Eigen::Vector3d& c = parts_->mesh.points[f[2]];
+  out.face = face_of[static_cast<size_t>(triangle - triangles.cbegin())];
+  const auto& f = mesh.mesh.faces[out.face];
+  const Eigen::Vector3d& a = mesh.points[f[0]];
+  const Eigen::Vector3d& b = mesh.points[f[1]];
+  const Eigen::Vector3d& c = mesh.points[f[2]];
   out.weights = nearest_weights(a, b, c, point);
   out.position = out.weights[0] * a + out.weights[1] * b + out.weights[2] * c;
   return out;
+}
+
+SurfacePoint NearestSurface::nearest(const Eigen::Vector3d& point) const {
+  const auto found = parts_->tree.closest_point_and_primitive(to_cgal(point));
+  return parts_->on_triangle(found.second, point);
+}
+
+std::optional<SurfacePoint> NearestSurface::nearest_within(const Eigen::Vector3d& point,
+                                                           double distance) const {
+  // The tree looks for what is nearer than a hint, which need not lie on the surface.
+  const Kernel::Point_3 hint = to_cgal(point + Eigen::Vector3d(distance, 0, 0));
+  const auto found =
+      parts_->tree.closest_point_and_primitive(to_cgal(point), {hint, parts_->triangles.cbegin()});
+  if (found.first == hint) return std::nullopt;
+  return parts_->on_triangle(found.second, point);
 }
 
 double NearestSurface::signed_distance(const Eigen::Vector3d& point,

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -46,6 +47,8 @@ class NearestSurface {
   NearestSurface& operator=(const NearestSurface&) = delete;
 
   SurfacePoint nearest(const Eigen::Vector3d& point) const;
+  /// The same where it is nearer than `distance`; faster than nearest() where nothing is.
+  std::optional<SurfacePoint> nearest_within(const Eigen::Vector3d& point, double distance) const;
 
   /// Distance to the nearest point, positive on the side that faces look to.
   ///

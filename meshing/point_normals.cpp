@@ -11,8 +11,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
+#include "libcgs/core/disjoint_sets.h"
 #include "libcgs/core/error.h"
-#include "meshing/disjoint_sets.h"
 #include "meshing/kd_tree.h"
 
 namespace cgs {

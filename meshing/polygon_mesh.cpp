@@ -28,4 +28,22 @@ PolygonMesh from_triangles(const TriangleMesh& mesh, const char* user) {
   return out;
 }
 
+TriangleMesh to_triangles(const PolygonMesh& mesh) {
+  TriangleMesh out;
+  std::vector<uint32_t> renamed(mesh.num_vertices(), 0);  // removed ones count
+  for (const auto v : mesh.vertices()) {
+    renamed[size_t(v)] = static_cast<uint32_t>(out.vertices.size());
+    out.vertices.push_back(vector_of(mesh.point(v)));
+  }
+  for (const auto f : mesh.faces()) {
+    std::array<uint32_t, 3> face{};
+    size_t k = 0;
+    for (const auto v : CGAL::vertices_around_face(mesh.halfedge(f), mesh)) {
+      face.at(k++) = renamed[size_t(v)];
+    }
+    out.faces.push_back(face);
+  }
+  return out;
+}
+
 }  // namespace cgs::polygon_mesh

@@ -26,4 +26,7 @@ inline Eigen::Vector3f vector_of(const Point& p) {
 ///         disagree on what is outside, or a face names a vertex twice
 PolygonMesh from_triangles(const TriangleMesh& mesh, const char* user);
 
+/// The vertices and faces that were not removed, in their order.
+TriangleMesh to_triangles(const PolygonMesh& mesh);
+
 }  // namespace cgs::polygon_mesh

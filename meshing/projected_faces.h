@@ -24,7 +24,11 @@ struct ProjectedFace {
 std::vector<ProjectedFace> projected_faces(const TriangleMesh& mesh, const Camera& camera);
 
 /// Twice the signed area of (a, b, (u, v)) in the picture.
-inline float edge_function(const Eigen::Vector3f& a, const Eigen::Vector3f& b, float u, float v) {
+template <typename Scalar>
+Scalar edge_function(const Eigen::Matrix<Scalar, 3, 1>& a,
+                     const Eigen::Matrix<Scalar, 3, 1>& b,
+                     Scalar u,
+                     Scalar v) {
   return (b.x() - a.x()) * (v - a.y()) - (b.y() - a.y()) * (u - a.x());
 }
 
@@ -36,35 +40,47 @@ struct PixelRect {
   int y1 = 0;
 };
 
-/// Calls visit(x, y, weights, nearness) for every pixel of `rect` whose centre the face covers:
-/// `weights` are those of the corners (barycentric in the picture), `nearness` is 1 / z.
-template <typename Visit>
-void for_each_pixel(const ProjectedFace& face, const PixelRect& rect, const Visit& visit) {
-  const auto& [a, b, c] = face.corner;
-  const auto first = [](float low, int begin) {
-    return std::max(begin, static_cast<int>(std::ceil(low - 0.5f)));
+/// Calls visit(x, y, weights, third) for every pixel of `rect` whose centre the triangle covers:
+/// `weights` are those of the corners (barycentric in the picture), `third` is what they give for
+/// the third coordinate. A centre counts as covered down to a weight of -slack.
+template <typename Scalar, typename Visit>
+void for_each_pixel(const std::array<Eigen::Matrix<Scalar, 3, 1>, 3>& corner,
+                    const PixelRect& rect,
+                    const Visit& visit,
+                    Scalar slack = 0) {
+  constexpr Scalar kHalf(0.5);
+  const auto& [a, b, c] = corner;
+  const auto first = [](Scalar low, int begin) {
+    return std::max(begin, static_cast<int>(std::ceil(low - kHalf)));
   };
-  const auto last = [](float high, int end) {
-    return std::min(end - 1, static_cast<int>(std::floor(high - 0.5f)));
+  const auto last = [](Scalar high, int end) {
+    return std::min(end - 1, static_cast<int>(std::floor(high - kHalf)));
   };
   const int y0 = first(std::min({a.y(), b.y(), c.y()}), rect.y0);
   const int y1 = last(std::max({a.y(), b.y(), c.y()}), rect.y1);
   if (y0 > y1) return;
   const int x0 = first(std::min({a.x(), b.x(), c.x()}), rect.x0);
   const int x1 = last(std::max({a.x(), b.x(), c.x()}), rect.x1);
-  const float area = edge_function(a, b, c.x(), c.y());
+  const Scalar area = edge_function<Scalar>(a, b, c.x(), c.y());
   if (!(std::abs(area) > 0)) return;
   for (int y = y0; y <= y1; ++y) {
     for (int x = x0; x <= x1; ++x) {
-      const float u = static_cast<float>(x) + 0.5f;
-      const float v = static_cast<float>(y) + 0.5f;
-      Eigen::Vector3f w(
-          edge_function(b, c, u, v), edge_function(c, a, u, v), edge_function(a, b, u, v));
+      const Scalar u = static_cast<Scalar>(x) + kHalf;
+      const Scalar v = static_cast<Scalar>(y) + kHalf;
+      Eigen::Matrix<Scalar, 3, 1> w(edge_function<Scalar>(b, c, u, v),
+                                    edge_function<Scalar>(c, a, u, v),
+                                    edge_function<Scalar>(a, b, u, v));
       w /= area;
-      if (w.minCoeff() < 0) continue;
+      if (w.minCoeff() < -slack) continue;
       visit(x, y, w, w.x() * a.z() + w.y() * b.z() + w.z() * c.z());
     }
   }
+}
+
+/// The same for a face before a camera; the third coordinate is `nearness`, 1 / z.
+template <typename Visit>
+void for_each_pixel(const ProjectedFace& face, const PixelRect& rect, const Visit& visit) {
+  for_each_pixel<float>(face.corner, rect, visit);
 }
 
 /// 1 / z of the nearest surface at every pixel centre, 0 = nothing. Same bits for any number of

@@ -9,12 +9,12 @@
 #include <vector>
 
 #include <CGAL/Polygon_mesh_processing/remesh.h>
-#include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "meshing/nearest_surface.h"
+#include "meshing/face_split.h"
 #include "meshing/polygon_mesh.h"
 #include "meshing/self_intersections.h"
+#include "meshing/stated_surface.h"
 #include "meshing/vertex_attributes.h"
 
 namespace cgs {
@@ -37,15 +37,7 @@ TriangleMesh subdivided_once(const TriangleMesh& mesh) {
     }
     return at->second;
   };
-  for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    const auto& [a, b, c] = mesh.faces[f];
-    const uint32_t ab = middle(a, b);
-    const uint32_t bc = middle(b, c);
-    const uint32_t ca = middle(c, a);
-    out.faces.insert(out.faces.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
-    if (!mesh.provenance.empty())
-      out.provenance.insert(out.provenance.end(), 4, mesh.provenance[f]);
-  }
+  split_faces(mesh, middle, out);
   return out;
 }
 
@@ -60,42 +52,18 @@ void check_size(const TriangleMesh& mesh, double edge) {
                    " faces, allowed are 67108864");
 }
 
-// What the nearest points of the input state, at the places of the new vertices.
-void take_attributes(TriangleMesh& out, const TriangleMesh& mesh) {
-  MeasurableMesh input;
-  input.mesh = mesh;
-  for (const auto& p : mesh.vertices) input.points.push_back(p.cast<double>());
-  const NearestSurface surface(input);
-  std::vector<SurfacePoint> nearest(out.vertices.size());
-  tbb::parallel_for(size_t(0), nearest.size(), [&](size_t v) {
-    nearest[v] = surface.nearest(out.vertices[v].cast<double>());
-  });
-  const std::vector<Eigen::Vector3f> places = std::move(out.vertices);
-  out.vertices.clear();
-  for (const SurfacePoint& at : nearest) {
-    // Weights this small are rounding: a vertex next to an unsure one does not become unsure.
-    constexpr double kNone = 1e-6;
-    std::array<VertexShare, 3> shares;
-    for (int k = 0; k < 3; ++k) {
-      const double weight = at.weights[k] > kNone ? at.weights[k] : 0;
-      shares.at(size_t(k)) = {mesh.faces[at.face].at(size_t(k)), static_cast<float>(weight)};
-    }
-    std::sort(shares.begin(), shares.end(), [](const VertexShare& a, const VertexShare& b) {
-      return a.weight > b.weight;
-    });
-    append_blend(out, mesh, shares);
-  }
-  out.vertices = places;
-}
-
 }  // namespace
 
-TriangleMesh subdivided(const TriangleMesh& mesh, size_t times) {
+void require_room_to_subdivide(const TriangleMesh& mesh, size_t times) {
   constexpr double kMost = 1 << 28;
   if (double(mesh.faces.size()) * std::pow(4.0, double(times)) > kMost) {
     throw LimitError("subdividing " + std::to_string(mesh.faces.size()) + " faces " +
                      std::to_string(times) + " times gives more than 268435456");
   }
+}
+
+TriangleMesh subdivided(const TriangleMesh& mesh, size_t times) {
+  require_room_to_subdivide(mesh, times);
   TriangleMesh out = mesh;
   for (size_t i = 0; i < times; ++i) out = subdivided_once(out);
   if (!mesh.normals.empty()) out.normals = vertex_normals(out);
@@ -121,22 +89,11 @@ TriangleMesh remeshed(const TriangleMesh& mesh, double edge) {
       edge,
       halfedges,
       CGAL::parameters::number_of_iterations(kIterations).face_patch_map(label));
-  TriangleMesh out;
-  std::vector<uint32_t> renamed(halfedges.num_vertices(), 0);
-  for (const auto v : halfedges.vertices()) {
-    renamed[size_t(v)] = static_cast<uint32_t>(out.vertices.size());
-    out.vertices.push_back(polygon_mesh::vector_of(halfedges.point(v)));
-  }
+  TriangleMesh out = polygon_mesh::to_triangles(halfedges);
   for (const auto f : halfedges.faces()) {
-    std::array<uint32_t, 3> face{};
-    size_t k = 0;
-    for (const auto v : CGAL::vertices_around_face(halfedges.halfedge(f), halfedges)) {
-      face.at(k++) = renamed[size_t(v)];
-    }
-    out.faces.push_back(face);
     if (!mesh.provenance.empty()) out.provenance.push_back(static_cast<Provenance>(label[f]));
   }
-  take_attributes(out, mesh);
+  take_attributes(out, StatedSurface(mesh));
   if (!mesh.normals.empty()) out.normals = vertex_normals(out);
   return out;
 }

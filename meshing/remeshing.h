@@ -14,6 +14,9 @@ namespace cgs {
 /// \throws LimitError beyond 2^28 faces
 TriangleMesh subdivided(const TriangleMesh& mesh, size_t times);
 
+/// \throws LimitError if splitting each face into four, so many times, gives more than 2^28
+void require_room_to_subdivide(const TriangleMesh& mesh, size_t times);
+
 /// The mesh with triangles of about equal sides.
 ///
 /// Borders between labels and open rims stay where they are within the edge length, so that every

@@ -101,13 +101,13 @@ class Tightening {
 // Input vertices on faces of labels with evidence whose area has changed too much.
 bool tighten_for_area(const TriangleMesh& mesh,
                       const SimplifyResult& result,
+                      double most_change,
                       std::vector<float>& tolerance) {
-  constexpr double kMostChange = 0.01;
   std::array<bool, kProvenanceCount> changed{};
   for (size_t label = 0; label < changed.size(); ++label) {
     const bool counts = mesh.provenance.empty() || Provenance(label) != Provenance::Inferred;
     const double change = std::abs(result.area_after[label] - result.area_before[label]);
-    changed[label] = counts && change > kMostChange * result.area_before[label];
+    changed[label] = counts && change > most_change * result.area_before[label];
   }
   std::vector<uint8_t> marked(tolerance.size(), 0);
   bool any = false;
@@ -140,6 +140,9 @@ void SimplifyOptions::validate() const {
   require(max_color_error > 0 && max_color_error <= 1,
           "SimplifyOptions.max_color_error must be in (0, 1]",
           max_color_error);
+  require(max_area_change > 0 && max_area_change <= 1,
+          "SimplifyOptions.max_area_change must be in (0, 1]",
+          max_area_change);
 }
 
 SimplifyResult simplify(const TriangleMesh& mesh,
@@ -162,7 +165,7 @@ SimplifyResult simplify(const TriangleMesh& mesh,
     result.rounds = round;
     if (round == 1) limits.pass_costs = out.pass_costs;
     result.area_after = area_by_provenance(out.mesh);
-    if (tighten_for_area(mesh, result, limits.tolerance)) continue;
+    if (tighten_for_area(mesh, result, options.max_area_change, limits.tolerance)) continue;
     Tightening tightening(limits.tolerance, options.max_error / 32);
     std::vector<uint32_t> bad;
     for (const auto& [f, g] : self_intersections(out.mesh)) bad.insert(bad.end(), {f, g});

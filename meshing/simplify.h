@@ -17,7 +17,9 @@ struct SimplifyOptions {
       0;  ///< The same for Inferred faces; 0 = max_error, else >= max_error.
   double max_color_error = 0.03;  ///< Largest change of a colour channel at an input vertex that is
                                   ///< not on Inferred faces only; in (0, 1]; 1 = any.
-  size_t target_faces = 0;        ///< Stop when so few are left; 0 = as few as the errors allow.
+  double max_area_change =
+      0.01;                 ///< Of any label with evidence, as a share of its area; in (0, 1].
+  size_t target_faces = 0;  ///< Stop when so few are left; 0 = as few as the errors allow.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
@@ -42,7 +44,7 @@ struct SimplifyResult {
 /// Faces keep their labels, borders between labels and open rims stay where they are within the
 /// error, topology is kept; see collapse_edges(). A mesh without provenance counts as evidence.
 /// What comes out is then measured: by samples in both directions, by the area of every label with
-/// evidence (which may change by 1 %), and for self-intersections. Where a check fails, the
+/// evidence, and for self-intersections. Where a check fails, the
 /// tolerance of the input vertices nearby is quartered, finally to zero, and the collapses are run
 /// again. If that does not help within a few rounds, the result is the input.
 /// \throws InvalidInput if a vertex is not finite.

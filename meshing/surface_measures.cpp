@@ -74,10 +74,6 @@ std::vector<Eigen::Vector3d> area_gradients(const MeasurableMesh& mesh) {
   return out;
 }
 
-Provenance weaker(Provenance a, Provenance b) {
-  return evidence_rank(a) < evidence_rank(b) ? a : b;
-}
-
 }  // namespace
 
 double SigmaSum::sigma() const { return std::sqrt(together_ * together_ + squares_); }
@@ -176,7 +172,8 @@ MeasuredValue straight_distance(const MeasurableMesh& mesh,
   const Eigen::Vector3d along = (to.position - from.position).stableNormalized();
   out.sigma = std::hypot(sigma_along(along, a), sigma_along(along, b));  // NaN: no statement
   if (mesh.states_provenance()) {
-    out.by_provenance.at(static_cast<size_t>(weaker(a.provenance, b.provenance))) = out.value;
+    out.by_provenance.at(static_cast<size_t>(weaker_evidence(a.provenance, b.provenance))) =
+        out.value;
   }
   return out;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -74,21 +75,30 @@ std::vector<Pixel> trustworthy_pixels(const TsdfView& view, double depth_trunc) 
 struct Extent {
   Eigen::AlignedBox3d surface;
   double footprint = 0;  // Median size of a pixel on the surface [internal units].
+  double sigma = 0;      // Median of the known ones [internal units].
 };
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 Extent surface_extent(std::span<const TsdfView> views, double depth_trunc) {
   Extent out;
   std::vector<double> footprints;
+  std::vector<double> sigmas;
   for (const TsdfView& view : views) {
     for (const Pixel& p : trustworthy_pixels(view, depth_trunc)) {
+      const float sigma = view.sigma.empty() ? 0 : view.sigma(p.x, p.y);
+      if (sigma > 0) sigmas.push_back(double(sigma));
       out.surface.extend(view.camera.unproject(p.x + 0.5, p.y + 0.5, double(p.depth)));
       footprints.push_back(2 * double(p.depth) / (view.camera.fx + view.camera.fy));
     }
   }
   require(!footprints.empty(), "fuse needs pixels with a depth, their number", 0);
-  const auto middle = footprints.begin() + std::ptrdiff_t(footprints.size() / 2);
-  std::nth_element(footprints.begin(), middle, footprints.end());
-  out.footprint = *middle;
+  out.footprint = median(footprints);
+  if (!sigmas.empty()) out.sigma = median(sigmas);
   return out;
 }
 
@@ -100,9 +110,12 @@ double chosen_voxel_size(const Extent& extent, const TsdfOptions& options) {
   if (options.voxel_size > 0) return options.voxel_size;
   const double margin = double(options.truncation) + kMargin;
   const auto limit = static_cast<double>(options.max_voxels);
+  const double coarsest = options.coarsest_voxel > 0
+                              ? std::max({options.coarsest_voxel, extent.footprint, extent.sigma})
+                              : std::numeric_limits<double>::infinity();
   double voxel = extent.footprint;
   while (voxels_in(extent.surface, voxel, margin) > limit) voxel *= 1.02;
-  return voxel;
+  return std::min(voxel, coarsest);
 }
 
 // The blocks of 8 x 8 x 8 voxels that cover the bounds, in x-major order.
@@ -356,6 +369,7 @@ void TsdfOptions::validate() const {
           "TsdfOptions.truncation must be >= 2 voxels and finite",
           truncation);
   require(max_voxels >= 4096, "TsdfOptions.max_voxels must be >= 4096", max_voxels);
+  require(coarsest_voxel >= 0, "TsdfOptions.coarsest_voxel must be >= 0", coarsest_voxel);
   require(min_weight >= 0, "TsdfOptions.min_weight must be >= 0", min_weight);
   require(depth_trunc >= 0, "TsdfOptions.depth_trunc must be >= 0", depth_trunc);
   require(gap_pixels >= 0 && gap_pixels <= 4096,

@@ -34,6 +34,9 @@ struct TsdfOptions {
   float truncation = 4;   ///< Half-width of the band around the surface [voxels]; >= 2. A pixel
                           ///< uses the larger of this and 3 sigma, at most 3 times this.
   int64_t max_voxels = 40'000'000;  ///< Voxels in the bounds when voxel_size is chosen; >= 4096.
+  double coarsest_voxel = 0;  ///< When voxel_size is chosen, max_voxels makes it no coarser than
+                              ///< this or, where that is larger, the median pixel footprint or
+                              ///< sigma [internal units]; 0 = any.
   float min_weight = 0;    ///< Band voxels below this weight count as not observed; >= 0. One exact
                            ///< view straight on gives 1, so a large value drops single views.
   double depth_trunc = 0;  ///< Depth beyond this is ignored [internal units]; 0 = none is.

@@ -72,12 +72,32 @@ void add_scale_options(CLI::App& command, SceneRequest& request) {
                      "What one scene unit is (m, cm, mm, in, ft), where the scene does not say; "
                      "STL and 3MF need it");
   command
+      .add_option("--up",
+                  request.up,
+                  "World direction that is up, three numbers; default: judged by the cameras")
+      ->expected(3);
+  command
       .add_option("--known-distance",
                   request.known_distances,
                   "Two pixels of input photographs and how far apart these points really are: "
                   "VIEW:X,Y VIEW:X,Y 1.2m, or 1.2m+-3mm; gives the scene its scale; several are "
                   "weighed against each other")
       ->allow_extra_args(false);
+  command.add_option("--marker-size",
+                     request.marker_size,
+                     "Side of the black square of printed markers (AprilTag 36h11; ArUco 4x4, 5x5, "
+                     "6x6, original) that two photographs show, e.g. 80mm or 80mm+-0.2mm; gives "
+                     "the scene its scale");
+  command.add_option(
+      "--control-points",
+      request.control.file,
+      "Table (CSV) of surveyed points and where photographs show them, columns name,x,y,z,view,"
+      "px,py and, if wanted, sigma and role (control or check): every result is then in the "
+      "coordinates of the table, z up; needs 3 points, each in 2 photographs, and tells scale, "
+      "unit and up by itself");
+  command.add_option("--control-unit",
+                     request.control.unit,
+                     "Unit of the coordinates in --control-points (m, cm, mm, in, ft); default m");
 }
 
 void add_focal_option(CLI::App& command, double& focal) {

@@ -26,7 +26,7 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 /// The same without --memory-limit, for commands that plan no memory.
 void add_output_options(CLI::App& command, CommonOptions& options);
 
-/// --assume-unit and --known-distance.
+/// --assume-unit, --up, --known-distance, --marker-size, --control-points and --control-unit.
 void add_scale_options(CLI::App& command, SceneRequest& request);
 
 /// --views, --downscale, --depth, --depth-kind, --depth-model, --depth-scale

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 
@@ -11,6 +12,7 @@
 #include "convert/commands/common_options.h"
 #include "convert/comparison.h"
 #include "convert/length.h"
+#include "convert/m3c2_comparison.h"
 #include "convert/measured_file.h"
 #include "convert/terminal.h"
 #include "io/json_file.h"
@@ -26,6 +28,7 @@ struct CompareArgs {
   size_t samples = 200'000;
   bool icp = false;
   bool scale = false;
+  M3c2Request m3c2;
   std::string threshold;
   std::filesystem::path ply;
   std::filesystem::path svg;
@@ -39,15 +42,6 @@ double share_within(const std::vector<Deviation>& deviations, double threshold) 
     return std::abs(d.distance) <= threshold;
   });
   return static_cast<double>(count) / static_cast<double>(std::max<size_t>(1, deviations.size()));
-}
-
-double range_of(const std::vector<Deviation>& deviations) {
-  std::vector<double> sizes;
-  sizes.reserve(deviations.size());
-  for (const Deviation& d : deviations) sizes.push_back(std::abs(d.distance));
-  std::sort(sizes.begin(), sizes.end());
-  const double most = sizes.empty() ? 0 : sizes[(sizes.size() - 1) * 98 / 100];
-  return std::max(most, 1e-9);
 }
 
 Agreement agreement(const CompareArgs& args,
@@ -66,6 +60,63 @@ Agreement agreement(const CompareArgs& args,
   return out;
 }
 
+std::string title_of(const CompareArgs& args) {
+  return args.a.filename().string() + " against " + args.b.filename().string();
+}
+
+Registration lay_onto(MeasurableMesh& a,
+                      const MeasurableMesh& b,
+                      const NearestSurface& surface,
+                      bool with_scale) {
+  constexpr size_t kPoints = 20'000;
+  Registration out = register_points(points_by_area(a, kPoints).places, b, surface, with_scale);
+  a = moved(a, out);
+  return out;
+}
+
+void print_json(const CompareArgs& args,
+                const MeasurableMesh& a,
+                const MeasurableMesh& b,
+                const FigureUnit& unit,
+                const nlohmann::ordered_json& found) {
+  nlohmann::ordered_json report = {{"a", measured_json(args.a, a, unit)},
+                                   {"b", measured_json(args.b, b, unit)}};
+  report.update(found);
+  std::cout << json_text(report) << "\n";
+}
+
+void print_text(const CompareArgs& args, const Comparison& comparison, const FigureUnit& unit) {
+  std::printf("%s, %zu points\n%s",
+              one_line(title_of(args)).c_str(),
+              comparison.summary.count,
+              comparison_text(comparison, unit).c_str());
+}
+
+// Cloud against cloud, along normals: what --m3c2 asks for.
+void print_m3c2(const CompareArgs& args,
+                MeasurableMesh a,
+                const MeasurableMesh& b,
+                const FigureUnit& unit) {
+  std::optional<Registration> registration;
+  if (args.icp) {
+    if (b.mesh.faces.empty()) {
+      throw InvalidInput("--icp needs a surface to lay A onto, but " + printable(args.b) +
+                         " is a point cloud");
+    }
+    registration = lay_onto(a, b, NearestSurface(b), args.scale);
+  }
+  M3c2Comparison found = compare_m3c2(args.m3c2, a, b);
+  found.comparison.registration = registration;
+  if (!args.ply.empty()) write_m3c2_ply(args.ply, a, found);
+  if (!args.svg.empty()) write_histogram_svg(args.svg, found.comparison, unit, title_of(args));
+  if (args.common.json) {
+    print_json(args, a, b, unit, m3c2_json(found, a, unit));
+  } else {
+    print_text(args, found.comparison, unit);
+    std::printf("%s", m3c2_text(found, unit).c_str());
+  }
+}
+
 void run_compare(const CompareArgs& args) {
   limit_threads(args.common.threads);
   require(args.samples >= 100 && args.samples <= 100'000'000,
@@ -76,21 +127,18 @@ void run_compare(const CompareArgs& args) {
   MeasurableFile second = read_measured(args.b, args.assume_unit);
   terminal.warn(first.warnings);
   terminal.warn(second.warnings);
-  if (second.content.mesh.faces.empty()) {
-    throw InvalidInput(printable(args.b) +
-                       " is a point cloud; distances need a surface: name the cloud first");
+  if (second.content.mesh.faces.empty() && !args.m3c2.wanted) {
+    throw InvalidInput(
+        printable(args.b) +
+        " is a point cloud; distances need a surface: name the cloud first, or say --m3c2");
   }
   MeasurableMesh a = std::move(first.content);
   const MeasurableMesh b = in_frame_of(second.content, a.frame);
   const FigureUnit unit = figure_unit(a.frame, args.unit);
-  const NearestSurface surface(b);
   Comparison comparison;
-  if (args.icp) {
-    constexpr size_t kPoints = 20'000;
-    comparison.registration =
-        register_points(points_by_area(a, kPoints).places, b, surface, args.scale);
-    a = moved(a, *comparison.registration);
-  }
+  if (args.m3c2.wanted) return print_m3c2(args, std::move(a), b, unit);
+  const NearestSurface surface(b);
+  if (args.icp) comparison.registration = lay_onto(a, b, surface, args.scale);
   comparison.by_area = deviations(points_by_area(a, args.samples), b, surface);
   comparison.summary = summarize(comparison.by_area);
   comparison.half_range = range_of(comparison.by_area);
@@ -100,19 +148,35 @@ void run_compare(const CompareArgs& args) {
   if (!args.ply.empty()) {
     write_colored(args.ply, a, deviations(points_by_vertex(a), b, surface), comparison.half_range);
   }
-  const std::string title = args.a.filename().string() + " against " + args.b.filename().string();
-  if (!args.svg.empty()) write_histogram_svg(args.svg, comparison, unit, title);
+  if (!args.svg.empty()) write_histogram_svg(args.svg, comparison, unit, title_of(args));
   if (args.common.json) {
-    nlohmann::ordered_json report = {{"a", measured_json(args.a, a, unit)},
-                                     {"b", measured_json(args.b, b, unit)}};
-    report.update(comparison_json(comparison, a, unit));
-    std::cout << json_text(report) << "\n";
+    print_json(args, a, b, unit, comparison_json(comparison, a, unit));
   } else {
-    std::printf("%s, %zu points\n%s",
-                one_line(title).c_str(),
-                comparison.summary.count,
-                comparison_text(comparison, unit).c_str());
+    print_text(args, comparison, unit);
   }
+}
+
+void add_m3c2(CLI::App& cmd, M3c2Request& request) {
+  auto* m3c2 = cmd.add_flag("--m3c2",
+                            request.wanted,
+                            "Points of A against points of B along local normals, with the level "
+                            "of detection; either may be a point cloud");
+  cmd.add_option("--normal-scale",
+                 request.normal_scale,
+                 "Diameter in which A gives the normal; default: twice the cylinder")
+      ->needs(m3c2);
+  cmd.add_option("--cylinder",
+                 request.cylinder,
+                 "Diameter in which points are averaged; default: about 30 points")
+      ->needs(m3c2);
+  cmd.add_option("--cylinder-depth",
+                 request.depth,
+                 "How far it reaches to either side; default: 10 diameters")
+      ->needs(m3c2);
+  cmd.add_option("--registration-error",
+                 request.registration,
+                 "Standard deviation of laying A onto B, e.g. 2mm; default 0")
+      ->needs(m3c2);
 }
 
 }  // namespace
@@ -127,8 +191,11 @@ void add_compare(CLI::App& app) {
       ->capture_default_str();
   auto* icp = cmd->add_flag("--icp", args->icp, "Lay A onto B first, from where it is");
   cmd->add_flag("--scale", args->scale, "Let it grow or shrink, too")->needs(icp);
+  add_m3c2(*cmd, args->m3c2);
+  cmd->get_option("--samples")->excludes("--m3c2");
   cmd->add_option(
-      "--threshold", args->threshold, "Accuracy, completeness and F-score within this length");
+         "--threshold", args->threshold, "Accuracy, completeness and F-score within this length")
+      ->excludes("--m3c2");
   cmd->add_option("--ply", args->ply, "Write A with the distance as colour and scalar");
   cmd->add_option("--svg", args->svg, "Draw the histogram");
   cmd->add_option("--unit", args->unit, "Unit of the figures; default m");
@@ -137,7 +204,9 @@ void add_compare(CLI::App& app) {
   add_common_options(*cmd, args->common);
   cmd->footer(
       "Positive distances lie on the side that B's faces look to.\n"
-      "Example: cgs compare 2026.ply 2024.ply --icp --unit mm --ply change.ply --threshold 5mm");
+      "Example: cgs compare 2026.ply 2024.ply --icp --unit mm --ply change.ply --threshold 5mm\n"
+      "         cgs compare 2026.ply 2024.ply --m3c2 --cylinder 5cm --registration-error 2mm "
+      "--ply change.ply");
   cmd->callback([args] { run_compare(*args); });
 }
 

@@ -59,10 +59,15 @@ void add_convert(CLI::App& app) {
   cmd->add_option("--simplify",
                   request.simplify,
                   "Largest error of simplified meshes, e.g. 2mm; default: a quarter of a voxel, "
-                  "none for splats without cameras; 0 = do not simplify");
-  cmd->add_option("--max-error", request.max_error, "Largest error of compression in a .glb");
+                  "none for meshes and splats without cameras; 0 = do not simplify");
+  cmd->add_option("--compression-error",
+                  request.compression_error,
+                  "Largest move of a vertex by compression in a .glb, e.g. 0.2mm");
   cmd->add_option("--assume-unit", request.assume_unit, "What one unit is: m, cm, mm, in, ft");
-  cmd->add_option("--up", request.up, "Direction that is up, three numbers; default 0 -1 0")
+  cmd->add_option("--up",
+                  request.up,
+                  "Direction that is up, three numbers; default: as the input says, else 0 0 1 for "
+                  "meshes and 0 -1 0 for splats")
       ->expected(3);
   cmd->add_option("--look-from", args->from, "Virtual cameras: best, outside or inside")
       ->capture_default_str();

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -8,6 +7,7 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/html.h"
 #include "convert/model.h"
 #include "convert/terminal.h"
 #include "convert/views.h"
@@ -36,17 +36,14 @@ void print_table(const nlohmann::ordered_json& report) {
               "holes",
               "MS-SSIM");
   const auto row = [](const std::string& name, const nlohmann::ordered_json& r) {
-    const auto figure = [&](const char* key) {
-      return r[key].is_number() ? r[key].get<double>() : std::nan("");
-    };
-    std::printf("%-24s %8.2f %8.3f %10.2f %10.3f %7.1f%% %8.3f\n",
+    std::printf("%-24s %8s %8s %10s %10s %7.1f%% %8s\n",
                 name.c_str(),
-                figure("psnr"),
-                figure("ssim"),
-                figure("psnr_seen"),
-                figure("ssim_seen"),
+                number(r["psnr"], "%.2f").c_str(),
+                number(r["ssim"], "%.3f").c_str(),
+                number(r["psnr_seen"], "%.2f").c_str(),
+                number(r["ssim_seen"], "%.3f").c_str(),
                 100 * r["hole_fraction"].get<double>(),
-                figure("ms_ssim"));
+                number(r["ms_ssim"], "%.3f").c_str());
   };
   for (const auto& view : report["views"]) row(view["name"].get<std::string>(), view);
   row("mean", report["mean"]);

@@ -10,6 +10,7 @@
 #include "convert/filter/chain.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
+#include "convert/stated_frame.h"
 #include "convert/terminal.h"
 #include "io/json_file.h"
 #include "libcgs/core/error.h"
@@ -33,11 +34,6 @@ void check_content(const std::filesystem::path& output, const FilterState& state
   throw InvalidInput("a point cloud can only be written as .ply, not as " + printable(output));
 }
 
-Eigen::Vector3d up_of(const FilterArgs& args, const MeasurableFile& file) {
-  if (!args.up.empty()) return {args.up[0], args.up[1], args.up[2]};
-  return file.up.value_or(Eigen::Vector3d::UnitZ());
-}
-
 void run_filter_command(const FilterArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.input);
@@ -52,6 +48,7 @@ void run_filter_command(const FilterArgs& args) {
   }
   MeasurableFile file = read_measured(args.input, args.assume_unit);
   terminal.warn(file.warnings);
+  settle_up(file.content.frame, args.up);
   FilterState state{std::move(file.content.mesh), file.content.frame, file.content.file_origin};
   const std::vector<PreparedFilter> filters = prepare_filters(args.operations, state.frame);
   for (const PreparedFilter& filter : filters) {
@@ -60,7 +57,7 @@ void run_filter_command(const FilterArgs& args) {
   require_writable_as(args.output, state.frame);
   const nlohmann::ordered_json report = run_filters(state, filters, terminal);
   check_content(args.output, state);
-  write_mesh_as(args.output, state.mesh, state.frame, up_of(args, file));
+  write_mesh_as(args.output, state.mesh, state.frame);
   if (state.frame.file_origin != state.file_origin) {
     terminal.warn("coordinates in " + printable(args.output) +
                   " are from another origin, which the file states: floats would lose digits");
@@ -83,11 +80,10 @@ void add_filter(CLI::App& app) {
       ->allow_extra_args(false);
   cmd->add_option(
       "--assume-unit", args->assume_unit, "What a unit of the file is, where it does not say");
-  cmd->add_option(
-         "--up",
-         args->up,
-         "Direction that is up, for .stl, .3mf and .glb; default: as the file says (.glb), "
-         "else 0 0 1")
+  cmd->add_option("--up",
+                  args->up,
+                  "Direction that is up, for .stl, .3mf and .glb; default: as the file says, "
+                  "else 0 0 1")
       ->expected(3);
   add_output_options(*cmd, args->common);
   cmd->footer(filter_help() +

@@ -14,7 +14,9 @@
 #include "convert/length.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
+#include "convert/orthophoto_files.h"
 #include "convert/terminal.h"
+#include "convert/thickness_figures.h"
 #include "io/dxf.h"
 #include "io/json_file.h"
 #include "io/mesh_arrays.h"
@@ -24,6 +26,7 @@
 #include "meshing/section.h"
 #include "meshing/shape_fit.h"
 #include "meshing/surface_measures.h"
+#include "meshing/thickness.h"
 
 namespace cgs {
 
@@ -44,13 +47,18 @@ struct MeasureArgs {
   std::string fit;
   std::string at;
   std::string radius;
+  OrthophotoRequest orthophoto;
+  bool thickness = false;
+  std::vector<std::string> thickness_at;
+  std::filesystem::path thickness_ply;
   std::string unit;
   std::string assume_unit;
   CommonOptions common;
 
   bool asks_for_nothing() const {
     return distance.empty() && along.empty() && !area && !volume && !bounds && section.empty() &&
-           fit.empty();
+           fit.empty() && orthophoto.prefix.empty() && !thickness && thickness_at.empty() &&
+           thickness_ply.empty();
   }
 };
 
@@ -79,11 +87,16 @@ class Measuring {
   void along(const std::vector<std::string>& ends);
   void section(const MeasureArgs& args);
   void fit(const MeasureArgs& args);
+  void orthophoto(const OrthophotoRequest& request);
+  void thickness();
+  void thickness_at(const std::vector<std::string>& points);
+  void thickness_ply(const std::filesystem::path& path);
   void certificate();
 
   Json figures = Json::object();
 
  private:
+  void require_inside();
   SurfacePoint pick(const std::string& text);
   Json point_json(const Eigen::Vector3d& internal) const {
     const Eigen::Vector3d p = mesh_.file_from_internal(internal);
@@ -258,6 +271,86 @@ void Measuring::fit(const MeasureArgs& args) {
   figures["fit"] = std::move(out);
 }
 
+void Measuring::orthophoto(const OrthophotoRequest& request) {
+  const Json out = write_orthophoto(request, mesh_, unit_);
+  char text[300];  // NOLINT(modernize-avoid-c-arrays)
+  std::snprintf(text,
+                sizeof(text),
+                "%d x %d pixels of %.6g %s; heights %.6g to %.6g %s%s",
+                out["width"].get<int>(),
+                out["height"].get<int>(),
+                out["pixel_size"].get<double>(),
+                unit_.name.c_str(),
+                out["lowest"].get<double>(),
+                out["highest"].get<double>(),
+                unit_.name.c_str(),
+                out["height_zero"] == 0 ? "" : ", in the file from height_zero of --json");
+  say("orthophoto", text);
+  if (mesh_.mesh.colors.empty()) say("", "all grey: this mesh has no colours of vertices");
+  for (const Provenance label : kProvenanceOrder) {
+    const Json& share = out[provenance_key(label)];
+    if (share.is_null() || share == 0) continue;
+    std::snprintf(text, sizeof(text), "%.2f %%", 100 * share.get<double>());
+    say("", std::string(text) + " of the picture " + std::string(provenance_name(label)));
+  }
+  for (const Json& file : out["files"]) say("", printable(file.get<std::string>()));
+  figures["orthophoto"] = out;
+}
+
+// Inside out, gaps between parts would be taken for their thickness.
+void Measuring::require_inside() {
+  if (!certified().closed || certified().oriented_outward) return;
+  throw InvalidInput(
+      "--thickness needs to know what is inside, but faces of this closed mesh disagree on it or "
+      "all look inward; cgs filter --op repair turns them");
+}
+
+void Measuring::thickness() {
+  require_inside();
+  constexpr size_t kSamples = 20'000;
+  const ThicknessSummary summary = summarize_thickness(mesh_, surface(), kSamples);
+  figures["thickness"] = thickness_json(summary, unit_);
+  say("thickness", thickness_text(summary.seen, unit_));
+  if (mesh_.states_provenance()) {
+    say("",
+        "where the near or the far side is inferred: " + thickness_text(summary.inferred, unit_));
+  }
+  if (summary.without_far_side > 0) {
+    char text[80];  // NOLINT(modernize-avoid-c-arrays)
+    std::snprintf(text, sizeof(text), "%.2f %% have no far side", 100 * summary.without_far_side);
+    say("", text);
+  }
+}
+
+void Measuring::thickness_at(const std::vector<std::string>& points) {
+  require_inside();
+  const ThicknessGauge gauge(mesh_, surface());
+  Json all = Json::array();
+  for (const std::string& text : points) {
+    const SurfacePoint from = pick(text);
+    const Thickness found = gauge.at(from);
+    Json one = {{"value", nullptr}, {"from", picked_json(text, from)}, {"to", nullptr}};
+    if (found.has_far_side()) {
+      one.update(figure_json(found.value, unit_, mesh_.states_provenance()));
+      const SurfaceEvidence there = evidence_at(mesh_, found.far_side);
+      one["to"] = {{"point", point_json(found.far_side.position)}, {"provenance", nullptr}};
+      if (mesh_.states_provenance()) {
+        one["to"]["provenance"] = provenance_name(there.provenance);
+      }
+    }
+    say("thickness",
+        found.has_far_side() ? figure_text(found.value, unit_, mesh_.states_provenance())
+                             : "none: there is no far side");
+    all.push_back(std::move(one));
+  }
+  figures["thickness_at"] = std::move(all);
+}
+
+void Measuring::thickness_ply(const std::filesystem::path& path) {
+  require_inside();
+  write_thickness_ply(path, mesh_, thickness_of_vertices(mesh_, surface()));
+}
+
 void Measuring::certificate() {
   figures["certificate"] = certificate_to_json(certified(), mesh_.mesh, mesh_.frame);
   say("certificate", certificate_line(certified()));
@@ -286,6 +379,10 @@ void run_measure(const MeasureArgs& args) {
   if (!args.along.empty()) measuring.along(args.along);
   if (!args.section.empty()) measuring.section(args);
   if (!args.fit.empty()) measuring.fit(args);
+  if (!args.orthophoto.prefix.empty()) measuring.orthophoto(args.orthophoto);
+  if (args.thickness) measuring.thickness();
+  if (!args.thickness_at.empty()) measuring.thickness_at(args.thickness_at);
+  if (!args.thickness_ply.empty()) measuring.thickness_ply(args.thickness_ply);
   if (all) measuring.certificate();
   if (args.common.json) {
     std::cout << json_text({{"mesh", about}, {"figures", measuring.figures}}) << "\n";
@@ -304,12 +401,42 @@ void add_figures(CLI::App& cmd, MeasureArgs& args) {
       "--section", args.section, "Cut by a plane: z=1.5, or a point and a normal x,y,z/nx,ny,nz");
   cmd.add_option("--svg", args.svg, "Draw the section")->needs(section);
   cmd.add_option("--dxf", args.dxf, "Write the section for CAD programs")->needs(section);
+  cmd.add_flag(
+      "--thickness", args.thickness, "Thickness: largest balls inside, all over the surface");
+  cmd.add_option("--thickness-at", args.thickness_at, "Thickness at points, x,y,z each");
+  cmd.add_option("--thickness-ply", args.thickness_ply, "Write the mesh coloured by thickness");
   auto* fit = cmd.add_option("--fit", args.fit, "Fit a shape to a patch of the surface")
                   ->check(CLI::IsMember({"plane", "sphere", "cylinder"}));
   auto* at = cmd.add_option("--at", args.at, "Middle of the patch, x,y,z")->needs(fit);
   auto* radius =
       cmd.add_option("--radius", args.radius, "Radius of the patch, e.g. 5cm")->needs(fit);
   fit->needs(at)->needs(radius);
+}
+
+void add_orthophoto(CLI::App& cmd, OrthophotoRequest& request) {
+  auto* prefix = cmd.add_option("--orthophoto",
+                                request.prefix,
+                                "Write PREFIX.png, PREFIX.tif (heights), PREFIX.provenance.png and "
+                                "a world file for each");
+  auto* side = cmd.add_option("--side", request.side, "Where it is seen from")
+                   ->check(CLI::IsMember({"top", "front", "back", "left", "right"}))
+                   ->capture_default_str()
+                   ->needs(prefix);
+  auto* up = cmd.add_option("--up",
+                            request.up,
+                            "Direction that is up, three numbers; default: as "
+                            "the file tells, else 0 0 1")
+                 ->expected(3)
+                 ->needs(prefix);
+  cmd.add_option("--plane",
+                 request.plane,
+                 "Or seen across the plane of three points, x,y,z each: right is from the first to "
+                 "the second, and they run counter-clockwise")
+      ->expected(3)
+      ->needs(prefix)
+      ->excludes(side)
+      ->excludes(up);
+  cmd.add_option("--pixel-size", request.pixel_size, "Of the orthophoto, e.g. 1mm")->needs(prefix);
 }
 
 }  // namespace
@@ -321,6 +448,7 @@ void add_measure(CLI::App& app) {
   cmd->add_option("mesh", args->mesh, "Mesh, ours or of others: .ply, .obj, .stl, .off, .glb")
       ->required();
   add_figures(*cmd, *args);
+  add_orthophoto(*cmd, args->orthophoto);
   cmd->add_option("--unit", args->unit, "Unit of the figures; default m");
   cmd->add_option(
       "--assume-unit", args->assume_unit, "What a unit of the file is, where it does not say");
@@ -329,7 +457,9 @@ void add_measure(CLI::App& app) {
       "Points are in the coordinates of the file and move to the nearest point of the surface.\n"
       "Without a figure: area, volume, bounds and certificate.\n"
       "Example: cgs measure out/portal/mesh/watertight.ply --distance -1,0,4 1,0,4 --unit mm\n"
-      "         cgs measure part.stl --assume-unit mm --section z=12 --dxf section.dxf");
+      "         cgs measure part.stl --assume-unit mm --section z=12 --dxf section.dxf\n"
+      "         cgs measure out/portal/mesh/watertight.ply --orthophoto facade --side front "
+      "--pixel-size 5mm");
   cmd->callback([args] { run_measure(*args); });
 }
 

@@ -8,6 +8,7 @@
 #include "convert/commands/common_options.h"
 #include "convert/mesh_files.h"
 #include "convert/simplification.h"
+#include "convert/stated_frame.h"
 #include "convert/terminal.h"
 #include "convert/volume_file.h"
 #include "io/json_file.h"
@@ -21,7 +22,7 @@ namespace {
 struct MeshArgs {
   std::filesystem::path volume;
   std::filesystem::path output;
-  std::vector<double> up = {0, 0, 1};
+  std::vector<double> up;
   std::string simplify;
   CommonOptions common;
 };
@@ -30,14 +31,14 @@ void run_mesh_command(const MeshArgs& args) {
   limit_threads(args.common.threads);
   Terminal terminal(args.common.quiet);
   VolumeFile file = read_volume(args.volume);
+  settle_up(file.frame, args.up);
   const Progress progress = terminal.begin("mesh");
   const auto options = simplify_options(args.simplify, file.volume.voxel_size, file.frame);
   TriangleMesh open = open_surface(file.volume, {});
   WatertightResult closed = watertight_surface(file.volume, {}, part_of(progress, 0.1, 0.5));
   const nlohmann::ordered_json simplification =
       simplify_meshes(open, closed, options, file.frame, part_of(progress, 0.5, 0.9));
-  const Eigen::Vector3d up(args.up[0], args.up[1], args.up[2]);
-  nlohmann::ordered_json files = write_mesh_files(args.output, open, closed.mesh, file.frame, up);
+  nlohmann::ordered_json files = write_mesh_files(args.output, open, closed.mesh, file.frame);
   write_obj(args.output / "watertight.obj", closed.mesh, file.frame);
   files["files"].push_back("watertight.obj");
   terminal.end(std::to_string(closed.mesh.faces.size()) + " faces, " +
@@ -62,9 +63,10 @@ void add_mesh(CLI::App& app) {
       app.add_subcommand("mesh", "Volume to meshes: open surface, and watertight with certificate");
   cmd->add_option("volume", args->volume, "Volume written by fuse or run (.vdb)")->required();
   cmd->add_option("-o,--output", args->output, "Folder to write")->required();
-  cmd->add_option("--up", args->up, "Direction that is up in the scene, three numbers")
-      ->expected(3)
-      ->capture_default_str();
+  cmd->add_option("--up",
+                  args->up,
+                  "Direction that is up, three numbers; default: as the volume says, else 0 0 1")
+      ->expected(3);
   cmd->add_option(
       "--simplify",
       args->simplify,

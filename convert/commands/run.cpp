@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <chrono>
 #include <iomanip>
 #include <iostream>
 #include <memory>
@@ -6,10 +7,12 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/budget.h"
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/length.h"
 #include "convert/pipeline.h"
+#include "convert/report.h"
 #include "io/json_file.h"
 #include "libcgs/core/error.h"
 
@@ -21,6 +24,8 @@ struct RunArgs {
   RunRequest request;
   TrainingArguments training;
   CommonOptions common;
+  std::string max_size;
+  std::string budget;
 };
 
 // One paragraph a user reads after a run: what was made, how far to trust it, what to open.
@@ -33,6 +38,7 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
          << 100 * scale["metres_sigma"].get<double>() / scale["metres_per_unit"].get<double>()
          << " %";
     terminal.say(text.str());
+    if (scale.contains("control_points")) terminal.say(control_words(scale));
   }
   const auto& certificate = report["certificate"];
   terminal.say(std::string("watertight mesh: ") +
@@ -42,6 +48,7 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
   for (const auto& [file, reason] : report["mesh"]["output"]["left_out"].items()) {
     terminal.say(file + " left out: " + reason.get<std::string>());
   }
+  for (const std::string& words : promise_words(report)) terminal.say(words);
   terminal.say("open " + (args.request.output / "report.html").string());
 }
 
@@ -53,11 +60,22 @@ void run_run(const RunArgs& args) {
   if (!args.common.memory_limit.empty()) {
     request.memory_limit = parse_bytes(args.common.memory_limit);
   }
+  if (!args.max_size.empty()) request.max_size = parse_file_size(args.max_size);
   if (!request.scene.assume_unit.empty()) (void)metres_in(request.scene.assume_unit);
   Terminal terminal(args.common.quiet);
+  const auto start = std::chrono::steady_clock::now();
+  const double budget = args.budget.empty() ? 0 : parse_seconds(args.budget);
+  if (budget > 0 && request.training.steps != training_preset("standard").steps) {
+    throw InvalidInput("--budget chooses the steps of the training; give it or --set steps");
+  }
+  if (budget > 0) request = within_budget(request, budget, start, terminal);
   const nlohmann::ordered_json report = run_pipeline(request, terminal);
   if (args.common.json) std::cout << json_text(report) << "\n";
   say_summary(report, args, terminal);
+  if (budget > 0) {
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    terminal.say("took " + format_seconds(taken.count()) + " of " + format_seconds(budget));
+  }
 }
 
 }  // namespace
@@ -82,14 +100,32 @@ void add_run(CLI::App& app) {
       args->request.simplify,
       "Largest error of simplified meshes where there is evidence, e.g. 2mm; four times "
       "that where inferred; default: a quarter of a voxel; 0 = do not simplify");
+  cmd->add_option("--compression-error",
+                  args->request.compression_error,
+                  "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
   cmd->add_option("--max-error",
                   args->request.max_error,
-                  "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
+                  "Promise: every mesh written, asset.glb too, lies within this of the fused "
+                  "surface, measured on the files, e.g. 1mm, or in scene units");
+  cmd->add_option("--max-size",
+                  args->max_size,
+                  "Promise: asset.glb with its textures is no larger, e.g. 2MB; leaves out the "
+                  "least detail that is needed and says how much that is");
+  auto* budget =
+      cmd->add_option("--budget",
+                      args->budget,
+                      "Time for all of it, e.g. 3min: tries small pictures, then takes the largest "
+                      "size and the training that this machine can do in it");
   cmd->add_flag("-w,--overwrite", args->request.overwrite, "Replace the results of another run");
   add_training_options(*cmd, args->training);
+  for (const char* chosen : {"--downscale", "--preset"}) budget->excludes(chosen);
   add_common_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs run photos/portal --views 1,10,19 --assume-unit m -o out/portal\n"
+      "         cgs run photos/portal --max-size 2MB -o out/portal_small\n"
+      "         cgs run photos/portal --budget 3min -o out/portal_soon\n"
+      "         cgs run photos/portal --assume-unit m --max-error 2mm -o out/portal_true\n"
+      "         cgs run photos/portal --control-points survey.csv -o out/portal_utm\n"
       "Running it again resumes at the first stage whose output is not there.");
   cmd->callback([args] { run_run(*args); });
 }

@@ -32,16 +32,23 @@ void run_train(const TrainArgs& args) {
   opened.keep(args.output);
   Scene& scene = opened.scene;
   const auto distances = known_distances(args.scene.known_distances, scene);
+  const auto markers = scale_markers(args.scene, scene);
   const size_t known = scene.warnings.size();
+  const bool states_up = !args.scene.up.empty() || !opened.control.is_null();
+  const Eigen::Vector3d up = states_up ? scene.frame.up : Eigen::Vector3d::Zero();
   terminal.warn(scene.warnings);
   TrainedModel trained =
       train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
   for (size_t i = known; i < warnings.size(); ++i) terminal.warn(warnings[i]);
+  trained.model.scene.frame.up = up;  // else the model tells it by its cameras
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
-  report["scale"] = scale_by(distances, trained.model);
-  if (!distances.empty()) write_model(args.output, trained.model);
+  report["scale"] = opened.control;
+  if (opened.control.is_null()) {
+    report["scale"] = scale_by(distances, markers, trained.model);
+    if (!report["scale"].is_null()) write_model(args.output, trained.model);
+  }
   write_file(args.output / "training.json", json_text(report) + "\n");
   forget_checkpoints(args.output);
   const size_t count = trained.model.gaussians.size();

@@ -23,7 +23,8 @@ const std::vector<FilterOperation>& filter_operations() {
                              selection_operations(),
                              point_operations(),
                              surface_operations(),
-                             repair_operations()}) {
+                             repair_operations(),
+                             solid_operations()}) {
       all.insert(all.end(), list.begin(), list.end());
     }
     return all;

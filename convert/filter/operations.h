@@ -28,6 +28,7 @@ std::vector<FilterOperation> selection_operations();
 std::vector<FilterOperation> point_operations();
 std::vector<FilterOperation> surface_operations();
 std::vector<FilterOperation> repair_operations();
+std::vector<FilterOperation> solid_operations();
 
 /// \throws InvalidInput that names the operation if the state is a point cloud
 void require_faces(const FilterState& state, const char* operation);

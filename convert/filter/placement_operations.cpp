@@ -4,8 +4,8 @@
 #include <sstream>
 
 #include "convert/filter/operations.h"
+#include "convert/filter/second_mesh.h"
 #include "io/byte_reader.h"
-#include "io/mesh_file.h"
 #include "libcgs/core/error.h"
 #include "meshing/placement.h"
 #include "meshing/vertex_attributes.h"
@@ -77,37 +77,11 @@ FilterStep prepare_transform(FilterArguments& arguments) {
   };
 }
 
-// Without the unit of one of them, nobody knows how large it is beside the other.
-void require_both_units(const std::filesystem::path& path,
-                        const Frame& second,
-                        const Frame& first) {
-  if (second.has_metric_scale() == first.has_metric_scale()) return;
-  if (second.has_metric_scale()) {
-    throw InvalidInput("--op merge: " + printable(path) +
-                       " states its unit, the first file does not: say it by --assume-unit");
-  }
-  throw InvalidInput("--op merge: the first file states its unit, " + printable(path) +
-                     " does not: cgs convert with --assume-unit writes it with one");
-}
-
 FilterStep prepare_merge(FilterArguments& arguments) {
   return [path = arguments.file()](FilterState& state, const Progress&) {
-    MeasurableFile second = read_mesh_file(path);
-    TriangleMesh& mesh = second.content.mesh;
-    if (mesh.faces.empty() != state.is_cloud()) {
-      throw InvalidInput("--op merge: " + printable(path) + " is a " +
-                         (mesh.faces.empty() ? "point cloud" : "mesh") + ", the first file is not");
-    }
-    require_both_units(path, second.content.frame, state.frame);
-    std::string remark = "+ " + std::to_string(mesh.vertices.size()) + " vertices, " +
-                         std::to_string(mesh.faces.size()) + " faces";
-    if (mesh.provenance.empty() != state.mesh.provenance.empty()) {
-      remark += "; only one file says what was observed: all of the other counts as inferred";
-    }
-    for (const std::string& warning : second.warnings) remark += "; " + warning;
-    move_to_frame(mesh, second.content.frame, state.frame);
-    state.mesh = joined(state.mesh, mesh);
-    return remark;
+    const SecondMesh second = read_second_mesh(state, path, "merge");
+    state.mesh = joined(state.mesh, second.mesh);
+    return "+ " + second.remark;
   };
 }
 

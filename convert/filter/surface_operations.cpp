@@ -8,6 +8,7 @@
 #include "convert/filter/operations.h"
 #include "convert/length.h"
 #include "libcgs/core/error.h"
+#include "meshing/loop_subdivision.h"
 #include "meshing/remeshing.h"
 #include "meshing/simplify.h"
 #include "meshing/smoothing.h"
@@ -97,6 +98,15 @@ FilterStep prepare_subdivide(FilterArguments& arguments) {
   };
 }
 
+FilterStep prepare_subdivide_loop(FilterArguments& arguments) {
+  const size_t times = arguments.count(1, 10);
+  return [times](FilterState& state, const Progress&) {
+    require_faces(state, "subdivide-loop");
+    state.mesh = loop_subdivided(state.mesh, times);
+    return std::string();
+  };
+}
+
 }  // namespace
 
 std::vector<FilterOperation> surface_operations() {
@@ -114,7 +124,12 @@ std::vector<FilterOperation> surface_operations() {
        "simplify-to=100000",
        prepare_simplify_to},
       {"remesh", "EDGE", "Triangles with sides of about this length", "remesh=5mm", prepare_remesh},
-      {"subdivide", "N", "Split every face into four, N times", "subdivide=1", prepare_subdivide}};
+      {"subdivide", "N", "Split every face into four, N times", "subdivide=1", prepare_subdivide},
+      {"subdivide-loop",
+       "N",
+       "Split every face into four and make the surface smooth, N times",
+       "subdivide-loop=1",
+       prepare_subdivide_loop}};
 }
 
 }  // namespace cgs

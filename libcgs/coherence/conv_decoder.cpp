@@ -13,6 +13,7 @@
 #include "libcgs/coherence/layer_convolution.h"
 #include "libcgs/coherence/upsampling.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/split_mix.h"
 
 namespace cgs {
 
@@ -116,10 +117,7 @@ class NormalDeviates {
 
  private:
   double uniform() {
-    uint64_t x = state_ += 0x9E3779B97F4A7C15ULL;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ULL;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBULL;
-    x ^= x >> 31;
+    const uint64_t x = split_mix(state_ += kSplitMixStep);
     return double(x >> 11) * 0x1p-52 - 1;
   }
   uint64_t state_;

@@ -38,6 +38,9 @@ void Frame::validate() const {
   require(source >= 0 && source <= static_cast<int>(ScaleSource::DepthSensor),
           "Frame.scale_source must be known",
           source);
+  require(up.isZero(0) || std::abs(up.norm() - 1) < 1e-6,
+          "Frame.up must have unit length, or be zero",
+          up.transpose());
 }
 
 std::string Frame::unit_name() const {

@@ -27,11 +27,14 @@ struct Frame {
   double metres_per_unit = 0;                             ///< Metres per world unit; 0 = unknown.
   double metres_sigma = 0;  ///< Standard deviation of metres_per_unit; 0 = not estimated.
   ScaleSource scale_source = ScaleSource::Unknown;
+  Eigen::Vector3d up =
+      Eigen::Vector3d::Zero();  ///< World direction, unit length; zero = not known.
 
   /// \throws InvalidInput naming the first field that no scene can have.
   void validate() const;
 
   bool has_metric_scale() const { return metres_per_unit > 0; }
+  bool knows_up() const { return !up.isZero(0); }
   /// "m", "mm", … for a known metres_per_unit of that name, "<x> m" for others, "unknown".
   std::string unit_name() const;
 

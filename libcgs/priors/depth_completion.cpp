@@ -10,32 +10,13 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/priors/directions.h"
 
 namespace cgs {
 
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
-struct Direction {
-  int dx, dy;
-};
-constexpr std::array<Direction, 16> kDirections = {{{1, 0},
-                                                    {-1, 0},
-                                                    {0, 1},
-                                                    {0, -1},
-                                                    {1, 1},
-                                                    {-1, 1},
-                                                    {1, -1},
-                                                    {-1, -1},
-                                                    {2, 1},
-                                                    {-2, 1},
-                                                    {2, -1},
-                                                    {-2, -1},
-                                                    {1, 2},
-                                                    {-1, 2},
-                                                    {1, -2},
-                                                    {-1, -2}}};
 
 struct Evidence {
   float inverse_depth = 0;

@@ -10,7 +10,9 @@
 
 #include <tbb/parallel_for.h>
 
+#include "libcgs/core/split_mix.h"
 #include "libcgs/priors/depth_fit.h"
+#include "libcgs/priors/directions.h"
 
 namespace cgs {
 
@@ -19,23 +21,6 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr double kFloor = 0.005;   // relative sigma that no guess goes below
 constexpr double kDeviations = 3;  // of the fit: beyond, given or measured depth is wrong
-
-constexpr std::array<std::pair<int, int>, 16> kDirections = {{{1, 0},
-                                                              {-1, 0},
-                                                              {0, 1},
-                                                              {0, -1},
-                                                              {1, 1},
-                                                              {-1, 1},
-                                                              {1, -1},
-                                                              {-1, -1},
-                                                              {2, 1},
-                                                              {-2, 1},
-                                                              {2, -1},
-                                                              {-2, -1},
-                                                              {1, 2},
-                                                              {-1, 2},
-                                                              {1, -2},
-                                                              {-1, -2}}};
 
 bool is_usable(const View& view, int x, int y) {
   return view.valid.empty() || view.valid(x, y) != 0;
@@ -136,20 +121,13 @@ class ErrorByDistance {
   std::array<double, kBins> sigma_ = {};
 };
 
-uint64_t hashed(uint64_t x) {
-  x = (x + 1) * 0x9E3779B97F4A7C15u;
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-  return x ^ (x >> 31);
-}
-
 // Large and small patches, in all somewhat more than a third of the picture.
 bool is_in_patch(int x, int y, int width, int height) {
   constexpr uint64_t kOneIn = 5;
   for (const int parts : {6, 32}) {
     const int side = std::max(4, std::min(width, height) / parts);
     const uint64_t cell = static_cast<uint64_t>(y / side) * 4096 + static_cast<uint64_t>(x / side);
-    if (hashed(cell * 64 + static_cast<uint64_t>(parts)) % kOneIn == 0) return true;
+    if (random_number(cell * 64 + static_cast<uint64_t>(parts)) % kOneIn == 0) return true;
   }
   return false;
 }

@@ -2,9 +2,11 @@
 #include "libcgs/priors/photo_pairs.h"
 
 #include <algorithm>
-#include <numeric>
+#include <cstdint>
 
 #include <tbb/parallel_for.h>
+
+#include "libcgs/core/disjoint_sets.h"
 
 namespace cgs {
 
@@ -41,26 +43,6 @@ PhotoPair matched_pair(const std::vector<UnposedPhoto>& photos, int a, int b) {
   return pair;
 }
 
-/// Sets of features that belong together.
-class Chains {
- public:
-  explicit Chains(size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), size_t{0});
-  }
-  size_t root(size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(size_t i, size_t j) {
-    i = root(i);
-    j = root(j);
-    parent_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<size_t> parent_;
-};
-
 bool shows_no_photo_twice(const Track& track) {
   for (size_t i = 1; i < track.seen.size(); ++i) {
     if (track.seen[i].photo == track.seen[i - 1].photo) return false;
@@ -89,21 +71,21 @@ std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,
 
 std::vector<Track> chain_matches(const std::vector<UnposedPhoto>& photos,
                                  const std::vector<PhotoPair>& pairs) {
-  std::vector<size_t> first(photos.size() + 1, 0);  // feature of a photograph -> place in chains
+  std::vector<uint32_t> first(photos.size() + 1, 0);  // feature of a photograph -> place in chains
   for (size_t i = 0; i < photos.size(); ++i) {
-    first[i + 1] = first[i] + photos[i].features.points.size();
+    first[i + 1] = first[i] + static_cast<uint32_t>(photos[i].features.points.size());
   }
-  Chains chains(first.back());
+  DisjointSets chains(first.back());
   for (const PhotoPair& pair : pairs) {
     if (!pair.is_connected) continue;
     for (const FeatureMatch& m : pair.matches) {
-      chains.join(first[static_cast<size_t>(pair.a)] + static_cast<size_t>(m.a),
-                  first[static_cast<size_t>(pair.b)] + static_cast<size_t>(m.b));
+      chains.join(first[static_cast<size_t>(pair.a)] + static_cast<uint32_t>(m.a),
+                  first[static_cast<size_t>(pair.b)] + static_cast<uint32_t>(m.b));
     }
   }
   std::vector<Track> of_root(first.back());
   for (size_t i = 0; i < photos.size(); ++i) {
-    for (size_t k = 0; k < photos[i].features.points.size(); ++k) {
+    for (uint32_t k = 0; k < photos[i].features.points.size(); ++k) {
       const int feature = static_cast<int>(k);
       of_root[chains.root(first[i] + k)].seen.push_back(
           {static_cast<int>(i), feature, from_centre(photos[i], feature), true});

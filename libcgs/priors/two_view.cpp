@@ -10,6 +10,8 @@
 #include <Eigen/SVD>
 #include <opencv2/calib3d.hpp>
 
+#include "libcgs/core/split_mix.h"
+
 namespace cgs {
 
 namespace {
@@ -48,15 +50,6 @@ Rays rays_of(const MatchedPoints& matches, double focal_a, double focal_b) {
 }
 
 constexpr size_t kSample = 5;
-
-// Random numbers that depend on nothing but their index. Source: Steele et al. 2014, "Fast
-// splittable pseudorandom number generators" (SplitMix64).
-uint64_t random_number(uint64_t index) {
-  uint64_t x = (index + 1) * 0x9E3779B97F4A7C15u;
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-  return x ^ (x >> 31);
-}
 
 // The essential matrices, up to ten, that explain five matches drawn at random.
 std::vector<Eigen::Matrix3d> essentials_of_sample(const Rays& rays, uint64_t trial) {

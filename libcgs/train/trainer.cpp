@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/split_mix.h"
 
 namespace cgs {
 
@@ -73,11 +74,8 @@ Raster<float> spread(const Raster<float>& gradient) {
 
 // A well-mixed number for a triple of counters: dropout must not depend on what ran before.
 uint64_t mixed(uint64_t a, uint64_t b, uint64_t c) {
-  uint64_t x =
-      a * 0x9E3779B97F4A7C15ULL ^ (b + 1) * 0xC2B2AE3D27D4EB4FULL ^ (c + 1) * 0x165667B19E3779F9ULL;
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ULL;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBULL;
-  return x ^ (x >> 31);
+  return split_mix(a * kSplitMixStep ^ (b + 1) * 0xC2B2AE3D27D4EB4FULL ^
+                   (c + 1) * 0x165667B19E3779F9ULL);
 }
 
 // Pixels of `first` whose measured depth `second` confirms, with the place where it does.

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/gaussian_ply.h"
+#include "io/mesh_file.h"
 #include "io/mesh_ply.h"
 #include "io/splat_reader.h"
 #include "io/spz.h"
@@ -31,8 +32,11 @@ class Conversion : public testing::Test {
     request.output = dir_ / to;
     request.volume.cameras.views = 16;
     request.volume.cameras.size = 160;
-    request.volume.voxel_size = "0.02";
     if (change) change(request);
+    const std::string ending = request.output.extension();
+    const bool stays_splats = request.as == "splats" || ending == ".splat" || ending == ".spz" ||
+                              (ending == ".ply" && request.as.empty());
+    if (from == "ball.ply" && !stays_splats) request.volume.voxel_size = "0.02";
     Terminal terminal(true);
     return convert_file(request, terminal);
   }
@@ -97,6 +101,49 @@ TEST_F(Conversion, GlbHoldsAMeshUnlessSplatsAreAskedFor) {
   convert("ball.ply", "s.glb", [](ConversionRequest& r) { r.as = "splats"; });
   EXPECT_NE(test::read_bytes(dir_ / "s.glb").find("KHR_gaussian_splatting:ROTATION"),
             std::string::npos);
+}
+
+TEST_F(Conversion, WhatIsUpComesFromTheUserTheFileOrCustom) {
+  Frame frame;
+  write_mesh_ply(dir_ / "mesh.ply", test::labelled_sphere(), frame);
+  frame.up = Eigen::Vector3d::UnitX();
+  write_mesh_ply(dir_ / "x.ply", test::labelled_sphere(), frame);
+  const auto up_in = [&](const std::string& from, const std::vector<double>& given = {}) {
+    convert(from, "m.glb", [&](ConversionRequest& r) { r.up = given; });
+    return read_mesh_file(dir_ / "m.glb").content.frame.up;
+  };
+  EXPECT_LT((up_in("x.ply") - Eigen::Vector3d::UnitX()).norm(), 1e-9);
+  EXPECT_LT((up_in("x.ply", {0, -3, 0}) + Eigen::Vector3d::UnitY()).norm(), 1e-9);
+  EXPECT_LT((up_in("mesh.ply") - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+  EXPECT_LT((up_in("ball.ply") + Eigen::Vector3d::UnitY()).norm(), 1e-9);
+}
+
+TEST_F(Conversion, SimplifiesMeshesAndRefusesWhatHasNoEffect) {
+  write_mesh_ply(dir_ / "mesh.ply", test::labelled_sphere(40, 60), Frame{});
+  const auto with = [&](auto set) { convert("mesh.ply", "m.ply", set); };
+  with([](ConversionRequest& r) { r.simplify = "0.01"; });
+  const size_t faces = read_mesh_file(dir_ / "m.ply").content.mesh.faces.size();
+  EXPECT_LT(faces, test::labelled_sphere(40, 60).faces.size() / 2);
+  EXPECT_THROW(with([](ConversionRequest& r) { r.open_surface = true; }), InvalidInput);
+  EXPECT_THROW(with([](ConversionRequest& r) { r.volume.voxel_size = "1"; }), InvalidInput);
+}
+
+TEST_F(Conversion, RefusesWhatHasNoEffectOnSplats) {
+  const auto to_splats = [&](auto set) { convert("ball.ply", "a.spz", set); };
+  EXPECT_THROW(to_splats([](ConversionRequest& r) { r.simplify = "1"; }), InvalidInput);
+  EXPECT_THROW(to_splats([](ConversionRequest& r) { r.open_surface = true; }), InvalidInput);
+  EXPECT_THROW(to_splats([](ConversionRequest& r) { r.volume.voxel_size = "1"; }), InvalidInput);
+  EXPECT_THROW(to_splats([](ConversionRequest& r) { r.compression_error = "1"; }), InvalidInput);
+  EXPECT_THROW(
+      convert("ball.ply", "a.obj", [](ConversionRequest& r) { r.compression_error = "1"; }),
+      InvalidInput);
+  EXPECT_FALSE(std::filesystem::exists(dir_ / "a.spz"));
+}
+
+TEST_F(Conversion, AssumesNoUnitWhereOneIsStated) {
+  write_mesh_ply(dir_ / "mesh.ply", test::labelled_sphere(), test::centimetre_frame());
+  convert("mesh.ply", "m.ply", [](ConversionRequest& r) { r.assume_unit = "m"; });
+  EXPECT_EQ(read_mesh_file(dir_ / "m.ply").content.frame.unit_name(), "cm");
 }
 
 TEST_F(Conversion, CadFilesNeedAUnit) {

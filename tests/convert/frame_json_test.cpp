@@ -15,6 +15,7 @@ TEST(FrameJson, ReadsBackTheSameBits) {
   frame.metres_per_unit = 0.3048;
   frame.metres_sigma = 1.0 / 7;
   frame.scale_source = ScaleSource::KnownDistance;
+  frame.up = Eigen::Vector3d(0.1, -0.7, 0.3).normalized();
   const auto text = frame_to_json(frame).dump();
   const Frame read = frame_from_json(nlohmann::ordered_json::parse(text));
   EXPECT_EQ(read.origin, frame.origin);
@@ -23,6 +24,15 @@ TEST(FrameJson, ReadsBackTheSameBits) {
   EXPECT_EQ(read.metres_per_unit, frame.metres_per_unit);
   EXPECT_EQ(read.metres_sigma, frame.metres_sigma);
   EXPECT_EQ(read.scale_source, frame.scale_source);
+  EXPECT_EQ(read.up, frame.up);
+}
+
+// As it was written before it could be said.
+TEST(FrameJson, UpMayBeUnknown) {
+  nlohmann::ordered_json json = frame_to_json({});
+  EXPECT_FALSE(frame_from_json(json).knows_up());
+  json.erase("up");
+  EXPECT_FALSE(frame_from_json(json).knows_up());
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ class KnownDistances : public testing::Test {
   }
 
   nlohmann::ordered_json scale(const std::vector<DistanceWords>& words) {
-    return scale_by(known_distances(words, model_.scene), model_);
+    return scale_by(known_distances(words, model_.scene), {}, model_);
   }
 
   /// Pixel of the file that sees a point of the wall, as users type it.

@@ -41,6 +41,38 @@ TEST(FormatLength, SpeaksTheUnitOfTheScene) {
   EXPECT_EQ(format_length(2, Frame{}), "2 units");
 }
 
+TEST(ParseFileSize, KnowsBothKindsOfPrefixes) {
+  EXPECT_EQ(parse_file_size("1500"), 1500u);
+  EXPECT_EQ(parse_file_size("800kB"), 800'000u);
+  EXPECT_EQ(parse_file_size("2 MB"), 2'000'000u);
+  EXPECT_EQ(parse_file_size("1.5MiB"), size_t{3} << 19);
+  for (const auto* bad : {"", "MB", "-1MB", "0", "0.2", "2M", "2 apples", "1e300GB"}) {
+    EXPECT_THROW(parse_file_size(bad), InvalidInput) << bad;
+  }
+  EXPECT_EQ(format_file_size(1'934'000), "1.93 MB");
+  EXPECT_EQ(format_file_size(81'200), "81.2 kB");
+  EXPECT_EQ(format_file_size(999'990), "1000.0 kB");
+  EXPECT_EQ(format_file_size(12'345'678'901), "12345.68 MB");
+}
+
+TEST(ParseSeconds, KnowsSecondsMinutesAndHours) {
+  EXPECT_EQ(parse_seconds("90"), 90);
+  EXPECT_EQ(parse_seconds("90s"), 90);
+  EXPECT_EQ(parse_seconds("1.5min"), 90);
+  EXPECT_EQ(parse_seconds("2 h"), 7200);
+  for (const char* bad : {"", "0", "-3s", "3m", "3 minutes", "nan", "min"}) {
+    EXPECT_THROW(parse_seconds(bad), InvalidInput) << bad;
+  }
+}
+
+TEST(FormatSeconds, SpeaksAsPeopleDo) {
+  EXPECT_EQ(format_seconds(0.4), "0 s");
+  EXPECT_EQ(format_seconds(59.4), "59 s");
+  EXPECT_EQ(format_seconds(59.6), "1 min 0 s");
+  EXPECT_EQ(format_seconds(125), "2 min 5 s");
+  EXPECT_EQ(format_seconds(4200), "1 h 10 min");
+}
+
 TEST(ParseBytes, KnowsBinaryPrefixes) {
   EXPECT_EQ(parse_bytes("4096"), 4096u);
   EXPECT_EQ(parse_bytes("4K"), 4096u);

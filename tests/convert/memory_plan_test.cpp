@@ -26,6 +26,15 @@ size_t most(const std::vector<StageMemory>& plan) {
   return out;
 }
 
+std::string refusal(const Scene& scene, size_t budget) {
+  try {
+    check_memory_plan(scene, true, {}, budget);
+  } catch (const LimitError& error) {
+    return error.what();
+  }
+  return "";
+}
+
 TEST(MemoryPlan, GrowsWithThePixelsOfTheInputViewsAlone) {
   const Scene scene = scene_of(3, 400, 300);
   Scene more = scene;
@@ -42,16 +51,52 @@ TEST(MemoryPlan, LeavesOutWhatTheUsersVoxelsDecide) {
   EXPECT_NE(text.find("depth and Gaussians"), std::string::npos) << text;
 }
 
+TEST(MemoryPlan, CountsTheFusedSurfaceWhereFilesAreHeldAgainstIt) {
+  const Scene scene = scene_of(3, 400, 300);
+  const auto plain = memory_plan(scene, true);
+  const auto sized = memory_plan(scene, true, {.asset = true});
+  const auto near = memory_plan(scene, true, {.meshes = true, .asset = true});
+  for (size_t i = 0; i < plain.size(); ++i) {
+    const bool assets = plain[i].stage == "textured assets";
+    const bool meshes = plain[i].stage == "volume and mesh";
+    EXPECT_EQ(sized[i].bytes > plain[i].bytes, assets) << plain[i].stage;
+    EXPECT_EQ(near[i].bytes > plain[i].bytes, assets || meshes) << plain[i].stage;
+  }
+}
+
+TEST(MemoryPlan, VoxelsThatMustKeepAnErrorGrowWithThePixelsWithoutEnd) {
+  const MeasuredFiles exact = {.meshes = true, .asset = true};
+  const size_t some = most(memory_plan(scene_of(4, 1000, 500), true, exact));
+  const size_t many = most(memory_plan(scene_of(8, 1000, 500), true, exact));
+  EXPECT_GT(double(many), 1.8 * double(some));
+}
+
 TEST(MemoryPlan, RefusesInOneLineThatSaysWhatToLower) {
-  const auto plan = memory_plan(scene_of(3, 504, 378), true);
-  EXPECT_NO_THROW(check_memory_plan(plan, most(plan)));
-  try {
-    check_memory_plan(plan, most(plan) / 5);
-    FAIL() << "was accepted";
-  } catch (const LimitError& error) {
-    const std::string message = error.what();
-    for (const char* word : {"volume and mesh", "--downscale 3", "--memory-limit"}) {
-      EXPECT_NE(message.find(word), std::string::npos) << message;
+  const Scene scene = scene_of(3, 504, 378);
+  const size_t needed = most(memory_plan(scene, true));
+  EXPECT_NO_THROW(check_memory_plan(scene, true, {}, needed));
+  const std::string message = refusal(scene, needed / 5);
+  for (const char* word : {"volume and mesh", "--downscale 4", "--memory-limit"}) {
+    EXPECT_NE(message.find(word), std::string::npos) << message;
+  }
+  EXPECT_NE(refusal(scene, 50 << 20).find("no --downscale makes it fit"), std::string::npos);
+}
+
+// What a stage needs without a picture does not shrink with the pictures.
+TEST(MemoryPlan, TheAdviceIsEnough) {
+  const int sides[] = {504, 2016, 6000};
+  for (const int side : sides) {
+    const Scene scene = scene_of(3, side, side);
+    for (const double share : {0.9, 0.5, 0.3}) {
+      const auto budget = static_cast<size_t>(share * double(most(memory_plan(scene, true))));
+      const std::string message = refusal(scene, budget);
+      const size_t at = message.find("--downscale ");
+      ASSERT_NE(at, std::string::npos) << message;
+      const int factor = std::stoi(message.substr(at + 12));
+      const Scene smaller = scene_of(3, side / factor, side / factor);
+      EXPECT_LE(most(memory_plan(smaller, true)), budget) << message;
+      const Scene larger = scene_of(3, side / (factor - 1), side / (factor - 1));
+      EXPECT_GT(most(memory_plan(larger, true)), budget) << message;
     }
   }
 }

@@ -44,8 +44,7 @@ TEST(CertificateToJson, GivesMeasuresInFileUnits) {
 
 TEST(WriteMeshFiles, LeavesCadFilesOutWithoutAScaleAndSaysHowToGetThem) {
   const test::TempDir dir;
-  const auto json = write_mesh_files(
-      dir / "mesh", corner(), corner(), frame_of_scale_2(), Eigen::Vector3d::UnitZ());
+  const auto json = write_mesh_files(dir / "mesh", corner(), corner(), frame_of_scale_2());
   EXPECT_TRUE(std::filesystem::exists(dir / "mesh/watertight.ply"));
   EXPECT_FALSE(std::filesystem::exists(dir / "mesh/watertight.stl"));
   for (const auto* name : {"watertight.stl", "watertight.3mf"}) {
@@ -58,8 +57,8 @@ TEST(WriteMeshFiles, WritesCadFilesOfAKnownScale) {
   const test::TempDir dir;
   Frame frame = frame_of_scale_2();
   frame.metres_per_unit = 1;
-  const auto json =
-      write_mesh_files(dir / "mesh", corner(), corner(), frame, Eigen::Vector3d::UnitZ());
+  frame.up = Eigen::Vector3d::UnitZ();
+  const auto json = write_mesh_files(dir / "mesh", corner(), corner(), frame);
   EXPECT_TRUE(json["left_out"].empty());
   for (const auto& name : json["files"]) {
     EXPECT_TRUE(std::filesystem::exists(dir / "mesh" / name.get<std::string>())) << name;
@@ -68,8 +67,7 @@ TEST(WriteMeshFiles, WritesCadFilesOfAKnownScale) {
 
 TEST(WriteMeshFiles, RefusesAMeshWithoutSurfaceAndWritesNothing) {
   const test::TempDir dir;
-  EXPECT_THROW(write_mesh_files(dir / "mesh", {}, {}, {}, Eigen::Vector3d::UnitZ()),
-               NumericalError);
+  EXPECT_THROW(write_mesh_files(dir / "mesh", {}, {}, {}), NumericalError);
   EXPECT_FALSE(std::filesystem::exists(dir / "mesh"));
 }
 

@@ -65,6 +65,33 @@ TEST(TextureFromPhotographs, LevelsExposureAndReportsWhatItDid) {
   EXPECT_LE(report["seam_length"].get<double>(), report["seam_length_unsmoothed"].get<double>());
 }
 
+TEST(CoarsenTexture, MakesPixelsAsLargeAsAskedAndKeepsTheirPlaces) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::box(20);
+  nlohmann::ordered_json report;
+  const PhotoTexture fine = texture_from_photographs(scene_in(dir), mesh, report);
+  PhotoTexture same = fine;
+  EXPECT_EQ(coarsen_texture(same, mesh, 1e-9), 1);
+  EXPECT_EQ(same.photographs[0].image.data, fine.photographs[0].image.data);
+  PhotoTexture coarse = fine;
+  constexpr double kTexel = 0.01;
+  const double share = coarsen_texture(coarse, mesh, kTexel);
+  EXPECT_LT(share, 1);
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (fine.of_face[f] < 0) continue;
+    const auto i = static_cast<size_t>(fine.of_face[f]);
+    const Camera& camera = coarse.photographs[i].camera;
+    ASSERT_EQ(coarse.photographs[i].image.width, camera.width);
+    const Eigen::Vector3d p = mesh.vertices[mesh.faces[f][0]].cast<double>();
+    const Eigen::Vector3d before = fine.photographs[i].camera.project(p);
+    const Eigen::Vector3d after = camera.project(p);
+    EXPECT_NEAR(before.x() / fine.photographs[i].camera.width, after.x() / camera.width, 1e-9);
+    // The box is between 0.5 and 1.4 from the cameras: sizes scatter around their median.
+    EXPECT_GT(after.z() / camera.fx, kTexel / 2);
+    EXPECT_LT(after.z() / camera.fx, kTexel * 2);
+  }
+}
+
 TEST(TextureFromPhotographs, SaysWhenAPhotographIsGone) {
   const test::TempDir dir;
   const Scene scene = scene_in(dir);

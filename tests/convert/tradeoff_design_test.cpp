@@ -59,7 +59,7 @@ TEST(TradeoffDesign, StartsFromTheDefaultsOfARun) {
   standard.scene.path = "photos";
   const RunRequest same = request_of({}, standard, 3, 0);
   EXPECT_EQ(same.training.steps, standard.training.steps);
-  EXPECT_EQ(same.voxel_size + same.simplify + same.max_error, "");
+  EXPECT_EQ(same.voxel_size + same.simplify + same.compression_error, "");
   EXPECT_EQ(same.scene.options.downscale, 3);
 }
 
@@ -69,7 +69,7 @@ TEST(TradeoffDesign, LengthsArePartsOfTheStandardVoxel) {
   EXPECT_EQ(r.scene.options.downscale, 6);
   EXPECT_DOUBLE_EQ(std::stod(r.voxel_size), 2 * 1.5 * 0.02);
   EXPECT_DOUBLE_EQ(std::stod(r.simplify), 0.01);
-  EXPECT_DOUBLE_EQ(std::stod(r.max_error), 0.002);
+  EXPECT_DOUBLE_EQ(std::stod(r.compression_error), 0.002);
   EXPECT_EQ(request_of({.simplify = 0}, {}, 1, 0).simplify, "0");
   EXPECT_THROW(request_of({.voxel = 2}, {}, 1, 0), InvalidInput);
 }
@@ -88,10 +88,11 @@ TEST(CommandLine, SurvivesAShell) {
   r.scene.path = "my photos/it's $HOME; #1";
   r.scene.options.views = "1,10,19";
   r.scene.assume_unit = "m";
+  r.scene.up = {0, -1, 0.5};
   r.output = "out/a b";
   EXPECT_EQ(words(command_line(r)),
             "cgs\nrun\nmy photos/it's $HOME; #1\n--views\n1,10,19\n--downscale\n2\n--assume-unit\n"
-            "m\n--preset\ndraft\n--voxel-size\n1\n-o\nout/a b\n");
+            "m\n--up\n0\n-1\n0.5\n--preset\ndraft\n--voxel-size\n1\n-o\nout/a b\n");
   r.training.steps = 120;
   EXPECT_NE(command_line(r).find("--set steps=120"), std::string::npos);
 }

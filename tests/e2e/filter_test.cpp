@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `cgs filter` as a user calls it.
+#include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "io/mesh_file.h"
 #include "io/mesh_ply.h"
+#include "meshing/certificate.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/sample_mesh.h"
 
@@ -150,6 +153,68 @@ TEST_F(Filter, MergesOnlyWhereBothOrNoneStateTheirUnit) {
   EXPECT_EQ(merge("unknown.ply", "unknown.ply", "").exit_code, 0);
 }
 
+TEST_F(Filter, CutsSolidsAndSaysWhatOfThemWasSeen) {
+  TriangleMesh other = test::labelled_sphere(32, 48);
+  for (auto& p : other.vertices) p.x() += 0.3f;
+  other.provenance.clear();
+  write_mesh_ply(dir_ / "other.ply", other, test::centimetre_frame());
+  const std::string file = (dir_ / "other.ply").string();
+  double volume = 0;
+  for (const char* name : {"union", "intersect", "subtract"}) {
+    const ProgramResult result =
+        filter("ball.ply", "cut.ply", std::string("--json --op ") + name + "=" + file);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(result.err.find("all of the other counts as inferred"), std::string::npos);
+    const MeasurableFile cut = read_mesh_file(dir_ / "cut.ply");
+    EXPECT_TRUE(cut.content.states_provenance() && cut.content.states_sigma());
+    const Certificate facts = certify(cut.content.mesh);
+    EXPECT_TRUE(facts.passed()) << name;
+    EXPECT_GT(facts.observed_area, 0);
+    const double scale = std::pow(cut.content.frame.scale / 64, 3);
+    volume += (name == std::string("subtract") ? -1 : 1) * scale * facts.volume;
+  }
+  // (A + B - C) + C - (A - C), where C is what they share, is B + C.
+  const double ball = certify(other).volume;
+  const double lens = std::numbers::pi * (4 * 0.4 + 0.3) * std::pow(2 * 0.4 - 0.3, 2) / 12;
+  EXPECT_NEAR(volume, ball + lens, 0.01 * ball);
+}
+
+TEST_F(Filter, SaysWhichSolidHasNoInside) {
+  ASSERT_EQ(filter("ball.ply", "open.ply", "-q --op crop-plane=3,-6,0,0,0,1").exit_code, 0);
+  const auto refused = [&](const std::string& a, const std::string& b, const char* part) {
+    const ProgramResult result = filter(a, "no.ply", "-q --op subtract=" + (dir_ / b).string());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("is not closed"), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(exists("no.ply"));
+  };
+  refused("open.ply", "ball.ply", "the mesh");
+  refused("ball.ply", "open.ply", "open.ply");
+}
+
+TEST_F(Filter, WrapsWhatIsOpenAndSaysWhereItWentInside) {
+  ASSERT_EQ(filter("ball.ply", "open.ply", "-q --op crop-plane=3,-6,15,0,0,-1").exit_code, 0);
+  const ProgramResult inside = filter("open.ply", "in.ply", "--op wrap=3cm");
+  ASSERT_EQ(inside.exit_code, 0) << inside.err;
+  EXPECT_NE(inside.err.find("lies BEHIND the input"), std::string::npos) << inside.err;
+  const ProgramResult over = filter("open.ply", "over.ply", "--op wrap=40cm,1cm");
+  ASSERT_EQ(over.exit_code, 0) << over.err;
+  EXPECT_EQ(over.err.find("BEHIND"), std::string::npos) << over.err;
+  EXPECT_NE(over.err.find("of the area bridges gaps"), std::string::npos) << over.err;
+  const Certificate facts = certify(read_mesh_file(dir_ / "over.ply").content.mesh);
+  EXPECT_TRUE(facts.passed());
+  EXPECT_GT(facts.inferred_area, 0.2 * facts.area);
+}
+
+TEST_F(Filter, WrapsPoints) {
+  ASSERT_EQ(filter("cloud.ply", "made.ply", "-q --op wrap=8cm,1cm").exit_code, 0);
+  const MeasurableFile made = read_mesh_file(dir_ / "made.ply");
+  EXPECT_TRUE(made.content.states_provenance() && made.content.states_sigma());
+  EXPECT_TRUE(certify(made.content.mesh).passed());
+  EXPECT_EQ(made.content.frame.metres_per_unit, 0.01);
+}
+
 TEST_F(Filter, PassesOnWarningsOfTheSecondFile) {
   test::write_bytes(dir_ / "flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n");
   const ProgramResult result =
@@ -163,11 +228,14 @@ TEST_F(Filter, PassesOnWarningsOfTheSecondFile) {
 TEST_F(Filter, KeepsWhatIsUp) {
   ASSERT_EQ(filter("ball.ply", "y.glb", "-q --op repair --up 0 1 0").exit_code, 0);
   ASSERT_EQ(filter("y.glb", "again.glb", "-q --op repair").exit_code, 0);
-  EXPECT_LT((*read_mesh_file(dir_ / "again.glb").up - Eigen::Vector3d::UnitY()).norm(), 1e-9);
+  EXPECT_LT((read_mesh_file(dir_ / "again.glb").content.frame.up - Eigen::Vector3d::UnitY()).norm(),
+            1e-9);
   ASSERT_EQ(filter("y.glb", "x.glb", "-q --op repair --up 1 0 0").exit_code, 0);
-  EXPECT_LT((*read_mesh_file(dir_ / "x.glb").up - Eigen::Vector3d::UnitX()).norm(), 1e-9);
+  EXPECT_LT((read_mesh_file(dir_ / "x.glb").content.frame.up - Eigen::Vector3d::UnitX()).norm(),
+            1e-9);
   ASSERT_EQ(filter("ball.ply", "z.glb", "-q --op repair").exit_code, 0);
-  EXPECT_LT((*read_mesh_file(dir_ / "z.glb").up - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+  EXPECT_LT((read_mesh_file(dir_ / "z.glb").content.frame.up - Eigen::Vector3d::UnitZ()).norm(),
+            1e-9);
 }
 
 TEST_F(Filter, RefusesSplatsAndOptionsWithoutEffect) {

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A run that is killed at any moment loses no finished work and leaves no half file: the files that
-// are there are whole, and the run that goes on ends with the bytes of one that was never
-// disturbed.
+// A run that is killed or interrupted at any moment loses no finished work and leaves no half file:
+// the files that are there are whole, and the run that goes on ends with the bytes of one that was
+// never disturbed. CGS_KILLS says how often that is tried.
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
-#include <map>
+#include <cstdio>
+#include <cstdlib>
 #include <random>
 #include <thread>
 
@@ -14,7 +17,7 @@
 #include <unistd.h>
 
 #include "samples/capture/files.h"
-#include "tests/support/run_cgs.h"
+#include "tests/support/run_folder.h"
 
 namespace cgs {
 namespace {
@@ -57,28 +60,28 @@ int exit_code_of(pid_t child) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-// Exit code of a program that may end by itself before it is killed; -1 if it was killed.
-int kill_after(Seconds wait, const Arguments& arguments) {
+/// How a program ended that was sent a signal, unless it had ended by itself before.
+struct End {
+  int code;       ///< -1 if it was killed.
+  Seconds after;  ///< The signal.
+};
+
+End signal_after(Seconds wait, int signal, const Arguments& arguments) {
   const pid_t child = start_cgs(arguments);
   std::this_thread::sleep_for(wait);
-  ::kill(child, SIGKILL);
-  return exit_code_of(child);
+  ::kill(child, signal);
+  const auto sent = std::chrono::steady_clock::now();
+  const int code = exit_code_of(child);
+  return {code, std::chrono::steady_clock::now() - sent};
 }
 
-// Files of a run by their path in its folder. What states times or memory is left out.
-std::map<std::string, std::string> files_of(const fs::path& folder) {
-  std::map<std::string, std::string> out;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
-    if (!entry.is_regular_file()) continue;
-    const std::string name = fs::relative(entry.path(), folder).string();
-    const bool states_times = name == "run.json" || name == "report.json" || name == "report.html";
-    out[name] = states_times ? "" : test::read_bytes(entry.path());
-  }
-  return out;
-}
-
-bool is_unfinished(const std::string& name) {
-  return name.find(".part") != std::string::npos || name.find(".checkpoint") != std::string::npos;
+void print_latency(std::vector<double> seconds) {
+  if (seconds.empty()) return;
+  std::sort(seconds.begin(), seconds.end());
+  std::printf("cancel: %zu interrupts, median %.2f s, 95 %% within %.2f s\n",
+              seconds.size(),
+              seconds[seconds.size() / 2],
+              seconds[(seconds.size() * 95 + 99) / 100 - 1]);
 }
 
 TEST(Killed, RunGoesOnToTheFilesOfOneThatWasNotKilled) {
@@ -89,33 +92,39 @@ TEST(Killed, RunGoesOnToTheFilesOfOneThatWasNotKilled) {
   const auto start = std::chrono::steady_clock::now();
   ASSERT_EQ(exit_code_of(start_cgs(run_arguments(capture, dir / "whole"))), 0);
   const Seconds whole = std::chrono::steady_clock::now() - start;
-  const auto expected = files_of(dir / "whole");
+  const auto expected = test::files_of_run(dir / "whole");
   ASSERT_TRUE(expected.contains("web/asset.glb"));
 
-  const int kills = std::getenv("CGS_SWEEP") != nullptr ? 60 : 8;
+  const char* const wish = std::getenv("CGS_KILLS");
+  const int kills = wish != nullptr ? std::atoi(wish) : 8;
+  constexpr std::array<int, 4> kSignals = {SIGKILL, SIGINT, SIGKILL, SIGTERM};
   const Arguments arguments = run_arguments(capture, dir / "killed");
   std::mt19937 random(7);
-  int killed = 0;
+  int stopped = 0;
+  std::vector<double> latency;
   for (int i = 0; i < kills; ++i) {
-    const double part = std::uniform_real_distribution<>(0, 1)(random);
-    const int code = kill_after(whole * part, arguments);
+    const double part = std::uniform_real_distribution<>(0.02, 1)(random);
+    const int signal = kSignals.at(static_cast<size_t>(i) % kSignals.size());
+    const auto [code, after] = signal_after(whole * part, signal, arguments);
     if (!fs::exists(dir / "killed")) continue;
-    for (const auto& [name, bytes] : files_of(dir / "killed")) {
-      if (is_unfinished(name)) continue;
+    for (const auto& [name, bytes] : test::files_of_run(dir / "killed")) {
+      if (test::is_unfinished(name)) continue;
       ASSERT_TRUE(expected.contains(name)) << name;
       EXPECT_TRUE(bytes == expected.at(name)) << name << " after kill " << i;
     }
-    if (code >= 0) {
-      EXPECT_EQ(code, 0);
+    if (code == 0) {
       fs::remove_all(dir / "killed");  // it ended by itself; begin anew
-    } else {
-      ++killed;
+      continue;
     }
+    EXPECT_EQ(code, signal == SIGKILL ? -1 : 128 + signal);
+    ++stopped;
+    if (signal != SIGKILL) latency.push_back(after.count());
   }
-  EXPECT_GE(killed, kills / 4);
+  print_latency(latency);
+  std::printf("kills and interrupts: %d of %d runs stopped\n", stopped, kills);
+  EXPECT_GE(stopped, kills / 4);
   EXPECT_EQ(exit_code_of(start_cgs(arguments)), 0);
-  EXPECT_TRUE(files_of(dir / "killed") == expected);
-  RecordProperty("killed", killed);
+  EXPECT_TRUE(test::files_of_run(dir / "killed") == expected);
 }
 
 }  // namespace

@@ -56,6 +56,49 @@ TEST(Measure, VolumeAndAreaAreTheSameFarAway) {
   }
 }
 
+TEST(Measure, OrthophotoOfACubeSeenFromThreeSides) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2), {10, 20, 30}));
+  const std::string mesh = (dir / "a.obj").string() + " --assume-unit m ";
+  const json top = json_of("measure " + mesh + "--pixel-size 10cm --unit cm --orthophoto " +
+                           (dir / "top").string())["figures"]["orthophoto"];
+  EXPECT_EQ(top["width"], 20);
+  EXPECT_EQ(top["height"], 20);
+  EXPECT_NEAR(top["corner"][0].get<double>(), 1000, 1e-9);
+  EXPECT_NEAR(top["corner"][1].get<double>(), 2200, 1e-9);
+  EXPECT_NEAR(top["highest"].get<double>(), 3200, 1e-9);
+  EXPECT_EQ(top["covered"], 1);
+  EXPECT_EQ(test::read_bytes(dir / "top.pgw"), "10\n0\n0\n-10\n1005\n2195\n");
+  const json front = json_of("measure " + mesh + "--side front --up 0 0 1 --orthophoto " +
+                             (dir / "front").string())["figures"]["orthophoto"];
+  EXPECT_NEAR(front["highest"].get<double>(), -20, 1e-9);  // toward the viewer is -y
+  EXPECT_NEAR(front["corner"][1].get<double>(), 32, 1e-9);
+  const json plane =
+      json_of("measure " + mesh + "--plane 10,20,30 10,22,30 10,20,32 --orthophoto " +
+              (dir / "plane").string())["figures"]["orthophoto"];
+  EXPECT_NEAR(plane["highest"].get<double>(), 2, 1e-9);
+  EXPECT_EQ(run_cgs("measure " + mesh + "--pixel-size 1um --orthophoto " + (dir / "x").string())
+                .exit_code,
+            4);
+  EXPECT_EQ(run_cgs("measure " + mesh + "--side top").exit_code, 2);
+}
+
+TEST(Measure, ThicknessOfACubeAndAtAPoint) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));
+  const json figures = json_of("measure " + (dir / "a.obj").string() +
+                               " --assume-unit cm --unit mm --thickness --thickness-at 1,1,5 "
+                               "1,0.25,2 --thickness-ply " +
+                               (dir / "t.ply").string())["figures"];
+  EXPECT_NEAR(figures["thickness_at"][0]["value"].get<double>(), 20, 1e-6);
+  EXPECT_NEAR(figures["thickness_at"][0]["to"]["point"][2].get<double>(), 0, 1e-6);
+  EXPECT_NEAR(figures["thickness_at"][1]["value"].get<double>(), 5, 1e-6);  // by the nearest edge
+  EXPECT_TRUE(figures["thickness_at"][0]["sigma"].is_null());
+  // Twice the distance to the nearest edge: its median over a square is half of 20 (1 - sqrt(1/2)).
+  EXPECT_NEAR(figures["thickness"]["seen"]["median"].get<double>(), 20 * (1 - std::sqrt(0.5)), 0.1);
+  EXPECT_TRUE(std::filesystem::exists(dir / "t.ply"));
+}
+
 TEST(Measure, FiguresOfACubeInMillimetres) {
   const TempDir dir;
   test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));

@@ -8,6 +8,7 @@
 #include "io/byte_writer.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
+#include "tests/support/splat_ply.h"
 
 namespace cgs {
 namespace {
@@ -41,15 +42,7 @@ struct RawSplat {
 };
 
 std::string raw_file(const std::vector<RawSplat>& splats) {
-  std::string out = "ply\nformat binary_little_endian 1.0\nelement vertex " +
-                    std::to_string(splats.size()) + "\n";
-  for (const char* name : {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0"}) {
-    out += std::string("property float ") + name + "\n";
-  }
-  for (const char* name : {"scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"}) {
-    out += std::string("property float ") + name + "\n";
-  }
-  out += "end_header\n";
+  std::string out = test::splat_ply_header("binary_little_endian", splats.size());
   for (const RawSplat& s : splats) {
     for (const float v : {s.x, s.y, s.z, s.dc, s.dc, s.dc, s.opacity}) append_bytes(out, v);
     for (const float v : {s.scale, s.scale - 1, s.scale - 2}) append_bytes(out, v);
@@ -102,6 +95,19 @@ TEST(GaussianPly, ComesBackAtEveryDegree) {
       const Eigen::Array3f ratio = back.gaussians.scale[i].array() / g.scale[i].array();
       EXPECT_LT((ratio - 1).abs().maxCoeff(), 1e-6f);
     }
+  }
+}
+
+// Their logits lie between 0 and 1, as probabilities would.
+TEST(GaussianPly, OurOwnHalfOpaqueSplatsAreNotTakenForProbabilities) {
+  const test::TempDir dir;
+  Gaussians g = sample(0);
+  for (size_t i = 0; i < g.size(); ++i) g.opacity[i] = 0.51f + 0.01f * static_cast<float>(i);
+  write_gaussian_ply(dir / "a.ply", g, exact_frame());
+  const GaussianFile back = read_gaussian_ply(dir / "a.ply", exact_frame());
+  EXPECT_TRUE(back.warnings.empty());
+  for (size_t i = 0; i < g.size(); ++i) {
+    EXPECT_NEAR(back.gaussians.opacity[i], g.opacity[i], 1e-6f);
   }
 }
 

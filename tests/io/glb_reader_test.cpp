@@ -214,7 +214,7 @@ void expect_round_trip(const GlbOptions& options, double tolerance) {
   EXPECT_DOUBLE_EQ(back.content.frame.metres_per_unit, 0.01);
   EXPECT_DOUBLE_EQ(back.content.frame.metres_sigma, 0.0001);
   EXPECT_EQ(back.content.frame.scale_source, ScaleSource::KnownDistance);
-  expect_near(*back.up, -Eigen::Vector3d::UnitY());
+  expect_near(back.content.frame.up, -Eigen::Vector3d::UnitY());
   const double ratio = back.content.frame.scale / frame.scale;
   for (size_t v = 0; v < mesh.vertices.size(); ++v) {
     const Eigen::Vector3d wanted = frame.world_from_internal(mesh.vertices[v].cast<double>());

@@ -32,6 +32,16 @@ TEST(PlyFrame, CommentsCarryUnitScaleSourceAndOriginExactly) {
   EXPECT_TRUE(back.warnings.empty());
 }
 
+TEST(PlyFrame, CommentsSayWhatIsUpWhereThatIsKnown) {
+  Frame frame = test::centimetre_frame();
+  EXPECT_FALSE(ply_placement(comments_of(frame), kBounds, {}).frame.knows_up());
+  frame.up = Eigen::Vector3d(0.2, -0.9, 0.1).normalized();
+  const Frame back = ply_placement(comments_of(frame), kBounds, {}).frame;
+  EXPECT_LT((back.up - frame.up).norm(), 1e-15);
+  EXPECT_FALSE(ply_placement({"up 0 0 0"}, kBounds, {}).frame.knows_up());
+  EXPECT_FALSE(ply_placement({"up and away"}, kBounds, {}).frame.knows_up());
+}
+
 TEST(PlyFrame, PlacesContentInTheWorld) {
   const PlyPlacement back = ply_placement(comments_of(test::centimetre_frame()), kBounds, {});
   const Eigen::Vector3d in_file(0.5, 1.5, -2.5);

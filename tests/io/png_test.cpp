@@ -62,6 +62,15 @@ TEST(EncodePng, ShowsMasksInBlackAndWhite) {
   EXPECT_EQ(decoded_png(encode_png(mask), PNG_FORMAT_GRAY, 3, 1), std::string("\0\xff\xff", 3));
 }
 
+TEST(EncodePng, IsTransparentWhereTheMaskIsZero) {
+  ColorImage image(2, 1, {1, 0, 0});
+  MaskMap shown(2, 1, 0);
+  shown(1, 0) = 1;
+  EXPECT_EQ(decoded_png(encode_png(image, shown), PNG_FORMAT_RGBA, 2, 1),
+            std::string("\xff\0\0\0\xff\0\0\xff", 8));
+  EXPECT_THROW(encode_png(image, MaskMap(1, 2, 1)), InvalidInput);
+}
+
 TEST(EncodePng, RefusesAnEmptyImage) {
   EXPECT_THROW(encode_png(ColorImage{}), InvalidInput);
   EXPECT_THROW(encode_png(MaskMap{}), InvalidInput);

@@ -9,6 +9,7 @@
 #include "io/splat_reader.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/solid_meshes.h"
+#include "tests/support/splat_ply.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs {
@@ -98,24 +99,7 @@ TEST(CheckSignificance, KnowsHowFormatsStoreCoordinates) {
 
 // Splats as other programs would write them where no origin is told.
 std::string splats_at(const Eigen::Vector3d& place, double extent) {
-  std::string out = "ply\nformat binary_little_endian 1.0\nelement vertex 27\n";
-  for (const char* name : {"x",
-                           "y",
-                           "z",
-                           "f_dc_0",
-                           "f_dc_1",
-                           "f_dc_2",
-                           "opacity",
-                           "scale_0",
-                           "scale_1",
-                           "scale_2",
-                           "rot_0",
-                           "rot_1",
-                           "rot_2",
-                           "rot_3"}) {
-    out += std::string("property float ") + name + "\n";
-  }
-  out += "end_header\n";
+  std::string out = test::splat_ply_header("binary_little_endian", 27);
   const auto log_scale = float(std::log(extent / 10));
   for (int i = 0; i < 27; ++i) {
     const Eigen::Vector3d p = place + extent / 2 * Eigen::Vector3d(i % 3, i / 3 % 3, i / 9);

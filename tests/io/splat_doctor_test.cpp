@@ -17,6 +17,7 @@ RawSplats healthy(int count = 400) {
   const Gaussians g = test::varied_splats(count, 1);
   RawSplats out;
   out.sh_degree = 1;
+  out.may_be_linear = true;
   for (size_t i = 0; i < g.size(); ++i) {
     out.position.emplace_back(g.position[i].cast<double>());
     out.log_scale.emplace_back(g.scale[i].array().log());

@@ -26,8 +26,9 @@ TEST(ReadStl, WeldsTheCornersOfABinaryFileOfOurs) {
   const ParsedMesh back = read_stl(dir / "a.stl");
   EXPECT_EQ(back.positions.size(), mesh.vertices.size());
   EXPECT_EQ(back.mesh.faces.size(), mesh.faces.size());
-  ASSERT_EQ(back.comments.size(), 1U);
+  ASSERT_EQ(back.comments.size(), 2U);
   EXPECT_EQ(back.comments[0], "metres_per_unit 0.001");
+  EXPECT_EQ(back.comments[1].substr(0, 12), "file_origin ");
 }
 
 TEST(ReadStl, ReadsTextWithSeveralSolids) {

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "io/mesh_file.h"
 #include "libcgs/core/up_axis.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
@@ -50,6 +51,22 @@ TEST(WriteStl, IsInMillimetresWithZUp) {
       EXPECT_LT((facets[i].corner.at(k) - turned).norm(), 1e-4f);
     }
   }
+}
+
+TEST(WriteStl, FarFromTheOriginTheHeaderLeadsBack) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::labelled_sphere();
+  Frame frame = test::centimetre_frame();
+  frame.file_origin = frame.origin = {448e5 + 0.25, 5.411e8, 12e3};
+  write_stl(dir / "a.stl", mesh, frame, Eigen::Matrix3d::Identity());
+  const std::string header = test::read_bytes(dir / "a.stl").substr(0, 80);
+  EXPECT_NE(header.find(", add 448000002.500 5411000000.000 120000.000"), std::string::npos);
+  const MeasurableMesh back = read_mesh_file(dir / "a.stl").content;
+  const Eigen::Vector3d in_world =
+      back.frame.world_from_internal(back.mesh.vertices[back.mesh.faces[0][0]].cast<double>());
+  const Eigen::Vector3d wanted =
+      frame.world_from_internal(mesh.vertices[mesh.faces[0][0]].cast<double>());
+  EXPECT_LT((in_world / 10 - wanted).norm(), 1e-5);
 }
 
 TEST(WriteStl, NormalsFollowTheCornersOutwards) {

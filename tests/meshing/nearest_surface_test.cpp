@@ -31,6 +31,20 @@ TEST(NearestSurface, SignedDistanceToACube) {
   }
 }
 
+TEST(NearestSurface, WithinADistanceFindsTheSameOrNothing) {
+  const MeasurableMesh ball = test::sphere_mesh(0.3);
+  const NearestSurface surface(ball);
+  for (const double x : {0.0, 0.1, 0.31, 0.8}) {
+    const Eigen::Vector3d p(x, 0.2 * x, 0.05);
+    const SurfacePoint nearest = surface.nearest(p);
+    const double distance = (nearest.position - p).norm();
+    EXPECT_FALSE(surface.nearest_within(p, distance * (1 - 1e-9)));
+    const auto found = surface.nearest_within(p, distance * (1 + 1e-9));
+    ASSERT_TRUE(found);
+    EXPECT_NEAR((found->position - p).norm(), distance, 1e-12);
+  }
+}
+
 // At a sharp tip the nearest faces look away from points that lie outside of them.
 TEST(NearestSurface, SignNearASharpTip) {
   MeasurableMesh mesh;

@@ -390,6 +390,7 @@ TEST(SimplifyOptions, RefusesEveryFieldOutOfRange) {
                InvalidInput);
   EXPECT_THROW((SimplifyOptions{.max_error = 1, .max_color_error = 0}.validate()), InvalidInput);
   EXPECT_THROW((SimplifyOptions{.max_error = 1, .max_color_error = NAN}.validate()), InvalidInput);
+  EXPECT_THROW((SimplifyOptions{.max_error = 1, .max_area_change = 0}.validate()), InvalidInput);
 }
 
 }  // namespace

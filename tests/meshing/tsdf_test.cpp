@@ -255,6 +255,22 @@ TEST(Fuse, CoarsensTheVoxelsToTheLimit) {
   EXPECT_LT(coarse.report.voxels, 250000U);  // Blocks stick out of the bounds.
 }
 
+TEST(Fuse, CoarsensNoFartherThanAskedAndIsNoFinerThanTheEvidence) {
+  auto views = three_views(sphere_before_wall());
+  const double footprint = fuse(views, {}).report.voxel_size;
+  const double limited = fuse(views, {.max_voxels = 100000}).report.voxel_size;
+  const double between = 0.5 * (footprint + limited);
+  const auto voxel = [&](double coarsest) {
+    return fuse(views, {.max_voxels = 100000, .coarsest_voxel = coarsest}).report.voxel_size;
+  };
+  EXPECT_DOUBLE_EQ(voxel(2 * limited), limited);
+  EXPECT_DOUBLE_EQ(voxel(between), between);
+  EXPECT_DOUBLE_EQ(voxel(footprint / 10), footprint);
+  const auto sigma = static_cast<float>(0.5 * (between + footprint));
+  for (TsdfView& view : views) view.sigma = DepthMap(view.camera.width, view.camera.height, sigma);
+  EXPECT_DOUBLE_EQ(voxel(footprint / 10), double(sigma));
+}
+
 TEST(Fuse, RefusesWhatDoesNotFitIntoMemory) {
   const auto views = three_views(sphere_before_wall());
   EXPECT_THROW(fuse(views, {.memory_limit = 1000000}), LimitError);
@@ -289,6 +305,7 @@ TEST(TsdfOptions, RefusesEveryFieldOutOfRange) {
   EXPECT_THROW(TsdfOptions{.voxel_size = nan}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.truncation = 1.9f}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.max_voxels = 0}.validate(), InvalidInput);
+  EXPECT_THROW(TsdfOptions{.coarsest_voxel = nan}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.min_weight = -1}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.depth_trunc = nan}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.gap_pixels = -1}.validate(), InvalidInput);

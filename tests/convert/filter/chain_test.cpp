@@ -29,10 +29,12 @@ struct Case {
   Keeps keeps = Keeps::Area;
   bool mesh = true;
   bool cloud = false;
-  double scale = 1;  ///< Of lengths.
+  double scale = 1;     ///< Of lengths.
+  bool closed = false;  ///< Whether it needs a closed mesh.
 };
 
 constexpr const char* kSecond = "second.ply";
+constexpr const char* kSolid = "solid.ply";
 
 // The internal unit of the frame is 64 cm and file coordinates start near (0.5, -0.25, 0).
 const std::map<std::string, Case>& cases() {
@@ -65,20 +67,26 @@ const std::map<std::string, Case>& cases() {
       {"repair", {"", Keeps::Area}},
       {"cut-self-intersections", {"", Keeps::Area}},
       {"fill-holes", {"40cm", Keeps::Area}},
-      {"hull", {"", Keeps::Part, true, true}}};
+      {"hull", {"", Keeps::Part, true, true}},
+      {"subdivide-loop", {"1", Keeps::Area}},
+      {"wrap", {"8cm,4mm", Keeps::Part, true, true}},
+      {"union", {kSolid, Keeps::Part, true, false, 1, true}},  // adds observed area
+      {"intersect", {kSolid, Keeps::Part, true, false, 1, true}},
+      {"subtract", {kSolid, Keeps::Part, true, false, 1, true}}};
   return kCases;
 }
 
 // A ball with labels in belts, a hole in its inferred part and a small observed part beside it.
-FilterState labelled_mesh() {
+FilterState labelled_mesh(bool closed = false) {
   const TriangleMesh ball = test::labelled_sphere(48, 64);
+  const Frame frame = test::centimetre_frame();
+  if (closed) return {ball, frame, frame.file_origin};
   std::vector<uint8_t> keep(ball.faces.size(), 1);
   for (size_t f = 0; f < keep.size(); ++f) {
     const Eigen::Vector3f p =
         ball.vertices[ball.faces[f][0]] - Eigen::Vector3f(0.05f, -0.1f, 0.15f);
     if ((p - Eigen::Vector3f(0, 0.2f, -0.35f)).norm() < 0.06f) keep[f] = 0;
   }
-  const Frame frame = test::centimetre_frame();
   return {with_faces(ball, keep), frame, frame.file_origin};
 }
 
@@ -94,11 +102,16 @@ void write_inputs(const test::TempDir& dir) {
   test::write_bytes(dir / "matrix.txt", "0 -1 0 5\n1 0 0 -2.5\n0 0 1 7\n0 0 0 1\n");
   const FilterState second = labelled_mesh();
   write_mesh_ply(dir / kSecond, second.mesh, second.frame);
+  FilterState solid = labelled_mesh(true);  // its observed part lies above that of the first
+  for (auto& p : solid.mesh.vertices) p.z() += 0.3f;
+  write_mesh_ply(dir / kSolid, solid.mesh, solid.frame);
 }
 
 std::string typed(const std::string& name, const test::TempDir& dir) {
   std::string arguments = cases().at(name).arguments;
-  if (name == "transform" || name == "merge") arguments = (dir / arguments).string();
+  if (arguments == kSecond || arguments == kSolid || name == "transform") {
+    arguments = (dir / arguments).string();
+  }
   return arguments.empty() ? name : name + "=" + arguments;
 }
 
@@ -182,7 +195,7 @@ TEST_P(EveryOperation, HasACase) { EXPECT_EQ(cases().count(name()), 1U); }
 TEST_P(EveryOperation, KeepsWhatIsKnownOfAMesh) {
   if (!cases().at(name()).mesh) GTEST_SKIP() << "for point clouds only";
   const Case& the = cases().at(name());
-  const FilterState before = labelled_mesh();
+  const FilterState before = labelled_mesh(the.closed);
   const FilterState after = filtered(before, typed(name(), dir_), 2);
   expect_sound(after);
   if (the.keeps != Keeps::Part) {
@@ -211,7 +224,8 @@ TEST_P(EveryOperation, KeepsWhatIsKnownOfACloud) {
 }
 
 TEST_P(EveryOperation, GivesTheSameBitsForAnyNumberOfThreads) {
-  const FilterState before = cases().at(name()).mesh ? labelled_mesh() : labelled_cloud();
+  const FilterState before =
+      cases().at(name()).mesh ? labelled_mesh(cases().at(name()).closed) : labelled_cloud();
   const FilterState one = filtered(before, typed(name(), dir_), 1);
   for (const int threads : {2, 3, 4}) {
     EXPECT_TRUE(same_bits(filtered(before, typed(name(), dir_), threads).mesh, one.mesh))

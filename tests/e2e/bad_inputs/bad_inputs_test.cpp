@@ -63,6 +63,7 @@ TEST(BadInputs, Colmap) { expect_all_right(colmap_cases()); }
 TEST(BadInputs, Arrays) { expect_all_right(array_cases()); }
 TEST(BadInputs, Transforms) { expect_all_right(transforms_cases()); }
 TEST(BadInputs, Images) { expect_all_right(image_cases()); }
+TEST(BadInputs, Surveys) { expect_all_right(survey_cases()); }
 TEST(BadInputs, Exr) { expect_all_right(exr_cases()); }
 TEST(BadInputs, Volumes) { expect_all_right(volume_cases()); }
 TEST(BadInputs, Outputs) { expect_all_right(output_cases()); }
@@ -82,6 +83,7 @@ TEST(BadInputs, EveryRowIsTriedOrLeftOutForAReason) {
                                       {'V', 6},
                                       {'M', 13},
                                       {'K', 5},
+                                      {'S', 16},
                                       {'E', 8}};
   std::set<std::string> tried;
   for (const auto& cases : {general_cases,
@@ -90,6 +92,7 @@ TEST(BadInputs, EveryRowIsTriedOrLeftOutForAReason) {
                             array_cases,
                             transforms_cases,
                             image_cases,
+                            survey_cases,
                             exr_cases,
                             volume_cases,
                             output_cases}) {

@@ -36,6 +36,7 @@ Cases colmap_cases();      ///< C
 Cases array_cases();       ///< L, N: poses_bounds.npy
 Cases transforms_cases();  ///< T
 Cases image_cases();       ///< I
+Cases survey_cases();      ///< S: tables of control points
 Cases exr_cases();         ///< X
 Cases volume_cases();      ///< V
 Cases output_cases();      ///< E: the environment, and files a run left behind

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/asset.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <nlohmann/json.hpp>
+
+#include "convert/html.h"
+#include "convert/length.h"
+#include "convert/mesh_files.h"
+#include "convert/size_search.h"
+#include "convert/texture.h"
+#include "convert/written_surface.h"
+#include "io/gltf.h"
+#include "io/mesh_file.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/up_axis.h"
+#include "meshing/simplify.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+// What the detail d is shared out to.
+constexpr double kSimplified = 0.8;
+constexpr double kRounded = 0.2;
+constexpr double kTexel = 2;
+constexpr double kLooserWhereInferred = 4;
+// Of the detail, what counts as the error of a mesh that is not simplified at all.
+constexpr double kLeastShare = 0.01;
+// Coarser than this share of the largest side, nothing is left to recognise.
+constexpr double kCoarsest = 1.0 / 50;
+
+/// The asset with what is below a detail left out.
+struct Form {
+  double detail = 0;  ///< [internal units]; 0 = whole
+  TriangleMesh mesh;
+  PhotoTexture texture;
+  double texture_share = 1;  ///< Of the width of photographs.
+  GlbOptions options;
+};
+
+double largest_side(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : mesh.vertices) box.extend(p);
+  return double(box.sizes().maxCoeff());
+}
+
+class AssetWriter {
+ public:
+  AssetWriter(const Model& model, const AssetContent& content, const RunRequest& request)
+      : scene_(model.scene),
+        mesh_(content.mesh),
+        texture_(content.texture),
+        frame_(model.scene.frame),
+        path_(request.output / "web/asset.glb"),
+        y_up_(y_up_from(model.scene.frame.up)),
+        summary_(content.summary),
+        side_(largest_side(content.mesh)) {
+    if (!request.compression_error.empty()) {
+      rounding_ = parse_length(request.compression_error, frame_);
+    }
+    if (request.max_error.empty()) return;
+    promise_ = parse_length(request.max_error, frame_);
+    rounding_ = kRoomForRounding * *promise_;
+  }
+
+  Form whole() const { return {0, mesh_, texture_, 1, glb_options(rounding_, summary_)}; }
+
+  /// \param already  how far mesh_ is from the fused surface where there is evidence
+  Form coarser(double detail, double already) const {
+    Form out = whole();
+    out.detail = detail;
+    // With a promise, the mesh was made as coarse as that allows before.
+    const double left = promise_ ? 0 : kSimplified * detail - already;
+    if (left > 0) simplify_to(left, detail / std::max(already, kLeastShare * detail), out);
+    const double rounding = rounding_ > 0 ? rounding_ : kRounded * detail;
+    out.options = glb_options(rounding, summary_for(out.mesh));
+    out.texture_share = coarsen_texture(out.texture, out.mesh, kTexel * detail);
+    return out;
+  }
+
+  GlbReport write(const Form& form) const {
+    return write_glb(path_, form.mesh, form.texture, frame_, form.options);
+  }
+
+  SurfaceDeviation deviation_from(const TriangleMesh& fused) const {
+    const TriangleMesh written = read_mesh_file(path_, frame_).content.mesh;
+    const SurfaceDeviation out = surface_deviation(written, fused);
+    if (promise_ && out.max() > *promise_) {
+      std::filesystem::remove(path_);
+      throw NumericalError("asset.glb is " + format_length(out.max(), frame_) +
+                           " off the fused surface, promised were " +
+                           format_length(*promise_, frame_));
+    }
+    return out;
+  }
+
+  double side() const { return side_; }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  GlbOptions glb_options(double rounding, const Json& summary) const {
+    GlbOptions out;
+    out.y_up = y_up_;
+    out.max_error = rounding * frame_.scale;
+    out.summary_json = summary.dump();
+    // Finer than any grid of the encoder: floats as they are.
+    constexpr double kFinestGrid = 1.0 / (1 << 20);
+    if (promise_ && rounding < kFinestGrid * side_) out.draco = false;
+    return out;
+  }
+
+  Json summary_for(const TriangleMesh& mesh) const {
+    Json out = summary_;
+    out["certificate"] = certificate_to_json(certify(mesh), mesh, frame_);
+    return out;
+  }
+
+  // Colours of vertices hold faces where photographs show them anyway, and small parts of the
+  // surface: both give way with coarser detail.
+  void simplify_to(double error, double coarser, Form& out) const {
+    SimplifyOptions options;
+    options.max_error = error;
+    options.max_error_inferred = kLooserWhereInferred * error;
+    options.max_color_error =
+        texture_.empty() ? std::min(1.0, coarser * options.max_color_error) : 1;
+    options.max_area_change = std::min(0.1, coarser * options.max_area_change);
+    out.mesh = simplify(mesh_, options).mesh;
+    Json unused;
+    if (!texture_.empty()) out.texture = texture_from_photographs(scene_, out.mesh, unused);
+  }
+
+  const Scene& scene_;
+  const TriangleMesh& mesh_;
+  const PhotoTexture& texture_;
+  const Frame& frame_;
+  std::filesystem::path path_;
+  Eigen::Matrix3d y_up_;
+  const Json& summary_;
+  double side_;
+  double rounding_ = 0;            ///< [internal units]; 0 = default of the format
+  std::optional<double> promise_;  ///< [internal units]
+};
+
+/// A form on disk.
+struct Written {
+  Form form;
+  GlbReport report;
+  std::vector<TriedSize> tried;  ///< Coarser forms than the whole; in internal units.
+};
+
+// Leaves the finest form on disk that is small enough.
+Written write_within(const AssetWriter& writer,
+                     size_t limit,
+                     double already,
+                     const Frame& frame,
+                     const Progress& progress) {
+  Written out{writer.whole(), {}, {}};
+  out.report = writer.write(out.form);
+  if (limit == 0 || out.report.bytes <= limit) return out;
+  const size_t whole = out.report.bytes;
+  double tries = 0;
+  // Just above what is there already: textures begin to shrink before the mesh does.
+  const double finest = std::max(already / kSimplified, 1e-4 * writer.side());
+  const double coarsest = std::max(finest, kCoarsest * writer.side());
+  const SizeSearch search = finest_within(limit, finest, coarsest, [&](double detail) {
+    report(progress, 1 - 1 / (1 + 0.2 * ++tries));
+    Form form = writer.coarser(detail, already);
+    const GlbReport written = writer.write(form);
+    const bool fits = written.bytes <= limit;
+    if (fits && (out.form.detail == 0 || detail < out.form.detail)) {
+      out.form = std::move(form);
+      out.report = written;
+    }
+    return written.bytes;
+  });
+  if (!search.detail) {
+    std::filesystem::remove(writer.path());
+    throw LimitError("asset.glb takes " + std::to_string(std::min(whole, search.smallest())) +
+                     " bytes at least, with all left out that is below " +
+                     format_length(coarsest, frame) + "; --max-size allows " +
+                     std::to_string(limit) + "; the other files are there");
+  }
+  if (search.tried.back().detail != out.form.detail) writer.write(out.form);
+  out.tried = search.tried;
+  return out;
+}
+
+Json glb_to_json(const GlbReport& glb, const Frame& frame) {
+  return {{"bytes", glb.bytes},
+          {"texture_bytes", glb.texture_bytes},
+          {"textured_triangles", glb.textured_triangles},
+          {"measured_texture_error", glb.measured_texture_error},
+          {"position_bits", glb.position_bits},
+          {"measured_max_error", glb.measured_max_error},
+          {"units", frame.unit_name()}};
+}
+
+Json form_to_json(const Written& written, const Frame& frame) {
+  Json tried = Json::array();
+  for (const TriedSize& form : written.tried) {
+    tried.push_back({{"detail", form.detail * frame.scale}, {"bytes", form.bytes}});
+  }
+  return {{"detail", written.form.detail * frame.scale},
+          {"faces", written.form.mesh.faces.size()},
+          {"texture_share", written.form.texture_share},
+          {"tried", tried}};
+}
+
+std::string words_for(const Written& written,
+                      const SurfaceDeviation& deviation,
+                      size_t limit,
+                      size_t whole_faces,
+                      const Frame& frame) {
+  std::string out = "asset.glb has " + format_file_size(written.report.bytes);
+  if (limit > 0) out += " of at most " + format_file_size(limit);
+  if (limit > 0 && written.form.detail == 0) out += "; nothing had to be left out";
+  if (written.form.detail > 0) {
+    out += "; for that its mesh has " + std::to_string(written.form.mesh.faces.size()) + " of " +
+           std::to_string(whole_faces) + " faces and its textures " +
+           number(100 * written.form.texture_share, "%.0f") +
+           " % of the photographs' width (detail " + format_length(written.form.detail, frame) +
+           ")";
+  }
+  return out + "; it is at most " + format_length(deviation.evidence, frame) +
+         " off the fused surface where there is evidence, " +
+         format_length(deviation.inferred, frame) + " where that is inferred (measured at " +
+         std::to_string(deviation.places) + " places, both ways)";
+}
+
+}  // namespace
+
+Json write_asset(const Model& model,
+                 const AssetContent& content,
+                 const RunRequest& request,
+                 const Progress& progress) {
+  const Frame& frame = model.scene.frame;
+  const TriangleMesh& mesh = content.mesh;
+  const AssetWriter writer(model, content, request);
+  if (request.max_error.empty() && request.max_size == 0) {
+    return glb_to_json(writer.write(writer.whole()), frame);
+  }
+  const TriangleMesh fused = fused_surface(request.output / "volume.vdb");
+  const double already = request.max_size > 0 ? surface_deviation(mesh, fused).evidence : 0;
+  const Written written =
+      write_within(writer, request.max_size, already, frame, part_of(progress, 0.1, 0.9));
+  const SurfaceDeviation deviation = writer.deviation_from(fused);
+  Json out = glb_to_json(written.report, frame);
+  out["deviation"] = {{"evidence", deviation.evidence * frame.scale},
+                      {"inferred", deviation.inferred * frame.scale},
+                      {"places", deviation.places},
+                      {"units", frame.unit_name()}};
+  out["form"] = form_to_json(written, frame);
+  out["words"] = words_for(written, deviation, request.max_size, mesh.faces.size(), frame);
+  return out;
+}
+
+}  // namespace cgs

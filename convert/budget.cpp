@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/budget.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/length.h"
+#include "convert/time_model.h"
+#include "io/atomic_file.h"
+#include "io/content_hash.h"
+#include "io/json_file.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+namespace {
+
+constexpr const char* kRecordFile = "budget.json";
+constexpr const char* kTrialFolder = "budget_trial";
+constexpr std::array kSizes = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32};
+constexpr int kLeastSide = 64;          // [pixels]; below, windows of the sweep are most of a view
+constexpr double kTrialPixels = 8'000;  // of a view, at least, in the first trials
+constexpr double kTrialShare = 0.1;     // of the time left, that one more trial may take
+constexpr double kEnoughPixels = 1.0 / 16;  // nearer to the goal another trial tells little
+constexpr double kReserve = 1.1;            // what forecasts are off by
+
+struct Candidate {
+  int downscale = 1;
+  std::string preset;
+  double seconds = 0;
+};
+
+struct Search {
+  const RunRequest& request;
+  const OpenedScene& opened;
+  double pixels;           // of the input views, full size
+  std::vector<int> sizes;  // downscales that may be used, ascending
+  double deadline;         // seconds after start
+  Clock::time_point start;
+  Terminal& terminal;
+  std::vector<TimedRun> runs = {};
+
+  double elapsed() const { return std::chrono::duration<double>(Clock::now() - start).count(); }
+  double left() const { return deadline - elapsed(); }
+  double pixels_at(int downscale) const { return pixels / (double(downscale) * downscale); }
+};
+
+std::string size_words(const Scene& scene, int downscale) {
+  const Camera& camera = scene.views[static_cast<size_t>(scene.input.front())].camera;
+  return std::to_string(camera.width / downscale) + " x " +
+         std::to_string(camera.height / downscale) + " pixels";
+}
+
+// One whole run, of which only the times are kept.
+TimedRun trial(const Search& search, int downscale, int steps) {
+  RunRequest request = search.request;
+  request.scene.options.downscale = downscale;
+  request.training.steps = steps;
+  request.output = search.request.output / kTrialFolder;
+  request.overwrite = true;
+  if (search.opened.poses) {  // not to be solved for again
+    make_output_folder(request.output / "model");
+    fs::copy(search.request.output / "model" / kPosesFolder,
+             request.output / "model" / kPosesFolder,
+             fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+  }
+  (void)search.terminal.begin("trying " + size_words(search.opened.scene, downscale));
+  Terminal silent = Terminal::silent();
+  const auto start = Clock::now();
+  const Json report = run_pipeline(request, silent);
+  TimedRun out;
+  out.pixels = search.pixels_at(downscale);
+  out.steps = steps;
+  out.opening = std::chrono::duration<double>(Clock::now() - start).count();
+  for (const Json& stage : report.at("stages")) {
+    out.stages.emplace_back(stage.at("stage"), stage.at("seconds"));
+    out.opening -= out.stages.back().second;
+  }
+  out.opening = std::max(0.0, out.opening);
+  (void)search.terminal.end(std::to_string(steps) + " steps");
+  return out;
+}
+
+// Best first.
+std::vector<Candidate> candidates(const Search& search) {
+  std::vector<Candidate> out;
+  for (const int downscale : search.sizes) {
+    for (const char* preset : {"standard", "draft"}) {
+      const int steps = training_preset(preset).steps;
+      out.push_back(
+          {downscale, preset, foretold_seconds(search.runs, search.pixels_at(downscale), steps)});
+    }
+  }
+  return out;
+}
+
+std::optional<Candidate> best_within(const Search& search, double seconds) {
+  const std::vector<Candidate> all = candidates(search);
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Candidate& candidate) {
+    return candidate.seconds * kReserve <= seconds;
+  });
+  return found == all.end() ? std::nullopt : std::optional(*found);
+}
+
+// The smallest pictures twice, then larger ones while these cost little of the time left and tell
+// more about the size in view.
+void run_trials(Search& search) {
+  const double views = static_cast<double>(search.opened.scene.input.size());
+  const auto first = std::find_if(search.sizes.rbegin(), search.sizes.rend(), [&](int downscale) {
+    return search.pixels_at(downscale) >= kTrialPixels * views;
+  });
+  const int smallest = first == search.sizes.rend() ? search.sizes.front() : *first;
+  const int draft = training_preset("draft").steps;
+  search.runs.push_back(trial(search, smallest, draft / 4));
+  search.runs.push_back(trial(search, smallest, draft));
+  for (int size = smallest;;) {
+    const std::optional<Candidate> aim = best_within(search, search.left());
+    if (!aim) return;
+    const bool has_two_sizes = search.runs.back().pixels != search.runs.front().pixels;
+    const double nearness = search.runs.back().pixels / search.pixels_at(aim->downscale);
+    if (has_two_sizes && nearness >= kEnoughPixels) return;
+    const auto next = std::find_if(
+        search.sizes.rbegin(), search.sizes.rend(), [&](int s) { return 2 * s <= size; });
+    if (next == search.sizes.rend() || *next <= aim->downscale) return;
+    size = *next;
+    const double cost = foretold_seconds(search.runs, search.pixels_at(size), draft / 4);
+    if (cost > kTrialShare * search.left()) return;
+    search.runs.push_back(trial(search, size, draft / 4));
+  }
+}
+
+// Sizes whose pictures hold something and whose run fits into memory.
+std::vector<int> usable_sizes(const RunRequest& request, const Scene& scene) {
+  int side = std::numeric_limits<int>::max();
+  for (const View& view : scene.views) {
+    side = std::min({side, view.camera.width, view.camera.height});
+  }
+  const MeasuredFiles measured = measured_files(request);
+  const size_t budget = memory_budget(request.memory_limit);
+  std::vector<int> out;
+  for (const int size : kSizes) {
+    if (size > 1 && side / size < kLeastSide) break;
+    const auto plan = memory_plan(scene, request.voxel_size.empty(), measured, size);
+    const bool fits = std::all_of(
+        plan.begin(), plan.end(), [&](const StageMemory& stage) { return stage.bytes <= budget; });
+    if (fits) out.push_back(size);
+  }
+  if (out.empty()) check_memory_plan(scene, request.voxel_size.empty(), measured, budget);
+  return out;
+}
+
+std::string words_of(const Search& search, const Candidate& chosen) {
+  std::string out = "--budget " + format_seconds(search.deadline) + ": " +
+                    size_words(search.opened.scene, chosen.downscale) + ", --preset " +
+                    chosen.preset + ", about " + format_seconds(chosen.seconds) + " after " +
+                    format_seconds(search.elapsed()) + " of trying";
+  const std::vector<Candidate> all = candidates(search);
+  const auto at = std::find_if(all.begin(), all.end(), [&](const Candidate& c) {
+    return c.downscale == chosen.downscale && c.preset == chosen.preset;
+  });
+  if (at == all.begin()) return out + "; it is the best there is";
+  const Candidate& better = *std::prev(at);
+  return out + "; the next better, " + size_words(search.opened.scene, better.downscale) +
+         ", --preset " + better.preset + ", would take about " +
+         format_seconds(better.seconds * kReserve + search.elapsed());
+}
+
+// \return what was chosen, as budget.json holds it
+Json choose(Search& search) {
+  run_trials(search);
+  const double left = search.left();
+  const std::optional<Candidate> chosen = best_within(search, left);
+  if (!chosen) {
+    const Candidate quickest = candidates(search).back();
+    throw LimitError("--budget " + format_seconds(search.deadline) +
+                     " is too short; the quickest setting, " +
+                     size_words(search.opened.scene, quickest.downscale) + ", needs about " +
+                     format_seconds(search.elapsed() + quickest.seconds * kReserve));
+  }
+  Json trials = Json::array();
+  for (const TimedRun& run : search.runs) {
+    Json stages = Json::object();
+    for (const auto& [stage, seconds] : run.stages) stages[stage] = seconds;
+    trials.push_back({{"pixels", run.pixels},
+                      {"steps", run.steps},
+                      {"opening_seconds", run.opening},
+                      {"stage_seconds", stages}});
+  }
+  return {{"seconds", search.deadline},
+          {"downscale", chosen->downscale},
+          {"preset", chosen->preset},
+          {"foretold_seconds", chosen->seconds},
+          {"trying_seconds", search.elapsed()},
+          {"words", words_of(search, *chosen)},
+          {"trials", trials}};
+}
+
+// Takes away what trials wrote, and folders that nothing came into.
+class TrialFolder {
+ public:
+  explicit TrialFolder(fs::path output) : output_(std::move(output)) {
+    make_output_folder(output_ / "model");
+  }
+  ~TrialFolder() {
+    std::error_code ignored;
+    fs::remove_all(output_ / kTrialFolder, ignored);
+    fs::remove(output_ / "model", ignored);
+    fs::remove(output_, ignored);
+  }
+  TrialFolder(const TrialFolder&) = delete;
+  TrialFolder& operator=(const TrialFolder&) = delete;
+
+ private:
+  fs::path output_;
+};
+
+// What an earlier start chose for the same; null if there is none.
+Json chosen_before(const fs::path& file, double seconds, const std::string& request) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(file, ignored)) return nullptr;
+  const Json record = read_json(file);
+  const bool is_same = record.is_object() && record.value("seconds", Json()) == Json(seconds) &&
+                       record.value("request", Json()) == Json(request);
+  return is_same ? record : Json();
+}
+
+}  // namespace
+
+RunRequest within_budget(const RunRequest& request,
+                         double seconds,
+                         Clock::time_point start,
+                         Terminal& terminal) {
+  if (request.scene.options.downscale) {
+    throw InvalidInput("--budget chooses the size of the pictures; give it or --downscale");
+  }
+  const fs::path file = request.output / kRecordFile;
+  RunRequest full = request;
+  full.scene.options.downscale = 1;
+  const OpenedScene opened = open_scene(full.scene, request.output / "model", terminal);
+  const std::string asked =
+      std::to_string(content_hash(json_text(request_json(full, opened.scene), -1)));
+  Json chosen = request.overwrite ? Json() : chosen_before(file, seconds, asked);
+  if (chosen.is_null()) {
+    const TrialFolder trials(request.output);
+    opened.keep(request.output / "model");
+    double pixels = 0;
+    for (const int i : opened.scene.input) {
+      const Camera& camera = opened.scene.views[static_cast<size_t>(i)].camera;
+      pixels += double(camera.width) * camera.height;
+    }
+    Search search{
+        request, opened, pixels, usable_sizes(request, opened.scene), seconds, start, terminal};
+    chosen = choose(search);
+    chosen["request"] = asked;
+    write_file(file, json_text(chosen) + "\n");
+  }
+  full.scene.options.downscale = chosen.at("downscale").get<int>();
+  full.training.steps = training_preset(chosen.at("preset").get<std::string>()).steps;
+  full.settings_reason = chosen.at("words").get<std::string>();
+  terminal.say(full.settings_reason);
+  return full;
+}
+
+}  // namespace cgs

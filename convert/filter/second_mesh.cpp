@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/filter/second_mesh.h"
+
+#include <utility>
+
+#include "io/mesh_file.h"
+#include "libcgs/core/error.h"
+#include "meshing/placement.h"
+
+namespace cgs {
+
+namespace {
+
+// Without the unit of one of them, nobody knows how large it is beside the other.
+void require_both_units(const std::filesystem::path& path,
+                        const Frame& second,
+                        const Frame& first,
+                        const std::string& operation) {
+  if (second.has_metric_scale() == first.has_metric_scale()) return;
+  if (second.has_metric_scale()) {
+    throw InvalidInput(operation + printable(path) +
+                       " states its unit, the first file does not: say it by --assume-unit");
+  }
+  throw InvalidInput(operation + "the first file states its unit, " + printable(path) +
+                     " does not: cgs convert with --assume-unit writes it with one");
+}
+
+}  // namespace
+
+SecondMesh read_second_mesh(const FilterState& state,
+                            const std::filesystem::path& path,
+                            const char* operation) {
+  const std::string prefix = std::string("--op ") + operation + ": ";
+  MeasurableFile second = read_mesh_file(path);
+  TriangleMesh& mesh = second.content.mesh;
+  if (mesh.faces.empty() != state.is_cloud()) {
+    throw InvalidInput(prefix + printable(path) + " is a " +
+                       (mesh.faces.empty() ? "point cloud" : "mesh") + ", the first file is not");
+  }
+  require_both_units(path, second.content.frame, state.frame, prefix);
+  SecondMesh out;
+  out.remark = std::to_string(mesh.vertices.size()) + " vertices, " +
+               std::to_string(mesh.faces.size()) + " faces";
+  if (mesh.provenance.empty() != state.mesh.provenance.empty()) {
+    out.remark += "; only one file says what was observed: all of the other counts as inferred";
+  }
+  for (const std::string& warning : second.warnings) out.remark += "; " + warning;
+  move_to_frame(mesh, second.content.frame, state.frame);
+  out.mesh = std::move(mesh);
+  return out;
+}
+
+}  // namespace cgs

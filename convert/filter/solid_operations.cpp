@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/filter/operations.h"
+#include "convert/filter/second_mesh.h"
+#include "convert/html.h"
+#include "libcgs/core/error.h"
+#include "meshing/boolean.h"
+#include "meshing/wrapping.h"
+
+namespace cgs {
+
+namespace {
+
+std::string percent(double part, double whole) {
+  return number(whole > 0 ? 100 * part / whole : 0, "%.1f %%");
+}
+
+// "9.3 % of the area bridges what the input does not show", and whether that is marked
+std::string bridge_remark(const EvidenceTransfer& evidence, const TriangleMesh& mesh) {
+  std::string out = percent(evidence.bridged, evidence.area) + " of the area bridges gaps";
+  if (mesh.provenance.empty()) out += ", not marked as the file does not say what was observed";
+  return out;
+}
+
+std::string cut_remark(size_t self_intersections) {
+  if (self_intersections == 0) return {};
+  return "; " + std::to_string(self_intersections) + " self-intersecting pairs of faces LEFT";
+}
+
+std::string volume_text(double volume, const Frame& frame) {
+  const double unit = frame.scale * (frame.has_metric_scale() ? frame.metres_per_unit : 1);
+  return number(volume * unit * unit * unit, "%.5g") +
+         (frame.has_metric_scale() ? " m3" : " units3");
+}
+
+std::string wrap_remark(const WrappedMesh& wrap, const FilterState& state) {
+  std::string out = "volume " + volume_text(wrap.volume, state.frame);
+  if (!std::isnan(wrap.input_volume)) {
+    out += " (the input with flat lids: " + volume_text(wrap.input_volume, state.frame) + ")";
+  }
+  out += "; " + bridge_remark(wrap.evidence, state.mesh) + "; " + percent(wrap.moved, 1) +
+         " of the offset taken back" + cut_remark(wrap.self_intersections);
+  constexpr double kNoise = 0.01;  // of the area: rims and crumpled spots
+  if (!wrap.knows_sides) {
+    out += "; without normals nobody knows whether it went inside: put --op normals before it";
+  } else if (wrap.evidence.behind > kNoise * wrap.evidence.area) {
+    out += "; " + percent(wrap.evidence.behind, wrap.evidence.area) +
+           " of the area lies BEHIND the input: it is a sheet there, or holes wider than ALPHA let "
+           "the wrap in; fill-holes before it, or a larger ALPHA, keeps it out";
+  }
+  return out;
+}
+
+FilterStep prepare_wrap(FilterArguments& arguments) {
+  const double alpha = arguments.length();
+  constexpr double kUsual = 30;  // as CGAL's default
+  const double offset = arguments.more() ? arguments.length() : alpha / kUsual;
+  if (offset > alpha) arguments.fail("OFFSET must not be larger than ALPHA");
+  return [=](FilterState& state, const Progress& progress) {
+    const double scale = state.frame.scale;
+    WrappedMesh wrap =
+        wrapped(state.mesh, {.alpha = alpha / scale, .offset = offset / scale}, progress);
+    state.mesh = std::move(wrap.mesh);
+    return wrap_remark(wrap, state);
+  };
+}
+
+void require_solid(const TriangleMesh& mesh, const std::string& name, const char* operation) {
+  const std::string reason = why_no_solid(mesh);
+  if (reason.empty()) return;
+  throw InvalidInput(std::string("--op ") + operation + ": " + name + " " + reason +
+                     ", so that it has no inside; repair, fill-holes or wrap may help");
+}
+
+FilterStep boolean_step(FilterArguments& arguments, const char* name, BooleanOperation operation) {
+  return [=, path = arguments.file()](FilterState& state, const Progress& progress) {
+    require_faces(state, name);
+    require_solid(state.mesh, "the mesh", name);
+    const SecondMesh second = read_second_mesh(state, path, name);
+    require_solid(second.mesh, printable(path), name);
+    report(progress, 0.3);
+    BooleanResult result = boolean(state.mesh, second.mesh, operation);
+    state.mesh = std::move(result.mesh);
+    return "with " + second.remark + "; " + std::to_string(result.from_second) +
+           " faces come from it" + cut_remark(result.self_intersections);
+  };
+}
+
+FilterStep prepare_union(FilterArguments& arguments) {
+  return boolean_step(arguments, "union", BooleanOperation::Union);
+}
+
+FilterStep prepare_intersect(FilterArguments& arguments) {
+  return boolean_step(arguments, "intersect", BooleanOperation::Intersection);
+}
+
+FilterStep prepare_subtract(FilterArguments& arguments) {
+  return boolean_step(arguments, "subtract", BooleanOperation::Difference);
+}
+
+}  // namespace
+
+std::vector<FilterOperation> solid_operations() {
+  return {{"wrap",
+           "ALPHA[,OFFSET]",
+           "Closed surface that a ball of radius ALPHA cannot get through",
+           "wrap=2cm",
+           prepare_wrap},
+          {"union", "FILE", "What is in this solid or a second one", "union=b.ply", prepare_union},
+          {"intersect",
+           "FILE",
+           "What is in this solid and a second one",
+           "intersect=b.ply",
+           prepare_intersect},
+          {"subtract",
+           "FILE",
+           "What is in this solid but not in a second one",
+           "subtract=b.ply",
+           prepare_subtract}};
+}
+
+}  // namespace cgs

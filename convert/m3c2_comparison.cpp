@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/m3c2_comparison.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/length.h"
+#include "io/mesh_ply.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/up_axis.h"
+#include "meshing/point_normals.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+M3c2Options options_of(const M3c2Request& request,
+                       const ComparedPoints& a,
+                       const ComparedPoints& b,
+                       const Frame& frame) {
+  M3c2Options out = m3c2_scales(request.cylinder.empty() ? spacing_cylinder(a, b)
+                                                         : parse_length(request.cylinder, frame));
+  if (!request.normal_scale.empty()) out.normal_scale = parse_length(request.normal_scale, frame);
+  if (!request.depth.empty()) out.depth = parse_length(request.depth, frame);
+  if (!request.registration.empty() && request.registration != "0") {
+    out.registration = parse_length(request.registration, frame);
+  }
+  return out;
+}
+
+// Which side of every vertex is outside.
+// \param is_known  false where that of the topmost vertex, which decides, is hardly more up than
+// down
+std::vector<Eigen::Vector3f> outward_of(const MeasurableMesh& mesh, bool& is_known) {
+  if (!mesh.mesh.faces.empty()) return vertex_normals(mesh.mesh);
+  if (!mesh.mesh.normals.empty()) return mesh.mesh.normals;
+  constexpr size_t kNeighbors = 12;
+  constexpr float kSteep = 0.5f;  // a normal less upright than 30 degrees
+  const Eigen::Matrix3f z_up =
+      z_up_from(mesh.frame.knows_up() ? mesh.frame.up : Eigen::Vector3d(Eigen::Vector3d::UnitZ()))
+          .cast<float>();
+  std::vector<Eigen::Vector3f> upright;
+  upright.reserve(mesh.mesh.vertices.size());
+  for (const Eigen::Vector3f& p : mesh.mesh.vertices) upright.emplace_back(z_up * p);
+  std::vector<Eigen::Vector3f> out = estimated_normals(upright, kNeighbors);
+  turn_consistently(out, upright, kNeighbors);
+  const auto top = std::max_element(
+      upright.begin(), upright.end(), [](const auto& p, const auto& q) { return p.z() < q.z(); });
+  is_known = out[static_cast<size_t>(top - upright.begin())].z() >= kSteep;
+  for (Eigen::Vector3f& n : out) n = z_up.transpose() * n;
+  return out;
+}
+
+bool all_state_sigma(const ComparedPoints& points) {
+  return std::all_of(points.sigma.begin(), points.sigma.end(), [&](const double& s) {
+    const auto i = static_cast<size_t>(&s - points.sigma.data());
+    return points.observed[i] == 0 || std::isfinite(s);
+  });
+}
+
+std::vector<double> known_detections(const M3c2Comparison& found) {
+  std::vector<double> out;
+  for (const M3c2Place& place : found.places) {
+    if (std::isfinite(place.detection)) out.push_back(place.detection);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+double at_share(const std::vector<double>& sorted, double share) {
+  if (sorted.empty()) return std::nan("");
+  return sorted[static_cast<size_t>(share * static_cast<double>(sorted.size() - 1))];
+}
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+bool is_significant(const M3c2Place& place) {
+  return place.change == Change::Nearer || place.change == Change::Farther;
+}
+
+Eigen::Vector3f color_of(const M3c2Place& place, double half_range) {
+  if (place.change == Change::Unknown) return Eigen::Vector3f::Constant(0.55f);
+  return diverging_color(is_significant(place) ? place.distance / half_range : 0);
+}
+
+}  // namespace
+
+M3c2Comparison compare_m3c2(const M3c2Request& request,
+                            const MeasurableMesh& a,
+                            const MeasurableMesh& b) {
+  const ComparedPoints points_a = points_by_vertex(a);
+  const ComparedPoints points_b = points_by_vertex(b);
+  M3c2Comparison out;
+  out.options = options_of(request, points_a, points_b, a.frame);
+  out.sigma_a = all_state_sigma(points_a);
+  out.sigma_b = all_state_sigma(points_b);
+  out.places =
+      m3c2(points_a.places, outward_of(a, out.is_side_known), points_a, points_b, out.options);
+  constexpr double kOf95Percent = 1.96;
+  for (size_t i = 0; i < out.places.size(); ++i) {
+    M3c2Place& place = out.places[i];
+    if (points_a.observed[i] == 0) place = {.distance = std::nan(""), .detection = std::nan("")};
+    if (!std::isfinite(place.distance)) {
+      ++out.comparison.without_distance;
+      continue;
+    }
+    out.comparison.by_area.push_back(
+        {place.distance, place.detection / kOf95Percent, place.change});
+  }
+  if (out.comparison.by_area.empty()) {
+    throw InvalidInput(
+        "no point of A has points of B in its cylinder, " +
+        format_length(out.options.cylinder, a.frame) + " wide and " +
+        format_length(out.options.depth, a.frame) +
+        " to either side: are both in the same place and unit? --cylinder-depth reaches farther");
+  }
+  out.comparison.summary = summarize(out.comparison.by_area);
+  out.comparison.half_range = range_of(out.comparison.by_area);
+  out.comparison.change_rule = "beyond the level of detection (95 %)";
+  out.comparison.no_change_rule = "no cylinder holds four points of either side";
+  return out;
+}
+
+Json m3c2_json(const M3c2Comparison& found, const MeasurableMesh& a, const FigureUnit& unit) {
+  Json out = comparison_json(found.comparison, a, unit);
+  const std::vector<double> detections = known_detections(found);
+  const auto all = static_cast<double>(std::max<size_t>(1, found.places.size()));
+  const auto variance = [](bool by_sigma) { return by_sigma ? "sigma" : "roughness"; };
+  out["m3c2"] = {{"normal_scale", found.options.normal_scale * unit.length},
+                 {"cylinder", found.options.cylinder * unit.length},
+                 {"cylinder_depth", found.options.depth * unit.length},
+                 {"registration_error", found.options.registration * unit.length},
+                 {"variance_a", variance(found.sigma_a)},
+                 {"variance_b", variance(found.sigma_b)},
+                 {"sign_known", found.is_side_known},
+                 {"places", found.places.size()},
+                 {"with_distance", static_cast<double>(found.comparison.by_area.size()) / all},
+                 {"with_detection", static_cast<double>(detections.size()) / all},
+                 {"detection",
+                  {{"median", number_or_null(at_share(detections, 0.5) * unit.length)},
+                   {"p95", number_or_null(at_share(detections, 0.95) * unit.length)}}}};
+  return out;
+}
+
+std::string m3c2_text(const M3c2Comparison& found, const FigureUnit& unit) {
+  const std::vector<double> detections = known_detections(found);
+  std::array<char, 500> text{};
+  std::string out = "level of detection (95 %): none\n";
+  if (!detections.empty()) {
+    std::snprintf(text.data(),
+                  text.size(),
+                  "level of detection (95 %%): median %.4g %s, 95 %% below %.4g; by %s of A and %s "
+                  "of B, registration %.4g\n",
+                  at_share(detections, 0.5) * unit.length,
+                  unit.name.c_str(),
+                  at_share(detections, 0.95) * unit.length,
+                  found.sigma_a ? "sigma" : "roughness",
+                  found.sigma_b ? "sigma" : "roughness",
+                  found.options.registration * unit.length);
+    out = text.data();
+  }
+  std::snprintf(text.data(),
+                text.size(),
+                "normals within %.4g %s, cylinders %.4g wide and %.4g to "
+                "either side; %.1f %% of %zu places have both sides in theirs\n",
+                found.options.normal_scale * unit.length,
+                unit.name.c_str(),
+                found.options.cylinder * unit.length,
+                found.options.depth * unit.length,
+                100 * static_cast<double>(found.comparison.by_area.size()) /
+                    static_cast<double>(std::max<size_t>(1, found.places.size())),
+                found.places.size());
+  out += text.data();
+  if (!found.is_side_known) {
+    out += "the SIGN of all distances is not known: A is a steep cloud without faces and normals\n";
+  }
+  return out;
+}
+
+void write_m3c2_ply(const std::filesystem::path& path,
+                    const MeasurableMesh& a,
+                    const M3c2Comparison& found) {
+  TriangleMesh out = a.mesh;
+  out.colors.clear();
+  out.normals.clear();
+  std::vector<VertexScalar> scalars;
+  const auto add = [&](const char* name, const auto& value) {
+    VertexScalar scalar{name, {}};
+    for (const M3c2Place& p : found.places) scalar.values.push_back(static_cast<float>(value(p)));
+    scalars.push_back(std::move(scalar));
+  };
+  const double scale = a.frame.scale;
+  add("scalar_distance", [&](const M3c2Place& p) { return p.distance * scale; });
+  add("scalar_detection", [&](const M3c2Place& p) { return p.detection * scale; });
+  add("scalar_roughness_a", [&](const M3c2Place& p) { return p.roughness_a * scale; });
+  add("scalar_roughness_b", [&](const M3c2Place& p) { return p.roughness_b * scale; });
+  add("scalar_count_a", [](const M3c2Place& p) { return p.count_a; });
+  add("scalar_count_b", [](const M3c2Place& p) { return p.count_b; });
+  add("scalar_change", [](const M3c2Place& p) { return int(p.change); });
+  add("scalar_significant", [](const M3c2Place& p) { return is_significant(p) ? 1 : 0; });
+  for (const M3c2Place& p : found.places) {
+    out.normals.push_back(p.normal);
+    out.colors.push_back(color_of(p, found.comparison.half_range));
+  }
+  write_mesh_ply(path, out, a.frame, scalars);
+}
+
+}  // namespace cgs

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "convert/comparison.h"
+#include "meshing/m3c2.h"
+
+namespace cgs {
+
+/// What `cgs compare --m3c2` is asked for; lengths as typed, empty = from the clouds' spacing.
+struct M3c2Request {
+  bool wanted = false;
+  std::string normal_scale;
+  std::string cylinder;
+  std::string depth;
+  std::string registration;  ///< Empty = 0.
+};
+
+/// What was found at the vertices of A.
+struct M3c2Comparison {
+  M3c2Options options;
+  bool sigma_a = false;  ///< All points of A state what they are worth: no roughness was needed.
+  bool sigma_b = false;
+  std::vector<M3c2Place> places;  ///< Of A's vertices, in their order.
+  Comparison comparison;          ///< Of the places with a distance.
+  bool is_side_known = true;      ///< Else all distances may have the other sign.
+};
+
+/// Compares the vertices of A with those of B, faces aside: every vertex of a reconstruction is a
+/// measurement, points between them are not. Faces, or normals that a cloud states, say which side
+/// is outside; else neighbours agree with each other and the topmost point, by the up of A's frame
+/// (+z where it is not known), looks up.
+/// \throws InvalidInput for a length that cannot be, clouds without seen points, or where no point
+///         of A has points of B in its cylinder
+M3c2Comparison compare_m3c2(const M3c2Request& request,
+                            const MeasurableMesh& a,
+                            const MeasurableMesh& b);
+
+/// comparison_json() and "m3c2": {"normal_scale", "cylinder", "cylinder_depth",
+/// "registration_error", "sign_known", "variance_a": "sigma" or "roughness", "variance_b",
+/// "places", "with_distance": share, "with_detection": share, "detection": {"median", "p95"}}
+nlohmann::ordered_json m3c2_json(const M3c2Comparison& found,
+                                 const MeasurableMesh& a,
+                                 const FigureUnit& unit);
+
+/// The scales and the level of detection, for people.
+std::string m3c2_text(const M3c2Comparison& found, const FigureUnit& unit);
+
+/// A with the normals used, coloured where the change is significant (white: it is not; grey:
+/// nothing can be told), and scalar_distance, scalar_detection, scalar_roughness_a,
+/// scalar_roughness_b [world units; NaN = cannot be told], scalar_count_a, scalar_count_b,
+/// scalar_change (the numbers of Change) and scalar_significant (0 or 1). \throws IoError
+void write_m3c2_ply(const std::filesystem::path& path,
+                    const MeasurableMesh& a,
+                    const M3c2Comparison& found);
+
+}  // namespace cgs

@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/orthophoto_files.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/length.h"
+#include "convert/measured_file.h"
+#include "convert/stated_frame.h"
+#include "io/atomic_file.h"
+#include "io/mesh_arrays.h"
+#include "io/png.h"
+#include "io/tiff.h"
+#include "libcgs/core/error.h"
+#include "meshing/orthophoto.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+constexpr double kMostPixels = 1e8;
+constexpr double kLongestSide = 30'000;  // [pixels]
+
+/// A picture's place in the world.
+struct Placed {
+  PictureGrid grid;
+  double pixel_size = 0;                             ///< [unit]
+  Eigen::Vector2d corner = Eigen::Vector2d::Zero();  ///< Of the top left pixel [unit].
+  double height_base = 0;                            ///< Height of internal (0, 0, 0) [unit].
+};
+
+PictureAxes axes_of(const OrthophotoRequest& request, const MeasurableMesh& mesh) {
+  if (!request.plane.empty()) {
+    std::array<Eigen::Vector3d, 3> p;
+    for (size_t k = 0; k < 3; ++k) {
+      p.at(k) = mesh.internal_from_file(parse_point(request.plane.at(k)));
+    }
+    return picture_axes(p[0], p[1], p[2]);
+  }
+  static const std::map<std::string, PictureSide> kSides = {{"top", PictureSide::Top},
+                                                            {"front", PictureSide::Front},
+                                                            {"back", PictureSide::Back},
+                                                            {"left", PictureSide::Left},
+                                                            {"right", PictureSide::Right}};
+  const auto side = kSides.find(request.side);
+  require(side != kSides.end(), "--side must be top, front, back, left or right", request.side);
+  if (!request.up.empty()) return picture_axes(side->second, up_direction(request.up));
+  // As programs for maps and CAD have it, where nobody says.
+  const Eigen::Vector3d z_up = Eigen::Vector3d::UnitZ();
+  return picture_axes(side->second, mesh.frame.knows_up() ? mesh.frame.up : z_up);
+}
+
+// What the faces use of an axis [internal units].
+struct Range {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  double length() const { return high - low; }
+};
+
+Range range_along(const MeasurableMesh& mesh, const Eigen::Vector3d& axis) {
+  Range out;
+  for (const auto& f : mesh.mesh.faces) {
+    for (const uint32_t v : f) {
+      out.low = std::min(out.low, axis.dot(mesh.points[v]));
+      out.high = std::max(out.high, axis.dot(mesh.points[v]));
+    }
+  }
+  return out;
+}
+
+// 1, 2 or 5 times a power of ten that splits a length into 1000 to 2500 parts.
+double round_part(double length) {
+  constexpr double kParts = 2500;
+  const double exact = length / kParts;
+  const double ten = std::pow(10, std::floor(std::log10(exact)));
+  for (const double step : {1.0, 2.0, 5.0}) {
+    if (step * ten >= exact) return step * ten;
+  }
+  return 10 * ten;
+}
+
+std::string number_text(double value) {
+  std::array<char, 32> text{};
+  constexpr int kDigits = 15;  // all that a double keeps of a decimal number
+  return {text.data(),
+          std::to_chars(
+              text.data(), text.data() + text.size(), value, std::chars_format::general, kDigits)
+              .ptr};
+}
+
+void check_size(double width, double height, const std::string& pixel_size) {
+  if (width * height <= kMostPixels && std::max(width, height) <= kLongestSide) return;
+  throw LimitError("--pixel-size " + pixel_size + " makes a picture of " + number_text(width) +
+                   " x " + number_text(height) +
+                   " pixels; at most 30000 on a side and 100 million "
+                   "in all are written");
+}
+
+Placed place(const OrthophotoRequest& request,
+             const MeasurableMesh& mesh,
+             const PictureAxes& axes,
+             const FigureUnit& unit) {
+  // World coordinates of internal (0, 0, 0) along the axes, or those from the plane's first point.
+  const double per_world = unit.length / mesh.frame.scale;
+  Eigen::Vector3d origin = mesh.frame.world_from_internal(Eigen::Vector3d::Zero()) * per_world;
+  if (!request.plane.empty()) {
+    origin = -unit.length * mesh.internal_from_file(parse_point(request.plane[0]));
+  }
+  const Range across = range_along(mesh, axes.right);
+  const Range along = range_along(mesh, axes.up);
+  const double longest = std::max(across.length(), along.length());
+  require(longest > 0, "an orthophoto needs a surface with extent, its size", longest);
+  Placed out;
+  out.pixel_size = request.pixel_size.empty()
+                       ? round_part(longest * unit.length)
+                       : parse_length(request.pixel_size, mesh.frame) * unit.length;
+  const double px = out.pixel_size;
+  const double left = std::floor((axes.right.dot(origin) + across.low * unit.length) / px);
+  const double right = std::ceil((axes.right.dot(origin) + across.high * unit.length) / px);
+  const double bottom = std::floor((axes.up.dot(origin) + along.low * unit.length) / px);
+  const double top = std::ceil((axes.up.dot(origin) + along.high * unit.length) / px);
+  const double width = std::max(1.0, right - left);
+  const double height = std::max(1.0, top - bottom);
+  check_size(width, height, request.pixel_size);
+  out.corner = {left * px, top * px};
+  out.height_base = axes.toward.dot(origin);
+  out.grid = {axes,
+              {(out.corner.x() - axes.right.dot(origin)) / unit.length,
+               (out.corner.y() - axes.up.dot(origin)) / unit.length},
+              px / unit.length,
+              static_cast<int>(width),
+              static_cast<int>(height)};
+  return out;
+}
+
+// World files place the middle of the first pixel; rows run down.
+std::string world_file(const Placed& placed) {
+  const double px = placed.pixel_size;
+  std::string out;
+  for (const double value :
+       {px, 0.0, 0.0, -px, placed.corner.x() + 0.5 * px, placed.corner.y() - 0.5 * px}) {
+    out += number_text(value) + "\n";
+  }
+  return out;
+}
+
+Eigen::Vector3f label_color(int8_t label) {
+  switch (static_cast<Provenance>(label)) {
+    case Provenance::Observed:
+      return {0.10f, 0.45f, 0.20f};
+    case Provenance::SingleView:
+      return {0.55f, 0.80f, 0.35f};
+    case Provenance::Interpolated:
+      return {1.0f, 0.6f, 0.1f};
+    case Provenance::Inferred:
+      return {0.95f, 0.1f, 0.85f};
+    case Provenance::Virtual:
+      return {0.35f, 0.45f, 0.9f};
+  }
+  return Eigen::Vector3f::Constant(0.6f);  // the mesh states none
+}
+
+ColorImage label_picture(const Orthophoto& photo) {
+  ColorImage out(photo.label.width, photo.label.height, Eigen::Vector3f::Ones());
+  std::transform(photo.label.data.begin(), photo.label.data.end(), out.data.begin(), label_color);
+  return out;
+}
+
+struct Heights {
+  Raster<float> values;  // [unit], from zero
+  double zero = 0;
+  double lowest = 0;
+  double highest = 0;
+};
+
+Heights heights_of(const Orthophoto& photo, const Placed& placed, const FigureUnit& unit) {
+  Heights out;
+  Range range;
+  for (const double h : photo.height.data) {
+    if (std::isnan(h)) continue;
+    range.low = std::min(range.low, h);
+    range.high = std::max(range.high, h);
+  }
+  out.lowest = placed.height_base + range.low * unit.length;
+  out.highest = placed.height_base + range.high * unit.length;
+  // Where floats of this size are coarser than a sixteenth of a pixel, heights count from below.
+  const double largest = std::max(std::abs(out.lowest), std::abs(out.highest));
+  if (largest * double(std::numeric_limits<float>::epsilon()) > placed.pixel_size / 16) {
+    out.zero = std::floor(out.lowest / placed.pixel_size) * placed.pixel_size;
+  }
+  out.values = Raster<float>(photo.height.width, photo.height.height, 0);
+  std::transform(
+      photo.height.data.begin(), photo.height.data.end(), out.values.data.begin(), [&](double h) {
+        return static_cast<float>((placed.height_base - out.zero) + h * unit.length);
+      });
+  return out;
+}
+
+std::filesystem::path with_ending(const std::filesystem::path& prefix, const char* ending) {
+  return prefix.string() + ending;
+}
+
+Json shares_json(const Orthophoto& photo, size_t covered, bool states_provenance) {
+  std::array<size_t, kProvenanceCount> counts = {};
+  for (const int8_t label : photo.label.data) {
+    if (label >= 0) ++counts.at(static_cast<size_t>(label));
+  }
+  Json out = Json::object();
+  for (const Provenance label : kProvenanceOrder) {
+    Json& share = out[provenance_key(label)];
+    if (!states_provenance) continue;
+    share = static_cast<double>(counts.at(static_cast<size_t>(label))) /
+            static_cast<double>(std::max<size_t>(1, covered));
+  }
+  return out;
+}
+
+Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+// Colour and label pictures, heights, and their world files; names as they lie in the folder.
+Json write_files(const std::filesystem::path& prefix,
+                 const Orthophoto& photo,
+                 const MaskMap& shown,
+                 const Raster<float>& heights,
+                 const std::string& world) {
+  if (prefix.has_parent_path()) make_output_folder(prefix.parent_path());
+  write_file(with_ending(prefix, ".png"), encode_png(photo.color, shown));
+  write_file(with_ending(prefix, ".provenance.png"), encode_png(label_picture(photo), shown));
+  write_tiff(with_ending(prefix, ".tif"), heights);
+  Json out = {
+      prefix.string() + ".png", prefix.string() + ".provenance.png", prefix.string() + ".tif"};
+  for (const char* ending : {".pgw", ".provenance.pgw", ".tfw"}) {
+    write_file(with_ending(prefix, ending), world);
+    out.push_back(prefix.string() + ending);
+  }
+  return out;
+}
+
+}  // namespace
+
+Json write_orthophoto(const OrthophotoRequest& request,
+                      const MeasurableMesh& mesh,
+                      const FigureUnit& unit) {
+  require(request.prefix.has_filename(),
+          "--orthophoto must name files in a folder, as plans/facade",
+          request.prefix.string());
+  const PictureAxes axes = axes_of(request, mesh);
+  const Placed placed = place(request, mesh, axes, unit);
+  const Orthophoto photo = orthophoto(mesh, placed.grid);
+  MaskMap shown(placed.grid.width, placed.grid.height, 0);
+  std::transform(
+      photo.height.data.begin(), photo.height.data.end(), shown.data.begin(), [](double h) {
+        return uint8_t(std::isnan(h) ? 0 : 1);
+      });
+  const auto covered =
+      static_cast<size_t>(std::count(shown.data.begin(), shown.data.end(), uint8_t{1}));
+  require(
+      covered > 0, "--pixel-size is so large that no pixel's middle shows the mesh, covered", 0);
+  const Heights heights = heights_of(photo, placed, unit);
+  Json out = {
+      {"files", write_files(request.prefix, photo, shown, heights.values, world_file(placed))},
+      {"unit", unit.name},
+      {"pixel_size", placed.pixel_size},
+      {"width", placed.grid.width},
+      {"height", placed.grid.height},
+      {"axes",
+       {{"right", vector_json(axes.right)},
+        {"up", vector_json(axes.up)},
+        {"toward", vector_json(axes.toward)}}},
+      {"corner", {placed.corner.x(), placed.corner.y()}},
+      {"height_zero", heights.zero},
+      {"lowest", heights.lowest},
+      {"highest", heights.highest},
+      {"covered", static_cast<double>(covered) / static_cast<double>(shown.data.size())}};
+  out.update(shares_json(photo, covered, mesh.states_provenance()));
+  return out;
+}
+
+}  // namespace cgs

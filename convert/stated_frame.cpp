@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/stated_frame.h"
+
+#include <cmath>
+#include <string>
+
+#include "convert/length.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+std::string assume_unit(Frame& frame, const std::string& unit) {
+  const double metres = metres_in(unit);
+  if (!frame.has_metric_scale()) {
+    frame.metres_per_unit = metres;
+    frame.scale_source = ScaleSource::Assumed;
+    return "";
+  }
+  if (std::abs(frame.metres_per_unit / metres - 1) <= 1e-9) return "";
+  return "--assume-unit " + unit + " left out: the input says its unit is " + frame.unit_name();
+}
+
+void settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats) {
+  if (!given.empty()) {
+    frame.up = up_direction(given);
+  } else if (!frame.knows_up()) {
+    frame.up = Eigen::Vector3d::UnitZ();
+    if (is_of_splats) frame.up = -Eigen::Vector3d::UnitY();
+  }
+}
+
+Eigen::Vector3d up_direction(const std::vector<double>& numbers) {
+  require(numbers.size() == 3,
+          "--up must be three numbers",
+          std::to_string(numbers.size()) + " numbers");
+  const Eigen::Vector3d up(numbers[0], numbers[1], numbers[2]);
+  require(up.allFinite() && up.norm() > 0, "--up must be a direction", up.transpose());
+  return up.normalized();
+}
+
+}  // namespace cgs

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "libcgs/core/frame.h"
+
+namespace cgs {
+
+/// Gives a frame the unit that the user assumes, unless its file or its cameras state one.
+///
+/// \param unit  as metres_in() takes it
+/// \return why it was left out, for a warning; empty if it was not
+/// \throws InvalidInput for an unknown unit
+std::string assume_unit(Frame& frame, const std::string& unit);
+
+/// Sets what is up: as given, else as the frame knows, else +z, or -y as splats of others mostly
+/// lie. \throws InvalidInput as up_direction()
+void settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats = false);
+
+/// The direction of --up, of unit length. \throws InvalidInput unless it is three finite numbers,
+/// not all 0
+Eigen::Vector3d up_direction(const std::vector<double>& numbers);
+
+}  // namespace cgs

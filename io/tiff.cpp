@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/tiff.h"
+
+#include <string_view>
+#include <vector>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "io/atomic_file.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+void write_tiff(const std::filesystem::path& path, const Raster<float>& values) {
+  require(!values.empty(), "a TIFF file needs pixels, width", values.width);
+  constexpr int kDeflate = 8;  // "Adobe Deflate", which every reader knows
+  // OpenCV takes no const data, and does not change it.
+  const cv::Mat view(values.height, values.width, CV_32FC1, const_cast<float*>(values.data.data()));
+  std::vector<unsigned char> bytes;
+  try {
+    if (!cv::imencode(".tif", view, bytes, {cv::IMWRITE_TIFF_COMPRESSION, kDeflate})) {
+      throw NumericalError("TIFF encoder: refused the picture");
+    }
+  } catch (const cv::Exception& error) {
+    throw NumericalError(std::string("TIFF encoder: ") + error.what());
+  }
+  write_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+}  // namespace cgs

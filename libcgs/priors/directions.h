@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+
+namespace cgs {
+
+/// A step between pixels.
+struct Direction {
+  int dx, dy;
+};
+
+/// Where to look for measured depth around a pixel that has none; the four neighbours come first.
+inline constexpr std::array<Direction, 16> kDirections = {{{1, 0},
+                                                           {-1, 0},
+                                                           {0, 1},
+                                                           {0, -1},
+                                                           {1, 1},
+                                                           {-1, 1},
+                                                           {1, -1},
+                                                           {-1, -1},
+                                                           {2, 1},
+                                                           {-2, 1},
+                                                           {2, -1},
+                                                           {-2, -1},
+                                                           {1, 2},
+                                                           {-1, 2},
+                                                           {1, -2},
+                                                           {-1, -2}}};
+
+}  // namespace cgs

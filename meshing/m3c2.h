@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "meshing/deviation.h"
+
+namespace cgs {
+
+/// Scales of a comparison of two clouds along local normals; all lengths in internal units.
+struct M3c2Options {
+  double normal_scale = 0;  ///< Diameter of the ball whose points of A give the normal; > 0.
+  double cylinder = 0;  ///< Diameter of the cylinder along the normal whose points of A and of B
+                        ///< are averaged; > 0.
+  double depth = 0;     ///< How far the cylinder reaches to either side; > 0.
+  double registration = 0;  ///< Standard deviation of laying A onto B; >= 0.
+
+  /// \throws InvalidInput naming the first field out of range.
+  void validate() const;
+};
+
+/// What the two clouds say at a place.
+struct M3c2Place {
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< Unit length; 0 = too few points around.
+  double distance = 0;     ///< From B to A along the normal: of the means; NaN = cannot be told.
+  double detection = 0;    ///< Level of detection at 95 %, as distance; NaN = cannot be told.
+  double roughness_a = 0;  ///< Standard deviation of A's points in the cylinder along the normal.
+  double roughness_b = 0;
+  uint32_t count_a = 0;  ///< Points in the cylinder.
+  uint32_t count_b = 0;
+  Change change = Change::Unknown;  ///< Unknown where detection is NaN.
+};
+
+/// Diameter of a cylinder that holds about 30 points of the sparser of two clouds where these are
+/// spread over a surface. \throws InvalidInput without seen points in different places
+double spacing_cylinder(const ComparedPoints& a, const ComparedPoints& b);
+
+/// The scales that go with a cylinder: twice its diameter for normals, ten times for the depth.
+M3c2Options m3c2_scales(double cylinder);
+
+/// Distances of A from B at `places`, with what roughness and known errors allow to detect.
+///
+/// Detection is 1.96 (sqrt(v_a + v_b) + registration). v is the variance of a mean: roughness^2 / n
+/// of the n points of that side, where these do not state what they are worth (Lague et al.); the
+/// mean of their sigma^2, where all do: errors of neighbours in one reconstruction are alike, and
+/// do not average out (James et al.). Points that nobody saw are left out. At least four points of
+/// either side are needed.
+/// \param outward  per place a direction on whose side the normal is to lie; 0 = as it comes
+/// Source: Lague, Brodu and Leroux 2013, "Accurate 3D comparison of complex topography with
+/// terrestrial laser scanner"; James, Robson and Smith 2017, "3-D uncertainty-based topographic
+/// change detection with structure-from-motion photogrammetry" (M3C2-PM).
+std::vector<M3c2Place> m3c2(const std::vector<Eigen::Vector3d>& places,
+                            const std::vector<Eigen::Vector3f>& outward,
+                            const ComparedPoints& a,
+                            const ComparedPoints& b,
+                            const M3c2Options& options);
+
+}  // namespace cgs

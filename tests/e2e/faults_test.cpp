@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Every call by which a run asks the system for something in its folders fails once, and at every
+// one the process is killed once. The run must end with the right exit code and one line, what it
+// leaves must be whole, and the run that goes on must end with the files of one that was never
+// disturbed. CGS_FAULTS says how many of some thousand errors, and of the kills, are tried.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <regex>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include "samples/capture/files.h"
+#include "tests/support/run_folder.h"
+
+namespace cgs {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// One call of the program's first thread and what befalls it.
+struct Fault {
+  std::string call;    ///< Of the system, as strace names it.
+  int nth = 0;         ///< Counted per call, from 1.
+  std::string effect;  ///< As strace injects it: "error=EIO", "signal=KILL".
+
+  std::string options() const {
+    const std::string when = ":when=" + std::to_string(nth);
+    return "-e trace=" + call + " -e inject=" + call + ":" + effect + when;
+  }
+};
+
+constexpr const char* kCalls = "openat,read,write,writev,pwrite64,lseek,fsync,rename,mkdir,unlink";
+
+const std::map<std::string, std::vector<std::string>>& errors_of_calls() {
+  static const std::map<std::string, std::vector<std::string>> all = {
+      {"openat", {"EMFILE", "ENOSPC"}},
+      {"read", {"EIO"}},
+      {"write", {"ENOSPC", "EIO"}},
+      {"writev", {"ENOSPC"}},
+      {"pwrite64", {"ENOSPC"}},
+      {"fsync", {"EIO"}},
+      {"rename", {"EIO"}},
+      {"mkdir", {"ENOSPC"}},
+      {"unlink", {"EIO"}}};
+  return all;
+}
+
+/// Counts a fault while it lives, and whether it brought failures.
+class Counted {
+ public:
+  Counted() { ++tried; }
+  ~Counted() { survived += failures() == before_ ? 1 : 0; }
+  Counted(const Counted&) = delete;
+  Counted& operator=(const Counted&) = delete;
+
+  static inline int tried = 0;
+  static inline int survived = 0;
+
+ private:
+  static int failures() {
+    return testing::UnitTest::GetInstance()->current_test_info()->result()->total_part_count();
+  }
+  int before_ = failures();
+};
+
+class Faults : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    if (std::system("strace -o /dev/null true 2>/dev/null") != 0) {
+      reason_ = "no strace here, or it may not trace";
+      return;
+    }
+    dir_ = new test::TempDir;
+    const auto views = capture_views(3);
+    write_capture(*dir_ / "capture", portal_scene(), views, input_cameras(views));
+    const std::string trace =
+        "-y -e trace=" + std::string(kCalls) + " -o " + (*dir_ / "calls").string();
+    ASSERT_EQ(run("whole", trace), 0) << message();
+    expected_ = test::files_of_run(*dir_ / "whole");
+    ASSERT_TRUE(expected_.contains("web/asset.glb"));
+    find_places();
+  }
+  static void TearDownTestSuite() {
+    std::printf("faults: %d survived of %d tried\n", Counted::survived, Counted::tried);
+    delete dir_;
+    dir_ = nullptr;
+  }
+  void SetUp() override {
+    if (!reason_.empty()) GTEST_SKIP() << reason_;
+  }
+
+  // Exit code of a run under strace; -1 if a signal ended it.
+  static int run(const std::string& out, const std::string& strace_options) {
+    const std::string strace =
+        strace_options.empty() ? "" : "strace -f -qq " + strace_options + " ";
+    const std::string command = strace + CGS_BINARY + " run " + (*dir_ / "capture").string() +
+                                " --views view_01,view_02,view_03 --assume-unit m --voxel-size "
+                                "40cm --simplify 0 --downscale 8 "
+                                "--set steps=3 --threads 1 -q -o " +
+                                (*dir_ / out).string() + " >/dev/null 2>" +
+                                (*dir_ / "message").string();
+    const int status = std::system(command.c_str());
+    // strace ends by the signal that ended its child, the shell with 128 + its number.
+    return WIFEXITED(status) && WEXITSTATUS(status) < 128 ? WEXITSTATUS(status) : -1;
+  }
+  static std::string message() { return test::read_bytes(*dir_ / "message"); }
+
+  // The calls of the first thread that concern the folder of this test, from strace's log.
+  static void find_places() {
+    std::ifstream log(*dir_ / "calls");
+    const std::regex form(R"(^(\d+)\s+(\w+)\((.*)$)");
+    const std::string folder = dir_->path().string();
+    std::string first_thread;
+    std::map<std::string, int> count;
+    for (std::string line; std::getline(log, line);) {
+      std::smatch parts;
+      if (!std::regex_match(line, parts, form)) continue;
+      if (first_thread.empty()) first_thread = parts[1];
+      if (parts[1] != first_thread) continue;
+      const int nth = ++count[parts[2]];
+      if (parts[3].str().find(folder) == std::string::npos) continue;
+      places_.push_back({parts[2], nth, ""});
+    }
+  }
+
+  // Where an effect is tried: at all places, or at `share` of them.
+  static std::vector<Fault> sample(std::vector<Fault> all, size_t share) {
+    if (const char* const wish = std::getenv("CGS_FAULTS")) share = std::stoul(wish);
+    share = std::min(share, all.size());
+    std::vector<Fault> out;
+    for (size_t i = 0; i < share; ++i) out.push_back(all[i * all.size() / share]);
+    return out;
+  }
+
+  // What lies in the folder after a fault: whole files of a whole run, and the state of unfinished
+  // work.
+  static void expect_whole_files(const std::string& out, bool may_leave_parts) {
+    for (const auto& [name, bytes] : test::files_of_run(*dir_ / out)) {
+      if (test::is_unfinished(name)) {
+        EXPECT_TRUE(may_leave_parts || name.ends_with(".checkpoint")) << name << " was left behind";
+        continue;
+      }
+      ASSERT_TRUE(expected_.contains(name)) << name;
+      EXPECT_TRUE(bytes == expected_.at(name)) << name << " differs";
+    }
+  }
+  static void expect_going_on() {
+    EXPECT_EQ(run("out", ""), 0) << message();
+    EXPECT_TRUE(test::files_of_run(*dir_ / "out") == expected_);
+    fs::remove_all(*dir_ / "out");
+  }
+
+  static inline test::TempDir* dir_ = nullptr;
+  static inline std::string reason_;
+  static inline std::map<std::string, std::string> expected_;
+  static inline std::vector<Fault> places_;
+};
+
+TEST_F(Faults, AnErrorOfTheSystemIsReportedAndNothingIsLost) {
+  std::vector<Fault> faults;
+  for (const Fault& place : places_) {
+    const auto errors = errors_of_calls().find(place.call);
+    if (errors == errors_of_calls().end()) continue;
+    for (const std::string& error : errors->second) {
+      faults.push_back({place.call, place.nth, "error=" + error});
+    }
+  }
+  ASSERT_GT(faults.size(), 100u);
+  int reported = 0;
+  const std::vector<Fault> tried = sample(faults, 14);
+  for (const Fault& fault : tried) {
+    SCOPED_TRACE(fault.options());
+    const Counted counted;
+    const int code = run("out", fault.options() + " -o /dev/null");
+    EXPECT_TRUE(code == 0 || code == 3 || code == 5) << code << ": " << message();
+    const std::string text = message();
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), code == 0 ? 0 : 1) << text;
+    reported += code == 0 ? 0 : 1;
+    // What a disk does not remove stays until the next run.
+    const bool removes = fault.call == "unlink";
+    if (code == 0 && !removes) {
+      EXPECT_TRUE(test::files_of_run(*dir_ / "out") == expected_);
+    }
+    expect_whole_files("out", removes);
+    expect_going_on();
+  }
+  // The others concern what may fail, such as a file that is only looked for.
+  EXPECT_GE(4 * reported, static_cast<int>(tried.size()));
+}
+
+TEST_F(Faults, AKillAnywhereLosesNothing) {
+  std::vector<Fault> faults;
+  for (const Fault& place : places_) {
+    if (place.call == "read" || place.call == "lseek") continue;  // change nothing on the disk
+    faults.push_back({place.call, place.nth, "signal=KILL"});
+  }
+  ASSERT_GT(faults.size(), 100u);
+  for (const Fault& fault : sample(faults, 8)) {
+    SCOPED_TRACE(fault.options());
+    const Counted counted;
+    EXPECT_EQ(run("out", fault.options() + " -o /dev/null"), -1) << message();
+    expect_whole_files("out", true);
+    expect_going_on();
+  }
+}
+
+}  // namespace
+}  // namespace cgs

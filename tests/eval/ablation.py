@@ -1,0 +1,78 @@
+#!/usr/bin/env python3
+"""What each part of the training brings on held-out views, as a Markdown table.
+
+usage: tests/eval/ablation.py CGS_BUILD MODEL... [--rows NAME,NAME] [--limit VIEWS]
+
+CGS_BUILD is the folder of the programs (build/release/bin). Each MODEL is a folder that
+`cgs train SCENE --set steps=0 -o MODEL` wrote. Every setting is trained from the same start on each
+of them, by training_accuracy; the fox needs --limit 2. A row says what is changed from the standard
+setting, a column PSNR [dB] and SSIM over all pixels, and the share of holes.
+"""
+import argparse
+import pathlib
+import re
+import subprocess
+import sys
+
+ROWS = {
+    "standard": [],
+    "no training": ["steps=0"],
+    "draft": ["steps=20"],
+    "120 steps": ["steps=120"],
+    "no decoder: every Gaussian for itself": ["depth_spacing=1", "opacity_spacing=1"],
+    "depth stays": ["depth_rate=1e-12"],
+    "opacity stays": ["opacity_rate=1e-12"],
+    "shapes stay balls": ["free_from=1"],
+    "no prior of depth": ["prior_weight=0"],
+    "no prior of opacity": ["opacity_prior=0"],
+    "no D-SSIM": ["ssim_weight=0", "l1_weight=1"],
+    "L1 on one scale": ["l1_levels=1"],
+    "with multisampling": ["sharp_from=0.5"],
+    "with coarse to fine": ["coarse_until=0.3"],
+    "with TV": ["tv_weight=0.01"],
+    "with TV within layers": ["masked_tv_weight=0.01"],
+    "with flow": ["flow_weight=1"],
+    "with block dropout": ["dropout=0.1"],
+}
+
+
+def last_line(program, model, limit, settings):
+    """PSNR, SSIM and share of holes after the last step."""
+    done = subprocess.run(
+        [program, model, "every=100000", f"limit={limit}", *settings],
+        capture_output=True, text=True, check=False)
+    lines = [line for line in done.stdout.splitlines() if re.match(r"\s*\d+ ", line)]
+    if done.returncode != 0 or not lines:
+        sys.exit(f"{program} {model} {' '.join(settings)}: {done.stderr.strip()}")
+    parts = lines[-1].split("|")
+    psnr, ssim = (float(word) for word in parts[1].split())
+    return psnr, ssim, parts[3].split()[1]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("build")
+    parser.add_argument("models", nargs="+")
+    parser.add_argument("--rows", help="only these, separated by commas")
+    parser.add_argument("--limit", type=int, default=6, help="held-out views per model")
+    args = parser.parse_args()
+    program = str(pathlib.Path(args.build) / "training_accuracy")
+    rows = args.rows.split(",") if args.rows else list(ROWS)
+    unknown = [row for row in rows if row not in ROWS]
+    if unknown:
+        sys.exit(f"--rows: {', '.join(unknown)} is none of {', '.join(ROWS)}")
+    rows = ["standard"] + [row for row in rows if row != "standard"]  # what changes are against
+    names = [pathlib.Path(model).name for model in args.models]
+    print("| setting | " + " | ".join(names) + " | mean change |")
+    print("|---" * (len(names) + 2) + "|")
+    standard = None
+    for row in rows:
+        results = [last_line(program, model, args.limit, ROWS[row]) for model in args.models]
+        standard = standard or results
+        change = sum(r[0] - s[0] for r, s in zip(results, standard)) / len(results)
+        cells = [f"{psnr:.2f} / {ssim:.3f}, {holes}" for psnr, ssim, holes in results]
+        print(f"| {row} | " + " | ".join(cells) + f" | {change:+.2f} dB |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace cgs::test {
+
+/// A kind of file that a reader of ours takes, for tests that damage such files.
+struct FileKind {
+  std::string name;  ///< Letters, digits and hyphens; none twice.
+  std::string file;  ///< Its path in a folder.
+  /// Writes a small valid file there, and whatever it refers to.
+  std::function<void(const std::filesystem::path& folder)> write;
+  /// Reads it. What is damaged may be read as something else or refused with an Error of ours;
+  /// what was read survives being written and read again.
+  std::function<void(const std::filesystem::path& folder)> read;
+  bool is_isolated = false;  ///< Decoded in a child process, where a fuzzer sees nothing.
+};
+
+/// All kinds, each with its valid file.
+const std::vector<FileKind>& file_kinds();
+
+}  // namespace cgs::test

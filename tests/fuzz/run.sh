@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Lets libFuzzer loose on every reader (but that of Draco, which works in a child process), built
+# with AddressSanitizer and UndefinedBehaviorSanitizer. What it learns stays in
+# build/sanitize/fuzz/corpus for the next time; what it breaks a reader with lies in
+# build/sanitize/fuzz/crashes and makes the script fail.
+#
+# usage: tests/fuzz/run.sh [SECONDS [KIND...]]     60 s for each kind of file if nothing is said
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+seconds=${1:-60}
+shift || true
+
+samples/install.sh --tests
+cmake --preset sanitize >/dev/null
+cmake --build --preset sanitize --target reader_fuzzer
+fuzzer=$PWD/build/sanitize/bin/reader_fuzzer
+results=$PWD/build/sanitize/fuzz
+mkdir -p "$results/crashes"
+export fuzzer results seconds
+TMPDIR=$(mktemp -d)
+export TMPDIR
+trap 'rm -rf "$TMPDIR"' EXIT
+
+fuzz() {
+  local corpus="$results/corpus/$1"
+  mkdir -p "$corpus"
+  "$fuzzer" --kind="$1" --seed="$corpus/valid" || { echo "$1: its valid file cannot be made"; return 1; }
+  local verdict=clean
+  "$fuzzer" --kind="$1" -max_total_time="$seconds" -max_len=65536 -timeout=20 -rss_limit_mb=6000 \
+    -print_final_stats=1 -artifact_prefix="$results/crashes/$1-" "$corpus" \
+    >"$results/$1.log" 2>&1 || verdict="DEFECT, see $results/$1.log"
+  local runs edges
+  runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$results/$1.log")
+  edges=$(grep -o 'cov: [0-9]*' "$results/$1.log" | tail -1 | cut -c6-)
+  printf '%-20s %9s runs %6s edges  %s\n' "$1" "${runs:-0}" "${edges:-0}" "$verdict"
+  [ "$verdict" = clean ]
+}
+export -f fuzz
+if [ $# -gt 0 ]; then kinds=$(printf '%s\n' "$@"); else kinds=$("$fuzzer" --list); fi
+xargs -P "$(nproc)" -I{} bash -c 'fuzz {}' <<<"$kinds"

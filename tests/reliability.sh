@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# The figures of reliability, one line each; more of everything than the tests try.
+#
+# usage: tests/reliability.sh [--long]
+#   a share of the faults and 20 s of fuzzing per kind of file: half an hour on 2 cores;
+#   --long tries all of them and fuzzes ten minutes each: a night
+set -euo pipefail
+cd "$(dirname "$0")/.."
+faults=40 kills=40 seconds=20
+if [ "${1:-}" = "--long" ]; then faults=100000 kills=200 seconds=600; fi
+
+samples/install.sh --tests
+cmake --preset release -DCGS_BUILD_TESTS=ON >/dev/null
+cmake --build --preset release
+bin=build/release/bin
+status=0
+
+# What a program prints in lines that start with a word; a program that fails is told.
+figures() {
+  local word=$1 output
+  shift
+  output=$("$@" 2>&1) || { status=1; echo "FAILED: $*"; grep -m5 -A4 Failure <<<"$output" || true; }
+  grep "^$word" <<<"$output" || { status=1; echo "NO FIGURE '$word': $*"; }
+}
+figures 'bad inputs:' "$bin/e2e_bad_inputs_test"
+CGS_SWEEP=full figures 'sweep:' "$bin/bad_input_sweep"
+figures 'extremes cells' "$bin/extremes_test"
+CGS_KILLS=$kills figures '\(cancel\|kills\)' "$bin/e2e_kill_test"
+CGS_FAULTS=$faults figures 'faults:' "$bin/e2e_faults_test"
+figures '\[  PASSED' "$bin/e2e_verify_test"
+tests/fuzz/run.sh "$seconds" || status=1
+exit $status
