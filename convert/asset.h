@@ -4,7 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "convert/model.h"
-#include "convert/pipeline.h"
+#include "convert/run_request.h"
 #include "libcgs/core/photo_texture.h"
 #include "libcgs/core/triangle_mesh.h"
 

@@ -10,6 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/length.h"
+#include "convert/memory_plan.h"
+#include "convert/pipeline.h"
 #include "convert/time_model.h"
 #include "io/atomic_file.h"
 #include "io/content_hash.h"
@@ -121,6 +123,7 @@ void run_trials(Search& search) {
   const int smallest = first == search.sizes.rend() ? search.sizes.front() : *first;
   const int draft = training_preset("draft").steps;
   search.runs.push_back(trial(search, smallest, draft / 4));
+  if (!best_within(search, search.left())) return;  // what a step costs would only be added
   search.runs.push_back(trial(search, smallest, draft));
   for (int size = smallest;;) {
     const std::optional<Candidate> aim = best_within(search, search.left());

@@ -3,7 +3,7 @@
 
 #include <chrono>
 
-#include "convert/pipeline.h"
+#include "convert/run_request.h"
 #include "convert/terminal.h"
 
 namespace cgs {

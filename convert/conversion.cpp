@@ -8,10 +8,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/fusion.h"
 #include "convert/length.h"
+#include "convert/memory_plan.h"
 #include "convert/mesh_files.h"
 #include "convert/model.h"
-#include "convert/pipeline.h"
 #include "convert/simplification.h"
 #include "convert/stated_frame.h"
 #include "convert/volume_file.h"

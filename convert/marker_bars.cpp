@@ -109,6 +109,7 @@ std::optional<std::pair<double, double>> side_and_sigma(const Sightings& seen) {
 }  // namespace
 
 std::vector<MarkerBar> marker_bars(const Scene& scene, const std::string& size) {
+  if (size.empty()) return {};
   const auto [known, known_sigma] = parse_metres_with_sigma(size);
   const std::map<std::string, Sightings> seen = sightings(scene);
   std::vector<MarkerBar> out;

@@ -22,7 +22,8 @@ struct MarkerBar {
 /// The sigma of a side is that of corners found to a fifth of a pixel of the photographs. What is
 /// no square in space, by more than a tenth of its side and three sigma, is no marker.
 /// \param scene  with cameras in internal units and photographs on disk
-/// \param size   outer side of the black square as printed, "80mm" or "80mm+-0.2mm"
+/// \param size   outer side of the black square as printed, "80mm" or "80mm+-0.2mm"; none
+///              are looked for where it is empty
 /// \throws InvalidInput for a size that cannot be read, or, saying what was found where, if no
 ///         marker is shown by two photographs
 std::vector<MarkerBar> marker_bars(const Scene& scene, const std::string& size);

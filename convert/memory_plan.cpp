@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <fstream>
 
 #include "libcgs/core/error.h"
 
@@ -95,6 +96,18 @@ void check_memory_plan(const Scene& scene,
                                : "no --downscale makes it fit, only a ";
   throw LimitError("'" + most.stage + "' needs about " + mebibytes(most.bytes) + " and " +
                    mebibytes(budget) + " may be used; " + fits + "larger --memory-limit allows it");
+}
+
+size_t memory_budget(size_t limit) {
+  if (limit > 0) return limit;
+  std::ifstream meminfo("/proc/meminfo");
+  std::string key;
+  size_t kibibytes = 0;
+  std::string unit;
+  while (meminfo >> key >> kibibytes >> unit) {
+    if (key == "MemAvailable:") return kibibytes * 1024 / 10 * 8;
+  }
+  return size_t{4} << 30;
 }
 
 }  // namespace cgs

@@ -44,4 +44,7 @@ void check_memory_plan(const Scene& scene,
                        const MeasuredFiles& measured,
                        size_t budget);
 
+/// Memory the program may plan for: the user's limit, or 80 % of what is free now [bytes].
+size_t memory_budget(size_t limit);
+
 }  // namespace cgs

@@ -2,8 +2,6 @@
 #include "convert/pipeline.h"
 
 #include <algorithm>
-#include <cmath>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
@@ -12,23 +10,20 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/frame_json.h"
-#include "convert/length.h"
+#include "convert/marker_bars.h"
+#include "convert/memory_plan.h"
+#include "convert/model.h"
 #include "convert/report.h"
 #include "convert/report_viewer.h"
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
-#include "convert/simplification.h"
 #include "convert/stage_cost.h"
-#include "convert/stated_frame.h"
 #include "convert/verification.h"
 #include "convert/views.h"
 #include "io/atomic_file.h"
-#include "io/content_hash.h"
 #include "io/depth_file.h"
 #include "io/image.h"
 #include "io/json_file.h"
-#include "io/masks.h"
-#include "io/photographs.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -190,11 +185,6 @@ Json run_report(Run& run, const Progress& progress) {
   return {{"pages", 1}};
 }
 
-// Whether lengths in the scene tell its scale.
-bool states_lengths(const SceneRequest& request) {
-  return !request.known_distances.empty() || !request.marker_size.empty();
-}
-
 /// Which stage a part of the request first has a say in; what is not here decides all.
 const std::map<std::string, std::string>& decided_stages() {
   static const std::map<std::string, std::string> kStages = {{"assume_unit", "scale"},
@@ -262,209 +252,13 @@ std::vector<Stage> stages_of(const Scene& scene) {
           {"report", "report", {"report.html", "report.json"}, run_report}};
 }
 
-// What load_given_depth() reads beside a depth file; empty if there is none.
-std::filesystem::path confidence_file(const std::filesystem::path& depth) {
-  const std::filesystem::path folder = depth.parent_path().parent_path() / "confidence";
-  return is_folder(folder) ? depth_file_of({folder, false}, depth) : std::filesystem::path();
-}
-
 }  // namespace
-
-Json request_json(const RunRequest& request, const Scene& scene) {
-  Json inputs = Json::object();
-  for (const int i : scene.input) {
-    const View& view = scene.views[static_cast<size_t>(i)];
-    inputs[view.name] = file_hash(view.image_path);
-    const auto mask =
-        mask_file({request.scene.path, request.scene.options.allow_external}, view.image_path);
-    if (mask) inputs[view.name + ", mask"] = file_hash(*mask);
-    if (view.depth_path.empty()) continue;
-    inputs[view.name + ", depth"] = file_hash(view.depth_path);
-    const std::filesystem::path confidence = confidence_file(view.depth_path);
-    if (!confidence.empty()) inputs[view.name + ", confidence"] = file_hash(confidence);
-  }
-  const std::filesystem::path& network = request.scene.options.depth.network;
-  if (!network.empty()) inputs["depth network"] = file_hash(network);
-  Json held_out = Json::object();
-  for (const int i : scene.held_out) {
-    const View& view = scene.views[static_cast<size_t>(i)];
-    held_out[view.name] = file_hash(view.image_path);
-  }
-  Json cameras = Json::array();
-  for (const View& view : scene.views) {
-    const Camera& c = view.camera;
-    const Eigen::Matrix4d pose = c.world_from_cam.matrix();
-    cameras.push_back({view.name,
-                       {c.width, c.height, c.fx, c.fy, c.cx, c.cy},
-                       std::vector<double>(pose.data(), pose.data() + pose.size()),
-                       view.distortion});
-  }
-  const uint64_t cameras_hash = content_hash(json_text(cameras, -1));
-  Json out = {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
-              {"views", request.scene.options.views},
-              {"downscale", request.scene.options.downscale.value_or(0)},
-              {"assume_unit", request.scene.assume_unit},
-              {"up", request.scene.up},
-              {"known_distances", request.scene.known_distances},
-              {"marker_size", request.scene.marker_size},
-              {"training", settings_to_json(request.training)},
-              {"voxel_size", request.voxel_size},
-              {"max_error", request.max_error},
-              {"simplify", request.simplify},
-              {"compression_error", request.compression_error},
-              {"max_size", request.max_size},
-              {"input_images", inputs},
-              {"held_out_images", held_out},
-              {"cameras", cameras_hash}};
-  // The cameras have moved with it; what is left is the sigma of the scale.
-  const ControlRequest& control = request.scene.control;
-  if (!control.file.empty()) {
-    out["control_points"] = {{"table", file_hash(control.file)}, {"unit", control.unit}};
-  }
-  // Only where it decides something: folders of runs without depth go on as before.
-  const bool has_depth = std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
-    return !scene.views[static_cast<size_t>(i)].depth_path.empty();
-  });
-  if (has_depth || !network.empty()) {
-    out["depth"] = {static_cast<int>(scene.depth_kind), scene.depth_scale};
-  }
-  return out;
-}
 
 std::vector<int> views_with_photograph(const Scene& scene) {
   std::vector<int> views = scene.input;
   views.insert(views.end(), scene.held_out.begin(), scene.held_out.end());
   std::sort(views.begin(), views.end());
   return views;
-}
-
-void OpenedScene::keep(const std::filesystem::path& model) const {
-  if (poses && !poses->is_stored) write_photo_poses(model / kPosesFolder, *poses);
-}
-
-std::vector<MarkerBar> scale_markers(const SceneRequest& request, const Scene& scene) {
-  if (request.marker_size.empty()) return {};
-  return marker_bars(scene, request.marker_size);
-}
-
-namespace {
-
-void refuse_two_scales(const SceneRequest& request) {
-  const ControlRequest& control = request.control;
-  if (control.file.empty() && !control.unit.empty()) {
-    throw InvalidInput("--control-unit is the unit of --control-points, which is not given");
-  }
-  for (const auto& [option, is_given] :
-       {std::pair("--known-distance", !request.known_distances.empty()),
-        std::pair("--marker-size", !request.marker_size.empty()),
-        std::pair("--assume-unit", !request.assume_unit.empty()),
-        std::pair("--up", !request.up.empty())}) {
-    if (control.file.empty() || !is_given) continue;
-    throw InvalidInput(std::string("--control-points tells scale, unit and up of the scene, and ") +
-                       option + " would tell it once more; leave that out");
-  }
-  if (!request.assume_unit.empty() && states_lengths(request)) {
-    throw InvalidInput(
-        "--assume-unit states the scale that --known-distance or --marker-size measures; give one");
-  }
-}
-
-}  // namespace
-
-OpenedScene open_scene(const SceneRequest& request,
-                       const std::filesystem::path& model,
-                       Terminal& terminal) {
-  refuse_two_scales(request);
-  require(request.focal >= 0 && std::isfinite(request.focal),
-          "--focal must be a number of pixels above 0",
-          request.focal);
-  OpenedScene out;
-  if (is_photographs(request.path)) {
-    request.options.validate();
-    const SceneRoot root{request.path, request.options.allow_external};
-    const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
-    out.poses = photo_poses(root, request.focal, stored, terminal);
-    out.scene = scene_of_photographs(request.path, out.poses->model, request.options);
-    auto& warnings = out.scene.warnings;
-    warnings.insert(warnings.end(), out.poses->warnings.begin(), out.poses->warnings.end());
-  } else {
-    out.scene = read_scene(request.path, request.options);
-    if (request.focal > 0) {
-      throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
-                         " states them (" + out.scene.kind + ")");
-    }
-  }
-  if (!request.control.file.empty()) {
-    out.control = move_to_control_frame(request.control, out.scene);
-    return out;
-  }
-  if (!request.assume_unit.empty()) {
-    const std::string refused = assume_unit(out.scene.frame, request.assume_unit);
-    if (!refused.empty()) out.scene.warnings.push_back(refused);
-  }
-  out.scene.frame.up = request.up.empty() ? world_up(out.scene) : up_direction(request.up);
-  return out;
-}
-
-MeasuredFiles measured_files(const RunRequest& request) {
-  return {.meshes = !request.max_error.empty(),
-          .asset = !request.max_error.empty() || request.max_size > 0};
-}
-
-size_t memory_budget(size_t limit) {
-  if (limit > 0) return limit;
-  std::ifstream meminfo("/proc/meminfo");
-  std::string key;
-  size_t kibibytes = 0;
-  std::string unit;
-  while (meminfo >> key >> kibibytes >> unit) {
-    if (key == "MemAvailable:") return kibibytes * 1024 / 10 * 8;
-  }
-  return size_t{4} << 30;
-}
-
-FusedVolume fuse_model(const Model& model,
-                       const std::string& voxel_size,
-                       size_t memory_limit,
-                       const Progress& progress,
-                       double coarsest_voxel) {
-  std::vector<TsdfView> views;
-  const std::vector<SupportView> inputs = support_views(model);
-  for (size_t k = 0; k < model.scene.input.size(); ++k) {
-    const Camera& camera = model.scene.views[static_cast<size_t>(model.scene.input[k])].camera;
-    const RenderBuffers buffers = render_camera(model, inputs, camera);
-    TsdfView view;
-    view.camera = camera;
-    view.depth = model.priors[k].depth;
-    view.sigma = model.priors[k].sigma;
-    view.guessed = inputs[k].guessed;
-    view.color = picture(buffers);
-    views.push_back(std::move(view));
-  }
-  TsdfOptions options;
-  options.coarsest_voxel = coarsest_voxel;
-  if (!voxel_size.empty()) options.voxel_size = parse_length(voxel_size, model.scene.frame);
-  options.memory_limit = memory_budget(memory_limit);
-  return fuse(views, options, progress);
-}
-
-Json fusion_to_json(const TsdfReport& report, const Frame& frame) {
-  const auto corner = [&](const Eigen::Vector3d& p) -> Json {
-    const Eigen::Vector3d q = frame.file_from_internal(p);
-    return {q.x(), q.y(), q.z()};
-  };
-  return {{"voxel_size", report.voxel_size * frame.scale},
-          {"units", frame.unit_name()},
-          {"bounds", {corner(report.bounds.min()), corner(report.bounds.max())}},
-          {"voxels",
-           {{"free", report.free},
-            {"occupied", report.occupied},
-            {"never_seen_hidden", report.hidden},
-            {"never_seen_outside", report.unseen},
-            {"conflicts", report.conflicts},
-            {"carved", report.carved}}},
-          {"predicted_bytes", report.predicted_bytes},
-          {"actual_bytes", report.actual_bytes}};
 }
 
 namespace {
@@ -522,30 +316,6 @@ Json run_stages(Run& run, Terminal& terminal) {
   return report_json(run);
 }
 
-// Refuses lengths that cannot be read before anything is computed. Where the scale will be known,
-// any stands for it.
-void check_lengths(const RunRequest& request, Frame frame) {
-  if (states_lengths(request.scene)) frame.metres_per_unit = 1;
-  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, frame);
-  for (const std::string& length : {request.max_error, request.compression_error}) {
-    if (!length.empty()) (void)parse_length(length, frame);
-  }
-  (void)simplify_options(request.simplify, 1, frame);
-}
-
-// A promise is about all that is done to the fused surface; its parts are then no longer free.
-void refuse_contradictions(const RunRequest& request) {
-  if (request.max_error.empty()) return;
-  for (const auto& [option, value] :
-       {std::pair("--simplify", request.simplify),
-        std::pair("--compression-error", request.compression_error)}) {
-    if (value.empty()) continue;
-    throw InvalidInput(
-        std::string("--max-error is the largest sum of all errors of the meshes and ") + option +
-        " one of them; give one of the two");
-  }
-}
-
 }  // namespace
 
 Json run_pipeline(const RunRequest& request, Terminal& terminal) {
@@ -560,7 +330,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   check_memory_plan(scene, chooses_voxels, measured, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
-  std::vector<MarkerBar> markers = scale_markers(request.scene, scene);
+  std::vector<MarkerBar> markers = marker_bars(scene, request.scene.marker_size);
   check_lengths(request, scene.frame);
   make_output_folder(request.output);
   const FolderLock lock(request.output);

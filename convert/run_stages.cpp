@@ -11,8 +11,10 @@
 
 #include "convert/asset.h"
 #include "convert/deviation_ledger.h"
+#include "convert/fusion.h"
 #include "convert/html.h"
 #include "convert/length.h"
+#include "convert/memory_plan.h"
 #include "convert/mesh_files.h"
 #include "convert/simplification.h"
 #include "convert/texture.h"

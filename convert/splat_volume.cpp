@@ -8,9 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <tbb/parallel_for.h>
 
+#include "convert/fusion.h"
 #include "convert/length.h"
+#include "convert/memory_plan.h"
 #include "convert/model.h"
-#include "convert/pipeline.h"
 #include "libcgs/core/error.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/render/thin_sheets.h"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "convert/pipeline.h"
 #include "convert/recommendation.h"
+#include "convert/run_request.h"
 #include "convert/stage_cost.h"
 #include "convert/surface_error.h"
 #include "convert/tradeoff_design.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "convert/pipeline.h"
+#include "convert/run_request.h"
 
 namespace cgs {
 

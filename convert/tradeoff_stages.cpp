@@ -5,7 +5,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/pipeline.h"
 #include "convert/run_stages.h"
+#include "convert/scene_request.h"
 #include "convert/stage_cost.h"
 #include "convert/views.h"
 #include "io/atomic_file.h"

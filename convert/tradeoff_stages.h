@@ -5,7 +5,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "convert/pipeline.h"
+#include "convert/model.h"
+#include "convert/run_request.h"
 
 namespace cgs {
 

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "convert/pipeline.h"
+#include "convert/run_request.h"
 
 namespace cgs {
 

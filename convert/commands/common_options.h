@@ -6,7 +6,7 @@
 
 #include <CLI/App.hpp>
 
-#include "convert/pipeline.h"
+#include "convert/scene_request.h"
 #include "io/scene_reader.h"
 #include "libcgs/train/training_options.h"
 

@@ -6,8 +6,8 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/fusion.h"
 #include "convert/length.h"
-#include "convert/pipeline.h"
 #include "convert/volume_file.h"
 #include "io/json_file.h"
 

@@ -12,7 +12,7 @@
 #include "convert/conversion.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
-#include "convert/pipeline.h"
+#include "convert/scene_request.h"
 #include "io/json_file.h"
 #include "io/splat_reader.h"
 #include "libcgs/core/error.h"

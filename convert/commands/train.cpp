@@ -6,8 +6,9 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/marker_bars.h"
 #include "convert/model.h"
-#include "convert/pipeline.h"
+#include "convert/scene_request.h"
 #include "io/atomic_file.h"
 #include "io/json_file.h"
 
@@ -32,7 +33,7 @@ void run_train(const TrainArgs& args) {
   opened.keep(args.output);
   Scene& scene = opened.scene;
   const auto distances = known_distances(args.scene.known_distances, scene);
-  const auto markers = scale_markers(args.scene, scene);
+  const auto markers = marker_bars(scene, args.scene.marker_size);
   const size_t known = scene.warnings.size();
   const bool states_up = !args.scene.up.empty() || !opened.control.is_null();
   const Eigen::Vector3d up = states_up ? scene.frame.up : Eigen::Vector3d::Zero();

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "convert/pipeline.h"
+#include "convert/scene_request.h"
 #include "io/image.h"
 #include "io/png.h"
 #include "io/scene_reader.h"

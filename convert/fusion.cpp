@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/fusion.h"
+
+#include <utility>
+
+#include "convert/length.h"
+#include "convert/memory_plan.h"
+#include "convert/views.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+FusedVolume fuse_model(const Model& model,
+                       const std::string& voxel_size,
+                       size_t memory_limit,
+                       const Progress& progress,
+                       double coarsest_voxel) {
+  std::vector<TsdfView> views;
+  const std::vector<SupportView> inputs = support_views(model);
+  for (size_t k = 0; k < model.scene.input.size(); ++k) {
+    const Camera& camera = model.scene.views[static_cast<size_t>(model.scene.input[k])].camera;
+    const RenderBuffers buffers = render_camera(model, inputs, camera);
+    TsdfView view;
+    view.camera = camera;
+    view.depth = model.priors[k].depth;
+    view.sigma = model.priors[k].sigma;
+    view.guessed = inputs[k].guessed;
+    view.color = picture(buffers);
+    views.push_back(std::move(view));
+  }
+  TsdfOptions options;
+  options.coarsest_voxel = coarsest_voxel;
+  if (!voxel_size.empty()) options.voxel_size = parse_length(voxel_size, model.scene.frame);
+  options.memory_limit = memory_budget(memory_limit);
+  return fuse(views, options, progress);
+}
+
+Json fusion_to_json(const TsdfReport& report, const Frame& frame) {
+  const auto corner = [&](const Eigen::Vector3d& p) -> Json {
+    const Eigen::Vector3d q = frame.file_from_internal(p);
+    return {q.x(), q.y(), q.z()};
+  };
+  return {{"voxel_size", report.voxel_size * frame.scale},
+          {"units", frame.unit_name()},
+          {"bounds", {corner(report.bounds.min()), corner(report.bounds.max())}},
+          {"voxels",
+           {{"free", report.free},
+            {"occupied", report.occupied},
+            {"never_seen_hidden", report.hidden},
+            {"never_seen_outside", report.unseen},
+            {"conflicts", report.conflicts},
+            {"carved", report.carved}}},
+          {"predicted_bytes", report.predicted_bytes},
+          {"actual_bytes", report.actual_bytes}};
+}
+
+}  // namespace cgs

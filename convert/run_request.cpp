@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/run_request.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "convert/length.h"
+#include "convert/model.h"
+#include "convert/run_record.h"
+#include "convert/simplification.h"
+#include "io/content_hash.h"
+#include "io/depth_file.h"
+#include "io/json_file.h"
+#include "io/masks.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+// What load_given_depth() reads beside a depth file; empty if there is none.
+std::filesystem::path confidence_file(const std::filesystem::path& depth) {
+  const std::filesystem::path folder = depth.parent_path().parent_path() / "confidence";
+  return is_folder(folder) ? depth_file_of({folder, false}, depth) : std::filesystem::path();
+}
+
+// Hashes of what goes in, by what it is.
+Json input_hashes(const SceneRequest& request, const Scene& scene) {
+  Json out = Json::object();
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    out[view.name] = file_hash(view.image_path);
+    const auto mask = mask_file({request.path, request.options.allow_external}, view.image_path);
+    if (mask) out[view.name + ", mask"] = file_hash(*mask);
+    if (view.depth_path.empty()) continue;
+    out[view.name + ", depth"] = file_hash(view.depth_path);
+    const std::filesystem::path confidence = confidence_file(view.depth_path);
+    if (!confidence.empty()) out[view.name + ", confidence"] = file_hash(confidence);
+  }
+  const std::filesystem::path& network = request.options.depth.network;
+  if (!network.empty()) out["depth network"] = file_hash(network);
+  return out;
+}
+
+uint64_t cameras_hash(const Scene& scene) {
+  Json cameras = Json::array();
+  for (const View& view : scene.views) {
+    const Camera& c = view.camera;
+    const Eigen::Matrix4d pose = c.world_from_cam.matrix();
+    cameras.push_back({view.name,
+                       {c.width, c.height, c.fx, c.fy, c.cx, c.cy},
+                       std::vector<double>(pose.data(), pose.data() + pose.size()),
+                       view.distortion});
+  }
+  return content_hash(json_text(cameras, -1));
+}
+
+}  // namespace
+
+MeasuredFiles measured_files(const RunRequest& request) {
+  return {.meshes = !request.max_error.empty(),
+          .asset = !request.max_error.empty() || request.max_size > 0};
+}
+
+void check_lengths(const RunRequest& request, Frame frame) {
+  if (request.scene.states_lengths()) frame.metres_per_unit = 1;
+  if (!request.voxel_size.empty()) (void)parse_length(request.voxel_size, frame);
+  for (const std::string& length : {request.max_error, request.compression_error}) {
+    if (!length.empty()) (void)parse_length(length, frame);
+  }
+  (void)simplify_options(request.simplify, 1, frame);
+}
+
+void refuse_contradictions(const RunRequest& request) {
+  // A promise is about all that is done to the fused surface; its parts are then no longer free.
+  if (request.max_error.empty()) return;
+  for (const auto& [option, value] :
+       {std::pair("--simplify", request.simplify),
+        std::pair("--compression-error", request.compression_error)}) {
+    if (value.empty()) continue;
+    throw InvalidInput(
+        std::string("--max-error is the largest sum of all errors of the meshes and ") + option +
+        " one of them; give one of the two");
+  }
+}
+
+Json request_json(const RunRequest& request, const Scene& scene) {
+  Json held_out = Json::object();
+  for (const int i : scene.held_out) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    held_out[view.name] = file_hash(view.image_path);
+  }
+  Json out = {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
+              {"views", request.scene.options.views},
+              {"downscale", request.scene.options.downscale.value_or(0)},
+              {"assume_unit", request.scene.assume_unit},
+              {"up", request.scene.up},
+              {"known_distances", request.scene.known_distances},
+              {"marker_size", request.scene.marker_size},
+              {"training", settings_to_json(request.training)},
+              {"voxel_size", request.voxel_size},
+              {"max_error", request.max_error},
+              {"simplify", request.simplify},
+              {"compression_error", request.compression_error},
+              {"max_size", request.max_size},
+              {"input_images", input_hashes(request.scene, scene)},
+              {"held_out_images", held_out},
+              {"cameras", cameras_hash(scene)}};
+  // The cameras have moved with it; what is left is the sigma of the scale.
+  const ControlRequest& control = request.scene.control;
+  if (!control.file.empty()) {
+    out["control_points"] = {{"table", file_hash(control.file)}, {"unit", control.unit}};
+  }
+  // Only where it decides something: folders of runs without depth go on as before.
+  const bool has_depth = std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
+    return !scene.views[static_cast<size_t>(i)].depth_path.empty();
+  });
+  if (has_depth || !request.scene.options.depth.network.empty()) {
+    out["depth"] = {static_cast<int>(scene.depth_kind), scene.depth_scale};
+  }
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/control_frame.h"
+#include "convert/known_distances.h"
+#include "convert/photo_poses.h"
+#include "convert/terminal.h"
+#include "io/scene_reader.h"
+
+namespace cgs {
+
+/// A scene as the user names it.
+struct SceneRequest {
+  std::filesystem::path path;
+  SceneOptions options;
+  std::string
+      assume_unit;  ///< Unit of one scene unit where the scene does not say; empty = unknown.
+  std::vector<double> up;  ///< World direction that is up; empty = judged by the cameras.
+  double focal = 0;        ///< Of photographs without cameras [pixels]; 0 = not given.
+  std::vector<DistanceWords> known_distances;  ///< Where they are given, no assume_unit.
+  std::string marker_size;  ///< Side of printed markers; where it is given, no assume_unit.
+  ControlRequest control;   ///< Where it is given, nothing else of scale, unit and up.
+
+  /// Whether lengths seen in the photographs tell the scale.
+  bool states_lengths() const;
+};
+
+/// Where solved cameras lie, below the folder of the model.
+inline constexpr const char* kPosesFolder = "colmap";
+
+/// Reads a scene, solving for the cameras of a folder that holds nothing but photographs, and gives
+/// it the unit the user assumes, or moves it into the frame of control points, if any.
+///
+/// \param model  folder of the model the scene is for; cameras stored there by OpenedScene::keep()
+///               are taken where they were solved from the same. Empty = none.
+/// \throws InvalidInput where a focal length is given for a scene with cameras, or two options
+///         state the scale; as read_scene(), photo_poses() and move_to_control_frame()
+struct OpenedScene {
+  Scene scene;
+  std::optional<PhotoPoses> poses;  ///< If they were solved for.
+  nlohmann::ordered_json control;   ///< As move_to_control_frame() returns it; null without.
+
+  /// Stores solved cameras below the folder of the model, for other programs and for the next time.
+  void keep(const std::filesystem::path& model) const;
+};
+OpenedScene open_scene(const SceneRequest& request,
+                       const std::filesystem::path& model,
+                       Terminal& terminal);
+
+}  // namespace cgs
