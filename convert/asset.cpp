@@ -94,7 +94,6 @@ class AssetWriter {
     const TriangleMesh written = read_mesh_file(path_, frame_).content.mesh;
     const SurfaceDeviation out = surface_deviation(written, fused);
     if (promise_ && out.max() > *promise_) {
-      std::filesystem::remove(path_);
       throw NumericalError("asset.glb is " + format_length(out.max(), frame_) +
                            " off the fused surface, promised were " +
                            format_length(*promise_, frame_));
@@ -182,7 +181,6 @@ Written write_within(const AssetWriter& writer,
     return written.bytes;
   });
   if (!search.detail) {
-    std::filesystem::remove(writer.path());
     throw LimitError("asset.glb takes " + std::to_string(std::min(whole, search.smallest())) +
                      " bytes at least, with all left out that is below " +
                      format_length(coarsest, frame) + "; --max-size allows " +
@@ -235,18 +233,11 @@ std::string words_for(const Written& written,
          std::to_string(deviation.places) + " places, both ways)";
 }
 
-}  // namespace
-
-Json write_asset(const Model& model,
-                 const AssetContent& content,
-                 const RunRequest& request,
-                 const Progress& progress) {
-  const Frame& frame = model.scene.frame;
-  const TriangleMesh& mesh = content.mesh;
-  const AssetWriter writer(model, content, request);
-  if (request.max_error.empty() && request.max_size == 0) {
-    return glb_to_json(writer.write(writer.whole()), frame);
-  }
+Json write_promised(const AssetWriter& writer,
+                    const RunRequest& request,
+                    const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const Progress& progress) {
   const TriangleMesh fused = fused_surface(request.output / "volume.vdb");
   const double already = request.max_size > 0 ? surface_deviation(mesh, fused).evidence : 0;
   const Written written =
@@ -260,6 +251,25 @@ Json write_asset(const Model& model,
   out["form"] = form_to_json(written, frame);
   out["words"] = words_for(written, deviation, request.max_size, mesh.faces.size(), frame);
   return out;
+}
+
+}  // namespace
+
+Json write_asset(const Model& model,
+                 const AssetContent& content,
+                 const RunRequest& request,
+                 const Progress& progress) {
+  const Frame& frame = model.scene.frame;
+  const AssetWriter writer(model, content, request);
+  if (request.max_error.empty() && request.max_size == 0) {
+    return glb_to_json(writer.write(writer.whole()), frame);
+  }
+  try {
+    return write_promised(writer, request, content.mesh, frame, progress);
+  } catch (...) {
+    std::filesystem::remove(writer.path());  // a form that was tried may break the promise
+    throw;
+  }
 }
 
 }  // namespace cgs

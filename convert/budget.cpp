@@ -16,6 +16,7 @@
 #include "io/atomic_file.h"
 #include "io/content_hash.h"
 #include "io/json_file.h"
+#include "io/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -113,16 +114,32 @@ std::optional<Candidate> best_within(const Search& search, double seconds) {
   return found == all.end() ? std::nullopt : std::optional(*found);
 }
 
+// The smallest pictures that something can be made of: what fails on a thumbnail, such as a known
+// distance between two small things, is no reason to refuse the run.
+int first_trial(Search& search, int steps) {
+  const double views = static_cast<double>(search.opened.scene.input.size());
+  auto size = std::find_if(search.sizes.rbegin(), search.sizes.rend(), [&](int downscale) {
+    return search.pixels_at(downscale) >= kTrialPixels * views;
+  });
+  if (size == search.sizes.rend()) --size;
+  while (true) {
+    try {
+      search.runs.push_back(trial(search, *size, steps));
+      return *size;
+    } catch (const InvalidInput&) {
+      if (std::next(size) == search.sizes.rend()) throw;
+    } catch (const NumericalError&) {
+      if (std::next(size) == search.sizes.rend()) throw;
+    }
+    ++size;
+  }
+}
+
 // The smallest pictures twice, then larger ones while these cost little of the time left and tell
 // more about the size in view.
 void run_trials(Search& search) {
-  const double views = static_cast<double>(search.opened.scene.input.size());
-  const auto first = std::find_if(search.sizes.rbegin(), search.sizes.rend(), [&](int downscale) {
-    return search.pixels_at(downscale) >= kTrialPixels * views;
-  });
-  const int smallest = first == search.sizes.rend() ? search.sizes.front() : *first;
   const int draft = training_preset("draft").steps;
-  search.runs.push_back(trial(search, smallest, draft / 4));
+  const int smallest = first_trial(search, draft / 4);
   if (!best_within(search, search.left())) return;  // what a step costs would only be added
   search.runs.push_back(trial(search, smallest, draft));
   for (int size = smallest;;) {
@@ -207,15 +224,16 @@ Json choose(Search& search) {
           {"trials", trials}};
 }
 
-// Takes away what trials wrote, and folders that nothing came into.
+// Holds the folder of the run, and takes away what trials wrote to it, those of a start that was
+// killed, too, and folders that nothing came into.
 class TrialFolder {
  public:
-  explicit TrialFolder(fs::path output) : output_(std::move(output)) {
-    make_output_folder(output_ / "model");
+  explicit TrialFolder(fs::path output) : output_(made(std::move(output))), lock_(output_) {
+    remove_trials();
   }
   ~TrialFolder() {
+    remove_trials();
     std::error_code ignored;
-    fs::remove_all(output_ / kTrialFolder, ignored);
     fs::remove(output_ / "model", ignored);
     fs::remove(output_, ignored);
   }
@@ -223,7 +241,17 @@ class TrialFolder {
   TrialFolder& operator=(const TrialFolder&) = delete;
 
  private:
+  static fs::path made(fs::path output) {
+    make_output_folder(output / "model");
+    return output;
+  }
+  void remove_trials() const {
+    std::error_code ignored;
+    fs::remove_all(output_ / kTrialFolder, ignored);
+  }
+
   fs::path output_;
+  FolderLock lock_;
 };
 
 // What an earlier start chose for the same; null if there is none.
@@ -236,6 +264,41 @@ Json chosen_before(const fs::path& file, double seconds, const std::string& requ
   return is_same ? record : Json();
 }
 
+void refuse_other_run(const RunRequest& request) {
+  if (request.overwrite || !is_present(request.output / "run.json")) return;
+  throw InvalidInput(printable(request.output) +
+                     " holds the results of another run; choose another folder, or say "
+                     "--overwrite");
+}
+
+// The choice of an earlier start, so that its run can go on, or a new one.
+Json choice(const RunRequest& request,
+            const RunRequest& full,
+            double seconds,
+            Clock::time_point start,
+            Terminal& terminal) {
+  const fs::path file = request.output / kRecordFile;
+  const OpenedScene opened = open_scene(full.scene, request.output / "model", terminal);
+  const std::string asked =
+      std::to_string(content_hash(json_text(request_json(full, opened.scene), -1)));
+  Json chosen = chosen_before(file, seconds, asked);
+  if (chosen.is_null()) refuse_other_run(request);
+  const TrialFolder trials(request.output);
+  if (!chosen.is_null()) return chosen;
+  opened.keep(request.output / "model");
+  double pixels = 0;
+  for (const int i : opened.scene.input) {
+    const Camera& camera = opened.scene.views[static_cast<size_t>(i)].camera;
+    pixels += double(camera.width) * camera.height;
+  }
+  Search search{
+      request, opened, pixels, usable_sizes(request, opened.scene), seconds, start, terminal};
+  chosen = choose(search);
+  chosen["request"] = asked;
+  write_file(file, json_text(chosen) + "\n");
+  return chosen;
+}
+
 }  // namespace
 
 RunRequest within_budget(const RunRequest& request,
@@ -245,27 +308,9 @@ RunRequest within_budget(const RunRequest& request,
   if (request.scene.options.downscale) {
     throw InvalidInput("--budget chooses the size of the pictures; give it or --downscale");
   }
-  const fs::path file = request.output / kRecordFile;
   RunRequest full = request;
   full.scene.options.downscale = 1;
-  const OpenedScene opened = open_scene(full.scene, request.output / "model", terminal);
-  const std::string asked =
-      std::to_string(content_hash(json_text(request_json(full, opened.scene), -1)));
-  Json chosen = request.overwrite ? Json() : chosen_before(file, seconds, asked);
-  if (chosen.is_null()) {
-    const TrialFolder trials(request.output);
-    opened.keep(request.output / "model");
-    double pixels = 0;
-    for (const int i : opened.scene.input) {
-      const Camera& camera = opened.scene.views[static_cast<size_t>(i)].camera;
-      pixels += double(camera.width) * camera.height;
-    }
-    Search search{
-        request, opened, pixels, usable_sizes(request, opened.scene), seconds, start, terminal};
-    chosen = choose(search);
-    chosen["request"] = asked;
-    write_file(file, json_text(chosen) + "\n");
-  }
+  const Json chosen = choice(request, full, seconds, start, terminal);
   full.scene.options.downscale = chosen.at("downscale").get<int>();
   full.training.steps = training_preset(chosen.at("preset").get<std::string>()).steps;
   full.settings_reason = chosen.at("words").get<std::string>();

@@ -314,10 +314,15 @@ Frame control_frame(const ControlFit& fit, double metres) {
 
 void warn_of_frame(const ControlFit& fit, Scene& scene) {
   constexpr double kMuch = 2;
+  const auto used = std::count_if(
+      fit.residuals.begin(), fit.residuals.end(), [](const auto& r) { return r.is_used; });
   if (fit.scatter > kMuch) {
     scene.warnings.push_back("the control points scatter " + number(fit.scatter, "%.1f") +
                              " times as much as their sigmas and picks say; the uncertainty of the "
-                             "scale is widened to cover it");
+                             "scale is widened to cover it" +
+                             (used == 4 ? "; of four points nobody can tell which is wrong, a "
+                                          "fifth would"
+                                        : ""));
   }
   // Points on level ground fit mirrored coordinates as well, seen from below.
   constexpr double kUpsideDown = -0.5;

@@ -73,9 +73,12 @@ std::optional<std::pair<double, double>> side_and_sigma(const Sightings& seen) {
   }
   const double mean = (sides[0] + sides[1] + sides[2] + sides[3]) / 4;
   double variance = 0;
+  double scatter = 1;  // where cameras are not quite right, they are for all four corners
   for (size_t k = 0; k < 4; ++k) {
     variance += gradient.at(k).dot(corners.at(k).covariance * gradient.at(k));
+    scatter = std::max(scatter, corners.at(k).scatter);
   }
+  variance *= scatter;
   constexpr double kWorstSide = 0.05;  // sigma of it: nearly parallel rays make sides too long
   if (std::sqrt(variance) > kWorstSide * mean) return std::nullopt;
   const double allowed =

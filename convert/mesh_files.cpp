@@ -64,6 +64,7 @@ Json write_mesh_files(const std::filesystem::path& folder,
       left_out[name] =
           "the scale of this scene is unknown and CAD files are in millimetres; "
           "--assume-unit m writes them as if one scene unit were a metre";
+      std::filesystem::remove(folder / name);  // of a time when the scale was known
       continue;
     }
     const Eigen::Matrix3d z_up = z_up_from(frame.up);

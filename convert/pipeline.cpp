@@ -279,13 +279,16 @@ void note_outputs(Run& run, bool is_fresh) {
 // to it, should this run end before them.
 void remove_outputs_after(const Stage& first, const Run& run) {
   bool is_later = false;
+  std::set<std::string> names;
   for (const Stage& stage : stages_of(run.scene)) {
     if (is_later) {
-      for (const std::string& name : stage.files) {
-        std::filesystem::remove(run.request.output / name);
-      }
+      names.insert(stage.files.begin(), stage.files.end());
+      names.insert(stage.further.begin(), stage.further.end());
     }
     is_later = is_later || stage.name == first.name;
+  }
+  for (const std::string& name : named_outputs(run.request.output, names)) {
+    std::filesystem::remove(run.request.output / name);
   }
 }
 

@@ -144,13 +144,28 @@ std::string rms_row(const std::string& name, const Json& rms) {
   return html.str();
 }
 
-std::string control_section(const Json& scale) {
+// What to add to coordinates in files to come to those of the table; empty if nothing.
+std::string far_origin(const Json& frame) {
+  const Json& origin = frame["file_origin"];
+  std::string out;
+  bool is_far = false;
+  for (const Json& coordinate : origin) {
+    out += (out.empty() ? "" : ", ") + number(coordinate, "%.10g");
+    is_far = is_far || coordinate.get<double>() != 0;
+  }
+  return is_far ? "; to the coordinates in PLY, OBJ and VDB add " + out +
+                      ", which keeps micrometres of coordinates this large"
+                : "";
+}
+
+std::string control_section(const Json& scale, const Json& frame) {
   const Json& control = scale["control_points"];
   const std::string unit = escaped(control["unit"].get<std::string>());
   std::ostringstream html;
-  html << "<h2>Control points</h2>\n<p>Every file is in the coordinates of "
-       << escaped(control["file"].get<std::string>())
-       << ", z up. Standard deviations of the frame: "
+  html << "<h2>Control points</h2>\n<p>Files are in the coordinates of "
+       << escaped(control["file"].get<std::string>()) << ", z up" << far_origin(frame)
+       << ". GLB is in metres and y up, STL and 3MF are in millimetres; each states its own origin."
+          " Standard deviations of the frame: "
        << "scale "
        << number(100 * scale["metres_sigma"].get<double>() / scale["metres_per_unit"].get<double>(),
                  "%.2g")
@@ -167,9 +182,10 @@ std::string control_section(const Json& scale) {
 }
 
 // Where the scale came from, if from known distances or control points.
-std::string scale_section(const Json& scale) {
+std::string scale_section(const Json& report) {
+  const Json& scale = report["scale"];
   if (scale.is_null()) return "";
-  if (scale.contains("control_points")) return control_section(scale);
+  if (scale.contains("control_points")) return control_section(scale, report["frame"]);
   std::ostringstream html;
   html << "<h2>Scale</h2>\n<p>One scene unit is " << number(scale["metres_per_unit"], "%.6g")
        << " m, with a standard deviation of " << number(scale["metres_sigma"], "%.2g")
@@ -417,11 +433,11 @@ void write_html_report(const std::filesystem::path& folder,
   for (const Json& warning : report["warnings"]) {
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
   }
-  html << viewer << scale_section(report["scale"]) << promises_section(report)
-       << certificate_section(report) << simplification_section(report) << deviation_section(report)
-       << mesh_section(folder) << evaluation_section(report["evaluation"])
-       << views_section(folder, report["views"], scene) << training_section(report["model"])
-       << timing_section(report["stages"]) << "</body></html>\n";
+  html << viewer << scale_section(report) << promises_section(report) << certificate_section(report)
+       << simplification_section(report) << deviation_section(report) << mesh_section(folder)
+       << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
+       << training_section(report["model"]) << timing_section(report["stages"])
+       << "</body></html>\n";
   write_file(folder / "report.html", html.str());
 }
 

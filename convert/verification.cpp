@@ -139,21 +139,24 @@ Json depth_options_json(const DepthOptions& options) {
           {"network", whole(options.network)}};
 }
 
-Json output_hashes(const fs::path& output, const std::set<std::string>& names) {
-  std::vector<fs::path> files;
+std::vector<std::string> named_outputs(const fs::path& output, const std::set<std::string>& names) {
+  std::vector<std::string> out;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(output)) {
-    if (entry.is_regular_file() && !entry.is_symlink()) files.push_back(entry.path());
+    if (!entry.is_regular_file() || entry.is_symlink()) continue;
+    const std::string name = fs::relative(entry.path(), output).generic_string();
+    const bool is_named = names.count(name) > 0 ||
+                          std::any_of(names.begin(), names.end(), [&](const std::string& known) {
+                            return known.back() == '.' && name.starts_with(known);
+                          });
+    if (is_named) out.push_back(name);
   }
-  std::sort(files.begin(), files.end());
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+Json output_hashes(const fs::path& output, const std::set<std::string>& names) {
   Json out = Json::object();
-  for (const fs::path& file : files) {
-    const std::string name = fs::relative(file, output).generic_string();
-    const bool is_ours = names.count(name) > 0 ||
-                         std::any_of(names.begin(), names.end(), [&](const std::string& known) {
-                           return known.back() == '.' && name.starts_with(known);
-                         });
-    if (is_ours) out[name] = file_hash(file);
-  }
+  for (const std::string& name : named_outputs(output, names)) out[name] = file_hash(output / name);
   return out;
 }
 

@@ -16,10 +16,14 @@ namespace cgs {
 /// leads to is part of the request already.
 nlohmann::ordered_json depth_options_json(const DepthOptions& options);
 
-/// Path below the folder and hash of the files of a finished run, in order of the paths.
+/// Files that a run wrote, by their paths below its folder, in order.
 ///
 /// \param names  paths of what a run writes; one that ends in a dot stands for all that begin so.
-///               Other files are the user's, who may change them. \throws IoError
+///               Other files are the user's, who may change them.
+std::vector<std::string> named_outputs(const std::filesystem::path& output,
+                                       const std::set<std::string>& names);
+
+/// Hashes of named_outputs(). \throws IoError
 nlohmann::ordered_json output_hashes(const std::filesystem::path& output,
                                      const std::set<std::string>& names);
 

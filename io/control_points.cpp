@@ -19,6 +19,7 @@ constexpr std::array<std::string_view, 7> kNeeded = {"name", "x", "y", "z", "vie
 constexpr std::array<std::string_view, 2> kOptional = {"sigma", "role"};
 constexpr double kFarthest = 1e12;
 constexpr size_t kMostPoints = 10'000;
+constexpr size_t kMostPicks = 1'000;  // of a point
 
 std::string_view unquoted(std::string_view field) {
   if (field.size() >= 2 && field.front() == '"' && field.back() == '"') {
@@ -206,6 +207,10 @@ class Table {
     const std::string_view view = cell("view");
     if (view.empty() && !at) return false;
     if (view.empty() || !at) lines_.fail(Defect::Schema, "states only some of view, px and py");
+    if (entry.point.picks.size() == kMostPicks) {
+      lines_.fail(Defect::Count,
+                  quoted(entry.point.name) + " has above " + std::to_string(kMostPicks) + " picks");
+    }
     for (const ControlPick& other : entry.point.picks) {
       if (other.view != view) continue;
       lines_.fail(Defect::Mismatch,

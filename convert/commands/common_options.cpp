@@ -92,9 +92,10 @@ void add_scale_options(CLI::App& command, SceneRequest& request) {
       "--control-points",
       request.control.file,
       "Table (CSV) of surveyed points and where photographs show them, columns name,x,y,z,view,"
-      "px,py and, if wanted, sigma and role (control or check): every result is then in the "
-      "coordinates of the table, z up; needs 3 points, each in 2 photographs, and tells scale, "
-      "unit and up by itself");
+      "px,py and, if wanted, sigma and role (control or check): results are then in the "
+      "coordinates "
+      "of the table, z up, less a far origin that files state; needs 3 points, each in 2 "
+      "photographs, and tells scale, unit and up by itself");
   command.add_option("--control-unit",
                      request.control.unit,
                      "Unit of the coordinates in --control-points (m, cm, mm, in, ft); default m");

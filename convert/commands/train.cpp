@@ -48,7 +48,10 @@ void run_train(const TrainArgs& args) {
   report["scale"] = opened.control;
   if (opened.control.is_null()) {
     report["scale"] = scale_by(distances, markers, trained.model);
-    if (!report["scale"].is_null()) write_model(args.output, trained.model);
+    if (!report["scale"].is_null()) {
+      write_model(args.output, trained.model);
+      terminal.warn(report["scale"].at("warnings").get<std::vector<std::string>>());
+    }
   }
   write_file(args.output / "training.json", json_text(report) + "\n");
   forget_checkpoints(args.output);

@@ -242,7 +242,7 @@ std::vector<std::array<size_t, 3>> triples(size_t count) {
 /// The points that agree best with the similarity of three of them.
 Places core_of(const std::vector<ControlPair>& pairs, const Places& candidates) {
   const size_t count = candidates.size();
-  const size_t trusted = count - (count - 2) / 2;  // of four, five: one may be wrong; of six, two
+  const size_t trusted = count - (count - 2) / 2;  // of five: one may be wrong; of six, two
   double least = std::numeric_limits<double>::infinity();
   Places best;
   for (const auto& triple : triples(count)) {
@@ -280,10 +280,36 @@ Places agreeing(const std::vector<ControlPair>& pairs,
   return out;
 }
 
+Places without(Places places, size_t k) {
+  places.erase(places.begin() + static_cast<std::ptrdiff_t>(k));
+  return places;
+}
+
+// The three of four points that agree, where leaving out no other point makes three agree as well:
+// a similarity meets three points of level ground whatever their heights, and then nobody can tell
+// which of the four is wrong. Empty if so.
+Places only_agreeing_three(const std::vector<ControlPair>& pairs, const Places& four) {
+  constexpr double kOfTwo =
+      13.8;  // 99.9 % of a chi-squared of two, as three points leave, lie below
+  std::vector<std::pair<double, size_t>> left;  // chi-squared, place of the point left out
+  for (size_t k = 0; k < four.size(); ++k) {
+    const Places three = without(four, k);
+    const Sides sides = sides_of(pairs, three);
+    if (is_line(sides.known) || is_line(sides.measured)) continue;
+    left.emplace_back(fit(pairs, three).chi_squared, k);
+  }
+  std::sort(left.begin(), left.end());
+  if (left.empty()) return {};
+  const double noise = std::max(1.0, left.front().first / 2);  // sigmas may be too small for all
+  if (left.size() > 1 && left[1].first <= kOfTwo * noise) return {};
+  return without(four, left.front().second);
+}
+
 /// The candidates without outliers.
 Places inliers(const std::vector<ControlPair>& pairs, const Places& candidates) {
   if (candidates.size() <= kFewest) return candidates;
-  Places out = core_of(pairs, candidates);
+  Places out =
+      candidates.size() == 4 ? only_agreeing_three(pairs, candidates) : core_of(pairs, candidates);
   if (out.empty()) return candidates;
   for (size_t before = 0; before < out.size();) {
     before = out.size();

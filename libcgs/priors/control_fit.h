@@ -54,7 +54,8 @@ struct ControlFit {
 ///
 /// Outliers among four or more points are found by the triple of points whose similarity most
 /// points agree with (least trimmed squares), and left out where they miss the fit of the rest by
-/// more than 99.9 % of points would; two of six may be wrong. Of three nobody can tell.
+/// more than 99.9 % of points would; two of six may be wrong. Of three nobody can tell, and of four
+/// only where no other three agree as well, as they do on level ground; else all four stay.
 ///
 /// Source: Umeyama 1991, "Least-squares estimation of transformation parameters between two point
 /// patterns", for the start; Rousseeuw and Leroy 1987, "Robust regression and outlier detection",

@@ -39,12 +39,13 @@ std::optional<RayMeeting> ray_meeting(const std::vector<SightRay>& rays) {
     if (!solver.isInvertible()) return std::nullopt;
     point = solver.solve(sum);
   }
-  RayMeeting out{near + point, information.inverse(), 0};
+  RayMeeting out{near + point, information.inverse(), 0, 0};
   for (const SightRay& ray : rays) {
     const Eigen::Vector3d away = point - (ray.origin - near);
     if (!(away.dot(ray.direction) > 0)) return std::nullopt;  // behind the camera
     const double miss = away.cross(ray.direction).norm() / away.norm();
     out.worst = std::max(out.worst, miss / ray.angle_sigma);
+    out.scatter += std::pow(miss / ray.angle_sigma, 2) / (2 * double(rays.size()) - 3);
   }
   return out;
 }

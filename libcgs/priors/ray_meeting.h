@@ -25,7 +25,8 @@ SightRay sight_ray(const Camera& camera, const Eigen::Vector2d& at, double sigma
 struct RayMeeting {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  double worst = 0;  ///< Largest angle by which a ray misses the point [its sigmas].
+  double worst = 0;    ///< Largest angle by which a ray misses the point [its sigmas].
+  double scatter = 0;  ///< Chi-squared of the misses by its degrees of freedom; about 1.
 };
 
 /// Least squares of the angles by which the rays miss the point.

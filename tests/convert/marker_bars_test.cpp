@@ -94,6 +94,17 @@ TEST_F(MarkerBars, RefusesWhereNoTwoPhotographsShowASquare) {
   EXPECT_NE(refusal("big").find("big"), std::string::npos);
 }
 
+// Cameras that are 2 pixels wrong must show in the sigma.
+TEST_F(MarkerBars, SigmaCoversCamerasThatAreNotQuiteRight) {
+  photograph({marker_at({-0.2, 0, 1.2}, 1)});
+  const double sigma = marker_bars(scene_, kSize).at(0).bar.measured_sigma;
+  scene_.views[1].camera.world_from_cam.rotate(
+      Eigen::AngleAxisd(2.0 / 450, Eigen::Vector3d(1, 1, 0).normalized()));
+  const ScaleBar bar = marker_bars(scene_, kSize).at(0).bar;
+  EXPECT_GT(bar.measured_sigma, 3 * sigma);
+  EXPECT_NEAR(bar.measured, 0.3 * kUnit, 3 * bar.measured_sigma);
+}
+
 // The same number, stuck to another place between two photographs.
 TEST_F(MarkerBars, DoesNotBelieveAMarkerThatMoved) {
   photograph({marker_at({-0.2, 0, 1.2}, 1)});

@@ -53,11 +53,20 @@ TEST_F(Budget, MuchTimeBuysEverythingAndTheChoiceIsKept) {
 
   const std::string model = test::read_bytes(out() / "model/gaussians.ply");
   fs::remove(out() / "report.html");
-  const auto again = run("10h");
+  fs::create_directory(out() / "budget_trial");  // as a start leaves it that was killed
+  const auto again = run("10h", "-w");
   ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_FALSE(fs::exists(out() / "budget_trial"));
   EXPECT_EQ(file("budget.json"), chosen);
   EXPECT_TRUE(fs::exists(out() / "report.html"));
   EXPECT_EQ(test::read_bytes(out() / "model/gaussians.ply"), model);
+
+  const std::string record = test::read_bytes(out() / "run.json");
+  const auto other = run("9h");
+  EXPECT_EQ(other.exit_code, 2) << other.err;
+  EXPECT_NE(other.err.find("holds the results of another run"), std::string::npos) << other.err;
+  EXPECT_EQ(file("budget.json"), chosen);
+  EXPECT_EQ(test::read_bytes(out() / "run.json"), record);
 }
 
 TEST_F(Budget, TooLittleTimeIsRefusedAndNothingStays) {

@@ -97,6 +97,14 @@ TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
   EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.3mf"));
   EXPECT_NE(result.err.find("--assume-unit"), std::string::npos);
   EXPECT_EQ(ordered_json::parse(result.out)["units"], "unknown");
+
+  const std::string again =
+      "run " + kSmallCapture.string() + " --views 0,1,2 -q -w -o " + (dir / "out").string();
+  ASSERT_EQ(run_cgs(again + " --assume-unit m").exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
+  ASSERT_EQ(run_cgs(again).exit_code, 0);  // in a unit that no longer holds
+  EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
+  EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.3mf"));
 }
 
 TEST(Portal, StagesByHandGiveTheFilesOfARun) {

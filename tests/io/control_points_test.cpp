@@ -49,6 +49,13 @@ TEST_F(ReadControlPoints, TakesCoordinatesAndPicksFromAnyRowOfAName) {
   ASSERT_EQ(points[1].picks.size(), 1u);
 }
 
+TEST_F(ReadControlPoints, RefusesMorePicksThanAnybodyMakes) {
+  std::string rows = "A,1,2,3,,,,,\n";
+  for (int i = 0; i <= 1000; ++i) rows += "A,,,,,,view" + std::to_string(i) + ",1,1\n";
+  EXPECT_EQ(defect(rows), "count");
+  EXPECT_NE(refusal(rows).find("line 1002"), std::string::npos) << refusal(rows);
+}
+
 TEST_F(ReadControlPoints, ReadsWhatSpreadsheetsAndEditorsWrite) {
   const std::vector<std::string> tables = {
       "name,x,y,z,view,px,py\nA,1,2,3,left,4,5\n",

@@ -140,6 +140,26 @@ TEST(ControlFit, NamesTheOutliersAmongFourAndMore) {
   EXPECT_LE(lost, 2);  // of 380; the threshold alone gives up one in a thousand
 }
 
+// A wrong height tilts any three of them a little, and they still agree.
+TEST(ControlFit, KeepsAllOfFourOnLevelGroundAndSaysThatTheyDoNotAgree) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    std::vector<ControlPair> level;
+    Noise noise(seed);
+    for (const Eigen::Vector3d& p : {Eigen::Vector3d(0, 0, 4),
+                                     Eigen::Vector3d(2, 0, 4),
+                                     Eigen::Vector3d(2, 2, 4),
+                                     Eigen::Vector3d(0, 2.1, 4)}) {
+      const Eigen::Matrix3d covariance = ellipsoid(0.001);
+      level.push_back({p + noise(covariance), covariance, planted()(p), 0.004, false});
+    }
+    const Eigen::Vector3d up = planted().rotation * Eigen::Vector3d::UnitZ();
+    level[seed % 4].known += 0.3 * up;
+    const ControlFit fit = fit_control(level);
+    for (const ControlResidual& residual : fit.residuals) EXPECT_TRUE(residual.is_used) << seed;
+    EXPECT_GT(fit.scatter, 2) << seed;
+  }
+}
+
 TEST(ControlFit, NamesTwoOfSix) {
   std::vector<ControlPair> bad = pairs(6, 0.002, 5);
   bad[1].known += Eigen::Vector3d(0.5, 0.5, 0);
