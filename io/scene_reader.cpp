@@ -372,7 +372,8 @@ void SceneOptions::validate() const {
 
 int find_view(const Scene& scene, const std::string& token) {
   for (size_t i = 0; i < scene.views.size(); ++i) {
-    if (scene.views[i].name == token) return static_cast<int>(i);
+    const View& view = scene.views[i];
+    if (view.name == token || view.image_path.filename() == token) return static_cast<int>(i);
   }
   uint64_t index = 0;
   if (parse_number(token, index) && index < scene.views.size()) return static_cast<int>(index);

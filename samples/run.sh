@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Installs what is needed, builds, makes a capture of a carved portal whose truth is known, and
-# turns three of its photographs into every asset. Run again, it only does what is missing.
+# turns three of its photographs into every asset. Run again, it only does what is missing; after an
+# update of the sources, remove the folder out first to see what they do.
 #
-# usage: samples/run.sh [OUTPUT]     (default: out/portal)
+# usage: samples/run.sh [OUTPUT]     (default: out/portal; relative to the repository)
 set -euo pipefail
 cd "$(dirname "$0")/.."
 output="${1:-out/portal}"

@@ -6,6 +6,10 @@
 #   --long tries all of them and fuzzes ten minutes each: a night
 set -euo pipefail
 cd "$(dirname "$0")/.."
+if [ $# -gt 1 ] || { [ $# -eq 1 ] && [ "$1" != "--long" ]; }; then
+  echo "usage: tests/reliability.sh [--long]" >&2
+  exit 2
+fi
 faults=40 kills=40 seconds=20
 if [ "${1:-}" = "--long" ]; then faults=100000 kills=200 seconds=600; fi
 

@@ -5,6 +5,10 @@
 # usage: tests/run.sh [--tidy]     --tidy adds static analysis (tests/tidy.sh), half an hour
 set -euo pipefail
 cd "$(dirname "$0")/.."
+if [ $# -gt 1 ] || { [ $# -eq 1 ] && [ "$1" != "--tidy" ]; }; then
+  echo "usage: tests/run.sh [--tidy]" >&2
+  exit 2
+fi
 
 samples/install.sh --tests
 cmake --preset release -DCGS_BUILD_TESTS=ON >/dev/null

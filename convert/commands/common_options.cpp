@@ -29,10 +29,11 @@ void add_output_options(CLI::App& command, CommonOptions& options) {
 }
 
 void add_scene_options(CLI::App& command, SceneOptions& options) {
-  command.add_option("--views",
-                     options.views,
-                     "Input views: indices in name order or file stems, e.g. 1,10,19; the rest is "
-                     "held out. Default: all of up to four, else three evenly spaced");
+  command.add_option(
+      "--views",
+      options.views,
+      "Input views: names, or indices in name order from 0, e.g. 1,10,19; the rest is "
+      "held out. Default: all of up to four, else three evenly spaced");
   command.add_option(
       "--downscale",
       options.downscale,

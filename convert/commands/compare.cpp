@@ -201,7 +201,7 @@ void add_compare(CLI::App& app) {
   cmd->add_option("--unit", args->unit, "Unit of the figures; default m");
   cmd->add_option(
       "--assume-unit", args->assume_unit, "What a unit of a file is, where it does not say");
-  add_common_options(*cmd, args->common);
+  add_output_options(*cmd, args->common);
   cmd->footer(
       "Positive distances lie on the side that B's faces look to.\n"
       "Example: cgs compare 2026.ply 2024.ply --icp --unit mm --ply change.ply --threshold 5mm\n"

@@ -79,7 +79,7 @@ void add_evaluate(CLI::App& app) {
   cmd->add_option("--scene", args->scene, "Scene folder, where the photographs have moved");
   cmd->add_option(
       "--views", args->views, "Views: indices in name order or names; default held out");
-  add_common_options(*cmd, args->common);
+  add_output_options(*cmd, args->common);
   cmd->footer("Example: cgs evaluate out/portal/model --scene photos/portal --json");
   cmd->callback([args] { run_evaluate(*args); });
 }

@@ -452,7 +452,7 @@ void add_measure(CLI::App& app) {
   cmd->add_option("--unit", args->unit, "Unit of the figures; default m");
   cmd->add_option(
       "--assume-unit", args->assume_unit, "What a unit of the file is, where it does not say");
-  add_common_options(*cmd, args->common);
+  add_output_options(*cmd, args->common);
   cmd->footer(
       "Points are in the coordinates of the file and move to the nearest point of the surface.\n"
       "Without a figure: area, volume, bounds and certificate.\n"

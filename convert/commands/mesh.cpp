@@ -6,6 +6,8 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/length.h"
+#include "convert/memory_plan.h"
 #include "convert/mesh_files.h"
 #include "convert/simplification.h"
 #include "convert/stated_frame.h"
@@ -35,7 +37,10 @@ void run_mesh_command(const MeshArgs& args) {
   const Progress progress = terminal.begin("mesh");
   const auto options = simplify_options(args.simplify, file.volume.voxel_size, file.frame);
   TriangleMesh open = open_surface(file.volume, {});
-  WatertightResult closed = watertight_surface(file.volume, {}, part_of(progress, 0.1, 0.5));
+  WatertightOptions closing;
+  closing.memory_limit =
+      memory_budget(args.common.memory_limit.empty() ? 0 : parse_bytes(args.common.memory_limit));
+  WatertightResult closed = watertight_surface(file.volume, closing, part_of(progress, 0.1, 0.5));
   const nlohmann::ordered_json simplification =
       simplify_meshes(open, closed, options, file.frame, part_of(progress, 0.5, 0.9));
   nlohmann::ordered_json files = write_mesh_files(args.output, open, closed.mesh, file.frame);

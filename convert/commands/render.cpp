@@ -48,7 +48,7 @@ void add_render(CLI::App& app) {
   cmd->add_option("model", args->model, "Model folder, e.g. out/portal/model")->required();
   cmd->add_option("-o,--output", args->output, "Folder to write")->required();
   cmd->add_option("--views", args->views, "Cameras: indices in name order or names; default all");
-  add_common_options(*cmd, args->common);
+  add_output_options(*cmd, args->common);
   cmd->footer("Example: cgs render out/portal/model --views 0,2 -o out/views");
   cmd->callback([args] { run_render(*args); });
 }

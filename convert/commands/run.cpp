@@ -83,10 +83,11 @@ void run_run(const RunArgs& args) {
 void add_run(CLI::App& app) {
   auto args = std::make_shared<RunArgs>();
   auto* cmd = app.add_subcommand("run", "Photographs to every asset, resumable");
-  cmd->add_option("scene",
-                  args->request.scene.path,
-                  "Folder: LLFF, COLMAP, transforms.json (nerfstudio, instant-ngp), Strecha, or "
-                  "nothing but photographs")
+  cmd->add_option(
+         "scene",
+         args->request.scene.path,
+         "Folder: LLFF, COLMAP, transforms.json (nerfstudio, instant-ngp), Strecha, Polycam, "
+         "Metashape, RealityCapture, cameras.json (3DGS), or nothing but photographs")
       ->required();
   cmd->add_option("-o,--output", args->request.output, "Folder to write")->required();
   add_scene_options(*cmd, args->request.scene.options);

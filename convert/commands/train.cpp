@@ -71,7 +71,7 @@ void add_train(CLI::App& app) {
   add_focal_option(*cmd, args->scene.focal);
   add_scale_options(*cmd, args->scene);
   add_training_options(*cmd, args->training);
-  add_common_options(*cmd, args->common);
+  add_output_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs train photos/portal --views 1,10,19 --preset draft -o out/model\n"
       "Interrupted, it goes on where it was when it is run again.");

@@ -2,7 +2,8 @@
 //
 // How accurate cameras solved from photographs alone are, beside those given with the data sets.
 //
-//   pose_accuracy FOLDER [SET]     FOLDER holds the data sets of kSets; SET = a part of the name
+//   pose_accuracy FOLDER [SET]     FOLDER holds the data sets of kSets, each as its authors offer
+//                                  it (Strecha, Middlebury, MVImgNet, LLFF); SET = part of a name
 //
 // Prints per set and source of the focal length (given = of the data set, Exif, solved = unknown):
 // photographs placed, largest error of rotation and of the direction between any two cameras

@@ -4,7 +4,8 @@
 // size and 2006 at third size), as scenes of two views.
 //
 //   stereo_accuracy FOLDER [PAIR]   FOLDER holds middlebury2014Q/ and middlebury2006T/; PAIR is one
-//                                   of them, such as Piano
+//                                   of them, such as Piano; a pair is a folder as it comes from
+//                                   vision.middlebury.edu/stereo/data
 //
 // Prints per pair, over pixels that both photographs show: the share that a depth was measured
 // for, the share of those whose disparity is wrong by more than 0.5, 1 and 2 pixels, the same

@@ -52,7 +52,7 @@ TEST_F(ReadControlPoints, TakesCoordinatesAndPicksFromAnyRowOfAName) {
 TEST_F(ReadControlPoints, RefusesMorePicksThanAnybodyMakes) {
   std::string rows = "A,1,2,3,,,,,\n";
   for (int i = 0; i <= 1000; ++i) rows += "A,,,,,,view" + std::to_string(i) + ",1,1\n";
-  EXPECT_EQ(defect(rows), "count");
+  EXPECT_EQ(defect(rows), "COUNT");
   EXPECT_NE(refusal(rows).find("line 1002"), std::string::npos) << refusal(rows);
 }
 

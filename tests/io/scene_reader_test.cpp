@@ -71,6 +71,7 @@ TEST_F(ReadScene, TakesNamesAndIndicesInAnyOrder) {
   write(6);
   EXPECT_EQ(read({.views = "v03, 0,v05"}).input, (Indices{0, 3, 5}));
   EXPECT_EQ(read({.views = "3,1"}).held_out, (Indices{0, 2, 4, 5}));
+  EXPECT_EQ(read({.views = "v01.png,2"}).input, (Indices{1, 2}));
 }
 
 TEST_F(ReadScene, RefusesUnknownAndRepeatedViews) {
