@@ -67,4 +67,30 @@ MaskMap hole_mask(const RenderBuffers& buffers) {
   return mask;
 }
 
+ColorImage tinted(ColorImage picture, const MaskMap& mask) {
+  const Eigen::Vector3f magenta(0.9f, 0.1f, 0.8f);
+  constexpr float kShine = 0.25f;
+  for (size_t i = 0; i < picture.data.size(); ++i) {
+    if (mask.data[i] != 0) picture.data[i] = kShine * picture.data[i] + (1 - kShine) * magenta;
+  }
+  return picture;
+}
+
+ColorImage contact_sheet(const std::vector<ColorImage>& pictures, int columns) {
+  constexpr int kGap = 4;  // [pixels]
+  const int rows = (static_cast<int>(pictures.size()) + columns - 1) / columns;
+  const int width = pictures.front().width + kGap;
+  const int height = pictures.front().height + kGap;
+  ColorImage out(columns * width - kGap, rows * height - kGap, Eigen::Vector3f::Ones());
+  for (size_t k = 0; k < pictures.size(); ++k) {
+    const ColorImage& picture = pictures[k];
+    const int left = static_cast<int>(k) % columns * width;
+    const int top = static_cast<int>(k) / columns * height;
+    for (int y = 0; y < picture.height; ++y) {
+      for (int x = 0; x < picture.width; ++x) out(left + x, top + y) = picture(x, y);
+    }
+  }
+  return out;
+}
+
 }  // namespace cgs

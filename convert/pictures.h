@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Geometry>
 
 #include "libcgs/core/raster.h"
@@ -18,5 +20,11 @@ ColorImage normal_picture(const NormalMap& normals, const Eigen::Isometry3d& cam
 
 /// 1 = hole.
 MaskMap hole_mask(const RenderBuffers& buffers);
+
+/// A picture with its masked pixels in magenta, through which it shines a little.
+ColorImage tinted(ColorImage picture, const MaskMap& mask);
+
+/// Pictures of one size side by side, row by row. \pre pictures are not empty, columns > 0
+ColorImage contact_sheet(const std::vector<ColorImage>& pictures, int columns);
 
 }  // namespace cgs

@@ -2,12 +2,16 @@
 #include "convert/views.h"
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "convert/pictures.h"
 #include "io/atomic_file.h"
+#include "io/cameras_json.h"
 #include "io/png.h"
+#include "io/resample.h"
 #include "io/scene_reader.h"
 #include "io/view_exr.h"
 #include "libcgs/core/error.h"
@@ -24,6 +28,13 @@ double fraction(const Raster<Hole>& holes, Hole kind) {
   return static_cast<double>(count) / static_cast<double>(holes.data.size());
 }
 
+Json hole_fractions(const RenderBuffers& buffers) {
+  return {{"hole_fraction", 1 - fraction(buffers.hole, Hole::None)},
+          {"transparent_fraction", fraction(buffers.hole, Hole::Transparent)},
+          {"occluded_fraction", fraction(buffers.hole, Hole::Occluded)},
+          {"outside_fraction", fraction(buffers.hole, Hole::Outside)}};
+}
+
 ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
   ViewRasters rasters;
   rasters.color = buffers.color;
@@ -32,7 +43,7 @@ ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
   rasters.normal = normals_from_depth(buffers.median_depth, camera);
   rasters.depth_variance = buffers.depth_variance;
   rasters.support = buffers.support;
-  rasters.hole = hole_mask(buffers);
+  rasters.hole = buffers.hole;
   return rasters;
 }
 
@@ -48,14 +59,43 @@ Json write_view(const Model& model,
   write_png(png("color"), picture(buffers));
   write_png(png("depth"), depth_picture(rasters.depth));
   write_png(png("normal"), normal_picture(rasters.normal, view.camera.cam_from_world()));
-  write_png(png("hole"), rasters.hole);
+  write_png(png("hole"), hole_mask(buffers));
   const auto& input = model.scene.input;
   const bool is_input = std::find(input.begin(), input.end(), index) != input.end();
-  return {{"name", view.name},
-          {"role", is_input ? "input" : "held out"},
-          {"hole_fraction", 1 - fraction(buffers.hole, Hole::None)},
-          {"transparent_fraction", fraction(buffers.hole, Hole::Transparent)},
-          {"unsupported_fraction", fraction(buffers.hole, Hole::Unsupported)}};
+  Json out = {{"name", view.name}, {"role", is_input ? "input" : "held out"}};
+  out.update(hole_fractions(buffers));
+  return out;
+}
+
+std::string frame_name(size_t k) {
+  std::string number = std::to_string(k);
+  number.insert(0, number.size() < 4 ? 4 - number.size() : 0, '0');
+  return "frame_" + number;
+}
+
+// Where the frames were taken from, in the frame of the model.
+Scene scene_of_path(const Model& model, const std::vector<Camera>& path) {
+  Scene out;
+  out.kind = model.scene.kind;
+  out.folder = model.scene.folder;
+  out.frame = model.scene.frame;
+  for (size_t k = 0; k < path.size(); ++k) {
+    View view;
+    view.name = frame_name(k);
+    view.camera = path[k];
+    out.views.push_back(view);
+  }
+  return out;
+}
+
+// Small enough for a sheet of them to fit a screen.
+ColorImage thumbnail(ColorImage picture) {
+  constexpr int kWidest = 320;
+  if (picture.width <= kWidest) return picture;
+  MaskMap all;
+  const int height = std::max(1, picture.height * kWidest / picture.width);
+  area_downscale(picture, all, kWidest, height);
+  return picture;
 }
 
 MaskMap intersection(const MaskMap& a, const MaskMap& b) {
@@ -110,6 +150,39 @@ Json write_views(const Model& model,
     report(progress, static_cast<double>(k) / static_cast<double>(views.size()));
     out.push_back(write_view(model, inputs, views[k], folder));
   }
+  report(progress, 1);
+  return out;
+}
+
+Json write_path(const Model& model,
+                const std::vector<Camera>& path,
+                const std::filesystem::path& folder,
+                const Progress& progress) {
+  make_output_folder(folder);
+  const std::vector<SupportView> inputs = support_views(model);
+  constexpr size_t kOnSheet = 12;
+  const size_t shown_each = std::max<size_t>(1, path.size() / kOnSheet);
+  std::vector<ColorImage> sheet;
+  Json out = Json::array();
+  for (size_t k = 0; k < path.size(); ++k) {
+    report(progress, static_cast<double>(k) / static_cast<double>(path.size()));
+    const RenderBuffers buffers = render_camera(model, inputs, path[k]);
+    const ColorImage shown = picture(buffers);
+    const MaskMap holes = hole_mask(buffers);
+    write_png(folder / (frame_name(k) + ".png"), shown);
+    write_png(folder / (frame_name(k) + ".hole.png"), holes);
+    if (k % shown_each == 0 && sheet.size() < kOnSheet) {
+      ColorImage small = thumbnail(tinted(shown, holes));
+      const bool fits =
+          sheet.empty() || (small.width == sheet[0].width && small.height == sheet[0].height);
+      if (fits) sheet.push_back(std::move(small));
+    }
+    out.push_back({{"name", frame_name(k)}});
+    out.back().update(hole_fractions(buffers));
+  }
+  constexpr int kColumns = 4;
+  write_png(folder / "contact.png", contact_sheet(sheet, kColumns));
+  write_cameras_json(folder / "cameras.json", scene_of_path(model, path));
   report(progress, 1);
   return out;
 }

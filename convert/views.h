@@ -17,6 +17,14 @@ nlohmann::ordered_json write_views(const Model& model,
                                    const std::filesystem::path& folder,
                                    const Progress& progress);
 
+/// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
+/// says where they are, and contact.png: twelve of them, holes in magenta. Returns per frame
+/// {"name", "hole_fraction", …}.
+nlohmann::ordered_json write_path(const Model& model,
+                                  const std::vector<Camera>& path,
+                                  const std::filesystem::path& folder,
+                                  const Progress& progress);
+
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
 /// that are not holes, and MS-SSIM over all: {"mean": {"psnr", "ssim", "psnr_seen", "ssim_seen",
 /// "hole_fraction", "ms_ssim"}, "views": [{"name", …}]}. Loads the photographs.

@@ -15,7 +15,7 @@ namespace cgs {
 namespace {
 
 /// Channel order of the values below.
-constexpr std::array<const char*, 12> kChannels = {"R",
+constexpr std::array<const char*, 13> kChannels = {"R",
                                                    "G",
                                                    "B",
                                                    "A",
@@ -26,7 +26,8 @@ constexpr std::array<const char*, 12> kChannels = {"R",
                                                    "distance.Y",
                                                    "variance.Y",
                                                    "support.Y",
-                                                   "hole.Y"};
+                                                   "hole.Y",
+                                                   "holeKind.Y"};
 
 template <typename T>
 void require_size(const Raster<T>& raster, const Camera& camera, const std::string& name) {
@@ -49,8 +50,11 @@ float premultiplied_linear(float coded, float alpha) {
   return finite_or_zero(alpha * linear_from_srgb(coded / alpha));
 }
 
-std::array<float, 12> pixel(const ViewRasters& view, const Camera& camera, double scale, size_t i) {
-  std::array<float, 12> out{};
+std::array<float, kChannels.size()> pixel(const ViewRasters& view,
+                                          const Camera& camera,
+                                          double scale,
+                                          size_t i) {
+  std::array<float, kChannels.size()> out{};
   const float alpha = view.alpha.data[i];
   for (size_t c = 0; c < 3; ++c) {
     out.at(c) = premultiplied_linear(view.color.data[i][static_cast<Eigen::Index>(c)], alpha);
@@ -69,7 +73,10 @@ std::array<float, 12> pixel(const ViewRasters& view, const Camera& camera, doubl
     out[9] = finite_or_zero(view.depth_variance.data[i] * scale * scale);
   }
   out[10] = view.support.data[i];
-  out[11] = !known || view.hole.data[i] != 0 ? 1.0f : 0.0f;
+  const Hole hole =
+      !known && view.hole.data[i] == Hole::None ? Hole::Transparent : view.hole.data[i];
+  out[11] = hole == Hole::None ? 0 : 1;
+  out[12] = static_cast<float>(hole);
   return out;
 }
 
@@ -104,7 +111,7 @@ void write_view_exr(const std::filesystem::path& path,
   const size_t pixels = view.depth.data.size();
   for (const char* name : kChannels) image.channels.emplace_back(name, std::vector<float>(pixels));
   for (size_t i = 0; i < pixels; ++i) {
-    const std::array<float, 12> values = pixel(view, camera, frame.scale, i);
+    const std::array<float, kChannels.size()> values = pixel(view, camera, frame.scale, i);
     for (size_t c = 0; c < values.size(); ++c) image.channels[c].second[i] = values.at(c);
   }
   Eigen::Isometry3d file_from_cam = camera.world_from_cam;

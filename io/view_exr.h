@@ -7,6 +7,7 @@
 #include "libcgs/core/camera.h"
 #include "libcgs/core/frame.h"
 #include "libcgs/core/raster.h"
+#include "libcgs/render/render_buffers.h"
 
 namespace cgs {
 
@@ -18,7 +19,7 @@ struct ViewRasters {
   NormalMap normal;              ///< World axes; 0 = unknown.
   Raster<float> depth_variance;  ///< [internal units squared]
   Raster<uint8_t> support;       ///< Number of input views that see the surface drawn here.
-  Raster<uint8_t> hole;          ///< Not 0 where no input view can vouch for the pixel.
+  Raster<Hole> hole;             ///< Why no input view can vouch for the pixel.
 };
 
 /// Writes a view as one OpenEXR file of 32-bit float channels.
@@ -28,6 +29,8 @@ struct ViewRasters {
 /// - N.X N.Y N.Z: unit normal in world axes, 0 where unknown
 /// - variance.Y: variance of Z [world units squared]; support.Y: number of input views
 /// - hole.Y: 1 where no input view can vouch for the pixel or depth is unknown, else 0
+/// - holeKind.Y: 0 no hole, 1 nothing was reconstructed, 2 hidden from every input view, 3 outside
+///   of every input picture (Hole); where depth alone is unknown, 1
 ///
 /// Unknown Z, distance and variance are 0, with hole.Y = 1; no value is NaN.
 /// Attributes: worldToCamera (left-handed, see ExrImage); as text, numbers row by row,

@@ -5,12 +5,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/camera_path.h"
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/model.h"
 #include "convert/terminal.h"
 #include "convert/views.h"
 #include "io/json_file.h"
+#include "io/scene_path.h"
 #include "io/scene_reader.h"
 
 namespace cgs {
@@ -21,6 +23,8 @@ struct RenderArgs {
   std::filesystem::path model;
   std::filesystem::path output;
   std::string views;
+  std::string path;
+  int frames = 60;
   CommonOptions common;
 };
 
@@ -30,6 +34,16 @@ void run_render(const RenderArgs& args) {
   Terminal terminal(args.common.quiet);
   const Model model = read_model(args.model);
   terminal.warn(model.scene.warnings);
+  if (!args.path.empty()) {
+    const bool is_file = lower_extension(args.path) == ".json";
+    const std::vector<Camera> path =
+        is_file ? camera_path_from(args.path, model) : camera_path(model, args.path, args.frames);
+    const nlohmann::ordered_json report =
+        write_path(model, path, args.output, terminal.begin("render"));
+    terminal.end(std::to_string(path.size()) + " frames");
+    if (args.common.json) std::cout << json_text(report) << "\n";
+    return;
+  }
   std::vector<int> views(model.scene.views.size());
   std::iota(views.begin(), views.end(), 0);
   if (!args.views.empty()) views = select_views(model.scene, args.views);
@@ -47,9 +61,22 @@ void add_render(CLI::App& app) {
       "render", "Model to EXR and PNG per camera: colour, depth, normal, support, holes");
   cmd->add_option("model", args->model, "Model folder, e.g. out/portal/model")->required();
   cmd->add_option("-o,--output", args->output, "Folder to write")->required();
-  cmd->add_option("--views", args->views, "Cameras: indices in name order or names; default all");
+  auto* views = cmd->add_option(
+      "--views", args->views, "Cameras: names, or indices in name order from 0; default all");
+  auto* path = cmd->add_option(
+      "--path",
+      args->path,
+      "Pictures and hole masks along a path instead: between (the input views), spiral (before "
+      "them), orbit (once around what they look at), or a .json of cameras as in cameras.json");
+  path->excludes(views);
+  cmd->add_option("--frames", args->frames, "Number of pictures along a path")
+      ->capture_default_str()
+      ->needs(path);
   add_output_options(*cmd, args->common);
-  cmd->footer("Example: cgs render out/portal/model --views 0,2 -o out/views");
+  cmd->footer(
+      "Example: cgs render out/portal/model --views 0,2 -o out/views\n"
+      "         cgs render out/portal/model --path spiral -o out/spiral; its frames as a film:\n"
+      "         ffmpeg -framerate 24 -i out/spiral/frame_%04d.png -pix_fmt yuv420p portal.mp4");
   cmd->callback([args] { run_render(*args); });
 }
 

@@ -2,6 +2,7 @@
 #include "libcgs/render/support.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -127,6 +128,54 @@ struct Judge {
   static constexpr int kRim = 3;  // [pixels]
 };
 
+bool is_in_a_picture(const Eigen::Vector3d& point, std::span<const SupportView> views) {
+  return std::any_of(views.begin(), views.end(), [&](const SupportView& view) {
+    return view.camera.sees(view.camera.project(point));
+  });
+}
+
+// Whether the part of a ray before its camera passes through what a picture shows: the four sides
+// of its pyramid and the plane of its camera leave something of the ray.
+bool crosses(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, const Camera& picture) {
+  const Eigen::Isometry3d to_picture = picture.cam_from_world();
+  const Eigen::Vector3d a = to_picture * from;
+  const Eigen::Vector3d b = to_picture.linear() * direction;
+  const std::array<Eigen::Vector3d, 5> inward = {
+      Eigen::Vector3d(picture.fx, 0, picture.cx),
+      Eigen::Vector3d(-picture.fx, 0, picture.width - picture.cx),
+      Eigen::Vector3d(0, picture.fy, picture.cy),
+      Eigen::Vector3d(0, -picture.fy, picture.height - picture.cy),
+      Eigen::Vector3d::UnitZ()};
+  double first = 0;
+  double last = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& side : inward) {
+    const double at_start = side.dot(a);
+    const double growth = side.dot(b);
+    if (growth > 0) {
+      first = std::max(first, -at_start / growth);
+    } else if (growth < 0) {
+      last = std::min(last, -at_start / growth);
+    } else if (at_start < 0) {
+      return false;
+    }
+  }
+  return first < last;
+}
+
+// Why pixel (x, y) with a surface of depth z (NaN = none) is a hole.
+Hole kind_of_hole(const Camera& camera, int x, int y, float z, std::span<const SupportView> views) {
+  const double u = x + 0.5;
+  const double v = y + 0.5;
+  if (!std::isnan(z)) {
+    return is_in_a_picture(camera.unproject(u, v, z), views) ? Hole::Occluded : Hole::Outside;
+  }
+  const Eigen::Vector3d direction = camera.world_from_cam.linear() * camera.ray_in_cam(u, v);
+  const bool was_looked_at = std::any_of(views.begin(), views.end(), [&](const SupportView& view) {
+    return crosses(camera.center(), direction, view.camera);
+  });
+  return was_looked_at ? Hole::Transparent : Hole::Outside;
+}
+
 void check_arguments(const RenderBuffers& buffers,
                      const Camera& camera,
                      std::span<const SupportView> views) {
@@ -172,14 +221,14 @@ void annotate_support(RenderBuffers& buffers,
     witnesses[i] = make_witness(views[i], camera, options);
   });
   buffers.support = Raster<uint8_t>(camera.width, camera.height, 0);
-  buffers.hole = Raster<Hole>(camera.width, camera.height, Hole::Transparent);
+  buffers.hole = Raster<Hole>(camera.width, camera.height, Hole::None);
   const Judge judge{buffers, witnesses, options};
   tbb::parallel_for(0, camera.height, [&](int y) {
     for (int x = 0; x < camera.width; ++x) {
-      if (std::isnan(judge.surface(x, y))) continue;
-      const int support = judge.support(x, y);
+      const float z = judge.surface(x, y);
+      const int support = std::isnan(z) ? 0 : judge.support(x, y);
       buffers.support(x, y) = static_cast<uint8_t>(support);
-      buffers.hole(x, y) = support > 0 ? Hole::None : Hole::Unsupported;
+      if (support == 0) buffers.hole(x, y) = kind_of_hole(camera, x, y, z, views);
     }
   });
 }

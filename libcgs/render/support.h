@@ -41,6 +41,8 @@ struct SupportOptions {
 /// there. Where no view agrees at the very pixel but one does within three pixels, the pixel is
 /// therefore judged by the best of the depths drawn within three pixels.
 ///
+/// A pixel without support is a hole; `hole` says of which kind.
+///
 /// \param buffers  as rasterize() gives them for `camera`
 /// \param views    the input views only: a virtual camera is no witness
 /// \throws InvalidInput if sizes disagree, an option is out of range or there are more than 255

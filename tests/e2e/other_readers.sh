@@ -30,7 +30,7 @@ done
 
 for exr in "$out"/views/*.exr; do
   header=$(exrheader "$exr")
-  for channel in A B G R Z N.X N.Y N.Z distance.Y variance.Y support.Y hole.Y; do
+  for channel in A B G R Z N.X N.Y N.Z distance.Y variance.Y support.Y hole.Y holeKind.Y; do
     expect "$(basename "$exr") has channel $channel" grep -q "  *$channel, 32-bit floating-point" <<<"$header"
   done
   for attribute in worldToCamera cgs:worldToCamera cgs:K cgs:units; do

@@ -117,6 +117,18 @@ TEST(Portal, StagesByHandGiveTheFilesOfARun) {
                 .exit_code,
             0);
   EXPECT_EQ(run_cgs("render " + out + "/model -q -o " + out + "/views").exit_code, 0);
+  const std::string path = "render " + out + "/model --path spiral --frames 3 --json -q -o " + out;
+  const auto spiral = run_cgs(path + "/spiral");
+  ASSERT_EQ(spiral.exit_code, 0) << spiral.err;
+  EXPECT_EQ(ordered_json::parse(spiral.out).size(), 3u);
+  EXPECT_TRUE(std::filesystem::exists(dir / "spiral/contact.png"));
+  ASSERT_EQ(run_cgs("render " + out + "/model --path " + out + "/spiral/cameras.json -q -o " + out +
+                    "/again")
+                .exit_code,
+            0);
+  EXPECT_TRUE(test::read_bytes(dir / "again/frame_0002.png") ==
+              test::read_bytes(dir / "spiral/frame_0002.png"));
+  EXPECT_EQ(run_cgs("render " + out + "/model --path loop -q -o " + out + "/no").exit_code, 2);
   EXPECT_EQ(run_cgs("fuse " + out + "/model -q -o " + out + "/volume.vdb").exit_code, 0);
   EXPECT_EQ(run_cgs("mesh " + out + "/volume.vdb --up 0 0 1 -q -o " + out + "/mesh").exit_code, 0);
   const auto evaluation = run_cgs("evaluate " + out + "/model -q --json");

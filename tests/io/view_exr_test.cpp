@@ -28,7 +28,7 @@ ViewRasters rasters() {
   v.normal = NormalMap(6, 4, Eigen::Vector3f(0, 0.6f, -0.8f));
   v.depth_variance = Raster<float>(6, 4, 0.01f);
   v.support = Raster<uint8_t>(6, 4, 3);
-  v.hole = Raster<uint8_t>(6, 4, 0);
+  v.hole = Raster<Hole>(6, 4, Hole::None);
   return v;
 }
 
@@ -72,7 +72,7 @@ TEST(WriteViewExr, MarksWhatIsUnknownAndWritesNoNan) {
   view.depth_variance(1, 1) = std::nanf("");
   view.alpha(1, 1) = 0;
   view.color(1, 1).setZero();
-  view.hole(2, 1) = 2;
+  view.hole(2, 1) = Hole::Outside;
   const ExrImage image = written(view, {});
   for (const auto& [name, values] : image.channels) {
     for (const float v : values) EXPECT_TRUE(std::isfinite(v)) << name;
@@ -82,6 +82,8 @@ TEST(WriteViewExr, MarksWhatIsUnknownAndWritesNoNan) {
   }
   EXPECT_EQ(at(image, "hole.Y", 1, 1), 1.0f);
   EXPECT_EQ(at(image, "hole.Y", 2, 1), 1.0f);
+  EXPECT_EQ(at(image, "holeKind.Y", 1, 1), 1.0f);
+  EXPECT_EQ(at(image, "holeKind.Y", 2, 1), 3.0f);
   EXPECT_GT(at(image, "Z", 2, 1), 0.0f);
 }
 

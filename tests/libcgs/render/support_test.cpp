@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -201,9 +202,9 @@ struct Facing {
 TEST(AnnotateSupport, DependsOnTheDepthOfTheWitness) {
   EXPECT_EQ(Facing(1, 1).judged(), Hole::None);
   EXPECT_EQ(Facing(0.995f, 1).judged(), Hole::None);
-  EXPECT_EQ(Facing(0.9f, 1).judged(), Hole::Unsupported);  // would have hidden what it saw
-  EXPECT_EQ(Facing(1.1f, 1).judged(), Hole::Unsupported);  // hidden from it
-  EXPECT_EQ(Facing(1, kNan).judged(), Hole::Unsupported);
+  EXPECT_EQ(Facing(0.9f, 1).judged(), Hole::Occluded);  // would have hidden what it saw
+  EXPECT_EQ(Facing(1.1f, 1).judged(), Hole::Occluded);  // hidden from it
+  EXPECT_EQ(Facing(1, kNan).judged(), Hole::Occluded);
   EXPECT_EQ(Facing(1.1f, 1).judged({.relative_tolerance = 0.2f}), Hole::None);
 }
 
@@ -211,9 +212,9 @@ TEST(AnnotateSupport, BelievesAnUncertainWitnessMore) {
   Facing facing(1.1f, 1);
   facing.view.sigma = DepthMap(facing.camera.width, facing.camera.height, 0.05f);
   EXPECT_EQ(facing.judged(), Hole::None);
-  EXPECT_EQ(facing.judged({.sigma_factor = 1}), Hole::Unsupported);
+  EXPECT_EQ(facing.judged({.sigma_factor = 1}), Hole::Occluded);
   for (float& sigma : facing.view.sigma.data) sigma = kNan;  // no statement
-  EXPECT_EQ(facing.judged(), Hole::Unsupported);
+  EXPECT_EQ(facing.judged(), Hole::Occluded);
 }
 
 TEST(AnnotateSupport, CallsPixelsWithoutASurfaceTransparent) {
@@ -227,11 +228,21 @@ TEST(AnnotateSupport, CallsPixelsWithoutASurfaceTransparent) {
   EXPECT_EQ(facing.judged({.min_alpha = 0.4f}), Hole::Transparent);
 }
 
+TEST(AnnotateSupport, TellsWhatNoPictureHoldsFromWhatWasNotReconstructed) {
+  Facing facing(1, 1);
+  facing.buffers.alpha(9, 7) = 0;
+  facing.view.camera.world_from_cam.translation() << 5, 0, 0;
+  EXPECT_EQ(facing.judged(), Hole::Transparent);  // far away the ray is in its picture
+  facing.view.camera.world_from_cam.rotate(
+      Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY()));
+  EXPECT_EQ(facing.judged(), Hole::Outside);
+}
+
 TEST(AnnotateSupport, DoesNotTakeAFloaterForASurface) {
   // Three pixels that nobody saw, in front of a wall that everybody saw.
   Facing facing(1, 1);
   for (int x = 8; x <= 10; ++x) facing.buffers.median_depth(x, 7) = 0.6f;
-  EXPECT_EQ(facing.judged(), Hole::Unsupported);
+  EXPECT_EQ(facing.judged(), Hole::Occluded);
   EXPECT_EQ(facing.buffers.hole(12, 7), Hole::None);
 }
 
@@ -256,9 +267,9 @@ TEST(AnnotateSupport, CountsGuessesOfSeveralViewsAsOneView) {
 TEST(AnnotateSupport, FindsNoWitnessBehindOrBesideItsImage) {
   Facing facing(1, 1);
   facing.view.camera.world_from_cam.translation().z() = 2;
-  EXPECT_EQ(facing.judged(), Hole::Unsupported);
+  EXPECT_EQ(facing.judged(), Hole::Outside);
   facing.view.camera.world_from_cam.translation() << 5, 0, 0;
-  EXPECT_EQ(facing.judged(), Hole::Unsupported);
+  EXPECT_EQ(facing.judged(), Hole::Outside);
 }
 
 TEST(AnnotateSupport, RefusesSizesThatDisagreeAndOptionsOutOfRange) {

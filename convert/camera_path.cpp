@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/camera_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "io/cameras_json.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+const Camera& input_camera(const Model& model, size_t k) {
+  return model.scene.views[static_cast<size_t>(model.scene.input.at(k))].camera;
+}
+
+float median_depth(const DepthMap& depth) {
+  std::vector<float> known;
+  for (const float z : depth.data) {
+    if (std::isfinite(z)) known.push_back(z);
+  }
+  if (known.empty()) throw NumericalError("no depth is known that a path could look at");
+  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
+  std::nth_element(known.begin(), middle, known.end());
+  return *middle;
+}
+
+/// What the input views look at, and from where on the whole.
+struct Subject {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d eye = Eigen::Vector3d::Zero();
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+};
+
+Subject subject_of(const Model& model) {
+  Subject out;
+  const size_t count = model.scene.input.size();
+  Eigen::Vector3d image_up = Eigen::Vector3d::Zero();
+  for (size_t k = 0; k < count; ++k) {
+    const Camera& camera = input_camera(model, k);
+    const float z = median_depth(model.priors.at(k).depth);
+    out.centre += camera.unproject(0.5 * camera.width, 0.5 * camera.height, z) / double(count);
+    out.eye += camera.center() / double(count);
+    image_up -= camera.world_from_cam.linear().col(1);
+  }
+  out.up = model.scene.frame.up.isZero() ? image_up.normalized() : model.scene.frame.up;
+  return out;
+}
+
+Camera looking(Camera like,
+               const Eigen::Vector3d& from,
+               const Eigen::Vector3d& at,
+               const Eigen::Vector3d& up) {
+  const Eigen::Vector3d forward = (at - from).normalized();
+  Eigen::Vector3d right = forward.cross(up);
+  if (right.norm() < 1e-6) right = like.world_from_cam.linear().col(0);
+  right = (right - right.dot(forward) * forward).normalized();
+  Eigen::Matrix3d axes;
+  axes << right, forward.cross(right), forward;
+  like.world_from_cam.linear() = axes;
+  like.world_from_cam.translation() = from;
+  return like;
+}
+
+Camera on_spiral(const Model& model, const Subject& subject, double turn) {
+  const Camera middle = looking(input_camera(model, 0), subject.eye, subject.centre, subject.up);
+  const Eigen::Matrix3d axes = middle.world_from_cam.linear();
+  Eigen::Vector3d reach = Eigen::Vector3d::Zero();
+  for (size_t k = 0; k < model.scene.input.size(); ++k) {
+    const Eigen::Vector3d off = axes.transpose() * (input_camera(model, k).center() - subject.eye);
+    reach = reach.cwiseMax(off.cwiseAbs());
+  }
+  constexpr double kFlattest = 0.3;  // views often stand in a row, and a line is no spiral
+  const double widest = reach.head<2>().maxCoeff();
+  const Eigen::Vector3d off(std::max(reach.x(), kFlattest * widest) * std::cos(turn),
+                            std::max(reach.y(), kFlattest * widest) * std::sin(turn),
+                            kFlattest * widest * std::sin(2 * turn));
+  return looking(middle, subject.eye + axes * off, subject.centre, subject.up);
+}
+
+Camera on_orbit(const Model& model, const Subject& subject, double turn) {
+  const Eigen::AngleAxisd around(turn, subject.up.normalized());
+  const Eigen::Vector3d eye = subject.centre + around * (subject.eye - subject.centre);
+  return looking(input_camera(model, 0), eye, subject.centre, subject.up);
+}
+
+Camera between(const Model& model, double turn) {
+  const size_t last = model.scene.input.size() - 1;
+  const double place = 0.5 * (1 - std::cos(turn)) * double(last);
+  const size_t k = std::min(static_cast<size_t>(place), last > 0 ? last - 1 : 0);
+  const double part = place - double(k);
+  Camera out = input_camera(model, 0);
+  const Eigen::Isometry3d& a = input_camera(model, k).world_from_cam;
+  const Eigen::Isometry3d& b = input_camera(model, std::min(k + 1, last)).world_from_cam;
+  const Eigen::Quaterniond from(a.linear());
+  out.world_from_cam.linear() =
+      from.slerp(part, Eigen::Quaterniond(b.linear())).normalized().toRotationMatrix();
+  out.world_from_cam.translation() = (1 - part) * a.translation() + part * b.translation();
+  return out;
+}
+
+}  // namespace
+
+std::vector<Camera> camera_path(const Model& model, const std::string& name, int frames) {
+  require(frames >= 2, "a path must have at least 2 frames", frames);
+  const bool is_known = name == "between" || name == "spiral" || name == "orbit";
+  require(is_known, "a path must be between, spiral, orbit or a .json file of cameras", name);
+  require(!model.priors.empty(),
+          "a path is laid through the input views of a model of train or run; the number of these",
+          model.priors.size());
+  const Subject subject = name == "between" ? Subject() : subject_of(model);
+  std::vector<Camera> out;
+  for (int i = 0; i < frames; ++i) {
+    const double turn = 2 * std::numbers::pi * i / frames;
+    out.push_back(name == "between"  ? between(model, turn)
+                  : name == "spiral" ? on_spiral(model, subject, turn)
+                                     : on_orbit(model, subject, turn));
+  }
+  return out;
+}
+
+std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Model& model) {
+  const Scene path = read_cameras_json(file);
+  const bool states_frame = path.kind != kForeignCameras;
+  std::vector<Camera> out;
+  for (const View& view : path.views) {
+    Camera camera = view.camera;
+    const Eigen::Vector3d in_file =
+        states_frame ? path.frame.file_from_internal(camera.center()) : camera.center();
+    camera.world_from_cam.translation() = model.scene.frame.internal_from_file(in_file);
+    out.push_back(camera);
+  }
+  return out;
+}
+
+}  // namespace cgs
