@@ -305,7 +305,7 @@ Json run_stages(Run& run, Terminal& terminal) {
     const Json result = stage.work(run, terminal.begin(stage.title));
     run.record.finish(stage.name, terminal.end(""), result);
     if (!result.is_object() || !result.contains("warnings")) continue;
-    for (const Json& text : result["warnings"]) terminal.warn(text.get<std::string>());
+    terminal.warn(result["warnings"].get<std::vector<std::string>>());
   }
   forget_checkpoints(run.request.output / "model");
   run.record.note("focal", run.request.scene.focal);
@@ -325,7 +325,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   refuse_contradictions(request);
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   Scene& scene = opened.scene;
-  for (const std::string& warning : scene.warnings) terminal.warn(warning);
+  terminal.warn(scene.warnings);
   const bool chooses_voxels = request.voxel_size.empty();
   const MeasuredFiles measured = measured_files(request);
   const std::vector<StageMemory> plan = memory_plan(scene, chooses_voxels, measured);

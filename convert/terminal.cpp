@@ -28,7 +28,8 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 }  // namespace
 
-Terminal::Terminal(bool quiet) : quiet_(quiet), rewrites_(::isatty(STDERR_FILENO) == 1), start_() {}
+Terminal::Terminal(bool quiet, bool is_strict)
+    : quiet_(quiet), is_strict_(is_strict), rewrites_(::isatty(STDERR_FILENO) == 1), start_() {}
 
 Terminal Terminal::silent() {
   Terminal out(true);
@@ -72,12 +73,15 @@ void Terminal::say(const std::string& line) const {
   if (!quiet_) std::fprintf(stderr, "%s\n", one_line(line).c_str());
 }
 
-void Terminal::warn(const std::string& line) const {
-  if (!is_silent_) std::fprintf(stderr, "cgs: warning: %s\n", one_line(line).c_str());
-}
+void Terminal::warn(const std::string& line) const { warn(std::vector{line}); }
 
 void Terminal::warn(const std::vector<std::string>& lines) const {
-  for (const std::string& line : lines) warn(line);
+  for (const std::string& line : lines) {
+    if (!is_silent_) std::fprintf(stderr, "cgs: warning: %s\n", one_line(line).c_str());
+  }
+  if (!is_strict_ || lines.empty()) return;
+  constexpr int kBadInput = 3;
+  throw Error(kBadInput, "--strict: a warning counts as an error");
 }
 
 void catch_interrupts() {

@@ -16,7 +16,8 @@ inline constexpr const char* kProgramVersion = "cgs 0.1.0";
 /// finished stage elsewhere.
 class Terminal {
  public:
-  explicit Terminal(bool quiet);
+  /// \param is_strict  a warning, or all that come together, throws an Error with exit code 3
+  explicit Terminal(bool quiet, bool is_strict = false);
   /// One that says nothing, not even warnings: for work whose result nobody sees.
   static Terminal silent();
 
@@ -33,6 +34,7 @@ class Terminal {
 
  private:
   bool quiet_;
+  bool is_strict_;
   bool is_silent_ = false;
   bool rewrites_;
   std::string stage_;

@@ -26,6 +26,7 @@ void add_output_options(CLI::App& command, CommonOptions& options) {
       ->capture_default_str();
   command.add_flag("--json", options.json, "Print the report as JSON on standard output");
   command.add_flag("-q,--quiet", options.quiet, "No progress on standard error");
+  command.add_flag("--strict", options.strict, "A warning ends the command with exit code 3");
 }
 
 void add_scene_options(CLI::App& command, SceneOptions& options) {

@@ -18,6 +18,7 @@ struct CommonOptions {
   std::string memory_limit;  ///< "4G"; empty = 80 % of what is free.
   bool json = false;         ///< Report on standard output, as JSON.
   bool quiet = false;        ///< No progress on standard error.
+  bool strict = false;       ///< Warnings end the command.
 };
 
 /// Adds them to a command; limit_threads() must be called when the command runs.

@@ -122,7 +122,7 @@ void run_compare(const CompareArgs& args) {
   require(args.samples >= 100 && args.samples <= 100'000'000,
           "--samples must be in 100 ... 100000000",
           args.samples);
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   MeasurableFile first = read_measured(args.a, args.assume_unit);
   MeasurableFile second = read_measured(args.b, args.assume_unit);
   terminal.warn(first.warnings);
@@ -186,7 +186,10 @@ void add_compare(CLI::App& app) {
   auto* cmd = app.add_subcommand(
       "compare", "Signed distances of a mesh or point cloud to a mesh, and what really changed");
   cmd->add_option("a", args->a, "Mesh or point cloud: .ply, .obj, .stl, .off, .glb")->required();
-  cmd->add_option("b", args->b, "Mesh to measure from: reference, or the earlier date")->required();
+  cmd->add_option("b",
+                  args->b,
+                  "Mesh to measure from (with --m3c2 also a cloud): reference, or the earlier date")
+      ->required();
   cmd->add_option("--samples", args->samples, "Points on A, evenly by area (of a cloud: all)")
       ->capture_default_str();
   auto* icp = cmd->add_flag("--icp", args->icp, "Lay A onto B first, from where it is");
@@ -203,7 +206,7 @@ void add_compare(CLI::App& app) {
       "--assume-unit", args->assume_unit, "What a unit of a file is, where it does not say");
   add_output_options(*cmd, args->common);
   cmd->footer(
-      "Positive distances lie on the side that B's faces look to.\n"
+      "Positive distances lie on the side that B's faces look to; with --m3c2: that A's look to.\n"
       "Example: cgs compare 2026.ply 2024.ply --icp --unit mm --ply change.ply --threshold 5mm\n"
       "         cgs compare 2026.ply 2024.ply --m3c2 --cylinder 5cm --registration-error 2mm "
       "--ply change.ply");

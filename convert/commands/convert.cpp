@@ -37,7 +37,7 @@ void run_convert(const ConvertArgs& args) {
   if (!args.common.memory_limit.empty()) {
     request.volume.memory_limit = parse_bytes(args.common.memory_limit);
   }
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   const nlohmann::ordered_json report = convert_file(request, terminal);
   if (args.common.json) std::cout << json_text(report) << "\n";
 }

@@ -51,7 +51,7 @@ void print_table(const nlohmann::ordered_json& report) {
 
 void run_evaluate(const EvaluateArgs& args) {
   limit_threads(args.common.threads);
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   Model model = read_model(args.model);
   terminal.warn(model.scene.warnings);
   if (!args.scene.empty()) relink_images(model.scene, args.scene);

@@ -40,7 +40,7 @@ void run_filter_command(const FilterArgs& args) {
   require(is_writable_mesh_name(args.output),
           "the output must end in .ply, .obj, .stl, .3mf or .glb",
           printable(args.output.filename()));
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   (void)prepare_filters(args.operations, Frame{.metres_per_unit = 1});  // before a long read
   if (is_splat_ply(args.input)) {
     throw InvalidInput(printable(args.input) +

@@ -25,7 +25,7 @@ struct FuseArgs {
 void run_fuse(const FuseArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.model);
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   const size_t memory =
       args.common.memory_limit.empty() ? 0 : parse_bytes(args.common.memory_limit);
   const Model model = read_model(args.model);

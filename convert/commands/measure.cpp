@@ -96,7 +96,7 @@ class Measuring {
   Json figures = Json::object();
 
  private:
-  void require_inside();
+  void require_inside(const char* option);
   SurfacePoint pick(const std::string& text);
   Json point_json(const Eigen::Vector3d& internal) const {
     const Eigen::Vector3d p = mesh_.file_from_internal(internal);
@@ -291,22 +291,22 @@ void Measuring::orthophoto(const OrthophotoRequest& request) {
     const Json& share = out[provenance_key(label)];
     if (share.is_null() || share == 0) continue;
     std::snprintf(text, sizeof(text), "%.2f %%", 100 * share.get<double>());
-    say("", std::string(text) + " of the picture " + std::string(provenance_name(label)));
+    say("", std::string(text) + " of what is shown: " + std::string(provenance_name(label)));
   }
   for (const Json& file : out["files"]) say("", printable(file.get<std::string>()));
   figures["orthophoto"] = out;
 }
 
 // Inside out, gaps between parts would be taken for their thickness.
-void Measuring::require_inside() {
+void Measuring::require_inside(const char* option) {
   if (!certified().closed || certified().oriented_outward) return;
-  throw InvalidInput(
-      "--thickness needs to know what is inside, but faces of this closed mesh disagree on it or "
-      "all look inward; cgs filter --op repair turns them");
+  throw InvalidInput(std::string(option) +
+                     " needs to know what is inside, but faces of this closed mesh disagree on it "
+                     "or all look inward; cgs filter --op repair turns them");
 }
 
 void Measuring::thickness() {
-  require_inside();
+  require_inside("--thickness");
   constexpr size_t kSamples = 20'000;
   const ThicknessSummary summary = summarize_thickness(mesh_, surface(), kSamples);
   figures["thickness"] = thickness_json(summary, unit_);
@@ -323,7 +323,7 @@ void Measuring::thickness() {
 }
 
 void Measuring::thickness_at(const std::vector<std::string>& points) {
-  require_inside();
+  require_inside("--thickness-at");
   const ThicknessGauge gauge(mesh_, surface());
   Json all = Json::array();
   for (const std::string& text : points) {
@@ -347,7 +347,7 @@ void Measuring::thickness_at(const std::vector<std::string>& points) {
 }
 
 void Measuring::thickness_ply(const std::filesystem::path& path) {
-  require_inside();
+  require_inside("--thickness-ply");
   write_thickness_ply(path, mesh_, thickness_of_vertices(mesh_, surface()));
 }
 
@@ -358,7 +358,7 @@ void Measuring::certificate() {
 
 void run_measure(const MeasureArgs& args) {
   limit_threads(args.common.threads);
-  const Terminal terminal(args.common.quiet);
+  const Terminal terminal(args.common.quiet, args.common.strict);
   MeasurableFile file = read_measured(args.mesh, args.assume_unit);
   terminal.warn(file.warnings);
   if (file.content.mesh.faces.empty() && !args.bounds) {

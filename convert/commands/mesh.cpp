@@ -31,7 +31,7 @@ struct MeshArgs {
 
 void run_mesh_command(const MeshArgs& args) {
   limit_threads(args.common.threads);
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   VolumeFile file = read_volume(args.volume);
   settle_up(file.frame, args.up);
   const Progress progress = terminal.begin("mesh");

@@ -31,7 +31,7 @@ struct RenderArgs {
 void run_render(const RenderArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.model);
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   const Model model = read_model(args.model);
   terminal.warn(model.scene.warnings);
   if (!args.path.empty()) {

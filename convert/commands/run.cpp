@@ -62,7 +62,7 @@ void run_run(const RunArgs& args) {
   }
   if (!args.max_size.empty()) request.max_size = parse_file_size(args.max_size);
   if (!request.scene.assume_unit.empty()) (void)metres_in(request.scene.assume_unit);
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   const auto start = std::chrono::steady_clock::now();
   const double budget = args.budget.empty() ? 0 : parse_seconds(args.budget);
   if (budget > 0 && request.training.steps != training_preset("standard").steps) {

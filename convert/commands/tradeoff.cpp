@@ -47,7 +47,7 @@ void run_tradeoff(const TradeoffArgs& args) {
   if (!args.common.memory_limit.empty()) {
     request.memory_limit = parse_bytes(args.common.memory_limit);
   }
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   const CostMeter meter;
   const OpenedScene opened = open_scene(request.scene, request.output, terminal);
   const StageCost opening = meter.read();

@@ -28,7 +28,7 @@ void run_train(const TrainArgs& args) {
   keep_apart(args.output, args.scene.path);
   const ModelRequest request = {
       {}, training_options(args.training), args.output, args.scene.options.depth.network};
-  Terminal terminal(args.common.quiet);
+  Terminal terminal(args.common.quiet, args.common.strict);
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   opened.keep(args.output);
   Scene& scene = opened.scene;
@@ -41,7 +41,7 @@ void run_train(const TrainArgs& args) {
   TrainedModel trained =
       train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
-  for (size_t i = known; i < warnings.size(); ++i) terminal.warn(warnings[i]);
+  terminal.warn(std::vector(warnings.begin() + static_cast<std::ptrdiff_t>(known), warnings.end()));
   trained.model.scene.frame.up = up;  // else the model tells it by its cameras
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
