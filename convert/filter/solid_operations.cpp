@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include "convert/html.h"
 #include "libcgs/core/error.h"
 #include "meshing/boolean.h"
+#include "meshing/flat_base.h"
 #include "meshing/wrapping.h"
 
 namespace cgs {
@@ -102,6 +104,29 @@ FilterStep prepare_subtract(FilterArguments& arguments) {
   return boolean_step(arguments, "subtract", BooleanOperation::Difference);
 }
 
+FilterStep prepare_base(FilterArguments& arguments) {
+  const double thickness = arguments.length();
+  std::optional<Eigen::Vector3d> stated;
+  if (arguments.more()) stated = arguments.direction();
+  return [=](FilterState& state, const Progress& progress) {
+    require_faces(state, "base");
+    require_solid(state.mesh, "the mesh", "base");
+    report(progress, 0.2);
+    const Eigen::Vector3d front = stated.value_or(seen_side(state.mesh));
+    if (front.isZero()) {
+      throw InvalidInput(
+          "--op base: the file does not say which side was seen; state the way that "
+          "its front looks as X,Y,Z after the thickness");
+    }
+    FlatBase base = with_flat_base(state.mesh, front, thickness / state.frame.scale);
+    state.mesh = std::move(base.solid.mesh);
+    const Eigen::Vector3d n = front.normalized();
+    return percent(base.cut_off, 1) + " of the volume cut off behind; the front looks to " +
+           number(n.x(), "%.2f") + "," + number(n.y(), "%.2f") + "," + number(n.z(), "%.2f") +
+           cut_remark(base.solid.self_intersections);
+  };
+}
+
 }  // namespace
 
 std::vector<FilterOperation> solid_operations() {
@@ -110,6 +135,11 @@ std::vector<FilterOperation> solid_operations() {
            "Closed surface that a ball of radius ALPHA cannot get through",
            "wrap=2cm",
            prepare_wrap},
+          {"base",
+           "THICKNESS[,X,Y,Z]",
+           "Closed mesh cut flat THICKNESS behind what was seen, which looks to X,Y,Z",
+           "base=5mm",
+           prepare_base},
           {"union", "FILE", "What is in this solid or a second one", "union=b.ply", prepare_union},
           {"intersect",
            "FILE",
