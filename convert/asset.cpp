@@ -62,6 +62,7 @@ class AssetWriter {
         path_(request.output / "web/asset.glb"),
         y_up_(y_up_from(model.scene.frame.up)),
         summary_(content.summary),
+        encoding_(request.glb_encoding),
         side_(largest_side(content.mesh)) {
     if (!request.compression_error.empty()) {
       rounding_ = parse_length(request.compression_error, frame_);
@@ -107,12 +108,13 @@ class AssetWriter {
  private:
   GlbOptions glb_options(double rounding, const Json& summary) const {
     GlbOptions out;
+    out.encoding = encoding_;
     out.y_up = y_up_;
     out.max_error = rounding * frame_.scale;
     out.summary_json = summary.dump();
     // Finer than any grid of the encoder: floats as they are.
     constexpr double kFinestGrid = 1.0 / (1 << 20);
-    if (promise_ && rounding < kFinestGrid * side_) out.draco = false;
+    if (promise_ && rounding < kFinestGrid * side_) out.encoding = GlbEncoding::Plain;
     return out;
   }
 
@@ -143,6 +145,7 @@ class AssetWriter {
   std::filesystem::path path_;
   Eigen::Matrix3d y_up_;
   const Json& summary_;
+  GlbEncoding encoding_;
   double side_;
   double rounding_ = 0;            ///< [internal units]; 0 = default of the format
   std::optional<double> promise_;  ///< [internal units]

@@ -208,6 +208,7 @@ void write_mesh(const ConversionRequest& request,
                 const TriangleMesh& mesh,
                 const Json& report) {
   GlbOptions options;
+  options.encoding = request.encoding;
   if (!request.compression_error.empty()) {
     options.max_error = parse_length(request.compression_error, source.frame) * source.frame.scale;
   }

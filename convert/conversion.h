@@ -9,6 +9,7 @@
 
 #include "convert/splat_volume.h"
 #include "convert/terminal.h"
+#include "io/gltf.h"
 #include "io/splat_doctor.h"
 
 namespace cgs {
@@ -21,8 +22,9 @@ struct ConversionRequest {
   bool open_surface = false;  ///< Leave meshes open where nothing was seen.
   std::string simplify;  ///< Largest error; "0" = none; empty = a quarter of a voxel for meshes
                          ///< from volumes, none for meshes and for splats without cameras.
-  std::string compression_error;  ///< Of a .glb; empty = 1/16384 of its size.
-  std::string assume_unit;        ///< Unit of one scene unit where the input does not say.
+  std::string compression_error;              ///< Of a .glb; empty = 1/16384 of its size.
+  GlbEncoding encoding = GlbEncoding::Draco;  ///< Of a .glb with a mesh.
+  std::string assume_unit;  ///< Unit of one scene unit where the input does not say.
   std::vector<double>
       up;  ///< World direction; empty = of the input, else +z for meshes, -y as 3DGS files lie.
   int spz_version = 3;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 
@@ -12,6 +13,7 @@
 #include "io/mesh_ply.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
+#include "meshing/kd_tree.h"
 #include "meshing/point_normals.h"
 
 namespace cgs {
@@ -19,6 +21,19 @@ namespace cgs {
 using Json = nlohmann::ordered_json;
 
 namespace {
+
+// "0", or 0 of any unit: other lengths must be positive, but an error may be none.
+// \throws InvalidInput for an unknown unit
+bool is_none(const std::string& length) {
+  const char* const last = length.data() + length.size();
+  double value = 0;
+  const auto [end, error] = std::from_chars(length.data(), last, value);
+  if (error != std::errc() || value != 0) return false;
+  std::string unit(end, last);
+  unit.erase(0, unit.find_first_not_of(' '));
+  if (!unit.empty()) (void)metres_in(unit);
+  return true;
+}
 
 M3c2Options options_of(const M3c2Request& request,
                        const ComparedPoints& a,
@@ -28,18 +43,23 @@ M3c2Options options_of(const M3c2Request& request,
                                                          : parse_length(request.cylinder, frame));
   if (!request.normal_scale.empty()) out.normal_scale = parse_length(request.normal_scale, frame);
   if (!request.depth.empty()) out.depth = parse_length(request.depth, frame);
-  if (!request.registration.empty() && request.registration != "0") {
+  if (!request.registration.empty() && !is_none(request.registration)) {
     out.registration = parse_length(request.registration, frame);
   }
   return out;
 }
 
 // Which side of every vertex is outside.
-// \param is_known  false where that of the topmost vertex, which decides, is hardly more up than
-// down
-std::vector<Eigen::Vector3f> outward_of(const MeasurableMesh& mesh, bool& is_known) {
-  if (!mesh.mesh.faces.empty()) return vertex_normals(mesh.mesh);
-  if (!mesh.mesh.normals.empty()) return mesh.mesh.normals;
+struct Outward {
+  std::vector<Eigen::Vector3f> directions;
+  std::vector<uint8_t> is_known;  // 0 where it may as well be the other side
+};
+
+bool is_stated(const Eigen::Vector3f& direction) { return !direction.isZero(0); }
+
+// Neighbours agree, and the topmost vertex of every part looks up; nobody knows where that is
+// hardly more up than down.
+Outward estimated_outward(const MeasurableMesh& mesh) {
   constexpr size_t kNeighbors = 12;
   constexpr float kSteep = 0.5f;  // a normal less upright than 30 degrees
   const Eigen::Matrix3f z_up =
@@ -48,20 +68,75 @@ std::vector<Eigen::Vector3f> outward_of(const MeasurableMesh& mesh, bool& is_kno
   std::vector<Eigen::Vector3f> upright;
   upright.reserve(mesh.mesh.vertices.size());
   for (const Eigen::Vector3f& p : mesh.mesh.vertices) upright.emplace_back(z_up * p);
-  std::vector<Eigen::Vector3f> out = estimated_normals(upright, kNeighbors);
-  turn_consistently(out, upright, kNeighbors);
-  const auto top = std::max_element(
-      upright.begin(), upright.end(), [](const auto& p, const auto& q) { return p.z() < q.z(); });
-  is_known = out[static_cast<size_t>(top - upright.begin())].z() >= kSteep;
-  for (Eigen::Vector3f& n : out) n = z_up.transpose() * n;
+  Outward out;
+  out.directions = estimated_normals(upright, kNeighbors);
+  for (const uint32_t start : turn_consistently(out.directions, upright, kNeighbors)) {
+    out.is_known.push_back(out.directions[start].z() >= kSteep ? 1 : 0);
+  }
+  for (Eigen::Vector3f& n : out.directions) n = z_up.transpose() * n;
   return out;
 }
 
-bool all_state_sigma(const ComparedPoints& points) {
-  return std::all_of(points.sigma.begin(), points.sigma.end(), [&](const double& s) {
-    const auto i = static_cast<size_t>(&s - points.sigma.data());
-    return points.observed[i] == 0 || std::isfinite(s);
-  });
+// Vertices without a direction take that of the nearest one with.
+void fill_from_nearest(std::vector<Eigen::Vector3f>& directions,
+                       const std::vector<Eigen::Vector3f>& places) {
+  std::vector<Eigen::Vector3f> known;
+  std::vector<Eigen::Vector3f> known_places;
+  for (size_t i = 0; i < directions.size(); ++i) {
+    if (!is_stated(directions[i])) continue;
+    known.push_back(directions[i]);
+    known_places.push_back(places[i]);
+  }
+  if (known.empty() || known.size() == directions.size()) return;
+  const KdTree tree(known_places);
+  std::vector<Neighbor> found;
+  for (size_t i = 0; i < directions.size(); ++i) {
+    if (is_stated(directions[i])) continue;
+    tree.nearest(places[i], 1, found);
+    directions[i] = known[found.front().point];
+  }
+}
+
+Outward outward_of(const MeasurableMesh& mesh) {
+  Outward out;
+  out.directions = mesh.mesh.faces.empty() ? mesh.mesh.normals : vertex_normals(mesh.mesh);
+  out.is_known.assign(out.directions.size(), 1);
+  // Some programs write normals that are all 0.
+  if (std::none_of(out.directions.begin(), out.directions.end(), is_stated)) {
+    out = estimated_outward(mesh);
+  }
+  fill_from_nearest(out.directions, mesh.mesh.vertices);
+  return out;
+}
+
+// What the variance comes from of the means of one side, whose columns have so many points.
+std::string variance_source(const std::vector<M3c2Place>& places,
+                            uint32_t M3c2Place::*count,
+                            uint32_t M3c2Place::*stated) {
+  bool all = true;
+  bool none = true;
+  for (const M3c2Place& place : places) {
+    if (!std::isfinite(place.distance)) continue;
+    all = all && place.*stated == place.*count;
+    none = none && place.*stated == 0;
+  }
+  return all ? "sigma" : none ? "roughness" : "mixed";
+}
+
+[[noreturn]] void refuse_without_distance(const M3c2Comparison& found, const Frame& frame) {
+  const bool has_normals = std::any_of(found.places.begin(),
+                                       found.places.end(),
+                                       [](const M3c2Place& p) { return is_stated(p.normal); });
+  if (!has_normals) {
+    throw InvalidInput("no point of A has four seen points within " +
+                       format_length(0.5 * found.options.normal_scale, frame) +
+                       " that are not on a line: --normal-scale or --cylinder must be larger");
+  }
+  throw InvalidInput(
+      "no point of A has points of B in its cylinder, " +
+      format_length(found.options.cylinder, frame) + " wide and " +
+      format_length(found.options.depth, frame) +
+      " to either side: are both in the same place and unit? --cylinder-depth reaches farther");
 }
 
 std::vector<double> known_detections(const M3c2Comparison& found) {
@@ -98,10 +173,9 @@ M3c2Comparison compare_m3c2(const M3c2Request& request,
   const ComparedPoints points_b = points_by_vertex(b);
   M3c2Comparison out;
   out.options = options_of(request, points_a, points_b, a.frame);
-  out.sigma_a = all_state_sigma(points_a);
-  out.sigma_b = all_state_sigma(points_b);
-  out.places =
-      m3c2(points_a.places, outward_of(a, out.is_side_known), points_a, points_b, out.options);
+  const Outward outward = outward_of(a);
+  out.places = m3c2(points_a.places, outward.directions, points_a, points_b, out.options);
+  size_t unknown_signs = 0;
   constexpr double kOf95Percent = 1.96;
   for (size_t i = 0; i < out.places.size(); ++i) {
     M3c2Place& place = out.places[i];
@@ -112,14 +186,13 @@ M3c2Comparison compare_m3c2(const M3c2Request& request,
     }
     out.comparison.by_area.push_back(
         {place.distance, place.detection / kOf95Percent, place.change});
+    if (outward.is_known[i] == 0) ++unknown_signs;
   }
-  if (out.comparison.by_area.empty()) {
-    throw InvalidInput(
-        "no point of A has points of B in its cylinder, " +
-        format_length(out.options.cylinder, a.frame) + " wide and " +
-        format_length(out.options.depth, a.frame) +
-        " to either side: are both in the same place and unit? --cylinder-depth reaches farther");
-  }
+  if (out.comparison.by_area.empty()) refuse_without_distance(out, a.frame);
+  out.unknown_signs =
+      static_cast<double>(unknown_signs) / static_cast<double>(out.comparison.by_area.size());
+  out.variance_a = variance_source(out.places, &M3c2Place::count_a, &M3c2Place::stated_a);
+  out.variance_b = variance_source(out.places, &M3c2Place::count_b, &M3c2Place::stated_b);
   out.comparison.summary = summarize(out.comparison.by_area);
   out.comparison.half_range = range_of(out.comparison.by_area);
   out.comparison.change_rule = "beyond the level of detection (95 %)";
@@ -131,14 +204,13 @@ Json m3c2_json(const M3c2Comparison& found, const MeasurableMesh& a, const Figur
   Json out = comparison_json(found.comparison, a, unit);
   const std::vector<double> detections = known_detections(found);
   const auto all = static_cast<double>(std::max<size_t>(1, found.places.size()));
-  const auto variance = [](bool by_sigma) { return by_sigma ? "sigma" : "roughness"; };
   out["m3c2"] = {{"normal_scale", found.options.normal_scale * unit.length},
                  {"cylinder", found.options.cylinder * unit.length},
                  {"cylinder_depth", found.options.depth * unit.length},
                  {"registration_error", found.options.registration * unit.length},
-                 {"variance_a", variance(found.sigma_a)},
-                 {"variance_b", variance(found.sigma_b)},
-                 {"sign_known", found.is_side_known},
+                 {"variance_a", found.variance_a},
+                 {"variance_b", found.variance_b},
+                 {"sign_known", found.is_sign_known()},
                  {"places", found.places.size()},
                  {"with_distance", static_cast<double>(found.comparison.by_area.size()) / all},
                  {"with_detection", static_cast<double>(detections.size()) / all},
@@ -150,6 +222,9 @@ Json m3c2_json(const M3c2Comparison& found, const MeasurableMesh& a, const Figur
 
 std::string m3c2_text(const M3c2Comparison& found, const FigureUnit& unit) {
   const std::vector<double> detections = known_detections(found);
+  const auto words = [](const std::string& source) {
+    return source == "mixed" ? std::string("sigma or roughness") : source;
+  };
   std::array<char, 500> text{};
   std::string out = "level of detection (95 %): none\n";
   if (!detections.empty()) {
@@ -160,8 +235,8 @@ std::string m3c2_text(const M3c2Comparison& found, const FigureUnit& unit) {
                   at_share(detections, 0.5) * unit.length,
                   unit.name.c_str(),
                   at_share(detections, 0.95) * unit.length,
-                  found.sigma_a ? "sigma" : "roughness",
-                  found.sigma_b ? "sigma" : "roughness",
+                  words(found.variance_a).c_str(),
+                  words(found.variance_b).c_str(),
                   found.options.registration * unit.length);
     out = text.data();
   }
@@ -177,8 +252,14 @@ std::string m3c2_text(const M3c2Comparison& found, const FigureUnit& unit) {
                     static_cast<double>(std::max<size_t>(1, found.places.size())),
                 found.places.size());
   out += text.data();
-  if (!found.is_side_known) {
-    out += "the SIGN of all distances is not known: A is a steep cloud without faces and normals\n";
+  if (!found.is_sign_known()) {
+    std::snprintf(
+        text.data(),
+        text.size(),
+        "the SIGN of %.3g %% of the distances is not known: A, or parts of it, is a steep "
+        "cloud without faces and normals\n",
+        100 * found.unknown_signs);
+    out += text.data();
   }
   return out;
 }

@@ -24,25 +24,33 @@ struct M3c2Request {
 /// What was found at the vertices of A.
 struct M3c2Comparison {
   M3c2Options options;
-  bool sigma_a = false;  ///< All points of A state what they are worth: no roughness was needed.
-  bool sigma_b = false;
+  /// What the variances of the means of a side come from: "sigma", "roughness", or "mixed" where
+  /// some of its points state a sigma and some do not.
+  std::string variance_a;
+  std::string variance_b;
   std::vector<M3c2Place> places;  ///< Of A's vertices, in their order.
   Comparison comparison;          ///< Of the places with a distance.
-  bool is_side_known = true;      ///< Else all distances may have the other sign.
+  double unknown_signs = 0;       ///< Share of the distances that may have the other sign.
+
+  bool is_sign_known() const {
+    constexpr double kNegligible = 0.01;
+    return unknown_signs <= kNegligible;
+  }
 };
 
 /// Compares the vertices of A with those of B, faces aside: every vertex of a reconstruction is a
 /// measurement, points between them are not. Faces, or normals that a cloud states, say which side
-/// is outside; else neighbours agree with each other and the topmost point, by the up of A's frame
-/// (+z where it is not known), looks up.
+/// is outside (where these are 0: the nearest that are not); else neighbours agree with each other,
+/// and of every part that hangs together the topmost point, by the up of A's frame (+z where it is
+/// not known), looks up: where that is steep, the sign is not known.
 /// \throws InvalidInput for a length that cannot be, clouds without seen points, or where no point
-///         of A has points of B in its cylinder
+///         of A has a normal, or points of B in its cylinder
 M3c2Comparison compare_m3c2(const M3c2Request& request,
                             const MeasurableMesh& a,
                             const MeasurableMesh& b);
 
 /// comparison_json() and "m3c2": {"normal_scale", "cylinder", "cylinder_depth",
-/// "registration_error", "sign_known", "variance_a": "sigma" or "roughness", "variance_b",
+/// "registration_error", "sign_known", "variance_a": "sigma", "roughness" or "mixed", "variance_b",
 /// "places", "with_distance": share, "with_detection": share, "detection": {"median", "p95"}}
 nlohmann::ordered_json m3c2_json(const M3c2Comparison& found,
                                  const MeasurableMesh& a,

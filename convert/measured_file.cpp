@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/conversion.h"
 #include "convert/stated_frame.h"
 #include "io/byte_reader.h"
 #include "libcgs/core/error.h"
@@ -36,6 +37,10 @@ std::string vector_text(const Eigen::Vector3d& v) {
 MeasurableFile read_measured(const std::filesystem::path& path,
                              const std::string& assume_unit,
                              const std::optional<Frame>& frame) {
+  if (is_splat_ply(path)) {
+    throw InvalidInput(printable(path) +
+                       " holds splats, not a mesh or points; cgs convert makes a mesh of them");
+  }
   MeasurableFile out = read_mesh_file(path, frame);
   if (assume_unit.empty()) return out;
   const std::string refused = cgs::assume_unit(out.content.frame, assume_unit);

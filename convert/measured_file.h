@@ -15,7 +15,8 @@
 namespace cgs {
 
 /// Reads a mesh to measure; where it does not state a unit, `assume_unit` (if any) is taken.
-/// \throws BadInput; InvalidInput for an unknown unit
+/// \throws BadInput; InvalidInput for splats, which are neither a mesh nor points on a surface, or
+///         an unknown unit
 MeasurableFile read_measured(const std::filesystem::path& path,
                              const std::string& assume_unit,
                              const std::optional<Frame>& frame = {});

@@ -12,6 +12,7 @@
 
 #include "convert/length.h"
 #include "convert/measured_file.h"
+#include "convert/memory_plan.h"
 #include "convert/stated_frame.h"
 #include "io/atomic_file.h"
 #include "io/mesh_arrays.h"
@@ -28,6 +29,10 @@ namespace {
 
 constexpr double kMostPixels = 1e8;
 constexpr double kLongestSide = 30'000;  // [pixels]
+// At most while the picture of the labels is encoded: heights as seen (8) and as written (4),
+// labels (1), what is shown (1), the encoded colours (4), and the colours of the labels (12), as
+// bytes (4) and encoded (4); and a tenth more.
+constexpr double kBytesOfPixel = 42;
 
 /// A picture's place in the world.
 struct Placed {
@@ -102,6 +107,15 @@ void check_size(double width, double height, const std::string& pixel_size) {
                    " x " + number_text(height) +
                    " pixels; at most 30000 on a side and 100 million "
                    "in all are written");
+}
+
+void check_memory(const PictureGrid& grid, size_t budget) {
+  const double needed = kBytesOfPixel * grid.width * grid.height;
+  if (needed <= static_cast<double>(budget)) return;
+  throw LimitError("a picture of " + std::to_string(grid.width) + " x " +
+                   std::to_string(grid.height) + " pixels needs about " +
+                   format_file_size(static_cast<size_t>(needed)) + " of memory and " +
+                   format_file_size(budget) + " may be used; a larger --pixel-size makes it fit");
 }
 
 Placed place(const OrthophotoRequest& request,
@@ -225,16 +239,21 @@ Json shares_json(const Orthophoto& photo, size_t covered, bool states_provenance
 
 Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-// Colour and label pictures, heights, and their world files; names as they lie in the folder.
+// Colour and label pictures, heights, and their world files; names as they lie in the folder. What
+// may run out of memory comes before the first file is there, so that none is left alone: heights
+// go first, as they are encoded while they are written. The photo's colours are gone afterwards.
 Json write_files(const std::filesystem::path& prefix,
-                 const Orthophoto& photo,
+                 Orthophoto& photo,
                  const MaskMap& shown,
                  const Raster<float>& heights,
                  const std::string& world) {
   if (prefix.has_parent_path()) make_output_folder(prefix.parent_path());
-  write_file(with_ending(prefix, ".png"), encode_png(photo.color, shown));
-  write_file(with_ending(prefix, ".provenance.png"), encode_png(label_picture(photo), shown));
+  const std::string colors = encode_png(photo.color, shown);
+  photo.color = ColorImage();  // the largest part of a photo
+  const std::string labels = encode_png(label_picture(photo), shown);
   write_tiff(with_ending(prefix, ".tif"), heights);
+  write_file(with_ending(prefix, ".png"), colors);
+  write_file(with_ending(prefix, ".provenance.png"), labels);
   Json out = {
       prefix.string() + ".png", prefix.string() + ".provenance.png", prefix.string() + ".tif"};
   for (const char* ending : {".pgw", ".provenance.pgw", ".tfw"}) {
@@ -248,13 +267,15 @@ Json write_files(const std::filesystem::path& prefix,
 
 Json write_orthophoto(const OrthophotoRequest& request,
                       const MeasurableMesh& mesh,
-                      const FigureUnit& unit) {
+                      const FigureUnit& unit,
+                      size_t memory_limit) {
   require(request.prefix.has_filename(),
           "--orthophoto must name files in a folder, as plans/facade",
           request.prefix.string());
   const PictureAxes axes = axes_of(request, mesh);
   const Placed placed = place(request, mesh, axes, unit);
-  const Orthophoto photo = orthophoto(mesh, placed.grid);
+  check_memory(placed.grid, memory_budget(memory_limit));
+  Orthophoto photo = orthophoto(mesh, placed.grid);
   MaskMap shown(placed.grid.width, placed.grid.height, 0);
   std::transform(
       photo.height.data.begin(), photo.height.data.end(), shown.data.begin(), [](double h) {

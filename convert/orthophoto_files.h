@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -34,9 +35,12 @@ struct OrthophotoRequest {
 ///         "corner": of the top left pixel, "height_zero": what is to be added to the heights in
 ///         the file (0 unless floats would lose digits), "lowest", "highest", "covered": share of
 ///         the pixels, and per label the share of the covered ones; null where not stated}
-/// \throws InvalidInput for a side or plane that cannot be, or too many pixels; IoError
+/// \param memory_limit  that the picture may use [bytes]; 0 = 80 % of what is free
+/// \throws InvalidInput for a side or plane that cannot be; LimitError for too many pixels, or more
+///         than the memory holds; IoError
 nlohmann::ordered_json write_orthophoto(const OrthophotoRequest& request,
                                         const MeasurableMesh& mesh,
-                                        const FigureUnit& unit);
+                                        const FigureUnit& unit,
+                                        size_t memory_limit = 0);
 
 }  // namespace cgs

@@ -197,6 +197,7 @@ const std::map<std::string, std::string>& decided_stages() {
                                                              {"simplify", "mesh"},
                                                              {"max_error", "mesh"},
                                                              {"compression_error", "web"},
+                                                             {"glb_encoding", "web"},
                                                              {"max_size", "web"}};
   return kStages;
 }

@@ -114,7 +114,10 @@ Json request_json(const RunRequest& request, const Scene& scene) {
   if (!control.file.empty()) {
     out["control_points"] = {{"table", file_hash(control.file)}, {"unit", control.unit}};
   }
-  // Only where it decides something: folders of runs without depth go on as before.
+  // Only where they decide something: folders of runs without them go on as before.
+  if (request.glb_encoding != GlbEncoding::Draco) {
+    out["glb_encoding"] = request.glb_encoding == GlbEncoding::Plain ? "plain" : "quantized";
+  }
   const bool has_depth = std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
     return !scene.views[static_cast<size_t>(i)].depth_path.empty();
   });

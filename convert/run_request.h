@@ -9,6 +9,7 @@
 
 #include "convert/memory_plan.h"
 #include "convert/scene_request.h"
+#include "io/gltf.h"
 #include "libcgs/train/training_options.h"
 
 namespace cgs {
@@ -21,10 +22,11 @@ struct RunRequest {
   std::string voxel_size;         ///< Empty = from the pixel footprint.
   std::string simplify;           ///< Largest error of simplification; empty = default, "0" = none.
   std::string compression_error;  ///< Of the compressed mesh; empty = 1/16384 of its size.
-  std::string max_error;          ///< Promise: how far the written meshes lie from the fused
-                                  ///< surface at most; empty = none.
-  size_t max_size = 0;            ///< Promise: largest asset.glb [bytes]; 0 = any.
-  size_t memory_limit = 0;        ///< [bytes]; 0 = 80 % of what is free.
+  GlbEncoding glb_encoding = GlbEncoding::Draco;  ///< Of asset.glb.
+  std::string max_error;    ///< Promise: how far the written meshes lie from the fused
+                            ///< surface at most; empty = none.
+  size_t max_size = 0;      ///< Promise: largest asset.glb [bytes]; 0 = any.
+  size_t memory_limit = 0;  ///< [bytes]; 0 = 80 % of what is free.
   bool overwrite = false;
   std::string settings_reason;  ///< Why size and training are these, for the report; may be empty.
 };

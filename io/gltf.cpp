@@ -20,6 +20,7 @@
 #include "io/atomic_file.h"
 #include "io/draco_codec.h"
 #include "io/glb_primitive.h"
+#include "io/glb_quantized.h"
 #include "io/mesh_arrays.h"
 #include "io/texture_images.h"
 #include "libcgs/core/error.h"
@@ -29,6 +30,7 @@ namespace cgs {
 namespace {
 
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
+constexpr const char* kQuantization = "KHR_mesh_quantization";
 constexpr const char* kUnlit = "KHR_materials_unlit";
 
 tinygltf::Value value_of(const nlohmann::json& json) {
@@ -169,17 +171,36 @@ class GlbBuilder {
     if (!in.colors.empty()) {
       out.attributes["COLOR_0"] = accessor(in.colors.size(), TINYGLTF_TYPE_VEC3, view(in.colors));
     }
-    if (!in.support.empty()) {
-      out.attributes["_SUPPORT"] =
-          accessor(in.support.size(), TINYGLTF_TYPE_SCALAR, view(in.support));
+    add_evidence_and_faces(in, std::move(out));
+  }
+
+  void add_quantized(const GlbPrimitive& in,
+                     const QuantizedPrimitive& stored,
+                     const QuantizedGrid& grid) {
+    model_.nodes[0].translation = {grid.origin.x(), grid.origin.y(), grid.origin.z()};
+    model_.nodes[0].scale = {grid.step, grid.step, grid.step};
+    use_extension(kQuantization);
+    model_.extensionsRequired = {kQuantization};
+    tinygltf::Primitive out = empty_primitive(in);
+    out.attributes["POSITION"] = short_accessor(stored.positions, TINYGLTF_TYPE_VEC3, false);
+    Eigen::Vector3f low = Eigen::Vector3f::Constant(65535);
+    Eigen::Vector3f high = Eigen::Vector3f::Zero();
+    for (const auto& p : stored.positions) {
+      const Eigen::Vector3f whole(p[0], p[1], p[2]);
+      low = low.cwiseMin(whole);
+      high = high.cwiseMax(whole);
     }
-    if (!in.sigma.empty()) {
-      out.attributes["_SIGMA"] = accessor(in.sigma.size(), TINYGLTF_TYPE_SCALAR, view(in.sigma));
+    set_bounds(out.attributes["POSITION"], low, high);
+    const int normals = accessor(in.normals.size(), TINYGLTF_TYPE_VEC3, view(stored.normals));
+    set_stored_type(normals, TINYGLTF_COMPONENT_TYPE_BYTE, true, sizeof(stored.normals[0]));
+    out.attributes["NORMAL"] = normals;
+    if (!in.texcoords.empty()) {
+      out.attributes["TEXCOORD_0"] = short_accessor(stored.texcoords, TINYGLTF_TYPE_VEC2, true);
     }
-    const int indices = view(in.faces, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
-    out.indices = accessor(in.faces.size() * 3, TINYGLTF_TYPE_SCALAR, indices);
-    model_.accessors.back().componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
-    model_.meshes[0].primitives.push_back(std::move(out));
+    if (!in.colors.empty()) {
+      out.attributes["COLOR_0"] = short_accessor(stored.colors, TINYGLTF_TYPE_VEC4, true);
+    }
+    add_evidence_and_faces(in, std::move(out));
   }
 
   void add_compressed(const GlbPrimitive& in, const DracoPrimitive& draco) {
@@ -215,6 +236,34 @@ class GlbBuilder {
   }
 
  private:
+  void add_evidence_and_faces(const GlbPrimitive& in, tinygltf::Primitive out) {
+    if (!in.support.empty()) {
+      out.attributes["_SUPPORT"] =
+          accessor(in.support.size(), TINYGLTF_TYPE_SCALAR, view(in.support));
+    }
+    if (!in.sigma.empty()) {
+      out.attributes["_SIGMA"] = accessor(in.sigma.size(), TINYGLTF_TYPE_SCALAR, view(in.sigma));
+    }
+    const int indices = view(in.faces, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
+    out.indices = accessor(in.faces.size() * 3, TINYGLTF_TYPE_SCALAR, indices);
+    model_.accessors.back().componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+    model_.meshes[0].primitives.push_back(std::move(out));
+  }
+
+  template <typename T>
+  int short_accessor(const std::vector<T>& values, int type, bool is_normalized) {
+    const int out = accessor(values.size(), type, view(values));
+    set_stored_type(out, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, is_normalized, sizeof(T));
+    return out;
+  }
+
+  void set_stored_type(int number, int component, bool is_normalized, size_t stride) {
+    tinygltf::Accessor& out = model_.accessors[static_cast<size_t>(number)];
+    out.componentType = component;
+    out.normalized = is_normalized;
+    model_.bufferViews[static_cast<size_t>(out.bufferView)].byteStride = stride;
+  }
+
   tinygltf::Primitive empty_primitive(const GlbPrimitive& in) {
     tinygltf::Primitive out;
     out.mode = TINYGLTF_MODE_TRIANGLES;
@@ -383,32 +432,46 @@ GlbReport write_glb(const std::filesystem::path& path,
   builder.set_extras(extras_for(mesh, frame, placement, options));
   builder.add_photographs(texture, images);
   for (const TextureImage& image : images) report.texture_bytes += image.jpeg.size();
-  const bool draco = options.draco && extent_of(primitives) >= kSmallestDracoExtent;
+  const bool too_small = extent_of(primitives) < kSmallestDracoExtent;
+  const GlbEncoding encoding =
+      options.encoding == GlbEncoding::Draco && too_small ? GlbEncoding::Plain : options.encoding;
+  const bool draco = encoding == GlbEncoding::Draco;
   const DracoGrid grid = draco ? grid_for(primitives, max_error) : DracoGrid{};
+  const QuantizedGrid whole = QuantizedGrid::around(box_of(primitives));
   double worst = 0;
   for (const GlbPrimitive& primitive : primitives) {
     report.triangles += primitive.faces.size();
     if (!primitive.texcoords.empty()) report.textured_triangles += primitive.faces.size();
-    if (!draco) {
-      report.vertices += primitive.positions.size();
+    double texture_error = 0;
+    size_t vertices = primitive.positions.size();
+    if (draco) {
+      const DracoPrimitive compressed = draco_compress(primitive, grid, options.speed);
+      builder.add_compressed(primitive, compressed);
+      vertices = compressed.vertices;
+      worst = std::max(worst, compressed.max_error);
+      texture_error = compressed.max_texture_error;
+    } else if (encoding == GlbEncoding::Quantized) {
+      const QuantizedPrimitive stored = quantized(primitive, whole);
+      builder.add_quantized(primitive, stored, whole);
+      worst = std::max(worst, stored.max_error);
+      texture_error = stored.max_texture_error;
+    } else {
       builder.add_plain(primitive);
-      continue;
     }
-    const DracoPrimitive compressed = draco_compress(primitive, grid, options.speed);
-    report.vertices += compressed.vertices;
-    worst = std::max(worst, compressed.max_error);
-    report.measured_texture_error =
-        std::max(report.measured_texture_error, compressed.max_texture_error);
-    builder.add_compressed(primitive, compressed);
+    report.vertices += vertices;
+    report.measured_texture_error = std::max(report.measured_texture_error, texture_error);
   }
   // Half a rounding error of float coordinates is not the compression's.
   const double slack = 1e-6 * double{grid.range};
   if (max_error > 0 && worst > max_error + slack) {
-    throw NumericalError("write_glb: compression moved a vertex by " + std::to_string(worst));
+    throw NumericalError("write_glb: compression moves a vertex by " +
+                         std::to_string(worst / world_scale) + ", allowed are " +
+                         std::to_string(options.max_error) +
+                         "; another encoding or a larger error may do");
   }
   report.primitives = primitives.size();
   report.dropped_triangles = mesh.faces.size() - report.triangles;
-  report.position_bits = draco ? grid.bits : 0;
+  report.position_bits = draco ? grid.bits : encoding == GlbEncoding::Quantized ? 16 : 0;
   report.measured_max_error = worst / world_scale;
   const std::string bytes = builder.bytes();
   report.bytes = bytes.size();

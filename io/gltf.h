@@ -13,12 +13,21 @@
 
 namespace cgs {
 
+/// How vertices and faces are stored in a binary glTF file.
+enum class GlbEncoding {
+  Plain,      ///< Floats; every reader takes them.
+  Quantized,  ///< KHR_mesh_quantization: whole numbers of 16 bits, half the size; readers need no
+              ///< decoder.
+  Draco       ///< KHR_draco_mesh_compression: a tenth of the size.
+};
+
 /// How a mesh becomes a binary glTF file.
 struct GlbOptions {
-  bool draco = true;     ///< Compress with KHR_draco_mesh_compression; meshes smaller than 1e-6
-                         ///< [units of the file] are not, as Draco cannot hold them.
-  double max_error = 0;  ///< Largest move of a vertex by compression [world units];
-                         ///< 0 = extent / 2^14, else > extent / 2^21.
+  GlbEncoding encoding = GlbEncoding::Draco;  ///< Meshes smaller than 1e-6 [units of the file] are
+                                              ///< stored plain where Draco is asked for, which
+                                              ///< cannot hold them.
+  double max_error = 0;  ///< Largest move of a vertex by Draco [world units]; 0 = extent / 2^14,
+                         ///< else > extent / 2^21. Quantized moves it by extent / 2^16 at most.
   int speed = 5;         ///< Of the encoder, 0 (smallest file) to 10 (fastest).
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
   int jpeg_quality = 90;                               ///< Of textures, 1 to 100.
@@ -35,7 +44,7 @@ struct GlbReport {
   size_t vertices = 0;    ///< Of all primitives; borders between them count twice.
   size_t triangles = 0;
   size_t dropped_triangles = 0;   ///< Without area: two corners at one place.
-  int position_bits = 0;          ///< Per coordinate; 0 = not compressed.
+  int position_bits = 0;          ///< Per coordinate; 0 = floats.
   double measured_max_error = 0;  ///< Largest distance of a decoded vertex [world units].
   size_t textured_triangles = 0;
   size_t texture_bytes = 0;           ///< Of all images.
@@ -53,10 +62,11 @@ struct GlbReport {
 /// - NORMAL; COLOR_0 in linear light; _SUPPORT (number of views that see the vertex); _SIGMA
 ///   (standard deviation along the normal [units of the file]; negative = no statement).
 /// - With Draco (edgebreaker) all primitives share one quantisation grid, so that borders between
-///   them stay closed. The result is decoded again and compared with the input.
+///   them stay closed. The result is decoded again and compared with the input. Quantized, the
+///   node's translation and scale lead from the shared grid to the units of the file.
 ///
 /// \throws InvalidInput if options or mesh are not usable (an array does not fit, no face with an
-///         area, coordinates beyond 1e18); NumericalError if the decoded mesh differs from the
+///         area, coordinates beyond 1e18); NumericalError if the mesh as stored differs from the
 ///         input by more than max_error; LimitError above 4 GiB; IoError
 /// Source: glTF 2.0 and KHR_draco_mesh_compression, Khronos Group.
 GlbReport write_glb(const std::filesystem::path& path,

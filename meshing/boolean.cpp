@@ -8,9 +8,11 @@
 #include <vector>
 
 #include <CGAL/Polygon_mesh_processing/corefinement.h>
+#include <CGAL/Polygon_mesh_processing/orientation.h>
 
 #include "libcgs/core/error.h"
 #include "meshing/certificate.h"
+#include "meshing/components.h"
 #include "meshing/corner_shares.h"
 #include "meshing/nearest_surface.h"
 #include "meshing/polygon_mesh.h"
@@ -149,6 +151,15 @@ TriangleMesh with_claims(const Cut& cut, const TriangleMesh& both, size_t first_
   return out;
 }
 
+// Whether every other shell of those within each other is a cavity. Without this, what corefinement
+// gives is arbitrary.
+bool shells_alternate(const TriangleMesh& mesh) {
+  CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
+  // Without loose vertices: CGAL takes each for a part of a face.
+  const TriangleMesh used = with_faces(mesh, std::vector<uint8_t>(mesh.faces.size(), 1));
+  return pmp::does_bound_a_volume(polygon_mesh::from_triangles(used, "the mesh"));
+}
+
 }  // namespace
 
 std::string why_no_solid(const TriangleMesh& mesh) {
@@ -159,6 +170,9 @@ std::string why_no_solid(const TriangleMesh& mesh) {
   if (!facts.oriented_outward) return "has faces that disagree on what is outside";
   if (facts.self_intersections > 0) {
     return "cuts itself (" + std::to_string(facts.self_intersections) + " pairs of faces)";
+  }
+  if (facts.components > 1 && !shells_alternate(mesh)) {
+    return "has shells within shells that disagree on what is outside";
   }
   return {};
 }

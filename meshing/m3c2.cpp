@@ -46,6 +46,7 @@ struct Cloud {
 /// Points of one side within the cylinder, along its axis from the place.
 struct Column {
   uint32_t count = 0;
+  uint32_t stated = 0;  ///< Those that state a sigma.
   double mean = 0;
   double roughness = 0;
   double variance = kNone;  ///< Of the mean.
@@ -67,6 +68,8 @@ class Comparing {
     const Column in_b = column(b_, place, side * *normal);
     out.count_a = in_a.count;
     out.count_b = in_b.count;
+    out.stated_a = in_a.stated;
+    out.stated_b = in_b.stated;
     out.roughness_a = in_a.roughness;
     out.roughness_b = in_b.roughness;
     if (in_a.count == 0 || in_b.count == 0) return out;
@@ -105,10 +108,14 @@ class Comparing {
     const double radius = 0.5 * options_.cylinder;
     const int slices = std::max(1, static_cast<int>(std::ceil(options_.depth / radius)));
     const double slice = 2 * options_.depth / slices;
-    // A float's worth more, as the tree rounds points.
-    const auto ball = static_cast<float>(std::hypot(radius, 0.5 * slice) * (1 + 1e-5) + 1e-6);
+    // More by what the tree loses where it rounds the points and the middle to float.
+    constexpr double kRounding = 4 * double(std::numeric_limits<float>::epsilon());
+    const double farthest = place.cwiseAbs().maxCoeff() + options_.depth + radius;
+    const auto ball =
+        static_cast<float>(std::hypot(radius, 0.5 * slice) * (1 + 1e-5) + kRounding * farthest);
     along_.clear();
     double squares = 0;
+    uint32_t stated = 0;
     const auto edge = [&](int k) { return slice * k - options_.depth; };
     for (int k = 0; k < slices; ++k) {
       const double low = edge(k);
@@ -120,22 +127,27 @@ class Comparing {
         if (along < low || along >= high) continue;
         if ((way - along * axis).squaredNorm() > radius * radius) continue;
         along_.push_back(along);
-        squares += cloud.sigma[n.point] * cloud.sigma[n.point];
+        const double sigma = cloud.sigma[n.point];
+        if (!std::isfinite(sigma)) continue;
+        squares += sigma * sigma;
+        ++stated;
       }
     }
-    return summary(squares);
+    return summary(squares, stated);
   }
 
-  Column summary(double sigma_squares) const {
+  Column summary(double sigma_squares, uint32_t stated) const {
     Column out;
     out.count = static_cast<uint32_t>(along_.size());
+    out.stated = stated;
     if (along_.empty()) return out;
     const auto n = static_cast<double>(along_.size());
     for (const double d : along_) out.mean += d / n;
     for (const double d : along_) out.roughness += (d - out.mean) * (d - out.mean);
     out.roughness = along_.size() > 1 ? std::sqrt(out.roughness / (n - 1)) : 0;
-    const bool all_state_sigma = std::isfinite(sigma_squares);
-    out.variance = all_state_sigma ? sigma_squares / n : out.roughness * out.roughness / n;
+    const double by_roughness = out.roughness * out.roughness / n;
+    const double by_sigma = stated > 0 ? sigma_squares / stated : 0;
+    out.variance = stated == out.count ? by_sigma : std::max(by_sigma, by_roughness);
     return out;
   }
 

@@ -31,6 +31,8 @@ struct M3c2Place {
   double roughness_b = 0;
   uint32_t count_a = 0;  ///< Points in the cylinder.
   uint32_t count_b = 0;
+  uint32_t stated_a = 0;  ///< Those of them that state a sigma.
+  uint32_t stated_b = 0;
   Change change = Change::Unknown;  ///< Unknown where detection is NaN.
 };
 
@@ -46,8 +48,9 @@ M3c2Options m3c2_scales(double cylinder);
 /// Detection is 1.96 (sqrt(v_a + v_b) + registration). v is the variance of a mean: roughness^2 / n
 /// of the n points of that side, where these do not state what they are worth (Lague et al.); the
 /// mean of their sigma^2, where all do: errors of neighbours in one reconstruction are alike, and
-/// do not average out (James et al.). Points that nobody saw are left out. At least four points of
-/// either side are needed.
+/// do not average out (James et al.); the larger of the two, where some do: what others do not
+/// state must not make the mean better. Points that nobody saw are left out. At least four points
+/// of either side are needed.
 /// \param outward  per place a direction on whose side the normal is to lie; 0 = as it comes
 /// Source: Lague, Brodu and Leroux 2013, "Accurate 3D comparison of complex topography with
 /// terrestrial laser scanner"; James, Robson and Smith 2017, "3-D uncertainty-based topographic

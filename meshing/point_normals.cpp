@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 
 #include <Eigen/Eigenvalues>
@@ -74,20 +75,23 @@ std::vector<Link> sorted_links(const std::vector<Eigen::Vector3f>& normals,
   return links;
 }
 
+constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+
 // Walks the tree from `start` and turns what disagrees with the point it was reached from.
+// \param start_of  per point; kNone where no walk has come yet
 void turn_part(std::vector<Eigen::Vector3f>& normals,
                const std::vector<std::vector<uint32_t>>& tree,
-               std::vector<uint8_t>& reached,
+               std::vector<uint32_t>& start_of,
                uint32_t start) {
   if (normals[start].z() < 0) normals[start] = -normals[start];
   std::vector<uint32_t> open = {start};
-  reached[start] = 1;
+  start_of[start] = start;
   while (!open.empty()) {
     const uint32_t a = open.back();
     open.pop_back();
     for (const uint32_t b : tree[a]) {
-      if (reached[b] != 0) continue;
-      reached[b] = 1;
+      if (start_of[b] != kNone) continue;
+      start_of[b] = start;
       if (normals[a].dot(normals[b]) < 0) normals[b] = -normals[b];
       open.push_back(b);
     }
@@ -126,9 +130,9 @@ void turn_towards(std::vector<Eigen::Vector3f>& normals,
   }
 }
 
-void turn_consistently(std::vector<Eigen::Vector3f>& normals,
-                       const std::vector<Eigen::Vector3f>& points,
-                       size_t neighbors) {
+std::vector<uint32_t> turn_consistently(std::vector<Eigen::Vector3f>& normals,
+                                        const std::vector<Eigen::Vector3f>& points,
+                                        size_t neighbors) {
   require(neighbors >= 1, "turning normals needs 1 neighbour or more; the number", neighbors);
   DisjointSets parts(points.size());
   std::vector<std::vector<uint32_t>> tree(points.size());
@@ -142,10 +146,11 @@ void turn_consistently(std::vector<Eigen::Vector3f>& normals,
   std::stable_sort(from_top.begin(), from_top.end(), [&](uint32_t a, uint32_t b) {
     return points[a].z() > points[b].z();
   });
-  std::vector<uint8_t> reached(points.size(), 0);
+  std::vector<uint32_t> start_of(points.size(), kNone);
   for (const uint32_t start : from_top) {
-    if (reached[start] == 0) turn_part(normals, tree, reached, start);
+    if (start_of[start] == kNone) turn_part(normals, tree, start_of, start);
   }
+  return start_of;
 }
 
 }  // namespace cgs

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -28,9 +29,10 @@ void turn_towards(std::vector<Eigen::Vector3f>& normals,
 /// Turns normals so that neighbours agree: along the tree of neighbours whose normals differ least,
 /// from the topmost (+z) point of every part, which looks up.
 /// \param neighbors  of every point that may be joined to it, >= 1
+/// \return per point the topmost of its part, on whose normal the side of all of them rests
 /// Source: Hoppe et al. 1992, section 3.3.
-void turn_consistently(std::vector<Eigen::Vector3f>& normals,
-                       const std::vector<Eigen::Vector3f>& points,
-                       size_t neighbors);
+std::vector<uint32_t> turn_consistently(std::vector<Eigen::Vector3f>& normals,
+                                        const std::vector<Eigen::Vector3f>& points,
+                                        size_t neighbors);
 
 }  // namespace cgs

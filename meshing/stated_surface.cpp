@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
@@ -26,6 +27,16 @@ Provenance label_by_support(float support) {
                         : Provenance::Inferred;
 }
 
+// Files state normals of any length, and zeros where they know none.
+// \return none if all are zero
+std::vector<Eigen::Vector3f> unit_normals(std::vector<Eigen::Vector3f> normals) {
+  for (Eigen::Vector3f& n : normals) n.stableNormalize();
+  const bool any = std::any_of(
+      normals.begin(), normals.end(), [](const Eigen::Vector3f& n) { return !n.isZero(0); });
+  if (!any) normals.clear();
+  return normals;
+}
+
 }  // namespace
 
 struct StatedSurface::Search {
@@ -45,8 +56,9 @@ StatedSurface::StatedSurface(const TriangleMesh& mesh) : search_(std::make_uniqu
   constexpr size_t kNeighbors = 12;
   require(!mesh.vertices.empty(), "a surface needs points, their number", mesh.vertices.size());
   search_->points.emplace(mesh.vertices);
-  search_->normals =
-      mesh.normals.empty() ? estimated_normals(mesh.vertices, kNeighbors) : mesh.normals;
+  input_.mesh.normals = unit_normals(std::move(input_.mesh.normals));
+  search_->normals = input_.mesh.normals.empty() ? estimated_normals(mesh.vertices, kNeighbors)
+                                                 : input_.mesh.normals;
 }
 
 StatedSurface::~StatedSurface() = default;
@@ -100,7 +112,7 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 enum class Side : uint8_t { Front, Bridge, Back };
 
 struct FaceFinding {
-  Provenance label = Provenance::Inferred;
+  Provenance label = Provenance::Inferred;  ///< Observed where a source without labels vouches.
   Side side = Side::Front;
   double area = 0;
 };
@@ -113,15 +125,15 @@ FaceFinding examine(const std::array<Eigen::Vector3d, 3>& corners,
   const Eigen::Vector3d middle = (corners[0] + corners[1] + corners[2]) / 3;
   out.area = area.norm();
   out.label = Provenance::Observed;
-  const bool knows_sides = source.knows_sides();
   int backs = 0;
   bool far = false;
   for (size_t k = 0; k < 4; ++k) {
     const Eigen::Vector3d at = k < 3 ? Eigen::Vector3d((middle + corners.at(k)) / 2) : middle;
     const StatedPlace place = source.nearest(at);
-    out.label = weaker_evidence(out.label, place.label);
+    if (source.states_provenance()) out.label = weaker_evidence(out.label, place.label);
     far = far || !((place.position - at).norm() <= reach);
-    if (knows_sides && !(place.normal.dot(area) > 0)) ++backs;
+    const bool knows_side = source.knows_sides() && !place.normal.isZero();
+    if (knows_side && !(place.normal.dot(area) > 0)) ++backs;
   }
   constexpr int kMost = 3;  // of the four places
   if (far) {
@@ -148,10 +160,10 @@ std::vector<FaceFinding> examine_faces(const TriangleMesh& surface,
 }
 
 // Vertices of invented faces alone.
-void drop_claims(TriangleMesh& surface) {
+void drop_claims(TriangleMesh& surface, const std::vector<FaceFinding>& findings) {
   std::vector<uint8_t> vouched(surface.vertices.size(), 0);
   for (size_t f = 0; f < surface.faces.size(); ++f) {
-    if (surface.provenance[f] == Provenance::Inferred) continue;
+    if (findings[f].label == Provenance::Inferred) continue;
     for (const uint32_t v : surface.faces[f]) vouched[v] = 1;
   }
   for (size_t v = 0; v < vouched.size(); ++v) {
@@ -192,7 +204,7 @@ EvidenceTransfer take_evidence(TriangleMesh& surface, const StatedSurface& sourc
     if (face.side == Side::Back) out.behind += face.area;
     if (source.states_provenance()) surface.provenance.push_back(face.label);
   }
-  if (source.states_provenance()) drop_claims(surface);
+  drop_claims(surface, findings);
   if (!source.mesh().normals.empty()) surface.normals = vertex_normals(surface);
   return out;
 }

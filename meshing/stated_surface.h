@@ -36,7 +36,8 @@ class StatedSurface {
   const TriangleMesh& mesh() const { return input_.mesh; }
   bool is_cloud() const { return input_.mesh.faces.empty(); }
   bool states_provenance() const;
-  /// Whether normals tell the outside: not those of a cloud that has none, which are estimated.
+  /// Whether normals tell the outside: not those of a cloud that has none (or none but zeros),
+  /// which are estimated.
   bool knows_sides() const { return !is_cloud() || !input_.mesh.normals.empty(); }
   StatedPlace nearest(const Eigen::Vector3d& point) const;
 
@@ -67,8 +68,9 @@ struct EvidenceTransfer {
 /// A face takes the weakest label found at its middle and towards its corners, and is Inferred
 /// where one of these is farther away than `reach` or looks the other way. Vertices take what the
 /// nearest place states; their sigma becomes the root of sigma^2 + distance^2. Without a face that
-/// has evidence they have no sigma and support 0. Normals, if the source has some, are made from
-/// the faces. What the source does not state, the surface does not state either.
+/// has evidence (if the source has no labels: that is no bridge and looks its way) they have no
+/// sigma and support 0. Normals, if the source has some, are made from the faces. What the source
+/// does not state, the surface does not state either.
 /// \param surface  vertices and faces
 /// \param reach    [internal units]
 EvidenceTransfer take_evidence(TriangleMesh& surface, const StatedSurface& source, double reach);

@@ -20,7 +20,10 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kMayReachIn = 0.05;  // of the radius
 constexpr double kBeside = 0.5;       // cosine of 60 degrees
 constexpr double kSmooth = 0.866;     // cosine of 30 degrees
-constexpr double kFast = 2e-3;        // tolerance where there are many places
+// Cosine of how far a normal may lean from that of its face, whose plane reaches into the ball by
+// 1 less this: farther than it may, it would shrink the ball to nothing.
+constexpr double kMostLean = 1 - 0.9 * kMayReachIn;
+constexpr double kFast = 2e-3;  // tolerance where there are many places
 
 SurfacePoint on_face(const MeasurableMesh& mesh, uint32_t face, const Eigen::Vector3d& weights) {
   const auto& f = mesh.mesh.faces[face];
@@ -68,6 +71,14 @@ double sigma_of_diameter(double near_sigma, double far_sigma, double cosine) {
   return 2 * std::hypot(cosine * near_sigma, far_sigma) / (1 - cosine);
 }
 
+// The direction nearest to `normal` that leans no farther than kMostLean from `own`.
+Eigen::Vector3d limit_lean(const Eigen::Vector3d& normal, const Eigen::Vector3d& own) {
+  const double upright = own.dot(normal);
+  if (upright >= kMostLean) return normal;
+  const Eigen::Vector3d aside = (normal - upright * own).stableNormalized();
+  return kMostLean * own + std::sqrt(1 - kMostLean * kMostLean) * aside;
+}
+
 }  // namespace
 
 ThicknessGauge::ThicknessGauge(const MeasurableMesh& mesh,
@@ -104,7 +115,7 @@ Eigen::Vector3d ThicknessGauge::smooth_normal(const SurfacePoint& point) const {
     }
     out += point.weights[static_cast<Eigen::Index>(k)] * around.stableNormalized();
   }
-  return out.stableNormalized();
+  return limit_lean(out.stableNormalized(), own);
 }
 
 Thickness ThicknessGauge::at(const SurfacePoint& point) const {

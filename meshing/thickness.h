@@ -23,7 +23,8 @@ struct Thickness {
 /// a point.
 ///
 /// The ball's centre lies on the normal there, which is smooth across edges of less than 30
-/// degrees: such edges are facets of a curved surface. The ball shrinks from the size of the mesh
+/// degrees: such edges are facets of a curved surface; it leans at most 17 degrees from the normal
+/// of the face itself, which would reach into the ball. The ball shrinks from the size of the mesh
 /// until nothing reaches into it. What reaches in beside the point itself (a ball through both
 /// would have them less than 60 degrees apart) may do so by 5 % of the radius, else roughness would
 /// be taken for thin matter. It is the thickness of a plate and the diameter of a ball; at convex

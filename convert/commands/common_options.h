@@ -7,6 +7,7 @@
 #include <CLI/App.hpp>
 
 #include "convert/scene_request.h"
+#include "io/gltf.h"
 #include "io/scene_reader.h"
 #include "libcgs/train/training_options.h"
 
@@ -33,6 +34,9 @@ void add_scale_options(CLI::App& command, SceneRequest& request);
 /// --views, --downscale, --depth, --depth-kind, --depth-model, --depth-scale
 /// and --allow-external.
 void add_scene_options(CLI::App& command, SceneOptions& options);
+
+/// --glb-encoding.
+void add_glb_option(CLI::App& command, GlbEncoding& encoding);
 
 /// --focal.
 void add_focal_option(CLI::App& command, double& focal);

@@ -63,6 +63,7 @@ void add_convert(CLI::App& app) {
   cmd->add_option("--compression-error",
                   request.compression_error,
                   "Largest move of a vertex by compression in a .glb, e.g. 0.2mm");
+  add_glb_option(*cmd, request.encoding);
   cmd->add_option("--assume-unit", request.assume_unit, "What one unit is: m, cm, mm, in, ft");
   cmd->add_option("--up",
                   request.up,

@@ -104,6 +104,7 @@ void add_run(CLI::App& app) {
   cmd->add_option("--compression-error",
                   args->request.compression_error,
                   "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
+  add_glb_option(*cmd, args->request.glb_encoding);
   cmd->add_option("--max-error",
                   args->request.max_error,
                   "Promise: every mesh written, asset.glb too, lies within this of the fused "

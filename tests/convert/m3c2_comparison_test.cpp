@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -31,6 +32,28 @@ MeasurableMesh rough_square(double z, uint32_t seed) {
   return out;
 }
 
+MeasurableMesh cloud_of(MeasurableMesh mesh) {
+  mesh.mesh.faces.clear();
+  mesh.mesh.provenance.clear();
+  return mesh;
+}
+
+// Turned so that z lies along y, x along z.
+MeasurableMesh as_wall(MeasurableMesh mesh) {
+  for (Vector3d& p : mesh.points) p = Vector3d(p.y(), p.z(), p.x());
+  return test::with_vertices(std::move(mesh));
+}
+
+// What the refusal of a comparison says.
+std::string refusal(const M3c2Request& request, const MeasurableMesh& a, const MeasurableMesh& b) {
+  try {
+    (void)compare_m3c2(request, a, b);
+  } catch (const InvalidInput& error) {
+    return error.what();
+  }
+  return "";
+}
+
 TEST(CompareM3c2, FindsWhatWasAddedInUnitsOfTheFile) {
   const MeasurableMesh a = rough_square(0.01, 1);
   const MeasurableMesh b = rough_square(0, 2);
@@ -52,45 +75,105 @@ TEST(CompareM3c2, FindsWhatWasAddedInUnitsOfTheFile) {
 }
 
 TEST(CompareM3c2, TakesCloudsWithoutFacesAndNormals) {
-  MeasurableMesh a = rough_square(0.01, 1);
-  MeasurableMesh b = rough_square(0, 2);
-  for (MeasurableMesh* mesh : {&a, &b}) {
-    mesh->mesh.faces.clear();
-    mesh->mesh.provenance.clear();
-  }
+  const MeasurableMesh a = cloud_of(rough_square(0.01, 1));
+  MeasurableMesh b = cloud_of(rough_square(0, 2));
   b.mesh.sigma.assign(b.points.size(), 0.003f);
   const M3c2Comparison found = compare_m3c2({.wanted = true}, a, b);
   EXPECT_NEAR(found.comparison.summary.mean, 0.01, 0.0005);  // the topmost point looks up
-  EXPECT_FALSE(found.sigma_a);
-  EXPECT_TRUE(found.sigma_b);
+  EXPECT_EQ(found.variance_a, "roughness");
+  EXPECT_EQ(found.variance_b, "sigma");
+}
+
+TEST(CompareM3c2, TellsWhereOnlySomePointsStateASigma) {
+  const MeasurableMesh a = cloud_of(rough_square(0.01, 1));
+  MeasurableMesh b = cloud_of(rough_square(0, 2));
+  b.mesh.sigma.assign(b.points.size(), 0.003f);
+  const M3c2Comparison all = compare_m3c2({.wanted = true}, a, b);
+  b.mesh.sigma[51 * 25 + 25] = std::nanf("");
+  const M3c2Comparison found = compare_m3c2({.wanted = true}, a, b);
+  EXPECT_EQ(found.variance_b, "mixed");
+  EXPECT_EQ(m3c2_json(found, a, {"m", 1, 0})["m3c2"]["variance_b"], "mixed");
+  EXPECT_NE(m3c2_text(found, {"m", 1, 0}).find("sigma or roughness of B"), std::string::npos);
+  for (size_t i = 0; i < found.places.size(); ++i) {
+    EXPECT_GE(found.places[i].detection, all.places[i].detection * (1 - 1e-9)) << i;
+  }
 }
 
 // Turned so that another axis is up, as the file says, and as nobody says.
 TEST(CompareM3c2, TheSignOfCloudsFollowsWhatIsUp) {
   for (const uint32_t seed : {1u, 3u, 5u, 7u}) {
-    MeasurableMesh a = rough_square(0.01, seed);
-    MeasurableMesh b = rough_square(0, seed + 1);
-    for (MeasurableMesh* mesh : {&a, &b}) {
-      mesh->mesh.faces.clear();
-      mesh->mesh.provenance.clear();
-      for (size_t v = 0; v < mesh->points.size(); ++v) {
-        Vector3d& p = mesh->points[v];
-        p = Vector3d(p.y(), p.z(), p.x());
-        mesh->mesh.vertices[v] = p.cast<float>();
-      }
-    }
-    EXPECT_FALSE(compare_m3c2({.wanted = true}, a, b).is_side_known);
+    MeasurableMesh a = as_wall(cloud_of(rough_square(0.01, seed)));
+    const MeasurableMesh b = as_wall(cloud_of(rough_square(0, seed + 1)));
+    EXPECT_FALSE(compare_m3c2({.wanted = true}, a, b).is_sign_known());
     a.frame.up = Vector3d::UnitY();
     const M3c2Comparison found = compare_m3c2({.wanted = true}, a, b);
-    EXPECT_TRUE(found.is_side_known);
+    EXPECT_TRUE(found.is_sign_known());
     EXPECT_NEAR(found.comparison.summary.mean, 0.01, 0.001);
   }
+}
+
+TEST(CompareM3c2, NormalsThatAreAllZeroAreNone) {
+  MeasurableMesh roof = cloud_of(rough_square(0.01, 1));
+  roof.mesh.normals.assign(roof.points.size(), Eigen::Vector3f::Zero());
+  const M3c2Comparison above = compare_m3c2({.wanted = true}, roof, cloud_of(rough_square(0, 2)));
+  EXPECT_TRUE(above.is_sign_known());
+  EXPECT_NEAR(above.comparison.summary.mean, 0.01, 0.0005);
+  const M3c2Comparison beside =
+      compare_m3c2({.wanted = true}, as_wall(roof), as_wall(cloud_of(rough_square(0, 2))));
+  EXPECT_FALSE(beside.is_sign_known());
+}
+
+TEST(CompareM3c2, APointWithoutNormalLooksWhereItsNeighbourDoes) {
+  for (const float z : {1.0f, -1.0f}) {
+    MeasurableMesh a = cloud_of(rough_square(0.01, 1));
+    a.mesh.normals.assign(a.points.size(), Eigen::Vector3f(0, 0, z));
+    for (size_t v = 0; v < a.points.size(); v += 7) a.mesh.normals[v].setZero();
+    const M3c2Comparison found = compare_m3c2({.wanted = true}, a, cloud_of(rough_square(0, 2)));
+    for (const M3c2Place& place : found.places) EXPECT_GT(place.normal.z() * z, 0);
+    EXPECT_NEAR(found.comparison.summary.mean, z * 0.01f, 0.0005);
+  }
+}
+
+// A roof and, apart from it and below, a wall of some points along either side; +x may be its
+// outside, or -x.
+MeasurableMesh roof_and_wall(double shift, int wall, uint32_t seed) {
+  MeasurableMesh out = cloud_of(rough_square(2 + shift, seed));
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(5 + shift, 0.002);
+  for (int i = 0; i < wall; ++i) {
+    for (int j = 0; j < wall; ++j) out.points.emplace_back(noise(random), 0.02 * i, 0.02 * j);
+  }
+  return test::with_vertices(std::move(out));
+}
+
+TEST(CompareM3c2, EveryPartNeedsATopThatLooksUp) {
+  const auto compared = [](int wall) {
+    return compare_m3c2({.wanted = true}, roof_and_wall(0.01, wall, 1), roof_and_wall(0, wall, 2));
+  };
+  const M3c2Comparison large = compared(40);
+  EXPECT_NEAR(large.unknown_signs, 1600.0 / (1600 + 51 * 51), 0.02);
+  EXPECT_FALSE(large.is_sign_known());
+  EXPECT_NE(m3c2_text(large, {"m", 1, 0}).find("SIGN of 38"), std::string::npos);
+  const M3c2Comparison small = compared(4);
+  EXPECT_GT(small.unknown_signs, 0);
+  EXPECT_TRUE(small.is_sign_known());
 }
 
 TEST(CompareM3c2, RefusesCloudsThatDoNotMeet) {
   MeasurableMesh far = rough_square(0, 2);
   for (Vector3d& p : far.points) p.x() += 100;
-  EXPECT_THROW(compare_m3c2({.wanted = true}, rough_square(0, 1), far), InvalidInput);
+  const std::string said = refusal({.wanted = true}, rough_square(0, 1), far);
+  EXPECT_NE(said.find("--cylinder-depth reaches farther"), std::string::npos) << said;
+}
+
+TEST(CompareM3c2, AdvisesWiderNormalsWhereThereAreNone) {
+  const MeasurableMesh a = rough_square(0.01, 1);  // points 2 cm apart
+  for (const M3c2Request& request : {M3c2Request{.wanted = true, .cylinder = "1mm"},
+                                     M3c2Request{.wanted = true, .normal_scale = "5mm"}}) {
+    const std::string said = refusal(request, a, rough_square(0, 2));
+    EXPECT_NE(said.find("--normal-scale or --cylinder must be larger"), std::string::npos) << said;
+    EXPECT_EQ(said.find("--cylinder-depth"), std::string::npos) << said;
+  }
 }
 
 TEST(CompareM3c2, WritesEveryFieldPerVertex) {
@@ -123,6 +206,16 @@ TEST(CompareM3c2, RefusesLengthsThatCannotBe) {
   EXPECT_THROW(compare_m3c2({.wanted = true, .cylinder = "1mm", .depth = "5m"}, a, a),
                InvalidInput);
   EXPECT_THROW(compare_m3c2({.wanted = true, .registration = "wide"}, a, a), InvalidInput);
+  EXPECT_THROW(compare_m3c2({.wanted = true, .registration = "-1mm"}, a, a), InvalidInput);
+  EXPECT_THROW(compare_m3c2({.wanted = true, .registration = "0furlong"}, a, a), InvalidInput);
+}
+
+TEST(CompareM3c2, ARegistrationMayHaveNoErrorInAnyUnit) {
+  const MeasurableMesh a = rough_square(0.01, 1);
+  for (const char* none : {"", "0", "0mm", "0.0 m"}) {
+    EXPECT_EQ(compare_m3c2({.wanted = true, .registration = none}, a, a).options.registration, 0)
+        << none;
+  }
 }
 
 }  // namespace

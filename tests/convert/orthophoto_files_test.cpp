@@ -163,6 +163,35 @@ TEST(WriteOrthophoto, TellsTheSharesOfTheLabelsItShows) {
                   .is_null());
 }
 
+TEST(WriteOrthophoto, RefusesAPictureThatMemoryDoesNotHold) {
+  const TempDir dir;
+  const MeasurableMesh mesh = placed(tilted_plane(), {0, 0, 0});
+  const OrthophotoRequest request{.prefix = dir / "map", .pixel_size = "1cm"};
+  constexpr size_t kBytes = 42 * 100 * 100;
+  try {
+    write_orthophoto(request, mesh, {"m", 1, 0}, kBytes / 2);
+    ADD_FAILURE() << "takes half of the memory it needs";
+  } catch (const LimitError& error) {
+    const std::string said = error.what();
+    EXPECT_NE(said.find("--pixel-size"), std::string::npos) << said;
+    EXPECT_NE(said.find("MB"), std::string::npos) << said;
+  }
+  EXPECT_EQ(test::entries(dir.path()), 0);
+  write_orthophoto(request, mesh, {"m", 1, 0}, 2 * kBytes);
+  EXPECT_EQ(test::entries(dir.path()), 6);
+}
+
+// Heights are encoded while they are written: what fails there must not leave pictures behind.
+TEST(WriteOrthophoto, WritesNoPictureWithoutItsHeights) {
+  const TempDir dir;
+  std::filesystem::create_directory(dir / "map.tif");
+  EXPECT_THROW(write_orthophoto({.prefix = dir / "map", .pixel_size = "1cm"},
+                                placed(tilted_plane(), {0, 0, 0}),
+                                {"m", 1, 0}),
+               IoError);
+  EXPECT_EQ(test::entries(dir.path()), 1);
+}
+
 TEST(WriteOrthophoto, RefusesWhatCannotBe) {
   const TempDir dir;
   const MeasurableMesh mesh = placed(tilted_plane(), {0, 0, 0});

@@ -10,6 +10,7 @@
 #include "io/mesh_file.h"
 #include "io/mesh_ply.h"
 #include "meshing/certificate.h"
+#include "meshing/vertex_attributes.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/sample_mesh.h"
 
@@ -191,6 +192,27 @@ TEST_F(Filter, SaysWhichSolidHasNoInside) {
   };
   refused("open.ply", "ball.ply", "the mesh");
   refused("ball.ply", "open.ply", "open.ply");
+}
+
+TEST_F(Filter, RefusesASolidWithinASolid) {
+  const TriangleMesh ball = test::labelled_sphere(32, 48);
+  TriangleMesh inner = ball;
+  TriangleMesh beside = ball;
+  const Eigen::Vector3f center(0.05f, -0.1f, 0.15f);
+  for (auto& p : inner.vertices) p = center + 0.5f * (p - center);
+  for (auto& p : beside.vertices) p.x() += 2;
+  write_mesh_ply(dir_ / "nested.ply", joined(ball, inner), test::centimetre_frame());
+  write_mesh_ply(dir_ / "beside.ply", beside, test::centimetre_frame());
+  const auto refused = [&](const std::string& a, const std::string& b, const char* name) {
+    const ProgramResult result = filter(a, "no.ply", "-q --op union=" + (dir_ / b).string());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find(std::string(name) + " has shells within shells"), std::string::npos)
+        << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(exists("no.ply"));
+  };
+  refused("beside.ply", "nested.ply", "nested.ply");
+  refused("nested.ply", "beside.ply", "the mesh");
 }
 
 TEST_F(Filter, WrapsWhatIsOpenAndSaysWhereItWentInside) {

@@ -83,6 +83,38 @@ TEST(Measure, OrthophotoOfACubeSeenFromThreeSides) {
   EXPECT_EQ(run_cgs("measure " + mesh + "--side top").exit_code, 2);
 }
 
+TEST(Measure, SharesOfLabelsAreOfWhatAnOrthophotoShows) {
+  const TempDir dir;
+  // A triangle covers half of its picture, and all of that is observed.
+  test::write_bytes(dir / "a.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\n"
+                    "property double y\nproperty double z\nelement face 1\n"
+                    "property list uchar int vertex_indices\nproperty uchar scalar_provenance\n"
+                    "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 2\n");
+  const auto result =
+      run_cgs("measure " + (dir / "a.ply").string() +
+              " --assume-unit m --pixel-size 1cm --orthophoto " + (dir / "top").string());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("100.00 % of what is shown: observed"), std::string::npos)
+      << result.out;
+}
+
+TEST(Measure, EveryThicknessSaysItselfThatItNeedsAnInside) {
+  const TempDir dir;
+  MeasurableMesh cube = test::cube_mesh(2);
+  for (auto& f : cube.mesh.faces) std::swap(f[0], f[1]);
+  test::write_bytes(dir / "a.obj", obj_text(cube));
+  const std::vector<std::string> options = {
+      "--thickness", "--thickness-at 1,1,2", "--thickness-ply " + (dir / "t.ply").string()};
+  for (const std::string& option : options) {
+    const auto result = run_cgs("measure " + (dir / "a.obj").string() + " " + option);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    const std::string name = option.substr(0, option.find(' '));
+    EXPECT_NE(result.err.find(name + " needs to know what is inside"), std::string::npos)
+        << result.err;
+  }
+}
+
 TEST(Measure, ThicknessOfACubeAndAtAPoint) {
   const TempDir dir;
   test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));
@@ -185,6 +217,11 @@ TEST(Compare, MatchesUnits) {
   const json out = json_of("compare " + (dir / "m.ply").string() + " " + (dir / "mm.ply").string() +
                            " --unit mm");
   EXPECT_NEAR(out["distance"]["mean"].get<double>(), 1, 1e-9);
+}
+
+TEST(Compare, SaysWhoseSideIsPositive) {
+  const std::string help = run_cgs("compare --help").out;
+  EXPECT_NE(help.find("with --m3c2: that A's look to"), std::string::npos) << help;
 }
 
 TEST(Info, CertifiesAMesh) {

@@ -102,6 +102,11 @@ TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
       "run " + kSmallCapture.string() + " --views 0,1,2 -q -w -o " + (dir / "out").string();
   ASSERT_EQ(run_cgs(again + " --assume-unit m").exit_code, 0);
   EXPECT_TRUE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
+  const auto model_written = std::filesystem::last_write_time(dir / "out/model/gaussians.ply");
+  ASSERT_EQ(run_cgs(again + " --assume-unit m --glb-encoding quantized").exit_code, 0);
+  EXPECT_NE(test::read_bytes(dir / "out/web/asset.glb").find("KHR_mesh_quantization"),
+            std::string::npos);
+  EXPECT_EQ(std::filesystem::last_write_time(dir / "out/model/gaussians.ply"), model_written);
   ASSERT_EQ(run_cgs(again).exit_code, 0);  // in a unit that no longer holds
   EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
   EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.3mf"));

@@ -464,7 +464,7 @@ void add_meshes(Kinds& kinds) {
     write_bytes(file, "OFF\n# a\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2 255 0 0\n4 0 1 3 2\n");
   }));
   kinds.push_back(of_mesh("glb", "a.glb", [=](const fs::path& file) {
-    write_glb(file, sphere(), centimetre_frame(), {.draco = false});
+    write_glb(file, sphere(), centimetre_frame(), {.encoding = GlbEncoding::Plain});
   }));
   FileKind draco = of_mesh("glb-draco", "a.glb", [=](const fs::path& file) {
     write_glb(file, sphere(), centimetre_frame());

@@ -243,8 +243,9 @@ void expect_round_trip(const GlbOptions& options, double tolerance) {
 
 TEST(ReadGlb, LeadsOurFilesBackToTheWorld) {
   const Eigen::Matrix3d y_up = y_up_from(-Eigen::Vector3d::UnitY());
-  expect_round_trip({.draco = false, .y_up = y_up}, 1e-4);
-  expect_round_trip({.draco = true, .y_up = y_up}, 64 * 0.8 / 8192);
+  expect_round_trip({.encoding = GlbEncoding::Plain, .y_up = y_up}, 1e-4);
+  expect_round_trip({.encoding = GlbEncoding::Quantized, .y_up = y_up}, 64 * 0.8 / 65536);
+  expect_round_trip({.encoding = GlbEncoding::Draco, .y_up = y_up}, 64 * 0.8 / 8192);
 }
 
 TEST(ReadGlb, AMeshOfOursWithoutLabelsHasNone) {

@@ -86,7 +86,7 @@ void expect_same(const Glb& glb, const TriangleMesh& mesh, const Frame& frame, d
 TEST(WriteGlb, PlainFileHoldsTheMesh) {
   const TriangleMesh mesh = test::labelled_sphere();
   const Frame frame = test::centimetre_frame();
-  const Written out = written(mesh, frame, {.draco = false});
+  const Written out = written(mesh, frame, {.encoding = GlbEncoding::Plain});
   ASSERT_EQ(out.glb.parts.size(), 4u);
   expect_same(out.glb, mesh, frame, 1e-5);
   EXPECT_EQ(out.report.measured_max_error, 0);
@@ -109,8 +109,8 @@ TEST(WriteGlb, DracoFileHoldsTheMeshWithinItsReport) {
 TEST(WriteGlb, KeepsSigmaInMetresAndMarksTheUnknown) {
   const TriangleMesh mesh = test::labelled_sphere();
   const Frame frame = test::centimetre_frame();
-  for (const bool draco : {false, true}) {
-    const Written out = written(mesh, frame, {.draco = draco});
+  for (const GlbEncoding encoding : {GlbEncoding::Plain, GlbEncoding::Draco}) {
+    const Written out = written(mesh, frame, {.encoding = encoding});
     for (const auto& value : out.glb.parts[0].values.at("_SIGMA")) {
       EXPECT_GT(value[0], 0.001f * 64 * 0.01f * 0.99f);
       EXPECT_LT(value[0], 0.005f * 64 * 0.01f);
@@ -188,8 +188,8 @@ TEST(WriteGlb, WritesBareMeshesAndLeavesOutEmptyClasses) {
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {0.5f, 0, 0}, {0, 0.5f, 0}, {9, 9, 9}};
   mesh.faces = {{0, 1, 2}, {1, 1, 2}};
-  for (const bool draco : {false, true}) {
-    const Written out = written(mesh, {}, {.draco = draco});
+  for (const GlbEncoding encoding : {GlbEncoding::Plain, GlbEncoding::Draco}) {
+    const Written out = written(mesh, {}, {.encoding = encoding});
     ASSERT_EQ(out.glb.parts.size(), 1u);
     EXPECT_EQ(out.glb.parts[0].material, "surface");
     EXPECT_EQ(out.glb.parts[0].values.size(), 2u);  // position and normal
@@ -280,8 +280,8 @@ struct WrittenBox {
 };
 
 TEST(WriteTexturedGlb, HasAPrimitiveAndMaterialForEachPhotograph) {
-  for (const bool draco : {false, true}) {
-    const WrittenBox out({.draco = draco});
+  for (const GlbEncoding encoding : {GlbEncoding::Plain, GlbEncoding::Draco}) {
+    const WrittenBox out({.encoding = encoding});
     std::vector<std::string> names;
     for (const Part& part : out.glb.parts) {
       names.push_back(part.material);
@@ -312,8 +312,8 @@ TEST(WriteTexturedGlb, HasAPrimitiveAndMaterialForEachPhotograph) {
 }
 
 TEST(WriteTexturedGlb, TextureCoordinatesAreTheProjections) {
-  for (const bool draco : {false, true}) {
-    const WrittenBox out({.draco = draco}, test::centimetre_frame());
+  for (const GlbEncoding encoding : {GlbEncoding::Plain, GlbEncoding::Draco}) {
+    const WrittenBox out({.encoding = encoding}, test::centimetre_frame());
     const auto images = texture_images(out.box.mesh, out.box.texture, 90);
     double worst = 0;
     for (const Part& part : out.glb.parts) {
@@ -341,7 +341,7 @@ TEST(WriteTexturedGlb, TextureCoordinatesAreTheProjections) {
     }
     EXPECT_LE(worst, 0.1);
     EXPECT_NEAR(worst, out.report.measured_texture_error, 1e-3);
-    if (!draco) EXPECT_LT(worst, 1e-3);
+    if (encoding == GlbEncoding::Plain) EXPECT_LT(worst, 1e-3);
   }
 }
 

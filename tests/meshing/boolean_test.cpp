@@ -8,6 +8,7 @@
 
 #include "libcgs/core/error.h"
 #include "meshing/certificate.h"
+#include "meshing/vertex_attributes.h"
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
@@ -137,6 +138,21 @@ TEST(WhyNoSolid, SaysWhatIsWrong) {
     crossed.vertices.push_back(p + Eigen::Vector3f(0.5f, 0, 0.1f));
   for (const auto& f : cube.faces) crossed.faces.push_back({f[0] + 8, f[1] + 8, f[2] + 8});
   EXPECT_NE(why_no_solid(crossed).find("cuts itself"), std::string::npos);
+}
+
+TEST(WhyNoSolid, ShellsWithinShellsMustAlternate) {
+  const TriangleMesh outer = box({0, 0, 0}, {4, 4, 4});
+  const TriangleMesh inner = box({1, 1, 1}, {3, 3, 3});
+  TriangleMesh cavity = inner;
+  for (auto& f : cavity.faces) std::swap(f[0], f[1]);
+  EXPECT_EQ(why_no_solid(joined(outer, inner)),
+            "has shells within shells that disagree on what is outside");
+  EXPECT_EQ(why_no_solid(joined(outer, box({5, 0, 0}, {6, 1, 1}))), "");
+  TriangleMesh hollow = joined(outer, cavity);
+  EXPECT_EQ(why_no_solid(hollow), "");
+  EXPECT_EQ(why_no_solid(joined(hollow, box({1.5f, 1.5f, 1.5f}, {2, 2, 2}))), "");
+  hollow.vertices.emplace_back(9.0f, 9.0f, 9.0f);  // of no face
+  EXPECT_EQ(why_no_solid(hollow), "");
 }
 
 }  // namespace

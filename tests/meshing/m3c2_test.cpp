@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/m3c2.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -144,6 +146,70 @@ TEST(M3c2, KnownSigmaCountsInFullAndRegistrationOnTop) {
   EXPECT_EQ(found[0].change, Change::Farther);  // 0.02
   const auto swapped = m3c2({Vector3d::Zero()}, {plane.normal.cast<float>()}, b, a, options);
   EXPECT_EQ(swapped[0].change, Change::Nearer);
+}
+
+TEST(M3c2, APointWithoutSigmaDoesNotMakeTheMeanBetter) {
+  const Plane plane;
+  auto a = noisy_plane(plane, kShift, 0.0005, 3000, 5);
+  auto b = noisy_plane(plane, 0, 0.0005, 3000, 6);
+  a.sigma.assign(a.places.size(), 0.005);
+  b.sigma.assign(b.places.size(), 0.005);
+  const auto in_the_middle = [&] {
+    return m3c2({Vector3d::Zero()}, {plane.normal.cast<float>()}, a, b, scales()).at(0);
+  };
+  const M3c2Place all = in_the_middle();
+  EXPECT_EQ(all.stated_a, all.count_a);
+  EXPECT_EQ(all.stated_b, all.count_b);
+  const auto nearest =
+      std::min_element(b.places.begin(), b.places.end(), [](const auto& p, const auto& q) {
+        return p.norm() < q.norm();
+      });
+  b.sigma[static_cast<size_t>(nearest - b.places.begin())] = std::nan("");
+  const M3c2Place but_one = in_the_middle();
+  EXPECT_EQ(but_one.stated_b + 1, but_one.count_b);
+  EXPECT_NEAR(but_one.detection, all.detection, 1e-12);
+}
+
+TEST(M3c2, SomePointsThatStateLittleDoNotHideTheRoughnessOfTheOthers) {
+  const Plane plane;
+  const auto a = noisy_plane(plane, kShift, kNoiseA, 3000, 5);
+  auto b = noisy_plane(plane, 0, kNoiseB, 3000, 6);
+  const auto in_the_middle = [&] {
+    return m3c2({Vector3d::Zero()}, {plane.normal.cast<float>()}, a, b, scales()).at(0);
+  };
+  const M3c2Place none = in_the_middle();
+  EXPECT_EQ(none.stated_b, 0U);
+  for (size_t i = 0; i < b.sigma.size(); i += 2) b.sigma[i] = 1e-6;
+  const M3c2Place some = in_the_middle();
+  EXPECT_GT(some.stated_b, 0U);
+  EXPECT_LT(some.stated_b, some.count_b);
+  EXPECT_DOUBLE_EQ(some.detection, none.detection);
+}
+
+// Points next to the rims of the cylinder, where floats are coarser than what separates them.
+TEST(M3c2, LosesNoPointWhereCoordinatesAreLarge) {
+  constexpr double kFar = 8000;
+  ComparedPoints a;
+  for (int i = -10; i <= 10; ++i) {
+    for (int j = -10; j <= 10; ++j) a.places.emplace_back(kFar + 0.02 * i, kFar + 0.02 * j, kFar);
+  }
+  ComparedPoints b;
+  constexpr double kAlmost = 0.05 * (1 - 1e-4);
+  constexpr int kAround = 100;
+  for (int i = 0; i < kAround; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kAround;
+    for (const double up : {-kAlmost, kAlmost}) {
+      b.places.emplace_back(
+          kFar + kAlmost * std::cos(angle), kFar + kAlmost * std::sin(angle), kFar + up);
+    }
+  }
+  for (ComparedPoints* points : {&a, &b}) {
+    points->sigma.assign(points->places.size(), std::nan(""));
+    points->observed.assign(points->places.size(), 1);
+  }
+  const M3c2Options options{0.3, 0.1, 0.05, 0};
+  const auto found = m3c2({Vector3d::Constant(kFar)}, {Eigen::Vector3f(0, 0, 1)}, a, b, options);
+  EXPECT_EQ(found[0].count_b, 2U * kAround);
 }
 
 TEST(M3c2, SaysNothingWhereTooFewPointsWereSeen) {

@@ -54,6 +54,16 @@ TEST(TurnConsistently, MakesABallLookOutwards) {
   for (size_t i = 0; i < points.size(); ++i) EXPECT_GT(normals[i].dot(points[i] - kCenter), 0) << i;
 }
 
+TEST(TurnConsistently, TellsTheTopOfEveryPart) {
+  auto points = ball_points(500);  // from the top down
+  const auto first = static_cast<uint32_t>(points.size());
+  for (const auto& p : ball_points(400)) points.emplace_back(p + Eigen::Vector3f(10, 0, -5));
+  auto normals = estimated_normals(points, 12);
+  const std::vector<uint32_t> tops = turn_consistently(normals, points, 8);
+  ASSERT_EQ(tops.size(), points.size());
+  for (uint32_t i = 0; i < points.size(); ++i) EXPECT_EQ(tops[i], i < first ? 0U : first) << i;
+}
+
 TEST(TurnTowards, LooksAtTheEye) {
   const auto points = ball_points(500);
   auto normals = estimated_normals(points, 12);

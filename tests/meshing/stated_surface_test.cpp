@@ -70,6 +70,50 @@ TEST(TakeEvidence, SigmaGrowsWithTheDistanceAndGoesWithTheLabel) {
   for (const float s : far.sigma) EXPECT_TRUE(std::isnan(s));
 }
 
+TEST(TakeEvidence, BridgesStateNothingOfASourceWithoutLabels) {
+  TriangleMesh sheet = half_seen_sheet();
+  sheet.provenance.clear();
+  sheet.support.assign(sheet.vertices.size(), 3);
+  const StatedSurface source(sheet);
+  const auto expect_nothing = [&](TriangleMesh face) {
+    take_evidence(face, source, 0.1);
+    EXPECT_TRUE(face.provenance.empty());
+    EXPECT_EQ(face.sigma.size(), 3U);
+    for (const float s : face.sigma) EXPECT_TRUE(std::isnan(s));
+    for (const float s : face.support) EXPECT_EQ(s, 0);
+  };
+  expect_nothing(triangle({0.2f, 0.2f, 0.2f}, 0.1f));
+  expect_nothing(triangle({0.2f, 0.2f, -0.05f}, 0.1f, false));
+  TriangleMesh near = triangle({0.2f, 0.2f, 0.04f}, 0.1f);
+  take_evidence(near, source, 0.1);
+  for (const float s : near.sigma) EXPECT_NEAR(s, 0.05f, 1e-6f);
+  for (const float s : near.support) EXPECT_EQ(s, 3);
+}
+
+// 3 x 3 points at z = 0, seen from above by three views.
+TriangleMesh points_that_look_up(float length) {
+  TriangleMesh out;
+  for (const float y : {0.0f, 1.0f, 2.0f}) {
+    for (const float x : {0.0f, 1.0f, 2.0f}) out.vertices.emplace_back(x, y, 0.0f);
+  }
+  out.normals.assign(9, Eigen::Vector3f(0, 0, length));
+  out.support.assign(9, 3);
+  return out;
+}
+
+TEST(TakeEvidence, NobodyKnowsTheBackOfAPointWithoutNormal) {
+  TriangleMesh cloud = points_that_look_up(1);
+  cloud.normals[4] = Eigen::Vector3f::Zero();  // (1, 1, 0)
+  const StatedSurface source(cloud);
+  for (const bool looks_up : {true, false}) {
+    TriangleMesh face = triangle({1, 1, 0.01f}, 0.1f, looks_up);
+    EXPECT_EQ(take_evidence(face, source, 0.3).behind, 0);
+    EXPECT_EQ(face.provenance.at(0), Provenance::Observed);
+    face = triangle({0, 0, 0.01f}, 0.1f, looks_up);
+    EXPECT_EQ(take_evidence(face, source, 0.3).behind > 0, !looks_up);
+  }
+}
+
 TEST(TakeEvidence, WhatIsNotStatedStaysSo) {
   const TriangleMesh cube = test::cube_mesh(1).mesh;
   TriangleMesh face = triangle({0.2f, 0.2f, 1.01f}, 0.1f);
@@ -88,6 +132,23 @@ TEST(StatedSurface, PointsAreLabelledByTheirSupport) {
   EXPECT_EQ(source.nearest({0.9, 0, 0}).label, Provenance::SingleView);
   EXPECT_EQ(source.nearest({5, 0, 0}).label, Provenance::Observed);
   EXPECT_THROW(StatedSurface(TriangleMesh{}), InvalidInput);
+}
+
+TEST(StatedSurface, NormalsHaveUnitLengthWhateverTheFileSays) {
+  const TriangleMesh cloud = points_that_look_up(3);
+  const StatedSurface source(cloud);
+  EXPECT_TRUE(source.knows_sides());
+  EXPECT_LT((source.nearest({1, 1, 0.2}).normal - Eigen::Vector3d::UnitZ()).norm(), 1e-6);
+}
+
+TEST(StatedSurface, NormalsThatAreAllZeroAreNone) {
+  const TriangleMesh cloud = points_that_look_up(0);
+  const StatedSurface source(cloud);
+  EXPECT_FALSE(source.knows_sides());
+  EXPECT_NEAR(std::abs(source.nearest({1, 1, 0.2}).normal.z()), 1, 1e-6);  // estimated
+  TriangleMesh below = triangle({1, 1, -0.01f}, 0.1f, false);
+  EXPECT_EQ(take_evidence(below, source, 0.3).behind, 0);
+  EXPECT_TRUE(below.normals.empty());
 }
 
 TEST(PointSpacing, OfAGrid) {

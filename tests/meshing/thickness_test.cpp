@@ -54,6 +54,63 @@ Thickness thickness_near(const MeasurableMesh& mesh, const Vector3d& point) {
   return ThicknessGauge(mesh, surface).at(surface.nearest(point));
 }
 
+// A box [0, 10]^3 whose edge along y at the largest x and z is a fillet of radius 2, three planes
+// that touch it: four bends of 22.5 degrees.
+MeasurableMesh filleted_box() {
+  constexpr double kSide = 10;
+  constexpr double kRadius = 2;
+  constexpr double kStep = std::numbers::pi / 8;
+  std::vector<Eigen::Vector2d> rim = {{0, 0}, {kSide, 0}};  // x and z, counter-clockwise
+  for (int k = 0; k < 4; ++k) {
+    const double angle = (k + 0.5) * kStep;
+    const double out = kRadius / std::cos(0.5 * kStep);
+    rim.emplace_back(kSide - kRadius + out * std::cos(angle),
+                     kSide - kRadius + out * std::sin(angle));
+  }
+  rim.emplace_back(0, kSide);
+  const auto n = static_cast<uint32_t>(rim.size());
+  MeasurableMesh out;
+  for (const double y : {0.0, kSide}) {
+    for (const Eigen::Vector2d& p : rim) out.points.emplace_back(p.x(), y, p.y());
+  }
+  for (uint32_t i = 0; i < n; ++i) {
+    const uint32_t next = (i + 1) % n;
+    out.mesh.faces.push_back({i, i + n, next + n});
+    out.mesh.faces.push_back({i, next + n, next});
+    if (i == 0 || next == 0) continue;
+    out.mesh.faces.push_back({0, i, next});
+    out.mesh.faces.push_back({n, next + n, i + n});
+  }
+  return test::with_vertices(std::move(out));
+}
+
+// Vertices of a fillet have the normals of the large faces beside it, which lean 22.5 degrees from
+// its own: the ball must not shrink to nothing for that.
+TEST(Thickness, OfACoarseFilletIsNotNothing) {
+  const MeasurableMesh box = filleted_box();
+  const NearestSurface surface(box);
+  const ThicknessGauge gauge(box, surface);
+  constexpr int kParts = 12;
+  int measured = 0;
+  for (uint32_t f = 0; f < box.mesh.faces.size(); ++f) {
+    const auto& [a, b, c] = box.mesh.faces[f];
+    const Vector3d across = (box.points[b] - box.points[a]).cross(box.points[c] - box.points[a]);
+    if (across.x() < 1 || across.z() < 1) continue;  // not the fillet
+    for (int i = 1; i < kParts; ++i) {
+      for (int j = 1; j < kParts - i; ++j) {
+        const Vector3d w = Vector3d(i, j, kParts - i - j) / kParts;
+        const Vector3d p = w[0] * box.points[a] + w[1] * box.points[b] + w[2] * box.points[c];
+        if (p.y() < 2.5 || p.y() > 7.5) continue;  // the ball would touch the ends
+        const double found = gauge.at({f, p, w}).value.value;
+        EXPECT_GT(found, 2) << f << ": " << w.transpose();
+        EXPECT_LT(found, 4.5) << f << ": " << w.transpose();
+        ++measured;
+      }
+    }
+  }
+  EXPECT_GT(measured, 100);
+}
+
 TEST(Thickness, OfAPlateIsItsOwnFromEitherSide) {
   const MeasurableMesh plate = box_mesh(1, 0.8, 0.02);
   for (const double z : {0.0, 0.02}) {

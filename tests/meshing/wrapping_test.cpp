@@ -161,6 +161,52 @@ TEST(Wrapped, TakesPointsWithAndWithoutNormals) {
   }
 }
 
+TEST(Wrapped, TakesNormalsOfAnyLengthAndNoneForZeros) {
+  TriangleMesh cloud;
+  cloud.vertices = test::sphere_mesh(1, 60, 120).mesh.vertices;
+  for (const auto& p : cloud.vertices) cloud.normals.emplace_back(5 * p);
+  const WrappedMesh sided = wrapped(cloud, {0.3, 0.02});
+  EXPECT_TRUE(sided.knows_sides);
+  EXPECT_NEAR(sided.volume / (4 * kPi / 3), 1, 0.01);
+  cloud.normals.assign(cloud.vertices.size(), Eigen::Vector3f::Zero());
+  const WrappedMesh bare = wrapped(cloud, {0.3, 0.02});
+  EXPECT_FALSE(bare.knows_sides);
+  EXPECT_EQ(bare.evidence.behind, 0);
+  EXPECT_NEAR(bare.volume / (4 * kPi / 3), 1, 0.01);
+}
+
+// As other programs write it: support and sigma, but no labels.
+TEST(Wrapped, ItsBackStatesNothingWithoutLabelsEither) {
+  TriangleMesh open = ball_with_hole(0.5);
+  open.provenance.clear();
+  open.support.assign(open.vertices.size(), 3);
+  const WrappedMesh out = wrapped(open, {0.15, 0.005});
+  EXPECT_TRUE(out.mesh.provenance.empty());
+  std::vector<uint8_t> looks_in(out.mesh.vertices.size(), 1);
+  std::vector<uint8_t> looks_out(out.mesh.vertices.size(), 1);
+  for (const auto& [a, b, c] : out.mesh.faces) {
+    const Eigen::Vector3f area = (out.mesh.vertices[b] - out.mesh.vertices[a])
+                                     .cross(out.mesh.vertices[c] - out.mesh.vertices[a]);
+    const bool inward = area.dot(out.mesh.vertices[a]) < 0;
+    for (const uint32_t v : {a, b, c}) (inward ? looks_out : looks_in)[v] = 0;
+  }
+  size_t invented = 0;
+  size_t known = 0;
+  for (size_t v = 0; v < out.mesh.vertices.size(); ++v) {
+    if (out.mesh.vertices[v].z() > 0) continue;  // the hole and its rim
+    if (looks_in[v] != 0) {
+      ++invented;
+      EXPECT_TRUE(std::isnan(out.mesh.sigma[v])) << v;
+      EXPECT_EQ(out.mesh.support[v], 0) << v;
+    } else if (looks_out[v] != 0 && !std::isnan(out.mesh.sigma[v])) {
+      ++known;
+      EXPECT_EQ(out.mesh.support[v], 3) << v;
+    }
+  }
+  EXPECT_GT(invented, 100U);
+  EXPECT_GT(known, 100U);
+}
+
 TEST(Wrapped, KeepsTheTwoSidesOfASheetApart) {
   const TriangleMesh sheet =
       test::grid_mesh(10, 10, [](double s, double t) { return Eigen::Vector3d(s, t, 0); }).mesh;

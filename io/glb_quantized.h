@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "io/glb_primitive.h"
+
+namespace cgs {
+
+/// The grid of 16 bits per coordinate that all primitives of a mesh share, so that borders between
+/// them stay closed: position = origin + step * whole numbers.
+struct QuantizedGrid {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  double step = 1;  ///< > 0
+
+  /// The finest that holds a box.
+  static QuantizedGrid around(const Eigen::AlignedBox3f& box);
+};
+
+/// The vertices of a primitive as KHR_mesh_quantization allows them, padded to multiples of four
+/// bytes.
+struct QuantizedPrimitive {
+  std::vector<std::array<uint16_t, 4>> positions;  ///< Steps of the grid, and 0.
+  std::vector<std::array<int8_t, 4>> normals;      ///< Normalized to [-127, 127], and 0.
+  std::vector<std::array<uint16_t, 2>> texcoords;  ///< Normalized to [0, 65535]; may be empty.
+  std::vector<std::array<uint16_t, 4>> colors;     ///< Normalized, alpha 1; may be empty.
+  double max_error = 0;          ///< Largest move of a position [units of the file].
+  double max_texture_error = 0;  ///< Largest move of a texture coordinate [pixels].
+};
+
+/// Source: glTF extension KHR_mesh_quantization, Khronos Group.
+/// \pre positions lie on the grid's box, texture coordinates in [0, 1]
+QuantizedPrimitive quantized(const GlbPrimitive& primitive, const QuantizedGrid& grid);
+
+}  // namespace cgs
