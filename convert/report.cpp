@@ -310,6 +310,22 @@ ColorImage photograph_of(const Scene& scene, int index) {
   return one.views[0].image;
 }
 
+// "3.1 % holes: 2.0 % hidden from every input photograph, …"
+std::string hole_words(const Json& view) {
+  std::string out = number(100 * view["hole_fraction"].get<double>(), "%.1f") + " % holes";
+  const char* before = ": ";
+  for (const auto& [key, words] :
+       {std::pair("occluded_fraction", "hidden from every input photograph"),
+        std::pair("outside_fraction", "outside of all of them"),
+        std::pair("transparent_fraction", "not reconstructed")}) {
+    const double share = view.value(key, 0.0);
+    if (!(share > 0)) continue;
+    out += before + number(100 * share, "%.1f") + " % " + words;
+    before = ", ";
+  }
+  return out;
+}
+
 std::string views_section(const std::filesystem::path& folder,
                           const Json& views,
                           const Scene& scene) {
@@ -325,8 +341,7 @@ std::string views_section(const std::filesystem::path& folder,
     const int index = find_view(scene, name);
     const std::string holes = overlay(folder / "views" / (name + ".hole.png"));
     html << "<h3>" << escaped(name) << " (" << view["role"].get<std::string>() << "), "
-         << number(100 * view["hole_fraction"].get<double>(), "%.1f")
-         << " % holes</h3>\n<div class=row>\n"
+         << hole_words(view) << "</h3>\n<div class=row>\n"
          << figure_of([&] { return photograph_of(scene, index); }, "photograph", holes)
          << figure(folder / "views" / (name + ".color.png"), "rendered", holes)
          << figure(folder / "views" / (name + ".depth.png"), "depth (red = near)")

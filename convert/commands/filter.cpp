@@ -42,10 +42,6 @@ void run_filter_command(const FilterArgs& args) {
           printable(args.output.filename()));
   Terminal terminal(args.common.quiet, args.common.strict);
   (void)prepare_filters(args.operations, Frame{.metres_per_unit = 1});  // before a long read
-  if (is_splat_ply(args.input)) {
-    throw InvalidInput(printable(args.input) +
-                       " holds splats, not a mesh or points; cgs convert makes a mesh of them");
-  }
   MeasurableFile file = read_measured(args.input, args.assume_unit);
   terminal.warn(file.warnings);
   settle_up(file.content.frame, args.up);
