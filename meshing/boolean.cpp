@@ -14,9 +14,9 @@
 #include "meshing/certificate.h"
 #include "meshing/components.h"
 #include "meshing/corner_shares.h"
-#include "meshing/nearest_surface.h"
 #include "meshing/polygon_mesh.h"
 #include "meshing/self_intersections.h"
+#include "meshing/triangle_tree.h"
 #include "meshing/vertex_attributes.h"
 
 namespace cgs {

@@ -8,6 +8,7 @@
 
 #include "libcgs/core/error.h"
 #include "meshing/mesh_distance.h"
+#include "meshing/triangle_tree.h"
 
 namespace cgs {
 

@@ -14,6 +14,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "meshing/triangle_tree.h"
 
 namespace cgs {
 
@@ -36,6 +37,19 @@ Triangles triangles(const TriangleMesh& mesh) {
     const Kernel::Triangle_3 t(
         to_cgal(mesh.vertices[f[0]]), to_cgal(mesh.vertices[f[1]]), to_cgal(mesh.vertices[f[2]]));
     if (!t.is_degenerate()) out.push_back(t);
+  }
+  return out;
+}
+
+std::vector<TriangleTree::Triangle> proper_triangles(const TriangleMesh& mesh) {
+  std::vector<TriangleTree::Triangle> out;
+  out.reserve(mesh.faces.size());
+  for (const auto& f : mesh.faces) {
+    const Eigen::Vector3f& a = mesh.vertices[f[0]];
+    const Eigen::Vector3f& b = mesh.vertices[f[1]];
+    const Eigen::Vector3f& c = mesh.vertices[f[2]];
+    if (CGAL::collinear(to_cgal(a), to_cgal(b), to_cgal(c))) continue;
+    out.push_back({a.cast<double>(), b.cast<double>(), c.cast<double>()});
   }
   return out;
 }
@@ -91,13 +105,8 @@ std::vector<Eigen::Vector3f> sample_surface(const TriangleMesh& mesh, size_t cou
 }
 
 struct DistanceToMesh::Parts {
-  explicit Parts(const TriangleMesh& mesh)
-      : soup(triangles(mesh)), tree(soup.cbegin(), soup.cend()) {
-    tree.build();
-    tree.accelerate_distance_queries();
-  }
-  Triangles soup;  // the tree points into it
-  Tree tree;
+  explicit Parts(const TriangleMesh& mesh) : tree(proper_triangles(mesh)) {}
+  TriangleTree tree;
 };
 
 DistanceToMesh::DistanceToMesh(const TriangleMesh& mesh) : parts_(std::make_unique<Parts>(mesh)) {}
@@ -108,7 +117,8 @@ DistanceToMesh& DistanceToMesh::operator=(DistanceToMesh&& other) noexcept = def
 std::vector<float> DistanceToMesh::of(const std::vector<Eigen::Vector3f>& points) const {
   std::vector<float> out(points.size());
   tbb::parallel_for(size_t(0), points.size(), [&](size_t i) {
-    out[i] = static_cast<float>(std::sqrt(parts_->tree.squared_distance(to_cgal(points[i]))));
+    const auto nearest = parts_->tree.nearest(points[i].cast<double>());
+    out[i] = static_cast<float>(std::sqrt(nearest->squared_distance));
   });
   return out;
 }

@@ -29,13 +29,6 @@ struct SurfaceEvidence {
 
 SurfaceEvidence evidence_at(const MeasurableMesh& mesh, const SurfacePoint& point);
 
-/// The point of a triangle nearest to `point`, as weights of its corners a, b and c.
-/// Source: C. Ericson 2004, "Real-Time Collision Detection", section 5.1.5.
-Eigen::Vector3d nearest_weights(const Eigen::Vector3d& a,
-                                const Eigen::Vector3d& b,
-                                const Eigen::Vector3d& c,
-                                const Eigen::Vector3d& point);
-
 /// Answers where a mesh is nearest to points, and on which side of it they lie. Queries may run in
 /// parallel.
 class NearestSurface {
