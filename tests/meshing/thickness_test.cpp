@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
+#include "meshing/triangle_tree.h"
 #include "tests/support/solid_meshes.h"
 
 namespace cgs {
