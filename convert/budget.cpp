@@ -11,6 +11,7 @@
 
 #include "convert/length.h"
 #include "convert/memory_plan.h"
+#include "convert/model.h"
 #include "convert/pipeline.h"
 #include "convert/time_model.h"
 #include "io/atomic_file.h"
@@ -93,6 +94,27 @@ TimedRun trial(const Search& search, int downscale, int steps) {
   return out;
 }
 
+// The training alone, of another number of steps than a whole run took: what a step costs.
+TimedRun training_trial(const Search& search, int downscale, int steps) {
+  SceneRequest request = search.request.scene;
+  request.options.downscale = downscale;
+  (void)search.terminal.begin("trying " + size_words(search.opened.scene, downscale));
+  Terminal silent = Terminal::silent();
+  const auto start = Clock::now();
+  Scene scene = open_scene(request, search.request.output / "model", silent).scene;
+  ModelRequest training;
+  training.training = search.request.training;
+  training.training.steps = steps;
+  training.depth_network = request.options.depth.network;
+  (void)train_model(std::move(scene), training, silent.begin(""));
+  TimedRun out;
+  out.pixels = search.pixels_at(downscale);
+  out.steps = steps;
+  out.stages = {{kTrainedStage, std::chrono::duration<double>(Clock::now() - start).count()}};
+  (void)search.terminal.end(std::to_string(steps) + " steps, training alone");
+  return out;
+}
+
 // Best first.
 std::vector<Candidate> candidates(const Search& search) {
   std::vector<Candidate> out;
@@ -135,13 +157,13 @@ int first_trial(Search& search, int steps) {
   }
 }
 
-// The smallest pictures twice, then larger ones while these cost little of the time left and tell
-// more about the size in view.
+// The smallest pictures and their training once more, then larger pictures while these cost little
+// of the time left and tell more about the size in view.
 void run_trials(Search& search) {
   const int draft = training_preset("draft").steps;
   const int smallest = first_trial(search, draft / 4);
   if (!best_within(search, search.left())) return;  // what a step costs would only be added
-  search.runs.push_back(trial(search, smallest, draft));
+  search.runs.insert(search.runs.begin(), training_trial(search, smallest, draft));
   for (int size = smallest;;) {
     const std::optional<Candidate> aim = best_within(search, search.left());
     if (!aim) return;

@@ -11,8 +11,12 @@ namespace cgs {
 
 namespace {
 
-constexpr const char* kTrainedStage = "model";
 constexpr double kSteepest = 1.5;  // planes of a sweep grow with the side of a picture
+
+bool has_stage(const TimedRun& run, const std::string& stage) {
+  return std::any_of(
+      run.stages.begin(), run.stages.end(), [&](const auto& s) { return s.first == stage; });
+}
 
 double seconds_of(const TimedRun& run, const std::string& stage) {
   const auto found = std::find_if(
@@ -53,6 +57,7 @@ double foretold_seconds(const std::vector<TimedRun>& runs, double pixels, int st
   for (const auto& [stage, seconds] : runs.back().stages) {
     std::map<double, double> measured;
     for (const TimedRun& run : runs) {
+      if (!has_stage(run, stage)) continue;
       const double training = stage == kTrainedStage ? per_step * run.pixels * run.steps : 0;
       measured[run.pixels] = std::max(0.0, seconds_of(run, stage) - training);
     }

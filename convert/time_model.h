@@ -7,12 +7,16 @@
 
 namespace cgs {
 
+/// The stage that takes longer with more steps of the training.
+inline constexpr const char* kTrainedStage = "model";
+
 /// What a run took.
 struct TimedRun {
   double pixels = 0;   ///< Of all input views.
   int steps = 0;       ///< Of the training.
   double opening = 0;  ///< [s] outside of the stages: photographs read and checked.
-  std::vector<std::pair<std::string, double>> stages;  ///< Name and time [s]; the same in all runs.
+  /// Name and time [s]; the same in all runs, but for runs of kTrainedStage alone.
+  std::vector<std::pair<std::string, double>> stages;
 };
 
 /// Foretells how long a run of another size will take.

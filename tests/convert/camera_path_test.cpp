@@ -75,6 +75,7 @@ TEST(CameraPath, BetweenVisitsEveryInputViewAndComesBack) {
 
 TEST(CameraPath, OfAFileIsInTheCoordinatesOfTheModelsFiles) {
   Model model = row_of_cameras();
+  model.scene.folder = "somewhere";
   model.scene.frame.scale = 4;
   model.scene.frame.origin = {1024, -512, 64};
   const test::TempDir dir;

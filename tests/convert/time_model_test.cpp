@@ -28,6 +28,15 @@ double total(const TimedRun& run) {
   return sum;
 }
 
+TEST(TimeModel, LearnsWhatAStepCostsFromTrainingAlone) {
+  TimedRun training = run_of(4e4, 20);
+  training.stages.pop_back();
+  training.opening = 0;
+  const std::vector<TimedRun> runs = {training, run_of(4e4, 5), run_of(1.6e5, 5)};
+  const double truth = total(run_of(6.4e5, 60));
+  EXPECT_NEAR(foretold_seconds(runs, 6.4e5, 60), truth, 1e-6 * truth);
+}
+
 TEST(TimeModel, ContinuesFixedCostsPowersAndSteps) {
   const std::vector<TimedRun> runs = {run_of(4e4, 5), run_of(4e4, 20), run_of(1.6e5, 5)};
   for (const double pixels : {4e4, 1.6e5, 6.4e5, 2.5e6}) {

@@ -46,7 +46,7 @@ float at(const ExrImage& image, const std::string& channel, int x, int y) {
 
 TEST(WriteViewExr, HasEveryChannelInWorldUnits) {
   const ExrImage image = written(rasters(), test::centimetre_frame());
-  EXPECT_EQ(image.channels.size(), 12u);
+  EXPECT_EQ(image.channels.size(), 13u);
   EXPECT_EQ(at(image, "Z", 2, 1), 48.0f);
   EXPECT_FLOAT_EQ(at(image, "variance.Y", 2, 1), 0.01f * 64 * 64);
   const double ray = std::hypot((2.5 - 3.2) / 5, (1.5 - 1.9) / 7, 1.0);
