@@ -112,9 +112,9 @@ class AssetWriter {
     out.y_up = y_up_;
     out.max_error = rounding * frame_.scale;
     out.summary_json = summary.dump();
-    // Finer than any grid of the encoder: floats as they are.
-    constexpr double kFinestGrid = 1.0 / (1 << 20);
-    if (promise_ && rounding < kFinestGrid * side_) out.encoding = GlbEncoding::Plain;
+    // Finer than any grid of the encoding: floats as they are.
+    const double finest_grid = encoding_ == GlbEncoding::Quantized ? 1.8 / 65535 : 1.0 / (1 << 20);
+    if (promise_ && rounding < finest_grid * side_) out.encoding = GlbEncoding::Plain;
     return out;
   }
 
@@ -241,7 +241,7 @@ Json write_promised(const AssetWriter& writer,
                     const TriangleMesh& mesh,
                     const Frame& frame,
                     const Progress& progress) {
-  const TriangleMesh fused = fused_surface(request.output / "volume.vdb");
+  const TriangleMesh fused = fused_surface(request.output / "volume.vdb", request.memory_limit);
   const double already = request.max_size > 0 ? surface_deviation(mesh, fused).evidence : 0;
   const Written written =
       write_within(writer, request.max_size, already, frame, part_of(progress, 0.1, 0.9));

@@ -94,14 +94,14 @@ TimedRun trial(const Search& search, int downscale, int steps) {
   return out;
 }
 
-// The training alone, of another number of steps than a whole run took: what a step costs.
+// The training alone: two of them tell what a step costs.
 TimedRun training_trial(const Search& search, int downscale, int steps) {
   SceneRequest request = search.request.scene;
   request.options.downscale = downscale;
   (void)search.terminal.begin("trying " + size_words(search.opened.scene, downscale));
   Terminal silent = Terminal::silent();
-  const auto start = Clock::now();
   Scene scene = open_scene(request, search.request.output / "model", silent).scene;
+  const auto start = Clock::now();
   ModelRequest training;
   training.training = search.request.training;
   training.training.steps = steps;
@@ -145,25 +145,34 @@ int first_trial(Search& search, int steps) {
   });
   if (size == search.sizes.rend()) --size;
   while (true) {
+    const double before = search.elapsed();
+    const auto is_last = [&] {
+      const auto next = std::next(size);
+      if (next == search.sizes.rend()) return true;
+      const double larger = search.pixels_at(*next) / search.pixels_at(*size);
+      return larger * (search.elapsed() - before) > search.left();
+    };
     try {
       search.runs.push_back(trial(search, *size, steps));
       return *size;
     } catch (const InvalidInput&) {
-      if (std::next(size) == search.sizes.rend()) throw;
+      if (is_last()) throw;
     } catch (const NumericalError&) {
-      if (std::next(size) == search.sizes.rend()) throw;
+      if (is_last()) throw;
     }
     ++size;
   }
 }
 
-// The smallest pictures and their training once more, then larger pictures while these cost little
+// The smallest pictures, their training apart, then larger pictures while these cost little
 // of the time left and tell more about the size in view.
 void run_trials(Search& search) {
   const int draft = training_preset("draft").steps;
   const int smallest = first_trial(search, draft / 4);
   if (!best_within(search, search.left())) return;  // what a step costs would only be added
-  search.runs.insert(search.runs.begin(), training_trial(search, smallest, draft));
+  search.runs.insert(
+      search.runs.begin(),
+      {training_trial(search, smallest, draft / 4), training_trial(search, smallest, draft)});
   for (int size = smallest;;) {
     const std::optional<Candidate> aim = best_within(search, search.left());
     if (!aim) return;

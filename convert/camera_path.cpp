@@ -16,12 +16,13 @@ const Camera& input_camera(const Model& model, size_t k) {
   return model.scene.views[static_cast<size_t>(model.scene.input.at(k))].camera;
 }
 
+// NaN where none is known.
 float median_depth(const DepthMap& depth) {
   std::vector<float> known;
   for (const float z : depth.data) {
     if (std::isfinite(z)) known.push_back(z);
   }
-  if (known.empty()) throw NumericalError("no depth is known that a path could look at");
+  if (known.empty()) return std::nanf("");
   const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
   std::nth_element(known.begin(), middle, known.end());
   return *middle;
@@ -32,19 +33,33 @@ struct Subject {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Vector3d eye = Eigen::Vector3d::Zero();
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  double distance = 0;  ///< Mean one of the input views.
 };
 
 Subject subject_of(const Model& model) {
   Subject out;
   const size_t count = model.scene.input.size();
   Eigen::Vector3d image_up = Eigen::Vector3d::Zero();
+  size_t with_depth = 0;
   for (size_t k = 0; k < count; ++k) {
     const Camera& camera = input_camera(model, k);
-    const float z = median_depth(model.priors.at(k).depth);
-    out.centre += camera.unproject(0.5 * camera.width, 0.5 * camera.height, z) / double(count);
     out.eye += camera.center() / double(count);
     image_up -= camera.world_from_cam.linear().col(1);
+    const float z = median_depth(model.priors.at(k).depth);
+    if (std::isnan(z)) continue;
+    out.centre += camera.unproject(0.5 * camera.width, 0.5 * camera.height, z);
+    ++with_depth;
   }
+  if (with_depth == 0) throw NumericalError("no depth is known that a path could look at");
+  out.centre /= double(with_depth);
+  for (size_t k = 0; k < count; ++k) {
+    out.distance += (input_camera(model, k).center() - out.centre).norm() / double(count);
+  }
+  // Views from all around have their mean inside of the subject.
+  const Eigen::Vector3d off = out.eye - out.centre;
+  out.eye = off.norm() < 0.5 * out.distance
+                ? input_camera(model, 0).center()
+                : Eigen::Vector3d(out.centre + out.distance / off.norm() * off);
   out.up = model.scene.frame.up.isZero() ? image_up.normalized() : model.scene.frame.up;
   return out;
 }
@@ -72,6 +87,8 @@ Camera on_spiral(const Model& model, const Subject& subject, double turn) {
     const Eigen::Vector3d off = axes.transpose() * (input_camera(model, k).center() - subject.eye);
     reach = reach.cwiseMax(off.cwiseAbs());
   }
+  constexpr double kWidest = 0.5;  // of the distance; more is an orbit
+  reach = reach.cwiseMin(kWidest * subject.distance);
   constexpr double kFlattest = 0.3;  // views often stand in a row, and a line is no spiral
   const double widest = reach.head<2>().maxCoeff();
   const Eigen::Vector3d off(std::max(reach.x(), kFlattest * widest) * std::cos(turn),
@@ -104,7 +121,8 @@ Camera between(const Model& model, double turn) {
 }  // namespace
 
 std::vector<Camera> camera_path(const Model& model, const std::string& name, int frames) {
-  require(frames >= 2, "a path must have at least 2 frames", frames);
+  constexpr int kMost = 10'000;
+  require(frames >= 2 && frames <= kMost, "a path must have 2 to 10000 frames", frames);
   const bool is_known = name == "between" || name == "spiral" || name == "orbit";
   require(is_known, "a path must be between, spiral, orbit or a .json file of cameras", name);
   require(!model.priors.empty(),

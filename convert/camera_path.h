@@ -17,7 +17,7 @@ namespace cgs {
 /// - "orbit": once around what they look at, about the up axis, most of it never seen by any of
 /// them
 ///
-/// \param frames  at least 2
+/// \param frames  2 to 10000
 /// \throws InvalidInput for another name or number, or for splats without input views;
 ///         NumericalError if no depth is known
 /// Source of the spiral: Mildenhall et al. 2019, "Local Light Field Fusion".

@@ -293,11 +293,17 @@ void remove_outputs_after(const Stage& first, const Run& run) {
   }
 }
 
+void warn_of(const Json& result, const Terminal& terminal) {
+  if (!result.is_object() || !result.contains("warnings")) return;
+  terminal.warn(result["warnings"].get<std::vector<std::string>>());
+}
+
 Json run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
   for (const Stage& stage : stages_of(run.scene)) {
     if (!stale && run.record.is_done(stage.name, stage.files)) {
       terminal.say(stage.title + ": done before");
+      warn_of(run.record.result(stage.name), terminal);
       continue;
     }
     if (!stale) remove_outputs_after(stage, run);
@@ -305,8 +311,7 @@ Json run_stages(Run& run, Terminal& terminal) {
     const CostMeter meter;  // from here on the peak of memory is that of the stage
     const Json result = stage.work(run, terminal.begin(stage.title));
     run.record.finish(stage.name, terminal.end(""), result);
-    if (!result.is_object() || !result.contains("warnings")) continue;
-    terminal.warn(result["warnings"].get<std::vector<std::string>>());
+    warn_of(result, terminal);
   }
   forget_checkpoints(run.request.output / "model");
   run.record.note("focal", run.request.scene.focal);

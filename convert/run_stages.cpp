@@ -194,7 +194,9 @@ Json write_meshes(const Model& model, const RunRequest& request, const Progress&
       model, request.voxel_size, request.memory_limit, part_of(progress, 0, 0.3), promise);
   Surfaces surfaces;
   surfaces.open = open_surface(fused.volume, {});
-  surfaces.closed = watertight_surface(fused.volume, {}, part_of(progress, 0.35, 0.6));
+  WatertightOptions closing;
+  closing.memory_limit = memory_budget(request.memory_limit);
+  surfaces.closed = watertight_surface(fused.volume, closing, part_of(progress, 0.35, 0.6));
   DeviationLedger ledger = fusion_ledger(model, fused.volume, surfaces.open, surfaces.closed.mesh);
   const std::filesystem::path folder = request.output / "mesh";
   const Progress rest = part_of(progress, 0.6, 0.9);

@@ -73,6 +73,16 @@ std::string frame_name(size_t k) {
   return "frame_" + number;
 }
 
+// Those of a longer path must not follow these.
+void remove_frames(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> found;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("frame_") && name.ends_with(".png")) found.push_back(entry.path());
+  }
+  for (const auto& file : found) std::filesystem::remove(file);
+}
+
 // Where the frames were taken from, in the frame of the model.
 Scene scene_of_path(const Model& model, const std::vector<Camera>& path) {
   Scene out;
@@ -160,8 +170,9 @@ Json write_path(const Model& model,
                 const Progress& progress) {
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
+  remove_frames(folder);
   constexpr size_t kOnSheet = 12;
-  const size_t shown_each = std::max<size_t>(1, path.size() / kOnSheet);
+  const auto place_on_sheet = [&](size_t k) { return k * kOnSheet / path.size(); };
   std::vector<ColorImage> sheet;
   Json out = Json::array();
   for (size_t k = 0; k < path.size(); ++k) {
@@ -171,7 +182,7 @@ Json write_path(const Model& model,
     const MaskMap holes = hole_mask(buffers);
     write_png(folder / (frame_name(k) + ".png"), shown);
     write_png(folder / (frame_name(k) + ".hole.png"), holes);
-    if (k % shown_each == 0 && sheet.size() < kOnSheet) {
+    if (k == 0 || path.size() <= kOnSheet || place_on_sheet(k) != place_on_sheet(k - 1)) {
       ColorImage small = thumbnail(tinted(shown, holes));
       const bool fits =
           sheet.empty() || (small.width == sheet[0].width && small.height == sheet[0].height);

@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 
+#include "convert/memory_plan.h"
 #include "convert/volume_file.h"
 #include "io/mesh_file.h"
 #include "io/scene_path.h"
@@ -86,9 +87,11 @@ SurfaceDeviation surface_deviation(const TriangleMesh& written, const TriangleMe
   return out;
 }
 
-TriangleMesh fused_surface(const std::filesystem::path& volume) {
+TriangleMesh fused_surface(const std::filesystem::path& volume, size_t memory_limit) {
   VolumeFile file = read_volume(volume);
-  TriangleMesh mesh = watertight_surface(file.volume, {}).mesh;
+  WatertightOptions closing;
+  closing.memory_limit = memory_budget(memory_limit);
+  TriangleMesh mesh = watertight_surface(file.volume, closing).mesh;
   if (mesh.faces.empty()) throw BadInput(Defect::Empty, volume, "holds no surface");
   return mesh;
 }

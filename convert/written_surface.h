@@ -25,7 +25,7 @@ SurfaceDeviation surface_deviation(const TriangleMesh& written, const TriangleMe
 
 /// The surface of a volume.vdb that was fused, closed but not simplified: what the watertight mesh
 /// of a run was made from. \throws BadInput
-TriangleMesh fused_surface(const std::filesystem::path& volume);
+TriangleMesh fused_surface(const std::filesystem::path& volume, size_t memory_limit);
 
 /// The largest distance of a vertex from where it was, of files with the same vertices in the same
 /// order (PLY, OBJ) or, for STL as write_mesh_files() wrote it, of a corner of a face

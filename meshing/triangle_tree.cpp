@@ -43,6 +43,32 @@ double squared_distance(const Eigen::AlignedBox3f& box, const Eigen::Vector3d& p
   return under.cwiseMax(over).cwiseMax(0.0).squaredNorm();
 }
 
+// Weight of b at the point of the side from a to b that is nearest to p.
+double nearest_on_side(const Eigen::Vector3d& a,
+                       const Eigen::Vector3d& b,
+                       const Eigen::Vector3d& p) {
+  const double length = (b - a).squaredNorm();
+  return length > 0 ? std::clamp((p - a).dot(b - a) / length, 0.0, 1.0) : 0.0;
+}
+
+// Of a triangle that is a line but for rounding.
+Eigen::Vector3d nearest_on_sides(const std::array<Eigen::Vector3d, 3>& corners,
+                                 const Eigen::Vector3d& p) {
+  Eigen::Vector3d best = Eigen::Vector3d::UnitX();
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t next = (k + 1) % 3;
+    const double t = nearest_on_side(corners.at(k), corners.at(next), p);
+    const double off = (corners.at(k) + t * (corners.at(next) - corners.at(k)) - p).squaredNorm();
+    if (!(off < least)) continue;
+    least = off;
+    best.setZero();
+    best[static_cast<Eigen::Index>(k)] = 1 - t;
+    best[static_cast<Eigen::Index>(next)] = t;
+  }
+  return best;
+}
+
 }  // namespace
 
 Eigen::Vector3d nearest_weights(const Eigen::Vector3d& a,
@@ -51,6 +77,11 @@ Eigen::Vector3d nearest_weights(const Eigen::Vector3d& a,
                                 const Eigen::Vector3d& p) {
   const Eigen::Vector3d ab = b - a;
   const Eigen::Vector3d ac = c - a;
+  constexpr double kLine = 1e-24;  // of the longest side to the fourth: what rounding leaves
+  const double longest = std::max(ab.squaredNorm(), ac.squaredNorm());
+  if (!(ab.cross(ac).squaredNorm() > kLine * longest * longest)) {
+    return nearest_on_sides({a, b, c}, p);
+  }
   const double d1 = ab.dot(p - a);
   const double d2 = ac.dot(p - a);
   if (d1 <= 0 && d2 <= 0) return {1, 0, 0};

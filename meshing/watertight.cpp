@@ -23,9 +23,13 @@ void check_memory(const Volume& volume, size_t limit) {
   const double voxels = (volume.bounds.sizes().array() / double(volume.voxel_size) + 5).prod();
   constexpr double kBytesPerVoxel = 6;  // inside, evidence, blurred, visited; part of the level set
   if (voxels * kBytesPerVoxel > static_cast<double>(limit)) {
-    throw LimitError("closing a volume of " + std::to_string(voxels) + " voxels may take " +
-                     std::to_string(voxels * kBytesPerVoxel) + " bytes, allowed are " +
-                     std::to_string(limit));
+    const auto mebibytes = [](double bytes) {
+      return std::to_string(std::lround(bytes / (1 << 20))) + " MiB";
+    };
+    throw LimitError("closing a volume of " + std::to_string(std::llround(voxels)) +
+                     " voxels may take " + mebibytes(voxels * kBytesPerVoxel) + ", allowed are " +
+                     mebibytes(static_cast<double>(limit)) +
+                     "; larger voxels need less, a larger memory limit allows it");
   }
 }
 

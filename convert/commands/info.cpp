@@ -26,6 +26,7 @@ using Json = nlohmann::ordered_json;
 struct InfoArgs {
   SceneRequest scene;
   bool json = false;
+  bool strict = false;
 };
 
 Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -268,6 +269,9 @@ void run_info(const InfoArgs& args) {
   } else {
     print_scene(info);
   }
+  if (args.strict && !info["warnings"].empty()) {
+    throw BadInput(Defect::Value, args.scene.path, "--strict: a warning counts as an error");
+  }
 }
 
 }  // namespace
@@ -287,6 +291,7 @@ void add_info(CLI::App& app) {
   add_scene_options(*cmd, args->scene.options);
   add_focal_option(*cmd, args->scene.focal);
   cmd->add_flag("--json", args->json, "Print JSON on standard output");
+  cmd->add_flag("--strict", args->strict, "A warning of a scene ends the command with exit code 3");
   cmd->footer(
       "Example: cgs info photos/portal --views 1,10,19\n"
       "         cgs info part.stl");

@@ -51,6 +51,9 @@ void run_mesh_command(const MeshArgs& args) {
   for (const auto& [name, reason] : files["left_out"].items()) {
     terminal.say(name + " left out: " + reason.get<std::string>());
   }
+  if (!closed.certificate.passed()) {
+    terminal.warn("the watertight mesh is NOT certified; --json says what is wrong with it");
+  }
   if (!args.common.json) return;
   const nlohmann::ordered_json report = {
       {"certificate", certificate_to_json(closed.certificate, closed.mesh, file.frame)},

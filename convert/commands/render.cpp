@@ -14,6 +14,7 @@
 #include "io/json_file.h"
 #include "io/scene_path.h"
 #include "io/scene_reader.h"
+#include "libcgs/core/error.h"
 
 namespace cgs {
 
@@ -36,6 +37,11 @@ void run_render(const RenderArgs& args) {
   terminal.warn(model.scene.warnings);
   if (!args.path.empty()) {
     const bool is_file = lower_extension(args.path) == ".json";
+    std::error_code ignored;
+    if (is_file && std::filesystem::equivalent(args.path, args.output / "cameras.json", ignored)) {
+      throw InvalidInput("--path: " + printable(args.path) +
+                         " would be replaced by the cameras of the frames; choose another folder");
+    }
     const std::vector<Camera> path =
         is_file ? camera_path_from(args.path, model) : camera_path(model, args.path, args.frames);
     const nlohmann::ordered_json report =
@@ -76,7 +82,8 @@ void add_render(CLI::App& app) {
   cmd->footer(
       "Example: cgs render out/portal/model --views 0,2 -o out/views\n"
       "         cgs render out/portal/model --path spiral -o out/spiral; its frames as a film:\n"
-      "         ffmpeg -framerate 24 -i out/spiral/frame_%04d.png -pix_fmt yuv420p portal.mp4");
+      "         ffmpeg -framerate 24 -i out/spiral/frame_%04d.png -pix_fmt yuv420p "
+      "-vf crop=trunc(iw/2)*2:trunc(ih/2)*2 portal.mp4");
   cmd->callback([args] { run_render(*args); });
 }
 

@@ -41,7 +41,8 @@ void run_train(const TrainArgs& args) {
   TrainedModel trained =
       train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
-  terminal.warn(std::vector(warnings.begin() + static_cast<std::ptrdiff_t>(known), warnings.end()));
+  const std::vector<std::string> found(warnings.begin() + static_cast<std::ptrdiff_t>(known),
+                                       warnings.end());
   trained.model.scene.frame.up = up;  // else the model tells it by its cameras
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
@@ -58,6 +59,7 @@ void run_train(const TrainArgs& args) {
   const size_t count = trained.model.gaussians.size();
   report["seconds"] = terminal.end(std::to_string(count) + " Gaussians");
   if (args.common.json) std::cout << json_text(report) << "\n";
+  terminal.warn(found);
 }
 
 }  // namespace

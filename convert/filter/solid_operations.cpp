@@ -119,6 +119,11 @@ FilterStep prepare_base(FilterArguments& arguments) {
           "its front looks as X,Y,Z after the thickness");
     }
     FlatBase base = with_flat_base(state.mesh, front, thickness / state.frame.scale);
+    constexpr double kNothing = 1e-9;  // of the volume
+    if (base.cut_off < kNothing) {
+      throw InvalidInput("--op base: the mesh ends before THICKNESS behind what was seen, so that "
+                         "nothing can be cut flat; state less");
+    }
     state.mesh = std::move(base.solid.mesh);
     const Eigen::Vector3d n = front.normalized();
     return percent(base.cut_off, 1) + " of the volume cut off behind; the front looks to " +

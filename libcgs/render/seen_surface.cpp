@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <vector>
 
 namespace cgs {
 
@@ -81,7 +82,43 @@ class Canvas {
       : inverse_depth_(camera.width, camera.height, kNan),
         pixel_(camera.width, camera.height, -1) {}
 
+  // Twice the area, positive where the other camera sees the side that the view saw.
+  static double area(const Corner& a, const Corner& b, const Corner& c) {
+    const Eigen::Vector2d ab = (b - a).head<2>();
+    const Eigen::Vector2d ac = (c - a).head<2>();
+    return ab.x() * ac.y() - ab.y() * ac.x();
+  }
+
   void draw(const Corner& a, const Corner& b, const Corner& c, int32_t pixel) {
+    cover(a, b, c, [&](int x, int y, float value) {
+      if (inverse_depth_(x, y) >= value) return;
+      inverse_depth_(x, y) = value;
+      pixel_(x, y) = pixel;
+    });
+  }
+
+  // The side that the view did not see; nobody knows what is there, and it hides what is farther.
+  // After all others: cells that noise has turned lie at the depth of their neighbours.
+  void draw_back(const Corner& a, const Corner& b, const Corner& c) {
+    constexpr float kNearer = 1.02f;
+    cover(a, b, c, [&](int x, int y, float value) {
+      if (inverse_depth_(x, y) * kNearer >= value) return;
+      inverse_depth_(x, y) = value;
+      pixel_(x, y) = -1;
+    });
+  }
+
+  SeenSurface take() {
+    for (size_t i = 0; i < pixel_.data.size(); ++i) {
+      float& value = inverse_depth_.data[i];
+      value = pixel_.data[i] < 0 ? kNan : 1 / value;
+    }
+    return {std::move(inverse_depth_), std::move(pixel_)};
+  }
+
+ private:
+  template <typename Visit>
+  void cover(const Corner& a, const Corner& b, const Corner& c, const Visit& visit) {
     const auto first = [](double p, double q, double r) {
       return std::ceil(std::min({p, q, r}) - 0.5 - kEdge);
     };
@@ -94,7 +131,7 @@ class Canvas {
     const double y1 = std::min(last(a.y(), b.y(), c.y()), double(pixel_.height - 1));
     const Eigen::Vector2d ab = (b - a).head<2>();
     const Eigen::Vector2d ac = (c - a).head<2>();
-    const double area = ab.x() * ac.y() - ab.y() * ac.x();
+    const double area = Canvas::area(a, b, c);
     // A cell so large shows that the camera is almost inside the surface, where depth says nothing.
     constexpr double kLargest = 64;
     if (!(std::abs(area) > 1e-12) || x1 - x0 > kLargest || y1 - y0 > kLargest) return;
@@ -105,19 +142,11 @@ class Canvas {
         const double wc = (ab.x() * p.y() - ab.y() * p.x()) / area;
         if (wb < -kEdge || wc < -kEdge || wb + wc > 1 + kEdge) continue;
         const auto value = static_cast<float>(a.z() + wb * (b.z() - a.z()) + wc * (c.z() - a.z()));
-        if (inverse_depth_(x, y) >= value) continue;
-        inverse_depth_(x, y) = value;
-        pixel_(x, y) = pixel;
+        visit(x, y, value);
       }
     }
   }
 
-  SeenSurface take() {
-    for (float& value : inverse_depth_.data) value = 1 / value;
-    return {std::move(inverse_depth_), std::move(pixel_)};
-  }
-
- private:
   static constexpr double kEdge = 1e-4;  // so that rounding leaves no crack between triangles
 
   DepthMap inverse_depth_;
@@ -131,6 +160,7 @@ SeenSurface seen_surface(const DepthCells& cells, const Camera& camera) {
   const Surface surface(cells);
   const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
   Canvas canvas(camera);
+  std::vector<std::array<Corner, 3>> backs;
   for (int y = 0; y < cells.depth.height; ++y) {
     for (int x = 0; x < cells.depth.width; ++x) {
       if (std::isnan(surface.at(x, y))) continue;
@@ -147,10 +177,16 @@ SeenSurface seen_surface(const DepthCells& cells, const Camera& camera) {
       }
       if (!before_camera) continue;
       const auto pixel = static_cast<int32_t>(cells.depth.index(x, y));
-      canvas.draw(corners[0], corners[1], corners[2], pixel);
-      canvas.draw(corners[0], corners[2], corners[3], pixel);
+      for (const auto& [b, c] : {std::pair(corners[1], corners[2]), {corners[2], corners[3]}}) {
+        if (Canvas::area(corners[0], b, c) < 0) {
+          backs.push_back({corners[0], b, c});
+        } else {
+          canvas.draw(corners[0], b, c, pixel);
+        }
+      }
     }
   }
+  for (const auto& [a, b, c] : backs) canvas.draw_back(a, b, c);
   return canvas.take();
 }
 

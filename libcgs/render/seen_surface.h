@@ -26,6 +26,9 @@ struct SeenSurface {
 /// little (`gap`), or if the step between them continues the step before or after it: a surface
 /// seen at a grazing angle. Elsewhere cells end half a pixel from their centre and the surface is
 /// torn: what lies behind the tear was hidden.
+///
+/// A cell that the other camera sees from behind is none: the view saw its front. It hides what
+/// lies behind it.
 SeenSurface seen_surface(const DepthCells& cells, const Camera& camera);
 
 }  // namespace cgs

@@ -41,13 +41,33 @@ double degrees_off(const Camera& camera, const Eigen::Vector3d& at) {
 TEST(CameraPath, OrbitsOnceAroundTheSubjectUpright) {
   const auto path = camera_path(row_of_cameras(), "orbit", 8);
   ASSERT_EQ(path.size(), 8u);
+  const double distance = (5 + 2 * std::hypot(5, 1)) / 3;  // the mean of the input views
   for (const Camera& camera : path) {
-    EXPECT_NEAR((camera.center() - kSubject).norm(), 5, 1e-9);
+    EXPECT_NEAR((camera.center() - kSubject).norm(), distance, 1e-9);
     EXPECT_LT(degrees_off(camera, kSubject), 1e-4);
     EXPECT_NEAR(camera.world_from_cam.linear().col(1).y(), 1, 1e-9);  // +y of the picture is down
     EXPECT_NEAR(camera.world_from_cam.linear().determinant(), 1, 1e-9);
   }
-  EXPECT_LT((path[4].center() - Eigen::Vector3d(0, 0, 10)).norm(), 1e-9);
+  EXPECT_LT((path[4].center() - Eigen::Vector3d(0, 0, 5 + distance)).norm(), 1e-9);
+}
+
+// Whose mean lies inside of the subject.
+TEST(CameraPath, KeepsItsDistanceFromASubjectWithViewsAllAround) {
+  Model model = row_of_cameras();
+  for (int i = 0; i < 3; ++i) {
+    Camera& camera = model.scene.views[static_cast<size_t>(i)].camera;
+    camera.world_from_cam =
+        Eigen::Translation3d(kSubject) *
+        Eigen::AngleAxisd(2 * std::numbers::pi * i / 3, Eigen::Vector3d::UnitY()) *
+        Eigen::Translation3d(0, 0, -5);
+  }
+  for (const char* name : {"orbit", "spiral"}) {
+    for (const Camera& camera : camera_path(model, name, 12)) {
+      EXPECT_GT((camera.center() - kSubject).norm(), 3.5) << name;
+      EXPECT_LT((camera.center() - kSubject).norm(), 7) << name;
+      EXPECT_LT(degrees_off(camera, kSubject), 1e-4) << name;
+    }
+  }
 }
 
 TEST(CameraPath, SpiralIsAsWideAsTheCamerasAndLooksAtTheSubject) {
@@ -95,6 +115,7 @@ TEST(CameraPath, OfAFileIsInTheCoordinatesOfTheModelsFiles) {
 TEST(CameraPath, RefusesWhatLeadsNowhere) {
   EXPECT_THROW(camera_path(row_of_cameras(), "loop", 8), InvalidInput);
   EXPECT_THROW(camera_path(row_of_cameras(), "orbit", 1), InvalidInput);
+  EXPECT_THROW(camera_path(row_of_cameras(), "orbit", 1'000'000'000), InvalidInput);
   EXPECT_THROW(camera_path({}, "orbit", 8), InvalidInput);
   Model blind = row_of_cameras();
   for (ViewPriors& priors : blind.priors) priors.depth = DepthMap(40, 30, std::nanf(""));

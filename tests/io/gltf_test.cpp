@@ -2,6 +2,7 @@
 #include "io/gltf.h"
 
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <set>
 
@@ -91,6 +92,52 @@ TEST(WriteGlb, PlainFileHoldsTheMesh) {
   expect_same(out.glb, mesh, frame, 1e-5);
   EXPECT_EQ(out.report.measured_max_error, 0);
   EXPECT_FALSE(out.glb.json.contains("extensionsRequired"));
+}
+
+// As KHR_mesh_quantization and the rules for vertex attributes ask for it.
+TEST(WriteGlb, QuantizedFileHoldsWholeNumbersOnOneGrid) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::labelled_sphere();
+  const GlbReport report = write_glb(
+      dir / "a.glb", mesh, test::centimetre_frame(), {.encoding = GlbEncoding::Quantized});
+  const std::string bytes = test::read_bytes(dir / "a.glb");
+  uint32_t json_size = 0;
+  std::memcpy(&json_size, bytes.data() + 12, sizeof json_size);
+  const auto json = nlohmann::json::parse(bytes.substr(20, json_size));
+  const char* const binary = bytes.data() + 28 + json_size;
+  EXPECT_EQ(json["extensionsRequired"], nlohmann::json({"KHR_mesh_quantization"}));
+  EXPECT_EQ(report.position_bits, 16);
+  const auto& node = json["nodes"][0];
+  ASSERT_TRUE(node.contains("translation") && node.contains("scale"));
+  const double step = node["scale"][0];
+  EXPECT_LE(report.measured_max_error, step * std::sqrt(3.0) / 2 * 100 + 1e-9);  // in centimetres
+  std::array<int, 3> high = {0, 0, 0};
+  for (const auto& primitive : json["meshes"][0]["primitives"]) {
+    const auto stored = [&](const char* name, int component, bool normalized, int stride) {
+      const auto& accessor = json["accessors"][primitive["attributes"][name].get<size_t>()];
+      EXPECT_EQ(accessor["componentType"], component) << name;
+      EXPECT_EQ(accessor.value("normalized", false), normalized) << name;
+      const auto& view = json["bufferViews"][accessor["bufferView"].get<size_t>()];
+      EXPECT_EQ(view["byteStride"], stride) << name;
+      EXPECT_EQ(view.value("byteOffset", 0) % 4, 0) << name;
+      EXPECT_GE(view["byteLength"].get<size_t>(), accessor["count"].get<size_t>() * size_t(stride));
+      return std::pair(accessor, binary + view.value("byteOffset", 0));
+    };
+    stored("NORMAL", 5120, true, 4);
+    stored("COLOR_0", 5123, true, 8);
+    const auto [positions, data] = stored("POSITION", 5123, false, 8);
+    std::array<int, 3> most = {0, 0, 0};
+    for (size_t v = 0; v < positions["count"].get<size_t>(); ++v) {
+      for (size_t c = 0; c < 3; ++c) {
+        uint16_t value = 0;
+        std::memcpy(&value, data + 8 * v + 2 * c, sizeof value);
+        most.at(c) = std::max<int>(most.at(c), value);
+        high.at(c) = std::max<int>(high.at(c), value);
+      }
+    }
+    for (size_t c = 0; c < 3; ++c) EXPECT_EQ(positions["max"][c], most.at(c));
+  }
+  EXPECT_EQ(std::max({high[0], high[1], high[2]}), 65535);
 }
 
 TEST(WriteGlb, DracoFileHoldsTheMeshWithinItsReport) {

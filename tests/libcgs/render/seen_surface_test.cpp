@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -109,6 +110,16 @@ TEST(SeenSurface, IsNotTornByStepsBelowTheGap) {
   const Camera novel = camera_at({0.3, 0, 0});  // halves end at 10 and begin at 12.7
   EXPECT_TRUE(std::isnan(seen(camera, depth, novel, 0.05f).depth(11, 30)));
   EXPECT_FALSE(std::isnan(seen(camera, depth, novel, 0.12f).depth(11, 30)));
+}
+
+TEST(SeenSurface, HasNoBack) {
+  const Camera front = camera_at({0, 0, 0});
+  const DepthMap depth = plane_depth({0, 0, 0.5}, front);  // at z = 2
+  Camera back = camera_at({0, 0, 4});
+  back.world_from_cam.rotate(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY()));
+  const SeenSurface surface = seen(front, depth, back);
+  for (const int32_t pixel : surface.pixel.data) EXPECT_EQ(pixel, -1);
+  for (const float z : surface.depth.data) EXPECT_TRUE(std::isnan(z));
 }
 
 TEST(SeenSurface, LeavesOutWhatLiesBehindTheCamera) {
