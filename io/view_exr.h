@@ -6,8 +6,8 @@
 
 #include "libcgs/core/camera.h"
 #include "libcgs/core/frame.h"
+#include "libcgs/core/hole.h"
 #include "libcgs/core/raster.h"
-#include "libcgs/render/render_buffers.h"
 
 namespace cgs {
 

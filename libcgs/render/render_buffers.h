@@ -3,17 +3,10 @@
 
 #include <cstdint>
 
+#include "libcgs/core/hole.h"
 #include "libcgs/core/raster.h"
 
 namespace cgs {
-
-/// Why no input view can vouch for a pixel of a rendered view.
-enum class Hole : uint8_t {
-  None = 0,         ///< Seen by an input view.
-  Transparent = 1,  ///< Alpha below the threshold: nothing was reconstructed along the ray.
-  Occluded = 2,     ///< What is drawn lies within input pictures, but none shows it: it is hidden.
-  Outside = 3,      ///< Outside of every input picture: what is drawn, or else all of the ray.
-};
 
 /// Everything one forward pass of the rasterizer gives for one camera. w_i is the blending weight
 /// of Gaussian i at the pixel, z_i the z-depth of its centre.
