@@ -244,10 +244,24 @@ class GlbBuilder {
     if (!in.sigma.empty()) {
       out.attributes["_SIGMA"] = accessor(in.sigma.size(), TINYGLTF_TYPE_SCALAR, view(in.sigma));
     }
-    const int indices = view(in.faces, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
-    out.indices = accessor(in.faces.size() * 3, TINYGLTF_TYPE_SCALAR, indices);
-    model_.accessors.back().componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+    out.indices = indices(in);
     model_.meshes[0].primitives.push_back(std::move(out));
+  }
+
+  // Of 16 bits where these suffice; their largest value restarts primitives and is no index.
+  int indices(const GlbPrimitive& in) {
+    const bool is_short = in.positions.size() < 65535;
+    std::vector<std::array<uint16_t, 3>> narrow;
+    for (size_t f = 0; is_short && f < in.faces.size(); ++f) {
+      const auto& face = in.faces[f];
+      narrow.push_back({uint16_t(face[0]), uint16_t(face[1]), uint16_t(face[2])});
+    }
+    const int bytes = is_short ? view(narrow, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER)
+                               : view(in.faces, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
+    const int out = accessor(in.faces.size() * 3, TINYGLTF_TYPE_SCALAR, bytes);
+    model_.accessors.back().componentType =
+        is_short ? TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT : TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+    return out;
   }
 
   template <typename T>

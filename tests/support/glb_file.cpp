@@ -37,8 +37,14 @@ void read_plain(const Glb& glb, const nlohmann::json& primitive, GlbPart& part) 
     return view_bytes(glb, glb.json["accessors"][accessor]["bufferView"]);
   };
   const std::string indices = raw(primitive["indices"]);
-  part.faces.resize(indices.size() / 12);
-  std::memcpy(part.faces.data(), indices.data(), indices.size());
+  const auto& listed = glb.json["accessors"][primitive["indices"].get<size_t>()];
+  const size_t width = listed["componentType"] == 5123 ? 2 : 4;  // unsigned short, unsigned int
+  EXPECT_TRUE(width == 2 || listed["componentType"] == 5125);
+  EXPECT_EQ(listed["count"].get<size_t>() * width, indices.size());
+  part.faces.resize(indices.size() / (3 * width));
+  for (size_t i = 0; i < 3 * part.faces.size(); ++i) {
+    std::memcpy(&part.faces[i / 3].at(i % 3), indices.data() + width * i, width);
+  }
   for (const auto& [name, accessor] : primitive["attributes"].items()) {
     const size_t n = components(glb, accessor);
     const std::string bytes = raw(accessor);
