@@ -2,13 +2,18 @@
 # Installs what is needed, builds everything, checks the format and runs all tests. Run again, it
 # only builds what changed.
 #
-# usage: tests/run.sh [--tidy]     --tidy adds static analysis (tests/tidy.sh), half an hour
+# usage: tests/run.sh [--tidy|--long]
+#   --tidy adds static analysis (tests/tidy.sh), half an hour
+#   --long adds all faults, kills and hours of fuzzing (tests/reliability.sh --long), a night
 set -euo pipefail
 cd "$(dirname "$0")/.."
-if [ $# -gt 1 ] || { [ $# -eq 1 ] && [ "$1" != "--tidy" ]; }; then
-  echo "usage: tests/run.sh [--tidy]" >&2
-  exit 2
-fi
+case "$*" in
+  "" | --tidy | --long) ;;
+  *)
+    echo "usage: tests/run.sh [--tidy|--long]" >&2
+    exit 2
+    ;;
+esac
 
 samples/install.sh --tests
 cmake --preset release -DCGS_BUILD_TESTS=ON >/dev/null
@@ -19,3 +24,4 @@ git ls-files '*.h' '*.cpp' | xargs -P 2 -n 60 clang-format-14 --dry-run --Werror
 if [ "${1:-}" = "--tidy" ]; then tests/tidy.sh; fi
 
 ctest --preset release -j 2
+if [ "${1:-}" = "--long" ]; then tests/reliability.sh --long; fi
