@@ -86,7 +86,6 @@ TEST(Trainer, MovesDepthTowardsTheTruth) {
   const PlantedScene planted = planted_scene(0.2);
   TrainingOptions options = short_training(120);
   options.depth_rate = 5e-3;
-  options.prior_weight = 0;  // these priors are wrong
   Trainer trainer(planted.scene, planted.priors, options);
   const double before = mean_depth_error(planted, trainer.model());
   run(trainer);
