@@ -118,7 +118,8 @@ TEST(Portal, StrictEndsAtAWarningBeforeAnythingIsWritten) {
   std::filesystem::remove(dir / "capture/images/view_05.png");
   const auto strict = run_cgs(run_arguments(dir / "capture", dir / "out") + " --strict");
   EXPECT_EQ(strict.exit_code, 3);
-  EXPECT_NE(strict.err.find("1 of 8 images are missing: images/view_05"), std::string::npos) << strict.err;
+  EXPECT_NE(strict.err.find("1 of 8 images are missing: images/view_05"), std::string::npos)
+      << strict.err;
   EXPECT_NE(strict.err.find("--strict: a warning counts as an error"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(dir / "out"));
 }
