@@ -30,7 +30,8 @@ struct TrainingOptions {
   double tv_weight = 0;         ///< Total variation of the rendered disparity.
   double masked_tv_weight = 0;  ///< The same within layers.
   double flow_weight = 0;       ///< Distance of corresponding points [scene extents].
-  double prior_weight = 0;      ///< Departure of measured depths from their prior, in sigmas.
+  double prior_weight = 0.002;  ///< Departure of measured depths from their prior, in sigmas. Less
+                                ///< lets rounding decide where photographs hardly tell depth.
   double depth_bending = 0;     ///< Of the depth lattice.
   double opacity_bending = 0;
   double opacity_prior = 0.001;  ///< Squared change of the logit, mean over Gaussians.
