@@ -121,8 +121,9 @@ FilterStep prepare_base(FilterArguments& arguments) {
     FlatBase base = with_flat_base(state.mesh, front, thickness / state.frame.scale);
     constexpr double kNothing = 1e-9;  // of the volume
     if (base.cut_off < kNothing) {
-      throw InvalidInput("--op base: the mesh ends before THICKNESS behind what was seen, so that "
-                         "nothing can be cut flat; state less");
+      throw InvalidInput(
+          "--op base: the mesh ends before THICKNESS behind what was seen, so that "
+          "nothing can be cut flat; state less");
     }
     state.mesh = std::move(base.solid.mesh);
     const Eigen::Vector3d n = front.normalized();
