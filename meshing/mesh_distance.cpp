@@ -25,31 +25,28 @@ using Triangles = std::vector<Kernel::Triangle_3>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
 using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
-Kernel::Point_3 to_cgal(const Eigen::Vector3f& p) {
-  return {double(p.x()), double(p.y()), double(p.z())};
-}
+Kernel::Point_3 to_cgal(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
 
-Triangles triangles(const TriangleMesh& mesh) {
-  CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
-  Triangles out;
-  out.reserve(mesh.faces.size());
-  for (const auto& f : mesh.faces) {
-    const Kernel::Triangle_3 t(
-        to_cgal(mesh.vertices[f[0]]), to_cgal(mesh.vertices[f[1]]), to_cgal(mesh.vertices[f[2]]));
-    if (!t.is_degenerate()) out.push_back(t);
-  }
-  return out;
-}
-
+// Those with an area.
 std::vector<TriangleTree::Triangle> proper_triangles(const TriangleMesh& mesh) {
   std::vector<TriangleTree::Triangle> out;
   out.reserve(mesh.faces.size());
   for (const auto& f : mesh.faces) {
-    const Eigen::Vector3f& a = mesh.vertices[f[0]];
-    const Eigen::Vector3f& b = mesh.vertices[f[1]];
-    const Eigen::Vector3f& c = mesh.vertices[f[2]];
-    if (CGAL::collinear(to_cgal(a), to_cgal(b), to_cgal(c))) continue;
-    out.push_back({a.cast<double>(), b.cast<double>(), c.cast<double>()});
+    const Eigen::Vector3d a = mesh.vertices[f[0]].cast<double>();
+    const Eigen::Vector3d b = mesh.vertices[f[1]].cast<double>();
+    const Eigen::Vector3d c = mesh.vertices[f[2]].cast<double>();
+    if (!CGAL::collinear(to_cgal(a), to_cgal(b), to_cgal(c))) out.push_back({a, b, c});
+  }
+  return out;
+}
+
+// The same for rays.
+Triangles triangles(const TriangleMesh& mesh) {
+  CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
+  Triangles out;
+  out.reserve(mesh.faces.size());
+  for (const auto& [a, b, c] : proper_triangles(mesh)) {
+    out.emplace_back(to_cgal(a), to_cgal(b), to_cgal(c));
   }
   return out;
 }
@@ -171,7 +168,8 @@ std::vector<float> cast(const TriangleMesh& mesh,
   tbb::parallel_for(size_t(0), origins.size(), [&](size_t i) {
     const Eigen::Vector3d d = directions[i].cast<double>();
     if (soup.empty() || !(d.squaredNorm() > 0)) return;
-    const Kernel::Ray_3 ray(to_cgal(origins[i]), Kernel::Vector_3(d.x(), d.y(), d.z()));
+    const Kernel::Ray_3 ray(to_cgal(origins[i].cast<double>()),
+                            Kernel::Vector_3(d.x(), d.y(), d.z()));
     const auto hit = tree.first_intersection(ray);
     if (!hit) return;
     const auto* point = boost::get<Kernel::Point_3>(&hit->first);

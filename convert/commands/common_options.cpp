@@ -10,6 +10,7 @@
 #include <opencv2/core/utility.hpp>
 #include <tbb/global_control.h>
 
+#include "convert/length.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -19,6 +20,10 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
                      options.memory_limit,
                      "Memory to stay below, e.g. 4G; default 80 % of what is free");
   add_output_options(command, options);
+}
+
+size_t stated_memory_limit(const CommonOptions& options) {
+  return options.memory_limit.empty() ? 0 : parse_bytes(options.memory_limit);
 }
 
 void add_output_options(CLI::App& command, CommonOptions& options) {

@@ -25,7 +25,10 @@ struct CommonOptions {
 /// Adds them to a command; limit_threads() must be called when the command runs.
 void add_common_options(CLI::App& command, CommonOptions& options);
 
-/// The same without --memory-limit, for commands that plan no memory.
+/// What --memory-limit says [bytes]; 0 where it is not given. \throws InvalidInput as parse_bytes()
+size_t stated_memory_limit(const CommonOptions& options);
+
+/// The same options without --memory-limit, for commands that plan no memory.
 void add_output_options(CLI::App& command, CommonOptions& options);
 
 /// --assume-unit, --up, --known-distance, --marker-size, --control-points and --control-unit.

@@ -7,7 +7,6 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/conversion.h"
-#include "convert/length.h"
 #include "io/json_file.h"
 #include "libcgs/core/error.h"
 
@@ -34,9 +33,7 @@ void run_convert(const ConvertArgs& args) {
   ConversionRequest request = args.request;
   request.volume.cameras.placement = placement_named(args.from);
   request.volume.cameras.validate();
-  if (!args.common.memory_limit.empty()) {
-    request.volume.memory_limit = parse_bytes(args.common.memory_limit);
-  }
+  request.volume.memory_limit = stated_memory_limit(args.common);
   Terminal terminal(args.common.quiet, args.common.strict);
   const nlohmann::ordered_json report = convert_file(request, terminal);
   if (args.common.json) std::cout << json_text(report) << "\n";

@@ -26,8 +26,7 @@ void run_fuse(const FuseArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.model);
   Terminal terminal(args.common.quiet, args.common.strict);
-  const size_t memory =
-      args.common.memory_limit.empty() ? 0 : parse_bytes(args.common.memory_limit);
+  const size_t memory = stated_memory_limit(args.common);
   const Model model = read_model(args.model);
   terminal.warn(model.scene.warnings);
   const FusedVolume fused = fuse_model(model, args.voxel_size, memory, terminal.begin("fuse"));

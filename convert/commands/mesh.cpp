@@ -6,7 +6,6 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/length.h"
 #include "convert/memory_plan.h"
 #include "convert/mesh_files.h"
 #include "convert/simplification.h"
@@ -38,8 +37,7 @@ void run_mesh_command(const MeshArgs& args) {
   const auto options = simplify_options(args.simplify, file.volume.voxel_size, file.frame);
   TriangleMesh open = open_surface(file.volume, {});
   WatertightOptions closing;
-  closing.memory_limit =
-      memory_budget(args.common.memory_limit.empty() ? 0 : parse_bytes(args.common.memory_limit));
+  closing.memory_limit = memory_budget(stated_memory_limit(args.common));
   WatertightResult closed = watertight_surface(file.volume, closing, part_of(progress, 0.1, 0.5));
   const nlohmann::ordered_json simplification =
       simplify_meshes(open, closed, options, file.frame, part_of(progress, 0.5, 0.9));

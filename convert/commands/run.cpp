@@ -57,9 +57,7 @@ void run_run(const RunArgs& args) {
   keep_apart(args.request.output, args.request.scene.path);
   RunRequest request = args.request;
   request.training = training_options(args.training);
-  if (!args.common.memory_limit.empty()) {
-    request.memory_limit = parse_bytes(args.common.memory_limit);
-  }
+  request.memory_limit = stated_memory_limit(args.common);
   if (!args.max_size.empty()) request.max_size = parse_file_size(args.max_size);
   if (!request.scene.assume_unit.empty()) (void)metres_in(request.scene.assume_unit);
   Terminal terminal(args.common.quiet, args.common.strict);

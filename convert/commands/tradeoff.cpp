@@ -44,9 +44,7 @@ void run_tradeoff(const TradeoffArgs& args) {
   limit_threads(args.common.threads);
   refuse_early(args);
   TradeoffRequest request = args.request;
-  if (!args.common.memory_limit.empty()) {
-    request.memory_limit = parse_bytes(args.common.memory_limit);
-  }
+  request.memory_limit = stated_memory_limit(args.common);
   Terminal terminal(args.common.quiet, args.common.strict);
   const CostMeter meter;
   const OpenedScene opened = open_scene(request.scene, request.output, terminal);
