@@ -113,7 +113,9 @@ class AssetWriter {
     out.max_error = rounding * frame_.scale;
     out.summary_json = summary.dump();
     // Finer than any grid of the encoding: floats as they are.
-    const double finest_grid = encoding_ == GlbEncoding::Quantized ? 1.8 / 65535 : 1.0 / (1 << 20);
+    const bool short_numbers =
+        encoding_ == GlbEncoding::Quantized || encoding_ == GlbEncoding::Meshopt;
+    const double finest_grid = short_numbers ? 1.8 / 65535 : 1.0 / (1 << 20);
     if (promise_ && rounding < finest_grid * side_) out.encoding = GlbEncoding::Plain;
     return out;
   }

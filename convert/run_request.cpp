@@ -115,8 +115,9 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     out["control_points"] = {{"table", file_hash(control.file)}, {"unit", control.unit}};
   }
   // Only where they decide something: folders of runs without them go on as before.
-  if (request.glb_encoding != GlbEncoding::Draco) {
-    out["glb_encoding"] = request.glb_encoding == GlbEncoding::Plain ? "plain" : "quantized";
+  for (const auto& [name, encoding] : glb_encodings()) {
+    const bool is_default = encoding == GlbEncoding::Draco;
+    if (encoding == request.glb_encoding && !is_default) out["glb_encoding"] = name;
   }
   const bool has_depth = std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
     return !scene.views[static_cast<size_t>(i)].depth_path.empty();

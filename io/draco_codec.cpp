@@ -75,6 +75,12 @@ int whole_bits(const std::vector<float>& values) {
   return bits;
 }
 
+/// Keeps whole numbers up to 65535 exactly.
+void quantize_whole(draco::ExpertEncoder& encoder, int id, const std::vector<float>& values) {
+  const int bits = whole_bits(values);
+  quantize(encoder, id, bits, 0, static_cast<float>((1 << bits) - 1));
+}
+
 /// As few bits as keep the error of texture coordinates, which lie in [0, 1].
 int texcoord_bits(const GlbPrimitive& primitive) {
   const double pixels = primitive.texture_size.maxCoeff();
@@ -102,6 +108,9 @@ std::string encode(const GlbPrimitive& primitive,
   if (!primitive.support.empty())
     ids["_SUPPORT"] = input.add(Attribute::GENERIC, primitive.support);
   if (!primitive.sigma.empty()) ids["_SIGMA"] = input.add(Attribute::GENERIC, primitive.sigma);
+  if (!primitive.features.empty()) {
+    ids["_FEATURE_ID_0"] = input.add(Attribute::GENERIC, primitive.features);
+  }
 
   draco::ExpertEncoder encoder(input.mesh());
   encoder.SetSpeedOptions(speed, speed);
@@ -118,9 +127,9 @@ std::string encode(const GlbPrimitive& primitive,
   if (ids.count("COLOR_0") != 0) {
     encoder.SetAttributeExplicitQuantization(ids["COLOR_0"], kColorBits, 3, black.data(), 1.0f);
   }
-  if (ids.count("_SUPPORT") != 0) {
-    const int bits = whole_bits(primitive.support);
-    quantize(encoder, ids["_SUPPORT"], bits, 0, static_cast<float>((1 << bits) - 1));
+  if (ids.count("_SUPPORT") != 0) quantize_whole(encoder, ids["_SUPPORT"], primitive.support);
+  if (ids.count("_FEATURE_ID_0") != 0) {
+    quantize_whole(encoder, ids["_FEATURE_ID_0"], primitive.features);
   }
   if (ids.count("_SIGMA") != 0) {
     const auto [low, high] = std::minmax_element(primitive.sigma.begin(), primitive.sigma.end());

@@ -39,7 +39,7 @@ inline constexpr double kDracoTextureError = 0.1;
 /// Compresses with the edgebreaker method, decodes again, and compares: every vertex within a step
 /// of its place, every face there, no face added, texture coordinates within kDracoTextureError.
 ///
-/// Normals keep 10 bits, colours 12, sigma 12; support is exact up to 65535.
+/// Normals keep 10 bits, colours 12, sigma 12; support and features are exact up to 65535.
 /// \param speed  0 (smallest) to 10 (fastest)
 /// \throws NumericalError if the library fails or the comparison does
 DracoPrimitive draco_compress(const GlbPrimitive& primitive, const DracoGrid& grid, int speed);

@@ -9,6 +9,7 @@
 #include <libexif/exif-data.h>
 
 #include "io/byte_reader.h"
+#include "io/heif.h"
 
 namespace cgs {
 
@@ -83,12 +84,17 @@ LensHint from_film(double millimetres, const ImageSize& size) {
   return {"", focal, std::hypot(rounding, kCut)};
 }
 
-// The Exif part of a JPEG; null for what is none or has none.
+// The Exif part of a JPEG, HEIC or AVIF file; null for what is none or has none.
 Exif read_exif(const std::filesystem::path& path) {
   // A JPEG segment has at most 64 KiB, and Exif is to be among the first.
   constexpr uint64_t kEnough = uint64_t{256} << 10;
-  const std::string bytes = read_file_start(path, kEnough);
-  if (!bytes.starts_with("\xff\xd8")) return {nullptr, &exif_data_unref};
+  std::string bytes = read_file_start(path, kEnough);
+  if (is_heif(bytes)) {
+    bytes = heif_exif(read_file(path), path);
+  } else if (!bytes.starts_with("\xff\xd8")) {
+    bytes.clear();
+  }
+  if (bytes.empty()) return {nullptr, &exif_data_unref};
   return {exif_data_new_from_data(reinterpret_cast<const unsigned char*>(bytes.data()),
                                   static_cast<unsigned>(bytes.size())),
           &exif_data_unref};
@@ -120,6 +126,7 @@ LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size) {
 int exif_orientation(const std::filesystem::path& path) {
   constexpr int kUpright = 1;
   constexpr int kLast = 8;
+  if (is_heif(read_file_start(path, 16))) return kUpright;  // its decoder has turned it already
   const Exif exif = read_exif(path);
   if (!exif) return kUpright;
   const double value = number(exif.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION);

@@ -15,8 +15,9 @@ struct LensHint {
   double sigma = 0;    ///< Relative standard deviation of `focal`.
 };
 
-/// Reads the Exif part of a JPEG: focal length from the resolution of the focal plane, else from
-/// the focal length as on 35 mm film. What is damaged or absurd counts as not said.
+/// Reads the Exif part of a JPEG, HEIC or AVIF file: focal length from the resolution of the focal
+/// plane, else from the focal length as on 35 mm film. What is damaged or absurd counts as not
+/// said.
 ///
 /// The film equivalent compares diagonals and is rounded to whole millimetres. Where the picture
 /// has another shape than the usual sensors (3:2 and 4:3) it was cut, and sigma is larger.

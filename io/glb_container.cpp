@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "io/byte_reader.h"
+#include "io/glb_meshopt.h"
 
 namespace cgs {
 
@@ -114,6 +115,7 @@ GlbContainer::GlbContainer(const std::filesystem::path& path)
   if (in.get<uint32_t>("type of the second chunk") == kBinaryChunk) {
     binary_ = in.take(size, "binary chunk");
   }
+  decode_views();
 }
 
 JsonValue GlbContainer::element(const char* array, const JsonValue& index) const {
@@ -127,20 +129,36 @@ JsonValue GlbContainer::element(const char* array, const JsonValue& index) const
   return list->at(static_cast<size_t>(i));
 }
 
-std::string_view GlbContainer::view_bytes(const JsonValue& view) const {
-  const JsonValue buffer = element("buffers", view.at("buffer"));
-  if (buffer.find("uri") || whole_number(view.at("buffer")) != 0) {
+// Of a buffer view, or of the extension of one that is compressed.
+std::string_view GlbContainer::chunk_bytes(const JsonValue& part) const {
+  const JsonValue buffer = element("buffers", part.at("buffer"));
+  if (buffer.find("uri") || whole_number(part.at("buffer")) != 0) {
     buffer.fail(Defect::Unsupported, "lies in another file; only files in one piece are read");
   }
-  const auto start = view.find("byteOffset");
+  const auto start = part.find("byteOffset");
   const uint64_t offset = start ? whole_number(*start) : 0;
-  const uint64_t length = whole_number(view.at("byteLength"));
+  const uint64_t length = whole_number(part.at("byteLength"));
   if (offset > binary_.size() || length > binary_.size() - offset) {
-    view.fail(Defect::Count,
+    part.fail(Defect::Count,
               "ends at byte " + std::to_string(offset + length) + " of a binary chunk of " +
                   std::to_string(binary_.size()));
   }
   return binary_.substr(offset, length);
+}
+
+void GlbContainer::decode_views() {
+  const auto views = root().find("bufferViews");
+  for (size_t i = 0; views && i < views->size(); ++i) {
+    const auto extensions = views->at(i).find("extensions");
+    const auto meshopt = extensions ? extensions->find(kMeshopt) : std::nullopt;
+    if (meshopt) decoded_[i] = meshopt_decoded(*meshopt, chunk_bytes(*meshopt));
+  }
+}
+
+std::string_view GlbContainer::view_bytes(const JsonValue& index) const {
+  const JsonValue view = element("bufferViews", index);
+  const auto decoded = decoded_.find(whole_number(index));
+  return decoded != decoded_.end() ? std::string_view(decoded->second) : chunk_bytes(view);
 }
 
 GlbContainer::Elements GlbContainer::elements(const JsonValue& accessor, int components) const {
@@ -166,7 +184,7 @@ GlbContainer::Elements GlbContainer::elements(const JsonValue& accessor, int com
   if (out.stride < size) stride->fail(Defect::Value, "is smaller than an element");
   const auto start = accessor.find("byteOffset");
   const uint64_t offset = start ? whole_number(*start) : 0;
-  out.bytes = view_bytes(view);
+  out.bytes = view_bytes(*view_index);
   const uint64_t room = offset <= out.bytes.size() ? out.bytes.size() - offset : 0;
   const uint64_t most = room >= size ? (room - size) / out.stride + 1 : 0;
   if (out.count > most) {

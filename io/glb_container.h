@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,7 +18,7 @@ namespace cgs {
 class GlbContainer {
  public:
   /// \throws BadInput Magic, Unsupported (another version), Truncated, Syntax; as read_json(),
-  /// LimitError included
+  /// LimitError included; as meshopt_decoded()
   /// Source: glTF 2.0, section 4.4 (GLB file format), Khronos Group.
   explicit GlbContainer(const std::filesystem::path& path);
 
@@ -27,9 +28,10 @@ class GlbContainer {
   /// Element `index` of a top-level array. \throws BadInput Ref where there is none
   JsonValue element(const char* array, const JsonValue& index) const;
 
-  /// The bytes of a buffer view of the binary chunk. \throws BadInput Unsupported for a buffer in
-  /// another file, Count where it leaves the chunk
-  std::string_view view_bytes(const JsonValue& view) const;
+  /// The bytes of the buffer view of a number, in the binary chunk or as EXT_meshopt_compression
+  /// decodes them. \throws BadInput Unsupported for a buffer in another file, Count where it leaves
+  /// the chunk
+  std::string_view view_bytes(const JsonValue& index) const;
 
   /// The values of an accessor of `components` numbers per element (glTF types SCALAR, VEC2 to
   /// VEC4), normalised whole numbers as such.
@@ -50,11 +52,14 @@ class GlbContainer {
     bool is_normalized = false;
   };
   Elements elements(const JsonValue& accessor, int components) const;
+  std::string_view chunk_bytes(const JsonValue& part) const;
+  void decode_views();
 
   std::filesystem::path path_;
   std::string content_;
   std::string_view binary_;
   nlohmann::json json_;
+  std::map<uint64_t, std::string> decoded_;  // compressed buffer views by their number
 };
 
 /// A number without sign or fraction, up to 2^53. \throws BadInput Schema

@@ -36,7 +36,8 @@ class PrimitiveReader {
     const auto fits = [&](const std::vector<float>& values, size_t components) {
       return values.empty() || values.size() == components * vertices;
     };
-    if (!fits(out.colors, 3) || !fits(out.support, 1) || !fits(out.sigma, 1)) {
+    if (!fits(out.colors, 3) || !fits(out.support, 1) || !fits(out.sigma, 1) ||
+        !fits(out.features, 1)) {
       primitive.fail(Defect::Count, "has attributes of different length");
     }
     for (const auto& face : out.faces) {
@@ -74,6 +75,7 @@ class PrimitiveReader {
     out.colors = colors(attributes);
     out.support = attribute(attributes, "_SUPPORT", 1);
     out.sigma = attribute(attributes, "_SIGMA", 1);
+    out.features = attribute(attributes, "_FEATURE_ID_0", 1);
     std::vector<uint32_t> corners;
     if (const auto index = primitive.find("indices")) {
       corners = file_.indices(file_.element("accessors", *index));
@@ -109,8 +111,7 @@ class PrimitiveReader {
   }
 
   GlbFaces compressed(const JsonValue& primitive, const JsonValue& draco) const {
-    const JsonValue view = file_.element("bufferViews", draco.at("bufferView"));
-    const DracoMesh mesh = read_draco(file_.view_bytes(view), file_.path());
+    const DracoMesh mesh = read_draco(file_.view_bytes(draco.at("bufferView")), file_.path());
     const JsonValue ids = draco.at("attributes");
     const JsonValue attributes = primitive.at("attributes");
     const auto values = [&](const char* name, int least) -> std::vector<float> {
@@ -129,6 +130,7 @@ class PrimitiveReader {
     out.colors = values("COLOR_0", 3);
     out.support = values("_SUPPORT", 1);
     out.sigma = values("_SIGMA", 1);
+    out.features = values("_FEATURE_ID_0", 1);
     out.faces = mesh.faces;
     if (out.positions.size() != 3 * mesh.vertices) {
       draco.fail(Defect::Schema, "has no positions");

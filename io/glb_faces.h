@@ -16,6 +16,7 @@ struct GlbFaces {
   std::vector<float> colors;     ///< Linear light, three each.
   std::vector<float> support;    ///< Of write_glb(), as sigma.
   std::vector<float> sigma;
+  std::vector<float> features;                 ///< Numbers of provenance classes.
   std::vector<std::array<uint32_t, 3>> faces;  ///< Within the positions.
 };
 

@@ -65,6 +65,7 @@ class Splitter {
       renumbered[v] = static_cast<uint32_t>(out.positions.size());
       append_vertex(out, v);
     }
+    if (label) out.features.assign(out.positions.size(), static_cast<float>(*label));
     for (auto& face : out.faces) {
       for (uint32_t& corner : face) corner = renumbered[corner];
     }

@@ -26,6 +26,7 @@ struct GlbPrimitive {
   std::vector<Eigen::Vector3f> colors;         ///< Linear light in [0, 1]; may be empty.
   std::vector<float> support;                  ///< May be empty.
   std::vector<float> sigma;                    ///< [units of the file]; may be empty.
+  std::vector<float> features;                 ///< Number of the class; empty without labels.
   std::vector<std::array<uint32_t, 3>> faces;  ///< No two corners at one place.
 };
 

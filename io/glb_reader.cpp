@@ -10,6 +10,7 @@
 #include "io/byte_writer.h"
 #include "io/glb_container.h"
 #include "io/glb_faces.h"
+#include "io/glb_meshopt.h"
 #include "io/mesh_arrays.h"
 #include "io/significance.h"
 #include "libcgs/core/srgb.h"
@@ -94,6 +95,7 @@ class SceneReader {
     for (size_t i = 0; required && i < required->size(); ++i) {
       const std::string name = required->at(i).text();
       const bool known = name == "KHR_draco_mesh_compression" || name == "KHR_mesh_quantization" ||
+                         name == kMeshopt || name == "EXT_mesh_features" ||
                          name.starts_with("KHR_materials_") || name.starts_with("KHR_texture_") ||
                          name.starts_with("EXT_texture_") || name == "KHR_lights_punctual";
       if (!known) required->at(i).fail(Defect::Unsupported, name + " is required and not known");
@@ -148,12 +150,28 @@ class SceneReader {
     const JsonValue primitives = mesh.at("primitives");
     for (size_t i = 0; i < primitives.size(); ++i) {
       const JsonValue primitive = primitives.at(i);
-      add(read_glb_primitive(file_, primitive), world, label_of(primitive));
+      const GlbFaces faces = read_glb_primitive(file_, primitive);
+      add(faces, world, labels_of(primitive, faces));
       if (out_.parsed.mesh.faces.size() > kMostCorners / 3) {
         throw LimitError(printable(file_.path()) + ": more than " +
                          std::to_string(kMostCorners / 3) + " triangles");
       }
     }
+  }
+
+  // Of faces; empty where nothing is said. Programs that pack files for the web join materials and
+  // forget their names, but keep feature numbers.
+  std::vector<Provenance> labels_of(const JsonValue& primitive, const GlbFaces& in) {
+    const std::optional<Provenance> label = label_of(primitive);
+    if (label) return std::vector<Provenance>(in.faces.size(), *label);
+    std::vector<Provenance> out;
+    if (in.features.empty()) return out;
+    for (const auto& face : in.faces) {
+      const float feature = in.features[face[0]];
+      if (!(feature >= 0 && feature < float{kProvenanceCount})) return {};
+      out.push_back(static_cast<Provenance>(feature));
+    }
+    return out;
   }
 
   // Materials of ours are named "<class>" or "<class> <photograph>"; of a mesh that does not say
@@ -176,7 +194,7 @@ class SceneReader {
 
   void add(const GlbFaces& in,
            const Eigen::Affine3d& world,
-           const std::optional<Provenance>& label) {
+           const std::vector<Provenance>& labels) {
     if (in.faces.empty()) return;  // points and lines neither add vertices nor lack colours
     TriangleMesh& mesh = out_.parsed.mesh;
     const bool is_mirrored = world.linear().determinant() < 0;
@@ -191,7 +209,8 @@ class SceneReader {
       }
       numbers[v] = number_of(place, in, v);
     }
-    for (const auto& face : in.faces) {
+    for (size_t f = 0; f < in.faces.size(); ++f) {
+      const auto& face = in.faces[f];
       std::array<uint32_t, 3> corners = {numbers[face[0]], numbers[face[1]], numbers[face[2]]};
       if (is_mirrored) std::swap(corners[1], corners[2]);
       // Rounding by compression lets short edges vanish, and with them their faces.
@@ -200,9 +219,9 @@ class SceneReader {
         continue;
       }
       mesh.faces.push_back(corners);
-      mesh.provenance.push_back(label.value_or(Provenance::Inferred));
+      mesh.provenance.push_back(labels.empty() ? Provenance::Inferred : labels[f]);
     }
-    all_have_labels_ = all_have_labels_ && label.has_value();
+    all_have_labels_ = all_have_labels_ && !labels.empty();
     all_have_colors_ = all_have_colors_ && !in.colors.empty();
     all_have_support_ = all_have_support_ && !in.support.empty();
     all_have_sigma_ = all_have_sigma_ && !in.sigma.empty();

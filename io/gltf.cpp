@@ -11,6 +11,7 @@
 #include <cmath>
 #include <fstream>  // tinygltf forgets it
 #include <limits>
+#include <map>
 #include <sstream>
 
 #include <Eigen/Geometry>
@@ -19,6 +20,7 @@
 
 #include "io/atomic_file.h"
 #include "io/draco_codec.h"
+#include "io/glb_meshopt.h"
 #include "io/glb_primitive.h"
 #include "io/glb_quantized.h"
 #include "io/mesh_arrays.h"
@@ -32,6 +34,8 @@ namespace {
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr const char* kQuantization = "KHR_mesh_quantization";
 constexpr const char* kUnlit = "KHR_materials_unlit";
+constexpr const char* kFeatures = "EXT_mesh_features";
+constexpr const char* kFeatureLabel = "provenance";
 
 tinygltf::Value value_of(const nlohmann::json& json) {
   if (json.is_object()) {
@@ -208,7 +212,7 @@ class GlbBuilder {
     nlohmann::json extension = {
         {"bufferView", raw_view(draco.bytes.data(), draco.bytes.size(), 0)}};
     for (const auto& [name, id] : draco.attribute_ids) {
-      const bool scalar = name == "_SUPPORT" || name == "_SIGMA";
+      const bool scalar = name.starts_with('_');  // all of ours
       const int type = scalar                 ? TINYGLTF_TYPE_SCALAR
                        : name == "TEXCOORD_0" ? TINYGLTF_TYPE_VEC2
                                               : TINYGLTF_TYPE_VEC3;
@@ -243,6 +247,10 @@ class GlbBuilder {
     }
     if (!in.sigma.empty()) {
       out.attributes["_SIGMA"] = accessor(in.sigma.size(), TINYGLTF_TYPE_SCALAR, view(in.sigma));
+    }
+    if (!in.features.empty()) {
+      out.attributes["_FEATURE_ID_0"] =
+          accessor(in.features.size(), TINYGLTF_TYPE_SCALAR, view(in.features));
     }
     out.indices = indices(in);
     model_.meshes[0].primitives.push_back(std::move(out));
@@ -283,6 +291,11 @@ class GlbBuilder {
     out.mode = TINYGLTF_MODE_TRIANGLES;
     out.material = static_cast<int>(model_.materials.size());
     model_.materials.push_back(material_for(in));
+    if (!in.features.empty()) {
+      const nlohmann::json id = {{"featureCount", 1}, {"attribute", 0}, {"label", kFeatureLabel}};
+      out.extensions[kFeatures] = value_of({{"featureIds", nlohmann::json::array({id})}});
+      use_extension(kFeatures);
+    }
     return out;
   }
 
@@ -383,6 +396,9 @@ nlohmann::json extras_for(const TriangleMesh& mesh,
       out["area"][std::string(provenance_name(label))] =
           area.at(static_cast<size_t>(label)) * placement.scale * placement.scale;
     }
+    for (size_t id = 0; id < kProvenanceCount; ++id) {
+      out["provenance_names"].push_back(provenance_name(static_cast<Provenance>(id)));
+    }
   }
   if (!options.summary_json.empty()) out["summary"] = parsed_summary(options.summary_json);
   return out;
@@ -405,6 +421,13 @@ GlbPlacement placement_for(const TriangleMesh& mesh,
 }
 
 }  // namespace
+
+std::map<std::string, GlbEncoding> glb_encodings() {
+  return {{"draco", GlbEncoding::Draco},
+          {"meshopt", GlbEncoding::Meshopt},
+          {"quantized", GlbEncoding::Quantized},
+          {"plain", GlbEncoding::Plain}};
+}
 
 void GlbOptions::validate() const {
   require(
@@ -452,8 +475,11 @@ GlbReport write_glb(const std::filesystem::path& path,
   const bool draco = encoding == GlbEncoding::Draco;
   const DracoGrid grid = draco ? grid_for(primitives, max_error) : DracoGrid{};
   const QuantizedGrid whole = QuantizedGrid::around(box_of(primitives));
+  const bool meshopt = encoding == GlbEncoding::Meshopt;
+  const bool whole_numbers = meshopt || encoding == GlbEncoding::Quantized;
   double worst = 0;
-  for (const GlbPrimitive& primitive : primitives) {
+  for (const GlbPrimitive& in : primitives) {
+    const GlbPrimitive& primitive = meshopt ? in_cache_order(in) : in;
     report.triangles += primitive.faces.size();
     if (!primitive.texcoords.empty()) report.textured_triangles += primitive.faces.size();
     double texture_error = 0;
@@ -464,7 +490,7 @@ GlbReport write_glb(const std::filesystem::path& path,
       vertices = compressed.vertices;
       worst = std::max(worst, compressed.max_error);
       texture_error = compressed.max_texture_error;
-    } else if (encoding == GlbEncoding::Quantized) {
+    } else if (whole_numbers) {
       const QuantizedPrimitive stored = quantized(primitive, whole);
       builder.add_quantized(primitive, stored, whole);
       worst = std::max(worst, stored.max_error);
@@ -485,9 +511,9 @@ GlbReport write_glb(const std::filesystem::path& path,
   }
   report.primitives = primitives.size();
   report.dropped_triangles = mesh.faces.size() - report.triangles;
-  report.position_bits = draco ? grid.bits : encoding == GlbEncoding::Quantized ? 16 : 0;
+  report.position_bits = draco ? grid.bits : whole_numbers ? 16 : 0;
   report.measured_max_error = worst / world_scale;
-  const std::string bytes = builder.bytes();
+  const std::string bytes = meshopt ? meshopt_compressed(builder.bytes()) : builder.bytes();
   report.bytes = bytes.size();
   write_file(path, bytes);
   return report;

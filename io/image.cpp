@@ -16,6 +16,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <unistd.h>
 
+#include "io/heif.h"
 #include "io/image_header.h"
 
 namespace cgs {
@@ -81,11 +82,29 @@ bool decode_jpeg(const unsigned char* bytes,
   return true;
 }
 
+ColorImage from_rgb(const ImageHeader& header, const unsigned char* rgb) {
+  ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
+  for (size_t i = 0; i < image.data.size(); ++i) {
+    const unsigned char* p = rgb + 3 * i;
+    image.data[i] = Eigen::Vector3f(p[0], p[1], p[2]) / 255.0f;
+  }
+  return image;
+}
+
+ColorImage read_heif(std::string_view bytes,
+                     const ImageHeader& header,
+                     const std::filesystem::path& path) {
+  const std::string rgb = decode_heif(bytes, path);
+  if (rgb.size() != size_t{3} * size_t(header.width) * size_t(header.height)) {
+    throw BadInput(Defect::Syntax, path, "the decoded image is not what its header announces");
+  }
+  return from_rgb(header, reinterpret_cast<const unsigned char*>(rgb.data()));
+}
+
 ColorImage read_jpeg(std::string_view bytes,
                      const ImageHeader& header,
                      const std::filesystem::path& path) {
-  ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
-  std::vector<unsigned char> rgb(image.data.size() * 3);
+  std::vector<unsigned char> rgb(size_t{3} * size_t(header.width) * size_t(header.height));
   JpegErrors errors = {};
   const bool is_decoded = decode_jpeg(reinterpret_cast<const unsigned char*>(bytes.data()),
                                       bytes.size(),
@@ -98,11 +117,7 @@ ColorImage read_jpeg(std::string_view bytes,
                    path,
                    std::string("JPEG data is cut or damaged (") + errors.message + ")");
   }
-  for (size_t i = 0; i < image.data.size(); ++i) {
-    const unsigned char* p = rgb.data() + 3 * i;
-    image.data[i] = Eigen::Vector3f(p[0], p[1], p[2]) / 255.0f;
-  }
-  return image;
+  return from_rgb(header, rgb.data());
 }
 
 /// Sends standard error nowhere while it lives: the decoders behind OpenCV print their complaints
@@ -218,6 +233,7 @@ ColorImage read_image(const std::filesystem::path& path,
   check_image_is_whole(bytes, header, path);
   if (alpha_mask != nullptr) *alpha_mask = {};
   if (header.format == ImageFormat::Jpeg) return read_jpeg(bytes, header, path);
+  if (header.format == ImageFormat::Heif) return read_heif(bytes, header, path);
 
   const cv::Mat pixels = decode_as_announced(bytes, header, path);
   ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());

@@ -13,8 +13,8 @@ struct ImageSize {
   int height = 0;  ///< [pixels]
 };
 
-/// The size of a PNG, JPEG, TIFF or WebP file from its header; the format is told from the content,
-/// not the name. Orientation tags are ignored here: see orientation.h.
+/// The size of a PNG, JPEG, TIFF, WebP, HEIC or AVIF file from its header; the format is told from
+/// the content, not the name. Orientation tags of Exif are ignored here: see orientation.h.
 /// \throws BadInput as parse_image_header(); LimitError above max_pixels.
 ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits = {});
 

@@ -6,6 +6,8 @@
 
 #include <zlib.h>
 
+#include "io/heif.h"
+
 namespace cgs {
 
 namespace {
@@ -13,7 +15,7 @@ namespace {
 using std::string_view_literals::operator""sv;
 
 constexpr std::string_view kPngMagic = "\x89PNG\r\n\x1a\n"sv;
-constexpr std::string_view kFormats = "PNG, JPEG, TIFF and WebP are read";
+constexpr std::string_view kFormats = "PNG, JPEG, TIFF, WebP, HEIC and AVIF are read";
 
 uint32_t big_endian(std::string_view bytes) {
   uint32_t value = 0;
@@ -258,7 +260,7 @@ void check_png_is_whole(std::string_view bytes, const std::filesystem::path& pat
   };
   const std::string formats = std::string("; ") + std::string(kFormats);
   refuse_foreign_content(path, bytes, "an image");
-  if (at(4, "ftyp")) throw BadInput(Defect::Unsupported, path, "HEIC or AVIF image" + formats);
+  if (at(4, "ftyp")) throw BadInput(Defect::Unsupported, path, "a video" + formats);
   if (at(0, "GIF8")) throw BadInput(Defect::Unsupported, path, "GIF image" + formats);
   if (at(0, "BM")) throw BadInput(Defect::Unsupported, path, "BMP image" + formats);
   if (at(0, "\x76\x2f\x31\x01")) {
@@ -281,6 +283,10 @@ ImageHeader parse_image_header(std::string_view bytes,
   }
   if (bytes.starts_with("RIFF") && bytes.substr(0, 12).ends_with("WEBP")) {
     return parse_webp(file, limits);
+  }
+  if (is_heif(bytes)) {
+    const ImageSize size = heif_size(bytes, path);
+    return checked(ImageFormat::Heif, uint32_t(size.width), uint32_t(size.height), path, limits);
   }
   const bool is_tiff = bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv) ||
                        bytes.starts_with("II+\0"sv) || bytes.starts_with("MM\0+"sv);

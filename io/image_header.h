@@ -8,7 +8,7 @@
 
 namespace cgs {
 
-enum class ImageFormat { Png, Jpeg, Tiff, WebP };
+enum class ImageFormat { Png, Jpeg, Tiff, WebP, Heif };
 
 /// What the first structures of an image file say about it.
 struct ImageHeader {
@@ -17,7 +17,8 @@ struct ImageHeader {
   int height = 0;  ///< [pixels]
 };
 
-/// Recognises the format by its magic bytes and reads the size, without decoding.
+/// Recognises the format by its magic bytes and reads the size, without decoding. That of HEIC and
+/// AVIF is the size upright.
 ///
 /// \throws BadInput Magic (no image), Unsupported (other image formats; JPEG in CMYK, or with other
 ///         than 8 bits), Truncated, Syntax, Value (a side of 0); LimitError above max_pixels.

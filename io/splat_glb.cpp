@@ -12,6 +12,7 @@
 
 #include "io/atomic_file.h"
 #include "io/byte_writer.h"
+#include "io/glb_bytes.h"
 #include "io/json_file.h"
 #include "io/splat_arrays.h"
 #include "libcgs/core/error.h"
@@ -106,23 +107,6 @@ void add_harmonics(SplatBuffer& buffer, const Gaussians& g) {
       buffer.add(name, "VEC3", [&](size_t i) { return g.sh[i * count + static_cast<size_t>(k)]; });
     }
   }
-}
-
-void append_chunk(std::string& out, std::string_view type, const std::string& content) {
-  append_bytes(out, static_cast<uint32_t>(content.size()));
-  out += type;
-  out += content;
-}
-
-/// \pre binary has a multiple of four bytes
-std::string glb_bytes(std::string json, const std::string& binary) {
-  json.resize((json.size() + 3) / 4 * 4, ' ');
-  std::string out = "glTF";
-  append_bytes(out, uint32_t{2});
-  append_bytes(out, static_cast<uint32_t>(12 + 8 + json.size() + 8 + binary.size()));
-  append_chunk(out, "JSON", json);
-  append_chunk(out, std::string_view("BIN\0", 4), binary);
-  return out;
 }
 
 }  // namespace

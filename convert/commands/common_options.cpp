@@ -109,16 +109,14 @@ void add_scale_options(CLI::App& command, SceneRequest& request) {
 }
 
 void add_glb_option(CLI::App& command, GlbEncoding& encoding) {
-  const std::map<std::string, GlbEncoding> names = {{"draco", GlbEncoding::Draco},
-                                                    {"quantized", GlbEncoding::Quantized},
-                                                    {"plain", GlbEncoding::Plain}};
   command
       .add_option("--glb-encoding",
                   encoding,
-                  "Of meshes in .glb: draco (smallest), quantized (16 bits, for readers without a "
-                  "decoder such as Debian's Blender from 3.0 on), plain (floats, for all); default "
-                  "draco")
-      ->transform(CLI::CheckedTransformer(names).description("draco, quantized, plain"));
+                  "Of meshes in .glb: draco (smallest), meshopt (shown soonest; for browsers), "
+                  "quantized (16 bits, for readers without a decoder such as Debian's Blender from "
+                  "3.0 on), plain (floats, for all); default draco")
+      ->transform(
+          CLI::CheckedTransformer(glb_encodings()).description("draco, meshopt, quantized, plain"));
 }
 
 void add_focal_option(CLI::App& command, double& focal) {

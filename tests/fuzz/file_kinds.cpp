@@ -466,6 +466,9 @@ void add_meshes(Kinds& kinds) {
   kinds.push_back(of_mesh("glb", "a.glb", [=](const fs::path& file) {
     write_glb(file, sphere(), centimetre_frame(), {.encoding = GlbEncoding::Plain});
   }));
+  kinds.push_back(of_mesh("glb-meshopt", "a.glb", [=](const fs::path& file) {
+    write_glb(file, sphere(), centimetre_frame(), {.encoding = GlbEncoding::Meshopt});
+  }));
   FileKind draco = of_mesh("glb-draco", "a.glb", [=](const fs::path& file) {
     write_glb(file, sphere(), centimetre_frame());
   });

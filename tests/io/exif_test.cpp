@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/heif_file.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
@@ -80,6 +81,18 @@ TEST_F(ExifFile, GivesTheFocalLengthFromThatOnFilm) {
   }
   // A sensor of 4:3 with the diagonal of film is 34.6 mm wide; portrait is no different.
   EXPECT_NEAR(hint({{kFilm, 3, 26}}, {3024, 4032}).focal, 4032 * 26 / 34.613, 1);
+}
+
+// HEIC and AVIF say in a way of their own how they are to be turned, and decoders have done so.
+TEST_F(ExifFile, IsReadFromHeicButForItsOrientation) {
+  constexpr size_t kBeforeTiff = 10;
+  const std::string exif = exif_segment({{kFilm, 3, 28}}, true).substr(kBeforeTiff);
+  test::write_bytes(dir_ / "a.heic",
+                    test::heif(ColorImage(48, 32, Eigen::Vector3f::Ones()), {.exif = exif}));
+  EXPECT_NEAR(lens_hint(dir_ / "a.heic", {3600, 2400}).focal, 2800, 0.5);
+  EXPECT_EQ(exif_orientation(dir_ / "a.heic"), 1);
+  test::write_bytes(dir_ / "b.heic", test::heif(ColorImage(48, 32, Eigen::Vector3f::Ones())));
+  EXPECT_EQ(lens_hint(dir_ / "b.heic", {3600, 2400}).focal, 0);
 }
 
 TEST_F(ExifFile, IsLessSureOfPicturesThatWereCut) {

@@ -195,7 +195,7 @@ TEST(ReadGlb, NamesWhatIsWrong) {
   EXPECT_EQ(broken("/scenes", Json::array()), "EMPTY");
   EXPECT_EQ(broken("/scenes", Json::object()), "SCHEMA");
   EXPECT_EQ(broken("/scene", 1), "REF");
-  EXPECT_EQ(broken("/extensionsRequired", {"EXT_meshopt_compression"}), "UNSUPPORTED");
+  EXPECT_EQ(broken("/extensionsRequired", {"KHR_meshopt_compression"}), "UNSUPPORTED");
   EXPECT_EQ(broken("/meshes/0/primitives/0/mode", 0), "EMPTY");
   Triangle t;
   t.binary[2] = 3;  // an index
@@ -245,7 +245,33 @@ TEST(ReadGlb, LeadsOurFilesBackToTheWorld) {
   const Eigen::Matrix3d y_up = y_up_from(-Eigen::Vector3d::UnitY());
   expect_round_trip({.encoding = GlbEncoding::Plain, .y_up = y_up}, 1e-4);
   expect_round_trip({.encoding = GlbEncoding::Quantized, .y_up = y_up}, 64 * 0.8 / 65536);
+  expect_round_trip({.encoding = GlbEncoding::Meshopt, .y_up = y_up}, 64 * 0.8 / 65536);
   expect_round_trip({.encoding = GlbEncoding::Draco, .y_up = y_up}, 64 * 0.8 / 8192);
+}
+
+// Programs that pack files for the web join materials and drop their names.
+TEST(ReadGlb, FeatureNumbersTellWhatMaterialsNoLongerSay) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::labelled_sphere();
+  for (const auto& [name, encoding] : glb_encodings()) {
+    write_glb(dir / "a.glb", mesh, test::centimetre_frame(), {.encoding = encoding});
+    std::string bytes = test::read_bytes(dir / "a.glb");
+    const size_t size = bytes.find(std::string("BIN\0", 4)) - 4 - 20;
+    nlohmann::json json = nlohmann::json::parse(bytes.substr(20, size));
+    for (auto& material : json["materials"]) material["name"] = "";
+    std::string text = json.dump();
+    ASSERT_LE(text.size(), size);
+    text.resize(size, ' ');
+    test::write_bytes(dir / "b.glb", bytes.replace(20, size, text));
+    const MeasurableFile back = read_mesh_file(dir / "b.glb");
+    const double ratio = back.content.frame.scale / test::centimetre_frame().scale;
+    const auto before = area_by_provenance(mesh);
+    const auto after = area_by_provenance(back.content.mesh);
+    for (size_t label = 0; label < before.size(); ++label) {
+      EXPECT_NEAR(after.at(label) * ratio * ratio, before.at(label), 1e-3 * before.at(label))
+          << name;
+    }
+  }
 }
 
 TEST(ReadGlb, AMeshOfOursWithoutLabelsHasNone) {

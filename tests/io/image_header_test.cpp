@@ -77,7 +77,8 @@ TEST(ParseImageHeader, NamesOtherContent) {
   EXPECT_EQ(refused("ply\nformat ascii 1.0\n"), "MAGIC");
   EXPECT_EQ(refused("<!DOCTYPE html>"), "MAGIC");
   EXPECT_EQ(refused("version https://git-lfs.github.com/spec/v1"), "MAGIC");
-  EXPECT_EQ(refused("\0\0\0\x18"s + "ftypheic"), "UNSUPPORTED");
+  EXPECT_EQ(refused("\0\0\0\x18"s + "ftypheic"), "SYNTAX");
+  EXPECT_EQ(refused("\0\0\0\x18"s + "ftypqt  "), "UNSUPPORTED");
   EXPECT_EQ(refused("II*\0\x10\0\0\0CR\x02\0"s), "UNSUPPORTED");
   EXPECT_EQ(refused("GIF89a"), "UNSUPPORTED");
   EXPECT_EQ(refused("BM123456"), "UNSUPPORTED");

@@ -16,6 +16,8 @@ namespace cgs::test {
 
 namespace {
 
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
+
 uint32_t word(const std::string& bytes, size_t offset) {
   uint32_t value = 0;
   std::memcpy(&value, bytes.data() + offset, 4);
@@ -57,7 +59,7 @@ void read_plain(const Glb& glb, const nlohmann::json& primitive, GlbPart& part) 
 }
 
 void read_draco(const Glb& glb, const nlohmann::json& primitive, GlbPart& part) {
-  const auto& extension = primitive["extensions"]["KHR_draco_mesh_compression"];
+  const auto& extension = primitive["extensions"][kDraco];
   const std::string bytes = view_bytes(glb, extension["bufferView"]);
   draco::DecoderBuffer buffer;
   buffer.Init(bytes.data(), bytes.size());
@@ -216,7 +218,7 @@ Glb parse_glb(const std::string& bytes) {
   for (const auto& primitive : glb.json["meshes"][0]["primitives"]) {
     GlbPart part;
     read_material(glb, primitive, part);
-    if (primitive.contains("extensions")) {
+    if (primitive.value("extensions", nlohmann::json()).contains(kDraco)) {
       read_draco(glb, primitive, part);
     } else {
       read_plain(glb, primitive, part);

@@ -279,13 +279,19 @@ void add_others(Cases& cases) {
              std::string(body.size() % 2, '\0');
     }));
   }
+  for (const std::string brand : {"heic", "avif"}) {
+    cases.push_back(picture_case("I14", brand + " without content", "SYNTAX", {"HEIF"}, [=] {
+      return std::string(
+                 "\0\0\0\x18"
+                 "ftyp",
+                 8) +
+             brand + std::string(100, '\0');
+    }));
+  }
   const std::vector<std::pair<std::string, std::string>> foreign = {
-      {"HEIC",
+      {"MP4",
        std::string(3, '\0') + "\x18"
-                              "ftypheic"},
-      {"AVIF",
-       std::string(3, '\0') + "\x18"
-                              "ftypavif"},
+                              "ftypisom"},
       {"CR2", std::string("II*\0\x10\0\0\0CR\2\0", 12)},
       {"GIF", "GIF89a"},
       {"BMP", "BM"}};
