@@ -109,7 +109,7 @@ std::string splat_loss_line(const SplatLoss& loss, const Frame& frame) {
   if (std::isinf(loss.psnr)) {
     out << "are the same";
   } else {
-    out << "differ by " << loss.psnr << " dB PSNR";
+    out << "agree to " << loss.psnr << " dB PSNR";
   }
   return out.str();
 }

@@ -39,8 +39,8 @@ SplatLoss splat_loss(const Gaussians& source,
 std::string splat_loss_line(const SplatLoss& loss, const Frame& frame);
 
 /// {"dropped", "centres": {"largest_move", "rms_move", "unit", "largest_of_extent",
-/// "rms_of_extent"}, "pictures": {"psnr", "views"}, "sh_degree"}; lengths in file units, centres
-/// null if splats were dropped, psnr null if the pictures are the same.
+/// "rms_of_extent"}, "pictures": {"psnr", "views"}, "sh_degree": {"before", "after"}}; lengths in
+/// file units, centres null if splats were dropped, psnr null if the pictures are the same.
 nlohmann::ordered_json splat_loss_to_json(const SplatLoss& loss, const Frame& frame);
 
 }  // namespace cgs

@@ -141,7 +141,7 @@ class SplatScene {
 
   RawSplats read() {
     const std::vector<GlbInstance> instances = glb_instances(file_);
-    for (const GlbInstance& instance : instances) find_degree(instance);
+    examine(instances);
     place();
     for (const GlbInstance& instance : instances) add_mesh(instance);
     if (splats_.size() == 0) throw BadInput(Defect::Empty, file_.path(), "holds no splats");
@@ -163,11 +163,22 @@ class SplatScene {
   }
 
  private:
-  void find_degree(const GlbInstance& instance) {
-    const JsonValue primitives = instance.mesh.at("primitives");
-    for (size_t i = 0; i < primitives.size(); ++i) {
-      if (!splat_extension(primitives.at(i))) continue;
-      splats_.sh_degree = std::max(splats_.sh_degree, sh_degree(primitives.at(i).at("attributes")));
+  /// Finds the degree, and refuses too many splats before any is read.
+  void examine(const std::vector<GlbInstance>& instances) {
+    uint64_t count = 0;
+    for (const GlbInstance& instance : instances) {
+      const JsonValue primitives = instance.mesh.at("primitives");
+      for (size_t i = 0; i < primitives.size(); ++i) {
+        if (!splat_extension(primitives.at(i))) continue;
+        const JsonValue attributes = primitives.at(i).at("attributes");
+        splats_.sh_degree = std::max(splats_.sh_degree, sh_degree(attributes));
+        const JsonValue positions = file_.element("accessors", attributes.at("POSITION"));
+        count += std::min(whole_number(positions.at("count")), kMostSplats + 1);
+      }
+    }
+    const uint64_t most = std::min(kMostSplats, kMostHarmonics / splats_.sh_count());
+    if (count > most) {
+      throw LimitError(printable(file_.path()) + ": more than " + std::to_string(most) + " splats");
     }
   }
 
@@ -269,10 +280,6 @@ class SplatScene {
       primitive.fail(Defect::Value, "lies in a node that flattens splats");
     }
     const Attributes in = attributes_of(primitive, extension);
-    const uint64_t most = std::min(kMostSplats, kMostHarmonics / splats_.sh_count());
-    if (in.count > most - splats_.size()) {
-      throw LimitError(printable(file_.path()) + ": more than " + std::to_string(most) + " splats");
-    }
     const SplatTurn turn(linear);
     for (size_t i = 0; i < in.count; ++i) {
       const Eigen::Vector3d p = in.three(in.position, i);
