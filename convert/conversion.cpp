@@ -14,9 +14,11 @@
 #include "convert/mesh_files.h"
 #include "convert/model.h"
 #include "convert/simplification.h"
+#include "convert/splat_loss.h"
 #include "convert/stated_frame.h"
 #include "convert/volume_file.h"
 #include "io/byte_reader.h"
+#include "io/compressed_ply.h"
 #include "io/dot_splat.h"
 #include "io/gaussian_ply.h"
 #include "io/gltf.h"
@@ -26,6 +28,7 @@
 #include "io/ply_header.h"
 #include "io/scene_path.h"
 #include "io/splat_glb.h"
+#include "io/splat_glb_reader.h"
 #include "io/splat_reader.h"
 #include "io/spz.h"
 #include "libcgs/core/error.h"
@@ -53,9 +56,10 @@ struct Source {
   Frame frame;
 };
 
-/// Files of a mesh: PLY has to be looked into, it may hold splats.
+/// Files of a mesh: PLY and .glb have to be looked into, they may hold splats.
 bool holds_mesh(const std::filesystem::path& path) {
   if (!is_mesh_name(path)) return false;
+  if (lower_extension(path) == ".glb") return !is_splat_glb(path);
   if (lower_extension(path) != ".ply") return true;
   const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
   if (start.substr(0, 3) != "ply") return false;
@@ -86,6 +90,11 @@ Source read_source(const std::filesystem::path& path) {
   return out;
 }
 
+/// SuperSplat's name for packed splats.
+bool is_compressed_ply_name(const std::filesystem::path& path) {
+  return lower_extension(path) == ".ply" && lower_extension(path.stem()) == ".compressed";
+}
+
 /// What the output is to hold, by its name, the flag, and for .ply and .glb the input.
 Content wanted_content(const ConversionRequest& request, Content from) {
   const std::string extension = lower_extension(request.output);
@@ -101,7 +110,8 @@ Content wanted_content(const ConversionRequest& request, Content from) {
   const bool asked = is({".ply", ".glb"}) && request.as == "splats";
   Content out = Content::Mesh;
   if (is({".vdb"})) out = Content::Volume;
-  if (is({".splat", ".spz"}) || stays || asked) out = Content::Splats;
+  const bool packed = is_compressed_ply_name(request.output);
+  if (is({".splat", ".spz"}) || stays || asked || packed) out = Content::Splats;
   const bool asked_other = (request.as == "mesh" && out != Content::Mesh) ||
                            (request.as == "splats" && out != Content::Splats);
   require(!asked_other, "--as must fit the output: " + extension + " cannot hold that", request.as);
@@ -114,33 +124,66 @@ Content wanted_content(const ConversionRequest& request, Content from) {
   return out;
 }
 
-Json write_splats(const ConversionRequest& request, const Source& source) {
-  const Gaussians& g = source.model ? source.model->gaussians : source.splats->gaussians;
+/// What was written, for the report.
+struct WrittenSplats {
+  Json report;
+  std::vector<uint32_t> order;  ///< Of the splats in the file, if it is another.
+};
+
+WrittenSplats write_splats(const ConversionRequest& request,
+                           const Gaussians& g,
+                           const Frame& frame) {
   const std::string extension = lower_extension(request.output);
   if (extension == ".splat") {
-    const DotSplatReport made = write_dot_splat(request.output, g, source.frame);
-    return {{"format", ".splat"},
-            {"splats", g.size()},
-            {"bytes", made.bytes},
-            {"clamped_colors", made.clamped_colors},
-            {"dropped_harmonics", made.dropped_sh}};
+    const DotSplatReport made = write_dot_splat(request.output, g, frame);
+    return {{{"format", ".splat"},
+             {"splats", g.size()},
+             {"bytes", made.bytes},
+             {"clamped_colors", made.clamped_colors},
+             {"dropped_harmonics", made.dropped_sh}},
+            {}};
   }
   if (extension == ".spz") {
-    const SpzReport made =
-        write_spz(request.output, g, source.frame, {.version = request.spz_version});
-    return {{"format", "SPZ " + std::to_string(request.spz_version)},
-            {"splats", g.size()},
-            {"bytes", made.bytes},
-            {"fractional_bits", made.fractional_bits},
-            {"clamped_splats", made.clamped}};
+    const SpzReport made = write_spz(request.output, g, frame, {.version = request.spz_version});
+    return {{{"format", "SPZ " + std::to_string(request.spz_version)},
+             {"splats", g.size()},
+             {"bytes", made.bytes},
+             {"fractional_bits", made.fractional_bits},
+             {"clamped_splats", made.clamped}},
+            {}};
   }
   if (extension == ".glb") {
-    const size_t bytes =
-        write_splat_glb(request.output, g, source.frame, {.y_up = y_up_from(source.frame.up)});
-    return {{"format", "KHR_gaussian_splatting"}, {"splats", g.size()}, {"bytes", bytes}};
+    const size_t bytes = write_splat_glb(request.output, g, frame, {.y_up = y_up_from(frame.up)});
+    return {{{"format", "KHR_gaussian_splatting"}, {"splats", g.size()}, {"bytes", bytes}}, {}};
   }
-  write_gaussian_ply(request.output, g, source.frame);
-  return {{"format", "3DGS PLY"}, {"splats", g.size()}};
+  if (is_compressed_ply_name(request.output)) {
+    CompressedPlyReport made = write_compressed_ply(request.output, g, frame);
+    return {{{"format", "compressed PLY"},
+             {"splats", g.size()},
+             {"bytes", made.bytes},
+             {"clamped_splats", made.clamped}},
+            std::move(made.order)};
+  }
+  write_gaussian_ply(request.output, g, frame);
+  return {{{"format", "3DGS PLY"}, {"splats", g.size()}}, {}};
+}
+
+/// Writes splats, reads them back and says what they lost.
+Json convert_splats(const ConversionRequest& request, const Source& source, Terminal& terminal) {
+  const Gaussians& g = source.model ? source.model->gaussians : source.splats->gaussians;
+  const WrittenSplats written = write_splats(request, g, source.frame);
+  Json report = written.report;
+  try {
+    const GaussianFile back = read_splats(request.output, source.frame);
+    const SplatLoss loss = splat_loss(g, back.gaussians, written.order);
+    report["loss"] = splat_loss_to_json(loss, source.frame);
+    terminal.say(splat_loss_line(loss, source.frame));
+  } catch (const Error& error) {
+    // The file is there: that it holds too little, or was not looked at, is a finding.
+    report["loss"] = {{"not_measured", error.what()}};
+    terminal.warn(std::string("what the file lost could not be measured: ") + error.what());
+  }
+  return report;
 }
 
 /// Splats to volume; the splats are gone afterwards.
@@ -261,8 +304,10 @@ Json bounds_json(const Gaussians& gaussians, const Frame& frame) {
 
 }  // namespace
 
-bool is_splat_ply(const std::filesystem::path& path) {
-  if (lower_extension(path) != ".ply" || is_folder(path)) return false;
+bool is_splat_file(const std::filesystem::path& path) {
+  if (is_folder(path)) return false;
+  if (lower_extension(path) == ".glb") return is_splat_glb(path);
+  if (lower_extension(path) != ".ply") return false;
   const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
   if (start.substr(0, 3) != "ply") return false;
   const PlyHeader header = parse_ply_header(start, path);
@@ -299,12 +344,14 @@ std::string conversion_table() {
   return "from                                 to splats        to .vdb  to a mesh\n"
          "                                     .ply .splat      volume   .ply .obj .stl\n"
          "                                     .spz .glb                 .3mf .glb\n"
+         "                                     .compressed.ply\n"
          "3DGS, 2DGS or packed .ply, .splat,\n"
-         "  .spz 2 to 4, .sog 2                yes              yes      yes, virtual cameras\n"
+         "  .spz 2 to 4, .sog 2, .ksplat,\n"
+         "  .glb with splats                   yes              yes      yes, virtual cameras\n"
          "model folder of train or run         yes              yes      yes, its own cameras\n"
          ".vdb of fuse, run or convert         no               no       yes\n"
          ".ply with faces, .obj, .stl, .off,\n"
-         "  .glb                               no               no       yes\n"
+         "  .glb with triangles                no               no       yes\n"
          "Where the ending can be both, .ply stays splats and .glb becomes a mesh; --as mesh and\n"
          "--as splats say otherwise. .stl and .3mf need a known scale, or --assume-unit.\n";
 }
@@ -329,7 +376,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   if (source.model) terminal.warn(source.model->scene.warnings);
   terminal.warn(source.warnings);
   if (wanted == Content::Splats) {
-    report["output"] = write_splats(request, source);
+    report["output"] = convert_splats(request, source, terminal);
     return report;
   }
   const bool from_splats_alone = source.splats.has_value();

@@ -40,9 +40,9 @@ nlohmann::ordered_json convert_file(const ConversionRequest& request, Terminal& 
 /// The pairs that convert_file() knows, as a table for people.
 std::string conversion_table();
 
-/// True for a PLY file whose vertices have what makes a splat. \throws BadInput as
-/// parse_ply_header()
-bool is_splat_ply(const std::filesystem::path& path);
+/// True for a PLY file whose vertices have what makes a splat, and for a .glb file of splats.
+/// \throws BadInput as parse_ply_header() and is_splat_glb()
+bool is_splat_file(const std::filesystem::path& path);
 
 /// What a file of splats holds and what is wrong with it: {"kind", "format", "counts", "bounds",
 /// "units", "findings", "warnings"}.

@@ -37,7 +37,7 @@ std::string vector_text(const Eigen::Vector3d& v) {
 MeasurableFile read_measured(const std::filesystem::path& path,
                              const std::string& assume_unit,
                              const std::optional<Frame>& frame) {
-  if (is_splat_ply(path)) {
+  if (is_splat_file(path)) {
     throw InvalidInput(printable(path) +
                        " holds splats, not a mesh or points; cgs convert makes a mesh of them");
   }

@@ -1,11 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/compressed_ply.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <span>
 
+#include <Eigen/Geometry>
+
+#include "io/atomic_file.h"
+#include "io/byte_writer.h"
+#include "io/morton_order.h"
+#include "io/ply_frame.h"
 #include "io/ply_rows.h"
+#include "io/splat_arrays.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/gaussians.h"
 
@@ -14,6 +24,9 @@ namespace cgs {
 namespace {
 
 constexpr uint64_t kChunk = 256;  // splats that share their ranges
+
+constexpr std::array<const char*, 4> kPacked = {
+    "packed_position", "packed_rotation", "packed_scale", "packed_color"};
 
 /// The lowest `bits` bits as a number in [0, 1].
 double unit(uint32_t packed, int bits) {
@@ -53,6 +66,155 @@ struct Chunk {
   Range position, log_scale, color;
 };
 
+/// A splat in the numbers that are packed.
+struct PackedValues {
+  Eigen::Vector3d position, log_scale, color;
+};
+
+/// A number in [0, 1] in the nearest of 2^bits steps.
+uint32_t packed_unit(double value, int bits) {
+  const double most = (1U << bits) - 1;
+  return static_cast<uint32_t>(std::lround(most * std::clamp(value, 0.0, 1.0)));
+}
+
+uint32_t packed_three(const Eigen::Vector3d& t) {
+  return packed_unit(t[0], 11) << 21 | packed_unit(t[1], 10) << 11 | packed_unit(t[2], 11);
+}
+
+uint32_t packed_rotation(const Eigen::Vector4f& rotation) {
+  Eigen::Vector4d q = rotation.cast<double>().normalized();
+  Eigen::Index largest = 0;
+  q.cwiseAbs().maxCoeff(&largest);
+  if (q[largest] < 0) q = -q;
+  auto out = static_cast<uint32_t>(largest);
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    if (i != largest) out = out << 10 | packed_unit(q[i] / std::numbers::sqrt2 + 0.5, 10);
+  }
+  return out;
+}
+
+/// A harmonic in [-4, 4]; the reader takes the middle of the step.
+uint8_t harmonic_byte(float c) {
+  return static_cast<uint8_t>(std::clamp(std::floor(256 * (double{c} / 8 + 0.5)), 0.0, 255.0));
+}
+
+/// The range of float that holds a box.
+Range rounded_outwards(const Eigen::AlignedBox3d& box) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  Range out{box.min(), box.max()};
+  for (int k = 0; k < 3; ++k) {
+    const auto low = static_cast<float>(box.min()[k]);
+    const auto high = static_cast<float>(box.max()[k]);
+    out.low[k] = low > box.min()[k] ? std::nextafter(low, -kInfinity) : low;
+    out.high[k] = high < box.max()[k] ? std::nextafter(high, kInfinity) : high;
+  }
+  return out;
+}
+
+/// Where a value lies in its range, in [0, 1].
+Eigen::Vector3d placed(const Range& range, const Eigen::Vector3d& value) {
+  const Eigen::Vector3d size = range.high - range.low;
+  const Eigen::Vector3d t = (value - range.low).cwiseQuotient(size);
+  return (size.array() > 0).select(t, Eigen::Vector3d::Zero());
+}
+
+/// Packs splats in their order, chunk by chunk.
+class SplatPacker {
+ public:
+  SplatPacker(const Gaussians& g, const Frame& frame, const std::vector<uint32_t>& order)
+      : g_(g), frame_(frame), order_(order) {}
+
+  std::string chunk_bytes() {
+    std::string out;
+    for (size_t begin = 0; begin < order_.size(); begin += kChunk) {
+      chunks_.push_back(chunk_of(
+          std::span(order_).subspan(begin, std::min<size_t>(kChunk, order_.size() - begin))));
+      for (const Range* range :
+           {&chunks_.back().position, &chunks_.back().log_scale, &chunks_.back().color}) {
+        for (const double c : range->low) append_bytes(out, static_cast<float>(c));
+        for (const double c : range->high) append_bytes(out, static_cast<float>(c));
+      }
+    }
+    return out;
+  }
+
+  /// \pre chunk_bytes() was called
+  void append_splat(std::string& out, size_t place) const {
+    const size_t i = order_[place];
+    const Chunk& chunk = chunks_[place / kChunk];
+    const PackedValues values = values_of(i);
+    const Eigen::Vector3d color = placed(chunk.color, values.color);
+    append_bytes(out, packed_three(placed(chunk.position, values.position)));
+    append_bytes(out, packed_rotation(g_.rotation[i]));
+    append_bytes(out, packed_three(placed(chunk.log_scale, values.log_scale)));
+    append_bytes(out,
+                 packed_unit(color[0], 8) << 24 | packed_unit(color[1], 8) << 16 |
+                     packed_unit(color[2], 8) << 8 | unit_byte(g_.opacity[i]));
+  }
+
+  /// \return whether a harmonic was out of range
+  bool append_harmonics(std::string& out, size_t place) const {
+    const auto count = static_cast<size_t>(g_.sh_count());
+    const Eigen::Vector3f* sh = g_.sh.data() + order_[place] * count;
+    bool clamped = false;
+    for (int channel = 0; channel < 3; ++channel) {
+      for (size_t k = 1; k < count; ++k) {
+        append_bytes(out, harmonic_byte(sh[k][channel]));
+        clamped = clamped || std::abs(sh[k][channel]) > 4;
+      }
+    }
+    return clamped;
+  }
+
+ private:
+  PackedValues values_of(size_t i) const {
+    const Eigen::Vector3f& dc = g_.sh[i * static_cast<size_t>(g_.sh_count())];
+    return {frame_.file_from_internal(g_.position[i].cast<double>()),
+            (frame_.scale * g_.scale[i].cast<double>()).array().log(),
+            (double{kShC0} * dc.cast<double>()).array() + 0.5};
+  }
+
+  Chunk chunk_of(std::span<const uint32_t> splats) const {
+    Eigen::AlignedBox3d position;
+    Eigen::AlignedBox3d log_scale;
+    Eigen::AlignedBox3d color;
+    for (const uint32_t i : splats) {
+      const PackedValues values = values_of(i);
+      position.extend(values.position);
+      log_scale.extend(values.log_scale);
+      color.extend(values.color);
+    }
+    return {rounded_outwards(position), rounded_outwards(log_scale), rounded_outwards(color)};
+  }
+
+  const Gaussians& g_;
+  const Frame& frame_;
+  const std::vector<uint32_t>& order_;
+  std::vector<Chunk> chunks_;
+};
+
+std::string packed_header(const Gaussians& g, const Frame& frame) {
+  std::string out = "ply\nformat binary_little_endian 1.0\ncomment generator cgs\n";
+  out += ply_frame_comments(frame);
+  out += "element chunk " + std::to_string((g.size() + kChunk - 1) / kChunk) + "\n";
+  for (const auto& [prefix, names] : {std::pair(std::string(), "xyz"),
+                                      std::pair(std::string("scale_"), "xyz"),
+                                      std::pair(std::string(), "rgb")}) {
+    for (const char* end : {"min_", "max_"}) {
+      for (const char axis : std::string(names)) {
+        out += "property float " + (end + prefix) + axis + "\n";
+      }
+    }
+  }
+  out += "element vertex " + std::to_string(g.size()) + "\n";
+  for (const char* name : kPacked) out += std::string("property uint ") + name + "\n";
+  if (g.sh_degree > 0) out += "element sh " + std::to_string(g.size()) + "\n";
+  for (int k = 0; k < 3 * (g.sh_count() - 1); ++k) {
+    out += "property uchar f_rest_" + std::to_string(k) + "\n";
+  }
+  return out + "end_header\n";
+}
+
 class PackedRows {
  public:
   PackedRows(const PlyHeader& header, const std::filesystem::path& path)
@@ -83,9 +245,6 @@ class PackedRows {
   RawSplats take() { return std::move(splats_); }
 
  private:
-  static constexpr std::array<const char*, 4> kPacked = {
-      "packed_position", "packed_rotation", "packed_scale", "packed_color"};
-
   int column(const PlyElement& element, const std::string& name) const {
     const int i = element.find(name);
     if (i < 0 || element.properties[static_cast<size_t>(i)].is_list) {
@@ -191,6 +350,38 @@ RawSplats parse_compressed_ply(std::string_view bytes, const std::filesystem::pa
     out.notes.push_back("trailing " + std::to_string(trailing) + " bytes ignored");
   }
   return out;
+}
+
+CompressedPlyReport write_compressed_ply(const std::filesystem::path& path,
+                                         const Gaussians& gaussians,
+                                         const Frame& frame) {
+  require_writable(gaussians);
+  require(gaussians.size() < std::numeric_limits<uint32_t>::max(),
+          "write_compressed_ply: number of splats must be below 2^32",
+          gaussians.size());
+  CompressedPlyReport report;
+  report.order = morton_order(gaussians.position);
+  SplatPacker packer(gaussians, frame, report.order);
+  AtomicFile file(path);
+  const auto write = [&](const std::string& bytes) {
+    file.write(bytes);
+    report.bytes += bytes.size();
+  };
+  write(packed_header(gaussians, frame));
+  write(packer.chunk_bytes());
+  std::string record;
+  for (size_t place = 0; place < gaussians.size(); ++place) {
+    record.clear();
+    packer.append_splat(record, place);
+    write(record);
+  }
+  for (size_t place = 0; gaussians.sh_degree > 0 && place < gaussians.size(); ++place) {
+    record.clear();
+    report.clamped += packer.append_harmonics(record, place) ? 1 : 0;
+    write(record);
+  }
+  file.commit();
+  return report;
 }
 
 }  // namespace cgs

@@ -85,7 +85,10 @@ uint64_t whole_number(const JsonValue& value) {
 }
 
 GlbContainer::GlbContainer(const std::filesystem::path& path)
-    : path_(path), content_(read_file(path)) {
+    : GlbContainer(read_file(path), path) {}
+
+GlbContainer::GlbContainer(std::string content, const std::filesystem::path& path)
+    : path_(path), content_(std::move(content)) {
   refuse_foreign_content(path, content_, "GLB");
   ByteReader in(content_, path);
   if (in.get<uint32_t>("magic") != kMagic) {

@@ -21,6 +21,8 @@ class GlbContainer {
   /// LimitError included; as meshopt_decoded()
   /// Source: glTF 2.0, section 4.4 (GLB file format), Khronos Group.
   explicit GlbContainer(const std::filesystem::path& path);
+  /// The same for the content of a file that was read already.
+  GlbContainer(std::string content, const std::filesystem::path& path);
 
   JsonValue root() const { return {json_, path_}; }
   const std::filesystem::path& path() const { return path_; }

@@ -167,10 +167,17 @@ size_t write_splat_glb(const std::filesystem::path& path,
   const Eigen::Quaterniond turn(options.y_up);
   document["nodes"][0]["rotation"] = {turn.x(), turn.y(), turn.z(), turn.w()};
   const Eigen::Vector3d origin = frame.world_from_internal(center.cast<double>());
-  document["asset"]["extras"] = {{"units", frame.has_metric_scale() ? "m" : "unknown"},
-                                 {"metres_per_unit", frame.metres_per_unit},
-                                 {"scale_source", scale_source_name(frame.scale_source)},
-                                 {"origin_in_world", {origin.x(), origin.y(), origin.z()}}};
+  Json rotation = Json::array();
+  for (int i = 0; i < 9; ++i) rotation.push_back(options.y_up(i / 3, i % 3));
+  const Eigen::Vector3d& file_origin = frame.file_origin;
+  document["asset"]["extras"] = {
+      {"units", frame.has_metric_scale() ? "m" : "unknown"},
+      {"metres_per_unit", frame.metres_per_unit},
+      {"metres_sigma", frame.metres_sigma},
+      {"scale_source", scale_source_name(frame.scale_source)},
+      {"origin_in_world", {origin.x(), origin.y(), origin.z()}},
+      {"gltf_from_world", std::move(rotation)},
+      {"file_origin", {file_origin.x(), file_origin.y(), file_origin.z()}}};
   const std::string out = glb_bytes(json_text(document, -1), buffer.take_bytes());
   write_file(path, out);
   return out.size();

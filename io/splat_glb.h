@@ -23,11 +23,12 @@ struct SplatGlbOptions {
 /// readers that only know points.
 ///
 /// In metres where the scale is known, else in world units; positions are relative to their median,
-/// and the node turns them +Y up. Its place in the world stands in asset.extras, in double.
+/// and the node turns them +Y up. Its place in the world stands in asset.extras, in double, and
+/// leads parse_splat_glb() back there.
 /// \return bytes of the file
 /// \throws InvalidInput as write_gaussian_ply(), or if a scale or place leaves the range of float;
 ///         LimitError above 4 GiB; IoError
-/// Source: Khronos Group, KHR_gaussian_splatting, release candidate of 2026.
+/// Source: Khronos Group, KHR_gaussian_splatting, 2026.
 size_t write_splat_glb(const std::filesystem::path& path,
                        const Gaussians& gaussians,
                        const Frame& frame,

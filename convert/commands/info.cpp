@@ -244,11 +244,11 @@ void run_mesh_info(const InfoArgs& args) {
   }
 }
 
-/// Files that no mesh reader takes, and PLY files with what makes a splat.
+/// Files that no mesh reader takes, and those of its kinds that hold splats.
 bool holds_splats(const std::filesystem::path& path) {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) return false;
-  return !is_mesh_name(path) || is_splat_ply(path);
+  return !is_mesh_name(path) || is_splat_file(path);
 }
 
 void run_info(const InfoArgs& args) {
@@ -286,7 +286,7 @@ void add_info(CLI::App& app) {
          "scene",
          args->scene.path,
          "Folder of a scene, as for run, a mesh (.ply, .obj, .stl, .off, .glb), which gets a "
-         "certificate, or splats (.ply, .spz, .splat, .sog)")
+         "certificate, or splats (.ply, .spz, .splat, .sog, .ksplat, .glb)")
       ->required();
   add_scene_options(*cmd, args->scene.options);
   add_focal_option(*cmd, args->scene.focal);

@@ -103,6 +103,45 @@ TEST_F(Conversion, GlbHoldsAMeshUnlessSplatsAreAskedFor) {
             std::string::npos);
 }
 
+TEST_F(Conversion, SplatsInGlbAreSplatsAgain) {
+  convert("ball.ply", "s.glb", [](ConversionRequest& r) { r.as = "splats"; });
+  EXPECT_TRUE(is_splat_file(dir_ / "s.glb"));
+  convert("s.glb", "t.ply");
+  const GaussianFile first = read_splats(dir_ / "ball.ply", Frame{});
+  const GaussianFile last = read_splats(dir_ / "t.ply", Frame{});
+  ASSERT_EQ(last.gaussians.size(), 4000u);
+  for (size_t i = 0; i < 4000; ++i) {
+    EXPECT_LT((last.gaussians.position[i] - first.gaussians.position[i]).norm(), 1e-6f);
+  }
+  const auto report =
+      convert("s.glb", "t.obj", [](ConversionRequest& r) { r.volume.voxel_size = "0.02"; });
+  EXPECT_TRUE(report["certificate"]["passed"].get<bool>());
+  convert("t.obj", "mesh.glb");
+  EXPECT_FALSE(is_splat_file(dir_ / "mesh.glb"));
+}
+
+TEST_F(Conversion, PacksSplatsWhereTheNameSaysSo) {
+  const auto report = convert("ball.ply", "p.compressed.ply");
+  EXPECT_EQ(report["output"]["format"], "compressed PLY");
+  EXPECT_EQ(read_splats(dir_ / "p.compressed.ply").format, "compressed PLY");
+  write_mesh_ply(dir_ / "mesh.ply", test::labelled_sphere(), Frame{});
+  EXPECT_THROW(convert("mesh.ply", "mesh.compressed.ply"), InvalidInput);
+  EXPECT_THROW(convert("ball.ply", "m.compressed.ply", [](auto& r) { r.as = "mesh"; }),
+               InvalidInput);
+}
+
+TEST_F(Conversion, SaysWhatEveryFileOfSplatsLost) {
+  for (const char* name : {"a.splat", "a.spz", "a.compressed.ply", "a.glb", "a.ply"}) {
+    const auto report = convert("ball.ply", name, [](ConversionRequest& r) { r.as = "splats"; });
+    const auto& loss = report["output"]["loss"];
+    EXPECT_EQ(loss["dropped"], 0) << name;
+    EXPECT_LT(loss["centres"]["largest_move"].get<double>(), 1e-3) << name;
+    EXPECT_GE(loss["centres"]["largest_move"], loss["centres"]["rms_move"]) << name;
+    EXPECT_TRUE(loss["pictures"]["psnr"].is_null() || loss["pictures"]["psnr"] > 35.0) << name;
+    EXPECT_GE(loss["pictures"]["views"], 8) << name;
+  }
+}
+
 TEST_F(Conversion, WhatIsUpComesFromTheUserTheFileOrCustom) {
   Frame frame;
   write_mesh_ply(dir_ / "mesh.ply", test::labelled_sphere(), frame);

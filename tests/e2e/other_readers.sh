@@ -85,6 +85,18 @@ points = o3d.io.read_point_cloud(sys.argv[1] + "/model/gaussians.ply")
 assert len(points.points) > 1000
 PY
 
+if command -v splat-transform >/dev/null; then
+  packed=$(mktemp -d)
+  expect "splat-transform: reads every packed splat" sh -c '
+    count() { "$1" info "$2" | head -1 | cut -d" " -f3; }
+    "$1" convert "$2" "$3/a.compressed.ply" && splat-transform "$3/a.compressed.ply" "$3/b.ply" &&
+      test "$(count "$1" "$3/b.ply")" = "$(count "$1" "$2")"' sh \
+    "$cgs" "$out/model/gaussians.ply" "$packed"
+  rm -rf "$packed"
+else
+  echo "skipped: packed splats (npm install @playcanvas/splat-transform)"
+fi
+
 if node -e 'require("gltf-validator")' 2>/dev/null; then
   expect "glTF validator: no error, no warning" node -e '
 const fs = require("fs");

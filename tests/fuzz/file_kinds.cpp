@@ -9,6 +9,7 @@
 #include "io/cameras_json_scene.h"
 #include "io/checkpoint.h"
 #include "io/colmap_model.h"
+#include "io/compressed_ply.h"
 #include "io/control_points.h"
 #include "io/depth_file.h"
 #include "io/dot_splat.h"
@@ -34,6 +35,7 @@
 #include "io/vdb.h"
 #include "libcgs/priors/onnx_input.h"
 #include "tests/support/exif_segment.h"
+#include "tests/support/ksplat_file.h"
 #include "tests/support/onnx_file.h"
 #include "tests/support/packed_ply.h"
 #include "tests/support/sample_mesh.h"
@@ -417,6 +419,18 @@ void add_splats(Kinds& kinds) {
     sog.add_harmonics();
     write_bytes(file, sog.bytes());
   }));
+  kinds.push_back(of_splats("packed-ply-of-ours", "a.ply", [=](const fs::path& file) {
+    write_compressed_ply(file, ours(), centimetre_frame());
+  }));
+  kinds.push_back(of_splats("splat-glb", "a.glb", [=](const fs::path& file) {
+    write_splat_glb(file, ours(), centimetre_frame());
+  }));
+  for (const uint16_t level : {0, 1, 2}) {
+    const std::string name = "ksplat-" + std::to_string(level);
+    kinds.push_back(of_splats(name, "a.ksplat", [=](const fs::path& file) {
+      write_bytes(file, KSplatFile{.level = level, .degree = 1, .splats = {{}, {}, {}}}.bytes());
+    }));
+  }
   kinds.push_back(of_splats("dot-splat", "a.splat", [=](const fs::path& file) {
     write_dot_splat(file, ours(), centimetre_frame());
   }));

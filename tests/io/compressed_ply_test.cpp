@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/compressed_ply.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include "io/splat_reader.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/packed_ply.h"
+#include "tests/support/sample_mesh.h"
 #include "tests/support/sample_splats.h"
 
 namespace cgs {
@@ -101,6 +104,111 @@ TEST(CompressedPly, RefusesWhatDoesNotFitTogether) {
   file.coefficients = 9;
   test::expect_every_truncation_is_refused(file.bytes(),
                                            [](const auto& path) { (void)read_splats(path); });
+}
+
+/// What write_compressed_ply() made, with what it should be within.
+class WrittenPackedPly : public testing::Test {
+ protected:
+  void write(const Gaussians& g, const Frame& frame) {
+    report_ = write_compressed_ply(dir_ / "a.ply", g, frame);
+    bytes_ = test::read_bytes(dir_ / "a.ply");
+    raw_ = parse_compressed_ply(bytes_, "a.ply");
+  }
+  /// The widest range of the values of one chunk.
+  template <typename Value>
+  Eigen::Vector3d largest_range(size_t count, const Value& value) const {
+    Eigen::Vector3d out = Eigen::Vector3d::Zero();
+    for (size_t begin = 0; begin < count; begin += 256) {
+      Eigen::AlignedBox3d box;
+      for (size_t i = begin; i < std::min(count, begin + 256); ++i) box.extend(value(i));
+      out = out.cwiseMax(box.sizes());
+    }
+    return out;
+  }
+  template <typename Value, typename Read>
+  void expect_within_half_a_step(const char* what,
+                                 const Value& value,
+                                 const Read& read,
+                                 const Eigen::Vector3d& steps) const {
+    const Eigen::Vector3d range = largest_range(raw_.size(), value);
+    const Eigen::Vector3d most = 0.5 * range.cwiseQuotient(steps) * 1.0001;
+    for (size_t i = 0; i < raw_.size(); ++i) {
+      const Eigen::Vector3d off = (read(i) - value(i)).cwiseAbs();
+      EXPECT_TRUE((off.array() <= most.array() + 1e-5).all())
+          << what << " " << i << ": " << off.transpose() << ", allowed " << most.transpose();
+    }
+  }
+  test::TempDir dir_;
+  CompressedPlyReport report_;
+  std::string bytes_;
+  RawSplats raw_;
+};
+
+TEST_F(WrittenPackedPly, ReadsBackWithinHalfAStep) {
+  const Frame frame = test::centimetre_frame();
+  for (int degree = 0; degree <= 3; ++degree) {
+    const Gaussians g = test::varied_splats(700, degree);
+    write(g, frame);
+    ASSERT_EQ(raw_.size(), 700u);
+    EXPECT_EQ(report_.bytes, bytes_.size());
+    EXPECT_EQ(report_.clamped, 0u);
+    const auto source = [&](size_t i) { return report_.order[i]; };
+    const auto sh = [&](size_t i, size_t k) {
+      return g.sh[source(i) * static_cast<size_t>(g.sh_count()) + k];
+    };
+    const Eigen::Vector3d three_steps(2047, 1023, 2047);
+    expect_within_half_a_step(
+        "position",
+        [&](size_t i) { return frame.file_from_internal(g.position[source(i)].cast<double>()); },
+        [&](size_t i) { return raw_.position[i]; },
+        three_steps);
+    expect_within_half_a_step(
+        "scale",
+        [&](size_t i) -> Eigen::Vector3d {
+          return (frame.scale * g.scale[source(i)].cast<double>()).array().log();
+        },
+        [&](size_t i) -> Eigen::Vector3d { return raw_.log_scale[i].cast<double>(); },
+        three_steps);
+    expect_within_half_a_step(
+        "colour",
+        [&](size_t i) -> Eigen::Vector3d { return sh(i, 0).cast<double>(); },
+        [&](size_t i) -> Eigen::Vector3d { return raw_.sh[i * raw_.sh_count()].cast<double>(); },
+        Eigen::Vector3d::Constant(255));
+    for (size_t i = 0; i < raw_.size(); ++i) {
+      const double opacity = 1 / (1 + std::exp(-double{raw_.logit[i]}));
+      EXPECT_NEAR(opacity, g.opacity[source(i)], 0.5 / 255 + 1e-6);
+      EXPECT_LT(test::angle_between(raw_.rotation[i], g.rotation[source(i)]), 0.0035);
+      for (size_t k = 1; k < raw_.sh_count(); ++k) {
+        const Eigen::Vector3f off = raw_.sh[i * raw_.sh_count() + k] - sh(i, k);
+        EXPECT_LE(off.cwiseAbs().maxCoeff(), 1.0f / 64);
+      }
+    }
+  }
+}
+
+TEST_F(WrittenPackedPly, KeepsUnitAndPlace) {
+  const Frame frame = test::centimetre_frame();
+  const Gaussians g = test::varied_splats(300, 1);
+  write(g, frame);
+  const GaussianFile back = read_splats(dir_ / "a.ply");
+  EXPECT_EQ(back.frame.unit_name(), "cm");
+  EXPECT_TRUE(back.warnings.empty());
+  const Gaussians again = read_splats(dir_ / "a.ply", frame).gaussians;
+  for (size_t i = 0; i < again.size(); ++i) {
+    EXPECT_LT((again.position[i] - g.position[report_.order[i]]).norm(), 1e-3f);
+  }
+}
+
+TEST_F(WrittenPackedPly, CountsWhatAByteCannotSayAndTakesOneSplat) {
+  Gaussians g = test::varied_splats(1, 1);
+  g.sh[2] = Eigen::Vector3f(5, 0, 0);
+  write(g, Frame{});
+  EXPECT_EQ(report_.clamped, 1u);
+  EXPECT_FLOAT_EQ(raw_.sh[2].x(), 4);
+  EXPECT_LT((raw_.position[0].cast<float>() - g.position[0]).norm(), 1e-7f);
+  EXPECT_THROW(write(Gaussians{.scale = {{1, 1, 1}}}, Frame{}), InvalidInput);
+  test::expect_full_disk_is_noticed(
+      [&](const auto& path) { write_compressed_ply(path, g, Frame{}); });
 }
 
 }  // namespace

@@ -50,6 +50,15 @@ TEST(SplatDoctor, FindsNothingInAHealthyFile) {
   EXPECT_EQ(out.gaussians.sh, test::varied_splats(400, 1).sh);
 }
 
+TEST(SplatDoctor, DropsPlacesThatFloatsCannotHoldAgain) {
+  const GaussianFile out = examined([](RawSplats& raw) {
+    raw.position[0].y() = 3e38;
+    raw.position[1].z() = -1e300;
+  });
+  EXPECT_EQ(out.findings.out_of_range, 2u);
+  EXPECT_EQ(out.gaussians.size(), 398u);
+}
+
 TEST(SplatDoctor, CountsEveryDefectApart) {
   const GaussianFile out = examined([](RawSplats& raw) {
     raw.position[0].x() = std::numeric_limits<double>::quiet_NaN();

@@ -10,8 +10,11 @@
 #include "io/gaussian_ply.h"
 #include "io/mesh_ply.h"
 #include "io/scene_reader.h"
+#include "io/splat_glb.h"
+#include "io/splat_glb_reader.h"
 #include "io/vdb.h"
 #include "tests/e2e/bad_inputs/valid_inputs.h"
+#include "tests/support/sample_splats.h"
 
 namespace cgs::test {
 
@@ -82,6 +85,16 @@ std::vector<Target> targets() {
            false,
            write_volume_file,
            [](const fs::path& folder) { (void)read_vdb(folder / "volume.vdb"); }},
+          {"splats in GLB",
+           "splats.glb",
+           false,
+           [](const fs::path& folder) {
+             write_splat_glb(folder / "splats.glb", varied_splats(3, 1), Frame{});
+           },
+           [](const fs::path& folder) {
+             const fs::path file = folder / "splats.glb";
+             (void)parse_splat_glb(read_file(file), file);
+           }},
           {"mesh", "mesh.ply", true, write_mesh, [](const fs::path& folder) {
              (void)read_mesh_ply(folder / "mesh.ply");
            }}};

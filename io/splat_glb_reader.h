@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "io/raw_splats.h"
+
+namespace cgs {
+
+/// True for a binary glTF file with a primitive of splats (KHR_gaussian_splatting).
+/// \throws BadInput as GlbContainer; LimitError
+bool is_splat_glb(const std::filesystem::path& path);
+
+/// Reads every splat of the default scene of a binary glTF file, nodes placed as the file says:
+/// they turn, scale and mirror splats and their spherical harmonics too. Attributes may be floats
+/// or whole numbers.
+///
+/// Files of ours lead back to world coordinates, with unit and origin. Others are in metres with +Y
+/// up, as the format demands, and are turned half way around z, into the axes of the 3DGS PLY.
+/// Colours in linear light become sRGB: exact for the mean colour of a splat, to first order
+/// for what depends on direction, with a note.
+///
+/// \param content  of the file, starting with "glTF"
+/// \throws BadInput as GlbContainer and glb_instances(); Empty without splats; Schema for an
+///         attribute that is missing or a primitive of no points; Count for attributes of different
+///         lengths; Unsupported for compressed splats; Value for a node that flattens them;
+///         LimitError for more than 2^26 splats, or 2^28 colours
+///         of theirs
+/// Source: Khronos Group, KHR_gaussian_splatting.
+RawSplats parse_splat_glb(std::string content, const std::filesystem::path& path);
+
+}  // namespace cgs
