@@ -8,12 +8,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/floaters.h"
 #include "convert/fusion.h"
 #include "convert/length.h"
 #include "convert/memory_plan.h"
 #include "convert/mesh_files.h"
 #include "convert/model.h"
 #include "convert/simplification.h"
+#include "convert/splat_selection.h"
 #include "convert/stated_frame.h"
 #include "convert/volume_file.h"
 #include "io/byte_reader.h"
@@ -216,6 +218,14 @@ void write_mesh(const ConversionRequest& request,
   write_mesh_as(request.output, mesh, source.frame, options);
 }
 
+/// \return what was left out, for the report
+Json leave_out_floaters(GaussianFile& file, const Terminal& terminal) {
+  const Floaters found = find_floaters(file.gaussians);
+  terminal.say(floaters_text(found));
+  if (!found.doubtful) keep_only(file.gaussians, found.keep);
+  return floaters_to_json(found, file.frame);
+}
+
 void refuse_for_splats(const ConversionRequest& request) {
   const char* const given = request.open_surface                 ? "--open"
                             : !request.simplify.empty()          ? "--simplify"
@@ -229,6 +239,9 @@ void check_before_work(const ConversionRequest& request, const Source& source, C
   require_writable_as(request.output, source.frame);
   if (source.content == Content::Mesh && request.open_surface) {
     throw InvalidInput("--open has no effect on an input that is a mesh already");
+  }
+  if (!source.splats && request.filter_floaters) {
+    throw InvalidInput("--filter-floaters is for files of splats alone");
   }
   if (source.content != Content::Splats && !request.volume.voxel_size.empty()) {
     throw InvalidInput("--voxel-size has no effect on an input that holds no splats");
@@ -328,6 +341,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   }
   if (source.model) terminal.warn(source.model->scene.warnings);
   terminal.warn(source.warnings);
+  if (request.filter_floaters) report["floaters"] = leave_out_floaters(*source.splats, terminal);
   if (wanted == Content::Splats) {
     report["output"] = write_splats(request, source);
     return report;
