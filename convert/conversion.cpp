@@ -66,7 +66,26 @@ bool holds_mesh(const std::filesystem::path& path) {
   return face != nullptr && face->count > 0;
 }
 
-Source read_source(const std::filesystem::path& path) {
+/// \throws LimitError before a file is read that would not fit
+void check_size(const std::filesystem::path& path, size_t memory_limit) {
+  const std::optional<SplatCount> stated = stated_splats(path);
+  if (!stated) return;
+  check_splat_memory_plan(
+      {.splats = stated->splats, .harmonics = stated->harmonics, .file_bytes = stated->file_bytes},
+      memory_budget(memory_limit));
+}
+
+/// The same before virtual cameras look at splats.
+void check_pictures(const ConversionRequest& request, const Gaussians& g) {
+  const VirtualCameraOptions& cameras = request.volume.cameras;
+  check_splat_memory_plan({.splats = g.size(),
+                           .harmonics = static_cast<uint64_t>(g.sh_count()),
+                           .pictures = static_cast<uint64_t>(cameras.views),
+                           .picture_pixels = uint64_t(cameras.size) * uint64_t(cameras.size)},
+                          memory_budget(request.volume.memory_limit));
+}
+
+Source read_source(const std::filesystem::path& path, size_t memory_limit) {
   Source out;
   if (is_folder(path)) {
     out.model = read_model(path);
@@ -82,6 +101,7 @@ Source read_source(const std::filesystem::path& path) {
     out.frame = file.content.frame;
     out.warnings = std::move(file.warnings);
   } else {
+    check_size(path, memory_limit);
     out.splats = read_splats(path);
     out.frame = out.splats->frame;
   }
@@ -324,7 +344,7 @@ std::string conversion_table() {
 
 Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   ConversionRequest request = given;
-  Source source = read_source(request.input);
+  Source source = read_source(request.input, request.volume.memory_limit);
   settle_up(source.frame, request.up, source.content == Content::Splats);
   if (!request.assume_unit.empty()) {
     const std::string refused = assume_unit(source.frame, request.assume_unit);
@@ -347,6 +367,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
     return report;
   }
   const bool from_splats_alone = source.splats.has_value();
+  if (from_splats_alone) check_pictures(request, source.splats->gaussians);
   if (source.content != Content::Mesh) {
     Volume volume = make_volume(request, source, terminal, report);
     if (wanted == Content::Volume) {
