@@ -18,10 +18,10 @@ namespace cgs {
 
 namespace {
 
-constexpr float kOpaque = 0.1f;     // splats that tell where the scene is
-constexpr double kReach = 1.5;      // of a splat [sigma]
-constexpr float kMatter = 0.25f;    // sum of opacities in a cell
-constexpr uint32_t kOne = 1 << 12;  // opacity 1 in the grid; whole numbers add up in any order
+constexpr float kOpaque = 0.1f;   // splats that tell where the scene is
+constexpr double kReach = 1.5;    // of a splat [sigma]
+constexpr float kMatter = 0.25f;  // sum of opacities in a cell
+constexpr float kOne = 256;       // opacity 1 in the grid, where whole numbers add up in any order
 constexpr size_t kGrain = 2048;
 
 double quantile(std::vector<float>& values, double q) {
@@ -81,7 +81,7 @@ class CellGrid {
  public:
   CellGrid(const Eigen::AlignedBox3d& scene, double cell) : cell_(cell) {
     constexpr double kWidened = 1.5;
-    const double side = kWidened * scene.sizes().maxCoeff() + 2 * cell;
+    const double side = kWidened * scene.sizes().maxCoeff() + 4 * cell;
     low_ = scene.center().array() - 0.5 * side;
     side_ = static_cast<int>(std::ceil(side / cell));
     opacity_.assign(size_t(side_) * size_t(side_) * size_t(side_), 0);
@@ -114,14 +114,10 @@ class CellGrid {
     return out;
   }
 
+  /// The cell and those that it touches, over corners, too.
   template <typename Visit>
   void for_each_around(size_t cell, const Visit& visit) const {
     const auto n = static_cast<size_t>(side_);
-    const size_t x = cell % n;
-    const size_t y = cell / n % n;
-    const size_t z = cell / n / n;
-    if (std::min({x, y, z}) == 0 || std::max({x, y, z}) + 1 == n)
-      return;  // nothing lies so far out
     for (size_t k = 0; k < 27; ++k) {
       visit(cell + k % 3 + n * (k / 3 % 3) + n * n * (k / 9) - (1 + n + n * n));
     }
@@ -144,9 +140,10 @@ class CellGrid {
           const Eigen::Vector3d t(part(x, steps[0]), part(y, steps[1]), part(z, steps[2]));
           const auto height =
               static_cast<float>(std::exp(-0.5 * kReach * kReach * t.squaredNorm()));
-          all += height;
           const size_t cell = cell_at(center + axes * t);
-          if (cell != kNone) out.push_back({cell, height, height});
+          if (cell == kNone) continue;
+          all += height;
+          out.push_back({cell, height, height});
         }
       }
     }
@@ -166,7 +163,7 @@ class CellGrid {
  private:
   static constexpr size_t kNone = SIZE_MAX;
 
-  static uint32_t fixed(float opacity) { return static_cast<uint32_t>(opacity * float{kOne}); }
+  static uint32_t fixed(float opacity) { return static_cast<uint32_t>(opacity * kOne + 0.5f); }
   static double part(int step, int steps) { return steps == 0 ? 0 : double(step) / steps; }
 
   int steps_along(double reach) const {
@@ -175,9 +172,10 @@ class CellGrid {
     return static_cast<int>(std::min<double>(kMostSteps, std::ceil(reach / cell_)));
   }
 
+  // None in the outermost layer, so that every cell has all its neighbours.
   size_t cell_at(const Eigen::Vector3d& p) const {
     const Eigen::Array3d at = ((p - low_) / cell_).array().floor();
-    if (!((at >= 0).all() && (at < double(side_)).all())) return kNone;
+    if (!((at >= 1).all() && (at < double(side_ - 1)).all())) return kNone;
     const Eigen::Vector3i c = at.cast<int>();
     return (size_t(c.z()) * size_t(side_) + size_t(c.y())) * size_t(side_) + size_t(c.x());
   }
@@ -253,15 +251,15 @@ class Parts {
     }
     sets_ = DisjointSets(count_);
     join_neighbours();
-    std::vector<Touch> touches;
     of_splat_.assign(g.size(), kNone);
+    std::vector<Touch> touches;
     for (size_t i = 0; i < g.size(); ++i) {
       if (kinds[i] != Kind::Surface) continue;
       grid.touched(g, i, touches);
-      for (const Touch& t : touches) {
-        if (number_[t.cell] == kNone) continue;
-        if (of_splat_[i] == kNone) of_splat_[i] = number_[t.cell];
-        sets_.join(of_splat_[i], number_[t.cell]);
+      for (const Touch& t : touches) join(of_splat_[i], number_[t.cell]);
+      for (size_t k = 0; k < touches.size() && of_splat_[i] == kNone; ++k) {
+        grid.for_each_around(touches[k].cell,
+                             [&](size_t near) { join(of_splat_[i], number_[near]); });
       }
     }
   }
@@ -282,12 +280,16 @@ class Parts {
  private:
   static constexpr uint32_t kNone = UINT32_MAX;
 
+  void join(uint32_t& part, uint32_t other) {
+    if (other == kNone) return;
+    if (part == kNone) part = other;
+    sets_.join(part, other);
+  }
+
   void join_neighbours() {
     for (size_t c = 0; c < number_.size(); ++c) {
       if (number_[c] == kNone) continue;
-      grid_.for_each_around(c, [&](size_t other) {
-        if (number_[other] != kNone) sets_.join(number_[c], number_[other]);
-      });
+      grid_.for_each_around(c, [&](size_t near) { join(number_[c], number_[near]); });
     }
   }
 
