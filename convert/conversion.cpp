@@ -241,8 +241,12 @@ void write_mesh(const ConversionRequest& request,
 /// \return what was left out, for the report
 Json leave_out_floaters(GaussianFile& file, const Terminal& terminal) {
   const Floaters found = find_floaters(file.gaussians);
-  terminal.say(floaters_text(found));
-  if (!found.doubtful) keep_only(file.gaussians, found.keep);
+  if (found.doubtful) {
+    terminal.warn(floaters_text(found));
+  } else {
+    terminal.say(floaters_text(found));
+    keep_only(file.gaussians, found.keep);
+  }
   return floaters_to_json(found, file.frame);
 }
 

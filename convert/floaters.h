@@ -29,11 +29,11 @@ struct Floaters {
 ///
 /// Space is divided into cells of a 200th of the scene, or larger where splats are sparse. A cell
 /// holds matter if the opacities of the splats that reach it (within 1.5 sigma, weighted by their
-/// Gaussians) sum up to a half. Opacity is not spread over the cell, so that thin wires count as
+/// Gaussians) sum up to a quarter. Opacity is not spread over the cell, so that thin wires count as
 /// matter, too. Then
-/// - haze has less than half of its mass in matter,
+/// - haze has less than half of its mass in matter or in cells that touch it,
 /// - needles, five times as long as wide and longer than two cells, have less than a quarter of
-///   theirs in what the others make matter,
+///   theirs at what the others make matter,
 /// - of what is left, parts of matter that do not touch, and hold fewer than a two-thousandth of
 ///   all splats (at least 30, if that is no more than a hundredth of them), are islands.
 /// The scene is the cube of one and a half times the size of the box from the 1st to the 99th
@@ -45,7 +45,7 @@ Floaters find_floaters(const Gaussians& gaussians);
 /// units.
 nlohmann::ordered_json floaters_to_json(const Floaters& floaters, const Frame& frame);
 
-/// "removed 312 of 7,000 splats as floaters: 100 faint haze, …"
+/// "removed 312 of 7000 splats as floaters: 100 haze, …"
 std::string floaters_text(const Floaters& floaters);
 
 }  // namespace cgs

@@ -102,7 +102,7 @@ std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
   constexpr double kBase = 60 * kMebi;
   constexpr double kHarmonic = 12;              // bytes per coefficient
   constexpr double kAsRead = 24 + 12 + 16 + 4;  // place in double, scale, rotation, opacity
-  constexpr double kJudged = 8;                 // one coordinate at a time, sorted
+  constexpr double kMoved = 12 + 4;             // place and opacity, made anew for the frame
   constexpr double kInFrame = 12 + 12 + 16 + 4;
   constexpr double kProjected = 64 + 8 + 1;      // Splat, RowRange, SplatFate
   constexpr double kSorted = 2 * 8 + 4 + 4 * 4;  // keys, order, rows of tiles
@@ -113,10 +113,9 @@ std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
   const auto bytes = [](double count) { return static_cast<size_t>(count); };
   std::vector<StageMemory> plan;
   if (work.file_bytes > 0) {
-    const double as_read = splats * (kAsRead + colors);
-    const double most = std::max(as_read + double(work.file_bytes),
-                                 as_read + splats * std::max(kJudged, kInFrame - 28));
-    plan.push_back({"reading the splats", bytes(kBase + most)});
+    // The file is gone before the splats are moved into their frame.
+    const double beside = std::max(double(work.file_bytes), splats * kMoved);
+    plan.push_back({"reading the splats", bytes(kBase + splats * (kAsRead + colors) + beside)});
   }
   if (work.pictures > 0) {
     const double pixels = double(work.picture_pixels);
