@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/floaters.h"
 #include "convert/fusion.h"
 #include "convert/length.h"
 #include "convert/memory_plan.h"
@@ -15,6 +16,7 @@
 #include "convert/model.h"
 #include "convert/simplification.h"
 #include "convert/splat_loss.h"
+#include "convert/splat_selection.h"
 #include "convert/stated_frame.h"
 #include "convert/volume_file.h"
 #include "io/byte_reader.h"
@@ -68,7 +70,26 @@ bool holds_mesh(const std::filesystem::path& path) {
   return face != nullptr && face->count > 0;
 }
 
-Source read_source(const std::filesystem::path& path) {
+/// \throws LimitError before a file is read that would not fit
+void check_size(const std::filesystem::path& path, size_t memory_limit) {
+  const std::optional<SplatCount> stated = stated_splats(path);
+  if (!stated) return;
+  check_splat_memory_plan(
+      {.splats = stated->splats, .harmonics = stated->harmonics, .file_bytes = stated->file_bytes},
+      memory_budget(memory_limit));
+}
+
+/// The same before virtual cameras look at splats.
+void check_pictures(const ConversionRequest& request, const Gaussians& g) {
+  const VirtualCameraOptions& cameras = request.volume.cameras;
+  check_splat_memory_plan({.splats = g.size(),
+                           .harmonics = static_cast<uint64_t>(g.sh_count()),
+                           .pictures = static_cast<uint64_t>(cameras.views),
+                           .picture_pixels = uint64_t(cameras.size) * uint64_t(cameras.size)},
+                          memory_budget(request.volume.memory_limit));
+}
+
+Source read_source(const std::filesystem::path& path, size_t memory_limit) {
   Source out;
   if (is_folder(path)) {
     out.model = read_model(path);
@@ -84,6 +105,7 @@ Source read_source(const std::filesystem::path& path) {
     out.frame = file.content.frame;
     out.warnings = std::move(file.warnings);
   } else {
+    check_size(path, memory_limit);
     out.splats = read_splats(path);
     out.frame = out.splats->frame;
   }
@@ -259,6 +281,18 @@ void write_mesh(const ConversionRequest& request,
   write_mesh_as(request.output, mesh, source.frame, options);
 }
 
+/// \return what was left out, for the report
+Json leave_out_floaters(GaussianFile& file, const Terminal& terminal) {
+  const Floaters found = find_floaters(file.gaussians);
+  if (found.doubtful) {
+    terminal.warn(floaters_text(found));
+  } else {
+    terminal.say(floaters_text(found));
+    keep_only(file.gaussians, found.keep);
+  }
+  return floaters_to_json(found, file.frame);
+}
+
 void refuse_for_splats(const ConversionRequest& request) {
   const char* const given = request.open_surface                 ? "--open"
                             : !request.simplify.empty()          ? "--simplify"
@@ -272,6 +306,9 @@ void check_before_work(const ConversionRequest& request, const Source& source, C
   require_writable_as(request.output, source.frame);
   if (source.content == Content::Mesh && request.open_surface) {
     throw InvalidInput("--open has no effect on an input that is a mesh already");
+  }
+  if (!source.splats && request.filter_floaters) {
+    throw InvalidInput("--filter-floaters is for files of splats alone");
   }
   if (source.content != Content::Splats && !request.volume.voxel_size.empty()) {
     throw InvalidInput("--voxel-size has no effect on an input that holds no splats");
@@ -358,7 +395,7 @@ std::string conversion_table() {
 
 Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   ConversionRequest request = given;
-  Source source = read_source(request.input);
+  Source source = read_source(request.input, request.volume.memory_limit);
   settle_up(source.frame, request.up, source.content == Content::Splats);
   if (!request.assume_unit.empty()) {
     const std::string refused = assume_unit(source.frame, request.assume_unit);
@@ -375,11 +412,13 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   }
   if (source.model) terminal.warn(source.model->scene.warnings);
   terminal.warn(source.warnings);
+  if (request.filter_floaters) report["floaters"] = leave_out_floaters(*source.splats, terminal);
   if (wanted == Content::Splats) {
     report["output"] = convert_splats(request, source, terminal);
     return report;
   }
   const bool from_splats_alone = source.splats.has_value();
+  if (from_splats_alone) check_pictures(request, source.splats->gaussians);
   if (source.content != Content::Mesh) {
     Volume volume = make_volume(request, source, terminal, report);
     if (wanted == Content::Volume) {

@@ -28,6 +28,7 @@ struct ConversionRequest {
   std::vector<double>
       up;  ///< World direction; empty = of the input, else +z for meshes, -y as 3DGS files lie.
   int spz_version = 3;
+  bool filter_floaters = false;  ///< Leave out splats of find_floaters().
   SplatVolumeRequest volume;
 };
 

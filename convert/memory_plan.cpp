@@ -98,6 +98,47 @@ void check_memory_plan(const Scene& scene,
                    mebibytes(budget) + " may be used; " + fits + "larger --memory-limit allows it");
 }
 
+std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
+  constexpr double kBase = 60 * kMebi;
+  constexpr double kHarmonic = 12;              // bytes per coefficient
+  constexpr double kAsRead = 24 + 12 + 16 + 4;  // place in double, scale, rotation, opacity
+  constexpr double kMoved = 12 + 4;             // place and opacity, made anew for the frame
+  constexpr double kInFrame = 12 + 12 + 16 + 4;
+  constexpr double kProjected = 64 + 8 + 1;      // Splat, RowRange, SplatFate
+  constexpr double kSorted = 2 * 8 + 4 + 4 * 4;  // keys, order, rows of tiles
+  constexpr double kPicturePixel = 4 + 12 + 12;  // depth, colour, normal; kept for each picture
+  constexpr double kDrawnPixel = 100;            // of the one that is being drawn
+  const auto splats = double(work.splats);
+  const double colors = kHarmonic * double(work.harmonics);
+  const auto bytes = [](double count) { return static_cast<size_t>(count); };
+  std::vector<StageMemory> plan;
+  if (work.file_bytes > 0) {
+    // The file is gone before the splats are moved into their frame.
+    const double beside = std::max(double(work.file_bytes), splats * kMoved);
+    plan.push_back({"reading the splats", bytes(kBase + splats * (kAsRead + colors) + beside)});
+  }
+  if (work.pictures > 0) {
+    const double pixels = double(work.picture_pixels);
+    plan.push_back({"taking pictures",
+                    bytes(kBase + splats * (kInFrame + colors + kProjected + kSorted) +
+                          pixels * (kPicturePixel * double(work.pictures) + kDrawnPixel))});
+  }
+  return plan;
+}
+
+void check_splat_memory_plan(const SplatWork& work, size_t budget) {
+  for (const StageMemory& stage : splat_memory_plan(work)) {
+    if (stage.bytes <= budget) continue;
+    const bool reads = stage.stage == "reading the splats";
+    const std::string less = reads ? "a file of fewer splats or without spherical harmonics needs "
+                                     "less, "
+                                   : "fewer splats, --virtual-views or --virtual-size need less, ";
+    throw LimitError("'" + stage.stage + "' needs about " + mebibytes(stage.bytes) + " and " +
+                     mebibytes(budget) + " may be used; " + less +
+                     "a larger --memory-limit allows it");
+  }
+}
+
 size_t memory_budget(size_t limit) {
   if (limit > 0) return limit;
   std::ifstream meminfo("/proc/meminfo");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,23 @@ void check_memory_plan(const Scene& scene,
                        bool chooses_voxels,
                        const MeasuredFiles& measured,
                        size_t budget);
+
+/// What `convert` makes of splats that came without cameras.
+struct SplatWork {
+  uint64_t splats = 0;
+  uint64_t harmonics = 1;       ///< RGB coefficients of each.
+  uint64_t file_bytes = 0;      ///< 0 = read already.
+  uint64_t pictures = 0;        ///< Of virtual cameras; 0 = none are taken.
+  uint64_t picture_pixels = 0;  ///< Of each.
+};
+
+/// The same for splats: "reading", then "pictures". How large voxels will be is known only after
+/// the pictures: the volume itself refuses what does not fit.
+std::vector<StageMemory> splat_memory_plan(const SplatWork& work);
+
+/// \throws LimitError naming the stage of splat_memory_plan() that needs most and what to lower, if
+///         it needs more than `budget` [bytes].
+void check_splat_memory_plan(const SplatWork& work, size_t budget);
 
 /// Memory the program may plan for: the user's limit, or 80 % of what is free now [bytes].
 size_t memory_budget(size_t limit);

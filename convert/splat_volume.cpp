@@ -12,6 +12,7 @@
 #include "convert/length.h"
 #include "convert/memory_plan.h"
 #include "convert/model.h"
+#include "convert/splat_selection.h"
 #include "libcgs/core/error.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/render/thin_sheets.h"
@@ -22,26 +23,11 @@ namespace {
 
 /// Leaves out what lies between the scene and cameras around it.
 size_t drop_outside(Gaussians& g, const Eigen::Vector3d& center, double radius) {
-  const auto sh_count = static_cast<size_t>(g.sh_count());
-  size_t kept = 0;
-  for (size_t i = 0; i < g.size(); ++i) {
-    if ((g.position[i].cast<double>() - center).norm() > radius) continue;
-    g.position[kept] = g.position[i];
-    g.scale[kept] = g.scale[i];
-    g.rotation[kept] = g.rotation[i];
-    g.opacity[kept] = g.opacity[i];
-    std::copy_n(g.sh.begin() + static_cast<std::ptrdiff_t>(i * sh_count),
-                sh_count,
-                g.sh.begin() + static_cast<std::ptrdiff_t>(kept * sh_count));
-    ++kept;
-  }
-  const size_t dropped = g.size() - kept;
-  g.position.resize(kept);
-  g.scale.resize(kept);
-  g.rotation.resize(kept);
-  g.opacity.resize(kept);
-  g.sh.resize(kept * sh_count);
-  return dropped;
+  std::vector<uint8_t> keep(g.size());
+  std::transform(g.position.begin(), g.position.end(), keep.begin(), [&](const auto& p) {
+    return (p.template cast<double>() - center).norm() <= radius ? 1 : 0;
+  });
+  return keep_only(g, keep);
 }
 
 /// Mean normals over 5 x 5 pixels: single splats are not smooth.

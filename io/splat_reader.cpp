@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/splat_reader.h"
 
+#include <algorithm>
+#include <system_error>
 #include <utility>
 
 #include "io/byte_reader.h"
@@ -38,6 +40,32 @@ RawSplats parse(std::string bytes, const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+std::optional<SplatCount> stated_splats(const std::filesystem::path& path) {
+  const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
+  SplatCount out;
+  std::error_code unknown;
+  out.file_bytes = std::filesystem::file_size(path, unknown);
+  if (unknown) return {};
+  if (start.substr(0, 3) != "ply") {
+    constexpr uint64_t kRecord = 32;
+    const bool is_plain = !looks_like_spz(start) && !looks_like_sog(start) &&
+                          !looks_like_ksplat(start) && start.substr(0, 4) != "glTF";
+    if (!is_plain || out.file_bytes % kRecord != 0) return {};
+    out.splats = out.file_bytes / kRecord;
+    return out;
+  }
+  const PlyHeader header = parse_ply_header(start, path);
+  const PlyElement* const vertex = header.find("vertex");
+  if (vertex == nullptr) return {};
+  out.splats = std::min(vertex->count, out.file_bytes);  // no splat is smaller than a byte
+  const PlyElement* const packed = header.find("sh");
+  for (const PlyProperty& p : (packed == nullptr ? vertex : packed)->properties) {
+    if (p.name.compare(0, 7, "f_rest_") == 0) ++out.harmonics;
+  }
+  out.harmonics = 1 + (out.harmonics - 1) / 3;
+  return out;
+}
 
 GaussianFile read_splats(const std::filesystem::path& path, const std::optional<Frame>& frame) {
   RawSplats raw = parse(read_file(path), path);  // whose bytes are gone before they are judged

@@ -60,6 +60,9 @@ void add_convert(CLI::App& app) {
   cmd->add_option("--compression-error",
                   request.compression_error,
                   "Largest move of a vertex by compression in a .glb, e.g. 0.2mm");
+  cmd->add_flag("--filter-floaters",
+                request.filter_floaters,
+                "Leave out splats that float in free space: haze, needles, small islands");
   add_glb_option(*cmd, request.encoding);
   cmd->add_option("--assume-unit", request.assume_unit, "What one unit is: m, cm, mm, in, ft");
   cmd->add_option("--up",

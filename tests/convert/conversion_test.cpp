@@ -179,6 +179,36 @@ TEST_F(Conversion, RefusesWhatHasNoEffectOnSplats) {
   EXPECT_FALSE(std::filesystem::exists(dir_ / "a.spz"));
 }
 
+TEST_F(Conversion, LeavesOutFloatersWhereAsked) {
+  Gaussians g;
+  test::add_sphere(g, {0, 0, 2}, 0.5, 4000);
+  test::add_disc(g, {0.7, 0, 2}, Eigen::Vector3d::UnitX(), 0.01);
+  write_gaussian_ply(dir_ / "dirty.ply", g, Frame{});
+  const auto filtered = [](ConversionRequest& r) { r.filter_floaters = true; };
+  EXPECT_FALSE(convert("dirty.ply", "as_it_is.ply").contains("floaters"));
+  EXPECT_EQ(read_splats(dir_ / "as_it_is.ply").gaussians.size(), 4001u);
+  const auto report = convert("dirty.ply", "clean.ply", filtered);
+  EXPECT_EQ(report["floaters"]["removed"], 1);
+  EXPECT_EQ(report["floaters"]["islands"], 1);
+  EXPECT_EQ(read_splats(dir_ / "clean.ply").gaussians.size(), 4000u);
+  write_mesh_ply(dir_ / "mesh.ply", test::labelled_sphere(), Frame{});
+  EXPECT_THROW(convert("mesh.ply", "mesh.obj", filtered), InvalidInput);
+}
+
+TEST_F(Conversion, RefusesWhatWouldNotFitBeforeAndAfterReading) {
+  const auto refusal = [&](size_t limit) -> std::string {
+    try {
+      convert("ball.ply", "a.obj", [&](ConversionRequest& r) { r.volume.memory_limit = limit; });
+    } catch (const LimitError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(refusal(size_t{1} << 20).find("reading the splats"), std::string::npos);
+  EXPECT_NE(refusal(size_t{66} << 20).find("taking pictures"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(dir_ / "a.obj"));
+}
+
 TEST_F(Conversion, AssumesNoUnitWhereOneIsStated) {
   write_mesh_ply(dir_ / "mesh.ply", test::labelled_sphere(), test::centimetre_frame());
   convert("mesh.ply", "m.ply", [](ConversionRequest& r) { r.assume_unit = "m"; });

@@ -101,5 +101,26 @@ TEST(MemoryPlan, TheAdviceIsEnough) {
   }
 }
 
+TEST(SplatMemoryPlan, NamesTheStageThatDoesNotFitAndWhatToLower) {
+  const SplatWork file = {.splats = 5'000'000, .harmonics = 16, .file_bytes = 1'240'000'000};
+  const SplatWork pictures = {
+      .splats = 5'000'000, .harmonics = 16, .pictures = 40, .picture_pixels = 512 * 512};
+  for (const SplatWork& work : {file, pictures}) {
+    const auto plan = splat_memory_plan(work);
+    ASSERT_EQ(plan.size(), 1u);
+    EXPECT_NO_THROW(check_splat_memory_plan(work, plan[0].bytes));
+    try {
+      check_splat_memory_plan(work, plan[0].bytes - 1);
+      ADD_FAILURE() << plan[0].stage;
+    } catch (const LimitError& error) {
+      const std::string message = error.what();
+      EXPECT_NE(message.find(plan[0].stage), std::string::npos) << message;
+      EXPECT_NE(message.find("--memory-limit"), std::string::npos) << message;
+      const char* const lower = work.pictures > 0 ? "--virtual-size" : "spherical harmonics";
+      EXPECT_NE(message.find(lower), std::string::npos) << message;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace cgs

@@ -6,8 +6,12 @@
 
 #include <gtest/gtest.h>
 
+#include "io/dot_splat.h"
+#include "io/gaussian_ply.h"
+#include "io/spz.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_splats.h"
+#include "tests/support/temp_dir.h"
 
 namespace cgs {
 namespace {
@@ -26,6 +30,23 @@ TEST(SplatReader, SaysWhatAFileIsInstead) {
                    "property float z\nend_header\n0 0 0\n"),
             "SCHEMA");
   EXPECT_EQ(defect("something else"), "MAGIC");
+}
+
+TEST(SplatReader, TellsSizesBeforeReading) {
+  const test::TempDir dir;
+  for (const int degree : {0, 1, 3}) {
+    const std::filesystem::path path = dir / "some.ply";
+    write_gaussian_ply(path, test::varied_splats(10, degree), Frame{});
+    const std::optional<SplatCount> stated = stated_splats(path);
+    ASSERT_TRUE(stated.has_value());
+    EXPECT_EQ(stated->splats, 10u);
+    EXPECT_EQ(stated->harmonics, uint64_t(degree + 1) * uint64_t(degree + 1));
+    EXPECT_EQ(stated->file_bytes, std::filesystem::file_size(path));
+  }
+  write_dot_splat(dir / "some.splat", test::varied_splats(7, 0), Frame{});
+  EXPECT_EQ(stated_splats(dir / "some.splat")->splats, 7u);
+  write_spz(dir / "some.spz", test::varied_splats(7, 0), Frame{});
+  EXPECT_FALSE(stated_splats(dir / "some.spz").has_value());
 }
 
 /// Files that other programs made. Counts and corners are those that another reader finds.
