@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <set>
 #include <tuple>
 #include <vector>
 
@@ -28,17 +29,22 @@ Face rotated(Face face) {
   return face;
 }
 
+polygon_mesh::PolygonMesh hull_of(const std::vector<Point>& points) {
+  polygon_mesh::PolygonMesh hull;
+  if (points.size() >= 4) CGAL::convex_hull_3(points.begin(), points.end(), hull);
+  if (hull.number_of_faces() < 4 || !CGAL::is_closed(hull)) {
+    throw NumericalError("a convex hull needs points not in one plane");
+  }
+  return hull;
+}
+
 // The faces of the hull, in vertices of the input, in the order CGAL happens to have them.
 std::vector<Face> hull_faces(const std::vector<Point>& points) {
   std::map<std::tuple<double, double, double>, uint32_t> number;
   for (uint32_t v = 0; v < points.size(); ++v) {
     number.try_emplace({points[v].x(), points[v].y(), points[v].z()}, v);
   }
-  polygon_mesh::PolygonMesh hull;
-  if (points.size() >= 4) CGAL::convex_hull_3(points.begin(), points.end(), hull);
-  if (hull.number_of_faces() < 4 || !CGAL::is_closed(hull)) {
-    throw NumericalError("a convex hull needs points not in one plane");
-  }
+  const polygon_mesh::PolygonMesh hull = hull_of(points);
   std::vector<Face> out;
   for (const auto f : hull.faces()) {
     Face face{};
@@ -125,6 +131,23 @@ TriangleMesh convex_hull(const TriangleMesh& mesh) {
   }
   out = with_faces(out, std::vector<uint8_t>(out.faces.size(), 1));
   if (!mesh.normals.empty()) out.normals = vertex_normals(out);
+  return out;
+}
+
+std::vector<uint8_t> on_convex_hull(const std::vector<Eigen::Vector3d>& points) {
+  CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
+  std::vector<Point> places;
+  places.reserve(points.size());
+  for (const auto& p : points) places.emplace_back(p.x(), p.y(), p.z());
+  const polygon_mesh::PolygonMesh hull = hull_of(places);
+  std::set<std::tuple<double, double, double>> corners;
+  for (const auto v : hull.vertices()) {
+    const Point& p = hull.point(v);
+    corners.emplace(p.x(), p.y(), p.z());
+  }
+  std::vector<uint8_t> out;
+  out.reserve(points.size());
+  for (const auto& p : points) out.push_back(corners.count({p.x(), p.y(), p.z()}) != 0 ? 1 : 0);
   return out;
 }
 

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
 #include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {
@@ -12,5 +17,10 @@ namespace cgs {
 /// provenance.
 /// \throws NumericalError if the vertices lie in one plane
 TriangleMesh convex_hull(const TriangleMesh& mesh);
+
+/// Which points are corners of their convex hull, all that lie in the place of one included: 1 =
+/// corner.
+/// \throws NumericalError if the points lie in one plane
+std::vector<uint8_t> on_convex_hull(const std::vector<Eigen::Vector3d>& points);
 
 }  // namespace cgs

@@ -159,6 +159,21 @@ std::vector<FaceFinding> examine_faces(const TriangleMesh& surface,
   return out;
 }
 
+// \return what they amount to
+EvidenceTransfer write_labels(TriangleMesh& surface,
+                              const StatedSurface& source,
+                              const std::vector<FaceFinding>& findings) {
+  EvidenceTransfer out;
+  surface.provenance.clear();
+  for (const FaceFinding& face : findings) {
+    out.area += face.area;
+    if (face.side == Side::Bridge) out.bridged += face.area;
+    if (face.side == Side::Back) out.behind += face.area;
+    if (source.states_provenance()) surface.provenance.push_back(face.label);
+  }
+  return out;
+}
+
 // Vertices of invented faces alone.
 void drop_claims(TriangleMesh& surface, const std::vector<FaceFinding>& findings) {
   std::vector<uint8_t> vouched(surface.vertices.size(), 0);
@@ -191,19 +206,17 @@ std::vector<double> take_attributes(TriangleMesh& surface, const StatedSurface& 
   return distances;
 }
 
+EvidenceTransfer take_labels(TriangleMesh& surface, const StatedSurface& source, double reach) {
+  return write_labels(surface, source, examine_faces(surface, source, reach));
+}
+
 EvidenceTransfer take_evidence(TriangleMesh& surface, const StatedSurface& source, double reach) {
   const std::vector<FaceFinding> findings = examine_faces(surface, source, reach);
   const std::vector<double> distances = take_attributes(surface, source);
   for (size_t v = 0; v < surface.sigma.size(); ++v) {
     surface.sigma[v] = static_cast<float>(std::hypot(double{surface.sigma[v]}, distances[v]));
   }
-  EvidenceTransfer out;
-  for (const FaceFinding& face : findings) {
-    out.area += face.area;
-    if (face.side == Side::Bridge) out.bridged += face.area;
-    if (face.side == Side::Back) out.behind += face.area;
-    if (source.states_provenance()) surface.provenance.push_back(face.label);
-  }
+  const EvidenceTransfer out = write_labels(surface, source, findings);
   drop_claims(surface, findings);
   if (!source.mesh().normals.empty()) surface.normals = vertex_normals(surface);
   return out;

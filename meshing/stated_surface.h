@@ -63,6 +63,10 @@ struct EvidenceTransfer {
   double behind = 0;   ///< Near the source, but looking the other way: its back, nobody saw it.
 };
 
+/// Labels the faces of a surface made over a mesh or cloud, see take_evidence(); its vertices stay
+/// as they are. A source that states no provenance leaves none.
+EvidenceTransfer take_labels(TriangleMesh& surface, const StatedSurface& source, double reach);
+
 /// Fills all that a surface made over a mesh or cloud states, from the nearest places of that.
 ///
 /// A face takes the weakest label found at its middle and towards its corners, and is Inferred

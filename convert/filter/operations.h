@@ -26,12 +26,16 @@ struct FilterOperation {
 std::vector<FilterOperation> placement_operations();
 std::vector<FilterOperation> selection_operations();
 std::vector<FilterOperation> point_operations();
+std::vector<FilterOperation> reconstruction_operations();
 std::vector<FilterOperation> surface_operations();
 std::vector<FilterOperation> repair_operations();
 std::vector<FilterOperation> solid_operations();
 
 /// \throws InvalidInput that names the operation if the state is a point cloud
 void require_faces(const FilterState& state, const char* operation);
+
+/// \throws InvalidInput that names the operation if the state has faces
+void require_cloud(const FilterState& state, const char* operation);
 
 /// All of them, in the order in which the help lists them.
 const std::vector<FilterOperation>& filter_operations();

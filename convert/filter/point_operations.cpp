@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <utility>
+
 #include "convert/filter/operations.h"
+#include "convert/length.h"
 #include "libcgs/core/error.h"
 #include "meshing/down_sampling.h"
+#include "meshing/hidden_points.h"
 #include "meshing/outliers.h"
 #include "meshing/point_normals.h"
+#include "meshing/point_smoothing.h"
 #include "meshing/vertex_attributes.h"
 
 namespace cgs {
@@ -75,6 +80,29 @@ FilterStep prepare_normals_towards(FilterArguments& arguments) {
   };
 }
 
+FilterStep prepare_mls(FilterArguments& arguments) {
+  constexpr size_t kDefault = 24;
+  const size_t neighbors = arguments.more() ? arguments.count(6, kMostNeighbors) : kDefault;
+  return [neighbors](FilterState& state, const Progress&) {
+    require_cloud(state, "mls");
+    SmoothedPoints result = smoothed_points(state.mesh, neighbors);
+    state.mesh = std::move(result.cloud);
+    return "moved " + format_length(result.rms, state.frame) + " rms, " +
+           format_length(result.most, state.frame) + " at most; " + std::to_string(result.held) +
+           " points held";
+  };
+}
+
+FilterStep prepare_hidden_points(FilterArguments& arguments) {
+  const Eigen::Vector3d eye = arguments.point();
+  return [eye](FilterState& state, const Progress&) {
+    require_cloud(state, "hidden-points");
+    state.mesh =
+        with_vertices(state.mesh, seen_from(state.mesh.vertices, state.internal_from_file(eye)));
+    return std::string();
+  };
+}
+
 }  // namespace
 
 std::vector<FilterOperation> point_operations() {
@@ -99,7 +127,17 @@ std::vector<FilterOperation> point_operations() {
        "X,Y,Z",
        "Turn normals to where the scanner stood",
        "normals-towards=0,0,2m",
-       prepare_normals_towards}};
+       prepare_normals_towards},
+      {"mls",
+       "[=NEIGHBOURS]",
+       "Smooth points: each onto a curved surface through its nearest (24)",
+       "mls=24",
+       prepare_mls},
+      {"hidden-points",
+       "X,Y,Z",
+       "Drop points that others hide from this place",
+       "hidden-points=0,0,2m",
+       prepare_hidden_points}};
 }
 
 }  // namespace cgs

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/filter/evidence_remark.h"
 #include "convert/filter/operations.h"
 #include "convert/filter/second_mesh.h"
 #include "convert/html.h"
@@ -16,17 +17,6 @@
 namespace cgs {
 
 namespace {
-
-std::string percent(double part, double whole) {
-  return number(whole > 0 ? 100 * part / whole : 0, "%.1f %%");
-}
-
-// "9.3 % of the area bridges what the input does not show", and whether that is marked
-std::string bridge_remark(const EvidenceTransfer& evidence, const TriangleMesh& mesh) {
-  std::string out = percent(evidence.bridged, evidence.area) + " of the area bridges gaps";
-  if (mesh.provenance.empty()) out += ", not marked as the file does not say what was observed";
-  return out;
-}
 
 std::string cut_remark(size_t self_intersections) {
   if (self_intersections == 0) return {};
@@ -46,10 +36,9 @@ std::string wrap_remark(const WrappedMesh& wrap, const FilterState& state) {
   }
   out += "; " + bridge_remark(wrap.evidence, state.mesh) + "; " + percent(wrap.moved, 1) +
          " of the offset taken back" + cut_remark(wrap.self_intersections);
-  constexpr double kNoise = 0.01;  // of the area: rims and crumpled spots
   if (!wrap.knows_sides) {
     out += "; without normals nobody knows whether it went inside: put --op normals before it";
-  } else if (wrap.evidence.behind > kNoise * wrap.evidence.area) {
+  } else if (is_behind(wrap.evidence)) {
     out += "; " + percent(wrap.evidence.behind, wrap.evidence.area) +
            " of the area lies BEHIND the input: it is a sheet there, or holes wider than ALPHA let "
            "the wrap in; fill-holes before it, or a larger ALPHA, keeps it out";

@@ -237,6 +237,42 @@ TEST_F(Filter, WrapsPoints) {
   EXPECT_EQ(made.content.frame.metres_per_unit, 0.01);
 }
 
+TEST_F(Filter, MakesSurfacesOfPoints) {
+  const ProgramResult closed = filter("cloud.ply", "poisson.ply", "--op poisson=4cm");
+  ASSERT_EQ(closed.exit_code, 0) << closed.err;
+  EXPECT_NE(closed.err.find("triangles of 40 mm; "), std::string::npos) << closed.err;
+  EXPECT_NE(closed.err.find("of the area bridges gaps"), std::string::npos) << closed.err;
+  const MeasurableFile made = read_mesh_file(dir_ / "poisson.ply");
+  EXPECT_TRUE(made.content.states_provenance() && made.content.states_sigma());
+  EXPECT_TRUE(certify(made.content.mesh).passed());
+  ASSERT_EQ(filter("cloud.ply", "joined.ply", "-q --op advancing-front").exit_code, 0);
+  const MeasurableFile joined = read_mesh_file(dir_ / "joined.ply");
+  EXPECT_EQ(joined.content.points.size(), test::labelled_sphere(32, 48).vertices.size());
+  EXPECT_TRUE(joined.content.states_provenance() && joined.content.states_sigma());
+}
+
+TEST_F(Filter, RefusesPointsOfWhichNoSurfaceCanBeMade) {
+  TriangleMesh bare = test::labelled_sphere(32, 48);
+  bare.faces.clear();
+  bare.provenance.clear();
+  bare.normals.clear();
+  write_mesh_ply(dir_ / "bare.ply", bare, test::centimetre_frame());
+  const auto refused = [&](const std::string& in, const std::string& op, const std::string& part) {
+    const ProgramResult result = filter(in, "no.ply", "-q --op " + op);
+    EXPECT_EQ(result.exit_code, 2) << op << result.err;
+    EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(exists("no.ply"));
+  };
+  refused("bare.ply", "poisson", "the points have no normals; put --op normals before it");
+  for (const char* op : {"poisson", "advancing-front", "mls", "hidden-points=0,0,9m"}) {
+    refused("ball.ply", op, "needs a point cloud, this mesh has 2976 faces");
+  }
+  refused("cloud.ply", "mls=5000", "needs as many points");
+  refused("cloud.ply", "mls=5", "'5' is not a whole number in 6 ... 10000");
+  EXPECT_EQ(filter("bare.ply", "yes.ply", "-q --op normals --op poisson=4cm").exit_code, 0);
+}
+
 TEST_F(Filter, PassesOnWarningsOfTheSecondFile) {
   test::write_bytes(dir_ / "flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n");
   const ProgramResult result =

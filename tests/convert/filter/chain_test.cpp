@@ -60,6 +60,10 @@ const std::map<std::string, Case>& cases() {
       {"voxel", {"6cm", Keeps::Part, false, true}},
       {"normals", {"", Keeps::Area, true, true}},
       {"normals-towards", {"3,-6,10", Keeps::Area, true, true}},
+      {"mls", {"12", Keeps::Part, false, true}},
+      {"hidden-points", {"3,-6,2m", Keeps::Part, false, true}},
+      {"poisson", {"4cm", Keeps::Part, false, true}},
+      {"advancing-front", {"20cm", Keeps::Part, false, true}},
       {"laplacian", {"2", Keeps::Area}},
       {"taubin", {"10", Keeps::Area}},
       {"simplify", {"3mm", Keeps::Area}},
@@ -222,6 +226,19 @@ TEST_P(EveryOperation, KeepsWhatIsKnownOfACloud) {
   const FilterState after = filtered(before, typed(name(), dir_), 2);
   expect_sound(after);
   EXPECT_GE(smallest_sigma(after), cases().at(name()).scale * smallest_sigma(before) * (1 - 1e-5));
+  constexpr double kSeenBelow = 2 - std::numbers::pi / 2;  // points have support farther down
+  expect_evidence_where_it_was(after.mesh, kSeenBelow + 0.05);
+}
+
+TEST_P(EveryOperation, AddsNoClaimToACloudThatMakesNone) {
+  if (!cases().at(name()).cloud) GTEST_SKIP() << "for meshes only";
+  FilterState state = labelled_cloud();
+  state.mesh.support.clear();
+  state.mesh.sigma.clear();
+  state = filtered(state, typed(name(), dir_), 2);
+  EXPECT_TRUE(state.mesh.support.empty() && state.mesh.sigma.empty());
+  for (const Provenance label : state.mesh.provenance) EXPECT_EQ(label, Provenance::Inferred);
+  if (name() != "hull") EXPECT_TRUE(state.mesh.provenance.empty());
 }
 
 TEST_P(EveryOperation, GivesTheSameBitsForAnyNumberOfThreads) {

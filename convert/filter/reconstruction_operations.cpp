@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "convert/filter/evidence_remark.h"
+#include "convert/filter/operations.h"
+#include "convert/length.h"
+#include "libcgs/core/error.h"
+#include "meshing/advancing_front.h"
+#include "meshing/poisson_surface.h"
+
+namespace cgs {
+
+namespace {
+
+void require_normals(const TriangleMesh& cloud) {
+  const bool any = std::any_of(cloud.normals.begin(),
+                               cloud.normals.end(),
+                               [](const Eigen::Vector3f& n) { return !n.isZero(0); });
+  if (any) return;
+  throw InvalidInput("--op poisson: the points have no normals; put --op normals before it");
+}
+
+std::string behind_remark(const EvidenceTransfer& evidence) {
+  if (!is_behind(evidence)) return {};
+  return "; " + percent(evidence.behind, evidence.area) +
+         " of the area looks AGAINST the normals of its points: --op normals-towards turns them";
+}
+
+FilterStep prepare_poisson(FilterArguments& arguments) {
+  const double spacing = arguments.more() ? arguments.length() : 0;
+  return [spacing](FilterState& state, const Progress& progress) {
+    require_cloud(state, "poisson");
+    require_normals(state.mesh);
+    PoissonSurface made =
+        poisson_surface(state.mesh, {.spacing = spacing / state.frame.scale}, progress);
+    state.mesh = std::move(made.mesh);
+    return "triangles of " + format_length(made.spacing, state.frame) + "; " +
+           bridge_remark(made.evidence, state.mesh) + behind_remark(made.evidence);
+  };
+}
+
+FilterStep prepare_advancing_front(FilterArguments& arguments) {
+  const double most =
+      arguments.more() ? arguments.length() : std::numeric_limits<double>::infinity();
+  return [most](FilterState& state, const Progress&) {
+    require_cloud(state, "advancing-front");
+    InterpolatedSurface made = advancing_front(state.mesh, most / state.frame.scale);
+    state.mesh = std::move(made.mesh);
+    return std::to_string(made.unused) + " points left out; " +
+           bridge_remark(made.evidence, state.mesh) + behind_remark(made.evidence);
+  };
+}
+
+}  // namespace
+
+std::vector<FilterOperation> reconstruction_operations() {
+  return {{"poisson",
+           "[=SPACING]",
+           "Closed smooth surface of points with normals, triangles of about SPACING",
+           "poisson=2mm",
+           prepare_poisson},
+          {"advancing-front",
+           "[=MAX_EDGE]",
+           "Surface through points as they are, open where there are none",
+           "advancing-front=1cm",
+           prepare_advancing_front}};
+}
+
+}  // namespace cgs

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/poisson_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/ChangeBackground.h>
+#include <openvdb/tools/SignedFloodFill.h>
+
+#include "libcgs/core/error.h"
+#include "meshing/certificate.h"
+#include "meshing/down_sampling.h"
+#include "meshing/isosurface.h"
+#include "meshing/poisson_function.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr std::ptrdiff_t kLeast = 10;  // points with a normal
+
+void check_cloud(const TriangleMesh& cloud) {
+  require(cloud.faces.empty(),
+          "Poisson's surface is made from points; the number of faces",
+          cloud.faces.size());
+  const auto known = std::count_if(cloud.normals.begin(),
+                                   cloud.normals.end(),
+                                   [](const Eigen::Vector3f& n) { return !n.isZero(0); });
+  require(known >= kLeast,
+          "Poisson's surface needs 10 points or more that state a normal, the number",
+          known);
+}
+
+double default_spacing(size_t points, double point_spacing) {
+  constexpr double kAtFullDetail = 200'000;
+  require(point_spacing > 0, "most points lie in one place; their spacing", point_spacing);
+  return point_spacing * std::max(1.0, std::sqrt(double(points) / kAtFullDetail));
+}
+
+TriangleMesh thinned(const TriangleMesh& cloud, double side) {
+  TriangleMesh bare;
+  for (size_t v = 0; v < cloud.vertices.size(); ++v) {
+    if (cloud.normals[v].isZero(0)) continue;
+    bare.vertices.push_back(cloud.vertices[v]);
+    bare.normals.emplace_back(cloud.normals[v].stableNormalized());
+    if (!cloud.sigma.empty()) bare.sigma.push_back(cloud.sigma[v]);
+  }
+  TriangleMesh out = down_sampled(bare, side);
+  const std::string count = std::to_string(out.vertices.size());
+  if (out.vertices.size() < size_t{kLeast}) {
+    throw NumericalError("thinned to the spacing, " + count +
+                         " points are left, Poisson's surface needs 10; state a smaller spacing");
+  }
+  constexpr size_t kMost = 2'000'000;
+  if (out.vertices.size() <= kMost) return out;
+  throw LimitError("Poisson's surface of " + count +
+                   " points would take hours and 10 GB, allowed are 2000000; state a larger "
+                   "spacing");
+}
+
+/// A cell of the function as a linear one.
+struct LinearPart {
+  Eigen::AlignedBox3d box;
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  double at_origin = 0;
+
+  explicit LinearPart(const PoissonFunction::Cell& cell) {
+    Eigen::Matrix3d edges;
+    Eigen::Vector3d rise;
+    for (size_t k = 0; k < 4; ++k) box.extend(cell.corners.at(k));
+    for (size_t k = 0; k < 3; ++k) {
+      edges.row(Eigen::Index(k)) = cell.corners.at(k + 1) - cell.corners[0];
+      rise[Eigen::Index(k)] = cell.values.at(k + 1) - cell.values[0];
+    }
+    gradient = edges.inverse() * rise;
+    at_origin = cell.values[0] - gradient.dot(cell.corners[0]);
+  }
+  double value(const Eigen::Vector3d& p) const { return at_origin + gradient.dot(p); }
+};
+
+/// The grid points around the zero surface of a function: all corners of every voxel that it comes
+/// into. Beyond a box around the points, to which sheets that nothing closes run out, is outside.
+class Band {
+ public:
+  Band(const Eigen::AlignedBox3d& box, double voxel) : box_(box), voxel_(voxel) {}
+
+  void add(const LinearPart& part) {
+    const double slope = part.gradient.norm();
+    if (!std::isfinite(slope) || !(slope > 0)) return;  // flat cells, none of which is alone
+    reaches_box_ = reaches_box_ || !box_.contains(part.box);
+    const Eigen::AlignedBox3d box = part.box.intersection(box_);
+    if (box.isEmpty()) return;
+    const double reach = std::sqrt(3.0) * voxel_ * slope;
+    for_each_in(box, [&](const openvdb::Coord& at) {
+      if (std::abs(part.value(place(at))) > reach) return;
+      slopes_at_.setValue(at, slopes_at_.getValue(at) + static_cast<float>(slope));
+      counts_at_.setValue(at, counts_at_.getValue(at) + 1);
+    });
+  }
+
+  /// About the distance to the zero surface, near it [internal units].
+  openvdb::FloatGrid::Ptr distances(const PoissonFunction& function) {
+    if (reaches_box_) add_box();
+    const auto background = static_cast<float>(3 * voxel_);
+    for (auto it = slopes_->beginValueOn(); it; ++it) {
+      const openvdb::Coord at = it.getCoord();
+      const Eigen::Vector3d p = place(at);
+      // Where the function is flat, in gaps, dividing by its slope keeps it from being rounded to
+      // nothing; at the box alone its sign is enough.
+      const int count = counts_at_.getValue(at);
+      const double slope = count > 0 ? double(*it) / count : 1e-30;
+      const double beyond = ((p - box_.center()).cwiseAbs() - box_.sizes() / 2).maxCoeff();
+      const double value = std::max(function.value(p) / slope, beyond);
+      it.setValue(static_cast<float>(std::clamp(value, -3 * voxel_, 3 * voxel_)));
+    }
+    slopes_->setTransform(openvdb::math::Transform::createLinearTransform(voxel_));
+    openvdb::tools::changeBackground(slopes_->tree(), background);
+    openvdb::tools::signedFloodFill(slopes_->tree());
+    return slopes_;
+  }
+
+ private:
+  Eigen::Vector3d place(const openvdb::Coord& at) const {
+    return voxel_ * Eigen::Vector3d(at.x(), at.y(), at.z());
+  }
+
+  // The corners of all voxels that the box comes into.
+  template <typename Visit>
+  void for_each_in(const Eigen::AlignedBox3d& box, const Visit& visit) const {
+    const Eigen::Vector3i low = (box.min() / voxel_).array().floor().cast<int>();
+    const Eigen::Vector3i high = (box.max() / voxel_).array().ceil().cast<int>();
+    for (int i = low.x(); i <= high.x(); ++i) {
+      for (int j = low.y(); j <= high.y(); ++j) {
+        for (int k = low.z(); k <= high.z(); ++k) visit(openvdb::Coord(i, j, k));
+      }
+    }
+  }
+
+  void add_box() {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double side : {box_.min()[axis], box_.max()[axis]}) {
+        Eigen::AlignedBox3d face = box_;
+        face.min()[axis] = side - voxel_ / 2;
+        face.max()[axis] = side + voxel_ / 2;
+        for_each_in(face, [&](const openvdb::Coord& at) { slopes_at_.setValueOn(at); });
+      }
+    }
+  }
+
+  Eigen::AlignedBox3d box_;
+  double voxel_;
+  bool reaches_box_ = false;
+  openvdb::FloatGrid::Ptr slopes_ = openvdb::FloatGrid::create(0);  // sums, of so many cells
+  openvdb::Int32Grid::Ptr counts_ = openvdb::Int32Grid::create(0);
+  openvdb::FloatGrid::Accessor slopes_at_ = slopes_->getAccessor();
+  openvdb::Int32Grid::Accessor counts_at_ = counts_->getAccessor();
+};
+
+Eigen::AlignedBox3d box_around(const std::vector<Eigen::Vector3f>& points, double voxel) {
+  constexpr double kMargin = 0.05;  // of the diagonal
+  Eigen::AlignedBox3d out;
+  for (const auto& p : points) out.extend(p.cast<double>());
+  const double margin = kMargin * out.diagonal().norm() + 4 * voxel;
+  out.min().array() -= margin;
+  out.max().array() += margin;
+  const Eigen::Vector3d s = out.sizes() / voxel;
+  constexpr double kMost = 1e8;
+  if (s.x() * s.y() + s.y() * s.z() + s.z() * s.x() <= kMost) return out;
+  throw LimitError("the spacing is too small for the extent of the points; state a larger one");
+}
+
+openvdb::FloatGrid::Ptr distances(const PoissonFunction& function,
+                                  const Eigen::AlignedBox3d& box,
+                                  double voxel) {
+  Band band(box, voxel);
+  for (const PoissonFunction::Cell& cell : function.crossed_cells()) band.add(LinearPart(cell));
+  return band.distances(function);
+}
+
+TriangleMesh closed_surface(const openvdb::FloatGrid& distance) {
+  for (const auto surface : {zero_surface, zero_surface_by_tetrahedra}) {
+    TriangleMesh mesh = surface(distance);
+    const Certificate facts = certify(mesh);
+    if (facts.passed()) return mesh;
+  }
+  throw NumericalError("these points and normals enclose nothing");
+}
+
+}  // namespace
+
+void PoissonOptions::validate() const {
+  require(spacing >= 0 && std::isfinite(spacing), "PoissonOptions.spacing must be >= 0", spacing);
+}
+
+PoissonSurface poisson_surface(const TriangleMesh& cloud,
+                               const PoissonOptions& options,
+                               const Progress& progress) {
+  options.validate();
+  check_cloud(cloud);
+  const double between = point_spacing(cloud.vertices);
+  PoissonSurface out;
+  out.spacing =
+      options.spacing > 0 ? options.spacing : default_spacing(cloud.vertices.size(), between);
+  const TriangleMesh points = thinned(cloud, out.spacing);
+  const Eigen::AlignedBox3d box = box_around(points.vertices, out.spacing);
+  const PoissonFunction function(points.vertices, points.normals, out.spacing);
+  report(progress, 0.6);
+  out.mesh = closed_surface(*distances(function, box, out.spacing));
+  report(progress, 0.9);
+  out.evidence = take_evidence(out.mesh, StatedSurface(cloud), 2 * between);
+  return out;
+}
+
+}  // namespace cgs
