@@ -115,6 +115,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     out["control_points"] = {{"table", file_hash(control.file)}, {"unit", control.unit}};
   }
   // Only where they decide something: folders of runs without them go on as before.
+  if (request.scene.refine_poses) out["refine_poses"] = true;
   if (request.glb_encoding != GlbEncoding::Draco) {
     out["glb_encoding"] = request.glb_encoding == GlbEncoding::Plain ? "plain" : "quantized";
   }
