@@ -334,7 +334,6 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   refuse_contradictions(request);
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   Scene& scene = opened.scene;
-  const Json fit = check_stated_cameras(request.scene, opened);
   terminal.warn(scene.warnings);
   const bool chooses_voxels = request.voxel_size.empty();
   const MeasuredFiles measured = measured_files(request);
@@ -342,6 +341,9 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   terminal.say("memory: " + memory_plan_text(plan));
   check_memory_plan(scene, chooses_voxels, measured, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
+  const size_t known = scene.warnings.size();
+  const Json fit = check_stated_cameras(request.scene, opened);
+  terminal.warn(std::vector(scene.warnings.begin() + std::ptrdiff_t(known), scene.warnings.end()));
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
   std::vector<MarkerBar> markers = marker_bars(scene, request.scene.marker_size);
   check_lengths(request, scene.frame);
@@ -363,8 +365,8 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   Json predicted = Json::object();
   for (const StageMemory& stage : plan) predicted[stage.stage] = stage.bytes;
   record.note("predicted_memory", predicted);
-  if (!fit.is_null()) record.note("camera_fit", fit);
-  if (opened.refined) record.note("refined_poses", opened.refined->report);
+  record.note("camera_fit", fit);
+  record.note("refined_poses", opened.refined ? opened.refined->report : Json());
   Run run{request,
           std::move(record),
           std::move(scene),

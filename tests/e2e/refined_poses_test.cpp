@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// `cgs run --refine-poses` on a small portal capture whose cameras are stated a third of a degree
+// `cgs run --refine-poses` on a small portal capture whose cameras are stated half a degree
 // off.
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -31,7 +31,7 @@ class RefinedPoses : public testing::Test {
     for (size_t i = 0; i < views.size(); ++i) {
       json& rows = transforms["frames"][i]["transform_matrix"];
       const Eigen::Vector3d axis(1, double(i) - 1.5, 0.5);
-      const Eigen::AngleAxisd turn(0.3 * M_PI / 180, axis.normalized());
+      const Eigen::AngleAxisd turn(0.6 * M_PI / 180, axis.normalized());
       for (size_t c = 0; c < 3; ++c) {
         const Eigen::Vector3d turned = turn * Eigen::Vector3d(rows[0][c], rows[1][c], rows[2][c]);
         for (size_t r = 0; r < 3; ++r) rows[r][c] = turned[static_cast<Eigen::Index>(r)];
@@ -104,7 +104,7 @@ TEST_F(RefinedPoses, DecideAllStages) {
   EXPECT_EQ(given.exit_code, 0) << given.err;
   EXPECT_NE(given.err.find("--refine-poses"), std::string::npos) << given.err;  // it is advised
   EXPECT_FALSE(read(plain / "run.json")["request"].contains("refine_poses"));
-  EXPECT_TRUE(read(plain / "run.json").contains("camera_fit"));
+  EXPECT_GT(read(plain / "run.json")["camera_fit"]["error"], 0.75);
 }
 
 }  // namespace
