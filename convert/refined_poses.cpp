@@ -125,7 +125,7 @@ std::vector<std::string> remarks(const Json& report) {
   if (!alone.empty()) {
     out.push_back(option + "too little of what " + alone +
                   (alone.find(", ") == std::string::npos ? " shows" : " show") +
-                  " is in the others; what is known of these cameras stays as given");
+                  " is in the others to refine their cameras");
   }
   return out;
 }
