@@ -40,6 +40,7 @@ struct Run {
   std::vector<KnownDistance> distances;
   std::vector<MarkerBar> markers;
   Json control;  ///< Of OpenedScene.
+  Json refined;  ///< RefinedPoses::report; null where it was not asked for.
   // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
   // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
   std::optional<Model> model;
@@ -171,6 +172,7 @@ Json report_json(const Run& run) {
               {"photographs", photographs},
               {"stages", stages},
               {"warnings", warnings}};
+  if (!run.refined.is_null()) out["refined_poses"] = run.refined;
   if (!run.request.settings_reason.empty()) out["settings_reason"] = run.request.settings_reason;
   return out;
 }
@@ -228,6 +230,7 @@ std::vector<Stage> stages_of(const Scene& scene) {
            model_files,
            run_model,
            {"model/training.json",
+            "model/refined_poses.json",
             "model/colmap/poses.json",
             "model/colmap/sparse/0/cameras.txt",
             "model/colmap/sparse/0/images.txt",
@@ -338,6 +341,9 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   terminal.say("memory: " + memory_plan_text(plan));
   check_memory_plan(scene, chooses_voxels, measured, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
+  const size_t known = scene.warnings.size();
+  const Json fit = check_stated_cameras(request.scene, opened);
+  terminal.warn(std::vector(scene.warnings.begin() + std::ptrdiff_t(known), scene.warnings.end()));
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
   std::vector<MarkerBar> markers = marker_bars(scene, request.scene.marker_size);
   check_lengths(request, scene.frame);
@@ -359,12 +365,15 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   Json predicted = Json::object();
   for (const StageMemory& stage : plan) predicted[stage.stage] = stage.bytes;
   record.note("predicted_memory", predicted);
+  record.note("camera_fit", fit);
+  record.note("refined_poses", opened.refined ? opened.refined->report : Json());
   Run run{request,
           std::move(record),
           std::move(scene),
           std::move(distances),
           std::move(markers),
           std::move(opened.control),
+          opened.refined ? std::move(opened.refined->report) : Json(),
           {},
           {}};
   try {

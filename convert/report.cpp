@@ -9,6 +9,7 @@
 
 #include "convert/html.h"
 #include "convert/page_files.h"
+#include "convert/refined_poses.h"
 #include "io/atomic_file.h"
 #include "io/byte_reader.h"
 #include "io/image.h"
@@ -178,6 +179,26 @@ std::string control_section(const Json& scale, const Json& frame) {
   for (const Json& point : control["points"]) html << control_row(point);
   html << rms_row("control points", control["control_rms"])
        << rms_row("check points", control["check_rms"]) << "</table>\n";
+  return html.str();
+}
+
+// How far cameras were moved, if they were refined.
+std::string refinement_section(const Json& report) {
+  if (!report.contains("refined_poses")) return "";
+  const Json& refined = report["refined_poses"];
+  std::ostringstream html;
+  html << "<h2>Cameras</h2>\n<p>" << escaped(refinement_words(refined))
+       << ".</p>\n<table>\n<tr><th>view</th><th></th><th>points</th><th>turned [degrees]</th>"
+          "<th>moved [scene units]</th><th>error before [pixels]</th><th>after</th></tr>\n";
+  for (const Json& view : refined["views"]) {
+    html << "<tr><td>" << escaped(view["view"].get<std::string>()) << "</td><td>"
+         << escaped(view["role"].get<std::string>()) << "</td><td>"
+         << number(view["points"], "%.0f") << "</td><td>" << number(view["degrees"], "%.3f")
+         << "</td><td>" << number(view["distance"]) << "</td><td>"
+         << number(view["error_before"], "%.2f") << "</td><td>"
+         << number(view["error_after"], "%.2f") << "</td></tr>\n";
+  }
+  html << "</table>\n";
   return html.str();
 }
 
@@ -448,11 +469,11 @@ void write_html_report(const std::filesystem::path& folder,
   for (const Json& warning : report["warnings"]) {
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
   }
-  html << viewer << scale_section(report) << promises_section(report) << certificate_section(report)
-       << simplification_section(report) << deviation_section(report) << mesh_section(folder)
-       << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
-       << training_section(report["model"]) << timing_section(report["stages"])
-       << "</body></html>\n";
+  html << viewer << refinement_section(report) << scale_section(report) << promises_section(report)
+       << certificate_section(report) << simplification_section(report) << deviation_section(report)
+       << mesh_section(folder) << evaluation_section(report["evaluation"])
+       << views_section(folder, report["views"], scene) << training_section(report["model"])
+       << timing_section(report["stages"]) << "</body></html>\n";
   write_file(folder / "report.html", html.str());
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "convert/camera_fit.h"
 #include "convert/stated_frame.h"
 #include "io/photographs.h"
 #include "libcgs/core/error.h"
@@ -32,6 +33,17 @@ void refuse_two_scales(const SceneRequest& request) {
   }
 }
 
+void refine(const SceneRequest& request,
+            const std::filesystem::path& model,
+            Terminal& terminal,
+            OpenedScene& out) {
+  const SceneRoot root{request.path, request.options.allow_external};
+  out.refined = refined_poses(out.scene, root, model, terminal);
+  move_cameras(*out.refined, out.scene);
+  auto& warnings = out.scene.warnings;
+  warnings.insert(warnings.end(), out.refined->warnings.begin(), out.refined->warnings.end());
+}
+
 }  // namespace
 
 bool SceneRequest::states_lengths() const {
@@ -47,6 +59,11 @@ OpenedScene open_scene(const SceneRequest& request,
           request.focal);
   OpenedScene out;
   if (is_photographs(request.path)) {
+    if (request.refine_poses) {
+      throw InvalidInput("--refine-poses is for cameras that a scene states; " +
+                         printable(request.path) +
+                         " holds photographs alone, which are solved for as well as they can be");
+    }
     request.options.validate();
     const SceneRoot root{request.path, request.options.allow_external};
     const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
@@ -60,6 +77,7 @@ OpenedScene open_scene(const SceneRequest& request,
       throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
                          " states them (" + out.scene.kind + ")");
     }
+    if (request.refine_poses) refine(request, model, terminal, out);
   }
   if (!request.control.file.empty()) {
     out.control = move_to_control_frame(request.control, out.scene);
@@ -75,6 +93,17 @@ OpenedScene open_scene(const SceneRequest& request,
 
 void OpenedScene::keep(const std::filesystem::path& model) const {
   if (poses && !poses->is_stored) write_photo_poses(model / kPosesFolder, *poses);
+  if (refined && !refined->is_stored) write_refined_poses(model, *refined);
+  if (!refined) forget_refined_poses(model);
+}
+
+nlohmann::ordered_json check_stated_cameras(const SceneRequest& request, OpenedScene& opened) {
+  if (opened.poses || opened.refined) return nullptr;
+  const SceneRoot root{request.path, request.options.allow_external};
+  const nlohmann::ordered_json fit = camera_fit(opened.scene, root);
+  const std::string warning = camera_fit_warning(fit);
+  if (!warning.empty()) opened.scene.warnings.push_back(warning);
+  return fit;
 }
 
 }  // namespace cgs

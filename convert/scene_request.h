@@ -11,6 +11,7 @@
 #include "convert/control_frame.h"
 #include "convert/known_distances.h"
 #include "convert/photo_poses.h"
+#include "convert/refined_poses.h"
 #include "convert/terminal.h"
 #include "io/scene_reader.h"
 
@@ -24,6 +25,8 @@ struct SceneRequest {
       assume_unit;  ///< Unit of one scene unit where the scene does not say; empty = unknown.
   std::vector<double> up;  ///< World direction that is up; empty = judged by the cameras.
   double focal = 0;        ///< Of photographs without cameras [pixels]; 0 = not given.
+  bool refine_poses =
+      false;  ///< Move the cameras a scene states to where the photographs have them.
   std::vector<DistanceWords> known_distances;  ///< Where they are given, no assume_unit.
   std::string marker_size;  ///< Side of printed markers; where it is given, no assume_unit.
   ControlRequest control;   ///< Where it is given, nothing else of scale, unit and up.
@@ -35,23 +38,32 @@ struct SceneRequest {
 /// Where solved cameras lie, below the folder of the model.
 inline constexpr const char* kPosesFolder = "colmap";
 
-/// Reads a scene, solving for the cameras of a folder that holds nothing but photographs, and gives
-/// it the unit the user assumes, or moves it into the frame of control points, if any.
+/// Reads a scene, solving for the cameras of a folder that holds nothing but photographs or
+/// refining those it states as asked, and gives it the unit the user assumes, or moves it into the
+/// frame of control points, if any.
 ///
 /// \param model  folder of the model the scene is for; cameras stored there by OpenedScene::keep()
 ///               are taken where they were solved from the same. Empty = none.
-/// \throws InvalidInput where a focal length is given for a scene with cameras, or two options
-///         state the scale; as read_scene(), photo_poses() and move_to_control_frame()
+/// \throws InvalidInput where a focal length is given for a scene with cameras, refinement asked
+/// for
+///         where there are none, or two options state the scale; as read_scene(), photo_poses(),
+///         refined_poses() and move_to_control_frame()
 struct OpenedScene {
   Scene scene;
-  std::optional<PhotoPoses> poses;  ///< If they were solved for.
-  nlohmann::ordered_json control;   ///< As move_to_control_frame() returns it; null without.
+  std::optional<PhotoPoses> poses;      ///< If they were solved for.
+  std::optional<RefinedPoses> refined;  ///< If that was asked for.
+  nlohmann::ordered_json control;       ///< As move_to_control_frame() returns it; null without.
 
-  /// Stores solved cameras below the folder of the model, for other programs and for the next time.
+  /// Stores solved and refined cameras below the folder of the model, for other programs and for
+  /// the next time.
   void keep(const std::filesystem::path& model) const;
 };
 OpenedScene open_scene(const SceneRequest& request,
                        const std::filesystem::path& model,
                        Terminal& terminal);
+
+/// How well cameras that were taken as the scene states them fit the photographs, as camera_fit();
+/// null for others. What is wrong with them is added to the warnings of the scene.
+nlohmann::ordered_json check_stated_cameras(const SceneRequest& request, OpenedScene& opened);
 
 }  // namespace cgs

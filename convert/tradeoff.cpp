@@ -319,7 +319,7 @@ Tradeoff measure_tradeoff(const TradeoffRequest& request,
               terminal,
               RunRecord(request.output, request_json(standard, opened.scene), false),
               Clock::now() + std::chrono::duration_cast<Clock::duration>(limit)};
-  if (opened.poses && !bench.record.is_done("cameras", {})) {
+  if ((opened.poses || opened.refined) && !bench.record.is_done("cameras", {})) {
     bench.record.finish("cameras", opening.wall, {{"cpu", opening.cpu}, {"wall", opening.wall}});
   }
   opened.keep(request.output);

@@ -130,6 +130,7 @@ std::string command_line(const RunRequest& request) {
   if (scene.options.downscale) add("--downscale", std::to_string(*scene.options.downscale));
   if (scene.options.allow_external) out += " --allow-external";
   if (scene.focal > 0) add("--focal", exact(scene.focal));
+  if (scene.refine_poses) out += " --refine-poses";
   add("--assume-unit", scene.assume_unit);
   add("--marker-size", scene.marker_size);
   if (!scene.up.empty()) out += " --up";

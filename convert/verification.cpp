@@ -67,6 +67,7 @@ SceneRequest scene_request(const Json& record) {
   out.options.allow_external = true;  // the run was allowed what it needed
   const Json focal = record.value("focal", Json(0));
   if (focal.is_number()) out.focal = focal.get<double>();
+  out.refine_poses = request.value("refine_poses", Json(false)) == Json(true);
   out.options.depth = depth_options_from(record.value("depth_options", Json()));
   out.control.file = text_at(record, "control_points");
   if (request.contains("control_points") && request["control_points"].is_object()) {

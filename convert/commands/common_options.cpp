@@ -119,12 +119,16 @@ void add_glb_option(CLI::App& command, GlbEncoding& encoding) {
           CLI::CheckedTransformer(glb_encodings()).description("draco, meshopt, quantized, plain"));
 }
 
-void add_focal_option(CLI::App& command, double& focal) {
+void add_camera_options(CLI::App& command, SceneRequest& request) {
   command.add_option(
       "--focal",
-      focal,
+      request.focal,
       "Focal length of photographs without cameras, in pixels of the files; default: "
       "what they say (Exif), else solved for");
+  command.add_flag("--refine-poses",
+                   request.refine_poses,
+                   "Move cameras that are slightly off (of phones, from elsewhere) to where the "
+                   "photographs have them; focal lengths, the first camera and the scale stay");
 }
 
 void add_training_options(CLI::App& command, TrainingArguments& arguments) {

@@ -41,8 +41,8 @@ void add_scene_options(CLI::App& command, SceneOptions& options);
 /// --glb-encoding.
 void add_glb_option(CLI::App& command, GlbEncoding& encoding);
 
-/// --focal.
-void add_focal_option(CLI::App& command, double& focal);
+/// --focal and --refine-poses.
+void add_camera_options(CLI::App& command, SceneRequest& request);
 
 /// How to train, as typed.
 struct TrainingArguments {

@@ -92,7 +92,8 @@ void add_baseline_warnings(const Json& baselines, Json& warnings) {
   }
 }
 
-Json scene_json(const Scene& scene) {
+Json scene_json(const OpenedScene& opened, const Json& fit) {
+  const Scene& scene = opened.scene;
   Json cameras = Json::array();
   for (int i = 0; i < static_cast<int>(scene.views.size()); ++i) {
     cameras.push_back(camera_json(scene, i));
@@ -114,8 +115,33 @@ Json scene_json(const Scene& scene) {
       {"units", scene.frame.unit_name()},
       {"cameras", cameras},
       {"baselines", baselines},
+      {"camera_fit", fit},
+      {"refined_poses", opened.refined ? opened.refined->report : Json()},
       {"missing", scene.missing},
       {"warnings", warnings}};
+}
+
+void print_fit(const Json& info) {
+  const Json& fit = info["camera_fit"];
+  if (!fit.is_null()) {
+    std::printf("cameras of input views fit the photographs to %.2f pixels (%zu matches)\n",
+                fit["error"].get<double>(),
+                fit["matches"].get<size_t>());
+  }
+  const Json& refined = info["refined_poses"];
+  if (refined.is_null()) return;
+  std::printf("refined: %s\n", refinement_words(refined).c_str());
+  for (const Json& view : refined["views"]) {
+    std::printf(
+        "  %-24s %-9s %6d points, moved %.3f degrees, %.4g units, error %.2f -> %.2f pixels\n",
+        one_line(view["view"].get<std::string>()).c_str(),
+        view["role"].get<std::string>().c_str(),
+        view["points"].get<int>(),
+        view["degrees"].get<double>(),
+        view["distance"].get<double>(),
+        view["error_before"].get<double>(),
+        view["error_after"].get<double>());
+  }
 }
 
 void print_scene(const Json& info) {
@@ -157,6 +183,7 @@ void print_scene(const Json& info) {
                 100 * row["baseline_to_depth"].get<double>(),
                 row["angle_degrees"].get<double>());
   }
+  print_fit(info);
   for (const Json& name : info["missing"]) {
     std::printf("missing: %s\n", one_line(name.get<std::string>()).c_str());
   }
@@ -263,7 +290,9 @@ void run_info(const InfoArgs& args) {
     return;
   }
   Terminal terminal(args.json);
-  const Json info = scene_json(open_scene(args.scene, {}, terminal).scene);
+  OpenedScene opened = open_scene(args.scene, {}, terminal);
+  const Json fit = check_stated_cameras(args.scene, opened);
+  const Json info = scene_json(opened, fit);
   if (args.json) {
     std::cout << json_text(info) << "\n";
   } else {
@@ -289,7 +318,7 @@ void add_info(CLI::App& app) {
          "certificate, or splats (.ply, .spz, .splat, .sog, .ksplat, .glb)")
       ->required();
   add_scene_options(*cmd, args->scene.options);
-  add_focal_option(*cmd, args->scene.focal);
+  add_camera_options(*cmd, args->scene);
   cmd->add_flag("--json", args->json, "Print JSON on standard output");
   cmd->add_flag("--strict", args->strict, "A warning of a scene ends the command with exit code 3");
   cmd->footer(

@@ -89,7 +89,7 @@ void add_run(CLI::App& app) {
       ->required();
   cmd->add_option("-o,--output", args->request.output, "Folder to write")->required();
   add_scene_options(*cmd, args->request.scene.options);
-  add_focal_option(*cmd, args->request.scene.focal);
+  add_camera_options(*cmd, args->request.scene);
   add_scale_options(*cmd, args->request.scene);
   cmd->add_option("--voxel-size",
                   args->request.voxel_size,

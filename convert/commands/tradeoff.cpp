@@ -76,7 +76,7 @@ void add_tradeoff(CLI::App& app) {
   cmd->add_option("scene", request.scene.path, "Folder of a scene, as for run")->required();
   cmd->add_option("-o,--output", request.output, "Folder to write")->required();
   add_scene_options(*cmd, request.scene.options);
-  add_focal_option(*cmd, request.scene.focal);
+  add_camera_options(*cmd, request.scene);
   cmd->add_option("--assume-unit",
                   request.scene.assume_unit,
                   "What one scene unit is (m, cm, mm, in, ft), where the scene does not say");

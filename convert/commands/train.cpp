@@ -30,6 +30,7 @@ void run_train(const TrainArgs& args) {
       {}, training_options(args.training), args.output, args.scene.options.depth.network};
   Terminal terminal(args.common.quiet, args.common.strict);
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
+  (void)check_stated_cameras(args.scene, opened);
   opened.keep(args.output);
   Scene& scene = opened.scene;
   const auto distances = known_distances(args.scene.known_distances, scene);
@@ -46,6 +47,7 @@ void run_train(const TrainArgs& args) {
   trained.model.scene.frame.up = up;  // else the model tells it by its cameras
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
+  if (opened.refined) report["refined_poses"] = opened.refined->report;
   report["scale"] = opened.control;
   if (opened.control.is_null()) {
     report["scale"] = scale_by(distances, markers, trained.model);
@@ -70,7 +72,7 @@ void add_train(CLI::App& app) {
   cmd->add_option("scene", args->scene.path, "Folder of a scene, as for run")->required();
   cmd->add_option("-o,--output", args->output, "Model folder to write")->required();
   add_scene_options(*cmd, args->scene.options);
-  add_focal_option(*cmd, args->scene.focal);
+  add_camera_options(*cmd, args->scene);
   add_scale_options(*cmd, args->scene);
   add_training_options(*cmd, args->training);
   add_output_options(*cmd, args->common);

@@ -69,6 +69,25 @@ struct ShapePrior {
   }
 };
 
+struct PoseRestraint {
+  PosePrior prior;
+
+  template <typename T>
+  bool operator()(const T* rotation, const T* translation, T* out) const {
+    const Eigen::Map<const Eigen::Quaternion<T>> q(rotation);
+    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> t(translation);
+    const Eigen::Quaternion<T> turn = q * prior.pose.rotation.conjugate().cast<T>();
+    const Eigen::Matrix<T, 3, 1> center = -(q.conjugate() * t);
+    const Eigen::Matrix<T, 3, 1> moved = center - prior.pose.center().cast<T>();
+    const T sign = turn.w() < T(0) ? T(-1) : T(1);
+    for (int i = 0; i < 3; ++i) {
+      out[i] = T(2) * sign * turn.vec()[i] / T(prior.rotation_sigma);
+      out[3 + i] = moved[i] / T(prior.center_sigma);
+    }
+    return true;
+  }
+};
+
 /// The unknowns, each kind in one piece of memory: Ceres sorts by address, and the order must be
 /// the same in every run.
 struct Unknowns {
@@ -142,16 +161,35 @@ void add_sightings(const Reconstruction& scene,
   }
 }
 
+void restrain_poses(const BundleOptions& options, Unknowns& unknowns, ceres::Problem& problem) {
+  for (size_t i = 0; i < options.pose_priors.size(); ++i) {
+    if (!problem.HasParameterBlock(unknowns.rotation(i))) continue;
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PoseRestraint, 6, 4, 3>(
+                                 new PoseRestraint{options.pose_priors[i]}),
+                             nullptr,
+                             unknowns.rotation(i),
+                             unknowns.translation(i));
+  }
+}
+
 // Rotations stay rotations; seven freedoms that no photograph can tell are held.
 void hold_gauge(const BundleOptions& options, Unknowns& unknowns, ceres::Problem& problem) {
   for (size_t i = 0; i < unknowns.photos; ++i) {
     if (!problem.HasParameterBlock(unknowns.rotation(i))) continue;
     problem.SetManifold(unknowns.rotation(i), new ceres::EigenQuaternionManifold);
-    if (static_cast<int>(i) == options.first) {
+    if (options.hold_poses || static_cast<int>(i) == options.first) {
       problem.SetParameterBlockConstant(unknowns.rotation(i));
       problem.SetParameterBlockConstant(unknowns.translation(i));
     } else if (static_cast<int>(i) == options.second) {
       problem.SetManifold(unknowns.translation(i), new ceres::SphereManifold<3>);
+    }
+  }
+}
+
+void hold_points(const Reconstruction& scene, Unknowns& unknowns, ceres::Problem& problem) {
+  for (size_t k = 0; k < scene.tracks.size(); ++k) {
+    if (problem.HasParameterBlock(unknowns.point(k))) {
+      problem.SetParameterBlockConstant(unknowns.point(k));
     }
   }
 }
@@ -322,7 +360,9 @@ std::vector<double> adjust_bundle(Reconstruction& scene,
   ceres::Problem problem(problem_options);
   add_sightings(scene, unknowns, &loss, problem);
   if (problem.NumResidualBlocks() == 0) return std::vector<double>(scene.lenses.size(), 0.0);
+  restrain_poses(options, unknowns, problem);
   hold_gauge(options, unknowns, problem);
+  if (options.hold_points) hold_points(scene, unknowns, problem);
   const std::vector<bool> held_focal = hold_lenses(priors, options, unknowns, problem);
   ceres::Solver::Summary summary;
   ceres::Solve(solver_options(options, scene, unknowns, problem), &problem, &summary);

@@ -14,12 +14,22 @@ struct LensPrior {
   double side = 0;   ///< Larger side of the photographs [working pixels].
 };
 
+/// What is known of a pose beforehand.
+struct PosePrior {
+  PhotoPose pose;
+  double rotation_sigma = 0;  ///< [rad]
+  double center_sigma = 0;    ///< Of each coordinate of the camera's centre [world units].
+};
+
 struct BundleOptions {
-  int first = 0;             ///< Photograph whose pose is held: the world's axes are its own.
-  int second = 1;            ///< Photograph whose distance from it is held.
+  int first = 0;             ///< Photograph whose pose is held; -1 = none.
+  int second = 1;            ///< Photograph whose distance from the origin is held; -1 = none.
   bool solve_focal = false;  ///< Of lenses whose prior is not exact.
   bool solve_shape = false;  ///< Distortion and principal point, which are small in any camera.
-  double loss_scale = 1;     ///< Of the Cauchy loss [working pixels].
+  bool hold_poses = false;   ///< All of them.
+  bool hold_points = false;
+  std::vector<PosePrior> pose_priors = {};  ///< Per photograph; empty = nothing is known.
+  double loss_scale = 1;                    ///< Of the Cauchy loss [working pixels].
   int most_iterations = 50;
 };
 

@@ -19,17 +19,24 @@ Eigen::Vector2d from_centre(const UnposedPhoto& photo, int feature) {
   return (photo.features.points[static_cast<size_t>(feature)] - centre) / photo.features.pixel;
 }
 
-PhotoPair matched_pair(const std::vector<UnposedPhoto>& photos, int a, int b) {
-  const UnposedPhoto& photo_a = photos[static_cast<size_t>(a)];
-  const UnposedPhoto& photo_b = photos[static_cast<size_t>(b)];
-  const std::vector<FeatureMatch> matches = match_features(photo_a.features, photo_b.features);
+bool shows_no_photo_twice(const Track& track) {
+  for (size_t i = 1; i < track.seen.size(); ++i) {
+    if (track.seen[i].photo == track.seen[i - 1].photo) return false;
+  }
+  return track.seen.size() >= 2;
+}
+
+}  // namespace
+
+PhotoPair match_pair(const UnposedPhoto& a, const UnposedPhoto& b) {
+  const std::vector<FeatureMatch> matches = match_features(a.features, b.features);
   MatchedPoints points;
   for (const FeatureMatch& m : matches) {
-    points.a.push_back(from_centre(photo_a, m.a));
-    points.b.push_back(from_centre(photo_b, m.b));
+    points.a.push_back(from_centre(a, m.a));
+    points.b.push_back(from_centre(b, m.b));
   }
   const std::vector<char> is_inlier = epipolar_inliers(points, kEpipolarError);
-  PhotoPair pair{a, b, {}, {}, false};
+  PhotoPair pair{0, 1, {}, {}, false};
   for (size_t i = 0; i < matches.size(); ++i) {
     if (is_inlier[i] == 0) continue;
     pair.matches.push_back(matches[i]);
@@ -43,15 +50,6 @@ PhotoPair matched_pair(const std::vector<UnposedPhoto>& photos, int a, int b) {
   return pair;
 }
 
-bool shows_no_photo_twice(const Track& track) {
-  for (size_t i = 1; i < track.seen.size(); ++i) {
-    if (track.seen[i].photo == track.seen[i - 1].photo) return false;
-  }
-  return track.seen.size() >= 2;
-}
-
-}  // namespace
-
 std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,
                                     const Progress& progress) {
   const int count = static_cast<int>(photos.size());
@@ -63,7 +61,11 @@ std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,
   for (size_t begin = 0; begin < pairs.size(); begin += kAtOnce) {
     report(progress, double(begin) / double(pairs.size()));
     tbb::parallel_for(begin, std::min(begin + kAtOnce, pairs.size()), [&](size_t i) {
-      pairs[i] = matched_pair(photos, pairs[i].a, pairs[i].b);
+      const int a = pairs[i].a;
+      const int b = pairs[i].b;
+      pairs[i] = match_pair(photos[static_cast<size_t>(a)], photos[static_cast<size_t>(b)]);
+      pairs[i].a = a;
+      pairs[i].b = b;
     });
   }
   return pairs;

@@ -22,6 +22,9 @@ struct PhotoPair {
 /// Fewest matches that say that two photographs show the same.
 inline constexpr size_t kFewestMatches = 24;
 
+/// Matches one pair, which is then (0, 1).
+PhotoPair match_pair(const UnposedPhoto& a, const UnposedPhoto& b);
+
 /// Matches every pair a < b.
 std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,
                                     const Progress& progress);

@@ -95,6 +95,9 @@ TEST(CommandLine, SurvivesAShell) {
             "m\n--up\n0\n-1\n0.5\n--preset\ndraft\n--voxel-size\n1\n-o\nout/a b\n");
   r.training.steps = 120;
   EXPECT_NE(command_line(r).find("--set steps=120"), std::string::npos);
+  EXPECT_EQ(command_line(r).find("--refine-poses"), std::string::npos);
+  r.scene.refine_poses = true;
+  EXPECT_NE(command_line(r).find(" --refine-poses"), std::string::npos);
 }
 
 }  // namespace

@@ -63,6 +63,37 @@ TEST(AdjustBundle, HoldsWhatItIsToldTo) {
   EXPECT_NEAR(scene.pose(1)->translation.norm(), before.pose(1)->translation.norm(), 1e-9);
 }
 
+TEST(AdjustBundle, HoldsPosesOrPoints) {
+  Reconstruction scene = around_points(0.3, 3);
+  const Reconstruction before = scene;
+  const BundleOptions poses_held{.hold_poses = true};
+  adjust_bundle(scene, {{900, 0, 1200}}, poses_held);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(scene.pose(i)->translation, before.pose(i)->translation);
+  EXPECT_NE(scene.tracks[0].position, before.tracks[0].position);
+  scene = before;
+  const BundleOptions points_held{.first = -1, .second = -1, .hold_points = true};
+  adjust_bundle(scene, {{900, 0, 1200}}, points_held);
+  for (int i = 0; i < 3; ++i) EXPECT_NE(scene.pose(i)->translation, before.pose(i)->translation);
+  EXPECT_EQ(scene.tracks[0].position, before.tracks[0].position);
+}
+
+// One point leaves four freedoms of a camera open.
+TEST(AdjustBundle, LeavesPosesWhereTheyWereKnownToBeIfPointsDoNotTell) {
+  Reconstruction scene = around_points(0, 1);
+  scene.tracks.resize(1);
+  scene.tracks[0].seen[2].at += Eigen::Vector2d(9, 0);
+  const PhotoPose given = *scene.poses[2];
+  BundleOptions options{.first = -1, .second = -1, .hold_points = true};
+  for (const auto& pose : scene.poses) options.pose_priors.push_back({*pose, 0.02, 0.1});
+  adjust_bundle(scene, {{900, 0, 1200}}, options);
+  EXPECT_LT(reprojection_error(scene, scene.tracks[0].position, scene.tracks[0].seen[2]), 0.5);
+  // 9 pixels are 0.01 rad, of which turning and moving take a share each, the least they can.
+  EXPECT_LT(scene.pose(2)->rotation.angularDistance(given.rotation), 0.0101);
+  EXPECT_GT(scene.pose(2)->rotation.angularDistance(given.rotation), 0.001);
+  EXPECT_LT((scene.pose(2)->center() - given.center()).norm(), 0.06);
+  EXPECT_GT((scene.pose(2)->center() - given.center()).norm(), 0.001);
+}
+
 TEST(AdjustBundle, StandsAWrongSighting) {
   Reconstruction scene = around_points(0, 1);
   scene.tracks[0].seen[1].at += Eigen::Vector2d(40, -30);

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "io/scene_path.h"
+#include "libcgs/core/scene.h"
+#include "libcgs/priors/pose_fit.h"
+
+namespace cgs {
+
+/// The camera of a view at the size of its photograph; the same whatever --downscale says.
+/// \throws as photograph_size()
+Camera camera_of_file(const View& view);
+
+/// Features of the photograph of a view and camera_of_file(). \throws as read_photograph()
+PosedPhoto posed_photo(const View& view, const SceneRoot& root, const FeatureOptions& options = {});
+
+/// How well the cameras of the input views agree with what the photographs show: a look at their
+/// strongest features, in a second or two.
+/// \return {"matches", "error": median distance of matches from where the cameras have them,
+///          "pairs": [{"views", "matches", "error"}]} in pixels of the pictures worked on; null
+///          where no two photographs share enough to tell
+nlohmann::ordered_json camera_fit(const Scene& scene, const SceneRoot& root);
+
+/// Advice for cameras that do not fit; empty for those that do, and for null.
+std::string camera_fit_warning(const nlohmann::ordered_json& fit);
+
+}  // namespace cgs

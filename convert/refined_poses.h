@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/terminal.h"
+#include "io/scene_path.h"
+#include "libcgs/core/scene.h"
+
+namespace cgs {
+
+/// Cameras of a scene that were moved to where its photographs have them.
+struct RefinedPoses {
+  std::map<std::string, Eigen::Isometry3d> poses;  ///< world_from_cam of the views that moved.
+  /// {"refined": whether any camera of an input view moved, "error_before", "error_after": median
+  ///  distances between where points appear and where they were seen, worst input view [pixels of
+  ///  the photographs], "views": [{"view", "role", "points", "refined", "degrees", "distance"
+  ///  [scene units], "error_before", "error_after"}]}
+  nlohmann::ordered_json report;
+  std::vector<std::string> warnings;  ///< What was left as given, and why.
+  std::string inputs;                 ///< Hashes of photographs and cameras, program.
+  bool is_stored = false;             ///< Read, not solved.
+};
+
+/// Refines the cameras of the input views as refine_poses(), and each held-out view against the
+/// points these know; or reads what write_refined_poses() stored, if that was made from the same.
+///
+/// \param scene   in world coordinates, with the identity frame
+/// \param stored  folder; may be empty or not exist
+/// \throws as read_photograph()
+RefinedPoses refined_poses(const Scene& scene,
+                           const SceneRoot& root,
+                           const std::filesystem::path& stored,
+                           Terminal& terminal);
+
+/// Moves the cameras of a scene.
+void move_cameras(const RefinedPoses& refined, Scene& scene);
+
+/// One line on it for people. \param report  of RefinedPoses
+std::string refinement_words(const nlohmann::ordered_json& report);
+
+/// Stores them as refined_poses.json in a folder, or removes what was stored there.
+/// \throws IoError
+void write_refined_poses(const std::filesystem::path& folder, const RefinedPoses& refined);
+void forget_refined_poses(const std::filesystem::path& folder);
+
+}  // namespace cgs
