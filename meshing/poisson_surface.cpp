@@ -67,6 +67,7 @@ struct LinearPart {
   Eigen::AlignedBox3d box;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   double at_origin = 0;
+  double area = 0;  // of its zero surface, about: the mean over its values, by the coarea formula
 
   explicit LinearPart(const PoissonFunction::Cell& cell) {
     Eigen::Matrix3d edges;
@@ -78,7 +79,11 @@ struct LinearPart {
     }
     gradient = edges.inverse() * rise;
     at_origin = cell.values[0] - gradient.dot(cell.corners[0]);
+    const auto [low, high] = std::minmax_element(cell.values.begin(), cell.values.end());
+    area = std::abs(edges.determinant()) / 6 * gradient.norm() / (*high - *low);
   }
+  // Flat cells have no gradient; others lie around them.
+  bool is_sound() const { return std::isfinite(area) && gradient.squaredNorm() > 0; }
   double value(const Eigen::Vector3d& p) const { return at_origin + gradient.dot(p); }
 };
 
@@ -90,7 +95,6 @@ class Band {
 
   void add(const LinearPart& part) {
     const double slope = part.gradient.norm();
-    if (!std::isfinite(slope) || !(slope > 0)) return;  // flat cells, none of which is alone
     reaches_box_ = reaches_box_ || !box_.contains(part.box);
     const Eigen::AlignedBox3d box = part.box.intersection(box_);
     if (box.isEmpty()) return;
@@ -160,33 +164,53 @@ class Band {
   openvdb::Int32Grid::Accessor counts_at_ = counts_->getAccessor();
 };
 
-Eigen::AlignedBox3d box_around(const std::vector<Eigen::Vector3f>& points, double voxel) {
-  constexpr double kMargin = 0.05;  // of the diagonal
+Eigen::AlignedBox3d box_around(const std::vector<Eigen::Vector3f>& points) {
+  constexpr double kMargin = 0.1;  // of the diagonal
   Eigen::AlignedBox3d out;
   for (const auto& p : points) out.extend(p.cast<double>());
-  const double margin = kMargin * out.diagonal().norm() + 4 * voxel;
+  const double margin = kMargin * out.diagonal().norm();
   out.min().array() -= margin;
   out.max().array() += margin;
-  const Eigen::Vector3d s = out.sizes() / voxel;
-  constexpr double kMost = 1e8;
-  if (s.x() * s.y() + s.y() * s.z() + s.z() * s.x() <= kMost) return out;
-  throw LimitError("the spacing is too small for the extent of the points; state a larger one");
+  return out;
 }
 
-openvdb::FloatGrid::Ptr distances(const PoissonFunction& function,
-                                  const Eigen::AlignedBox3d& box,
-                                  double voxel) {
-  Band band(box, voxel);
-  for (const PoissonFunction::Cell& cell : function.crossed_cells()) band.add(LinearPart(cell));
-  return band.distances(function);
+std::vector<LinearPart> crossed_parts(const PoissonFunction& function) {
+  std::vector<LinearPart> out;
+  for (const PoissonFunction::Cell& cell : function.crossed_cells()) {
+    if (const LinearPart part(cell); part.is_sound()) out.push_back(part);
+  }
+  return out;
+}
+
+// Of the grid: what closes gaps may be many times larger than what was measured.
+double grid_spacing(const std::vector<LinearPart>& parts,
+                    const Eigen::AlignedBox3d& box,
+                    double spacing,
+                    bool is_stated) {
+  double area = 0;
+  bool reaches_box = false;
+  for (const LinearPart& part : parts) {
+    reaches_box = reaches_box || !box.contains(part.box);
+    if (box.contains(part.box.center())) area += part.area;
+  }
+  const Eigen::Vector3d s = box.sizes();
+  if (reaches_box) area += 2 * (s.x() * s.y() + s.y() * s.z() + s.z() * s.x());
+  constexpr double kFacesPerSquare = 3;  // on average over all directions
+  constexpr double kUsualFaces = 2e6;
+  constexpr double kMostFaces = 2e7;
+  const double faces = kFacesPerSquare * area / (spacing * spacing);
+  if (!is_stated) return spacing * std::sqrt(std::max(1.0, faces / kUsualFaces));
+  if (faces <= kMostFaces) return spacing;
+  throw LimitError("Poisson's surface would have about " +
+                   std::to_string(static_cast<uint64_t>(std::min(faces, 1e18))) +
+                   " faces, allowed are 20000000; state a larger spacing");
 }
 
 TriangleMesh closed_surface(const openvdb::FloatGrid& distance) {
-  for (const auto surface : {zero_surface, zero_surface_by_tetrahedra}) {
-    TriangleMesh mesh = surface(distance);
-    const Certificate facts = certify(mesh);
-    if (facts.passed()) return mesh;
-  }
+  TriangleMesh mesh = zero_surface(distance);
+  if (certify(mesh).passed()) return mesh;
+  mesh = zero_surface_by_tetrahedra(distance);  // more faces, but they never cut each other
+  if (certify(mesh).closed) return mesh;
   throw NumericalError("these points and normals enclose nothing");
 }
 
@@ -206,10 +230,14 @@ PoissonSurface poisson_surface(const TriangleMesh& cloud,
   out.spacing =
       options.spacing > 0 ? options.spacing : default_spacing(cloud.vertices.size(), between);
   const TriangleMesh points = thinned(cloud, out.spacing);
-  const Eigen::AlignedBox3d box = box_around(points.vertices, out.spacing);
   const PoissonFunction function(points.vertices, points.normals, out.spacing);
   report(progress, 0.6);
-  out.mesh = closed_surface(*distances(function, box, out.spacing));
+  const std::vector<LinearPart> parts = crossed_parts(function);
+  const Eigen::AlignedBox3d box = box_around(points.vertices);
+  out.spacing = grid_spacing(parts, box, out.spacing, options.spacing > 0);
+  Band band(box, out.spacing);
+  for (const LinearPart& part : parts) band.add(part);
+  out.mesh = closed_surface(*band.distances(function));
   report(progress, 0.9);
   out.evidence = take_evidence(out.mesh, StatedSurface(cloud), 2 * between);
   return out;

@@ -11,7 +11,7 @@ namespace cgs {
 
 struct PoissonOptions {
   double spacing = 0;  ///< Sides of triangles, about [internal units]; 0 = that of the points,
-                       ///< and coarser beyond 200,000 of them.
+                       ///< coarser beyond 200,000 of them or 2 million triangles.
 
   /// \throws InvalidInput naming the field out of range
   void validate() const;
@@ -29,11 +29,12 @@ struct PoissonSurface {
 /// Points are thinned to the spacing first (see down_sampled()), so that the work depends on the
 /// spacing and not on how often a place was measured; those without normal are left out. The result
 /// takes label and sigma from all points, see take_evidence(): what lies farther than two of
-/// *their* spacings from every point bridges a gap and is Inferred.
-/// Source: see PoissonFunction; its zero surface is taken on a grid of the spacing.
+/// *their* spacings from every point bridges a gap and is Inferred. Where sheets run on for want of
+/// anything to close them, they end at a box around the points, which becomes a part of the
+/// surface. Source: see PoissonFunction; its zero surface is taken on a grid of the spacing.
 /// \throws InvalidInput if there are faces, no normals, or fewer than 10 points with one;
-///         LimitError for more than 2 million points after thinning; NumericalError if fewer than
-///         10 are left of them, or if they enclose nothing
+///         LimitError for more than 2 million points after thinning or 20 million triangles;
+///         NumericalError if fewer than 10 are left of them, or if they enclose nothing
 PoissonSurface poisson_surface(const TriangleMesh& cloud,
                                const PoissonOptions& options,
                                const Progress& progress = {});
