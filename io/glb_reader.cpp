@@ -63,13 +63,14 @@ class SceneReader {
     }
   }
 
-  // Of faces; empty where nothing is said. Programs that pack files for the web join materials and
-  // forget their names, but keep feature numbers.
+  // Of faces; empty where nothing is said. Programs that pack files for the web join materials that
+  // look alike under the name of one, but keep feature numbers: these come first.
   std::vector<Provenance> labels_of(const JsonValue& primitive, const GlbFaces& in) {
     const std::optional<Provenance> label = label_of(primitive);
-    if (label) return std::vector<Provenance>(in.faces.size(), *label);
+    if (in.features.empty()) {
+      return label ? std::vector<Provenance>(in.faces.size(), *label) : std::vector<Provenance>();
+    }
     std::vector<Provenance> out;
-    if (in.features.empty()) return out;
     for (const auto& face : in.faces) {
       const float feature = in.features[face[0]];
       if (!(feature >= 0 && feature < float{kProvenanceCount})) return {};

@@ -249,8 +249,9 @@ TEST(ReadGlb, LeadsOurFilesBackToTheWorld) {
   expect_round_trip({.encoding = GlbEncoding::Draco, .y_up = y_up}, 64 * 0.8 / 8192);
 }
 
-// Programs that pack files for the web join materials and drop their names.
-TEST(ReadGlb, FeatureNumbersTellWhatMaterialsNoLongerSay) {
+// Programs that pack files for the web join materials that look alike: what one photograph saw
+// would become "observed".
+TEST(ReadGlb, FeatureNumbersCorrectWhatMaterialsClaim) {
   const test::TempDir dir;
   const TriangleMesh mesh = test::labelled_sphere();
   for (const auto& [name, encoding] : glb_encodings()) {
@@ -258,9 +259,9 @@ TEST(ReadGlb, FeatureNumbersTellWhatMaterialsNoLongerSay) {
     std::string bytes = test::read_bytes(dir / "a.glb");
     const size_t size = bytes.find(std::string("BIN\0", 4)) - 4 - 20;
     nlohmann::json json = nlohmann::json::parse(bytes.substr(20, size));
-    for (auto& material : json["materials"]) material["name"] = "";
+    for (auto& material : json["materials"]) material["name"] = "observed";
     std::string text = json.dump();
-    ASSERT_LE(text.size(), size);
+    ASSERT_LE(text.size(), size);  // other names were longer
     text.resize(size, ' ');
     test::write_bytes(dir / "b.glb", bytes.replace(20, size, text));
     const MeasurableFile back = read_mesh_file(dir / "b.glb");
