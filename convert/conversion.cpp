@@ -89,6 +89,14 @@ void check_pictures(const ConversionRequest& request, const Gaussians& g) {
                           memory_budget(request.volume.memory_limit));
 }
 
+/// The same before what was written is read again, beside what it was made from.
+void check_reading_back(const ConversionRequest& request, const Gaussians& g) {
+  check_splat_memory_plan({.splats = g.size(),
+                           .harmonics = static_cast<uint64_t>(g.sh_count()),
+                           .read_back_bytes = std::filesystem::file_size(request.output)},
+                          memory_budget(request.volume.memory_limit));
+}
+
 Source read_source(const std::filesystem::path& path, size_t memory_limit) {
   Source out;
   if (is_folder(path)) {
@@ -196,10 +204,16 @@ Json convert_splats(const ConversionRequest& request, const Source& source, Term
   const WrittenSplats written = write_splats(request, g, source.frame);
   Json report = written.report;
   try {
+    const Progress progress = terminal.begin("read back");
+    cgs::report(progress, 0);
+    check_reading_back(request, g);
     const GaussianFile back = read_splats(request.output, source.frame);
-    const SplatLoss loss = splat_loss(g, back.gaussians, written.order);
+    if (back.gaussians.size() < g.size()) terminal.warn(back.warnings);  // why they are missing
+    const SplatLoss loss = splat_loss(g, back.gaussians, written.order, progress);
     report["loss"] = splat_loss_to_json(loss, source.frame);
-    terminal.say(splat_loss_line(loss, source.frame));
+    terminal.end(splat_loss_line(loss, source.frame));
+  } catch (const Cancelled&) {
+    throw;
   } catch (const Error& error) {
     // The file is there: that it holds too little, or was not looked at, is a finding.
     report["loss"] = {{"not_measured", error.what()}};
@@ -282,7 +296,11 @@ void write_mesh(const ConversionRequest& request,
 }
 
 /// \return what was left out, for the report
-Json leave_out_floaters(GaussianFile& file, const Terminal& terminal) {
+Json leave_out_floaters(GaussianFile& file, size_t memory_limit, const Terminal& terminal) {
+  check_splat_memory_plan({.splats = file.gaussians.size(),
+                           .harmonics = static_cast<uint64_t>(file.gaussians.sh_count()),
+                           .finds_floaters = true},
+                          memory_budget(memory_limit));
   const Floaters found = find_floaters(file.gaussians);
   if (found.doubtful) {
     terminal.warn(floaters_text(found));
@@ -294,11 +312,24 @@ Json leave_out_floaters(GaussianFile& file, const Terminal& terminal) {
 }
 
 void refuse_for_splats(const ConversionRequest& request) {
-  const char* const given = request.open_surface                 ? "--open"
-                            : !request.simplify.empty()          ? "--simplify"
-                            : !request.volume.voxel_size.empty() ? "--voxel-size"
-                                                                 : nullptr;
-  if (given != nullptr) throw InvalidInput(std::string(given) + " has no effect on splats");
+  const ConversionRequest usual;
+  const VirtualCameraOptions& cameras = request.volume.cameras;
+  const bool is_spz = lower_extension(request.output) == ".spz";
+  const std::initializer_list<std::pair<bool, const char*>> options = {
+      {request.open_surface, "--open"},
+      {!request.simplify.empty(), "--simplify"},
+      {!request.volume.voxel_size.empty(), "--voxel-size"},
+      {request.encoding != usual.encoding, "--glb-encoding"},
+      {cameras.placement != usual.volume.cameras.placement, "--look-from"},
+      {cameras.views != usual.volume.cameras.views, "--virtual-views"},
+      {cameras.size != usual.volume.cameras.size, "--virtual-size"},
+      {!is_spz && request.spz_version != usual.spz_version, "--spz-version"}};
+  for (const auto& [is_given, name] : options) {
+    if (is_given) {
+      throw InvalidInput(std::string(name) + " has no effect on " +
+                         printable(request.output.filename()));
+    }
+  }
 }
 
 /// Refuses at once what would be refused after minutes of work.
@@ -412,7 +443,9 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   }
   if (source.model) terminal.warn(source.model->scene.warnings);
   terminal.warn(source.warnings);
-  if (request.filter_floaters) report["floaters"] = leave_out_floaters(*source.splats, terminal);
+  if (request.filter_floaters) {
+    report["floaters"] = leave_out_floaters(*source.splats, request.volume.memory_limit, terminal);
+  }
   if (wanted == Content::Splats) {
     report["output"] = convert_splats(request, source, terminal);
     return report;

@@ -133,6 +133,7 @@ class CellGrid {
     for (int axis = 0; axis < 3; ++axis) {
       steps[static_cast<size_t>(axis)] = steps_along(kReach * double{g.scale[i][axis]});
     }
+    coarsen(steps);
     float all = 0;
     for (int x = -steps[0]; x <= steps[0]; ++x) {
       for (int y = -steps[1]; y <= steps[1]; ++y) {
@@ -166,10 +167,22 @@ class CellGrid {
   static uint32_t fixed(float opacity) { return static_cast<uint32_t>(opacity * kOne + 0.5f); }
   static double part(int step, int steps) { return steps == 0 ? 0 : double(step) / steps; }
 
+  // To each side, a cell each.
   int steps_along(double reach) const {
-    constexpr int kMostSteps = 6;  // to each side
+    constexpr double kMost = 400;  // across all cells
     if (reach < 0.5 * cell_) return 0;
-    return static_cast<int>(std::min<double>(kMostSteps, std::ceil(reach / cell_)));
+    return static_cast<int>(std::min(kMost, std::ceil(reach / cell_)));
+  }
+
+  // A disc may reach far without leaving cells out; what fills space is haze, however it is seen.
+  static void coarsen(std::array<int, 3>& steps) {
+    constexpr double kMostPlaces = 20'000;
+    const auto places = [&] {
+      return (2.0 * steps[0] + 1) * (2.0 * steps[1] + 1) * (2.0 * steps[2] + 1);
+    };
+    while (places() > kMostPlaces) {
+      for (int& n : steps) n -= n > 6 ? n / 6 : 0;
+    }
   }
 
   // None in the outermost layer, so that every cell has all its neighbours.
@@ -310,9 +323,8 @@ void mark_islands(CellGrid& grid, const Gaussians& g, std::vector<Kind>& kinds) 
   const std::vector<uint32_t> sizes = Parts(grid, g, kinds).sizes();
   const uint32_t largest = *std::max_element(sizes.begin(), sizes.end());
   for (size_t i = 0; i < g.size(); ++i) {
-    if (kinds[i] == Kind::Surface && sizes[i] < least && sizes[i] < largest) {
-      kinds[i] = Kind::Island;
-    }
+    if (kinds[i] != Kind::Surface || sizes[i] >= least || sizes[i] >= largest) continue;
+    kinds[i] = sizes[i] == 0 ? Kind::Haze : Kind::Island;
   }
 }
 
@@ -374,7 +386,12 @@ std::string floaters_text(const Floaters& f) {
     return std::to_string(f.count()) + " of " + all + " look like floaters (" + kinds +
            "): too many, none was removed";
   }
-  return "removed " + std::to_string(f.count()) + " of " + all + " as floaters: " + kinds;
+  std::string out =
+      "removed " + std::to_string(f.count()) + " of " + all + " as floaters: " + kinds;
+  if (f.outside > 0) {
+    out += "; " + std::to_string(f.outside) + " too far from the scene to judge were kept";
+  }
+  return out;
 }
 
 }  // namespace cgs

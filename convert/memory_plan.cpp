@@ -117,6 +117,17 @@ std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
     const double beside = std::max(double(work.file_bytes), splats * kMoved);
     plan.push_back({"reading the splats", bytes(kBase + splats * (kAsRead + colors) + beside)});
   }
+  const double as_read = splats * (kAsRead + colors);
+  const double in_frame = splats * (kInFrame + colors);
+  if (work.finds_floaters) {
+    constexpr double kCells = 304.0 * 304 * 304 * (4 + 1 + 4);  // opacity, at matter, part
+    constexpr double kOfSplat = 12 + 1 + 1 + 4 + 4 + 8;  // place, kind, kept, part, size, tree
+    plan.push_back({"finding floaters", bytes(kBase + in_frame + kCells + splats * kOfSplat)});
+  }
+  if (work.read_back_bytes > 0) {
+    const double file = double(work.read_back_bytes);
+    plan.push_back({"reading back", bytes(kBase + in_frame + as_read + 2 * file)});
+  }
   if (work.pictures > 0) {
     const double pixels = double(work.picture_pixels);
     plan.push_back({"taking pictures",
@@ -129,10 +140,10 @@ std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
 void check_splat_memory_plan(const SplatWork& work, size_t budget) {
   for (const StageMemory& stage : splat_memory_plan(work)) {
     if (stage.bytes <= budget) continue;
-    const bool reads = stage.stage == "reading the splats";
-    const std::string less = reads ? "a file of fewer splats or without spherical harmonics needs "
-                                     "less, "
-                                   : "fewer splats, --virtual-views or --virtual-size need less, ";
+    const bool pictures = stage.stage == "taking pictures";
+    const std::string less = pictures
+                                 ? "fewer splats, --virtual-views or --virtual-size need less, "
+                                 : "fewer splats or none of spherical harmonics need less, ";
     throw LimitError("'" + stage.stage + "' needs about " + mebibytes(stage.bytes) + " and " +
                      mebibytes(budget) + " may be used; " + less +
                      "a larger --memory-limit allows it");

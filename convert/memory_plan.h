@@ -48,14 +48,16 @@ void check_memory_plan(const Scene& scene,
 /// What `convert` makes of splats that came without cameras.
 struct SplatWork {
   uint64_t splats = 0;
-  uint64_t harmonics = 1;       ///< RGB coefficients of each.
-  uint64_t file_bytes = 0;      ///< 0 = read already.
-  uint64_t pictures = 0;        ///< Of virtual cameras; 0 = none are taken.
-  uint64_t picture_pixels = 0;  ///< Of each.
+  uint64_t harmonics = 1;        ///< RGB coefficients of each.
+  uint64_t file_bytes = 0;       ///< 0 = read already.
+  uint64_t pictures = 0;         ///< Of virtual cameras; 0 = none are taken.
+  uint64_t picture_pixels = 0;   ///< Of each.
+  uint64_t read_back_bytes = 0;  ///< Of a file of them that was written; 0 = it is not read.
+  bool finds_floaters = false;
 };
 
-/// The same for splats: "reading", then "pictures". How large voxels will be is known only after
-/// the pictures: the volume itself refuses what does not fit.
+/// The same for splats: reading, floaters, pictures, reading back. How large voxels will be is
+/// known only after the pictures: the volume itself refuses what does not fit.
 std::vector<StageMemory> splat_memory_plan(const SplatWork& work);
 
 /// \throws LimitError naming the stage of splat_memory_plan() that needs most and what to lower, if

@@ -38,15 +38,17 @@ void compare_centres(const Gaussians& source,
 }
 
 /// Peak signal-to-noise ratio over all pictures, of the pixels where either shows splats.
-double psnr_of_pictures(const Gaussians& source,
-                        const Gaussians& written,
-                        const std::vector<Camera>& cameras) {
+std::optional<double> psnr_of_pictures(const Gaussians& source,
+                                       const Gaussians& written,
+                                       const std::vector<Camera>& cameras,
+                                       const Progress& progress) {
   constexpr float kNothing = 0.05f;  // alpha below which there is nothing
   double sum = 0;
   size_t count = 0;
-  for (const Camera& camera : cameras) {
-    const RenderBuffers a = rasterize(source, camera);
-    const RenderBuffers b = rasterize(written, camera);
+  for (size_t k = 0; k < cameras.size(); ++k) {
+    report(progress, double(k) / double(cameras.size()));
+    const RenderBuffers a = rasterize(source, cameras[k]);
+    const RenderBuffers b = rasterize(written, cameras[k]);
     for (size_t i = 0; i < a.alpha.data.size(); ++i) {
       if (std::max(a.alpha.data[i], b.alpha.data[i]) < kNothing) continue;
       const Eigen::Vector3f x = a.color.data[i].cwiseMin(1.0f);
@@ -55,6 +57,7 @@ double psnr_of_pictures(const Gaussians& source,
       count += 3;
     }
   }
+  if (count == 0) return std::nullopt;
   if (sum == 0) return std::numeric_limits<double>::infinity();
   return -10 * std::log10(sum / static_cast<double>(count));
 }
@@ -71,7 +74,8 @@ std::string percent(double part) {
 
 SplatLoss splat_loss(const Gaussians& source,
                      const Gaussians& written,
-                     std::span<const uint32_t> order) {
+                     std::span<const uint32_t> order,
+                     const Progress& progress) {
   SplatLoss out;
   out.dropped = source.size() - std::min(source.size(), written.size());
   if (source.size() == written.size()) compare_centres(source, written, order, out);
@@ -81,7 +85,7 @@ SplatLoss splat_loss(const Gaussians& source,
   const VirtualCameras cameras = virtual_cameras(source, options);
   out.extent = 2 * cameras.radius;
   out.views = cameras.cameras.size();
-  out.psnr = psnr_of_pictures(source, written, cameras.cameras);
+  out.psnr = psnr_of_pictures(source, written, cameras.cameras, progress);
   out.sh_degree_before = source.sh_degree;
   out.sh_degree_after = written.sh_degree;
   return out;
@@ -106,10 +110,12 @@ std::string splat_loss_line(const SplatLoss& loss, const Frame& frame) {
         << " change with direction";
   }
   out << "; " << loss.views << " pictures ";
-  if (std::isinf(loss.psnr)) {
+  if (!loss.psnr) {
+    out << "show too little to compare";
+  } else if (std::isinf(*loss.psnr)) {
     out << "are the same";
   } else {
-    out << "agree to " << loss.psnr << " dB PSNR";
+    out << "agree to " << *loss.psnr << " dB PSNR";
   }
   return out.str();
 }
@@ -123,8 +129,9 @@ Json splat_loss_to_json(const SplatLoss& loss, const Frame& frame) {
                       {"largest_of_extent", *loss.largest_move / loss.extent},
                       {"rms_of_extent", *loss.rms_move / loss.extent}};
   }
-  out["pictures"] = {{"psnr", std::isinf(loss.psnr) ? Json() : Json(loss.psnr)},
-                     {"views", loss.views}};
+  Json psnr;
+  if (loss.psnr) psnr = std::isinf(*loss.psnr) ? Json("same") : Json(*loss.psnr);
+  out["pictures"] = {{"psnr", psnr}, {"views", loss.views}};
   out["sh_degree"] = {{"before", loss.sh_degree_before}, {"after", loss.sh_degree_after}};
   return out;
 }

@@ -10,6 +10,7 @@
 
 #include "libcgs/core/frame.h"
 #include "libcgs/core/gaussians.h"
+#include "libcgs/core/progress.h"
 
 namespace cgs {
 
@@ -19,9 +20,10 @@ struct SplatLoss {
   /// Moves of centres [internal units]; empty if splats were dropped, so that nobody knows which of
   /// the two belong together.
   std::optional<double> largest_move, rms_move;
-  double extent = 0;  ///< Diameter of the scene without its strays [internal units]; > 0.
-  double psnr = 0;    ///< Of pictures, where they show splats [dB]; infinity = the same.
-  size_t views = 0;   ///< Pictures of each.
+  double extent = 0;           ///< Diameter of the scene without its strays [internal units]; > 0.
+  std::optional<double> psnr;  ///< Of pictures, where they show splats [dB]; infinity = the same;
+                               ///< empty = they show too little to compare.
+  size_t views = 0;            ///< Pictures of each.
   int sh_degree_before = 0;
   int sh_degree_after = 0;
 };
@@ -33,14 +35,16 @@ struct SplatLoss {
 /// \throws InvalidInput as virtual_cameras(); LimitError as rasterize()
 SplatLoss splat_loss(const Gaussians& source,
                      const Gaussians& written,
-                     std::span<const uint32_t> order);
+                     std::span<const uint32_t> order,
+                     const Progress& progress = {});
 
 /// One line for people.
 std::string splat_loss_line(const SplatLoss& loss, const Frame& frame);
 
 /// {"dropped", "centres": {"largest_move", "rms_move", "unit", "largest_of_extent",
 /// "rms_of_extent"}, "pictures": {"psnr", "views"}, "sh_degree": {"before", "after"}}; lengths in
-/// file units, centres null if splats were dropped, psnr null if the pictures are the same.
+/// file units, centres null if splats were dropped; psnr is "same" for pictures that are, and null
+/// for those that show too little.
 nlohmann::ordered_json splat_loss_to_json(const SplatLoss& loss, const Frame& frame);
 
 }  // namespace cgs

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include <libexif/exif-data.h>
 
@@ -53,8 +54,10 @@ double pixels_per_millimetre(ExifData* exif, const ImageSize& size) {
   const double unit = number(exif, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_PLANE_RESOLUTION_UNIT);
   const double millimetres = unit == kInch ? 25.4 : unit == kCentimetre ? 10 : 0;
   // Stated for the picture as it was taken; programs that shrink it leave the tag.
-  const double width = number(exif, EXIF_IFD_EXIF, EXIF_TAG_PIXEL_X_DIMENSION);
-  const double height = number(exif, EXIF_IFD_EXIF, EXIF_TAG_PIXEL_Y_DIMENSION);
+  double width = number(exif, EXIF_IFD_EXIF, EXIF_TAG_PIXEL_X_DIMENSION);
+  double height = number(exif, EXIF_IFD_EXIF, EXIF_TAG_PIXEL_Y_DIMENSION);
+  // HEIC states the size before it is turned upright.
+  if ((width > height) != (size.width > size.height)) std::swap(width, height);
   const bool is_same_shape =
       std::abs(width * size.height - height * size.width) <= 2 * std::max(size.width, size.height);
   if (!(resolution > 0 && millimetres > 0 && width > 0 && is_same_shape)) return 0;

@@ -149,19 +149,34 @@ std::string_view GlbContainer::chunk_bytes(const JsonValue& part) const {
   return binary_.substr(offset, length);
 }
 
+// Several views may name the same stream: together they hold no more than one that fills the file.
 void GlbContainer::decode_views() {
   const auto views = root().find("bufferViews");
+  uint64_t room = kMostMeshoptRatio * binary_.size();
   for (size_t i = 0; views && i < views->size(); ++i) {
     const auto extensions = views->at(i).find("extensions");
     const auto meshopt = extensions ? extensions->find(kMeshopt) : std::nullopt;
-    if (meshopt) decoded_[i] = meshopt_decoded(*meshopt, chunk_bytes(*meshopt));
+    if (!meshopt) continue;
+    std::string bytes = meshopt_decoded(*meshopt, chunk_bytes(*meshopt));
+    if (bytes.size() > room) {
+      throw LimitError(printable(path_) + ": compressed buffer views hold more than " +
+                       std::to_string(kMostMeshoptRatio) + " times the bytes of the file");
+    }
+    room -= bytes.size();
+    const uint64_t stated = whole_number(views->at(i).at("byteLength"));
+    if (stated != bytes.size()) {
+      views->at(i).fail(Defect::Count,
+                        "has " + std::to_string(stated) + " bytes, its stream holds " +
+                            std::to_string(bytes.size()));
+    }
+    decoded_[i] = {std::move(bytes), whole_number(meshopt->at("byteStride"))};
   }
 }
 
 std::string_view GlbContainer::view_bytes(const JsonValue& index) const {
   const JsonValue view = element("bufferViews", index);
   const auto decoded = decoded_.find(whole_number(index));
-  return decoded != decoded_.end() ? std::string_view(decoded->second) : chunk_bytes(view);
+  return decoded != decoded_.end() ? std::string_view(decoded->second.bytes) : chunk_bytes(view);
 }
 
 GlbContainer::Elements GlbContainer::elements(const JsonValue& accessor, int components) const {
@@ -183,8 +198,10 @@ GlbContainer::Elements GlbContainer::elements(const JsonValue& accessor, int com
   if (!view_index) accessor.fail(Defect::Unsupported, "has no buffer view");
   const JsonValue view = element("bufferViews", *view_index);
   const auto stride = view.find("byteStride");
-  out.stride = stride ? whole_number(*stride) : size;
-  if (out.stride < size) stride->fail(Defect::Value, "is smaller than an element");
+  const auto decoded = decoded_.find(whole_number(*view_index));
+  const uint64_t packed = decoded != decoded_.end() ? decoded->second.stride : size;
+  out.stride = stride ? whole_number(*stride) : packed;
+  if (out.stride < size) view.fail(Defect::Value, "has a stride smaller than an element");
   const auto start = accessor.find("byteOffset");
   const uint64_t offset = start ? whole_number(*start) : 0;
   out.bytes = view_bytes(*view_index);

@@ -61,7 +61,12 @@ class GlbContainer {
   std::string content_;
   std::string_view binary_;
   nlohmann::json json_;
-  std::map<uint64_t, std::string> decoded_;  // compressed buffer views by their number
+  // Of a compressed buffer view.
+  struct DecodedView {
+    std::string bytes;
+    uint64_t stride = 0;
+  };
+  std::map<uint64_t, DecodedView> decoded_;  // by number
 };
 
 /// A number without sign or fraction, up to 2^53. \throws BadInput Schema

@@ -260,9 +260,7 @@ std::string meshopt_decoded(const JsonValue& extension, std::string_view bytes) 
   stream.count = whole_number(extension.at("count"));
   stream.stride = whole_number(extension.at("byteStride"));
   require_fit(extension, stream);
-  // No stream holds more than 64 times its bytes: what claims more is not worth the memory.
-  constexpr uint64_t kMostPerByte = 64;
-  if (stream.count > kMostPerByte * bytes.size() / stream.stride) {
+  if (stream.count > kMostMeshoptRatio * bytes.size() / stream.stride) {
     extension.at("count").fail(Defect::Count,
                                "is " + std::to_string(stream.count) + " for a stream of " +
                                    std::to_string(bytes.size()) + " bytes");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -10,6 +11,9 @@
 namespace cgs {
 
 inline constexpr const char* kMeshopt = "EXT_meshopt_compression";
+
+/// No stream holds more bytes for each of its own.
+inline constexpr uint64_t kMostMeshoptRatio = 64;
 
 /// The same primitive with faces and vertices in an order in which neighbours follow each other,
 /// which compresses best and draws fastest.

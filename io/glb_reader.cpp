@@ -12,6 +12,7 @@
 #include "io/glb_scene.h"
 #include "io/mesh_arrays.h"
 #include "io/significance.h"
+#include "io/splat_glb.h"
 #include "libcgs/core/srgb.h"
 
 namespace cgs {
@@ -39,6 +40,9 @@ class SceneReader {
     if (!all_have_support_) mesh.support.clear();
     if (!all_have_sigma_) mesh.sigma.clear();
     if (!origin_.is_ours || !all_have_labels_) mesh.provenance.clear();
+    if (has_splats_) {
+      out_.parsed.warnings.emplace_back("left out the splats that lie beside the triangles");
+    }
     if (has_textures_) {
       out_.parsed.warnings.emplace_back("textures are not read; a mesh keeps colours of vertices");
     }
@@ -54,6 +58,8 @@ class SceneReader {
     const JsonValue primitives = mesh.at("primitives");
     for (size_t i = 0; i < primitives.size(); ++i) {
       const JsonValue primitive = primitives.at(i);
+      const auto extensions = primitive.find("extensions");
+      has_splats_ = has_splats_ || (extensions && extensions->find(kGaussianSplatting));
       const GlbFaces faces = read_glb_primitive(file_, primitive);
       add(faces, world, labels_of(primitive, faces));
       if (out_.parsed.mesh.faces.size() > kMostCorners / 3) {
@@ -72,9 +78,16 @@ class SceneReader {
     }
     std::vector<Provenance> out;
     for (const auto& face : in.faces) {
-      const float feature = in.features[face[0]];
-      if (!(feature >= 0 && feature < float{kProvenanceCount})) return {};
-      out.push_back(static_cast<Provenance>(feature));
+      size_t weakest = 0;  // in kProvenanceOrder, which goes from most to least evidence
+      for (const uint32_t corner : face) {
+        const auto* const found = std::find_if(
+            kProvenanceOrder.begin(), kProvenanceOrder.end(), [&](Provenance candidate) {
+              return static_cast<float>(candidate) == in.features[corner];
+            });
+        if (found == kProvenanceOrder.end()) return {};
+        weakest = std::max(weakest, static_cast<size_t>(found - kProvenanceOrder.begin()));
+      }
+      out.push_back(kProvenanceOrder.at(weakest));
     }
     return out;
   }
@@ -162,6 +175,7 @@ class SceneReader {
   bool all_have_support_ = true;
   bool all_have_sigma_ = true;
   bool has_textures_ = false;
+  bool has_splats_ = false;
 };
 
 }  // namespace

@@ -420,6 +420,61 @@ GlbPlacement placement_for(const TriangleMesh& mesh,
   return out;
 }
 
+/// How the primitives of a file are stored, on which grid.
+struct GlbStore {
+  GlbEncoding encoding = GlbEncoding::Plain;
+  DracoGrid draco;
+  QuantizedGrid whole;
+  int speed = 0;
+
+  int position_bits() const {
+    if (encoding == GlbEncoding::Plain) return 0;
+    return encoding == GlbEncoding::Draco ? draco.bits : 16;
+  }
+};
+
+GlbStore store_for(const std::vector<GlbPrimitive>& primitives,
+                   const GlbOptions& options,
+                   double max_error) {
+  GlbStore out;
+  out.encoding = options.encoding;
+  const bool is_too_small = extent_of(primitives) < kSmallestDracoExtent;
+  if (out.encoding == GlbEncoding::Draco && is_too_small) out.encoding = GlbEncoding::Plain;
+  if (out.encoding == GlbEncoding::Draco) out.draco = grid_for(primitives, max_error);
+  out.whole = QuantizedGrid::around(box_of(primitives));
+  out.speed = options.speed;
+  return out;
+}
+
+/// \return the largest move of a vertex [units of the file]
+double add_primitive(GlbBuilder& builder,
+                     const GlbPrimitive& primitive,
+                     const GlbStore& store,
+                     GlbReport& report) {
+  report.triangles += primitive.faces.size();
+  if (!primitive.texcoords.empty()) report.textured_triangles += primitive.faces.size();
+  double error = 0;
+  double texture_error = 0;
+  size_t vertices = primitive.positions.size();
+  if (store.encoding == GlbEncoding::Draco) {
+    const DracoPrimitive compressed = draco_compress(primitive, store.draco, store.speed);
+    builder.add_compressed(primitive, compressed);
+    vertices = compressed.vertices;
+    error = compressed.max_error;
+    texture_error = compressed.max_texture_error;
+  } else if (store.encoding == GlbEncoding::Plain) {
+    builder.add_plain(primitive);
+  } else {
+    const QuantizedPrimitive stored = quantized(primitive, store.whole);
+    builder.add_quantized(primitive, stored, store.whole);
+    error = stored.max_error;
+    texture_error = stored.max_texture_error;
+  }
+  report.vertices += vertices;
+  report.measured_texture_error = std::max(report.measured_texture_error, texture_error);
+  return error;
+}
+
 }  // namespace
 
 std::map<std::string, GlbEncoding> glb_encodings() {
@@ -460,7 +515,7 @@ GlbReport write_glb(const std::filesystem::path& path,
   const GlbPlacement placement = placement_for(mesh, frame, options);
   std::vector<TextureImage> images;
   if (!texture.empty()) images = texture_images(mesh, texture, options.jpeg_quality);
-  const std::vector<GlbPrimitive> primitives = glb_primitives(mesh, placement, texture, images);
+  std::vector<GlbPrimitive> primitives = glb_primitives(mesh, placement, texture, images);
   require(!primitives.empty(), "write_glb: faces with three different corners must be > 0", 0);
   const double world_scale = placement.scale / frame.scale;  // units of the file per world unit
   const double max_error = options.max_error * world_scale;
@@ -469,40 +524,14 @@ GlbReport write_glb(const std::filesystem::path& path,
   builder.set_extras(extras_for(mesh, frame, placement, options));
   builder.add_photographs(texture, images);
   for (const TextureImage& image : images) report.texture_bytes += image.jpeg.size();
-  const bool too_small = extent_of(primitives) < kSmallestDracoExtent;
-  const GlbEncoding encoding =
-      options.encoding == GlbEncoding::Draco && too_small ? GlbEncoding::Plain : options.encoding;
-  const bool draco = encoding == GlbEncoding::Draco;
-  const DracoGrid grid = draco ? grid_for(primitives, max_error) : DracoGrid{};
-  const QuantizedGrid whole = QuantizedGrid::around(box_of(primitives));
-  const bool meshopt = encoding == GlbEncoding::Meshopt;
-  const bool whole_numbers = meshopt || encoding == GlbEncoding::Quantized;
+  const GlbStore store = store_for(primitives, options, max_error);
   double worst = 0;
-  for (const GlbPrimitive& in : primitives) {
-    const GlbPrimitive& primitive = meshopt ? in_cache_order(in) : in;
-    report.triangles += primitive.faces.size();
-    if (!primitive.texcoords.empty()) report.textured_triangles += primitive.faces.size();
-    double texture_error = 0;
-    size_t vertices = primitive.positions.size();
-    if (draco) {
-      const DracoPrimitive compressed = draco_compress(primitive, grid, options.speed);
-      builder.add_compressed(primitive, compressed);
-      vertices = compressed.vertices;
-      worst = std::max(worst, compressed.max_error);
-      texture_error = compressed.max_texture_error;
-    } else if (whole_numbers) {
-      const QuantizedPrimitive stored = quantized(primitive, whole);
-      builder.add_quantized(primitive, stored, whole);
-      worst = std::max(worst, stored.max_error);
-      texture_error = stored.max_texture_error;
-    } else {
-      builder.add_plain(primitive);
-    }
-    report.vertices += vertices;
-    report.measured_texture_error = std::max(report.measured_texture_error, texture_error);
+  for (GlbPrimitive& primitive : primitives) {
+    if (store.encoding == GlbEncoding::Meshopt) primitive = in_cache_order(std::move(primitive));
+    worst = std::max(worst, add_primitive(builder, primitive, store, report));
   }
   // Half a rounding error of float coordinates is not the compression's.
-  const double slack = 1e-6 * double{grid.range};
+  const double slack = 1e-6 * double{store.draco.range};
   if (max_error > 0 && worst > max_error + slack) {
     throw NumericalError("write_glb: compression moves a vertex by " +
                          std::to_string(worst / world_scale) + ", allowed are " +
@@ -511,9 +540,10 @@ GlbReport write_glb(const std::filesystem::path& path,
   }
   report.primitives = primitives.size();
   report.dropped_triangles = mesh.faces.size() - report.triangles;
-  report.position_bits = draco ? grid.bits : whole_numbers ? 16 : 0;
+  report.position_bits = store.position_bits();
   report.measured_max_error = worst / world_scale;
-  const std::string bytes = meshopt ? meshopt_compressed(builder.bytes()) : builder.bytes();
+  std::string bytes = builder.bytes();
+  if (store.encoding == GlbEncoding::Meshopt) bytes = meshopt_compressed(bytes);
   report.bytes = bytes.size();
   write_file(path, bytes);
   return report;

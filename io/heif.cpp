@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <memory>
@@ -41,21 +42,30 @@ struct PrimaryImage {
   }
 };
 
-std::string pixels_of(const PrimaryImage& file) {
+std::string pixels_of(const PrimaryImage& file, const ImageSize& size) {
+  const bool has_alpha = heif_image_handle_has_alpha_channel(file.handle.get()) != 0;
   heif_image* decoded = nullptr;
-  require_ok(heif_decode_image(
-      file.handle.get(), &decoded, heif_colorspace_RGB, heif_chroma_interleaved_RGB, nullptr));
+  require_ok(
+      heif_decode_image(file.handle.get(),
+                        &decoded,
+                        heif_colorspace_RGB,
+                        has_alpha ? heif_chroma_interleaved_RGBA : heif_chroma_interleaved_RGB,
+                        nullptr));
   const Image image(decoded, &heif_image_release);
+  heif_error warning{};
+  if (heif_image_get_decoding_warnings(image.get(), 0, &warning, 1) > 0) require_ok(warning);
   int stride = 0;
   const uint8_t* const rows =
       heif_image_get_plane_readonly(image.get(), heif_channel_interleaved, &stride);
-  if (rows == nullptr) throw std::runtime_error("HEIF: no colours");
-  const auto width = static_cast<size_t>(heif_image_get_primary_width(image.get()));
-  const auto height = static_cast<size_t>(heif_image_get_primary_height(image.get()));
+  const bool fits = rows != nullptr && heif_image_get_primary_width(image.get()) == size.width &&
+                    heif_image_get_primary_height(image.get()) == size.height;
+  if (!fits) throw std::runtime_error("HEIF: the image is not of the size that is announced");
+  const size_t row_bytes = (has_alpha ? 4 : 3) * static_cast<size_t>(size.width);
   std::string out;
-  out.reserve(3 * width * height);
-  for (size_t y = 0; y < height; ++y) {
-    out.append(reinterpret_cast<const char*>(rows) + y * static_cast<size_t>(stride), 3 * width);
+  out.reserve(row_bytes * static_cast<size_t>(size.height));
+  for (int y = 0; y < size.height; ++y) {
+    const auto* row = reinterpret_cast<const char*>(rows) + std::ptrdiff_t{y} * stride;
+    out.append(row, row_bytes);
   }
   return out;
 }
@@ -65,10 +75,11 @@ std::string exif_of(const PrimaryImage& file) {
   heif_item_id id = 0;
   heif_image_handle* const handle = file.handle.get();
   if (heif_image_handle_get_list_of_metadata_block_IDs(handle, "Exif", &id, 1) != 1) return "";
-  std::string block(heif_image_handle_get_metadata_size(handle, id), '\0');
-  require_ok(heif_image_handle_get_metadata(handle, id, block.data()));
   constexpr size_t kOffset = 4;
-  if (block.size() < kOffset) return "";
+  constexpr size_t kMost = size_t{1} << 20;
+  std::string block(heif_image_handle_get_metadata_size(handle, id), '\0');
+  if (block.size() < kOffset || block.size() > kMost) return "";
+  if (heif_image_handle_get_metadata(handle, id, block.data()).code != heif_error_Ok) return "";
   uint64_t skipped = 0;
   for (size_t i = 0; i < kOffset; ++i) skipped = skipped << 8 | static_cast<uint8_t>(block[i]);
   if (skipped > block.size() - kOffset) return "";
@@ -77,11 +88,24 @@ std::string exif_of(const PrimaryImage& file) {
 
 }  // namespace
 
+// Of the box that comes first: the major brand, a version, and brands that it is compatible with.
 bool is_heif(std::string_view bytes) {
   static constexpr std::array<std::string_view, 8> kBrands = {
       "heic", "heix", "heim", "heis", "mif1", "msf1", "avif", "avis"};
-  if (bytes.substr(0, 8).substr(std::min<size_t>(4, bytes.size())) != "ftyp") return false;
-  return std::find(kBrands.begin(), kBrands.end(), bytes.substr(8, 4)) != kBrands.end();
+  constexpr size_t kMajor = 8;
+  constexpr size_t kVersion = 12;
+  constexpr size_t kMostBytes = 256;
+  if (bytes.size() < kVersion || bytes.substr(4, 4) != "ftyp") return false;
+  size_t end = 0;
+  for (const char c : bytes.substr(0, 4)) end = end << 8 | static_cast<uint8_t>(c);
+  end = std::min({std::max(end, kVersion), bytes.size(), kMostBytes});
+  for (size_t at = kMajor; at + 4 <= end; at += 4) {
+    if (at == kVersion) continue;
+    if (std::find(kBrands.begin(), kBrands.end(), bytes.substr(at, 4)) != kBrands.end()) {
+      return true;
+    }
+  }
+  return false;
 }
 
 ImageSize heif_size(std::string_view bytes, const std::filesystem::path& path) {
@@ -99,8 +123,15 @@ ImageSize heif_size(std::string_view bytes, const std::filesystem::path& path) {
   return {sides[0], sides[1]};
 }
 
-std::string decode_heif(std::string_view bytes, const std::filesystem::path& path) {
-  return run_isolated([&] { return pixels_of(PrimaryImage(bytes)); }, path);
+std::string decode_heif(std::string_view bytes,
+                        const ImageSize& size,
+                        const std::filesystem::path& path) {
+  // A stream may hold a larger picture than is announced, which must not cost more.
+  constexpr size_t kLeast = size_t{256} << 20;
+  constexpr size_t kPerPixel = 64;
+  IsolationLimits limits;
+  limits.memory = kLeast + kPerPixel * static_cast<size_t>(size.width) * size_t(size.height);
+  return run_isolated([&] { return pixels_of(PrimaryImage(bytes), size); }, path, limits);
 }
 
 std::string heif_exif(std::string_view bytes, const std::filesystem::path& path) {

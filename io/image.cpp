@@ -23,6 +23,10 @@ namespace cgs {
 
 namespace {
 
+bool is_all_usable(const MaskMap& usable) {
+  return std::all_of(usable.data.begin(), usable.data.end(), [](uint8_t set) { return set != 0; });
+}
+
 // What libjpeg calls instead of exit() and fprintf().
 struct JpegErrors {
   jpeg_error_mgr base;  // first, so that a pointer to it is a pointer to this
@@ -82,34 +86,41 @@ bool decode_jpeg(const unsigned char* bytes,
   return true;
 }
 
-ColorImage from_rgb(const ImageHeader& header, const unsigned char* rgb) {
+ColorImage from_bytes(const ImageHeader& header, const char* samples, int channels) {
   ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
-  for (size_t i = 0; i < image.data.size(); ++i) {
-    const unsigned char* p = rgb + 3 * i;
-    image.data[i] = Eigen::Vector3f(p[0], p[1], p[2]) / 255.0f;
+  const auto* p = reinterpret_cast<const unsigned char*>(samples);
+  for (Eigen::Vector3f& color : image.data) {
+    color = Eigen::Vector3f(p[0], p[1], p[2]) / 255.0f;
+    p += channels;
   }
   return image;
 }
 
 ColorImage read_heif(std::string_view bytes,
                      const ImageHeader& header,
-                     const std::filesystem::path& path) {
-  const std::string rgb = decode_heif(bytes, path);
-  if (rgb.size() != size_t{3} * size_t(header.width) * size_t(header.height)) {
-    throw BadInput(Defect::Syntax, path, "the decoded image is not what its header announces");
+                     const std::filesystem::path& path,
+                     MaskMap* alpha_mask) {
+  const std::string samples = decode_heif(bytes, {header.width, header.height}, path);
+  const size_t pixels = size_t(header.width) * size_t(header.height);
+  if (samples.size() == 3 * pixels) return from_bytes(header, samples.data(), 3);
+  constexpr unsigned char kHalf = 128;
+  MaskMap usable(header.width, header.height, 1);
+  for (size_t i = 0; i < pixels; ++i) {
+    usable.data[i] = static_cast<unsigned char>(samples[4 * i + 3]) >= kHalf ? 1 : 0;
   }
-  return from_rgb(header, reinterpret_cast<const unsigned char*>(rgb.data()));
+  if (alpha_mask != nullptr && !is_all_usable(usable)) *alpha_mask = std::move(usable);
+  return from_bytes(header, samples.data(), 4);
 }
 
 ColorImage read_jpeg(std::string_view bytes,
                      const ImageHeader& header,
                      const std::filesystem::path& path) {
-  std::vector<unsigned char> rgb(size_t{3} * size_t(header.width) * size_t(header.height));
+  std::string rgb(size_t{3} * size_t(header.width) * size_t(header.height), '\0');
   JpegErrors errors = {};
   const bool is_decoded = decode_jpeg(reinterpret_cast<const unsigned char*>(bytes.data()),
                                       bytes.size(),
                                       header,
-                                      rgb.data(),
+                                      reinterpret_cast<unsigned char*>(rgb.data()),
                                       errors);
   if (!is_decoded) throw BadInput(Defect::Syntax, path, std::string("JPEG: ") + errors.message);
   if (errors.base.num_warnings > 0) {
@@ -117,7 +128,7 @@ ColorImage read_jpeg(std::string_view bytes,
                    path,
                    std::string("JPEG data is cut or damaged (") + errors.message + ")");
   }
-  return from_rgb(header, rgb.data());
+  return from_bytes(header, rgb.data(), 3);
 }
 
 /// Sends standard error nowhere while it lives: the decoders behind OpenCV print their complaints
@@ -233,7 +244,7 @@ ColorImage read_image(const std::filesystem::path& path,
   check_image_is_whole(bytes, header, path);
   if (alpha_mask != nullptr) *alpha_mask = {};
   if (header.format == ImageFormat::Jpeg) return read_jpeg(bytes, header, path);
-  if (header.format == ImageFormat::Heif) return read_heif(bytes, header, path);
+  if (header.format == ImageFormat::Heif) return read_heif(bytes, header, path, alpha_mask);
 
   const cv::Mat pixels = decode_as_announced(bytes, header, path);
   ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
@@ -254,9 +265,7 @@ ColorImage read_image(const std::filesystem::path& path,
     default:
       throw BadInput(Defect::Unsupported, path, "signed whole-number samples are not read");
   }
-  const bool is_all =
-      std::all_of(usable.data.begin(), usable.data.end(), [](uint8_t set) { return set != 0; });
-  if (alpha_mask != nullptr && !is_all) *alpha_mask = std::move(usable);
+  if (alpha_mask != nullptr && !is_all_usable(usable)) *alpha_mask = std::move(usable);
   return image;
 }
 

@@ -23,8 +23,9 @@ ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits
 ///
 /// \param alpha_mask  where not null: emptied if every pixel is usable, else 1 where alpha is at
 ///                    least 0.5 and, for float images, the colour is finite
-/// \throws BadInput Truncated (also when a decoder only warns about missing data), Syntax,
-///         Unsupported, Magic, Open, Empty; LimitError before anything is decoded.
+/// \throws BadInput Truncated (also when a decoder only warns about missing data, which those of
+///         HEIC and AVIF rarely do), Syntax, Unsupported, Magic, Open, Empty; LimitError before
+///         anything is decoded.
 ColorImage read_image(const std::filesystem::path& path,
                       MaskMap* alpha_mask = nullptr,
                       const ReadLimits& limits = {});

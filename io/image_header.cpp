@@ -260,6 +260,10 @@ void check_png_is_whole(std::string_view bytes, const std::filesystem::path& pat
   };
   const std::string formats = std::string("; ") + std::string(kFormats);
   refuse_foreign_content(path, bytes, "an image");
+  if (at(4, "ftypcrx ")) {
+    throw BadInput(
+        Defect::Unsupported, path, "raw camera file; develop it, " + std::string(kFormats));
+  }
   if (at(4, "ftyp")) throw BadInput(Defect::Unsupported, path, "a video" + formats);
   if (at(0, "GIF8")) throw BadInput(Defect::Unsupported, path, "GIF image" + formats);
   if (at(0, "BM")) throw BadInput(Defect::Unsupported, path, "BMP image" + formats);

@@ -24,7 +24,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kExtension = "KHR_gaussian_splatting";
 constexpr int kFloat = 5126;  // glTF's number of the component type
 constexpr int kArrayBuffer = 34962;
 
@@ -76,9 +75,9 @@ class SplatBuffer {
         {"mode", 0},
         {"attributes", attributes_},
         {"extensions",
-         {{kExtension, {{"kernel", "ellipse"}, {"colorSpace", "srgb_rec709_display"}}}}}};
+         {{kGaussianSplatting, {{"kernel", "ellipse"}, {"colorSpace", "srgb_rec709_display"}}}}}};
     return {{"asset", {{"version", "2.0"}, {"generator", "cgs"}}},
-            {"extensionsUsed", {kExtension}},
+            {"extensionsUsed", {kGaussianSplatting}},
             {"scene", 0},
             {"scenes", {{{"nodes", {0}}}}},
             {"nodes", {{{"name", "splats"}, {"mesh", 0}}}},
@@ -102,14 +101,19 @@ void add_harmonics(SplatBuffer& buffer, const Gaussians& g) {
   const auto count = static_cast<size_t>(g.sh_count());
   for (int degree = 0, k = 0; degree <= g.sh_degree; ++degree) {
     for (int order = 0; order <= 2 * degree; ++order, ++k) {
-      const std::string name = std::string(kExtension) + ":SH_DEGREE_" + std::to_string(degree) +
-                               "_COEF_" + std::to_string(order);
-      buffer.add(name, "VEC3", [&](size_t i) { return g.sh[i * count + static_cast<size_t>(k)]; });
+      buffer.add(splat_harmonic_name(degree, order), "VEC3", [&](size_t i) {
+        return g.sh[i * count + static_cast<size_t>(k)];
+      });
     }
   }
 }
 
 }  // namespace
+
+std::string splat_harmonic_name(int degree, int order) {
+  return std::string(kGaussianSplatting) + ":SH_DEGREE_" + std::to_string(degree) + "_COEF_" +
+         std::to_string(order);
+}
 
 void SplatGlbOptions::validate() const {
   const double off = (y_up * y_up.transpose() - Eigen::Matrix3d::Identity()).norm();
@@ -145,7 +149,7 @@ size_t write_splat_glb(const std::filesystem::path& path,
     throw LimitError("write_splat_glb: glTF binary files end at 4 GiB");
   }
   SplatBuffer buffer(g.size());
-  const auto named = [](const char* what) { return std::string(kExtension) + ":" + what; };
+  const auto named = [](const char* what) { return std::string(kGaussianSplatting) + ":" + what; };
   buffer.add("POSITION", "VEC3", placed);
   buffer.set_bounds_of_last(box);
   buffer.add("COLOR_0", "VEC4", [&](size_t i) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <string>
 
 #include <Eigen/Core>
 
@@ -10,6 +11,12 @@
 #include "libcgs/core/gaussians.h"
 
 namespace cgs {
+
+/// The extension, and the prefix of its attributes.
+inline constexpr const char* kGaussianSplatting = "KHR_gaussian_splatting";
+
+/// The attribute of a spherical harmonic: degree 0 to 3, order 0 to 2 degree.
+std::string splat_harmonic_name(int degree, int order);
 
 struct SplatGlbOptions {
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).

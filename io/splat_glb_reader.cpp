@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -13,6 +14,7 @@
 #include "io/glb_container.h"
 #include "io/glb_scene.h"
 #include "io/sh_rotation.h"
+#include "io/splat_glb.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/srgb.h"
@@ -21,29 +23,61 @@ namespace cgs {
 
 namespace {
 
-constexpr const char* kExtension = "KHR_gaussian_splatting";
 // Nodes may repeat a mesh, so that the size of the file is no bound.
 constexpr uint64_t kMostSplats = uint64_t{1} << 26;
 constexpr uint64_t kMostHarmonics = uint64_t{1} << 28;
+constexpr uint64_t kMostPrimitives = uint64_t{1} << 20;
 
 std::optional<JsonValue> splat_extension(const JsonValue& primitive) {
   const auto extensions = primitive.find("extensions");
-  return extensions ? extensions->find(kExtension) : std::nullopt;
-}
-
-std::string harmonic_name(int degree, int order) {
-  return std::string(kExtension) + ":SH_DEGREE_" + std::to_string(degree) + "_COEF_" +
-         std::to_string(order);
+  return extensions ? extensions->find(kGaussianSplatting) : std::nullopt;
 }
 
 /// The highest degree of which anything is there.
 int sh_degree(const JsonValue& attributes) {
   for (int degree = 3; degree > 0; --degree) {
     for (int order = 0; order <= 2 * degree; ++order) {
-      if (attributes.find(harmonic_name(degree, order))) return degree;
+      if (attributes.find(splat_harmonic_name(degree, order))) return degree;
     }
   }
   return 0;
+}
+
+/// The primitives of a scene, those of a mesh once for every node that shows it.
+struct ScenePrimitives {
+  uint64_t splats = 0;           ///< Entries of their positions.
+  int sh_degree = 0;             ///< The highest.
+  bool has_triangles = false;    ///< In primitives that are no splats.
+  std::set<std::string> others;  ///< Those, by their place in the file.
+};
+
+ScenePrimitives scene_primitives(const GlbContainer& file,
+                                 const std::vector<GlbInstance>& instances) {
+  constexpr int kTriangles = 4;
+  ScenePrimitives out;
+  uint64_t visited = 0;
+  for (const GlbInstance& instance : instances) {
+    const JsonValue primitives = instance.mesh.at("primitives");
+    visited += primitives.size();
+    if (visited > kMostPrimitives) {
+      throw LimitError(printable(file.path()) + ": the nodes show more than " +
+                       std::to_string(kMostPrimitives) + " primitives");
+    }
+    for (size_t i = 0; i < primitives.size(); ++i) {
+      const JsonValue primitive = primitives.at(i);
+      if (!splat_extension(primitive)) {
+        const auto mode = primitive.find("mode");
+        out.has_triangles = out.has_triangles || !mode || mode->count() >= kTriangles;
+        out.others.insert(primitive.pointer());
+        continue;
+      }
+      const JsonValue attributes = primitive.at("attributes");
+      out.sh_degree = std::max(out.sh_degree, sh_degree(attributes));
+      const JsonValue positions = file.element("accessors", attributes.at("POSITION"));
+      out.splats += std::min(whole_number(positions.at("count")), kMostSplats + 1);
+    }
+  }
+  return out;
 }
 
 /// What a node does to splats: the linear part of its matrix.
@@ -165,19 +199,11 @@ class SplatScene {
  private:
   /// Finds the degree, and refuses too many splats before any is read.
   void examine(const std::vector<GlbInstance>& instances) {
-    uint64_t count = 0;
-    for (const GlbInstance& instance : instances) {
-      const JsonValue primitives = instance.mesh.at("primitives");
-      for (size_t i = 0; i < primitives.size(); ++i) {
-        if (!splat_extension(primitives.at(i))) continue;
-        const JsonValue attributes = primitives.at(i).at("attributes");
-        splats_.sh_degree = std::max(splats_.sh_degree, sh_degree(attributes));
-        const JsonValue positions = file_.element("accessors", attributes.at("POSITION"));
-        count += std::min(whole_number(positions.at("count")), kMostSplats + 1);
-      }
-    }
+    const ScenePrimitives found = scene_primitives(file_, instances);
+    splats_.sh_degree = found.sh_degree;
+    others_ = found.others.size();
     const uint64_t most = std::min(kMostSplats, kMostHarmonics / splats_.sh_count());
-    if (count > most) {
+    if (found.splats > most) {
       throw LimitError(printable(file_.path()) + ": more than " + std::to_string(most) + " splats");
     }
   }
@@ -214,17 +240,15 @@ class SplatScene {
     const JsonValue primitives = instance.mesh.at("primitives");
     for (size_t i = 0; i < primitives.size(); ++i) {
       const auto extension = splat_extension(primitives.at(i));
-      if (extension) {
-        add(primitives.at(i), *extension, file_from_gltf_ * instance.gltf_from_mesh);
-      } else {
-        ++others_;
-      }
+      if (extension) add(primitives.at(i), *extension, file_from_gltf_ * instance.gltf_from_mesh);
     }
   }
 
   Attributes attributes_of(const JsonValue& primitive, const JsonValue& extension) const {
     const JsonValue in = primitive.at("attributes");
-    const auto named = [](const char* what) { return std::string(kExtension) + ":" + what; };
+    const auto named = [](const char* what) {
+      return std::string(kGaussianSplatting) + ":" + what;
+    };
     if (extension.find("extensions") && !in.find(named("ROTATION"))) {
       extension.fail(Defect::Unsupported, "holds compressed splats; save them uncompressed");
     }
@@ -257,7 +281,7 @@ class SplatScene {
     out.degree = sh_degree(in);
     for (int degree = 0; degree <= out.degree; ++degree) {
       for (int order = 0; order <= 2 * degree; ++order) {
-        out.harmonics.push_back(values(harmonic_name(degree, order), 3));
+        out.harmonics.push_back(values(splat_harmonic_name(degree, order), 3));
       }
     }
     return out;
@@ -328,16 +352,16 @@ class SplatScene {
 
 }  // namespace
 
-bool is_splat_glb(const std::filesystem::path& path) {
+GlbSplatCount count_glb_splats(const std::filesystem::path& path) {
   const GlbContainer file(path);
-  const auto meshes = file.root().find("meshes");
-  for (size_t i = 0; meshes && i < meshes->size(); ++i) {
-    const JsonValue primitives = meshes->at(i).at("primitives");
-    for (size_t k = 0; k < primitives.size(); ++k) {
-      if (splat_extension(primitives.at(k))) return true;
-    }
-  }
-  return false;
+  const ScenePrimitives found = scene_primitives(file, glb_instances(file));
+  const uint64_t side = static_cast<uint64_t>(found.sh_degree) + 1;
+  return {found.splats, side * side, found.has_triangles};
+}
+
+bool is_splat_glb(const std::filesystem::path& path) {
+  const GlbSplatCount found = count_glb_splats(path);
+  return found.splats > 0 && !found.has_triangles;
 }
 
 RawSplats parse_splat_glb(std::string content, const std::filesystem::path& path) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -8,13 +9,23 @@
 
 namespace cgs {
 
-/// True for a binary glTF file with a primitive of splats (KHR_gaussian_splatting).
-/// \throws BadInput as GlbContainer; LimitError
+/// What the default scene of a binary glTF file states to hold.
+struct GlbSplatCount {
+  uint64_t splats = 0;         ///< KHR_gaussian_splatting
+  uint64_t harmonics = 1;      ///< RGB coefficients of each.
+  bool has_triangles = false;  ///< Beside them.
+};
+
+/// \throws BadInput as GlbContainer and glb_instances(); LimitError
+GlbSplatCount count_glb_splats(const std::filesystem::path& path);
+
+/// True for a binary glTF file that shows splats and no triangles: what shows both is a mesh.
+/// \throws BadInput as count_glb_splats(); LimitError
 bool is_splat_glb(const std::filesystem::path& path);
 
 /// Reads every splat of the default scene of a binary glTF file, nodes placed as the file says:
-/// they turn, scale and mirror splats and their spherical harmonics too. Attributes may be floats
-/// or whole numbers.
+/// they turn, scale and mirror splats and their spherical harmonics too (harmonics are only turned
+/// where a node scales its axes differently). Attributes may be floats or whole numbers.
 ///
 /// Files of ours lead back to world coordinates, with unit and origin. Others are in metres with +Y
 /// up, as the format demands, and are turned half way around z, into the axes of the 3DGS PLY.

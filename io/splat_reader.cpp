@@ -47,10 +47,16 @@ std::optional<SplatCount> stated_splats(const std::filesystem::path& path) {
   std::error_code unknown;
   out.file_bytes = std::filesystem::file_size(path, unknown);
   if (unknown) return {};
+  if (start.substr(0, 4) == "glTF") {
+    const GlbSplatCount found = count_glb_splats(path);
+    out.splats = found.splats;
+    out.harmonics = found.harmonics;
+    return out;
+  }
   if (start.substr(0, 3) != "ply") {
     constexpr uint64_t kRecord = 32;
-    const bool is_plain = !looks_like_spz(start) && !looks_like_sog(start) &&
-                          !looks_like_ksplat(start) && start.substr(0, 4) != "glTF";
+    const bool is_plain =
+        !looks_like_spz(start) && !looks_like_sog(start) && !looks_like_ksplat(start);
     if (!is_plain || out.file_bytes % kRecord != 0) return {};
     out.splats = out.file_bytes / kRecord;
     return out;

@@ -404,11 +404,12 @@ FusedVolume fuse(std::span<const TsdfView> views,
   const auto mixed = size_t(std::count(sights.begin(), sights.end(), Sight::Mixed));
   out.report.predicted_bytes = predicted_bytes(views, grid.size(), mixed);
   if (out.report.predicted_bytes > options.memory_limit) {
-    const auto mebibytes = [](size_t bytes) { return std::to_string(bytes >> 20) + " MiB"; };
+    constexpr size_t kMebi = size_t{1} << 20;
+    const size_t needed = (out.report.predicted_bytes + kMebi - 1) / kMebi;
     throw LimitError("fusing " + std::to_string(out.report.voxels) + " voxels may take " +
-                     mebibytes(out.report.predicted_bytes) + ", allowed are " +
-                     mebibytes(options.memory_limit) +
-                     "; larger voxels need less, a larger memory limit allows it");
+                     std::to_string(needed) + " MiB, allowed are " +
+                     std::to_string(options.memory_limit / kMebi) +
+                     " MiB; larger voxels need less, a larger memory limit allows it");
   }
   report(progress, 0.15);
 

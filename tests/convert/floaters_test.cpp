@@ -56,6 +56,29 @@ TEST_F(FloatersTest, LeavesASceneWithoutThemAlone) {
   EXPECT_FALSE(found.doubtful);
 }
 
+// Few large splats, each of which lets most light through: together they stop most of it.
+TEST_F(FloatersTest, LeavesAFloorOfLargeFaintSplats) {
+  constexpr int kSide = 10;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const double x = 1.2 * (i % kSide + 0.5) / kSide - 0.6;
+    const double y = 1.2 * (i / kSide + 0.5) / kSide - 0.6;
+    add(scene_, {x, y, -0.45}, {0.15, 0.15, 0.001}, 0.1);
+  }
+  const Floaters found = find_floaters(scene_);
+  EXPECT_LT(found.count(), 10u) << floaters_text(found);
+}
+
+TEST_F(FloatersTest, SaysWhatWasTooFarToJudge) {
+  const size_t ends_of_the_wire = find_floaters(scene_).outside;
+  add(scene_, {40, 0, 0}, {0.01, 0.01, 0.01}, 0.9);
+  const Floaters found = find_floaters(scene_);
+  EXPECT_EQ(found.outside, ends_of_the_wire + 1);
+  EXPECT_EQ(found.keep.back(), 1);
+  EXPECT_NE(floaters_text(found).find(std::to_string(found.outside) +
+                                      " too far from the scene to judge were kept"),
+            std::string::npos);
+}
+
 TEST_F(FloatersTest, FindsEachKindAndNothingElse) {
   const size_t surface = scene_.size();
   Gaussians g = scene_;

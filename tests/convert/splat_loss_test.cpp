@@ -21,10 +21,10 @@ TEST(SplatLoss, IsNothingForTheSameSplats) {
   const SplatLoss loss = splat_loss(ball(), ball(), {});
   EXPECT_EQ(loss.largest_move, 0.0);
   EXPECT_EQ(loss.rms_move, 0.0);
-  EXPECT_TRUE(std::isinf(loss.psnr));
+  EXPECT_TRUE(std::isinf(loss.psnr.value()));
   EXPECT_GT(loss.views, 0u);
   const nlohmann::ordered_json json = splat_loss_to_json(loss, Frame{});
-  EXPECT_TRUE(json["pictures"]["psnr"].is_null());
+  EXPECT_EQ(json["pictures"]["psnr"], "same");
   EXPECT_EQ(splat_loss_line(loss, Frame{}),
             "the file reads back with centres as they were; " + std::to_string(loss.views) +
                 " pictures are the same");
@@ -57,7 +57,16 @@ TEST(SplatLoss, MeasuresColoursWhereSplatsAre) {
   for (Eigen::Vector3f& c : source.sh) c = Eigen::Vector3f::Constant(-0.2f / kShC0);
   Gaussians written = source;
   for (Eigen::Vector3f& c : written.sh) c = Eigen::Vector3f::Constant(-0.1f / kShC0);
-  EXPECT_NEAR(splat_loss(source, written, {}).psnr, 20, 1);
+  EXPECT_NEAR(splat_loss(source, written, {}).psnr.value(), 20, 1);
+}
+
+TEST(SplatLoss, DoesNotJudgePicturesThatShowNothing) {
+  Gaussians faint = ball();
+  for (float& alpha : faint.opacity) alpha = 1e-5f;
+  const SplatLoss loss = splat_loss(faint, faint, {});
+  EXPECT_FALSE(loss.psnr.has_value());
+  EXPECT_TRUE(splat_loss_to_json(loss, Frame{})["pictures"]["psnr"].is_null());
+  EXPECT_NE(splat_loss_line(loss, Frame{}).find("show too little"), std::string::npos);
 }
 
 TEST(SplatLoss, SaysWhatIsMissing) {

@@ -35,6 +35,7 @@
 #include "io/vdb.h"
 #include "libcgs/priors/onnx_input.h"
 #include "tests/support/exif_segment.h"
+#include "tests/support/heif_file.h"
 #include "tests/support/ksplat_file.h"
 #include "tests/support/onnx_file.h"
 #include "tests/support/packed_ply.h"
@@ -113,6 +114,10 @@ void add_pictures(Kinds& kinds) {
     return bytes.insert(2, orientation_segment(6));
   };
   kinds.push_back(of_bytes("jpeg", "a.jpg", with_exif, read));
+  FileKind heic = of_bytes(
+      "heic", "a.heic", [] { return heif(ColorImage(16, 12, Eigen::Vector3f::Ones())); }, read);
+  heic.is_isolated = true;
+  kinds.push_back(heic);
   kinds.push_back(of_bytes("tiff", "a.tif", tiff_bytes, read));
 }
 

@@ -2,11 +2,14 @@
 #include "io/glb_meshopt.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <set>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/glb_bytes.h"
 #include "io/glb_reader.h"
 #include "io/gltf.h"
 #include "libcgs/core/error.h"
@@ -49,6 +52,34 @@ TEST(GlbMeshopt, CacheOrderIsTheSameMesh) {
   }
 }
 
+/// What a file says of a face, corners from the smallest place on.
+struct FaceClaims {
+  std::array<std::array<double, 3>, 3> places;
+  std::array<float, 3> support;
+  std::array<float, 3> sigma;
+  Provenance label;
+
+  bool operator<(const FaceClaims& other) const { return places < other.places; }
+};
+
+FaceClaims claims_of(const GlbMesh& file, size_t f) {
+  const TriangleMesh& mesh = file.parsed.mesh;
+  auto face = mesh.faces[f];
+  const auto place = [&](uint32_t v) {
+    const Eigen::Vector3d& p = file.parsed.positions[v];
+    return std::array{p.x(), p.y(), p.z()};
+  };
+  const auto less = [&](uint32_t a, uint32_t b) { return place(a) < place(b); };
+  std::rotate(face.begin(), std::min_element(face.begin(), face.end(), less), face.end());
+  FaceClaims out{{}, {}, {}, mesh.provenance[f]};
+  for (size_t k = 0; k < 3; ++k) {
+    out.places.at(k) = place(face.at(k));
+    out.support.at(k) = mesh.support[face.at(k)];
+    out.sigma.at(k) = mesh.sigma[face.at(k)];
+  }
+  return out;
+}
+
 TEST(GlbMeshopt, HoldsWhatTheQuantizedFileHoldsInLess) {
   const test::TempDir dir;
   const TriangleMesh mesh = test::labelled_sphere(96, 128);
@@ -59,17 +90,24 @@ TEST(GlbMeshopt, HoldsWhatTheQuantizedFileHoldsInLess) {
   const GlbReport packed = written("m.glb", GlbEncoding::Meshopt);
   EXPECT_LT(packed.bytes, quantized.bytes / 2);
   EXPECT_EQ(packed.measured_max_error, quantized.measured_max_error);
-  const GlbMesh a = read_glb(dir / "q.glb");
-  const GlbMesh b = read_glb(dir / "m.glb");
-  const auto sorted = [](std::vector<Eigen::Vector3d> places) {
-    const auto less = [](const Eigen::Vector3d& s, const Eigen::Vector3d& t) {
-      return std::lexicographical_compare(s.data(), s.data() + 3, t.data(), t.data() + 3);
-    };
-    std::sort(places.begin(), places.end(), less);
-    return places;
+  // To the last bit, but for sigma, which keeps 15.
+  const auto claims = [&](const char* name) {
+    const GlbMesh file = read_glb(dir / name);
+    std::multiset<FaceClaims> out;
+    for (size_t f = 0; f < file.parsed.mesh.faces.size(); ++f) out.insert(claims_of(file, f));
+    return out;
   };
-  EXPECT_EQ(sorted(a.parsed.positions), sorted(b.parsed.positions));  // to the last bit
-  EXPECT_EQ(a.parsed.mesh.faces.size(), b.parsed.mesh.faces.size());
+  const std::multiset<FaceClaims> wanted = claims("q.glb");
+  const std::multiset<FaceClaims> found = claims("m.glb");
+  ASSERT_EQ(found.size(), wanted.size());
+  for (auto a = found.begin(), b = wanted.begin(); a != found.end(); ++a, ++b) {
+    EXPECT_EQ(a->places, b->places);
+    EXPECT_EQ(a->label, b->label);
+    EXPECT_EQ(a->support, b->support);
+    for (size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(a->sigma.at(k), b->sigma.at(k), std::abs(b->sigma.at(k)) / (1 << 14));
+    }
+  }
 }
 
 /// Streams of one triangle, decoded with the extension's parameters.
@@ -109,6 +147,24 @@ TEST(GlbMeshopt, RefusesStreamsThatAreNone) {
     EXPECT_THROW(decoded(changed("mode", "STRIPS"), stream), BadInput);
     EXPECT_THROW(decoded(changed("filter", "COLOR"), stream), BadInput);
   }
+}
+
+// A small file with many views of one stream would fill the memory.
+TEST(GlbMeshopt, RefusesManyViewsOfOneStream) {
+  const test::TempDir dir;
+  write_glb(dir / "a.glb",
+            test::labelled_sphere(),
+            test::centimetre_frame(),
+            {.encoding = GlbEncoding::Meshopt});
+  const std::string file = test::read_bytes(dir / "a.glb");
+  const size_t json_size = file.find(std::string("BIN\0", 4)) - 4 - 20;
+  auto document = nlohmann::json::parse(file.substr(20, json_size));
+  const auto view = document["bufferViews"][0];
+  ASSERT_TRUE(view.contains("extensions"));
+  constexpr int kCopies = 2000;
+  for (int i = 0; i < kCopies; ++i) document["bufferViews"].push_back(view);
+  test::write_bytes(dir / "b.glb", glb_bytes(document.dump(), file.substr(28 + json_size)));
+  EXPECT_THROW(read_glb(dir / "b.glb"), LimitError);
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 namespace cgs {
 namespace {
 
+using namespace std::string_literals;
+
 /// Red grows to the right, green downwards.
 ColorImage ramps(int width, int height) {
   ColorImage out(width, height, Eigen::Vector3f::Zero());
@@ -74,6 +76,29 @@ TEST(Heif, TurnsPicturesUpright) {
   EXPECT_LT(largest_difference(back, turned), 0.05f);
 }
 
+TEST(Heif, MasksWhatIsTransparent) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.avif",
+                    test::heif(ramps(96, 64), {.codec = heif_compression_AV1, .has_alpha = true}));
+  MaskMap mask;
+  (void)read_image(dir / "a.avif", &mask);
+  ASSERT_FALSE(mask.empty());
+  EXPECT_EQ(mask(10, 10), 0);
+  EXPECT_EQ(mask(80, 10), 1);
+}
+
+// Phones write the family's common brand first, and their own after it.
+TEST(Heif, IsToldByAnyOfItsBrands) {
+  const auto box = [](const std::string& brands) {
+    return std::string("\0\0\0\x18", 4) + "ftyp" + brands;
+  };
+  EXPECT_TRUE(is_heif(box("heic\0\0\0\0mif1heic"s)));
+  EXPECT_TRUE(is_heif(box("miaf\0\0\0\0MA1Bavif"s)));
+  EXPECT_FALSE(is_heif(box("isom\0\0\0\0iso2mp41"s)));
+  EXPECT_FALSE(is_heif(box("isom\0\0\0\0iso2mp41heic"s)));  // beyond the box
+  EXPECT_FALSE(is_heif("ftyp"));
+}
+
 TEST(Heif, RefusesWhatIsCutOrDamaged) {
   const std::string good = test::heif(ramps(96, 64));
   const test::TempDir dir;
@@ -83,6 +108,10 @@ TEST(Heif, RefusesWhatIsCutOrDamaged) {
   };
   EXPECT_EQ(defect(good.substr(0, good.size() / 2)), "SYNTAX");
   EXPECT_EQ(defect(good.substr(0, 40)), "SYNTAX");
+  std::string turned = good;  // says 64 x 96
+  const size_t size = turned.find("ispe") + 8;
+  std::swap(turned[size + 3], turned[size + 7]);
+  EXPECT_EQ(defect(turned), "SYNTAX");
   int refused = 0;
   for (size_t at = 12; at < good.size(); at += 1 + good.size() / 60) {
     std::string bad = good;

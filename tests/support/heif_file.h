@@ -18,6 +18,7 @@ struct HeifKind {
   heif_compression_format codec = heif_compression_HEVC;
   heif_orientation orientation = heif_orientation_normal;  ///< How it is to be turned when shown.
   std::string exif;                                        ///< From the TIFF header on; or empty.
+  bool has_alpha = false;                                  ///< The left half is transparent.
 };
 
 /// A picture as such a file, of the best quality that is not lossless.
@@ -26,16 +27,23 @@ inline std::string heif(const ColorImage& picture, const HeifKind& kind = {}) {
     EXPECT_EQ(error.code, heif_error_Ok) << error.message;
   };
   heif_image* image = nullptr;
-  ok(heif_image_create(
-      picture.width, picture.height, heif_colorspace_RGB, heif_chroma_interleaved_RGB, &image));
-  ok(heif_image_add_plane(image, heif_channel_interleaved, picture.width, picture.height, 24));
+  const int channels = kind.has_alpha ? 4 : 3;
+  ok(heif_image_create(picture.width,
+                       picture.height,
+                       heif_colorspace_RGB,
+                       kind.has_alpha ? heif_chroma_interleaved_RGBA : heif_chroma_interleaved_RGB,
+                       &image));
+  ok(heif_image_add_plane(
+      image, heif_channel_interleaved, picture.width, picture.height, 8 * channels));
   int stride = 0;
   uint8_t* const rows = heif_image_get_plane(image, heif_channel_interleaved, &stride);
   for (int y = 0; y < picture.height; ++y) {
     for (int x = 0; x < picture.width; ++x) {
       for (int c = 0; c < 3; ++c) {
-        rows[y * stride + 3 * x + c] = static_cast<uint8_t>(std::lround(255 * picture(x, y)[c]));
+        rows[y * stride + channels * x + c] =
+            static_cast<uint8_t>(std::lround(255 * picture(x, y)[c]));
       }
+      if (kind.has_alpha) rows[y * stride + channels * x + 3] = 2 * x < picture.width ? 0 : 255;
     }
   }
   heif_context* const context = heif_context_alloc();

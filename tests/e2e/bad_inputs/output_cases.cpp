@@ -25,7 +25,7 @@ void add_environment(Cases& cases) {
          return Call{{"fuse", folder / "model", "-q", "-o", folder / "taken/v.vdb"}, {}};
        }});
   cases.push_back(
-      {"E05", "a volume above the budget", "LIMIT", {"bytes"}, [](const fs::path& f) {
+      {"E05", "a volume above the budget", "LIMIT", {"MiB, allowed are"}, [](const fs::path& f) {
          write_model_folder(f);
          return Call{{"fuse", f / "model", "-q", "--memory-limit", "1M", "-o", f / "out.vdb"}, {}};
        }});
