@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <numeric>
 #include <tuple>
@@ -99,36 +100,59 @@ std::vector<std::array<uint32_t, 3>> joined_points(const std::vector<Eigen::Vect
 // Where faces of a part should look at a corner: along its normal, or away from the middle.
 std::vector<Eigen::Vector3d> outward(const TriangleMesh& mesh, const MeshComponents& parts) {
   std::vector<Eigen::Vector4d> middle(parts.area.size(), Eigen::Vector4d::Zero());
+  std::vector<uint8_t> states_normals(parts.area.size(), 0);
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     for (const uint32_t v : mesh.faces[f]) {
       middle[parts.of_face[f]] += mesh.vertices[v].cast<double>().homogeneous();
+      if (!mesh.normals.empty() && !mesh.normals[v].isZero(0)) states_normals[parts.of_face[f]] = 1;
     }
   }
   std::vector<Eigen::Vector3d> out(mesh.vertices.size(), Eigen::Vector3d::Zero());
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     const Eigen::Vector3d center = middle[parts.of_face[f]].hnormalized();
     for (const uint32_t v : mesh.faces[f]) {
-      out[v] = mesh.normals.empty() ? Eigen::Vector3d(mesh.vertices[v].cast<double>() - center)
-                                    : mesh.normals[v].cast<double>();
+      out[v] = states_normals[parts.of_face[f]] != 0
+                   ? mesh.normals[v].cast<double>()
+                   : Eigen::Vector3d(mesh.vertices[v].cast<double>() - center);
     }
   }
   return out;
 }
 
+/// How the faces of a part lie, sums over them.
+struct PartSide {
+  double agreement = 0;  // with where they should look
+  double most = 0;       // that it could be
+  Eigen::Vector3d area = Eigen::Vector3d::Zero();
+
+  // Where that says nothing, as of a plane without normals, the larger side of an axis is out.
+  bool is_wrong() const {
+    constexpr double kNoise = 1e-4;
+    if (std::abs(agreement) > kNoise * most) return agreement < 0;
+    Eigen::Index axis = 0;
+    area.cwiseAbs().maxCoeff(&axis);
+    return area[axis] < 0;
+  }
+};
+
 // Neighbours agree within a part already.
 void turn_parts(TriangleMesh& mesh) {
   const MeshComponents parts = components(mesh);
   const std::vector<Eigen::Vector3d> sides = outward(mesh, parts);
-  std::vector<double> agreement(parts.area.size(), 0);
+  std::vector<PartSide> all(parts.area.size());
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     const auto& [a, b, c] = mesh.faces[f];
     const Eigen::Vector3d area = (mesh.vertices[b] - mesh.vertices[a])
                                      .cast<double>()
                                      .cross((mesh.vertices[c] - mesh.vertices[a]).cast<double>());
-    agreement[parts.of_face[f]] += area.dot(sides[a] + sides[b] + sides[c]);
+    const Eigen::Vector3d out = sides[a] + sides[b] + sides[c];
+    PartSide& part = all[parts.of_face[f]];
+    part.agreement += area.dot(out);
+    part.most += area.norm() * out.norm();
+    part.area += area;
   }
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    if (agreement[parts.of_face[f]] < 0) std::swap(mesh.faces[f][1], mesh.faces[f][2]);
+    if (all[parts.of_face[f]].is_wrong()) std::swap(mesh.faces[f][1], mesh.faces[f][2]);
   }
 }
 

@@ -22,7 +22,8 @@ struct InterpolatedSurface {
 /// All that is stated of a point stays as it is, for it does not move. A face takes the weakest
 /// label under it (see take_labels()) and of its corners; what lies farther than two spacings from
 /// every point bridges a gap and is Inferred. Faces look to the side of the normals, or, where
-/// there are none, away from the middle of their part.
+/// there are none or all are zero, away from the middle of their part; where that tells nothing, as
+/// of a plane, to the larger side of the axis that they look along most.
 /// Source: Cohen-Steiner and Da 2004, "A greedy Delaunay-based surface reconstruction algorithm",
 /// as in CGAL.
 /// \param max_edge  of a triangle [internal units], > 0

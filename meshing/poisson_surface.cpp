@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -89,27 +90,34 @@ struct LinearPart {
 
 /// The grid points around the zero surface of a function: all corners of every voxel that it comes
 /// into. Beyond a box around the points, to which sheets that nothing closes run out, is outside.
+/// The grid counts in voxels, for OpenVDB takes no tiny ones.
 class Band {
  public:
   Band(const Eigen::AlignedBox3d& box, double voxel) : box_(box), voxel_(voxel) {}
 
+  /// \throws LimitError if that takes too many grid points
   void add(const LinearPart& part) {
-    const double slope = part.gradient.norm();
     reaches_box_ = reaches_box_ || !box_.contains(part.box);
     const Eigen::AlignedBox3d box = part.box.intersection(box_);
     if (box.isEmpty()) return;
-    const double reach = std::sqrt(3.0) * voxel_ * slope;
-    for_each_in(box, [&](const openvdb::Coord& at) {
-      if (std::abs(part.value(place(at))) > reach) return;
-      slopes_at_.setValue(at, slopes_at_.getValue(at) + static_cast<float>(slope));
-      counts_at_.setValue(at, counts_at_.getValue(at) + 1);
-    });
+    const double slope = voxel_ * part.gradient.norm();
+    const double reach = std::sqrt(3.0) * slope;
+    const auto [low, high] = corners_of(box);
+    for (int i = low.x(); i <= high.x(); ++i) {
+      for (int j = low.y(); j <= high.y(); ++j) {
+        const auto [first, last] = near_zero(part, {i, j}, 1.01 * reach, {low.z(), high.z()});
+        for (int k = first; k <= last; ++k) {
+          const openvdb::Coord at(i, j, k);
+          if (std::abs(part.value(place(at))) <= reach) add(at, slope);
+        }
+      }
+    }
   }
 
-  /// About the distance to the zero surface, near it [internal units].
+  /// About the distance to the zero surface, near it [voxels].
   openvdb::FloatGrid::Ptr distances(const PoissonFunction& function) {
+    constexpr float kBackground = 3;
     if (reaches_box_) add_box();
-    const auto background = static_cast<float>(3 * voxel_);
     for (auto it = slopes_->beginValueOn(); it; ++it) {
       const openvdb::Coord at = it.getCoord();
       const Eigen::Vector3d p = place(at);
@@ -118,11 +126,10 @@ class Band {
       const int count = counts_at_.getValue(at);
       const double slope = count > 0 ? double(*it) / count : 1e-30;
       const double beyond = ((p - box_.center()).cwiseAbs() - box_.sizes() / 2).maxCoeff();
-      const double value = std::max(function.value(p) / slope, beyond);
-      it.setValue(static_cast<float>(std::clamp(value, -3 * voxel_, 3 * voxel_)));
+      const auto value = static_cast<float>(std::max(function.value(p) / slope, beyond / voxel_));
+      it.setValue(std::clamp(value, -kBackground, kBackground));
     }
-    slopes_->setTransform(openvdb::math::Transform::createLinearTransform(voxel_));
-    openvdb::tools::changeBackground(slopes_->tree(), background);
+    openvdb::tools::changeBackground(slopes_->tree(), kBackground);
     openvdb::tools::signedFloodFill(slopes_->tree());
     return slopes_;
   }
@@ -132,16 +139,35 @@ class Band {
     return voxel_ * Eigen::Vector3d(at.x(), at.y(), at.z());
   }
 
-  // The corners of all voxels that the box comes into.
-  template <typename Visit>
-  void for_each_in(const Eigen::AlignedBox3d& box, const Visit& visit) const {
-    const Eigen::Vector3i low = (box.min() / voxel_).array().floor().cast<int>();
-    const Eigen::Vector3i high = (box.max() / voxel_).array().ceil().cast<int>();
-    for (int i = low.x(); i <= high.x(); ++i) {
-      for (int j = low.y(); j <= high.y(); ++j) {
-        for (int k = low.z(); k <= high.z(); ++k) visit(openvdb::Coord(i, j, k));
-      }
+  // The lowest and the highest of all voxels that the box comes into.
+  std::pair<Eigen::Vector3i, Eigen::Vector3i> corners_of(const Eigen::AlignedBox3d& box) const {
+    return {(box.min() / voxel_).array().floor().cast<int>(),
+            (box.max() / voxel_).array().ceil().cast<int>()};
+  }
+
+  // Where a column along z, within a range, can have values up to the reach: first and last.
+  std::pair<int, int> near_zero(const LinearPart& part,
+                                const Eigen::Vector2i& column,
+                                double reach,
+                                const Eigen::Vector2i& range) const {
+    const double value = part.value(place({column.x(), column.y(), 0}));
+    const double rise = voxel_ * part.gradient.z();
+    if (rise == 0 && std::abs(value) > reach) return {0, -1};
+    if (rise == 0) return {range[0], range[1]};
+    const auto [first, last] = std::minmax({(-reach - value) / rise, (reach - value) / rise});
+    return {static_cast<int>(std::ceil(std::clamp<double>(first, range[0], range[1] + 1))),
+            static_cast<int>(std::floor(std::clamp<double>(last, range[0] - 1, range[1])))};
+  }
+
+  void add(const openvdb::Coord& at, double slope) {
+    constexpr uint64_t kMost = 100'000'000;  // 2 GB, at least three for each of the faces allowed
+    const int count = counts_at_.getValue(at);
+    if (count == 0 && ++size_ > kMost) {
+      throw LimitError(
+          "Poisson's surface would need more than 100000000 grid points; state a larger spacing");
     }
+    slopes_at_.setValue(at, slopes_at_.getValue(at) + static_cast<float>(slope));
+    counts_at_.setValue(at, count + 1);
   }
 
   void add_box() {
@@ -150,7 +176,12 @@ class Band {
         Eigen::AlignedBox3d face = box_;
         face.min()[axis] = side - voxel_ / 2;
         face.max()[axis] = side + voxel_ / 2;
-        for_each_in(face, [&](const openvdb::Coord& at) { slopes_at_.setValueOn(at); });
+        const auto [low, high] = corners_of(face);
+        for (int i = low.x(); i <= high.x(); ++i) {
+          for (int j = low.y(); j <= high.y(); ++j) {
+            for (int k = low.z(); k <= high.z(); ++k) slopes_at_.setValueOn({i, j, k});
+          }
+        }
       }
     }
   }
@@ -158,6 +189,7 @@ class Band {
   Eigen::AlignedBox3d box_;
   double voxel_;
   bool reaches_box_ = false;
+  uint64_t size_ = 0;
   openvdb::FloatGrid::Ptr slopes_ = openvdb::FloatGrid::create(0);  // sums, of so many cells
   openvdb::Int32Grid::Ptr counts_ = openvdb::Int32Grid::create(0);
   openvdb::FloatGrid::Accessor slopes_at_ = slopes_->getAccessor();
@@ -182,6 +214,12 @@ std::vector<LinearPart> crossed_parts(const PoissonFunction& function) {
   return out;
 }
 
+// With one decimal.
+std::string rounded_up(double factor) {
+  const auto tenths = static_cast<uint64_t>(std::ceil(std::min(10 * factor, 1e18)));
+  return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10);
+}
+
 // Of the grid: what closes gaps may be many times larger than what was measured.
 double grid_spacing(const std::vector<LinearPart>& parts,
                     const Eigen::AlignedBox3d& box,
@@ -198,19 +236,35 @@ double grid_spacing(const std::vector<LinearPart>& parts,
   constexpr double kFacesPerSquare = 3;  // on average over all directions
   constexpr double kUsualFaces = 2e6;
   constexpr double kMostFaces = 2e7;
+  constexpr double kMostCoarser = 3;  // of itself; then what was measured is lost in what was not
   const double faces = kFacesPerSquare * area / (spacing * spacing);
-  if (!is_stated) return spacing * std::sqrt(std::max(1.0, faces / kUsualFaces));
-  if (faces <= kMostFaces) return spacing;
-  throw LimitError("Poisson's surface would have about " +
-                   std::to_string(static_cast<uint64_t>(std::min(faces, 1e18))) +
-                   " faces, allowed are 20000000; state a larger spacing");
+  const double coarser = std::sqrt(std::max(1.0, faces / kUsualFaces));
+  if (!is_stated && coarser <= kMostCoarser) return spacing * coarser;
+  if (is_stated && faces <= kMostFaces) return spacing;
+  const std::string count = std::to_string(static_cast<uint64_t>(std::min(faces, 1e18)));
+  if (!is_stated) {
+    throw LimitError("closing all gaps as finely as the points lie would take about " + count +
+                     " faces, most of them far from any point; remove what lies apart (--op "
+                     "statistical-outliers=NEIGHBOURS,SIGMAS) or state a spacing (--op "
+                     "poisson=SPACING)");
+  }
+  throw LimitError("Poisson's surface would have about " + count +
+                   " faces, allowed are 20000000; state a spacing " +
+                   rounded_up(std::sqrt(faces / kMostFaces)) + " times as large");
 }
 
-TriangleMesh closed_surface(const openvdb::FloatGrid& distance) {
-  TriangleMesh mesh = zero_surface(distance);
+TriangleMesh scaled(TriangleMesh mesh, double factor) {
+  for (auto& p : mesh.vertices) p = (factor * p.cast<double>()).cast<float>();
+  return mesh;
+}
+
+TriangleMesh closed_surface(const openvdb::FloatGrid& distance, double voxel) {
+  TriangleMesh mesh = scaled(zero_surface(distance), voxel);
   if (certify(mesh).passed()) return mesh;
-  mesh = zero_surface_by_tetrahedra(distance);  // more faces, but they never cut each other
-  if (certify(mesh).closed) return mesh;
+  // More faces, but they never cut each other.
+  mesh = scaled(zero_surface_by_tetrahedra(distance), voxel);
+  const Certificate facts = certify(mesh);
+  if (facts.closed && facts.edge_manifold && facts.vertex_manifold) return mesh;
   throw NumericalError("these points and normals enclose nothing");
 }
 
@@ -237,7 +291,7 @@ PoissonSurface poisson_surface(const TriangleMesh& cloud,
   out.spacing = grid_spacing(parts, box, out.spacing, options.spacing > 0);
   Band band(box, out.spacing);
   for (const LinearPart& part : parts) band.add(part);
-  out.mesh = closed_surface(*band.distances(function));
+  out.mesh = closed_surface(*band.distances(function), out.spacing);
   report(progress, 0.9);
   out.evidence = take_evidence(out.mesh, StatedSurface(cloud), 2 * between);
   return out;

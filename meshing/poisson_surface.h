@@ -33,8 +33,9 @@ struct PoissonSurface {
 /// anything to close them, they end at a box around the points, which becomes a part of the
 /// surface. Source: see PoissonFunction; its zero surface is taken on a grid of the spacing.
 /// \throws InvalidInput if there are faces, no normals, or fewer than 10 points with one;
-///         LimitError for more than 2 million points after thinning or 20 million triangles;
-///         NumericalError if fewer than 10 are left of them, or if they enclose nothing
+///         LimitError for more than 2 million points after thinning or 20 million triangles, or
+///         if spacing is 0 and gaps are so wide that triangles would be 3 times as coarse for
+///         them; NumericalError if fewer than 10 are left of them, or if they enclose nothing
 PoissonSurface poisson_surface(const TriangleMesh& cloud,
                                const PoissonOptions& options,
                                const Progress& progress = {});

@@ -81,6 +81,34 @@ TEST(AdvancingFront, FacesLookAlongTheNormals) {
   for (const Provenance label : turned.provenance) EXPECT_EQ(label, Provenance::Observed);
 }
 
+TEST(AdvancingFront, NormalsOfNoLengthAreNone) {
+  TriangleMesh cloud = half(1000);
+  for (auto& n : cloud.normals) n.setZero();
+  EXPECT_TRUE(looks_out(advancing_front(cloud).mesh));
+}
+
+TEST(AdvancingFront, APlaneLooksToTheLargerSideOfItsAxis) {
+  const TriangleMesh sheet =
+      test::grid_mesh(20, 10, [](double s, double t) { return Eigen::Vector3d(s, t, 0); }).mesh;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float side : {-1.0f, 1.0f}) {
+      TriangleMesh cloud;
+      for (const auto& p : sheet.vertices) {
+        Eigen::Vector3f turned;
+        turned[(axis + 1) % 3] = side * p.x();
+        turned[(axis + 2) % 3] = p.y();
+        turned[axis] = 0.1f * p.y();
+        cloud.vertices.push_back(turned);
+      }
+      const TriangleMesh out = advancing_front(cloud).mesh;
+      for (const auto& [a, b, c] : out.faces) {
+        const auto& p = out.vertices;
+        EXPECT_GT((p[b] - p[a]).cross(p[c] - p[a])[axis], 0);
+      }
+    }
+  }
+}
+
 TEST(AdvancingFront, NoEdgeIsLongerThanStated) {
   const TriangleMesh cloud = test::sphere_cloud(2000, 0.02);
   const InterpolatedSurface out = advancing_front(cloud, 0.12);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -31,6 +32,15 @@ double angle_of(const TriangleMesh& mesh, size_t f) {
   return std::acos(sum.normalized().z());
 }
 
+std::string refusal_of(const TriangleMesh& cloud, const PoissonOptions& options) {
+  try {
+    poisson_surface(cloud, options);
+  } catch (const LimitError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
 double rms_of_radius(const TriangleMesh& mesh) {
   double squares = 0;
   for (const auto& p : mesh.vertices) squares += std::pow(p.cast<double>().norm() - 1, 2);
@@ -56,6 +66,51 @@ TEST(PoissonSurface, ChoosesItsSpacingFromThePoints) {
   EXPECT_NEAR(out.spacing / between, 1.1, 0.05);
   EXPECT_TRUE(certify(out.mesh).passed());
   EXPECT_LT(rms_of_radius(out.mesh), 0.005);
+}
+
+// But for the solver, which stops elsewhere; OpenVDB takes no voxels below 1e-5.
+TEST(PoissonSurface, IsTheSameAtEveryScale) {
+  TriangleMesh cloud = test::sphere_cloud(2000, 0.01);
+  const PoissonSurface usual = poisson_surface(cloud, {.spacing = 0.06});
+  const double volume = certify(usual.mesh).volume;
+  for (const float scale : {0x1p-20f, 0x1p+20f}) {
+    TriangleMesh other = cloud;
+    for (auto& p : other.vertices) p *= scale;
+    const PoissonSurface out = poisson_surface(other, {.spacing = 0.06 * double{scale}});
+    const Certificate facts = certify(out.mesh);
+    EXPECT_TRUE(facts.passed());
+    EXPECT_NEAR(facts.volume / std::pow(double{scale}, 3) / volume, 1, 0.01);
+    EXPECT_NEAR(double(out.mesh.faces.size()) / double(usual.mesh.faces.size()), 1, 0.01);
+  }
+}
+
+// Cells of the function are many voxels wide.
+TEST(PoissonSurface, IsClosedAlsoOnAGridMuchFinerThanThePoints) {
+  const PoissonSurface out = poisson_surface(test::sphere_cloud(2000), {.spacing = 0.01});
+  const Certificate facts = certify(out.mesh);
+  EXPECT_TRUE(facts.passed());
+  EXPECT_EQ(facts.euler_number, 2);
+  EXPECT_LT(rms_of_radius(out.mesh), 0.02);
+  EXPECT_NEAR(double(out.mesh.faces.size()) / (4 * kPi / 1e-4 * 3), 1, 0.1);
+}
+
+TEST(PoissonSurface, RefusesMoreFacesThanFitAndTellsWhatSpacingDoes) {
+  const TriangleMesh cloud = test::sphere_cloud(1000);
+  const std::string refusal = refusal_of(cloud, {.spacing = 0.0003});
+  EXPECT_NE(refusal.find("allowed are 20000000; state a spacing "), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find(" times as large"), std::string::npos) << refusal;
+}
+
+TEST(PoissonSurface, RefusesToLoseThePointsToOneFarAway) {
+  TriangleMesh cloud = test::sphere_cloud(2000);
+  const TriangleMesh ball = cloud;
+  cloud.vertices.emplace_back(1000.0f, 0.0f, 0.0f);
+  cloud.normals.emplace_back(0.0f, 0.0f, 1.0f);
+  cloud.support.push_back(3);
+  cloud.sigma.push_back(0);
+  const std::string refusal = refusal_of(cloud, {});
+  EXPECT_NE(refusal.find("--op statistical-outliers"), std::string::npos) << refusal;
+  EXPECT_EQ(refusal_of(ball, {}), "none");
 }
 
 TEST(PoissonSurface, InventsExactlyWhatCoversAHole) {
