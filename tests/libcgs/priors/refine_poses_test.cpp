@@ -198,6 +198,35 @@ TEST(RefinePose, PutsAFurtherCameraWhereTheRefinedOnesHaveIt) {
   EXPECT_LT(errors.direction, 0.1);
 }
 
+TEST(RefinePose, TellsMatchesOfACameraThatIsTooFarOff) {
+  const PointScene scene = four_views();
+  std::vector<PosedPhoto> photos = posed_photos(scene, 0.5, 0.01);
+  photos[3].camera = disturbed(scene.cameras[3], 15, 0, 9);
+  const PoseRefinement refined = refine_poses(photos);
+  EXPECT_TRUE(refined.photos[1].is_refined);
+  EXPECT_EQ(refined.photos[3].points, 0);
+  EXPECT_GT(refined.photos[3].matches, 300);
+  EXPECT_FALSE(refined.photos[3].is_refined);
+}
+
+// The error of a camera that is a little off need not halve.
+TEST(RefinePose, FollowsThePointsWhereTheseMoved) {
+  const PointScene scene = four_views();
+  std::vector<PosedPhoto> photos = posed_photos(scene, 0.5, 0.01);
+  PosedPhoto further = photos[1];
+  photos.erase(photos.begin() + 1);
+  PoseRefinement refined = refine_poses(photos);
+  EXPECT_TRUE(refined.points.is_moved);
+  further.camera.world_from_cam = refine_pose(further, refined.points).world_from_cam;
+  further.camera = disturbed(further.camera, 0.01, 0, 4);
+  const RefinedPose pose = refine_pose(further, refined.points);
+  EXPECT_TRUE(pose.is_refined);
+  EXPECT_GT(pose.error_after, 0.5 * pose.error_before);
+  EXPECT_LT(pose.error_after, pose.error_before);
+  refined.points.is_moved = false;
+  EXPECT_FALSE(refine_pose(further, refined.points).is_refined);
+}
+
 TEST(RefinePose, LeavesACameraThatFitsOrSharesTooLittle) {
   std::vector<PosedPhoto> photos = posed_photos(four_views(), 0, 0);
   PosedPhoto further = photos[1];
