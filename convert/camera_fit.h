@@ -20,10 +20,12 @@ Camera camera_of_file(const View& view);
 PosedPhoto posed_photo(const View& view, const SceneRoot& root, const FeatureOptions& options = {});
 
 /// How well the cameras of the input views agree with what the photographs show: a look at their
-/// strongest features, in a second or two. A view fits if at least one half of its pairs do, so
-/// that one pair of wrong matches condemns none; that does not depend on --downscale. \return
-/// {"fits": whether all views do, "matches", "error": of the view that fits worst,
-///          "views": [{"view", "error": median of its pairs, the lower of two, "fits"}],
+/// strongest features, in a second or two. The error of a view is the median of its pairs, where a
+/// pair of wrong matches among pairs that fit does not count. The verdict does not depend on
+/// --downscale.
+///
+/// \return {"fits": whether all views do, "matches", "error": of the view that fits worst,
+///          "views": [{"view", "error", "fits"}],
 ///          "pairs": [{"views", "matches", "error": median distance of matches from where the
 ///          cameras have them}]} in pixels of the photographs as worked on; null where no two
 ///          photographs share enough to tell
