@@ -77,6 +77,7 @@ TimedRun trial(const Search& search, int downscale, int steps) {
              request.output / "model" / kPosesFolder,
              fs::copy_options::recursive | fs::copy_options::overwrite_existing);
   }
+  if (search.opened.refined) write_refined_poses(request.output / "model", *search.opened.refined);
   (void)search.terminal.begin("trying " + size_words(search.opened.scene, downscale));
   Terminal silent = Terminal::silent();
   const auto start = Clock::now();

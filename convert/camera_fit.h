@@ -15,15 +15,23 @@ namespace cgs {
 /// \throws as photograph_size()
 Camera camera_of_file(const View& view);
 
-/// Features of the photograph of a view and camera_of_file(). \throws as read_photograph()
+/// Features of the photograph of a view, without those that the undistorted picture does not hold,
+/// and camera_of_file(). \throws as read_photograph()
 PosedPhoto posed_photo(const View& view, const SceneRoot& root, const FeatureOptions& options = {});
 
 /// How well the cameras of the input views agree with what the photographs show: a look at their
-/// strongest features, in a second or two.
-/// \return {"matches", "error": median distance of matches from where the cameras have them,
-///          "pairs": [{"views", "matches", "error"}]} in pixels of the pictures worked on; null
-///          where no two photographs share enough to tell
-nlohmann::ordered_json camera_fit(const Scene& scene, const SceneRoot& root);
+/// strongest features, in a second or two. The error of a view is the median of its pairs, where a
+/// pair of wrong matches among pairs that fit does not count. The verdict does not depend on
+/// --downscale.
+///
+/// \return {"fits": whether all views do, "matches", "error": of the view that fits worst,
+///          "views": [{"view", "error", "fits"}],
+///          "pairs": [{"views", "matches", "error": median distance of matches from where the
+///          cameras have them}]} in pixels of the photographs as worked on; null where no two
+///          photographs share enough to tell
+nlohmann::ordered_json camera_fit(const Scene& scene,
+                                  const SceneRoot& root,
+                                  const Progress& progress = {});
 
 /// Advice for cameras that do not fit; empty for those that do, and for null.
 std::string camera_fit_warning(const nlohmann::ordered_json& fit);

@@ -17,18 +17,21 @@ namespace cgs {
 /// Cameras of a scene that were moved to where its photographs have them.
 struct RefinedPoses {
   std::map<std::string, Eigen::Isometry3d> poses;  ///< world_from_cam of the views that moved.
-  /// {"refined": whether any camera of an input view moved, "error_before", "error_after": median
+  /// {"refined": whether any camera of an input view moved, "views": [{"view", "role", "matches":
+  ///  with views that show the same, "points": that come of them, "refined", "degrees", "distance"
+  ///  [scene units], "error_before", "error_after"}], "error_before", "error_after": median
   ///  distances between where points appear and where they were seen, worst input view [pixels of
-  ///  the photographs], "views": [{"view", "role", "points", "refined", "degrees", "distance"
-  ///  [scene units], "error_before", "error_after"}]}
+  ///  the photographs as worked on]}; errors are null where no points tell
   nlohmann::ordered_json report;
-  std::vector<std::string> warnings;  ///< What was left as given, and why.
+  nlohmann::ordered_json fit;         ///< "refined" and "views" in pixels of the files.
+  std::vector<std::string> warnings;  ///< What could not be told or placed, and why.
   std::string inputs;                 ///< Hashes of photographs and cameras, program.
   bool is_stored = false;             ///< Read, not solved.
 };
 
 /// Refines the cameras of the input views as refine_poses(), and each held-out view against the
-/// points these know; or reads what write_refined_poses() stored, if that was made from the same.
+/// points these know; or reads what write_refined_poses() stored, if that was made from the same
+/// and is whole.
 ///
 /// \param scene   in world coordinates, with the identity frame
 /// \param stored  folder; may be empty or not exist

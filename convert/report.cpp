@@ -188,15 +188,16 @@ std::string refinement_section(const Json& report) {
   const Json& refined = report["refined_poses"];
   std::ostringstream html;
   html << "<h2>Cameras</h2>\n<p>" << escaped(refinement_words(refined))
-       << ".</p>\n<table>\n<tr><th>view</th><th></th><th>points</th><th>turned [degrees]</th>"
+       << ".</p>\n<table>\n<tr><th>view</th><th></th><th>matches</th><th>points</th><th>turned "
+          "[degrees]</th>"
           "<th>moved [scene units]</th><th>error before [pixels]</th><th>after</th></tr>\n";
   for (const Json& view : refined["views"]) {
     html << "<tr><td>" << escaped(view["view"].get<std::string>()) << "</td><td>"
          << escaped(view["role"].get<std::string>()) << "</td><td>"
-         << number(view["points"], "%.0f") << "</td><td>" << number(view["degrees"], "%.3f")
-         << "</td><td>" << number(view["distance"]) << "</td><td>"
-         << number(view["error_before"], "%.2f") << "</td><td>"
-         << number(view["error_after"], "%.2f") << "</td></tr>\n";
+         << number(view["matches"], "%.0f") << "</td><td>" << number(view["points"], "%.0f")
+         << "</td><td>" << number(view["degrees"], "%.3f") << "</td><td>"
+         << number(view["distance"]) << "</td><td>" << number(view["error_before"], "%.2f")
+         << "</td><td>" << number(view["error_after"], "%.2f") << "</td></tr>\n";
   }
   html << "</table>\n";
   return html.str();

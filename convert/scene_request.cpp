@@ -97,10 +97,14 @@ void OpenedScene::keep(const std::filesystem::path& model) const {
   if (!refined) forget_refined_poses(model);
 }
 
-nlohmann::ordered_json check_stated_cameras(const SceneRequest& request, OpenedScene& opened) {
+nlohmann::ordered_json check_stated_cameras(const SceneRequest& request,
+                                            OpenedScene& opened,
+                                            Terminal& terminal) {
   if (opened.poses || opened.refined) return nullptr;
   const SceneRoot root{request.path, request.options.allow_external};
-  const nlohmann::ordered_json fit = camera_fit(opened.scene, root);
+  const nlohmann::ordered_json fit =
+      camera_fit(opened.scene, root, terminal.begin("checking cameras"));
+  terminal.end("");
   const std::string warning = camera_fit_warning(fit);
   if (!warning.empty()) opened.scene.warnings.push_back(warning);
   return fit;

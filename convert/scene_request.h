@@ -21,12 +21,12 @@ namespace cgs {
 struct SceneRequest {
   std::filesystem::path path;
   SceneOptions options;
-  std::string
-      assume_unit;  ///< Unit of one scene unit where the scene does not say; empty = unknown.
+  /// Unit of one scene unit where the scene does not say; empty = unknown.
+  std::string assume_unit;
   std::vector<double> up;  ///< World direction that is up; empty = judged by the cameras.
   double focal = 0;        ///< Of photographs without cameras [pixels]; 0 = not given.
-  bool refine_poses =
-      false;  ///< Move the cameras a scene states to where the photographs have them.
+  /// Move the cameras a scene states to where the photographs have them.
+  bool refine_poses = false;
   std::vector<DistanceWords> known_distances;  ///< Where they are given, no assume_unit.
   std::string marker_size;  ///< Side of printed markers; where it is given, no assume_unit.
   ControlRequest control;   ///< Where it is given, nothing else of scale, unit and up.
@@ -44,10 +44,9 @@ inline constexpr const char* kPosesFolder = "colmap";
 ///
 /// \param model  folder of the model the scene is for; cameras stored there by OpenedScene::keep()
 ///               are taken where they were solved from the same. Empty = none.
-/// \throws InvalidInput where a focal length is given for a scene with cameras, refinement asked
-/// for
-///         where there are none, or two options state the scale; as read_scene(), photo_poses(),
-///         refined_poses() and move_to_control_frame()
+/// \throws InvalidInput where a focal length is given for a scene with cameras, refinement is asked
+///         for where there are none, or two options state the scale; as read_scene(),
+///         photo_poses(), refined_poses() and move_to_control_frame()
 struct OpenedScene {
   Scene scene;
   std::optional<PhotoPoses> poses;      ///< If they were solved for.
@@ -64,6 +63,8 @@ OpenedScene open_scene(const SceneRequest& request,
 
 /// How well cameras that were taken as the scene states them fit the photographs, as camera_fit();
 /// null for others. What is wrong with them is added to the warnings of the scene.
-nlohmann::ordered_json check_stated_cameras(const SceneRequest& request, OpenedScene& opened);
+nlohmann::ordered_json check_stated_cameras(const SceneRequest& request,
+                                            OpenedScene& opened,
+                                            Terminal& terminal);
 
 }  // namespace cgs

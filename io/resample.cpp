@@ -133,8 +133,28 @@ Eigen::Vector2d undistorted(const Eigen::Vector2d& point,
   const cv::Matx33d K = opencv_intrinsics(camera);
   const std::vector<cv::Point2d> from = {{point.x() - 0.5, point.y() - 0.5}};
   std::vector<cv::Point2d> to;
-  cv::undistortPoints(from, to, K, cv::Vec<double, 5>(distortion.data()), cv::noArray(), K);
+  // By default it takes five steps, which leaves half a pixel where lenses bend strongly.
+  const cv::TermCriteria until(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, 1e-10);
+  cv::undistortPoints(from, to, K, cv::Vec<double, 5>(distortion.data()), cv::noArray(), K, until);
   return {to[0].x + 0.5, to[0].y + 0.5};
+}
+
+bool is_undone(const Eigen::Vector2d& point,
+               const Eigen::Vector2d& undistorted,
+               const Camera& camera,
+               const std::array<double, 5>& distortion) {
+  const Eigen::Vector3d ray = camera.ray_in_cam(undistorted.x(), undistorted.y());
+  if (!(ray.head<2>().norm() < fold_radius(distortion))) return false;
+  const std::vector<cv::Point3d> from = {{ray.x(), ray.y(), ray.z()}};
+  std::vector<cv::Point2d> to;
+  cv::projectPoints(from,
+                    cv::Vec3d(),
+                    cv::Vec3d(),
+                    opencv_intrinsics(camera),
+                    cv::Vec<double, 5>(distortion.data()),
+                    to);
+  constexpr double kUndone = 0.01;  // [pixels]
+  return (Eigen::Vector2d(to[0].x + 0.5, to[0].y + 0.5) - point).norm() <= kUndone;
 }
 
 void area_downscale(ColorImage& image, MaskMap& valid, int width, int height) {

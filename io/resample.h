@@ -20,10 +20,18 @@ void undistort(ColorImage& image,
                const Camera& camera,
                const std::array<double, 5>& distortion);
 
-/// Where a point of a photograph lies in the picture undistort() makes of it [pixels].
+/// Where a point of a photograph lies in the picture undistort() makes of it [pixels]. What that
+/// picture does not hold, as the lens folds there, comes back anywhere: see is_undone().
 Eigen::Vector2d undistorted(const Eigen::Vector2d& point,
                             const Camera& camera,
                             const std::array<double, 5>& distortion);
+
+/// Whether undistorted() found the place that the lens puts at the point, to 0.01 pixels, and
+/// within what undistort() shows.
+bool is_undone(const Eigen::Vector2d& point,
+               const Eigen::Vector2d& undistorted,
+               const Camera& camera,
+               const std::array<double, 5>& distortion);
 
 /// Averages the usable pixels under each pixel of a smaller image, in place. A pixel is usable if
 /// at least half of its area is; `valid` is emptied if every pixel is.

@@ -125,10 +125,13 @@ void add_camera_options(CLI::App& command, SceneRequest& request) {
       request.focal,
       "Focal length of photographs without cameras, in pixels of the files; default: "
       "what they say (Exif), else solved for");
-  command.add_flag("--refine-poses",
-                   request.refine_poses,
-                   "Move cameras that are slightly off (of phones, from elsewhere) to where the "
-                   "photographs have them; focal lengths, the first camera and the scale stay");
+  command.add_flag(
+      "--refine-poses",
+      request.refine_poses,
+      "Move cameras that are slightly off (of phones, from elsewhere) to where the "
+      "photographs have them; focal lengths, the first input camera that shares enough "
+      "with others and the scale stay; errors are in pixels of the photographs as "
+      "worked on");
 }
 
 void add_training_options(CLI::App& command, TrainingArguments& arguments) {

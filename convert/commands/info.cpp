@@ -10,6 +10,7 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/conversion.h"
+#include "convert/html.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
 #include "convert/scene_request.h"
@@ -133,14 +134,16 @@ void print_fit(const Json& info) {
   std::printf("refined: %s\n", refinement_words(refined).c_str());
   for (const Json& view : refined["views"]) {
     std::printf(
-        "  %-24s %-9s %6d points, moved %.3f degrees, %.4g units, error %.2f -> %.2f pixels\n",
+        "  %-24s %-9s %6d matches, %6d points, moved %.3f degrees, %.4g units, error %s -> %s "
+        "pixels\n",
         one_line(view["view"].get<std::string>()).c_str(),
         view["role"].get<std::string>().c_str(),
+        view["matches"].get<int>(),
         view["points"].get<int>(),
         view["degrees"].get<double>(),
         view["distance"].get<double>(),
-        view["error_before"].get<double>(),
-        view["error_after"].get<double>());
+        number(view["error_before"], "%.2f").c_str(),
+        number(view["error_after"], "%.2f").c_str());
   }
 }
 
@@ -278,6 +281,20 @@ bool holds_splats(const std::filesystem::path& path) {
   return !is_mesh_name(path) || is_splat_file(path);
 }
 
+// info tells what is wrong with a scene, photographs that cannot be read too.
+Json checked_cameras(const SceneRequest& request, OpenedScene& opened, Terminal& terminal) {
+  std::string reason;
+  try {
+    return check_stated_cameras(request, opened, terminal);
+  } catch (const BadInput& error) {
+    reason = error.what();
+  } catch (const LimitError& error) {
+    reason = error.what();
+  }
+  opened.scene.warnings.push_back("whether the cameras fit could not be told: " + reason);
+  return nullptr;
+}
+
 void run_info(const InfoArgs& args) {
   if (holds_splats(args.scene.path)) {
     const Json info = splat_file_to_json(read_splats(args.scene.path));
@@ -291,7 +308,7 @@ void run_info(const InfoArgs& args) {
   }
   Terminal terminal(args.json);
   OpenedScene opened = open_scene(args.scene, {}, terminal);
-  const Json fit = check_stated_cameras(args.scene, opened);
+  const Json fit = checked_cameras(args.scene, opened, terminal);
   const Json info = scene_json(opened, fit);
   if (args.json) {
     std::cout << json_text(info) << "\n";

@@ -30,7 +30,7 @@ void run_train(const TrainArgs& args) {
       {}, training_options(args.training), args.output, args.scene.options.depth.network};
   Terminal terminal(args.common.quiet, args.common.strict);
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
-  (void)check_stated_cameras(args.scene, opened);
+  (void)check_stated_cameras(args.scene, opened, terminal);
   opened.keep(args.output);
   Scene& scene = opened.scene;
   const auto distances = known_distances(args.scene.known_distances, scene);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "libcgs/core/camera.h"
+#include "libcgs/core/progress.h"
 #include "libcgs/priors/photo_features.h"
 #include "libcgs/priors/solve_poses.h"
 
@@ -30,12 +31,15 @@ struct EpipolarFit {
   int a = 0;
   int b = 0;
   size_t matches = 0;
-  double error = 0;  ///< Median distance of a match from its epipolar line [working pixels].
+  /// Median distance of a match from its epipolar line [working pixels]; for cameras at one place
+  /// the angle between the rays times the focal length.
+  double error = 0;
 };
 
 /// Matches photographs and holds the matches that any two cameras could explain against the cameras
 /// given. The same for any number of threads.
 /// \return pairs a < b that share enough
-std::vector<EpipolarFit> epipolar_fits(const std::vector<PosedPhoto>& photos);
+std::vector<EpipolarFit> epipolar_fits(const std::vector<PosedPhoto>& photos,
+                                       const Progress& progress = {});
 
 }  // namespace cgs

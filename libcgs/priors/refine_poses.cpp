@@ -57,14 +57,11 @@ struct Gauge {
   double baseline = 0;  // [scene units]
 };
 
-Gauge gauge_of(const std::vector<PosedPhoto>& photos, const std::vector<PhotoPair>& pairs) {
-  std::vector<int> shared(photos.size(), 0);
-  for (const PhotoPair& pair : pairs) {
-    for (const int i : {pair.a, pair.b}) shared[static_cast<size_t>(i)] += pair.is_connected;
-  }
+// \param matches  per photograph
+Gauge gauge_of(const std::vector<PosedPhoto>& photos, const std::vector<size_t>& matches) {
   Gauge out;
   for (int i = 0; i < static_cast<int>(photos.size()); ++i) {
-    if (shared[static_cast<size_t>(i)] == 0) continue;
+    if (matches[static_cast<size_t>(i)] == 0) continue;
     if (out.first < 0) out.first = i;
     const double distance = (photos[static_cast<size_t>(i)].camera.center() -
                              photos[static_cast<size_t>(out.first)].camera.center())
@@ -72,6 +69,16 @@ Gauge gauge_of(const std::vector<PosedPhoto>& photos, const std::vector<PhotoPai
     if (distance <= out.baseline) continue;
     out.farthest = i;
     out.baseline = distance;
+  }
+  return out;
+}
+
+// Per photograph.
+std::vector<size_t> matches_of(size_t photos, const std::vector<PhotoPair>& pairs) {
+  std::vector<size_t> out(photos, 0);
+  for (const PhotoPair& pair : pairs) {
+    if (!pair.is_connected) continue;
+    for (const int i : {pair.a, pair.b}) out[static_cast<size_t>(i)] += pair.matches.size();
   }
   return out;
 }
@@ -96,8 +103,13 @@ void triangulate_anew(Reconstruction& scene, double most_error) {
   triangulate(scene, most_error, kLeastAngle);
 }
 
-void adjust(const std::vector<LensPrior>& lenses, BundleOptions options, Reconstruction& scene) {
+void adjust(const std::vector<LensPrior>& lenses,
+            BundleOptions options,
+            Reconstruction& scene,
+            const Progress& progress) {
+  double done = 0;
   for (const double most_error : kRounds) {
+    report(progress, done++ / kRounds.size());
     triangulate_anew(scene, most_error);
     options.loss_scale = kLossShare * most_error;
     adjust_bundle(scene, lenses, options);
@@ -131,10 +143,12 @@ Reconstruction as_given(const Reconstruction& refined,
 }
 
 RefinedPose fit_of(const PosedPhoto& photo,
+                   size_t matches,
                    const std::vector<double>& before,
                    const std::vector<double>& after) {
   RefinedPose out;
   out.world_from_cam = photo.camera.world_from_cam;
+  out.matches = static_cast<int>(matches);
   if (after.size() < kFewestMatches) return out;
   out.points = static_cast<int>(after.size());
   out.error_before = photo.features.pixel * median_of(before);
@@ -159,8 +173,11 @@ Reconstruction roughly_known(const std::vector<PosedPhoto>& photos,
   return scene;
 }
 
-/// A place in the photograph to be placed, and the known point it shows.
-using Shown = std::pair<size_t, int>;  // (track, feature)
+/// What the photograph to be placed shares with others, and the places where it shows known points.
+struct Shown {
+  size_t matches = 0;
+  std::map<size_t, int> feature_of;  // track -> feature
+};
 
 // The known point that each feature of a photograph shows; -1 = none.
 std::vector<std::ptrdiff_t> tracks_of(const KnownPoints& points, int photo) {
@@ -176,35 +193,37 @@ std::vector<std::ptrdiff_t> tracks_of(const KnownPoints& points, int photo) {
   return out;
 }
 
-// Known points that a photograph shows, by its matches with all others; in their order. Those found
-// in two places are left out.
-std::vector<Shown> shown_points(const UnposedPhoto& photo, const KnownPoints& points) {
+// By its matches with all others. Points found in two places are left out.
+Shown shown_points(const UnposedPhoto& photo, const KnownPoints& points) {
   std::vector<PhotoPair> pairs(points.photos.size());
   tbb::parallel_for(
       size_t{0}, pairs.size(), [&](size_t i) { pairs[i] = match_pair(points.photos[i], photo); });
-  std::map<size_t, int> feature_of;
+  Shown out;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (!pairs[i].is_connected) continue;
+    out.matches += pairs[i].matches.size();
     const std::vector<std::ptrdiff_t> tracks = tracks_of(points, static_cast<int>(i));
     for (const FeatureMatch& m : pairs[i].matches) {
       const std::ptrdiff_t track = tracks[static_cast<size_t>(m.a)];
       if (track < 0) continue;
-      const auto known = feature_of.emplace(static_cast<size_t>(track), m.b).first;
+      const auto known = out.feature_of.emplace(static_cast<size_t>(track), m.b).first;
       if (known->second != m.b) known->second = -1;
     }
   }
-  std::erase_if(feature_of, [](const Shown& shown) { return shown.second < 0; });
-  return {feature_of.begin(), feature_of.end()};
+  std::erase_if(out.feature_of, [](const auto& shown) { return shown.second < 0; });
+  return out;
 }
 
 // One photograph and the points it shows, which are known.
-Reconstruction resection_of(const PosedPhoto& photo, const KnownPoints& points) {
-  const UnposedPhoto unposed = as_unposed(photo);
+Reconstruction resection_of(const PosedPhoto& photo,
+                            const UnposedPhoto& unposed,
+                            const Shown& shown,
+                            const KnownPoints& points) {
   Reconstruction scene;
   scene.lenses = {{working_focal(photo)}};
   scene.lens_of = {0};
   scene.poses = {pose_in(points.frame, photo.camera.world_from_cam)};
-  for (const auto& [track, feature] : shown_points(unposed, points)) {
+  for (const auto& [track, feature] : shown.feature_of) {
     const Eigen::Vector2d& at = unposed.features.points[static_cast<size_t>(feature)];
     scene.tracks.push_back({{{0, feature, at / unposed.features.pixel, true}},
                             points.scene.tracks[track].position,
@@ -226,10 +245,13 @@ PoseRefinement refine_poses(const std::vector<PosedPhoto>& photos, const Progres
   PoseRefinement out;
   for (const PosedPhoto& photo : photos) {
     out.points.photos.push_back(as_unposed(photo));
-    out.photos.push_back(fit_of(photo, {}, {}));
   }
-  const std::vector<PhotoPair> pairs = match_photos(out.points.photos, part_of(progress, 0, 0.8));
-  const Gauge gauge = gauge_of(photos, pairs);
+  const std::vector<PhotoPair> pairs = match_photos(out.points.photos, part_of(progress, 0, 0.7));
+  const std::vector<size_t> matches = matches_of(photos.size(), pairs);
+  for (size_t i = 0; i < photos.size(); ++i) {
+    out.photos.push_back(fit_of(photos[i], matches[i], {}, {}));
+  }
+  const Gauge gauge = gauge_of(photos, matches);
   if (!(gauge.baseline > 0)) return out;
   const Frame frame = frame_of(photos, gauge);
   Reconstruction scene = roughly_known(photos, frame, chain_matches(out.points.photos, pairs));
@@ -240,12 +262,13 @@ PoseRefinement refine_poses(const std::vector<PosedPhoto>& photos, const Progres
     lenses.push_back(exact_lens(photos[i]));
     options.pose_priors.push_back(prior_of(*given[i], gauge.baseline / frame.scale));
   }
-  adjust(lenses, options, scene);
+  adjust(lenses, options, scene, part_of(progress, 0.7, 1));
   const Reconstruction before = as_given(scene, given, lenses);
   report(progress, 1);
   for (size_t i = 0; i < photos.size(); ++i) {
     const int photo = static_cast<int>(i);
-    out.photos[i] = fit_of(photos[i], errors_in(before, photo), errors_in(scene, photo));
+    out.photos[i] =
+        fit_of(photos[i], matches[i], errors_in(before, photo), errors_in(scene, photo));
   }
   out.points.frame = frame;
   if (std::none_of(out.photos.begin(), out.photos.end(), is_clearly_better)) {
@@ -259,12 +282,15 @@ PoseRefinement refine_poses(const std::vector<PosedPhoto>& photos, const Progres
     if (refined.is_refined) refined.world_from_cam = pose_in_world(frame, *scene.poses[i]);
   }
   out.points.scene = std::move(scene);
+  out.points.is_moved = true;
   return out;
 }
 
 RefinedPose refine_pose(const PosedPhoto& photo, const KnownPoints& points) {
-  if (points.scene.tracks.empty()) return fit_of(photo, {}, {});
-  Reconstruction scene = resection_of(photo, points);
+  const UnposedPhoto unposed = as_unposed(photo);
+  const Shown shown = shown_points(unposed, points);
+  if (shown.feature_of.empty()) return fit_of(photo, shown.matches, {}, {});
+  Reconstruction scene = resection_of(photo, unposed, shown, points);
   const PhotoPose given = *scene.poses[0];
   const double baseline = 0.75;  // 1/2 ... 1 in the frame
   BundleOptions options{.first = -1, .second = -1, .hold_points = true};
@@ -277,8 +303,10 @@ RefinedPose refine_pose(const PosedPhoto& photo, const KnownPoints& points) {
   use_what_is_within(scene, kRounds.back());
   Reconstruction before = scene;
   before.poses[0] = given;
-  RefinedPose out = fit_of(photo, errors_in(before, 0), errors_in(scene, 0));
-  out.is_refined = is_clearly_better(out);
+  RefinedPose out = fit_of(photo, shown.matches, errors_in(before, 0), errors_in(scene, 0));
+  // Where the others moved, the pose given says where they were.
+  const bool is_better = out.points > 0 && out.error_after < out.error_before;
+  out.is_refined = points.is_moved ? is_better : is_clearly_better(out);
   if (out.is_refined) {
     out.world_from_cam = pose_in_world(points.frame, *scene.poses[0]);
   } else {

@@ -110,6 +110,29 @@ TEST(Undistort, CarriesTheMaskAlong) {
   EXPECT_EQ(valid(60, 41), 1);
 }
 
+TEST(Undistorted, IsExactForStrongLensesToTheCorners) {
+  for (const std::array<double, 5> d :
+       {std::array<double, 5>{-0.3, 0.08, 0.004, -0.006, 0.01}, {0.4, -0.02, -0.003, 0.002, 0}}) {
+    for (const Eigen::Vector2d truth : {Eigen::Vector2d(1, 1), {119, 89}, {60, 3}, {30, 80}}) {
+      const Eigen::Vector2d ray = kCamera.ray_in_cam(truth.x(), truth.y()).head<2>();
+      const Eigen::Vector2d bent = distorted(ray.x(), ray.y(), d);
+      const Eigen::Vector2d at = {kCamera.fx * bent.x() + kCamera.cx,
+                                  kCamera.fy * bent.y() + kCamera.cy};
+      const Eigen::Vector2d found = cgs::undistorted(at, kCamera, d);
+      EXPECT_LT((found - truth).norm(), 1e-5);
+      EXPECT_TRUE(is_undone(at, found, kCamera, d));
+    }
+  }
+}
+
+TEST(Undistorted, IsNotThereBeyondTheFold) {
+  const std::array<double, 5> folding = {-1.0, 0, 0, 0, 0};  // folds at r = 0.577, reaches 0.385
+  for (const double r : {0.3, 0.38, 0.39, 0.5}) {
+    const Eigen::Vector2d at = {kCamera.cx - 100 * r, kCamera.cy};
+    EXPECT_EQ(is_undone(at, cgs::undistorted(at, kCamera, folding), kCamera, folding), r < 0.385);
+  }
+}
+
 TEST(AreaDownscale, AveragesBlocks) {
   ColorImage image(4, 2, Eigen::Vector3f::Zero());
   for (int x = 0; x < 4; ++x) image(x, 0) = Eigen::Vector3f::Constant(0.25f * float(x));

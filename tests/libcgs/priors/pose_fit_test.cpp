@@ -59,6 +59,21 @@ TEST(EpipolarFits, AreInPixelsOfThePictureSearchedWhateverShapeTheyHave) {
   EXPECT_NEAR(fits[0].error, 8.0 / 3600 * std::sqrt(1800.0 * 3600) / 2, 1e-3);
 }
 
+// Nothing says how far what they show is away, but they cannot differ by more than their turn.
+TEST(EpipolarFits, AreAnglesForCamerasAtOnePlace) {
+  test::PointScene scene = side_by_side();
+  scene.cameras[1].world_from_cam.translation() = scene.cameras[0].center();
+  PosedPhoto right = posed(scene, 1);
+  for (const double off : {0.0, 0.01}) {
+    right.camera.world_from_cam.linear() =
+        scene.cameras[1].world_from_cam.linear() *
+        Eigen::AngleAxisd(off, Eigen::Vector3d::UnitX()).toRotationMatrix();
+    const auto fits = epipolar_fits({posed(scene, 0), right});
+    ASSERT_EQ(fits.size(), 1u);
+    EXPECT_NEAR(fits[0].error, 900 * off, 0.01 + 0.1 * 900 * off) << off;
+  }
+}
+
 TEST(EpipolarFits, DoNotDependOnThePlace) {
   const test::PointScene scene = side_by_side();
   std::vector<PosedPhoto> photos = {posed(scene, 0), posed(scene, 1)};

@@ -76,6 +76,7 @@ TEST(RefinePoses, PutsDisturbedCamerasRight) {
     for (size_t i = 1; i < photos.size(); ++i) {
       EXPECT_TRUE(refined.photos[i].is_refined);
       EXPECT_GT(refined.photos[i].points, 300);
+      EXPECT_GE(refined.photos[i].matches, refined.photos[i].points);
       EXPECT_LT(refined.photos[i].error_after, 0.5);
       EXPECT_GT(refined.photos[i].error_before, 2 * refined.photos[i].error_after);
     }
@@ -128,6 +129,7 @@ TEST(RefinePoses, LeavesPhotographsThatShareTooLittle) {
   const std::vector<PosedPhoto> photos = posed_photos(scene, 0.5, 0.01);
   for (const RefinedPose& pose : refine_poses(photos).photos) {
     EXPECT_FALSE(pose.is_refined);
+    EXPECT_EQ(pose.matches, 0);
     EXPECT_EQ(pose.points, 0);
   }
 }
@@ -196,6 +198,24 @@ TEST(RefinePose, PutsAFurtherCameraWhereTheRefinedOnesHaveIt) {
   const auto errors = pose_errors(solved, {scene.cameras[0], scene.cameras[1]});
   EXPECT_LT(errors.rotation, 0.02);
   EXPECT_LT(errors.direction, 0.1);
+}
+
+// The error of a camera that is a little off need not halve.
+TEST(RefinePose, FollowsThePointsWhereTheseMoved) {
+  const PointScene scene = four_views();
+  std::vector<PosedPhoto> photos = posed_photos(scene, 0.5, 0.01);
+  PosedPhoto further = photos[1];
+  photos.erase(photos.begin() + 1);
+  PoseRefinement refined = refine_poses(photos);
+  EXPECT_TRUE(refined.points.is_moved);
+  further.camera.world_from_cam = refine_pose(further, refined.points).world_from_cam;
+  further.camera = disturbed(further.camera, 0.01, 0, 4);
+  const RefinedPose pose = refine_pose(further, refined.points);
+  EXPECT_TRUE(pose.is_refined);
+  EXPECT_GT(pose.error_after, 0.5 * pose.error_before);
+  EXPECT_LT(pose.error_after, pose.error_before);
+  refined.points.is_moved = false;
+  EXPECT_FALSE(refine_pose(further, refined.points).is_refined);
 }
 
 TEST(RefinePose, LeavesACameraThatFitsOrSharesTooLittle) {
