@@ -110,13 +110,13 @@ TEST(GlbMeshopt, HoldsWhatTheQuantizedFileHoldsInLess) {
   }
 }
 
-/// Streams of one triangle, decoded with the extension's parameters.
-std::string decoded(nlohmann::json parameters, const std::string& stream) {
-  const nlohmann::json json = std::move(parameters);
-  return meshopt_decoded(JsonValue(json, "a.glb"), stream);
-}
+/// A file, taken apart.
+struct PackedSphere {
+  nlohmann::json document;
+  std::string binary;
+};
 
-TEST(GlbMeshopt, RefusesStreamsThatAreNone) {
+PackedSphere packed_sphere() {
   const test::TempDir dir;
   write_glb(dir / "a.glb",
             test::labelled_sphere(),
@@ -124,12 +124,22 @@ TEST(GlbMeshopt, RefusesStreamsThatAreNone) {
             {.encoding = GlbEncoding::Meshopt});
   const std::string file = test::read_bytes(dir / "a.glb");
   const size_t json_size = file.find(std::string("BIN\0", 4)) - 4 - 20;
-  const auto document = nlohmann::json::parse(file.substr(20, json_size));
-  for (const auto& view : document["bufferViews"]) {
+  return {nlohmann::json::parse(file.substr(20, json_size)), file.substr(28 + json_size)};
+}
+
+/// A stream decoded with the extension's parameters.
+std::string decoded(nlohmann::json parameters, const std::string& stream) {
+  const nlohmann::json json = std::move(parameters);
+  return meshopt_decoded(JsonValue(json, "a.glb"), stream);
+}
+
+TEST(GlbMeshopt, RefusesStreamsThatAreNone) {
+  const PackedSphere file = packed_sphere();
+  for (const auto& view : file.document["bufferViews"]) {
     if (!view.contains("extensions")) continue;
     const nlohmann::json good = view["extensions"][kMeshopt];
     const std::string stream =
-        file.substr(28 + json_size + good["byteOffset"].get<size_t>(), good["byteLength"]);
+        file.binary.substr(good["byteOffset"].get<size_t>(), good["byteLength"]);
     EXPECT_EQ(decoded(good, stream).size(), view["byteLength"]);
     EXPECT_THROW(decoded(good, stream.substr(0, stream.size() - 1)), BadInput);
     EXPECT_THROW(decoded(good, ""), BadInput);
@@ -152,18 +162,13 @@ TEST(GlbMeshopt, RefusesStreamsThatAreNone) {
 // A small file with many views of one stream would fill the memory.
 TEST(GlbMeshopt, RefusesManyViewsOfOneStream) {
   const test::TempDir dir;
-  write_glb(dir / "a.glb",
-            test::labelled_sphere(),
-            test::centimetre_frame(),
-            {.encoding = GlbEncoding::Meshopt});
-  const std::string file = test::read_bytes(dir / "a.glb");
-  const size_t json_size = file.find(std::string("BIN\0", 4)) - 4 - 20;
-  auto document = nlohmann::json::parse(file.substr(20, json_size));
-  const auto view = document["bufferViews"][0];
+  PackedSphere file = packed_sphere();
+  nlohmann::json& views = file.document["bufferViews"];
+  const nlohmann::json view = views[0];
   ASSERT_TRUE(view.contains("extensions"));
   constexpr int kCopies = 2000;
-  for (int i = 0; i < kCopies; ++i) document["bufferViews"].push_back(view);
-  test::write_bytes(dir / "b.glb", glb_bytes(document.dump(), file.substr(28 + json_size)));
+  for (int i = 0; i < kCopies; ++i) views.push_back(view);
+  test::write_bytes(dir / "b.glb", glb_bytes(file.document.dump(), file.binary));
   EXPECT_THROW(read_glb(dir / "b.glb"), LimitError);
 }
 
