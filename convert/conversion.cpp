@@ -203,12 +203,13 @@ Json convert_splats(const ConversionRequest& request, const Source& source, Term
   const Gaussians& g = source.model ? source.model->gaussians : source.splats->gaussians;
   const WrittenSplats written = write_splats(request, g, source.frame);
   Json report = written.report;
+  std::vector<std::string> missing;  // why splats are
   try {
     const Progress progress = terminal.begin("read back");
     cgs::report(progress, 0);
     check_reading_back(request, g);
     const GaussianFile back = read_splats(request.output, source.frame);
-    if (back.gaussians.size() < g.size()) terminal.warn(back.warnings);  // why they are missing
+    if (back.gaussians.size() < g.size()) missing = back.warnings;
     const SplatLoss loss = splat_loss(g, back.gaussians, written.order, progress);
     report["loss"] = splat_loss_to_json(loss, source.frame);
     terminal.end(splat_loss_line(loss, source.frame));
@@ -217,8 +218,9 @@ Json convert_splats(const ConversionRequest& request, const Source& source, Term
   } catch (const Error& error) {
     // The file is there: that it holds too little, or was not looked at, is a finding.
     report["loss"] = {{"not_measured", error.what()}};
-    terminal.warn(std::string("what the file lost could not be measured: ") + error.what());
+    missing.push_back(std::string("what the file lost could not be measured: ") + error.what());
   }
+  terminal.warn(missing);
   return report;
 }
 

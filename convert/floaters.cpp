@@ -174,7 +174,8 @@ class CellGrid {
     return static_cast<int>(std::min(kMost, std::ceil(reach / cell_)));
   }
 
-  // A disc may reach far without leaving cells out; what fills space is haze, however it is seen.
+  // A disc may reach over 70 cells to each side without leaving any out; what fills space is haze,
+  // however it is seen.
   static void coarsen(std::array<int, 3>& steps) {
     constexpr double kMostPlaces = 20'000;
     const auto places = [&] {
@@ -382,12 +383,10 @@ std::string floaters_text(const Floaters& f) {
   const std::string kinds = std::to_string(f.haze) + " haze, " + std::to_string(f.needles) +
                             " needles, " + std::to_string(f.islands) + " in small islands";
   const std::string all = std::to_string(f.keep.size()) + " splats";
-  if (f.doubtful) {
-    return std::to_string(f.count()) + " of " + all + " look like floaters (" + kinds +
-           "): too many, none was removed";
-  }
-  std::string out =
-      "removed " + std::to_string(f.count()) + " of " + all + " as floaters: " + kinds;
+  const std::string some = std::to_string(f.count()) + " of " + all;
+  std::string out = f.doubtful
+                        ? some + " look like floaters (" + kinds + "): too many, none was removed"
+                        : "removed " + some + " as floaters: " + kinds;
   if (f.outside > 0) {
     out += "; " + std::to_string(f.outside) + " too far from the scene to judge were kept";
   }

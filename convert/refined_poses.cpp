@@ -232,7 +232,9 @@ std::vector<std::string> remarks(const Json& report) {
   Names left;  // behind
   for (const Json& view : report["views"]) {
     if (view["points"] != 0) continue;
-    (view["matches"] == 0 ? alone : far_off).add(view["view"]);
+    // What a held-out view shares with one input alone cannot place it, however good its camera is.
+    const bool is_input = view["role"] == "input";
+    (is_input && view["matches"] != 0 ? far_off : alone).add(view["view"]);
     if (view["role"] == "held out" && report["refined"] == true) left.add(view["view"]);
   }
   const std::string option = "--refine-poses: ";
@@ -242,8 +244,10 @@ std::vector<std::string> remarks(const Json& report) {
   std::vector<std::string> out;
   if (far_off.count > 0) {
     out.push_back(option + "the " + far_off.form("camera of ", "cameras of ") + far_off.text +
-                  far_off.form(" is", " are") + " too far off to be refined; leave " +
-                  far_off.form("it", "them") + " out or give the photographs without cameras");
+                  far_off.form(" is", " are") + " too far off to be refined, or what " +
+                  far_off.form("it shows", "they show") +
+                  " lies where too few others see it; leave " + far_off.form("it", "them") +
+                  " out or give the photographs without cameras");
   }
   if (alone.count > 0) {
     out.push_back(option + "too little of what " + alone.text + alone.form(" shows", " show") +

@@ -103,6 +103,9 @@ ColorImage read_heif(std::string_view bytes,
   const std::string samples = decode_heif(bytes, {header.width, header.height}, path);
   const size_t pixels = size_t(header.width) * size_t(header.height);
   if (samples.size() == 3 * pixels) return from_bytes(header, samples.data(), 3);
+  if (samples.size() != 4 * pixels) {
+    throw BadInput(Defect::Syntax, path, "the decoded image is not what its header announces");
+  }
   constexpr unsigned char kHalf = 128;
   MaskMap usable(header.width, header.height, 1);
   for (size_t i = 0; i < pixels; ++i) {

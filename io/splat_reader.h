@@ -16,9 +16,10 @@ struct SplatCount {
   uint64_t file_bytes = 0;
 };
 
-/// Tells before a file is read what it will hold, if it holds splats; none for SPZ and SOG, whose
-/// headers are compressed, and for .ksplat. Nothing is promised: headers can lie.
-/// \throws BadInput as parse_ply_header() and count_glb_splats(), or if the file cannot be opened
+/// Tells what a file holds by its header (a .glb is read for that), if it holds splats; none for
+/// SPZ and SOG, whose headers are compressed, and for .ksplat. Nothing is promised: headers can
+/// lie. \throws BadInput as parse_ply_header() and count_glb_splats(), or if the file cannot be
+/// opened
 std::optional<SplatCount> stated_splats(const std::filesystem::path& path);
 
 /// Reads splats of any format we know, recognised by content: 3DGS and 2DGS PLY, packed PLY, SPZ 2
