@@ -281,11 +281,12 @@ bool holds_splats(const std::filesystem::path& path) {
   return !is_mesh_name(path) || is_splat_file(path);
 }
 
-// info tells what is wrong with a scene, photographs that cannot be read too.
-Json checked_cameras(const SceneRequest& request, OpenedScene& opened, Terminal& terminal) {
+// info tells what is wrong with a scene, photographs that cannot be read too, and nothing else.
+Json checked_cameras(const SceneRequest& request, OpenedScene& opened) {
+  Terminal quiet(true);
   std::string reason;
   try {
-    return check_stated_cameras(request, opened, terminal);
+    return check_stated_cameras(request, opened, quiet);
   } catch (const BadInput& error) {
     reason = error.what();
   } catch (const LimitError& error) {
@@ -308,7 +309,7 @@ void run_info(const InfoArgs& args) {
   }
   Terminal terminal(args.json);
   OpenedScene opened = open_scene(args.scene, {}, terminal);
-  const Json fit = checked_cameras(args.scene, opened, terminal);
+  const Json fit = checked_cameras(args.scene, opened);
   const Json info = scene_json(opened, fit);
   if (args.json) {
     std::cout << json_text(info) << "\n";
