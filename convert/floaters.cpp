@@ -164,7 +164,9 @@ class CellGrid {
  private:
   static constexpr size_t kNone = SIZE_MAX;
 
-  static uint32_t fixed(float opacity) { return static_cast<uint32_t>(opacity * kOne + 0.5f); }
+  static uint32_t fixed(float opacity) {
+    return static_cast<uint32_t>(std::lround(opacity * kOne));
+  }
   static double part(int step, int steps) { return steps == 0 ? 0 : double(step) / steps; }
 
   // To each side, a cell each.

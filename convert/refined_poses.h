@@ -15,7 +15,7 @@
 namespace cgs {
 
 /// Cameras of a scene that were moved to where its photographs have them.
-struct RefinedPoses {
+struct RefinedPoses {  // NOLINT(bugprone-exception-escape): moving JSON does not throw
   std::map<std::string, Eigen::Isometry3d> poses;  ///< world_from_cam of the views that moved.
   /// {"refined": whether any camera of an input view moved, "views": [{"view", "role", "matches":
   ///  with views that show the same, "points": that come of them, "refined", "degrees", "distance"

@@ -102,8 +102,7 @@ nlohmann::ordered_json check_stated_cameras(const SceneRequest& request,
                                             Terminal& terminal) {
   if (opened.poses || opened.refined) return nullptr;
   const SceneRoot root{request.path, request.options.allow_external};
-  const nlohmann::ordered_json fit =
-      camera_fit(opened.scene, root, terminal.begin("checking cameras"));
+  nlohmann::ordered_json fit = camera_fit(opened.scene, root, terminal.begin("checking cameras"));
   terminal.end("");
   const std::string warning = camera_fit_warning(fit);
   if (!warning.empty()) opened.scene.warnings.push_back(warning);
