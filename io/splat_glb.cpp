@@ -108,6 +108,42 @@ void add_harmonics(SplatBuffer& buffer, const Gaussians& g) {
   }
 }
 
+std::string named(const char* what) { return std::string(kGaussianSplatting) + ":" + what; }
+
+/// Colours for readers that only know points, rotations and opacities.
+void add_looks(SplatBuffer& buffer, const Gaussians& g) {
+  buffer.add("COLOR_0", "VEC4", [&](size_t i) {
+    const Eigen::Vector3f& dc = g.sh[i * static_cast<size_t>(g.sh_count())];
+    Eigen::Vector4f out = Eigen::Vector4f::Constant(g.opacity[i]);
+    for (int k = 0; k < 3; ++k) {
+      out[k] = linear_from_srgb(std::clamp(kShC0 * dc[k] + 0.5f, 0.0f, 1.0f));
+    }
+    return out;
+  });
+  buffer.add(named("ROTATION"), "VEC4", [&](size_t i) {
+    const Eigen::Vector4f q = g.rotation[i].normalized();
+    return Eigen::Vector4f(q[1], q[2], q[3], q[0]);
+  });
+  buffer.add(named("OPACITY"), "SCALAR", [&](size_t i) { return std::array{g.opacity[i]}; });
+}
+
+/// What asset.extras say, and lead readers of ours back by.
+Json place_in_world(const Frame& frame,
+                    const Eigen::Vector3f& center,
+                    const Eigen::Matrix3d& y_up) {
+  const Eigen::Vector3d origin = frame.world_from_internal(center.cast<double>());
+  Json rotation = Json::array();
+  for (int i = 0; i < 9; ++i) rotation.push_back(y_up(i / 3, i % 3));
+  const Eigen::Vector3d& file_origin = frame.file_origin;
+  return {{"units", frame.has_metric_scale() ? "m" : "unknown"},
+          {"metres_per_unit", frame.metres_per_unit},
+          {"metres_sigma", frame.metres_sigma},
+          {"scale_source", scale_source_name(frame.scale_source)},
+          {"origin_in_world", {origin.x(), origin.y(), origin.z()}},
+          {"gltf_from_world", std::move(rotation)},
+          {"file_origin", {file_origin.x(), file_origin.y(), file_origin.z()}}};
+}
+
 }  // namespace
 
 std::string splat_harmonic_name(int degree, int order) {
@@ -149,39 +185,15 @@ size_t write_splat_glb(const std::filesystem::path& path,
     throw LimitError("write_splat_glb: glTF binary files end at 4 GiB");
   }
   SplatBuffer buffer(g.size());
-  const auto named = [](const char* what) { return std::string(kGaussianSplatting) + ":" + what; };
   buffer.add("POSITION", "VEC3", placed);
   buffer.set_bounds_of_last(box);
-  buffer.add("COLOR_0", "VEC4", [&](size_t i) {
-    const Eigen::Vector3f& dc = g.sh[i * static_cast<size_t>(g.sh_count())];
-    Eigen::Vector4f out = Eigen::Vector4f::Constant(g.opacity[i]);
-    for (int k = 0; k < 3; ++k) {
-      out[k] = linear_from_srgb(std::clamp(kShC0 * dc[k] + 0.5f, 0.0f, 1.0f));
-    }
-    return out;
-  });
-  buffer.add(named("ROTATION"), "VEC4", [&](size_t i) {
-    const Eigen::Vector4f q = g.rotation[i].normalized();
-    return Eigen::Vector4f(q[1], q[2], q[3], q[0]);
-  });
+  add_looks(buffer, g);
   buffer.add(named("SCALE"), "VEC3", length);
-  buffer.add(named("OPACITY"), "SCALAR", [&](size_t i) { return std::array{g.opacity[i]}; });
   add_harmonics(buffer, g);
   Json document = buffer.document();
   const Eigen::Quaterniond turn(options.y_up);
   document["nodes"][0]["rotation"] = {turn.x(), turn.y(), turn.z(), turn.w()};
-  const Eigen::Vector3d origin = frame.world_from_internal(center.cast<double>());
-  Json rotation = Json::array();
-  for (int i = 0; i < 9; ++i) rotation.push_back(options.y_up(i / 3, i % 3));
-  const Eigen::Vector3d& file_origin = frame.file_origin;
-  document["asset"]["extras"] = {
-      {"units", frame.has_metric_scale() ? "m" : "unknown"},
-      {"metres_per_unit", frame.metres_per_unit},
-      {"metres_sigma", frame.metres_sigma},
-      {"scale_source", scale_source_name(frame.scale_source)},
-      {"origin_in_world", {origin.x(), origin.y(), origin.z()}},
-      {"gltf_from_world", std::move(rotation)},
-      {"file_origin", {file_origin.x(), file_origin.y(), file_origin.z()}}};
+  document["asset"]["extras"] = place_in_world(frame, center, options.y_up);
   const std::string out = glb_bytes(json_text(document, -1), buffer.take_bytes());
   write_file(path, out);
   return out.size();
