@@ -110,15 +110,15 @@ std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
   constexpr double kDrawnPixel = 100;            // of the one that is being drawn
   const auto splats = double(work.splats);
   const double colors = kHarmonic * double(work.harmonics);
+  const double as_read = splats * (kAsRead + colors);
+  const double in_frame = splats * (kInFrame + colors);
   const auto bytes = [](double count) { return static_cast<size_t>(count); };
   std::vector<StageMemory> plan;
   if (work.file_bytes > 0) {
     // The file is gone before the splats are moved into their frame.
     const double beside = std::max(double(work.file_bytes), splats * kMoved);
-    plan.push_back({"reading the splats", bytes(kBase + splats * (kAsRead + colors) + beside)});
+    plan.push_back({"reading the splats", bytes(kBase + as_read + beside)});
   }
-  const double as_read = splats * (kAsRead + colors);
-  const double in_frame = splats * (kInFrame + colors);
   if (work.finds_floaters) {
     constexpr double kCells = 304.0 * 304 * 304 * (4 + 1 + 4);  // opacity, at matter, part
     constexpr double kOfSplat = 12 + 1 + 1 + 4 + 4 + 8;  // place, kind, kept, part, size, tree
@@ -131,7 +131,7 @@ std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
   if (work.pictures > 0) {
     const double pixels = double(work.picture_pixels);
     plan.push_back({"taking pictures",
-                    bytes(kBase + splats * (kInFrame + colors + kProjected + kSorted) +
+                    bytes(kBase + in_frame + splats * (kProjected + kSorted) +
                           pixels * (kPicturePixel * double(work.pictures) + kDrawnPixel))});
   }
   return plan;
