@@ -142,8 +142,10 @@ std::optional<RefinedPoses> stored_poses(const std::filesystem::path& folder,
                                          const std::string& inputs) {
   if (folder.empty() || !is_present(folder / kFileName)) return std::nullopt;
   try {
-    (void)read_json(folder / kFileName);  // refuses what is nested too deep to be copied
-    const Json record = Json::parse(read_file(folder / kFileName));
+    const std::string text =
+        read_file(folder / kFileName, {.max_file_bytes = ReadLimits{}.max_json_bytes});
+    (void)parse_json(text, folder / kFileName);  // refuses what is nested too deep to be copied
+    const Json record = Json::parse(text);
     RefinedPoses out;
     out.fit = record.at("fit");
     const Json& poses = record.at("poses");
