@@ -6,9 +6,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/pipeline.h"
+#include "convert/recorded_request.h"
 #include "convert/run_record.h"
-#include "io/byte_reader.h"
-#include "io/json_file.h"
 #include "io/scene_path.h"
 #include "libcgs/core/error.h"
 
@@ -19,62 +19,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-// The record of a run that came to its end.
-Json finished_record(const fs::path& output) {
-  const fs::path path = output / "run.json";
-  if (!is_present(path)) {
-    throw BadInput(Defect::Missing, path, "no such file; give the folder of a run");
-  }
-  (void)read_json(path);  // refuses what is nested too deep to be copied
-  Json record = Json::parse(read_file(path));
-  const bool is_finished = record.is_object() && record.contains("outputs") &&
-                           record["outputs"].is_object() && record.contains("request") &&
-                           record["request"].is_object();
-  if (is_finished) return record;
-  throw BadInput(Defect::Schema,
-                 path,
-                 "is not of a finished run: it does not say what the outputs were; run it again");
-}
-
-std::string text_at(const Json& json, const char* key) {
-  return json.contains(key) && json[key].is_string() ? json[key].get<std::string>() : "";
-}
-
-// As depth_options_json() wrote them; runs of before have none.
-DepthOptions depth_options_from(const Json& json) {
-  DepthOptions out;
-  if (!json.is_object()) return out;
-  out.folder = text_at(json, "folder");
-  out.network = text_at(json, "network");
-  const Json kind = json.value("kind", Json(0));
-  const bool is_kind = kind.is_number_integer() && kind.get<int64_t>() >= 0 &&
-                       kind.get<int64_t>() <= static_cast<int64_t>(DepthKind::Disparity);
-  if (is_kind) out.kind = static_cast<DepthKind>(kind.get<int>());
-  const Json scale = json.value("scale", Json(0));
-  if (scale.is_number()) out.scale = scale.get<double>();
-  return out;
-}
-
-SceneRequest scene_request(const Json& record) {
-  const Json& request = record["request"];
-  SceneRequest out;
-  out.path = text_at(request, "scene");
-  out.options.views = text_at(request, "views");
-  const Json downscale = request.value("downscale", Json(0));
-  if (downscale.is_number_integer() && downscale.get<int>() > 0) {
-    out.options.downscale = downscale.get<int>();
-  }
-  out.options.allow_external = true;  // the run was allowed what it needed
-  const Json focal = record.value("focal", Json(0));
-  if (focal.is_number()) out.focal = focal.get<double>();
-  out.refine_poses = request.value("refine_poses", Json(false)) == Json(true);
-  out.options.depth = depth_options_from(record.value("depth_options", Json()));
-  out.control.file = text_at(record, "control_points");
-  if (request.contains("control_points") && request["control_points"].is_object()) {
-    out.control.unit = text_at(request["control_points"], "unit");
-  }
-  return out;
-}
+constexpr const char* kInput = "input ";  // begins the lines on what went in
 
 // Adds what two sets of named hashes do not have in common.
 void compare(const Json& before, const Json& now, const std::string& kind, Verification& out) {
@@ -95,23 +40,22 @@ void verify_inputs(const Json& record,
                    const fs::path& output,
                    Terminal& terminal,
                    Verification& out) {
-  RunRequest request;
-  request.scene = scene_request(record);
+  const RunRequest request = recorded_request(record, output / "run.json");
   const OpenedScene opened = open_scene(request.scene, output / "model", terminal);
   const Json now = request_json(request, opened.scene);
   const Json& before = record["request"];
   for (const char* kind : {"input_images", "held_out_images"}) {
-    compare(before.value(kind, Json::object()), now[kind], "input ", out);
+    compare(before.value(kind, Json::object()), now[kind], kInput, out);
     out.inputs += now[kind].size();
   }
   if (now.contains("control_points")) {
     if (before.value("control_points", Json()) != now["control_points"]) {
-      out.differing.emplace_back("input control points: changed");
+      out.differing.push_back(std::string(kInput) + "control points: changed");
     }
     ++out.inputs;
   }
   if (before.value("cameras", Json()) != now["cameras"]) {
-    out.differing.emplace_back("input cameras: changed");
+    out.differing.push_back(std::string(kInput) + "cameras: changed");
   }
   ++out.inputs;
 }
@@ -129,16 +73,6 @@ Json hashes_now(const Json& record, const fs::path& output) {
 }
 
 }  // namespace
-
-Json depth_options_json(const DepthOptions& options) {
-  const auto whole = [](const fs::path& path) {
-    return path.empty() ? std::string() : fs::weakly_canonical(path).string();
-  };
-  return {{"folder", whole(options.folder)},
-          {"kind", static_cast<int>(options.kind)},
-          {"scale", options.scale},
-          {"network", whole(options.network)}};
-}
 
 std::vector<std::string> named_outputs(const fs::path& output, const std::set<std::string>& names) {
   std::vector<std::string> out;
@@ -168,6 +102,25 @@ Verification verify_run(const fs::path& output, Terminal& terminal) {
   const Json now = hashes_now(record, output);
   out.outputs = record["outputs"].size();
   compare(record["outputs"], now, "", out);
+  return out;
+}
+
+Verification recompute_run(const fs::path& output, Terminal& terminal) {
+  const fs::path fresh = output / kRecomputedFolder;
+  Verification out = verify_run(output, terminal);
+  const bool has_inputs =
+      std::none_of(out.differing.begin(), out.differing.end(), [](const std::string& line) {
+        return line.starts_with(kInput);
+      });
+  if (!has_inputs) return out;
+  RunRequest request = recorded_request(finished_record(output), output / "run.json");
+  request.output = fresh;
+  request.overwrite = true;  // what an earlier version left there
+  (void)run_pipeline(request, terminal);
+  const size_t inputs = out.inputs;
+  out = compare_runs(output, fresh);
+  out.inputs = inputs;
+  if (out.differing.empty()) fs::remove_all(fresh);
   return out;
 }
 

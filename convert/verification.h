@@ -8,13 +8,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "convert/run_request.h"
+#include "convert/terminal.h"
 
 namespace cgs {
-
-/// How depth was given, for run.json: it must be known to read the inputs again, while what it
-/// leads to is part of the request already.
-nlohmann::ordered_json depth_options_json(const DepthOptions& options);
 
 /// Files that a run wrote, by their paths below its folder, in order.
 ///
@@ -40,6 +36,15 @@ struct Verification {
 /// scene
 ///         cannot be read any more
 Verification verify_run(const std::filesystem::path& output, Terminal& terminal);
+
+/// Where recompute_run() works, below the folder of the run.
+inline constexpr const char* kRecomputedFolder = "recomputed";
+
+/// Does all of a finished run again, from its inputs, and compares what comes out with what is
+/// there. It works in a folder below the run's, which goes on where an interrupted call stopped;
+/// it stays if anything differs. Nothing is computed if an input is no longer what it was.
+/// \throws as verify_run(), recorded_request() and run_pipeline()
+Verification recompute_run(const std::filesystem::path& output, Terminal& terminal);
 
 /// Compares the outputs of two finished runs, as they are now. Left out are report.json and
 /// report.html, which state times.

@@ -17,13 +17,19 @@ namespace {
 struct VerifyArgs {
   std::filesystem::path output;
   std::filesystem::path other;
+  bool recompute = false;
   bool json = false;
 };
 
+Verification found_by(const VerifyArgs& args) {
+  if (!args.other.empty()) return compare_runs(args.output, args.other);
+  Terminal terminal(!args.recompute);
+  if (args.recompute) return recompute_run(args.output, terminal);
+  return verify_run(args.output, terminal);
+}
+
 void run_verify(const VerifyArgs& args) {
-  Terminal terminal(true);
-  const Verification found = args.other.empty() ? verify_run(args.output, terminal)
-                                                : compare_runs(args.output, args.other);
+  const Verification found = found_by(args);
   if (args.json) {
     std::cout << json_text(nlohmann::ordered_json{{"inputs", found.inputs},
                                                   {"outputs", found.outputs},
@@ -33,6 +39,10 @@ void run_verify(const VerifyArgs& args) {
     for (const std::string& line : found.differing) std::cout << one_line(line) << "\n";
     if (args.other.empty()) std::cout << found.inputs << " inputs and ";
     std::cout << found.outputs << " outputs checked, " << found.differing.size() << " differ\n";
+    const std::filesystem::path fresh = args.output / kRecomputedFolder;
+    if (args.recompute && std::filesystem::exists(fresh)) {
+      std::cout << "what was computed now is in " << printable(fresh) << "\n";
+    }
   }
   if (found.differing.empty()) return;
   throw BadInput(
@@ -48,10 +58,15 @@ void add_verify(CLI::App& app) {
   auto* cmd = app.add_subcommand(
       "verify", "Inputs and outputs of a run against the hashes in its run.json; exit 3 = changed");
   cmd->add_option("output", args->output, "Folder that run wrote")->required();
-  cmd->add_option(
+  auto* other = cmd->add_option(
       "other", args->other, "Folder of another run that should have given the same files");
+  cmd->add_flag("--recompute",
+                args->recompute,
+                "Do the whole run again from its inputs and compare the files; takes as long, and "
+                "as much room beside it, as the run did")
+      ->excludes(other);
   cmd->add_flag("--json", args->json, "Report on standard output, as JSON");
-  cmd->footer("Example: cgs verify out/portal");
+  cmd->footer("Example: cgs verify out/portal\n         cgs verify out/portal --recompute");
   cmd->callback([args] { run_verify(*args); });
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The same photographs give the same files for any number of threads, and `cgs verify` notices when
 // an input or an output of a run is not what it was.
+#include <iomanip>
 #include <map>
+#include <sstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -27,6 +29,15 @@ std::map<std::string, std::string> results_in(const fs::path& folder) {
     if (entry.is_regular_file() && !states_times) out[name] = read_bytes(entry.path());
   }
   return out;
+}
+
+// 64-bit FNV-1a, as 16 hexadecimal digits.
+std::string fnv1a(const std::string& bytes) {
+  uint64_t hash = 14695981039346656037u;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
+  std::ostringstream text;
+  text << std::hex << std::setw(16) << std::setfill('0') << hash;
+  return text.str();
 }
 
 class Verify : public testing::Test {
@@ -191,6 +202,59 @@ TEST_F(Verify, RefusesWhatIsNoFinishedRun) {
   auto json = nlohmann::json::parse(read_bytes(out() / "run.json"));
   json["outputs"] = {{"../scene/transforms.json", 7}};
   EXPECT_EQ(verify_with(out() / "run.json", json.dump()).exit_code, 3);
+}
+
+// Hashes only tell that files are what they were; whether they are what the inputs lead to, doing
+// it again tells.
+TEST_F(Verify, RecomputesEverythingAndFindsAResultThatTheInputsDoNotLeadTo) {
+  const std::string recompute = "verify " + out().string() + " --recompute";
+  const auto same = run_cgs(recompute);
+  EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
+  EXPECT_NE(same.out.find(" 0 differ"), std::string::npos) << same.out;
+  EXPECT_FALSE(fs::exists(out() / "recomputed"));
+
+  const std::string glb = read_bytes(out() / "web/asset.glb");
+  const std::string record = read_bytes(out() / "run.json");
+  std::string forged = glb;
+  forged[forged.size() / 2] = char(forged[forged.size() / 2] ^ 1);
+  write_bytes(out() / "web/asset.glb", forged);
+  auto json = nlohmann::ordered_json::parse(record);
+  json["outputs"]["web/asset.glb"] = fnv1a(forged);
+  write_bytes(out() / "run.json", json.dump());
+  EXPECT_EQ(verify().exit_code, 0);
+  const auto found = run_cgs(recompute);
+  write_bytes(out() / "web/asset.glb", glb);
+  write_bytes(out() / "run.json", record);
+  EXPECT_EQ(found.exit_code, 3) << found.out;
+  EXPECT_NE(found.out.find("web/asset.glb: changed\n"), std::string::npos) << found.out;
+  EXPECT_NE(found.out.find(" 1 differ\n"), std::string::npos) << found.out;
+  EXPECT_TRUE(read_bytes(out() / "recomputed/web/asset.glb") == glb);
+  fs::remove_all(out() / "recomputed");
+}
+
+// Everything a run can be asked for comes back from its record.
+TEST_F(Verify, RecomputesARunOfManyOptions) {
+  const fs::path many = *dir_ / "many";
+  const auto result = run_cgs("run " + scene().string() + " --views " + kInputViews +
+                              " --known-distance v11:20,20 v12:40,20 1.2m+-1cm --up 0 0 1 "
+                              "--set steps=3 --set depth_spacing=64,16 --voxel-size 6cm "
+                              "--simplify 2cm --compression-error 1cm --glb-encoding meshopt "
+                              "--refine-poses --downscale 1 -q -o " +
+                              many.string());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto same = run_cgs("verify " + many.string() + " --recompute");
+  EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
+}
+
+TEST_F(Verify, DoesNotRecomputeFromOtherInputs) {
+  const fs::path view = scene() / "images/v12.png";
+  const std::string before = read_bytes(view);
+  write_bytes(view, read_bytes(scene() / "images/v11.png"));
+  const auto found = run_cgs("verify " + out().string() + " --recompute");
+  write_bytes(view, before);
+  EXPECT_EQ(found.exit_code, 3);
+  EXPECT_NE(found.out.find("input v12: changed"), std::string::npos) << found.out;
+  EXPECT_FALSE(fs::exists(out() / "recomputed"));
 }
 
 // Two runs are the same if their results are, and told apart otherwise.
