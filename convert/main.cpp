@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <new>
@@ -11,6 +12,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <glog/logging.h>
+#include <opencv2/core.hpp>
 
 #include "convert/commands/commands.h"
 #include "convert/terminal.h"
@@ -65,6 +67,18 @@ int run_program(int argc, char** argv) {
   return 0;
 }
 
+// Ends at once: what libraries do at a regular end may need memory, too, and abort without.
+[[noreturn]] void end_without_memory() {
+  std::fprintf(stderr, "cgs: LIMIT: out of memory; try --downscale 2 or a larger --voxel-size\n");
+  std::fflush(nullptr);
+  std::_Exit(4);
+}
+
+int end_unexpectedly(const std::exception& error) {
+  std::fprintf(stderr, "cgs: unexpected: %s\n", cgs::one_line(error.what()).c_str());
+  return 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -82,10 +96,11 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "cgs: %s\n", io.what());
     return io.exit_code();
   } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "cgs: LIMIT: out of memory; try --downscale 2 or a larger --voxel-size\n");
-    return 4;
+    end_without_memory();
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) end_without_memory();
+    return end_unexpectedly(error);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "cgs: unexpected: %s\n", error.what());
-    return 1;
+    return end_unexpectedly(error);
   }
 }

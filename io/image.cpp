@@ -5,10 +5,13 @@
 #include <cstdio>
 // clang-format off
 #include <jpeglib.h>
+#include <jerror.h>
 // clang-format on
 #include <algorithm>
 #include <cmath>
 #include <csetjmp>
+#include <cstddef>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -18,6 +21,7 @@
 
 #include "io/heif.h"
 #include "io/image_header.h"
+#include "libcgs/core/opencv_memory.h"
 
 namespace cgs {
 
@@ -125,6 +129,7 @@ ColorImage read_jpeg(std::string_view bytes,
                                       header,
                                       reinterpret_cast<unsigned char*>(rgb.data()),
                                       errors);
+  if (!is_decoded && errors.base.msg_code == JERR_OUT_OF_MEMORY) throw std::bad_alloc();
   if (!is_decoded) throw BadInput(Defect::Syntax, path, std::string("JPEG: ") + errors.message);
   if (errors.base.num_warnings > 0) {
     throw BadInput(Defect::Truncated,
@@ -155,7 +160,19 @@ class Silence {
   int saved_;
 };
 
-cv::Mat decode_with_opencv(std::string_view bytes, const std::filesystem::path& path) {
+// Decoders tell a lack of memory as they tell damage, or abort: throws std::bad_alloc before.
+void ensure_memory_to_decode(const ImageHeader& header) {
+  constexpr size_t kBytesPerPixel = 16;  // four channels of 16 bits, and as much to work with
+  constexpr size_t kTables = size_t{16} << 20;
+  const size_t pixels = size_t(header.width) * size_t(header.height);
+  // Called by name, so that no compiler leaves it out. Unwritten memory is only address space.
+  ::operator delete(::operator new(kBytesPerPixel* pixels + kTables));
+}
+
+cv::Mat decode_with_opencv(std::string_view bytes,
+                           const ImageHeader& header,
+                           const std::filesystem::path& path) {
+  ensure_memory_to_decode(header);
   const cv::Mat buffer(1,
                        static_cast<int>(bytes.size()),
                        CV_8UC1,
@@ -165,6 +182,11 @@ cv::Mat decode_with_opencv(std::string_view bytes, const std::filesystem::path& 
     const Silence silence;
     // Unchanged keeps 16 bits and alpha, and does not apply the orientation tag.
     pixels = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception& error) {
+    throw_if_out_of_memory(error);
+    throw BadInput(Defect::Syntax, path, "the image decoder refused the content");
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::exception&) {
     throw BadInput(Defect::Syntax, path, "the image decoder refused the content");
   }
@@ -182,7 +204,7 @@ std::string read_image_file(const std::filesystem::path& path, const ReadLimits&
 cv::Mat decode_as_announced(std::string_view bytes,
                             const ImageHeader& header,
                             const std::filesystem::path& path) {
-  cv::Mat pixels = decode_with_opencv(bytes, path);
+  cv::Mat pixels = decode_with_opencv(bytes, header, path);
   if (pixels.cols != header.width || pixels.rows != header.height || pixels.channels() > 4) {
     throw BadInput(Defect::Syntax, path, "the decoded image is not what its header announces");
   }

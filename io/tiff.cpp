@@ -8,6 +8,7 @@
 
 #include "io/atomic_file.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/opencv_memory.h"
 
 namespace cgs {
 
@@ -22,6 +23,7 @@ void write_tiff(const std::filesystem::path& path, const Raster<float>& values) 
       throw NumericalError("TIFF encoder: refused the picture");
     }
   } catch (const cv::Exception& error) {
+    throw_if_out_of_memory(error);
     throw NumericalError(std::string("TIFF encoder: ") + error.what());
   }
   write_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});

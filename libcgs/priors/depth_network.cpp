@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/opencv_memory.h"
 #include "libcgs/priors/onnx_input.h"
 
 namespace cgs {
@@ -97,6 +98,7 @@ DepthNetwork::DepthNetwork(const std::string& onnx, const std::filesystem::path&
     net_->net = cv::dnn::readNetFromONNX(onnx.data(), onnx.size());
     net_->net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
   } catch (const cv::Exception& error) {
+    throw_if_out_of_memory(error);
     net_->fail(Defect::Unsupported, "OpenCV cannot run this network: " + reason_of(error));
   }
 }
@@ -113,6 +115,7 @@ DepthMap DepthNetwork::operator()(const View& view) {
     net_->net.setInput(input_blob(image, net_->size));
     output = net_->net.forward().clone();
   } catch (const cv::Exception& error) {
+    throw_if_out_of_memory(error);
     net_->fail(Defect::Unsupported, "OpenCV cannot run this network: " + reason_of(error));
   }
   const int dimensions = output.dims;

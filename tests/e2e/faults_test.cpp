@@ -2,7 +2,8 @@
 // Every call by which a run asks the system for something in its folders fails once, and at every
 // one the process is killed once. The run must end with the right exit code and one line, what it
 // leaves must be whole, and the run that goes on must end with the files of one that was never
-// disturbed. CGS_FAULTS says how many of some thousand errors, and of the kills, are tried.
+// disturbed; so must one that lacks memory. CGS_FAULTS says how many of some thousand errors, and
+// of the kills, are tried.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -94,15 +95,24 @@ class Faults : public testing::Test {
 
   // Exit code of a run under strace; -1 if a signal ended it.
   static int run(const std::string& out, const std::string& strace_options) {
-    const std::string strace =
-        strace_options.empty() ? "" : "strace -f -qq " + strace_options + " ";
-    const std::string command = strace + CGS_BINARY + " run " + (*dir_ / "capture").string() +
-                                " --views view_01,view_02,view_03 --assume-unit m --voxel-size "
-                                "40cm --simplify 0 --downscale 8 "
-                                "--set steps=3 --threads 1 -q -o " +
-                                (*dir_ / out).string() + " >/dev/null 2>" +
-                                (*dir_ / "message").string();
-    const int status = std::system(command.c_str());
+    return run_after(strace_options.empty() ? "" : "strace -f -qq " + strace_options + " ", out);
+  }
+  // The same with so much address space.
+  static int run_within(size_t kibibytes, const std::string& out) {
+    return run_after("ulimit -v " + std::to_string(kibibytes) + "; ", out);
+  }
+  static int run_after(const std::string& before, const std::string& out) {
+    const std::string arguments = (*dir_ / "capture").string() +
+                                  " --views view_01,view_02,view_03 --assume-unit m --voxel-size "
+                                  "40cm --simplify 0 --downscale 8 "
+                                  "--set steps=3 --threads 1 -q -o " +
+                                  (*dir_ / out).string();
+    return exit_code(before + CGS_BINARY + " run " + arguments);
+  }
+  // What the command says on standard error is message().
+  static int exit_code(const std::string& command) {
+    const std::string quiet = command + " >/dev/null 2>" + (*dir_ / "message").string();
+    const int status = std::system(quiet.c_str());
     // strace ends by the signal that ended its child, the shell with 128 + its number.
     return WIFEXITED(status) && WEXITSTATUS(status) < 128 ? WEXITSTATUS(status) : -1;
   }
@@ -203,6 +213,43 @@ TEST_F(Faults, AKillAnywhereLosesNothing) {
     const Counted counted;
     EXPECT_EQ(run("out", fault.options() + " -o /dev/null"), -1) << message();
     expect_whole_files("out", true);
+    expect_going_on();
+  }
+}
+
+// Halves the distance between a limit that is too small and one that is not until it is `step`.
+template <typename IsEnough>
+std::pair<size_t, size_t> bisect(size_t low, size_t high, size_t step, IsEnough is_enough) {
+  while (high - low > step) {
+    const size_t middle = (low + high) / 2;
+    (is_enough(middle) ? high : low) = middle;
+  }
+  return {low, high};
+}
+
+TEST_F(Faults, MemoryThatRunsOutAnywhereIsSaidAndNothingIsLost) {
+  constexpr size_t kMost = size_t{4} << 20;  // [KiB]
+  const auto starts = [](size_t limit) {
+    return exit_code("ulimit -v " + std::to_string(limit) + "; " + CGS_BINARY + " --version") == 0;
+  };
+  const auto ends = [](size_t limit) {
+    const bool is_enough = run_within(limit, "out") == 0;
+    fs::remove_all(*dir_ / "out");
+    return is_enough;
+  };
+  const size_t least = bisect(0, kMost, 256, starts).second;  // below, its libraries do not load
+  const size_t need = bisect(least, kMost, 4096, ends).first;
+  ASSERT_GT(need, least + 8192);
+  constexpr size_t kTried = 12;
+  for (size_t i = 0; i < kTried; ++i) {
+    const size_t limit = least + 1024 + i * (need - least - 1024) / kTried;
+    SCOPED_TRACE(std::to_string(limit) + " of " + std::to_string(need) + " KiB");
+    const Counted counted;
+    EXPECT_EQ(run_within(limit, "out"), 4);
+    const std::string text = message();
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+    EXPECT_NE(text.find("LIMIT"), std::string::npos) << text;
+    if (fs::exists(*dir_ / "out")) expect_whole_files("out", false);
     expect_going_on();
   }
 }
