@@ -15,6 +15,7 @@
 #include "convert/size_search.h"
 #include "convert/texture.h"
 #include "convert/written_surface.h"
+#include "io/glb_primitive.h"
 #include "io/gltf.h"
 #include "io/mesh_file.h"
 #include "io/tileset.h"
@@ -49,8 +50,10 @@ struct Form {
   GlbOptions options;
 };
 
-// From the detail of one level to that of the next: its file is about a fifth as large.
+// From the detail of one level to that of the next.
 constexpr double kLevelStep = 3;
+// Of a level: a viewer that bears an error of a pixel shall see no pixels of textures.
+constexpr double kLevelTexel = 1;
 
 Eigen::AlignedBox3d box_of(const TriangleMesh& mesh) {
   Eigen::AlignedBox3d box;
@@ -87,7 +90,7 @@ class AssetWriter {
     const double left = promise_ ? 0 : kSimplified * detail - already;
     const double looser = detail / std::max(already, kLeastShare * detail);
     if (left > 0) simplify_to(left, kLooserWhereInferred * left, looser, out);
-    leave_out_below(detail, rounding_ > 0 ? rounding_ : kRounded * detail, out);
+    leave_out_below(detail, kTexel, rounding_ > 0 ? rounding_ : kRounded * detail, out);
     return out;
   }
 
@@ -97,7 +100,7 @@ class AssetWriter {
     Form out = whole();
     const double error = kSimplified * detail;
     simplify_to(error, error, detail / finest, out);
-    leave_out_below(detail, std::max(rounding_, kRounded * detail), out);
+    leave_out_below(detail, kLevelTexel, std::max(rounding_, kRounded * detail), out);
     return out;
   }
 
@@ -122,10 +125,9 @@ class AssetWriter {
 
   /// Of a mesh, in the coordinates of the files.
   Eigen::AlignedBox3d box_in_file(const TriangleMesh& mesh) const {
+    const GlbPlacement placement{y_up_, file_unit(), box_.center()};
     Eigen::AlignedBox3d out;
-    for (const Eigen::Vector3f& p : mesh.vertices) {
-      out.extend(file_unit() * (y_up_ * (p.cast<double>() - box_.center())));
-    }
+    for (const Eigen::Vector3f& p : mesh.vertices) out.extend(placement(p).cast<double>());
     return out;
   }
   /// Units of the files per internal unit.
@@ -177,10 +179,11 @@ class AssetWriter {
     if (!texture_.empty()) out.texture = texture_from_photographs(scene_, out.mesh, unused);
   }
 
-  void leave_out_below(double detail, double rounding, Form& out) const {
+  // \param texel  of textures, in details
+  void leave_out_below(double detail, double texel, double rounding, Form& out) const {
     out.detail = detail;
     out.options = glb_options(rounding, summary_for(out.mesh));
-    out.texture_share = coarsen_texture(out.texture, out.mesh, kTexel * detail);
+    out.texture_share = coarsen_texture(out.texture, out.mesh, texel * detail);
   }
 
   const Scene& scene_;
@@ -390,7 +393,7 @@ Json write_levels(const AssetWriter& writer,
                   size_t count,
                   const Frame& frame,
                   const Progress& progress) {
-  const double shown = texel_size(finest_form.texture, finest_form.mesh) / kTexel;
+  const double shown = texel_size(finest_form.texture, finest_form.mesh) / kLevelTexel;
   const double finest = std::max(shown, finest_form.detail);
   finest_form = {};
   const std::filesystem::path folder = writer.path().parent_path();
