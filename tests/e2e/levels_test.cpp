@@ -134,8 +134,8 @@ size_t pixels_of(const test::Glb& glb) {
 
 TEST(Levels, AreSmallerAndAsFarOffAsTheySay) {
   const TempDir dir;
-  make_capture(dir, 4);
-  const auto run = run_cgs(run_arguments(dir, "--lods 2 --json"));
+  make_capture(dir, 3);
+  const auto run = run_cgs(run_arguments(dir, "--lods 2 --json --voxel-size 0.08"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const json levels = parsed(dir / "out/run.json")["stages"]["web"]["result"]["levels"];
   ASSERT_EQ(levels.size(), 2u);
