@@ -43,10 +43,10 @@ struct WrittenAsset {
 /// was written is read again and held against the surface that volume.vdb holds.
 ///
 /// Coarser levels of it, request.lods of them, follow as web/asset.lod1.glb and so on, with
-/// web/tileset.json. Their details, which are also the size of a pixel of their textures, go on from
-/// the pixels of asset.glb and grow threefold, less where they would pass a fiftieth of the object;
-/// inferred surface stays as near as the rest. None of them keeps a promise; how far it is off
-/// asset.glb is measured.
+/// web/tileset.json. Their details, which are also the size of a pixel of their textures, go on
+/// from the pixels of asset.glb and grow threefold, less where they would pass a fiftieth of the
+/// object; inferred surface stays as near as the rest. None of them keeps a promise; how far it is
+/// off asset.glb is measured.
 ///
 /// \return of asset.glb bytes and measured errors; with a promise "deviation", "form" and, for
 ///         people, "words"; of each level "file", "bytes", "faces", "texture_share", "detail",
