@@ -15,8 +15,10 @@
 #include "convert/size_search.h"
 #include "convert/texture.h"
 #include "convert/written_surface.h"
+#include "io/glb_primitive.h"
 #include "io/gltf.h"
 #include "io/mesh_file.h"
+#include "io/tileset.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
 #include "meshing/simplify.h"
@@ -26,6 +28,8 @@ namespace cgs {
 using Json = nlohmann::ordered_json;
 
 namespace {
+
+constexpr const char* kTilesetName = "tileset.json";
 
 // What the detail d is shared out to.
 constexpr double kSimplified = 0.8;
@@ -46,10 +50,15 @@ struct Form {
   GlbOptions options;
 };
 
-double largest_side(const TriangleMesh& mesh) {
-  Eigen::AlignedBox3f box;
-  for (const Eigen::Vector3f& p : mesh.vertices) box.extend(p);
-  return double(box.sizes().maxCoeff());
+// From the detail of one level to that of the next.
+constexpr double kLevelStep = 3;
+// Of a level: a viewer that bears an error of a pixel shall see no pixels of textures.
+constexpr double kLevelTexel = 1;
+
+Eigen::AlignedBox3d box_of(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3f& p : mesh.vertices) box.extend(p.cast<double>());
+  return box;
 }
 
 class AssetWriter {
@@ -63,7 +72,7 @@ class AssetWriter {
         y_up_(y_up_from(model.scene.frame.up)),
         summary_(content.summary),
         encoding_(request.glb_encoding),
-        side_(largest_side(content.mesh)) {
+        box_(box_of(content.mesh)) {
     if (!request.compression_error.empty()) {
       rounding_ = parse_length(request.compression_error, frame_);
     }
@@ -77,23 +86,35 @@ class AssetWriter {
   /// \param already  how far mesh_ is from the fused surface where there is evidence
   Form coarser(double detail, double already) const {
     Form out = whole();
-    out.detail = detail;
     // With a promise, the mesh was made as coarse as that allows before.
     const double left = promise_ ? 0 : kSimplified * detail - already;
-    if (left > 0) simplify_to(left, detail / std::max(already, kLeastShare * detail), out);
-    const double rounding = rounding_ > 0 ? rounding_ : kRounded * detail;
-    out.options = glb_options(rounding, summary_for(out.mesh));
-    out.texture_share = coarsen_texture(out.texture, out.mesh, kTexel * detail);
+    const double looser = detail / std::max(already, kLeastShare * detail);
+    if (left > 0) simplify_to(left, kLooserWhereInferred * left, looser, out);
+    leave_out_below(detail, kTexel, rounding_ > 0 ? rounding_ : kRounded * detail, out);
     return out;
   }
 
-  GlbReport write(const Form& form) const {
-    return write_glb(path_, form.mesh, form.texture, frame_, form.options);
+  /// A level that states its error instead of keeping one; a viewer sees all surface alike.
+  /// \param finest  detail of the whole
+  Form level(double detail, double finest) const {
+    Form out = whole();
+    const double error = kSimplified * detail;
+    simplify_to(error, error, detail / finest, out);
+    leave_out_below(detail, kLevelTexel, std::max(rounding_, kRounded * detail), out);
+    return out;
+  }
+
+  GlbReport write(const Form& form) const { return write(form, path_); }
+  GlbReport write(const Form& form, const std::filesystem::path& path) const {
+    return write_glb(path, form.mesh, form.texture, frame_, form.options);
+  }
+
+  TriangleMesh read(const std::filesystem::path& path) const {
+    return read_mesh_file(path, frame_).content.mesh;
   }
 
   SurfaceDeviation deviation_from(const TriangleMesh& fused) const {
-    const TriangleMesh written = read_mesh_file(path_, frame_).content.mesh;
-    const SurfaceDeviation out = surface_deviation(written, fused);
+    const SurfaceDeviation out = surface_deviation(read(path_), fused);
     if (promise_ && out.max() > *promise_) {
       throw NumericalError("asset.glb is " + format_length(out.max(), frame_) +
                            " off the fused surface, promised were " +
@@ -102,7 +123,24 @@ class AssetWriter {
     return out;
   }
 
-  double side() const { return side_; }
+  /// Of a mesh, in the coordinates of the files.
+  Eigen::AlignedBox3d box_in_file(const TriangleMesh& mesh) const {
+    const GlbPlacement placement{y_up_, file_unit(), box_.center()};
+    Eigen::AlignedBox3d out;
+    for (const Eigen::Vector3f& p : mesh.vertices) out.extend(placement(p).cast<double>());
+    return out;
+  }
+  /// Units of the files per internal unit.
+  double file_unit() const {
+    return frame_.scale * (frame_.has_metric_scale() ? frame_.metres_per_unit : 1.0);
+  }
+  /// Where the files' (0, 0, 0) lies in the world, turned so that up is +Z [units of the files].
+  Eigen::Vector3d place() const {
+    const Eigen::Vector3d in_world = frame_.world_from_internal(box_.center());
+    return file_unit() / frame_.scale * (z_up_from(frame_.up) * in_world);
+  }
+
+  double side() const { return box_.sizes().maxCoeff(); }
   const std::filesystem::path& path() const { return path_; }
 
  private:
@@ -110,13 +148,14 @@ class AssetWriter {
     GlbOptions out;
     out.encoding = encoding_;
     out.y_up = y_up_;
+    out.center = box_.center();
     out.max_error = rounding * frame_.scale;
     out.summary_json = summary.dump();
     // Finer than any grid of the encoding: floats as they are.
     const bool short_numbers =
         encoding_ == GlbEncoding::Quantized || encoding_ == GlbEncoding::Meshopt;
     const double finest_grid = short_numbers ? 1.8 / 65535 : 1.0 / (1 << 20);
-    if (promise_ && rounding < finest_grid * side_) out.encoding = GlbEncoding::Plain;
+    if (promise_ && rounding < finest_grid * side()) out.encoding = GlbEncoding::Plain;
     return out;
   }
 
@@ -128,16 +167,23 @@ class AssetWriter {
 
   // Colours of vertices hold faces where photographs show them anyway, and small parts of the
   // surface: both give way with coarser detail.
-  void simplify_to(double error, double coarser, Form& out) const {
+  void simplify_to(double error, double inferred, double coarser, Form& out) const {
     SimplifyOptions options;
     options.max_error = error;
-    options.max_error_inferred = kLooserWhereInferred * error;
+    options.max_error_inferred = inferred;
     options.max_color_error =
         texture_.empty() ? std::min(1.0, coarser * options.max_color_error) : 1;
     options.max_area_change = std::min(0.1, coarser * options.max_area_change);
     out.mesh = simplify(mesh_, options).mesh;
     Json unused;
     if (!texture_.empty()) out.texture = texture_from_photographs(scene_, out.mesh, unused);
+  }
+
+  // \param texel  of textures, in details
+  void leave_out_below(double detail, double texel, double rounding, Form& out) const {
+    out.detail = detail;
+    out.options = glb_options(rounding, summary_for(out.mesh));
+    out.texture_share = coarsen_texture(out.texture, out.mesh, texel * detail);
   }
 
   const Scene& scene_;
@@ -148,7 +194,7 @@ class AssetWriter {
   Eigen::Matrix3d y_up_;
   const Json& summary_;
   GlbEncoding encoding_;
-  double side_;
+  Eigen::AlignedBox3d box_;        ///< Of mesh_.
   double rounding_ = 0;            ///< [internal units]; 0 = default of the format
   std::optional<double> promise_;  ///< [internal units]
 };
@@ -206,6 +252,13 @@ Json glb_to_json(const GlbReport& glb, const Frame& frame) {
           {"units", frame.unit_name()}};
 }
 
+Json deviation_to_json(const SurfaceDeviation& deviation, const Frame& frame) {
+  return {{"evidence", deviation.evidence * frame.scale},
+          {"inferred", deviation.inferred * frame.scale},
+          {"places", deviation.places},
+          {"units", frame.unit_name()}};
+}
+
 Json form_to_json(const Written& written, const Frame& frame) {
   Json tried = Json::array();
   for (const TriedSize& form : written.tried) {
@@ -238,43 +291,163 @@ std::string words_for(const Written& written,
          std::to_string(deviation.places) + " places, both ways)";
 }
 
-Json write_promised(const AssetWriter& writer,
-                    const RunRequest& request,
-                    const TriangleMesh& mesh,
-                    const Frame& frame,
-                    const Progress& progress) {
+// The form on disk, and what the report says of it.
+std::pair<Form, Json> write_promised(const AssetWriter& writer,
+                                     const RunRequest& request,
+                                     const TriangleMesh& mesh,
+                                     const Frame& frame,
+                                     const Progress& progress) {
   const TriangleMesh fused = fused_surface(request.output / "volume.vdb", request.memory_limit);
   const double already = request.max_size > 0 ? surface_deviation(mesh, fused).evidence : 0;
-  const Written written =
+  Written written =
       write_within(writer, request.max_size, already, frame, part_of(progress, 0.1, 0.9));
   const SurfaceDeviation deviation = writer.deviation_from(fused);
   Json out = glb_to_json(written.report, frame);
-  out["deviation"] = {{"evidence", deviation.evidence * frame.scale},
-                      {"inferred", deviation.inferred * frame.scale},
-                      {"places", deviation.places},
-                      {"units", frame.unit_name()}};
+  out["deviation"] = deviation_to_json(deviation, frame);
   out["form"] = form_to_json(written, frame);
   out["words"] = words_for(written, deviation, request.max_size, mesh.faces.size(), frame);
-  return out;
+  return {std::move(written.form), std::move(out)};
 }
 
-}  // namespace
-
-Json write_asset(const Model& model,
-                 const AssetContent& content,
-                 const RunRequest& request,
-                 const Progress& progress) {
-  const Frame& frame = model.scene.frame;
-  const AssetWriter writer(model, content, request);
+/// The form without a promise is the whole.
+std::pair<Form, Json> write_finest(const AssetWriter& writer,
+                                   const RunRequest& request,
+                                   const TriangleMesh& mesh,
+                                   const Frame& frame,
+                                   const Progress& progress) {
   if (request.max_error.empty() && request.max_size == 0) {
-    return glb_to_json(writer.write(writer.whole()), frame);
+    Form form = writer.whole();
+    Json json = glb_to_json(writer.write(form), frame);
+    return {std::move(form), std::move(json)};
   }
   try {
-    return write_promised(writer, request, content.mesh, frame, progress);
+    return write_promised(writer, request, mesh, frame, progress);
   } catch (...) {
     std::filesystem::remove(writer.path());  // a form that was tried may break the promise
     throw;
   }
+}
+
+std::string level_name(size_t level) { return "asset.lod" + std::to_string(level) + ".glb"; }
+
+// Details of the levels that go on from the finest one. \param finest  0 = not known
+std::vector<double> level_details(double finest, double side, size_t levels) {
+  const auto n = double(levels);
+  const double coarsest = kCoarsest * side;
+  if (finest == 0) finest = coarsest / std::pow(kLevelStep, n);
+  finest = std::min(finest, coarsest / std::pow(2, n));
+  const double step = std::min(kLevelStep, std::pow(coarsest / finest, 1 / n));
+  std::vector<double> out;
+  for (size_t k = 1; k <= levels; ++k) out.push_back(finest * std::pow(step, double(k)));
+  return out;
+}
+
+/// A coarser level on disk.
+struct Level {
+  std::string file;
+  size_t bytes = 0;
+  size_t faces = 0;
+  double texture_share = 1;
+  double detail = 0;           ///< [internal units]
+  SurfaceDeviation deviation;  ///< From the finest level, as that reads.
+  Eigen::AlignedBox3d box;     ///< [units of the files]
+};
+
+Json level_to_json(const Level& level, const Frame& frame) {
+  const std::string words =
+      level.file + ": " + format_file_size(level.bytes) + ", " + std::to_string(level.faces) +
+      " faces, textures " + number(100 * level.texture_share, "%.0f") +
+      " % of the photographs' width; at most " + format_length(level.deviation.evidence, frame) +
+      " off asset.glb where there is evidence, " + format_length(level.deviation.inferred, frame) +
+      " where that is inferred (measured)";
+  return {{"file", level.file},
+          {"bytes", level.bytes},
+          {"faces", level.faces},
+          {"texture_share", level.texture_share},
+          {"detail", level.detail * frame.scale},
+          {"deviation", deviation_to_json(level.deviation, frame)},
+          {"words", words}};
+}
+
+Tileset tileset_of(const AssetWriter& writer,
+                   const std::vector<Level>& levels,
+                   const TriangleMesh& full,
+                   const Frame& frame) {
+  Tileset out;
+  out.units = frame.has_metric_scale() ? "m" : "unknown";
+  out.place = writer.place();
+  out.levels = {{writer.path().filename().string(), 0}};
+  out.box = writer.box_in_file(full);
+  for (const Level& level : levels) {
+    // A viewer must not find the way to what is finer barred by a level that came out better.
+    const double error =
+        std::max(out.levels.front().geometric_error, level.deviation.max() * writer.file_unit());
+    out.levels.insert(out.levels.begin(), {level.file, error});
+    out.box.extend(level.box);
+  }
+  return out;
+}
+
+Json write_levels(const AssetWriter& writer,
+                  Form finest_form,
+                  size_t count,
+                  const Frame& frame,
+                  const Progress& progress) {
+  const double shown = texel_size(finest_form.texture, finest_form.mesh) / kLevelTexel;
+  const double finest = std::max(shown, finest_form.detail);
+  finest_form = {};
+  const std::filesystem::path folder = writer.path().parent_path();
+  const TriangleMesh full = writer.read(writer.path());
+  std::vector<Level> levels;
+  for (const double detail : level_details(finest, writer.side(), count)) {
+    report(progress, double(levels.size()) / double(count));
+    const Form form = writer.level(detail, finest > 0 ? finest : detail / kLevelStep);
+    const std::string name = level_name(levels.size() + 1);
+    const GlbReport written = writer.write(form, folder / name);
+    const TriangleMesh mesh = writer.read(folder / name);
+    levels.push_back({name,
+                      written.bytes,
+                      written.triangles,
+                      form.texture_share,
+                      detail,
+                      surface_deviation(mesh, full),
+                      writer.box_in_file(mesh)});
+  }
+  write_tileset(folder / kTilesetName, tileset_of(writer, levels, full, frame));
+  Json out = Json::array();
+  for (const Level& level : levels) out.push_back(level_to_json(level, frame));
+  return out;
+}
+
+// Of a run that wanted more of them.
+void remove_levels(const std::filesystem::path& folder) {
+  for (const std::string& name : level_files(kMostLods)) std::filesystem::remove(folder / name);
+}
+
+}  // namespace
+
+std::vector<std::string> level_files(size_t levels) {
+  std::vector<std::string> out;
+  for (size_t k = 1; k <= levels; ++k) out.push_back(level_name(k));
+  if (levels > 0) out.emplace_back(kTilesetName);
+  return out;
+}
+
+WrittenAsset write_asset(const Model& model,
+                         const AssetContent& content,
+                         const RunRequest& request,
+                         const Progress& progress) {
+  const Frame& frame = model.scene.frame;
+  const AssetWriter writer(model, content, request);
+  remove_levels(writer.path().parent_path());
+  const double of_finest = request.lods > 0 ? 0.5 : 1;
+  auto [form, asset] =
+      write_finest(writer, request, content.mesh, frame, part_of(progress, 0, of_finest));
+  WrittenAsset out{std::move(asset), Json::array()};
+  if (request.lods == 0) return out;
+  out.levels =
+      write_levels(writer, std::move(form), request.lods, frame, part_of(progress, of_finest, 1));
+  return out;
 }
 
 }  // namespace cgs

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include "convert/model.h"
 #include "convert/run_request.h"
@@ -14,12 +17,21 @@ namespace cgs {
 /// it.
 inline constexpr double kRoomForRounding = 0.1;
 
+/// The files below web/ that so many levels take: asset.lod1.glb, …, tileset.json; none for 0.
+std::vector<std::string> level_files(size_t levels);
+
 /// What asset.glb is made from.
 struct AssetContent {
   const TriangleMesh& mesh;               ///< Watertight, as the run wrote it.
   const PhotoTexture& texture;            ///< Of this mesh.
   const nlohmann::ordered_json& summary;  ///< Goes into the file; its certificate becomes that of
                                           ///< the mesh in it.
+};
+
+/// What was written, for the report.
+struct WrittenAsset {
+  nlohmann::ordered_json asset;
+  nlohmann::ordered_json levels;  ///< Empty without request.lods.
 };
 
 /// Writes web/asset.glb below request.output, as small as request.max_size and as near to the fused
@@ -30,12 +42,20 @@ struct AssetContent {
 /// and positions are rounded by a fifth of d. The smallest d that fits wins. With a promise, what
 /// was written is read again and held against the surface that volume.vdb holds.
 ///
-/// \return bytes and measured errors; with a promise "deviation", "form" and, for people, "words"
+/// Coarser levels of it, request.lods of them, follow as web/asset.lod1.glb and so on, with
+/// web/tileset.json. Their details, which are also the size of a pixel of their textures, go on
+/// from the pixels of asset.glb and grow threefold, less where they would pass a fiftieth of the
+/// object; inferred surface stays as near as the rest. None of them keeps a promise; how far it is
+/// off asset.glb is measured.
+///
+/// \return of asset.glb bytes and measured errors; with a promise "deviation", "form" and, for
+///         people, "words"; of each level "file", "bytes", "faces", "texture_share", "detail",
+///         "deviation" from asset.glb, "words"
 /// \throws LimitError with the smallest size that can be reached, and no asset.glb is left;
 ///         NumericalError where the file is farther off than promised
-nlohmann::ordered_json write_asset(const Model& model,
-                                   const AssetContent& content,
-                                   const RunRequest& request,
-                                   const Progress& progress);
+WrittenAsset write_asset(const Model& model,
+                         const AssetContent& content,
+                         const RunRequest& request,
+                         const Progress& progress);
 
 }  // namespace cgs

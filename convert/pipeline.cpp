@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/asset.h"
 #include "convert/frame_json.h"
 #include "convert/marker_bars.h"
 #include "convert/memory_plan.h"
@@ -201,6 +202,7 @@ const std::map<std::string, std::string>& decided_stages() {
                                                              {"max_error", "mesh"},
                                                              {"compression_error", "web"},
                                                              {"glb_encoding", "web"},
+                                                             {"lods", "web"},
                                                              {"max_size", "web"}};
   return kStages;
 }
@@ -214,7 +216,7 @@ struct Stage {
   std::vector<std::string> further = {};  ///< What it may write besides, as output_hashes() says.
 };
 
-std::vector<Stage> stages_of(const Scene& scene) {
+std::vector<Stage> stages_of(const Scene& scene, size_t lods) {
   std::vector<std::string> view_files;
   for (const int i : views_with_photograph(scene)) {
     const std::string stem = "views/" + scene.views[static_cast<size_t>(i)].name;
@@ -226,6 +228,9 @@ std::vector<Stage> stages_of(const Scene& scene) {
   for (const int i : scene.input) {
     model_files.push_back("model/priors/" + scene.views[static_cast<size_t>(i)].name + ".exr");
   }
+  std::vector<std::string> web_files = {
+      "web/asset.glb", "web/splats.glb", "mesh/watertight.obj", "mesh/watertight.mtl"};
+  for (const std::string& name : level_files(lods)) web_files.push_back("web/" + name);
   return {{"model",
            "depth and Gaussians",
            model_files,
@@ -251,9 +256,10 @@ std::vector<Stage> stages_of(const Scene& scene) {
            run_mesh},
           {"web",
            "textured assets",
-           {"web/asset.glb", "web/splats.glb", "mesh/watertight.obj", "mesh/watertight.mtl"},
+           web_files,
            run_web,
-           {"web/splats.spz", "mesh/watertight."}},  // other formats, pictures of the texture
+           // Other formats, pictures of the texture, levels of a run that wanted more of them.
+           {"web/splats.spz", "mesh/watertight.", "web/asset.", "web/tileset.json"}},
           {"report", "report", {"report.html", "report.json"}, run_report}};
 }
 
@@ -273,7 +279,7 @@ namespace {
 void note_outputs(Run& run, bool is_fresh) {
   if (!is_fresh && run.record.json().contains("outputs")) return;
   std::set<std::string> names;
-  for (const Stage& stage : stages_of(run.scene)) {
+  for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
     names.insert(stage.files.begin(), stage.files.end());
     names.insert(stage.further.begin(), stage.further.end());
   }
@@ -285,7 +291,7 @@ void note_outputs(Run& run, bool is_fresh) {
 void remove_outputs_after(const Stage& first, const Run& run) {
   bool is_later = false;
   std::set<std::string> names;
-  for (const Stage& stage : stages_of(run.scene)) {
+  for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
     if (is_later) {
       names.insert(stage.files.begin(), stage.files.end());
       names.insert(stage.further.begin(), stage.further.end());
@@ -304,7 +310,7 @@ void warn_of(const Json& result, const Terminal& terminal) {
 
 Json run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
-  for (const Stage& stage : stages_of(run.scene)) {
+  for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
     if (!stale && run.record.is_done(stage.name, stage.files)) {
       terminal.say(stage.title + ": done before");
       warn_of(run.record.result(stage.name), terminal);

@@ -263,6 +263,14 @@ std::string promises_section(const Json& report) {
   return html;
 }
 
+std::string levels_section(const Json& report) {
+  const std::vector<std::string> levels = level_words(report);
+  if (levels.empty()) return "";
+  std::string html = "<h2>Levels of detail</h2>\n";
+  for (const std::string& words : levels) html += "<p>" + escaped(words) + ".</p>\n";
+  return html;
+}
+
 // Three figures of one kind of deviation as cells of a table.
 std::string deviation_cells(const Json& figures, const ShownUnit& unit) {
   std::string out;
@@ -447,6 +455,14 @@ std::vector<std::string> promise_words(const Json& report) {
   return out;
 }
 
+std::vector<std::string> level_words(const Json& report) {
+  std::vector<std::string> out;
+  for (const Json& level : report["web"].value("levels", Json::array())) {
+    out.push_back(level["words"].get<std::string>());
+  }
+  return out;
+}
+
 void write_html_report(const std::filesystem::path& folder,
                        const Json& report,
                        const Scene& scene,
@@ -471,10 +487,11 @@ void write_html_report(const std::filesystem::path& folder,
     html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
   }
   html << viewer << refinement_section(report) << scale_section(report) << promises_section(report)
-       << certificate_section(report) << simplification_section(report) << deviation_section(report)
-       << mesh_section(folder) << evaluation_section(report["evaluation"])
-       << views_section(folder, report["views"], scene) << training_section(report["model"])
-       << timing_section(report["stages"]) << "</body></html>\n";
+       << levels_section(report) << certificate_section(report) << simplification_section(report)
+       << deviation_section(report) << mesh_section(folder)
+       << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
+       << training_section(report["model"]) << timing_section(report["stages"])
+       << "</body></html>\n";
   write_file(folder / "report.html", html.str());
 }
 

@@ -116,6 +116,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
   }
   // Only where they decide something: folders of runs without them go on as before.
   if (request.scene.refine_poses) out["refine_poses"] = true;
+  if (request.lods > 0) out["lods"] = request.lods;
   for (const auto& [name, encoding] : glb_encodings()) {
     const bool is_default = encoding == GlbEncoding::Draco;
     if (encoding == request.glb_encoding && !is_default) out["glb_encoding"] = name;

@@ -25,11 +25,15 @@ struct RunRequest {
   GlbEncoding glb_encoding = GlbEncoding::Draco;  ///< Of asset.glb.
   std::string max_error;    ///< Promise: how far the written meshes lie from the fused
                             ///< surface at most; empty = none.
+  size_t lods = 0;          ///< Coarser levels of asset.glb, 0 to kMostLods.
   size_t max_size = 0;      ///< Promise: largest asset.glb [bytes]; 0 = any.
   size_t memory_limit = 0;  ///< [bytes]; 0 = 80 % of what is free.
   bool overwrite = false;
   std::string settings_reason;  ///< Why size and training are these, for the report; may be empty.
 };
+
+/// Further levels would differ by less than a factor of 2 in scenes of the usual photographs.
+inline constexpr size_t kMostLods = 5;
 
 /// What the promises of a request make a run hold against the fused surface.
 MeasuredFiles measured_files(const RunRequest& request);

@@ -243,12 +243,14 @@ Json write_assets(const Model& model,
   write_obj(request.output / "mesh/watertight.obj", mesh, texture, model.scene.frame);
   if (!request.max_error.empty()) require_obj_in_place(request, mesh, model.scene.frame);
   const Json splats = write_web_splats(request.output / "web", model);
-  const Json asset =
+  const WrittenAsset written =
       write_asset(model, {mesh, texture, summary}, request, part_of(progress, 0.4, 0.9));
-  return {{"texture", texture_report},
-          {"splats", splats},
-          {"deviations", asset_deviations(model, mesh, request.output / "web/asset.glb")},
-          {"asset.glb", asset}};
+  Json out = {{"texture", texture_report},
+              {"splats", splats},
+              {"deviations", asset_deviations(model, mesh, request.output / "web/asset.glb")},
+              {"asset.glb", written.asset}};
+  if (request.lods > 0) out["levels"] = written.levels;
+  return out;
 }
 
 }  // namespace cgs

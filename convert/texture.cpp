@@ -98,6 +98,15 @@ double pixel_size(const TriangleMesh& mesh, const PhotoTexture& texture, size_t 
 
 }  // namespace
 
+double texel_size(const PhotoTexture& texture, const TriangleMesh& mesh) {
+  double smallest = 0;
+  for (size_t i = 0; i < texture.photographs.size(); ++i) {
+    const double pixel = pixel_size(mesh, texture, i);
+    if (pixel > 0 && (smallest == 0 || pixel < smallest)) smallest = pixel;
+  }
+  return smallest;
+}
+
 double coarsen_texture(PhotoTexture& texture, const TriangleMesh& mesh, double texel) {
   constexpr int kSmallest = 16;  // [pixels]
   double largest_share = 0;

@@ -20,6 +20,10 @@ PhotoTexture texture_from_photographs(const Scene& scene,
                                       const TriangleMesh& mesh,
                                       nlohmann::ordered_json& report);
 
+/// The size of a pixel on the surface [internal units], of the photograph where it is smallest, by
+/// the median over the faces that show it; 0 where none is shown.
+double texel_size(const PhotoTexture& texture, const TriangleMesh& mesh);
+
 /// Makes photographs smaller whose pixels cover less of the surface than `texel` [internal units],
 /// by the median over the faces that show them, until they cover that; none below 16 pixels.
 /// \return the largest share of its width that a photograph in use keeps, 1 if there is none

@@ -411,8 +411,9 @@ GlbPlacement placement_for(const TriangleMesh& mesh,
   GlbPlacement out;
   out.rotation = options.y_up;
   out.scale = frame.scale * (frame.has_metric_scale() ? frame.metres_per_unit : 1.0);
-  out.center = 0.5 * (low.cast<double>() + high.cast<double>());
-  const double reach = (high.cast<double>() - out.center).norm() * out.scale;
+  out.center = options.center.value_or(0.5 * (low.cast<double>() + high.cast<double>()));
+  const double reach = out.scale * std::max((high.cast<double>() - out.center).norm(),
+                                            (low.cast<double>() - out.center).norm());
   constexpr double kFarthest = 1e18;  // the encoder's float arithmetic overflows beyond
   require(reach > 1 / kFarthest && reach < kFarthest,
           "write_glb: the mesh must have an extent between 1e-18 and 1e18",

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 
 #include <Eigen/Core>
@@ -36,8 +37,10 @@ struct GlbOptions {
                          ///< at most.
   int speed = 5;         ///< Of the encoder, 0 (smallest file) to 10 (fastest).
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
-  int jpeg_quality = 90;                               ///< Of textures, 1 to 100.
-  std::string summary_json;  ///< JSON text for asset.extras.summary; may be empty.
+  std::optional<Eigen::Vector3d> center;  ///< What becomes (0, 0, 0) [internal units]; default: the
+                                          ///< middle of the mesh.
+  int jpeg_quality = 90;                  ///< Of textures, 1 to 100.
+  std::string summary_json;               ///< JSON text for asset.extras.summary; may be empty.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
@@ -62,7 +65,7 @@ struct GlbReport {
 /// - One primitive and material per provenance class that is present ("observed", "single view",
 ///   "interpolated", "inferred", or "surface" if the mesh has no labels), double-sided and opaque;
 ///   inferred surface is tinted magenta, interpolated surface blue.
-/// - POSITION is relative to the middle of the mesh. asset.extras tells where that lies
+/// - POSITION is relative to options.center. asset.extras tells where that lies
 ///   (origin_in_world), the axes (gltf_from_world, row by row), units ("m" or "unknown"),
 ///   metres_per_unit, metres_sigma, scale_source, the area of each class, and the summary.
 /// - NORMAL; COLOR_0 in linear light; _SUPPORT (number of views that see the vertex); _SIGMA

@@ -49,6 +49,7 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
     terminal.say(file + " left out: " + reason.get<std::string>());
   }
   for (const std::string& words : promise_words(report)) terminal.say(words);
+  for (const std::string& words : level_words(report)) terminal.say(words);
   terminal.say("open " + (args.request.output / "report.html").string());
 }
 
@@ -103,6 +104,12 @@ void add_run(CLI::App& app) {
                   args->request.compression_error,
                   "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
   add_glb_option(*cmd, args->request.glb_encoding);
+  cmd->add_option(
+         "--lods",
+         args->request.lods,
+         "Coarser levels of asset.glb to write, 0 to 5, with a tileset.json (3D Tiles) for "
+         "viewers that show the one that the distance asks for; default 0")
+      ->check(CLI::Range(size_t{0}, kMostLods));
   cmd->add_option("--max-error",
                   args->request.max_error,
                   "Promise: every mesh written, asset.glb too, lies within this of the fused "

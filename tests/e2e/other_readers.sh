@@ -98,16 +98,18 @@ else
 fi
 
 if node -e 'require("gltf-validator")' 2>/dev/null; then
-  expect "glTF validator: no error, no warning" node -e '
+  for file in "$out"/web/asset*.glb; do
+    expect "glTF validator: $(basename "$file"): no error, no warning" node -e '
 const fs = require("fs");
-const file = process.argv[1] + "/web/asset.glb";
+const file = process.argv[1];
 require("gltf-validator").validateBytes(new Uint8Array(fs.readFileSync(file))).then((report) => {
   const { numErrors, numWarnings } = report.issues;
   if (numErrors + numWarnings > 0) {
     console.log(JSON.stringify(report.issues.messages.slice(0, 5), null, 1));
     process.exit(1);
   }
-});' "$out"
+});' "$file"
+  done
 else
   echo "skipped: glTF validator (npm install gltf-validator)"
 fi

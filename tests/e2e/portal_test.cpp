@@ -61,7 +61,8 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
 TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
   make_capture(kSmallCapture, 3);
   std::filesystem::remove_all(kSmallRun);
-  const std::string arguments = run_arguments(kSmallCapture, kSmallRun) + " --voxel-size 8cm";
+  const std::string arguments = run_arguments(kSmallCapture, kSmallRun) +
+                                " --voxel-size 8cm --lods 2";  // for other_readers.sh, too
   ASSERT_EQ(run_cgs(arguments).exit_code, 0);
   const auto splats_written = std::filesystem::last_write_time(kSmallRun / "model/gaussians.ply");
   const auto glb = test::read_bytes(kSmallRun / "web/asset.glb");

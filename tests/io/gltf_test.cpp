@@ -219,6 +219,21 @@ TEST(WriteGlb, TellsUnitsOriginAreasAndSummary) {
   expect_same(plain.glb, mesh, unscaled, plain.report.measured_max_error + 1e-5);
 }
 
+TEST(WriteGlb, TakesACenterThatOtherFilesShare) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  const Frame frame = test::centimetre_frame();
+  const Eigen::Vector3d center(0.25, -0.5, 0.125);
+  for (const auto& [name, encoding] : glb_encodings()) {
+    const Written out = written(mesh, frame, {.encoding = encoding, .center = center});
+    const Eigen::Vector3d origin = frame.world_from_internal(center);
+    const auto stated = out.glb.json["asset"]["extras"]["origin_in_world"];
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(stated[size_t(k)], origin[k]) << name;
+    if (encoding == GlbEncoding::Plain || encoding == GlbEncoding::Draco) {
+      expect_same(out.glb, mesh, frame, out.report.measured_max_error + 1e-5);
+    }
+  }
+}
+
 TEST(WriteGlb, ShowsInferredSurfaceDifferently) {
   const Written out = written(test::labelled_sphere(), test::centimetre_frame(), {});
   std::set<std::vector<double>> factors;
