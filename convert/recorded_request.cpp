@@ -104,6 +104,7 @@ RunRequest recorded_request(const Json& record, const fs::path& path) {
     out.compression_error = text_at(asked, "compression_error");
     out.max_error = text_at(asked, "max_error");
     out.max_size = asked.value("max_size", size_t{0});
+    out.lods = asked.value("lods", size_t{0});
     const std::string encoding = text_at(asked, "glb_encoding");
     if (!encoding.empty()) out.glb_encoding = glb_encodings().at(encoding);
     return out;

@@ -235,12 +235,13 @@ TEST_F(Verify, RecomputesEverythingAndFindsAResultThatTheInputsDoNotLeadTo) {
 // Everything a run can be asked for comes back from its record.
 TEST_F(Verify, RecomputesARunOfManyOptions) {
   const fs::path many = *dir_ / "many";
-  const auto result = run_cgs("run " + scene().string() + " --views " + kInputViews +
-                              " --known-distance v11:20,20 v12:40,20 1.2m+-1cm --up 0 0 1 "
-                              "--set steps=3 --set depth_spacing=64,16 --voxel-size 6cm "
-                              "--simplify 2cm --compression-error 1cm --glb-encoding meshopt "
-                              "--refine-poses --downscale 1 -q -o " +
-                              many.string());
+  const auto result =
+      run_cgs("run " + scene().string() + " --views " + kInputViews +
+              " --known-distance v11:20,20 v12:40,20 1.2m+-1cm --up 0 0 1 "
+              "--set steps=3 --set depth_spacing=64,16 --voxel-size 6cm "
+              "--simplify 2cm --compression-error 1cm --glb-encoding meshopt --lods 1 "
+              "--refine-poses --downscale 1 -q -o " +
+              many.string());
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto same = run_cgs("verify " + many.string() + " --recompute");
   EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
