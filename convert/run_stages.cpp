@@ -239,12 +239,12 @@ Json write_assets(const Model& model,
   make_output_folder(request.output / "web");
   Json texture_report;
   const PhotoTexture texture = texture_from_photographs(model.scene, mesh, texture_report);
-  report(progress, 0.3);
+  report(progress, 0.2);
   write_obj(request.output / "mesh/watertight.obj", mesh, texture, model.scene.frame);
   if (!request.max_error.empty()) require_obj_in_place(request, mesh, model.scene.frame);
-  const Json splats = write_web_splats(request.output / "web", model);
+  const Json splats = write_web_splats(request.output / "web", model, part_of(progress, 0.25, 0.6));
   const Json asset =
-      write_asset(model, {mesh, texture, summary}, request, part_of(progress, 0.4, 0.9));
+      write_asset(model, {mesh, texture, summary}, request, part_of(progress, 0.6, 0.95));
   return {{"texture", texture_report},
           {"splats", splats},
           {"deviations", asset_deviations(model, mesh, request.output / "web/asset.glb")},
