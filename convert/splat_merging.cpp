@@ -13,6 +13,7 @@
 
 #include "convert/splat_selection.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/split_mix.h"
 #include "libcgs/render/projection.h"
 #include "libcgs/render/training_rasterizer.h"
 #include "meshing/kd_tree.h"
@@ -97,6 +98,13 @@ float merge_cost(const WeighedSplats& s,
          (color + options.depth_cost * off * off + options.spread_cost * std::max(0.0f, spread));
 }
 
+// Where all cost the same, as on a white wall, pairs are chosen in an order that both sides agree
+// on and that is none of place: by index, everyone would choose the next, and hardly two each
+// other.
+uint64_t order_of_pair(uint32_t i, uint32_t j) {
+  return split_mix(uint64_t{std::min(i, j)} << 32 | std::max(i, j));
+}
+
 constexpr uint32_t kNobody = UINT32_MAX;
 
 // For each splat the one that it would cost least to merge with; kNobody = too much with any.
@@ -111,11 +119,14 @@ std::vector<uint32_t> cheapest_partners(const WeighedSplats& s, const MergeOptio
       const uint32_t i = tree.order()[k];
       tree.nearest(s.splats.position[i], kNeighbors + 1, near);
       float least = options.most_cost;
+      uint64_t first = UINT64_MAX;
       for (const Neighbor& n : near) {
         if (n.point == i) continue;
         const float cost = merge_cost(s, shapes, options, i, n.point);
-        if (cost > least || (cost == least && n.point > out[i])) continue;
+        const uint64_t order = order_of_pair(i, n.point);
+        if (cost > least || (cost == least && order >= first)) continue;
         least = cost;
+        first = order;
         out[i] = n.point;
       }
     }

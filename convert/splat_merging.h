@@ -24,7 +24,7 @@ WeighedSplats weigh_splats(const Gaussians& gaussians, std::span<const Camera> c
 
 /// When splats are left out or merged.
 struct MergeOptions {
-  float least_weight = 0.1f;   ///< Splats that show less are left out [pixels]; >= 0.
+  float least_weight = 0.05f;  ///< Splats that show less are left out [pixels]; >= 0.
   float most_cost = 0.001f;    ///< Of a merge, see merge_splats() [pixels]; >= 0.
   float depth_cost = 0.01f;    ///< Of a squared pixel between two along their normals; >= 0.
   float spread_cost = 0.001f;  ///< Of a squared pixel between two beyond neighbours; >= 0.

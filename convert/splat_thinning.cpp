@@ -21,8 +21,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::array<float, 7> kLadder = {
-    0.000125f, 0.00025f, 0.0005f, 0.001f, 0.002f, 0.004f, 0.008f};
+constexpr std::array<float, 3> kLadder = {0.0005f, 0.001f, 0.002f};
 
 std::vector<Camera> input_cameras(const Scene& scene) {
   std::vector<Camera> out;
@@ -174,7 +173,7 @@ ThinnedSplats thin_splats(const Gaussians& gaussians,
   size_t low = 0;  // settings below lose little enough, those from `high` on too much
   size_t high = kLadder.size();
   while (low < high) {
-    report(progress, 0.25 * double(1 + out.tried.size()));
+    report(progress, 0.3 + 0.35 * double(out.tried.size()));
     const size_t middle = (low + high) / 2;
     Gaussians fewer = thinned_by(trials, kLadder.at(middle));
     out.tried.push_back({kLadder.at(middle), fewer.size(), loss_of(trials, fewer)});
