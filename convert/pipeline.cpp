@@ -22,6 +22,7 @@
 #include "convert/stage_cost.h"
 #include "convert/verification.h"
 #include "convert/views.h"
+#include "convert/web_splats.h"
 #include "io/atomic_file.h"
 #include "io/depth_file.h"
 #include "io/image.h"
@@ -130,6 +131,10 @@ Json run_evaluation(Run& run, const Progress& progress) {
   return evaluate_views(model, model.scene.held_out, progress);
 }
 
+Json run_splats(Run& run, const Progress& progress) {
+  return write_web_splats(run.request.output / "web", loaded_model(run), progress);
+}
+
 Json run_mesh(Run& run, const Progress& progress) {
   return write_meshes(loaded_model(run), run.request, progress);
 }
@@ -171,6 +176,7 @@ Json report_json(const Run& run) {
               {"mesh", mesh},
               {"certificate", mesh.at("certificate")},
               {"web", run.record.result("web")},
+              {"splats", run.record.result("splats")},
               {"photographs", photographs},
               {"stages", stages},
               {"warnings", warnings}};
@@ -229,7 +235,7 @@ std::vector<Stage> stages_of(const Scene& scene, size_t lods) {
     model_files.push_back("model/priors/" + scene.views[static_cast<size_t>(i)].name + ".exr");
   }
   std::vector<std::string> web_files = {
-      "web/asset.glb", "web/splats.glb", "mesh/watertight.obj", "mesh/watertight.mtl"};
+      "web/asset.glb", "mesh/watertight.obj", "mesh/watertight.mtl"};
   for (const std::string& name : level_files(lods)) web_files.push_back("web/" + name);
   return {{"model",
            "depth and Gaussians",
@@ -244,6 +250,7 @@ std::vector<Stage> stages_of(const Scene& scene, size_t lods) {
           {"scale", "scale", {}, run_scale},
           {"views", "views", view_files, run_views},
           {"evaluation", "held-out views", {}, run_evaluation},
+          {"splats", "splats for browsers", {"web/splats.glb"}, run_splats, {"web/splats.spz"}},
           {"mesh",
            "volume and mesh",
            {"volume.vdb",
@@ -259,7 +266,7 @@ std::vector<Stage> stages_of(const Scene& scene, size_t lods) {
            web_files,
            run_web,
            // Other formats, pictures of the texture, levels of a run that wanted more of them.
-           {"web/splats.spz", "mesh/watertight.", "web/asset.", "web/tileset.json"}},
+           {"mesh/watertight.", "web/asset.", "web/tileset.json"}},
           {"report", "report", {"report.html", "report.json"}, run_report}};
 }
 

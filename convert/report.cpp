@@ -356,6 +356,30 @@ std::string hole_words(const Json& view) {
   return out;
 }
 
+std::string thinning_section(const Json& report) {
+  const Json thinning = report["splats"].value("thinning", Json());
+  if (!thinning.is_object() || thinning["tried"].empty()) return "";
+  std::ostringstream html;
+  html << "<h2>Splats for browsers</h2>\n<p>" << number(thinning["kept"], "%.0f") << " of "
+       << number(thinning["of"], "%.0f")
+       << " splats are in web/splats: what pictures do not need is left out or merged, by the "
+          "strongest setting that loses at most "
+       << number(thinning["most_loss_db"], "%.2f")
+       << " dB against photographs taken beside and between the input views. A photograph differs "
+          "from the splats of the others by "
+       << number(thinning["unseen_psnr"], "%.1f")
+       << " dB.</p>\n<table>\n<tr><th>cost of a merge, at most</th><th>splats</th><th>loss "
+          "[dB]</th><th></th></tr>\n";
+  for (const Json& trial : thinning["tried"]) {
+    html << "<tr><td>" << number(trial["most_cost"], "%g") << "</td><td>"
+         << number(trial["splats"], "%.0f") << "</td><td>" << number(trial["loss_db"], "%.3f")
+         << "</td><td>" << (trial["most_cost"] == thinning["chosen"] ? "chosen" : "")
+         << "</td></tr>\n";
+  }
+  html << "</table>\n";
+  return html.str();
+}
+
 std::string views_section(const std::filesystem::path& folder,
                           const Json& views,
                           const Scene& scene) {
@@ -490,8 +514,8 @@ void write_html_report(const std::filesystem::path& folder,
        << levels_section(report) << certificate_section(report) << simplification_section(report)
        << deviation_section(report) << mesh_section(folder)
        << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
-       << training_section(report["model"]) << timing_section(report["stages"])
-       << "</body></html>\n";
+       << training_section(report["model"]) << thinning_section(report)
+       << timing_section(report["stages"]) << "</body></html>\n";
   write_file(folder / "report.html", html.str());
 }
 

@@ -19,7 +19,6 @@
 #include "convert/simplification.h"
 #include "convert/texture.h"
 #include "convert/volume_file.h"
-#include "convert/web_splats.h"
 #include "convert/written_surface.h"
 #include "io/atomic_file.h"
 #include "io/mesh_file.h"
@@ -242,11 +241,9 @@ Json write_assets(const Model& model,
   report(progress, 0.3);
   write_obj(request.output / "mesh/watertight.obj", mesh, texture, model.scene.frame);
   if (!request.max_error.empty()) require_obj_in_place(request, mesh, model.scene.frame);
-  const Json splats = write_web_splats(request.output / "web", model);
   const WrittenAsset written =
       write_asset(model, {mesh, texture, summary}, request, part_of(progress, 0.4, 0.9));
   Json out = {{"texture", texture_report},
-              {"splats", splats},
               {"deviations", asset_deviations(model, mesh, request.output / "web/asset.glb")},
               {"asset.glb", written.asset}};
   if (request.lods > 0) out["levels"] = written.levels;

@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/web_splats.h"
 
+#include <algorithm>
+#include <vector>
+
 #include <nlohmann/json.hpp>
 
+#include "convert/splat_thinning.h"
+#include "io/atomic_file.h"
+#include "io/scene_reader.h"
 #include "io/splat_glb.h"
 #include "io/spz.h"
+#include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
 
@@ -12,14 +19,39 @@ namespace cgs {
 
 using Json = nlohmann::ordered_json;
 
-Json write_web_splats(const std::filesystem::path& folder, const Model& model) {
+namespace {
+
+// As many as the input views have pixels with depth, in their order.
+std::vector<size_t> counts_of_views(const Model& model) {
+  std::vector<size_t> out;
+  for (const ViewPriors& priors : model.priors) {
+    const std::vector<float>& depth = priors.depth.data;
+    out.push_back(static_cast<size_t>(std::count_if(depth.begin(), depth.end(), has_gaussian)));
+  }
+  return out;
+}
+
+ThinnedSplats thinned_splats(const Model& model, const Progress& progress) {
+  Scene scene = model.scene;
+  load_images(scene, scene.input);
+  return thin_splats(model.gaussians, scene, counts_of_views(model), progress);
+}
+
+}  // namespace
+
+Json write_web_splats(const std::filesystem::path& folder,
+                      const Model& model,
+                      const Progress& progress) {
   const Frame& frame = model.scene.frame;
   const Eigen::Matrix3d y_up = y_up_from(model.scene.frame.up);
+  make_output_folder(folder);
+  const ThinnedSplats thinned = thinned_splats(model, progress);
   const size_t glb_bytes =
-      write_splat_glb(folder / "splats.glb", model.gaussians, frame, {.y_up = y_up});
-  Json out = {{"splats.glb", {{"bytes", glb_bytes}}}};
+      write_splat_glb(folder / "splats.glb", thinned.splats, frame, {.y_up = y_up});
+  Json out = {{"thinning", thinning_to_json(thinned, model.gaussians.size())},
+              {"splats.glb", {{"bytes", glb_bytes}}}};
   try {
-    const SpzReport spz = write_spz(folder / "splats.spz", model.gaussians, frame);
+    const SpzReport spz = write_spz(folder / "splats.spz", thinned.splats, frame);
     out["splats.spz"] = {{"bytes", spz.bytes},
                          {"fractional_bits", spz.fractional_bits},
                          {"clamped_splats", spz.clamped}};

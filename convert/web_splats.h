@@ -9,9 +9,13 @@
 
 namespace cgs {
 
-/// Writes the splats of a model for viewers in browsers: splats.glb and splats.spz. Splats that
-/// reach too far for SPZ are no reason to end a run: it is left out then.
-/// \return {"splats.glb": {…}, "splats.spz": {…}, "left_out": {"splats.spz": "why"}}
-nlohmann::ordered_json write_web_splats(const std::filesystem::path& folder, const Model& model);
+/// Writes the splats of a model for viewers in browsers: splats.glb and splats.spz, thinned by
+/// thin_splats(). Splats that reach too far for SPZ are no reason to end a run: it is left out
+/// then. \return {"thinning": {…}, "splats.glb": {…}, "splats.spz": {…},
+///          "left_out": {"splats.spz": "why"}}
+/// \throws as load_images()
+nlohmann::ordered_json write_web_splats(const std::filesystem::path& folder,
+                                        const Model& model,
+                                        const Progress& progress = {});
 
 }  // namespace cgs

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/splat_thinning.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/model.h"
+#include "convert/splat_merging.h"
+#include "convert/splat_refit.h"
+#include "convert/splat_selection.h"
+#include "libcgs/render/rasterizer.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+constexpr std::array<float, 3> kLadder = {0.0005f, 0.001f, 0.002f};
+
+std::vector<Camera> input_cameras(const Scene& scene) {
+  std::vector<Camera> out;
+  for (const int i : scene.input) out.push_back(scene.views[static_cast<size_t>(i)].camera);
+  return out;
+}
+
+// On the line from one camera to another at `place`: 0 and 1 are these, less and more lies beside.
+Camera on_the_way(const Camera& from, const Camera& to, double place) {
+  Camera out = from;
+  const Eigen::Matrix3d start = from.world_from_cam.linear();
+  const Eigen::AngleAxisd turn(Eigen::Matrix3d(start.transpose() * to.world_from_cam.linear()));
+  out.world_from_cam.linear() =
+      start * Eigen::AngleAxisd(place * turn.angle(), turn.axis()).toRotationMatrix();
+  out.world_from_cam.translation() = (1 - place) * from.center() + place * to.center();
+  return out;
+}
+
+// The input cameras, and those at the given places between neighbours in their order.
+std::vector<Camera> with_cameras_between(const std::vector<Camera>& inputs,
+                                         const std::vector<double>& places) {
+  constexpr size_t kMostPairs = 4;
+  constexpr double kWidest = 0.5;  // cosine between views: farther apart, the way may lead through
+                                   // what they look at
+  std::vector<std::pair<size_t, size_t>> pairs;
+  for (size_t i = 0; i + 1 < inputs.size(); ++i) pairs.emplace_back(i, i + 1);
+  if (inputs.size() > 2) pairs.emplace_back(inputs.size() - 1, 0);
+  const auto forward = [&](size_t i) { return inputs[i].world_from_cam.linear().col(2); };
+  pairs.erase(std::remove_if(
+                  pairs.begin(),
+                  pairs.end(),
+                  [&](const auto& p) { return forward(p.first).dot(forward(p.second)) < kWidest; }),
+              pairs.end());
+  std::vector<Camera> out = inputs;
+  const size_t count = std::min(pairs.size(), kMostPairs);
+  for (size_t k = 0; k < count; ++k) {
+    const auto& [a, b] = pairs[k * pairs.size() / count];
+    for (const double place : places) out.push_back(on_the_way(inputs[a], inputs[b], place));
+  }
+  return out;
+}
+
+std::vector<ColorImage> pictures_of(const Gaussians& g, const std::vector<Camera>& cameras) {
+  std::vector<ColorImage> out;
+  for (const Camera& camera : cameras) out.push_back(picture(rasterize(g, camera)));
+  return out;
+}
+
+double mean_square(const ColorImage& a, const ColorImage& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.data.size(); ++i) {
+    sum += (a.data[i] - b.data[i]).cast<double>().squaredNorm();
+  }
+  return sum / (3 * double(a.data.size()));
+}
+
+// Mean squared error of a photograph where splats show something; empty if that is nowhere.
+std::optional<double> error_of(const Gaussians& g, const View& view) {
+  constexpr float kShown = 0.5f;  // alpha
+  const RenderBuffers buffers = rasterize(g, view.camera);
+  const ColorImage shown = picture(buffers);
+  double sum = 0;
+  size_t count = 0;
+  for (size_t i = 0; i < shown.data.size(); ++i) {
+    if (buffers.alpha.data[i] < kShown) continue;
+    if (!view.valid.empty() && view.valid.data[i] == 0) continue;
+    sum += (shown.data[i] - view.image.data[i]).cast<double>().squaredNorm();
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / (3 * double(count));
+}
+
+// PSNR of the input photographs against the splats of the others [dB].
+std::optional<double> psnr_of_unseen(const Gaussians& gaussians,
+                                     const Scene& scene,
+                                     std::span<const size_t> counts) {
+  constexpr double kLeastError = 1e-6;  // 60 dB: a photograph has noise
+  double sum = 0;
+  size_t count = 0;
+  size_t first = 0;
+  for (size_t n = 0; n < counts.size(); ++n) {
+    std::vector<uint8_t> keep(gaussians.size(), 1);
+    std::fill_n(keep.begin() + static_cast<std::ptrdiff_t>(first), counts[n], uint8_t{0});
+    first += counts[n];
+    Gaussians others = gaussians;
+    keep_only(others, keep);
+    const auto error = error_of(others, scene.views[static_cast<size_t>(scene.input[n])]);
+    if (!error) continue;
+    sum -= 10 * std::log10(std::max(*error, kLeastError));
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / double(count);
+}
+
+/// What all settings share.
+struct Trials {
+  WeighedSplats weighed;
+  std::vector<PictureToMatch> wanted;
+  std::vector<Camera> judged_from;
+  std::vector<ColorImage> full;  ///< From there.
+  double unseen = 0;             ///< Mean squared error.
+};
+
+Gaussians thinned_by(const Trials& t, float most_cost) {
+  constexpr size_t kPasses = 24;
+  WeighedSplats merged = merge_splats(t.weighed, {.most_cost = most_cost});
+  refit_splats(merged.splats, merged.pixel, t.wanted, std::max(kPasses, t.wanted.size()));
+  return std::move(merged.splats);
+}
+
+// Mean over the pictures [dB].
+double loss_of(const Trials& t, const Gaussians& g) {
+  double sum = 0;
+  for (size_t k = 0; k < t.full.size(); ++k) {
+    const ColorImage shown = picture(rasterize(g, t.judged_from[k]));
+    sum += 10 * std::log10(1 + mean_square(shown, t.full[k]) / t.unseen);
+  }
+  return sum / double(t.full.size());
+}
+
+Trials prepare(const Gaussians& gaussians, const Scene& scene, double unseen_psnr) {
+  const std::vector<Camera> inputs = input_cameras(scene);
+  const std::vector<Camera> fitted = with_cameras_between(inputs, {0.5, -0.3, 1.3});
+  Trials out;
+  out.weighed = weigh_splats(gaussians, fitted);
+  out.wanted = pictures_to_match(gaussians, fitted);
+  out.judged_from = with_cameras_between(inputs, {0.25, -0.2});
+  out.full = pictures_of(gaussians, out.judged_from);
+  out.unseen = std::pow(10, -0.1 * unseen_psnr);
+  return out;
+}
+
+}  // namespace
+
+ThinnedSplats thin_splats(const Gaussians& gaussians,
+                          const Scene& scene,
+                          std::span<const size_t> counts,
+                          const Progress& progress) {
+  ThinnedSplats out;
+  out.splats = gaussians;
+  report(progress, 0);
+  const size_t known = std::accumulate(counts.begin(), counts.end(), size_t{0});
+  if (known != gaussians.size() || counts.size() != scene.input.size()) return out;
+  out.unseen_psnr = psnr_of_unseen(gaussians, scene, counts);
+  if (!out.unseen_psnr) return out;
+  const Trials trials = prepare(gaussians, scene, *out.unseen_psnr);
+  size_t low = 0;  // settings below lose little enough, those from `high` on too much
+  size_t high = kLadder.size();
+  while (low < high) {
+    report(progress, 0.3 + 0.35 * double(out.tried.size()));
+    const size_t middle = (low + high) / 2;
+    Gaussians fewer = thinned_by(trials, kLadder.at(middle));
+    out.tried.push_back({kLadder.at(middle), fewer.size(), loss_of(trials, fewer)});
+    if (out.tried.back().loss <= kMostThinningLoss) {
+      out.most_cost = kLadder.at(middle);
+      out.splats = std::move(fewer);
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  report(progress, 1);
+  return out;
+}
+
+Json thinning_to_json(const ThinnedSplats& thinned, size_t before) {
+  Json out = {{"kept", thinned.splats.size()},
+              {"of", before},
+              {"chosen", nullptr},
+              {"most_loss_db", kMostThinningLoss},
+              {"unseen_psnr", nullptr},
+              {"tried", Json::array()}};
+  // Numbers of the ladder as they are written there, not as float has them.
+  const auto as_written = [](float cost) { return std::round(double(cost) * 1e6) / 1e6; };
+  if (thinned.most_cost) out["chosen"] = as_written(*thinned.most_cost);
+  if (thinned.unseen_psnr) out["unseen_psnr"] = *thinned.unseen_psnr;
+  for (const ThinningTrial& t : thinned.tried) {
+    out["tried"].push_back(
+        {{"most_cost", as_written(t.most_cost)}, {"splats", t.splats}, {"loss_db", t.loss}});
+  }
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "libcgs/core/gaussians.h"
+#include "libcgs/core/progress.h"
+#include "libcgs/core/scene.h"
+
+namespace cgs {
+
+/// A setting that was tried.
+struct ThinningTrial {
+  float most_cost = 0;  ///< MergeOptions::most_cost
+  size_t splats = 0;    ///< What was left.
+  double loss = 0;      ///< Of PSNR against photographs that nobody took [dB], see thin_splats().
+};
+
+/// Fewer splats that look the same.
+struct ThinnedSplats {
+  Gaussians splats;
+  std::vector<ThinningTrial> tried;
+  std::optional<float>
+      most_cost;  ///< Of the setting that was chosen; empty = all splats were kept.
+  /// PSNR of photographs against splats of the other photographs alone [dB]; empty = they show
+  /// nothing of each other, so that there is nothing to judge by.
+  std::optional<double> unseen_psnr;
+};
+
+/// What may be lost as thin_splats() foresees it [dB]. It foresees more than photographs that were
+/// held out show: where these are, less was reconstructed well than where input photographs meet.
+inline constexpr double kMostThinningLoss = 0.1;
+
+/// The splats of input views without those that its pictures do not need: merge_splats() and
+/// refit_splats() on the input views and on cameras between and beside them, by the strongest
+/// setting of a fixed ladder of three (the middle one is tried, and then one of the others) that
+/// loses at most kMostThinningLoss.
+///
+/// Photographs held out have no say. How well the model shows what it was not trained on is told by
+/// each input photograph and the splats of the others: its mean squared error E, where they show
+/// something. A picture of fewer splats that differs by D on average of squares from that of all
+/// would then lose 10 log10(1 + D / E) dB against a photograph taken there, as neither error knows
+/// of the other. Judged is the mean over the input views and over cameras that were not fitted to.
+/// The same choice and the same bits every time, for any number of threads.
+///
+/// \param scene   with the pixels of its input views
+/// \param counts  how many of the splats are of each input view, in their order; if that is not all
+///                of them, nobody knows whose they are, and all are kept
+/// \throws as weigh_splats() and refit_splats()
+ThinnedSplats thin_splats(const Gaussians& gaussians,
+                          const Scene& scene,
+                          std::span<const size_t> counts,
+                          const Progress& progress = {});
+
+/// {"kept", "of", "chosen", "most_loss_db", "unseen_psnr", "tried": [{"most_cost", "splats",
+/// "loss_db"}]}
+nlohmann::ordered_json thinning_to_json(const ThinnedSplats& thinned, size_t before);
+
+}  // namespace cgs
