@@ -103,7 +103,7 @@ TEST_F(ColmapModel, ReadsEveryKnownCameraModelInBothForms) {
 TEST_F(ColmapModel, RefusesBadCameras) {
   const std::string one = packed(uint64_t(1));
   EXPECT_EQ(cameras_refused(packed(uint64_t(1) << 63) + std::string(64, '\0')), "COUNT");
-  for (const int32_t model : {99, -1, 5, 6}) {
+  for (const int32_t model : {99, -1, 6, 7}) {
     EXPECT_EQ(cameras_refused(one + camera_record(1, model, {1, 1, 1, 1, 1, 1})), "UNSUPPORTED");
   }
   EXPECT_EQ(cameras_refused(one + camera_record(1, 0, {500, 320, 240}, 0)), "VALUE");
