@@ -70,7 +70,7 @@ TEST_F(FisheyePortal, ShowsWhatAPinholeCameraRecords) {
     return -10 * std::log10(sum / count);
   };
   // Sampled at other places, so not the same; but nothing else lies as near.
-  EXPECT_GT(psnr(0), 28);
+  EXPECT_GT(psnr(0), 24);
   EXPECT_GT(psnr(0), psnr(1) + 4);
   EXPECT_GT(psnr(0), psnr(-1) + 4);
 }
@@ -78,7 +78,10 @@ TEST_F(FisheyePortal, ShowsWhatAPinholeCameraRecords) {
 TEST_F(FisheyePortal, HasTheDepthOfThePortal) {
   const fs::path out = *dir_ / "out";
   run(out, "");
-  for (const double share : test::fisheye_depth_accuracy(out, *portal_)) EXPECT_GT(share, 0.8);
+  const double tolerance = 0.01 * kDivisor;  // the same part of a pixel as 1 % at full size
+  for (const double share : test::fisheye_depth_accuracy(out, *portal_, tolerance)) {
+    EXPECT_GT(share, 0.8);
+  }
   const auto verified = run_cgs("verify " + out.string());
   EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
 }

@@ -101,7 +101,8 @@ void write_fisheye_capture(const std::filesystem::path& folder,
 }
 
 std::vector<double> fisheye_depth_accuracy(const std::filesystem::path& run_folder,
-                                           const PortalScene& scene) {
+                                           const PortalScene& scene,
+                                           double tolerance) {
   const Scene run = read_cameras_json(run_folder / "model/cameras.json");
   std::vector<Camera> inputs;
   for (const int i : run.input) {
@@ -121,7 +122,7 @@ std::vector<double> fisheye_depth_accuracy(const std::filesystem::path& run_fold
     for (float& value : depth.data) {
       if (value == 0) value = std::numeric_limits<float>::quiet_NaN();
     }
-    out.push_back(depth_accuracy(depth, view_truth(scene, inputs[k], inputs)));
+    out.push_back(depth_accuracy(depth, view_truth(scene, inputs[k], inputs), tolerance));
   }
   return out;
 }

@@ -24,10 +24,10 @@ void write_fisheye_capture(const std::filesystem::path& folder,
                            const PortalScene& scene,
                            int downscale);
 
-/// Of each input view of a run on such a capture, at full size and with `--assume-unit m`: the
-/// share of pixels two of them see whose depth is within 1 % of the truth. \throws BadInput if the
-/// run is not complete
+/// Of each input view of a run on such a capture with `--assume-unit m`: depth_accuracy().
+/// \throws BadInput if the run is not complete
 std::vector<double> fisheye_depth_accuracy(const std::filesystem::path& run_folder,
-                                           const PortalScene& scene);
+                                           const PortalScene& scene,
+                                           double tolerance = 0.01);
 
 }  // namespace cgs::test
