@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/html.h"
+#include "io/lens.h"
 #include "io/orientation.h"
-#include "io/resample.h"
 
 namespace cgs {
 
@@ -26,14 +26,12 @@ constexpr double kWrongMatches = 2.5;  // [working pixels]
 // is stored must not depend on.
 double without_rounding(double pixels) { return static_cast<double>(static_cast<float>(pixels)); }
 
-void take_out_distortion(const Camera& camera,
-                         const std::array<double, 5>& distortion,
-                         PhotoFeatures& features) {
+void take_out_distortion(const LensMap& lens, PhotoFeatures& features) {
   size_t kept = 0;
   for (size_t i = 0; i < features.points.size(); ++i) {
-    const Eigen::Vector2d at = undistorted(features.points[i], camera, distortion);
-    if (!is_undone(features.points[i], at, camera, distortion)) continue;
-    features.points[kept] = at;
+    const auto undone = lens(features.points[i]);
+    if (!undone) continue;
+    features.points[kept] = undone->at;
     features.descriptors.row(Eigen::Index(kept)) = features.descriptors.row(Eigen::Index(i));
     ++kept;
   }
@@ -59,8 +57,7 @@ double error_of(int photo, const std::vector<EpipolarFit>& fits) {
 }  // namespace
 
 Camera camera_of_file(const View& view) {
-  const ImageSize size = photograph_size(view);
-  Camera out = resized(view.camera, size.width, size.height);
+  Camera out = picture_camera(view);
   for (double* value : {&out.fx, &out.fy, &out.cx, &out.cy}) *value = without_rounding(*value);
   return out;
 }
@@ -69,7 +66,7 @@ PosedPhoto posed_photo(const View& view, const SceneRoot& root, const FeatureOpt
   MaskMap usable;
   const ColorImage image = read_photograph(view, root, usable);
   PosedPhoto out{view.name, camera_of_file(view), detect_features(image, usable, options)};
-  take_out_distortion(out.camera, view.distortion, out.features);
+  take_out_distortion(LensMap(view, out.camera), out.features);
   return out;
 }
 

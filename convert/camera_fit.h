@@ -11,8 +11,8 @@
 
 namespace cgs {
 
-/// The camera of a view at the size of its photograph; the same whatever --downscale says.
-/// \throws as photograph_size()
+/// picture_camera() of a view without the rounding that --downscale leaves; the same whatever
+/// --downscale says. \throws as picture_camera()
 Camera camera_of_file(const View& view);
 
 /// Features of the photograph of a view, without those that the undistorted picture does not hold,

@@ -14,8 +14,8 @@
 #include "convert/length.h"
 #include "convert/model.h"
 #include "io/control_points.h"
+#include "io/lens.h"
 #include "io/orientation.h"
-#include "io/resample.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/control_fit.h"
 #include "libcgs/priors/ray_meeting.h"
@@ -43,8 +43,8 @@ struct Sighted {
 /// A pick as its camera sees it.
 struct Seen {
   std::string view;
-  Camera photograph;
-  Eigen::Vector2d at;  // undistorted [pixels of the photograph]
+  Camera picture;
+  PicturePoint pick;  // in the undistorted picture
 };
 
 // By the name of the view or of its file, or its index in name order.
@@ -79,23 +79,28 @@ Seen seen(const ControlPick& pick, const Scene& scene, const std::filesystem::pa
                    line + "lies outside of the " + std::to_string(size.width) + " x " +
                        std::to_string(size.height) + " pixels of " + printable(view->image_path));
   }
-  const ImageSize size = photograph_size(*view);
-  Seen out{view->name, resized(view->camera, size.width, size.height), {}};
-  const Eigen::Vector2d centre = *at + Eigen::Vector2d(0.5, 0.5);
-  out.at = undistorted(centre, out.photograph, view->distortion);
-  return out;
+  const Camera picture = picture_camera(*view);
+  const auto undone = LensMap(*view, picture)(*at + Eigen::Vector2d(0.5, 0.5));
+  if (!undone) {
+    throw BadInput(Defect::Value,
+                   file,
+                   line + "lies where the lens of " + printable(view->name) + " cannot be undone");
+  }
+  return {view->name, picture, *undone};
 }
 
 std::optional<RayMeeting> meeting_of(const std::vector<Seen>& picks) {
   std::vector<SightRay> rays;
   rays.reserve(picks.size());
-  for (const Seen& pick : picks) rays.push_back(sight_ray(pick.photograph, pick.at, kPickSigma));
+  for (const Seen& pick : picks) {
+    rays.push_back(sight_ray(pick.picture, pick.pick.at, kPickSigma * pick.pick.stretch));
+  }
   return ray_meeting(rays);
 }
 
-// [pixels]
-double distance_to(const Seen& pick, const Eigen::Vector3d& point) {
-  return (pick.photograph.project(point).head<2>() - pick.at).norm();
+// [pixels of the photograph]
+double distance_to(const Seen& seen, const Eigen::Vector3d& point) {
+  return (seen.picture.project(point).head<2>() - seen.pick.at).norm() / seen.pick.stretch;
 }
 
 double largest_distance(const std::vector<Seen>& picks, const Eigen::Vector3d& point) {
@@ -177,7 +182,7 @@ Sighted sighted(const ControlPoint& point, const Scene& scene, const std::filesy
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(out.meeting->covariance,
                                                              Eigen::EigenvaluesOnly);
   constexpr double kWorst = 0.1;  // of the distance; beyond, the error is no ellipsoid any more
-  const double distance = (out.meeting->point - picks.front().photograph.center()).norm();
+  const double distance = (out.meeting->point - picks.front().picture.center()).norm();
   if (!(std::sqrt(eigen.eigenvalues()[2]) <= kWorst * distance)) {
     out.remark = "its picks leave the distance open by more than 10 %";
     out.meeting.reset();

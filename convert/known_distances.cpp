@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/length.h"
+#include "io/lens.h"
 #include "io/orientation.h"
-#include "io/resample.h"
 #include "io/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/scale_bars.h"
@@ -95,13 +95,14 @@ Picked picked_point(const KnownDistance::Pick& pick, const Model& model, const s
       static_cast<size_t>(std::find(input.begin(), input.end(), pick.view) - input.begin());
   const View& view = model.scene.views[static_cast<size_t>(pick.view)];
   const ViewPriors& priors = model.priors.at(k);
-  const ImageSize size = photograph_size(view);
-  const Camera in_file = resized(view.camera, size.width, size.height);
-  const Eigen::Vector2d pinhole =
-      undistorted({pick.x + 0.5, pick.y + 0.5}, in_file, view.distortion);
-  const Eigen::Vector2d at(pinhole.x() * view.camera.width / size.width,
-                           pinhole.y() * view.camera.height / size.height);
-  const int pixel = next_measured(priors, at);
+  const Camera picture = picture_camera(view);
+  const auto undone = LensMap(view, picture)({pick.x + 0.5, pick.y + 0.5});
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();  // in the picture worked on
+  if (undone) {
+    at = {undone->at.x() * view.camera.width / picture.width,
+          undone->at.y() * view.camera.height / picture.height};
+  }
+  const int pixel = undone ? next_measured(priors, at) : -1;
   if (pixel < 0) {
     throw InvalidInput("--known-distance " + printable(text) + ": no depth was measured at " +
                        printable(view.name) + ":" + std::to_string(std::lround(pick.x)) + "," +

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "convert/length.h"
+#include "io/lens.h"
 #include "io/orientation.h"
-#include "io/resample.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/markers.h"
 #include "libcgs/priors/ray_meeting.h"
@@ -24,11 +24,15 @@ constexpr double kCornerSigma = 0.2;  // [pixels of the photograph]
 /// The rays to the corners of a marker, per photograph.
 using Sightings = std::vector<std::array<SightRay, 4>>;
 
-std::array<SightRay, 4> rays_of(const Marker& marker, const View& view, const Camera& photograph) {
+// Nothing where the lens cannot be undone.
+std::optional<std::array<SightRay, 4>> rays_of(const Marker& marker,
+                                               const LensMap& lens,
+                                               const Camera& picture) {
   std::array<SightRay, 4> out;
   for (size_t k = 0; k < 4; ++k) {
-    const Eigen::Vector2d at = undistorted(marker.corners.at(k), photograph, view.distortion);
-    out.at(k) = sight_ray(photograph, at, kCornerSigma);
+    const auto corner = lens(marker.corners.at(k));
+    if (!corner) return std::nullopt;
+    out.at(k) = sight_ray(picture, corner->at, kCornerSigma * corner->stretch);
   }
   return out;
 }
@@ -37,10 +41,11 @@ std::map<std::string, Sightings> sightings(const Scene& scene) {
   std::map<std::string, Sightings> out;
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
-    const ImageSize size = photograph_size(view);
-    const Camera photograph = resized(view.camera, size.width, size.height);
+    const Camera picture = picture_camera(view);
+    const LensMap lens(view, picture);
     for (const Marker& marker : find_markers(read_photograph(view))) {
-      out[marker.name].push_back(rays_of(marker, view, photograph));
+      const auto rays = rays_of(marker, lens, picture);
+      if (rays) out[marker.name].push_back(*rays);
     }
   }
   return out;

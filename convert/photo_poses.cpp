@@ -161,7 +161,7 @@ ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
     const SolvedPhoto& solved = solution.photos[i];
     if (!solved.is_placed) continue;
     const auto camera_id = static_cast<uint32_t>(photos[i].lens + 1);
-    model.cameras[camera_id] = {solved.camera, {solved.k1, 0, 0, 0, 0}};
+    model.cameras[camera_id] = {solved.camera, {solved.k1, 0, 0, 0, 0}, {}};
     ColmapImage image;
     image.id = static_cast<uint32_t>(i + 1);
     image.camera_id = camera_id;

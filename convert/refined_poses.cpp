@@ -13,6 +13,7 @@
 #include "io/atomic_file.h"
 #include "io/content_hash.h"
 #include "io/json_file.h"
+#include "io/lens.h"
 #include "io/masks.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/refine_poses.h"
@@ -53,7 +54,7 @@ std::string inputs_text(const Scene& scene, const SceneRoot& root) {
                      file_hash(view.image_path),
                      mask ? file_hash(*mask) : "",
                      {camera.fx, camera.fy, camera.cx, camera.cy},
-                     view.distortion,
+                     lens_numbers(view),
                      std::vector<double>(pose.data(), pose.data() + pose.size())});
   }
   return json_text({{"program", kProgramVersion}, {"views", views}}, -1);

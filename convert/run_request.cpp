@@ -12,6 +12,7 @@
 #include "io/content_hash.h"
 #include "io/depth_file.h"
 #include "io/json_file.h"
+#include "io/lens.h"
 #include "io/masks.h"
 #include "libcgs/core/error.h"
 
@@ -53,7 +54,7 @@ uint64_t cameras_hash(const Scene& scene) {
     cameras.push_back({view.name,
                        {c.width, c.height, c.fx, c.fy, c.cx, c.cy},
                        std::vector<double>(pose.data(), pose.data() + pose.size()),
-                       view.distortion});
+                       lens_numbers(view)});
   }
   return content_hash(json_text(cameras, -1));
 }

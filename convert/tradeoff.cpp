@@ -17,7 +17,7 @@
 #include "convert/run_stages.h"
 #include "convert/tradeoff_stages.h"
 #include "io/atomic_file.h"
-#include "io/orientation.h"
+#include "io/lens.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -286,7 +286,7 @@ void measure_errors(Bench& bench, Tradeoff& out) {
 int downscale_of(const SceneRequest& request, const Scene& scene) {
   if (request.options.downscale) return *request.options.downscale;
   const View& view = scene.views[static_cast<size_t>(scene.input.front())];
-  return std::max(1, photograph_size(view).width / view.camera.width);
+  return std::max(1, picture_camera(view).width / view.camera.width);
 }
 
 RunRequest standard_request(const TradeoffRequest& request) {

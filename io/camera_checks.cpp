@@ -89,10 +89,14 @@ void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimi
 
 double fold_radius(const std::array<double, 5>& distortion) {
   const auto& [k1, k2, p1, p2, k3] = distortion;
-  // d/dr of r (1 + k1 r^2 + k2 r^4 + k3 r^6), as a polynomial in s = r^2.
-  Eigen::VectorXd polynomial(4);
-  polynomial << 1, 3 * k1, 5 * k2, 7 * k3;
-  Eigen::Index degree = 3;
+  return fold_radius(std::array<double, 4>{k1, k2, k3, 0});
+}
+
+double fold_radius(const std::array<double, 4>& radial) {
+  // The derivative, as a polynomial in s = r^2.
+  Eigen::VectorXd polynomial(5);
+  polynomial << 1, 3 * radial[0], 5 * radial[1], 7 * radial[2], 9 * radial[3];
+  Eigen::Index degree = 4;
   while (degree > 0 && polynomial[degree] == 0) --degree;
   if (degree == 0) return std::numeric_limits<double>::infinity();
   const Eigen::PolynomialSolver<double, Eigen::Dynamic> solver(polynomial.head(degree + 1));

@@ -34,6 +34,9 @@ void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimi
 /// \param distortion  k1 k2 p1 p2 k3
 double fold_radius(const std::array<double, 5>& distortion);
 
+/// The same of a lens that is r (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8), r in any unit.
+double fold_radius(const std::array<double, 4>& radial);
+
 /// Calls refuse(Value) if a coefficient is not finite, or if the distortion cannot be undone
 /// already inside the largest circle around the principal point that the image holds.
 void check_distortion(const Camera& camera,

@@ -10,6 +10,7 @@
 
 #include "io/atomic_file.h"
 #include "io/camera_checks.h"
+#include "io/fisheye_map.h"
 #include "io/json_file.h"
 
 namespace cgs {
@@ -31,6 +32,19 @@ json frame_json(const Scene& scene) {
           {"up", vector_json(frame.up)},
           {"kind", scene.kind},
           {"folder", std::filesystem::absolute(scene.folder).lexically_normal().string()}};
+}
+
+json fisheye_json(const Fisheye& fisheye) {
+  const Camera& c = fisheye.photograph;
+  return {{"width", c.width},
+          {"height", c.height},
+          {"fx", c.fx},
+          {"fy", c.fy},
+          {"cx", c.cx},
+          {"cy", c.cy},
+          {"k", fisheye.k},
+          {"p", fisheye.p},
+          {"radius", fisheye.radius}};
 }
 
 json camera_json(const Scene& scene, size_t index) {
@@ -63,6 +77,7 @@ json camera_json(const Scene& scene, size_t index) {
     return std::find(list.begin(), list.end(), static_cast<int>(index)) != list.end();
   };
   entry["role"] = contains(scene.input) ? "input" : contains(scene.held_out) ? "held_out" : "";
+  if (view.fisheye) entry["fisheye"] = fisheye_json(*view.fisheye);
   if (view.orientation != 1) entry["orientation"] = view.orientation;
   if (!view.image_path.empty()) {
     entry["image_path"] = std::filesystem::absolute(view.image_path).lexically_normal().string();
@@ -111,6 +126,26 @@ Eigen::Vector3d read_position(const JsonValue& entry, const Frame& frame) {
   return frame.file_from_internal(internal) == in_file ? internal : from_file;
 }
 
+Fisheye read_fisheye(const JsonValue& value) {
+  Fisheye out;
+  Camera& camera = out.photograph;
+  camera.width = value.at("width").count();
+  camera.height = value.at("height").count();
+  camera.fx = value.at("fx").number();
+  camera.fy = value.at("fy").number();
+  camera.cx = value.at("cx").number();
+  camera.cy = value.at("cy").number();
+  const JsonValue k = value.at("k");
+  const JsonValue p = value.at("p");
+  if (k.size() != out.k.size()) k.fail(Defect::Schema, "expected k1 k2 k3 k4");
+  if (p.size() != out.p.size()) p.fail(Defect::Schema, "expected p1 p2");
+  for (size_t i = 0; i < out.k.size(); ++i) out.k.at(i) = k.at(i).number();
+  for (size_t i = 0; i < out.p.size(); ++i) out.p.at(i) = p.at(i).number();
+  out.radius = value.at("radius").number();
+  check_fisheye(out, [&](Defect defect, const std::string& why) { value.fail(defect, why); });
+  return out;
+}
+
 // Files are named after views: a name must not lead into another folder.
 std::string read_name(const JsonValue& value, std::set<std::string>& taken) {
   std::string name = value.text();
@@ -147,6 +182,7 @@ View read_view(const JsonValue& entry, const Frame& frame, std::set<std::string>
     for (size_t i = 0; i < 5; ++i) view.distortion[i] = distortion->at(i).number();
     check_distortion(camera, view.distortion, refuse);
   }
+  if (const auto fisheye = entry.find("fisheye")) view.fisheye = read_fisheye(*fisheye);
   if (const auto orientation = entry.find("orientation")) {
     view.orientation = orientation->count();
     if (view.orientation < 1 || view.orientation > 8) {

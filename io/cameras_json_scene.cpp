@@ -39,7 +39,9 @@ Scene read_cameras_json_scene(const SceneRoot& root) {
     if (view.image_path.empty()) scene.missing.push_back(view.name);
     // What this program wrote is in its internal frame.
     Camera& camera = view.camera;
-    camera.world_from_cam = world_from_internal(scene.frame, camera.world_from_cam);
+    const Eigen::Isometry3d pose = world_from_internal(scene.frame, camera.world_from_cam);
+    if (view.fisheye) camera = view.fisheye->photograph;
+    camera.world_from_cam = pose;
     view.near *= scene.frame.scale;
     view.far *= scene.frame.scale;
   }

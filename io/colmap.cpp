@@ -95,6 +95,7 @@ View view_of(const SceneRoot& root,
   view.name = image.name;
   view.camera = camera->second.camera;
   view.distortion = camera->second.distortion;
+  view.fisheye = camera->second.fisheye;
   view.camera.world_from_cam = pose_of(image, refuse, scene);
   const fs::path path = photograph(root, folder, image.name, root.folder);
   if (is_present(path)) {

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "io/camera_checks.h"
+#include "io/fisheye_map.h"
 #include "io/text_lines.h"
 
 namespace cgs {
@@ -18,16 +19,20 @@ struct CameraModel {
   size_t parameters;
 };
 
-constexpr std::array<CameraModel, 5> kModels = {{{0, "SIMPLE_PINHOLE", 3},
+constexpr std::array<CameraModel, 8> kModels = {{{0, "SIMPLE_PINHOLE", 3},
                                                  {1, "PINHOLE", 4},
                                                  {2, "SIMPLE_RADIAL", 4},
                                                  {3, "RADIAL", 5},
-                                                 {4, "OPENCV", 8}}};
+                                                 {4, "OPENCV", 8},
+                                                 {5, "OPENCV_FISHEYE", 8},
+                                                 {8, "SIMPLE_RADIAL_FISHEYE", 4},
+                                                 {9, "RADIAL_FISHEYE", 5}}};
 
 std::string unsupported(const std::string& model) {
   return "camera model " + model +
-         " is not read; known are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL and OPENCV: "
-         "undistort the images first (colmap image_undistorter)";
+         " is not read; known are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, "
+         "SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE: undistort the images first "
+         "(colmap image_undistorter)";
 }
 
 // Parameters in COLMAP's order: f | fx fy, cx, cy, distortion.
@@ -43,13 +48,21 @@ ColmapCamera camera_from(const CameraModel& model,
   ColmapCamera out;
   out.camera.width = static_cast<int>(width);
   out.camera.height = static_cast<int>(height);
-  const bool has_two_focals = model.name == "PINHOLE" || model.name == "OPENCV";
+  const bool has_two_focals =
+      model.name == "PINHOLE" || model.name == "OPENCV" || model.name == "OPENCV_FISHEYE";
   const size_t rest = has_two_focals ? 2 : 1;
   out.camera.fx = p[0];
   out.camera.fy = has_two_focals ? p[1] : p[0];
   out.camera.cx = p[rest];
   out.camera.cy = p[rest + 1];
-  const auto distortion = p.subspan(rest + 2);  // k1 | k1 k2 | k1 k2 p1 p2: our order
+  const auto distortion = p.subspan(rest + 2);
+  if (model.name.ends_with("FISHEYE")) {
+    out.fisheye = Fisheye{out.camera, {}, {}, 0};
+    std::copy(distortion.begin(), distortion.end(), out.fisheye->k.begin());
+    check_fisheye(*out.fisheye, refuse);
+    return out;
+  }
+  // k1 | k1 k2 | k1 k2 p1 p2: our order
   std::copy(distortion.begin(), distortion.end(), out.distortion.begin());
   check_intrinsics(out.camera, refuse);
   check_distortion(out.camera, out.distortion, refuse);

@@ -5,13 +5,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "libcgs/core/camera.h"
+#include "libcgs/core/fisheye.h"
 
 namespace cgs {
 
@@ -19,6 +20,7 @@ namespace cgs {
 struct ColmapCamera {
   Camera camera;
   std::array<double, 5> distortion = {};  ///< k1 k2 p1 p2 k3
+  std::optional<Fisheye> fisheye;  ///< Of fisheye models; `camera` is that of the photograph.
 };
 
 struct ColmapImage {
@@ -46,8 +48,8 @@ struct ColmapModel {
   std::vector<ColmapPoint> points;
 };
 
-/// Readers of COLMAP's model files. Camera models SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL
-/// and OPENCV are understood.
+/// Readers of COLMAP's model files. Camera models SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL,
+/// OPENCV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE are understood.
 /// \throws BadInput Truncated, Count, Syntax (also ids that occur twice), Unsupported (other camera
 ///         models), Value (intrinsics out of range, naming the camera); LimitError.
 /// Source: COLMAP documentation, "Output format"; binary layout of COLMAP 3.x.

@@ -26,7 +26,7 @@ std::ostream& operator<<(std::ostream& out, const Exact& number) {
 void write_camera(uint32_t id, const ColmapCamera& colmap, std::ostream& out) {
   const Camera& c = colmap.camera;
   const auto& [k1, k2, p1, p2, k3] = colmap.distortion;
-  assert(k3 == 0);
+  assert(k3 == 0 && !colmap.fisheye);
   const bool has_one_focal = c.fx == c.fy;
   const bool is_radial = k2 == 0 && p1 == 0 && p2 == 0;
   const char* model = "OPENCV";

@@ -6,12 +6,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "io/camera_checks.h"
 #include "io/depth_file.h"
+#include "io/fisheye_map.h"
 #include "io/orientation.h"
 #include "libcgs/core/error.h"
 
@@ -83,14 +85,31 @@ Raster<float> upright(const Raster<float>& values, const View& view, const Image
                      ", which is another shape");
 }
 
-// Where a pixel of the undistorted picture lies in the photograph, both of the camera's size; NaN
-// where the lens never put it.
+// Where a pixel of the undistorted picture lies in the photograph; NaN where the lens never put it.
 class Lens {
  public:
   explicit Lens(const View& view)
-      : camera_(view.camera), k_(view.distortion), fold_(fold_radius(view.distortion)) {}
+      : camera_(view.camera), k_(view.distortion), fold_(fold_radius(view.distortion)) {
+    if (view.fisheye) fisheye_.emplace(*view.fisheye);
+  }
 
-  Eigen::Vector2d operator()(double u, double v) const {
+  /// As shares of width and height of the photograph.
+  Eigen::Array2d operator()(double u, double v) const {
+    if (!fisheye_) return bent(u, v).array() / size_of(camera_);
+    const Eigen::Array2d full =
+        Eigen::Array2d(u, v) / size_of(camera_) * size_of(fisheye_->picture());
+    return fisheye_->in_photograph(full).array() / size_of(fisheye_->photograph());
+  }
+  /// Share of width and height under a pixel on the axis.
+  Eigen::Array2d pixel() const {
+    if (!fisheye_) return size_of(camera_).inverse();
+    return size_of(fisheye_->picture()) / size_of(camera_) / size_of(fisheye_->photograph());
+  }
+
+ private:
+  static Eigen::Array2d size_of(const Camera& camera) { return {camera.width, camera.height}; }
+
+  Eigen::Vector2d bent(double u, double v) const {
     if (k_ == std::array<double, 5>{}) return {u, v};
     const Eigen::Vector2d p = camera_.ray_in_cam(u, v).head<2>();
     if (!(p.norm() < fold_)) return Eigen::Vector2d::Constant(double(kNaN));
@@ -103,10 +122,10 @@ class Lens {
     return {camera_.fx * q.x() + camera_.cx, camera_.fy * q.y() + camera_.cy};
   }
 
- private:
   const Camera& camera_;
   const std::array<double, 5>& k_;
   double fold_;
+  std::optional<FisheyeMap> fisheye_;
 };
 
 bool is_like(float value, float reference) {
@@ -214,18 +233,18 @@ std::set<int> find_all_beside(Scene& scene, const SceneRoot& root) {
 DepthMap resampled(const Raster<float>& values, const View& view) {
   const Camera& camera = view.camera;
   const Lens lens(view);
-  const double across = double(values.width) / camera.width;
-  const double down = double(values.height) / camera.height;
+  const Eigen::Array2d size(values.width, values.height);
+  const Eigen::Array2d under = lens.pixel() * size;  // values under a pixel, across and down
   DepthMap out(camera.width, camera.height, kNaN);
   for (int y = 0; y < out.height; ++y) {
     for (int x = 0; x < out.width; ++x) {
-      const Eigen::Vector2d at = lens(x + 0.5, y + 0.5);
-      const double u = at.x() * across;
-      const double v = at.y() * down;
+      const Eigen::Array2d at = lens(x + 0.5, y + 0.5) * size;
+      const double u = at.x();
+      const double v = at.y();
       if (!(u >= 0 && v >= 0 && u < values.width && v < values.height)) continue;
       constexpr double kFiner = 1.01;
-      out(x, y) = across > kFiner || down > kFiner
-                      ? averaged(values, u, v, std::max(across, 1.0), std::max(down, 1.0))
+      out(x, y) = under.maxCoeff() > kFiner
+                      ? averaged(values, u, v, std::max(under.x(), 1.0), std::max(under.y(), 1.0))
                       : interpolated(values, u, v);
     }
   }

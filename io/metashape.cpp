@@ -14,6 +14,7 @@
 
 #include "io/byte_reader.h"
 #include "io/camera_checks.h"
+#include "io/fisheye_map.h"
 #include "io/photograph_index.h"
 #include "io/text_lines.h"
 
@@ -137,6 +138,7 @@ class MetashapeFile {
 struct Sensor {
   Camera camera;
   std::array<double, 5> distortion = {};
+  std::optional<Fisheye> fisheye;
 };
 
 int side(const MetashapeFile& file, const pugi::xml_node& resolution, const char* name) {
@@ -171,9 +173,20 @@ void refuse_further_terms(const MetashapeFile& file,
   }
 }
 
+// Of a fisheye the other terms are read.
+void refuse_further_fisheye_terms(const MetashapeFile& file, const pugi::xml_node& calibration) {
+  for (const char* name : {"p3", "p4", "b2"}) {
+    if (file.number_or_0(calibration, name) == 0) continue;
+    file.fail(Defect::Unsupported,
+              calibration,
+              std::string(name) + " of a fisheye is not read; undistort the photographs first");
+  }
+}
+
 Sensor read_sensor(const MetashapeFile& file, const pugi::xml_node& node) {
   const std::string type = node.attribute("type").as_string("frame");
-  if (type != "frame") {
+  const bool is_fisheye = type == "fisheye" || type == "equidistant_fisheye";
+  if (type != "frame" && !is_fisheye) {
     file.fail(Defect::Unsupported, node, "sensors of type \"" + type + "\" are not read");
   }
   pugi::xml_node calibration = file.child(node, "calibration");
@@ -193,10 +206,17 @@ Sensor read_sensor(const MetashapeFile& file, const pugi::xml_node& node) {
   camera.fx = camera.fy + get("b1");
   camera.cx = 0.5 * camera.width + get("cx");
   camera.cy = 0.5 * camera.height + get("cy");
-  out.distortion = {get("k1"), get("k2"), get("p2"), get("p1"), get("k3")};
   const Refuse refuse = [&](Defect defect, const std::string& why) {
     file.fail(defect, calibration, why);
   };
+  if (is_fisheye) {
+    out.fisheye =
+        Fisheye{camera, {get("k1"), get("k2"), get("k3"), get("k4")}, {get("p2"), get("p1")}, 0};
+    check_fisheye(*out.fisheye, refuse);
+    refuse_further_fisheye_terms(file, calibration);
+    return out;
+  }
+  out.distortion = {get("k1"), get("k2"), get("p2"), get("p1"), get("k3")};
   check_intrinsics(camera, refuse);
   check_distortion(camera, out.distortion, refuse);
   refuse_further_terms(file, calibration, camera);
@@ -331,6 +351,7 @@ class MetashapeReader {
     const Sensor read = read_sensor(file_, sensor->second);
     view.camera = read.camera;
     view.distortion = read.distortion;
+    view.fisheye = read.fisheye;
     view.camera.world_from_cam = read_pose(node);
     return view;
   }

@@ -20,7 +20,8 @@ bool is_metashape(const std::filesystem::path& folder);
 /// other components than the active one (the one with most cameras if none is), as nothing says
 /// where components lie relative to each other.
 /// \throws BadInput Syntax, Schema (what is missing), Value (matrices, intrinsics), Unsupported
-///         (fisheye and other sensors; k4, p3, p4 or b2 that move a pixel), Empty; LimitError
+///         (other sensors than frame, fisheye and equidistant_fisheye; k4, p3, p4 or b2 that
+///         move a pixel), Empty; LimitError
 /// Source: Agisoft Metashape Professional manual, appendices "Camera models" and "Coordinate
 ///         systems"; Metashape Python reference, Chunk.exportCameras, CamerasFormatXML.
 Scene read_metashape(const SceneRoot& root);

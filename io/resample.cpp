@@ -88,6 +88,29 @@ bool is_covered(const MaskMap& valid, double u, double v) {
   return valid(x0, y0) != 0 && valid(x1, y0) != 0 && valid(x0, y1) != 0 && valid(x1, y1) != 0;
 }
 
+// An image of another size whose pixels come from where `from`(x, y) says, counted from the centre
+// of the first pixel; 0, and not valid, where that is outside or NaN.
+template <typename From>
+void resample(ColorImage& image, MaskMap& valid, const cv::Size& size, const From& from) {
+  ColorImage out(size.width, size.height, Eigen::Vector3f::Zero());
+  MaskMap reached(size.width, size.height, 0);
+  tbb::parallel_for(0, size.height, [&](int y) {
+    for (int x = 0; x < size.width; ++x) {
+      const Eigen::Vector2d at = from(x, y);
+      const double u = at.x();
+      const double v = at.y();
+      const bool is_inside = u >= 0 && v >= 0 && u <= image.width - 1 && v <= image.height - 1;
+      if (!is_inside || !is_covered(valid, u, v)) continue;
+      out(x, y) = sample(image, u, v);
+      reached(x, y) = 1;
+    }
+  });
+  image = std::move(out);
+  const bool is_all =
+      std::all_of(reached.data.begin(), reached.data.end(), [](uint8_t set) { return set != 0; });
+  valid = is_all ? MaskMap() : std::move(reached);
+}
+
 // OpenCV counts pixel centres from 0, this project from 0.5.
 cv::Matx33d opencv_intrinsics(const Camera& camera) {
   return {camera.fx, 0, camera.cx - 0.5, 0, camera.fy, camera.cy - 0.5, 0, 0, 1};
@@ -106,25 +129,21 @@ void undistort(ColorImage& image,
   cv::Mat map_v;
   cv::initUndistortRectifyMap(K, coefficients, cv::noArray(), K, size, CV_32FC1, map_u, map_v);
   const double fold = fold_radius(distortion);
-  ColorImage out(image.width, image.height, Eigen::Vector3f::Zero());
-  MaskMap reached(image.width, image.height, 0);
-  tbb::parallel_for(0, image.height, [&](int y) {
-    for (int x = 0; x < image.width; ++x) {
-      const double u = map_u.at<float>(y, x);
-      const double v = map_v.at<float>(y, x);
-      // Beyond the fold the polynomial runs back into the image and would mirror it.
-      const double radius = camera.ray_in_cam(x + 0.5, y + 0.5).head<2>().norm();
-      const bool is_inside =
-          u >= 0 && v >= 0 && u <= image.width - 1 && v <= image.height - 1 && radius < fold;
-      if (!is_inside || !is_covered(valid, u, v)) continue;
-      out(x, y) = sample(image, u, v);
-      reached(x, y) = 1;
-    }
+  resample(image, valid, size, [&](int x, int y) -> Eigen::Vector2d {
+    // Beyond the fold the polynomial runs back into the image and would mirror it.
+    const double radius = camera.ray_in_cam(x + 0.5, y + 0.5).head<2>().norm();
+    if (!(radius < fold)) return Eigen::Vector2d::Constant(-1);
+    return {map_u.at<float>(y, x), map_v.at<float>(y, x)};
   });
-  image = std::move(out);
-  const bool is_all =
-      std::all_of(reached.data.begin(), reached.data.end(), [](uint8_t set) { return set != 0; });
-  valid = is_all ? MaskMap() : std::move(reached);
+}
+
+void undistort(ColorImage& image, MaskMap& valid, const FisheyeMap& fisheye) {
+  const cv::Size size(fisheye.picture().width, fisheye.picture().height);
+  resample(image, valid, size, [&](int x, int y) -> Eigen::Vector2d {
+    const Eigen::Vector2d at = fisheye.in_photograph({x + 0.5, y + 0.5});
+    if (!fisheye.shows(at)) return Eigen::Vector2d::Constant(-1);
+    return at - Eigen::Vector2d::Constant(0.5);
+  });
 }
 
 Eigen::Vector2d undistorted(const Eigen::Vector2d& point,

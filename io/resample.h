@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "io/fisheye_map.h"
 #include "libcgs/core/camera.h"
 #include "libcgs/core/raster.h"
 
@@ -19,6 +20,9 @@ void undistort(ColorImage& image,
                MaskMap& valid,
                const Camera& camera,
                const std::array<double, 5>& distortion);
+
+/// The same for a fisheye photograph: the image becomes fisheye.picture() in size and content.
+void undistort(ColorImage& image, MaskMap& valid, const FisheyeMap& fisheye);
 
 /// Where a point of a photograph lies in the picture undistort() makes of it [pixels]. What that
 /// picture does not hold, as the lens folds there, comes back anywhere: see is_undone().

@@ -15,6 +15,7 @@
 #include "io/cameras_json_scene.h"
 #include "io/colmap.h"
 #include "io/exif.h"
+#include "io/fisheye_map.h"
 #include "io/image.h"
 #include "io/llff.h"
 #include "io/masks.h"
@@ -189,6 +190,30 @@ void fit_cameras(Scene& scene) {
   }
 }
 
+// From here on a view through a fisheye has the camera of its undistorted picture.
+void make_pinholes(Scene& scene) {
+  int cropped = 0;
+  for (View& view : scene.views) {
+    if (!view.fisheye) continue;
+    const Eigen::Isometry3d pose = view.camera.world_from_cam;
+    view.fisheye->radius *= double(view.camera.width) / view.fisheye->photograph.width;
+    view.fisheye->photograph = view.camera;
+    view.fisheye->photograph.world_from_cam.setIdentity();
+    check_fisheye(*view.fisheye, [&](Defect defect, const std::string& why) {
+      throw BadInput(defect, scene.folder, "view " + printable(view.name) + ": " + why);
+    });
+    const FisheyeMap map(*view.fisheye);
+    view.camera = map.picture();
+    view.camera.world_from_cam = pose;
+    cropped += map.is_cropped() ? 1 : 0;
+  }
+  if (cropped > 0) {
+    scene.warnings.push_back(std::to_string(cropped) +
+                             " fisheye photographs show more than 60 degrees to a side of their "
+                             "axis; what lies beyond is left out");
+  }
+}
+
 void divide_sizes(Scene& scene, int downscale) {
   for (View& view : scene.views) {
     Camera& camera = view.camera;
@@ -315,14 +340,17 @@ void load_image(Scene& scene, View& view) {
   }
   const int width = view.image.width;
   const int height = view.image.height;
-  if (width < camera.width || height < camera.height ||
-      !have_same_shape(camera.width, camera.height, width, height)) {
+  const Camera& taken = view.fisheye ? view.fisheye->photograph : camera;
+  if (width < taken.width || height < taken.height ||
+      !have_same_shape(taken.width, taken.height, width, height)) {
     throw BadInput(Defect::Mismatch,
                    view.image_path,
                    "the image has " + size_text(width, height) + " pixels, its camera is for " +
-                       size_text(camera.width, camera.height));
+                       size_text(taken.width, taken.height));
   }
-  if (view.distortion != std::array<double, 5>{}) {
+  if (view.fisheye) {
+    undistort(view.image, view.valid, FisheyeMap(*view.fisheye));
+  } else if (view.distortion != std::array<double, 5>{}) {
     undistort(view.image, view.valid, resized(camera, width, height), view.distortion);
   }
   area_downscale(view.image, view.valid, camera.width, camera.height);
@@ -354,6 +382,7 @@ Scene prepared(Scene scene, const SceneOptions& options) {
   sort_views(scene);
   check_presence(scene);
   fit_cameras(scene);
+  make_pinholes(scene);
   divide_sizes(scene, options.downscale ? *options.downscale : chosen_downscale(scene));
   choose_views(scene, options.views);
   check_baselines(scene);

@@ -11,6 +11,7 @@
 
 #include "io/camera_checks.h"
 #include "io/depth_file.h"
+#include "io/fisheye_map.h"
 #include "io/image.h"
 #include "io/json_file.h"
 
@@ -40,29 +41,70 @@ double focal_from_angle(const JsonValue& angle, int side) {
   return 0.5 * side / std::tan(0.5 * value);
 }
 
-void check_model(const JsonValue& document, const JsonValue& frame) {
+// Whether the photograph was taken through a fisheye; refuses models that are not read.
+bool is_fisheye(const JsonValue& document, const JsonValue& frame) {
   static constexpr std::array<std::string_view, 6> kKnown = {
       "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE"};
-  if (const auto model = setting(document, frame, "camera_model")) {
-    if (std::find(kKnown.begin(), kKnown.end(), model->text()) == kKnown.end()) {
-      model->fail(Defect::Unsupported,
-                  "camera model \"" + printable(model->text()) +
-                      "\" is not read; known are PINHOLE and OPENCV: undistort the images first");
+  // Other lenses of instant-ngp, which has no camera_model.
+  for (const char* key : {"ftheta_p0", "latlong", "equirectangular"}) {
+    if (const auto other = setting(document, frame, key)) {
+      other->fail(Defect::Unsupported, "such images are not read: undistort them first");
     }
   }
-  const auto fisheye = setting(document, frame, "is_fisheye");
-  if (fisheye && fisheye->boolean()) {
-    fisheye->fail(Defect::Unsupported, "fisheye images are not read: undistort them first");
+  const auto flag = setting(document, frame, "is_fisheye");
+  const auto model = setting(document, frame, "camera_model");
+  if (!model) return flag && flag->boolean();
+  if (model->text() == "OPENCV_FISHEYE") return true;
+  if (std::find(kKnown.begin(), kKnown.end(), model->text()) == kKnown.end()) {
+    model->fail(Defect::Unsupported,
+                "camera model \"" + printable(model->text()) +
+                    "\" is not read; known are PINHOLE, OPENCV and OPENCV_FISHEYE: undistort the "
+                    "images first");
   }
-  const auto k4 = setting(document, frame, "k4");
-  if (k4 && k4->number() != 0) {
-    k4->fail(Defect::Unsupported, "distortion beyond k3 is not read: undistort the images first");
+  return flag && flag->boolean();
+}
+
+// A coefficient under its own name, else in nerfstudio's list of them; 0 if it is in neither.
+double coefficient(const JsonValue& document, const JsonValue& frame, std::string_view key) {
+  static constexpr std::array<std::string_view, 6> kOrder = {"k1", "k2", "k3", "k4", "p1", "p2"};
+  if (const auto value = setting(document, frame, key)) return value->number();
+  const auto list = setting(document, frame, "distortion_params");
+  if (!list) return 0;
+  if (list->size() != kOrder.size()) list->fail(Defect::Schema, "expected k1 k2 k3 k4 p1 p2");
+  const auto* const place = std::find(kOrder.begin(), kOrder.end(), key);
+  if (place == kOrder.end()) return 0;
+  return list->at(static_cast<size_t>(place - kOrder.begin())).number();
+}
+
+void refuse_further_terms(const JsonValue& document,
+                          const JsonValue& frame,
+                          std::initializer_list<const char*> keys) {
+  for (const char* key : keys) {
+    if (coefficient(document, frame, key) == 0) continue;
+    frame.fail(Defect::Unsupported,
+               std::string("the distortion ") + key + " is not read: undistort the images first");
   }
+}
+
+void read_distortion(const JsonValue& document, const JsonValue& frame, View& view) {
+  const auto get = [&](const char* key) { return coefficient(document, frame, key); };
+  const Refuse refuse = [&](Defect defect, const std::string& why) { frame.fail(defect, why); };
+  if (is_fisheye(document, frame)) {
+    refuse_further_terms(document, frame, {"k5", "k6"});
+    view.fisheye = Fisheye{view.camera,
+                           {get("k1"), get("k2"), get("k3"), get("k4")},
+                           {get("p1"), get("p2")},
+                           number_or(setting(document, frame, "fisheye_crop_radius"), 0)};
+    check_fisheye(*view.fisheye, refuse);
+    return;
+  }
+  refuse_further_terms(document, frame, {"k4", "k5", "k6"});
+  view.distortion = {get("k1"), get("k2"), get("p1"), get("p2"), get("k3")};
+  check_distortion(view.camera, view.distortion, refuse);
 }
 
 // Intrinsics of a frame for an image of the given size.
 void read_intrinsics(const JsonValue& document, const JsonValue& frame, View& view) {
-  check_model(document, frame);
   Camera& camera = view.camera;
   const auto get = [&](std::string_view key) { return setting(document, frame, key); };
   const auto fl_x = get("fl_x");
@@ -85,11 +127,9 @@ void read_intrinsics(const JsonValue& document, const JsonValue& frame, View& vi
   }
   camera.cx = number_or(get("cx"), 0.5 * camera.width);
   camera.cy = number_or(get("cy"), 0.5 * camera.height);
-  static constexpr std::array<std::string_view, 5> kKeys = {"k1", "k2", "p1", "p2", "k3"};
-  for (size_t i = 0; i < kKeys.size(); ++i) view.distortion[i] = number_or(get(kKeys[i]), 0);
   const Refuse refuse = [&](Defect defect, const std::string& why) { frame.fail(defect, why); };
   check_intrinsics(camera, refuse);
-  check_distortion(camera, view.distortion, refuse);
+  read_distortion(document, frame, view);
 }
 
 Eigen::Isometry3d read_pose(const JsonValue& matrix) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "libcgs/core/camera.h"
+#include "libcgs/core/fisheye.h"
 #include "libcgs/core/frame.h"
 #include "libcgs/core/raster.h"
 
@@ -34,6 +35,9 @@ struct View {
   /// Lens distortion k1 k2 p1 p2 k3 (Brown-Conrady, as OpenCV defines it) of the image file, which
   /// load_images() takes out of the pixels; all zero = none.
   std::array<double, 5> distortion = {};
+  /// Of a photograph through a fisheye lens, which load_images() turns into what a pinhole camera
+  /// would have recorded; `distortion` is then zero. Empty = none.
+  std::optional<Fisheye> fisheye;
   ColorImage image;                  ///< Empty until loaded; same size as camera.
   MaskMap valid;                     ///< Empty = every pixel; else 1 where the image may be used.
   std::filesystem::path depth_path;  ///< File with depth from elsewhere; empty = none.

@@ -112,7 +112,8 @@ std::vector<float> sky_visibility(const PortalScene& scene) {
 ColorImage render_view(const PortalScene& scene,
                        const std::vector<float>& sky,
                        const Camera& camera,
-                       uint32_t seed) {
+                       uint32_t seed,
+                       const std::function<Vector3d(double u, double v)>& ray) {
   const Shader shade{scene, sky};
   ColorImage image(camera.width, camera.height, Vector3f::Zero());
   const double spread = 1 / (kSamples * camera.fx);
@@ -123,7 +124,8 @@ ColorImage render_view(const PortalScene& scene,
         const int row = s / kSamples;
         const double u = x + (s % kSamples + 0.5) / kSamples;
         const double v = y + (row + 0.5) / kSamples;
-        const Vector3d direction = camera.world_from_cam.linear() * camera.ray_in_cam(u, v);
+        const Vector3d in_cam = ray ? ray(u, v) : camera.ray_in_cam(u, v);
+        const Vector3d direction = camera.world_from_cam.linear() * in_cam;
         sum += shade({.origin = camera.center(), .direction = direction}, spread);
       }
       const auto pixel = static_cast<uint32_t>(image.index(x, y));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "libcgs/core/camera.h"
@@ -16,9 +17,12 @@ std::vector<float> sky_visibility(const PortalScene& scene);
 /// sRGB-coded, with sensor noise of half a grey level that depends on `seed`, rounded to 8 bits.
 ///
 /// \param sky  from sky_visibility(scene)
+/// \param ray  direction in camera axes of a point of the picture [pixels], for lenses that are no
+///             pinhole; empty = that of the camera
 ColorImage render_view(const PortalScene& scene,
                        const std::vector<float>& sky,
                        const Camera& camera,
-                       uint32_t seed);
+                       uint32_t seed,
+                       const std::function<Eigen::Vector3d(double u, double v)>& ray = {});
 
 }  // namespace cgs

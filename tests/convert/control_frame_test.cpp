@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/fisheye_map.h"
 #include "io/png.h"
 #include "libcgs/core/error.h"
 #include "tests/support/scene_files.h"
@@ -66,7 +67,9 @@ class ControlFrame : public testing::Test {
     const Eigen::Vector2d n = local.head<2>() / local.z();
     const double r2 = n.squaredNorm();
     const auto [k1, k2, p1, p2, k3] = lens_;
-    const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const double angle = std::atan(n.norm());
+    const double fisheye = (1 + 0.02 * angle * angle) * angle / n.norm();
+    const double radial = is_fisheye_ ? fisheye : 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
     const double x = n.x() * radial + 2 * p1 * n.x() * n.y() + p2 * (r2 + 2 * n.x() * n.x());
     const double y = n.y() * radial + p1 * (r2 + 2 * n.y() * n.y()) + 2 * p2 * n.x() * n.y();
     const Eigen::Vector2d uvz(camera.fx * x + camera.cx, camera.fy * y + camera.cy);
@@ -112,6 +115,7 @@ class ControlFrame : public testing::Test {
   Scene scene_;
   std::vector<Camera> photographs_;
   std::array<double, 5> lens_ = {};  // Brown: k1 k2 p1 p2 k3
+  bool is_fisheye_ = false;          // with k1 = 0.02
 };
 
 TEST_F(ControlFrame, TakesEverythingOfTheSceneAlong) {
@@ -154,6 +158,22 @@ TEST_F(ControlFrame, SeesThroughALens) {
   for (View& view : scene_.views) view.distortion = lens_;
   const auto report = move(points(6));
   EXPECT_LT(report["control_points"]["control_rms"]["all"].get<double>(), 1e-4);
+}
+
+TEST_F(ControlFrame, SeesThroughAFisheye) {
+  is_fisheye_ = true;
+  for (size_t i = 0; i < 3; ++i) {
+    View& view = scene_.views[i];
+    photographs_[i].fx = photographs_[i].fy = 140;  // the picks are in pixels of the photograph
+    view.fisheye = Fisheye{photographs_[i], {0.02, 0, 0, 0}, {}, 0};
+    const Camera picture = FisheyeMap(*view.fisheye).picture();
+    const Eigen::Isometry3d pose = view.camera.world_from_cam;
+    view.camera = resized(picture, picture.width / 2, picture.height / 2);
+    view.camera.world_from_cam = pose;
+  }
+  const auto report = move(points(6));
+  EXPECT_LT(report["control_points"]["control_rms"]["all"].get<double>(), 1e-4);
+  EXPECT_EQ(warnings(), "");
 }
 
 TEST_F(ControlFrame, StatesWhatCheckPointsSay) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/fisheye_map.h"
 #include "libcgs/core/error.h"
 #include "tests/support/exif_segment.h"
 #include "tests/support/scene_files.h"
@@ -90,6 +91,37 @@ TEST_F(KnownDistances, MayEndInTwoPhotographsAndBeTakenThroughALens) {
   for (View& view : model_.scene.views) view.distortion = {-0.12, 0.03, 0.002, -0.001, 0.01};
   scale({{pixel_of(0, -0.1, 0.05), pixel_of(2, 0.15, -0.05), "2m"}});
   EXPECT_NEAR(model_.scene.frame.metres_per_unit, 2 / (kUnit * std::hypot(0.25, 0.1)), 1e-5);
+}
+
+TEST_F(KnownDistances, MayBePickedThroughAFisheye) {
+  // The picture worked on is a quarter of what the lens makes of 240 x 160 pixels.
+  const Fisheye lens{
+      {.width = kFileWidth, .height = kFileHeight, .fx = 130, .fy = 130, .cx = 122, .cy = 77},
+      {0.03, -0.01, 0.002, 0},
+      {},
+      0};
+  const Camera picture = FisheyeMap(lens).picture();
+  for (View& view : model_.scene.views) {
+    view.fisheye = lens;
+    const Eigen::Isometry3d pose = view.camera.world_from_cam;
+    view.camera = resized(picture, picture.width / kDownscale, picture.height / kDownscale);
+    view.camera.world_from_cam = pose;
+  }
+  for (ViewPriors& priors : model_.priors) {
+    const Camera& camera = model_.scene.views[0].camera;
+    priors.depth = DepthMap(camera.width, camera.height, float(kDepth));
+    priors.sigma = DepthMap(camera.width, camera.height, float(kSigma));
+    priors.origin = Raster<DepthOrigin>(camera.width, camera.height, DepthOrigin::Measured);
+  }
+  const auto pick = [&](double x, double y) {  // the model, written out
+    const double angle = std::atan2(std::hypot(x, y), kDepth);
+    const double s = angle * angle;
+    const double bent = angle * (1 + s * (0.03 + s * (-0.01 + s * 0.002))) / std::hypot(x, y);
+    return "left:" + std::to_string(130 * bent * x + 122 - 0.5) + "," +
+           std::to_string(130 * bent * y + 77 - 0.5);
+  };
+  scale({{pick(-0.35, 0.05), pick(0.3, -0.1), "2m"}});
+  EXPECT_NEAR(model_.scene.frame.metres_per_unit, 2 / (kUnit * std::hypot(0.65, 0.15)), 1e-5);
 }
 
 TEST_F(KnownDistances, ArePickedAsViewersTurnThePicture) {

@@ -235,7 +235,7 @@ void add_scene_descriptions(Kinds& kinds) {
   kinds.push_back(of_cameras("transforms-json",
                              "transforms.json",
                              R"({"w": 32, "h": 24, "fl_x": 30, "cx": 16, "k1": 0.01, "frames": [
-{"file_path": "images/0.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]},
+{"file_path": "images/0.png", "is_fisheye": true, "k4": 0.001, "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]},
 {"file_path": "b\u00e9.png", "transform_matrix": [[1,0,0,1e-1],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]})",
                              read_transforms_json));
   kinds.push_back(of_cameras("splat-cameras-json",
@@ -340,9 +340,11 @@ void add_our_cameras(Kinds& kinds) {
 
 void add_colmap_binary(Kinds& kinds) {
   const auto cameras = [] {
-    return packed(uint64_t{2}, uint32_t{1}, int32_t{1}, uint64_t{32}, uint64_t{24}, 30.0, 30.0) +
+    return packed(uint64_t{3}, uint32_t{1}, int32_t{1}, uint64_t{32}, uint64_t{24}, 30.0, 30.0) +
            packed(16.0, 12.0, uint32_t{2}, int32_t{4}, uint64_t{32}, uint64_t{24}) +
-           packed(30.0, 30.0, 16.0, 12.0, 0.01, 0.0, 0.0, 0.0);
+           packed(30.0, 30.0, 16.0, 12.0, 0.01, 0.0, 0.0, 0.0) +
+           packed(uint32_t{3}, int32_t{5}, uint64_t{32}, uint64_t{24}, 15.0, 15.0, 16.0, 12.0) +
+           packed(0.01, 0.0, 0.0, 0.0);
   };
   kinds.push_back(of_bytes("colmap-cameras-bin", "a.bin", cameras, read_colmap_cameras_binary));
   const auto images = [] {
@@ -363,11 +365,12 @@ void add_colmap_binary(Kinds& kinds) {
 
 void add_colmap_text(Kinds& kinds) {
   const auto text = [](std::string bytes) { return [=] { return bytes; }; };
-  kinds.push_back(of_bytes(
-      "colmap-cameras-txt",
-      "a.txt",
-      text("# cameras\n1 PINHOLE 32 24 30 30.5 16 12\n2 OPENCV 32 24 30 30 16 12 0 0 0 0\n"),
-      read_colmap_cameras_text));
+  kinds.push_back(
+      of_bytes("colmap-cameras-txt",
+               "a.txt",
+               text("# cameras\n1 PINHOLE 32 24 30 30.5 16 12\n2 OPENCV 32 24 30 30 16 12 0 0 0 0\n"
+                    "3 OPENCV_FISHEYE 32 24 15 15 16 12 0.01 0 0 0\n"),
+               read_colmap_cameras_text));
   kinds.push_back(of_bytes("colmap-images-txt",
                            "a.txt",
                            text("1 1 0 0 0 0 0 0 1 0.png\n3 4 7\n2 1 0 0 0 -0.1 0 0 1 b c.png\n\n"),

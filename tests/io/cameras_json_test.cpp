@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/lens.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
@@ -31,6 +32,13 @@ Scene far_away_scene() {
     view.distortion = {0.01, -0.02, 0.003, 0.004, 0.05};
     scene.views.push_back(view);
   }
+  View& fisheye = scene.views[1];
+  fisheye.distortion = {};
+  fisheye.fisheye =
+      Fisheye{{.width = 81, .height = 61, .fx = 60.1, .fy = 59.9, .cx = 41.3, .cy = 29.7},
+              {0.01, -0.002, 1.0 / 3000, 1e-5},
+              {1e-4, -2e-4},
+              77.7};
   scene.input = {0, 2};
   scene.held_out = {1};
   scene.frame.metres_per_unit = 0.3;
@@ -72,6 +80,7 @@ TEST_F(CamerasJson, RestoresTheSceneBitForBit) {
     EXPECT_EQ(scene.views[i].near, out.views[i].near);
     EXPECT_EQ(scene.views[i].far, out.views[i].far);
     EXPECT_EQ(scene.views[i].distortion, out.views[i].distortion);
+    EXPECT_EQ(lens_numbers(scene.views[i]), lens_numbers(out.views[i]));
   }
   EXPECT_EQ(out.input, scene.input);
   EXPECT_EQ(out.held_out, scene.held_out);
@@ -147,6 +156,10 @@ TEST_F(CamerasJson, RefusesBadFiles) {
   EXPECT_EQ(refused("/1/rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}}), "VALUE");
   EXPECT_EQ(refused("/1/rotation", {{1, 0, 0}, {0, 1, 0}}), "SCHEMA");
   EXPECT_EQ(refused("/1/distortion", {1, 2}), "SCHEMA");
+  EXPECT_EQ(refused("/1/fisheye/k", {1, 2}), "SCHEMA");
+  EXPECT_EQ(refused("/1/fisheye/p", {1, 2, 3}), "SCHEMA");
+  EXPECT_EQ(refused("/1/fisheye/fx", 0), "VALUE");
+  EXPECT_EQ(refused("/1/fisheye/k/0", -9), "VALUE");
   EXPECT_EQ(refused("/0/frame/scale", 0), "VALUE");
   EXPECT_EQ(refused("/0/frame/scale_source", "guess"), "SCHEMA");
   const std::string whole = test::read_bytes(path_);

@@ -47,6 +47,33 @@ std::string image_record(uint32_t id, const std::string& name, uint64_t keypoint
   return out;
 }
 
+TEST_F(ColmapModel, ReadsFisheyesInBothForms) {
+  const std::string binary =
+      packed(uint64_t(3)) + camera_record(1, 5, {300, 310, 320, 240, 0.1, -0.02, 0.003, -4e-4}) +
+      camera_record(2, 8, {300, 320, 240, 0.1}) + camera_record(3, 9, {300, 320, 240, 0.1, -0.02});
+  const std::string text =
+      "1 OPENCV_FISHEYE 640 480 300 310 320 240 0.1 -0.02 0.003 -4e-4\n"
+      "2 SIMPLE_RADIAL_FISHEYE 640 480 300 320 240 0.1\n"
+      "3 RADIAL_FISHEYE 640 480 300 320 240 0.1 -0.02\n";
+  for (const ColmapCameras& cameras :
+       {read_colmap_cameras_binary(file(binary)), read_colmap_cameras_text(file(text))}) {
+    ASSERT_EQ(cameras.size(), 3u);
+    for (const auto& [id, entry] : cameras) {
+      ASSERT_TRUE(entry.fisheye) << id;
+      EXPECT_EQ(entry.distortion, (std::array<double, 5>{})) << id;
+      EXPECT_EQ(entry.fisheye->photograph.fx, 300) << id;
+      EXPECT_EQ(entry.fisheye->photograph.fy, id == 1 ? 310 : 300) << id;
+      EXPECT_EQ(entry.fisheye->photograph.cx, 320) << id;
+      EXPECT_EQ(entry.fisheye->photograph.height, 480) << id;
+    }
+    EXPECT_EQ(cameras.at(1).fisheye->k, (std::array<double, 4>{0.1, -0.02, 0.003, -4e-4}));
+    EXPECT_EQ(cameras.at(2).fisheye->k, (std::array<double, 4>{0.1, 0, 0, 0}));
+    EXPECT_EQ(cameras.at(3).fisheye->k, (std::array<double, 4>{0.1, -0.02, 0, 0}));
+  }
+  EXPECT_EQ(cameras_refused(packed(uint64_t(1)) + camera_record(1, 8, {300, 320, 240, -1})),
+            "VALUE");
+}
+
 TEST_F(ColmapModel, ReadsEveryKnownCameraModelInBothForms) {
   const std::string binary = packed(uint64_t(5)) + camera_record(1, 0, {500, 320, 240}) +
                              camera_record(2, 1, {500, 510, 320, 240}) +
@@ -76,7 +103,7 @@ TEST_F(ColmapModel, ReadsEveryKnownCameraModelInBothForms) {
 TEST_F(ColmapModel, RefusesBadCameras) {
   const std::string one = packed(uint64_t(1));
   EXPECT_EQ(cameras_refused(packed(uint64_t(1) << 63) + std::string(64, '\0')), "COUNT");
-  for (const int32_t model : {99, -1, 5, 6}) {
+  for (const int32_t model : {99, -1, 6, 7}) {
     EXPECT_EQ(cameras_refused(one + camera_record(1, model, {1, 1, 1, 1, 1, 1})), "UNSUPPORTED");
   }
   EXPECT_EQ(cameras_refused(one + camera_record(1, 0, {500, 320, 240}, 0)), "VALUE");

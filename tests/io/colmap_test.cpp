@@ -63,6 +63,46 @@ TEST_F(ReadColmap, PrefersBinaryOverText) {
   EXPECT_EQ(scene.warnings.size(), 1u);
 }
 
+// Newer versions also write which cameras are fixed to each other. Their documentation says that
+// cameras and images stay as they were, so these files must change nothing.
+TEST_F(ReadColmap, NeedsNoRigsAndFrames) {
+  const auto write_binary = [&] {
+    write("cameras.bin",
+          test::packed(
+              uint64_t(1), uint32_t(1), int32_t(0), uint64_t(80), uint64_t(60), 200.0, 40.0, 30.0));
+    std::string images = test::packed(uint64_t(2));
+    for (const uint32_t i : {1u, 2u}) {
+      images += test::packed(i, 1.0, 0.0, 0.0, 0.0, -0.5 * i, 0.0, 0.0, uint32_t(1)) +
+                (i == 1 ? "a.png" : "b.png") + '\0' + test::packed(uint64_t(0));
+    }
+    write("images.bin", images);
+  };
+  for (const bool is_binary : {false, true}) {
+    if (is_binary) write_binary();
+    const Scene before = read();
+    // A rig of one sensor of type camera (0), then two frames of one image each.
+    write("rigs.txt", "# rigs\n1 1 CAMERA 1\n");
+    write("frames.txt",
+          "# frames\n1 1 1 0 0 0 0 0 0 1 CAMERA 1 1\n2 1 1 0 0 0 -1 0 0 1 CAMERA 1 2\n");
+    write("rigs.bin", test::packed(uint64_t(1), uint32_t(1), uint32_t(1), int32_t(0), uint32_t(1)));
+    std::string frames = test::packed(uint64_t(2));
+    for (const uint32_t i : {1u, 2u}) {
+      frames += test::packed(i, uint32_t(1), 1.0, 0.0, 0.0, 0.0, -0.5 * i, 0.0, 0.0, uint32_t(1)) +
+                test::packed(int32_t(0), uint32_t(1), uint64_t(i));
+    }
+    write("frames.bin", frames);
+    const Scene after = read();
+    EXPECT_EQ(after.warnings, before.warnings);
+    ASSERT_EQ(after.views.size(), 2u);
+    for (size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ(after.views[i].name, before.views[i].name);
+      EXPECT_EQ(after.views[i].camera.fx, is_binary ? 200 : 100);
+      EXPECT_EQ(after.views[i].camera.world_from_cam.matrix(),
+                before.views[i].camera.world_from_cam.matrix());
+    }
+  }
+}
+
 TEST_F(ReadColmap, RefusesBadReferencesAndPoses) {
   images("1 1 0 0 0 0 0 0 9 a.png\n\n");
   EXPECT_EQ(refused(), "REF");

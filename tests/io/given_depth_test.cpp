@@ -230,6 +230,48 @@ TEST_F(DistortedGivenDepth, LosesTheDistortionAsThePhotographDoes) {
   EXPECT_GT(known, kWidth * kHeight * 9 / 10);
 }
 
+class FisheyeGivenDepth : public GivenDepthFiles {
+ protected:
+  FisheyeGivenDepth() : GivenDepthFiles("OPENCV_FISHEYE 64 48 32 32 32 24 0.02 -0.01 0 0") {}
+};
+
+TEST_F(FisheyeGivenDepth, LosesTheDistortionAsThePhotographDoes) {
+  const auto ray = [](double u, double v) {  // with z = 1, by bisection of the definition
+    const double x = (u - 32) / 32;
+    const double y = (v - 24) / 32;
+    double low = 0;
+    double high = 1.5;
+    for (int i = 0; i < 60; ++i) {
+      const double angle = 0.5 * (low + high);
+      const double bent = angle * (1 + 0.02 * std::pow(angle, 2) - 0.01 * std::pow(angle, 4));
+      (bent < std::hypot(x, y) ? low : high) = angle;
+    }
+    const double s = std::hypot(x, y) > 0 ? std::tan(low) / std::hypot(x, y) : 1;
+    return std::pair(s * x, s * y);
+  };
+  for (const int times : {1, 3}) {  // as large as the photograph, and larger
+    write("depth/v1.npy", times * kWidth, times * kHeight, [&](double u, double v) {
+      const auto [x, y] = ray(u, v);
+      return 4 / (1.5 + 0.2 * x - 0.1 * y);  // a slanted plane
+    });
+    const View view = first();
+    const Camera& c = view.camera;
+    EXPECT_GT(c.width, kWidth);
+    ASSERT_EQ(view.image.width, c.width);
+    int known = 0;
+    for (int y = 4; y < c.height - 4; ++y) {
+      for (int x = 4; x < c.width - 4; ++x) {
+        const Eigen::Vector3d at = c.ray_in_cam(x + 0.5, y + 0.5);
+        const double expected = 4 / (1.5 + 0.2 * at.x() - 0.1 * at.y());
+        if (std::isnan(view.given_depth(x, y))) continue;
+        ++known;
+        ASSERT_NEAR(view.given_depth(x, y), expected, 0.005 * expected) << x << ' ' << y;
+      }
+    }
+    EXPECT_GT(known, (c.width - 8) * (c.height - 8) * 95 / 100);
+  }
+}
+
 TEST(DepthOptions, RefusesAScaleOutOfRange) {
   EXPECT_NO_THROW(DepthOptions{}.validate());
   EXPECT_THROW((DepthOptions{.scale = -1}.validate()), InvalidInput);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/calib3d.hpp>
 
+#include "io/fisheye_map.h"
 #include "io/scene_reader.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
@@ -129,6 +130,34 @@ TEST_F(ReadMetashape, ProjectsAsTheManualSays) {
   }
 }
 
+// The manual's equidistant fisheye: the polynomial of the frame camera, of the angle.
+TEST_F(ReadMetashape, ReadsFisheyes) {
+  for (const std::string type : {"fisheye", "equidistant_fisheye"}) {
+    std::string xml = with("type=\"frame\">\n    <res", "type=\"" + type + "\">\n    <res");
+    xml.insert(xml.find("<b1>"), "<k4>0.002</k4>");
+    const View view = read(xml).views[0];
+    ASSERT_TRUE(view.fisheye) << type;
+    const FisheyeMap map(*view.fisheye);
+    const Camera& picture = map.picture();
+    for (int k = 0; k < 20; ++k) {
+      const Eigen::Vector3d ray(0.3 * (k % 5) - 0.6, 0.25 * (k / 5) - 0.4, 1);
+      const double r0 = ray.head<2>().norm();
+      const double x = ray.x() * std::atan(r0) / r0;
+      const double y = ray.y() * std::atan(r0) / r0;
+      const double r2 = x * x + y * y;
+      const double radial =
+          1 + kK[0] * r2 + kK[1] * r2 * r2 + kK[2] * r2 * r2 * r2 + 0.002 * r2 * r2 * r2 * r2;
+      const double xd = x * radial + kP[0] * (r2 + 2 * x * x) + 2 * kP[1] * x * y;
+      const double yd = y * radial + kP[1] * (r2 + 2 * y * y) + 2 * kP[0] * x * y;
+      const Eigen::Vector2d expected(40 + kCx + xd * (kF + kB1), 30 + kCy + yd * kF);
+      const Eigen::Vector3d at = picture.project_in_cam(ray);
+      EXPECT_LT((map.in_photograph(at.head<2>()) - expected).norm(), 1e-9) << k;
+    }
+    xml.insert(xml.find("<b1>"), "<b2>0.1</b2>");
+    EXPECT_EQ(test::defect_of([&] { read(xml); }), "UNSUPPORTED");
+  }
+}
+
 TEST_F(ReadMetashape, IsRecognisedByItsContent) {
   EXPECT_FALSE(is_metashape(dir_.path()));
   test::write_bytes(dir_ / "a.xml", "<svg></svg>");
@@ -184,7 +213,9 @@ TEST_F(ReadMetashape, RefusesWhatItCannotUse) {
   EXPECT_EQ(refused(matrix, "3.5" + matrix.substr(first.size())), "VALUE");
   EXPECT_EQ(refused("0 0 0 1 </transform>", "0 0 1 1 </transform>"), "VALUE");
   EXPECT_EQ(refused("<scale>2.5", "<scale>0"), "VALUE");
-  EXPECT_EQ(refused("type=\"frame\">\n    <res", "type=\"fisheye\">\n    <res"), "UNSUPPORTED");
+  const std::string frame = "type=\"frame\">\n    <res";
+  EXPECT_EQ(refused(frame, "type=\"equisolid_fisheye\">\n    <res"), "UNSUPPORTED");
+  EXPECT_EQ(refused(frame, "type=\"spherical\">\n    <res"), "UNSUPPORTED");
   EXPECT_EQ(refused("<b1>", "<k4>0.5</k4><b1>"), "UNSUPPORTED");
   EXPECT_EQ(refused("<b1>", "<b2>3</b2><b1>"), "UNSUPPORTED");
   EXPECT_EQ(refused("<b1>", "<k4>1e-7</k4><b2>1e-4</b2><b1>"), "");

@@ -130,10 +130,44 @@ TEST_F(ReadTransforms, RefusesSizesThatAreNotThoseOfTheFile) {
 
 TEST_F(ReadTransforms, RefusesLensesItCannotUndo) {
   EXPECT_EQ(refused_with("/k1", -10), "VALUE");
-  EXPECT_EQ(refused_with("/camera_model", "OPENCV_FISHEYE"), "UNSUPPORTED");
-  EXPECT_EQ(refused_with("/is_fisheye", true), "UNSUPPORTED");
+  EXPECT_EQ(refused_with("/camera_model", "FISHEYE624"), "UNSUPPORTED");
   EXPECT_EQ(refused_with("/k4", 0.1), "UNSUPPORTED");
+  EXPECT_EQ(refused_with("/k6", 0.1), "UNSUPPORTED");
+  EXPECT_EQ(refused_with("/equirectangular", true), "UNSUPPORTED");
+  EXPECT_EQ(refused_with("/ftheta_p0", 0.1), "UNSUPPORTED");
+  EXPECT_EQ(refused_with("/distortion_params", {0.1, 0.2}), "SCHEMA");
   EXPECT_EQ(refused_with("/camera_model", "OPENCV"), "");
+}
+
+TEST_F(ReadTransforms, ReadsFisheyesOfBothPrograms) {
+  for (const char* key : {"k1", "k2", "k3", "k4", "p1", "p2"}) document_.erase(key);
+  document_["k1"] = 0.04;
+  document_["k2"] = -0.01;
+  document_["k3"] = 0.002;
+  document_["k4"] = -0.0003;
+  document_["p2"] = 0.001;
+  document_["fisheye_crop_radius"] = 31;
+  const json plain = document_;
+  for (const auto& [key, value] :
+       {std::pair<std::string, json>("camera_model", "OPENCV_FISHEYE"), {"is_fisheye", true}}) {
+    document_ = plain;
+    document_[key] = value;
+    const View view = read().views[0];
+    ASSERT_TRUE(view.fisheye) << key;
+    EXPECT_EQ(view.fisheye->k, (std::array<double, 4>{0.04, -0.01, 0.002, -0.0003}));
+    EXPECT_EQ(view.fisheye->p, (std::array<double, 2>{0, 0.001}));
+    EXPECT_EQ(view.fisheye->radius, 31);
+    EXPECT_EQ(view.fisheye->photograph.fx, view.camera.fx);
+    EXPECT_EQ(view.distortion, (std::array<double, 5>{}));
+  }
+  EXPECT_EQ(refused_with("/k1", -3), "VALUE");
+}
+
+// Older files of nerfstudio state the coefficients as a list.
+TEST_F(ReadTransforms, ReadsTheListOfCoefficients) {
+  for (const char* key : {"k1", "k2", "k3", "k4", "p1", "p2"}) document_.erase(key);
+  document_["frames"][0]["distortion_params"] = {0.01, 0.02, 0.03, 0, 0.001, 0.002};
+  EXPECT_EQ(read().views[0].distortion, (std::array<double, 5>{0.01, 0.02, 0.001, 0.002, 0.03}));
 }
 
 TEST_F(ReadTransforms, TakesTheFirstOfTwoFramesOfOneFile) {

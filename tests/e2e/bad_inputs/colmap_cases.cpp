@@ -87,12 +87,25 @@ void add_cameras(Cases& cases) {
   cases.push_back(model_case("C06", "image id twice", "SYNTAX", {"images.bin"}, [](ColmapFiles& f) {
     f.images = images([](ColmapImageFields& image) { image.id = 1; });
   }));
-  for (const int32_t model : {5, 6}) {
-    cases.push_back(model_case(
-        "C22", "fisheye or full OpenCV", "UNSUPPORTED", {"undistort"}, [=](ColmapFiles& f) {
+  for (const int32_t model : {6, 7}) {
+    cases.push_back(
+        model_case("C22", "full OpenCV or FOV", "UNSUPPORTED", {"undistort"}, [=](ColmapFiles& f) {
           f.cameras = one_camera(model, {30, 30, 16, 12, 0, 0, 0, 0});
         }));
   }
+  for (const double k1 : {-3.0, kNan}) {
+    cases.push_back(model_case(
+        "C22", "a fisheye that folds, or is NaN", "VALUE", {"camera 1"}, [=](ColmapFiles& f) {
+          f.cameras = one_camera(5, {30, 30, 16, 12, k1, 0, 0, 0});
+        }));
+  }
+  cases.push_back(model_case("C22", "a fisheye", "OK", {}, [](ColmapFiles& f) {
+    f.cameras = one_camera(5, {30, 30, 16, 12, 0.01, 0, 0, 0});
+  }));
+  cases.push_back(
+      model_case("C22", "a fisheye of 200 degrees", "OK+W", {"60 degrees"}, [](ColmapFiles& f) {
+        f.cameras = one_camera(5, {9, 9, 16, 12, 0.01, 0, 0, 0});
+      }));
 }
 
 Case image_case(const std::string& row,
