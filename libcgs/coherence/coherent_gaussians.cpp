@@ -249,8 +249,9 @@ void CoherentGaussians::free_shapes() {
     for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
       const int x = pixel % view.depth.width;
       const int y = pixel / view.depth.width;
-      view.steps[k].col(0) = surface_step(view.camera, view.depth, x, y, {1, 0}).cast<float>();
-      view.steps[k].col(1) = surface_step(view.camera, view.depth, x, y, {0, 1}).cast<float>();
+      // On the surface at the start, not at this step: a restored training knows no other.
+      view.steps[k].col(0) = surface_step(view.camera, view.start, x, y, {1, 0}).cast<float>();
+      view.steps[k].col(1) = surface_step(view.camera, view.start, x, y, {0, 1}).cast<float>();
       std::fill_n(&own.value[k * kShapeSize], 2, std::log(options_.radius_factor));
     });
   }
@@ -297,7 +298,7 @@ float CoherentGaussians::add_shape_gradient(size_t n,
                                             size_t k,
                                             const CovarianceGradient& gradient) {
   const ViewState& view = views_[n];
-  ParameterBlock& own = shape(n);
+  ParameterBlock& own = parameters[parameters.size() - views_.size() + n];  // shape(n), unsearched
   const float* value = &own.value[k * kShapeSize];
   const auto z = double(view.depth.data[view.pixels[k]]);
   const Eigen::Matrix<double, 3, 2> P = z * view.steps[k].cast<double>();
