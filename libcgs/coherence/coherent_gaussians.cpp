@@ -298,7 +298,7 @@ float CoherentGaussians::add_shape_gradient(size_t n,
                                             size_t k,
                                             const CovarianceGradient& gradient) {
   const ViewState& view = views_[n];
-  ParameterBlock& own = parameters[parameters.size() - views_.size() + n];  // shape(n), unsearched
+  ParameterBlock& own = shape(n);
   const float* value = &own.value[k * kShapeSize];
   const auto z = double(view.depth.data[view.pixels[k]]);
   const Eigen::Matrix<double, 3, 2> P = z * view.steps[k].cast<double>();

@@ -24,10 +24,9 @@ struct CoherenceOptions {
   std::vector<int> opacity_spacing = {16, 4, 2};       ///< Knots of the opacity lattice [pixels].
   int conv_depth_width = 0;  ///< ConvDecoderOptions.width of depth; 0 = by the number of views, as
                              ///< published: 10 for two, 15 for three, 18 for more.
-  int conv_opacity_width = 0;  ///< The same of opacity: 6, 10, 12.
-  float conv_depth_gain =
-      16;  ///< Change of log depth per unit of the network's output, near 0; > 0.
-  float conv_opacity_gain = 100;   ///< The same of the logit.
+  int conv_opacity_width = 0;      ///< The same of opacity: 6, 10, 12.
+  float conv_depth_gain = 2;       ///< Log depth per unit of the network's output; > 0.
+  float conv_opacity_gain = 30;    ///< Logit per unit of the network's output; > 0.
   float max_depth_change = 0.5f;   ///< Bound of |log(depth / starting depth)|; > 0.
   float max_logit_change = 12.0f;  ///< Bound of the change of the opacity's logit; > 0.
   float radius_factor = 0.4f;      ///< As in InitialisationOptions.
@@ -58,11 +57,11 @@ void require_decodable(const Scene& scene, const CoherenceOptions& options);
 ///   z = z0 exp(D tanh(f_n(p) / D)),  logit(opacity) = logit(o0) + L tanh(g_n(p) / L),
 /// with the residual maps f, g of CoherenceOptions::decoder and the bounds D, L. Both start at 0.
 /// Until shapes are free, Gaussians are balls of radius_factor pixels. A free shape is an ellipse
-/// of three numbers in its own picture, laid on the surface: with the steps P = [p_x p_y] (3x2)
-/// from its point to the next pixels' points and a lower triangle L with e^a, e^b on its diagonal,
-/// the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a photograph
-/// cannot show, how far a Gaussian reaches along the ray, thus follows the surface instead of
-/// drifting. Colours are those of the pixels.
+/// of three numbers in its own picture, laid on the starting surface: with the steps P = [p_x p_y]
+/// (3x2) from its point to the next pixels' points and a lower triangle L with e^a, e^b on its
+/// diagonal, the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a
+/// photograph cannot show, how far a Gaussian reaches along the ray, thus follows the surface
+/// instead of drifting. Colours are those of the pixels.
 ///
 /// Source: Paliwal et al. 2024, "CoherentGS", section 3; the residual here is relative to depth
 ///         and bounded, and lattices may stand in for the convolutional decoders.
@@ -122,7 +121,7 @@ class CoherentGaussians {
     Range range;
   };
   std::span<ParameterBlock> blocks(ParameterRole role);
-  ParameterBlock& shape(size_t n) { return blocks(ParameterRole::Shape)[n]; }
+  ParameterBlock& shape(size_t n) { return parameters[parameters.size() - views_.size() + n]; }
   void decode_view(size_t n);
   float add_shape_gradient(size_t n, size_t k, const CovarianceGradient& gradient);
   void add_view_gradients(size_t n,

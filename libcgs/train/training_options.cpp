@@ -153,8 +153,11 @@ TrainingOptions reference_options() {
   options.coherence.decoder = ResidualDecoder::Conv;
   options.coherence.radius_factor = 0.6f;
   options.steps = static_cast<int>(kSteps / 3);
-  options.conv_depth_rate *= faster;
-  options.conv_opacity_rate *= faster;
+  options.coherence.conv_depth_gain = 16;  // 50 units, of which a scene is about three away
+  options.coherence.conv_opacity_gain = 100;
+  options.conv_depth_rate = 1e-4 * faster;
+  options.conv_opacity_rate = 1e-5 * faster;
+  options.conv_rise = 1000 / kSteps;
   options.free_from = 8000 / kSteps;
   options.sharp_from = 5000 / kSteps;
   options.shape_rate = 1e-4 * faster;

@@ -27,10 +27,10 @@ struct TrainingOptions {
 
   /// Of the networks of decoder=conv, whose rates rise and fall by triangular2() (AdamW): those of
   /// depth and opacity at the first peak, and the share of the schedule until that of depth. That
-  /// of opacity comes twice as late. As published.
-  double conv_depth_rate = 1e-4;
-  double conv_opacity_rate = 1e-5;
-  double conv_rise = 1.0 / 13;
+  /// of opacity comes twice as late.
+  double conv_depth_rate = 3e-4;
+  double conv_opacity_rate = 1e-3;
+  double conv_rise = 0.25;
 
   double l1_weight = 0.8;
   double ssim_weight = 0.2;

@@ -197,9 +197,7 @@ TEST(Trainer, NetworksMakeHeldOutViewsBetter) {
 TEST(Trainer, NetworksMoveDepthTowardsTheTruth) {
   const PlantedScene planted = planted_scene(0.2);
   TrainingOptions options = short_training_of_networks(120);
-  options.coherence.conv_depth_gain = 2;
   options.conv_depth_rate = 5e-4;
-  options.conv_rise = 0.25;
   options.conv_opacity_rate = 0;
   Trainer trainer(planted.scene, planted.priors, options);
   const double before = mean_depth_error(planted, trainer.model());
