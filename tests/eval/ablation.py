@@ -8,7 +8,7 @@ CGS_BUILD is the folder of the programs (build/release/bin). Each MODEL is a fol
 `cgs train SCENE --set steps=0 -o MODEL` wrote. Every setting is trained from the same start on each
 of them, by training_accuracy; the fox needs --limit 2. A row says what is changed from the standard
 setting, a column PSNR [dB] and SSIM over all pixels, the share of holes and, with --time, the
-core-seconds of the steps. Rows of networks (decoder=conv) are slow and only run where named.
+core-seconds of the steps. Rows of many steps or of networks (decoder=conv) only run where named.
 """
 import argparse
 import pathlib
@@ -35,9 +35,10 @@ ROWS = {
     "with TV within layers": ["masked_tv_weight=0.01"],
     "with flow": ["flow_weight=1"],
     "with block dropout": ["dropout=0.1"],
-    "240 steps": ["steps=240"],
 }
-NETWORKS = {
+SLOW = {
+    "240 steps": ["steps=240"],
+    "1500 steps": ["steps=1500"],
     "networks": ["decoder=conv"],
     "networks 240 steps": ["decoder=conv", "steps=240"],
     "reference 240 steps": ["preset=reference", "steps=240"],
@@ -68,7 +69,7 @@ def main():
     args = parser.parse_args()
     program = str(pathlib.Path(args.build) / "training_accuracy")
     rows = args.rows.split(",") if args.rows else list(ROWS)
-    known = ROWS | NETWORKS
+    known = ROWS | SLOW
     unknown = [row for row in rows if row not in known]
     if unknown:
         sys.exit(f"--rows: {', '.join(unknown)} is none of {', '.join(known)}")
