@@ -197,16 +197,19 @@ std::vector<int> usable_sizes(const RunRequest& request, const Scene& scene) {
     side = std::min({side, view.camera.width, view.camera.height});
   }
   const MeasuredFiles measured = measured_files(request);
+  const CoherenceOptions& coherence = request.training.coherence;
   const size_t budget = memory_budget(request.memory_limit);
   std::vector<int> out;
   for (const int size : kSizes) {
     if (size > 1 && side / size < kLeastSide) break;
-    const auto plan = memory_plan(scene, request.voxel_size.empty(), measured, size);
+    const auto plan = memory_plan(scene, request.voxel_size.empty(), measured, coherence, size);
     const bool fits = std::all_of(
         plan.begin(), plan.end(), [&](const StageMemory& stage) { return stage.bytes <= budget; });
     if (fits) out.push_back(size);
   }
-  if (out.empty()) check_memory_plan(scene, request.voxel_size.empty(), measured, budget);
+  if (out.empty()) {
+    check_memory_plan(scene, request.voxel_size.empty(), measured, budget, coherence);
+  }
   return out;
 }
 

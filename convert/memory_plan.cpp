@@ -37,6 +37,21 @@ double pixels_of(const View& view) {
   return double(view.camera.width) * double(view.camera.height);
 }
 
+// What the networks of decoder=conv hold: feature maps of all views, and parameters with their
+// gradients (one of each band of rows that is worked on) and means. Measured at 24,000 to 140,000
+// pixels and widths of 10 to 30.
+double of_networks(const CoherenceOptions& coherence, size_t views, double pixels) {
+  if (coherence.decoder != ResidualDecoder::Conv) return 0;
+  constexpr double kBase = 20 * kMebi;
+  constexpr double kOfPixel = 55;          // bytes per unit of width
+  constexpr double kOfParameters = 260e3;  // bytes per squared unit of width
+  const auto of_one = [&](double width) {
+    return kBase + width * kOfPixel * pixels + width * width * kOfParameters;
+  };
+  const ConvWidths widths = conv_widths(coherence, views);
+  return of_one(widths.depth) + of_one(widths.opacity);
+}
+
 std::string mebibytes(size_t bytes) {
   std::array<char, 40> text{};
   std::snprintf(text.data(), text.size(), "%.0f MiB", double(bytes) / kMebi);
@@ -48,6 +63,7 @@ std::string mebibytes(size_t bytes) {
 std::vector<StageMemory> memory_plan(const Scene& scene,
                                      bool chooses_voxels,
                                      const MeasuredFiles& measured,
+                                     const CoherenceOptions& coherence,
                                      int downscale) {
   double pixels = 0;
   for (const int i : scene.input) pixels += pixels_of(scene.views[static_cast<size_t>(i)]);
@@ -62,7 +78,8 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
     const double of_voxel = f.of_voxel + (measures ? f.of_fused : 0);
     // Voxels that must keep an error are not made coarser to save memory.
     const double voxel_pixels = measured.meshes ? pixels : std::min(pixels, kMostPixels);
-    const double bytes = f.base + f.of_pixel * pixels + of_voxel * voxel_pixels;
+    double bytes = f.base + f.of_pixel * pixels + of_voxel * voxel_pixels;
+    if (stage == "depth and Gaussians") bytes += of_networks(coherence, scene.input.size(), pixels);
     plan.push_back({stage, static_cast<size_t>(bytes)});
   }
   return plan;
@@ -79,10 +96,11 @@ std::string memory_plan_text(const std::vector<StageMemory>& plan) {
 void check_memory_plan(const Scene& scene,
                        bool chooses_voxels,
                        const MeasuredFiles& measured,
-                       size_t budget) {
+                       size_t budget,
+                       const CoherenceOptions& coherence) {
   constexpr int kMostDownscale = 32;  // beyond, nothing can be made out in a photograph
   const auto largest = [&](int downscale) {
-    const auto plan = memory_plan(scene, chooses_voxels, measured, downscale);
+    const auto plan = memory_plan(scene, chooses_voxels, measured, coherence, downscale);
     return *std::max_element(
         plan.begin(), plan.end(), [](const auto& a, const auto& b) { return a.bytes < b.bytes; });
   };

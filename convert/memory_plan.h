@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "libcgs/coherence/coherent_gaussians.h"
 #include "libcgs/core/scene.h"
 
 namespace cgs {
@@ -29,10 +30,12 @@ struct MeasuredFiles {
 /// \param chooses_voxels  false where the user says how large voxels are: stages that depend on
 /// them
 ///                        are then left out, and the volume itself refuses what does not fit
+/// \param coherence       of the training: networks hold much more than lattices
 /// \param downscale       divides the sides of the pictures once more
 std::vector<StageMemory> memory_plan(const Scene& scene,
                                      bool chooses_voxels,
                                      const MeasuredFiles& measured = {},
+                                     const CoherenceOptions& coherence = {},
                                      int downscale = 1);
 
 /// "depth and Gaussians 410 MiB, views 320 MiB, …"
@@ -43,7 +46,8 @@ std::string memory_plan_text(const std::vector<StageMemory>& plan);
 void check_memory_plan(const Scene& scene,
                        bool chooses_voxels,
                        const MeasuredFiles& measured,
-                       size_t budget);
+                       size_t budget,
+                       const CoherenceOptions& coherence = {});
 
 /// What `convert` makes of splats that came without cameras.
 struct SplatWork {

@@ -181,6 +181,7 @@ void take_sensor_scale(const GivenDepthReport& given, Frame& frame) {
 TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress) {
   request.priors.validate();
   request.training.validate();
+  require_decodable(scene, request.training.coherence);
   constexpr double kPriorsShare = 0.2;
   load_images(scene, scene.input, part_of(progress, 0, 0.01));
   if (!request.depth_network.empty()) guess_by_network(request.depth_network, scene);

@@ -351,9 +351,11 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   terminal.warn(scene.warnings);
   const bool chooses_voxels = request.voxel_size.empty();
   const MeasuredFiles measured = measured_files(request);
-  const std::vector<StageMemory> plan = memory_plan(scene, chooses_voxels, measured);
+  const CoherenceOptions& coherence = request.training.coherence;
+  const std::vector<StageMemory> plan = memory_plan(scene, chooses_voxels, measured, coherence);
   terminal.say("memory: " + memory_plan_text(plan));
-  check_memory_plan(scene, chooses_voxels, measured, memory_budget(request.memory_limit));
+  check_memory_plan(
+      scene, chooses_voxels, measured, memory_budget(request.memory_limit), coherence);
   refuse_unreadable_images(scene);
   const size_t known = scene.warnings.size();
   const Json fit = check_stated_cameras(request.scene, opened, terminal);

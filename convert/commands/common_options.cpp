@@ -135,7 +135,12 @@ void add_camera_options(CLI::App& command, SceneRequest& request) {
 }
 
 void add_training_options(CLI::App& command, TrainingArguments& arguments) {
-  command.add_option("--preset", arguments.preset, "draft or standard")->capture_default_str();
+  command
+      .add_option("--preset",
+                  arguments.preset,
+                  "draft, standard, or reference: the published CoherentGS schedule with "
+                  "convolutional decoders, hours instead of a minute")
+      ->capture_default_str();
   command.add_option(
       "--set",
       arguments.settings,

@@ -94,6 +94,50 @@ void set_shape(const Eigen::Matrix<double, 3, 2>& B,
   rotation = Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()).cast<float>();
 }
 
+void require_width(int width, const char* rule) { require(width >= 0 && width <= 64, rule, width); }
+
+// Options that hold for the input views.
+const CoherenceOptions& checked(const Scene& scene, const CoherenceOptions& options) {
+  options.validate();
+  require_decodable(scene, options);
+  return options;
+}
+
+std::vector<Raster<uint8_t>> layers_of(const std::vector<ViewPriors>& priors) {
+  std::vector<Raster<uint8_t>> out;
+  out.reserve(priors.size());
+  for (const ViewPriors& p : priors) out.push_back(p.layer);
+  return out;
+}
+
+int layer_count(const std::vector<ViewPriors>& priors) {
+  int highest = 0;
+  for (const ViewPriors& p : priors) {
+    for (const uint8_t layer : p.layer.data) highest = std::max(highest, int(layer));
+  }
+  return highest + 1;
+}
+
+ResidualMaps depth_maps(const std::vector<ViewPriors>& priors, const CoherenceOptions& options) {
+  if (options.decoder == ResidualDecoder::Lattice) {
+    return {layers_of(priors), LayeredLatticeOptions{options.depth_spacing}};
+  }
+  const int width = conv_widths(options, priors.size()).depth;
+  return {layers_of(priors),
+          ConvDecoderOptions{.width = width, .layers = layer_count(priors)},
+          options.conv_depth_gain};
+}
+
+ResidualMaps opacity_maps(const std::vector<ViewPriors>& priors, const CoherenceOptions& options) {
+  if (options.decoder == ResidualDecoder::Lattice) {
+    return {layers_of(priors), LayeredLatticeOptions{options.opacity_spacing}};
+  }
+  const int width = conv_widths(options, priors.size()).opacity;
+  return {layers_of(priors),
+          ConvDecoderOptions{.width = width, .layers = layer_count(priors), .seed = 1},
+          options.conv_opacity_gain};
+}
+
 }  // namespace
 
 void CoherenceOptions::validate() const {
@@ -109,32 +153,57 @@ void CoherenceOptions::validate() const {
   require(max_radius >= radius_factor && std::isfinite(max_radius),
           "CoherenceOptions.max_radius must be >= radius_factor",
           max_radius);
+  require(conv_depth_gain > 0 && std::isfinite(conv_depth_gain),
+          "CoherenceOptions.conv_depth_gain must be > 0",
+          conv_depth_gain);
+  require(conv_opacity_gain > 0 && std::isfinite(conv_opacity_gain),
+          "CoherenceOptions.conv_opacity_gain must be > 0",
+          conv_opacity_gain);
+  require_width(conv_depth_width, "CoherenceOptions.conv_depth_width must be in [0, 64]");
+  require_width(conv_opacity_width, "CoherenceOptions.conv_opacity_width must be in [0, 64]");
   LayeredLatticeOptions{depth_spacing}.validate();
   LayeredLatticeOptions{opacity_spacing}.validate();
   InitialisationOptions{radius_factor, opacity}.validate();
 }
 
+ConvWidths conv_widths(const CoherenceOptions& options, size_t views) {
+  const ConvWidths published = views <= 2   ? ConvWidths{10, 6}
+                               : views == 3 ? ConvWidths{15, 10}
+                                            : ConvWidths{18, 12};
+  return {options.conv_depth_width > 0 ? options.conv_depth_width : published.depth,
+          options.conv_opacity_width > 0 ? options.conv_opacity_width : published.opacity};
+}
+
+void require_decodable(const Scene& scene, const CoherenceOptions& options) {
+  if (options.decoder != ResidualDecoder::Conv) return;
+  const auto camera = [&](int index) -> const Camera& {
+    return scene.views[static_cast<size_t>(index)].camera;
+  };
+  for (const int i : scene.input) {
+    const Camera& first = camera(scene.input.front());
+    if (camera(i).width == first.width && camera(i).height == first.height) continue;
+    const auto size = [](const Camera& c) {
+      return std::to_string(c.width) + " x " + std::to_string(c.height);
+    };
+    throw InvalidInput("decoder=conv needs input views of one size, but " +
+                       scene.views[static_cast<size_t>(i)].name + " has " + size(camera(i)) +
+                       " pixels and the first " + size(first) + "; decoder=lattice takes any");
+  }
+}
+
 CoherentGaussians::CoherentGaussians(const Scene& scene,
                                      const std::vector<ViewPriors>& priors,
                                      const CoherenceOptions& options)
-    : options_(options) {
-  options.validate();
+    : options_(checked(scene, options)),
+      depth_maps_(depth_maps(priors, options)),
+      opacity_maps_(opacity_maps(priors, options)) {
   gaussians_ = initial_gaussians(scene, priors, {options.radius_factor, options.opacity});
   if (gaussians_.size() > 0) start_logit_ = logit(gaussians_.opacity[0]);
   size_t first = 0;
   for (size_t n = 0; n < priors.size(); ++n) {
     const Camera& camera = scene.views[static_cast<size_t>(scene.input[n])].camera;
     const DepthMap& depth = priors[n].depth;
-    ViewState view{camera,
-                   LayeredLattice(priors[n].layer, {options.depth_spacing}),
-                   LayeredLattice(priors[n].layer, {options.opacity_spacing}),
-                   depth,
-                   depth,
-                   Raster<float>(depth.width, depth.height, 0),
-                   Raster<float>(depth.width, depth.height, 0),
-                   {},
-                   {},
-                   {}};
+    ViewState view{camera, depth, depth, {}, {}, {}};
     for (size_t i = 0; i < depth.data.size(); ++i) {
       if (has_gaussian(depth.data[i])) {
         view.pixels.push_back(static_cast<int>(i));
@@ -142,12 +211,31 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
     }
     view.range = {first, first + view.pixels.size()};
     first = view.range.last;
-    ViewParameters own;
-    own.depth.resize(view.depth_lattice.parameter_count());
-    own.opacity.resize(view.opacity_lattice.parameter_count());
-    parameters.push_back(std::move(own));
     views_.push_back(std::move(view));
   }
+  parameters = depth_maps_.initial_blocks(ParameterRole::Depth);
+  for (ParameterBlock& block : opacity_maps_.initial_blocks(ParameterRole::Opacity)) {
+    parameters.push_back(std::move(block));
+  }
+  parameters.resize(parameters.size() + views_.size(), {ParameterRole::Shape, {}, {}});
+}
+
+std::span<ParameterBlock> CoherentGaussians::blocks(ParameterRole role) {
+  const auto begin = std::find_if(parameters.begin(),
+                                  parameters.end(),
+                                  [&](const ParameterBlock& block) { return block.role == role; });
+  const auto end = std::find_if(
+      begin, parameters.end(), [&](const ParameterBlock& block) { return block.role != role; });
+  return {begin, end};
+}
+
+std::vector<Raster<float>> CoherentGaussians::zeros() const {
+  std::vector<Raster<float>> out;
+  out.reserve(views_.size());
+  for (const ViewState& view : views_) {
+    out.emplace_back(view.depth.width, view.depth.height, 0.0f);
+  }
+  return out;
 }
 
 void CoherentGaussians::free_shapes() {
@@ -156,29 +244,29 @@ void CoherentGaussians::free_shapes() {
   for (size_t n = 0; n < views_.size(); ++n) {
     ViewState& view = views_[n];
     view.steps.resize(view.pixels.size());
-    ParameterBlock& shape = parameters[n].shape;
-    shape.resize(view.pixels.size() * kShapeSize);
+    ParameterBlock& own = shape(n);
+    own.start(std::vector<float>(view.pixels.size() * kShapeSize, 0));
     for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
       const int x = pixel % view.depth.width;
       const int y = pixel / view.depth.width;
-      view.steps[k].col(0) = surface_step(view.camera, view.depth, x, y, {1, 0}).cast<float>();
-      view.steps[k].col(1) = surface_step(view.camera, view.depth, x, y, {0, 1}).cast<float>();
-      std::fill_n(&shape.value[k * kShapeSize], 2, std::log(options_.radius_factor));
+      // On the surface at the start, not at this step: a restored training knows no other.
+      view.steps[k].col(0) = surface_step(view.camera, view.start, x, y, {1, 0}).cast<float>();
+      view.steps[k].col(1) = surface_step(view.camera, view.start, x, y, {0, 1}).cast<float>();
+      std::fill_n(&own.value[k * kShapeSize], 2, std::log(options_.radius_factor));
     });
   }
 }
 
 void CoherentGaussians::decode_view(size_t n) {
   ViewState& view = views_[n];
-  view.depth_lattice.evaluate(parameters[n].depth.value, view.depth_change);
-  view.opacity_lattice.evaluate(parameters[n].opacity.value, view.logit_change);
+  std::vector<float>& shapes = shape(n).value;
   const auto unit = static_cast<float>(pixel_size(view.camera));
   const float max_depth = options_.max_depth_change;
   const float max_logit = options_.max_logit_change;
   for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
     const size_t g = view.range.first + k;
-    float& f = view.depth_change.data[pixel];
-    float& h = view.logit_change.data[pixel];
+    float& f = depth_change_[n].data[pixel];
+    float& h = logit_change_[n].data[pixel];
     f = std::tanh(f / max_depth);
     h = std::tanh(h / max_logit);
     const float z = view.start.data[pixel] * std::exp(max_depth * f);
@@ -191,16 +279,17 @@ void CoherentGaussians::decode_view(size_t n) {
       gaussians_.scale[g].setConstant(options_.radius_factor * z * unit);
       return;
     }
-    float* shape = &parameters[n].shape.value[k * kShapeSize];
-    bound_shape(shape, options_);
-    const Eigen::Matrix<double, 3, 2> B =
-        double(z) * view.steps[k].cast<double>() * triangle(shape);
+    float* own = &shapes[k * kShapeSize];
+    bound_shape(own, options_);
+    const Eigen::Matrix<double, 3, 2> B = double(z) * view.steps[k].cast<double>() * triangle(own);
     const double thickness = double(options_.min_radius * z * unit);
     set_shape(B, thickness, gaussians_.scale[g], gaussians_.rotation[g]);
   });
 }
 
 void CoherentGaussians::decode() {
+  depth_maps_.evaluate(blocks(ParameterRole::Depth), depth_change_);
+  opacity_maps_.evaluate(blocks(ParameterRole::Opacity), logit_change_);
   for (size_t n = 0; n < views_.size(); ++n) decode_view(n);
 }
 
@@ -209,8 +298,8 @@ float CoherentGaussians::add_shape_gradient(size_t n,
                                             size_t k,
                                             const CovarianceGradient& gradient) {
   const ViewState& view = views_[n];
-  ParameterBlock& shape = parameters[n].shape;
-  const float* value = &shape.value[k * kShapeSize];
+  ParameterBlock& own = shape(n);
+  const float* value = &own.value[k * kShapeSize];
   const auto z = double(view.depth.data[view.pixels[k]]);
   const Eigen::Matrix<double, 3, 2> P = z * view.steps[k].cast<double>();
   const Eigen::Matrix2d L = triangle(value);
@@ -218,7 +307,7 @@ float CoherentGaussians::add_shape_gradient(size_t n,
   const Eigen::Vector3d normal = P.col(0).cross(P.col(1)).normalized();
   const double thickness = double(options_.min_radius) * z * pixel_size(view.camera);
   const Eigen::Matrix2d of_triangle = 2 * P.transpose() * G * P * L;
-  float* sum = &shape.gradient[k * kShapeSize];
+  float* sum = &own.gradient[k * kShapeSize];
   sum[0] += static_cast<float>(of_triangle(0, 0) * L(0, 0));
   sum[1] += static_cast<float>(of_triangle(1, 1) * L(1, 1));
   sum[2] += static_cast<float>(of_triangle(1, 0));
@@ -229,10 +318,10 @@ float CoherentGaussians::add_shape_gradient(size_t n,
 
 void CoherentGaussians::add_view_gradients(size_t n,
                                            const GaussianGradients& gradients,
-                                           const Raster<float>& depth) {
+                                           const Raster<float>& depth,
+                                           Raster<float>& by_f,
+                                           Raster<float>& by_h) {
   const ViewState& view = views_[n];
-  Raster<float> by_f(view.depth.width, view.depth.height, 0);
-  Raster<float> by_h(view.depth.width, view.depth.height, 0);
   const auto unit = static_cast<float>(pixel_size(view.camera));
   const Eigen::Matrix3d R = view.camera.world_from_cam.linear();
   for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
@@ -248,50 +337,46 @@ void CoherentGaussians::add_view_gradients(size_t n,
     } else {
       by_z += add_shape_gradient(n, k, gradients.covariance[g]) / z;
     }
-    const float f = view.depth_change.data[pixel];
-    const float h = view.logit_change.data[pixel];
+    const float f = depth_change_[n].data[pixel];
+    const float h = logit_change_[n].data[pixel];
     const float o = gaussians_.opacity[g];
     by_f.data[pixel] = by_z * z * (1 - f) * (1 + f);
     by_h.data[pixel] = gradients.opacity[g] * o * (1 - o) * (1 - h) * (1 + h);
   });
-  view.depth_lattice.add_gradient(by_f, parameters[n].depth.gradient);
-  view.opacity_lattice.add_gradient(by_h, parameters[n].opacity.gradient);
 }
 
 void CoherentGaussians::add_gradients(const GaussianGradients& gaussians,
                                       std::span<const Raster<float>> depth) {
+  std::vector<Raster<float>> by_f = zeros();
+  std::vector<Raster<float>> by_h = zeros();
   for (size_t n = 0; n < views_.size(); ++n) {
-    add_view_gradients(n, gaussians, n < depth.size() ? depth[n] : Raster<float>{});
+    add_view_gradients(
+        n, gaussians, n < depth.size() ? depth[n] : Raster<float>{}, by_f[n], by_h[n]);
   }
+  depth_maps_.add_gradient(std::move(by_f), blocks(ParameterRole::Depth));
+  opacity_maps_.add_gradient(std::move(by_h), blocks(ParameterRole::Opacity));
 }
 
 double CoherentGaussians::add_opacity_prior(double weight) {
   if (!(weight > 0)) return 0;
   const double share = weight / double(std::max<size_t>(gaussians_.size(), 1));
   double sum = 0;
+  std::vector<Raster<float>> by_h = zeros();
   for (size_t n = 0; n < views_.size(); ++n) {
-    const ViewState& view = views_[n];
-    Raster<float> by_h(view.depth.width, view.depth.height, 0);
-    for (const int pixel : view.pixels) {
-      const float h = view.logit_change.data[pixel];
+    for (const int pixel : views_[n].pixels) {
+      const float h = logit_change_[n].data[pixel];
       const float change = options_.max_logit_change * h;
       sum += double(change) * double(change);
-      by_h.data[pixel] = static_cast<float>(2 * share) * change * (1 - h) * (1 + h);
+      by_h[n].data[pixel] = static_cast<float>(2 * share) * change * (1 - h) * (1 + h);
     }
-    view.opacity_lattice.add_gradient(by_h, parameters[n].opacity.gradient);
   }
+  opacity_maps_.add_gradient(std::move(by_h), blocks(ParameterRole::Opacity));
   return share * sum;
 }
 
 double CoherentGaussians::add_bending(double depth_weight, double opacity_weight) {
-  double sum = 0;
-  for (size_t n = 0; n < views_.size(); ++n) {
-    ViewParameters& own = parameters[n];
-    sum += views_[n].depth_lattice.add_bending(own.depth.value, depth_weight, own.depth.gradient);
-    sum += views_[n].opacity_lattice.add_bending(
-        own.opacity.value, opacity_weight, own.opacity.gradient);
-  }
-  return sum;
+  return depth_maps_.add_bending(depth_weight, blocks(ParameterRole::Depth)) +
+         opacity_maps_.add_bending(opacity_weight, blocks(ParameterRole::Opacity));
 }
 
 }  // namespace cgs

@@ -4,7 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "libcgs/coherence/layered_lattice.h"
+#include "libcgs/coherence/parameter_block.h"
+#include "libcgs/coherence/residual_maps.h"
 #include "libcgs/core/gaussian_gradients.h"
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/scene.h"
@@ -12,21 +13,20 @@
 
 namespace cgs {
 
-/// Numbers that an optimiser changes, and the derivative of the loss with respect to each.
-struct ParameterBlock {
-  std::vector<float> value;
-  std::vector<float> gradient;
-
-  void resize(size_t count) {
-    value.assign(count, 0);
-    gradient.assign(count, 0);
-  }
-};
+/// What gives residual depth and opacity: cubic B-spline lattices of each view and layer, or the
+/// published convolutional networks, one for depth and one for opacity, shared by all views.
+enum class ResidualDecoder { Lattice, Conv };
 
 /// How Gaussians hang together.
 struct CoherenceOptions {
+  ResidualDecoder decoder = ResidualDecoder::Lattice;
   std::vector<int> depth_spacing = {128, 64, 32, 16};  ///< Knots of the depth lattice [pixels].
   std::vector<int> opacity_spacing = {16, 4, 2};       ///< Knots of the opacity lattice [pixels].
+  int conv_depth_width = 0;  ///< ConvDecoderOptions.width of depth; 0 = by the number of views, as
+                             ///< published: 10 for two, 15 for three, 18 for more.
+  int conv_opacity_width = 0;      ///< The same of opacity: 6, 10, 12.
+  float conv_depth_gain = 2;       ///< Log depth per unit of the network's output; > 0.
+  float conv_opacity_gain = 30;    ///< Logit per unit of the network's output; > 0.
   float max_depth_change = 0.5f;   ///< Bound of |log(depth / starting depth)|; > 0.
   float max_logit_change = 12.0f;  ///< Bound of the change of the opacity's logit; > 0.
   float radius_factor = 0.4f;      ///< As in InitialisationOptions.
@@ -40,36 +40,44 @@ struct CoherenceOptions {
   void validate() const;
 };
 
+/// ConvDecoderOptions.width of the two networks.
+struct ConvWidths {
+  int depth;
+  int opacity;
+};
+ConvWidths conv_widths(const CoherenceOptions& options, size_t views);
+
+/// \throws InvalidInput if the networks of options cannot draw the input views: these must be of
+///         one size.
+void require_decodable(const Scene& scene, const CoherenceOptions& options);
+
 /// One Gaussian per input pixel, on the ray of its pixel, moved by few numbers.
 ///
 /// For a pixel p of view n with starting depth z0(p):
 ///   z = z0 exp(D tanh(f_n(p) / D)),  logit(opacity) = logit(o0) + L tanh(g_n(p) / L),
-/// with layered lattices f, g and the bounds D, L of CoherenceOptions. Both start at the identity.
+/// with the residual maps f, g of CoherenceOptions::decoder and the bounds D, L. Both start at 0.
 /// Until shapes are free, Gaussians are balls of radius_factor pixels. A free shape is an ellipse
-/// of three numbers in its own picture, laid on the surface: with the steps P = [p_x p_y] (3x2)
-/// from its point to the next pixels' points and a lower triangle L with e^a, e^b on its diagonal,
-/// the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a photograph
-/// cannot show, how far a Gaussian reaches along the ray, thus follows the surface instead of
-/// drifting. Colours are those of the pixels.
+/// of three numbers in its own picture, laid on the starting surface: with the steps P = [p_x p_y]
+/// (3x2) from its point to the next pixels' points and a lower triangle L with e^a, e^b on its
+/// diagonal, the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a
+/// photograph cannot show, how far a Gaussian reaches along the ray, thus follows the surface
+/// instead of drifting. Colours are those of the pixels.
 ///
-/// Source: Paliwal et al. 2024, "CoherentGS", section 3, with lattices instead of convolutional
-///         decoders and the residual relative to depth.
+/// Source: Paliwal et al. 2024, "CoherentGS", section 3; the residual here is relative to depth
+///         and bounded, and lattices may stand in for the convolutional decoders.
 class CoherentGaussians {
  public:
   /// \param priors  in the order of scene.input; pixels of NaN depth have no Gaussian
-  /// \throws InvalidInput if priors, images and cameras are not of one size
+  /// \throws InvalidInput if priors, images and cameras are not of one size, or as
+  ///         require_decodable()
   CoherentGaussians(const Scene& scene,
                     const std::vector<ViewPriors>& priors,
                     const CoherenceOptions& options);
 
-  /// What the optimiser may change in one view. `shape` holds (a, b, corner of L) per Gaussian; it
-  /// is empty until free_shapes().
-  struct ViewParameters {
-    ParameterBlock depth;
-    ParameterBlock opacity;
-    ParameterBlock shape;
-  };
-  std::vector<ViewParameters> parameters;
+  /// What the optimiser may change: blocks of depth (one per view of lattices, one of a network),
+  /// blocks of opacity alike, and one block of shape per view: (a, b, corner of L) per Gaussian,
+  /// empty until free_shapes().
+  std::vector<ParameterBlock> parameters;
 
   /// From now on every Gaussian has a shape of its own, at first L = radius_factor: it covers its
   /// pixel's piece of the surface and is longer than the ball it was along the slope.
@@ -99,30 +107,38 @@ class CoherentGaussians {
   /// and its gradient. \return weight times the mean
   double add_opacity_prior(double weight);
 
-  /// Adds the bending energies of depth and opacity, times weights. \return the weighted sum
+  /// Adds the bending energies of the lattices of depth and opacity, times weights; networks have
+  /// none. \return the weighted sum
   double add_bending(double depth_weight, double opacity_weight);
 
  private:
   struct ViewState {
     Camera camera;
-    LayeredLattice depth_lattice;
-    LayeredLattice opacity_lattice;
     DepthMap start;
     DepthMap depth;
-    Raster<float> depth_change;  // f, then tanh(f / D)
-    Raster<float> logit_change;
     std::vector<int> pixels;
     std::vector<Eigen::Matrix<float, 3, 2>> steps;  // to the next pixels, for depth 1; if free
     Range range;
   };
+  std::span<ParameterBlock> blocks(ParameterRole role);
+  ParameterBlock& shape(size_t n) { return parameters[parameters.size() - views_.size() + n]; }
   void decode_view(size_t n);
   float add_shape_gradient(size_t n, size_t k, const CovarianceGradient& gradient);
-  void add_view_gradients(size_t n, const GaussianGradients& gaussians, const Raster<float>& depth);
+  void add_view_gradients(size_t n,
+                          const GaussianGradients& gaussians,
+                          const Raster<float>& depth,
+                          Raster<float>& by_f,
+                          Raster<float>& by_g);
+  std::vector<Raster<float>> zeros() const;  // of the size of the views
 
   CoherenceOptions options_;
   float start_logit_ = 0;
   bool shapes_are_free_ = false;
   std::vector<ViewState> views_;
+  ResidualMaps depth_maps_;
+  ResidualMaps opacity_maps_;
+  std::vector<Raster<float>> depth_change_;  // f, then tanh(f / D), per view
+  std::vector<Raster<float>> logit_change_;  // the same of g
   Gaussians gaussians_;
 };
 

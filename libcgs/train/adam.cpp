@@ -9,7 +9,7 @@
 
 namespace cgs {
 
-size_t adam_step(ParameterBlock& block, AdamState& state, float rate) {
+size_t adam_step(ParameterBlock& block, AdamState& state, float rate, float decay) {
   const size_t count = block.value.size();
   std::atomic<size_t> skipped = 0;
   if (rate > 0) {
@@ -26,6 +26,7 @@ size_t adam_step(ParameterBlock& block, AdamState& state, float rate) {
     const auto unbias_square = static_cast<float>(1 / (1 - std::pow(kSquareDecay, steps)));
     constexpr auto kB1 = static_cast<float>(kMeanDecay);
     constexpr auto kB2 = static_cast<float>(kSquareDecay);
+    const float kept = 1 - rate * decay;
     constexpr size_t kBlock = 1 << 15;
     tbb::parallel_for(size_t{0}, (count + kBlock - 1) / kBlock, [&](size_t b) {
       const size_t end = std::min(count, (b + 1) * kBlock);
@@ -41,6 +42,7 @@ size_t adam_step(ParameterBlock& block, AdamState& state, float rate) {
         const float g = std::clamp(block.gradient[i], -kLargest, kLargest);
         m = kB1 * m + (1 - kB1) * g;
         s = kB2 * s + (1 - kB2) * g * g;
+        block.value[i] *= kept;
         block.value[i] -= rate * m * unbias_mean / (std::sqrt(s * unbias_square) + kTiny);
       }
       skipped += skipped_here;

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "libcgs/coherence/coherent_gaussians.h"
+#include "libcgs/coherence/parameter_block.h"
 
 namespace cgs {
 
@@ -15,15 +15,18 @@ struct AdamState {
   int64_t steps = 0;
 };
 
-/// One step of Adam with bias correction and without weight decay, beta = (0.9, 0.999); the
-/// gradient is set to zero afterwards. Entries whose gradient and mean are both zero stay as they
-/// are. The state is created on first use.
+/// One step of Adam with bias correction, beta = (0.9, 0.999); the gradient is set to zero
+/// afterwards. Entries whose gradient and mean are both zero stay as they are, but for decay. The
+/// state is created on first use.
 ///
 /// A gradient that is not finite must not end a training: its entry keeps its value for this step
 /// and its means begin anew. One above 1e15 counts as 1e15, so that its square stays in range and
-/// does not hold the entry back for ever. \param rate  length of a step where gradients agree; 0
-/// leaves values and state alone \return number of entries whose gradient was not finite Source:
-/// Kingma and Ba 2015, "Adam", algorithm 1.
-size_t adam_step(ParameterBlock& block, AdamState& state, float rate);
+/// does not hold the entry back for ever.
+/// \param rate   length of a step where gradients agree; 0 leaves values and state alone
+/// \param decay  values shrink by rate times this share of themselves (AdamW)
+/// \return number of entries whose gradient was not finite
+/// Source: Kingma and Ba 2015, "Adam", algorithm 1; Loshchilov and Hutter 2019, "Decoupled weight
+///         decay regularization", algorithm 2.
+size_t adam_step(ParameterBlock& block, AdamState& state, float rate, float decay = 0);
 
 }  // namespace cgs

@@ -11,6 +11,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/split_mix.h"
+#include "libcgs/train/learning_rate.h"
 
 namespace cgs {
 
@@ -197,9 +198,7 @@ Trainer::Trainer(const Scene& scene,
           {i, j, matches_between(full_[i].camera, priors[i], full_[j].camera, priors[j])});
     }
   }
-  depth_state_.resize(priors.size());
-  opacity_state_.resize(priors.size());
-  shape_state_.resize(priors.size());
+  states_.resize(model_.parameters.size());
   disparity_unit_ = median_depth(priors);
   model_.decode();
 }
@@ -257,10 +256,14 @@ void Trainer::add_view(size_t n, GaussianGradients& sum, StepReport& report) {
                               loss.color);
   report.ssim += structural_dissimilarity(
       rendered->color, view.photograph, &use, share * options_.ssim_weight, loss.color);
-  report.tv +=
-      total_variation(*rendered, disparity_unit_, nullptr, share * options_.tv_weight, loss);
+  const double gone_over = options_.tv_to_layers * time() * options_.tv_weight;
   report.tv += total_variation(
-      *rendered, disparity_unit_, &view.layer, share * options_.masked_tv_weight, loss);
+      *rendered, disparity_unit_, nullptr, share * (options_.tv_weight - gone_over), loss);
+  report.tv += total_variation(*rendered,
+                               disparity_unit_,
+                               &view.layer,
+                               share * (options_.masked_tv_weight + gone_over),
+                               loss);
   if (sharp) {
     for (int c = 0; c < 3; ++c) loss.color[c] = spread(loss.color[c]);
     loss.alpha = spread(loss.alpha);
@@ -302,20 +305,31 @@ void Trainer::add_depth_terms(std::vector<Raster<float>>& sum, StepReport& repor
   }
 }
 
-size_t Trainer::update() {
+float Trainer::rate(ParameterRole role) const {
+  if (role != ParameterRole::Shape && options_.coherence.decoder == ResidualDecoder::Conv) {
+    const bool is_depth = role == ParameterRole::Depth;
+    const double peak = is_depth ? options_.conv_depth_rate : options_.conv_opacity_rate;
+    const double rise = options_.conv_rise * (is_depth ? 1 : 2) * options_.steps;
+    constexpr double kBase = 1e-6;
+    return static_cast<float>(triangular2(step_, std::min(kBase, peak), peak, rise));
+  }
   const double fall = 0.5 * (1 + std::cos(std::numbers::pi * time()));
-  const double rate = options_.final_rate + (1 - options_.final_rate) * fall;
+  const double left = options_.final_rate + (1 - options_.final_rate) * fall;
+  const double start = role == ParameterRole::Depth     ? options_.depth_rate
+                       : role == ParameterRole::Opacity ? options_.opacity_rate
+                                                        : options_.shape_rate;
+  return static_cast<float>(left * start);
+}
+
+size_t Trainer::update() {
+  constexpr float kNetworkDecay = 0.01f;
+  const bool has_networks = options_.coherence.decoder == ResidualDecoder::Conv;
   size_t skipped = 0;
-  for (size_t n = 0; n < model_.view_count(); ++n) {
-    CoherentGaussians::ViewParameters& own = model_.parameters[n];
-    skipped +=
-        adam_step(own.depth, depth_state_[n], static_cast<float>(rate * options_.depth_rate));
-    skipped +=
-        adam_step(own.opacity, opacity_state_[n], static_cast<float>(rate * options_.opacity_rate));
-    if (model_.shapes_are_free()) {
-      skipped +=
-          adam_step(own.shape, shape_state_[n], static_cast<float>(rate * options_.shape_rate));
-    }
+  for (size_t i = 0; i < model_.parameters.size(); ++i) {
+    ParameterBlock& block = model_.parameters[i];
+    if (block.value.empty()) continue;  // shapes that are not free
+    const float decay = has_networks && block.role != ParameterRole::Shape ? kNetworkDecay : 0;
+    skipped += adam_step(block, states_[i], rate(block.role), decay);
   }
   return skipped;
 }
@@ -348,12 +362,7 @@ std::string Trainer::save() const {
   append(out, static_cast<int64_t>(step_));
   append(out, static_cast<int64_t>(model_.shapes_are_free()));
   out.append(reinterpret_cast<const char*>(history_.data()), history_.size() * sizeof(StepReport));
-  for (size_t n = 0; n < model_.view_count(); ++n) {
-    const CoherentGaussians::ViewParameters& own = model_.parameters[n];
-    append(out, own.depth.value, depth_state_[n]);
-    append(out, own.opacity.value, opacity_state_[n]);
-    append(out, own.shape.value, shape_state_[n]);
-  }
+  for (size_t i = 0; i < states_.size(); ++i) append(out, model_.parameters[i].value, states_[i]);
   return out;
 }
 
@@ -365,12 +374,7 @@ void Trainer::restore(std::string_view state) {
   if (take<int64_t>(state) != 0) model_.free_shapes();
   history_.clear();
   for (int i = 0; i < step_; ++i) history_.push_back(take<StepReport>(state));
-  for (size_t n = 0; n < model_.view_count(); ++n) {
-    CoherentGaussians::ViewParameters& own = model_.parameters[n];
-    take(state, own.depth.value, depth_state_[n]);
-    take(state, own.opacity.value, opacity_state_[n]);
-    take(state, own.shape.value, shape_state_[n]);
-  }
+  for (size_t i = 0; i < states_.size(); ++i) take(state, model_.parameters[i].value, states_[i]);
   require(state.empty(), "a saved state must end with its last block", state.size());
   model_.decode();
 }

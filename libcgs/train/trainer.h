@@ -68,6 +68,7 @@ class Trainer {
   const Gaussians& drawn_for(size_t view);
   void add_view(size_t n, GaussianGradients& sum, StepReport& report);
   void add_depth_terms(std::vector<Raster<float>>& sum, StepReport& report);
+  float rate(ParameterRole role) const;
   size_t update();  ///< \return gradients that were not finite
 
   const std::vector<ViewPriors>& priors_;
@@ -77,8 +78,8 @@ class Trainer {
   std::vector<TrainingView> coarse_;  // at half size; empty unless the schedule has a coarse part
   std::vector<Pair> pairs_;           // empty unless the flow term has a weight
   TrainingRasterizer rasterizer_;
-  Gaussians with_gaps_;  // what dropout leaves for one view; unused without it
-  std::vector<AdamState> depth_state_, opacity_state_, shape_state_;
+  Gaussians with_gaps_;            // what dropout leaves for one view; unused without it
+  std::vector<AdamState> states_;  // of the blocks of the model
   float disparity_unit_ = 1;
   std::vector<StepReport> history_;
   int step_ = 0;

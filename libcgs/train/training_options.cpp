@@ -13,7 +13,7 @@ namespace {
 
 struct Field {
   std::string_view name;
-  std::variant<int*, float*, double*, std::vector<int>*> value;
+  std::variant<int*, float*, double*, std::vector<int>*, ResidualDecoder*> value;
 };
 
 std::vector<Field> fields_of(TrainingOptions& o) {
@@ -25,10 +25,14 @@ std::vector<Field> fields_of(TrainingOptions& o) {
           {"opacity_rate", &o.opacity_rate},
           {"shape_rate", &o.shape_rate},
           {"final_rate", &o.final_rate},
+          {"conv_depth_rate", &o.conv_depth_rate},
+          {"conv_opacity_rate", &o.conv_opacity_rate},
+          {"conv_rise", &o.conv_rise},
           {"l1_weight", &o.l1_weight},
           {"ssim_weight", &o.ssim_weight},
           {"tv_weight", &o.tv_weight},
           {"masked_tv_weight", &o.masked_tv_weight},
+          {"tv_to_layers", &o.tv_to_layers},
           {"flow_weight", &o.flow_weight},
           {"prior_weight", &o.prior_weight},
           {"depth_bending", &o.depth_bending},
@@ -37,8 +41,13 @@ std::vector<Field> fields_of(TrainingOptions& o) {
           {"l1_levels", &o.l1_levels},
           {"dropout", &o.dropout},
           {"dropout_block", &o.dropout_block},
+          {"decoder", &o.coherence.decoder},
           {"depth_spacing", &o.coherence.depth_spacing},
           {"opacity_spacing", &o.coherence.opacity_spacing},
+          {"conv_depth_width", &o.coherence.conv_depth_width},
+          {"conv_opacity_width", &o.coherence.conv_opacity_width},
+          {"conv_depth_gain", &o.coherence.conv_depth_gain},
+          {"conv_opacity_gain", &o.coherence.conv_opacity_gain},
           {"max_depth_change", &o.coherence.max_depth_change},
           {"max_logit_change", &o.coherence.max_logit_change},
           {"radius_factor", &o.coherence.radius_factor},
@@ -64,6 +73,13 @@ void parse(std::string_view name, std::string_view text, std::vector<int>& out) 
   }
 }
 
+void parse(std::string_view name, std::string_view text, ResidualDecoder& out) {
+  require(text == "lattice" || text == "conv",
+          std::string(name).append(" must be lattice or conv"),
+          text);
+  out = text == "conv" ? ResidualDecoder::Conv : ResidualDecoder::Lattice;
+}
+
 template <typename T>
 std::string print(T value) {
   std::array<char, 64> text{};
@@ -78,6 +94,10 @@ std::string print(const std::vector<int>& values) {
     out += print(value);
   }
   return out;
+}
+
+std::string print(ResidualDecoder value) {
+  return value == ResidualDecoder::Conv ? "conv" : "lattice";
 }
 
 void require_fraction(double value, std::string name) {
@@ -100,6 +120,10 @@ void TrainingOptions::validate() const {
   require_weight(depth_rate, "depth_rate");
   require_weight(opacity_rate, "opacity_rate");
   require_weight(shape_rate, "shape_rate");
+  require_weight(conv_depth_rate, "conv_depth_rate");
+  require_weight(conv_opacity_rate, "conv_opacity_rate");
+  require(conv_rise > 0 && conv_rise <= 1, "conv_rise must be in (0, 1]", conv_rise);
+  require_fraction(tv_to_layers, "tv_to_layers");
   require_weight(l1_weight, "l1_weight");
   require_weight(ssim_weight, "ssim_weight");
   require_weight(tv_weight, "tv_weight");
@@ -108,10 +132,45 @@ void TrainingOptions::validate() const {
   require_weight(prior_weight, "prior_weight");
   require_weight(depth_bending, "depth_bending");
   require_weight(opacity_bending, "opacity_bending");
+  const bool has_knots = coherence.decoder == ResidualDecoder::Lattice;
+  require(has_knots || depth_bending == 0,
+          "depth_bending must be 0 with decoder=conv, which has no knots",
+          depth_bending);
+  require(has_knots || opacity_bending == 0,
+          "opacity_bending must be 0 with decoder=conv, which has no knots",
+          opacity_bending);
   require(l1_levels >= 1, "l1_levels must be >= 1", l1_levels);
   require(dropout >= 0 && dropout < 1, "dropout must be in [0, 1)", dropout);
   require(dropout_block >= 1, "dropout_block must be >= 1", dropout_block);
 }
+
+namespace {
+
+TrainingOptions reference_options() {
+  constexpr double kSteps = 13000;       // of one view each
+  const double faster = std::sqrt(3.0);  // as a step here is the mean of three views
+  TrainingOptions options;
+  options.coherence.decoder = ResidualDecoder::Conv;
+  options.coherence.radius_factor = 0.6f;
+  options.steps = static_cast<int>(kSteps / 3);
+  options.coherence.conv_depth_gain = 16;  // 50 units, of which a scene is about three away
+  options.coherence.conv_opacity_gain = 100;
+  options.conv_depth_rate = 1e-4 * faster;
+  options.conv_opacity_rate = 1e-5 * faster;
+  options.conv_rise = 1000 / kSteps;
+  options.free_from = 8000 / kSteps;
+  options.sharp_from = 5000 / kSteps;
+  options.shape_rate = 1e-4 * faster;
+  options.final_rate = 1;
+  options.tv_weight = 5;
+  options.tv_to_layers = 1;
+  options.flow_weight = 0.5;  // 0.1 in units of which the extent of a scene has about five
+  options.prior_weight = 0;
+  options.opacity_prior = 0;
+  return options;
+}
+
+}  // namespace
 
 TrainingOptions training_preset(std::string_view name) {
   TrainingOptions options;
@@ -120,7 +179,8 @@ TrainingOptions training_preset(std::string_view name) {
     options.steps = 20;
     return options;
   }
-  throw InvalidInput("--preset must be draft or standard, but is " + std::string(name));
+  if (name == "reference") return reference_options();
+  throw InvalidInput("--preset must be draft, standard or reference, but is " + std::string(name));
 }
 
 void set_training_field(TrainingOptions& options, std::string_view name, std::string_view value) {

@@ -23,16 +23,24 @@ struct TrainingOptions {
   double depth_rate = 1e-3;   ///< Of log depth, per step, at the start.
   double opacity_rate = 0.1;  ///< Of the logit.
   double shape_rate = 0.2;    ///< Of the entries of a shape (CoherentGaussians).
-  double final_rate = 0.05;   ///< All rates fall to this part of themselves, along a cosine.
+  double final_rate = 0.05;   ///< These rates fall to this part of themselves, along a cosine.
+
+  /// Of the networks of decoder=conv, whose rates rise and fall by triangular2() (AdamW): those of
+  /// depth and opacity at the first peak, and the share of the schedule until that of depth. That
+  /// of opacity comes twice as late.
+  double conv_depth_rate = 3e-4;
+  double conv_opacity_rate = 1e-3;
+  double conv_rise = 0.25;
 
   double l1_weight = 0.8;
   double ssim_weight = 0.2;
   double tv_weight = 0;         ///< Total variation of the rendered disparity.
   double masked_tv_weight = 0;  ///< The same within layers.
+  double tv_to_layers = 0;      ///< Share of tv_weight that goes over to the layers until the end.
   double flow_weight = 0;       ///< Distance of corresponding points [scene extents].
   double prior_weight = 0.002;  ///< Departure of measured depths from their prior, in sigmas. Less
                                 ///< lets rounding decide where photographs hardly tell depth.
-  double depth_bending = 0;     ///< Of the depth lattice.
+  double depth_bending = 0;     ///< Of the depth lattice; 0 with decoder=conv, which has no knots.
   double opacity_bending = 0;
   double opacity_prior = 0.001;  ///< Squared change of the logit, mean over Gaussians.
 
@@ -44,7 +52,14 @@ struct TrainingOptions {
   void validate() const;
 };
 
-/// The settings of a name: "draft" or "standard". \throws InvalidInput
+/// The settings of a name. \throws InvalidInput if it is none of:
+/// - "draft" and "standard": lattices;
+/// - "reference": the schedule that CoherentGS was published with, as far as it has a meaning here.
+///   Networks; balls for 8/13 of the time, drawn at twice the size from 5/13 on; its losses but the
+///   perceptual one; no prior that holds depth or opacity. A step here looks at all views, so the
+///   13 000 steps of one view each are 4333, with rates higher by the root of three. Where paper
+///   and implementation differ, the paper: total variation goes over to layers from none to all,
+///   the flow term counts in full.
 TrainingOptions training_preset(std::string_view name);
 
 /// Sets one field by its name, e.g. ("steps", "500") or ("depth_spacing", "64,16"); the names are

@@ -51,6 +51,25 @@ TEST(MemoryPlan, LeavesOutWhatTheUsersVoxelsDecide) {
   EXPECT_NE(text.find("depth and Gaussians"), std::string::npos) << text;
 }
 
+TEST(MemoryPlan, CountsNetworksWhileTheyAreTrained) {
+  const Scene scene = scene_of(3, 400, 300);
+  CoherenceOptions networks;
+  networks.decoder = ResidualDecoder::Conv;
+  CoherenceOptions wider = networks;
+  wider.conv_depth_width = 30;
+  const auto lattices = memory_plan(scene, true);
+  const auto published = memory_plan(scene, true, {}, networks);
+  const auto wide = memory_plan(scene, true, {}, wider);
+  for (size_t i = 0; i < lattices.size(); ++i) {
+    const bool trains = lattices[i].stage == "depth and Gaussians";
+    EXPECT_EQ(published[i].bytes > lattices[i].bytes, trains) << lattices[i].stage;
+    EXPECT_EQ(wide[i].bytes > published[i].bytes, trains) << lattices[i].stage;
+  }
+  const size_t needed = most(published);
+  EXPECT_THROW(check_memory_plan(scene, true, {}, needed - 1, networks), LimitError);
+  EXPECT_NO_THROW(check_memory_plan(scene, true, {}, needed - 1));
+}
+
 TEST(MemoryPlan, CountsTheFusedSurfaceWhereFilesAreHeldAgainstIt) {
   const Scene scene = scene_of(3, 400, 300);
   const auto plain = memory_plan(scene, true);

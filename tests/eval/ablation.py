@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """What each part of the training brings on held-out views, as a Markdown table.
 
-usage: tests/eval/ablation.py CGS_BUILD MODEL... [--rows NAME,NAME] [--limit VIEWS]
+usage: tests/eval/ablation.py CGS_BUILD MODEL... [--rows NAME,NAME] [--limit VIEWS | --views NAME,NAME]
+                              [--time]
 
 CGS_BUILD is the folder of the programs (build/release/bin). Each MODEL is a folder that
 `cgs train SCENE --set steps=0 -o MODEL` wrote. Every setting is trained from the same start on each
 of them, by training_accuracy; the fox needs --limit 2. A row says what is changed from the standard
-setting, a column PSNR [dB] and SSIM over all pixels, and the share of holes.
+setting, a column PSNR [dB] and SSIM over all pixels, the share of holes and, with --time, the
+core-seconds of the steps. Rows of many steps or of networks (decoder=conv) only run where named.
 """
 import argparse
 import pathlib
@@ -34,19 +36,26 @@ ROWS = {
     "with flow": ["flow_weight=1"],
     "with block dropout": ["dropout=0.1"],
 }
+SLOW = {
+    "240 steps": ["steps=240"],
+    "1500 steps": ["steps=1500"],
+    "networks": ["decoder=conv"],
+    "networks 240 steps": ["decoder=conv", "steps=240"],
+    "reference 240 steps": ["preset=reference", "steps=240"],
+}
 
 
-def last_line(program, model, limit, settings):
-    """PSNR, SSIM and share of holes after the last step."""
+def last_line(program, model, held_out, settings):
+    """PSNR, SSIM, share of holes and core-seconds after the last step."""
     done = subprocess.run(
-        [program, model, "every=100000", f"limit={limit}", *settings],
+        [program, model, "every=100000", held_out, *settings],
         capture_output=True, text=True, check=False)
     lines = [line for line in done.stdout.splitlines() if re.match(r"\s*\d+ ", line)]
     if done.returncode != 0 or not lines:
         sys.exit(f"{program} {model} {' '.join(settings)}: {done.stderr.strip()}")
     parts = lines[-1].split("|")
     psnr, ssim = (float(word) for word in parts[1].split())
-    return psnr, ssim, parts[3].split()[1]
+    return psnr, ssim, parts[3].split()[1], float(parts[0].split()[1])
 
 
 def main():
@@ -55,22 +64,27 @@ def main():
     parser.add_argument("models", nargs="+")
     parser.add_argument("--rows", help="only these, separated by commas")
     parser.add_argument("--limit", type=int, default=6, help="held-out views per model")
+    parser.add_argument("--views", help="held-out views by name instead, separated by commas")
+    parser.add_argument("--time", action="store_true", help="core-seconds of the steps as well")
     args = parser.parse_args()
     program = str(pathlib.Path(args.build) / "training_accuracy")
     rows = args.rows.split(",") if args.rows else list(ROWS)
-    unknown = [row for row in rows if row not in ROWS]
+    known = ROWS | SLOW
+    unknown = [row for row in rows if row not in known]
     if unknown:
-        sys.exit(f"--rows: {', '.join(unknown)} is none of {', '.join(ROWS)}")
+        sys.exit(f"--rows: {', '.join(unknown)} is none of {', '.join(known)}")
+    held_out = f"views={args.views}" if args.views else f"limit={args.limit}"
     rows = ["standard"] + [row for row in rows if row != "standard"]  # what changes are against
     names = [pathlib.Path(model).name for model in args.models]
     print("| setting | " + " | ".join(names) + " | mean change |")
     print("|---" * (len(names) + 2) + "|")
     standard = None
     for row in rows:
-        results = [last_line(program, model, args.limit, ROWS[row]) for model in args.models]
+        results = [last_line(program, model, held_out, known[row]) for model in args.models]
         standard = standard or results
         change = sum(r[0] - s[0] for r, s in zip(results, standard)) / len(results)
-        cells = [f"{psnr:.2f} / {ssim:.3f}, {holes}" for psnr, ssim, holes in results]
+        cells = [f"{psnr:.2f} / {ssim:.3f}, {holes}" + (f", {seconds:.0f} s" if args.time else "")
+                 for psnr, ssim, holes, seconds in results]
         print(f"| {row} | " + " | ".join(cells) + f" | {change:+.2f} dB |", flush=True)
 
 

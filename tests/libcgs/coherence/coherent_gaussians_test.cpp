@@ -9,6 +9,7 @@
 
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
+#include "tests/support/reference_conv_decoder.h"
 
 namespace cgs {
 namespace {
@@ -53,6 +54,16 @@ CoherenceOptions small_lattices() {
   return options;
 }
 
+CoherenceOptions small_networks() {
+  CoherenceOptions options;
+  options.decoder = ResidualDecoder::Conv;
+  options.conv_depth_width = 2;
+  options.conv_opacity_width = 1;
+  options.conv_depth_gain = 3;
+  options.conv_opacity_gain = 30;
+  return options;
+}
+
 void randomise(ParameterBlock& block, float size, std::mt19937& random) {
   std::normal_distribution<float> normal(0, size);
   for (float& value : block.value) value += normal(random);
@@ -60,10 +71,11 @@ void randomise(ParameterBlock& block, float size, std::mt19937& random) {
 
 void randomise(CoherentGaussians& model, unsigned seed) {
   std::mt19937 random(seed);
-  for (auto& own : model.parameters) {
-    randomise(own.depth, 0.1f, random);
-    randomise(own.opacity, 1.0f, random);
-    randomise(own.shape, 0.2f, random);
+  for (ParameterBlock& block : model.parameters) {
+    const float size = block.role == ParameterRole::Depth     ? 0.1f
+                       : block.role == ParameterRole::Opacity ? 1.0f
+                                                              : 0.2f;
+    randomise(block, size, random);
   }
 }
 
@@ -148,24 +160,26 @@ void expect_gradients(bool free) {
   model.decode();
   const LinearLoss loss(model, free);
   model.add_gradients(loss.weights, loss.depth);
-  for (auto& own : model.parameters) {
-    expect_finite_differences(model, own.depth, loss);
-    expect_finite_differences(model, own.opacity, loss);
-    if (free) expect_finite_differences(model, own.shape, loss);
+  for (ParameterBlock& block : model.parameters) {
+    if (!block.value.empty()) expect_finite_differences(model, block, loss);
   }
 }
 
-TEST(CoherentGaussians, StartAsTheInitialOnes) {
-  CoherentGaussians model(scene_of(3), priors_of(3), small_lattices());
+void expect_initial_gaussians(const CoherenceOptions& options) {
+  CoherentGaussians model(scene_of(3), priors_of(3), options);
   model.decode();
-  const Gaussians start =
-      initial_gaussians(scene_of(3), priors_of(3), {small_lattices().radius_factor, 0});
+  const Gaussians start = initial_gaussians(scene_of(3), priors_of(3), {options.radius_factor, 0});
   ASSERT_EQ(model.gaussians().size(), start.size());
   for (size_t i = 0; i < start.size(); ++i) {
     EXPECT_EQ(model.gaussians().position[i], start.position[i]);
     EXPECT_LT((model.gaussians().scale[i] - start.scale[i]).norm(), 1e-6f * start.scale[i].norm());
     EXPECT_NEAR(model.gaussians().opacity[i], 0.5f, 1e-6f);
   }
+}
+
+TEST(CoherentGaussians, StartAsTheInitialOnes) {
+  expect_initial_gaussians(small_lattices());
+  expect_initial_gaussians(small_networks());
 }
 
 // A plane that leans back by 60 degrees: its pieces are twice as long as wide.
@@ -224,16 +238,120 @@ TEST(CoherentGaussians, MoveByNoMoreThanTheBound) {
   CoherenceOptions options = small_lattices();
   options.max_depth_change = 0.2f;
   CoherentGaussians model(scene_of(2), priors_of(2), options);
-  for (float& value : model.parameters[0].depth.value) value = 1e6f;
-  for (float& value : model.parameters[1].depth.value) value = -1e6f;
-  for (float& value : model.parameters[0].opacity.value) value = 1e6f;
-  for (float& value : model.parameters[1].opacity.value) value = -1e6f;
+  const auto fill = [&](size_t block, ParameterRole role, float with) {
+    ASSERT_EQ(model.parameters[block].role, role);
+    for (float& value : model.parameters[block].value) value = with;
+  };
+  fill(0, ParameterRole::Depth, 1e6f);
+  fill(1, ParameterRole::Depth, -1e6f);
+  fill(2, ParameterRole::Opacity, 1e6f);
+  fill(3, ParameterRole::Opacity, -1e6f);
   model.decode();
   EXPECT_NEAR(model.depth(0)(0, 0), 0.5 * std::exp(0.2), 1e-5);
   EXPECT_NEAR(model.depth(1)(0, 0), 0.5 * std::exp(-0.2), 1e-5);
   for (const float o : model.gaussians().opacity) {
     EXPECT_TRUE(o >= 0 && o <= 1 && std::isfinite(o));
   }
+}
+
+// All of decode() in double, by the definition, with one network in its place.
+struct DoubleChain {
+  Scene scene;
+  std::vector<ViewPriors> priors;
+  CoherenceOptions options;
+  std::vector<double> untrained_depth, untrained_opacity;
+
+  static std::vector<std::vector<double>> network(const std::vector<ViewPriors>& priors,
+                                                  int width,
+                                                  const std::vector<double>& parameters) {
+    std::vector<Raster<uint8_t>> layers;
+    for (const ViewPriors& p : priors) layers.push_back(p.layer);
+    return test::reference_conv_decoder(layers, {.width = width, .layers = 2}, parameters);
+  }
+
+  double operator()(const LinearLoss& loss,
+                    const std::vector<double>& depth,
+                    const std::vector<double>& opacity) const {
+    const auto f = network(priors, options.conv_depth_width, depth);
+    const auto f0 = network(priors, options.conv_depth_width, untrained_depth);
+    const auto h = network(priors, options.conv_opacity_width, opacity);
+    const auto h0 = network(priors, options.conv_opacity_width, untrained_opacity);
+    const auto bounded = [](double change, double bound) {
+      return bound * std::tanh(change / bound);
+    };
+    double sum = 0;
+    size_t g = 0;
+    for (size_t n = 0; n < priors.size(); ++n) {
+      const Camera& camera = scene.views[n].camera;
+      for (size_t i = 0; i < f[n].size(); ++i) {
+        const double start = double(priors[n].depth.data[i]);
+        if (std::isnan(start)) continue;
+        const double change = double(options.conv_depth_gain) * (f[n][i] - f0[n][i]);
+        const double z = start * std::exp(bounded(change, double(options.max_depth_change)));
+        const Eigen::Vector3d position =
+            camera.unproject(double(i % kWidth) + 0.5, double(i / kWidth) + 0.5, z);
+        const double logit = bounded(double(options.conv_opacity_gain) * (h[n][i] - h0[n][i]),
+                                     double(options.max_logit_change));
+        sum += loss.weights.position[g].cast<double>().dot(position);
+        sum += double(loss.weights.opacity[g]) / (1 + std::exp(-std::log(0.6 / 0.4) - logit));
+        sum += double(loss.weights.radius[g]) * double(options.radius_factor) * z * 2 /
+               (camera.fx + camera.fy);
+        sum += double(loss.depth[n].data[i]) * z;
+        ++g;
+      }
+    }
+    return sum;
+  }
+};
+
+void expect_gradients_of_networks(bool of_depth) {
+  DoubleChain chain{scene_of(2), priors_of(2), small_networks(), {}, {}};
+  CoherentGaussians model(chain.scene, chain.priors, chain.options);
+  const auto values = [&](size_t block) {
+    const std::vector<float>& from = model.parameters[block].value;
+    return std::vector<double>(from.begin(), from.end());
+  };
+  chain.untrained_depth = values(0);
+  chain.untrained_opacity = values(1);
+  std::mt19937 random(4);
+  randomise(model.parameters[0], 0.06f, random);
+  randomise(model.parameters[1], 0.06f, random);
+  model.decode();
+  const LinearLoss loss(model, false);
+  model.add_gradients(loss.weights, loss.depth);
+  const std::vector<double> depth = values(0);
+  const std::vector<double> opacity = values(1);
+  EXPECT_NEAR(loss(model), chain(loss, depth, opacity), 1e-3);
+  const std::vector<float>& gradient = model.parameters[of_depth ? 0 : 1].gradient;
+  double worst = 0;
+  double largest = 0;
+  constexpr double kStep = 1e-6;
+  for (size_t i = 0; i < gradient.size(); i += 1 + gradient.size() / 97) {
+    const auto at = [&](double step) {
+      std::vector<double> changed = of_depth ? depth : opacity;
+      changed[i] += step;
+      return of_depth ? chain(loss, changed, opacity) : chain(loss, depth, changed);
+    };
+    const double slope = (at(kStep) - at(-kStep)) / (2 * kStep);
+    worst = std::max(worst, std::abs(slope - double(gradient[i])));
+    largest = std::max(largest, std::abs(slope));
+  }
+  EXPECT_GT(largest, 0.01);
+  EXPECT_LT(worst, 1e-4 * largest);
+}
+
+TEST(CoherentGaussians, GradientsOfNetworksMatchFiniteDifferencesInDouble) {
+  expect_gradients_of_networks(true);
+  expect_gradients_of_networks(false);
+}
+
+TEST(CoherentGaussians, NetworksNeedViewsOfOneSize) {
+  Scene scene = scene_of(2);
+  EXPECT_NO_THROW(require_decodable(scene, small_networks()));
+  scene.views[1].camera.width += 1;
+  EXPECT_NO_THROW(require_decodable(scene, small_lattices()));
+  EXPECT_THROW(require_decodable(scene, small_networks()), InvalidInput);
+  EXPECT_THROW(CoherentGaussians(scene, priors_of(2), small_networks()), InvalidInput);
 }
 
 TEST(CoherentGaussians, GradientsOfBallsMatchFiniteDifferences) { expect_gradients(false); }
@@ -243,6 +361,12 @@ TEST(CoherentGaussians, GradientsOfFreeShapesMatchFiniteDifferences) { expect_gr
 TEST(CoherenceOptions, NameTheFieldOutOfRange) {
   CoherenceOptions options;
   options.max_depth_change = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(options.validate(), InvalidInput);
+  options = {};
+  options.conv_depth_width = 65;
+  EXPECT_THROW(options.validate(), InvalidInput);
+  options = {};
+  options.conv_opacity_gain = 0;
   EXPECT_THROW(options.validate(), InvalidInput);
 }
 

@@ -9,11 +9,11 @@
 namespace cgs {
 namespace {
 
-TEST(Adam, FollowsThePublishedAlgorithm) {
+void expect_published_algorithm(float decay) {
   ParameterBlock block;
-  block.resize(3);
+  block.start(std::vector<float>(3, 2));
   AdamState state;
-  std::vector<double> value(3, 0);
+  std::vector<double> value(3, 2);
   std::vector<double> m(3, 0);
   std::vector<double> v(3, 0);
   std::mt19937 random(1);
@@ -26,9 +26,9 @@ TEST(Adam, FollowsThePublishedAlgorithm) {
       v[i] = 0.999 * v[i] + 0.001 * double(g) * double(g);
       const double m_hat = m[i] / (1 - std::pow(0.9, t));
       const double v_hat = v[i] / (1 - std::pow(0.999, t));
-      value[i] -= 0.01 * m_hat / std::sqrt(v_hat);
+      value[i] -= 0.01 * double(decay) * value[i] + 0.01 * m_hat / std::sqrt(v_hat);
     }
-    adam_step(block, state, 0.01f);
+    adam_step(block, state, 0.01f, decay);
   }
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(double(block.value[i]), value[i], 1e-5);
@@ -36,10 +36,14 @@ TEST(Adam, FollowsThePublishedAlgorithm) {
   }
 }
 
+TEST(Adam, FollowsThePublishedAlgorithm) { expect_published_algorithm(0); }
+
+TEST(Adam, DecaysWeightsApartFromTheGradient) { expect_published_algorithm(0.5f); }
+
 TEST(Adam, StepsHaveTheLengthOfTheRateHoweverSmallTheGradient) {
   for (const float size : {1e-9f, 1.0f, 1e9f}) {
     ParameterBlock block;
-    block.resize(1);
+    block.start(std::vector<float>(1, 0));
     AdamState state;
     block.gradient[0] = size;
     adam_step(block, state, 0.5f);
@@ -49,7 +53,7 @@ TEST(Adam, StepsHaveTheLengthOfTheRateHoweverSmallTheGradient) {
 
 TEST(Adam, LeavesWhatHasNoGradient) {
   ParameterBlock block;
-  block.resize(2);
+  block.start(std::vector<float>(2, 0));
   block.value = {1, 2};
   block.gradient = {0, 1};
   AdamState state;
@@ -61,7 +65,7 @@ TEST(Adam, LeavesWhatHasNoGradient) {
 TEST(Adam, SkipsWhatIsNotFiniteAndOnlyThat) {
   const auto values_after = [](float odd, size_t* skipped) {
     ParameterBlock block;
-    block.resize(3);
+    block.start(std::vector<float>(3, 0));
     AdamState state;
     *skipped = 0;
     for (int step = 0; step < 20; ++step) {
@@ -86,7 +90,7 @@ TEST(Adam, SkipsWhatIsNotFiniteAndOnlyThat) {
 
 TEST(Adam, AHugeGradientDoesNotFreezeAnEntry) {
   ParameterBlock block;
-  block.resize(1);
+  block.start(std::vector<float>(1, 0));
   AdamState state;
   block.gradient = {3e38f};
   adam_step(block, state, 0.01f);
@@ -97,7 +101,7 @@ TEST(Adam, AHugeGradientDoesNotFreezeAnEntry) {
 TEST(Adam, TakesTheSameStepsForGradientsOfAnyPowerOfTwo) {
   const auto values_after = [](int power) {
     ParameterBlock block;
-    block.resize(1);
+    block.start(std::vector<float>(1, 0));
     AdamState state;
     for (int step = 0; step < 20; ++step) {
       block.gradient = {std::ldexp(1.0f + 0.1f * float(step % 3), power)};
@@ -112,7 +116,7 @@ TEST(Adam, TakesTheSameStepsForGradientsOfAnyPowerOfTwo) {
 
 TEST(Adam, RateZeroDoesNothing) {
   ParameterBlock block;
-  block.resize(1);
+  block.start(std::vector<float>(1, 0));
   block.gradient = {1};
   AdamState state;
   adam_step(block, state, 0);

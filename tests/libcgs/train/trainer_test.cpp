@@ -8,6 +8,8 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/priors/depth_layers.h"
+#include "libcgs/render/rasterizer.h"
+#include "libcgs/train/image_metrics.h"
 #include "tests/support/stereo_scene.h"
 
 namespace cgs {
@@ -19,12 +21,17 @@ struct PlantedScene {
   std::vector<ViewPriors> priors;
 };
 
-// A textured wall with a box in front, seen by three cameras; its depth is known up to a smooth
-// bump of `error` relative height, another one in each view.
-PlantedScene planted_scene(double error) {
+std::vector<test::TexturedPatch> wall_and_box() {
   std::vector<test::TexturedPatch> patches;
   patches.push_back({{0, 0, 1.0}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()});
   test::add_box(patches, {-0.15, -0.12, 0.7}, {0.15, 0.12, 0.9});
+  return patches;
+}
+
+// A textured wall with a box in front, seen by three cameras; its depth is known up to a smooth
+// bump of `error` relative height, another one in each view.
+PlantedScene planted_scene(double error) {
+  const std::vector<test::TexturedPatch> patches = wall_and_box();
   std::vector<Camera> cameras;
   for (const double x : {-0.12, 0.0, 0.12}) {
     cameras.push_back(test::looking_at({x, 0.03 * x, 0}, {0, 0, 0.9}, 72, 56, 70));
@@ -73,6 +80,17 @@ TrainingOptions short_training(int steps) {
   return options;
 }
 
+TrainingOptions short_training_of_networks(int steps) {
+  TrainingOptions options;
+  options.steps = steps;
+  options.coherence.decoder = ResidualDecoder::Conv;
+  options.coherence.conv_depth_width = 3;
+  options.coherence.conv_opacity_width = 2;
+  options.conv_depth_rate = 1e-3;
+  options.conv_opacity_rate = 1e-3;
+  return options;
+}
+
 void run(Trainer& trainer) {
   while (!trainer.done()) trainer.step();
 }
@@ -107,21 +125,28 @@ TEST(Trainer, LosesLessAndLess) {
   EXPECT_LT(trainer.history().back().total(), 0.9 * trainer.history().front().total());
 }
 
-TEST(Trainer, GivesTheSameBitsForAnyNumberOfThreads) {
+void expect_same_bits_for_any_number_of_threads(const TrainingOptions& options) {
   const PlantedScene planted = planted_scene(0.02);
   Gaussians first;
   for (const size_t threads : {1, 2, 3, 4}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    Trainer trainer(planted.scene, planted.priors, short_training(10));
+    Trainer trainer(planted.scene, planted.priors, options);
     run(trainer);
     if (threads == 1) first = trainer.model().gaussians();
     EXPECT_TRUE(same_bits(first, trainer.model().gaussians())) << threads << " threads";
   }
 }
 
-TEST(Trainer, RestoredFromAnyStepEndsWithTheSameBits) {
+TEST(Trainer, GivesTheSameBitsForAnyNumberOfThreads) {
+  expect_same_bits_for_any_number_of_threads(short_training(10));
+}
+
+TEST(Trainer, GivesTheSameBitsOfNetworksForAnyNumberOfThreads) {
+  expect_same_bits_for_any_number_of_threads(short_training_of_networks(6));
+}
+
+void expect_same_bits_after_restoring(const TrainingOptions& options) {
   const PlantedScene planted = planted_scene(0.02);
-  const TrainingOptions options = short_training(12);
   Trainer whole(planted.scene, planted.priors, options);
   run(whole);
   for (int stop = 0; stop <= 12; stop += 3) {
@@ -134,6 +159,50 @@ TEST(Trainer, RestoredFromAnyStepEndsWithTheSameBits) {
     EXPECT_TRUE(same_bits(whole.model().gaussians(), resumed.model().gaussians())) << stop;
     EXPECT_EQ(resumed.history().size(), 12u);
   }
+}
+
+TEST(Trainer, RestoredFromAnyStepEndsWithTheSameBits) {
+  TrainingOptions options = short_training(12);
+  expect_same_bits_after_restoring(options);
+  options.free_from = 0.4;
+  expect_same_bits_after_restoring(options);
+}
+
+TEST(Trainer, RestoredFromAnyStepOfNetworksEndsWithTheSameBits) {
+  TrainingOptions options = short_training_of_networks(12);
+  options.free_from = 0.4;  // before and after shapes are free
+  options.sharp_from = 0.6;
+  expect_same_bits_after_restoring(options);
+}
+
+// The wall and the box from between two of the cameras.
+double held_out_psnr(const Gaussians& gaussians) {
+  const std::vector<test::TexturedPatch> patches = wall_and_box();
+  const Camera camera = test::looking_at({0.06, 0.01, 0}, {0, 0, 0.9}, 72, 56, 70);
+  return psnr(rasterize(gaussians, camera).color, test::photograph(patches, camera, 0.02));
+}
+
+TEST(Trainer, NetworksMakeHeldOutViewsBetter) {
+  const PlantedScene planted = planted_scene(0.03);
+  const TrainingOptions options = short_training_of_networks(40);
+  Trainer trainer(planted.scene, planted.priors, options);
+  const double before = held_out_psnr(trainer.model().gaussians());
+  run(trainer);
+  const double after = held_out_psnr(trainer.model().gaussians());
+  EXPECT_LT(trainer.history().back().total(), 0.9 * trainer.history().front().total());
+  EXPECT_GT(after, before + 1) << "from " << before << " dB";
+}
+
+// The network of depth alone.
+TEST(Trainer, NetworksMoveDepthTowardsTheTruth) {
+  const PlantedScene planted = planted_scene(0.2);
+  TrainingOptions options = short_training_of_networks(120);
+  options.conv_depth_rate = 5e-4;
+  options.conv_opacity_rate = 0;
+  Trainer trainer(planted.scene, planted.priors, options);
+  const double before = mean_depth_error(planted, trainer.model());
+  run(trainer);
+  EXPECT_LT(mean_depth_error(planted, trainer.model()), 0.8 * before) << "from " << before;
 }
 
 TEST(Trainer, RefusesAStateThatDoesNotFit) {

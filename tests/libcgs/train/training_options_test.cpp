@@ -14,6 +14,7 @@ TEST(TrainingOptions, EveryFieldSurvivesPrintingAndReading) {
   options.depth_rate = 0.1 + 0.2;
   options.coherence.max_depth_change = 0.7f;
   options.coherence.depth_spacing = {40, 10};
+  options.coherence.decoder = ResidualDecoder::Conv;
   TrainingOptions copy;
   for (const auto& [name, value] : training_fields(options)) {
     set_training_field(copy, name, value);
@@ -30,10 +31,20 @@ TEST(TrainingOptions, RefuseUnknownFieldsAndBadValues) {
   EXPECT_THROW(set_training_field(options, "steps", ""), InvalidInput);
   EXPECT_THROW(set_training_field(options, "depth_rate", "fast"), InvalidInput);
   EXPECT_THROW(set_training_field(options, "depth_spacing", "8,"), InvalidInput);
+  EXPECT_THROW(set_training_field(options, "decoder", "network"), InvalidInput);
 }
 
 TEST(TrainingOptions, ValidateNamesTheFieldOutOfRange) {
-  for (const char* setting : {"steps", "dropout", "ssim_weight", "final_rate", "l1_levels"}) {
+  for (const char* setting : {"steps",
+                              "dropout",
+                              "ssim_weight",
+                              "final_rate",
+                              "l1_levels",
+                              "conv_depth_width",
+                              "conv_depth_gain",
+                              "conv_opacity_rate",
+                              "conv_rise",
+                              "tv_to_layers"}) {
     TrainingOptions options;
     set_training_field(options, setting, "-1");
     try {
@@ -45,10 +56,21 @@ TEST(TrainingOptions, ValidateNamesTheFieldOutOfRange) {
   }
 }
 
+TEST(TrainingOptions, NetworksHaveNoKnotsToBend) {
+  for (const char* bending : {"depth_bending", "opacity_bending"}) {
+    TrainingOptions options;
+    set_training_field(options, bending, "1");
+    EXPECT_NO_THROW(options.validate()) << bending;
+    set_training_field(options, "decoder", "conv");
+    EXPECT_THROW(options.validate(), InvalidInput) << bending;
+  }
+}
+
 TEST(TrainingPreset, EveryNameIsValidAndOthersAreRefused) {
-  for (const char* name : {"draft", "standard"}) {
+  for (const char* name : {"draft", "standard", "reference"}) {
     EXPECT_NO_THROW(training_preset(name).validate()) << name;
   }
+  EXPECT_EQ(training_preset("reference").coherence.decoder, ResidualDecoder::Conv);
   EXPECT_THROW(training_preset("fastest"), InvalidInput);
 }
 
