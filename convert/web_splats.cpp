@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/splat_thinning.h"
+#include "convert/views.h"
 #include "io/atomic_file.h"
 #include "io/scene_reader.h"
 #include "io/splat_glb.h"
@@ -37,6 +38,15 @@ ThinnedSplats thinned_splats(const Model& model, const Progress& progress) {
   return thin_splats(model.gaussians, scene, counts_of_views(model), progress);
 }
 
+// How they show what was held out, as the evaluation of the model says of all of them; null
+// without.
+Json held_out_figures(const Model& model, const Gaussians& splats, const Progress& progress) {
+  if (model.scene.held_out.empty()) return nullptr;
+  Model shown = model;
+  shown.gaussians = splats;
+  return evaluate_views(shown, shown.scene.held_out, progress).at("mean");
+}
+
 }  // namespace
 
 Json write_web_splats(const std::filesystem::path& folder,
@@ -45,11 +55,12 @@ Json write_web_splats(const std::filesystem::path& folder,
   const Frame& frame = model.scene.frame;
   const Eigen::Matrix3d y_up = y_up_from(model.scene.frame.up);
   make_output_folder(folder);
-  const ThinnedSplats thinned = thinned_splats(model, progress);
+  const ThinnedSplats thinned = thinned_splats(model, part_of(progress, 0, 0.9));
   const size_t glb_bytes =
       write_splat_glb(folder / "splats.glb", thinned.splats, frame, {.y_up = y_up});
-  Json out = {{"thinning", thinning_to_json(thinned, model.gaussians.size())},
-              {"splats.glb", {{"bytes", glb_bytes}}}};
+  Json thinning = thinning_to_json(thinned, model.gaussians.size());
+  thinning["held_out"] = held_out_figures(model, thinned.splats, part_of(progress, 0.9, 1));
+  Json out = {{"thinning", thinning}, {"splats.glb", {{"bytes", glb_bytes}}}};
   try {
     const SpzReport spz = write_spz(folder / "splats.spz", thinned.splats, frame);
     out["splats.spz"] = {{"bytes", spz.bytes},

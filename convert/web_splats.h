@@ -11,8 +11,9 @@ namespace cgs {
 
 /// Writes the splats of a model for viewers in browsers: splats.glb and splats.spz, thinned by
 /// thin_splats(). Splats that reach too far for SPZ are no reason to end a run: it is left out
-/// then. \return {"thinning": {…}, "splats.glb": {…}, "splats.spz": {…},
-///          "left_out": {"splats.spz": "why"}}
+/// then.
+/// \return {"thinning": {…, "held_out": mean of evaluate_views() or null}, "splats.glb": {…},
+///          "splats.spz": {…}, "left_out": {"splats.spz": "why"}}
 /// \throws as load_images()
 nlohmann::ordered_json write_web_splats(const std::filesystem::path& folder,
                                         const Model& model,

@@ -138,8 +138,9 @@ void add_training_options(CLI::App& command, TrainingArguments& arguments) {
   command
       .add_option("--preset",
                   arguments.preset,
-                  "draft, standard, or reference: the published CoherentGS schedule with "
-                  "convolutional decoders, hours instead of a minute")
+                  "draft, standard, fine (a third, all, four times of the training steps), or "
+                  "reference: the published CoherentGS schedule with convolutional decoders, hours "
+                  "instead of a minute")
       ->capture_default_str();
   command.add_option(
       "--set",

@@ -179,8 +179,13 @@ TrainingOptions training_preset(std::string_view name) {
     options.steps = 20;
     return options;
   }
+  if (name == "fine") {
+    options.steps = 240;
+    return options;
+  }
   if (name == "reference") return reference_options();
-  throw InvalidInput("--preset must be draft, standard or reference, but is " + std::string(name));
+  throw InvalidInput("--preset must be draft, standard, fine or reference, but is " +
+                     std::string(name));
 }
 
 void set_training_field(TrainingOptions& options, std::string_view name, std::string_view value) {

@@ -56,6 +56,12 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
   EXPECT_GT(certificate["area_inferred"].get<double>(), 0);
   EXPECT_NE(report["model"]["description"].get<std::string>().find("optimised against"),
             std::string::npos);
+
+  // Far fewer splats show what was held out as well as all do.
+  const auto& thinning = report["splats"]["thinning"];
+  EXPECT_LE(thinning["kept"].get<double>(), 0.65 * thinning["of"].get<double>());
+  EXPECT_GE(thinning["held_out"]["psnr"].get<double>(),
+            report["evaluation"]["mean"]["psnr"].get<double>() - 0.05);
 }
 
 TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {

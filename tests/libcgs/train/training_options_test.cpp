@@ -67,7 +67,7 @@ TEST(TrainingOptions, NetworksHaveNoKnotsToBend) {
 }
 
 TEST(TrainingPreset, EveryNameIsValidAndOthersAreRefused) {
-  for (const char* name : {"draft", "standard", "reference"}) {
+  for (const char* name : {"draft", "standard", "fine", "reference"}) {
     EXPECT_NO_THROW(training_preset(name).validate()) << name;
   }
   EXPECT_EQ(training_preset("reference").coherence.decoder, ResidualDecoder::Conv);
