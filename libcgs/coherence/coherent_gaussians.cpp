@@ -245,7 +245,7 @@ void CoherentGaussians::free_shapes() {
     ViewState& view = views_[n];
     view.steps.resize(view.pixels.size());
     ParameterBlock& own = shape(n);
-    own.start(std::vector<float>(view.pixels.size() * kShapeSize, 0));
+    own.resize(view.pixels.size() * kShapeSize);
     for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
       const int x = pixel % view.depth.width;
       const int y = pixel / view.depth.width;

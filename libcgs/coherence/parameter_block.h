@@ -15,10 +15,9 @@ struct ParameterBlock {
   std::vector<float> value;
   std::vector<float> gradient;
 
-  /// `values` as they are now, no gradient yet.
-  void start(std::vector<float> values) {
-    gradient.assign(values.size(), 0);
-    value = std::move(values);
+  void resize(size_t count) {
+    value.assign(count, 0);
+    gradient.assign(count, 0);
   }
 };
 

@@ -21,14 +21,11 @@ ResidualMaps::ResidualMaps(const std::vector<Raster<uint8_t>>& layers,
 }
 
 std::vector<ParameterBlock> ResidualMaps::initial_blocks(ParameterRole role) const {
-  std::vector<ParameterBlock> out;
+  std::vector<ParameterBlock> out(network_ ? 1 : lattices_.size(), {role, {}, {}});
+  for (size_t n = 0; n < lattices_.size(); ++n) out[n].resize(lattices_[n].parameter_count());
   if (network_) {
-    out.push_back({role, {}, {}});
-    out.back().start(network_->initial_parameters());
-  }
-  for (const LayeredLattice& lattice : lattices_) {
-    out.push_back({role, {}, {}});
-    out.back().start(std::vector<float>(lattice.parameter_count(), 0));
+    out[0].resize(network_->parameter_count());
+    out[0].value = network_->initial_parameters();
   }
   return out;
 }

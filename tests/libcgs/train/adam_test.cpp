@@ -11,7 +11,8 @@ namespace {
 
 void expect_published_algorithm(float decay) {
   ParameterBlock block;
-  block.start(std::vector<float>(3, 2));
+  block.resize(3);
+  block.value = {2, 2, 2};
   AdamState state;
   std::vector<double> value(3, 2);
   std::vector<double> m(3, 0);
@@ -43,7 +44,7 @@ TEST(Adam, DecaysWeightsApartFromTheGradient) { expect_published_algorithm(0.5f)
 TEST(Adam, StepsHaveTheLengthOfTheRateHoweverSmallTheGradient) {
   for (const float size : {1e-9f, 1.0f, 1e9f}) {
     ParameterBlock block;
-    block.start(std::vector<float>(1, 0));
+    block.resize(1);
     AdamState state;
     block.gradient[0] = size;
     adam_step(block, state, 0.5f);
@@ -53,7 +54,7 @@ TEST(Adam, StepsHaveTheLengthOfTheRateHoweverSmallTheGradient) {
 
 TEST(Adam, LeavesWhatHasNoGradient) {
   ParameterBlock block;
-  block.start(std::vector<float>(2, 0));
+  block.resize(2);
   block.value = {1, 2};
   block.gradient = {0, 1};
   AdamState state;
@@ -65,7 +66,7 @@ TEST(Adam, LeavesWhatHasNoGradient) {
 TEST(Adam, SkipsWhatIsNotFiniteAndOnlyThat) {
   const auto values_after = [](float odd, size_t* skipped) {
     ParameterBlock block;
-    block.start(std::vector<float>(3, 0));
+    block.resize(3);
     AdamState state;
     *skipped = 0;
     for (int step = 0; step < 20; ++step) {
@@ -90,7 +91,7 @@ TEST(Adam, SkipsWhatIsNotFiniteAndOnlyThat) {
 
 TEST(Adam, AHugeGradientDoesNotFreezeAnEntry) {
   ParameterBlock block;
-  block.start(std::vector<float>(1, 0));
+  block.resize(1);
   AdamState state;
   block.gradient = {3e38f};
   adam_step(block, state, 0.01f);
@@ -101,7 +102,7 @@ TEST(Adam, AHugeGradientDoesNotFreezeAnEntry) {
 TEST(Adam, TakesTheSameStepsForGradientsOfAnyPowerOfTwo) {
   const auto values_after = [](int power) {
     ParameterBlock block;
-    block.start(std::vector<float>(1, 0));
+    block.resize(1);
     AdamState state;
     for (int step = 0; step < 20; ++step) {
       block.gradient = {std::ldexp(1.0f + 0.1f * float(step % 3), power)};
@@ -116,7 +117,7 @@ TEST(Adam, TakesTheSameStepsForGradientsOfAnyPowerOfTwo) {
 
 TEST(Adam, RateZeroDoesNothing) {
   ParameterBlock block;
-  block.start(std::vector<float>(1, 0));
+  block.resize(1);
   block.gradient = {1};
   AdamState state;
   adam_step(block, state, 0);
