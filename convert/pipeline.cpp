@@ -336,6 +336,7 @@ Json run_stages(Run& run, Terminal& terminal) {
   if (!control.empty()) {
     run.record.note("control_points", std::filesystem::weakly_canonical(control).string());
   }
+  run.record.note("allow_external", run.request.scene.options.allow_external);
   run.record.note("depth_options", depth_options_json(run.request.scene.options.depth));
   note_outputs(run, stale);
   loaded_model(run);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/recorded_request.h"
 
+#include <algorithm>
+
 #include <nlohmann/json.hpp>
 
 #include "io/byte_reader.h"
@@ -47,7 +49,8 @@ SceneRequest scene_request(const Json& record) {
   if (downscale.is_number_integer() && downscale.get<int>() > 0) {
     out.options.downscale = downscale.get<int>();
   }
-  out.options.allow_external = true;  // the run was allowed what it needed
+  // Records of before do not say it; such runs were allowed what they needed.
+  out.options.allow_external = record.value("allow_external", Json(true)) == Json(true);
   out.options.depth = depth_options_from(record.value("depth_options", Json()));
   out.focal = number_at(record, "focal");
   out.refine_poses = request.value("refine_poses", Json(false)) == Json(true);
@@ -104,7 +107,7 @@ RunRequest recorded_request(const Json& record, const fs::path& path) {
     out.compression_error = text_at(asked, "compression_error");
     out.max_error = text_at(asked, "max_error");
     out.max_size = asked.value("max_size", size_t{0});
-    out.lods = asked.value("lods", size_t{0});
+    out.lods = std::min(asked.value("lods", size_t{0}), kMostLods);
     const std::string encoding = text_at(asked, "glb_encoding");
     if (!encoding.empty()) out.glb_encoding = glb_encodings().at(encoding);
     return out;

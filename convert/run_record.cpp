@@ -64,7 +64,9 @@ Json read_record(const std::filesystem::path& path) {
   try {
     (void)read_json(path);  // refuses what is nested too deep to be copied
     record = Json::parse(read_file(path));
-  } catch (const std::exception&) {
+  } catch (const Error&) {
+    return nullptr;
+  } catch (const Json::exception&) {
     return nullptr;
   }
   const bool is_record = record.is_object() && record.contains("request") &&

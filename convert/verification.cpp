@@ -9,6 +9,8 @@
 #include "convert/pipeline.h"
 #include "convert/recorded_request.h"
 #include "convert/run_record.h"
+#include "io/atomic_file.h"
+#include "io/byte_reader.h"
 #include "io/scene_path.h"
 #include "libcgs/core/error.h"
 
@@ -72,6 +74,21 @@ Json hashes_now(const Json& record, const fs::path& output) {
   return now;
 }
 
+// The file that a line of Verification::differing is about.
+std::string name_of(const std::string& line) { return line.substr(0, line.rfind(": ")); }
+
+// What an earlier call computed to its end is of another day; what it did not, goes on.
+void remove_finished(const fs::path& fresh) {
+  if (!fs::exists(fresh)) return;
+  if (!is_present(fresh / "run.json")) {
+    throw InvalidInput(printable(fresh) + " is in the way of what is computed again; move it");
+  }
+  const Json record = Json::parse(read_file(fresh / "run.json"), nullptr, false);
+  const bool goes_on = record.is_object() && !record.contains("outputs") &&
+                       record.value("program", Json()) == Json(kProgramVersion);
+  if (!goes_on) fs::remove_all(fresh);
+}
+
 }  // namespace
 
 std::vector<std::string> named_outputs(const fs::path& output, const std::set<std::string>& names) {
@@ -105,22 +122,31 @@ Verification verify_run(const fs::path& output, Terminal& terminal) {
   return out;
 }
 
-Verification recompute_run(const fs::path& output, Terminal& terminal) {
-  const fs::path fresh = output / kRecomputedFolder;
+Verification recompute_run(const fs::path& output, size_t memory_limit, Terminal& terminal) {
+  const FolderLock lock(output);
   Verification out = verify_run(output, terminal);
   const bool has_inputs =
       std::none_of(out.differing.begin(), out.differing.end(), [](const std::string& line) {
         return line.starts_with(kInput);
       });
   if (!has_inputs) return out;
+  const fs::path fresh = output / kRecomputedFolder;
+  remove_finished(fresh);
   RunRequest request = recorded_request(finished_record(output), output / "run.json");
   request.output = fresh;
-  request.overwrite = true;  // what an earlier version left there
+  request.overwrite = true;
+  request.memory_limit = memory_limit;
   (void)run_pipeline(request, terminal);
-  const size_t inputs = out.inputs;
-  out = compare_runs(output, fresh);
-  out.inputs = inputs;
-  if (out.differing.empty()) fs::remove_all(fresh);
+  std::set<std::string> known;
+  for (const std::string& line : out.differing) known.insert(name_of(line));
+  for (const std::string& line : compare_runs(output, fresh).differing) {
+    if (known.count(name_of(line)) == 0) out.differing.push_back(line);
+  }
+  if (out.differing.empty()) {
+    fs::remove_all(fresh);
+  } else {
+    out.recomputed = fresh;
+  }
   return out;
 }
 

@@ -333,6 +333,8 @@ DracoPrimitive draco_compress(const GlbPrimitive& primitive, const DracoGrid& gr
     }
   } catch (const Error&) {
     throw;
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::exception& error) {
     fail(error.what());
   }

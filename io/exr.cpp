@@ -167,6 +167,8 @@ ExrImage read_exr(const std::filesystem::path& path, const ReadLimits& limits) {
     return decode(bytes, path);
   } catch (const Error&) {
     throw;
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::exception& error) {
     throw BadInput(Defect::Syntax, path, error.what());
   }

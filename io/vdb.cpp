@@ -81,6 +81,8 @@ std::vector<openvdb::GridBase::Ptr> read_vdb(const std::filesystem::path& path,
     return *grids;
   } catch (const Error&) {
     throw;
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::ios_base::failure&) {
     throw BadInput(Defect::Truncated, path, "the file ends within a grid");
   } catch (const openvdb::LookupError& error) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/commands/commands.h"
+#include "convert/commands/common_options.h"
 #include "convert/terminal.h"
 #include "convert/verification.h"
 #include "io/json_file.h"
@@ -18,19 +19,22 @@ struct VerifyArgs {
   std::filesystem::path output;
   std::filesystem::path other;
   bool recompute = false;
-  bool json = false;
+  CommonOptions common;
 };
 
 Verification found_by(const VerifyArgs& args) {
   if (!args.other.empty()) return compare_runs(args.output, args.other);
-  Terminal terminal(!args.recompute);
-  if (args.recompute) return recompute_run(args.output, terminal);
+  Terminal terminal(args.common.quiet || !args.recompute, args.common.strict);
+  if (args.recompute) {
+    return recompute_run(args.output, stated_memory_limit(args.common), terminal);
+  }
   return verify_run(args.output, terminal);
 }
 
 void run_verify(const VerifyArgs& args) {
+  limit_threads(args.common.threads);
   const Verification found = found_by(args);
-  if (args.json) {
+  if (args.common.json) {
     std::cout << json_text(nlohmann::ordered_json{{"inputs", found.inputs},
                                                   {"outputs", found.outputs},
                                                   {"differing", found.differing}})
@@ -39,9 +43,8 @@ void run_verify(const VerifyArgs& args) {
     for (const std::string& line : found.differing) std::cout << one_line(line) << "\n";
     if (args.other.empty()) std::cout << found.inputs << " inputs and ";
     std::cout << found.outputs << " outputs checked, " << found.differing.size() << " differ\n";
-    const std::filesystem::path fresh = args.output / kRecomputedFolder;
-    if (args.recompute && std::filesystem::exists(fresh)) {
-      std::cout << "what was computed now is in " << printable(fresh) << "\n";
+    if (!found.recomputed.empty()) {
+      std::cout << "what was computed now is in " << printable(found.recomputed) << "\n";
     }
   }
   if (found.differing.empty()) return;
@@ -65,7 +68,7 @@ void add_verify(CLI::App& app) {
                 "Do the whole run again from its inputs and compare the files; takes as long, and "
                 "as much room beside it, as the run did")
       ->excludes(other);
-  cmd->add_flag("--json", args->json, "Report on standard output, as JSON");
+  add_common_options(*cmd, args->common);
   cmd->footer("Example: cgs verify out/portal\n         cgs verify out/portal --recompute");
   cmd->callback([args] { run_verify(*args); });
 }

@@ -229,6 +229,26 @@ TEST_F(Verify, RecomputesEverythingAndFindsAResultThatTheInputsDoNotLeadTo) {
   EXPECT_NE(found.out.find("web/asset.glb: changed\n"), std::string::npos) << found.out;
   EXPECT_NE(found.out.find(" 1 differ\n"), std::string::npos) << found.out;
   EXPECT_TRUE(read_bytes(out() / "recomputed/web/asset.glb") == glb);
+
+  // What was computed then is no witness today.
+  write_bytes(out() / "recomputed/web/asset.glb", forged);
+  write_bytes(out() / "web/asset.glb", forged);
+  const auto again = run_cgs(recompute);
+  write_bytes(out() / "web/asset.glb", glb);
+  EXPECT_EQ(again.exit_code, 3) << again.out;
+  EXPECT_NE(again.out.find("web/asset.glb: changed\n"), std::string::npos) << again.out;
+  fs::remove_all(out() / "recomputed");
+}
+
+// Files that state times cannot be computed again, and are held against their hashes all the same.
+TEST_F(Verify, RecomputingFindsAChangedPageToo) {
+  const std::string page = read_bytes(out() / "report.html");
+  write_bytes(out() / "report.html", page + " ");
+  const auto found = run_cgs("verify " + out().string() + " --recompute -q --threads 1");
+  write_bytes(out() / "report.html", page);
+  EXPECT_EQ(found.exit_code, 3);
+  EXPECT_NE(found.out.find("report.html: changed\n"), std::string::npos) << found.out;
+  EXPECT_NE(found.out.find(" 1 differ\n"), std::string::npos) << found.out;
   fs::remove_all(out() / "recomputed");
 }
 
