@@ -23,11 +23,12 @@ struct StageFactors {
   double of_voxel;  ///< [bytes per pixel], up to kMostPixels
   double of_fused;  ///< The same on top, where files are held against the fused surface.
 };
-constexpr std::array<StageFactors, 6> kFactors = {{{"depth and Gaussians", 150 * kMebi, 520, 0, 0},
+constexpr std::array<StageFactors, 7> kFactors = {{{"depth and Gaussians", 150 * kMebi, 520, 0, 0},
                                                    {"views", 103 * kMebi, 200, 0, 0},
                                                    {"held-out views", 103 * kMebi, 200, 0, 0},
+                                                   {"splats for browsers", 124 * kMebi, 670, 0, 0},
                                                    {"volume and mesh", 160 * kMebi, 100, 1700, 720},
-                                                   {"textured assets", 95 * kMebi, 100, 570, 1500},
+                                                   {"textured assets", 124 * kMebi, 100, 145, 1500},
                                                    {"report", 131 * kMebi, 130, 0, 0}}};
 
 // Above, voxels grow with the pixels: TsdfOptions::max_voxels.
