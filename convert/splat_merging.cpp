@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -42,35 +43,52 @@ float pixel_at(const Camera& camera,
   return static_cast<float>(uvz.z() / std::max(camera.fx, camera.fy));
 }
 
+Eigen::Vector3f ray_to(const Camera& camera, const Eigen::Vector3f& position) {
+  return (position.cast<double>() - camera.center()).normalized().cast<float>();
+}
+
 void keep_weighed(WeighedSplats& s, const std::vector<uint8_t>& keep) {
   size_t kept = 0;
   for (size_t i = 0; i < keep.size(); ++i) {
     if (keep[i] == 0) continue;
     s.weight[kept] = s.weight[i];
     s.pixel[kept] = s.pixel[i];
+    s.ray[kept] = s.ray[i];
     ++kept;
   }
   s.weight.resize(kept);
   s.pixel.resize(kept);
+  s.ray.resize(kept);
   keep_only(s.splats, keep);
 }
 
 /// What the costs of all merges of a round need of each splat.
 struct Shapes {
-  std::vector<Eigen::Vector3f> normal;  ///< Along the shortest axis.
+  std::vector<Eigen::Vector3f> normal;  ///< As merge_splats() says.
   std::vector<float> reach;             ///< As seen, a pixel's blur included [internal units].
 };
+
+Eigen::Vector3f normal_of(const WeighedSplats& s, size_t i) {
+  constexpr float kAsShort = 1.01f;  // what optimisation left as good as equal
+  const Eigen::Vector3f& scale = s.splats.scale[i];
+  const Eigen::Matrix3f axes = rotation_matrix(s.splats.rotation[i]);
+  Eigen::Index shortest = 0;
+  const float least = scale.minCoeff(&shortest);
+  Eigen::Vector3f out = Eigen::Vector3f::Zero();
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    if (scale[k] <= kAsShort * least) out += axes.col(k).dot(s.ray[i]) * axes.col(k);
+  }
+  const float length = out.norm();
+  return length > 0 ? Eigen::Vector3f(out / length) : Eigen::Vector3f(axes.col(shortest));
+}
 
 Shapes shapes_of(const WeighedSplats& s) {
   Shapes out;
   out.normal.resize(s.splats.size());
   out.reach.resize(s.splats.size());
   for_each_splat(s.splats.size(), [&](size_t i) {
-    const Eigen::Vector3f& scale = s.splats.scale[i];
-    Eigen::Index shortest = 0;
-    scale.minCoeff(&shortest);
-    out.normal[i] = rotation_matrix(s.splats.rotation[i]).col(shortest);
-    out.reach[i] = scale.maxCoeff() + std::sqrt(kDilation) * s.pixel[i];
+    out.normal[i] = normal_of(s, i);
+    out.reach[i] = s.splats.scale[i].maxCoeff() + std::sqrt(kDilation) * s.pixel[i];
   });
   return out;
 }
@@ -124,7 +142,7 @@ std::vector<uint32_t> cheapest_partners(const WeighedSplats& s, const MergeOptio
         if (n.point == i) continue;
         const float cost = merge_cost(s, shapes, options, i, n.point);
         const uint64_t order = order_of_pair(i, n.point);
-        if (cost > least || (cost == least && order >= first)) continue;
+        if (!(cost <= least) || (cost == least && order >= first)) continue;  // never NaN
         least = cost;
         first = order;
         out[i] = n.point;
@@ -134,30 +152,84 @@ std::vector<uint32_t> cheapest_partners(const WeighedSplats& s, const MergeOptio
   return out;
 }
 
-// Across the two longest axes, as a camera sees it that resolves `pixel`.
-double area_seen(const Eigen::Matrix3d& covariance, float pixel) {
-  const double blur = double(kDilation) * double(pixel) * double(pixel);
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt((eigen.eigenvalues()[1] + blur) * (eigen.eigenvalues()[2] + blur));
-}
+/// Moments of one splat.
+struct Moments {
+  Eigen::Vector3d variance;  ///< Rising [internal units^2].
+  Eigen::Matrix3d axes;
+};
 
-void set_covariance(Gaussians& g, size_t i, const Eigen::Matrix3d& covariance, float pixel) {
-  constexpr double kThinnest = 0.05;  // [pixels]
+Moments moments_of(const Eigen::Matrix3d& covariance) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(covariance);
-  Eigen::Matrix3d axes = eigen.eigenvectors();
-  if (axes.determinant() < 0) axes.col(0) = -axes.col(0);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
+double blur_of(float pixel) { return double(kDilation) * double(pixel) * double(pixel); }
+
+// Across the two longest axes, as a camera sees it that resolves `pixel`, over 2 pi.
+double area_seen(const Eigen::Vector3d& variance, float pixel) {
+  const double blur = blur_of(pixel);
+  return std::sqrt((variance[1] + blur) * (variance[2] + blur));
+}
+
+double area_seen(const Eigen::Vector3f& scale, float pixel) {
+  Eigen::Vector3d variance = scale.cast<double>().cwiseAbs2();
+  std::sort(variance.begin(), variance.end());
+  return area_seen(variance, pixel);
+}
+
+// Sum of x^k / k^2: the optical depth -ln(1 - x G) of a Gaussian of opacity x in [0, 1], over the
+// plane and over its area.
+double dilogarithm(double x) {
+  constexpr double kOfOne = std::numbers::pi * std::numbers::pi / 6;
+  if (x >= 1) return kOfOne;
+  if (x > 0.5) return kOfOne - std::log(x) * std::log1p(-x) - dilogarithm(1 - x);
+  double sum = 0;
+  double power = x;
+  for (int k = 1; power > 1e-9; ++k, power *= x) sum += power / double(k * k);
+  return sum;
+}
+
+// The opacity in [0, most] whose dilogarithm is nearest to `depth`.
+double opacity_of(double depth, double most) {
+  if (depth >= dilogarithm(most)) return most;
+  double x = std::min(depth, most);
+  constexpr int kSteps = 6;  // of Newton, from the right on a convex function
+  for (int k = 0; k < kSteps && x > 0; ++k) {
+    x = std::clamp(x - (dilogarithm(x) - depth) * x / -std::log1p(-x), 0.0, most);
+  }
+  return x;
+}
+
+void set_moments(Gaussians& g, size_t i, Moments m, float pixel) {
+  constexpr double kThinnest = 0.05;  // [pixels]
+  if (m.axes.determinant() < 0) m.axes.col(0) = -m.axes.col(0);
   const double least = kThinnest * double(pixel);
-  g.scale[i] = eigen.eigenvalues().cwiseMax(least * least).cwiseSqrt().cast<float>();
-  const Eigen::Quaterniond q(axes);
+  g.scale[i] = m.variance.cwiseMax(least * least).cwiseSqrt().cast<float>();
+  const Eigen::Quaterniond q(m.axes);
   g.rotation[i] = Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()).normalized().cast<float>();
+}
+
+// Gives a splat an optical depth, summed over the picture [internal units^2 over 2 pi], by its
+// opacity, and by its size where that is not enough.
+void set_depth(Gaussians& g, size_t i, Moments& m, float pixel, double depth) {
+  constexpr double kMostOpacity = 0.97;  // one splat never hides everything
+  const double area = area_seen(m.variance, pixel);
+  g.opacity[i] = static_cast<float>(opacity_of(depth / area, kMostOpacity));
+  const double grow = depth / (area * dilogarithm(kMostOpacity));
+  if (!(grow > 1)) return;
+  for (const Eigen::Index k : {1, 2}) {
+    m.variance[k] += (grow - 1) * (m.variance[k] + blur_of(pixel));
+  }
+}
+
+double depth_of(const WeighedSplats& s, uint32_t i) {
+  return dilogarithm(double(s.splats.opacity[i])) * area_seen(s.splats.scale[i], s.pixel[i]);
 }
 
 // Merges splat j into i.
 void merge_into(WeighedSplats& s, uint32_t i, uint32_t j) {
-  constexpr double kMostOpacity = 0.97;  // one splat never hides everything
-  constexpr float kFaintest = 1e-6f;     // so that two of no weight have a middle, too
+  constexpr float kFaintest = 1e-6f;  // so that two of no weight have a middle, too
   Gaussians& g = s.splats;
   const double of_i = std::max(s.weight[i], kFaintest);
   const double of_j = std::max(s.weight[j], kFaintest);
@@ -166,18 +238,17 @@ void merge_into(WeighedSplats& s, uint32_t i, uint32_t j) {
   const Eigen::Matrix3d cov_i = covariance(g.scale[i], g.rotation[i]).cast<double>();
   const Eigen::Matrix3d cov_j = covariance(g.scale[j], g.rotation[j]).cast<double>();
   const Eigen::Vector3d step = (g.position[j] - g.position[i]).cast<double>();
-  const Eigen::Matrix3d cov = a * cov_i + b * cov_j + a * b * step * step.transpose();
   const float pixel = std::min(s.pixel[i], s.pixel[j]);
-  const double covered = double(g.opacity[i]) * area_seen(cov_i, s.pixel[i]) +
-                         double(g.opacity[j]) * area_seen(cov_j, s.pixel[j]);
-  g.opacity[i] = static_cast<float>(std::min(covered / area_seen(cov, pixel), kMostOpacity));
+  Moments both = moments_of(a * cov_i + b * cov_j + a * b * step * step.transpose());
+  set_depth(g, i, both, pixel, depth_of(s, i) + depth_of(s, j));
+  set_moments(g, i, both, pixel);
   g.position[i] += (b * step).cast<float>();
-  set_covariance(g, i, cov, pixel);
   const auto count = static_cast<size_t>(g.sh_count());
   for (size_t k = 0; k < count; ++k) {
     Eigen::Vector3f& c = g.sh[i * count + k];
     c += static_cast<float>(b) * (g.sh[j * count + k] - c);
   }
+  if (s.pixel[j] < s.pixel[i]) s.ray[i] = s.ray[j];
   s.weight[i] += s.weight[j];
   s.pixel[i] = pixel;
 }
@@ -214,13 +285,18 @@ void MergeOptions::validate() const {
 
 WeighedSplats weigh_splats(const Gaussians& gaussians, std::span<const Camera> cameras) {
   require(!cameras.empty(), "weigh_splats: number of cameras must be > 0", cameras.size());
-  WeighedSplats out{
-      gaussians, std::vector<float>(gaussians.size(), 0), std::vector(gaussians.size(), kInfinity)};
+  WeighedSplats out{gaussians,
+                    std::vector<float>(gaussians.size(), 0),
+                    std::vector(gaussians.size(), kInfinity),
+                    std::vector<Eigen::Vector3f>(gaussians.size(), Eigen::Vector3f::Zero())};
   // Grey, so that the derivative of a picture with respect to the constant coefficient is the sum
   // of weights: no colour is cut off at black.
-  Gaussians grey = gaussians;
-  grey.sh_degree = 0;
-  grey.sh.assign(grey.size(), Eigen::Vector3f::Zero());
+  Gaussians grey;
+  grey.position = gaussians.position;
+  grey.scale = gaussians.scale;
+  grey.rotation = gaussians.rotation;
+  grey.opacity = gaussians.opacity;
+  grey.sh.assign(gaussians.size(), Eigen::Vector3f::Zero());
   TrainingRasterizer rasterizer({.shape = GaussianShape::Ellipsoids, .sh_gradients = true});
   GaussianGradients sum;
   for (const Camera& camera : cameras) {
@@ -233,8 +309,10 @@ WeighedSplats weigh_splats(const Gaussians& gaussians, std::span<const Camera> c
     const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
     for_each_splat(grey.size(), [&](size_t i) {
       out.weight[i] = std::max(out.weight[i], sum.sh[i].x());
-      out.pixel[i] =
-          std::min(out.pixel[i], pixel_at(camera, cam_from_world, gaussians.position[i]));
+      const float pixel = pixel_at(camera, cam_from_world, gaussians.position[i]);
+      if (!(pixel < out.pixel[i])) return;
+      out.pixel[i] = pixel;
+      out.ray[i] = ray_to(camera, gaussians.position[i]);
     });
   }
   // What no camera sees is as large as its own pixel would be; it weighs nothing or little.
@@ -246,10 +324,11 @@ WeighedSplats weigh_splats(const Gaussians& gaussians, std::span<const Camera> c
 
 WeighedSplats merge_splats(WeighedSplats s, const MergeOptions& options) {
   options.validate();
-  require(s.weight.size() == s.splats.size() && s.pixel.size() == s.splats.size(),
-          "merge_splats: there must be a weight and a pixel per splat; splats",
-          s.splats.size());
-  std::vector<uint8_t> keep(s.splats.size());
+  const size_t count = s.splats.size();
+  require(s.weight.size() == count && s.pixel.size() == count && s.ray.size() == count,
+          "merge_splats: there must be a weight, a pixel and a ray per splat; splats",
+          count);
+  std::vector<uint8_t> keep(count);
   for (size_t i = 0; i < keep.size(); ++i) {
     keep[i] = static_cast<uint8_t>(s.weight[i] >= options.least_weight);
   }

@@ -16,6 +16,8 @@ struct WeighedSplats {
   std::vector<float> weight;
   /// Edge of a pixel at the splat, in the camera that resolves it best [internal units]; > 0.
   std::vector<float> pixel;
+  /// From that camera to the splat, of length 1; zero = no camera sees it.
+  std::vector<Eigen::Vector3f> ray;
 };
 
 /// Weighs splats by what they show in any of the cameras.
@@ -41,9 +43,13 @@ struct MergeOptions {
 /// adds to the squared errors of a picture:
 ///   w_i w_j / (w_i + w_j) * (|c_i - c_j|^2 + depth_cost n^2 + spread_cost max(0, d^2 - 3/2)),
 /// with weights w, colours c, distance d and the part n of it along the normals, both in pixels.
-/// The merged splat has the moments of the two (centre, covariance, colour), and the opacity that
-/// keeps the area they cover as cameras see it, a pixel's blur included. Same bits for any number
-/// of threads.
+/// A normal is the shortest axis; where several are as short, as of balls, it is the part of the
+/// viewing ray along these.
+///
+/// The merged splat has the moments of the two (centre, covariance, colour). Its opacity keeps
+/// their optical depth -ln(1 - alpha), added up over the picture, a pixel's blur included: that of
+/// layers adds up, alpha does not. What no opacity of one splat reaches, it gains in size. Same
+/// bits for any number of threads.
 ///
 /// Sources: Ward 1963, "Hierarchical grouping to optimize an objective function"; Kerbl et al.
 /// 2024, "A Hierarchical 3D Gaussian Representation", for opacities.

@@ -18,7 +18,7 @@ namespace {
 // Steps of Adam where gradients agree, at first.
 constexpr float kOpacityRate = 0.05f;   // of the logit
 constexpr float kColorRate = 0.004f;    // of 1
-constexpr float kScaleRate = 0.03f;     // of the logarithm
+constexpr float kScaleRate = 0.06f;     // of the logarithm
 constexpr float kPositionRate = 0.03f;  // [pixels]
 
 constexpr float kLeastOpacity = 0.002f;
@@ -72,16 +72,20 @@ Refit::Refit(Gaussians& gaussians, const std::vector<float>& pixel)
 TrainingBuffers Refit::differences(const PictureToMatch& picture) {
   const TrainingBuffers& drawn = rasterizer_.forward(g_, picture.camera);
   const auto share = static_cast<float>(1.0 / double(picture.alpha.data.size()));
-  const auto off_by = [&](const Raster<float>& is, const Raster<float>& wanted) {
-    Raster<float> out = is;
-    for (size_t i = 0; i < out.data.size(); ++i) {
-      out.data[i] = 2 * share * (out.data[i] - wanted.data[i]);
-    }
-    return out;
-  };
   TrainingBuffers out;
-  for (size_t c = 0; c < 3; ++c) out.color[c] = off_by(drawn.color[c], picture.color[c]);
-  out.alpha = off_by(drawn.alpha, picture.alpha);
+  out.color = drawn.color;
+  out.alpha = drawn.alpha;
+  for (size_t i = 0; i < out.alpha.data.size(); ++i) {
+    const float off_alpha = drawn.alpha.data[i] - picture.alpha.data[i];
+    float of_alpha = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      const float on_black = drawn.color[c].data[i] - picture.color[c].data[i];
+      const float on_white = on_black - off_alpha;
+      out.color[c].data[i] = share * (on_black + on_white);
+      of_alpha -= share * on_white;
+    }
+    out.alpha.data[i] = of_alpha;
+  }
   return out;
 }
 
@@ -138,13 +142,32 @@ std::vector<PictureToMatch> pictures_to_match(const Gaussians& gaussians,
   return out;
 }
 
+double mean_square_difference(const PictureToMatch& a, const PictureToMatch& b) {
+  constexpr float kShown = 0.5f;  // alpha
+  double sum = 0;
+  size_t count = 0;
+  for (size_t i = 0; i < a.alpha.data.size(); ++i) {
+    if (!(std::max(a.alpha.data[i], b.alpha.data[i]) >= kShown)) continue;
+    const double off_alpha = double(a.alpha.data[i]) - double(b.alpha.data[i]);
+    for (size_t c = 0; c < 3; ++c) {
+      const double on_black = double(a.color[c].data[i]) - double(b.color[c].data[i]);
+      const double on_white = on_black - off_alpha;
+      sum += 0.5 * (on_black * on_black + on_white * on_white);
+    }
+    ++count;
+  }
+  return count == 0 ? 0 : sum / (3 * double(count));
+}
+
 void refit_splats(Gaussians& gaussians,
                   const std::vector<float>& pixel,
                   std::span<const PictureToMatch> pictures,
-                  size_t passes) {
+                  size_t passes,
+                  const Progress& progress) {
   require(!pictures.empty(), "refit_splats: number of pictures must be > 0", pictures.size());
   Refit refit(gaussians, pixel);
   for (size_t k = 0; k < passes; ++k) {
+    report(progress, double(k) / double(passes));
     constexpr double kFinal = 0.1;  // of the rates, which fall so that the last picture is not all
     const double fall = 0.5 * (1 + std::cos(std::numbers::pi * double(k) / double(passes)));
     refit.step(pictures[k % pictures.size()], static_cast<float>(kFinal + (1 - kFinal) * fall));

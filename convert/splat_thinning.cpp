@@ -64,34 +64,23 @@ std::vector<Camera> with_cameras_between(const std::vector<Camera>& inputs,
   return out;
 }
 
-std::vector<ColorImage> pictures_of(const Gaussians& g, const std::vector<Camera>& cameras) {
-  std::vector<ColorImage> out;
-  for (const Camera& camera : cameras) out.push_back(picture(rasterize(g, camera)));
-  return out;
-}
-
-double mean_square(const ColorImage& a, const ColorImage& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.data.size(); ++i) {
-    sum += (a.data[i] - b.data[i]).cast<double>().squaredNorm();
-  }
-  return sum / (3 * double(a.data.size()));
-}
-
-// Mean squared error of a photograph where splats show something; empty if that is nowhere.
-std::optional<double> error_of(const Gaussians& g, const View& view) {
-  constexpr float kShown = 0.5f;  // alpha
+// Mean squared error of a photograph where splats show something; empty if that is hardly anywhere:
+// edges alone, cut off by the frame, tell of nothing else. `own` are the splats of the photograph,
+// one per pixel of what it shows.
+std::optional<double> error_of(const Gaussians& g, const View& view, size_t own) {
+  constexpr float kShown = 0.5f;        // alpha
+  constexpr double kLeastShare = 0.05;  // of what has splats of its own
   const RenderBuffers buffers = rasterize(g, view.camera);
   const ColorImage shown = picture(buffers);
   double sum = 0;
   size_t count = 0;
   for (size_t i = 0; i < shown.data.size(); ++i) {
-    if (buffers.alpha.data[i] < kShown) continue;
     if (!view.valid.empty() && view.valid.data[i] == 0) continue;
+    if (buffers.alpha.data[i] < kShown) continue;
     sum += (shown.data[i] - view.image.data[i]).cast<double>().squaredNorm();
     ++count;
   }
-  if (count == 0) return std::nullopt;
+  if (count == 0 || double(count) < kLeastShare * double(own)) return std::nullopt;
   return sum / (3 * double(count));
 }
 
@@ -99,7 +88,7 @@ std::optional<double> error_of(const Gaussians& g, const View& view) {
 std::optional<double> psnr_of_unseen(const Gaussians& gaussians,
                                      const Scene& scene,
                                      std::span<const size_t> counts) {
-  constexpr double kLeastError = 1e-6;  // 60 dB: a photograph has noise
+  constexpr double kLeastError = 1e-6;  // so that there is a logarithm
   double sum = 0;
   size_t count = 0;
   size_t first = 0;
@@ -109,7 +98,8 @@ std::optional<double> psnr_of_unseen(const Gaussians& gaussians,
     first += counts[n];
     Gaussians others = gaussians;
     keep_only(others, keep);
-    const auto error = error_of(others, scene.views[static_cast<size_t>(scene.input[n])]);
+    const auto error =
+        error_of(others, scene.views[static_cast<size_t>(scene.input[n])], counts[n]);
     if (!error) continue;
     sum -= 10 * std::log10(std::max(*error, kLeastError));
     ++count;
@@ -118,64 +108,68 @@ std::optional<double> psnr_of_unseen(const Gaussians& gaussians,
   return sum / double(count);
 }
 
+// Photographs may tell that the model is better than eight bits a channel can show. Nobody sees
+// then what differs by less than their step (root mean square), so this is allowed.
+double least_error_to_judge_by() {
+  constexpr double kStep = 1.0 / 255;
+  return kStep * kStep / (std::pow(10, 0.1 * kMostThinningLoss) - 1);
+}
+
 /// What all settings share.
 struct Trials {
   WeighedSplats weighed;
-  std::vector<PictureToMatch> wanted;
-  std::vector<Camera> judged_from;
-  std::vector<ColorImage> full;  ///< From there.
-  double unseen = 0;             ///< Mean squared error.
+  /// Of all splats: from the input views, from cameras to fit to, from cameras to judge by.
+  std::vector<PictureToMatch> full;
+  size_t inputs = 0;
+  size_t fitted = 0;  ///< Those before the ones to judge by.
+  double unseen = 0;  ///< Mean squared error.
 };
 
-Gaussians thinned_by(const Trials& t, float most_cost) {
+Gaussians thinned_by(const Trials& t, float most_cost, const Progress& progress) {
   constexpr size_t kPasses = 24;
   WeighedSplats merged = merge_splats(t.weighed, {.most_cost = most_cost});
-  refit_splats(merged.splats, merged.pixel, t.wanted, std::max(kPasses, t.wanted.size()));
+  const auto wanted = std::span(t.full).first(t.fitted);
+  refit_splats(merged.splats, merged.pixel, wanted, std::max(kPasses, wanted.size()), progress);
   return std::move(merged.splats);
 }
 
 // Mean over the pictures [dB].
 double loss_of(const Trials& t, const Gaussians& g) {
   double sum = 0;
+  size_t count = 0;
   for (size_t k = 0; k < t.full.size(); ++k) {
-    const ColorImage shown = picture(rasterize(g, t.judged_from[k]));
-    sum += 10 * std::log10(1 + mean_square(shown, t.full[k]) / t.unseen);
+    if (k >= t.inputs && k < t.fitted) continue;
+    const std::vector<PictureToMatch> shown = pictures_to_match(g, std::span(&t.full[k].camera, 1));
+    sum += 10 * std::log10(1 + mean_square_difference(shown.front(), t.full[k]) / t.unseen);
+    ++count;
   }
-  return sum / double(t.full.size());
+  return sum / double(count);
 }
 
 Trials prepare(const Gaussians& gaussians, const Scene& scene, double unseen_psnr) {
   const std::vector<Camera> inputs = input_cameras(scene);
-  const std::vector<Camera> fitted = with_cameras_between(inputs, {0.5, -0.3, 1.3});
+  std::vector<Camera> cameras = with_cameras_between(inputs, {0.5, -0.3, 1.3});
   Trials out;
-  out.weighed = weigh_splats(gaussians, fitted);
-  out.wanted = pictures_to_match(gaussians, fitted);
-  out.judged_from = with_cameras_between(inputs, {0.25, -0.2});
-  out.full = pictures_of(gaussians, out.judged_from);
-  out.unseen = std::pow(10, -0.1 * unseen_psnr);
+  out.weighed = weigh_splats(gaussians, cameras);
+  out.inputs = inputs.size();
+  out.fitted = cameras.size();
+  const std::vector<Camera> judged = with_cameras_between(inputs, {0.25, -0.2});
+  cameras.insert(
+      cameras.end(), judged.begin() + static_cast<std::ptrdiff_t>(inputs.size()), judged.end());
+  out.full = pictures_to_match(gaussians, cameras);
+  out.unseen = std::max(std::pow(10, -0.1 * unseen_psnr), least_error_to_judge_by());
   return out;
 }
 
-}  // namespace
-
-ThinnedSplats thin_splats(const Gaussians& gaussians,
-                          const Scene& scene,
-                          std::span<const size_t> counts,
-                          const Progress& progress) {
-  ThinnedSplats out;
-  out.splats = gaussians;
-  report(progress, 0);
-  const size_t known = std::accumulate(counts.begin(), counts.end(), size_t{0});
-  if (known != gaussians.size() || counts.size() != scene.input.size()) return out;
-  out.unseen_psnr = psnr_of_unseen(gaussians, scene, counts);
-  if (!out.unseen_psnr) return out;
-  const Trials trials = prepare(gaussians, scene, *out.unseen_psnr);
+// The strongest setting of the ladder that loses little enough, if one does, by bisection.
+void choose(ThinnedSplats& out, const Trials& trials, const Progress& progress) {
   size_t low = 0;  // settings below lose little enough, those from `high` on too much
   size_t high = kLadder.size();
   while (low < high) {
-    report(progress, 0.3 + 0.35 * double(out.tried.size()));
     const size_t middle = (low + high) / 2;
-    Gaussians fewer = thinned_by(trials, kLadder.at(middle));
+    const double done = 0.5 * double(out.tried.size());
+    Gaussians fewer =
+        thinned_by(trials, kLadder.at(middle), part_of(progress, done, std::min(1.0, done + 0.5)));
     out.tried.push_back({kLadder.at(middle), fewer.size(), loss_of(trials, fewer)});
     if (out.tried.back().loss <= kMostThinningLoss) {
       out.most_cost = kLadder.at(middle);
@@ -185,6 +179,24 @@ ThinnedSplats thin_splats(const Gaussians& gaussians,
       high = middle;
     }
   }
+}
+
+}  // namespace
+
+ThinnedSplats thin_splats(const Gaussians& gaussians,
+                          const Scene& scene,
+                          std::span<const size_t> counts,
+                          const Progress& progress) {
+  ThinnedSplats out;
+  report(progress, 0);
+  const size_t known = std::accumulate(counts.begin(), counts.end(), size_t{0});
+  if (known == gaussians.size() && counts.size() == scene.input.size()) {
+    out.unseen_psnr = psnr_of_unseen(gaussians, scene, counts);
+  }
+  if (out.unseen_psnr) {
+    choose(out, prepare(gaussians, scene, *out.unseen_psnr), part_of(progress, 0.2, 1));
+  }
+  if (!out.most_cost) out.splats = gaussians;
   report(progress, 1);
   return out;
 }

@@ -27,7 +27,7 @@ struct ThinnedSplats {
   std::optional<float>
       most_cost;  ///< Of the setting that was chosen; empty = all splats were kept.
   /// PSNR of photographs against splats of the other photographs alone [dB]; empty = they show
-  /// nothing of each other, so that there is nothing to judge by.
+  /// hardly anything of each other, so that there is nothing to judge by.
   std::optional<double> unseen_psnr;
 };
 
@@ -42,9 +42,11 @@ inline constexpr double kMostThinningLoss = 0.1;
 ///
 /// Photographs held out have no say. How well the model shows what it was not trained on is told by
 /// each input photograph and the splats of the others: its mean squared error E, where they show
-/// something. A picture of fewer splats that differs by D on average of squares from that of all
-/// would then lose 10 log10(1 + D / E) dB against a photograph taken there, as neither error knows
-/// of the other. Judged is the mean over the input views and over cameras that were not fitted to.
+/// something, which must be a twentieth of what it shows itself. A picture of fewer splats that
+/// differs by D from that of all, as mean_square_difference() has it, would then lose
+/// 10 log10(1 + D / E) dB against a photograph taken there, as neither error knows of the other.
+/// What differs by no more than a step of eight bits is always allowed: E counts as large enough
+/// for that. Judged is the mean over the input views and over cameras that were not fitted to.
 /// The same choice and the same bits every time, for any number of threads.
 ///
 /// \param scene   with the pixels of its input views

@@ -2,6 +2,7 @@
 #include "convert/web_splats.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -38,24 +39,34 @@ ThinnedSplats thinned_splats(const Model& model, const Progress& progress) {
   return thin_splats(model.gaussians, scene, counts_of_views(model), progress);
 }
 
+/// Two sets change places for as long as this lives: a model is large to copy.
+class Exchange {
+ public:
+  Exchange(Gaussians& a, Gaussians& b) : a_(a), b_(b) { std::swap(a_, b_); }
+  ~Exchange() { std::swap(a_, b_); }
+  Exchange(const Exchange&) = delete;
+  Exchange& operator=(const Exchange&) = delete;
+
+ private:
+  Gaussians& a_;
+  Gaussians& b_;
+};
+
 // How they show what was held out, as the evaluation of the model says of all of them; null
 // without.
-Json held_out_figures(const Model& model, const Gaussians& splats, const Progress& progress) {
+Json held_out_figures(Model& model, Gaussians& splats, const Progress& progress) {
   if (model.scene.held_out.empty()) return nullptr;
-  Model shown = model;
-  shown.gaussians = splats;
-  return evaluate_views(shown, shown.scene.held_out, progress).at("mean");
+  const Exchange exchange(model.gaussians, splats);
+  return evaluate_views(model, model.scene.held_out, progress).at("mean");
 }
 
 }  // namespace
 
-Json write_web_splats(const std::filesystem::path& folder,
-                      const Model& model,
-                      const Progress& progress) {
+Json write_web_splats(const std::filesystem::path& folder, Model& model, const Progress& progress) {
   const Frame& frame = model.scene.frame;
   const Eigen::Matrix3d y_up = y_up_from(model.scene.frame.up);
   make_output_folder(folder);
-  const ThinnedSplats thinned = thinned_splats(model, part_of(progress, 0, 0.9));
+  ThinnedSplats thinned = thinned_splats(model, part_of(progress, 0, 0.9));
   const size_t glb_bytes =
       write_splat_glb(folder / "splats.glb", thinned.splats, frame, {.y_up = y_up});
   Json thinning = thinning_to_json(thinned, model.gaussians.size());

@@ -14,9 +14,10 @@ namespace cgs {
 /// then.
 /// \return {"thinning": {…, "held_out": mean of evaluate_views() or null}, "splats.glb": {…},
 ///          "splats.spz": {…}, "left_out": {"splats.spz": "why"}}
+/// \param model  as before when this returns or throws
 /// \throws as load_images()
 nlohmann::ordered_json write_web_splats(const std::filesystem::path& folder,
-                                        const Model& model,
+                                        Model& model,
                                         const Progress& progress = {});
 
 }  // namespace cgs
