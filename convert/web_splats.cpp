@@ -33,8 +33,18 @@ std::vector<size_t> counts_of_views(const Model& model) {
   return out;
 }
 
+// All splats where photographs are gone, or of names that cameras.json cannot hold: there is
+// nothing to judge by.
 ThinnedSplats thinned_splats(const Model& model, const Progress& progress) {
   Scene scene = model.scene;
+  const bool has_photographs = std::all_of(scene.input.begin(), scene.input.end(), [&](int i) {
+    return !scene.views[static_cast<size_t>(i)].image_path.empty();
+  });
+  if (!has_photographs) {
+    ThinnedSplats all;
+    all.splats = model.gaussians;
+    return all;
+  }
   load_images(scene, scene.input);
   return thin_splats(model.gaussians, scene, counts_of_views(model), progress);
 }
