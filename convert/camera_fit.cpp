@@ -26,11 +26,11 @@ constexpr double kWrongMatches = 2.5;  // [working pixels]
 // is stored must not depend on.
 double without_rounding(double pixels) { return static_cast<double>(static_cast<float>(pixels)); }
 
-void take_out_distortion(const LensMap& lens, PhotoFeatures& features) {
+void take_out_distortion(const LensMap& lens, const Camera& picture, PhotoFeatures& features) {
   size_t kept = 0;
   for (size_t i = 0; i < features.points.size(); ++i) {
     const auto undone = lens(features.points[i]);
-    if (!undone) continue;
+    if (!undone || !picture.sees({undone->at.x(), undone->at.y(), 1})) continue;
     features.points[kept] = undone->at;
     features.descriptors.row(Eigen::Index(kept)) = features.descriptors.row(Eigen::Index(i));
     ++kept;
@@ -66,7 +66,7 @@ PosedPhoto posed_photo(const View& view, const SceneRoot& root, const FeatureOpt
   MaskMap usable;
   const ColorImage image = read_photograph(view, root, usable);
   PosedPhoto out{view.name, camera_of_file(view), detect_features(image, usable, options)};
-  take_out_distortion(LensMap(view, out.camera), out.features);
+  take_out_distortion(LensMap(view, out.camera), out.camera, out.features);
   return out;
 }
 

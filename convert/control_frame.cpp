@@ -44,6 +44,8 @@ struct Sighted {
 struct Seen {
   std::string view;
   Camera picture;
+  LensMap lens;
+  Eigen::Vector2d in_photograph;
   PicturePoint pick;  // in the undistorted picture
 };
 
@@ -80,13 +82,15 @@ Seen seen(const ControlPick& pick, const Scene& scene, const std::filesystem::pa
                        std::to_string(size.height) + " pixels of " + printable(view->image_path));
   }
   const Camera picture = picture_camera(*view);
-  const auto undone = LensMap(*view, picture)(*at + Eigen::Vector2d(0.5, 0.5));
+  const LensMap lens(*view, picture);
+  const Eigen::Vector2d in_photograph = *at + Eigen::Vector2d(0.5, 0.5);
+  const auto undone = lens(in_photograph);
   if (!undone) {
     throw BadInput(Defect::Value,
                    file,
                    line + "lies where the lens of " + printable(view->name) + " cannot be undone");
   }
-  return {view->name, picture, *undone};
+  return {view->name, picture, lens, in_photograph, *undone};
 }
 
 std::optional<RayMeeting> meeting_of(const std::vector<Seen>& picks) {
@@ -98,9 +102,16 @@ std::optional<RayMeeting> meeting_of(const std::vector<Seen>& picks) {
   return ray_meeting(rays);
 }
 
-// [pixels of the photograph]
+// [pixels of the photograph]; of points that the lens does not show, as many as their angle from
+// the pick covers on the axis.
 double distance_to(const Seen& seen, const Eigen::Vector3d& point) {
-  return (seen.picture.project(point).head<2>() - seen.pick.at).norm() / seen.pick.stretch;
+  const Eigen::Vector3d uvz = seen.picture.project(point);
+  const auto at = uvz.z() > 0 ? seen.lens.in_photograph(uvz.head<2>()) : std::nullopt;
+  if (at) return (*at - seen.in_photograph).norm();
+  const Camera& c = seen.picture;
+  const Eigen::Vector3d ray = c.ray_in_cam(seen.pick.at.x(), seen.pick.at.y());
+  const Eigen::Vector3d away = c.cam_from_world() * point;
+  return std::sqrt(c.fx * c.fy) * std::atan2(ray.cross(away).norm(), ray.dot(away));
 }
 
 double largest_distance(const std::vector<Seen>& picks, const Eigen::Vector3d& point) {

@@ -19,6 +19,13 @@ std::string text(double value) {
   return out.str();
 }
 
+// Next to a large root the solver leaves rounding of those at 0.
+bool is_root(const Eigen::VectorXd& polynomial, double t) {
+  constexpr double kSmall = 1e-6;
+  const double value = Eigen::poly_eval(polynomial, t);
+  return std::abs(value) <= kSmall * Eigen::poly_eval(polynomial.cwiseAbs(), t);
+}
+
 double radial_factor(const std::array<double, 5>& distortion, double r) {
   const double r2 = r * r;
   return 1 + r2 * (distortion[0] + r2 * (distortion[1] + r2 * distortion[4]));
@@ -87,33 +94,41 @@ void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimi
   }
 }
 
+void check_coefficient(double value, const Refuse& refuse) {
+  constexpr double kLargest = 1e50;  // far above any lens; its powers are finite
+  if (std::abs(value) <= kLargest) return;
+  refuse(Defect::Value,
+         "a distortion coefficient is " + text(value) + ", allowed is up to " + text(kLargest));
+}
+
 double fold_radius(const std::array<double, 5>& distortion) {
   const auto& [k1, k2, p1, p2, k3] = distortion;
   return fold_radius(std::array<double, 4>{k1, k2, k3, 0});
 }
 
 double fold_radius(const std::array<double, 4>& radial) {
-  // The derivative, as a polynomial in s = r^2.
+  // The derivative, as a polynomial in t = 1 / r^2: its highest coefficient is 1 however small the
+  // coefficients of the lens are.
   Eigen::VectorXd polynomial(5);
-  polynomial << 1, 3 * radial[0], 5 * radial[1], 7 * radial[2], 9 * radial[3];
-  Eigen::Index degree = 4;
-  while (degree > 0 && polynomial[degree] == 0) --degree;
-  if (degree == 0) return std::numeric_limits<double>::infinity();
-  const Eigen::PolynomialSolver<double, Eigen::Dynamic> solver(polynomial.head(degree + 1));
-  double smallest = std::numeric_limits<double>::infinity();
+  polynomial << 9 * radial[3], 7 * radial[2], 5 * radial[1], 3 * radial[0], 1;
+  Eigen::Index zeros = 0;
+  while (polynomial[zeros] == 0) ++zeros;
+  if (zeros == 4) return std::numeric_limits<double>::infinity();
+  const Eigen::VectorXd significant = polynomial.tail(5 - zeros);
+  const Eigen::PolynomialSolver<double, Eigen::Dynamic> solver(significant);
+  double largest = 0;
   for (const std::complex<double>& root : solver.roots()) {
-    const bool is_real = std::abs(root.imag()) <= 1e-9 * std::abs(root.real());
-    if (is_real && root.real() > 0) smallest = std::min(smallest, root.real());
+    const double t = root.real();
+    const bool is_real = std::abs(root.imag()) <= 1e-9 * std::abs(t);
+    if (is_real && t > largest && is_root(significant, t)) largest = t;
   }
-  return std::sqrt(smallest);
+  return 1 / std::sqrt(largest);
 }
 
 void check_distortion(const Camera& camera,
                       const std::array<double, 5>& distortion,
                       const Refuse& refuse) {
-  for (const double value : distortion) {
-    if (!std::isfinite(value)) refuse(Defect::Value, "a distortion coefficient is not finite");
-  }
+  for (const double value : distortion) check_coefficient(value, refuse);
   const double fold = fold_radius(distortion);
   if (!std::isfinite(fold)) return;
   const double circle = std::min(std::min(camera.cx, camera.width - camera.cx) / camera.fx,

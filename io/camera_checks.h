@@ -37,7 +37,10 @@ double fold_radius(const std::array<double, 5>& distortion);
 /// The same of a lens that is r (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8), r in any unit.
 double fold_radius(const std::array<double, 4>& radial);
 
-/// Calls refuse(Value) if a coefficient is not finite, or if the distortion cannot be undone
+/// Calls refuse(Value) unless a coefficient is finite and what is made of it can be.
+void check_coefficient(double value, const Refuse& refuse);
+
+/// Calls refuse(Value) as check_coefficient(), or if the distortion cannot be undone
 /// already inside the largest circle around the principal point that the image holds.
 void check_distortion(const Camera& camera,
                       const std::array<double, 5>& distortion,

@@ -146,6 +146,19 @@ Fisheye read_fisheye(const JsonValue& value) {
   return out;
 }
 
+// Photographs are undistorted to the picture of the fisheye, at the size of the camera.
+void check_picture(const View& view, const JsonValue& entry) {
+  const Camera& camera = view.camera;
+  const Camera expected = resized(FisheyeMap(*view.fisheye).picture(), camera.width, camera.height);
+  const Eigen::Vector4d difference(expected.fx - camera.fx,
+                                   expected.fy - camera.fy,
+                                   expected.cx - camera.cx,
+                                   expected.cy - camera.cy);
+  constexpr double kSame = 0.01;  // [pixels]
+  if (difference.cwiseAbs().maxCoeff() <= kSame) return;
+  entry.fail(Defect::Mismatch, "the camera is not that of the undistorted picture of its fisheye");
+}
+
 // Files are named after views: a name must not lead into another folder.
 std::string read_name(const JsonValue& value, std::set<std::string>& taken) {
   std::string name = value.text();
@@ -182,7 +195,10 @@ View read_view(const JsonValue& entry, const Frame& frame, std::set<std::string>
     for (size_t i = 0; i < 5; ++i) view.distortion[i] = distortion->at(i).number();
     check_distortion(camera, view.distortion, refuse);
   }
-  if (const auto fisheye = entry.find("fisheye")) view.fisheye = read_fisheye(*fisheye);
+  if (const auto fisheye = entry.find("fisheye")) {
+    view.fisheye = read_fisheye(*fisheye);
+    check_picture(view, entry);
+  }
   if (const auto orientation = entry.find("orientation")) {
     view.orientation = orientation->count();
     if (view.orientation < 1 || view.orientation > 8) {

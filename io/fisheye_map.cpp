@@ -63,6 +63,18 @@ FisheyeMap::FisheyeMap(const Fisheye& fisheye) : lens_(fisheye), fold_(fold_angl
   picture_.cy = -top * camera.fy;
 }
 
+FisheyeMap FisheyeMap::resized(int width, int height) const {
+  const double across = double(width) / lens_.photograph.width;
+  const double down = double(height) / lens_.photograph.height;
+  FisheyeMap out = *this;
+  out.lens_.photograph = cgs::resized(lens_.photograph, width, height);
+  out.lens_.radius *= across;
+  out.picture_ = cgs::resized(picture_,
+                              std::max(1, int(std::lround(across * picture_.width))),
+                              std::max(1, int(std::lround(down * picture_.height))));
+  return out;
+}
+
 // Of the ray that falls at a radius in focal lengths, tangential terms left out; the fold or 90
 // degrees for those that none falls at.
 double FisheyeMap::angle_at(double radius) const {
@@ -115,18 +127,18 @@ std::optional<PicturePoint> FisheyeMap::in_picture(const Eigen::Vector2d& in_pho
   const double step = 1e-4;  // [radians]
   const double inner = std::max(0.0, angle - step);
   const auto radius = [&](double a) { return a * radial_factor(lens_.k, a); };
-  out.stretch = (std::tan(angle) - std::tan(inner)) / (radius(angle) - radius(inner));
-  if (angle == 0) out.stretch = 1;
+  if (angle == 0) return out;
+  const double along = (angle - inner) / (radius(angle) - radius(inner));  // [radians]
+  const double across = std::sin(angle) / radius(angle);
+  out.stretch = std::max(along, across) / std::cos(angle);
   return out;
 }
 
 void check_fisheye(const Fisheye& fisheye, const Refuse& refuse) {
   const Camera& camera = fisheye.photograph;
   check_intrinsics(camera, refuse);
-  const bool is_finite =
-      std::all_of(fisheye.k.begin(), fisheye.k.end(), [](double k) { return std::isfinite(k); }) &&
-      std::isfinite(fisheye.p[0]) && std::isfinite(fisheye.p[1]);
-  if (!is_finite) refuse(Defect::Value, "a distortion coefficient is not finite");
+  for (const double k : fisheye.k) check_coefficient(k, refuse);
+  for (const double p : fisheye.p) check_coefficient(p, refuse);
   if (!(fisheye.radius >= 0)) refuse(Defect::Value, "the radius of what is shown is below 0");
   const double fold = fold_angle(fisheye.k);
   const double reach = fold * radial_factor(fisheye.k, fold);

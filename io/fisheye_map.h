@@ -10,10 +10,11 @@
 
 namespace cgs {
 
-/// A point of a picture and how many of its pixels a pixel of the photograph covers there.
+/// A point of a picture and by how much a pixel of the photograph covers a larger angle there than
+/// one of the picture does across the radius.
 struct PicturePoint {
   Eigen::Vector2d at;  ///< [pixels]
-  double stretch = 1;  ///< Along the radius, where it is largest.
+  double stretch = 1;  ///< Along the radius or across it, whichever is more.
 };
 
 /// Between a fisheye photograph and the picture that a pinhole camera of the same focal lengths
@@ -22,6 +23,9 @@ struct PicturePoint {
 class FisheyeMap {
  public:
   explicit FisheyeMap(const Fisheye& fisheye);
+
+  /// The same lens and the same picture, of a photograph of another size.
+  FisheyeMap resized(int width, int height) const;
 
   /// Size and intrinsics of the photograph.
   const Camera& photograph() const { return lens_.photograph; }

@@ -6,19 +6,28 @@
 
 namespace cgs {
 
+namespace {
+
+FisheyeMap fisheye_map(const View& view) {
+  const ImageSize size = photograph_size(view);
+  return FisheyeMap(*view.fisheye).resized(size.width, size.height);
+}
+
+}  // namespace
+
 Camera picture_camera(const View& view) {
   if (!view.fisheye) {
     const ImageSize size = photograph_size(view);
     return resized(view.camera, size.width, size.height);
   }
-  Camera out = FisheyeMap(*view.fisheye).picture();
+  Camera out = fisheye_map(view).picture();
   out.world_from_cam = view.camera.world_from_cam;
   return out;
 }
 
 LensMap::LensMap(const View& view, const Camera& camera)
     : camera_(camera), distortion_(view.distortion) {
-  if (view.fisheye) fisheye_.emplace(*view.fisheye);
+  if (view.fisheye) fisheye_ = fisheye_map(view);
 }
 
 std::optional<PicturePoint> LensMap::operator()(const Eigen::Vector2d& in_photograph) const {
@@ -26,6 +35,13 @@ std::optional<PicturePoint> LensMap::operator()(const Eigen::Vector2d& in_photog
   const Eigen::Vector2d at = undistorted(in_photograph, camera_, distortion_);
   if (!is_undone(in_photograph, at, camera_, distortion_)) return std::nullopt;
   return PicturePoint{at};
+}
+
+std::optional<Eigen::Vector2d> LensMap::in_photograph(const Eigen::Vector2d& in_picture) const {
+  const Eigen::Vector2d out =
+      fisheye_ ? fisheye_->in_photograph(in_picture) : distorted(in_picture, camera_, distortion_);
+  if (!out.allFinite()) return std::nullopt;
+  return out;
 }
 
 std::vector<double> lens_numbers(const View& view) {

@@ -10,18 +10,21 @@
 namespace cgs {
 
 /// The camera of the undistorted picture of a view before it is made smaller: for a fisheye that of
-/// its FisheyeMap, else of the size of the photograph. \throws as photograph_size()
+/// its FisheyeMap, at the size of the photograph. \throws as photograph_size()
 Camera picture_camera(const View& view);
 
-/// Where points of the photograph of a view lie in its undistorted picture of full size.
+/// Where points of the photograph of a view lie in its undistorted picture of full size, and back.
 class LensMap {
  public:
   /// \param camera  picture_camera(view)
+  /// \throws as photograph_size()
   LensMap(const View& view, const Camera& camera);
 
   /// \param in_photograph  [pixels], the first centre at 0.5
   /// \return nothing where the lens cannot be undone
   std::optional<PicturePoint> operator()(const Eigen::Vector2d& in_photograph) const;
+  /// \return nothing where the lens folds
+  std::optional<Eigen::Vector2d> in_photograph(const Eigen::Vector2d& in_picture) const;
 
  private:
   Camera camera_;

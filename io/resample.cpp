@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -158,12 +159,13 @@ Eigen::Vector2d undistorted(const Eigen::Vector2d& point,
   return {to[0].x + 0.5, to[0].y + 0.5};
 }
 
-bool is_undone(const Eigen::Vector2d& point,
-               const Eigen::Vector2d& undistorted,
-               const Camera& camera,
-               const std::array<double, 5>& distortion) {
-  const Eigen::Vector3d ray = camera.ray_in_cam(undistorted.x(), undistorted.y());
-  if (!(ray.head<2>().norm() < fold_radius(distortion))) return false;
+Eigen::Vector2d distorted(const Eigen::Vector2d& point,
+                          const Camera& camera,
+                          const std::array<double, 5>& distortion) {
+  const Eigen::Vector3d ray = camera.ray_in_cam(point.x(), point.y());
+  if (!(ray.head<2>().norm() < fold_radius(distortion))) {
+    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
   const std::vector<cv::Point3d> from = {{ray.x(), ray.y(), ray.z()}};
   std::vector<cv::Point2d> to;
   cv::projectPoints(from,
@@ -172,8 +174,15 @@ bool is_undone(const Eigen::Vector2d& point,
                     opencv_intrinsics(camera),
                     cv::Vec<double, 5>(distortion.data()),
                     to);
+  return {to[0].x + 0.5, to[0].y + 0.5};
+}
+
+bool is_undone(const Eigen::Vector2d& point,
+               const Eigen::Vector2d& undistorted,
+               const Camera& camera,
+               const std::array<double, 5>& distortion) {
   constexpr double kUndone = 0.01;  // [pixels]
-  return (Eigen::Vector2d(to[0].x + 0.5, to[0].y + 0.5) - point).norm() <= kUndone;
+  return (distorted(undistorted, camera, distortion) - point).norm() <= kUndone;
 }
 
 void area_downscale(ColorImage& image, MaskMap& valid, int width, int height) {

@@ -30,6 +30,11 @@ Eigen::Vector2d undistorted(const Eigen::Vector2d& point,
                             const Camera& camera,
                             const std::array<double, 5>& distortion);
 
+/// Where a point of that picture lies in the photograph [pixels]; NaN where the lens folds.
+Eigen::Vector2d distorted(const Eigen::Vector2d& point,
+                          const Camera& camera,
+                          const std::array<double, 5>& distortion);
+
 /// Whether undistorted() found the place that the lens puts at the point, to 0.01 pixels, and
 /// within what undistort() shows.
 bool is_undone(const Eigen::Vector2d& point,

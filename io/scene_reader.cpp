@@ -148,7 +148,8 @@ std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-// The divisor the options leave open, of the largest photograph.
+// The divisor the options leave open, of the largest photograph or, as that is what is worked on,
+// undistorted picture of a fisheye.
 int chosen_downscale(Scene& scene) {
   const auto longest = [](const View& view) {
     return view.image_path.empty() ? 0 : std::max(view.camera.width, view.camera.height);
@@ -158,7 +159,7 @@ int chosen_downscale(Scene& scene) {
   constexpr int kLongest = SceneOptions::kLongestSide;
   const int downscale = std::max(1, (longest(largest) + kLongest - 1) / kLongest);
   if (downscale > 1) {
-    scene.warnings.push_back("photographs of " +
+    scene.warnings.push_back((largest.fisheye ? "undistorted pictures of " : "photographs of ") +
                              size_text(largest.camera.width, largest.camera.height) +
                              " pixels are worked on at 1/" + std::to_string(downscale) +
                              " of their size; --downscale 1 takes all of it, and longer");
@@ -341,18 +342,19 @@ void load_image(Scene& scene, View& view) {
   const int width = view.image.width;
   const int height = view.image.height;
   const Camera& taken = view.fisheye ? view.fisheye->photograph : camera;
-  if (width < taken.width || height < taken.height ||
-      !have_same_shape(taken.width, taken.height, width, height)) {
+  const auto refuse_size = [&] {
     throw BadInput(Defect::Mismatch,
                    view.image_path,
                    "the image has " + size_text(width, height) + " pixels, its camera is for " +
                        size_text(taken.width, taken.height));
-  }
+  };
+  if (!have_same_shape(taken.width, taken.height, width, height)) refuse_size();
   if (view.fisheye) {
-    undistort(view.image, view.valid, FisheyeMap(*view.fisheye));
+    undistort(view.image, view.valid, FisheyeMap(*view.fisheye).resized(width, height));
   } else if (view.distortion != std::array<double, 5>{}) {
     undistort(view.image, view.valid, resized(camera, width, height), view.distortion);
   }
+  if (view.image.width < camera.width || view.image.height < camera.height) refuse_size();
   area_downscale(view.image, view.valid, camera.width, camera.height);
   load_given_depth(scene, view, {width, height});
   const auto is_set = [](uint8_t set) { return set != 0; };

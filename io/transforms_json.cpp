@@ -45,10 +45,12 @@ double focal_from_angle(const JsonValue& angle, int side) {
 bool is_fisheye(const JsonValue& document, const JsonValue& frame) {
   static constexpr std::array<std::string_view, 6> kKnown = {
       "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE"};
-  // Other lenses of instant-ngp, which has no camera_model.
+  // Other lenses of instant-ngp, which has no camera_model and takes the key alone for yes.
   for (const char* key : {"ftheta_p0", "latlong", "equirectangular"}) {
     if (const auto other = setting(document, frame, key)) {
-      other->fail(Defect::Unsupported, "such images are not read: undistort them first");
+      other->fail(Defect::Unsupported,
+                  "whatever its value, this key says a lens that is not read: undistort the images "
+                  "first, or take it out if they are none of such a lens");
     }
   }
   const auto flag = setting(document, frame, "is_fisheye");
@@ -64,16 +66,21 @@ bool is_fisheye(const JsonValue& document, const JsonValue& frame) {
   return flag && flag->boolean();
 }
 
-// A coefficient under its own name, else in nerfstudio's list of them; 0 if it is in neither.
-double coefficient(const JsonValue& document, const JsonValue& frame, std::string_view key) {
+// A coefficient as one object states it: in the list, which wins in nerfstudio, or by its name.
+std::optional<JsonValue> stated_coefficient(const JsonValue& object, std::string_view key) {
   static constexpr std::array<std::string_view, 6> kOrder = {"k1", "k2", "k3", "k4", "p1", "p2"};
-  if (const auto value = setting(document, frame, key)) return value->number();
-  const auto list = setting(document, frame, "distortion_params");
-  if (!list) return 0;
+  const auto list = object.find("distortion_params");
+  if (!list) return object.find(key);
   if (list->size() != kOrder.size()) list->fail(Defect::Schema, "expected k1 k2 k3 k4 p1 p2");
   const auto* const place = std::find(kOrder.begin(), kOrder.end(), key);
-  if (place == kOrder.end()) return 0;
-  return list->at(static_cast<size_t>(place - kOrder.begin())).number();
+  if (place == kOrder.end()) return object.find(key);
+  return list->at(static_cast<size_t>(place - kOrder.begin()));
+}
+
+// Of the frame, else of the whole file; 0 if neither states it.
+double coefficient(const JsonValue& document, const JsonValue& frame, std::string_view key) {
+  if (const auto value = stated_coefficient(frame, key)) return value->number();
+  return number_or(stated_coefficient(document, key), 0);
 }
 
 void refuse_further_terms(const JsonValue& document,
