@@ -102,6 +102,18 @@ class ControlFrame : public testing::Test {
     test::write_bytes(dir_ / "survey.csv", "name,x,y,z,sigma,role,view,px,py\n" + rows);
     return move_to_control_frame({dir_ / "survey.csv", unit}, scene_);
   }
+  void make_fisheyes(double focal) {
+    is_fisheye_ = true;
+    for (size_t i = 0; i < 3; ++i) {
+      View& view = scene_.views[i];
+      photographs_[i].fx = photographs_[i].fy = focal;  // of the photograph, as picks are
+      view.fisheye = Fisheye{photographs_[i], {0.02, 0, 0, 0}, {}, 0};
+      const Camera picture = FisheyeMap(*view.fisheye).picture();
+      const Eigen::Isometry3d pose = view.camera.world_from_cam;
+      view.camera = resized(picture, picture.width / 2, picture.height / 2);
+      view.camera.world_from_cam = pose;
+    }
+  }
   std::string refusal(const std::string& rows, const std::string& unit = "") {
     return test::message_of([&] { move(rows, unit); });
   }
@@ -161,19 +173,23 @@ TEST_F(ControlFrame, SeesThroughALens) {
 }
 
 TEST_F(ControlFrame, SeesThroughAFisheye) {
-  is_fisheye_ = true;
-  for (size_t i = 0; i < 3; ++i) {
-    View& view = scene_.views[i];
-    photographs_[i].fx = photographs_[i].fy = 140;  // the picks are in pixels of the photograph
-    view.fisheye = Fisheye{photographs_[i], {0.02, 0, 0, 0}, {}, 0};
-    const Camera picture = FisheyeMap(*view.fisheye).picture();
-    const Eigen::Isometry3d pose = view.camera.world_from_cam;
-    view.camera = resized(picture, picture.width / 2, picture.height / 2);
-    view.camera.world_from_cam = pose;
-  }
+  make_fisheyes(140);
   const auto report = move(points(6));
   EXPECT_LT(report["control_points"]["control_rms"]["all"].get<double>(), 1e-4);
   EXPECT_EQ(warnings(), "");
+}
+
+// Some 75 degrees off the axis, across the radius, along which the undistorted picture is stretched
+// far more.
+TEST_F(ControlFrame, MeasuresPicksInThePhotographOfAFisheye) {
+  make_fisheyes(90);
+  const Eigen::Vector3d aside(0.9, 0, 0.24);
+  std::string rows = points(5) + known("bad", in_control(aside));
+  rows += pick("bad", 0, aside) + pick("bad", 1, aside, {0, 10}) + pick("bad", 2, aside);
+  move(rows);
+  EXPECT_NE(warnings().find("control point bad: its pick in photo_1 is left out: 10.0 pixels"),
+            std::string::npos)
+      << warnings();
 }
 
 TEST_F(ControlFrame, StatesWhatCheckPointsSay) {

@@ -100,19 +100,6 @@ TEST_F(KnownDistances, MayBePickedThroughAFisheye) {
       {0.03, -0.01, 0.002, 0},
       {},
       0};
-  const Camera picture = FisheyeMap(lens).picture();
-  for (View& view : model_.scene.views) {
-    view.fisheye = lens;
-    const Eigen::Isometry3d pose = view.camera.world_from_cam;
-    view.camera = resized(picture, picture.width / kDownscale, picture.height / kDownscale);
-    view.camera.world_from_cam = pose;
-  }
-  for (ViewPriors& priors : model_.priors) {
-    const Camera& camera = model_.scene.views[0].camera;
-    priors.depth = DepthMap(camera.width, camera.height, float(kDepth));
-    priors.sigma = DepthMap(camera.width, camera.height, float(kSigma));
-    priors.origin = Raster<DepthOrigin>(camera.width, camera.height, DepthOrigin::Measured);
-  }
   const auto pick = [&](double x, double y) {  // the model, written out
     const double angle = std::atan2(std::hypot(x, y), kDepth);
     const double s = angle * angle;
@@ -120,8 +107,27 @@ TEST_F(KnownDistances, MayBePickedThroughAFisheye) {
     return "left:" + std::to_string(130 * bent * x + 122 - 0.5) + "," +
            std::to_string(130 * bent * y + 77 - 0.5);
   };
-  scale({{pick(-0.35, 0.05), pick(0.3, -0.1), "2m"}});
-  EXPECT_NEAR(model_.scene.frame.metres_per_unit, 2 / (kUnit * std::hypot(0.65, 0.15)), 1e-5);
+  for (const int larger : {1, 2}) {  // than the photographs that the model was made of
+    Fisheye recorded = lens;
+    recorded.photograph = resized(lens.photograph, kFileWidth / larger, kFileHeight / larger);
+    const Camera picture = FisheyeMap(recorded).picture();
+    const int width = picture.width * larger / kDownscale;
+    const int height = picture.height * larger / kDownscale;
+    for (View& view : model_.scene.views) {
+      view.fisheye = recorded;
+      const Eigen::Isometry3d pose = view.camera.world_from_cam;
+      view.camera = resized(picture, width, height);
+      view.camera.world_from_cam = pose;
+    }
+    for (ViewPriors& priors : model_.priors) {
+      priors.depth = DepthMap(width, height, float(kDepth));
+      priors.sigma = DepthMap(width, height, float(kSigma));
+      priors.origin = Raster<DepthOrigin>(width, height, DepthOrigin::Measured);
+    }
+    model_.scene.frame.metres_per_unit = 0;
+    scale({{pick(-0.35, 0.05), pick(0.3, -0.1), "2m"}});
+    EXPECT_NEAR(model_.scene.frame.metres_per_unit, 2 / (kUnit * std::hypot(0.65, 0.15)), 1e-5);
+  }
 }
 
 TEST_F(KnownDistances, ArePickedAsViewersTurnThePicture) {

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/image.h"
+#include "io/png.h"
 #include "io/scene_reader.h"
 #include "samples/capture/render.h"
 #include "tests/support/fisheye_portal.h"
@@ -39,6 +41,29 @@ class FisheyePortal : public testing::Test {
                                 output.string() + more);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.err;
+  }
+
+  static void write_larger(const fs::path& folder) {
+    fs::create_directories(folder / "images");
+    for (const auto& file : fs::directory_iterator(capture() / "images")) {
+      const ColorImage image = read_image(file.path());
+      ColorImage larger(2 * image.width, 2 * image.height, Eigen::Vector3f::Zero());
+      for (int y = 0; y < larger.height; ++y) {
+        for (int x = 0; x < larger.width; ++x) larger(x, y) = image(x / 2, y / 2);
+      }
+      write_png(folder / "images" / file.path().filename(), larger);
+    }
+    json transforms = json::parse(test::read_bytes(capture() / "transforms.json"));
+    for (const char* key : {"w", "h", "fl_x", "fl_y", "cx", "cy"}) {
+      transforms[key] = 2 * transforms[key].get<double>();
+    }
+    test::write_bytes(folder / "transforms.json", transforms.dump());
+  }
+  static double mean_psnr(const fs::path& output, const fs::path& scene) {
+    const auto result = run_cgs("evaluate " + (output / "model").string() + " --scene " +
+                                scene.string() + " --json -q");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return json::parse(result.out)["mean"]["psnr"];
   }
 
   static test::TempDir* dir_;
@@ -84,6 +109,11 @@ TEST_F(FisheyePortal, HasTheDepthOfThePortal) {
   }
   const auto verified = run_cgs("verify " + out.string());
   EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
+  // The same photographs at twice their size show the same.
+  write_larger(*dir_ / "larger");
+  const double given = mean_psnr(out, capture());
+  EXPECT_GT(given, 15);
+  EXPECT_NEAR(mean_psnr(out, *dir_ / "larger"), given, 0.5);
 }
 
 // Cameras half a degree off are moved back as those of other lenses are.

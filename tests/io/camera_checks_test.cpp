@@ -90,11 +90,24 @@ TEST(FoldRadius, IsWhereTheDistortedRadiusStopsGrowing) {
   }
 }
 
+TEST(FoldRadius, IsNotMisledByCoefficientsThatDoNothing) {
+  using Radial = std::array<double, 4>;
+  for (const double nothing : {1e-150, -1e-150, 1e-300, 1e-20}) {
+    EXPECT_NEAR(fold_radius(Radial{-0.5, 0, 0, nothing}), std::sqrt(2.0 / 3), 1e-9) << nothing;
+    EXPECT_NEAR(fold_radius(Radial{-0.5, nothing, 0, 0}), std::sqrt(2.0 / 3), 1e-9) << nothing;
+  }
+  EXPECT_TRUE(std::isinf(fold_radius(Radial{0.1, 0, 0, 1e-150})));
+  EXPECT_TRUE(std::isinf(fold_radius(Radial{1e6, 1e-5, 1e-9, 1e-20})));
+}
+
 TEST(CheckDistortion, RefusesAFoldInsideTheImage) {
   const Camera camera{.width = 640, .height = 480, .fx = 500, .fy = 500, .cx = 320, .cy = 240};
   EXPECT_NO_THROW(check_distortion(camera, {-0.3, 0.1, 0, 0, 0}, refuse));
   EXPECT_EQ(defect_of([&] { check_distortion(camera, {-10, 0, 0, 0, 0}, refuse); }), "VALUE");
   EXPECT_EQ(defect_of([&] { check_distortion(camera, {kNan, 0, 0, 0, 0}, refuse); }), "VALUE");
+  for (const double huge : {-1e308, 1e308, -1e30}) {
+    EXPECT_EQ(defect_of([&] { check_distortion(camera, {huge, 0, 0, 0, 0}, refuse); }), "VALUE");
+  }
 }
 
 }  // namespace

@@ -32,13 +32,17 @@ Scene far_away_scene() {
     view.distortion = {0.01, -0.02, 0.003, 0.004, 0.05};
     scene.views.push_back(view);
   }
-  View& fisheye = scene.views[1];
+  View& fisheye = scene.views[2];
   fisheye.distortion = {};
   fisheye.fisheye =
       Fisheye{{.width = 81, .height = 61, .fx = 60.1, .fy = 59.9, .cx = 41.3, .cy = 29.7},
               {0.01, -0.002, 1.0 / 3000, 1e-5},
               {1e-4, -2e-4},
               77.7};
+  const Camera picture = FisheyeMap(*fisheye.fisheye).picture();
+  const Eigen::Isometry3d pose = fisheye.camera.world_from_cam;
+  fisheye.camera = resized(picture, picture.width / 2, picture.height / 2);
+  fisheye.camera.world_from_cam = pose;
   scene.input = {0, 2};
   scene.held_out = {1};
   scene.frame.metres_per_unit = 0.3;
@@ -156,10 +160,12 @@ TEST_F(CamerasJson, RefusesBadFiles) {
   EXPECT_EQ(refused("/1/rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}}), "VALUE");
   EXPECT_EQ(refused("/1/rotation", {{1, 0, 0}, {0, 1, 0}}), "SCHEMA");
   EXPECT_EQ(refused("/1/distortion", {1, 2}), "SCHEMA");
-  EXPECT_EQ(refused("/1/fisheye/k", {1, 2}), "SCHEMA");
-  EXPECT_EQ(refused("/1/fisheye/p", {1, 2, 3}), "SCHEMA");
-  EXPECT_EQ(refused("/1/fisheye/fx", 0), "VALUE");
-  EXPECT_EQ(refused("/1/fisheye/k/0", -9), "VALUE");
+  EXPECT_EQ(refused("/2/fisheye/k", {1, 2}), "SCHEMA");
+  EXPECT_EQ(refused("/2/fisheye/p", {1, 2, 3}), "SCHEMA");
+  EXPECT_EQ(refused("/2/fisheye/fx", 0), "VALUE");
+  EXPECT_EQ(refused("/2/fisheye/k/0", -9), "VALUE");
+  EXPECT_EQ(refused("/2/width", 25), "MISMATCH") << "not what the fisheye is undistorted to";
+  EXPECT_EQ(refused("/2/cy", 10), "MISMATCH");
   EXPECT_EQ(refused("/0/frame/scale", 0), "VALUE");
   EXPECT_EQ(refused("/0/frame/scale_source", "guess"), "SCHEMA");
   const std::string whole = test::read_bytes(path_);

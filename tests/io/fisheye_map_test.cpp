@@ -61,11 +61,51 @@ TEST(FisheyeMap, UndoesTheLensToTheLastCorner) {
       const auto found = map.in_picture({u, v});
       ASSERT_TRUE(found) << u << ' ' << v;
       EXPECT_LT((map.in_photograph(found->at) - Eigen::Vector2d(u, v)).norm(), 1e-7);
-      // Pixels of the picture that one along the radius covers, by differences.
-      const Eigen::Vector2d out = Eigen::Vector2d(u - 203.3, v - 147.6).normalized() * 1e-3;
-      const auto next = map.in_picture({u + out.x(), v + out.y()});
-      ASSERT_TRUE(next);
-      EXPECT_NEAR((next->at - found->at).norm() / 1e-3, found->stretch, 0.06 * found->stretch);
+    }
+  }
+}
+
+// The angle that a pixel of the photograph covers, by differences along and across the radius. That
+// of a pixel of the picture, across, is 1 / f times the cosine of the angle off the axis.
+TEST(FisheyeMap, KnowsTheAngleUnderAPixelOfThePhotograph) {
+  Fisheye fisheye = lens();
+  fisheye.photograph.fy = fisheye.photograph.fx;
+  for (const double k1 : {-0.03, 0.9}) {  // the second covers more across the radius
+    fisheye.k[0] = k1;
+    const FisheyeMap map(fisheye);
+    const auto ray = [&](const Eigen::Vector2d& at) {
+      const Eigen::Vector2d in_picture = map.in_picture(at).value().at;
+      return map.picture().ray_in_cam(in_picture.x(), in_picture.y());
+    };
+    for (double u = 5; u <= 400; u += 30) {
+      for (double v = 5; v <= 300; v += 30) {
+        const Eigen::Vector2d at(u, v);
+        const Eigen::Vector2d out = (at - Eigen::Vector2d(203.3, 147.6)).normalized();
+        const Eigen::Vector3d here = ray(at).normalized();
+        double largest = 0;
+        for (const Eigen::Vector2d& way : {out, Eigen::Vector2d(-out.y(), out.x())}) {
+          const double step = 1e-3;
+          const Eigen::Vector3d there = ray(at + step * way).normalized();
+          largest = std::max(largest, here.cross(there).norm() / step);
+        }
+        const double stated = map.in_picture(at)->stretch * here.z() / fisheye.photograph.fx;
+        EXPECT_NEAR(stated, largest, 1e-3 * largest) << k1 << ' ' << u << ' ' << v;
+      }
+    }
+  }
+}
+
+TEST(FisheyeMap, ShowsTheSameOfPhotographsOfAnotherSize) {
+  Fisheye fisheye = lens();
+  fisheye.radius = 190;
+  const FisheyeMap map(fisheye);
+  const FisheyeMap larger = map.resized(1200, 900);
+  EXPECT_EQ(larger.picture().width, 3 * map.picture().width);
+  for (double x = 0.5; x < map.picture().width; x += 29) {
+    for (double y = 0.5; y < map.picture().height; y += 23) {
+      const Eigen::Vector2d at = map.in_photograph({x, y});
+      EXPECT_LT((larger.in_photograph({3 * x, 3 * y}) - 3 * at).norm(), 1e-9) << x << ' ' << y;
+      EXPECT_EQ(larger.shows(3 * at), map.shows(at));
     }
   }
 }
@@ -143,6 +183,11 @@ TEST(CheckFisheye, RefusesWhatCannotBeUndone) {
   bad = lens();
   bad.p[1] = std::numeric_limits<double>::infinity();
   EXPECT_EQ(defect(bad), "VALUE");
+  bad = lens();
+  bad.k = {-1e308, 0, 0, 0};
+  EXPECT_EQ(defect(bad), "VALUE");
+  bad.k = {-0.5, 0, 0, 1e-150};
+  EXPECT_EQ(defect(bad), "VALUE") << "folds inside the picture";
   bad = lens();
   bad.photograph.fx = 0;
   EXPECT_EQ(defect(bad), "VALUE");

@@ -225,6 +225,82 @@ TEST_F(ReadScene, UndistortsWhenLoadingAndCanDoSoAgain) {
   EXPECT_TRUE(scene.views[0].image.data == first);
 }
 
+// A smooth picture over directions.
+Eigen::Vector3d light_from(const Eigen::Vector3d& ray) {
+  const Eigen::Array3d d = ray.normalized();
+  return 0.5 + 0.4 * (Eigen::Array3d(6, 5, 4) * d).sin();
+}
+
+// What an ideal fisheye lens, in the middle, records of it.
+std::string fisheye_png(int width, int height, double focal) {
+  std::vector<std::string> rows;
+  for (int y = 0; y < height; ++y) {
+    std::string row;
+    for (int x = 0; x < width; ++x) {
+      const Eigen::Vector2d at(x + 0.5 - 0.5 * width, y + 0.5 - 0.5 * height);
+      const double angle = at.norm() / focal;
+      const Eigen::Vector2d side = std::sin(angle) * at.normalized();
+      const Eigen::Vector3d light = light_from({side.x(), side.y(), std::cos(angle)});
+      for (int c = 0; c < 3; ++c) row += char(std::lround(255 * light[c]));
+    }
+    rows.push_back(row);
+  }
+  return test::png(uint32_t(width), rows);
+}
+
+double largest_difference(const View& view) {
+  double worst = 0;
+  for (int y = 0; y < view.image.height; ++y) {
+    for (int x = 0; x < view.image.width; ++x) {
+      if (!view.valid.empty() && view.valid(x, y) == 0) continue;
+      const Eigen::Vector3d light = light_from(view.camera.ray_in_cam(x + 0.5, y + 0.5));
+      const Eigen::Vector3d found = view.image(x, y).cast<double>();
+      worst = std::max(worst, (found - light).cwiseAbs().maxCoeff());
+    }
+  }
+  return worst;
+}
+
+// 190 x 143 degrees. Photographs that are put in the place of others may be of another size.
+TEST_F(ReadScene, LoadsFisheyePhotographsOfAnySize) {
+  write(2, "OPENCV_FISHEYE 200 150 60 60 100 75 0 0 0 0");
+  const auto photograph = [&](int width, int height, double focal) {
+    for (const char* name : {"images/v00.png", "images/v01.png"}) {
+      test::write_bytes(dir_ / name, fisheye_png(width, height, focal));
+    }
+  };
+  photograph(200, 150, 60);
+  Scene scene = read({.downscale = 2});
+  ASSERT_EQ(scene.warnings.size(), 1u);
+  EXPECT_NE(scene.warnings[0].find("2 fisheye photographs show more than 60 degrees"),
+            std::string::npos);
+  EXPECT_EQ(scene.views[0].camera.width, std::lround(2 * 60 * std::sqrt(3)) / 2);
+  for (const auto& [width, height] : {std::pair(200, 150), {400, 300}, {100, 75}}) {
+    photograph(width, height, 0.3 * width);
+    load_images(scene, {0});
+    EXPECT_LT(largest_difference(scene.views[0]), 0.03) << width;
+    EXPECT_TRUE(scene.views[0].valid.empty() || scene.views[0].valid(52, 52) == 1) << width;
+  }
+  photograph(80, 60, 24);  // smaller than what is worked on
+  EXPECT_EQ(defect_of([&] { load_images(scene, {0}); }), "MISMATCH");
+  photograph(200, 200, 60);
+  EXPECT_EQ(defect_of([&] { load_images(scene, {0}); }), "MISMATCH");
+}
+
+TEST_F(ReadScene, SaysThatItIsTheUndistortedPictureOfAFisheyeThatIsLarge) {
+  write(2, "OPENCV_FISHEYE 800 800 390 390 400 400 0 0 0 0");  // 59 degrees to each side
+  for (const char* name : {"images/v00.png", "images/v01.png"}) {
+    test::write_bytes(dir_ / name, test::rgb_png(800, 800, name[9]));
+  }
+  const Scene scene = read();
+  ASSERT_EQ(scene.warnings.size(), 1u);
+  const int side = int(std::lround(2 * 390 * std::tan(399.5 / 390)));
+  const std::string size = std::to_string(side) + " x " + std::to_string(side);
+  EXPECT_NE(scene.warnings[0].find("undistorted pictures of " + size + " pixels are worked on at "),
+            std::string::npos)
+      << scene.warnings[0];
+}
+
 TEST_F(ReadScene, WarnsOfOddPictures) {
   write(3);
   test::write_bytes(dir_ / "images/v01.png", test::rgb_png(80, 60, 0));

@@ -135,6 +135,7 @@ TEST_F(ReadTransforms, RefusesLensesItCannotUndo) {
   EXPECT_EQ(refused_with("/k6", 0.1), "UNSUPPORTED");
   EXPECT_EQ(refused_with("/equirectangular", true), "UNSUPPORTED");
   EXPECT_EQ(refused_with("/ftheta_p0", 0.1), "UNSUPPORTED");
+  EXPECT_EQ(refused_with("/latlong", false), "UNSUPPORTED") << "instant-ngp looks for the key only";
   EXPECT_EQ(refused_with("/distortion_params", {0.1, 0.2}), "SCHEMA");
   EXPECT_EQ(refused_with("/camera_model", "OPENCV"), "");
 }
@@ -168,6 +169,16 @@ TEST_F(ReadTransforms, ReadsTheListOfCoefficients) {
   for (const char* key : {"k1", "k2", "k3", "k4", "p1", "p2"}) document_.erase(key);
   document_["frames"][0]["distortion_params"] = {0.01, 0.02, 0.03, 0, 0.001, 0.002};
   EXPECT_EQ(read().views[0].distortion, (std::array<double, 5>{0.01, 0.02, 0.001, 0.002, 0.03}));
+}
+
+TEST_F(ReadTransforms, TakesTheListOfCoefficientsBeforeTheirNames) {
+  document_["distortion_params"] = {0.01, 0.02, 0.03, 0, 0.001, 0.002};
+  document_["k1"] = -0.1;
+  document_["frames"][1]["k1"] = -0.2;
+  const Scene scene = read();
+  EXPECT_EQ(scene.views[0].distortion[0], 0.01);
+  EXPECT_EQ(scene.views[1].distortion[0], -0.2) << "of the frame";
+  EXPECT_EQ(refused_with("/k5", 0.1), "UNSUPPORTED") << "is not in the list";
 }
 
 TEST_F(ReadTransforms, TakesTheFirstOfTwoFramesOfOneFile) {
