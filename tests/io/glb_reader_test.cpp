@@ -246,6 +246,11 @@ TEST(ReadGlb, LeadsOurFilesBackToTheWorld) {
   expect_round_trip({.encoding = GlbEncoding::Plain, .y_up = y_up}, 1e-4);
   expect_round_trip({.encoding = GlbEncoding::Quantized, .y_up = y_up}, 64 * 0.8 / 65536);
   expect_round_trip({.encoding = GlbEncoding::Meshopt, .y_up = y_up}, 64 * 0.8 / 65536);
+  // Levels of detail share a center; it may lie beside the middle of the mesh.
+  const Eigen::Vector3d center(0.25, -0.5, 0.125);
+  for (const GlbEncoding encoding : {GlbEncoding::Quantized, GlbEncoding::Meshopt}) {
+    expect_round_trip({.encoding = encoding, .y_up = y_up, .center = center}, 2 * 64 * 0.8 / 65536);
+  }
   expect_round_trip({.encoding = GlbEncoding::Draco, .y_up = y_up}, 64 * 0.8 / 8192);
 }
 
