@@ -60,4 +60,8 @@ std::string table_row(std::string_view name, std::string_view value) {
   return "<tr><td>" + escaped(name) + "</td><td>" + std::string(value) + "</td></tr>\n";
 }
 
+std::string verdict(bool good, const std::string& yes, const std::string& no) {
+  return good ? "<span class=good>" + yes + "</span>" : "<span class=bad>" + no + "</span>";
+}
+
 }  // namespace cgs

@@ -21,4 +21,7 @@ std::string base64(std::string_view bytes);
 /// A row of a table: a name, which is escaped, and a value, which is HTML.
 std::string table_row(std::string_view name, std::string_view value);
 
+/// `yes` in the colour of what is good or `no` in that of what is bad; both are HTML.
+std::string verdict(bool good, const std::string& yes, const std::string& no);
+
 }  // namespace cgs

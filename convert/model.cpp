@@ -126,35 +126,67 @@ uint64_t training_key(const Model& model, const TrainingOptions& options) {
   return key;
 }
 
+/// The state of a training on the disk; without a folder there is none.
+class TrainingCheckpoint {
+ public:
+  TrainingCheckpoint(std::filesystem::path folder, uint64_t key, std::vector<std::string>& warnings)
+      : folder_(std::move(folder)), key_(key), warnings_(warnings) {}
+
+  void restore(Trainer& trainer) {
+    if (folder_.empty()) return;
+    const SavedState saved = read_checkpoint(folder_, kCheckpointName, key_);
+    if (saved.state) trainer.restore(*saved.state);
+    if (!saved.warning.empty()) warnings_.push_back(saved.warning);
+  }
+
+  /// \throws IoError
+  void save(const Trainer& trainer) {
+    saved_ = std::chrono::steady_clock::now();
+    if (folder_.empty()) return;
+    make_output_folder(folder_);
+    write_checkpoint(folder_, kCheckpointName, key_, trainer.save());
+  }
+
+  /// What cannot be saved ends no work: the next state may be, and so may the result.
+  void try_to_save(const Trainer& trainer) {
+    try {
+      save(trainer);
+    } catch (const IoError& error) {
+      if (!has_failed_) warnings_.push_back(std::string(error.what()) + "; going on without it");
+      has_failed_ = true;
+    }
+  }
+
+  void try_to_save_at_times(const Trainer& trainer) {
+    constexpr auto kBetween = std::chrono::seconds(20);
+    if (std::chrono::steady_clock::now() - saved_ >= kBetween) try_to_save(trainer);
+  }
+
+ private:
+  std::filesystem::path folder_;
+  uint64_t key_;
+  std::vector<std::string>& warnings_;
+  std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
+  bool has_failed_ = false;
+};
+
 void optimise(TrainedModel& trained, const ModelRequest& request, const Progress& progress) {
-  constexpr auto kBetweenCheckpoints = std::chrono::seconds(20);
   Model& model = trained.model;
   Trainer trainer(model.scene, model.priors, request.training);
-  const uint64_t key = training_key(model, request.training);
-  const bool saves = !request.checkpoints.empty();
-  const auto save = [&] {
-    if (!saves) return;
-    make_output_folder(request.checkpoints);
-    write_checkpoint(request.checkpoints, kCheckpointName, key, trainer.save());
-  };
-  if (saves) {
-    const auto state = read_checkpoint(request.checkpoints, kCheckpointName, key);
-    if (state) trainer.restore(*state);
-  }
-  auto saved = std::chrono::steady_clock::now();
+  TrainingCheckpoint checkpoint(
+      request.checkpoints, training_key(model, request.training), model.scene.warnings);
+  checkpoint.restore(trainer);
   while (!trainer.done()) {
     trainer.step();
     try {
       report(progress, double(trainer.steps_done()) / request.training.steps);
     } catch (const Cancelled&) {
-      save();
+      checkpoint.save(trainer);
       throw;
     }
-    if (std::chrono::steady_clock::now() - saved < kBetweenCheckpoints) continue;
-    save();
-    saved = std::chrono::steady_clock::now();
+    checkpoint.try_to_save_at_times(trainer);
   }
-  save();
+  checkpoint.try_to_save(trainer);
   model.gaussians = trainer.model().gaussians();
   // The depth of the priors stays that of the sweep: meshes and support rest on what was measured,
   // pictures on what was optimised to look right.

@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -20,11 +19,5 @@ void write_html_report(const std::filesystem::path& folder,
                        const nlohmann::ordered_json& report,
                        const Scene& scene,
                        const std::string& viewer);
-
-/// A sentence for each promise of a run and how it was kept. \param report content of report.json
-std::vector<std::string> promise_words(const nlohmann::ordered_json& report);
-
-/// The same for each coarser level of asset.glb: how large it is and how far off.
-std::vector<std::string> level_words(const nlohmann::ordered_json& report);
 
 }  // namespace cgs

@@ -24,21 +24,23 @@ std::filesystem::path previous_path(const std::filesystem::path& folder, const s
   return folder / (name + ".previous.checkpoint");
 }
 
+// The state in a file if it is whole; \throws BadInput.
 std::optional<std::string> read_one(const std::filesystem::path& path, uint64_t belongs_to) {
-  try {
-    const std::string bytes = read_file(path);
-    ByteReader in(bytes, path);
-    if (in.take(kMagic.size(), "magic") != kMagic) return std::nullopt;
-    if (in.get<uint64_t>("key") != belongs_to) return std::nullopt;
-    const auto size = in.get<uint64_t>("size");
-    in.expect_records(size, 1, "state");
-    const std::string_view state = in.take(size, "state");
-    const uint64_t expected = content_hash(std::string_view(bytes).substr(0, in.offset()));
-    if (in.get<uint64_t>("hash") != expected || in.remaining() != 0) return std::nullopt;
-    return std::string(state);
-  } catch (const BadInput&) {
-    return std::nullopt;
+  const std::string bytes = read_file(path);
+  ByteReader in(bytes, path);
+  if (in.take(kMagic.size(), "magic") != kMagic) {
+    throw BadInput(Defect::Magic, path, "not a checkpoint of this version of the program");
   }
+  const auto key = in.get<uint64_t>("key");
+  const auto size = in.get<uint64_t>("size");
+  in.expect_records(size, 1, "state");
+  const std::string_view state = in.take(size, "state");
+  const uint64_t expected = content_hash(std::string_view(bytes).substr(0, in.offset()));
+  if (in.get<uint64_t>("hash") != expected || in.remaining() != 0) {
+    throw BadInput(Defect::Value, path, "its content does not match its hash");
+  }
+  if (key != belongs_to) return std::nullopt;
+  return std::string(state);
 }
 
 }  // namespace
@@ -65,11 +67,23 @@ void write_checkpoint(const std::filesystem::path& folder,
   file.commit();
 }
 
-std::optional<std::string> read_checkpoint(const std::filesystem::path& folder,
-                                           const std::string& name,
-                                           uint64_t belongs_to) {
-  std::optional<std::string> state = read_one(current_path(folder, name), belongs_to);
-  return state ? state : read_one(previous_path(folder, name), belongs_to);
+SavedState read_checkpoint(const std::filesystem::path& folder,
+                           const std::string& name,
+                           uint64_t belongs_to) {
+  SavedState out;
+  for (const auto& path : {current_path(folder, name), previous_path(folder, name)}) {
+    std::error_code ignored;
+    if (!std::filesystem::exists(path, ignored)) continue;
+    try {
+      out.state = read_one(path, belongs_to);
+    } catch (const BadInput& damage) {
+      if (out.warning.empty()) out.warning = damage.what();
+    }
+    if (out.state) break;
+  }
+  if (out.warning.empty()) return out;
+  out.warning += out.state ? "; going on from the state before it" : "; starting anew";
+  return out;
 }
 
 void remove_checkpoint(const std::filesystem::path& folder, const std::string& name) {

@@ -21,11 +21,17 @@ void write_checkpoint(const std::filesystem::path& folder,
                       uint64_t belongs_to,
                       std::string_view state);
 
+/// What read_checkpoint() found.
+struct SavedState {
+  std::optional<std::string> state;  ///< The newest whole one; none = work starts anew.
+  std::string warning;               ///< What was damaged; empty = nothing.
+};
+
 /// The newest whole state that belongs to `belongs_to`, or nothing: a missing, damaged or foreign
 /// checkpoint means that work starts anew, never that it fails.
-std::optional<std::string> read_checkpoint(const std::filesystem::path& folder,
-                                           const std::string& name,
-                                           uint64_t belongs_to);
+SavedState read_checkpoint(const std::filesystem::path& folder,
+                           const std::string& name,
+                           uint64_t belongs_to);
 
 /// Removes both generations once the work is done. \throws IoError
 void remove_checkpoint(const std::filesystem::path& folder, const std::string& name);

@@ -112,6 +112,7 @@ GlbContainer::GlbContainer(std::string content, const std::filesystem::path& pat
                      " bytes of JSON, allowed are " + std::to_string(ReadLimits{}.max_json_bytes));
   }
   json_ = parse_json(in.take(json_bytes, "JSON chunk"), path);
+  refuse_other_version();
   constexpr size_t kChunkHeader = 8;
   if (in.remaining() < kChunkHeader) return;
   const auto size = in.get<uint32_t>("size of the second chunk");
@@ -119,6 +120,17 @@ GlbContainer::GlbContainer(std::string content, const std::filesystem::path& pat
     binary_ = in.take(size, "binary chunk");
   }
   decode_views();
+}
+
+// The container has a version of its own.
+void GlbContainer::refuse_other_version() const {
+  const auto asset = root().find("asset");
+  for (const char* key : {"version", "minVersion"}) {
+    const auto version = asset ? asset->find(key) : std::nullopt;
+    if (version && version->text().rfind("2.", 0) != 0) {
+      throw BadInput(Defect::Unsupported, path_, "glTF " + version->text() + "; 2.0 is read");
+    }
+  }
 }
 
 JsonValue GlbContainer::element(const char* array, const JsonValue& index) const {

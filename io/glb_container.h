@@ -55,6 +55,7 @@ class GlbContainer {
   };
   Elements elements(const JsonValue& accessor, int components) const;
   std::string_view chunk_bytes(const JsonValue& part) const;
+  void refuse_other_version() const;
   void decode_views();
 
   std::filesystem::path path_;

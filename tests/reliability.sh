@@ -26,11 +26,26 @@ figures() {
   output=$("$@" 2>&1) || { status=1; echo "FAILED: $*"; grep -m5 -A4 Failure <<<"$output" || true; }
   grep "^$word" <<<"$output" || { status=1; echo "NO FIGURE '$word': $*"; }
 }
+# Runs on captures of three sizes, and how much memory they needed of what was foreseen.
+foreseen_memory() {
+  local folder
+  folder=$(mktemp -d)
+  for size in 1 2 3; do
+    "$bin/cgs_make_capture" "$folder/capture_$size" --downscale $size
+    "$bin/cgs" run "$folder/capture_$size" --views view_01,view_02,view_03 --assume-unit m -q \
+      -o "$folder/out_$size"
+  done
+  local result=0
+  tests/eval/memory_ratio.py "$folder"/out_* || result=1
+  rm -rf "$folder"
+  return $result
+}
 figures 'bad inputs:' "$bin/e2e_bad_inputs_test"
 CGS_SWEEP=full figures 'sweep:' "$bin/bad_input_sweep"
 figures 'extremes cells' "$bin/extremes_test"
-CGS_KILLS=$kills figures '\(cancel\|kills\)' "$bin/e2e_kill_test"
+CGS_KILLS=$kills figures '\(cancel\|kills\|lost\)' "$bin/e2e_kill_test"
 CGS_FAULTS=$faults figures 'faults:' "$bin/e2e_faults_test"
-figures '\[  PASSED' "$bin/e2e_verify_test"
+figures 'hashes:' "$bin/e2e_verify_test"
+figures 'memory:' foreseen_memory
 tests/fuzz/run.sh "$seconds" || status=1
 exit $status

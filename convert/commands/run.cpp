@@ -12,7 +12,7 @@
 #include "convert/commands/common_options.h"
 #include "convert/length.h"
 #include "convert/pipeline.h"
-#include "convert/report.h"
+#include "convert/report_surface.h"
 #include "io/json_file.h"
 #include "libcgs/core/error.h"
 

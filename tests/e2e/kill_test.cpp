@@ -84,19 +84,57 @@ void print_latency(std::vector<double> seconds) {
               seconds[(seconds.size() * 95 + 99) / 100 - 1]);
 }
 
+// How often a program is stopped, if the environment does not say.
+int wished_kills(int otherwise) {
+  const char* const wish = std::getenv("CGS_KILLS");
+  return wish != nullptr ? std::atoi(wish) : otherwise;
+}
+
+void write_small_capture(const fs::path& folder) {
+  const auto views = capture_views(3);
+  write_capture(folder, portal_scene(), views, input_cameras(views));
+}
+
+TEST(Killed, TrainingLosesWhatWasDoneSinceItsLastState) {
+  constexpr double kBetweenStates = 20;  // [s]
+  const test::TempDir dir;
+  write_small_capture(dir / "capture");
+  const Arguments arguments = {"train",
+                               dir / "capture",
+                               "--views",
+                               "view_01,view_02,view_03",
+                               "--downscale",
+                               "4",
+                               "--set",
+                               "steps=100000",
+                               "-q",
+                               "-o",
+                               dir / "model"};
+  std::mt19937 random(11);
+  double worst = 0;
+  for (int i = 0; i < std::max(1, wished_kills(1) / 20); ++i) {
+    const Seconds wait(std::uniform_real_distribution<>(1.5, 2.5)(random) * kBetweenStates);
+    EXPECT_EQ(signal_after(wait, SIGKILL, arguments).code, -1);
+    const fs::path state = dir / "model/training.checkpoint";
+    ASSERT_TRUE(fs::exists(state));
+    const Seconds lost = fs::file_time_type::clock::now() - fs::last_write_time(state);
+    worst = std::max(worst, lost.count());
+  }
+  std::printf("lost: at worst %.0f s of training\n", worst);
+  EXPECT_LT(worst, kBetweenStates + 5);
+}
+
 TEST(Killed, RunGoesOnToTheFilesOfOneThatWasNotKilled) {
   const test::TempDir dir;
   const fs::path capture = dir / "capture";
-  const auto views = capture_views(3);
-  write_capture(capture, portal_scene(), views, input_cameras(views));
+  write_small_capture(capture);
   const auto start = std::chrono::steady_clock::now();
   ASSERT_EQ(exit_code_of(start_cgs(run_arguments(capture, dir / "whole"))), 0);
   const Seconds whole = std::chrono::steady_clock::now() - start;
   const auto expected = test::files_of_run(dir / "whole");
   ASSERT_TRUE(expected.contains("web/asset.glb"));
 
-  const char* const wish = std::getenv("CGS_KILLS");
-  const int kills = wish != nullptr ? std::atoi(wish) : 8;
+  const int kills = wished_kills(8);
   constexpr std::array<int, 4> kSignals = {SIGKILL, SIGINT, SIGKILL, SIGTERM};
   const Arguments arguments = run_arguments(capture, dir / "killed");
   std::mt19937 random(7);

@@ -157,7 +157,7 @@ void add_containers(Kinds& kinds) {
                    "work.checkpoint",
                    [](Folder folder) { write_checkpoint(folder, "work", 7, "state of work"); },
                    [](Folder folder) {
-                     const auto state = read_checkpoint(folder, "work", 7);
+                     const auto state = read_checkpoint(folder, "work", 7).state;
                      require(!state || *state == "state of work", "a damaged state was taken");
                    }});
   const auto read_network = [](const fs::path& file) {

@@ -2,6 +2,7 @@
 #include "io/checkpoint.h"
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -12,8 +13,17 @@
 
 namespace {
 
-using cgs::read_checkpoint;
 using cgs::write_checkpoint;
+
+std::optional<std::string> read_checkpoint(const std::filesystem::path& folder,
+                                           const std::string& name,
+                                           uint64_t belongs_to) {
+  return cgs::read_checkpoint(folder, name, belongs_to).state;
+}
+
+std::string warning(const cgs::test::TempDir& folder) {
+  return cgs::read_checkpoint(folder.path(), "work", 7).warning;
+}
 
 TEST(Checkpoint, GivesBackTheNewestState) {
   const cgs::test::TempDir folder;
@@ -28,6 +38,22 @@ TEST(Checkpoint, OfOtherWorkIsNotUsed) {
   const cgs::test::TempDir folder;
   write_checkpoint(folder.path(), "work", 7, "one");
   EXPECT_FALSE(read_checkpoint(folder.path(), "work", 8));
+  EXPECT_EQ(cgs::read_checkpoint(folder.path(), "work", 8).warning, "");
+}
+
+TEST(Checkpoint, DamageIsTold) {
+  const cgs::test::TempDir folder;
+  EXPECT_EQ(warning(folder), "");
+  write_checkpoint(folder.path(), "work", 7, "first state");
+  EXPECT_EQ(warning(folder), "");
+  const std::filesystem::path newest = folder.path() / "work.checkpoint";
+  cgs::write_file(newest, "CGSCKPT2" + cgs::read_file(newest).substr(8));
+  EXPECT_NE(warning(folder).find("this version"), std::string::npos) << warning(folder);
+  EXPECT_NE(warning(folder).find("starting anew"), std::string::npos) << warning(folder);
+  write_checkpoint(folder.path(), "work", 7, "second state");
+  EXPECT_EQ(warning(folder), "");  // the damaged one is older
+  cgs::write_file(newest, "CGS");
+  EXPECT_NE(warning(folder).find("work.checkpoint: "), std::string::npos) << warning(folder);
 }
 
 TEST(Checkpoint, EveryDamageFallsBackToTheOneBefore) {

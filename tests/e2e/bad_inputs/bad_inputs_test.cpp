@@ -67,6 +67,9 @@ TEST(BadInputs, Surveys) { expect_all_right(survey_cases()); }
 TEST(BadInputs, Exr) { expect_all_right(exr_cases()); }
 TEST(BadInputs, Volumes) { expect_all_right(volume_cases()); }
 TEST(BadInputs, Outputs) { expect_all_right(output_cases()); }
+TEST(BadInputs, Meshes) { expect_all_right(mesh_cases()); }
+TEST(BadInputs, Depth) { expect_all_right(depth_cases()); }
+TEST(BadInputs, Checkpoints) { expect_all_right(checkpoint_cases()); }
 
 // Rows per kind of input, as the matrix numbers them.
 TEST(BadInputs, EveryRowIsTriedOrLeftOutForAReason) {
@@ -95,7 +98,10 @@ TEST(BadInputs, EveryRowIsTriedOrLeftOutForAReason) {
                             survey_cases,
                             exr_cases,
                             volume_cases,
-                            output_cases}) {
+                            output_cases,
+                            mesh_cases,
+                            depth_cases,
+                            checkpoint_cases}) {
     for (const Case& bad : cases()) tried.insert(bad.row);
   }
   std::set<std::string> left_out;

@@ -40,6 +40,9 @@ Cases survey_cases();      ///< S: tables of control points
 Cases exr_cases();         ///< X
 Cases volume_cases();      ///< V
 Cases output_cases();      ///< E: the environment, and files a run left behind
+Cases mesh_cases();        ///< B, M: glTF, STL, OBJ, 3MF
+Cases depth_cases();       ///< D: depth files; masks
+Cases checkpoint_cases();  ///< K: the state of unfinished work
 
 /// Rows of the matrix that nothing here can meet yet, with the reason.
 struct LeftOut {

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+namespace cgs {
+
+// Sections of report.html as HTML, made from the content of report.json: where the scene lies.
+// Empty where a run has nothing to say on it.
+
+/// How far cameras were moved, if they were refined.
+std::string refinement_section(const nlohmann::ordered_json& report);
+
+/// Where the scale came from, if from known distances or control points.
+std::string scale_section(const nlohmann::ordered_json& report);
+
+}  // namespace cgs

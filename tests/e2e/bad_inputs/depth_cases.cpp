@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <limits>
+
+#include "tests/e2e/bad_inputs/valid_inputs.h"
+#include "tests/support/zip_bytes.h"
+
+namespace cgs::test {
+
+namespace {
+
+/// A picture of one number per pixel.
+using Values = std::function<double(int x, int y)>;
+
+std::string npy_depth(const Values& value, int width = kWidth, int height = kHeight) {
+  std::string data;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) data += packed(static_cast<float>(value(x, y)));
+  }
+  return npy("<f4", "(" + std::to_string(height) + ", " + std::to_string(width) + ")", data);
+}
+
+std::string png16_depth(const Values& value) {
+  std::vector<std::string> rows;
+  for (int y = 0; y < kHeight; ++y) {
+    std::string row;
+    for (int x = 0; x < kWidth; ++x) {
+      const auto level = static_cast<unsigned>(value(x, y));
+      row += {static_cast<char>(level >> 8), static_cast<char>(level & 0xFF)};
+    }
+    rows.push_back(row);
+  }
+  return png(kWidth, rows, {.color_type = 0, .bit_depth = 16});
+}
+
+/// The same file as the depth of every photograph, in the folder "depth" that the program is told
+/// of.
+Case depth_case(const std::string& row,
+                const std::string& damage,
+                const std::string& expected,
+                const std::string& extension,
+                const std::string& bytes,
+                const std::vector<std::string>& options = {}) {
+  return {row, damage, expected, {}, [=](const fs::path& folder) {
+            write_transforms_scene(folder);
+            for (const char* name : {"0", "1", "2"}) {
+              write_bytes(folder / "depth" / (name + extension), bytes);
+            }
+            Call call = train_call(folder);
+            const std::vector<std::string> told = {
+                "--set", "steps=0", "--depth", (folder / "depth").string()};
+            call.arguments.insert(call.arguments.end(), told.begin(), told.end());
+            call.arguments.insert(call.arguments.end(), options.begin(), options.end());
+            return call;
+          }};
+}
+
+// The pictures show what is 1.5 units away.
+double plane(int /*x*/, int /*y*/) { return 1.5; }
+
+void add_values(Cases& cases) {
+  const auto nothing = [](int, int) { return 0.0; };
+  cases.push_back(depth_case("D01", "no depth anywhere", "OK+W", ".png", png16_depth(nothing)));
+  cases.push_back(depth_case(
+      "D02", "whole numbers count as millimetres", "OK|OK+W", ".png", png16_depth([](int, int) {
+        return 1500.0;
+      })));
+  const auto holed = [](double odd) {
+    return [odd](int x, int y) { return x % 4 == 0 ? odd : plane(x, y); };
+  };
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  for (const double odd : {-1.0, kNone, kFar, -kFar, 1e30, 1e-30}) {
+    cases.push_back(depth_case("D03",
+                               "every fourth column is " + std::to_string(odd),
+                               "OK|OK+W",
+                               ".npy",
+                               npy_depth(holed(odd)),
+                               {"--depth-kind", "metric"}));
+  }
+  cases.push_back(depth_case(
+      "D03", "every fourth column is 65535", "OK|OK+W", ".png", png16_depth([](int x, int) {
+        return x % 4 == 0 ? 65535.0 : 1500.0;
+      })));
+  for (const double odd : {0.0, -2.0}) {
+    cases.push_back(depth_case("D04",
+                               "every fourth disparity is " + std::to_string(odd),
+                               "OK|OK+W",
+                               ".npy",
+                               npy_depth(holed(odd)),
+                               {"--depth-kind", "disparity"}));
+  }
+}
+
+void add_sizes(Cases& cases) {
+  cases.push_back(depth_case(
+      "D05", "half the size", "OK|OK+W", ".npy", npy_depth(plane, kWidth / 2, kHeight / 2)));
+  cases.push_back(depth_case(
+      "D05", "another shape", "MISMATCH", ".npy", npy_depth(plane, kHeight, kWidth / 2)));
+  cases.push_back(
+      {"I15", "a mask of another size", "MISMATCH", {"masks"}, [](const fs::path& folder) {
+         write_transforms_scene(folder);
+         write_bytes(folder / "scene/masks/0.png", rgb_png(kWidth, kHeight / 2));
+         return train_call(folder);
+       }});
+}
+
+// Formats of depth that are not read: none of them is opened, whatever is in it.
+void add_other_formats(Cases& cases) {
+  const auto refused = [&](const char* row,
+                           const std::string& damage,
+                           const std::string& extension,
+                           const std::string& bytes) {
+    cases.push_back(depth_case(row, damage, "MISSING|UNSUPPORTED", extension, bytes));
+  };
+  refused("C28", "COLMAP: 99999 x 99999", ".bin", "99999&99999&1&" + std::string(12, '\0'));
+  refused("C29", "COLMAP: no third separator", ".bin", "32&24&1");
+  refused("N11",
+          "NPZ: 100 MB in 100 kB",
+          ".npz",
+          zip_bytes({{"depth.npy", std::string(100 << 20, '\0')}}, {.method = 8}));
+  refused("N12", "NPZ: an unknown method", ".npz", zip_bytes({{"depth.npy", "?"}}, {.method = 12}));
+}
+
+}  // namespace
+
+Cases depth_cases() {
+  Cases cases;
+  add_values(cases);
+  add_sizes(cases);
+  add_other_formats(cases);
+  return cases;
+}
+
+}  // namespace cgs::test
