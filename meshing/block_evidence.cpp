@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/block_evidence.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace cgs {
+
+BlockEvidence::BlockEvidence(bool has_band)
+    : sums_(has_band ? std::make_unique<Sums>() : nullptr) {}
+
+BlockEvidence::Place::Place(const openvdb::Coord& origin, double voxel) {
+  for (int i = 0; i < kBlockSide; ++i) {
+    const auto at = static_cast<size_t>(i);
+    x[at] = static_cast<float>(voxel * (origin.x() + i));
+    y[at] = static_cast<float>(voxel * (origin.y() + i));
+    z[at] = static_cast<float>(voxel * (origin.z() + i));
+  }
+}
+
+Eigen::AlignedBox3f BlockEvidence::Place::box() const {
+  return {Eigen::Vector3f(x.front(), y.front(), z.front()),
+          Eigen::Vector3f(x.back(), y.back(), z.back())};
+}
+
+void BlockEvidence::add(const Place& place, const DepthField& field, const TsdfView& view) {
+  for (size_t i = 0; i < kBlockSide; ++i) {
+    for (size_t j = 0; j < kBlockSide; ++j) {
+      const SightingRow row = field.row(place.x[i], place.y[j], place.z);
+      if ((row.free | row.hidden | row.band) == 0) continue;
+      const size_t first = (i * kBlockSide + j) * kBlockSide;
+      for (unsigned left = row.hidden; left != 0; left &= left - 1) {
+        hidden_.set(first + size_t(std::countr_zero(left)));
+      }
+      for (unsigned left = row.free; left != 0; left &= left - 1) {
+        const auto lane = size_t(std::countr_zero(left));
+        if (row.weight[lane] > 0) free_.set(first + lane);
+        if (sums_) sums_->free_weight[first + lane] += row.weight[lane];
+      }
+      if (row.band != 0 && sums_) add_band(first, row, view);
+    }
+  }
+}
+
+void BlockEvidence::add_band(size_t first, const SightingRow& row, const TsdfView& view) {
+  Sums& s = *sums_;
+  const bool has_color = !view.color.empty();
+  if (row.has_sigma && !sigma_) sigma_ = std::make_unique<SigmaSums>();
+  if (has_color && !color_) color_ = std::make_unique<ColorSums>();
+  for (size_t lane = 0; lane < kBlockSide; ++lane) {  // others have weight and distance 0
+    const size_t n = first + lane;
+    const auto w = double(row.weight_in_band[lane]);
+    const auto d = double(row.distance_in_band[lane]);
+    s.weight[n] += w;
+    s.distance[n] += w * d;
+    if (!row.has_sigma) continue;
+    const auto sigma = double(row.sigma[lane]);
+    sigma_->spread[n] += w * d * d;
+    sigma_->variance[n] += w * w * sigma * sigma;
+  }
+  for (unsigned left = row.band; left != 0; left &= left - 1) {
+    const auto lane = size_t(std::countr_zero(left));
+    const size_t n = first + lane;
+    const int x = row.x[lane];
+    const int y = row.y[lane];
+    const bool is_guess = !view.guessed.empty() && view.guessed(x, y) != 0;
+    s.count[n] = static_cast<uint16_t>(s.count[n] + 1);
+    if (!view.is_virtual && !is_guess) s.known[n] = static_cast<uint16_t>(s.known[n] + 1);
+    if (is_guess) s.is_guessed[n] = 1;
+    if (!row.has_sigma || !(row.sigma[lane] > 0)) s.lacks_sigma[n] = 1;
+    if (!has_color) continue;
+    const auto w = double(row.weight_in_band[lane]);
+    const Eigen::Vector3f& c = view.color(x, y);
+    color_->weight[n] += w;
+    for (size_t k = 0; k < 3; ++k) color_->color[k][n] += w * double(c[Eigen::Index(k)]);
+  }
+}
+
+void BlockEvidence::add_whole(Sight sight) {
+  if (sight == Sight::Hidden) hidden_.set();
+  if (sight == Sight::Free) free_.set();
+}
+
+BlockEvidence::Voxel BlockEvidence::operator[](size_t n) const {
+  Voxel out;
+  out.free = free_[n];
+  out.hidden = hidden_[n];
+  if (!sums_) return out;
+  out.weight = sums_->weight[n];
+  out.distance = sums_->distance[n];
+  out.free_weight = sums_->free_weight[n];
+  out.count = sums_->count[n];
+  out.known = sums_->known[n];
+  out.is_guessed = sums_->is_guessed[n] != 0;
+  out.has_sigma = sums_->lacks_sigma[n] == 0;
+  if (sigma_) {
+    out.spread = sigma_->spread[n];
+    out.variance = sigma_->variance[n];
+  }
+  if (color_) {
+    out.color_weight = color_->weight[n];
+    for (size_t k = 0; k < 3; ++k) out.color[Eigen::Index(k)] = color_->color[k][n];
+  }
+  return out;
+}
+
+void BlockEvidence::clear() {
+  free_.reset();
+  hidden_.reset();
+  if (sums_) *sums_ = {};
+  if (sigma_) *sigma_ = {};
+  if (color_) *color_ = {};
+}
+
+float BlockEvidence::Voxel::support() const {
+  return static_cast<float>(std::max(known, is_guessed ? 1 : 0));
+}
+
+double BlockEvidence::Voxel::sigma() const {
+  const double promised = variance / (weight * weight);
+  if (count < 2) return std::sqrt(promised);
+  const double between = std::max(0.0, spread / weight - mean() * mean());
+  return std::sqrt(std::max(promised, between / (count - 1)));
+}
+
+}  // namespace cgs
