@@ -19,28 +19,43 @@ BlockEvidence::Place::Place(const openvdb::Coord& origin, double voxel) {
   }
 }
 
-Eigen::AlignedBox3f BlockEvidence::Place::box() const {
-  return {Eigen::Vector3f(x.front(), y.front(), z.front()),
-          Eigen::Vector3f(x.back(), y.back(), z.back())};
+Eigen::AlignedBox3f BlockEvidence::Place::box(size_t i, size_t j, size_t count) const {
+  return {Eigen::Vector3f(x[i], y[j], z.front()),
+          Eigen::Vector3f(x[i + count - 1], y[j + count - 1], z.back())};
 }
 
 void BlockEvidence::add(const Place& place, const DepthField& field, const TsdfView& view) {
-  for (size_t i = 0; i < kBlockSide; ++i) {
-    for (size_t j = 0; j < kBlockSide; ++j) {
-      const SightingRow row = field.row(place.x[i], place.y[j], place.z);
-      if ((row.free | row.hidden | row.band) == 0) continue;
-      const size_t first = (i * kBlockSide + j) * kBlockSide;
-      for (unsigned left = row.hidden; left != 0; left &= left - 1) {
-        hidden_.set(first + size_t(std::countr_zero(left)));
+  constexpr size_t kPart = 4;  // Rows are looked into in parts of 4 x 4.
+  for (size_t part = 0; part < 4; ++part) {
+    const size_t x = part / 2 * kPart;
+    const size_t y = part % 2 * kPart;
+    const Sight sight = field.look(place.box(x, y, kPart)).sight;
+    if (sight == Sight::Nothing) continue;
+    for (size_t i = x; i < x + kPart; ++i) {
+      for (size_t j = y; j < y + kPart; ++j) {
+        const size_t row = i * kBlockSide + j;
+        if (sight == Sight::Hidden) {
+          hidden_[row] = 0xff;
+        } else if (sight == Sight::Free && !sums_) {
+          free_[row] = 0xff;
+        } else {
+          add_row(row, field.row(place.x[i], place.y[j], place.z), view);
+        }
       }
-      for (unsigned left = row.free; left != 0; left &= left - 1) {
-        const auto lane = size_t(std::countr_zero(left));
-        if (row.weight[lane] > 0) free_.set(first + lane);
-        if (sums_) sums_->free_weight[first + lane] += row.weight[lane];
-      }
-      if (row.band != 0 && sums_) add_band(first, row, view);
     }
   }
+}
+
+void BlockEvidence::add_row(size_t row, const SightingRow& sightings, const TsdfView& view) {
+  hidden_[row] = static_cast<uint8_t>(hidden_[row] | sightings.hidden);
+  free_[row] = static_cast<uint8_t>(free_[row] | sightings.free);
+  if (!sums_) return;
+  const size_t first = row * kBlockSide;
+  for (unsigned left = sightings.free; left != 0; left &= left - 1) {
+    const auto lane = size_t(std::countr_zero(left));
+    sums_->free_weight[first + lane] += sightings.weight[lane];
+  }
+  if (sightings.band != 0) add_band(first, sightings, view);
 }
 
 void BlockEvidence::add_band(size_t first, const SightingRow& row, const TsdfView& view) {
@@ -77,15 +92,19 @@ void BlockEvidence::add_band(size_t first, const SightingRow& row, const TsdfVie
   }
 }
 
+bool BlockEvidence::is_settled() const {
+  return !sums_ && std::all_of(free_.begin(), free_.end(), [](uint8_t row) { return row == 0xff; });
+}
+
 void BlockEvidence::add_whole(Sight sight) {
-  if (sight == Sight::Hidden) hidden_.set();
-  if (sight == Sight::Free) free_.set();
+  if (sight == Sight::Hidden) hidden_.fill(0xff);
+  if (sight == Sight::Free) free_.fill(0xff);
 }
 
 BlockEvidence::Voxel BlockEvidence::operator[](size_t n) const {
   Voxel out;
-  out.free = free_[n];
-  out.hidden = hidden_[n];
+  out.free = (free_[n / kBlockSide] >> n % kBlockSide & 1) != 0;
+  out.hidden = (hidden_[n / kBlockSide] >> n % kBlockSide & 1) != 0;
   if (!sums_) return out;
   out.weight = sums_->weight[n];
   out.distance = sums_->distance[n];
@@ -106,8 +125,8 @@ BlockEvidence::Voxel BlockEvidence::operator[](size_t n) const {
 }
 
 void BlockEvidence::clear() {
-  free_.reset();
-  hidden_.reset();
+  free_ = {};
+  hidden_ = {};
   if (sums_) *sums_ = {};
   if (sigma_) *sigma_ = {};
   if (color_) *color_ = {};

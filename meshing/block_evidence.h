@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -29,7 +28,8 @@ class BlockEvidence {
   /// Coordinates of the voxel centres of a block [internal units].
   struct Place {
     Place(const openvdb::Coord& origin, double voxel);
-    Eigen::AlignedBox3f box() const;
+    /// What holds `count` rows of rows of voxels from (x, y) on.
+    Eigen::AlignedBox3f box(size_t x = 0, size_t y = 0, size_t count = kBlockSide) const;
     std::array<float, kBlockSide> x, y, z;
   };
 
@@ -40,7 +40,7 @@ class BlockEvidence {
 
   bool has_band() const { return sums_ != nullptr; }
   /// True if nothing can change any more: without band, and free all over.
-  bool is_settled() const { return !sums_ && free_.all(); }
+  bool is_settled() const;
 
   /// Everything known about a voxel.
   struct Voxel {
@@ -80,9 +80,11 @@ class BlockEvidence {
     std::array<Doubles, 3> color = {};
   };
 
+  void add_row(size_t row, const SightingRow& sightings, const TsdfView& view);
   void add_band(size_t first, const SightingRow& row, const TsdfView& view);
 
-  std::bitset<kBlockVoxels> free_, hidden_;
+  // A bit per voxel, a byte per row of them.
+  std::array<uint8_t, kBlockSide*kBlockSide> free_ = {}, hidden_ = {};
   std::unique_ptr<Sums> sums_;
   std::unique_ptr<SigmaSums> sigma_;  // null until a view has a sigma
   std::unique_ptr<ColorSums> color_;  // null until a view has colour

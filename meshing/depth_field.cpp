@@ -54,17 +54,6 @@ Floats gathered(const float* values, Ints index, Ints mask) {
                                   sizeof(float));
 }
 
-// True where the mask is set and the raster is not 0 there. Reads three bytes further.
-Ints gathered_set(const Raster<uint8_t>& raster, Ints index, Ints mask) {
-  const __m256i words =
-      _mm256_mask_i32gather_epi32(_mm256_setzero_si256(),
-                                  reinterpret_cast<const int*>(raster.data.data()),
-                                  std::bit_cast<__m256i>(index),
-                                  std::bit_cast<__m256i>(mask),
-                                  1);
-  return (std::bit_cast<Ints>(words) & 0xff) != 0;
-}
-
 float least(Floats values) {
   const __m128 four = _mm_min_ps(_mm256_castps256_ps128(values), _mm256_extractf128_ps(values, 1));
   const __m128 two = _mm_min_ps(four, _mm_movehl_ps(four, four));
@@ -196,25 +185,26 @@ DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double 
       height_(view.camera.height),
       truncation_(static_cast<float>(options.truncation * voxel)),
       voxel_(static_cast<float>(voxel)),
-      depth_(usable_depth(view, options.depth_trunc)),
-      slope_(width_, height_, 1),
-      weight_(width_, height_, 1) {
-  drop_hanging_pixels(depth_, continuous_quads(depth_, view.camera));
-  continuous_ = continuous_quads(depth_, view.camera);
-  continuous_.data.resize(continuous_.data.size() + 3);  // for gathered_set()
-  hides_ = with_gaps_filled(depth_, options.gap_pixels * options.gap_pixels);
+      pixels_(width_, height_, {kNaN, 1, 1, kNaN}) {
+  DepthMap depth = usable_depth(view, options.depth_trunc);
+  drop_hanging_pixels(depth, continuous_quads(depth, view.camera));
+  const Raster<uint8_t> continuous = continuous_quads(depth, view.camera);
+  const DepthMap hides = with_gaps_filled(depth, options.gap_pixels * options.gap_pixels);
   if (!view.sigma.empty()) sigma_ = DepthMap(width_, height_, 0);
-
-  const NormalMap normals = normals_from_depth(depth_, view.camera);
-  build_pyramid(look_along(view, normals));
+  build_pyramid(depth, hides, look_along(view, depth));
+  for (size_t i = 0; i < pixels_.data.size(); ++i) {
+    pixels_.data[i].depth = continuous.data[i] != 0 ? -depth.data[i] : depth.data[i];
+    pixels_.data[i].hides = hides.data[i];
+  }
 }
 
 // Mean normals over 5 x 5 pixels of similar depth: the factors made from them must vary slowly, or
 // they would move the zero crossing between voxels of different pixels.
-Raster<float> DepthField::look_along(const TsdfView& view, const NormalMap& normals) {
+Raster<float> DepthField::look_along(const TsdfView& view, const DepthMap& depth) {
   constexpr int kRadius = 2;
   constexpr float kSameSurface = 0.03f;
-  const Raster<float> depth = with_margin(depth_, kRadius);
+  const NormalMap normals = normals_from_depth(depth, view.camera);
+  const Raster<float> padded = with_margin(depth, kRadius);
   std::array<Raster<float>, 3> normal;
   for (size_t k = 0; k < 3; ++k) {
     Raster<float> one(width_, height_, 0);
@@ -229,12 +219,12 @@ Raster<float> DepthField::look_along(const TsdfView& view, const NormalMap& norm
   tbb::parallel_for(0, height_, [&](int y) {
     const auto down = static_cast<float>(view.camera.ray_in_cam(0, y + 0.5).y());
     for (int x = 0; x < width_; x += kLanes) {
-      const auto here = load<Floats>(&depth(x + kRadius, y + kRadius));
+      const auto here = load<Floats>(&padded(x + kRadius, y + kRadius));
       const Ints known = here - here == 0.0f;
       std::array<Floats, 3> sum = {};
       for (int v = y; any(known) && v <= y + 2 * kRadius; ++v) {
         for (int u = x; u <= x + 2 * kRadius; ++u) {
-          const Ints same = magnitude(load<Floats>(&depth(u, v)) - here) <= kSameSurface * here;
+          const Ints same = magnitude(load<Floats>(&padded(u, v)) - here) <= kSameSurface * here;
           for (size_t k = 0; k < 3; ++k) {
             sum[k] += select(same, load<Floats>(&normal[k](u, v)), Floats{});
           }
@@ -260,17 +250,14 @@ Raster<float> DepthField::look_along(const TsdfView& view, const NormalMap& norm
         sigma = select(values > 0.0f, values * slope, Floats{});
       }
       const Floats noise = sigma / voxel_;
-      const auto put = [&](Floats values, Raster<float>& raster) {
-        if (x + kLanes <= width_) {
-          store(values, &raster(x, y));
-        } else {
-          std::memcpy(&raster(x, y), &values, sizeof(float) * size_t(width_ - x));
-        }
-      };
-      put(slope, slope_);
-      put(facing * facing / (1.0f + noise * noise), weight_);
-      put(max(Floats{} + truncation_, 3.0f * sigma) / slope, slack);
-      if (!sigma_.empty()) put(sigma, sigma_);
+      const Floats weight = facing * facing / (1.0f + noise * noise);
+      const Floats limit = max(Floats{} + truncation_, 3.0f * sigma) / slope;
+      for (int k = 0; k < std::min(kLanes, width_ - x); ++k) {
+        pixels_(x + k, y).slope = slope[k];
+        pixels_(x + k, y).weight = weight[k];
+        slack(x + k, y) = limit[k];
+        if (!sigma_.empty()) sigma_(x + k, y) = sigma[k];
+      }
     }
   });
   return slack;
@@ -284,15 +271,17 @@ void DepthField::Extremes::add(const Extremes& other) {
   any_unknown |= other.any_unknown;
 }
 
-void DepthField::build_pyramid(const Raster<float>& slack) {
+void DepthField::build_pyramid(const DepthMap& depth,
+                               const DepthMap& hides,
+                               const Raster<float>& slack) {
   Level finest((width_ + 1) / 2, (height_ + 1) / 2, kNoExtremes);
   tbb::parallel_for(0, finest.height, [&](int row) {
     for (int y = 2 * row; y < std::min(2 * row + 2, height_); ++y) {
       for (int x = 0; x < width_; ++x) {
         Extremes& to = finest(x / 2, row);
-        const float d = depth_(x, y);
+        const float d = depth(x, y);
         to.slack = std::max(to.slack, slack(x, y));
-        to.any_known |= std::isfinite(hides_(x, y));
+        to.any_known |= std::isfinite(hides(x, y));
         if (std::isfinite(d)) {
           to.nearest = std::min(to.nearest, d);
           to.farthest = std::max(to.farthest, d);
@@ -316,7 +305,7 @@ void DepthField::build_pyramid(const Raster<float>& slack) {
 bool DepthField::shows_one_surface(float u, float v) const {
   const int x0 = static_cast<int>(std::floor(u - 0.5f));
   const int y0 = static_cast<int>(std::floor(v - 0.5f));
-  return continuous_.contains(x0, y0) && continuous_(x0, y0) != 0;
+  return pixels_.contains(x0, y0) && pixels_(x0, y0).depth < 0;
 }
 
 float DepthField::interpolated(float u, float v) const {
@@ -326,9 +315,10 @@ float DepthField::interpolated(float u, float v) const {
   const int y0 = static_cast<int>(std::floor(fv));
   const float a = fu - static_cast<float>(x0);
   const float b = fv - static_cast<float>(y0);
+  const auto depth = [&](int x, int y) { return std::abs(pixels_(x, y).depth); };
   // Inverse depth is linear in pixel coordinates on a plane, depth is not.
-  const float top = (1 - a) / depth_(x0, y0) + a / depth_(x0 + 1, y0);
-  const float bottom = (1 - a) / depth_(x0, y0 + 1) + a / depth_(x0 + 1, y0 + 1);
+  const float top = (1 - a) / depth(x0, y0) + a / depth(x0 + 1, y0);
+  const float bottom = (1 - a) / depth(x0, y0 + 1) + a / depth(x0 + 1, y0 + 1);
   return 1 / ((1 - b) * top + b * bottom);
 }
 
@@ -344,16 +334,17 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   out.x = static_cast<int>(u);
   out.y = static_cast<int>(v);
   const bool one_surface = shows_one_surface(u, v);
-  const float d = one_surface ? interpolated(u, v) : depth_(out.x, out.y);
+  const Pixel& pixel = pixels_(out.x, out.y);
+  const float d = one_surface ? interpolated(u, v) : std::abs(pixel.depth);
   if (!std::isfinite(d)) {
-    if (p.z() > hides_(out.x, out.y)) out.sight = Sight::Hidden;
+    if (p.z() > pixel.hides) out.sight = Sight::Hidden;
     return out;
   }
   if (!sigma_.empty()) out.sigma = sigma_(out.x, out.y);
-  out.distance = (d - p.z()) * slope_(out.x, out.y);
+  out.distance = (d - p.z()) * pixel.slope;
   const float wanted = std::max(truncation_, 3 * out.sigma);
   const float band = std::min(wanted, kMaxBandGrowth * truncation_);
-  out.weight = weight_(out.x, out.y);
+  out.weight = pixel.weight;
   // Half a pixel from an occlusion edge either surface may be the true one.
   if (!one_surface) out.weight *= kEdgeWeight;
   if (out.distance > wanted) {
@@ -383,31 +374,39 @@ SightingRow DepthField::row(float x, float y, const std::array<float, 8>& z) con
   const Ints px = __builtin_convertvector(select(inside, u, Floats{}), Ints);
   const Ints py = __builtin_convertvector(select(inside, v, Floats{}), Ints);
   const Ints pixel = py * width_ + px;
+  static_assert(sizeof(Pixel) == 4 * sizeof(float));
+  const auto of_pixel = [&](const float& member, Ints index, Ints mask) {
+    return gathered(&member, index * 4, mask);
+  };
+  const Pixel& first = pixels_.data.front();
 
   const Floats left = _mm256_floor_ps(u - 0.5f);
   const Floats top = _mm256_floor_ps(v - 0.5f);
   const Ints has_quad = inside & (left >= 0.0f) & (top >= 0.0f);
   const Ints corner = __builtin_convertvector(select(has_quad, top, Floats{}), Ints) * width_ +
                       __builtin_convertvector(select(has_quad, left, Floats{}), Ints);
-  const Ints one_surface = has_quad & gathered_set(continuous_, corner, has_quad);
+  const Floats at_corner = of_pixel(first.depth, corner, has_quad);
+  const Ints one_surface = has_quad & (at_corner < 0.0f);
   const Floats a = (u - 0.5f) - left;
   const Floats b = (v - 0.5f) - top;
   const auto at_quad = [&](int offset) {
-    return gathered(depth_.data.data() + offset, corner, one_surface);
+    return magnitude(of_pixel(first.depth, corner + offset, one_surface));
   };
-  const Floats above = (1.0f - a) / at_quad(0) + a / at_quad(1);
+  const Floats above = (1.0f - a) / magnitude(at_corner) + a / at_quad(1);
   const Floats below = (1.0f - a) / at_quad(width_) + a / at_quad(width_ + 1);
   const Floats between = 1.0f / ((1.0f - b) * above + b * below);
-  const Floats nearest = gathered(depth_.data.data(), pixel, inside & ~one_surface);
-  const Floats d = select(one_surface, between, nearest);
+  Floats d = between;
+  if (const Ints other = inside & ~one_surface; any(other)) {
+    d = select(other, magnitude(of_pixel(first.depth, pixel, other)), d);
+  }
   const Ints known = inside & (d - d == 0.0f);
   const Ints unknown = inside & ~known;
   if (any(unknown)) {
-    out.hidden = bits(unknown & (depth > gathered(hides_.data.data(), pixel, unknown)));
+    out.hidden = bits(unknown & (depth > of_pixel(first.hides, pixel, unknown)));
   }
   if (!any(known)) return out;
 
-  const Floats distance = (d - depth) * gathered(slope_.data.data(), pixel, known);
+  const Floats distance = (d - depth) * of_pixel(first.slope, pixel, known);
   out.has_sigma = !sigma_.empty();
   const Floats sigma = out.has_sigma ? gathered(sigma_.data.data(), pixel, known) : Floats{};
   const Floats wanted = max(Floats{} + truncation_, 3.0f * sigma);
@@ -415,13 +414,14 @@ SightingRow DepthField::row(float x, float y, const std::array<float, 8>& z) con
   const Ints is_free = known & (distance > wanted);
   const Ints is_hidden = known & (distance < -band);
   const Ints in_band = known & (distance >= -band) & (distance <= band);
-  out.free = bits(is_free);
+  out.free = bits(is_free);  // as far as seen so far
   out.hidden |= bits(is_hidden);
   out.band = bits(in_band);
   if ((out.free | out.band) == 0) return out;
 
-  Floats weight = gathered(weight_.data.data(), pixel, known);
+  Floats weight = of_pixel(first.weight, pixel, known);
   weight = select(one_surface, weight, weight * kEdgeWeight);
+  out.free &= bits(weight > 0.0f);
   store(weight, out.weight.data());
   if (out.band == 0) return out;
   const Floats behind = -distance - voxel_;
@@ -437,7 +437,7 @@ SightingRow DepthField::row(float x, float y, const std::array<float, 8>& z) con
 
 DepthField::Extremes DepthField::over_pixels(int x0, int y0, int x1, int y1) const {
   size_t k = 0;
-  while (k + 1 < pyramid_.size() && std::max(x1 - x0, y1 - y0) >> (k + 1) > 2) ++k;
+  while (k + 1 < pyramid_.size() && std::max(x1 - x0, y1 - y0) >> (k + 1) > 3) ++k;
   const Level& level = pyramid_[k];
   Extremes out = kNoExtremes;
   for (int y = y0 >> (k + 1); y <= y1 >> (k + 1); ++y) {

@@ -31,7 +31,8 @@ struct Sighting {
 
 /// Sightings of eight points in a row; a bit per point says what it is.
 struct SightingRow {
-  unsigned free = 0, band = 0, hidden = 0;
+  unsigned free = 0;  ///< Where the weight is above 0.
+  unsigned band = 0, hidden = 0;
   bool has_sigma = false;  ///< False where sigma is 0 throughout.
   alignas(32) std::array<float, 8> weight;
   alignas(32) std::array<float, 8> weight_in_band;    ///< 0 where the point is not.
@@ -80,9 +81,18 @@ class DepthField {
                                            false,
                                            false};
 
+  // What is asked of a pixel, in one place of memory.
+  struct Pixel {
+    float depth;   // NaN where not usable; negative where the 2 x 2 pixels from here on show one
+                   // surface
+    float slope;   // distance to the surface per z-distance
+    float weight;  // of one surface, not behind it
+    float hides;   // depth with its small gaps filled
+  };
+
   // Sets slope, weight and sigma. \return the slack of Extremes of every pixel
-  Raster<float> look_along(const TsdfView& view, const NormalMap& normals);
-  void build_pyramid(const Raster<float>& slack);
+  Raster<float> look_along(const TsdfView& view, const DepthMap& depth);
+  void build_pyramid(const DepthMap& depth, const DepthMap& hides, const Raster<float>& slack);
 
   bool shows_one_surface(float u, float v) const;
   float interpolated(float u, float v) const;
@@ -92,14 +102,10 @@ class DepthField {
   Eigen::Vector3f t_;
   float fx_, fy_, cx_, cy_;
   int width_, height_;
-  float truncation_;      // [internal units]
-  float voxel_;           // [internal units]
-  DepthMap depth_;        // NaN where not usable
-  DepthMap hides_;        // depth_ with its small gaps filled
-  Raster<float> slope_;   // distance to the surface per z-distance
-  Raster<float> weight_;  // of one surface, not behind it
-  DepthMap sigma_;        // of distance [internal units], 0 = not known; empty = nowhere known
-  Raster<uint8_t> continuous_;  // 1 where the 2 x 2 pixels from (x, y) on show one surface
+  float truncation_;  // [internal units]
+  float voxel_;       // [internal units]
+  Raster<Pixel> pixels_;
+  DepthMap sigma_;  // of distance [internal units], 0 = not known; empty = nowhere known
   std::vector<Level> pyramid_;  // from 2 x 2 pixels on
 };
 

@@ -11,9 +11,9 @@
 #include <numbers>
 #include <string>
 
+#include <sys/resource.h>
 #include <tbb/parallel_for.h>
 
-#include "convert/terminal.h"
 #include "io/mesh_file.h"
 #include "io/mesh_ply.h"
 #include "meshing/components.h"
@@ -84,6 +84,12 @@ class Stopwatch {
   std::clock_t cpu_start_ = std::clock();
 };
 
+size_t peak_mebibytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<size_t>(usage.ru_maxrss) >> 10;
+}
+
 // Frames are read when they are asked for, as a user's are.
 TsdfView read_frame(const std::filesystem::path& folder, size_t i) {
   TsdfView view;
@@ -112,7 +118,7 @@ void fuse_frames(const std::filesystem::path& folder, double voxel, size_t view_
               fusing_cpu,
               extracting.wall(),
               extracting.cpu(),
-              peak_memory() >> 20,
+              peak_mebibytes(),
               mesh.faces.size(),
               fused.report.portions,
               fused.report.predicted_bytes >> 20);
