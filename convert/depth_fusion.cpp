@@ -113,7 +113,7 @@ class Frames {
 
 // The frame that shows much of what another does, from as far off as possible; itself if none does.
 size_t partner_of(const Scene& scene, size_t i) {
-  constexpr double kSameDirection = 0.7;  // cosine
+  constexpr double kSameDirection = 0.5;  // cosine
   const auto camera = [&](size_t k) -> const Camera& {
     return scene.views[static_cast<size_t>(scene.input[k])].camera;
   };

@@ -8,7 +8,7 @@
 namespace cgs {
 
 BlockEvidence::BlockEvidence(bool has_band)
-    : sums_(has_band ? std::make_unique<Sums>() : nullptr) {}
+    : free_weight_(has_band ? std::make_unique<std::array<float, kBlockVoxels>>() : nullptr) {}
 
 BlockEvidence::Place::Place(const openvdb::Coord& origin, double voxel) {
   for (int i = 0; i < kBlockSide; ++i) {
@@ -36,7 +36,7 @@ void BlockEvidence::add(const Place& place, const DepthField& field, const TsdfV
         const size_t row = i * kBlockSide + j;
         if (sight == Sight::Hidden) {
           hidden_[row] = 0xff;
-        } else if (sight == Sight::Free && !sums_) {
+        } else if (sight == Sight::Free && !has_band()) {
           free_[row] = 0xff;
         } else {
           add_row(row, field.row(place.x[i], place.y[j], place.z), view);
@@ -49,16 +49,17 @@ void BlockEvidence::add(const Place& place, const DepthField& field, const TsdfV
 void BlockEvidence::add_row(size_t row, const SightingRow& sightings, const TsdfView& view) {
   hidden_[row] = static_cast<uint8_t>(hidden_[row] | sightings.hidden);
   free_[row] = static_cast<uint8_t>(free_[row] | sightings.free);
-  if (!sums_) return;
+  if (!has_band()) return;
   const size_t first = row * kBlockSide;
   for (unsigned left = sightings.free; left != 0; left &= left - 1) {
     const auto lane = size_t(std::countr_zero(left));
-    sums_->free_weight[first + lane] += sightings.weight[lane];
+    (*free_weight_)[first + lane] += sightings.weight[lane];
   }
   if (sightings.band != 0) add_band(first, sightings, view);
 }
 
 void BlockEvidence::add_band(size_t first, const SightingRow& row, const TsdfView& view) {
+  if (!sums_) sums_ = std::make_unique<Sums>();
   Sums& s = *sums_;
   const bool has_color = !view.color.empty();
   if (row.has_sigma && !sigma_) sigma_ = std::make_unique<SigmaSums>();
@@ -93,7 +94,8 @@ void BlockEvidence::add_band(size_t first, const SightingRow& row, const TsdfVie
 }
 
 bool BlockEvidence::is_settled() const {
-  return !sums_ && std::all_of(free_.begin(), free_.end(), [](uint8_t row) { return row == 0xff; });
+  return !has_band() &&
+         std::all_of(free_.begin(), free_.end(), [](uint8_t row) { return row == 0xff; });
 }
 
 void BlockEvidence::add_whole(Sight sight) {
@@ -105,10 +107,10 @@ BlockEvidence::Voxel BlockEvidence::operator[](size_t n) const {
   Voxel out;
   out.free = (free_[n / kBlockSide] >> n % kBlockSide & 1) != 0;
   out.hidden = (hidden_[n / kBlockSide] >> n % kBlockSide & 1) != 0;
+  if (has_band()) out.free_weight = (*free_weight_)[n];
   if (!sums_) return out;
   out.weight = sums_->weight[n];
   out.distance = sums_->distance[n];
-  out.free_weight = sums_->free_weight[n];
   out.count = sums_->count[n];
   out.known = sums_->known[n];
   out.is_guessed = sums_->is_guessed[n] != 0;
@@ -127,6 +129,7 @@ BlockEvidence::Voxel BlockEvidence::operator[](size_t n) const {
 void BlockEvidence::clear() {
   free_ = {};
   hidden_ = {};
+  if (free_weight_) *free_weight_ = {};
   if (sums_) *sums_ = {};
   if (sigma_) *sigma_ = {};
   if (color_) *color_ = {};

@@ -38,7 +38,7 @@ class BlockEvidence {
   /// The same where the view says one thing about all of it: Hidden, or Free without has_band.
   void add_whole(Sight sight);
 
-  bool has_band() const { return sums_ != nullptr; }
+  bool has_band() const { return free_weight_ != nullptr; }
   /// True if nothing can change any more: without band, and free all over.
   bool is_settled() const;
 
@@ -68,7 +68,6 @@ class BlockEvidence {
   using Doubles = std::array<double, kBlockVoxels>;
   struct Sums {
     Doubles weight = {}, distance = {};
-    std::array<float, kBlockVoxels> free_weight = {};
     std::array<uint16_t, kBlockVoxels> count = {}, known = {};
     std::array<uint8_t, kBlockVoxels> is_guessed = {}, lacks_sigma = {};
   };
@@ -85,14 +84,15 @@ class BlockEvidence {
 
   // A bit per voxel, a byte per row of them.
   std::array<uint8_t, kBlockSide*kBlockSide> free_ = {}, hidden_ = {};
-  std::unique_ptr<Sums> sums_;
+  std::unique_ptr<std::array<float, kBlockVoxels>> free_weight_;  // null without band
+  std::unique_ptr<Sums> sums_;        // null until a voxel is in the band of a view
   std::unique_ptr<SigmaSums> sigma_;  // null until a view has a sigma
   std::unique_ptr<ColorSums> color_;  // null until a view has colour
 
  public:
   /// Memory of one block [bytes].
-  static constexpr size_t kPlainBytes = 2 * kBlockVoxels / 8 + 4 * sizeof(void*);
-  static constexpr size_t kBandBytes = kPlainBytes + sizeof(Sums);
+  static constexpr size_t kPlainBytes = 2 * kBlockVoxels / 8 + 5 * sizeof(void*);
+  static constexpr size_t kBandBytes = kPlainBytes + kBlockVoxels * sizeof(float) + sizeof(Sums);
   static constexpr size_t kSigmaBytes = sizeof(SigmaSums);
   static constexpr size_t kColorBytes = sizeof(ColorSums);
 };
