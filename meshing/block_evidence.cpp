@@ -29,11 +29,16 @@ void BlockEvidence::add(const Place& place, const DepthField& field, const TsdfV
   for (size_t part = 0; part < 4; ++part) {
     const size_t x = part / 2 * kPart;
     const size_t y = part % 2 * kPart;
-    const Sight sight = field.look(place.box(x, y, kPart)).sight;
+    const DepthField::Look look = field.look(place.box(x, y, kPart));
+    const Sight sight = look.sight;
     if (sight == Sight::Nothing) continue;
+    const bool may_hide_only = !look.may_touch && !look.may_free;
     for (size_t i = x; i < x + kPart; ++i) {
       for (size_t j = y; j < y + kPart; ++j) {
         const size_t row = i * kBlockSide + j;
+        // What is free stays so, whatever hides it elsewhere.
+        const int told = may_hide_only ? free_[row] | hidden_[row] : has_band() ? 0 : free_[row];
+        if (told == 0xff) continue;
         if (sight == Sight::Hidden) {
           hidden_[row] = 0xff;
         } else if (sight == Sight::Free && !has_band()) {

@@ -478,7 +478,7 @@ DepthField::Look DepthField::look(const Eigen::AlignedBox3f& box) const {
   const bool is_before = z_max < e.nearest - e.slack;
   const bool is_behind = z_min > e.farthest + e.slack;
   const bool may_touch = !is_before && !is_behind;
-  if (!inside || e.any_unknown) return {Sight::Mixed, may_touch};
+  if (!inside || e.any_unknown) return {Sight::Mixed, may_touch, !is_behind};
   return {is_before ? Sight::Free : is_behind ? Sight::Hidden : Sight::Mixed, may_touch};
 }
 

@@ -57,6 +57,7 @@ class DepthField {
   struct Look {
     Sight sight = Sight::Mixed;  ///< Mixed if that differs or is not cheap to tell.
     bool may_touch = true;       ///< False if no point within the box is in the band.
+    bool may_free = true;        ///< False if none is free.
   };
   Look look(const Eigen::AlignedBox3f& box) const;
 
