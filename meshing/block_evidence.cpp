@@ -7,8 +7,18 @@
 
 namespace cgs {
 
-BlockEvidence::BlockEvidence(bool has_band)
-    : free_weight_(has_band ? std::make_unique<std::array<float, kBlockVoxels>>() : nullptr) {}
+namespace {
+
+constexpr size_t kPartSide = 4;
+
+size_t part_x(size_t part) { return part / 2 * kPartSide; }
+size_t part_y(size_t part) { return part % 2 * kPartSide; }
+
+}  // namespace
+
+BlockEvidence::BlockEvidence(unsigned touched)
+    : touched_(touched),
+      free_weight_(touched != 0 ? std::make_unique<std::array<float, kBlockVoxels>>() : nullptr) {}
 
 BlockEvidence::Place::Place(const openvdb::Coord& origin, double voxel) {
   for (int i = 0; i < kBlockSide; ++i) {
@@ -19,29 +29,33 @@ BlockEvidence::Place::Place(const openvdb::Coord& origin, double voxel) {
   }
 }
 
-Eigen::AlignedBox3f BlockEvidence::Place::box(size_t i, size_t j, size_t count) const {
+Eigen::AlignedBox3f BlockEvidence::Place::box() const {
+  return {Eigen::Vector3f(x.front(), y.front(), z.front()),
+          Eigen::Vector3f(x.back(), y.back(), z.back())};
+}
+
+Eigen::AlignedBox3f BlockEvidence::Place::part_box(size_t part) const {
+  const size_t i = part_x(part);
+  const size_t j = part_y(part);
   return {Eigen::Vector3f(x[i], y[j], z.front()),
-          Eigen::Vector3f(x[i + count - 1], y[j + count - 1], z.back())};
+          Eigen::Vector3f(x[i + kPartSide - 1], y[j + kPartSide - 1], z.back())};
 }
 
 void BlockEvidence::add(const Place& place, const DepthField& field, const TsdfView& view) {
-  constexpr size_t kPart = 4;  // Rows are looked into in parts of 4 x 4.
-  for (size_t part = 0; part < 4; ++part) {
-    const size_t x = part / 2 * kPart;
-    const size_t y = part % 2 * kPart;
-    const DepthField::Look look = field.look(place.box(x, y, kPart));
-    const Sight sight = look.sight;
-    if (sight == Sight::Nothing) continue;
+  for (size_t part = 0; part < kParts; ++part) {
+    const DepthField::Look look = field.look(place.part_box(part));
+    if (look.sight == Sight::Nothing) continue;
     const bool may_hide_only = !look.may_touch && !look.may_free;
-    for (size_t i = x; i < x + kPart; ++i) {
-      for (size_t j = y; j < y + kPart; ++j) {
+    const bool is_touched = (touched_ >> part & 1) != 0;
+    for (size_t i = part_x(part); i < part_x(part) + kPartSide; ++i) {
+      for (size_t j = part_y(part); j < part_y(part) + kPartSide; ++j) {
         const size_t row = i * kBlockSide + j;
         // What is free stays so, whatever hides it elsewhere.
-        const int told = may_hide_only ? free_[row] | hidden_[row] : has_band() ? 0 : free_[row];
+        const int told = may_hide_only ? free_[row] | hidden_[row] : is_touched ? 0 : free_[row];
         if (told == 0xff) continue;
-        if (sight == Sight::Hidden) {
+        if (look.sight == Sight::Hidden) {
           hidden_[row] = 0xff;
-        } else if (sight == Sight::Free && !has_band()) {
+        } else if (look.sight == Sight::Free && !is_touched) {
           free_[row] = 0xff;
         } else {
           add_row(row, field.row(place.x[i], place.y[j], place.z), view);

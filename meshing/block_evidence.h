@@ -19,26 +19,31 @@ inline constexpr int kBlockVoxels = kBlockSide * kBlockSide * kBlockSide;
 /// the same views in the same order give the same bits, however they come in portions.
 class BlockEvidence {
  public:
-  /// \param has_band  false for a block that is near the surface of no view: what is free and
-  ///                  hidden there needs a hundredth of the memory
-  explicit BlockEvidence(bool has_band);
+  /// A quarter of a block: 4 x 4 rows of voxels.
+  static constexpr size_t kParts = 4;
+  static constexpr unsigned kAllParts = 0xf;
+
+  /// \param touched  a bit per part that the surface of any view may touch; what is free and hidden
+  ///                 in others is quick to tell, and needs a hundredth of the memory if all are
+  explicit BlockEvidence(unsigned touched);
   BlockEvidence(BlockEvidence&&) noexcept = default;
   BlockEvidence& operator=(BlockEvidence&&) noexcept = default;
 
   /// Coordinates of the voxel centres of a block [internal units].
   struct Place {
     Place(const openvdb::Coord& origin, double voxel);
-    /// What holds `count` rows of rows of voxels from (x, y) on.
-    Eigen::AlignedBox3f box(size_t x = 0, size_t y = 0, size_t count = kBlockSide) const;
+    Eigen::AlignedBox3f box() const;
+    Eigen::AlignedBox3f part_box(size_t part) const;
     std::array<float, kBlockSide> x, y, z;
   };
 
-  /// Adds what a view says, voxel by voxel; not Band where has_band is false.
+  /// Adds what a view says, voxel by voxel; never Band in parts that are not touched.
   void add(const Place& place, const DepthField& field, const TsdfView& view);
-  /// The same where the view says one thing about all of it: Hidden, or Free without has_band.
+  /// The same where the view says one thing about all of it: Hidden, or Free where no part is
+  /// touched.
   void add_whole(Sight sight);
 
-  bool has_band() const { return free_weight_ != nullptr; }
+  bool has_band() const { return touched_ != 0; }
   /// True if nothing can change any more: without band, and free all over.
   bool is_settled() const;
 
@@ -82,6 +87,7 @@ class BlockEvidence {
   void add_row(size_t row, const SightingRow& sightings, const TsdfView& view);
   void add_band(size_t first, const SightingRow& row, const TsdfView& view);
 
+  unsigned touched_;
   // A bit per voxel, a byte per row of them.
   std::array<uint8_t, kBlockSide*kBlockSide> free_ = {}, hidden_ = {};
   std::unique_ptr<std::array<float, kBlockVoxels>> free_weight_;  // null without band

@@ -54,6 +54,26 @@ Floats gathered(const float* values, Ints index, Ints mask) {
                                   sizeof(float));
 }
 
+// The four floats from 4 * index on, for each of eight indices: all the first ones, and so on.
+// Eight loads, where gathering them would take 32.
+std::array<Floats, 4> four_of_each(const float* values, Ints index) {
+  std::array<Floats, 4> pairs;  // of indices k and k + 4
+  for (int k = 0; k < 4; ++k) {
+    pairs[size_t(k)] = _mm256_insertf128_ps(
+        _mm256_castps128_ps256(_mm_loadu_ps(values + 4 * std::ptrdiff_t(index[k]))),
+        _mm_loadu_ps(values + 4 * std::ptrdiff_t(index[k + 4])),
+        1);
+  }
+  const Floats a = _mm256_unpacklo_ps(pairs[0], pairs[1]);
+  const Floats b = _mm256_unpackhi_ps(pairs[0], pairs[1]);
+  const Floats c = _mm256_unpacklo_ps(pairs[2], pairs[3]);
+  const Floats d = _mm256_unpackhi_ps(pairs[2], pairs[3]);
+  return {_mm256_shuffle_ps(a, c, 0x44),
+          _mm256_shuffle_ps(a, c, 0xee),
+          _mm256_shuffle_ps(b, d, 0x44),
+          _mm256_shuffle_ps(b, d, 0xee)};
+}
+
 float least(Floats values) {
   const __m128 four = _mm_min_ps(_mm256_castps256_ps128(values), _mm256_extractf128_ps(values, 1));
   const __m128 two = _mm_min_ps(four, _mm_movehl_ps(four, four));
@@ -375,38 +395,34 @@ SightingRow DepthField::row(float x, float y, const std::array<float, 8>& z) con
   const Ints py = __builtin_convertvector(select(inside, v, Floats{}), Ints);
   const Ints pixel = py * width_ + px;
   static_assert(sizeof(Pixel) == 4 * sizeof(float));
-  const auto of_pixel = [&](const float& member, Ints index, Ints mask) {
-    return gathered(&member, index * 4, mask);
-  };
-  const Pixel& first = pixels_.data.front();
+  const float* const first = &pixels_.data.front().depth;
+  const auto depth_of = [&](Ints index, Ints mask) { return gathered(first, index * 4, mask); };
 
   const Floats left = _mm256_floor_ps(u - 0.5f);
   const Floats top = _mm256_floor_ps(v - 0.5f);
   const Ints has_quad = inside & (left >= 0.0f) & (top >= 0.0f);
   const Ints corner = __builtin_convertvector(select(has_quad, top, Floats{}), Ints) * width_ +
                       __builtin_convertvector(select(has_quad, left, Floats{}), Ints);
-  const Floats at_corner = of_pixel(first.depth, corner, has_quad);
+  const Floats at_corner = depth_of(corner, has_quad);
   const Ints one_surface = has_quad & (at_corner < 0.0f);
   const Floats a = (u - 0.5f) - left;
   const Floats b = (v - 0.5f) - top;
   const auto at_quad = [&](int offset) {
-    return magnitude(of_pixel(first.depth, corner + offset, one_surface));
+    return magnitude(depth_of(corner + offset, one_surface));
   };
   const Floats above = (1.0f - a) / magnitude(at_corner) + a / at_quad(1);
   const Floats below = (1.0f - a) / at_quad(width_) + a / at_quad(width_ + 1);
   const Floats between = 1.0f / ((1.0f - b) * above + b * below);
-  Floats d = between;
-  if (const Ints other = inside & ~one_surface; any(other)) {
-    d = select(other, magnitude(of_pixel(first.depth, pixel, other)), d);
-  }
+  const auto [own_depth, slope, own_weight, hides] = four_of_each(first, pixel);
+  const Floats d = select(one_surface, between, magnitude(own_depth));
   const Ints known = inside & (d - d == 0.0f);
   const Ints unknown = inside & ~known;
   if (any(unknown)) {
-    out.hidden = bits(unknown & (depth > of_pixel(first.hides, pixel, unknown)));
+    out.hidden = bits(unknown & (depth > hides));
   }
   if (!any(known)) return out;
 
-  const Floats distance = (d - depth) * of_pixel(first.slope, pixel, known);
+  const Floats distance = (d - depth) * slope;
   out.has_sigma = !sigma_.empty();
   const Floats sigma = out.has_sigma ? gathered(sigma_.data.data(), pixel, known) : Floats{};
   const Floats wanted = max(Floats{} + truncation_, 3.0f * sigma);
@@ -419,8 +435,7 @@ SightingRow DepthField::row(float x, float y, const std::array<float, 8>& z) con
   out.band = bits(in_band);
   if ((out.free | out.band) == 0) return out;
 
-  Floats weight = of_pixel(first.weight, pixel, known);
-  weight = select(one_surface, weight, weight * kEdgeWeight);
+  Floats weight = select(one_surface, own_weight, own_weight * kEdgeWeight);
   out.free &= bits(weight > 0.0f);
   store(weight, out.weight.data());
   if (out.band == 0) return out;

@@ -536,7 +536,8 @@ class Fuser {
     check_memory(out_.report,
                  pixels_ * kPixelBytes + grid_.size() * kBlockBytes + mixed * kLeafBytes,
                  options_.memory_limit);
-    tbb::enumerable_thread_specific<BlockEvidence> scratch([] { return BlockEvidence(true); });
+    tbb::enumerable_thread_specific<BlockEvidence> scratch(
+        [] { return BlockEvidence(BlockEvidence::kAllParts); });
     collect(0.15, [&](size_t c, const auto& keep) {
       CubeLook look(fields, grid_, c);
       grid_.each_in_cube(c, [&](size_t i) {
@@ -547,7 +548,7 @@ class Fuser {
         const BlockEvidence::Place place(grid_.origin(i), rules_.voxel);
         const Looks& looks = look.at(place);
         if (!any_touches(looks)) {
-          BlockEvidence plain(false);
+          BlockEvidence plain(0);
           ask(held, looks, place, plain);
           keep(i, finished(plain, grid_.origin(i), rules_));
           return;
@@ -594,7 +595,7 @@ class Fuser {
     touched_.assign(grid_.size(), 0);
     std::vector<uint8_t> is_mixed(grid_.size(), 0);
     struct Found {
-      std::vector<size_t> touched, mixed;
+      std::vector<std::pair<size_t, uint8_t>> mixed;  // Blocks, and what of them is touched.
     };
     std::vector<Found> found(kAtOnce);
     for (size_t first = 0; first < views_.size(); first += kAtOnce) {
@@ -608,22 +609,29 @@ class Fuser {
           CubeLook look(fields, grid_, c);
           if (look.is_told()) continue;
           grid_.each_in_cube(c, [&](size_t i) {
-            const Looks& looks = look.at({grid_.origin(i), rules_.voxel});
-            if (looks[0].sight != Sight::Mixed) return;
-            (looks[0].may_touch ? of_view.touched : of_view.mixed).push_back(i);
+            const BlockEvidence::Place place(grid_.origin(i), rules_.voxel);
+            const DepthField::Look of_block = look.at(place)[0];
+            if (of_block.sight != Sight::Mixed) return;
+            unsigned parts = 0;
+            for (size_t p = 0; of_block.may_touch && p < BlockEvidence::kParts; ++p) {
+              if (field.look(place.part_box(p)).may_touch) parts |= 1U << p;
+            }
+            of_view.mixed.emplace_back(i, static_cast<uint8_t>(parts));
           });
         }
       });
       for (size_t v = first; v < last; ++v) {
-        for (const size_t i : found[v - first].touched) touched_[i] = 1;
-        for (const size_t i : found[v - first].mixed) is_mixed[i] = 1;
+        for (const auto& [i, parts] : found[v - first].mixed) {
+          touched_[i] = static_cast<uint8_t>(touched_[i] | parts);
+          is_mixed[i] = 1;
+        }
       }
       report(progress, static_cast<double>(last) / static_cast<double>(views_.size()));
     }
     size_t touched = 0;
     size_t mixed = 0;
     for (size_t i = 0; i < touched_.size(); ++i) {
-      touched += touched_[i];
+      touched += touched_[i] != 0 ? 1 : 0;
       mixed += touched_[i] == 0 && is_mixed[i] != 0 ? 1 : 0;
     }
     // Of a block on the surface, leaves take the place of evidence.
@@ -666,14 +674,13 @@ class Fuser {
                    const BlockEvidence::Place& place) {
     if (whole_[i] == Sight::Free) return;
     std::unique_ptr<BlockEvidence>& evidence = evidence_[i];
-    const bool has_band = touched_[i] != 0;
     const Sight sight = together(looks);
-    if (!evidence && !has_band && sight != Sight::Mixed) {
+    if (!evidence && touched_[i] == 0 && sight != Sight::Mixed) {
       if (sight != Sight::Nothing) whole_[i] = sight;
       return;
     }
     if (!evidence) {
-      evidence = std::make_unique<BlockEvidence>(has_band);
+      evidence = std::make_unique<BlockEvidence>(touched_[i]);
       evidence->add_whole(whole_[i]);
     }
     ask(held, looks, place, *evidence);
@@ -719,9 +726,9 @@ class Fuser {
   FusedVolume out_;
   BlockGrid grid_;
   Rules rules_;
-  size_t pixels_ = 0;                                     // Of all views.
-  size_t portion_ = 0;                                    // Views held at once.
-  std::vector<uint8_t> touched_;                          // By the surface of any view.
+  size_t pixels_ = 0;             // Of all views.
+  size_t portion_ = 0;            // Views held at once.
+  std::vector<uint8_t> touched_;  // A bit per part, by the surface of any view.
   std::vector<std::unique_ptr<BlockEvidence>> evidence_;  // Null where a block is one thing …
   std::vector<Sight> whole_;                              // … namely this.
 };
