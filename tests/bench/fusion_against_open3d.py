@@ -65,7 +65,7 @@ def blocks(folder):
     depth, (fx, fy, cx, cy), poses = frames(folder)
     device = o3d.core.Device("CPU:0")
     grid = o3d.t.geometry.VoxelBlockGrid(
-        ("tsdf", "weight"), (o3d.core.float32, o3d.core.float32), ((1), (1)), VOXEL, 16, 20000, device)
+        ("tsdf", "weight"), (o3d.core.float32, o3d.core.float32), ((1), (1)), VOXEL, 16, 3000, device)
     camera = o3d.core.Tensor([[fx, 0, cx - 0.5], [0, fy, cy - 0.5], [0, 0, 1]], o3d.core.float64)
 
     def integrate():
@@ -76,7 +76,7 @@ def blocks(folder):
             grid.integrate(found, picture, camera, extrinsic, 1.0, 1000.0, 4.0)
 
     _, *fusing = timed(integrate)
-    # As it recommends for a surface as whole as the others'.
+    # What one frame saw is surface, as in the others.
     mesh, *extracting = timed(lambda: grid.extract_triangle_mesh(weight_threshold=1.0))
     return fusing, extracting, mesh.to_legacy()
 
