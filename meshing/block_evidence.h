@@ -89,7 +89,8 @@ class BlockEvidence {
 
   unsigned touched_;
   // A bit per voxel, a byte per row of them.
-  std::array<uint8_t, kBlockSide*kBlockSide> free_ = {}, hidden_ = {};
+  static constexpr size_t kRows = kBlockVoxels / kBlockSide;
+  std::array<uint8_t, kRows> free_ = {}, hidden_ = {};
   std::unique_ptr<std::array<float, kBlockVoxels>> free_weight_;  // null without band
   std::unique_ptr<Sums> sums_;        // null until a voxel is in the band of a view
   std::unique_ptr<SigmaSums> sigma_;  // null until a view has a sigma

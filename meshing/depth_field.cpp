@@ -167,6 +167,82 @@ void drop_hanging_pixels(DepthMap& depth, const Raster<uint8_t>& continuous) {
   }
 }
 
+// Mean normals over 5 x 5 pixels of similar depth: the factors made from them must vary slowly, or
+// they would move the zero crossing between voxels of different pixels.
+class SmoothNormals {
+ public:
+  SmoothNormals(const DepthMap& depth, const Camera& camera) : depth_(with_margin(depth, kRadius)) {
+    const NormalMap normals = normals_from_depth(depth, camera);
+    for (size_t k = 0; k < 3; ++k) {
+      Raster<float> one(depth.width, depth.height, 0);
+      for (size_t i = 0; i < one.data.size(); ++i) one.data[i] = normals.data[i][Eigen::Index(k)];
+      normal_[k] = with_margin(one, kRadius);
+    }
+  }
+
+  // Of the eight pixels from (x, y) on: those with a depth.
+  Ints known(int x, int y) const {
+    const auto here = load<Floats>(&depth_(x + kRadius, y + kRadius));
+    return here - here == 0.0f;
+  }
+  // Their normals, not yet of length 1.
+  std::array<Floats, 3> sum(int x, int y) const {
+    constexpr float kSameSurface = 0.03f;
+    std::array<Floats, 3> out = {};
+    if (!any(known(x, y))) return out;
+    const auto here = load<Floats>(&depth_(x + kRadius, y + kRadius));
+    for (int v = y; v <= y + 2 * kRadius; ++v) {
+      for (int u = x; u <= x + 2 * kRadius; ++u) {
+        const Ints same = magnitude(load<Floats>(&depth_(u, v)) - here) <= kSameSurface * here;
+        for (size_t k = 0; k < 3; ++k) {
+          out[k] += select(same, load<Floats>(&normal_[k](u, v)), Floats{});
+        }
+      }
+    }
+    return out;
+  }
+
+ private:
+  static constexpr int kRadius = 2;
+
+  Raster<float> depth_;
+  std::array<Raster<float>, 3> normal_;
+};
+
+// Of the eight pixels from (x, y) on; 0 where there is none.
+Floats given_sigma(const TsdfView& view, int x, int y) {
+  Floats out = {};
+  if (view.sigma.empty()) return out;
+  for (int k = 0; k < std::min(kLanes, view.sigma.width - x); ++k) out[k] = view.sigma(x + k, y);
+  return out;
+}
+
+struct InterpolatedLanes {
+  Floats depth;
+  Ints one_surface;  // Elsewhere the depth means nothing.
+};
+
+// DepthField::interpolated() for eight points; `first` is the first of pixels of four floats.
+InterpolatedLanes interpolated_lanes(
+    const float* first, int width, Floats u, Floats v, Ints inside) {
+  const auto depth_of = [&](Ints index, Ints mask) { return gathered(first, index * 4, mask); };
+  const Floats left = _mm256_floor_ps(u - 0.5f);
+  const Floats top = _mm256_floor_ps(v - 0.5f);
+  const Ints has_quad = inside & (left >= 0.0f) & (top >= 0.0f);
+  const Ints corner = __builtin_convertvector(select(has_quad, top, Floats{}), Ints) * width +
+                      __builtin_convertvector(select(has_quad, left, Floats{}), Ints);
+  const Floats at_corner = depth_of(corner, has_quad);
+  const Ints one_surface = has_quad & (at_corner < 0.0f);
+  const Floats a = (u - 0.5f) - left;
+  const Floats b = (v - 0.5f) - top;
+  const auto at_quad = [&](int offset) {
+    return magnitude(depth_of(corner + offset, one_surface));
+  };
+  const Floats above = (1.0f - a) / magnitude(at_corner) + a / at_quad(1);
+  const Floats below = (1.0f - a) / at_quad(width) + a / at_quad(width + 1);
+  return {1.0f / ((1.0f - b) * above + b * below), one_surface};
+}
+
 }  // namespace
 
 Raster<uint8_t> continuous_quads(const DepthMap& depth, const Camera& camera) {
@@ -179,7 +255,7 @@ Raster<uint8_t> continuous_quads(const DepthMap& depth, const Camera& camera) {
     return continuous_step({at(-1), at(0), at(1), at(2)}, inverse_focal, noise);
   };
   tbb::parallel_for(0, std::max(0, depth.height - 1), [&](int y) {
-    std::vector<int32_t> down(size_t(depth.width) + 2 * kLanes);
+    std::vector<int32_t> down(size_t(depth.width) + 2 * size_t{kLanes});
     for (int x = 0; x < depth.width; x += kLanes) {
       store(step(x, y, 0, 1), &down[size_t(x)]);
     }
@@ -218,19 +294,8 @@ DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double 
   }
 }
 
-// Mean normals over 5 x 5 pixels of similar depth: the factors made from them must vary slowly, or
-// they would move the zero crossing between voxels of different pixels.
 Raster<float> DepthField::look_along(const TsdfView& view, const DepthMap& depth) {
-  constexpr int kRadius = 2;
-  constexpr float kSameSurface = 0.03f;
-  const NormalMap normals = normals_from_depth(depth, view.camera);
-  const Raster<float> padded = with_margin(depth, kRadius);
-  std::array<Raster<float>, 3> normal;
-  for (size_t k = 0; k < 3; ++k) {
-    Raster<float> one(width_, height_, 0);
-    for (size_t i = 0; i < one.data.size(); ++i) one.data[i] = normals.data[i][Eigen::Index(k)];
-    normal[k] = with_margin(one, kRadius);
-  }
+  const SmoothNormals normals(depth, view.camera);
   std::vector<float> across(size_t(width_) + kLanes);
   for (int x = 0; x < width_; ++x) {
     across[size_t(x)] = static_cast<float>(view.camera.ray_in_cam(x + 0.5, 0).x());
@@ -239,17 +304,8 @@ Raster<float> DepthField::look_along(const TsdfView& view, const DepthMap& depth
   tbb::parallel_for(0, height_, [&](int y) {
     const auto down = static_cast<float>(view.camera.ray_in_cam(0, y + 0.5).y());
     for (int x = 0; x < width_; x += kLanes) {
-      const auto here = load<Floats>(&padded(x + kRadius, y + kRadius));
-      const Ints known = here - here == 0.0f;
-      std::array<Floats, 3> sum = {};
-      for (int v = y; any(known) && v <= y + 2 * kRadius; ++v) {
-        for (int u = x; u <= x + 2 * kRadius; ++u) {
-          const Ints same = magnitude(load<Floats>(&padded(u, v)) - here) <= kSameSurface * here;
-          for (size_t k = 0; k < 3; ++k) {
-            sum[k] += select(same, load<Floats>(&normal[k](u, v)), Floats{});
-          }
-        }
-      }
+      const Ints known = normals.known(x, y);
+      const std::array<Floats, 3> sum = normals.sum(x, y);
       // Sums in the order of Eigen's.
       const auto ray_x = load<Floats>(&across[size_t(x)]);
       std::array<Floats, 3> ray;
@@ -261,14 +317,8 @@ Raster<float> DepthField::look_along(const TsdfView& view, const DepthMap& depth
       const Floats one = Floats{} + 1.0f;
       const Floats facing = select(known, min(max(along / norm(ray), one * kMinFacing), one), one);
       const Floats slope = select(known, max(along, kMinSlope * norm(ray)), one);
-      Floats sigma = {};
-      if (!sigma_.empty()) {
-        std::array<float, kLanes> given{};
-        for (int k = 0; k < std::min(kLanes, width_ - x); ++k)
-          given[size_t(k)] = view.sigma(x + k, y);
-        const auto values = load<Floats>(given.data());
-        sigma = select(values > 0.0f, values * slope, Floats{});
-      }
+      const Floats given = given_sigma(view, x, y);
+      const Floats sigma = select(given > 0.0f, given * slope, Floats{});
       const Floats noise = sigma / voxel_;
       const Floats weight = facing * facing / (1.0f + noise * noise);
       const Floats limit = max(Floats{} + truncation_, 3.0f * sigma) / slope;
@@ -396,23 +446,7 @@ SightingRow DepthField::row(float x, float y, const std::array<float, 8>& z) con
   const Ints pixel = py * width_ + px;
   static_assert(sizeof(Pixel) == 4 * sizeof(float));
   const float* const first = &pixels_.data.front().depth;
-  const auto depth_of = [&](Ints index, Ints mask) { return gathered(first, index * 4, mask); };
-
-  const Floats left = _mm256_floor_ps(u - 0.5f);
-  const Floats top = _mm256_floor_ps(v - 0.5f);
-  const Ints has_quad = inside & (left >= 0.0f) & (top >= 0.0f);
-  const Ints corner = __builtin_convertvector(select(has_quad, top, Floats{}), Ints) * width_ +
-                      __builtin_convertvector(select(has_quad, left, Floats{}), Ints);
-  const Floats at_corner = depth_of(corner, has_quad);
-  const Ints one_surface = has_quad & (at_corner < 0.0f);
-  const Floats a = (u - 0.5f) - left;
-  const Floats b = (v - 0.5f) - top;
-  const auto at_quad = [&](int offset) {
-    return magnitude(depth_of(corner + offset, one_surface));
-  };
-  const Floats above = (1.0f - a) / magnitude(at_corner) + a / at_quad(1);
-  const Floats below = (1.0f - a) / at_quad(width_) + a / at_quad(width_ + 1);
-  const Floats between = 1.0f / ((1.0f - b) * above + b * below);
+  const auto [between, one_surface] = interpolated_lanes(first, width_, u, v, inside);
   const auto [own_depth, slope, own_weight, hides] = four_of_each(first, pixel);
   const Floats d = select(one_surface, between, magnitude(own_depth));
   const Ints known = inside & (d - d == 0.0f);

@@ -113,8 +113,8 @@ void add_fuse(CLI::App& app) {
                   "World direction that is up, three numbers; default: judged by the cameras")
       ->expected(3);
   cmd->footer(
-      "Examples: cgs fuse out/portal/model --voxel-size 10mm -o portal.vdb\n"
-      "          cgs fuse rgbd/desk --depth-scale 5000 --voxel-size 5mm -o desk.vdb\n"
+      "Example: cgs fuse out/portal/model --voxel-size 10mm -o portal.vdb\n"
+      "         cgs fuse rgbd/desk --depth-scale 5000 --voxel-size 5mm -o desk.vdb\n"
       "A depth frame counts as one view, measured to 0.5 % of its depth (one standard deviation),\n"
       "as in cgs train: what two or more frames measured is observed, what one did, single view.\n"
       "Frames are read one after the other, up to three times: memory follows the surface.");
