@@ -8,7 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "libcgs/render/lanes.h"
+#include "libcgs/core/lanes.h"
 
 namespace cgs {
 
