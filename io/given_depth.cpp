@@ -232,6 +232,8 @@ std::set<int> find_all_beside(Scene& scene, const SceneRoot& root) {
 
 DepthMap resampled(const Raster<float>& values, const View& view) {
   const Camera& camera = view.camera;
+  const bool is_bent = view.fisheye || view.distortion != std::array<double, 5>{};
+  if (!is_bent && values.width == camera.width && values.height == camera.height) return values;
   const Lens lens(view);
   const Eigen::Array2d size(values.width, values.height);
   const Eigen::Array2d under = lens.pixel() * size;  // values under a pixel, across and down
@@ -305,11 +307,19 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
                    "holds no depth named as an input photograph: .exr .pfm .npy .tif or .png");
   }
   if (count == 0) return;
+  std::vector<std::string> lacking;
   for (const int i : scene.input) {
     if (has_depth(i) || explained.contains(i)) continue;
-    scene.warnings.push_back("there is depth for other views, but none for view " +
-                             printable(scene.views[static_cast<size_t>(i)].name));
+    lacking.push_back(printable(scene.views[static_cast<size_t>(i)].name));
   }
+  if (lacking.empty()) return;
+  constexpr size_t kShown = 5;
+  std::string names = lacking[0];
+  for (size_t i = 1; i < std::min(lacking.size(), kShown); ++i) names += ", " + lacking[i];
+  scene.warnings.push_back(
+      "there is depth for other views, but none for " +
+      (lacking.size() > 1 ? std::to_string(lacking.size()) + " views: " : std::string("view ")) +
+      names + (lacking.size() > kShown ? ", …" : ""));
 }
 
 void load_given_depth(const Scene& scene, View& view, const ImageSize& photograph) {

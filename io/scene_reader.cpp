@@ -271,7 +271,7 @@ std::vector<int> llff_protocol(const std::vector<int>& usable) {
   return out;
 }
 
-void choose_views(Scene& scene, const std::string& list) {
+void choose_views(Scene& scene, const std::string& list, bool all_views) {
   constexpr size_t kTakeAll = 4;
   const std::vector<int> usable = views_with_files(scene);
   if (!list.empty()) {
@@ -283,7 +283,8 @@ void choose_views(Scene& scene, const std::string& list) {
                          "\" has no image file");
     }
   } else {
-    scene.input = usable.size() <= kTakeAll ? usable : llff_protocol(usable);
+    const bool takes_all = all_views || usable.size() <= kTakeAll;
+    scene.input = takes_all ? usable : llff_protocol(usable);
   }
   if (scene.input.size() < 2) throw BadInput(Defect::Empty, scene.folder, "need at least 2 views");
   std::set_difference(usable.begin(),
@@ -328,7 +329,15 @@ void check_places(const Scene& scene) {
   (void)check_significance(scene.folder, box, kDoubleDigits);
 }
 
-void load_image(Scene& scene, View& view) {
+// True if every pixel of a photograph may be used, which its name and its camera tell.
+bool is_whole(const View& view, const SceneRoot& root) {
+  const fs::path extension = view.image_path.extension();
+  const bool is_jpeg = extension == ".jpg" || extension == ".jpeg";  // has no transparent pixels
+  const bool is_bent = view.fisheye || view.distortion != std::array<double, 5>{};
+  return is_jpeg && !is_bent && !mask_file(root, view.image_path);
+}
+
+void load_image(const Scene& scene, View& view, std::vector<std::string>& warnings) {
   if (view.image_path.empty()) {
     throw BadInput(Defect::Missing, scene.folder, "view " + printable(view.name) + " has no image");
   }
@@ -336,8 +345,8 @@ void load_image(Scene& scene, View& view) {
   const SceneRoot root = {scene.folder, false};
   view.image = read_photograph(view, root, view.valid);
   if (lacks_mask(root, view.image_path)) {
-    scene.warnings.push_back("there are masks, but none for view " + printable(view.name) +
-                             ", of which everything is used");
+    warnings.push_back("there are masks, but none for view " + printable(view.name) +
+                       ", of which everything is used");
   }
   const int width = view.image.width;
   const int height = view.image.height;
@@ -360,10 +369,10 @@ void load_image(Scene& scene, View& view) {
   const auto is_set = [](uint8_t set) { return set != 0; };
   const bool is_masked =
       !view.valid.empty() && std::none_of(view.valid.data.begin(), view.valid.data.end(), is_set);
-  if (is_masked) scene.warnings.push_back("view " + printable(view.name) + " is fully masked");
+  if (is_masked) warnings.push_back("view " + printable(view.name) + " is fully masked");
   const auto is_first = [&](const Eigen::Vector3f& c) { return c == view.image.data.front(); };
   if (std::all_of(view.image.data.begin(), view.image.data.end(), is_first)) {
-    scene.warnings.push_back("view " + printable(view.name) + " has one colour everywhere");
+    warnings.push_back("view " + printable(view.name) + " has one colour everywhere");
   }
 }
 
@@ -386,7 +395,7 @@ Scene prepared(Scene scene, const SceneOptions& options) {
   fit_cameras(scene);
   make_pinholes(scene);
   divide_sizes(scene, options.downscale ? *options.downscale : chosen_downscale(scene));
-  choose_views(scene, options.views);
+  choose_views(scene, options.views, options.all_views);
   check_baselines(scene);
   check_places(scene);
   find_given_depth(scene, options.depth, options.allow_external);
@@ -454,10 +463,23 @@ Scene scene_of_photographs(const fs::path& folder,
 void load_images(Scene& scene, const std::vector<int>& views, const Progress& progress) {
   for (size_t i = 0; i < views.size(); ++i) {
     report(progress, static_cast<double>(i) / static_cast<double>(views.size()));
-    load_image(scene, scene.views.at(static_cast<size_t>(views[i])));
+    load_image(scene, scene.views.at(static_cast<size_t>(views[i])), scene.warnings);
   }
   warn_of_identical_images(scene, views);
   report(progress, 1);
+}
+
+View loaded_view(const Scene& scene,
+                 int view,
+                 bool with_image,
+                 std::vector<std::string>& warnings) {
+  View out = scene.views.at(static_cast<size_t>(view));
+  if (!with_image && is_whole(out, {scene.folder, false})) {
+    load_given_depth(scene, out, photograph_size(out));
+  } else {
+    load_image(scene, out, warnings);
+  }
+  return out;
 }
 
 }  // namespace cgs

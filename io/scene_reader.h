@@ -18,6 +18,7 @@ struct SceneOptions {
   /// Input views: comma-separated names (file stems) or indices in name order; a name wins where
   /// both fit. Empty = choose: all of at most four, else the LLFF protocol.
   std::string views;
+  bool all_views = false;  ///< Where `views` is empty, take every one.
   /// Divide image sizes by this; >= 1. Empty = choose: the smallest that leaves no side above
   /// kLongestSide; what was chosen becomes a warning.
   std::optional<int> downscale;
@@ -74,5 +75,12 @@ std::vector<int> select_views(const Scene& scene, const std::string& list);
 /// \param views  indices into scene.views that have an image file
 /// \throws BadInput as read_image(), Missing; Mismatch if a file has changed its shape; LimitError.
 void load_images(Scene& scene, const std::vector<int>& views, const Progress& progress = {});
+
+/// A copy of one view, loaded as by load_images(). Any number of threads may ask at once.
+///
+/// \param with_image  false leaves `image` empty where it can be, which is much quicker
+/// \param warnings    gets what is odd
+/// \throws as load_images()
+View loaded_view(const Scene& scene, int view, bool with_image, std::vector<std::string>& warnings);
 
 }  // namespace cgs

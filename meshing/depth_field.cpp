@@ -2,9 +2,13 @@
 #include "meshing/depth_field.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 
 #include <tbb/parallel_for.h>
+
+#include "libcgs/core/lanes.h"
 
 namespace cgs {
 
@@ -13,30 +17,113 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kBackground = 1e6f;  // Depth of rays that hit nothing; far beyond any surface.
 constexpr float kMinSlope = 0.25f;   // At grazing incidence the local plane says little.
+constexpr float kMinFacing = 0.05f;  // Cosine of incidence.
 constexpr float kMaxBandGrowth = 3.0f;
+constexpr float kEdgeWeight = 0.25f;   // of pixels at an occlusion edge
+constexpr float kLeastBehind = 0.05f;  // of the weight at the far end of the band
 
 // Depth steps between neighbours, in footprints of a pixel.
 constexpr float kSmallStep = 3.0f;     // A surface tilted by 72 degrees.
 constexpr float kLargestStep = 12.0f;  // 85 degrees, if the next step is alike.
 constexpr float kNoiseSteps = 5.0f;    // Steps up to this many standard deviations are noise.
 
+constexpr float kRounding = 1e-3f;  // [voxels]; far more than floats lose
+
+Floats select(Ints mask, Floats yes, Floats no) {
+  return _mm256_blendv_ps(no, yes, std::bit_cast<__m256>(mask));
+}
+
+Floats magnitude(Floats values) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), values); }
+
+// In the order in which Eigen adds up.
+Floats norm(const std::array<Floats, 3>& v) {
+  return _mm256_sqrt_ps(v[0] * v[0] + (v[1] * v[1] + v[2] * v[2]));
+}
+
+// A bit per lane.
+unsigned bits(Ints mask) {
+  return static_cast<unsigned>(_mm256_movemask_ps(std::bit_cast<__m256>(mask)));
+}
+
+// Values at the indices where the mask is set, NaN elsewhere.
+Floats gathered(const float* values, Ints index, Ints mask) {
+  return _mm256_mask_i32gather_ps(Floats{} + kNaN,
+                                  values,
+                                  std::bit_cast<__m256i>(index),
+                                  std::bit_cast<__m256>(mask),
+                                  sizeof(float));
+}
+
+// The four floats from 4 * index on, for each of eight indices: all the first ones, and so on.
+// Eight loads, where gathering them would take 32.
+std::array<Floats, 4> four_of_each(const float* values, Ints index) {
+  std::array<Floats, 4> pairs;  // of indices k and k + 4
+  for (int k = 0; k < 4; ++k) {
+    pairs[size_t(k)] = _mm256_insertf128_ps(
+        _mm256_castps128_ps256(_mm_loadu_ps(values + 4 * std::ptrdiff_t(index[k]))),
+        _mm_loadu_ps(values + 4 * std::ptrdiff_t(index[k + 4])),
+        1);
+  }
+  const Floats a = _mm256_unpacklo_ps(pairs[0], pairs[1]);
+  const Floats b = _mm256_unpackhi_ps(pairs[0], pairs[1]);
+  const Floats c = _mm256_unpacklo_ps(pairs[2], pairs[3]);
+  const Floats d = _mm256_unpackhi_ps(pairs[2], pairs[3]);
+  return {_mm256_shuffle_ps(a, c, 0x44),
+          _mm256_shuffle_ps(a, c, 0xee),
+          _mm256_shuffle_ps(b, d, 0x44),
+          _mm256_shuffle_ps(b, d, 0xee)};
+}
+
+float least(Floats values) {
+  const __m128 four = _mm_min_ps(_mm256_castps256_ps128(values), _mm256_extractf128_ps(values, 1));
+  const __m128 two = _mm_min_ps(four, _mm_movehl_ps(four, four));
+  return _mm_cvtss_f32(_mm_min_ss(two, _mm_shuffle_ps(two, two, 1)));
+}
+
+// The values of a raster with a margin around them, as long as eight lanes may reach to the right.
+Raster<float> with_margin(const Raster<float>& raster, int margin) {
+  Raster<float> out(raster.width + 2 * margin + kLanes, raster.height + 2 * margin, kNaN);
+  for (int y = 0; y < raster.height; ++y) {
+    const auto row = raster.data.begin() + std::ptrdiff_t(raster.index(0, y));
+    std::copy(row, row + raster.width, &out(margin, y + margin));
+  }
+  return out;
+}
+
 // One row or column of four depths: is the step between the middle two part of a surface?
-bool continuous_step(const std::array<float, 4>& depths, float footprint, float noise) {
-  const auto [before, a, b, after] = depths;
-  const float step = b - a;
-  const float small = std::max(kSmallStep * footprint, kNoiseSteps * noise);
-  if (std::abs(step) <= small) return true;
-  if (!(std::abs(step) <= kLargestStep * footprint)) return false;
-  const auto alike = [&](float other) {
-    return other * step > 0 && std::abs(other) * 2 >= std::abs(step);
+Ints continuous_step(const std::array<Floats, 4>& depths, float inverse_focal, float noise) {
+  const auto& [before, a, b, after] = depths;
+  const Floats step = b - a;
+  const Floats near = min(a, b);
+  const Floats footprint = near * inverse_focal;
+  const Floats small = max(kSmallStep * footprint, kNoiseSteps * (near * noise));
+  const auto alike = [&](Floats other) {
+    return (other * step > 0.0f) & (magnitude(other) * 2.0f >= magnitude(step));
   };
-  return alike(a - before) || alike(after - b);
+  return (magnitude(step) <= small) |
+         ((magnitude(step) <= kLargestStep * footprint) & (alike(a - before) | alike(after - b)));
+}
+
+// The value in the middle of the order of values >= 0, as std::nth_element finds it. Numbers above
+// zero have the order of their bits, so that a histogram of the upper ones tells most of it.
+float middle_value(std::vector<float>& values) {
+  const auto upper = [](float value) { return std::bit_cast<uint32_t>(value) >> 16; };
+  std::vector<uint32_t> histogram(1 << 16, 0);
+  for (const float value : values) ++histogram[upper(value)];
+  size_t rank = values.size() / 2;
+  uint32_t bin = 0;
+  while (rank >= histogram[bin]) rank -= histogram[bin++];
+  std::erase_if(values, [&](float value) { return upper(value) != bin; });
+  const auto middle = values.begin() + std::ptrdiff_t(rank);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 // Standard deviation of the pixel noise relative to depth, from the median second difference
 // along rows, which is blind to slopes and to the few pixels at edges.
 float relative_noise(const DepthMap& depth) {
   std::vector<float> bends;
+  bends.reserve(depth.data.size());
   for (int y = 0; y < depth.height; ++y) {
     for (int x = 1; x + 1 < depth.width; ++x) {
       const float d = depth(x, y);
@@ -45,10 +132,8 @@ float relative_noise(const DepthMap& depth) {
     }
   }
   if (bends.empty()) return 0;
-  const auto middle = bends.begin() + std::ptrdiff_t(bends.size() / 2);
-  std::nth_element(bends.begin(), middle, bends.end());
   constexpr float kSigmaPerMedian = 1.4826f / 2.4495f;  // sqrt(1 + 4 + 1) terms in a difference
-  return kSigmaPerMedian * *middle;
+  return kSigmaPerMedian * middle_value(bends);
 }
 
 DepthMap usable_depth(const TsdfView& view, double depth_trunc) {
@@ -82,39 +167,104 @@ void drop_hanging_pixels(DepthMap& depth, const Raster<uint8_t>& continuous) {
   }
 }
 
-// Mean normal over 5 x 5 pixels of similar depth: the factors made from it must vary slowly, or
+// Mean normals over 5 x 5 pixels of similar depth: the factors made from them must vary slowly, or
 // they would move the zero crossing between voxels of different pixels.
-Eigen::Vector3f smooth_normal(const NormalMap& normals, const DepthMap& depth, int x, int y) {
-  constexpr int kRadius = 2;
-  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-  for (int v = std::max(0, y - kRadius); v <= std::min(depth.height - 1, y + kRadius); ++v) {
-    for (int u = std::max(0, x - kRadius); u <= std::min(depth.width - 1, x + kRadius); ++u) {
-      constexpr float kSameSurface = 0.03f;
-      if (std::abs(depth(u, v) - depth(x, y)) <= kSameSurface * depth(x, y)) sum += normals(u, v);
+class SmoothNormals {
+ public:
+  SmoothNormals(const DepthMap& depth, const Camera& camera) : depth_(with_margin(depth, kRadius)) {
+    const NormalMap normals = normals_from_depth(depth, camera);
+    for (size_t k = 0; k < 3; ++k) {
+      Raster<float> one(depth.width, depth.height, 0);
+      for (size_t i = 0; i < one.data.size(); ++i) one.data[i] = normals.data[i][Eigen::Index(k)];
+      normal_[k] = with_margin(one, kRadius);
     }
   }
-  const float length = sum.norm();
-  return length > 0 ? Eigen::Vector3f(sum / length) : Eigen::Vector3f::Zero();
+
+  // Of the eight pixels from (x, y) on: those with a depth.
+  Ints known(int x, int y) const {
+    const auto here = load<Floats>(&depth_(x + kRadius, y + kRadius));
+    return here - here == 0.0f;
+  }
+  // Their normals, not yet of length 1.
+  std::array<Floats, 3> sum(int x, int y) const {
+    constexpr float kSameSurface = 0.03f;
+    std::array<Floats, 3> out = {};
+    if (!any(known(x, y))) return out;
+    const auto here = load<Floats>(&depth_(x + kRadius, y + kRadius));
+    for (int v = y; v <= y + 2 * kRadius; ++v) {
+      for (int u = x; u <= x + 2 * kRadius; ++u) {
+        const Ints same = magnitude(load<Floats>(&depth_(u, v)) - here) <= kSameSurface * here;
+        for (size_t k = 0; k < 3; ++k) {
+          out[k] += select(same, load<Floats>(&normal_[k](u, v)), Floats{});
+        }
+      }
+    }
+    return out;
+  }
+
+ private:
+  static constexpr int kRadius = 2;
+
+  Raster<float> depth_;
+  std::array<Raster<float>, 3> normal_;
+};
+
+// Of the eight pixels from (x, y) on; 0 where there is none.
+Floats given_sigma(const TsdfView& view, int x, int y) {
+  Floats out = {};
+  if (view.sigma.empty()) return out;
+  for (int k = 0; k < std::min(kLanes, view.sigma.width - x); ++k) out[k] = view.sigma(x + k, y);
+  return out;
+}
+
+struct InterpolatedLanes {
+  Floats depth;
+  Ints one_surface;  // Elsewhere the depth means nothing.
+};
+
+// DepthField::interpolated() for eight points; `first` is the first of pixels of four floats.
+InterpolatedLanes interpolated_lanes(
+    const float* first, int width, Floats u, Floats v, Ints inside) {
+  const auto depth_of = [&](Ints index, Ints mask) { return gathered(first, index * 4, mask); };
+  const Floats left = _mm256_floor_ps(u - 0.5f);
+  const Floats top = _mm256_floor_ps(v - 0.5f);
+  const Ints has_quad = inside & (left >= 0.0f) & (top >= 0.0f);
+  const Ints corner = __builtin_convertvector(select(has_quad, top, Floats{}), Ints) * width +
+                      __builtin_convertvector(select(has_quad, left, Floats{}), Ints);
+  const Floats at_corner = depth_of(corner, has_quad);
+  const Ints one_surface = has_quad & (at_corner < 0.0f);
+  const Floats a = (u - 0.5f) - left;
+  const Floats b = (v - 0.5f) - top;
+  const auto at_quad = [&](int offset) {
+    return magnitude(depth_of(corner + offset, one_surface));
+  };
+  const Floats above = (1.0f - a) / magnitude(at_corner) + a / at_quad(1);
+  const Floats below = (1.0f - a) / at_quad(width) + a / at_quad(width + 1);
+  return {1.0f / ((1.0f - b) * above + b * below), one_surface};
 }
 
 }  // namespace
 
 Raster<uint8_t> continuous_quads(const DepthMap& depth, const Camera& camera) {
   Raster<uint8_t> out(depth.width, depth.height, 0);
-  const auto at = [&](int x, int y) { return depth.contains(x, y) ? depth(x, y) : kNaN; };
   const auto inverse_focal = static_cast<float>(2 / (camera.fx + camera.fy));
   const float noise = relative_noise(depth);
-  const auto step = [&](int x, int y, int dx, int dy) {
-    const float near = std::min(at(x, y), at(x + dx, y + dy));
-    return continuous_step(
-        {at(x - dx, y - dy), at(x, y), at(x + dx, y + dy), at(x + 2 * dx, y + 2 * dy)},
-        near * inverse_focal,
-        near * noise);
+  const Raster<float> padded = with_margin(depth, 1);
+  const auto step = [&](int x, int y, int dx, int dy) {  // from (x, y)
+    const auto at = [&](int k) { return load<Floats>(&padded(x + 1 + k * dx, y + 1 + k * dy)); };
+    return continuous_step({at(-1), at(0), at(1), at(2)}, inverse_focal, noise);
   };
   tbb::parallel_for(0, std::max(0, depth.height - 1), [&](int y) {
-    for (int x = 0; x + 1 < depth.width; ++x) {
-      out(x, y) =
-          step(x, y, 1, 0) && step(x, y + 1, 1, 0) && step(x, y, 0, 1) && step(x + 1, y, 0, 1);
+    std::vector<int32_t> down(size_t(depth.width) + 2 * size_t{kLanes});
+    for (int x = 0; x < depth.width; x += kLanes) {
+      store(step(x, y, 0, 1), &down[size_t(x)]);
+    }
+    for (int x = 0; x < depth.width; x += kLanes) {
+      const unsigned is_one = bits(step(x, y, 1, 0) & step(x, y + 1, 1, 0) &
+                                   load<Ints>(&down[size_t(x)]) & load<Ints>(&down[size_t(x) + 1]));
+      for (int k = 0; k < std::min(kLanes, depth.width - 1 - x); ++k) {
+        out(x + k, y) = is_one >> k & 1;
+      }
     }
   });
   return out;
@@ -131,46 +281,92 @@ DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double 
       height_(view.camera.height),
       truncation_(static_cast<float>(options.truncation * voxel)),
       voxel_(static_cast<float>(voxel)),
-      depth_(usable_depth(view, options.depth_trunc)),
-      slope_(width_, height_, 1),
-      facing_(width_, height_, 1),
-      sigma_(width_, height_, 0) {
-  drop_hanging_pixels(depth_, continuous_quads(depth_, view.camera));
-  continuous_ = continuous_quads(depth_, view.camera);
-  hides_ = with_gaps_filled(depth_, options.gap_pixels * options.gap_pixels);
+      pixels_(width_, height_, {kNaN, 1, 1, kNaN}) {
+  DepthMap depth = usable_depth(view, options.depth_trunc);
+  drop_hanging_pixels(depth, continuous_quads(depth, view.camera));
+  const Raster<uint8_t> continuous = continuous_quads(depth, view.camera);
+  const DepthMap hides = with_gaps_filled(depth, options.gap_pixels * options.gap_pixels);
+  if (!view.sigma.empty()) sigma_ = DepthMap(width_, height_, 0);
+  build_pyramid(depth, hides, look_along(view, depth));
+  for (size_t i = 0; i < pixels_.data.size(); ++i) {
+    pixels_.data[i].depth = continuous.data[i] != 0 ? -depth.data[i] : depth.data[i];
+    pixels_.data[i].hides = hides.data[i];
+  }
+}
 
-  const NormalMap normals = normals_from_depth(depth_, view.camera);
-  const Eigen::Matrix3f R_world = R_.transpose();
-  Level finest(width_, height_, {kNaN, kNaN, 0, false, true});
+Raster<float> DepthField::look_along(const TsdfView& view, const DepthMap& depth) {
+  const SmoothNormals normals(depth, view.camera);
+  std::vector<float> across(size_t(width_) + kLanes);
+  for (int x = 0; x < width_; ++x) {
+    across[size_t(x)] = static_cast<float>(view.camera.ray_in_cam(x + 0.5, 0).x());
+  }
+  Raster<float> slack(width_, height_, truncation_);
   tbb::parallel_for(0, height_, [&](int y) {
-    for (int x = 0; x < width_; ++x) {
-      const float d = depth_(x, y);
-      const float behind = hides_(x, y);
-      if (!view.sigma.empty() && view.sigma(x, y) > 0) sigma_(x, y) = view.sigma(x, y);
-      const Eigen::Vector3f ray = R_world * view.camera.ray_in_cam(x + 0.5, y + 0.5).cast<float>();
-      if (std::isfinite(d)) {
-        const float along = std::abs(smooth_normal(normals, depth_, x, y).dot(ray));
-        facing_(x, y) = std::clamp(along / ray.norm(), 0.05f, 1.0f);
-        slope_(x, y) = std::max(along, kMinSlope * ray.norm());
+    const auto down = static_cast<float>(view.camera.ray_in_cam(0, y + 0.5).y());
+    for (int x = 0; x < width_; x += kLanes) {
+      const Ints known = normals.known(x, y);
+      const std::array<Floats, 3> sum = normals.sum(x, y);
+      // Sums in the order of Eigen's.
+      const auto ray_x = load<Floats>(&across[size_t(x)]);
+      std::array<Floats, 3> ray;
+      for (int k = 0; k < 3; ++k) ray[size_t(k)] = R_(0, k) * ray_x + (R_(1, k) * down + R_(2, k));
+      const Floats length = norm(sum);
+      const Floats dot =
+          sum[0] / length * ray[0] + (sum[1] / length * ray[1] + sum[2] / length * ray[2]);
+      const Floats along = select(length > 0.0f, magnitude(dot), Floats{});
+      const Floats one = Floats{} + 1.0f;
+      const Floats facing = select(known, min(max(along / norm(ray), one * kMinFacing), one), one);
+      const Floats slope = select(known, max(along, kMinSlope * norm(ray)), one);
+      const Floats given = given_sigma(view, x, y);
+      const Floats sigma = select(given > 0.0f, given * slope, Floats{});
+      const Floats noise = sigma / voxel_;
+      const Floats weight = facing * facing / (1.0f + noise * noise);
+      const Floats limit = max(Floats{} + truncation_, 3.0f * sigma) / slope;
+      for (int k = 0; k < std::min(kLanes, width_ - x); ++k) {
+        pixels_(x + k, y).slope = slope[k];
+        pixels_(x + k, y).weight = weight[k];
+        slack(x + k, y) = limit[k];
+        if (!sigma_.empty()) sigma_(x + k, y) = sigma[k];
       }
-      const float free_limit = std::max(truncation_, 3 * sigma_(x, y) * slope_(x, y));
-      finest(x, y) = {d, d, free_limit / slope_(x, y), std::isfinite(behind), !std::isfinite(d)};
+    }
+  });
+  return slack;
+}
+
+void DepthField::Extremes::add(const Extremes& other) {
+  nearest = std::min(nearest, other.nearest);
+  farthest = std::max(farthest, other.farthest);
+  slack = std::max(slack, other.slack);
+  any_known |= other.any_known;
+  any_unknown |= other.any_unknown;
+}
+
+void DepthField::build_pyramid(const DepthMap& depth,
+                               const DepthMap& hides,
+                               const Raster<float>& slack) {
+  Level finest((width_ + 1) / 2, (height_ + 1) / 2, kNoExtremes);
+  tbb::parallel_for(0, finest.height, [&](int row) {
+    for (int y = 2 * row; y < std::min(2 * row + 2, height_); ++y) {
+      for (int x = 0; x < width_; ++x) {
+        Extremes& to = finest(x / 2, row);
+        const float d = depth(x, y);
+        to.slack = std::max(to.slack, slack(x, y));
+        to.any_known |= std::isfinite(hides(x, y));
+        if (std::isfinite(d)) {
+          to.nearest = std::min(to.nearest, d);
+          to.farthest = std::max(to.farthest, d);
+        } else {
+          to.any_unknown = true;
+        }
+      }
     }
   });
   pyramid_.push_back(std::move(finest));
   while (pyramid_.back().width > 1 || pyramid_.back().height > 1) {
     const Level& fine = pyramid_.back();
-    Level coarse((fine.width + 1) / 2, (fine.height + 1) / 2, {kNaN, kNaN, 0, false, false});
+    Level coarse((fine.width + 1) / 2, (fine.height + 1) / 2, kNoExtremes);
     for (int y = 0; y < fine.height; ++y) {
-      for (int x = 0; x < fine.width; ++x) {
-        Extremes& to = coarse(x / 2, y / 2);
-        const Extremes& from = fine(x, y);
-        to = {std::fmin(to.nearest, from.nearest),
-              std::fmax(to.farthest, from.farthest),
-              std::max(to.slack, from.slack),
-              to.any_known || from.any_known,
-              to.any_unknown || from.any_unknown};
-      }
+      for (int x = 0; x < fine.width; ++x) coarse(x / 2, y / 2).add(fine(x, y));
     }
     pyramid_.push_back(std::move(coarse));
   }
@@ -179,7 +375,7 @@ DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double 
 bool DepthField::shows_one_surface(float u, float v) const {
   const int x0 = static_cast<int>(std::floor(u - 0.5f));
   const int y0 = static_cast<int>(std::floor(v - 0.5f));
-  return continuous_.contains(x0, y0) && continuous_(x0, y0) != 0;
+  return pixels_.contains(x0, y0) && pixels_(x0, y0).depth < 0;
 }
 
 float DepthField::interpolated(float u, float v) const {
@@ -189,9 +385,10 @@ float DepthField::interpolated(float u, float v) const {
   const int y0 = static_cast<int>(std::floor(fv));
   const float a = fu - static_cast<float>(x0);
   const float b = fv - static_cast<float>(y0);
+  const auto depth = [&](int x, int y) { return std::abs(pixels_(x, y).depth); };
   // Inverse depth is linear in pixel coordinates on a plane, depth is not.
-  const float top = (1 - a) / depth_(x0, y0) + a / depth_(x0 + 1, y0);
-  const float bottom = (1 - a) / depth_(x0, y0 + 1) + a / depth_(x0 + 1, y0 + 1);
+  const float top = (1 - a) / depth(x0, y0) + a / depth(x0 + 1, y0);
+  const float bottom = (1 - a) / depth(x0, y0 + 1) + a / depth(x0 + 1, y0 + 1);
   return 1 / ((1 - b) * top + b * bottom);
 }
 
@@ -207,21 +404,18 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   out.x = static_cast<int>(u);
   out.y = static_cast<int>(v);
   const bool one_surface = shows_one_surface(u, v);
-  const float d = one_surface ? interpolated(u, v) : depth_(out.x, out.y);
+  const Pixel& pixel = pixels_(out.x, out.y);
+  const float d = one_surface ? interpolated(u, v) : std::abs(pixel.depth);
   if (!std::isfinite(d)) {
-    if (p.z() > hides_(out.x, out.y)) out.sight = Sight::Hidden;
+    if (p.z() > pixel.hides) out.sight = Sight::Hidden;
     return out;
   }
-  const float slope = slope_(out.x, out.y);
-  out.sigma = sigma_(out.x, out.y) * slope;
-  out.distance = (d - p.z()) * slope;
+  if (!sigma_.empty()) out.sigma = sigma_(out.x, out.y);
+  out.distance = (d - p.z()) * pixel.slope;
   const float wanted = std::max(truncation_, 3 * out.sigma);
   const float band = std::min(wanted, kMaxBandGrowth * truncation_);
-  const float noise = out.sigma / voxel_;
-  const float facing = facing_(out.x, out.y);
-  out.weight = facing * facing / (1 + noise * noise);
+  out.weight = pixel.weight;
   // Half a pixel from an occlusion edge either surface may be the true one.
-  constexpr float kEdgeWeight = 0.25f;
   if (!one_surface) out.weight *= kEdgeWeight;
   if (out.distance > wanted) {
     out.sight = Sight::Free;
@@ -231,60 +425,110 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
     out.sight = Sight::Band;
     // Behind the surface by more than a voxel the band only assumes that there is matter.
     const float behind = -out.distance - voxel_;
-    if (behind > 0) out.weight *= std::max(0.05f, 1 - behind / (band - voxel_));
+    if (behind > 0) out.weight *= std::max(kLeastBehind, 1 - behind / (band - voxel_));
   }
+  return out;
+}
+
+SightingRow DepthField::row(float x, float y, const std::array<float, 8>& z) const {
+  SightingRow out;
+  const auto zs = load<Floats>(z.data());
+  // In the order in which Eigen adds up: the bits are those of at().
+  const auto moved = [&](int r) { return (R_(r, 0) * x + (R_(r, 1) * y + R_(r, 2) * zs)) + t_[r]; };
+  const Floats depth = moved(2);
+  const Floats u = fx_ * moved(0) / depth + cx_;
+  const Floats v = fy_ * moved(1) / depth + cy_;
+  const Ints inside = (depth > 0.0f) & (u >= 0.0f) & (v >= 0.0f) &
+                      (u < static_cast<float>(width_)) & (v < static_cast<float>(height_));
+  if (!any(inside)) return out;
+  const Ints px = __builtin_convertvector(select(inside, u, Floats{}), Ints);
+  const Ints py = __builtin_convertvector(select(inside, v, Floats{}), Ints);
+  const Ints pixel = py * width_ + px;
+  static_assert(sizeof(Pixel) == 4 * sizeof(float));
+  const float* const first = &pixels_.data.front().depth;
+  const auto [between, one_surface] = interpolated_lanes(first, width_, u, v, inside);
+  const auto [own_depth, slope, own_weight, hides] = four_of_each(first, pixel);
+  const Floats d = select(one_surface, between, magnitude(own_depth));
+  const Ints known = inside & (d - d == 0.0f);
+  const Ints unknown = inside & ~known;
+  if (any(unknown)) {
+    out.hidden = bits(unknown & (depth > hides));
+  }
+  if (!any(known)) return out;
+
+  const Floats distance = (d - depth) * slope;
+  out.has_sigma = !sigma_.empty();
+  const Floats sigma = out.has_sigma ? gathered(sigma_.data.data(), pixel, known) : Floats{};
+  const Floats wanted = max(Floats{} + truncation_, 3.0f * sigma);
+  const Floats band = min(wanted, Floats{} + kMaxBandGrowth * truncation_);
+  const Ints is_free = known & (distance > wanted);
+  const Ints is_hidden = known & (distance < -band);
+  const Ints in_band = known & (distance >= -band) & (distance <= band);
+  out.free = bits(is_free);  // as far as seen so far
+  out.hidden |= bits(is_hidden);
+  out.band = bits(in_band);
+  if ((out.free | out.band) == 0) return out;
+
+  Floats weight = select(one_surface, own_weight, own_weight * kEdgeWeight);
+  out.free &= bits(weight > 0.0f);
+  store(weight, out.weight.data());
+  if (out.band == 0) return out;
+  const Floats behind = -distance - voxel_;
+  const Floats less = max(Floats{} + kLeastBehind, 1.0f - behind / (band - voxel_));
+  weight = select(behind > 0.0f, weight * less, weight);
+  store(select(in_band, weight, Floats{}), out.weight_in_band.data());
+  store(select(in_band, distance, Floats{}), out.distance_in_band.data());
+  store(select(in_band, sigma, Floats{}), out.sigma.data());
+  store(px, out.x.data());
+  store(py, out.y.data());
   return out;
 }
 
 DepthField::Extremes DepthField::over_pixels(int x0, int y0, int x1, int y1) const {
   size_t k = 0;
-  while (k + 1 < pyramid_.size() && std::max(x1 - x0, y1 - y0) >> k > 2) ++k;
+  while (k + 1 < pyramid_.size() && std::max(x1 - x0, y1 - y0) >> (k + 1) > 3) ++k;
   const Level& level = pyramid_[k];
-  Extremes out = {kNaN, kNaN, 0, false, false};
-  for (int y = y0 >> k; y <= y1 >> k; ++y) {
-    for (int x = x0 >> k; x <= x1 >> k; ++x) {
-      const Extremes& e = level(x, y);
-      out = {std::fmin(out.nearest, e.nearest),
-             std::fmax(out.farthest, e.farthest),
-             std::max(out.slack, e.slack),
-             out.any_known || e.any_known,
-             out.any_unknown || e.any_unknown};
-    }
+  Extremes out = kNoExtremes;
+  for (int y = y0 >> (k + 1); y <= y1 >> (k + 1); ++y) {
+    for (int x = x0 >> (k + 1); x <= x1 >> (k + 1); ++x) out.add(level(x, y));
   }
   return out;
 }
 
-Sight DepthField::over(const Eigen::AlignedBox3f& box) const {
-  Eigen::AlignedBox2f shadow;
-  float z_min = std::numeric_limits<float>::max();
-  float z_max = std::numeric_limits<float>::lowest();
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3f p =
-        R_ * box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(corner)) + t_;
-    z_min = std::min(z_min, p.z());
-    z_max = std::max(z_max, p.z());
-    if (p.z() > 0) {
-      shadow.extend(Eigen::Vector2f(fx_ * p.x() / p.z() + cx_, fy_ * p.y() / p.z() + cy_));
-    }
-  }
-  if (z_max <= 0) return Sight::Nothing;
-  if (!(z_min > 0.1f * z_max)) return Sight::Mixed;
+DepthField::Look DepthField::look(const Eigen::AlignedBox3f& box) const {
+  // A little larger, so that no rounding makes a point say something else than its box.
+  const Eigen::Vector3f low = box.min().array() - kRounding * voxel_;
+  const Eigen::Vector3f high = box.max().array() + kRounding * voxel_;
+  const Floats x = {low[0], high[0], low[0], high[0], low[0], high[0], low[0], high[0]};
+  const Floats y = {low[1], low[1], high[1], high[1], low[1], low[1], high[1], high[1]};
+  const Floats z = {low[2], low[2], low[2], low[2], high[2], high[2], high[2], high[2]};
+  const auto moved = [&](int r) { return R_(r, 0) * x + R_(r, 1) * y + R_(r, 2) * z + t_[r]; };
+  const Floats depth = moved(2);
+  const float z_min = least(depth);
+  const float z_max = -least(-depth);
+  if (z_max <= 0) return {Sight::Nothing, false};
+  if (!(z_min > 0.1f * z_max)) return {Sight::Mixed, true};
+  const Floats u = fx_ * moved(0) / depth + cx_;
+  const Floats v = fy_ * moved(1) / depth + cy_;
   const auto w = static_cast<float>(width_);
   const auto h = static_cast<float>(height_);
   constexpr float kReach = 2;  // Interpolation looks one pixel further, rounding is paid too.
-  const Eigen::Vector2f low = shadow.min().array() - kReach;
-  const Eigen::Vector2f high = shadow.max().array() + kReach;
-  if (high.x() < 0 || high.y() < 0 || low.x() >= w || low.y() >= h) return Sight::Nothing;
-  const bool inside = low.x() >= 0 && low.y() >= 0 && high.x() < w && high.y() < h;
-  const Extremes e = over_pixels(static_cast<int>(std::max(low.x(), 0.0f)),
-                                 static_cast<int>(std::max(low.y(), 0.0f)),
-                                 static_cast<int>(std::min(high.x(), w - 1)),
-                                 static_cast<int>(std::min(high.y(), h - 1)));
-  if (!e.any_known) return Sight::Nothing;
-  if (!inside || e.any_unknown) return Sight::Mixed;
-  if (z_max < e.nearest - e.slack) return Sight::Free;
-  if (z_min > e.farthest + e.slack) return Sight::Hidden;
-  return Sight::Mixed;
+  const float left = least(u) - kReach;
+  const float right = -least(-u) + kReach;
+  const float top = least(v) - kReach;
+  const float bottom = -least(-v) + kReach;
+  if (right < 0 || bottom < 0 || left >= w || top >= h) return {Sight::Nothing, false};
+  const bool inside = left >= 0 && top >= 0 && right < w && bottom < h;
+  const Extremes e = over_pixels(static_cast<int>(std::max(left, 0.0f)),
+                                 static_cast<int>(std::max(top, 0.0f)),
+                                 static_cast<int>(std::min(right, w - 1)),
+                                 static_cast<int>(std::min(bottom, h - 1)));
+  if (!e.any_known) return {Sight::Nothing, false};
+  const bool is_before = z_max < e.nearest - e.slack;
+  const bool is_behind = z_min > e.farthest + e.slack;
+  const bool may_touch = !is_before && !is_behind;
+  if (!inside || e.any_unknown) return {Sight::Mixed, may_touch, !is_behind};
+  return {is_before ? Sight::Free : is_behind ? Sight::Hidden : Sight::Mixed, may_touch};
 }
 
 }  // namespace cgs

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 
 #include "libcgs/core/camera.h"
@@ -59,6 +60,7 @@ struct TsdfReport {
   size_t conflicts = 0;        ///< Voxels near the surface of one view and free in another.
   size_t carved = 0;           ///< Conflicts that free space won.
   size_t predicted_bytes = 0;  ///< Upper bound, known before any grid was made.
+  size_t portions = 1;         ///< In which the views were held.
   size_t actual_bytes = 0;     ///< Of the grids.
 };
 
@@ -67,8 +69,16 @@ struct FusedVolume {
   TsdfReport report;
 };
 
+/// Depth maps that are made when they are asked for, as many as there may be.
+struct TsdfSource {
+  size_t count = 0;
+  /// View i, without its colour where `with_color` is false. Asked for up to three times, from
+  /// several threads at once; must give the same every time.
+  std::function<TsdfView(size_t i, bool with_color)> view;
+};
+
 /// Fuses depth maps into a volume of three states.
-///
+//////
 /// - Bounds: the box of all surface points whose depth lies within the 1st and 99th percentile of
 ///   their view, plus truncation and two voxels.
 /// - Distance of a voxel in a view: depth difference along z times the cosine factor of the local
@@ -81,6 +91,10 @@ struct FusedVolume {
 ///   and others a voxel behind their surface, the larger weight wins; a tie keeps it.
 /// The result is bit-identical for any number of threads.
 ///
+/// Of a source, only as many views are held at once as fit into `view_memory`; beyond these, what
+/// has been summed up so far near the surface is kept instead. The result is that of all at once;
+/// a voxel size that is chosen is the median of at most kFootprints pixels, evenly spaced.
+///
 /// \throws InvalidInput   if there is no view, a raster does not match its camera, or no pixel has
 ///                        a depth.
 /// \throws LimitError     if the predicted memory is above options.memory_limit.
@@ -89,5 +103,12 @@ struct FusedVolume {
 FusedVolume fuse(std::span<const TsdfView> views,
                  const TsdfOptions& options,
                  const Progress& progress = {});
+
+inline constexpr size_t kViewMemory = size_t{256} << 20;
+inline constexpr size_t kFootprints = size_t{1} << 22;
+FusedVolume fuse_streamed(const TsdfSource& source,
+                          const TsdfOptions& options,
+                          const Progress& progress = {},
+                          size_t view_memory = kViewMemory);
 
 }  // namespace cgs

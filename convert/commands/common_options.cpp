@@ -45,6 +45,14 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
       options.downscale,
       "Divide the image size by this; default: the smallest that leaves no side above " +
           std::to_string(SceneOptions::kLongestSide) + " pixels");
+  command.add_option("--depth-model",
+                     options.depth.network,
+                     "Network (.onnx, in the form of MiDaS small) that guesses disparity where "
+                     "photographs measure none; depth with --depth-kind depth");
+  add_depth_options(command, options);
+}
+
+void add_depth_options(CLI::App& command, SceneOptions& options) {
   const std::map<std::string, DepthKind> kinds = {{"auto", DepthKind::Unknown},
                                                   {"metric", DepthKind::Metric},
                                                   {"depth", DepthKind::Relative},
@@ -60,10 +68,6 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
                   "metric (of a sensor), depth or disparity (up to scale and offset, of a "
                   "network); default auto: whichever fits what the photographs show")
       ->transform(CLI::CheckedTransformer(kinds).description("auto, metric, depth, disparity"));
-  command.add_option("--depth-model",
-                     options.depth.network,
-                     "Network (.onnx, in the form of MiDaS small) that guesses disparity where "
-                     "photographs measure none; depth with --depth-kind depth");
   command.add_option("--depth-scale",
                      options.depth.scale,
                      "Values of metric depth files per metre; default: 1000 where they are whole "

@@ -38,6 +38,9 @@ void add_scale_options(CLI::App& command, SceneRequest& request);
 /// and --allow-external.
 void add_scene_options(CLI::App& command, SceneOptions& options);
 
+/// Of these --depth, --depth-kind, --depth-scale and --allow-external.
+void add_depth_options(CLI::App& command, SceneOptions& options);
+
 /// --glb-encoding.
 void add_glb_option(CLI::App& command, GlbEncoding& encoding);
 

@@ -2,6 +2,7 @@
 #include "libcgs/core/camera.h"
 
 #include <cmath>
+#include <vector>
 
 #include <tbb/parallel_for.h>
 
@@ -31,11 +32,20 @@ Camera resized(const Camera& camera, int width, int height) {
 
 namespace {
 
+// Directions as ray_in_cam() gives them, of every column and row of pixels.
+struct Rays {
+  explicit Rays(const Camera& camera) {
+    for (int x = 0; x < camera.width; ++x) across.push_back(camera.ray_in_cam(x + 0.5, 0).x());
+    for (int y = 0; y < camera.height; ++y) down.push_back(camera.ray_in_cam(0, y + 0.5).y());
+  }
+  std::vector<double> across, down;
+};
+
 // Difference of the unprojected points before and after p along one axis. Of a one-sided and a
 // central difference the one with the smaller depth step is taken, so that normals at an
 // occlusion edge belong to the surface of the pixel and not to the jump.
 Eigen::Vector3d tangent(const DepthMap& depth,
-                        const Camera& camera,
+                        const Rays& rays,
                         const Eigen::Vector2i& pixel,
                         const Eigen::Vector2i& step) {
   const int x = pixel.x();
@@ -46,7 +56,8 @@ Eigen::Vector3d tangent(const DepthMap& depth,
     return depth.contains(u, v) ? depth(u, v) : std::nanf("");
   };
   const auto point = [&](int u, int v) {
-    return Eigen::Vector3d(double(depth(u, v)) * camera.ray_in_cam(u + 0.5, v + 0.5));
+    const Eigen::Vector3d ray(rays.across[size_t(u)], rays.down[size_t(v)], 1);
+    return Eigen::Vector3d(double(depth(u, v)) * ray);
   };
   const float here = depth(x, y);
   const float step_before = std::abs(depth_at(x - dx, y - dy) - here);
@@ -68,11 +79,12 @@ Eigen::Vector3d tangent(const DepthMap& depth,
 NormalMap normals_from_depth(const DepthMap& depth, const Camera& camera) {
   NormalMap normals(depth.width, depth.height, Eigen::Vector3f::Zero());
   const Eigen::Matrix3d R = camera.world_from_cam.rotation();
+  const Rays rays(camera);
   tbb::parallel_for(0, depth.height, [&](int y) {
     for (int x = 0; x < depth.width; ++x) {
       if (!std::isfinite(depth(x, y))) continue;
       const Eigen::Vector3d n =
-          tangent(depth, camera, {x, y}, {0, 1}).cross(tangent(depth, camera, {x, y}, {1, 0}));
+          tangent(depth, rays, {x, y}, {0, 1}).cross(tangent(depth, rays, {x, y}, {1, 0}));
       const double length = n.norm();
       if (length > 0) normals(x, y) = (R * (n / length)).cast<float>();
     }

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <optional>
 
 #include <Eigen/Eigenvalues>
 
@@ -56,21 +58,8 @@ Eigen::Vector3d convergence_from(const Eigen::Vector3d& place, const Scene& scen
   return A.ldlt().solve(b);
 }
 
-}  // namespace
-
-double median_baseline(const Scene& scene) {
-  std::vector<double> lengths;
-  for (size_t i = 0; i < scene.input.size(); ++i) {
-    for (size_t j = i + 1; j < scene.input.size(); ++j) {
-      const auto& a = scene.views[static_cast<size_t>(scene.input[i])].camera;
-      const auto& b = scene.views[static_cast<size_t>(scene.input[j])].camera;
-      lengths.push_back((a.center() - b.center()).norm());
-    }
-  }
-  return lengths.empty() ? 0 : quantile(lengths, 0.5);
-}
-
-DepthRange depth_range(const Scene& scene, int view) {
+// `median_of` gives the median baseline when it is needed: of many views it takes its time.
+DepthRange range_of(const Scene& scene, int view, const std::function<double()>& median_of) {
   const View& v = scene.views[static_cast<size_t>(view)];
   if (v.near > 0 && v.far > v.near) return {v.near, v.far};
   const std::vector<double> depths = point_depths(scene, v.camera);
@@ -79,7 +68,7 @@ DepthRange depth_range(const Scene& scene, int view) {
     // Sparse points miss what has no texture: leave room before and behind them.
     return {0.8 * quantile(depths, kOrderQuantile), 1.5 * quantile(depths, 1 - kOrderQuantile)};
   }
-  const double baseline = median_baseline(scene);
+  const double baseline = median_of();
   if (!(baseline > 0)) {
     throw BadInput(Defect::Value,
                    scene.folder,
@@ -95,12 +84,35 @@ DepthRange depth_range(const Scene& scene, int view) {
   return {2 * baseline, 100 * baseline};
 }
 
+}  // namespace
+
+double median_baseline(const Scene& scene) {
+  std::vector<double> lengths;
+  for (size_t i = 0; i < scene.input.size(); ++i) {
+    for (size_t j = i + 1; j < scene.input.size(); ++j) {
+      const auto& a = scene.views[static_cast<size_t>(scene.input[i])].camera;
+      const auto& b = scene.views[static_cast<size_t>(scene.input[j])].camera;
+      lengths.push_back((a.center() - b.center()).norm());
+    }
+  }
+  return lengths.empty() ? 0 : quantile(lengths, 0.5);
+}
+
+DepthRange depth_range(const Scene& scene, int view) {
+  return range_of(scene, view, [&] { return median_baseline(scene); });
+}
+
 std::vector<Eigen::Vector3d> subject_points(const Scene& scene) {
   std::vector<Eigen::Vector3d> points;
+  std::optional<double> baseline;
+  const auto median_of = [&] {
+    if (!baseline) baseline = median_baseline(scene);
+    return *baseline;
+  };
   for (const int i : scene.input) {
     const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
     points.push_back(camera.center());
-    const DepthRange range = depth_range(scene, i);
+    const DepthRange range = range_of(scene, i, median_of);
     // The far bound may be guessed generously; the near half of the range in inverse depth is
     // where the subject stands.
     const double middle = 2 / (1 / range.near + 1 / range.far);

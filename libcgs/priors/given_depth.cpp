@@ -17,9 +17,8 @@ namespace cgs {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr double kSensorFloor = 0.005;  // relative: calibration of the best sensors
-constexpr double kWorstSensor = 0.2;    // relative scatter beyond which depth is not metric
-constexpr double kNoFit = 1;            // scatter that stands for none
+constexpr double kWorstSensor = 0.2;  // relative scatter beyond which depth is not metric
+constexpr double kNoFit = 1;          // scatter that stands for none
 
 std::string percent(double share) {
   std::array<char, 32> text{};
@@ -130,7 +129,7 @@ class Fitter {
       constexpr double kAboutAsWell = 1.5;
       const bool may_be_metric = states_metres() || std::abs(std::log(world_scale())) < kSameUnit;
       const bool fits =
-          scale_->scatter < kFits && scale_->scatter < std::max(kAboutAsWell * best, kSensorFloor);
+          scale_->scatter < kFits && scale_->scatter < std::max(kAboutAsWell * best, kSensorSigma);
       if (may_be_metric && fits) return DepthKind::Metric;
     }
     if (!(best < kNoFit)) return DepthKind::Unknown;
@@ -147,7 +146,7 @@ class Fitter {
     }
     double squares = 0;
     for (const double log : logs) squares += log * log;
-    return std::hypot(kSensorFloor, std::sqrt(squares) / double(std::max(size_t{1}, logs.size())));
+    return std::hypot(kSensorSigma, std::sqrt(squares) / double(std::max(size_t{1}, logs.size())));
   }
 
   void leave_out(const std::string& why) {
@@ -160,7 +159,7 @@ class Fitter {
     const Frame& frame = scene_.frame;
     const bool is_told = scene_.depth_kind == DepthKind::Metric || states_metres();
     double internal_per_metre = 0;
-    double scatter = kSensorFloor;
+    double scatter = kSensorSigma;
     if (scale_ && scale_->scatter > kWorstSensor) {
       leave_out("as metric depth they are " + percent(scale_->scatter) +
                 " from what the photographs show");
@@ -235,8 +234,9 @@ class Fitter {
   GivenDepth out_;
 };
 
-// Next to a jump, sensors report what is on neither side.
-bool is_at_edge(const DepthMap& depth, int x, int y) {
+}  // namespace
+
+bool is_at_depth_edge(const DepthMap& depth, int x, int y) {
   constexpr float kJump = 0.05f;  // relative
   const float z = depth(x, y);
   for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
@@ -245,8 +245,6 @@ bool is_at_edge(const DepthMap& depth, int x, int y) {
   }
   return false;
 }
-
-}  // namespace
 
 GivenDepth fit_given_depth(const Scene& scene, const std::vector<ViewPriors>& priors) {
   const bool is_given = std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
@@ -261,12 +259,12 @@ GivenDepth fit_given_depth(const Scene& scene, const std::vector<ViewPriors>& pr
 void merge_sensor_depth(const FittedDepth& sensor, const View& view, ViewPriors& priors) {
   constexpr double kSigmas = 3;
   constexpr float kConfidence = 0.5f;  // of a pixel that no other view confirms
-  const double relative = std::max(kSensorFloor, sensor.scatter);
+  const double relative = std::max(kSensorSigma, sensor.scatter);
   for (int y = 0; y < sensor.depth.height; ++y) {
     for (int x = 0; x < sensor.depth.width; ++x) {
       const auto z = double(sensor.depth(x, y));
       const bool is_usable = view.valid.empty() || view.valid(x, y) != 0;
-      if (!(z > 0) || !is_usable || is_at_edge(sensor.depth, x, y)) continue;
+      if (!(z > 0) || !is_usable || is_at_depth_edge(sensor.depth, x, y)) continue;
       const double sigma = relative * z;
       if (priors.origin(x, y) == DepthOrigin::Measured) {
         const auto own = double(priors.depth(x, y));

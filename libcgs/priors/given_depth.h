@@ -36,6 +36,12 @@ struct GivenDepth {
 /// \param priors  of plane_sweep(), in the order of Scene::input
 GivenDepth fit_given_depth(const Scene& scene, const std::vector<ViewPriors>& priors);
 
+/// Relative standard deviation of what the best sensors measure: their calibration.
+inline constexpr double kSensorSigma = 0.005;
+
+/// True next to a jump of depth, where sensors report what is on neither side.
+bool is_at_depth_edge(const DepthMap& depth, int x, int y);
+
 /// Enters the depth of a sensor into what a view knows. Pixels without measured depth become
 /// Measured, with sigma the larger of the scatter and 0.5 % of the depth; where both are known and
 /// agree within three sigma, the weighted mean is taken, and where they do not, what photographs

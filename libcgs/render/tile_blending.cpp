@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "libcgs/render/lanes.h"
+#include "libcgs/core/lanes.h"
 
 namespace cgs {
 

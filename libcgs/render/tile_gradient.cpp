@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "libcgs/render/lanes.h"
+#include "libcgs/core/lanes.h"
 #include "libcgs/render/tile_kernels.h"
 
 namespace cgs {

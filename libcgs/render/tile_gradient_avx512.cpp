@@ -9,7 +9,7 @@
 
 #include <immintrin.h>
 
-#include "libcgs/render/lanes.h"
+#include "libcgs/core/lanes.h"
 #include "libcgs/render/tile_gradient.h"
 
 #ifdef __clang__

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "libcgs/render/lanes.h"
+#include "libcgs/core/lanes.h"
 #include "libcgs/render/tile_gradient.h"
 
 // The loops of tile_gradient.h over the pixels of a tile, for any number of lanes. Lanes gives

@@ -71,6 +71,25 @@ void expect_refused(const TempDir& dir, int exit_code, const std::vector<std::st
   EXPECT_FALSE(std::filesystem::exists(dir / "out")) << "something was left behind";
 }
 
+TEST(BadInput, FusionOfASceneWithoutDepthOrOfAModelWithOptionsOfDepth) {
+  const TempDir dir;
+  write_scene(dir);
+  const auto fuse = [&](const std::string& input, const std::string& more) {
+    return run_cgs("fuse " + (dir / input).string() + more + " -q -o " +
+                   (dir / "out.vdb").string());
+  };
+  const ProgramResult none = fuse("scene", "");
+  EXPECT_EQ(none.exit_code, 3);
+  EXPECT_EQ(std::count(none.err.begin(), none.err.end(), '\n'), 1) << none.err;
+  EXPECT_NE(none.err.find("MISSING"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("--depth"), std::string::npos) << none.err;
+  test::write_bytes(dir / "model/gaussians.ply", "");
+  const ProgramResult model = fuse("model", " --depth-scale 1000");
+  EXPECT_EQ(model.exit_code, 2);
+  EXPECT_NE(model.err.find("--depth-scale"), std::string::npos) << model.err;
+  EXPECT_FALSE(std::filesystem::exists(dir / "out.vdb"));
+}
+
 TEST(BadInput, MissingFolder) {
   const TempDir dir;
   expect_refused(dir, 3, {"OPEN", "scene"});

@@ -63,7 +63,7 @@ TEST(DepthField, SaysTheSameOverABoxAsAtItsPoints) {
                               -0.5f + 0.05f * float(i / 20 % 20),
                               -0.4f + 0.05f * float(i / 400));
     const Eigen::AlignedBox3f box(low, low.array() + 0.04f);
-    const Sight sight = field.over(box);
+    const Sight sight = field.look(box).sight;
     if (sight == Sight::Mixed) continue;
     ++told;
     for (int k = 0; k < 27; ++k) {
@@ -73,6 +73,64 @@ TEST(DepthField, SaysTheSameOverABoxAsAtItsPoints) {
     }
   }
   EXPECT_GT(told, 2000);
+}
+
+TEST(DepthField, SaysTheSameOfARowAsOfItsPoints) {
+  const auto shape = test::nearest({test::sphere({0, 0, 0}, 0.15), test::plane({0, 0.2, 1}, 0.4)});
+  TsdfView view = test::photographed(shape, test::camera_at({0.4, 0.1, -1}, {0, 0, 0}, 96));
+  test::spoil(view, 0.01, 1);
+  for (const bool has_sigma : {false, true}) {
+    if (has_sigma) view.sigma = DepthMap(view.depth.width, view.depth.height, 0.004f);
+    const DepthField field(view, {}, 0.01);
+    std::array<int, 4> told = {};
+    for (int i = 0; i < 40 * 40; ++i) {
+      const float x = -0.7f + 0.035f * float(i % 40);
+      const float y = -0.5f + 0.025f * float(i / 40);
+      for (int part = 0; part < 20; ++part) {
+        std::array<float, 8> z{};
+        for (int k = 0; k < 8; ++k) z[size_t(k)] = -1.2f + 0.1f * float(part) + 0.0125f * float(k);
+        const SightingRow row = field.row(x, y, z);
+        for (size_t k = 0; k < 8; ++k) {
+          const Sighting one = field.at({x, y, z[k]});
+          ++told[size_t(one.sight)];
+          const auto is = [&](unsigned bits) { return (bits >> k & 1) != 0; };
+          ASSERT_EQ(is(row.free), one.sight == Sight::Free);
+          ASSERT_EQ(is(row.hidden), one.sight == Sight::Hidden);
+          ASSERT_EQ(is(row.band), one.sight == Sight::Band);
+          if (is(row.free)) ASSERT_EQ(row.weight[k], one.weight);
+          if (row.band == 0) continue;
+          ASSERT_EQ(row.weight_in_band[k], is(row.band) ? one.weight : 0);
+          ASSERT_EQ(row.distance_in_band[k], is(row.band) ? one.distance : 0);
+          ASSERT_EQ(row.sigma[k], is(row.band) ? one.sigma : 0);
+          if (!is(row.band)) continue;
+          ASSERT_EQ(row.x[k], one.x);
+          ASSERT_EQ(row.y[k], one.y);
+        }
+      }
+    }
+    for (const int count : told) EXPECT_GT(count, 1000);
+  }
+}
+
+TEST(DepthField, TellsOfBoxesThatNoBandTouches) {
+  const auto shape = test::nearest({test::sphere({0, 0, 0}, 0.15), test::plane({0, 0, 1}, 0.4)});
+  TsdfView view = test::photographed(shape, camera());
+  for (int y = 0; y < view.depth.height; ++y) view.depth(20, y) = std::nanf("");
+  const DepthField field(view, {}, 0.01);
+  int untouched = 0;
+  for (int i = 0; i < 20 * 20 * 20; ++i) {
+    const Eigen::Vector3f low(-0.5f + 0.05f * float(i % 20),
+                              -0.5f + 0.05f * float(i / 20 % 20),
+                              -0.4f + 0.05f * float(i / 400));
+    if (field.look({low, low.array() + 0.04f}).may_touch) continue;
+    ++untouched;
+    for (int k = 0; k < 125; ++k) {
+      const Eigen::Vector3f p =
+          low + 0.01f * Eigen::Vector3f(float(k % 5), float(k / 5 % 5), float(k / 25));
+      ASSERT_NE(field.at(p).sight, Sight::Band) << p.transpose();
+    }
+  }
+  EXPECT_GT(untouched, 4000);
 }
 
 TEST(DepthField, CarvesAlongRaysThatHitNothing) {

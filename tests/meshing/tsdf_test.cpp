@@ -247,6 +247,118 @@ TEST(Fuse, GivesTheSameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one.colors, four.colors);
 }
 
+// The same views, made when they are asked for.
+TsdfSource source_of(const std::vector<TsdfView>& views) {
+  return {views.size(), [&views](size_t i, bool with_color) {
+            TsdfView view = views[i];
+            if (!with_color) view.color = {};
+            return view;
+          }};
+}
+
+template <typename Grid>
+void expect_same(const Grid& a, const Grid& b) {
+  ASSERT_TRUE(a.tree().hasSameTopology(b.tree())) << a.getName();
+  auto other = b.getConstAccessor();
+  for (auto it = a.cbeginValueAll(); it; ++it) {
+    ASSERT_EQ(*it, other.getValue(it.getCoord())) << a.getName();
+  }
+}
+
+void expect_same(const FusedVolume& a, const FusedVolume& b) {
+  expect_same(*a.volume.tsdf, *b.volume.tsdf);
+  expect_same(*a.volume.weight, *b.volume.weight);
+  expect_same(*a.volume.color, *b.volume.color);
+  expect_same(*a.volume.support, *b.volume.support);
+  expect_same(*a.volume.sigma, *b.volume.sigma);
+  expect_same(*a.volume.state, *b.volume.state);
+  EXPECT_EQ(a.report.free, b.report.free);
+  EXPECT_EQ(a.report.occupied, b.report.occupied);
+  EXPECT_EQ(a.report.hidden, b.report.hidden);
+  EXPECT_EQ(a.report.unseen, b.report.unseen);
+  EXPECT_EQ(a.report.conflicts, b.report.conflicts);
+  EXPECT_EQ(a.report.carved, b.report.carved);
+}
+
+// Views all around a sphere and of a wall behind it, noisy, of several kinds.
+std::vector<TsdfView> varied_views() {
+  std::vector<TsdfView> views = three_views(sphere_before_wall());
+  for (const double x : {-0.5, -0.15, 0.15, 0.5}) {
+    views.push_back(
+        test::photographed(sphere_before_wall(), test::camera_at({x, 0.3, -0.7}, kCenter, 128)));
+  }
+  for (size_t i = 0; i < views.size(); ++i) test::spoil(views[i], 0.01, uint32_t(i));
+  const auto mask = [](const TsdfView& view, uint8_t value) {
+    return MaskMap(view.camera.width, view.camera.height, value);
+  };
+  views[1].color = {};
+  views[2].guessed = mask(views[2], 1);
+  views[4].is_virtual = true;
+  views[5].usable = mask(views[5], 1);
+  for (size_t i = 0; i < 4000; ++i) views[5].usable.data[i] = 0;
+  for (size_t i = 3; i < views.size(); ++i) {
+    views[i].sigma = DepthMap(views[i].camera.width, views[i].camera.height, 0.004f);
+  }
+  return views;
+}
+
+TEST(Fuse, GivesTheSameBitsInAnyPortionsAndNumberOfThreads) {
+  const std::vector<TsdfView> views = varied_views();
+  const FusedVolume at_once = fuse(views, {});
+  EXPECT_GT(at_once.report.carved, 0U);
+  EXPECT_EQ(at_once.report.portions, 1U);
+  const size_t one_view = size_t{kWidth} * kWidth * 3 / 4 * 64;
+  for (const size_t memory : {size_t{1}, 3 * one_view, kViewMemory}) {
+    for (const size_t threads : {1, 4}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      const FusedVolume streamed = fuse_streamed(source_of(views), {}, {}, memory);
+      EXPECT_EQ(streamed.report.portions == views.size(), memory == 1);
+      EXPECT_EQ(streamed.report.portions == 1, memory == kViewMemory);
+      EXPECT_GE(streamed.report.predicted_bytes, streamed.report.actual_bytes);
+      expect_same(at_once, streamed);
+    }
+  }
+}
+
+TEST(Fuse, HoldsASourceToItsMemoryAndItsViewsToTheirCameras) {
+  std::vector<TsdfView> views = varied_views();
+  EXPECT_THROW(fuse_streamed(source_of(views), {.memory_limit = 1000000}, {}, 1), LimitError);
+  views[3].sigma = DepthMap(3, 3, 1);
+  EXPECT_THROW(fuse_streamed(source_of(views), {}, {}, 1), InvalidInput);
+  EXPECT_THROW(fuse_streamed(TsdfSource{}, {}), InvalidInput);
+}
+
+TEST(Fuse, KeepsTheThicknessOfAPlateSeenFromBothSides) {
+  const Vector3d half(0.2, 0.2, 0.02);
+  std::vector<TsdfView> views;
+  for (const double z : {-0.8, 0.8}) {
+    for (const double x : {-0.2, 0.2}) {
+      views.push_back(
+          test::photographed(test::box(-half, half), test::camera_at({x, 0.1, z}, {0, 0, 0}, 200)));
+    }
+  }
+  const FusedVolume fused = fuse_streamed(source_of(views), {.voxel_size = 0.004}, {}, 1);
+  const TriangleMesh mesh = open_surface(fused.volume, {});
+  double front = 0;
+  double back = 0;
+  for (const auto& v : mesh.vertices) {
+    if (std::abs(v.x()) > 0.15f || std::abs(v.y()) > 0.15f) continue;
+    ASSERT_NEAR(std::abs(v.z()), 0.02f, 0.002f);
+    front += v.z() < 0 ? 1 : 0;
+    back += v.z() > 0 ? 1 : 0;
+  }
+  EXPECT_GT(front, 1000);
+  EXPECT_GT(back, 1000);
+}
+
+TEST(Fuse, LeavesAWallThatIsSeenFromOneSideOpen) {
+  const TriangleMesh mesh = open_surface(
+      fuse_streamed(source_of(three_views(test::plane({0, 0, 1}, 0.1))), {}, {}, 1).volume, {});
+  ASSERT_GT(mesh.faces.size(), 1000U);
+  for (const auto& v : mesh.vertices) ASSERT_NEAR(v.z(), 0.1f, 0.005f);
+  for (const auto& n : mesh.normals) ASSERT_LT(n.z(), 0);
+}
+
 TEST(Fuse, CoarsensTheVoxelsToTheLimit) {
   const auto views = three_views(sphere_before_wall());
   const auto fine = fuse(views, {});

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include <openvdb/openvdb.h>
+
+#include "meshing/depth_field.h"
+
+namespace cgs {
+
+inline constexpr int kBlockSide = 8;  ///< Voxels along the edge of an OpenVDB leaf.
+inline constexpr int kBlockVoxels = kBlockSide * kBlockSide * kBlockSide;
+
+/// What views say about the voxels of one block, summed up in the order in which they are added:
+/// the same views in the same order give the same bits, however they come in portions.
+class BlockEvidence {
+ public:
+  /// A quarter of a block: 4 x 4 rows of voxels.
+  static constexpr size_t kParts = 4;
+  static constexpr unsigned kAllParts = 0xf;
+
+  /// \param touched  a bit per part that the surface of any view may touch; what is free and hidden
+  ///                 in others is quick to tell, and needs a hundredth of the memory if all are
+  explicit BlockEvidence(unsigned touched);
+  BlockEvidence(BlockEvidence&&) noexcept = default;
+  BlockEvidence& operator=(BlockEvidence&&) noexcept = default;
+
+  /// Coordinates of the voxel centres of a block [internal units].
+  struct Place {
+    Place(const openvdb::Coord& origin, double voxel);
+    Eigen::AlignedBox3f box() const;
+    Eigen::AlignedBox3f part_box(size_t part) const;
+    std::array<float, kBlockSide> x, y, z;
+  };
+
+  /// Adds what a view says, voxel by voxel; never Band in parts that are not touched.
+  void add(const Place& place, const DepthField& field, const TsdfView& view);
+  /// The same where the view says one thing about all of it: Hidden, or Free where no part is
+  /// touched.
+  void add_whole(Sight sight);
+
+  bool has_band() const { return touched_ != 0; }
+  /// True if nothing can change any more: without band, and free all over.
+  bool is_settled() const;
+
+  /// Everything known about a voxel.
+  struct Voxel {
+    double weight = 0, distance = 0, spread = 0, variance = 0;  // weighted sums
+    float free_weight = 0;
+    int count = 0;  // of views in the band
+    int known = 0;  // of those that are photographs and no guess
+    bool is_guessed = false, has_sigma = true;
+    bool free = false, hidden = false;
+    double color_weight = 0;
+    Eigen::Vector3d color = Eigen::Vector3d::Zero();
+
+    double mean() const { return distance / weight; }
+    /// Guesses that agree still rest on one view each.
+    float support() const;
+    /// The larger of what the views promise and how far they disagree.
+    double sigma() const;
+  };
+  Voxel operator[](size_t n) const;
+
+  /// Forgets everything, but keeps the memory.
+  void clear();
+
+ private:
+  using Doubles = std::array<double, kBlockVoxels>;
+  struct Sums {
+    Doubles weight = {}, distance = {};
+    std::array<uint16_t, kBlockVoxels> count = {}, known = {};
+    std::array<uint8_t, kBlockVoxels> is_guessed = {}, lacks_sigma = {};
+  };
+  struct SigmaSums {
+    Doubles spread = {}, variance = {};
+  };
+  struct ColorSums {
+    Doubles weight = {};
+    std::array<Doubles, 3> color = {};
+  };
+
+  void add_row(size_t row, const SightingRow& sightings, const TsdfView& view);
+  void add_band(size_t first, const SightingRow& row, const TsdfView& view);
+
+  unsigned touched_;
+  // A bit per voxel, a byte per row of them.
+  static constexpr size_t kRows = kBlockVoxels / kBlockSide;
+  std::array<uint8_t, kRows> free_ = {}, hidden_ = {};
+  std::unique_ptr<std::array<float, kBlockVoxels>> free_weight_;  // null without band
+  std::unique_ptr<Sums> sums_;        // null until a voxel is in the band of a view
+  std::unique_ptr<SigmaSums> sigma_;  // null until a view has a sigma
+  std::unique_ptr<ColorSums> color_;  // null until a view has colour
+
+ public:
+  /// Memory of one block [bytes].
+  static constexpr size_t kPlainBytes = 2 * kBlockVoxels / 8 + 5 * sizeof(void*);
+  static constexpr size_t kBandBytes = kPlainBytes + kBlockVoxels * sizeof(float) + sizeof(Sums);
+  static constexpr size_t kSigmaBytes = sizeof(SigmaSums);
+  static constexpr size_t kColorBytes = sizeof(ColorSums);
+};
+
+}  // namespace cgs
