@@ -371,7 +371,7 @@ ClosedMesh closed_mesh(const TriangleMesh& mesh, const Progress& progress) {
     done = done || closing.enclose(closing.diagonal() / parts);
   }
   report(progress, 0.6);
-  for (const double parts : {200.0, 100.0, 50.0, 25.0, 12.0}) {
+  for (const double parts : {100.0, 50.0, 25.0, 12.0}) {
     done = done || closing.wrap(closing.diagonal() / parts);
   }
   report(progress, 0.9);

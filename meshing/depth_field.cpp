@@ -232,6 +232,8 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
     // Behind the surface by more than a voxel the band only assumes that there is matter.
     const float behind = -out.distance - voxel_;
     if (behind > 0) out.weight *= std::max(0.05f, 1 - behind / (band - voxel_));
+    constexpr float kMeasured = 2;  // [voxels], or what noise explains
+    out.is_assumed = -out.distance > std::max(kMeasured * voxel_, 3 * out.sigma);
   }
   return out;
 }

@@ -20,10 +20,11 @@ enum class Sight : uint8_t {
 /// A depth map seen from one point of space.
 struct Sighting {
   Sight sight = Sight::Nothing;
-  float distance = 0;  ///< To the surface, + in front [internal units].
-  float weight = 0;    ///< In (0, 1].
-  float sigma = 0;     ///< Of distance [internal units]; 0 = not known.
-  int x = 0;           ///< Nearest pixel.
+  float distance = 0;       ///< To the surface, + in front [internal units].
+  float weight = 0;         ///< In (0, 1].
+  float sigma = 0;          ///< Of distance [internal units]; 0 = not known.
+  bool is_assumed = false;  ///< So far behind the surface that there is only assumed to be matter.
+  int x = 0;                ///< Nearest pixel.
   int y = 0;
 };
 

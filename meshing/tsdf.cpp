@@ -181,21 +181,17 @@ struct Block {
   Counts counts;
 };
 
-// Everything the views say about one voxel.
-struct Evidence {
+// What views with a voxel in their band say about it.
+struct BandSums {
   double weight = 0, distance = 0, spread = 0, variance = 0;  // weighted sums
-  float free_weight = 0;
-  int count = 0;  // of views in the band
+  int count = 0;                                              // of views
   int known = 0;  // of those that are photographs and no guess
   bool is_guessed = false;
-  bool hidden = false, has_sigma = true;
+  bool has_sigma = true;
   double color_weight = 0;
   Eigen::Vector3d color = Eigen::Vector3d::Zero();
 
   void add(const Sighting& s, const TsdfView& view) {
-    if (s.sight == Sight::Hidden) hidden = true;
-    if (s.sight == Sight::Free) free_weight += s.weight;
-    if (s.sight != Sight::Band) return;
     const auto w = double(s.weight);
     const auto d = double(s.distance);
     weight += w;
@@ -221,6 +217,22 @@ struct Evidence {
     const double between = std::max(0.0, spread / weight - mean() * mean());
     return std::sqrt(std::max(promised, between / (count - 1)));
   }
+};
+
+// Everything the views say about one voxel.
+struct Evidence {
+  BandSums measured, assumed;
+  float free_weight = 0;
+  bool hidden = false;
+
+  void add(const Sighting& s, const TsdfView& view) {
+    if (s.sight == Sight::Hidden) hidden = true;
+    if (s.sight == Sight::Free) free_weight += s.weight;
+    if (s.sight == Sight::Band) (s.is_assumed ? assumed : measured).add(s, view);
+  }
+  // Averaged, what one view assumes behind its surface would push out the surface that another one
+  // measures there: thin plates and edges would grow.
+  const BandSums& band() const { return measured.weight > 0 ? measured : assumed; }
 };
 
 class BlockFuser {
@@ -254,20 +266,21 @@ class BlockFuser {
  private:
   void store(Block& block, openvdb::Index n, const Coord& origin, const Evidence& e) const {
     Counts& counts = block.counts;
-    const bool seen = e.weight > 0 && e.weight >= double(min_weight_);
-    const bool conflict = seen && e.free_weight > 0 && std::abs(e.mean()) < voxel_;
+    const BandSums& band = e.band();
+    const bool seen = band.weight > 0 && band.weight >= double(min_weight_);
+    const bool conflict = seen && e.free_weight > 0 && std::abs(band.mean()) < voxel_;
     // In front of the surface both say the same.
-    const bool carved = seen && e.distance < 0 && double(e.free_weight) > e.weight;
+    const bool carved = seen && band.distance < 0 && double(e.free_weight) > band.weight;
     counts.conflicts += conflict;
     counts.carved += conflict && carved;
     if (seen && !carved) {
       ++counts.occupied;
       block.state->setValueOn(n, int(VoxelState::Occupied));
-      store_band(block, n, origin, e);
+      store_band(block, n, origin, band);
     } else if (e.free_weight > 0) {
       ++counts.free;
       block.state->setValueOn(n, int(VoxelState::Free));
-    } else if (e.hidden || (e.weight > 0 && e.distance < 0)) {
+    } else if (e.hidden || (band.weight > 0 && band.distance < 0)) {
       ++counts.hidden;
       block.state->setValueOn(n, int(VoxelState::NeverSeen));
     } else {
@@ -275,7 +288,7 @@ class BlockFuser {
     }
   }
 
-  static void store_band(Block& block, openvdb::Index n, const Coord& origin, const Evidence& e) {
+  static void store_band(Block& block, openvdb::Index n, const Coord& origin, const BandSums& e) {
     const auto leaf = [&](auto& pointer) -> auto& {
       using Leaf = std::remove_reference_t<decltype(*pointer)>;
       if (!pointer) pointer = std::make_unique<Leaf>(origin, typename Leaf::ValueType(0), false);

@@ -90,14 +90,17 @@ nlohmann::ordered_json closing_details(const ClosedMesh& closed, const Frame& fr
     attempts.push_back(
         {{"way", attempt.way}, {"size", attempt.size * frame.scale}, {"reason", attempt.reason}});
   }
-  const double volume = closed.compared_volume * std::pow(frame.scale, 3);
+  nlohmann::ordered_json compared = nullptr;
+  if (!std::isnan(closed.compared_volume)) {
+    compared = closed.compared_volume * std::pow(frame.scale, 3);
+  }
   const auto distances = [&](const DistanceStatistics& d) -> nlohmann::ordered_json {
     return {{"rms", d.rms * frame.scale}, {"max", d.max * frame.scale}};
   };
   return {{"way", closed.attempts[closed.taken].way},
           {"objection", closed.attempts[closed.taken].reason},
           {"attempts", attempts},
-          {"compared_volume", std::isnan(volume) ? nlohmann::ordered_json() : volume},
+          {"compared_volume", compared},
           {"deviation",
            {{"from_result", distances(closed.deviation.accuracy)},
             {"from_input", distances(closed.deviation.completeness)}}},
