@@ -167,8 +167,8 @@ TriangleMesh cut_and_filled(TriangleMesh mesh) {
     std::vector<uint8_t> drop = faces_in_the_way(mesh);
     if (std::count(drop.begin(), drop.end(), uint8_t(1)) == 0) break;
     for (int ring = 0; ring < round; ++ring) grow(mesh, drop);
-    std::vector<uint8_t> keep;
-    for (const uint8_t d : drop) keep.push_back(d == 0 ? 1 : 0);
+    std::vector<uint8_t> keep(drop.size());
+    for (size_t f = 0; f < keep.size(); ++f) keep[f] = drop[f] == 0 ? 1 : 0;
     const TriangleMesh rest = with_faces(mesh, keep);
     if (area_of(rest) < (1 - kMost) * area_of(mesh)) {
       throw NumericalError("too much of the surface would have to go");

@@ -25,12 +25,11 @@ struct ClosedMesh {
   Certificate certificate;               ///< Passes.
   std::vector<ClosingAttempt> attempts;  ///< In the order in which they were made.
   size_t taken = 0;                      ///< Which attempt the mesh is of.
-  double compared_volume =
-      std::numeric_limits<double>::quiet_NaN();  ///< Of what surrounds the gentler, uncertified
-                                                 ///< candidate, which the result was held against;
-                                                 ///< NaN = none needed [internal units cubed].
-  MeshDistance
-      deviation;  ///< By samples: accuracy from the result to the input, completeness back.
+  /// Within the filled surface, which the result was held against; NaN = it was not, or that is a
+  /// sheet [internal units cubed].
+  double compared_volume = std::numeric_limits<double>::quiet_NaN();
+  MeshDistance deviation;  ///< By samples: accuracy from the result to the input, completeness
+                           ///< back.
 };
 
 /// Makes any mesh closed, 2-manifold, oriented outwards and free of self-intersection, by the
@@ -48,8 +47,10 @@ struct ClosedMesh {
 /// held against the volume that the outside of the filled surface surrounds, and against the
 /// input, which must not stick out; what fails is taken only if nothing else is left, the nearest
 /// first, and its reason stays. Labels, sigma and support are kept, see these functions: what
-/// closes a hole is Inferred. \throws InvalidInput if the mesh has no face; NumericalError, with
-/// all reasons, if nothing passes
+/// closes a hole is Inferred.
+///
+/// \throws InvalidInput if the mesh has no face; NumericalError, with all reasons, if nothing
+///         passes
 ClosedMesh closed_mesh(const TriangleMesh& mesh, const Progress& progress = {});
 
 }  // namespace cgs

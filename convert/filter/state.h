@@ -31,13 +31,13 @@ struct FilterState {
 
 /// What an operation says about its work.
 struct FilterRemark {
-  FilterRemark(std::string words)
-      : text(std::move(words)) {}  // NOLINT(google-explicit-constructor)
+  // NOLINTNEXTLINE(google-explicit-constructor): most operations have no more to say than words
+  FilterRemark(std::string words) : text(std::move(words)) {}
   FilterRemark(std::string words, nlohmann::ordered_json figures)
       : text(std::move(words)), details(std::move(figures)) {}
 
-  std::string text;                // For the user: "12 holes"; may be empty.
-  nlohmann::ordered_json details;  // For machines, in file units; null = no more than the text.
+  std::string text;                ///< For the user: "12 holes"; may be empty.
+  nlohmann::ordered_json details;  ///< For machines, in file units; null = no more than the text.
 };
 
 /// One operation with its arguments: changes the state. Throws what libcgs/core/error.h lists.
