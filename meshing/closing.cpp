@@ -130,7 +130,8 @@ TriangleMesh put_right(const TriangleMesh& mesh, Small dropped) {
 }
 
 TriangleMesh filled(const TriangleMesh& mesh) {
-  return holes_filled(mesh, std::numeric_limits<double>::max()).mesh;
+  constexpr size_t kLongestRim = 1000;  // of an open scene a wrap is sooner there
+  return holes_filled(mesh, std::numeric_limits<double>::max(), {}, kLongestRim).mesh;
 }
 
 // Faces that cut others, and those along rims that could not be closed.
