@@ -74,18 +74,25 @@ void BlockEvidence::add_row(size_t row, const SightingRow& sightings, const Tsdf
     const auto lane = size_t(std::countr_zero(left));
     (*free_weight_)[first + lane] += sightings.weight[lane];
   }
-  if (sightings.band != 0) add_band(first, sightings, view);
+  if (sightings.band != 0) add_band(row, sightings, view);
 }
 
-void BlockEvidence::add_band(size_t first, const SightingRow& row, const TsdfView& view) {
+void BlockEvidence::add_band(size_t at, const SightingRow& row, const TsdfView& view) {
   if (!sums_) sums_ = std::make_unique<Sums>();
   Sums& s = *sums_;
   const bool has_color = !view.color.empty();
   if (row.has_sigma && !sigma_) sigma_ = std::make_unique<SigmaSums>();
   if (has_color && !color_) color_ = std::make_unique<ColorSums>();
-  for (size_t lane = 0; lane < kBlockSide; ++lane) {  // others have weight and distance 0
+  const size_t first = at * kBlockSide;
+  const unsigned measured = row.band & ~row.assumed;
+  for (unsigned left = measured & ~unsigned{measured_[at]}; left != 0; left &= left - 1) {
+    forget_band(first + size_t(std::countr_zero(left)));
+  }
+  measured_[at] = static_cast<uint8_t>(measured_[at] | measured);
+  const unsigned taken = measured | (row.band & ~unsigned{measured_[at]});
+  for (size_t lane = 0; lane < kBlockSide; ++lane) {  // others than taken add 0
     const size_t n = first + lane;
-    const auto w = double(row.weight_in_band[lane]);
+    const auto w = double(row.weight_in_band[lane]) * double(taken >> lane & 1);
     const auto d = double(row.distance_in_band[lane]);
     s.weight[n] += w;
     s.distance[n] += w * d;
@@ -94,7 +101,7 @@ void BlockEvidence::add_band(size_t first, const SightingRow& row, const TsdfVie
     sigma_->spread[n] += w * d * d;
     sigma_->variance[n] += w * w * sigma * sigma;
   }
-  for (unsigned left = row.band; left != 0; left &= left - 1) {
+  for (unsigned left = taken; left != 0; left &= left - 1) {
     const auto lane = size_t(std::countr_zero(left));
     const size_t n = first + lane;
     const int x = row.x[lane];
@@ -110,6 +117,17 @@ void BlockEvidence::add_band(size_t first, const SightingRow& row, const TsdfVie
     color_->weight[n] += w;
     for (size_t k = 0; k < 3; ++k) color_->color[k][n] += w * double(c[Eigen::Index(k)]);
   }
+}
+
+void BlockEvidence::forget_band(size_t n) {
+  Sums& s = *sums_;
+  s.weight[n] = s.distance[n] = 0;
+  s.count[n] = s.known[n] = 0;
+  s.is_guessed[n] = s.lacks_sigma[n] = 0;
+  if (sigma_) sigma_->spread[n] = sigma_->variance[n] = 0;
+  if (!color_) return;
+  color_->weight[n] = 0;
+  for (auto& channel : color_->color) channel[n] = 0;
 }
 
 bool BlockEvidence::is_settled() const {
@@ -148,6 +166,7 @@ BlockEvidence::Voxel BlockEvidence::operator[](size_t n) const {
 void BlockEvidence::clear() {
   free_ = {};
   hidden_ = {};
+  measured_ = {};
   if (free_weight_) *free_weight_ = {};
   if (sums_) *sums_ = {};
   if (sigma_) *sigma_ = {};

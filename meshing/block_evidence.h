@@ -47,7 +47,9 @@ class BlockEvidence {
   /// True if nothing can change any more: without band, and free all over.
   bool is_settled() const;
 
-  /// Everything known about a voxel.
+  /// Everything known about a voxel. What a view only assumes behind its surface counts where no
+  /// view measures: averaged, it would push out the surface that another one sees there, and thin
+  /// plates and edges would grow.
   struct Voxel {
     double weight = 0, distance = 0, spread = 0, variance = 0;  // weighted sums
     float free_weight = 0;
@@ -85,12 +87,14 @@ class BlockEvidence {
   };
 
   void add_row(size_t row, const SightingRow& sightings, const TsdfView& view);
-  void add_band(size_t first, const SightingRow& row, const TsdfView& view);
+  void add_band(size_t row, const SightingRow& sightings, const TsdfView& view);
+  void forget_band(size_t n);
 
   unsigned touched_;
   // A bit per voxel, a byte per row of them.
   static constexpr size_t kRows = kBlockVoxels / kBlockSide;
   std::array<uint8_t, kRows> free_ = {}, hidden_ = {};
+  std::array<uint8_t, kRows> measured_ = {};  // what is summed up is no assumption
   std::unique_ptr<std::array<float, kBlockVoxels>> free_weight_;  // null without band
   std::unique_ptr<Sums> sums_;        // null until a voxel is in the band of a view
   std::unique_ptr<SigmaSums> sigma_;  // null until a view has a sigma
@@ -98,7 +102,7 @@ class BlockEvidence {
 
  public:
   /// Memory of one block [bytes].
-  static constexpr size_t kPlainBytes = 2 * kBlockVoxels / 8 + 5 * sizeof(void*);
+  static constexpr size_t kPlainBytes = 3 * kBlockVoxels / 8 + 5 * sizeof(void*);
   static constexpr size_t kBandBytes = kPlainBytes + kBlockVoxels * sizeof(float) + sizeof(Sums);
   static constexpr size_t kSigmaBytes = sizeof(SigmaSums);
   static constexpr size_t kColorBytes = sizeof(ColorSums);

@@ -11,7 +11,6 @@
 #include <CGAL/Polygon_mesh_processing/orientation.h>
 
 #include "libcgs/core/error.h"
-#include "meshing/certificate.h"
 #include "meshing/components.h"
 #include "meshing/corner_shares.h"
 #include "meshing/polygon_mesh.h"
@@ -162,15 +161,21 @@ bool shells_alternate(const TriangleMesh& mesh) {
 
 }  // namespace
 
+std::string why_no_solid(const Certificate& certificate) {
+  if (!certificate.edge_manifold) return "has edges with more than two faces";
+  if (!certificate.closed) return "is not closed";
+  if (!certificate.vertex_manifold) return "has vertices where only corners of sheets meet";
+  if (!certificate.oriented_outward) return "has faces that disagree on what is outside";
+  if (certificate.self_intersections > 0) {
+    return "cuts itself (" + std::to_string(certificate.self_intersections) + " pairs of faces)";
+  }
+  return {};
+}
+
 std::string why_no_solid(const TriangleMesh& mesh) {
   const Certificate facts = certify(mesh);
-  if (!facts.edge_manifold) return "has edges with more than two faces";
-  if (!facts.closed) return "is not closed";
-  if (!facts.vertex_manifold) return "has vertices where only corners of sheets meet";
-  if (!facts.oriented_outward) return "has faces that disagree on what is outside";
-  if (facts.self_intersections > 0) {
-    return "cuts itself (" + std::to_string(facts.self_intersections) + " pairs of faces)";
-  }
+  std::string reason = why_no_solid(facts);
+  if (!reason.empty()) return reason;
   if (facts.components > 1 && !shells_alternate(mesh)) {
     return "has shells within shells that disagree on what is outside";
   }

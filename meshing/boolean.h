@@ -5,6 +5,7 @@
 #include <string>
 
 #include "libcgs/core/triangle_mesh.h"
+#include "meshing/certificate.h"
 
 namespace cgs {
 
@@ -19,6 +20,9 @@ struct BooleanResult {
 
 /// Why a mesh bounds no volume: "is not closed", …; empty if it does.
 std::string why_no_solid(const TriangleMesh& mesh);
+
+/// The same as far as a certificate tells: nothing about shells within shells.
+std::string why_no_solid(const Certificate& certificate);
 
 /// The union, intersection, or difference (first less second) of two solids in the same frame.
 ///

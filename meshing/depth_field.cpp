@@ -21,6 +21,8 @@ constexpr float kMinFacing = 0.05f;  // Cosine of incidence.
 constexpr float kMaxBandGrowth = 3.0f;
 constexpr float kEdgeWeight = 0.25f;   // of pixels at an occlusion edge
 constexpr float kLeastBehind = 0.05f;  // of the weight at the far end of the band
+// How far behind its surface a view still measures [voxels], or what noise explains.
+constexpr float kMeasured = 2;
 
 // Depth steps between neighbours, in footprints of a pixel.
 constexpr float kSmallStep = 3.0f;     // A surface tilted by 72 degrees.
@@ -426,6 +428,7 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
     // Behind the surface by more than a voxel the band only assumes that there is matter.
     const float behind = -out.distance - voxel_;
     if (behind > 0) out.weight *= std::max(kLeastBehind, 1 - behind / (band - voxel_));
+    out.is_assumed = -out.distance > std::max(kMeasured * voxel_, 3 * out.sigma);
   }
   return out;
 }
@@ -476,6 +479,8 @@ SightingRow DepthField::row(float x, float y, const std::array<float, 8>& z) con
   const Floats behind = -distance - voxel_;
   const Floats less = max(Floats{} + kLeastBehind, 1.0f - behind / (band - voxel_));
   weight = select(behind > 0.0f, weight * less, weight);
+  const Floats measured = max(Floats{} + kMeasured * voxel_, 3.0f * sigma);
+  out.assumed = bits(in_band & (-distance > measured));
   store(select(in_band, weight, Floats{}), out.weight_in_band.data());
   store(select(in_band, distance, Floats{}), out.distance_in_band.data());
   store(select(in_band, sigma, Floats{}), out.sigma.data());

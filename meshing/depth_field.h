@@ -22,10 +22,11 @@ enum class Sight : uint8_t {
 /// A depth map seen from one point of space.
 struct Sighting {
   Sight sight = Sight::Nothing;
-  float distance = 0;  ///< To the surface, + in front [internal units].
-  float weight = 0;    ///< In (0, 1].
-  float sigma = 0;     ///< Of distance [internal units]; 0 = not known.
-  int x = 0;           ///< Nearest pixel.
+  float distance = 0;       ///< To the surface, + in front [internal units].
+  float weight = 0;         ///< In (0, 1].
+  float sigma = 0;          ///< Of distance [internal units]; 0 = not known.
+  bool is_assumed = false;  ///< So far behind the surface that there is only assumed to be matter.
+  int x = 0;                ///< Nearest pixel.
   int y = 0;
 };
 
@@ -33,6 +34,7 @@ struct Sighting {
 struct SightingRow {
   unsigned free = 0;  ///< Where the weight is above 0.
   unsigned band = 0, hidden = 0;
+  unsigned assumed = 0;    ///< Of the band, as in Sighting.
   bool has_sigma = false;  ///< False where sigma is 0 throughout.
   alignas(32) std::array<float, 8> weight;
   alignas(32) std::array<float, 8> weight_in_band;    ///< 0 where the point is not.

@@ -94,7 +94,10 @@ double append_faces(TriangleMesh& out, const PolygonMesh& closed, const std::vec
 
 }  // namespace
 
-FilledMesh holes_filled(const TriangleMesh& mesh, double widest, const Progress& progress) {
+FilledMesh holes_filled(const TriangleMesh& mesh,
+                        double widest,
+                        const Progress& progress,
+                        size_t longest_rim) {
   CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
   PolygonMesh closed = polygon_mesh::from_triangles(mesh, "filling holes");
   std::vector<PolygonMesh::Halfedge_index> starts;
@@ -104,7 +107,7 @@ FilledMesh holes_filled(const TriangleMesh& mesh, double widest, const Progress&
   for (size_t i = 0; i < starts.size(); ++i) {
     report(progress, double(i) / double(starts.size()));
     Hole hole{rim_of(closed, starts[i]), {}, {}};
-    if (width_of(mesh, hole.rim) <= widest) {
+    if (hole.rim.size() <= longest_rim && width_of(mesh, hole.rim) <= widest) {
       pmp::triangulate_refine_and_fair_hole(
           closed, starts[i], std::back_inserter(hole.faces), std::back_inserter(hole.vertices));
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 
 #include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
@@ -24,6 +25,10 @@ struct FilledMesh {
 /// not state provenance states none afterwards either. \param widest  largest diagonal of the box
 /// around a hole's rim [internal units] Source: Liepa 2003, "Filling holes in meshes", as in CGAL.
 /// \throws NumericalError if the mesh is not manifold
-FilledMesh holes_filled(const TriangleMesh& mesh, double widest, const Progress& progress = {});
+/// \param longest_rim  in edges; the time of a hole may grow with the cube of them
+FilledMesh holes_filled(const TriangleMesh& mesh,
+                        double widest,
+                        const Progress& progress = {},
+                        size_t longest_rim = std::numeric_limits<size_t>::max());
 
 }  // namespace cgs

@@ -86,7 +86,9 @@ struct TsdfSource {
 ///   1/z (exact on planes), never across an occlusion edge; pixels that hang between two surfaces
 ///   are ignored.
 /// - Weight: squared cosine of incidence / (1 + (sigma / voxel)^2), falling off behind the surface,
-///   where the band is an assumption and not a measurement, and a quarter at occlusion edges.
+///   where the band is an assumption and not a measurement, and a quarter at occlusion edges. What
+///   a view assumes more than two voxels and 3 sigma behind its surface counts only where no view
+///   has the voxel in front of or nearer behind its own: plates and edges would grow.
 /// - Free: farther than max(truncation, 3 sigma) in front of the surface. Where one view says free
 ///   and others a voxel behind their surface, the larger weight wins; a tie keeps it.
 /// The result is bit-identical for any number of threads.

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,9 +12,9 @@
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
-#include "libcgs/core/disjoint_sets.h"
 #include "libcgs/core/error.h"
 #include "meshing/components.h"
+#include "meshing/lidded_volume.h"
 #include "meshing/polygon_mesh.h"
 #include "meshing/self_intersections.h"
 
@@ -167,49 +165,6 @@ double move_apart(TriangleMesh& wrap, const Places& to) {
   return sum / double(step.size());
 }
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-uint64_t side(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
-
-// The sides of faces that no other face has, in the direction of their face; nothing where two
-// faces have the same side in the same direction.
-std::optional<std::vector<std::array<uint32_t, 2>>> rim_sides(const TriangleMesh& mesh) {
-  std::vector<uint64_t> sides;
-  sides.reserve(3 * mesh.faces.size());
-  for (const auto& [a, b, c] : mesh.faces) {
-    sides.insert(sides.end(), {side(a, b), side(b, c), side(c, a)});
-  }
-  std::sort(sides.begin(), sides.end());
-  if (std::adjacent_find(sides.begin(), sides.end()) != sides.end()) return std::nullopt;
-  std::vector<std::array<uint32_t, 2>> out;
-  for (const uint64_t s : sides) {
-    const auto a = static_cast<uint32_t>(s >> 32);
-    const auto b = static_cast<uint32_t>(s);
-    if (!std::binary_search(sides.begin(), sides.end(), side(b, a))) out.push_back({a, b});
-  }
-  return out;
-}
-
-double volume_with_holes_closed(const TriangleMesh& mesh) {
-  const auto rims = rim_sides(mesh);
-  if (mesh.faces.empty() || !rims) return kNaN;
-  const Eigen::Vector3d center = mesh.vertices[mesh.faces[0][0]].cast<double>();
-  const auto at = [&](uint32_t v) -> Eigen::Vector3d {
-    return mesh.vertices[v].cast<double>() - center;
-  };
-  double sum = 0;
-  for (const auto& [a, b, c] : mesh.faces) sum += at(a).dot(at(b).cross(at(c)));
-  DisjointSets rim_of(mesh.vertices.size());
-  for (const auto& [a, b] : *rims) rim_of.join(a, b);
-  std::vector<Eigen::Vector4d> middle(mesh.vertices.size(), Eigen::Vector4d::Zero());
-  for (const auto& [a, b] : *rims) middle[rim_of.root(a)] += at(a).homogeneous();
-  for (const auto& [a, b] : *rims) {
-    const Eigen::Vector3d tip = middle[rim_of.root(a)].hnormalized();
-    sum += at(b).dot(at(a).cross(tip));
-  }
-  return sum / 6;
-}
-
 }  // namespace
 
 void WrapOptions::validate() const {
@@ -233,7 +188,7 @@ WrappedMesh wrapped(const TriangleMesh& mesh,
   out.knows_sides = source.knows_sides();
   const std::vector<double> volumes = components(out.mesh).volume;
   out.volume = std::accumulate(volumes.begin(), volumes.end(), 0.0);
-  out.input_volume = volume_with_holes_closed(mesh);
+  out.input_volume = lidded_volume(mesh);
   return out;
 }
 

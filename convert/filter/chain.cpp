@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -107,16 +108,18 @@ Json run_filters(FilterState& state,
   for (const PreparedFilter& filter : filters) {
     const Progress progress = terminal.begin(one_line(filter.text));
     cgs::report(progress, 0);
-    const std::string remark = filter.run(state, progress);
+    FilterRemark remark = filter.run(state, progress);
     const Tally after = tally(state);
     require_something_left(filter, before, after);
     const double seconds = terminal.end(change_text(before, after, state.frame) +
-                                        (remark.empty() ? "" : "; " + remark));
-    report.push_back({{"operation", filter.text},
-                      {"seconds", seconds},
-                      {"remark", remark},
-                      {"before", tally_json(before)},
-                      {"after", tally_json(after)}});
+                                        (remark.text.empty() ? "" : "; " + remark.text));
+    Json entry = {{"operation", filter.text},
+                  {"seconds", seconds},
+                  {"remark", remark.text},
+                  {"before", tally_json(before)},
+                  {"after", tally_json(after)}};
+    if (!remark.details.is_null()) entry["details"] = std::move(remark.details);
+    report.push_back(std::move(entry));
     before = after;
   }
   return report;

@@ -28,7 +28,8 @@ std::vector<PreparedFilter> prepare_filters(const std::vector<std::string>& type
 
 /// Runs the operations in their order, with a line on the terminal for each.
 /// \return per operation {"operation", "seconds", "remark", "before": {"vertices", "faces",
-///         "area": {"observed", …}}, "after": {…}}, areas in squared file units
+///         "area": {"observed", …}}, "after": {…}}, areas in squared file units; and "details",
+///         where the operation has any
 /// \throws NumericalError naming the operation that left nothing; as the operations
 nlohmann::ordered_json run_filters(FilterState& state,
                                    const std::vector<PreparedFilter>& filters,

@@ -9,8 +9,11 @@
 #include "convert/filter/operations.h"
 #include "convert/filter/second_mesh.h"
 #include "convert/html.h"
+#include "convert/length.h"
+#include "convert/mesh_files.h"
 #include "libcgs/core/error.h"
 #include "meshing/boolean.h"
+#include "meshing/closing.h"
 #include "meshing/flat_base.h"
 #include "meshing/wrapping.h"
 
@@ -57,6 +60,60 @@ FilterStep prepare_wrap(FilterArguments& arguments) {
         wrapped(state.mesh, {.alpha = alpha / scale, .offset = offset / scale}, progress);
     state.mesh = std::move(wrap.mesh);
     return wrap_remark(wrap, state);
+  };
+}
+
+std::string attempt_text(const ClosingAttempt& attempt, const Frame& frame) {
+  return attempt.way + (attempt.size > 0 ? " of " + format_length(attempt.size, frame) : "");
+}
+
+std::string closing_remark(const ClosedMesh& closed, const Frame& frame) {
+  const ClosingAttempt& taken = closed.attempts[closed.taken];
+  std::string out = "certified, by " + attempt_text(taken, frame);
+  for (const ClosingAttempt& attempt : closed.attempts) {
+    if (&attempt != &taken)
+      out += "; not by " + attempt_text(attempt, frame) + ": " + attempt.reason;
+  }
+  out += "; volume " + volume_text(closed.certificate.volume, frame);
+  const auto off = [&](const DistanceStatistics& d) {
+    return format_length(d.rms, frame) + " rms, " + format_length(d.max, frame) + " at most";
+  };
+  out += "; off the input by " + off(closed.deviation.accuracy) + ", the input off it by " +
+         off(closed.deviation.completeness);
+  if (!taken.reason.empty()) out += "; look at it: what was taken " + taken.reason;
+  return out;
+}
+
+nlohmann::ordered_json closing_details(const ClosedMesh& closed, const Frame& frame) {
+  nlohmann::ordered_json attempts = nlohmann::ordered_json::array();
+  for (const ClosingAttempt& attempt : closed.attempts) {
+    attempts.push_back(
+        {{"way", attempt.way}, {"size", attempt.size * frame.scale}, {"reason", attempt.reason}});
+  }
+  nlohmann::ordered_json compared = nullptr;
+  if (!std::isnan(closed.compared_volume)) {
+    compared = closed.compared_volume * std::pow(frame.scale, 3);
+  }
+  const auto distances = [&](const DistanceStatistics& d) -> nlohmann::ordered_json {
+    return {{"rms", d.rms * frame.scale}, {"max", d.max * frame.scale}};
+  };
+  return {{"way", closed.attempts[closed.taken].way},
+          {"objection", closed.attempts[closed.taken].reason},
+          {"attempts", attempts},
+          {"compared_volume", compared},
+          {"deviation",
+           {{"from_result", distances(closed.deviation.accuracy)},
+            {"from_input", distances(closed.deviation.completeness)}}},
+          {"certificate", certificate_to_json(closed.certificate, closed.mesh, frame)}};
+}
+
+FilterStep prepare_watertight(FilterArguments&) {
+  return [](FilterState& state, const Progress& progress) {
+    require_faces(state, "watertight");
+    ClosedMesh closed = closed_mesh(state.mesh, progress);
+    FilterRemark out(closing_remark(closed, state.frame), closing_details(closed, state.frame));
+    state.mesh = std::move(closed.mesh);
+    return out;
   };
 }
 
@@ -125,27 +182,33 @@ FilterStep prepare_base(FilterArguments& arguments) {
 }  // namespace
 
 std::vector<FilterOperation> solid_operations() {
-  return {{"wrap",
-           "ALPHA[,OFFSET]",
-           "Closed surface that a ball of radius ALPHA cannot get through",
-           "wrap=2cm",
-           prepare_wrap},
-          {"base",
-           "THICKNESS[,X,Y,Z]",
-           "Closed mesh cut flat THICKNESS behind what was seen, which looks to X,Y,Z",
-           "base=5mm",
-           prepare_base},
-          {"union", "FILE", "What is in this solid or a second one", "union=b.ply", prepare_union},
-          {"intersect",
-           "FILE",
-           "What is in this solid and a second one",
-           "intersect=b.ply",
-           prepare_intersect},
-          {"subtract",
-           "FILE",
-           "What is in this solid but not in a second one",
-           "subtract=b.ply",
-           prepare_subtract}};
+  return {
+      {"watertight",
+       "",
+       "Closed, oriented mesh that does not cut itself, certified, by the gentlest way that works",
+       "watertight",
+       prepare_watertight},
+      {"wrap",
+       "ALPHA[,OFFSET]",
+       "Closed surface that a ball of radius ALPHA cannot get through",
+       "wrap=2cm",
+       prepare_wrap},
+      {"base",
+       "THICKNESS[,X,Y,Z]",
+       "Closed mesh cut flat THICKNESS behind what was seen, which looks to X,Y,Z",
+       "base=5mm",
+       prepare_base},
+      {"union", "FILE", "What is in this solid or a second one", "union=b.ply", prepare_union},
+      {"intersect",
+       "FILE",
+       "What is in this solid and a second one",
+       "intersect=b.ply",
+       prepare_intersect},
+      {"subtract",
+       "FILE",
+       "What is in this solid but not in a second one",
+       "subtract=b.ply",
+       prepare_subtract}};
 }
 
 }  // namespace cgs

@@ -3,6 +3,9 @@
 
 #include <functional>
 #include <string>
+#include <utility>
+
+#include <nlohmann/json.hpp>
 
 #include "libcgs/core/frame.h"
 #include "libcgs/core/progress.h"
@@ -26,8 +29,18 @@ struct FilterState {
   bool is_cloud() const { return mesh.faces.empty(); }
 };
 
-/// One operation with its arguments: changes the state and returns a remark for the user ("12
-/// holes", may be empty). Throws what libcgs/core/error.h lists.
-using FilterStep = std::function<std::string(FilterState& state, const Progress& progress)>;
+/// What an operation says about its work.
+struct FilterRemark {
+  // NOLINTNEXTLINE(google-explicit-constructor): most operations have no more to say than words
+  FilterRemark(std::string words) : text(std::move(words)) {}
+  FilterRemark(std::string words, nlohmann::ordered_json figures)
+      : text(std::move(words)), details(std::move(figures)) {}
+
+  std::string text;                ///< For the user: "12 holes"; may be empty.
+  nlohmann::ordered_json details;  ///< For machines, in file units; null = no more than the text.
+};
+
+/// One operation with its arguments: changes the state. Throws what libcgs/core/error.h lists.
+using FilterStep = std::function<FilterRemark(FilterState& state, const Progress& progress)>;
 
 }  // namespace cgs

@@ -229,6 +229,34 @@ TEST_F(Filter, WrapsWhatIsOpenAndSaysWhereItWentInside) {
   EXPECT_GT(facts.inferred_area, 0.2 * facts.area);
 }
 
+TEST_F(Filter, MakesWatertightAndSaysHow) {
+  ASSERT_EQ(filter("ball.ply", "open.ply", "-q --op crop-plane=3,-6,15,0,0,-1").exit_code, 0);
+  const ProgramResult result = filter("open.ply", "closed.ply", "--json --op watertight");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("certified, by fill-holes; not by repair: is not closed; volume 0."),
+            std::string::npos)
+      << result.err;
+  const auto details = nlohmann::json::parse(result.out)["operations"][0]["details"];
+  EXPECT_EQ(details["way"], "fill-holes");
+  EXPECT_EQ(details["objection"], "");
+  EXPECT_EQ(details["attempts"].size(), 2U);
+  EXPECT_EQ(details["certificate"]["passed"], true);
+  const MeasurableFile closed = read_mesh_file(dir_ / "closed.ply");
+  const Certificate facts = certify(closed.content.mesh);
+  EXPECT_TRUE(facts.passed());
+  const double scale = closed.content.frame.scale;
+  EXPECT_NEAR(details["certificate"]["volume"].get<double>() / (facts.volume * std::pow(scale, 3)),
+              1,
+              1e-5);
+  // The lid is up to the height of the missing cap, a few cm, off the input, which it holds.
+  EXPECT_GT(details["deviation"]["from_result"]["max"].get<double>(), 5);
+  EXPECT_LT(details["deviation"]["from_input"]["max"].get<double>(), 0.01);
+  const ProgramResult cloud = filter("cloud.ply", "no.ply", "-q --op watertight");
+  EXPECT_EQ(cloud.exit_code, 2);
+  EXPECT_NE(cloud.err.find("needs faces"), std::string::npos) << cloud.err;
+  EXPECT_FALSE(exists("no.ply"));
+}
+
 TEST_F(Filter, WrapsPoints) {
   ASSERT_EQ(filter("cloud.ply", "made.ply", "-q --op wrap=8cm,1cm").exit_code, 0);
   const MeasurableFile made = read_mesh_file(dir_ / "made.ply");

@@ -97,6 +97,7 @@ TEST(DepthField, SaysTheSameOfARowAsOfItsPoints) {
           ASSERT_EQ(is(row.free), one.sight == Sight::Free);
           ASSERT_EQ(is(row.hidden), one.sight == Sight::Hidden);
           ASSERT_EQ(is(row.band), one.sight == Sight::Band);
+          ASSERT_EQ(is(row.assumed), one.is_assumed);
           if (is(row.free)) ASSERT_EQ(row.weight[k], one.weight);
           if (row.band == 0) continue;
           ASSERT_EQ(row.weight_in_band[k], is(row.band) ? one.weight : 0);

@@ -56,6 +56,25 @@ TEST(WatertightSurface, IsTheWholeSphereSeenFromAllSides) {
             0.97 * result.certificate.area);
 }
 
+// What the views from one side assume behind their surface reaches beyond the other side.
+TEST(WatertightSurface, LeavesAPlateOfThreeVoxelsAsThickAsItIs) {
+  const Vector3d half(0.2, 0.2, 0.016);
+  std::vector<Vector3d> eyes;
+  for (const double side : {-0.8, 0.8}) {
+    for (const double x : {-0.5, 0.05, 0.5}) {
+      for (const double y : {-0.4, 0.3}) eyes.emplace_back(x, y, side);
+    }
+  }
+  auto views = views_of(test::box(kCenter - half, kCenter + half), eyes);
+  for (TsdfView& view : views) {
+    for (float& depth : view.depth.data) depth = std::isnan(depth) ? INFINITY : depth;
+  }
+  auto fused = fuse(views, {.voxel_size = 0.01});
+  const WatertightResult result = watertight_surface(fused.volume, {});
+  EXPECT_TRUE(result.certificate.passed());
+  EXPECT_NEAR(result.certificate.volume / (8 * half.prod()), 1, 0.05);
+}
+
 TEST(WatertightSurface, LabelsFrontObservedAndBackInferred) {
   auto fused = fuse(views_of(test::sphere(kCenter, kRadius), kThreeEyes), {});
   const WatertightResult result = watertight_surface(fused.volume, {});

@@ -73,6 +73,7 @@ const std::map<std::string, Case>& cases() {
       {"fill-holes", {"40cm", Keeps::Area}},
       {"hull", {"", Keeps::Part, true, true}},
       {"subdivide-loop", {"1", Keeps::Area}},
+      {"watertight", {"", Keeps::Area}},
       {"wrap", {"8cm,4mm", Keeps::Part, true, true}},
       {"base", {"5cm", Keeps::Area, true, false, 1, true}},
       {"union", {kSolid, Keeps::Part, true, false, 1, true}},  // adds observed area
