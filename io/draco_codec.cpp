@@ -18,8 +18,7 @@ namespace cgs {
 namespace {
 
 constexpr int kNormalBits = 10;
-constexpr int kColorBits = 12;
-constexpr int kSigmaBits = 12;
+constexpr int kSigmaBits = 11;
 
 [[noreturn]] void fail(const std::string& reason) {
   throw NumericalError("Draco compression: " + reason);
@@ -93,6 +92,25 @@ int texcoord_bits(const GlbPrimitive& primitive) {
   return bits;
 }
 
+/// Sigma on its grid. What is known stays above zero, where it would count as unknown: values
+/// below a step become a step.
+struct StoredSigma {
+  std::vector<float> values;
+  float low = 0;
+  float range = 1;
+
+  explicit StoredSigma(const std::vector<float>& sigma) : values(sigma) {
+    if (values.empty()) return;
+    const auto [least, most] = std::minmax_element(values.begin(), values.end());
+    low = *least;
+    if (*most > *least) range = *most - *least;
+    const float step = range / static_cast<float>((1 << kSigmaBits) - 1);
+    for (float& value : values) {
+      if (value >= 0) value = std::max(value, std::min(step, *most));
+    }
+  }
+};
+
 std::string encode(const GlbPrimitive& primitive,
                    const DracoGrid& grid,
                    int speed,
@@ -100,41 +118,45 @@ std::string encode(const GlbPrimitive& primitive,
   using Attribute = draco::GeometryAttribute;
   DracoInput input(primitive);
   ids["POSITION"] = input.add(Attribute::POSITION, primitive.positions);
-  ids["NORMAL"] = input.add(Attribute::NORMAL, primitive.normals);
+  if (!primitive.normals.empty()) {
+    ids["NORMAL"] = input.add(Attribute::NORMAL, primitive.normals);
+  }
   if (!primitive.texcoords.empty()) {
     ids["TEXCOORD_0"] = input.add(Attribute::TEX_COORD, primitive.texcoords);
   }
   if (!primitive.colors.empty()) ids["COLOR_0"] = input.add(Attribute::COLOR, primitive.colors);
   if (!primitive.support.empty())
     ids["_SUPPORT"] = input.add(Attribute::GENERIC, primitive.support);
-  if (!primitive.sigma.empty()) ids["_SIGMA"] = input.add(Attribute::GENERIC, primitive.sigma);
+  const StoredSigma sigma(primitive.sigma);
+  if (!sigma.values.empty()) ids["_SIGMA"] = input.add(Attribute::GENERIC, sigma.values);
   if (!primitive.features.empty()) {
     ids["_FEATURE_ID_0"] = input.add(Attribute::GENERIC, primitive.features);
   }
 
   draco::ExpertEncoder encoder(input.mesh());
-  encoder.SetSpeedOptions(speed, speed);
+  // Slower ones gain 2 % at most by a prediction that crashes on some meshes (Draco 1.5.5).
+  constexpr int kSlowest = 2;
+  encoder.SetSpeedOptions(std::max(speed, kSlowest), std::max(speed, kSlowest));
   // Not left to the library: its sequential method cannot be decoded for large meshes before 1.5.7.
   encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
   encoder.SetAttributeExplicitQuantization(
       ids["POSITION"], grid.bits, 3, grid.origin.data(), grid.range);
-  encoder.SetAttributeQuantization(ids["NORMAL"], kNormalBits);
+  if (ids.count("NORMAL") != 0) encoder.SetAttributeQuantization(ids["NORMAL"], kNormalBits);
   const Eigen::Vector3f black = Eigen::Vector3f::Zero();
   if (ids.count("TEXCOORD_0") != 0) {
     encoder.SetAttributeExplicitQuantization(
         ids["TEXCOORD_0"], texcoord_bits(primitive), 2, black.data(), 1.0f);
   }
   if (ids.count("COLOR_0") != 0) {
-    encoder.SetAttributeExplicitQuantization(ids["COLOR_0"], kColorBits, 3, black.data(), 1.0f);
+    encoder.SetAttributeExplicitQuantization(
+        ids["COLOR_0"], kDracoColorBits, 3, black.data(), 1.0f);
   }
   if (ids.count("_SUPPORT") != 0) quantize_whole(encoder, ids["_SUPPORT"], primitive.support);
   if (ids.count("_FEATURE_ID_0") != 0) {
     quantize_whole(encoder, ids["_FEATURE_ID_0"], primitive.features);
   }
   if (ids.count("_SIGMA") != 0) {
-    const auto [low, high] = std::minmax_element(primitive.sigma.begin(), primitive.sigma.end());
-    const float range = *high > *low ? *high - *low : 1.0f;
-    quantize(encoder, ids["_SIGMA"], kSigmaBits, *low, range);
+    quantize(encoder, ids["_SIGMA"], kSigmaBits, sigma.low, sigma.range);
   }
   draco::EncoderBuffer buffer;
   const draco::Status status = encoder.EncodeToBuffer(&buffer);

@@ -36,12 +36,15 @@ struct DracoPrimitive {
 /// Largest error of texture coordinates that compression may add [pixels].
 inline constexpr double kDracoTextureError = 0.1;
 
+/// Of colours in linear light: none moves by a level of 255 of its sRGB code.
+inline constexpr int kDracoColorBits = 11;
+
 /// Compresses with the edgebreaker method, decodes again, and compares: every vertex within a step
 /// of its place, every face there, no face added, texture coordinates within kDracoTextureError.
 ///
-/// Normals keep 10 bits, colours 12, sigma 12; support and features are exact up to 65535.
-/// \param speed  0 (smallest) to 10 (fastest)
-/// \throws NumericalError if the library fails or the comparison does
+/// Normals keep 10 bits, sigma 11, rounded up where it is less than a step; support and features
+/// are exact up to 65535. \param speed  0 (smallest) to 10 (fastest) \throws NumericalError if the
+/// library fails or the comparison does
 DracoPrimitive draco_compress(const GlbPrimitive& primitive, const DracoGrid& grid, int speed);
 
 }  // namespace cgs

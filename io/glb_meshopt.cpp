@@ -84,7 +84,7 @@ std::string octahedral(std::string_view normals, size_t count) {
 }
 
 std::string exponential(std::string_view floats, size_t count) {
-  constexpr int kBits = 15;
+  constexpr int kBits = 9;  // with the sign; to a 250th
   std::vector<float> values(count);
   std::memcpy(values.data(), floats.data(), count * sizeof(float));
   std::string out(count * sizeof(float), '\0');
@@ -199,7 +199,7 @@ GlbPrimitive in_cache_order(GlbPrimitive primitive) {
   const size_t corners = 3 * primitive.faces.size();
   unsigned int* const indices = primitive.faces.data()->data();
   const std::vector<unsigned int> before(indices, indices + corners);
-  meshopt_optimizeVertexCache(indices, before.data(), corners, vertices);
+  meshopt_optimizeVertexCacheStrip(indices, before.data(), corners, vertices);
   std::vector<unsigned int> remap(vertices);
   meshopt_optimizeVertexFetchRemap(remap.data(), indices, corners, vertices);
   for (auto& face : primitive.faces) {

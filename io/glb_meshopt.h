@@ -16,13 +16,13 @@ inline constexpr const char* kMeshopt = "EXT_meshopt_compression";
 inline constexpr uint64_t kMostMeshoptRatio = 64;
 
 /// The same primitive with faces and vertices in an order in which neighbours follow each other,
-/// which compresses best and draws fastest.
+/// which compresses best and draws fast.
 GlbPrimitive in_cache_order(GlbPrimitive primitive);
 
 /// Compresses the vertices and faces of a binary glTF file of write_glb(), whose images stay.
 ///
 /// Whole numbers and faces come back bit by bit, but for normals, which keep 8 bits per coordinate
-/// of an octahedron; floats keep 15 bits (sigma), or are exact where these suffice. Readers that do
+/// of an octahedron; floats keep 9 bits (sigma), or are exact where these suffice. Readers that do
 /// not know the extension cannot open the file.
 /// \throws NumericalError if a stream does not decode to what went in; LimitError above 4 GiB
 /// Source: glTF extension EXT_meshopt_compression, Khronos Group.

@@ -15,14 +15,22 @@ namespace {
 
 constexpr uint32_t kUnused = std::numeric_limits<uint32_t>::max();
 
-/// glTF forbids NaN: no statement becomes a negative number, of the size of the others so that it
-/// does not coarsen a quantisation of them.
+/// glTF forbids NaN: no statement becomes a negative number, smaller than the others so that it
+/// hardly coarsens a quantisation of them.
 float unknown_sigma(const TriangleMesh& mesh, double scale) {
+  constexpr float kShare = 1.0f / 8;
   float largest = 0;
   for (const float s : mesh.sigma) {
     if (std::isfinite(s)) largest = std::max(largest, s);
   }
-  return largest > 0 ? -static_cast<float>(largest * scale) : -1.0f;
+  return largest > 0 ? -static_cast<float>(kShare * largest * scale) : -1.0f;
+}
+
+/// Splats hold the light of the scene, as photographs do. Also where no photograph fits: beside
+/// photographs, lit surface would look like another. What was not seen is tinted and lit.
+bool is_unlit(std::optional<Provenance> label, bool textured) {
+  if (label == Provenance::Inferred || label == Provenance::Interpolated) return false;
+  return textured || label == Provenance::Virtual;
 }
 
 class Splitter {
@@ -46,6 +54,7 @@ class Splitter {
     GlbPrimitive out;
     out.name = label ? provenance_name(*label) : "surface";
     out.photograph = photograph;
+    out.is_unlit = is_unlit(label, !texture_.empty());
     if (photograph != PhotoTexture::kNone) {
       out.texture_size = images_[static_cast<size_t>(photograph)].size;
     }

@@ -19,10 +19,11 @@ namespace cgs {
 struct GlbPrimitive {
   std::string name;  ///< Of the class.
   int photograph = PhotoTexture::kNone;
+  bool is_unlit = false;                       ///< Its colours hold the light of the scene already.
   std::vector<Eigen::Vector2f> texcoords;      ///< Into the photograph's image; may be empty.
   Eigen::Vector2i texture_size = {0, 0};       ///< Of that image [pixels].
   std::vector<Eigen::Vector3f> positions;      ///< [units of the file], glTF axes, local origin
-  std::vector<Eigen::Vector3f> normals;        ///< Unit length.
+  std::vector<Eigen::Vector3f> normals;        ///< Unit length; may be empty.
   std::vector<Eigen::Vector3f> colors;         ///< Linear light in [0, 1]; may be empty.
   std::vector<float> support;                  ///< May be empty.
   std::vector<float> sigma;                    ///< [units of the file]; may be empty.

@@ -11,14 +11,19 @@
 
 namespace cgs {
 
-/// The grid of 16 bits per coordinate that all primitives of a mesh share, so that borders between
-/// them stay closed: position = origin + step * whole numbers.
+/// The grid of up to 16 bits per coordinate that all primitives of a mesh share, so that borders
+/// between them stay closed: position = origin + step * whole numbers.
 struct QuantizedGrid {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double step = 1;  ///< > 0
+  int bits = 16;    ///< In use, of each coordinate.
 
-  /// The finest that holds a box.
-  static QuantizedGrid around(const Eigen::AlignedBox3f& box);
+  /// The one of so many bits that holds a box.
+  static QuantizedGrid around(const Eigen::AlignedBox3f& box, int bits = 16);
+
+  /// The coarsest that holds a box and moves no vertex farther than max_error; where none does,
+  /// the finest.
+  static QuantizedGrid within(double max_error, const Eigen::AlignedBox3f& box);
 };
 
 /// The vertices of a primitive as KHR_mesh_quantization allows them, padded to multiples of four
@@ -32,8 +37,16 @@ struct QuantizedPrimitive {
   double max_texture_error = 0;  ///< Largest move of a texture coordinate [pixels].
 };
 
+/// How much of 16 bits is used; the rest stays zero, which codecs pack to nothing.
+struct QuantizedRounding {
+  int color_bits = 16;
+  double texture_error = 0;  ///< What a texture coordinate may move by [pixels]; 0 = all bits.
+};
+
 /// Source: glTF extension KHR_mesh_quantization, Khronos Group.
 /// \pre positions lie on the grid's box, texture coordinates in [0, 1]
-QuantizedPrimitive quantized(const GlbPrimitive& primitive, const QuantizedGrid& grid);
+QuantizedPrimitive quantized(const GlbPrimitive& primitive,
+                             const QuantizedGrid& grid,
+                             const QuantizedRounding& rounding = {});
 
 }  // namespace cgs

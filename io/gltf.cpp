@@ -103,13 +103,17 @@ float decimal_below(float value) {
 }
 float decimal_above(float value) { return -decimal_below(-value); }
 
+double error_or_default(double max_error, double extent) {
+  return max_error > 0 ? max_error : std::ldexp(extent, -14);
+}
+
 /// The cube that holds every position, and as few bits as keep the error.
 DracoGrid grid_for(const std::vector<GlbPrimitive>& primitives, double max_error) {
   const Eigen::AlignedBox3f box = box_of(primitives);
   const Eigen::Vector3f origin = box.min().unaryExpr(&decimal_below);
   DracoGrid grid{origin, decimal_above((box.max() - origin).maxCoeff()), 1};
   const double half_diagonal = std::sqrt(3.0) / 2;  // of a cell: the farthest a vertex can move
-  const double wanted = max_error > 0 ? max_error : std::ldexp(double{grid.range}, -14);
+  const double wanted = error_or_default(max_error, double{grid.range});
   while (grid.bits < kMaxDracoBits && grid.step() * half_diagonal > wanted) ++grid.bits;
   require(grid.step() * half_diagonal <= wanted,
           "GlbOptions.max_error must be above extent / 2^21",
@@ -137,7 +141,6 @@ class GlbBuilder {
   /// Adds the images that are used; call it before any primitive.
   void add_photographs(const PhotoTexture& texture, const std::vector<TextureImage>& images) {
     if (texture.empty()) return;
-    textured_ = true;
     tinygltf::Sampler sampler;
     sampler.minFilter = TINYGLTF_TEXTURE_FILTER_LINEAR_MIPMAP_LINEAR;
     sampler.magFilter = TINYGLTF_TEXTURE_FILTER_LINEAR;
@@ -195,9 +198,11 @@ class GlbBuilder {
       high = high.cwiseMax(whole);
     }
     set_bounds(out.attributes["POSITION"], low, high);
-    const int normals = accessor(in.normals.size(), TINYGLTF_TYPE_VEC3, view(stored.normals));
-    set_stored_type(normals, TINYGLTF_COMPONENT_TYPE_BYTE, true, sizeof(stored.normals[0]));
-    out.attributes["NORMAL"] = normals;
+    if (!in.normals.empty()) {
+      const int normals = accessor(in.normals.size(), TINYGLTF_TYPE_VEC3, view(stored.normals));
+      set_stored_type(normals, TINYGLTF_COMPONENT_TYPE_BYTE, true, sizeof(stored.normals[0]));
+      out.attributes["NORMAL"] = normals;
+    }
     if (!in.texcoords.empty()) {
       out.attributes["TEXCOORD_0"] = short_accessor(stored.texcoords, TINYGLTF_TYPE_VEC2, true);
     }
@@ -309,9 +314,8 @@ class GlbBuilder {
       out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.25, 0.8, 1.0};
     } else if (in.name == provenance_name(Provenance::Interpolated)) {
       out.pbrMetallicRoughness.baseColorFactor = {0.55, 0.75, 1.0, 1.0};
-    } else if (textured_ || in.name == provenance_name(Provenance::Virtual)) {
-      // Splats hold the light of the scene, as photographs do. Also where no photograph fits:
-      // beside photographs, lit surface would look like another.
+    }
+    if (in.is_unlit) {
       out.extensions[kUnlit] = tinygltf::Value(tinygltf::Value::Object());
       use_extension(kUnlit);
     }
@@ -372,7 +376,6 @@ class GlbBuilder {
   }
 
   tinygltf::Model model_;
-  bool textured_ = false;
   std::vector<std::string> names_;  // of photographs
   std::vector<int> texture_of_;     // per photograph
 };
@@ -421,6 +424,13 @@ GlbPlacement placement_for(const TriangleMesh& mesh,
   return out;
 }
 
+/// What Draco leaves out, too.
+constexpr QuantizedRounding kPackedRounding = {kDracoColorBits, kDracoTextureError};
+
+bool is_compressed(GlbEncoding encoding) {
+  return encoding == GlbEncoding::Draco || encoding == GlbEncoding::Meshopt;
+}
+
 /// How the primitives of a file are stored, on which grid.
 struct GlbStore {
   GlbEncoding encoding = GlbEncoding::Plain;
@@ -430,7 +440,7 @@ struct GlbStore {
 
   int position_bits() const {
     if (encoding == GlbEncoding::Plain) return 0;
-    return encoding == GlbEncoding::Draco ? draco.bits : 16;
+    return encoding == GlbEncoding::Draco ? draco.bits : whole.bits;
   }
 };
 
@@ -442,7 +452,11 @@ GlbStore store_for(const std::vector<GlbPrimitive>& primitives,
   const bool is_too_small = extent_of(primitives) < kSmallestDracoExtent;
   if (out.encoding == GlbEncoding::Draco && is_too_small) out.encoding = GlbEncoding::Plain;
   if (out.encoding == GlbEncoding::Draco) out.draco = grid_for(primitives, max_error);
-  out.whole = QuantizedGrid::around(box_of(primitives));
+  const Eigen::AlignedBox3f box = box_of(primitives);
+  out.whole = QuantizedGrid::around(box);
+  if (out.encoding == GlbEncoding::Meshopt) {
+    out.whole = QuantizedGrid::within(error_or_default(max_error, box.sizes().maxCoeff()), box);
+  }
   out.speed = options.speed;
   return out;
 }
@@ -466,7 +480,9 @@ double add_primitive(GlbBuilder& builder,
   } else if (store.encoding == GlbEncoding::Plain) {
     builder.add_plain(primitive);
   } else {
-    const QuantizedPrimitive stored = quantized(primitive, store.whole);
+    const bool packed = store.encoding == GlbEncoding::Meshopt;
+    const QuantizedPrimitive stored =
+        quantized(primitive, store.whole, packed ? kPackedRounding : QuantizedRounding{});
     builder.add_quantized(primitive, stored, store.whole);
     error = stored.max_error;
     texture_error = stored.max_texture_error;
@@ -528,6 +544,7 @@ GlbReport write_glb(const std::filesystem::path& path,
   const GlbStore store = store_for(primitives, options, max_error);
   double worst = 0;
   for (GlbPrimitive& primitive : primitives) {
+    if (is_compressed(store.encoding) && primitive.is_unlit) primitive.normals.clear();
     if (store.encoding == GlbEncoding::Meshopt) primitive = in_cache_order(std::move(primitive));
     worst = std::max(worst, add_primitive(builder, primitive, store, report));
   }

@@ -32,10 +32,10 @@ struct GlbOptions {
   GlbEncoding encoding = GlbEncoding::Draco;  ///< Meshes smaller than 1e-6 [units of the file] are
                                               ///< stored plain where Draco is asked for, which
                                               ///< cannot hold them.
-  double max_error = 0;  ///< Largest move of a vertex by Draco [world units]; 0 = extent / 2^14,
-                         ///< else > extent / 2^21. Quantized and Meshopt move it by extent / 2^16
-                         ///< at most.
-  int speed = 5;         ///< Of the encoder, 0 (smallest file) to 10 (fastest).
+  double max_error = 0;  ///< Largest move of a vertex by Draco or Meshopt [world units]; 0 =
+                         ///< extent / 2^14, else > extent / 2^21 and extent / 2^16. Quantized moves
+                         ///< it by extent / 2^16 at most.
+  int speed = 1;         ///< Of the encoder, 0 to 10 (fastest); files of 0 are no smaller.
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
   std::optional<Eigen::Vector3d> center;  ///< What becomes (0, 0, 0) [internal units]; default: the
                                           ///< middle of the mesh.
@@ -68,9 +68,10 @@ struct GlbReport {
 /// - POSITION is relative to options.center. asset.extras tells where that lies
 ///   (origin_in_world), the axes (gltf_from_world, row by row), units ("m" or "unknown"),
 ///   metres_per_unit, metres_sigma, scale_source, the area of each class, and the summary.
-/// - NORMAL; COLOR_0 in linear light; _SUPPORT (number of views that see the vertex); _SIGMA
-///   (standard deviation along the normal [units of the file]; negative = no statement);
-///   _FEATURE_ID_0 (EXT_mesh_features: the number of the class, named in
+/// - NORMAL, which Draco and Meshopt leave out where the material is unlit: it follows from the
+///   faces, and nothing asks for it there. COLOR_0 in linear light; _SUPPORT (number of views that
+///   see the vertex); _SIGMA (standard deviation along the normal [units of the file]; negative =
+///   no statement); _FEATURE_ID_0 (EXT_mesh_features: the number of the class, named in
 ///   asset.extras.provenance_names), which programs that pack files for the web keep.
 /// - With Draco (edgebreaker) all primitives share one quantisation grid, so that borders between
 ///   them stay closed. The result is decoded again and compared with the input. Quantized and

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a viewer of web/asset.glb sees from the cameras of a run, against the photographs: as they
-// are, and with the exposure of the picture, one factor on linear light per channel, matched.
+// are, and with the exposure of the picture, one factor on linear light per channel, matched. Of
+// input views also where the view's own photograph is shown, which tells of resampling, offsets and
+// JPEG alone, and where another one is, which tells of the surface, too.
 //
 // usage: texture_accuracy RUN_FOLDER [ASSET.glb [PICTURE_FOLDER]]
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 
@@ -57,6 +60,19 @@ ColorImage exposure_matched(ColorImage picture, const ColorImage& photograph, co
   return picture;
 }
 
+/// Of a part of a file, the name of the photograph that it shows; empty = none.
+std::string photograph_of(const test::Glb& glb, const test::GlbPart& part) {
+  if (part.image < 0) return {};
+  return glb.json["images"][static_cast<size_t>(part.image)]["name"];
+}
+
+/// \return NaN where no pixel counts
+double psnr_on(const MaskMap& use, const ColorImage& picture, const ColorImage& photograph) {
+  const bool any =
+      std::any_of(use.data.begin(), use.data.end(), [](uint8_t used) { return used != 0; });
+  return any ? psnr(picture, photograph, &use) : std::nan("");
+}
+
 struct Mean {
   double sum = 0;
   int count = 0;
@@ -86,6 +102,8 @@ void measure(const std::filesystem::path& run,
     const test::GlbPicture picture = test::render_glb(glb, camera);
     MaskMap seen(camera.width, camera.height, 0);
     MaskMap textured = seen;
+    MaskMap own = seen;
+    MaskMap other = seen;
     double n = 0;
     double n_textured = 0;
     for (size_t p = 0; p < seen.data.size(); ++p) {
@@ -93,6 +111,9 @@ void measure(const std::filesystem::path& run,
       if (part < 0 || (!view.valid.empty() && view.valid.data[p] == 0)) continue;
       seen.data[p] = is_seen(glb.parts[static_cast<size_t>(part)].material) ? 1 : 0;
       textured.data[p] = glb.parts[static_cast<size_t>(part)].image >= 0 ? 1 : 0;
+      const std::string shown = photograph_of(glb, glb.parts[static_cast<size_t>(part)]);
+      own.data[p] = shown == view.name ? 1 : 0;
+      other.data[p] = !shown.empty() && shown != view.name ? 1 : 0;
       n += seen.data[p];
       n_textured += textured.data[p];
     }
@@ -113,6 +134,11 @@ void measure(const std::filesystem::path& run,
         ssim(picture.color, view.image, &seen),
         100 * n_textured / double(seen.data.size()));
     if (n_textured > 0) std::printf(", PSNR %.2f dB", psnr(picture.color, view.image, &textured));
+    if (is_input && n_textured > 0) {
+      std::printf(" (own photograph %.2f dB, others %.2f dB)",
+                  psnr_on(own, picture.color, view.image),
+                  psnr_on(other, picture.color, view.image));
+    }
     std::printf("\n");
     if (!pictures.empty()) {
       write_png(pictures / (view.name + ".png"), picture.color);

@@ -84,13 +84,16 @@ TEST(GlbMeshopt, HoldsWhatTheQuantizedFileHoldsInLess) {
   const test::TempDir dir;
   const TriangleMesh mesh = test::labelled_sphere(96, 128);
   const auto written = [&](const char* name, GlbEncoding encoding) {
-    return write_glb(dir / name, mesh, test::centimetre_frame(), {.encoding = encoding});
+    return write_glb(dir / name,
+                     mesh,
+                     test::centimetre_frame(),
+                     {.encoding = encoding, .max_error = 0.9 * 51.2 / 65535});  // all 16 bits
   };
   const GlbReport quantized = written("q.glb", GlbEncoding::Quantized);
   const GlbReport packed = written("m.glb", GlbEncoding::Meshopt);
   EXPECT_LT(packed.bytes, quantized.bytes / 2);
   EXPECT_EQ(packed.measured_max_error, quantized.measured_max_error);
-  // To the last bit, but for sigma, which keeps 15.
+  // To the last bit, but for sigma, which keeps 9.
   const auto claims = [&](const char* name) {
     const GlbMesh file = read_glb(dir / name);
     std::multiset<FaceClaims> out;
@@ -105,9 +108,28 @@ TEST(GlbMeshopt, HoldsWhatTheQuantizedFileHoldsInLess) {
     EXPECT_EQ(a->label, b->label);
     EXPECT_EQ(a->support, b->support);
     for (size_t k = 0; k < 3; ++k) {
-      EXPECT_NEAR(a->sigma.at(k), b->sigma.at(k), std::abs(b->sigma.at(k)) / (1 << 14));
+      EXPECT_NEAR(a->sigma.at(k), b->sigma.at(k), std::abs(b->sigma.at(k)) / (1 << 7));
     }
   }
+}
+
+TEST(GlbMeshopt, StoresPositionsNoFinerThanAsked) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::labelled_sphere(96, 128);
+  size_t previous = 0;
+  for (const double wanted : {1.0, 0.1, 1e-2, 1e-3}) {  // of an extent of 51.2
+    const GlbReport out = write_glb(dir / "a.glb",
+                                    mesh,
+                                    test::centimetre_frame(),
+                                    {.encoding = GlbEncoding::Meshopt, .max_error = wanted});
+    EXPECT_LE(out.measured_max_error, wanted);
+    EXPECT_GT(out.measured_max_error, wanted / 8);
+    EXPECT_GT(out.bytes, previous);
+    previous = out.bytes;
+  }
+  const GlbReport by_default =
+      write_glb(dir / "a.glb", mesh, test::centimetre_frame(), {.encoding = GlbEncoding::Meshopt});
+  EXPECT_EQ(by_default.position_bits, 14);
 }
 
 /// A file, taken apart.

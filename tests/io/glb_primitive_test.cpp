@@ -75,7 +75,7 @@ TEST(GlbPrimitives, UnknownSigmaIsNegativeAndNotLarge) {
   float largest = 0;
   for (const float s : parts[1].sigma) largest = std::max(largest, s);
   EXPECT_LT(parts[3].sigma.front(), 0);
-  EXPECT_GE(parts[3].sigma.front(), -2 * largest);
+  EXPECT_GE(parts[3].sigma.front(), -0.25f * largest);
 }
 
 TEST(GlbPrimitives, DropFacesWithoutThreePlaces) {

@@ -67,7 +67,7 @@ void expect_same(const Glb& glb, const TriangleMesh& mesh, const Frame& frame, d
       for (int k = 0; k < 3; ++k) {
         EXPECT_NEAR(part.values.at("COLOR_0")[i][static_cast<size_t>(k)],
                     linear_from_srgb(mesh.colors[index][k]),
-                    2e-4);
+                    1 / 4094.0);
       }
     }
     std::multiset<std::array<uint32_t, 3>> before;
@@ -163,6 +163,17 @@ TEST(WriteGlb, KeepsSigmaInMetresAndMarksTheUnknown) {
       EXPECT_LT(value[0], 0.005f * 64 * 0.01f);
     }
     for (const auto& value : out.glb.parts[3].values.at("_SIGMA")) EXPECT_LT(value[0], 0);
+  }
+}
+
+TEST(WriteGlb, SigmaThatIsKnownStaysSoHoweverSmall) {
+  TriangleMesh mesh = test::labelled_sphere();
+  for (size_t v = 0; v < mesh.sigma.size(); v += 2) mesh.sigma[v] *= 1e-5f;
+  for (const GlbEncoding encoding : {GlbEncoding::Plain, GlbEncoding::Draco}) {
+    const Written out = written(mesh, test::centimetre_frame(), {.encoding = encoding});
+    for (size_t part = 0; part < 2; ++part) {
+      for (const auto& value : out.glb.parts[part].values.at("_SIGMA")) EXPECT_GT(value[0], 0);
+    }
   }
 }
 
@@ -352,6 +363,8 @@ TEST(WriteTexturedGlb, HasAPrimitiveAndMaterialForEachPhotograph) {
       const bool unlit = part.material_json.contains("extensions") &&
                          part.material_json["extensions"].contains("KHR_materials_unlit");
       EXPECT_EQ(unlit, part.material != "inferred") << part.material;
+      const bool has_normals = encoding == GlbEncoding::Plain || !unlit;
+      EXPECT_EQ(part.values.count("NORMAL"), has_normals ? 1u : 0u) << part.material;
     }
     EXPECT_EQ(names,
               (std::vector<std::string>{"observed left side",
