@@ -7,6 +7,10 @@
 #include <mutex>
 #include <set>
 
+#include <nlohmann/json.hpp>
+
+#include "convert/depth_agreement.h"
+#include "convert/html.h"
 #include "convert/length.h"
 #include "convert/memory_plan.h"
 #include "convert/model.h"
@@ -19,6 +23,8 @@ namespace cgs {
 
 namespace {
 
+// Scales nearer to each other than this are not told apart by frames.
+constexpr double kFinestFactor = 0.0125;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 View& first_input(Scene& scene) { return scene.views[static_cast<size_t>(scene.input.front())]; }
@@ -61,7 +67,6 @@ void settle_scale(Scene& scene, const std::string& unit) {
   }
   if (scene.frame.has_metric_scale()) return;
   scene.frame.metres_per_unit = 1;
-  scene.frame.metres_sigma = kSensorSigma;
   scene.frame.scale_source = ScaleSource::DepthSensor;
 }
 
@@ -111,49 +116,50 @@ class Frames {
   mutable std::set<std::string> warnings_;  // in an order that no thread decides
 };
 
-// The frame that shows much of what another does, from as far off as possible; itself if none does.
-size_t partner_of(const Scene& scene, size_t i) {
-  constexpr double kSameDirection = 0.5;  // cosine
-  const auto camera = [&](size_t k) -> const Camera& {
-    return scene.views[static_cast<size_t>(scene.input[k])].camera;
-  };
-  const Eigen::Vector3d axis = camera(i).world_from_cam.linear().col(2);
-  size_t best = i;
-  for (size_t k = 0; k < scene.input.size(); ++k) {
-    if (axis.dot(camera(k).world_from_cam.linear().col(2)) < kSameDirection) continue;
-    const auto off = [&](size_t j) { return (camera(j).center() - camera(i).center()).norm(); };
-    if (off(k) > off(best)) best = k;
+std::string percent(double part) { return std::to_string(std::lround(100 * part)) + " %"; }
+
+// What to say where frames do not agree, or only as depth of another unit would.
+std::string disagreement_words(const DepthAgreement& agreement, const Frame& frame) {
+  std::string out = std::isnan(agreement.off)
+                        ? "no two frames show the same, as they are placed"
+                        : "frames disagree by " + percent(agreement.off) + " of the depth (median)";
+  if (!std::isnan(agreement.best_factor) && agreement.best_factor != 1) {
+    out += "; they agree better where a unit of the cameras is " +
+           number(frame.metres_per_unit / agreement.best_factor, "%.3g") + " m";
   }
-  return best;
+  return out +
+         ": are the cameras in metres (--assume-unit), the depth in millimetres (--depth-scale)?";
 }
 
-// How far the depth of some frames is from what others measured there; the median of some pixels.
-double disagreement(const Scene& scene, const Frames& frames) {
-  constexpr size_t kPairs = 8;
-  constexpr int kStep = 7;
-  std::vector<double> off;
-  const size_t count = std::min(kPairs, frames.size());
-  for (size_t n = 0; n < count; ++n) {
-    const size_t i = n * frames.size() / count;
-    const size_t k = partner_of(scene, i);
-    if (k == i) continue;
-    const TsdfView from = frames(i, false);
-    const TsdfView to = frames(k, false);
-    for (int y = 0; y < from.depth.height; y += kStep) {
-      for (int x = 0; x < from.depth.width; x += kStep) {
-        if (!(from.depth(x, y) > 0)) continue;
-        const Eigen::Vector3d uvz =
-            to.camera.project(from.camera.unproject(x + 0.5, y + 0.5, double(from.depth(x, y))));
-        if (!to.camera.sees(uvz)) continue;
-        const float measured = to.depth(int(uvz.x()), int(uvz.y()));
-        if (measured > 0) off.push_back(std::abs(double(measured) / uvz.z() - 1));
-      }
-    }
+// A scale that only the depth tells has to be seen in it.
+// \param is_said  somebody said that the values are metres
+void judge_scale(const DepthAgreement& agreement,
+                 const Scene& scene,
+                 bool is_said,
+                 Frame& frame,
+                 std::vector<std::string>& warnings) {
+  constexpr double kMost = 0.05;
+  const bool is_assumed = frame.scale_source == ScaleSource::DepthSensor;
+  const bool fits =
+      agreement.off <= kMost && agreement.best_factor >= 0.9 && agreement.best_factor <= 1.1;
+  if (is_assumed && !is_said && !fits && !std::isnan(agreement.off)) {
+    throw BadInput(Defect::Mismatch,
+                   scene.folder,
+                   disagreement_words(agreement, frame) + " --depth-kind metric takes it as it is");
   }
-  if (off.empty()) return double(kNaN);
-  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
-  std::nth_element(off.begin(), middle, off.end());
-  return *middle;
+  if (!fits && (is_assumed || agreement.off > kMost)) {
+    warnings.push_back(disagreement_words(agreement, frame));
+  }
+  if (fits && is_assumed && !agreement.shows_scale) {
+    warnings.push_back(
+        "frames agree with cameras of any unit, as these hardly move or see little but a plane; "
+        "no scale is stated, but metres were taken: --assume-unit m states them");
+  }
+  if (!is_assumed) return;
+  const bool is_known = fits && agreement.shows_scale;
+  frame.metres_per_unit = is_known ? 1 : 0;
+  frame.metres_sigma = is_known ? std::max(kFinestFactor, std::abs(agreement.best_factor - 1)) : 0;
+  if (!is_known) frame.scale_source = ScaleSource::Unknown;
 }
 
 }  // namespace
@@ -172,9 +178,18 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   scene.frame.up = up;
 
   const Frames frames(scene);
+  std::vector<Camera> cameras;
+  for (const int i : scene.input) cameras.push_back(scene.views[static_cast<size_t>(i)].camera);
+  const DepthAgreement agreement =
+      depth_agreement(cameras, [&](size_t i) { return frames(i, false); });
   DepthFusion out;
   out.frames = frames.size();
-  out.disagreement = disagreement(scene, frames);
+  out.disagreement = agreement.off;
+  out.frame = scene.frame;
+  out.warnings = scene.warnings;
+  const DepthOptions& depth = request.options.depth;
+  const bool is_said = depth.kind == DepthKind::Metric || depth.scale != 0;
+  judge_scale(agreement, scene, is_said, out.frame, out.warnings);
   TsdfOptions fusing;
   if (!request.voxel_size.empty()) {
     fusing.voxel_size = parse_length(request.voxel_size, scene.frame);
@@ -182,19 +197,8 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   fusing.memory_limit = memory_budget(request.memory_limit);
   const TsdfSource source = {frames.size(), std::cref(frames)};
   out.fused = fuse_streamed(source, fusing, progress);
-  out.warnings = scene.warnings;
   const std::vector<std::string> odd = frames.warnings();
   out.warnings.insert(out.warnings.end(), odd.begin(), odd.end());
-  constexpr double kAgrees = 0.05;
-  if (out.disagreement > kAgrees) {
-    // Nobody said that the cameras are in metres, and it does not look so.
-    if (scene.frame.scale_source == ScaleSource::DepthSensor) scene.frame.metres_per_unit = 0;
-    out.warnings.push_back(
-        "frames disagree by " + std::to_string(std::lround(100 * out.disagreement)) +
-        " % of the depth (median): are the cameras in metres (--assume-unit), the depth in "
-        "millimetres (--depth-scale)?");
-  }
-  out.frame = scene.frame;
   return out;
 }
 

@@ -50,20 +50,6 @@ std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : ".";
 }
 
-// What killed processes left of a file.
-void remove_abandoned_parts(const std::filesystem::path& path) {
-  const std::string start = path.filename().string() + std::string(kPart);
-  std::error_code error;
-  std::filesystem::directory_iterator entry(folder_of(path), error);
-  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    std::error_code ignored;  // what stays is in nobody's way
-    if (name.rfind(start, 0) != 0 || !entry->is_regular_file(ignored)) continue;
-    const pid_t process = process_of(name);
-    if (process > 0 && is_gone(process)) std::filesystem::remove(entry->path(), ignored);
-  }
-}
-
 void sync_to_disk(int descriptor, const std::filesystem::path& path) {
   if (::fsync(descriptor) != 0) throw IoError(path, std::generic_category().message(errno));
 }
@@ -71,7 +57,6 @@ void sync_to_disk(int descriptor, const std::filesystem::path& path) {
 }  // namespace
 
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), part_(path_) {
-  remove_abandoned_parts(path_);
   part_ += std::string(kPart) + std::to_string(::getpid());
   descriptor_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (descriptor_ < 0) throw IoError(path_, std::generic_category().message(errno));

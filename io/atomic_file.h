@@ -17,7 +17,6 @@ namespace cgs {
 /// Use: AtomicFile file("mesh.ply"); file.write(bytes); file.commit();
 class AtomicFile {
  public:
-  /// Removes the temporaries of the same file that killed processes left.
   /// \throws IoError if the temporary cannot be created.
   explicit AtomicFile(std::filesystem::path path);
   ~AtomicFile();

@@ -43,6 +43,16 @@ std::optional<std::string> read_one(const std::filesystem::path& path, uint64_t 
   return std::string(state);
 }
 
+bool is_whole(const std::filesystem::path& path, uint64_t belongs_to) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) return false;
+  try {
+    return read_one(path, belongs_to).has_value();
+  } catch (const BadInput&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 void write_checkpoint(const std::filesystem::path& folder,
@@ -59,8 +69,9 @@ void write_checkpoint(const std::filesystem::path& folder,
   file.write(head);
   file.write(state);
   file.write(tail);
-  std::error_code error;
-  if (std::filesystem::exists(path, error)) {
+  // A damaged one must not take the place of a whole one.
+  if (is_whole(path, belongs_to)) {
+    std::error_code error;
     std::filesystem::rename(path, previous_path(folder, name), error);
     if (error) throw IoError(path, "cannot keep the older checkpoint: " + error.message());
   }

@@ -36,7 +36,7 @@ struct DracoPrimitive {
 /// Largest error of texture coordinates that compression may add [pixels].
 inline constexpr double kDracoTextureError = 0.1;
 
-/// Of colours in linear light: none moves by a level of 255 of its sRGB code.
+/// Of colours in linear light: none moves by more than one level of 255 of its sRGB code.
 inline constexpr int kDracoColorBits = 11;
 
 /// Compresses with the edgebreaker method, decodes again, and compares: every vertex within a step

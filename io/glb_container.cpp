@@ -125,12 +125,14 @@ GlbContainer::GlbContainer(std::string content, const std::filesystem::path& pat
 // The container has a version of its own.
 void GlbContainer::refuse_other_version() const {
   const auto asset = root().find("asset");
-  for (const char* key : {"version", "minVersion"}) {
+  const auto require = [&](const char* key, std::string_view start) {
     const auto version = asset ? asset->find(key) : std::nullopt;
-    if (version && version->text().rfind("2.", 0) != 0) {
+    if (version && version->text().rfind(start, 0) != 0) {
       throw BadInput(Defect::Unsupported, path_, "glTF " + version->text() + "; 2.0 is read");
     }
-  }
+  };
+  require("version", "2.");
+  require("minVersion", "2.0");
 }
 
 JsonValue GlbContainer::element(const char* array, const JsonValue& index) const {

@@ -12,6 +12,9 @@ namespace {
 constexpr size_t kPartSide = 4;
 
 size_t part_x(size_t part) { return part / 2 * kPartSide; }
+// Stays at the largest number.
+void count_up(uint16_t& count) { count = static_cast<uint16_t>(count + (count < UINT16_MAX)); }
+
 size_t part_y(size_t part) { return part % 2 * kPartSide; }
 
 }  // namespace
@@ -107,8 +110,8 @@ void BlockEvidence::add_band(size_t at, const SightingRow& row, const TsdfView& 
     const int x = row.x[lane];
     const int y = row.y[lane];
     const bool is_guess = !view.guessed.empty() && view.guessed(x, y) != 0;
-    s.count[n] = static_cast<uint16_t>(s.count[n] + 1);
-    if (!view.is_virtual && !is_guess) s.known[n] = static_cast<uint16_t>(s.known[n] + 1);
+    count_up(s.count[n]);
+    if (!view.is_virtual && !is_guess) count_up(s.known[n]);
     if (is_guess) s.is_guessed[n] = 1;
     if (!row.has_sigma || !(row.sigma[lane] > 0)) s.lacks_sigma[n] = 1;
     if (!has_color) continue;

@@ -163,18 +163,19 @@ void grow(const TriangleMesh& mesh, std::vector<uint8_t>& faces) {
 
 TriangleMesh cut_and_filled(TriangleMesh mesh) {
   constexpr int kRounds = 8;
-  constexpr double kMost = 0.05;
+  constexpr double kMost = 0.05;  // of the area, in all rounds together
+  double lost = 0;
+  const double whole = area_of(mesh);
   for (int round = 0; round < kRounds; ++round) {
     std::vector<uint8_t> drop = faces_in_the_way(mesh);
     if (std::count(drop.begin(), drop.end(), uint8_t(1)) == 0) break;
     for (int ring = 0; ring < round; ++ring) grow(mesh, drop);
     std::vector<uint8_t> keep(drop.size());
     for (size_t f = 0; f < keep.size(); ++f) keep[f] = drop[f] == 0 ? 1 : 0;
-    const TriangleMesh rest = with_faces(mesh, keep);
-    if (area_of(rest) < (1 - kMost) * area_of(mesh)) {
-      throw NumericalError("too much of the surface would have to go");
-    }
-    mesh = filled(put_right(rest, Small::Anything));
+    const TriangleMesh rest = put_right(with_faces(mesh, keep), Small::Anything);
+    lost += area_of(mesh) - area_of(rest);
+    if (lost > kMost * whole) throw NumericalError("too much of the surface would have to go");
+    mesh = filled(rest);
   }
   return mesh;
 }
@@ -192,18 +193,25 @@ MeasurableMesh measurable(const TriangleMesh& mesh) {
   return out;
 }
 
-// The share of a surface that lies farther than `distance` outside a solid.
-double share_outside(const TriangleMesh& surface, const TriangleMesh& solid, double distance) {
+/// Which shares of a surface lie farther from that of a solid than some distance.
+struct SharesOff {
+  double outside = 0, inside = 0;
+};
+
+SharesOff shares_off(const TriangleMesh& surface, const TriangleMesh& solid, double distance) {
   constexpr size_t kSamples = 20'000;
   const MeasurableMesh around = measurable(solid);
   const NearestSurface nearest(around);
   const std::vector<Eigen::Vector3f> samples = sample_surface(surface, kSamples);
-  size_t out = 0;
+  size_t outside = 0, inside = 0;
   for (const auto& p : samples) {
     const Eigen::Vector3d at = p.cast<double>();
-    if (nearest.signed_distance(at, nearest.nearest(at)) > distance) ++out;
+    const double off = nearest.signed_distance(at, nearest.nearest(at));
+    outside += off > distance;
+    inside += off < -distance;
   }
-  return static_cast<double>(out) / static_cast<double>(samples.size());
+  const auto all = static_cast<double>(samples.size());
+  return {static_cast<double>(outside) / all, static_cast<double>(inside) / all};
 }
 
 class Closing {
@@ -211,7 +219,8 @@ class Closing {
   explicit Closing(const TriangleMesh& input) : input_(input), diagonal_(diagonal_of(input)) {}
 
   bool repair() {
-    return attempt("repair", 0, [&] { return base_ = put_right(input_, Small::Sheets); });
+    return attempt(
+        "repair", 0, [&] { return held_against_ = base_ = put_right(input_, Small::Sheets); });
   }
 
   bool fill() {
@@ -219,13 +228,14 @@ class Closing {
       base_ = filled(base_);
       const bool may_be_flat = !self_intersections(base_).empty();  // faces of the patches
       if (may_be_flat) base_ = put_right(base_, Small::Sheets);
-      return base_;
+      return held_against_ = base_;
     });
   }
 
   bool cut() {
     return attempt("cut-self-intersections", 0, [&] {
       TriangleMesh made = cut_and_filled(base_);
+      (void)reference_volume();  // of the surface before it was cut
       if (!certify(base_).closed && certify(made).closed) base_ = made;
       return made;
     });
@@ -265,6 +275,7 @@ class Closing {
     out_.mesh = std::move(best_->mesh);
     out_.certificate = best_->certificate;
     out_.taken = best_->attempt;
+    out_.inside = best_->inside;
     if (reference_) out_.compared_volume = *reference_;
     out_.deviation = mesh_distance(out_.mesh, input_, kSamples);
     return std::move(out_);
@@ -276,6 +287,7 @@ class Closing {
     Certificate certificate;
     size_t attempt = 0;
     double objection = 0;
+    double inside = 0;  // share of the input
   };
 
   // \return whether nothing speaks against what was made
@@ -286,18 +298,20 @@ class Closing {
       return false;
     }
     try {
-      Candidate made{make(), {}, out_.attempts.size() - 1, 0};
+      Candidate made{make(), {}, out_.attempts.size() - 1, 0, 0};
       made.certificate = certify(made.mesh);
       settle(made);
       record.reason = why_no_solid(made.certificate);
       if (!record.reason.empty()) return false;
-      if (made.attempt > 1) made.objection = object(made, record.reason);
+      made.objection = object(made, record.reason);
       if (!best_ || made.objection < best_->objection) best_ = std::move(made);
     } catch (const NumericalError& error) {
       record.reason = error.what();
     } catch (const LimitError& error) {
       record.reason = error.what();
     } catch (const std::logic_error& error) {  // what CGAL throws
+      record.reason = error.what();
+    } catch (const openvdb::Exception& error) {  // of voxels too small for it
       record.reason = error.what();
     }
     return record.reason.empty();
@@ -313,25 +327,37 @@ class Closing {
   }
 
   // How much speaks against a certified candidate, and why.
-  double object(const Candidate& made, std::string& reason) {
+  double object(Candidate& made, std::string& reason) {
     constexpr double kVolume = 0.03;
-    constexpr double kOutside = 0.005;
+    constexpr double kOff = 0.005;
+    constexpr double kDropped = 0.025;  // of the input, hanging sheets included
     constexpr double kBehind = 0.01;
     constexpr double kFar = 1.0 / 200;  // of the diagonal
     std::vector<std::string> reasons;
-    const double outside = share_outside(base_, made.mesh, kFar * diagonal_);
-    if (outside > kOutside) {
-      reasons.push_back("leaves out " + percent(outside) + " of the surface");
+    const SharesOff of_input = shares_off(input_, made.mesh, kFar * diagonal_);
+    made.inside = of_input.inside;
+    const SharesOff off = shares_off(held_against_, made.mesh, kFar * diagonal_);
+    const double left_out = std::max(off.outside, of_input.outside);
+    if (off.outside > kOff || of_input.outside > kDropped) {
+      reasons.push_back("leaves out " + percent(left_out) + " of the surface");
     }
     if (behind_ > kBehind) reasons.push_back("has " + percent(behind_) + " of its area inside");
-    const double volume = reference_volume();
-    const double change = std::isnan(volume) ? 0 : made.certificate.volume / volume - 1;
+    const double change = volume_change(made, off.outside + off.inside < kOff);
     if (std::abs(change) > kVolume) {
       reasons.push_back("holds " + percent(std::abs(change)) + (change > 0 ? " more" : " less") +
                         " than the filled surface surrounds");
     }
     for (const std::string& r : reasons) reason += (reason.empty() ? "" : ", ") + r;
-    return reasons.empty() ? 0 : outside + behind_ + std::abs(change);
+    return reasons.empty() ? 0 : left_out + behind_ + std::abs(change);
+  }
+
+  // Beside the filled surface. What the first two ways make is that surface, and what passes
+  // everywhere near the input surrounds less only where it keeps a cavity.
+  double volume_change(const Candidate& made, bool is_near) {
+    if (made.attempt < 2) return 0;
+    const double volume = reference_volume();
+    const double change = std::isnan(volume) ? 0 : made.certificate.volume / volume - 1;
+    return is_near && behind_ == 0 ? std::max(0.0, change) : change;
   }
 
   // What the filled surface surrounds or, where it is open, would with flat lids; NaN for a sheet.
@@ -340,7 +366,10 @@ class Closing {
     constexpr double kVoxels = 256;  // along the diagonal
     double volume = kNaN;
     if (certify(base_).closed) {
-      volume = enclosed_by_level_set(*enclosing_level_set(base_, diagonal_ / kVoxels));
+      try {
+        volume = enclosed_by_level_set(*enclosing_level_set(base_, diagonal_ / kVoxels));
+      } catch (const openvdb::Exception&) {  // of voxels too small for it: nothing to hold against
+      }
     } else {
       volume = lidded_volume(base_);
     }
@@ -350,7 +379,8 @@ class Closing {
 
   const TriangleMesh& input_;
   double diagonal_;
-  TriangleMesh base_;  // what the next way starts from
+  TriangleMesh base_;          // what the next way starts from
+  TriangleMesh held_against_;  // repaired and filled, but nothing cut
   std::optional<double> reference_;
   double behind_ = 0;  // share of the last wrap's area that covers the back of the surface
   std::optional<Candidate> best_;

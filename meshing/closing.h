@@ -28,6 +28,8 @@ struct ClosedMesh {
   /// Within the filled surface, which the result was held against; NaN = it was not, or that is a
   /// sheet [internal units cubed].
   double compared_volume = std::numeric_limits<double>::quiet_NaN();
+  double inside = 0;  ///< Share of the input that lies deep within the result: overlaps, and the
+                      ///< walls of cavities that were filled.
   MeshDistance deviation;  ///< By samples: accuracy from the result to the input, completeness
                            ///< back.
 };
@@ -43,11 +45,11 @@ struct ClosedMesh {
 /// 4. level-set: the outside of the surface with its holes filled, however it cuts itself;
 /// 5. wrap: wrapped() with ever larger balls.
 ///
-/// The last three may lose or bridge what they should not, unnoticed by any certificate. They are
-/// held against the volume that the outside of the filled surface surrounds, and against the
-/// input, which must not stick out; what fails is taken only if nothing else is left, the nearest
-/// first, and its reason stays. Labels, sigma and support are kept, see these functions: what
-/// closes a hole is Inferred.
+/// A certificate does not notice what is lost or bridged. So all are held against the input, which
+/// must not stick out, and the last three against the volume that the outside of the filled surface
+/// surrounds; what fails is taken only if nothing else is left, the nearest first, and its reason
+/// stays. Level set and wrap fill cavities, see ClosedMesh::inside. Labels, sigma and support are
+/// kept, see these functions: what closes a hole is Inferred.
 ///
 /// \throws InvalidInput if the mesh has no face; NumericalError, with all reasons, if nothing
 ///         passes

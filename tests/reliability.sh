@@ -28,15 +28,14 @@ figures() {
 }
 # Runs on captures of three sizes, and how much memory they needed of what was foreseen.
 foreseen_memory() {
-  local folder
+  local folder result=0
   folder=$(mktemp -d)
   for size in 1 2 3; do
-    "$bin/cgs_make_capture" "$folder/capture_$size" --downscale $size
+    "$bin/cgs_make_capture" "$folder/capture_$size" --downscale $size || result=1
     "$bin/cgs" run "$folder/capture_$size" --views view_01,view_02,view_03 --assume-unit m -q \
-      -o "$folder/out_$size"
+      -o "$folder/out_$size" || result=1
   done
-  local result=0
-  tests/eval/memory_ratio.py "$folder"/out_* || result=1
+  tests/eval/memory_ratio.py "$folder"/out_{1,2,3} || result=1
   rm -rf "$folder"
   return $result
 }

@@ -31,6 +31,7 @@ void run_train(const TrainArgs& args) {
   Terminal terminal(args.common.quiet, args.common.strict);
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   (void)check_stated_cameras(args.scene, opened, terminal);
+  remove_abandoned_files(args.output);
   opened.keep(args.output);
   Scene& scene = opened.scene;
   const auto distances = known_distances(args.scene.known_distances, scene);

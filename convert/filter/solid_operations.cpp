@@ -80,6 +80,10 @@ std::string closing_remark(const ClosedMesh& closed, const Frame& frame) {
   };
   out += "; off the input by " + off(closed.deviation.accuracy) + ", the input off it by " +
          off(closed.deviation.completeness);
+  if (closed.inside > 0.01) {
+    out += "; " + percent(closed.inside, 1) +
+           " of the surface lies deep inside (overlaps, or cavities that were filled)";
+  }
   if (!taken.reason.empty()) out += "; look at it: what was taken " + taken.reason;
   return out;
 }
@@ -101,6 +105,7 @@ nlohmann::ordered_json closing_details(const ClosedMesh& closed, const Frame& fr
           {"objection", closed.attempts[closed.taken].reason},
           {"attempts", attempts},
           {"compared_volume", compared},
+          {"inside", closed.inside},
           {"deviation",
            {{"from_result", distances(closed.deviation.accuracy)},
             {"from_input", distances(closed.deviation.completeness)}}},

@@ -208,13 +208,52 @@ TEST_F(SphereFrames, OfCamerasInOtherUnitsAreNoticedUnlessTheUnitIsSaid) {
   }
 }
 
-TEST_F(SphereFrames, ThatDoNotAgreeGiveAWarningAndNoScale) {
-  DepthFusionRequest wrong = request();
-  wrong.voxel_size = "";
-  wrong.options.depth.scale = 800;
-  const DepthFusion out = fuse_depth(wrong, {});
+TEST_F(SphereFrames, TellTheScaleWhereTheyAgree) {
+  const DepthFusion out = fuse_depth(request(), {});
+  EXPECT_TRUE(out.warnings.empty());
+  EXPECT_EQ(out.frame.metres_per_unit, 1);
+  EXPECT_EQ(out.frame.metres_sigma, 0.0125);
+}
+
+TEST_F(SphereFrames, OfOtherUnitsThanTheirCamerasGiveAWarningAndNoScale) {
+  for (const double factor : {1e-3, 0.01, 0.5, 0.8, 1.25, 2.0, 100.0, 1e3}) {
+    json document = document_;
+    for (json& frame : document["frames"]) {
+      for (int r = 0; r < 3; ++r) {
+        frame["transform_matrix"][r][3] = factor * frame["transform_matrix"][r][3].get<double>();
+      }
+    }
+    test::write_bytes(dir_ / "transforms.json", document.dump());
+    DepthFusionRequest wrong = request();
+    wrong.voxel_size = "";
+    if (factor == 0.8) {
+      EXPECT_EQ(test::defect_of([&] { (void)fuse_depth(wrong, {}); }), "MISMATCH");
+    }
+    wrong.options.depth.kind = DepthKind::Metric;
+    const DepthFusion out = fuse_depth(wrong, {});
+    ASSERT_EQ(out.warnings.size(), 1u) << factor;
+    EXPECT_NE(out.warnings[0].find("are the cameras in metres"), std::string::npos);
+    EXPECT_FALSE(out.frame.has_metric_scale()) << factor;
+    EXPECT_EQ(out.frame.scale_source, ScaleSource::Unknown);
+    if (factor == 1e3) EXPECT_NE(out.warnings[0].find(" 0.001 m"), std::string::npos);
+  }
+}
+
+// From one place a wall of any distance looks the same.
+TEST_F(SphereFrames, OfCamerasThatStandStillTellNoScale) {
+  for (json& frame : document_["frames"]) frame = document_["frames"][0];
+  for (int i = 0; i < kFrames; ++i) {
+    document_["frames"][size_t(i)]["file_path"] = "images/" + name(i) + ".png";
+    document_["frames"][size_t(i)]["transform_matrix"][0][3] =
+        1e-4 * i + document_["frames"][0]["transform_matrix"][0][3].get<double>();
+    test::write_bytes(dir_ / "depth" / (name(i) + ".png"), depth_png(views_[0].depth));
+  }
+  test::write_bytes(dir_ / "transforms.json", document_.dump());
+  DepthFusionRequest still = request();
+  still.voxel_size = "";
+  const DepthFusion out = fuse_depth(still, {});
   ASSERT_EQ(out.warnings.size(), 1u);
-  EXPECT_NE(out.warnings[0].find("disagree"), std::string::npos);
+  EXPECT_NE(out.warnings[0].find("cameras of any unit"), std::string::npos) << out.warnings[0];
   EXPECT_FALSE(out.frame.has_metric_scale());
 }
 

@@ -79,20 +79,6 @@ TEST(AtomicFile, TemporariesOfKilledProcessesAreRemovedAndNothingElse) {
   EXPECT_NO_THROW(remove_abandoned_files(dir / "missing"));
 }
 
-TEST(AtomicFile, WritingAFileRemovesWhatAKilledProcessLeftOfIt) {
-  const test::TempDir dir;
-  const pid_t child = ::fork();
-  if (child == 0) ::_exit(0);
-  ::waitpid(child, nullptr, 0);
-  for (const std::string& name : {"a.ply", "b.ply"}) {
-    test::write_bytes(dir / (name + ".part" + std::to_string(child)), "half");
-  }
-  write_file(dir / "a.ply", "whole");
-  EXPECT_EQ(test::entries(dir.path()), 2);
-  EXPECT_EQ(test::read_bytes(dir / "a.ply"), "whole");
-  EXPECT_TRUE(std::filesystem::exists(dir / ("b.ply.part" + std::to_string(child))));
-}
-
 TEST(AtomicFile, CommitsWhatALibraryWrote) {
   const test::TempDir dir;
   AtomicFile file(dir / "a.txt");

@@ -41,6 +41,17 @@ TEST(Checkpoint, OfOtherWorkIsNotUsed) {
   EXPECT_EQ(cgs::read_checkpoint(folder.path(), "work", 8).warning, "");
 }
 
+TEST(Checkpoint, ADamagedOneNeverTakesThePlaceOfAWholeOne) {
+  const cgs::test::TempDir folder;
+  write_checkpoint(folder.path(), "work", 7, "first state");
+  write_checkpoint(folder.path(), "work", 7, "second state");
+  const std::filesystem::path newest = folder.path() / "work.checkpoint";
+  cgs::write_file(newest, "CGS");
+  write_checkpoint(folder.path(), "work", 7, "third state");
+  std::filesystem::remove(newest);
+  EXPECT_EQ(read_checkpoint(folder.path(), "work", 7), "first state");
+}
+
 TEST(Checkpoint, DamageIsTold) {
   const cgs::test::TempDir folder;
   EXPECT_EQ(warning(folder), "");

@@ -2,7 +2,6 @@
 #include <limits>
 
 #include "tests/e2e/bad_inputs/valid_inputs.h"
-#include "tests/support/zip_bytes.h"
 
 namespace cgs::test {
 
@@ -104,30 +103,12 @@ void add_sizes(Cases& cases) {
        }});
 }
 
-// Formats of depth that are not read: none of them is opened, whatever is in it.
-void add_other_formats(Cases& cases) {
-  const auto refused = [&](const char* row,
-                           const std::string& damage,
-                           const std::string& extension,
-                           const std::string& bytes) {
-    cases.push_back(depth_case(row, damage, "MISSING|UNSUPPORTED", extension, bytes));
-  };
-  refused("C28", "COLMAP: 99999 x 99999", ".bin", "99999&99999&1&" + std::string(12, '\0'));
-  refused("C29", "COLMAP: no third separator", ".bin", "32&24&1");
-  refused("N11",
-          "NPZ: 100 MB in 100 kB",
-          ".npz",
-          zip_bytes({{"depth.npy", std::string(100 << 20, '\0')}}, {.method = 8}));
-  refused("N12", "NPZ: an unknown method", ".npz", zip_bytes({{"depth.npy", "?"}}, {.method = 12}));
-}
-
 }  // namespace
 
 Cases depth_cases() {
   Cases cases;
   add_values(cases);
   add_sizes(cases);
-  add_other_formats(cases);
   return cases;
 }
 

@@ -7,7 +7,6 @@
 #include "tests/e2e/bad_inputs/valid_inputs.h"
 #include "tests/support/sample_mesh.h"
 #include "tests/support/triangle_glb.h"
-#include "tests/support/zip_bytes.h"
 
 namespace cgs::test {
 
@@ -270,24 +269,6 @@ void add_obj(Cases& cases) {
   obj("M08", "a face of a million corners", "OK+W", vertices + polygon + "\n");
 }
 
-// 3MF is written, not read: none is opened, whatever is in it.
-void add_3mf(Cases& cases) {
-  const std::string model = "3D/3dmodel.model";
-  const auto zip = [&](const char* row,
-                       const std::string& damage,
-                       const std::vector<std::pair<std::string, std::string>>& files,
-                       const ZipDamage& how = {}) {
-    cases.push_back(file_case(row, damage, "UNSUPPORTED", "m.3mf", zip_bytes(files, how)));
-  };
-  zip("M09", "100 MB in 100 kB", {{model, std::string(100 << 20, '0')}}, {.method = 8});
-  zip("M10", "an entry outside", {{"../../.bashrc", "touch x"}});
-  zip("M11", "an entry whose method lies", {{model, "<model/>"}}, {.method = 12});
-  zip("M12",
-      "a document type",
-      {{model, "<!DOCTYPE a [<!ENTITY b SYSTEM \"file:///etc/passwd\">]>"}});
-  zip("M13", "no such vertex", {{model, "<model><triangle v1=\"9\" v2=\"1\" v3=\"2\"/></model>"}});
-}
-
 }  // namespace
 
 Cases mesh_cases() {
@@ -299,7 +280,6 @@ Cases mesh_cases() {
   add_draco(cases);
   add_stl(cases);
   add_obj(cases);
-  add_3mf(cases);
   return cases;
 }
 
