@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/fusion_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+struct Pixel {
+  float depth;
+  int x, y;
+};
+
+// The pixels of a view whose depth lies within its 1st and 99th percentile.
+std::vector<Pixel> trustworthy_pixels(const TsdfView& view, double depth_trunc) {
+  std::vector<Pixel> pixels;
+  std::vector<float> depths;
+  for (int y = 0; y < view.depth.height; ++y) {
+    for (int x = 0; x < view.depth.width; ++x) {
+      const float d = view.depth(x, y);
+      if (!std::isfinite(d) || d <= 0 || (depth_trunc > 0 && d > depth_trunc)) continue;
+      if (!view.usable.empty() && view.usable(x, y) == 0) continue;
+      pixels.push_back({d, x, y});
+      depths.push_back(d);
+    }
+  }
+  if (pixels.empty()) return pixels;
+  const auto percentile = [&](size_t percent) {
+    const auto at = depths.begin() + std::ptrdiff_t((depths.size() - 1) * percent / 100);
+    std::nth_element(depths.begin(), at, depths.end());
+    return *at;
+  };
+  const float low = percentile(1);
+  const float high = percentile(99);
+  std::erase_if(pixels, [&](const Pixel& p) { return p.depth < low || p.depth > high; });
+  return pixels;
+}
+
+// What one view adds to it.
+struct ViewExtent {
+  Eigen::AlignedBox3d surface;
+  size_t pixels = 0;
+  std::vector<double> footprints, sigmas;
+};
+
+// Footprints and sigmas are those of at most `most` pixels, evenly spaced.
+ViewExtent view_extent(const TsdfView& view, double depth_trunc, size_t most) {
+  ViewExtent out;
+  out.pixels = view.depth.data.size();
+  const size_t stride = 1 + (out.pixels - 1) / most;
+  size_t i = 0;
+  for (const Pixel& p : trustworthy_pixels(view, depth_trunc)) {
+    out.surface.extend(view.camera.unproject(p.x + 0.5, p.y + 0.5, double(p.depth)));
+    if (i++ % stride != 0) continue;
+    const float sigma = view.sigma.empty() ? 0 : view.sigma(p.x, p.y);
+    if (sigma > 0) out.sigmas.push_back(double(sigma));
+    out.footprints.push_back(2 * double(p.depth) / (view.camera.fx + view.camera.fy));
+  }
+  return out;
+}
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double voxels_in(const Eigen::AlignedBox3d& surface, double voxel, double margin) {
+  return ((surface.sizes().array() / voxel) + 2 * margin).prod();
+}
+
+}  // namespace
+
+void validate_view(const TsdfView& v, size_t i) {
+  const auto fits = [&](const auto& raster) {
+    return raster.width == v.camera.width && raster.height == v.camera.height;
+  };
+  const bool ok = fits(v.depth) && (v.sigma.empty() || fits(v.sigma)) &&
+                  (v.color.empty() || fits(v.color)) && (v.usable.empty() || fits(v.usable)) &&
+                  (v.guessed.empty() || fits(v.guessed));
+  require(ok && v.camera.width > 1 && v.camera.height > 1,
+          "every raster must have the size of its camera, the view where one has not",
+          i);
+}
+
+Extent surface_extent(const FusionViews& views,
+                      double depth_trunc,
+                      size_t most_footprints,
+                      const Progress& progress) {
+  Extent out;
+  const size_t most = std::max(size_t{1}, most_footprints / views.size());
+  std::vector<double> footprints;
+  std::vector<double> sigmas;
+  std::vector<ViewExtent> parts(kViewsAtOnce);
+  for (size_t first = 0; first < views.size(); first += kViewsAtOnce) {
+    const size_t last = std::min(first + kViewsAtOnce, views.size());
+    views.each(first, last, false, [&](size_t i, const TsdfView& view) {
+      parts[i - first] = view_extent(view, depth_trunc, most);
+    });
+    for (size_t i = first; i < last; ++i) {
+      const ViewExtent& part = parts[i - first];
+      out.surface.extend(part.surface);
+      out.pixels += part.pixels;
+      footprints.insert(footprints.end(), part.footprints.begin(), part.footprints.end());
+      sigmas.insert(sigmas.end(), part.sigmas.begin(), part.sigmas.end());
+    }
+    report(progress, static_cast<double>(last) / static_cast<double>(views.size()));
+  }
+  require(!footprints.empty(), "fuse needs pixels with a depth, their number", 0);
+  out.footprint = median(footprints);
+  if (!sigmas.empty()) out.sigma = median(sigmas);
+  return out;
+}
+
+double chosen_voxel_size(const Extent& extent, const TsdfOptions& options) {
+  if (options.voxel_size > 0) return options.voxel_size;
+  const double margin = double(options.truncation) + kFusionMargin;
+  const auto limit = static_cast<double>(options.max_voxels);
+  const double coarsest = options.coarsest_voxel > 0
+                              ? std::max({options.coarsest_voxel, extent.footprint, extent.sigma})
+                              : std::numeric_limits<double>::infinity();
+  double voxel = extent.footprint;
+  while (voxels_in(extent.surface, voxel, margin) > limit) voxel *= 1.02;
+  return std::min(voxel, coarsest);
+}
+
+}  // namespace cgs

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "libcgs/core/progress.h"
+#include "meshing/tsdf.h"
+
+namespace cgs {
+
+/// \throws InvalidInput if its rasters differ in size, naming the view
+void validate_view(const TsdfView& view, size_t number);
+
+/// Views that are in memory, or come one after the other.
+class FusionViews {
+ public:
+  explicit FusionViews(std::span<const TsdfView> views) : views_(views), count_(views.size()) {}
+  explicit FusionViews(const TsdfSource& source) : source_(&source), count_(source.count) {}
+
+  size_t size() const { return count_; }
+  bool are_in_memory() const { return source_ == nullptr; }
+  /// Calls work(i, view) for views first ... last - 1, several at once.
+  template <typename Work>
+  void each(size_t first, size_t last, bool with_color, const Work& work) const {
+    tbb::parallel_for(first, last, [&](size_t i) {
+      if (are_in_memory()) {
+        work(i, views_[i]);
+        return;
+      }
+      TsdfView view = source_->view(i, with_color);
+      validate_view(view, i);
+      // Nested loops of a waiting thread must not begin another view: that would hold one more.
+      tbb::this_task_arena::isolate([&] { work(i, std::move(view)); });
+    });
+  }
+
+ private:
+  std::span<const TsdfView> views_;
+  const TsdfSource* source_ = nullptr;
+  size_t count_;
+};
+
+/// Where the surface lies, and how finely it is known.
+struct Extent {
+  Eigen::AlignedBox3d surface;
+  double footprint = 0;  ///< Median size of a pixel on the surface [internal units].
+  double sigma = 0;      ///< Median of the known ones [internal units].
+  size_t pixels = 0;     ///< Of all views.
+};
+
+/// What the trustworthy pixels of all views show; those whose depth lies between the 1st and the
+/// 99th percentile of their view. \param most_footprints  of how many pixels medians are taken,
+/// evenly spaced \throws InvalidInput without any depth
+Extent surface_extent(const FusionViews& views,
+                      double depth_trunc,
+                      size_t most_footprints,
+                      const Progress& progress);
+
+/// Voxel edge of the options or, where that is 0, by the extent [internal units].
+double chosen_voxel_size(const Extent& extent, const TsdfOptions& options);
+
+inline constexpr double kFusionMargin = 2;  ///< Voxels around the band.
+inline constexpr size_t kViewsAtOnce = 16;  ///< Between two reports of progress.
+
+}  // namespace cgs
