@@ -89,11 +89,11 @@ void validate_view(const TsdfView& v, size_t i) {
           i);
 }
 
-Extent surface_extent(const FusionViews& views,
-                      double depth_trunc,
-                      size_t most_footprints,
-                      const Progress& progress) {
-  Extent out;
+SurfaceExtent surface_extent(const FusionViews& views,
+                             double depth_trunc,
+                             size_t most_footprints,
+                             const Progress& progress) {
+  SurfaceExtent out;
   const size_t most = std::max(size_t{1}, most_footprints / views.size());
   std::vector<double> footprints;
   std::vector<double> sigmas;
@@ -118,7 +118,7 @@ Extent surface_extent(const FusionViews& views,
   return out;
 }
 
-double chosen_voxel_size(const Extent& extent, const TsdfOptions& options) {
+double chosen_voxel_size(const SurfaceExtent& extent, const TsdfOptions& options) {
   if (options.voxel_size > 0) return options.voxel_size;
   const double margin = double(options.truncation) + kFusionMargin;
   const auto limit = static_cast<double>(options.max_voxels);

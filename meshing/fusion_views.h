@@ -33,10 +33,12 @@ class FusionViews {
         work(i, views_[i]);
         return;
       }
-      TsdfView view = source_->view(i, with_color);
-      validate_view(view, i);
       // Nested loops of a waiting thread must not begin another view: that would hold one more.
-      tbb::this_task_arena::isolate([&] { work(i, std::move(view)); });
+      tbb::this_task_arena::isolate([&] {
+        TsdfView view = source_->view(i, with_color);
+        validate_view(view, i);
+        work(i, std::move(view));
+      });
     });
   }
 
@@ -47,7 +49,7 @@ class FusionViews {
 };
 
 /// Where the surface lies, and how finely it is known.
-struct Extent {
+struct SurfaceExtent {
   Eigen::AlignedBox3d surface;
   double footprint = 0;  ///< Median size of a pixel on the surface [internal units].
   double sigma = 0;      ///< Median of the known ones [internal units].
@@ -55,15 +57,16 @@ struct Extent {
 };
 
 /// What the trustworthy pixels of all views show; those whose depth lies between the 1st and the
-/// 99th percentile of their view. \param most_footprints  of how many pixels medians are taken,
-/// evenly spaced \throws InvalidInput without any depth
-Extent surface_extent(const FusionViews& views,
-                      double depth_trunc,
-                      size_t most_footprints,
-                      const Progress& progress);
+/// 99th percentile of their view.
+/// \param most_footprints  of how many pixels medians are taken, evenly spaced
+/// \throws InvalidInput without any depth
+SurfaceExtent surface_extent(const FusionViews& views,
+                             double depth_trunc,
+                             size_t most_footprints,
+                             const Progress& progress);
 
 /// Voxel edge of the options or, where that is 0, by the extent [internal units].
-double chosen_voxel_size(const Extent& extent, const TsdfOptions& options);
+double chosen_voxel_size(const SurfaceExtent& extent, const TsdfOptions& options);
 
 inline constexpr double kFusionMargin = 2;  ///< Voxels around the band.
 inline constexpr size_t kViewsAtOnce = 16;  ///< Between two reports of progress.

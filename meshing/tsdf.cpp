@@ -2,9 +2,7 @@
 #include "meshing/tsdf.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,7 +10,6 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include "libcgs/core/error.h"
 #include "meshing/block_evidence.h"
@@ -26,8 +23,6 @@ namespace cgs {
 namespace {
 
 using openvdb::Coord;
-
-constexpr double kMargin = 2;  // Voxels around the band.
 
 constexpr size_t kHeldPixelBytes = DepthField::kPixelBytes + sizeof(Eigen::Vector3f) + 1;
 constexpr size_t kBlockBytes = 16;  // Of any block, in lists.
@@ -140,7 +135,7 @@ class Fuser {
   void prepare(size_t view_memory) {
     require(views_.size() > 0, "fuse needs at least one view, their number", views_.size());
     const size_t most = views_.are_in_memory() ? std::numeric_limits<size_t>::max() : kFootprints;
-    const Extent extent = surface_extent(views_, options_.depth_trunc, most, part(0, 0.1));
+    const SurfaceExtent extent = surface_extent(views_, options_.depth_trunc, most, part(0, 0.1));
     pixels_ = extent.pixels;
     const double voxel = chosen_voxel_size(extent, options_);
     const Eigen::Vector3d margin =
