@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 namespace cgs {
@@ -35,8 +36,7 @@ class Comparison {
     const size_t count = std::min(kFrames, cameras_.size());
     for (size_t n = 0; n < count; ++n) {
       const size_t i = n * cameras_.size() / count;
-      const double depth = factor * median_depth(i);
-      const size_t k = partner(i, kFarthest * depth);
+      const size_t k = partner(i, kFarthest * factor * frame(i).median_depth);
       if (k != i) looked_at += compare(i, k, factor, all);
     }
     if (all.size() < kFewest || double(all.size()) < kFewestShare * double(looked_at)) {
@@ -54,17 +54,23 @@ class Comparison {
     return *middle;
   }
 
-  const TsdfView& frame(size_t i) {
-    const auto found = frames_.find(i);
-    return found != frames_.end() ? found->second : frames_.emplace(i, frame_(i)).first->second;
-  }
+  // What is kept of a frame.
+  struct Frame {
+    Camera camera;
+    DepthMap depth;
+    double median_depth = 0;
+  };
 
-  double median_depth(size_t i) {
+  const Frame& frame(size_t i) {
+    const auto found = frames_.find(i);
+    if (found != frames_.end()) return found->second;
+    TsdfView view = frame_(i);
     std::vector<double> values;
-    for (const float z : frame(i).depth.data) {
+    for (const float z : view.depth.data) {
       if (z > 0) values.push_back(double(z));
     }
-    return values.empty() ? 0 : median(values);
+    const double middle = values.empty() ? 0 : median(values);
+    return frames_.emplace(i, Frame{view.camera, std::move(view.depth), middle}).first->second;
   }
 
   // The frame from as far off as allowed that looks the same way; itself if there is none.
@@ -85,8 +91,8 @@ class Comparison {
   // Appends what pixels of a frame are off in its partner. \return how many were looked at
   size_t compare(size_t i, size_t k, double factor, std::vector<double>& off) {
     constexpr double kHidden = 0.7;  // of the depth: the partner shows something before it
-    const TsdfView& from = frame(i);
-    const TsdfView& to = frame(k);
+    const Frame& from = frame(i);
+    const Frame& to = frame(k);
     size_t looked_at = 0;
     for (int y = 0; y < from.depth.height; y += kStep) {
       for (int x = 0; x < from.depth.width; x += kStep) {
@@ -104,7 +110,7 @@ class Comparison {
 
   const std::vector<Camera>& cameras_;
   const std::function<TsdfView(size_t)>& frame_;
-  std::map<size_t, TsdfView> frames_;
+  std::map<size_t, Frame> frames_;
 };
 
 }  // namespace
@@ -117,15 +123,15 @@ DepthAgreement depth_agreement(const std::vector<Camera>& cameras,
   const auto is_worse = [&](double off, double than) {
     return !(off <= std::max(kNoise, kClearly * than));
   };
+  std::map<double, double> off;
+  for (const double factor : kFactors) off[factor] = comparison.off(factor);
   DepthAgreement out;
-  out.off = comparison.off(1);
+  out.off = off.at(1);
   double least = out.off;
   if (!std::isnan(out.off)) out.best_factor = 1;
-  std::map<double, double> off;
-  for (const double factor : kFactors) {
-    off[factor] = comparison.off(factor);
-    if (!(off[factor] < least || std::isnan(least)) || !is_worse(out.off, off[factor])) continue;
-    least = off[factor];
+  for (const auto& [factor, of_factor] : off) {
+    if (!(of_factor < least || std::isnan(least)) || !is_worse(out.off, of_factor)) continue;
+    least = of_factor;
     out.best_factor = factor;
   }
   out.shows_scale = out.off < kAgrees && out.best_factor >= 0.95 && out.best_factor <= 1.05 &&

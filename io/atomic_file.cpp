@@ -46,10 +46,6 @@ void write_all(int descriptor, std::string_view bytes, const std::filesystem::pa
   }
 }
 
-std::filesystem::path folder_of(const std::filesystem::path& path) {
-  return path.has_parent_path() ? path.parent_path() : ".";
-}
-
 void sync_to_disk(int descriptor, const std::filesystem::path& path) {
   if (::fsync(descriptor) != 0) throw IoError(path, std::generic_category().message(errno));
 }
@@ -101,8 +97,8 @@ void AtomicFile::commit() {
   std::filesystem::rename(part_, path_, error);  // same folder, so the move is atomic
   if (error) throw IoError(path_, error.message());
   // The name itself must survive a power cut too.
-  const int folder_descriptor =
-      ::open(folder_of(path_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
+  const int folder_descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder_descriptor >= 0) {
     (void)::fsync(folder_descriptor);
     ::close(folder_descriptor);

@@ -42,7 +42,7 @@ double diagonal_of(const TriangleMesh& mesh) {
 }
 
 double area_of(const TriangleMesh& mesh) {
-  const std::vector<double> areas = components(mesh).area;
+  const auto areas = area_by_provenance(mesh);
   return std::accumulate(areas.begin(), areas.end(), 0.0);
 }
 

@@ -10,7 +10,6 @@
 #include <openvdb/tools/MeshToVolume.h>
 
 #include "libcgs/core/error.h"
-#include "meshing/components.h"
 
 namespace cgs {
 
@@ -20,7 +19,7 @@ constexpr float kHalfWidth = 3;  // [voxels]
 
 void check_size(const TriangleMesh& mesh, double voxel) {
   double area = 0;
-  for (const double a : components(mesh).area) area += a;
+  for (const double a : area_by_provenance(mesh)) area += a;
   const double voxels = 2 * double(kHalfWidth) * area / (voxel * voxel);
   constexpr double kMost = 1 << 27;
   if (voxels <= kMost) return;

@@ -2,6 +2,7 @@
 #include "meshing/tsdf.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -359,7 +360,7 @@ class Fuser {
   BlockGrid grid_;
   FusionRules rules_;
   size_t pixels_ = 0;             // Of all views.
-  size_t portion_ = 0;            // FusionViews held at once.
+  size_t portion_ = 0;            // Views held at once.
   std::vector<uint8_t> touched_;  // A bit per part, by the surface of any view.
   std::vector<std::unique_ptr<BlockEvidence>> evidence_;  // Null where a block is one thing …
   std::vector<Sight> whole_;                              // … namely this.
