@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Looks for data races: what works in threads is built with ThreadSanitizer, and so is TBB, from
+# Debian's source, for how the packaged one hands work from thread to thread would not be seen and
+# all of it be reported. The source is fetched once and kept in build/race.
+#
+# usage: tests/races.sh [TEST...]     those that set a number of threads if nothing is said
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+# Debian's source of TBB, without touching the lists of packages of this machine.
+fetch_tbb() {
+  local folder=$1 sources=/etc/apt/sources.list.d
+  local apt=(-o "Dir::Etc::SourceList=/dev/null" -o "Dir::Etc::SourceParts=$folder/parts"
+    -o "Dir::State::Lists=$folder/lists" -o "Dir::Cache=$folder/cache" -o APT::Sandbox::User=)
+  mkdir -p "$folder"/{parts,lists/partial,cache/archives/partial}
+  cat /etc/apt/sources.list $sources/*.list 2>/dev/null | sed -n 's/^deb /deb-src /p' \
+    >"$folder/parts/source.list"
+  cat $sources/*.sources 2>/dev/null | sed 's/^Types:.*/Types: deb-src/' \
+    >"$folder/parts/source.sources"
+  apt-get "${apt[@]}" -qq update || true # one list that cannot be had does not matter
+  (cd "$folder" && apt-get "${apt[@]}" -qq source --download-only onetbb)
+  tar -C "$folder" --strip-components=1 -xf "$folder"/onetbb_*.orig.tar.xz
+}
+
+samples/install.sh --tests
+tbb=$PWD/build/race/tbb
+if [ ! -f "$tbb/CMakeLists.txt" ]; then
+  echo "fetching the source of TBB"
+  fetch_tbb "$tbb"
+fi
+cmake -G Ninja -S "$tbb" -B "$tbb/build" -DCMAKE_CXX_COMPILER=clang++-14 -DCMAKE_C_COMPILER=clang-14 \
+  -DCMAKE_BUILD_TYPE=RelWithDebInfo -DTBB_TEST=OFF -DTBB_STRICT=OFF -DTBBMALLOC_BUILD=OFF \
+  -DTBB_SANITIZE=thread -DCMAKE_LIBRARY_OUTPUT_DIRECTORY="$tbb/lib" >/dev/null
+cmake --build "$tbb/build"
+
+if [ $# -gt 0 ]; then
+  tests=("$@")
+else
+  mapfile -t tests < <(grep -rl max_allowed_parallelism tests --include='*_test.cpp' |
+    sed 's|^tests/||; s|\.cpp$||; s|/|_|g' | sort)
+fi
+cmake --preset race >/dev/null
+cmake --build --preset race --target "${tests[@]}"
+
+status=0
+for test in "${tests[@]}"; do
+  verdict=clean
+  LD_LIBRARY_PATH="$tbb/lib" TSAN_OPTIONS="halt_on_error=1 second_deadlock_stack=1" \
+    "build/race/bin/$test" >"build/race/$test.log" 2>&1 || verdict="FAILED, see build/race/$test.log"
+  printf '%-45s %s\n' "$test" "$verdict"
+  [ "$verdict" = clean ] || status=1
+done
+exit $status
