@@ -13,10 +13,11 @@ fetch_tbb() {
   local apt=(-o "Dir::Etc::SourceList=/dev/null" -o "Dir::Etc::SourceParts=$folder/parts"
     -o "Dir::State::Lists=$folder/lists" -o "Dir::Cache=$folder/cache" -o APT::Sandbox::User=)
   mkdir -p "$folder"/{parts,lists/partial,cache/archives/partial}
-  cat /etc/apt/sources.list $sources/*.list 2>/dev/null | sed -n 's/^deb /deb-src /p' \
-    >"$folder/parts/source.list"
-  cat $sources/*.sources 2>/dev/null | sed 's/^Types:.*/Types: deb-src/' \
-    >"$folder/parts/source.sources"
+  # Either form may be missing.
+  { cat /etc/apt/sources.list $sources/*.list 2>/dev/null || true; } |
+    sed -n 's/^deb /deb-src /p' >"$folder/parts/source.list"
+  { cat $sources/*.sources 2>/dev/null || true; } |
+    sed 's/^Types:.*/Types: deb-src/' >"$folder/parts/source.sources"
   apt-get "${apt[@]}" -qq update || true # one list that cannot be had does not matter
   (cd "$folder" && apt-get "${apt[@]}" -qq source --download-only onetbb)
   tar -C "$folder" --strip-components=1 -xf "$folder"/onetbb_*.orig.tar.xz
