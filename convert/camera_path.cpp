@@ -7,6 +7,7 @@
 
 #include "io/cameras_json.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 
 namespace cgs {
 
@@ -23,9 +24,7 @@ float median_depth(const DepthMap& depth) {
     if (std::isfinite(z)) known.push_back(z);
   }
   if (known.empty()) return std::nanf("");
-  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-  std::nth_element(known.begin(), middle, known.end());
-  return *middle;
+  return median(known);
 }
 
 /// What the input views look at, and from where on the whole.

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "libcgs/core/order_statistics.h"
+
 namespace cgs {
 
 namespace {
@@ -47,12 +49,6 @@ class Comparison {
 
  private:
   static constexpr double kFarthest = 1.5;  // partner [depths]
-
-  static double median(std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  }
 
   // What is kept of a frame.
   struct Frame {

@@ -12,6 +12,7 @@
 
 #include "libcgs/core/disjoint_sets.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "meshing/kd_tree.h"
 
 namespace cgs {
@@ -23,13 +24,6 @@ constexpr double kReach = 1.5;    // of a splat [sigma]
 constexpr float kMatter = 0.25f;  // sum of opacities in a cell
 constexpr float kOne = 256;       // opacity 1 in the grid, where whole numbers add up in any order
 constexpr size_t kGrain = 2048;
-
-double quantile(std::vector<float>& values, double q) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return double{*at};
-}
 
 std::vector<Eigen::Vector3f> opaque_places(const Gaussians& g) {
   std::vector<Eigen::Vector3f> out;

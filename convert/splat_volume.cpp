@@ -14,6 +14,7 @@
 #include "convert/model.h"
 #include "convert/splat_selection.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/render/thin_sheets.h"
 
@@ -82,9 +83,7 @@ double default_voxel(const std::vector<TsdfView>& views, double radius) {
   if (footprints.empty()) {
     throw NumericalError("the splats are too few, too small or too transparent to show a surface");
   }
-  const auto middle = footprints.begin() + static_cast<std::ptrdiff_t>(footprints.size() / 2);
-  std::nth_element(footprints.begin(), middle, footprints.end());
-  return std::max(smallest, double{*middle});
+  return std::max(smallest, double{median(footprints)});
 }
 
 size_t thicken(std::vector<TsdfView>& views, std::vector<NormalMap>& normals, double thickness) {

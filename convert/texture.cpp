@@ -10,6 +10,7 @@
 
 #include "io/resample.h"
 #include "io/scene_reader.h"
+#include "libcgs/core/order_statistics.h"
 #include "meshing/exposure.h"
 #include "meshing/face_views.h"
 
@@ -91,9 +92,7 @@ double pixel_size(const TriangleMesh& mesh, const PhotoTexture& texture, size_t 
     sizes.push_back(2 * depth / (camera.fx + camera.fy));
   }
   if (sizes.empty()) return 0;
-  const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return *middle;
+  return median(sizes);
 }
 
 }  // namespace

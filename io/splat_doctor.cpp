@@ -8,6 +8,7 @@
 
 #include "io/ply_frame.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 
 namespace cgs {
 
@@ -32,12 +33,8 @@ std::vector<Eigen::Vector3d> inner_corners(const std::vector<Eigen::Vector3d>& p
   for (int axis = 0; axis < 3; ++axis) {
     std::transform(
         points.begin(), points.end(), values.begin(), [&](const auto& p) { return p[axis]; });
-    const auto at = [&](size_t i) {
-      std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(i), values.end());
-      return values[i];
-    };
-    low[axis] = at(cut);
-    high[axis] = at(points.size() - 1 - cut);
+    low[axis] = nth_smallest(values, cut);
+    high[axis] = nth_smallest(values, points.size() - 1 - cut);
   }
   return {low, high};
 }

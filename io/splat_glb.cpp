@@ -16,6 +16,7 @@
 #include "io/json_file.h"
 #include "io/splat_arrays.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/srgb.h"
 
 namespace cgs {
@@ -34,9 +35,7 @@ Eigen::Vector3f median_position(const Gaussians& g) {
     std::transform(g.position.begin(), g.position.end(), values.begin(), [&](const auto& p) {
       return p[axis];
     });
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    out[axis] = *middle;
+    out[axis] = median(values);
   }
   return out;
 }

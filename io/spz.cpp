@@ -11,6 +11,7 @@
 #include "io/byte_writer.h"
 #include "io/compression.h"
 #include "io/splat_arrays.h"
+#include "libcgs/core/order_statistics.h"
 
 namespace cgs {
 
@@ -301,11 +302,10 @@ int fitting_bits(const Gaussians& g, const Frame& frame) {
   }
   double extent = 0;  // of the inner 98 %
   for (std::vector<float>& values : axes) {
-    const auto cut = static_cast<ptrdiff_t>(values.size() / 100);
-    std::nth_element(values.begin(), values.begin() + cut, values.end());
-    const float low = values[static_cast<size_t>(cut)];
-    std::nth_element(values.begin(), values.end() - 1 - cut, values.end());
-    extent = std::max(extent, double{*(values.end() - 1 - cut)} - double{low});
+    const size_t cut = values.size() / 100;
+    const float low = nth_smallest(values, cut);
+    const float high = nth_smallest(values, values.size() - 1 - cut);
+    extent = std::max(extent, double{high} - double{low});
   }
   extent *= frame.scale;
   constexpr double kReach = (1 << 23) - 1;  // steps to either side

@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/srgb.h"
 
 namespace cgs {
@@ -41,12 +42,6 @@ Eigen::Vector3f color_at(const View& view, const Eigen::Vector3d& point) {
     sum += weight * color.unaryExpr([](float c) { return linear_from_srgb(c); });
   }
   return sum;
-}
-
-float median(std::vector<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// What two views say about each other.
@@ -89,7 +84,7 @@ Eigen::VectorXd log_gains(const std::vector<Pair>& pairs, size_t views, size_t c
   for (const Pair& pair : pairs) {
     const auto a = static_cast<Eigen::Index>(pair.a);
     const auto b = static_cast<Eigen::Index>(pair.b);
-    const std::vector<float>& ratios = pair.log_ratio.at(channel);
+    std::vector<float> ratios = pair.log_ratio.at(channel);
     const auto weight = static_cast<double>(ratios.size());
     const double difference = -weight * double{median(ratios)};  // gain a - gain b
     normal(a, a) += weight;

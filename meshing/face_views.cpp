@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "meshing/face_adjacency.h"
 #include "meshing/projected_faces.h"
 
@@ -148,9 +149,7 @@ class Labelling {
       if (label_[f] >= 0) densities.push_back(best_[f]);
     }
     if (densities.empty()) return;
-    const auto middle = densities.begin() + static_cast<std::ptrdiff_t>(densities.size() / 2);
-    std::nth_element(densities.begin(), middle, densities.end());
-    seam_cost_ = seam_cost / std::sqrt(double{*middle});
+    seam_cost_ = seam_cost / std::sqrt(double{median(densities)});
   }
 
   double seam_length() const {

@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "meshing/kd_tree.h"
 
 namespace cgs {
@@ -170,9 +171,7 @@ double width_of_thirty(const Cloud& cloud) {
     cloud.tree.nearest(cloud.points[i].cast<float>(), kPoints, found);
     squares.push_back(found.back().squared_distance);
   }
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
-  return 2 * std::sqrt(double(*middle));
+  return 2 * std::sqrt(double{median(squares)});
 }
 
 }  // namespace

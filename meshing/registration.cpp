@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 
 namespace cgs {
 
@@ -43,10 +44,8 @@ double robust_width(const std::vector<Pair>& all) {
   std::vector<double> distances;
   distances.reserve(all.size());
   for (const Pair& p : all) distances.push_back(std::abs(p.distance));
-  auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
   constexpr double kNormal = 1.4826;  // median to standard deviation of a normal distribution
-  return std::max(kNormal * *middle, 1e-12);
+  return std::max(kNormal * median(distances), 1e-12);
 }
 
 double tukey_weight(double distance, double width) {

@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "meshing/corner_shares.h"
 #include "meshing/kd_tree.h"
 #include "meshing/measured_value.h"
@@ -100,9 +101,7 @@ double point_spacing(const std::vector<Eigen::Vector3f>& points) {
     for (const Neighbor& n : found) sum += std::sqrt(double(n.squared_distance));
     mean[i] = static_cast<float>(sum / double(found.size() - 1));
   });
-  const auto middle = mean.begin() + static_cast<std::ptrdiff_t>(mean.size() / 2);
-  std::nth_element(mean.begin(), middle, mean.end());
-  return double{*middle};
+  return double{median(mean)};
 }
 
 namespace {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/core/scene.h"
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -10,6 +9,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 
 namespace cgs {
 
@@ -17,10 +17,9 @@ namespace {
 
 constexpr double kOrderQuantile = 0.01;  // of sparse points trimmed on each side, as outliers
 
-double quantile(std::vector<double> values, double q) {
+double nearest_rank(std::vector<double> values, double q) {
   const auto k = static_cast<size_t>(std::lround(q * static_cast<double>(values.size() - 1)));
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
-  return values[k];
+  return nth_smallest(values, k);
 }
 
 // Coordinates may be large and the scene small: points are subtracted before they are turned, which
@@ -66,7 +65,7 @@ DepthRange range_of(const Scene& scene, int view, const std::function<double()>&
   constexpr size_t kEnoughPoints = 20;
   if (depths.size() >= kEnoughPoints) {
     // Sparse points miss what has no texture: leave room before and behind them.
-    return {0.8 * quantile(depths, kOrderQuantile), 1.5 * quantile(depths, 1 - kOrderQuantile)};
+    return {0.8 * nearest_rank(depths, kOrderQuantile), 1.5 * quantile(depths, 1 - kOrderQuantile)};
   }
   const double baseline = median_of();
   if (!(baseline > 0)) {
@@ -95,7 +94,7 @@ double median_baseline(const Scene& scene) {
       lengths.push_back((a.center() - b.center()).norm());
     }
   }
-  return lengths.empty() ? 0 : quantile(lengths, 0.5);
+  return lengths.empty() ? 0 : nearest_rank(lengths, 0.5);
 }
 
 DepthRange depth_range(const Scene& scene, int view) {

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/directions.h"
 
 namespace cgs {
@@ -236,11 +237,7 @@ float fallback_inverse_depth(const ViewPriors& priors, const DepthCompletionOpti
   for (size_t i = 0; i < priors.depth.data.size(); ++i) {
     if (priors.origin.data[i] == DepthOrigin::Measured) known.push_back(1 / priors.depth.data[i]);
   }
-  if (!known.empty()) {
-    const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-    std::nth_element(known.begin(), middle, known.end());
-    return *middle;
-  }
+  if (!known.empty()) return median(known);
   if (options.fallback_depth > 0) return static_cast<float>(1 / options.fallback_depth);
   throw NumericalError("no pixel of a view has a measured depth to complete from");
 }

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "libcgs/core/order_statistics.h"
+
 namespace cgs {
 
 namespace {
@@ -103,9 +105,7 @@ bool reweighted(const std::vector<FitPoint>& points, LineFit& line) {
 }  // namespace
 
 double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return nth_smallest(values, (values.size() - 1) / 2);
 }
 
 double robust_deviation(std::vector<double> values) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "libcgs/core/order_statistics.h"
+
 namespace cgs {
 
 namespace {
@@ -34,13 +36,10 @@ View reduced(const View& view) {
 DepthRange range_of(std::vector<float> depths, const DepthRange& guess) {
   constexpr double kNearMargin = 0.75;
   constexpr double kFarMargin = 1.5;
-  const auto quantile = [&](size_t k) {
-    std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(k), depths.end());
-    return static_cast<double>(depths[k]);
-  };
   const size_t trimmed = depths.size() / 100;
-  return {std::max(guess.near, kNearMargin * quantile(trimmed)),
-          std::min(guess.far, kFarMargin * quantile(depths.size() - 1 - trimmed))};
+  return {
+      std::max(guess.near, kNearMargin * double{nth_smallest(depths, trimmed)}),
+      std::min(guess.far, kFarMargin * double{nth_smallest(depths, depths.size() - 1 - trimmed)})};
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <Eigen/SVD>
 #include <opencv2/calib3d.hpp>
 
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/split_mix.h"
 
 namespace cgs {
@@ -268,9 +269,7 @@ double parallax(const MatchedPoints& matches, double focal_a, double focal_b) {
       weights[i] = 1 / std::max(left[i], 0.1);
     }
   }
-  const auto middle = left.begin() + static_cast<std::ptrdiff_t>(left.size() / 2);
-  std::nth_element(left.begin(), middle, left.end());
-  return *middle;
+  return median(left);
 }
 
 }  // namespace cgs

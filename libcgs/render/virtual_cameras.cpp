@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/render/rasterizer.h"
 
 namespace cgs {
@@ -26,13 +27,6 @@ struct Ball {
   Eigen::AlignedBox3d inner;     // of the middle nine tenths along each axis: within the walls
   std::vector<uint32_t> splats;  // opaque ones within it
 };
-
-double quantile(std::vector<double>& values, double q) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 Ball ball_around(const Gaussians& g) {
   std::vector<uint32_t> opaque;

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/split_mix.h"
 #include "libcgs/train/learning_rate.h"
 
@@ -167,9 +168,7 @@ float median_depth(const std::vector<ViewPriors>& priors) {
     });
   }
   if (all.empty()) return 1;
-  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
-  return *middle;
+  return median(all);
 }
 
 }  // namespace

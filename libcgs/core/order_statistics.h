@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace cgs {
+
+// All of these leave the values in another order. There must be one, and no NaN among them.
+
+/// The value that k others precede in ascending order; k < values.size().
+template <typename T>
+T nth_smallest(std::vector<T>& values, size_t k) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(k);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// The middle value; of an even number of them the larger one of the two.
+template <typename T>
+T median(std::vector<T>& values) {
+  return nth_smallest(values, values.size() / 2);
+}
+
+/// The value at the share q of the way through the order, rounded down; 0 <= q <= 1.
+template <typename T>
+T quantile(std::vector<T>& values, double q) {
+  return nth_smallest(values, static_cast<size_t>(q * static_cast<double>(values.size() - 1)));
+}
+
+}  // namespace cgs
