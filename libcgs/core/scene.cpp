@@ -65,7 +65,8 @@ DepthRange range_of(const Scene& scene, int view, const std::function<double()>&
   constexpr size_t kEnoughPoints = 20;
   if (depths.size() >= kEnoughPoints) {
     // Sparse points miss what has no texture: leave room before and behind them.
-    return {0.8 * nearest_rank(depths, kOrderQuantile), 1.5 * quantile(depths, 1 - kOrderQuantile)};
+    return {0.8 * nearest_rank(depths, kOrderQuantile),
+            1.5 * nearest_rank(depths, 1 - kOrderQuantile)};
   }
   const double baseline = median_of();
   if (!(baseline > 0)) {
