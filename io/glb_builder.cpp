@@ -18,8 +18,8 @@
 
 #include <tiny_gltf.h>
 
+#include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
-#include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {
 
