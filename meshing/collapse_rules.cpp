@@ -63,7 +63,7 @@ void Collapser::gather_star(uint32_t u, uint32_t v) {
   for (const uint32_t a : {u, v}) {
     for (uint32_t i = first_[a]; i < first_[a + 1]; ++i) {
       const uint32_t f = around_[i];
-      if (dead_[f] != 0) continue;
+      if (is_dead(f)) continue;
       if (!has(mesh_.faces[f], u + v - a)) {
         moving_.push_back(f);
       } else if (a == u) {
@@ -83,10 +83,14 @@ Collapser::Outcome Collapser::collapse(uint32_t a, uint32_t b) {
   if (both_on_border != border) return Outcome::Refused;
   const Placement to = placement(u, v);
   const Vector3f p = (to.point + center_).cast<float>();
-  if (!reachable(u, v, p)) return Outcome::Refused;
-  if (border && !border_allows(u, v, p)) return Outcome::Refused;
-  if (!faces_allow(u, v, p, to.t) || !witnesses_allow(p) || !stays_near(p)) {
-    return Outcome::Refused;
+  if (may_move_anywhere_) {
+    if (!faces_allow(u, v, p, to.t) || !hand_over_witnesses()) return Outcome::Refused;
+  } else {
+    if (!reachable(u, v, p)) return Outcome::Refused;
+    if (border && !border_allows(u, v, p)) return Outcome::Refused;
+    if (!faces_allow(u, v, p, to.t) || !witnesses_allow(p) || !stays_near(p)) {
+      return Outcome::Refused;
+    }
   }
   apply(u, v, to);
   return Outcome::Done;
@@ -220,7 +224,7 @@ bool Collapser::folds() const {
     }
     for (uint32_t i = first_[f.b]; i < first_[f.b + 1]; ++i) {
       const uint32_t g = around_[i];
-      if (dead_[g] != 0 || g == f.face || !has(mesh_.faces[g], f.c)) continue;
+      if (g == f.face || !has(mesh_.faces[g], f.c)) continue;
       const Vector3f n = area_vector(mesh_.faces[g]).cast<float>();
       const float now = f.normal.dot(n);
       if (now < kLeastCosine * n.norm() && now < f.normal_before.dot(n)) return true;
@@ -261,6 +265,23 @@ bool Collapser::witnesses_allow(const Vector3f& p) {
   };
   return std::all_of(dying_.begin(), dying_.end(), find) &&
          std::all_of(moving_.begin(), moving_.end(), find);
+}
+
+// Gives the witnesses of faces that vanish to any other one of their label; there must be one.
+bool Collapser::hand_over_witnesses() {
+  points_.clear();
+  face_of_point_.clear();
+  for (const uint32_t f : dying_) {
+    const auto heir = std::find_if(fresh_.begin(), fresh_.end(), [&](const NewFace& fresh) {
+      return fresh.label == mesh_.provenance[f];
+    });
+    for (uint32_t w = witness_[f]; w != kNone; w = next_witness_[w]) {
+      if (heir == fresh_.end()) return false;
+      points_.push_back(w);
+      face_of_point_.push_back(heir->face);
+    }
+  }
+  return true;
 }
 
 // Whether a point lies near the input around its nearest witness of the star.
@@ -320,11 +341,11 @@ void Collapser::apply(uint32_t u, uint32_t v, const Placement& to) {
   quadric_[u] += quadric_[v];
   used_[u] = used_[v] = 1;
   for (const uint32_t f : dying_) {
-    dead_[f] = 1;
     for (const uint32_t w : mesh_.faces[f]) changed_[w] = 1;
+    mesh_.faces[f].fill(kNone);
   }
   for (const uint32_t f : moving_) {
-    witness_[f] = kNone;
+    if (!may_move_anywhere_) witness_[f] = kNone;  // all of them are in points_
     for (uint32_t& w : mesh_.faces[f]) {
       if (w == v) w = u;
       changed_[w] = 1;

@@ -104,11 +104,14 @@ class Collapser {
   bool faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t);
   bool folds() const;
   bool witnesses_allow(const Vector3f& p);
+  bool hand_over_witnesses();
   bool is_near_original(const Vector3f& x) const;
   bool stays_near(const Vector3f& p) const;
   void apply(uint32_t u, uint32_t v, const Placement& to);
   void merge_knowledge(uint32_t u, uint32_t v, float t);
   void drop_dead_faces();
+  // Told by the corners themselves, which are looked at anyway: memory is what takes the time.
+  bool is_dead(uint32_t f) const { return mesh_.faces[f][0] == kNone; }
   Vector3d vertex(uint32_t v) const { return mesh_.vertices[v].cast<double>() - center_; }
   Vector3d area_vector(const Face& f) const {
     return (vertex(f[1]) - vertex(f[0])).cross(vertex(f[2]) - vertex(f[0]));
@@ -118,10 +121,10 @@ class Collapser {
   const CollapseLimits& limits_;
   TriangleMesh mesh_;  // vertex numbers are those of the original
   Vector3d center_ = Vector3d::Zero();
-  std::vector<uint8_t> dead_;     // per face
-  std::vector<uint8_t> refused_;  // per face, a bit per side
-  std::vector<uint32_t> first_;   // faces around vertex v: around_[first_[v] ... first_[v + 1])
-  std::vector<uint32_t> around_;  // as of the beginning of the pass
+  bool may_move_anywhere_ = false;  // all tolerances reach across the mesh, colours may change
+  std::vector<uint8_t> refused_;    // per face, a bit per side
+  std::vector<uint32_t> first_;     // faces around vertex v: around_[first_[v] ... first_[v + 1])
+  std::vector<uint32_t> around_;    // as of the beginning of the pass
   std::vector<uint32_t> original_first_, original_around_;  // the same of the input
   std::vector<Kind> kind_;
   std::vector<Quadric> quadric_;

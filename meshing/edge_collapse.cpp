@@ -25,8 +25,12 @@ Collapser::Collapser(const TriangleMesh& mesh, const CollapseLimits& limits)
   Eigen::AlignedBox3d box;
   for (const Vector3f& p : mesh.vertices) box.extend(p.cast<double>());
   if (!box.isEmpty()) center_ = box.center();
+  may_move_anywhere_ =
+      limits.color >= 1 &&
+      std::all_of(limits.tolerance.begin(), limits.tolerance.end(), [&](float tolerance) {
+        return !box.isEmpty() && double{tolerance} > box.diagonal().norm();
+      });
   const size_t n = mesh.vertices.size();
-  dead_.assign(mesh.faces.size(), 0);
   refused_.assign(mesh.faces.size(), 0);
   changed_.assign(n, 0);
   kind_.assign(n, Kind::Fixed);
@@ -69,7 +73,7 @@ void Collapser::neighbors_of(uint32_t v, std::vector<Neighbor>& out) const {
   out.clear();
   for (uint32_t i = first_[v]; i < first_[v + 1]; ++i) {
     const uint32_t f = around_[i];
-    if (dead_[f] != 0) continue;
+    if (is_dead(f)) continue;
     const Face& face = mesh_.faces[f];
     const Provenance label = mesh_.provenance[f];
     const int k = face[0] == v ? 0 : face[1] == v ? 1 : 2;
@@ -250,7 +254,7 @@ bool Collapser::pass() {
     if (left <= limits_.target_faces) break;
     const uint32_t f = at->slot / 3;
     const uint32_t k = at->slot % 3;
-    if (dead_[f] != 0) continue;
+    if (is_dead(f)) continue;
     const Outcome outcome = collapse(mesh_.faces[f][k], mesh_.faces[f][(k + 1) % 3]);
     if (outcome == Outcome::Refused) refused_[f] |= static_cast<uint8_t>(1U << k);
     if (outcome == Outcome::Done) left -= dying_.size();
@@ -262,8 +266,8 @@ bool Collapser::pass() {
 
 void Collapser::drop_dead_faces() {
   size_t n = 0;
-  for (size_t f = 0; f < mesh_.faces.size(); ++f) {
-    if (dead_[f] != 0) continue;
+  for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
+    if (is_dead(f)) continue;
     mesh_.faces[n] = mesh_.faces[f];
     mesh_.provenance[n] = mesh_.provenance[f];
     refused_[n] = refused_[f];
@@ -274,7 +278,6 @@ void Collapser::drop_dead_faces() {
   mesh_.provenance.resize(n);
   refused_.resize(n);
   witness_.resize(n);
-  dead_.assign(n, 0);
 }
 
 CollapsedMesh Collapser::run() {

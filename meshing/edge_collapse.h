@@ -12,10 +12,12 @@ namespace cgs {
 /// What edge collapse must keep. Every vertex of the input is a witness: at any time it lies within
 /// its tolerance of a face of its own label.
 struct CollapseLimits {
-  std::vector<float> tolerance;  ///< Per vertex [internal units], >= 0; 0 = the vertex stays.
-  float color = 1;               ///< Largest change of a colour channel at a witness on a face that
-                                 ///< is not Inferred.
-  size_t target_faces = 0;       ///< Stop when so few are left.
+  /// Per vertex [internal units], >= 0; 0 = the vertex stays. Where all are longer than the
+  /// diagonal of the mesh and colours may change, distances are not looked at, which is faster.
+  std::vector<float> tolerance;
+  float color = 1;          ///< Largest change of a colour channel at a witness on a face that
+                            ///< is not Inferred.
+  size_t target_faces = 0;  ///< Stop when so few are left.
   /// How far each pass goes, as an earlier run gave it; empty = the cheapest third of what is left.
   /// Two runs that go as far differ only near the vertices whose limits differ.
   std::vector<float> pass_costs;

@@ -67,7 +67,7 @@ FilterStep prepare_simplify_to(FilterArguments& arguments) {
     require_faces(state, "simplify-to");
     Eigen::AlignedBox3f box;
     for (const auto& p : state.mesh.vertices) box.extend(p);
-    const SimplifyOptions options{.max_error = std::max(1e-30, double(box.diagonal().norm())),
+    const SimplifyOptions options{.max_error = std::max(1e-30, 2 * double(box.diagonal().norm())),
                                   .max_color_error = 1,
                                   .target_faces = faces};
     SimplifyResult result = simplify(state.mesh, options, progress);
