@@ -57,94 +57,119 @@ float squared_distance_to_segment(const Vector3f& x, const Vector3f& a, const Ve
 
 }  // namespace
 
-void Collapser::gather_star(uint32_t u, uint32_t v) {
-  moving_.clear();
-  dying_.clear();
+void Collapser::gather_star(Attempt& attempt) const {
+  attempt.moving.clear();
+  attempt.dying.clear();
+  const auto [u, v] = std::pair(attempt.u, attempt.v);
   for (const uint32_t a : {u, v}) {
     for (uint32_t i = first_[a]; i < first_[a + 1]; ++i) {
       const uint32_t f = around_[i];
       if (is_dead(f)) continue;
       if (!has(mesh_.faces[f], u + v - a)) {
-        moving_.push_back(f);
+        attempt.moving.push_back(f);
       } else if (a == u) {
-        dying_.push_back(f);
+        attempt.dying.push_back(f);
       }
     }
   }
 }
 
-Collapser::Outcome Collapser::collapse(uint32_t a, uint32_t b) {
-  if (used_[a] != 0 || used_[b] != 0) return Outcome::Later;
-  const auto [u, v] = kind_[b] > kind_[a] ? std::pair(b, a) : std::pair(a, b);
-  gather_star(u, v);
-  bool border = false;
-  if (!link_allows(u, v, border)) return Outcome::Refused;
-  const bool both_on_border = kind_[v] == Kind::Border;
-  if (both_on_border != border) return Outcome::Refused;
-  const Placement to = placement(u, v);
-  const Vector3f p = (to.point + center_).cast<float>();
-  if (may_move_anywhere_) {
-    if (!faces_allow(u, v, p, to.t) || !hand_over_witnesses()) return Outcome::Refused;
-  } else {
-    if (!reachable(u, v, p)) return Outcome::Refused;
-    if (border && !border_allows(u, v, p)) return Outcome::Refused;
-    if (!faces_allow(u, v, p, to.t) || !witnesses_allow(p) || !stays_near(p)) {
-      return Outcome::Refused;
-    }
+void Collapser::try_collapse(uint32_t slot, Attempt& out) const {
+  const Face& face = mesh_.faces[slot / 3];
+  out.u = face[slot % 3];
+  out.v = face[(slot % 3 + 1) % 3];
+  if (out.u == kNone || used_[out.u] != 0 || used_[out.v] != 0) {
+    out.outcome = Attempt::Outcome::Later;
+    out.moving.clear();  // what an earlier candidate left
+    return;
   }
-  apply(u, v, to);
-  return Outcome::Done;
+  if (kind_[out.v] > kind_[out.u]) std::swap(out.u, out.v);
+  out.outcome = outcome_of(out);
+}
+
+Attempt::Outcome Collapser::outcome_of(Attempt& attempt) const {
+  gather_star(attempt);
+  bool border = false;
+  if (!link_allows(attempt, border)) return Attempt::Outcome::Refused;
+  const bool both_on_border = kind_[attempt.v] == Kind::Border;
+  if (both_on_border != border) return Attempt::Outcome::Refused;
+  attempt.to = placement(attempt.u, attempt.v);
+  const Vector3f p = (attempt.to.point + center_).cast<float>();
+  bool is_allowed = false;
+  if (may_move_anywhere_) {
+    is_allowed = faces_allow(attempt, p) && hand_over_witnesses(attempt);
+  } else {
+    is_allowed = reachable(attempt, p) && (!border || border_allows(attempt, p)) &&
+                 faces_allow(attempt, p) && witnesses_allow(attempt, p) && stays_near(attempt, p);
+  }
+  return is_allowed ? Attempt::Outcome::Allowed : Attempt::Outcome::Refused;
+}
+
+// Whether anything that an attempt looked at has changed in this batch. A collapse stamps all
+// corners of the faces it changes: where neither u nor v is stamped, their faces are what they
+// were.
+bool Collapser::is_stale(const Attempt& attempt) const {
+  const auto is_stamped = [&](uint32_t v) { return stamp_[v] == batches_; };
+  if (is_stamped(attempt.u) || is_stamped(attempt.v)) return true;
+  return std::any_of(attempt.moving.begin(), attempt.moving.end(), [&](uint32_t f) {
+    const Face& face = mesh_.faces[f];
+    return std::any_of(face.begin(), face.end(), is_stamped);
+  });
 }
 
 // The link condition for the surface, and for the borders drawn on it.
-bool Collapser::link_allows(uint32_t u, uint32_t v, bool& border) {
-  neighbors_of(u, around_u_);
-  neighbors_of(v, around_v_);
-  if (dying_.empty() || dying_.size() > 2) return false;
+bool Collapser::link_allows(Attempt& attempt, bool& border) const {
+  const auto [u, v] = std::pair(attempt.u, attempt.v);
+  const std::vector<uint32_t>& dying = attempt.dying;
+  neighbors_of(u, attempt.around_u);
+  neighbors_of(v, attempt.around_v);
+  if (dying.empty() || dying.size() > 2) return false;
   size_t shared = 0;
-  for (const Neighbor& n : around_u_) {
+  for (const Neighbor& n : attempt.around_u) {
     if (n.vertex == v) border = n.border;
-    const auto at = std::find_if(
-        around_v_.begin(), around_v_.end(), [&](const auto& m) { return m.vertex == n.vertex; });
-    if (at == around_v_.end()) continue;
+    const auto at = std::find_if(attempt.around_v.begin(),
+                                 attempt.around_v.end(),
+                                 [&](const auto& m) { return m.vertex == n.vertex; });
+    if (at == attempt.around_v.end()) continue;
     ++shared;
     // Two borders would become one: the label between them would vanish.
     if (n.border && at->border) return false;
   }
-  if (shared != dying_.size()) return false;
-  if (dying_.size() == 1) return true;
+  if (shared != dying.size()) return false;
+  if (dying.size() == 1) return true;
   // A tetrahedron would become two faces on each other.
   std::array<uint32_t, 2> apex{};
   for (size_t i = 0; i < 2; ++i) {
-    for (const uint32_t w : mesh_.faces[dying_[i]]) {
+    for (const uint32_t w : mesh_.faces[dying[i]]) {
       if (w != u && w != v) apex.at(i) = w;
     }
   }
-  return std::count_if(moving_.begin(), moving_.end(), [&](uint32_t f) {
+  return std::count_if(attempt.moving.begin(), attempt.moving.end(), [&](uint32_t f) {
            return has(mesh_.faces[f], apex[0]) && has(mesh_.faces[f], apex[1]);
          }) < 2;
 }
 
 // The new vertex must lie near the old star: witnesses keep the old surface near the new one, this
 // keeps the new one near the old.
-bool Collapser::reachable(uint32_t u, uint32_t v, const Vector3f& p) const {
-  const float reach = 0.5f * std::max(limits_.tolerance[u], limits_.tolerance[v]);
+bool Collapser::reachable(const Attempt& attempt, const Vector3f& p) const {
+  const float reach = 0.5f * std::max(limits_.tolerance[attempt.u], limits_.tolerance[attempt.v]);
   const auto near = [&](uint32_t f) {
     const Face& face = mesh_.faces[f];
     const Triangle old(mesh_.vertices[face[0]], mesh_.vertices[face[1]], mesh_.vertices[face[2]]);
     return foot_on(old, p - mesh_.vertices[face[0]]).squared_distance <= reach * reach;
   };
-  return std::any_of(dying_.begin(), dying_.end(), near) ||
-         std::any_of(moving_.begin(), moving_.end(), near);
+  return std::any_of(attempt.dying.begin(), attempt.dying.end(), near) ||
+         std::any_of(attempt.moving.begin(), attempt.moving.end(), near);
 }
 
 // Original border vertices stay near the border.
-bool Collapser::border_allows(uint32_t u, uint32_t v, const Vector3f& p) {
+bool Collapser::border_allows(const Attempt& attempt, const Vector3f& p) const {
+  const auto [u, v] = std::pair(attempt.u, attempt.v);
   std::array<uint32_t, 2> ends = {kNone, kNone};
-  for (const Neighbor& n : around_u_) {
+  for (const Neighbor& n : attempt.around_u) {
     if (n.border && n.vertex != v && kind_[u] == Kind::Border) ends[0] = n.vertex;
   }
-  for (const Neighbor& n : around_v_) {
+  for (const Neighbor& n : attempt.around_v) {
     if (n.border && n.vertex != u) ends[1] = n.vertex;
   }
   const auto near = [&](uint32_t of) {
@@ -164,21 +189,23 @@ bool Collapser::border_allows(uint32_t u, uint32_t v, const Vector3f& p) {
   return near(v) && (kind_[u] == Kind::Corner || near(u));
 }
 
-// No new face may be turned or thin. Leaves the new faces in fresh_.
-bool Collapser::faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t) {
+// No new face may be turned or thin. Leaves the new faces in attempt.fresh.
+bool Collapser::faces_allow(Attempt& attempt, const Vector3f& p) const {
   constexpr double kLeastCosine = 0.5;
   constexpr double kLeastQuality = 0.05;  // 1 = equilateral
   const auto quality = [](double area, const Vector3d& ab, const Vector3d& ac) {
     const double edges = ab.squaredNorm() + ac.squaredNorm() + (ac - ab).squaredNorm();
     return edges > 0 ? 2 * std::sqrt(3.0) * area / edges : 0;
   };
+  const auto [u, v] = std::pair(attempt.u, attempt.v);
+  const float t = attempt.to.t;
   const bool colored = !mesh_.colors.empty();
   Vector3f color = Vector3f::Zero();
   if (colored) color = (1 - t) * mesh_.colors[u] + t * mesh_.colors[v];
-  fresh_.clear();
+  attempt.fresh.clear();
   double worst_old = 1;
   double worst_new = 1;
-  for (const uint32_t f : moving_) {
+  for (const uint32_t f : attempt.moving) {
     const Face& face = mesh_.faces[f];
     const size_t k = face[0] == u || face[0] == v ? 0 : face[1] == u || face[1] == v ? 1 : 2;
     const uint32_t b = face[(k + 1) % 3];
@@ -204,20 +231,21 @@ bool Collapser::faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t) 
     fresh.normal = (n / size).cast<float>();
     fresh.normal_before = size_before > 0 ? Vector3f((before / size_before).cast<float>())
                                           : Vector3f(Vector3f::Zero());
-    fresh_.push_back(fresh);
+    attempt.fresh.push_back(fresh);
     worst_new = std::min(worst_new, quality(size, ab, ac));
     worst_old = std::min(
         worst_old, quality(size_before, vertex(b) - vertex(face[k]), vertex(c) - vertex(face[k])));
   }
-  return !fresh_.empty() && worst_new >= std::min(kLeastQuality, worst_old) && !folds();
+  return !attempt.fresh.empty() && worst_new >= std::min(kLeastQuality, worst_old) &&
+         !folds(attempt);
 }
 
 // Whether neighbours come to lie nearly back to back that did not before: a flap of which no
 // witness knows.
-bool Collapser::folds() const {
+bool Collapser::folds(const Attempt& attempt) const {
   constexpr float kLeastCosine = -0.5f;
-  for (const NewFace& f : fresh_) {
-    for (const NewFace& g : fresh_) {
+  for (const NewFace& f : attempt.fresh) {
+    for (const NewFace& g : attempt.fresh) {
       if (f.c != g.b) continue;
       const float now = f.normal.dot(g.normal);
       if (now < kLeastCosine && now < f.normal_before.dot(g.normal_before)) return true;
@@ -234,9 +262,9 @@ bool Collapser::folds() const {
 }
 
 // Every witness of the old star must be near a new face of its label, in place and colour.
-bool Collapser::witnesses_allow(const Vector3f& p) {
-  points_.clear();
-  face_of_point_.clear();
+bool Collapser::witnesses_allow(Attempt& attempt, const Vector3f& p) const {
+  attempt.points.clear();
+  attempt.face_of_point.clear();
   const auto find = [&](uint32_t f) {
     const Provenance label = mesh_.provenance[f];
     const bool compare_colors = !mesh_.colors.empty() && label != Provenance::Inferred;
@@ -244,7 +272,7 @@ bool Collapser::witnesses_allow(const Vector3f& p) {
       const Vector3f x = original_.vertices[w] - p;
       const NewFace* nearest = nullptr;
       Foot foot{std::numeric_limits<float>::infinity(), 0, 0};
-      for (const NewFace& fresh : fresh_) {
+      for (const NewFace& fresh : attempt.fresh) {
         if (fresh.label != label) continue;
         const Foot other = foot_on(fresh, x);
         if (!(other.squared_distance < foot.squared_distance)) continue;
@@ -258,37 +286,38 @@ bool Collapser::witnesses_allow(const Vector3f& p) {
         const float change = (color - original_.colors[w]).cwiseAbs().maxCoeff();
         if (!(change <= limits_.color)) return false;
       }
-      points_.push_back(w);
-      face_of_point_.push_back(nearest->face);
+      attempt.points.push_back(w);
+      attempt.face_of_point.push_back(nearest->face);
     }
     return true;
   };
-  return std::all_of(dying_.begin(), dying_.end(), find) &&
-         std::all_of(moving_.begin(), moving_.end(), find);
+  return std::all_of(attempt.dying.begin(), attempt.dying.end(), find) &&
+         std::all_of(attempt.moving.begin(), attempt.moving.end(), find);
 }
 
 // Gives the witnesses of faces that vanish to any other one of their label; there must be one.
-bool Collapser::hand_over_witnesses() {
-  points_.clear();
-  face_of_point_.clear();
-  for (const uint32_t f : dying_) {
-    const auto heir = std::find_if(fresh_.begin(), fresh_.end(), [&](const NewFace& fresh) {
-      return fresh.label == mesh_.provenance[f];
-    });
+bool Collapser::hand_over_witnesses(Attempt& attempt) const {
+  attempt.points.clear();
+  attempt.face_of_point.clear();
+  for (const uint32_t f : attempt.dying) {
+    const auto heir =
+        std::find_if(attempt.fresh.begin(), attempt.fresh.end(), [&](const NewFace& fresh) {
+          return fresh.label == mesh_.provenance[f];
+        });
     for (uint32_t w = witness_[f]; w != kNone; w = next_witness_[w]) {
-      if (heir == fresh_.end()) return false;
-      points_.push_back(w);
-      face_of_point_.push_back(heir->face);
+      if (heir == attempt.fresh.end()) return false;
+      attempt.points.push_back(w);
+      attempt.face_of_point.push_back(heir->face);
     }
   }
   return true;
 }
 
 // Whether a point lies near the input around its nearest witness of the star.
-bool Collapser::is_near_original(const Vector3f& x) const {
+bool Collapser::is_near_original(const Attempt& attempt, const Vector3f& x) const {
   uint32_t nearest = kNone;
   float least = std::numeric_limits<float>::infinity();
-  for (const uint32_t w : points_) {
+  for (const uint32_t w : attempt.points) {
     const float squared_distance = (original_.vertices[w] - x).squaredNorm();
     if (squared_distance >= least) continue;
     least = squared_distance;
@@ -311,9 +340,10 @@ bool Collapser::is_near_original(const Vector3f& x) const {
 
 // Witnesses keep the input near the new faces; this keeps the new faces near the input, between
 // their corners, too.
-bool Collapser::stays_near(const Vector3f& p) const {
-  return std::all_of(fresh_.begin(), fresh_.end(), [&](const NewFace& f) {
-    return is_near_original(p + (f.ab + f.ac) / 3) && is_near_original(p + f.ab / 2);
+bool Collapser::stays_near(const Attempt& attempt, const Vector3f& p) const {
+  return std::all_of(attempt.fresh.begin(), attempt.fresh.end(), [&](const NewFace& f) {
+    return is_near_original(attempt, p + (f.ab + f.ac) / 3) &&
+           is_near_original(attempt, p + f.ab / 2);
   });
 }
 
@@ -329,7 +359,9 @@ void Collapser::merge_knowledge(uint32_t u, uint32_t v, float t) {
   mesh_.sigma[u] = t >= 1 ? mesh_.sigma[v] : mixed;
 }
 
-void Collapser::apply(uint32_t u, uint32_t v, const Placement& to) {
+void Collapser::apply(const Attempt& attempt) {
+  const auto [u, v] = std::pair(attempt.u, attempt.v);
+  const Placement& to = attempt.to;
   mesh_.vertices[u] = (to.point + center_).cast<float>();
   if (!mesh_.colors.empty()) {
     mesh_.colors[u] = (1 - to.t) * mesh_.colors[u] + to.t * mesh_.colors[v];
@@ -340,21 +372,26 @@ void Collapser::apply(uint32_t u, uint32_t v, const Placement& to) {
   }
   quadric_[u] += quadric_[v];
   used_[u] = used_[v] = 1;
-  for (const uint32_t f : dying_) {
-    for (const uint32_t w : mesh_.faces[f]) changed_[w] = 1;
+  stamp_[u] = stamp_[v] = batches_;
+  for (const uint32_t f : attempt.dying) {
+    for (const uint32_t w : mesh_.faces[f]) {
+      changed_[w] = 1;
+      stamp_[w] = batches_;
+    }
     mesh_.faces[f].fill(kNone);
   }
-  for (const uint32_t f : moving_) {
-    if (!may_move_anywhere_) witness_[f] = kNone;  // all of them are in points_
+  for (const uint32_t f : attempt.moving) {
+    if (!may_move_anywhere_) witness_[f] = kNone;  // all of them are in attempt.points
     for (uint32_t& w : mesh_.faces[f]) {
       if (w == v) w = u;
       changed_[w] = 1;
+      stamp_[w] = batches_;
     }
   }
-  for (size_t i = 0; i < points_.size(); ++i) {
-    uint32_t& head = witness_[face_of_point_[i]];
-    next_witness_[points_[i]] = head;
-    head = points_[i];
+  for (size_t i = 0; i < attempt.points.size(); ++i) {
+    uint32_t& head = witness_[attempt.face_of_point[i]];
+    next_witness_[attempt.points[i]] = head;
+    head = attempt.points[i];
   }
 }
 

@@ -69,6 +69,22 @@ struct NewFace : Triangle {
   Vector3f color, color_ab, color_ac;  ///< At the new vertex, and differences.
 };
 
+/// One collapse as it is tried: what it would do, and room that is kept for the next one.
+struct Attempt {
+  enum class Outcome {
+    Allowed,
+    Refused,
+    Later  ///< A vertex has been merged in this pass.
+  };
+  Outcome outcome = Outcome::Later;
+  uint32_t u = kNone, v = kNone;  ///< v goes, u moves.
+  Placement to;
+  std::vector<uint32_t> moving, dying;          ///< Faces around; those at the edge.
+  std::vector<uint32_t> points, face_of_point;  ///< Witnesses that change hands, and to whom.
+  std::vector<NewFace> fresh;                   ///< The moving faces, moved.
+  std::vector<Neighbor> around_u, around_v;
+};
+
 /// One run of collapse_edges().
 class Collapser {
  public:
@@ -83,7 +99,6 @@ class Collapser {
       return cost != o.cost ? cost < o.cost : slot < o.slot;
     }
   };
-  enum class Outcome { Done, Refused, Later };
 
   void index_faces();
   void neighbors_of(uint32_t v, std::vector<Neighbor>& out) const;
@@ -96,18 +111,22 @@ class Collapser {
   Placement placement(uint32_t u, uint32_t v) const;
   float pass_cost();
   bool pass();
-  Outcome collapse(uint32_t a, uint32_t b);
-  void gather_star(uint32_t u, uint32_t v);
-  bool link_allows(uint32_t u, uint32_t v, bool& border);
-  bool reachable(uint32_t u, uint32_t v, const Vector3f& p) const;
-  bool border_allows(uint32_t u, uint32_t v, const Vector3f& p);
-  bool faces_allow(uint32_t u, uint32_t v, const Vector3f& p, float t);
-  bool folds() const;
-  bool witnesses_allow(const Vector3f& p);
-  bool hand_over_witnesses();
-  bool is_near_original(const Vector3f& x) const;
-  bool stays_near(const Vector3f& p) const;
-  void apply(uint32_t u, uint32_t v, const Placement& to);
+  size_t batch_size() const;
+  void try_all(size_t first, size_t count);
+  void try_collapse(uint32_t slot, Attempt& out) const;
+  Attempt::Outcome outcome_of(Attempt& attempt) const;
+  void gather_star(Attempt& attempt) const;
+  bool link_allows(Attempt& attempt, bool& border) const;
+  bool reachable(const Attempt& attempt, const Vector3f& p) const;
+  bool border_allows(const Attempt& attempt, const Vector3f& p) const;
+  bool faces_allow(Attempt& attempt, const Vector3f& p) const;
+  bool folds(const Attempt& attempt) const;
+  bool witnesses_allow(Attempt& attempt, const Vector3f& p) const;
+  bool hand_over_witnesses(Attempt& attempt) const;
+  bool is_near_original(const Attempt& attempt, const Vector3f& x) const;
+  bool stays_near(const Attempt& attempt, const Vector3f& p) const;
+  bool is_stale(const Attempt& attempt) const;
+  void apply(const Attempt& attempt);
   void merge_knowledge(uint32_t u, uint32_t v, float t);
   void drop_dead_faces();
   // Told by the corners themselves, which are looked at anyway: memory is what takes the time.
@@ -137,10 +156,9 @@ class Collapser {
   std::vector<uint32_t> witness_;  // per face: list of original vertices
   std::vector<uint32_t> next_witness_;
   std::vector<uint32_t> next_on_border_;  // per original border vertex: ring of those merged
-  // Of the collapse at hand.
-  std::vector<uint32_t> moving_, dying_, points_, face_of_point_;
-  std::vector<NewFace> fresh_;
-  std::vector<Neighbor> around_u_, around_v_;
+  std::vector<Attempt> batch_;            // candidates that are tried at once
+  std::vector<uint32_t> stamp_;           // per vertex: the batch in which its star last changed
+  uint32_t batches_ = 0;
 };
 
 }  // namespace cgs::edge_collapse

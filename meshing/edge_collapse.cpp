@@ -33,6 +33,7 @@ Collapser::Collapser(const TriangleMesh& mesh, const CollapseLimits& limits)
   const size_t n = mesh.vertices.size();
   refused_.assign(mesh.faces.size(), 0);
   changed_.assign(n, 0);
+  stamp_.assign(n, 0);
   kind_.assign(n, Kind::Fixed);
   quadric_.resize(n);
   index_faces();
@@ -237,6 +238,24 @@ float Collapser::pass_cost() {
   return candidates_[wanted].cost;
 }
 
+// So few that hardly any of them looks at what another one changes, and is tried in vain.
+size_t Collapser::batch_size() const {
+  return std::clamp<size_t>(mesh_.faces.size() / 2000, 32, 4096);
+}
+
+// Tries candidates as if each were the first: independent of each other, so at once. They are
+// carried out in their order, after another try where an earlier one has changed something.
+void Collapser::try_all(size_t first, size_t count) {
+  ++batches_;
+  if (batch_.size() < count) batch_.resize(count);
+  constexpr size_t kGrain = 8;
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kGrain), [&](const auto& r) {
+    for (size_t i = r.begin(); i != r.end(); ++i) {
+      try_collapse(candidates_[first + i].slot, batch_[i]);
+    }
+  });
+}
+
 // Collapses the cheapest part of what may be collapsed. False if there is nothing.
 bool Collapser::pass() {
   find_candidates();
@@ -250,14 +269,23 @@ bool Collapser::pass() {
   used_.assign(mesh_.vertices.size(), 0);
   changed_.assign(changed_.size(), 0);
   size_t left = mesh_.faces.size();
-  for (auto at = candidates_.begin(); at != wanted; ++at) {
-    if (left <= limits_.target_faces) break;
-    const uint32_t f = at->slot / 3;
-    const uint32_t k = at->slot % 3;
-    if (is_dead(f)) continue;
-    const Outcome outcome = collapse(mesh_.faces[f][k], mesh_.faces[f][(k + 1) % 3]);
-    if (outcome == Outcome::Refused) refused_[f] |= static_cast<uint8_t>(1U << k);
-    if (outcome == Outcome::Done) left -= dying_.size();
+  const auto count = static_cast<size_t>(wanted - candidates_.begin());
+  for (size_t first = 0; first < count && left > limits_.target_faces;) {
+    const size_t tried = std::min(count - first, batch_size());
+    try_all(first, tried);
+    for (size_t i = 0; i < tried && left > limits_.target_faces; ++i) {
+      const uint32_t slot = candidates_[first + i].slot;
+      Attempt& attempt = batch_[i];
+      if (is_dead(slot / 3)) continue;
+      if (is_stale(attempt)) try_collapse(slot, attempt);
+      if (attempt.outcome == Attempt::Outcome::Refused) {
+        refused_[slot / 3] |= static_cast<uint8_t>(1U << slot % 3);
+      }
+      if (attempt.outcome != Attempt::Outcome::Allowed) continue;
+      apply(attempt);
+      left -= attempt.dying.size();
+    }
+    first += tried;
   }
   drop_dead_faces();
   index_faces();
