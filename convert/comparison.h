@@ -50,7 +50,7 @@ double range_of(const std::vector<Deviation>& deviations);
 Eigen::Vector3f diverging_color(double t);
 
 /// {"unit", "distance": {…}, "histogram": {"low", "high", "counts"}, "change": shares of A's
-/// points, "registration", "agreement"}; see the README.
+/// points, "registration", "agreement"}; see docs/measuring.md.
 nlohmann::ordered_json comparison_json(const Comparison& comparison,
                                        const MeasurableMesh& a,
                                        const FigureUnit& unit);

@@ -26,7 +26,7 @@ struct MeasuredFiles {
 /// Predicts what the stages of a run will need, from the sizes of its pictures alone.
 ///
 /// What a stage holds grows with the pixels of the input views: a Gaussian, a few voxels and a few
-/// faces come of each. The factors are measured; see the README for how well they hold.
+/// faces come of each. The factors are measured; see docs/reliability.md for how well they hold.
 /// \param chooses_voxels  false where the user says how large voxels are: stages that depend on
 /// them
 ///                        are then left out, and the volume itself refuses what does not fit

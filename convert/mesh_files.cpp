@@ -87,8 +87,8 @@ void require_writable_as(const std::filesystem::path& path, const Frame& frame) 
   const std::string extension = lower_extension(path);
   if (extension != ".stl" && extension != ".3mf") return;
   require(frame.has_metric_scale(),
-          "CAD files are in millimetres; --assume-unit m (cm, mm, in, ft) says what a unit is; "
-          "the scale of this input",
+          "CAD files are in millimetres; say what a unit is with --assume-unit m (cm, mm, in, ft); "
+          "the scale of this input must be known",
           "unknown");
 }
 

@@ -15,6 +15,19 @@
 
 namespace cgs {
 
+namespace {
+
+constexpr const char* kDepthHeading = "Depth";
+
+}  // namespace
+
+OptionGroup::OptionGroup(CLI::App& command, const std::string& heading)
+    : command_(command), before_(command.option_defaults()->get_group()) {
+  command.option_defaults()->group(heading);
+}
+
+OptionGroup::~OptionGroup() { command_.option_defaults()->group(before_); }
+
 void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("--memory-limit",
                      options.memory_limit,
@@ -35,24 +48,32 @@ void add_output_options(CLI::App& command, CommonOptions& options) {
 }
 
 void add_scene_options(CLI::App& command, SceneOptions& options) {
-  command.add_option(
-      "--views",
-      options.views,
-      "Input views: names, or indices in name order from 0, e.g. 1,10,19; the rest is "
-      "held out. Default: all of up to four, else three evenly spaced");
-  command.add_option(
-      "--downscale",
-      options.downscale,
-      "Divide the image size by this; default: the smallest that leaves no side above " +
-          std::to_string(SceneOptions::kLongestSide) + " pixels");
+  {
+    const OptionGroup group(command, "Photographs");
+    command.add_option(
+        "--views",
+        options.views,
+        "Input views: names, or indices in name order from 0, e.g. 1,10,19; the rest is "
+        "held out. Default: all of up to four, else three evenly spaced");
+    command.add_option(
+        "--downscale",
+        options.downscale,
+        "Divide the image size by this; default: the smallest that leaves no side above " +
+            std::to_string(SceneOptions::kLongestSide) + " pixels");
+  }
+  add_depth_options(command, options);
+  const OptionGroup group(command, kDepthHeading);
   command.add_option("--depth-model",
                      options.depth.network,
                      "Network (.onnx, in the form of MiDaS small) that guesses disparity where "
-                     "photographs measure none; depth with --depth-kind depth");
-  add_depth_options(command, options);
+                     "photographs measure none; with --depth-kind depth one that guesses depth");
 }
 
 void add_depth_options(CLI::App& command, SceneOptions& options) {
+  command.add_flag("--allow-external",
+                   options.allow_external,
+                   "Follow links and absolute paths that leave the scene folder");
+  const OptionGroup group(command, kDepthHeading);
   const std::map<std::string, DepthKind> kinds = {{"auto", DepthKind::Unknown},
                                                   {"metric", DepthKind::Metric},
                                                   {"depth", DepthKind::Relative},
@@ -72,12 +93,10 @@ void add_depth_options(CLI::App& command, SceneOptions& options) {
                      options.depth.scale,
                      "Values of metric depth files per metre; default: 1000 where they are whole "
                      "numbers (5000 in TUM data sets), else 1");
-  command.add_flag("--allow-external",
-                   options.allow_external,
-                   "Follow links and absolute paths that leave the scene folder");
 }
 
 void add_scale_options(CLI::App& command, SceneRequest& request) {
+  const OptionGroup group(command, "Scale and frame");
   command.add_option("--assume-unit",
                      request.assume_unit,
                      "What one scene unit is (m, cm, mm, in, ft), where the scene does not say; "
@@ -104,9 +123,8 @@ void add_scale_options(CLI::App& command, SceneRequest& request) {
       request.control.file,
       "Table (CSV) of surveyed points and where photographs show them, columns name,x,y,z,view,"
       "px,py and, if wanted, sigma and role (control or check): results are then in the "
-      "coordinates "
-      "of the table, z up, less a far origin that files state; needs 3 points, each in 2 "
-      "photographs, and tells scale, unit and up by itself");
+      "coordinates of the table, z up (files state a far origin apart, to be added); needs 3 "
+      "points, each in 2 photographs, and tells scale, unit and up by itself");
   command.add_option("--control-unit",
                      request.control.unit,
                      "Unit of the coordinates in --control-points (m, cm, mm, in, ft); default m");
@@ -124,6 +142,7 @@ void add_glb_option(CLI::App& command, GlbEncoding& encoding) {
 }
 
 void add_camera_options(CLI::App& command, SceneRequest& request) {
+  const OptionGroup group(command, "Photographs");
   command.add_option(
       "--focal",
       request.focal,
@@ -132,13 +151,13 @@ void add_camera_options(CLI::App& command, SceneRequest& request) {
   command.add_flag(
       "--refine-poses",
       request.refine_poses,
-      "Move cameras that are slightly off (of phones, from elsewhere) to where the "
-      "photographs have them; focal lengths, the first input camera that shares enough "
-      "with others and the scale stay; errors are in pixels of the photographs as "
-      "worked on");
+      "Correct cameras that are slightly off (of phones, from elsewhere) by what the "
+      "photographs show; focal lengths, the scale and the first input camera that shares "
+      "enough with others stay");
 }
 
 void add_training_options(CLI::App& command, TrainingArguments& arguments) {
+  const OptionGroup group(command, "Training");
   command
       .add_option("--preset",
                   arguments.preset,

@@ -13,6 +13,19 @@
 
 namespace cgs {
 
+/// Puts the options that are added during its life under a heading of their own in --help.
+class OptionGroup {
+ public:
+  OptionGroup(CLI::App& command, const std::string& heading);
+  ~OptionGroup();
+  OptionGroup(const OptionGroup&) = delete;
+  OptionGroup& operator=(const OptionGroup&) = delete;
+
+ private:
+  CLI::App& command_;
+  std::string before_;
+};
+
 /// Flags that every long command has.
 struct CommonOptions {
   int threads = 0;           ///< 0 = one per core.

@@ -192,7 +192,10 @@ void add_compare(CLI::App& app) {
       ->required();
   cmd->add_option("--samples", args->samples, "Points on A, evenly by area (of a cloud: all)")
       ->capture_default_str();
-  auto* icp = cmd->add_flag("--icp", args->icp, "Lay A onto B first, from where it is");
+  auto* icp =
+      cmd->add_flag("--icp",
+                    args->icp,
+                    "Move A onto B first (iterative closest point); A must lie near B already");
   cmd->add_flag("--scale", args->scale, "Let it grow or shrink, too")->needs(icp);
   add_m3c2(*cmd, args->m3c2);
   cmd->get_option("--samples")->excludes("--m3c2");

@@ -77,6 +77,45 @@ void run_run(const RunArgs& args) {
   }
 }
 
+void add_surface_options(CLI::App& command, RunArgs& args) {
+  const OptionGroup group(command, "Surface and files");
+  command.add_option("--voxel-size",
+                     args.request.voxel_size,
+                     "Edge of a voxel, e.g. 5mm, or in scene units; default: from the pixel size");
+  command.add_option(
+      "--simplify",
+      args.request.simplify,
+      "Largest error of simplified meshes where there is evidence, e.g. 2mm; four times "
+      "that where inferred; default: a quarter of a voxel; 0 = do not simplify");
+  command.add_option("--compression-error",
+                     args.request.compression_error,
+                     "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
+  add_glb_option(command, args.request.glb_encoding);
+  command
+      .add_option(
+          "--lods",
+          args.request.lods,
+          "Coarser levels of asset.glb to write, 0 to 5, with a tileset.json (3D Tiles) for "
+          "viewers that show the one that the distance asks for; default 0")
+      ->check(CLI::Range(size_t{0}, kMostLods).description("0 to 5"));
+}
+
+void add_promises(CLI::App& command, RunArgs& args) {
+  const OptionGroup group(command, "Promises, kept or refused");
+  command.add_option("--max-error",
+                     args.request.max_error,
+                     "Every mesh written, asset.glb too, lies within this of the fused "
+                     "surface, measured on the files, e.g. 1mm, or in scene units");
+  command.add_option("--max-size",
+                     args.max_size,
+                     "asset.glb with its textures is no larger, e.g. 2MB; leaves out the "
+                     "least detail that is needed and says how much that is");
+  command.add_option("--budget",
+                     args.budget,
+                     "Time for all of it, e.g. 3min: tries small pictures, then takes the largest "
+                     "size and the training that this machine can do in it");
+}
+
 }  // namespace
 
 void add_run(CLI::App& app) {
@@ -89,43 +128,16 @@ void add_run(CLI::App& app) {
          "Metashape, RealityCapture, cameras.json (3DGS), or nothing but photographs")
       ->required();
   cmd->add_option("-o,--output", args->request.output, "Folder to write")->required();
+  cmd->add_flag("-w,--overwrite", args->request.overwrite, "Replace the results of another run");
   add_scene_options(*cmd, args->request.scene.options);
   add_camera_options(*cmd, args->request.scene);
   add_scale_options(*cmd, args->request.scene);
-  cmd->add_option("--voxel-size",
-                  args->request.voxel_size,
-                  "Edge of a voxel, e.g. 5mm, or in scene units; default: from the pixel size");
-  cmd->add_option(
-      "--simplify",
-      args->request.simplify,
-      "Largest error of simplified meshes where there is evidence, e.g. 2mm; four times "
-      "that where inferred; default: a quarter of a voxel; 0 = do not simplify");
-  cmd->add_option("--compression-error",
-                  args->request.compression_error,
-                  "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
-  add_glb_option(*cmd, args->request.glb_encoding);
-  cmd->add_option(
-         "--lods",
-         args->request.lods,
-         "Coarser levels of asset.glb to write, 0 to 5, with a tileset.json (3D Tiles) for "
-         "viewers that show the one that the distance asks for; default 0")
-      ->check(CLI::Range(size_t{0}, kMostLods));
-  cmd->add_option("--max-error",
-                  args->request.max_error,
-                  "Promise: every mesh written, asset.glb too, lies within this of the fused "
-                  "surface, measured on the files, e.g. 1mm, or in scene units");
-  cmd->add_option("--max-size",
-                  args->max_size,
-                  "Promise: asset.glb with its textures is no larger, e.g. 2MB; leaves out the "
-                  "least detail that is needed and says how much that is");
-  auto* budget =
-      cmd->add_option("--budget",
-                      args->budget,
-                      "Time for all of it, e.g. 3min: tries small pictures, then takes the largest "
-                      "size and the training that this machine can do in it");
-  cmd->add_flag("-w,--overwrite", args->request.overwrite, "Replace the results of another run");
+  add_surface_options(*cmd, *args);
+  add_promises(*cmd, *args);
   add_training_options(*cmd, args->training);
-  for (const char* chosen : {"--downscale", "--preset"}) budget->excludes(chosen);
+  for (const char* chosen : {"--downscale", "--preset"}) {
+    cmd->get_option("--budget")->excludes(chosen);
+  }
   add_common_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs run photos/portal --views 1,10,19 --assume-unit m -o out/portal\n"

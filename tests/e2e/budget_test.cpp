@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // `cgs run --budget`: what it chooses and keeps. How well times are met is no matter of a test: see
-// the README for what was measured.
+// docs/tradeoff.md for what was measured.
 #include <filesystem>
 
 #include <gtest/gtest.h>
