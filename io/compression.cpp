@@ -26,10 +26,11 @@ Bytef* bytes_of(const char* text) {
 class Inflater {
  public:
   Inflater(std::string_view bytes,
-           int window,
+           DeflateWrapping wrapping,
            const std::filesystem::path& path,
            std::string_view what)
       : bytes_(bytes), path_(path), what_(what) {
+    const int window = wrapping == DeflateWrapping::Gzip ? kGzipWindow : kRawWindow;
     if (inflateInit2(&stream_, window) != Z_OK) throw std::bad_alloc();
   }
   ~Inflater() { inflateEnd(&stream_); }
@@ -37,8 +38,7 @@ class Inflater {
   Inflater& operator=(const Inflater&) = delete;
 
   std::string take(size_t size) {
-    constexpr size_t kHighestRatio = 1032;
-    if (size / kHighestRatio > bytes_.size()) {
+    if (!can_inflate_to(bytes_.size(), size)) {
       throw BadInput(Defect::Count,
                      path_,
                      what_ + " should hold " + std::to_string(size) + " bytes, " +
@@ -49,7 +49,7 @@ class Inflater {
     while (made < size) {
       const size_t more = step(out.data() + made, size - made);
       if (more == 0) {
-        throw BadInput(Defect::Truncated,
+        throw BadInput(state_ == Z_STREAM_END ? Defect::Count : Defect::Truncated,
                        path_,
                        what_ + " needs " + std::to_string(size) + " bytes, its stream holds " +
                            std::to_string(made));
@@ -63,7 +63,7 @@ class Inflater {
   void expect_end() {
     char more = 0;
     if (step(&more, 1) > 0) {
-      throw BadInput(Defect::Mismatch, path_, what_ + " goes on after its last byte");
+      throw BadInput(Defect::Count, path_, what_ + " is longer than it says");
     }
     if (state_ != Z_STREAM_END) throw BadInput(Defect::Truncated, path_, what_ + " has no end");
   }
@@ -108,18 +108,23 @@ std::string inflate(std::string_view bytes,
                     size_t size,
                     const std::filesystem::path& path,
                     std::string_view what) {
-  Inflater inflater(
-      bytes, wrapping == DeflateWrapping::Gzip ? kGzipWindow : kRawWindow, path, what);
+  Inflater inflater(bytes, wrapping, path, what);
   std::string out = inflater.take(size);
   inflater.expect_end();
   return out;
 }
 
-std::string gunzip_start(std::string_view bytes,
-                         size_t size,
-                         const std::filesystem::path& path,
-                         std::string_view what) {
-  return Inflater(bytes, kGzipWindow, path, what).take(size);
+std::string inflate_start(std::string_view bytes,
+                          DeflateWrapping wrapping,
+                          size_t size,
+                          const std::filesystem::path& path,
+                          std::string_view what) {
+  return Inflater(bytes, wrapping, path, what).take(size);
+}
+
+bool can_inflate_to(uint64_t packed, uint64_t size) {
+  constexpr uint64_t kHighestRatio = 1032;
+  return size / kHighestRatio <= packed;
 }
 
 std::string gzip(std::string_view bytes) {

@@ -13,21 +13,25 @@ enum class DeflateWrapping { Gzip, None };
 
 /// The content of a deflate stream that must hold exactly `size` bytes.
 /// \param what  names the content in the message
-/// \throws BadInput Truncated (it holds less, or is cut), Mismatch (it holds more), Syntax (it is
-///         damaged, or its checksum is wrong), Count (more than any stream of that length can hold;
-///         told before memory is taken)
+/// \throws BadInput Truncated (it is cut), Count (it holds less or more; where no stream of that
+///         length can hold as much, this is told before memory is taken), Syntax (it is damaged, or
+///         its checksum is wrong)
 std::string inflate(std::string_view bytes,
                     DeflateWrapping wrapping,
                     size_t size,
                     const std::filesystem::path& path,
                     std::string_view what);
 
-/// The first `size` bytes of a gzip file; what follows them is not looked at.
+/// The first `size` bytes of the content; what follows them is not looked at.
 /// \throws BadInput Truncated, Syntax, Count as above
-std::string gunzip_start(std::string_view bytes,
-                         size_t size,
-                         const std::filesystem::path& path,
-                         std::string_view what);
+std::string inflate_start(std::string_view bytes,
+                          DeflateWrapping wrapping,
+                          size_t size,
+                          const std::filesystem::path& path,
+                          std::string_view what);
+
+/// Whether any deflate stream of so many bytes can hold `size`.
+bool can_inflate_to(uint64_t packed, uint64_t size);
 
 /// A gzip file of these bytes, without name and time: the same bytes give the same file.
 std::string gzip(std::string_view bytes);

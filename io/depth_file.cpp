@@ -9,6 +9,7 @@
 
 #include "io/exr.h"
 #include "io/npy.h"
+#include "io/npz.h"
 #include "io/pfm.h"
 
 namespace cgs {
@@ -18,8 +19,8 @@ namespace fs = std::filesystem;
 namespace {
 
 // What keeps values as they are comes before what may be a picture to look at.
-constexpr std::array<const char*, 6> kExtensions = {
-    ".exr", ".pfm", ".npy", ".tiff", ".tif", ".png"};
+constexpr std::array<const char*, 7> kExtensions = {
+    ".exr", ".pfm", ".npy", ".npz", ".tiff", ".tif", ".png"};
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
@@ -51,18 +52,14 @@ Raster<float> from_exr(const fs::path& path, const ReadLimits& limits) {
   return out;
 }
 
-Raster<float> from_npy(const fs::path& path, const ReadLimits& limits) {
-  const NpyArray array = read_npy(path, limits);
-  std::vector<size_t> sides = array.shape;
-  if (sides.size() > 2) std::erase(sides, size_t{1});
-  if (sides.size() != 2 || sides[0] == 0 || sides[1] == 0) {
-    throw BadInput(Defect::Schema, path, "expected an array of height x width values");
-  }
+Raster<float> from_array(const NpyArray& array, const fs::path& path, const ReadLimits& limits) {
+  const auto sides = picture_sides(array.shape);
+  if (!sides) throw BadInput(Defect::Schema, path, "expected an array of height x width values");
   if (array.values.size() > limits.max_pixels) {
     throw LimitError(printable(path) + ": " + std::to_string(array.values.size()) +
                      " pixels, allowed are " + std::to_string(limits.max_pixels));
   }
-  Raster<float> out(static_cast<int>(sides[1]), static_cast<int>(sides[0]), 0);
+  Raster<float> out(static_cast<int>((*sides)[1]), static_cast<int>((*sides)[0]), 0);
   std::transform(array.values.begin(), array.values.end(), out.data.begin(), [](double value) {
     return static_cast<float>(value);
   });
@@ -92,12 +89,14 @@ StoredSamples read_depth_file(const fs::path& path, const ReadLimits& limits) {
   } else if (extension == ".pfm") {
     out.values = read_pfm(path, limits);
   } else if (extension == ".npy") {
-    out.values = from_npy(path, limits);
+    out.values = from_array(read_npy(path, limits), path, limits);
+  } else if (extension == ".npz") {
+    out.values = from_array(read_npz_depth(path, limits), path, limits);
   } else if (has_depth_extension(path)) {
     out = read_samples(path, limits);
   } else {
     throw BadInput(
-        Defect::Unsupported, path, "no depth file; read are .exr .pfm .npy .tif .tiff .png");
+        Defect::Unsupported, path, "no depth file; read are .exr .pfm .npy .npz .tif .tiff .png");
   }
   for (float& value : out.values.data) {
     if (!is_depth(value, extension, out.whole_bits)) value = kNone;

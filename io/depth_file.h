@@ -6,7 +6,8 @@
 
 namespace cgs {
 
-/// True for what read_depth_file() reads, by extension in any case: .exr .pfm .npy .tif .tiff .png
+/// True for what read_depth_file() reads, by extension in any case: .exr .pfm .npy .npz .tif .tiff
+/// .png
 bool has_depth_extension(const std::filesystem::path& path);
 
 /// The file of a photograph in a folder of depth files: of the same stem, and of several the one

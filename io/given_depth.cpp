@@ -304,7 +304,7 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
   if (count == 0 && !options.folder.empty()) {
     throw BadInput(Defect::Missing,
                    options.folder,
-                   "holds no depth named as an input photograph: .exr .pfm .npy .tif or .png");
+                   "holds no depth named as an input photograph: .exr .pfm .npy .npz .tif or .png");
   }
   if (count == 0) return;
   std::vector<std::string> lacking;

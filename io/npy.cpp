@@ -175,21 +175,49 @@ std::vector<double> from_fortran_order(const NpyArray& array) {
   return out;
 }
 
-}  // namespace
-
-NpyArray read_npy(const std::filesystem::path& path, const ReadLimits& limits) {
-  const std::string bytes = read_file(path, limits);
-  refuse_foreign_content(path, bytes, "npy");
-  ByteReader file(bytes, path);
+// \throws BadInput Unsupported for other elements than floats
+Header float_header(ByteReader& file, const ReadLimits& limits) {
   const std::string_view text = header_text(file, limits);
-  const Header header = HeaderParser(text, file).parse();
-
+  Header header = HeaderParser(text, file).parse();
   const std::string_view descr = header.descr;
   const bool is_known = descr == "<f8" || descr == ">f8" || descr == "<f4" || descr == ">f4";
   if (!is_known) {
     file.fail(Defect::Unsupported,
               "element type '" + header.descr + "', known are <f8, >f8, <f4 and >f4");
   }
+  return header;
+}
+
+}  // namespace
+
+NpyArray read_npy(const std::filesystem::path& path, const ReadLimits& limits) {
+  const std::string bytes = read_file(path, limits);
+  refuse_foreign_content(path, bytes, "npy");
+  return parse_npy(bytes, path, limits);
+}
+
+std::optional<std::array<size_t, 2>> picture_sides(const std::vector<size_t>& shape) {
+  std::vector<size_t> sides = shape;
+  if (sides.size() > 2) std::erase(sides, size_t{1});
+  if (sides.size() != 2 || sides[0] == 0 || sides[1] == 0) return std::nullopt;
+  return std::array{sides[0], sides[1]};
+}
+
+std::optional<std::vector<size_t>> npy_shape(std::string_view start) {
+  try {
+    ByteReader file(start, "");
+    return float_header(file, {}).shape;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+NpyArray parse_npy(std::string_view bytes,
+                   const std::filesystem::path& path,
+                   const ReadLimits& limits) {
+  ByteReader file(bytes, path);
+  const Header header = float_header(file, limits);
+  const std::string_view descr = header.descr;
   const size_t width = descr[2] == '8' ? 8 : 4;
   const size_t count = element_count(header.shape, file);
   size_t needed = 0;

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "io/byte_reader.h"
@@ -15,6 +18,10 @@ struct NpyArray {
   std::vector<double> values;  ///< Product of shape.
 };
 
+/// Its sides where it is a picture: two, beside any of length 1; else nothing.
+/// \param shape  height before width
+std::optional<std::array<size_t, 2>> picture_sides(const std::vector<size_t>& shape);
+
 /// Reads a NumPy .npy file of float32 or float64 values, versions 1 to 3, either byte order, C or
 /// Fortran order; values come back as double in C order.
 ///
@@ -23,5 +30,13 @@ struct NpyArray {
 ///         Truncated, Unsupported (other element types); LimitError.
 /// Source: numpy.lib.format, "NPY format" versions 1.0, 2.0 and 3.0.
 NpyArray read_npy(const std::filesystem::path& path, const ReadLimits& limits = {});
+
+/// The same from memory. \param path  for messages
+NpyArray parse_npy(std::string_view bytes,
+                   const std::filesystem::path& path,
+                   const ReadLimits& limits = {});
+
+/// The shape of an array that parse_npy() reads, from the start of its file; nothing for others.
+std::optional<std::vector<size_t>> npy_shape(std::string_view start);
 
 }  // namespace cgs

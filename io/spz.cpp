@@ -331,7 +331,7 @@ bool looks_like_spz(std::string_view bytes) {
 RawSplats parse_spz(std::string_view bytes, const std::filesystem::path& path) {
   std::string start;
   if (bytes.substr(0, 2) == kGzipMagic) {
-    start = gunzip_start(bytes, kHeaderBytes, path, "SPZ header");
+    start = inflate_start(bytes, DeflateWrapping::Gzip, kHeaderBytes, path, "SPZ header");
   }
   ByteReader reader(start.empty() ? bytes : std::string_view(start), path);
   const Header header = header_of(reader);

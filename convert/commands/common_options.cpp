@@ -78,11 +78,12 @@ void add_depth_options(CLI::App& command, SceneOptions& options) {
                                                   {"metric", DepthKind::Metric},
                                                   {"depth", DepthKind::Relative},
                                                   {"disparity", DepthKind::Disparity}};
-  command.add_option("--depth",
-                     options.depth.folder,
-                     "Folder with a depth file per photograph, of the same stem: .exr .pfm .npy "
-                     ".tif .png; default: what the scene says, else a folder \"depth\" beside the "
-                     "photographs");
+  command.add_option(
+      "--depth",
+      options.depth.folder,
+      "Folder with a depth file per photograph, of the same stem: .exr .pfm .npy .npz "
+      ".tif .png; default: what the scene says, else a folder \"depth\" beside the "
+      "photographs");
   command
       .add_option("--depth-kind",
                   options.depth.kind,

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/zip_bytes.h"
 
 namespace cgs {
@@ -47,10 +48,62 @@ TEST(Zip, RefusesWhatItCannotTrust) {
   EXPECT_EQ(defect("PK\x03\x04 and nothing more"), "TRUNCATED");
 }
 
+TEST(Zip, ReadsSizesOf64Bits) {
+  const std::string bytes =
+      test::zip_bytes({{"a.txt", kText}, {"b", "xyz"}}, {.method = 8, .is_64_bits = true});
+  const ZipArchive archive(bytes, "x.npz");
+  EXPECT_EQ(archive.read("a.txt", 5000), kText);
+  EXPECT_EQ(archive.read("b", 5000), "xyz");
+  EXPECT_EQ(archive.names(), (std::vector<std::string>{"a.txt", "b"}));
+}
+
+TEST(Zip, ReadsTheStartOfAFile) {
+  for (const uint16_t method : {uint16_t{0}, uint16_t{8}}) {
+    const std::string bytes = test::zip_bytes({{"a", "abcdef"}}, {.method = method});
+    const ZipArchive archive(bytes, "x.npz");
+    EXPECT_EQ(archive.read_start("a", 4), "abcd");
+    EXPECT_EQ(archive.read_start("a", 100), "abcdef");
+  }
+}
+
+TEST(Zip, RefusesSizesThatLie) {
+  for (const bool is_64_bits : {false, true}) {
+    for (const uint16_t method : {uint16_t{0}, uint16_t{8}}) {
+      for (const int64_t change : {-4990, -1, 1, 3000, 100'000'000}) {
+        const test::ZipDamage lie = {
+            .method = method, .size_change = change, .is_64_bits = is_64_bits};
+        EXPECT_EQ(defect(test::zip_bytes({{"a.txt", kText}}, lie)), "COUNT") << change;
+      }
+    }
+  }
+  const test::ZipDamage huge = {.method = 8, .size_change = int64_t{1} << 50, .is_64_bits = true};
+  EXPECT_EQ(defect(test::zip_bytes({{"a.txt", kText}}, huge)), "COUNT");
+}
+
+TEST(Zip, RefusesWhatUnpacksToTooMuch) {
+  const std::string large(size_t{40} << 20, '\0');
+  const auto opened = [](const std::string& bytes) {
+    return test::defect_of([&] { ZipArchive(bytes, "x.3mf"); });
+  };
+  // One is within what small archives may unpack to, two are not.
+  EXPECT_EQ(opened(test::zip_bytes({{"a", large}}, {.method = 8})), "");
+  EXPECT_EQ(opened(test::zip_bytes({{"a", large}, {"b", large}}, {.method = 8})), "LIMIT");
+}
+
+TEST(Zip, RefusesNamesThatLeaveAFolder) {
+  for (const char* name : {"../a.txt", "x/../../a", "/etc/a", "..\\a", "C:/a", ""}) {
+    EXPECT_EQ(defect(test::zip_bytes({{"a.txt", kText}, {name, "b"}})), "PATH") << name;
+  }
+  EXPECT_EQ(defect(test::zip_bytes({{"a.txt", kText}, {"b/..c/d..", "b"}})), "OK");
+}
+
 TEST(Zip, RefusesEveryTruncation) {
-  const std::string whole = test::zip_bytes({{"a.txt", kText}}, {.method = 8});
-  for (size_t n = 0; n < whole.size(); ++n) {
-    EXPECT_NE(defect(whole.substr(0, n)), "OK") << n;
+  for (const bool is_64_bits : {false, true}) {
+    const std::string whole =
+        test::zip_bytes({{"a.txt", kText}}, {.method = 8, .is_64_bits = is_64_bits});
+    for (size_t n = 0; n < whole.size(); ++n) {
+      EXPECT_NE(defect(whole.substr(0, n)), "OK") << n;
+    }
   }
 }
 

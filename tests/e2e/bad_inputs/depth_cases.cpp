@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "tests/e2e/bad_inputs/valid_inputs.h"
+#include "tests/support/zip_bytes.h"
 
 namespace cgs::test {
 
@@ -103,10 +104,45 @@ void add_sizes(Cases& cases) {
        }});
 }
 
+void add_archives(Cases& cases) {
+  const auto npz = [&](const char* row,
+                       const std::string& damage,
+                       const std::string& expected,
+                       const std::string& array,
+                       const ZipDamage& lie) {
+    cases.push_back(depth_case(
+        row, "npz: " + damage, expected, ".npz", zip_bytes({{"depth.npy", array}}, lie)));
+  };
+  const std::string good = npy_depth(plane);
+  npz("N12", "good, deflated", "OK|OK+W", good, {.method = 8});
+  npz("N12", "good, with 64-bit sizes", "OK|OK+W", good, {.method = 8, .is_64_bits = true});
+  npz("N11", "100 kB unpack to 100 MB", "LIMIT", std::string(100 << 20, '\0'), {.method = 8});
+  std::string noise(11 << 20, '\0');
+  uint32_t state = 1;
+  for (char& byte : noise) byte = static_cast<char>((state = state * 1664525 + 1013904223) >> 24);
+  npz("N11",
+      "11 MB unpack to 10 GB",
+      "LIMIT",
+      noise,
+      {.method = 8, .size_change = 10'000'000'000, .is_64_bits = true});
+  for (const int64_t lie : {-100, -1, 1, 1000, 100'000'000}) {
+    for (const uint16_t method : {uint16_t{0}, uint16_t{8}}) {
+      npz("N12",
+          "size off by " + std::to_string(lie),
+          "COUNT",
+          good,
+          {.method = method, .size_change = lie});
+    }
+  }
+  npz("N12", "encrypted", "UNSUPPORTED", good, {.flags = 1});
+  npz("N12", "bzip2", "UNSUPPORTED", good, {.method = 12});
+}
+
 }  // namespace
 
 Cases depth_cases() {
   Cases cases;
+  add_archives(cases);
   add_values(cases);
   add_sizes(cases);
   return cases;
