@@ -15,6 +15,7 @@
 #include "convert/memory_plan.h"
 #include "convert/model.h"
 #include "convert/stated_frame.h"
+#include "io/colmap_depth.h"
 #include "io/depth_file.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/given_depth.h"
@@ -59,13 +60,22 @@ void take_size_of_depth(Scene& scene) {
   }
 }
 
+// Depth maps of COLMAP are in units of the cameras and tell nothing of metres.
+bool is_in_units_of_cameras(const View& view) { return is_colmap_depth_name(view.depth_path); }
+
+bool tells_metres(const Scene& scene) {
+  return std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
+    return !is_in_units_of_cameras(scene.views[static_cast<size_t>(i)]);
+  });
+}
+
 // Cameras with depth in metres are taken to be in metres unless something else is said.
 void settle_scale(Scene& scene, const std::string& unit) {
   if (!unit.empty()) {
     const std::string refused = assume_unit(scene.frame, unit);
     if (!refused.empty()) scene.warnings.push_back(refused);
   }
-  if (scene.frame.has_metric_scale()) return;
+  if (scene.frame.has_metric_scale() || !tells_metres(scene)) return;
   scene.frame.metres_per_unit = 1;
   scene.frame.scale_source = ScaleSource::DepthSensor;
 }
@@ -84,7 +94,8 @@ class Frames {
       const std::lock_guard lock(mutex_);
       warnings_.insert(warnings.begin(), warnings.end());
     }
-    if (!view.depth_states_metres && scene_.depth_kind != DepthKind::Metric) {
+    const bool is_scaled = is_in_units_of_cameras(view);
+    if (!is_scaled && !view.depth_states_metres && scene_.depth_kind != DepthKind::Metric) {
       throw BadInput(Defect::Unsupported,
                      view.depth_path,
                      "does not say that it measures metres; --depth-kind metric does, and cgs "
@@ -96,10 +107,11 @@ class Frames {
     out.usable = std::move(view.valid);
     out.depth = DepthMap(view.camera.width, view.camera.height, kNaN);
     out.sigma = out.depth;
-    const double internal_per_metre = 1 / (scene_.frame.metres_per_unit * scene_.frame.scale);
+    const double units = is_scaled ? 1 : scene_.frame.metres_per_unit;
+    const double internal_per_value = 1 / (units * scene_.frame.scale);
     for (int y = 0; y < out.depth.height; ++y) {
       for (int x = 0; x < out.depth.width; ++x) {
-        const double z = double(view.given_depth(x, y)) * internal_per_metre;
+        const double z = double(view.given_depth(x, y)) * internal_per_value;
         if (!(z > 0) || is_at_depth_edge(view.given_depth, x, y)) continue;
         out.depth(x, y) = static_cast<float>(z);
         out.sigma(x, y) = static_cast<float>(kSensorSigma * z);
@@ -129,6 +141,16 @@ std::string disagreement_words(const DepthAgreement& agreement, const Frame& fra
   }
   return out +
          ": are the cameras in metres (--assume-unit), the depth in millimetres (--depth-scale)?";
+}
+
+// Depth in units of the cameras has no scale to find: it fits as it is, or is of other cameras.
+void judge_fit(const DepthAgreement& agreement, const Scene& scene) {
+  constexpr double kMost = 0.05;
+  if (std::isnan(agreement.off) || agreement.off <= kMost) return;
+  throw BadInput(Defect::Mismatch,
+                 scene.folder,
+                 "frames disagree by " + percent(agreement.off) +
+                     " of the depth (median): were these depth maps made with these cameras?");
 }
 
 // A scale that only the depth tells has to be seen in it.
@@ -189,7 +211,11 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   out.warnings = scene.warnings;
   const DepthOptions& depth = request.options.depth;
   const bool is_said = depth.kind == DepthKind::Metric || depth.scale != 0;
-  judge_scale(agreement, scene, is_said, out.frame, out.warnings);
+  if (tells_metres(scene)) {
+    judge_scale(agreement, scene, is_said, out.frame, out.warnings);
+  } else {
+    judge_fit(agreement, scene);
+  }
   TsdfOptions fusing;
   if (!request.voxel_size.empty()) {
     fusing.voxel_size = parse_length(request.voxel_size, scene.frame);

@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+#include "io/colmap_depth.h"
 #include "io/exr.h"
 #include "io/npy.h"
 #include "io/npz.h"
@@ -69,11 +70,13 @@ Raster<float> from_array(const NpyArray& array, const fs::path& path, const Read
 }  // namespace
 
 bool has_depth_extension(const fs::path& path) {
+  if (is_colmap_depth_name(path)) return true;
   const std::string extension = lower_extension(path);
   return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
 }
 
 fs::path depth_file_of(const SceneRoot& folder, const fs::path& photograph) {
+  if (fs::path map = colmap_depth_of(folder, photograph); !map.empty()) return map;
   for (const std::string extension : kExtensions) {
     const std::string name = photograph.stem().string() + extension;
     if (is_present(folder.folder / name)) return resolve_in_scene(folder, name, folder.folder);
@@ -90,13 +93,17 @@ StoredSamples read_depth_file(const fs::path& path, const ReadLimits& limits) {
     out.values = read_pfm(path, limits);
   } else if (extension == ".npy") {
     out.values = from_array(read_npy(path, limits), path, limits);
+  } else if (is_colmap_depth_name(path)) {
+    out.values = read_colmap_depth(path, limits);
   } else if (extension == ".npz") {
     out.values = from_array(read_npz_depth(path, limits), path, limits);
   } else if (has_depth_extension(path)) {
     out = read_samples(path, limits);
   } else {
     throw BadInput(
-        Defect::Unsupported, path, "no depth file; read are .exr .pfm .npy .npz .tif .tiff .png");
+        Defect::Unsupported,
+        path,
+        "no depth file; read are .exr .pfm .npy .npz .tif .tiff .png and .bin of COLMAP");
   }
   for (float& value : out.values.data) {
     if (!is_depth(value, extension, out.whole_bits)) value = kNone;

@@ -6,14 +6,13 @@
 
 namespace cgs {
 
-/// True for what read_depth_file() reads, by extension in any case: .exr .pfm .npy .npz .tif .tiff
-/// .png
+/// True for what read_depth_file() reads: .exr .pfm .npy .npz .tif .tiff .png in any case, and
+/// depth maps of COLMAP.
 bool has_depth_extension(const std::filesystem::path& path);
 
-/// The file of a photograph in a folder of depth files: of the same stem, and of several the one
-/// whose format comes first in has_depth_extension(); empty if there is none.
-/// \param folder  in which links must not lead elsewhere unless allow_external
-/// \throws BadInput Path
+/// The file of a photograph in a folder of depth files: as colmap_depth_of(), else of the same
+/// stem, and of several the one whose format comes first above; empty if there is none. \param
+/// folder  in which links must not lead elsewhere unless allow_external \throws BadInput Path
 std::filesystem::path depth_file_of(const SceneRoot& folder,
                                     const std::filesystem::path& photograph);
 
@@ -22,8 +21,8 @@ std::filesystem::path depth_file_of(const SceneRoot& folder,
 /// 65535 among 16-bit whole numbers.
 ///
 /// Of an EXR the channel Z, else depth.Z, depth.V, Y, R or the only one is taken; of an NPY arrays
-/// with two sides beside any of length 1.
-/// \throws BadInput as read_exr(), read_pfm(), read_npy() and read_samples(); Schema (no such
+/// with two sides beside any of length 1; of an NPZ what read_npz_depth() chooses.
+/// \throws BadInput as the readers of the formats; Schema (no such
 ///         channel, another shape), Unsupported (another extension); LimitError
 StoredSamples read_depth_file(const std::filesystem::path& path, const ReadLimits& limits = {});
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "io/camera_checks.h"
+#include "io/colmap_depth.h"
 #include "io/depth_file.h"
 #include "io/fisheye_map.h"
 #include "io/orientation.h"
@@ -26,8 +27,9 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kSameSurface = 0.05f;  // relative step between values that may be averaged
 
-// The file in a folder "depth" in or beside the folder of a photograph, beneath the scene.
-fs::path depth_beside(const SceneRoot& root, const fs::path& photograph) {
+// The file in a folder "depth" in or beside the folder of a photograph, beneath the scene, else
+// where COLMAP's dense stereo puts it.
+fs::path depth_beside(const Scene& scene, const SceneRoot& root, const fs::path& photograph) {
   std::error_code ignored;  // what cannot be resolved stays as it is, and is not found
   const fs::path top = fs::weakly_canonical(root.folder, ignored);
   const fs::path folder = fs::weakly_canonical(photograph.parent_path(), ignored);
@@ -39,7 +41,10 @@ fs::path depth_beside(const SceneRoot& root, const fs::path& photograph) {
     fs::path file = depth_file_of({inside, root.allow_external}, photograph);
     if (!file.empty()) return file;
   }
-  return {};
+  const std::string maps = "stereo/depth_maps";
+  if (scene.kind != "COLMAP" || !is_folder(root.folder / maps)) return {};
+  const fs::path inside = resolve_in_scene(root, maps, root.folder);
+  return colmap_depth_of({inside, root.allow_external}, photograph);
 }
 
 // The file that goes with the depth of a view as Polycam lays it out; empty if there is none.
@@ -83,6 +88,16 @@ Raster<float> upright(const Raster<float>& values, const View& view, const Image
                      std::to_string(values.height) + " pixels, its photograph " +
                      std::to_string(photograph.width) + " x " + std::to_string(photograph.height) +
                      ", which is another shape");
+}
+
+// COLMAP makes depth maps of pictures that it has undistorted itself, of another camera than this.
+void refuse_map_of_distorted(const View& view) {
+  const bool is_bent = view.fisheye || view.distortion != std::array<double, 5>{};
+  if (!is_bent || !is_colmap_depth_name(view.depth_path)) return;
+  throw BadInput(Defect::Mismatch,
+                 view.depth_path,
+                 "is the depth of COLMAP's undistorted picture, but this photograph has lens "
+                 "distortion; open the folder with images/, sparse/ and stereo/ instead");
 }
 
 // Where a pixel of the undistorted picture lies in the photograph; NaN where the lens never put it.
@@ -188,7 +203,7 @@ std::map<fs::path, int> uses_of_files_beside(const Scene& scene, const SceneRoot
   for (const View& view : scene.views) {
     if (view.image_path.empty() || !view.depth_path.empty()) continue;
     try {
-      ++out[depth_beside(root, view.image_path)];
+      ++out[depth_beside(scene, root, view.image_path)];
     } catch (const Error&) {
       continue;  // told of input views
     }
@@ -198,14 +213,16 @@ std::map<fs::path, int> uses_of_files_beside(const Scene& scene, const SceneRoot
 
 // Gives a view the file that lies beside its photograph, if it can be its depth. Nobody named it,
 // so what is wrong with it is no reason to stop. \return that, or nothing
-std::string find_depth_beside(View& view,
+std::string find_depth_beside(const Scene& scene,
+                              View& view,
                               const SceneRoot& root,
                               const std::map<fs::path, int>& uses) {
   try {
-    const fs::path file = depth_beside(root, view.image_path);
+    const fs::path file = depth_beside(scene, root, view.image_path);
     if (file.empty()) return "";
     if (uses.at(file) > 1) throw BadInput(Defect::Ref, file, "lies beside several photographs");
     view.depth_path = file;
+    refuse_map_of_distorted(view);
     (void)upright(read_depth_file(file).values, view, photograph_size(view));
     return "";
   } catch (const Error& error) {
@@ -221,7 +238,7 @@ std::set<int> find_all_beside(Scene& scene, const SceneRoot& root) {
   for (const int i : scene.input) {
     View& view = scene.views[static_cast<size_t>(i)];
     if (view.image_path.empty() || !view.depth_path.empty()) continue;
-    const std::string why = find_depth_beside(view, root, uses);
+    const std::string why = find_depth_beside(scene, view, root, uses);
     if (why.empty()) continue;
     scene.warnings.push_back("the depth beside view " + printable(view.name) +
                              " is not used: " + why);
@@ -251,6 +268,24 @@ DepthMap resampled(const Raster<float>& values, const View& view) {
     }
   }
   return out;
+}
+
+// Depth maps of COLMAP are in units of the scene, and more photographs than these may have shaped
+// them.
+void check_colmap_maps(Scene& scene, const DepthOptions& options) {
+  const auto is_map = [&](int i) {
+    return is_colmap_depth_name(scene.views[static_cast<size_t>(i)].depth_path);
+  };
+  if (std::none_of(scene.input.begin(), scene.input.end(), is_map)) return;
+  if (options.kind == DepthKind::Metric || options.scale > 0) {
+    throw InvalidInput(
+        "depth maps of COLMAP are in units of the scene, not in metres: leave --depth-kind metric "
+        "and --depth-scale out; --known-distance or --assume-unit tell the scale");
+  }
+  if (scene.held_out.empty()) return;
+  scene.warnings.emplace_back(
+      "depth maps of COLMAP are used; if held-out photographs were among those it made them from, "
+      "figures on these flatter");
 }
 
 // Of two photographs with one file of depth, it belongs to one at most.
@@ -304,9 +339,11 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
   if (count == 0 && !options.folder.empty()) {
     throw BadInput(Defect::Missing,
                    options.folder,
-                   "holds no depth named as an input photograph: .exr .pfm .npy .npz .tif or .png");
+                   "holds no depth named as an input photograph: .exr .pfm .npy .npz .tif .png, or "
+                   ".geometric.bin of COLMAP");
   }
   if (count == 0) return;
+  check_colmap_maps(scene, options);
   std::vector<std::string> lacking;
   for (const int i : scene.input) {
     if (has_depth(i) || explained.contains(i)) continue;
@@ -324,6 +361,7 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
 
 void load_given_depth(const Scene& scene, View& view, const ImageSize& photograph) {
   if (view.depth_path.empty()) return;
+  refuse_map_of_distorted(view);
   StoredSamples file = read_depth_file(view.depth_path);
   const fs::path confidence = confidence_file(scene, view, true);
   if (!confidence.empty()) drop_low_confidence(confidence, file.values);

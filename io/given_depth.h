@@ -23,11 +23,12 @@ struct DepthOptions {
 
 /// Gives every view that has a photograph the file with its depth, if there is one: in the folder
 /// of the options, else where the layout of the scene says, else in a folder "depth" beside that of
-/// the photograph, or in it. There only input views get one, and a file that cannot be used (of
-/// colours, of another shape, damaged) becomes a warning, as do input views that have none while
-/// others do.
-/// \throws BadInput Missing (the folder of the options holds no file for an input view), Path,
-///         Ref (one file for two views)
+/// the photograph, or in it, else in stereo/depth_maps of COLMAP's layout. In these three only
+/// input views get one, and a file that cannot be used (of colours, of another shape, damaged)
+/// becomes a warning, as do input views that have none while others do. \throws BadInput Missing
+/// (the folder of the options holds no file for an input view), Path,
+///         Ref (one file for two views); InvalidInput where the options say that depth maps of
+///         COLMAP, which are in units of the scene, are in metres
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external);
 
 /// Reads the depth of a view at the size of its camera, which has no distortion. In Polycam's
@@ -39,7 +40,8 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
 /// of both sides of a depth edge never mix. A photograph that is stored turned may come with depth
 /// that is turned or upright.
 /// \param photograph  size of the photograph, upright [pixels]
-/// \throws BadInput Mismatch for another shape, and as read_depth_file(); LimitError
+/// Depth maps of COLMAP, of undistorted pictures, do not go with a photograph that has distortion.
+/// \throws BadInput Mismatch for another shape or such a map, and as read_depth_file(); LimitError
 void load_given_depth(const Scene& scene, View& view, const ImageSize& photograph);
 
 }  // namespace cgs

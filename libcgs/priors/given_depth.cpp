@@ -175,9 +175,11 @@ class Fitter {
         out_.metres_per_unit = metres;
         out_.metres_sigma = sigma * metres;
       }
-      out_.remarks.push_back("depth files: metric, " + number(1 / world_scale()) +
-                             " m per scene unit, " + percent(scale_->scatter) +
-                             " from what the photographs show");
+      out_.remarks.push_back("depth files: " +
+                             (is_told
+                                  ? "metric, " + number(1 / world_scale()) + " m per scene unit, "
+                                  : std::string("in units of the scene, ")) +
+                             percent(scale_->scatter) + " from what the photographs show");
       const bool is_other = frame.has_metric_scale() && is_told &&
                             std::abs(std::log(frame.metres_per_unit / metres)) > kSigmas * sigma;
       if (is_other) {

@@ -257,6 +257,47 @@ TEST_F(SphereFrames, OfCamerasThatStandStillTellNoScale) {
   EXPECT_FALSE(out.frame.has_metric_scale());
 }
 
+// COLMAP's depth is in units of its cameras, whatever these are.
+TEST_F(SphereFrames, OfColmapAreFusedInUnitsOfTheirCamerasAndTellNoScale) {
+  constexpr double kUnits = 3;  // per metre
+  for (int i = 0; i < kFrames; ++i) {
+    for (int r = 0; r < 3; ++r) {
+      json& value = document_["frames"][size_t(i)]["transform_matrix"][r][3];
+      value = kUnits * value.get<double>();
+    }
+    std::string map = std::to_string(kWidth) + "&" + std::to_string(kHeight) + "&1&";
+    for (const float z : views_[size_t(i)].depth.data) {
+      map += test::packed(z > 0 ? float(kUnits) * z : 0.0f);
+    }
+    test::write_bytes(dir_ / "maps" / (name(i) + ".png.geometric.bin"), map);
+  }
+  test::write_bytes(dir_ / "transforms.json", document_.dump());
+  for (const char* unit : {"", "mm"}) {
+    DepthFusionRequest colmap = request();
+    colmap.options.depth.folder = dir_ / "maps";
+    colmap.assume_unit = unit;
+    colmap.voxel_size = "";
+    const DepthFusion out = fuse_depth(colmap, {});
+    EXPECT_TRUE(out.warnings.empty()) << out.warnings.front();
+    EXPECT_LT(out.disagreement, 0.01);
+    EXPECT_EQ(out.frame.metres_per_unit, unit[0] == 'm' ? 0.001 : 0);
+    for (const auto& v : open_surface(out.fused.volume, {}).vertices) {
+      const Vector3d p = out.frame.world_from_internal(v.cast<double>());
+      ASSERT_NEAR((p - kUnits * kCenter).norm(), kUnits * kRadius, 0.03);
+    }
+  }
+  for (json& frame : document_["frames"]) {
+    for (int r = 0; r < 3; ++r) {
+      frame["transform_matrix"][r][3] = 1.3 * frame["transform_matrix"][r][3].get<double>();
+    }
+  }
+  test::write_bytes(dir_ / "transforms.json", document_.dump());
+  DepthFusionRequest wrong = request();
+  wrong.options.depth.folder = dir_ / "maps";
+  wrong.voxel_size = "";
+  EXPECT_EQ(test::defect_of([&] { (void)fuse_depth(wrong, {}); }), "MISMATCH");
+}
+
 TEST_F(SphereFrames, AreRefusedWhereTheirDepthCannotBeFused) {
   const auto refused = [](const DepthFusionRequest& bad) {
     return test::defect_of([&] { (void)fuse_depth(bad, {}); });

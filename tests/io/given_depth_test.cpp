@@ -48,15 +48,31 @@ class GivenDepthFiles : public testing::Test {
     test::write_bytes(dir_ / name, test::npy("<f4", shape, values));
   }
 
+  /// The same as COLMAP writes it.
+  void write_map(const std::string& name,
+                 int width,
+                 int height,
+                 const std::function<double(double, double)>& f) {
+    write("map", width, height, f);
+    const std::string array = test::read_bytes(dir_ / "map");
+    const size_t bytes = sizeof(float) * size_t(width) * size_t(height);
+    test::write_bytes(dir_ / name,
+                      std::to_string(width) + "&" + std::to_string(height) + "&1&" +
+                          array.substr(array.size() - bytes));
+  }
+
   View first(SceneOptions options = {}) {
     Scene scene = read_scene(dir_.path(), options);
     warnings_ = scene.warnings.size();
+    all_warnings_ = "";
+    for (const std::string& warning : scene.warnings) all_warnings_ += warning + "\n";
     load_images(scene, scene.input);
     return scene.views[0];
   }
 
   test::TempDir dir_;
   size_t warnings_ = 0;
+  std::string all_warnings_;
 };
 
 double ramp(double u, double v) { return 2 + 0.005 * u + 0.01 * v; }
@@ -171,6 +187,61 @@ TEST_F(GivenDepthFiles, OfAnotherShapeAreRefusedOrLeftOut) {
   expect_unusable("PATH");
 }
 
+TEST_F(GivenDepthFiles, MapsOfColmapAreFoundInItsWorkspace) {
+  const std::string maps = "stereo/depth_maps/";
+  write_map(maps + "v1.png.photometric.bin", kWidth, kHeight, ramp);
+  write_map(maps + "v2.png.photometric.bin", kWidth, kHeight, ramp);
+  View view = first();
+  EXPECT_EQ(warnings_, 0u) << all_warnings_;
+  EXPECT_NEAR(view.given_depth(20, 10), ramp(20.5, 10.5), 1e-6);
+  EXPECT_FALSE(view.depth_states_metres);
+  // Maps that views agree on come first; COLMAP may have worked at another size.
+  write_map(maps + "v1.png.geometric.bin", kWidth / 2, kHeight / 2, [](double u, double v) {
+    return 2 * ramp(u, v);
+  });
+  view = first();
+  EXPECT_NEAR(view.given_depth(20, 10), 2 * ramp(20.5, 10.5), 1e-5);
+  SceneOptions options;
+  options.depth.folder = dir_ / maps;
+  EXPECT_NEAR(first(options).given_depth(20, 10), 2 * ramp(20.5, 10.5), 1e-5);
+  // What somebody put beside the photographs counts more.
+  write("depth/v1.npy", kWidth, kHeight, [](double, double) { return 7; });
+  EXPECT_EQ(first().given_depth(20, 10), 7);
+  std::filesystem::remove(dir_ / "depth/v1.npy");
+  test::write_bytes(dir_ / maps / "v1.png.geometric.bin", "64&48&1&");
+  EXPECT_TRUE(first().given_depth.empty()) << "what is damaged becomes a warning";
+  EXPECT_NE(all_warnings_.find("COUNT"), std::string::npos) << all_warnings_;
+}
+
+TEST_F(GivenDepthFiles, MapsOfColmapAreNotInMetres) {
+  write_map("stereo/depth_maps/v1.png.geometric.bin", kWidth, kHeight, ramp);
+  write_map("stereo/depth_maps/v2.png.geometric.bin", kWidth, kHeight, ramp);
+  SceneOptions options;
+  options.depth.kind = DepthKind::Metric;
+  EXPECT_THROW((void)first(options), InvalidInput);
+  options = {};
+  options.depth.scale = 1000;
+  EXPECT_THROW((void)first(options), InvalidInput);
+}
+
+TEST_F(GivenDepthFiles, MapsOfColmapMayComeFromPhotographsThatAreHeldOut) {
+  std::string images;
+  for (const int i : {1, 2, 3}) {
+    const std::string name = "v" + std::to_string(i) + ".png";
+    images += std::to_string(i) + " 1 0 0 0 " + std::to_string(i) + " 0 0 1 " + name + "\n\n";
+    test::write_bytes(dir_ / "images" / name, test::rgb_png(kWidth, kHeight, i));
+    write_map("stereo/depth_maps/" + name + ".geometric.bin", kWidth, kHeight, ramp);
+  }
+  test::write_bytes(dir_ / "sparse/0/images.txt", images);
+  (void)first();
+  EXPECT_EQ(warnings_, 0u);
+  SceneOptions options;
+  options.views = "v1,v2";
+  (void)first(options);
+  ASSERT_EQ(warnings_, 1u);
+  EXPECT_NE(all_warnings_.find("held-out"), std::string::npos) << all_warnings_;
+}
+
 TEST_F(GivenDepthFiles, AFileIsTheDepthOfOnePhotograph) {
   // A rig: two folders with the same names.
   std::string images;
@@ -228,6 +299,15 @@ TEST_F(DistortedGivenDepth, LosesTheDistortionAsThePhotographDoes) {
     }
   }
   EXPECT_GT(known, kWidth * kHeight * 9 / 10);
+}
+
+TEST_F(DistortedGivenDepth, IsNoneOfColmapsUndistortedPictures) {
+  write_map("stereo/depth_maps/v1.png.geometric.bin", kWidth, kHeight, ramp);
+  EXPECT_TRUE(first().given_depth.empty());
+  EXPECT_NE(all_warnings_.find("undistorted"), std::string::npos) << all_warnings_;
+  SceneOptions options;
+  options.depth.folder = dir_ / "stereo/depth_maps";
+  EXPECT_EQ(test::defect_of([&] { (void)first(options); }), "MISMATCH");
 }
 
 class FisheyeGivenDepth : public GivenDepthFiles {
