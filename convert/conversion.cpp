@@ -421,7 +421,7 @@ std::string conversion_table() {
          "model folder of train or run         yes              yes      yes, its own cameras\n"
          ".vdb of fuse, run or convert         no               no       yes\n"
          ".ply with faces, .obj, .stl, .off,\n"
-         "  .glb with triangles                no               no       yes\n"
+         "  .3mf, .glb with triangles          no               no       yes\n"
          "Where the ending can be both, .ply stays splats and .glb becomes a mesh; --as mesh and\n"
          "--as splats say otherwise. .stl and .3mf need a known scale, or --assume-unit.\n";
 }

@@ -144,9 +144,15 @@ std::string disagreement_words(const DepthAgreement& agreement, const Frame& fra
 }
 
 // Depth in units of the cameras has no scale to find: it fits as it is, or is of other cameras.
-void judge_fit(const DepthAgreement& agreement, const Scene& scene) {
+void judge_fit(const DepthAgreement& agreement,
+               const Scene& scene,
+               std::vector<std::string>& warnings) {
   constexpr double kMost = 0.05;
-  if (std::isnan(agreement.off) || agreement.off <= kMost) return;
+  if (std::isnan(agreement.off)) {
+    warnings.emplace_back("no two frames show the same, as they are placed");
+    return;
+  }
+  if (agreement.off <= kMost) return;
   throw BadInput(Defect::Mismatch,
                  scene.folder,
                  "frames disagree by " + percent(agreement.off) +
@@ -214,7 +220,7 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   if (tells_metres(scene)) {
     judge_scale(agreement, scene, is_said, out.frame, out.warnings);
   } else {
-    judge_fit(agreement, scene);
+    judge_fit(agreement, scene, out.warnings);
   }
   TsdfOptions fusing;
   if (!request.voxel_size.empty()) {

@@ -116,10 +116,10 @@ std::map<std::string, double> deviations_of_files(const Surfaces& fused,
   const TriangleMesh read = read_mesh_ply(folder / "watertight.ply", frame).mesh;
   out["watertight.ply"] = surface_deviation(read, fused.closed.mesh).max();
   for (const Json& file : written.files["files"]) {
-    if (file != "watertight.stl") continue;
+    const auto name = file.get<std::string>();
+    if (name != "watertight.stl" && name != "watertight.3mf") continue;
     // The same mesh: it is as far off, and what its vertices were rounded by.
-    out["watertight.stl"] =
-        out["watertight.ply"] + vertex_moves(folder / "watertight.stl", read, frame);
+    out[name] = out["watertight.ply"] + vertex_moves(folder / name, read, frame);
   }
   return out;
 }

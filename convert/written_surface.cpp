@@ -12,6 +12,7 @@
 #include "io/mesh_file.h"
 #include "io/scene_path.h"
 #include "io/stl_reader.h"
+#include "io/threemf_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
 #include "meshing/mesh_distance.h"
@@ -65,9 +66,9 @@ void add_distances(const TriangleMesh& from, const TriangleMesh& to, SurfaceDevi
   out.places += distances.size();
 }
 
-// The corners of an STL file of ours, turned and scaled back.
-TriangleMesh read_turned_stl(const std::filesystem::path& file, const Frame& frame) {
-  const ParsedMesh parsed = read_stl(file);
+// The corners of an STL or 3MF file of ours, turned and scaled back.
+TriangleMesh read_turned(const std::filesystem::path& file, const Frame& frame) {
+  const ParsedMesh parsed = lower_extension(file) == ".stl" ? read_stl(file) : read_3mf(file);
   const Eigen::Matrix3d file_from_turned = z_up_from(frame.up).transpose();
   TriangleMesh out;
   out.faces = parsed.mesh.faces;
@@ -99,9 +100,9 @@ TriangleMesh fused_surface(const std::filesystem::path& volume, size_t memory_li
 double vertex_moves(const std::filesystem::path& file,
                     const TriangleMesh& mesh,
                     const Frame& frame) {
-  const bool by_corner = lower_extension(file) == ".stl";
+  const bool by_corner = lower_extension(file) == ".stl" || lower_extension(file) == ".3mf";
   const TriangleMesh read =
-      by_corner ? read_turned_stl(file, frame) : read_mesh_file(file, frame).content.mesh;
+      by_corner ? read_turned(file, frame) : read_mesh_file(file, frame).content.mesh;
   if (read.faces.size() != mesh.faces.size() ||
       (!by_corner && read.vertices.size() != mesh.vertices.size())) {
     throw BadInput(Defect::Count,

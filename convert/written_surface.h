@@ -28,7 +28,7 @@ SurfaceDeviation surface_deviation(const TriangleMesh& written, const TriangleMe
 TriangleMesh fused_surface(const std::filesystem::path& volume, size_t memory_limit);
 
 /// The largest distance of a vertex from where it was, of files with the same vertices in the same
-/// order (PLY, OBJ) or, for STL as write_mesh_files() wrote it, of a corner of a face
+/// order (PLY, OBJ) or, for STL and 3MF as write_mesh_files() wrote them, of a corner of a face
 /// [internal units]. What the mesh deviates by, the file deviates by this more at most.
 /// \throws BadInput, also if the file has other numbers of vertices or faces
 double vertex_moves(const std::filesystem::path& file,

@@ -12,6 +12,7 @@
 #include "io/ply_frame.h"
 #include "io/scene_path.h"
 #include "io/stl_reader.h"
+#include "io/threemf_reader.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -32,12 +33,16 @@ ParsedMesh parse(const std::filesystem::path& path, Eigen::Vector3d& up) {
     up = Eigen::Vector3d::UnitZ();  // no rule of the format, but of the programs that print it
     return read_stl(path);
   }
+  if (extension == ".3mf") {
+    up = Eigen::Vector3d::UnitZ();
+    return read_3mf(path);
+  }
   if (extension == ".off") return read_off(path);
   throw BadInput(Defect::Unsupported,
                  path,
                  "'" + extension +
                      "' is not a mesh format that is read; known are .ply, .obj, "
-                     ".stl, .off and .glb");
+                     ".stl, .off, .3mf and .glb");
 }
 
 // Three corners in one place or on one line: no area. Others keep such faces, so do we.
@@ -55,7 +60,7 @@ size_t faces_without_area(const MeasurableMesh& content) {
 
 bool is_mesh_name(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
-  const auto known = {".ply", ".obj", ".stl", ".off", ".glb"};
+  const auto known = {".ply", ".obj", ".stl", ".off", ".3mf", ".glb"};
   return std::find(known.begin(), known.end(), extension) != known.end();
 }
 

@@ -16,11 +16,12 @@ struct MeasurableFile {
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
 };
 
-/// True for the endings that read_mesh_file() takes: .ply, .obj, .stl, .off, .glb, in any case.
+/// True for the endings that read_mesh_file() takes: .ply, .obj, .stl, .off, .3mf, .glb, in any
+/// case.
 bool is_mesh_name(const std::filesystem::path& path);
 
-/// Reads a mesh or point cloud that we or others wrote, as PLY, OBJ, STL, OFF or
-/// binary glTF.
+/// Reads a mesh or point cloud that we or others wrote, as PLY, OBJ, STL, OFF, 3MF
+/// or binary glTF.
 ///
 /// Coordinates stay double from the file to the canonical frame, so that a far-away origin costs
 /// no digit.

@@ -185,7 +185,8 @@ void add_compare(CLI::App& app) {
   auto args = std::make_shared<CompareArgs>();
   auto* cmd = app.add_subcommand(
       "compare", "Signed distances of a mesh or point cloud to a mesh, and what really changed");
-  cmd->add_option("a", args->a, "Mesh or point cloud: .ply, .obj, .stl, .off, .glb")->required();
+  cmd->add_option("a", args->a, "Mesh or point cloud: .ply, .obj, .stl, .off, .3mf, .glb")
+      ->required();
   cmd->add_option("b",
                   args->b,
                   "Mesh to measure from (with --m3c2 also a cloud): reference, or the earlier date")

@@ -332,7 +332,7 @@ void add_info(CLI::App& app) {
   cmd->add_option(
          "scene",
          args->scene.path,
-         "Folder of a scene, as for run, a mesh (.ply, .obj, .stl, .off, .glb), which gets a "
+         "Folder of a scene, as for run, a mesh (.ply, .obj, .stl, .off, .3mf, .glb), which gets a "
          "certificate, or splats (.ply, .spz, .splat, .sog, .ksplat, .glb)")
       ->required();
   add_scene_options(*cmd, args->scene.options);

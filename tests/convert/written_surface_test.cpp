@@ -68,7 +68,7 @@ TEST(VertexMoves, AreTheRoundingOfEachFormat) {
   frame.up = Eigen::Vector3d(0.3, -1, 0.2).normalized();
   write_mesh_files(dir.path(), mesh, mesh, frame);
   write_obj(dir / "watertight.obj", mesh, frame);
-  for (const char* name : {"surface.ply", "watertight.stl", "watertight.obj"}) {
+  for (const char* name : {"surface.ply", "watertight.stl", "watertight.3mf", "watertight.obj"}) {
     EXPECT_LT(vertex_moves(dir / name, mesh, frame), 1e-6) << name;
     TriangleMesh moved = mesh;
     moved.vertices[20].x() += 0.003f;

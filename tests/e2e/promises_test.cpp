@@ -99,7 +99,7 @@ TEST(MaxError, IsKeptByEveryMeshFile) {
   }
   const json mesh = result_of(out, "mesh")["promise"];
   EXPECT_NEAR(mesh["promised"].get<double>(), 0.12, 1e-12);
-  for (const char* file : {"surface.ply", "watertight.ply", "watertight.stl"}) {
+  for (const char* file : {"surface.ply", "watertight.ply", "watertight.stl", "watertight.3mf"}) {
     EXPECT_LE(mesh["files"][file].get<double>(), 0.108) << file;
   }
   const json asset = result_of(out, "web")["asset.glb"]["deviation"];

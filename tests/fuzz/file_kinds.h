@@ -20,6 +20,8 @@ struct FileKind {
   bool is_isolated = false;  ///< Decoded in a child process, where a fuzzer sees nothing.
 };
 
+std::vector<FileKind> asset_kinds();  ///< Of splats and meshes.
+
 /// All kinds, each with its valid file.
 const std::vector<FileKind>& file_kinds();
 

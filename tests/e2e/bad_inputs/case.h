@@ -14,7 +14,8 @@ namespace cgs::test {
 struct Call {
   std::vector<std::string> arguments;
   std::function<void()> read;
-  uint64_t disk_bytes = 0;  ///< No file may grow larger, as on a full disk; 0 = no limit.
+  uint64_t disk_bytes = 0;     ///< No file may grow larger, as on a full disk; 0 = no limit.
+  bool has_no_rights = false;  ///< Root becomes nobody first.
 };
 
 /// One bad input. `make` writes it below a fresh folder and says how to use it; whatever the call
@@ -43,13 +44,6 @@ Cases output_cases();      ///< E: the environment, and files a run left behind
 Cases mesh_cases();        ///< B, M: glTF, STL, OBJ, 3MF
 Cases depth_cases();       ///< D: depth files; masks
 Cases checkpoint_cases();  ///< K: the state of unfinished work
-
-/// Rows of the matrix that nothing here can meet yet, with the reason.
-struct LeftOut {
-  std::string rows;  ///< "B01 B02 …"
-  std::string reason;
-};
-std::vector<LeftOut> left_out_rows();
 
 /// What is wrong with the way a case ends; empty if it ends as it should.
 std::string verdict(const Case& bad);

@@ -138,11 +138,30 @@ void add_archives(Cases& cases) {
   npz("N12", "bzip2", "UNSUPPORTED", good, {.method = 12});
 }
 
+void add_colmap_maps(Cases& cases) {
+  std::string values;
+  for (int i = 0; i < kWidth * kHeight; ++i) values += packed(1.5f);
+  const std::string size = std::to_string(kWidth) + "&" + std::to_string(kHeight) + "&";
+  const auto map = [&](const char* row, const std::string& expected, const std::string& bytes) {
+    cases.push_back(
+        depth_case(row, "\"" + bytes.substr(0, 16) + "\"", expected, ".png.geometric.bin", bytes));
+  };
+  map("C28", "OK|OK+W", size + "1&" + values);
+  map("C28", "COUNT", "99999&99999&1&" + values.substr(0, 12));
+  map("C28", "COUNT", "4294967295&4294967295&1&" + values);
+  map("C28", "COUNT", size + "1&" + values + values);
+  map("C28", "SCHEMA", size + "3&" + values + values + values);
+  for (const char* start : {"0&0&0&", "-5&4&1&", "5&4&1", "5&4", "5.5&4&1&", "&&&", "5;4;1;"}) {
+    map("C29", "SYNTAX", start + values);
+  }
+}
+
 }  // namespace
 
 Cases depth_cases() {
   Cases cases;
   add_archives(cases);
+  add_colmap_maps(cases);
   add_values(cases);
   add_sizes(cases);
   return cases;

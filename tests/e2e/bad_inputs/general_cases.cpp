@@ -1,20 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <clocale>
+#include <cstdlib>
 #include <fstream>
+#include <map>
+#include <stdexcept>
 #include <thread>
 
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "io/cameras_json.h"
+#include "io/depth_file.h"
 #include "io/exr.h"
 #include "io/gaussian_ply.h"
+#include "io/mesh_file.h"
 #include "io/mesh_ply.h"
 #include "io/scene_reader.h"
 #include "io/splat_glb.h"
 #include "io/splat_glb_reader.h"
 #include "io/vdb.h"
 #include "tests/e2e/bad_inputs/valid_inputs.h"
+#include "tests/support/run_cgs.h"
 #include "tests/support/sample_splats.h"
+#include "tests/support/threemf_file.h"
 
 namespace cgs::test {
 
@@ -95,9 +102,31 @@ std::vector<Target> targets() {
              const fs::path file = folder / "splats.glb";
              (void)parse_splat_glb(read_file(file), file);
            }},
-          {"mesh", "mesh.ply", true, write_mesh, [](const fs::path& folder) {
-             (void)read_mesh_ply(folder / "mesh.ply");
-           }}};
+          {"mesh",
+           "mesh.ply",
+           true,
+           write_mesh,
+           [](const fs::path& folder) { (void)read_mesh_ply(folder / "mesh.ply"); }},
+          {"npz",
+           "depth.npz",
+           false,
+           [](const fs::path& folder) {
+             const std::string array = npy("<f4", "(2, 3)", std::string(24, '\1'));
+             write_bytes(folder / "depth.npz", zip_bytes({{"a.npy", array}}, {.method = 8}));
+           },
+           [](const fs::path& folder) { (void)read_depth_file(folder / "depth.npz"); }},
+          {"COLMAP depth",
+           "a.jpg.geometric.bin",
+           false,
+           [](const fs::path& folder) {
+             write_bytes(folder / "a.jpg.geometric.bin", "3&2&1&" + std::string(24, '\1'));
+           },
+           [](const fs::path& folder) { (void)read_depth_file(folder / "a.jpg.geometric.bin"); }},
+          {"3MF",
+           "mesh.3mf",
+           false,
+           [](const fs::path& folder) { write_bytes(folder / "mesh.3mf", ThreeMfFile().bytes()); },
+           [](const fs::path& folder) { (void)read_mesh_file(folder / "mesh.3mf"); }}};
 }
 
 constexpr const char* kAnyRefusal =
@@ -108,31 +137,47 @@ constexpr const char* kAnyRefusal =
 class PerTarget {
  public:
   explicit PerTarget(Cases& cases) : cases_(cases) {}
+  using Change = std::function<void(const fs::path& file)>;
+  using Applies = std::function<bool(const Target&)>;
+
   void add(
       const std::string& row,
       const std::string& damage,
       const std::string& expected,
-      const std::function<void(const fs::path& file)>& change,
-      const std::function<bool(const Target&)>& applies = [](const Target&) { return true; }) {
+      const Change& change,
+      const Applies& applies = [](const Target&) { return true; }) {
+    add_all(row, damage, expected, change, applies, false);
+  }
+  void add_without_rights(const std::string& row,
+                          const std::string& damage,
+                          const std::string& expected,
+                          const Change& change) {
+    add_all(
+        row, damage, expected, change, [](const Target&) { return true; }, true);
+  }
+
+ private:
+  void add_all(const std::string& row,
+               const std::string& damage,
+               const std::string& expected,
+               const Change& change,
+               const Applies& applies,
+               bool has_no_rights) {
     for (const Target& target : targets()) {
       if (!applies(target)) continue;
       std::vector<std::string> words;
       if (expected.find("OK") == std::string::npos) {
         words.push_back(fs::path(target.file).filename().string());
       }
-      cases_.push_back({row,
-                        target.name + ": " + damage,
-                        expected,
-                        words,
-                        [target, change](const fs::path& folder) {
-                          target.write(folder);
-                          change(folder / target.file);
-                          return Call{{}, [=] { target.read(folder); }};
-                        }});
+      cases_.push_back(
+          {row, target.name + ": " + damage, expected, words, [=](const fs::path& folder) {
+             target.write(folder);
+             change(folder / target.file);
+             return Call{{}, [=] { target.read(folder); }, 0, has_no_rights};
+           }});
     }
   }
 
- private:
   Cases& cases_;
 };
 
@@ -168,11 +213,9 @@ void add_odd_files(PerTarget& each) {
     fs::remove(file);
     fs::create_symlink(file.filename(), file);
   });
-  if (::geteuid() != 0) {
-    each.add("G05", "no permission", "OPEN", [](const fs::path& file) {
-      fs::permissions(file, fs::perms::none);
-    });
-  }
+  each.add_without_rights("G05", "no permission", "OPEN", [](const fs::path& file) {
+    fs::permissions(file, fs::perms::none);
+  });
 }
 
 void add_foreign_content(PerTarget& each) {
@@ -184,7 +227,14 @@ void add_foreign_content(PerTarget& each) {
           "Git LFS pointer",
           "version https://git-lfs.github.com/spec/v1\noid sha256:0123\nsize 12345\n");
   content("G11", "gzip", std::string("\x1f\x8b\x08\0\0\0\0\0\0\x03", 10) + std::string(40, 'x'));
-  content("G11", "zip", std::string("PK\x03\x04", 4) + std::string(60, '\0'));
+  each.add(
+      "G11",
+      "zip",
+      "MAGIC",
+      [](const fs::path& file) {
+        write_bytes(file, std::string("PK\x03\x04", 4) + std::string(60, '\0'));
+      },
+      [](const Target& t) { return t.name != "npz" && t.name != "3MF"; });
   each.add(
       "G08",
       "PNG bytes",
@@ -323,6 +373,57 @@ void add_names(Cases& cases) {
                    }});
 }
 
+// German numbers have a decimal comma and points between thousands.
+void use_german_locale(const fs::path& folder) {
+  const fs::path made = folder / "locales/de_DE.UTF-8";
+  fs::create_directories(made.parent_path());
+  const std::string command = "localedef -i de_DE -f UTF-8 '" + made.string() + "' >/dev/null 2>&1";
+  (void)!std::system(command.c_str());  // warnings count as failure; what it made is asked below
+  ::setenv("LOCPATH", made.parent_path().c_str(), 1);
+  ::setenv("LC_ALL", "de_DE.UTF-8", 1);
+  const char* const is_there = std::setlocale(LC_ALL, "");
+  const bool has_comma = is_there != nullptr && *std::localeconv()->decimal_point == ',';
+  std::setlocale(LC_ALL, "C");
+  if (!has_comma) throw std::runtime_error("needs the Debian package locales");
+}
+
+// The files of a run, without those that state times.
+std::map<std::string, std::string> results(const fs::path& folder) {
+  std::map<std::string, std::string> out;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string name = fs::relative(entry.path(), folder);
+    const bool has_times = name == "report.html" || name == "report.json" || name == "run.json";
+    if (entry.is_regular_file() && !has_times) out[name] = read_bytes(entry.path());
+  }
+  return out;
+}
+
+// The program gives the same bytes wherever its user lives.
+void add_locale(Cases& cases) {
+  cases.push_back({"G17", "a decimal comma", "OK", {}, [](const fs::path& folder) {
+                     write_colmap_text_scene(folder);
+                     return Call{{}, [folder] {
+                                   const auto run = [&](const std::string& name) {
+                                     const fs::path out = folder / "runs" / name;
+                                     const ProgramResult ended =
+                                         run_cgs("run " + (folder / "scene").string() +
+                                                 " --assume-unit cm -q -o " + out.string());
+                                     if (ended.exit_code != 0) throw std::runtime_error(ended.err);
+                                     return results(out);
+                                   };
+                                   const auto plain = run("plain");
+                                   use_german_locale(folder);
+                                   const auto german = run("german");
+                                   if (plain.size() < 20) throw std::runtime_error("few files");
+                                   for (const auto& [name, bytes] : plain) {
+                                     if (german.count(name) == 1 && german.at(name) == bytes)
+                                       continue;
+                                     throw std::runtime_error("another " + name);
+                                   }
+                                 }};
+                   }});
+}
+
 }  // namespace
 
 Cases general_cases() {
@@ -335,15 +436,8 @@ Cases general_cases() {
   add_text(each);
   add_shrinking(cases);
   add_names(cases);
+  add_locale(cases);
   return cases;
-}
-
-std::vector<LeftOut> left_out_rows() {
-  std::vector<LeftOut> rows = {{"G17", "no function of the program asks for a locale"},
-                               {"C28 C29", "COLMAP's depth maps are not read"},
-                               {"M09 M10 M11 M12 M13", "3MF is written, not read"}};
-  if (::geteuid() == 0) rows.push_back({"G05", "root may read every file"});
-  return rows;
 }
 
 }  // namespace cgs::test

@@ -6,6 +6,7 @@
 #include "libcgs/core/error.h"
 #include "tests/e2e/bad_inputs/valid_inputs.h"
 #include "tests/support/sample_mesh.h"
+#include "tests/support/threemf_file.h"
 #include "tests/support/triangle_glb.h"
 
 namespace cgs::test {
@@ -269,6 +270,89 @@ void add_obj(Cases& cases) {
   obj("M08", "a face of a million corners", "OK+W", vertices + polygon + "\n");
 }
 
+void add_3mf(Cases& cases) {
+  using File = ThreeMfFile;
+  const auto bytes = [&](const char* row,
+                         const std::string& damage,
+                         const std::string& expected,
+                         const std::string& content) {
+    cases.push_back(file_case(row, damage, expected, "m.3mf", content));
+  };
+  const auto changed = [&](const char* row,
+                           const std::string& damage,
+                           const std::string& expected,
+                           const std::function<void(File&)>& change,
+                           const ZipDamage& archive = {.method = 8}) {
+    File file;
+    change(file);
+    bytes(row, damage, expected, file.bytes(archive));
+  };
+  const auto nothing = [](File&) {};
+  changed("M09", "untouched twin", "OK", nothing);
+  changed("M11", "64-bit sizes that are right", "OK", nothing, {.method = 8, .is_64_bits = true});
+  const std::string zeros(size_t{50} << 20, ' ');
+  changed("M09", "a model of 50 MB of blanks and another", "LIMIT", [&](File& file) {
+    file.build += zeros;
+    file.more_files = {{"3D/b.model", zeros}};
+  });
+  changed("M09",
+          "65 536 files",
+          "LIMIT",
+          [](File& file) {
+            for (int i = 0; i < 65536; ++i) file.more_files.emplace_back(std::to_string(i), "");
+          },
+          {.is_64_bits = true});
+  for (const char* name : {"../../.bashrc", "/etc/passwd", "..\\..\\.bashrc", "3D/../../x"}) {
+    changed("M10", std::string("a file ") + name, "PATH", [&](File& file) {
+      file.more_files = {{name, "alias ls=rm"}};
+    });
+  }
+  changed("M10", "the model at ../x", "PATH", [](File& file) { file.target = "/3D/../../x"; });
+  changed("M10", "a part at ../x", "PATH", [](File& file) {
+    file.build = "<item objectid=\"1\" p:path=\"/../x\"/>";
+  });
+  for (const int64_t lie : {int64_t{-50}, int64_t{50}, int64_t{1} << 40}) {
+    changed("M11",
+            "64-bit sizes off by " + std::to_string(lie),
+            "COUNT",
+            nothing,
+            {.method = 8, .size_change = lie, .is_64_bits = true});
+  }
+  std::string laughs = "<!DOCTYPE model [<!ENTITY a0 \"ha\">";
+  for (int i = 1; i < 20; ++i) {
+    laughs += "<!ENTITY a" + std::to_string(i) + " \"";
+    for (int k = 0; k < 10; ++k) laughs += "&a" + std::to_string(i - 1) + ";";
+    laughs += "\">";
+  }
+  for (const std::string& before :
+       {std::string("<!DOCTYPE model SYSTEM \"http://localhost/a.dtd\">"),
+        std::string("<!DOCTYPE model [<!ENTITY e SYSTEM \"file:///etc/passwd\">]>"),
+        laughs + "]>"}) {
+    changed("M12", before.substr(0, 40), "UNSUPPORTED", [&](File& file) {
+      file.before = before;
+      file.build += "&e;&a19;";
+    });
+  }
+  changed("M13", "corner 4 of 4", "REF", [](File& file) {
+    file.resources.replace(file.resources.find("v3=\"3\""), 6, "v3=\"4\"");
+  });
+  changed("M13", "its own component", "REF", [](File& file) {
+    file.resources = File::object(1, File::components({{1, ""}}));
+  });
+  changed("M13", "a cycle of components", "REF", [](File& file) {
+    file.resources = File::object(1, File::components({{2, ""}})) +
+                     File::object(2, File::components({{3, ""}})) +
+                     File::object(3, File::components({{1, ""}}));
+  });
+  changed("M13", "components that multiply to 10^20", "LIMIT", [](File& file) {
+    for (int id = 2; id < 22; ++id) {
+      file.resources += File::object(
+          id, File::components(std::vector<std::pair<int, std::string>>(10, {id - 1, ""})));
+    }
+    file.build = "<item objectid=\"21\"/>";
+  });
+}
+
 }  // namespace
 
 Cases mesh_cases() {
@@ -280,6 +364,7 @@ Cases mesh_cases() {
   add_draco(cases);
   add_stl(cases);
   add_obj(cases);
+  add_3mf(cases);
   return cases;
 }
 

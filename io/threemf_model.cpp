@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/threemf_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "io/byte_reader.h"
+#include "io/text_lines.h"
+#include "io/xml_events.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr std::string_view kCore = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02|";
+constexpr std::string_view kPath =
+    "http://schemas.microsoft.com/3dmanufacturing/production/2015/06|path";
+
+// Extensions that a model may require: they leave the shape as the core says.
+constexpr std::array<std::string_view, 3> kHarmless = {
+    "http://schemas.microsoft.com/3dmanufacturing/material/2015/02",
+    "http://schemas.microsoft.com/3dmanufacturing/production/2015/06",
+    "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07"};
+
+std::string metres_of(const XmlElement& model) {
+  static const std::map<std::string_view, const char*> kUnits = {{"micron", "0.000001"},
+                                                                 {"millimeter", "0.001"},
+                                                                 {"centimeter", "0.01"},
+                                                                 {"inch", "0.0254"},
+                                                                 {"foot", "0.3048"},
+                                                                 {"meter", "1"}};
+  const std::string_view unit = model.find("unit").value_or("millimeter");
+  const auto known = kUnits.find(unit);
+  if (known != kUnits.end()) return known->second;
+  model.fail(Defect::Schema, "unit \"" + std::string(unit.substr(0, 40)) + "\" is not known");
+}
+
+// Twelve numbers; rows of a matrix that row vectors are multiplied with.
+Eigen::Affine3d transform_of(const XmlElement& element) {
+  Eigen::Affine3d out = Eigen::Affine3d::Identity();
+  const auto text = element.find("transform");
+  if (!text) return out;
+  const std::vector<std::string_view> words = tokens(*text);
+  if (words.size() != 12) {
+    element.fail(Defect::Schema,
+                 "a transform has 12 numbers, this one " + std::to_string(words.size()));
+  }
+  for (size_t i = 0; i < words.size(); ++i) {
+    double& value = out(static_cast<int>(i % 3), static_cast<int>(i / 3));
+    if (!parse_number(words[i], value)) element.fail(Defect::Syntax, "transform: no number");
+    if (!std::isfinite(value)) element.fail(Defect::Value, "transform: a number is not finite");
+  }
+  return out;
+}
+
+ThreeMfPlacement placement_of(const XmlElement& element) {
+  ThreeMfPlacement out;
+  out.part = element.find(kPath).value_or("");
+  out.object = element.count("objectid");
+  out.transform = transform_of(element);
+  return out;
+}
+
+/// Gathers a model from the elements of its file.
+class ModelReader {
+ public:
+  explicit ModelReader(const std::filesystem::path& path) : path_(path) {}
+
+  ThreeMfModel read(std::string_view xml) {
+    const XmlHandlers handlers = {
+        [&](const XmlElement& element) { start(element); },
+        [&](std::string_view name) { end(name); },
+        [&](std::string_view text) { add_text(text); },
+        [&](std::string_view prefix, std::string_view uri) { uris_[std::string(prefix)] = uri; }};
+    read_xml(xml, path_, handlers);
+    return std::move(model_);
+  }
+
+ private:
+  void start(const XmlElement& element) {
+    std::string_view name = element.name();
+    const bool is_core = name.starts_with(kCore);
+    if (is_core) name.remove_prefix(kCore.size());
+    if (!std::exchange(has_root_, true)) {
+      if (!is_core || name != "model") {
+        element.fail(Defect::Schema, "expected a <model> of 3MF core 2015/02");
+      }
+      model_.metres_per_unit = metres_of(element);
+      refuse_unknown_extensions(element);
+    } else if (is_core) {
+      start_core(name, element);
+    }
+  }
+
+  void start_core(std::string_view name, const XmlElement& element) {
+    if (name == "vertex") {
+      add_vertex(element);
+    } else if (name == "triangle") {
+      add_triangle(element);
+    } else if (name == "component") {
+      inside(element).components.push_back(placement_of(element));
+    } else if (name == "object") {
+      start_object(element);
+    } else if (name == "basematerials") {
+      const uint64_t id = element.count("id");
+      refuse_second(element, id);
+      names_ = &model_.material_names[id];
+    } else if (name == "base" && names_ != nullptr) {
+      names_->emplace_back(element.at("name"));
+    } else if (name == "item") {
+      model_.build.push_back(placement_of(element));
+    } else if (name == "metadata" && object_ == nullptr) {
+      const std::string_view key = element.at("name");
+      text_ = key == "Application"   ? &model_.application
+              : key == "Description" ? &model_.description
+                                     : nullptr;
+    }
+  }
+
+  void end(std::string_view name) {
+    if (!name.starts_with(kCore)) return;
+    name.remove_prefix(kCore.size());
+    if (name == "object") object_ = nullptr;
+    if (name == "basematerials") names_ = nullptr;
+    if (name == "metadata") text_ = nullptr;
+  }
+
+  void add_text(std::string_view text) {
+    constexpr size_t kLongest = 65536;
+    if (text_ != nullptr && text_->size() + text.size() <= kLongest) *text_ += text;
+  }
+
+  void refuse_unknown_extensions(const XmlElement& model) const {
+    for (const std::string_view prefix : tokens(model.find("requiredextensions").value_or(""))) {
+      const auto uri = uris_.find(std::string(prefix));
+      const std::string known = uri == uris_.end() ? "" : uri->second;
+      if (std::find(kHarmless.begin(), kHarmless.end(), known) != kHarmless.end()) continue;
+      model.fail(Defect::Unsupported,
+                 "requires the extension " + std::string(prefix.substr(0, 40)) +
+                     (known.empty() ? "" : " (" + known.substr(0, 100) + ")"));
+    }
+  }
+
+  void refuse_second(const XmlElement& element, uint64_t id) {
+    if (ids_.insert(id).second) return;
+    element.fail(Defect::Schema, "a second resource has the id " + std::to_string(id));
+  }
+
+  void start_object(const XmlElement& element) {
+    if (object_ != nullptr) element.fail(Defect::Schema, "stands inside another");
+    const uint64_t id = element.count("id");
+    refuse_second(element, id);
+    object_ = &model_.objects[id];
+    material_ = {};
+    if (!element.find("pid")) return;
+    material_.group = element.count("pid");
+    material_.index = element.find("pindex") ? element.count("pindex") : 0;
+  }
+
+  ThreeMfObject& inside(const XmlElement& element) const {
+    if (object_ == nullptr) element.fail(Defect::Schema, "stands outside of an object");
+    return *object_;
+  }
+
+  void add_vertex(const XmlElement& element) {
+    inside(element).vertices.emplace_back(
+        element.number("x"), element.number("y"), element.number("z"));
+  }
+
+  void add_triangle(const XmlElement& element) {
+    ThreeMfObject& object = inside(element);
+    std::array<uint32_t, 3> corners{};
+    const std::array<const char*, 3> names = {"v1", "v2", "v3"};
+    for (size_t k = 0; k < corners.size(); ++k) {
+      const uint64_t corner = element.count(names.at(k));
+      if (corner >= object.vertices.size()) {
+        element.fail(Defect::Ref,
+                     std::string(names.at(k)) + " names vertex " + std::to_string(corner) + " of " +
+                         std::to_string(object.vertices.size()));
+      }
+      corners.at(k) = static_cast<uint32_t>(corner);
+    }
+    ThreeMfMaterial material = material_;
+    if (element.find("pid")) material.group = element.count("pid");
+    if (element.find("p1")) material.index = element.count("p1");
+    object.triangles.push_back(corners);
+    object.materials.push_back(material);
+  }
+
+  const std::filesystem::path& path_;
+  ThreeMfModel model_;
+  std::map<std::string, std::string> uris_;  // by prefix
+  std::set<uint64_t> ids_;
+  bool has_root_ = false;
+  ThreeMfObject* object_ = nullptr;            // the one whose elements come
+  ThreeMfMaterial material_;                   // of its triangles that name none
+  std::vector<std::string>* names_ = nullptr;  // of the group whose elements come
+  std::string* text_ = nullptr;                // the metadata whose text comes
+};
+
+}  // namespace
+
+ThreeMfModel parse_threemf_model(std::string_view xml, const std::filesystem::path& path) {
+  return ModelReader(path).read(xml);
+}
+
+}  // namespace cgs

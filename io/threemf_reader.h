@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include "io/parsed_mesh.h"
+
+namespace cgs {
+
+/// Reads everything that a 3MF file builds as one mesh: objects, their components and where the
+/// build puts them, in the unit the file states; +Z is up. Nothing is extracted to disk.
+///
+/// Files of ours lead back to the origin they were moved from, and to what was observed of each
+/// face. Colours, textures and what is not built are not read.
+///
+/// \throws BadInput Magic (no ZIP archive), as ZipArchive and parse_threemf_model(); Missing (a
+/// part
+///         that is named), Path (a part whose name would leave the archive), Ref (an object that is
+///         not there, or is a component of itself), Empty (nothing is built); LimitError for
+///         components that multiply
+/// Source: 3MF Core Specification 1.3 and Production Extension 1.1, 3MF Consortium.
+ParsedMesh read_3mf(const std::filesystem::path& path);
+
+}  // namespace cgs

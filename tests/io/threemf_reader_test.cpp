@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/threemf_reader.h"
+
+#include <gtest/gtest.h>
+
+#include "io/mesh_file.h"
+#include "io/threemf.h"
+#include "libcgs/core/up_axis.h"
+#include "tests/support/python.h"
+#include "tests/support/sample_mesh.h"
+#include "tests/support/scene_files.h"
+#include "tests/support/temp_dir.h"
+#include "tests/support/threemf_file.h"
+
+namespace cgs {
+namespace {
+
+using Eigen::Vector3d;
+using test::ThreeMfFile;
+
+class Read3mf : public testing::Test {
+ protected:
+  ParsedMesh read(const ThreeMfFile& file) {
+    test::write_bytes(dir_ / "a.3mf", file.bytes());
+    return read_3mf(dir_ / "a.3mf");
+  }
+  std::string refused(const ThreeMfFile& file) {
+    return test::defect_of([&] { (void)read(file); });
+  }
+  test::TempDir dir_;
+};
+
+double volume(const ParsedMesh& mesh) {
+  double sum = 0;
+  for (const auto& f : mesh.mesh.faces) {
+    sum += mesh.positions[f[0]].cross(mesh.positions[f[1]]).dot(mesh.positions[f[2]]) / 6;
+  }
+  return sum;
+}
+
+TEST_F(Read3mf, ReadsWhatThisProgramWrites) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  Frame frame = test::centimetre_frame();
+  frame.up = Vector3d::UnitY();
+  write_3mf(dir_ / "a.3mf", mesh, frame, z_up_from(frame.up));
+  const MeasurableFile back = read_mesh_file(dir_ / "a.3mf");
+  EXPECT_TRUE(back.warnings.empty());
+  EXPECT_EQ(back.content.mesh.faces, mesh.faces);
+  EXPECT_EQ(back.content.mesh.provenance, mesh.provenance);
+  EXPECT_EQ(back.content.frame.unit_name(), "mm");
+  EXPECT_EQ(back.content.frame.up, Vector3d::UnitZ());
+  ASSERT_EQ(back.content.points.size(), mesh.vertices.size());
+  for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const Vector3d p = 10 * frame.file_from_internal(mesh.vertices[i].cast<double>());
+    const Vector3d q = back.content.file_from_internal(back.content.points[i]);
+    EXPECT_LT((q - Vector3d(p.x(), -p.z(), p.y())).norm(), 1e-4);
+  }
+}
+
+TEST_F(Read3mf, FarFromTheOriginTheDescriptionLeadsBack) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  Frame frame = test::centimetre_frame();
+  frame.file_origin = frame.origin = {448e5 + 0.25, 5.411e8, 12e3};
+  write_3mf(dir_ / "a.3mf", mesh, frame, Eigen::Matrix3d::Identity());
+  const MeasurableMesh back = read_mesh_file(dir_ / "a.3mf").content;
+  const Vector3d in_world = back.frame.world_from_internal(back.mesh.vertices[7].cast<double>());
+  const Vector3d wanted = frame.world_from_internal(mesh.vertices[7].cast<double>());
+  EXPECT_LT((in_world / 10 - wanted).norm(), 1e-5);
+}
+
+// By Python's zipfile and the core specification: centimetres, a component of a component, each
+// with a transform, and the build with another; places computed by the script itself.
+TEST_F(Read3mf, ReadsWhatOthersWriteByTheSpecification) {
+  ASSERT_TRUE(test::run_python(R"(
+import zipfile
+import numpy as np
+core = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+corners = np.array([[0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 4]], float)
+faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+rng = np.random.default_rng(5)
+steps = [np.vstack([np.linalg.qr(rng.normal(size=(3, 3)))[0] * 1.5, rng.normal(size=(1, 3))])
+         for _ in range(3)]
+text = lambda m: " ".join(f"{v:.17g}" for v in m.reshape(-1))
+vertices = "".join(f'<m:vertex x="{a}" y="{b}" z="{c}"/>' for a, b, c in corners)
+triangles = "".join(f'<m:triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in faces)
+model = f'''<?xml version="1.0" encoding="UTF-8"?>
+<m:model unit="centimeter" xml:lang="en-US" xmlns:m="{core}"><m:resources>
+<m:object id="4"><m:mesh><m:vertices>{vertices}</m:vertices><m:triangles>{triangles}</m:triangles>
+</m:mesh></m:object>
+<m:object id="7"><m:components><m:component objectid="4" transform="{text(steps[0])}"/>
+<m:component objectid="4"/></m:components></m:object>
+<m:object id="9"><m:components><m:component objectid="7" transform="{text(steps[1])}"/>
+</m:components></m:object></m:resources>
+<m:build><m:item objectid="9" transform="{text(steps[2])}"/><m:item objectid="4"/></m:build></m:model>'''
+with zipfile.ZipFile("other.3mf", "w", zipfile.ZIP_DEFLATED) as archive:
+    archive.writestr("[Content_Types].xml", '<?xml version="1.0"?><Types '
+        'xmlns="http://schemas.openxmlformats.org/package/2006/content-types"/>')
+    archive.writestr("_rels/.rels", '<?xml version="1.0"?><Relationships '
+        'xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship '
+        'Target="/3D/box.model" Id="rel0" '
+        'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>')
+    archive.writestr("3D/box.model", model)
+apply = lambda p, m: p @ m[:3] + m[3]
+chains = [[steps[0], steps[1], steps[2]], [steps[1], steps[2]], []]
+out = []
+for chain in chains:
+    p = corners
+    for m in chain:
+        p = apply(p, m)
+    out.append(p)
+np.vstack(out).astype("<f8").tofile("places")
+)",
+                               dir_.path()));
+  const ParsedMesh mesh = read_3mf(dir_ / "other.3mf");
+  const std::string places = test::read_bytes(dir_ / "places");
+  ASSERT_EQ(places.size(), 12 * 3 * sizeof(double));
+  ASSERT_EQ(mesh.positions.size(), 12u);
+  ASSERT_EQ(mesh.mesh.faces.size(), 12u);
+  for (size_t i = 0; i < 12; ++i) {
+    Vector3d p;
+    std::memcpy(p.data(), places.data() + i * 3 * sizeof(double), 3 * sizeof(double));
+    EXPECT_LT((mesh.positions[i] - p).norm(), 1e-12) << i;
+  }
+  EXPECT_EQ(mesh.comments, (std::vector<std::string>{"metres_per_unit 0.01"}));
+  EXPECT_TRUE(mesh.mesh.provenance.empty());
+  // Outside is outside, mirrored or not: 4 is the volume of the tetrahedron.
+  const double scaled = 4 * std::pow(1.5, 9) + 4 * std::pow(1.5, 6) + 4;
+  EXPECT_NEAR(volume(mesh), scaled, 1e-9 * scaled);
+}
+
+TEST_F(Read3mf, KnowsAllUnits) {
+  const std::vector<std::pair<std::string, std::string>> units = {{"unit=\"micron\"", "0.000001"},
+                                                                  {"", "0.001"},
+                                                                  {"unit=\"inch\"", "0.0254"},
+                                                                  {"unit=\"foot\"", "0.3048"},
+                                                                  {"unit=\"meter\"", "1"},
+                                                                  {"unit=\"millimeter\"", "0.001"}};
+  for (const auto& [attribute, metres] : units) {
+    ThreeMfFile file;
+    file.attributes = attribute;
+    EXPECT_EQ(read(file).comments[0], "metres_per_unit " + metres);
+  }
+  ThreeMfFile file;
+  file.attributes = "unit=\"parsec\"";
+  EXPECT_EQ(refused(file), "SCHEMA");
+}
+
+// As slicers save projects: objects in files of their own.
+TEST_F(Read3mf, ReadsObjectsOfOtherPartsOfTheArchive) {
+  ThreeMfFile file;
+  file.attributes = "unit=\"meter\" requiredextensions=\"p\"";
+  file.resources =
+      ThreeMfFile::object(2,
+                          ThreeMfFile::components({{1, "p:path=\"/3D/Objects/o.model\""},
+                                                   {1, "p:path=\"3D/Objects/o.model\""}}));
+  file.build = "<item objectid=\"2\"/><item objectid=\"1\" p:path=\"/3D/Objects/o.model\"/>";
+  file.more_files = {
+      {"3D/Objects/o.model",
+       ThreeMfFile::document(
+           "",
+           "<resources>" + ThreeMfFile::object(1, ThreeMfFile::tetrahedron()) + "</resources>")}};
+  const ParsedMesh mesh = read(file);
+  EXPECT_EQ(mesh.mesh.faces.size(), 12u);
+  EXPECT_EQ(mesh.comments[0], "metres_per_unit 1");
+  file.more_files.clear();
+  EXPECT_EQ(refused(file), "MISSING");
+}
+
+TEST_F(Read3mf, LabelsOfOthersAreNoProvenance) {
+  ThreeMfFile file;
+  file.resources =
+      "<basematerials id=\"5\"><base name=\"observed\" displaycolor=\"#FFFFFF\"/>"
+      "</basematerials><object id=\"1\" pid=\"5\" pindex=\"0\">" +
+      ThreeMfFile::tetrahedron() + "</object>";
+  EXPECT_TRUE(read(file).mesh.provenance.empty());
+  file.resources = "<metadata name=\"Application\">cgs</metadata>" + file.resources;
+  EXPECT_EQ(read(file).mesh.provenance, std::vector<Provenance>(4, Provenance::Observed));
+  file.resources += ThreeMfFile::object(2, ThreeMfFile::tetrahedron());
+  file.build += "<item objectid=\"2\"/>";
+  EXPECT_TRUE(read(file).mesh.provenance.empty()) << "half of it says nothing";
+}
+
+TEST_F(Read3mf, RefusesWhatDoesNotLeadAnywhere) {
+  const auto with = [&](const auto& change) {
+    ThreeMfFile file;
+    change(file);
+    return refused(file);
+  };
+  using File = ThreeMfFile;
+  EXPECT_EQ(with([](File&) {}), "");
+  EXPECT_EQ(with([](File& f) { f.build = ""; }), "EMPTY");
+  EXPECT_EQ(with([](File& f) { f.build = "<item objectid=\"3\"/>"; }), "REF");
+  EXPECT_EQ(with([](File& f) { f.resources += File::object(1, ""); }), "SCHEMA");
+  EXPECT_EQ(with([](File& f) { f.target = "/3D/other.model"; }), "MISSING");
+  EXPECT_EQ(with([](File& f) { f.target = "/../3dmodel.model"; }), "PATH");
+  EXPECT_EQ(with([](File& f) {
+              f.resources = File::object(1, File::components({{1, ""}}));
+            }),
+            "REF");
+  EXPECT_EQ(with([](File& f) { f.attributes += " requiredextensions=\"b\""; }), "UNSUPPORTED");
+  EXPECT_EQ(with([](File& f) { f.build = "<item objectid=\"1\" transform=\"1 0 0\"/>"; }),
+            "SCHEMA");
+  EXPECT_EQ(with([](File& f) {
+              f.build = "<item objectid=\"1\" transform=\"1e300 0 0 0 1 0 0 0 1 1e308 0 0\"/>";
+              f.resources.replace(f.resources.find("x=\"1\""), 5, "x=\"1e200\"");
+            }),
+            "VALUE");
+  EXPECT_EQ(with([](File& f) { f.before = "<!DOCTYPE model>"; }), "UNSUPPORTED");
+  test::write_bytes(dir_ / "b.3mf", "solid");
+  EXPECT_EQ(test::defect_of([&] { (void)read_3mf(dir_ / "b.3mf"); }), "MAGIC");
+  test::write_bytes(dir_ / "b.3mf", test::zip_bytes({{"meta.json", "{}"}}));
+  EXPECT_EQ(test::defect_of([&] { (void)read_3mf(dir_ / "b.3mf"); }), "MISSING");
+}
+
+TEST_F(Read3mf, RefusesComponentsThatMultiply) {
+  ThreeMfFile file;
+  const std::vector<std::pair<int, std::string>> ten = {
+      {1, ""}, {1, ""}, {1, ""}, {1, ""}, {1, ""}};
+  for (int id = 2; id < 20; ++id) {
+    std::vector<std::pair<int, std::string>> parts = ten;
+    for (auto& part : parts) part.first = id - 1;
+    file.resources += ThreeMfFile::object(id, ThreeMfFile::components(parts));
+  }
+  file.build = "<item objectid=\"6\"/>";
+  EXPECT_EQ(read(file).mesh.faces.size(), 4u * 3125);
+  file.build = "<item objectid=\"19\"/>";
+  EXPECT_EQ(refused(file), "LIMIT");
+  for (int id = 20; id < 100; ++id) {
+    file.resources += ThreeMfFile::object(id, ThreeMfFile::components({{id - 1, ""}}));
+  }
+  file.build = "<item objectid=\"99\"/>";
+  EXPECT_EQ(refused(file), "LIMIT") << "a long chain";
+}
+
+}  // namespace
+}  // namespace cgs
