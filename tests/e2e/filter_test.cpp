@@ -60,8 +60,12 @@ TEST_F(Filter, WritesEveryFormat) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_TRUE(exists(name)) << name;
   }
-  const MeasurableFile stl = read_mesh_file(dir_ / "a.stl");
-  EXPECT_EQ(stl.content.mesh.faces.size(), test::labelled_sphere(32, 48).faces.size());
+  for (const char* name : {"a.stl", "a.3mf"}) {
+    const MeasurableFile again = read_mesh_file(dir_ / name);
+    EXPECT_EQ(again.content.mesh.faces.size(), test::labelled_sphere(32, 48).faces.size()) << name;
+  }
+  EXPECT_EQ(filter("a.3mf", "again.ply", "--op repair").exit_code, 0);
+  EXPECT_TRUE(read_mesh_file(dir_ / "again.ply").content.states_provenance());
 }
 
 TEST_F(Filter, TakesPointCloudsAndWritesThemAsPly) {

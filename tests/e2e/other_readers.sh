@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Opens the files of a finished run with other people's programs and checks what they see:
-# vdb_print, exrheader, Open3D, ezdxf, and the Khronos glTF validator where npm has it installed.
+# vdb_print, exrheader, Open3D, Python, ezdxf, and the Khronos glTF validator where npm has it installed.
 #
 # usage: other_readers.sh OUT        (a folder that cgs run --assume-unit m wrote)
 #
@@ -55,6 +55,23 @@ for name, scale in (("stl", 1000), ("obj", 1)):
     assert len(other.triangles) == len(mesh.triangles), name
     size = sorted(other.get_max_bound() - other.get_min_bound())
     assert len(size) == 3 and size[0] > 0, name
+PY
+
+expect "Python: watertight.3mf is the mesh of watertight.ply" /usr/bin/python3 - "$out" <<'PY'
+import sys
+import xml.etree.ElementTree as tree
+import zipfile
+core = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+with zipfile.ZipFile(sys.argv[1] + "/mesh/watertight.3mf") as archive:
+    assert archive.testzip() is None, "damaged"
+    model = tree.fromstring(archive.read("3D/3dmodel.model"))
+assert model.get("unit") == "millimeter", "unit"
+with open(sys.argv[1] + "/mesh/watertight.ply", "rb") as file:
+    counts = {w[1]: int(w[2]) for w in (line.decode().split() for line in iter(
+        file.readline, b"end_header\n")) if w[0] == "element"}
+assert len(model.findall(f".//{core}vertex")) == counts["vertex"], "vertices"
+assert len(model.findall(f".//{core}triangle")) == counts["face"], "faces"
+assert len(model.findall(f"{core}build/{core}item")) == 1, "build"
 PY
 
 drawing=$(mktemp -d)
