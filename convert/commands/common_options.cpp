@@ -83,8 +83,7 @@ void add_depth_options(CLI::App& command, SceneOptions& options) {
       options.depth.folder,
       "Folder with a depth file per photograph, of the same stem: .exr .pfm .npy .npz "
       ".tif .png, or depth_maps of COLMAP's dense stereo; default: what the scene says, else a "
-      "folder \"depth\" beside the "
-      "photographs");
+      "folder \"depth\" beside the photographs");
   command
       .add_option("--depth-kind",
                   options.depth.kind,
