@@ -188,9 +188,7 @@ Extremes widened(const Extremes& cells, int reach) {
 
 }  // namespace
 
-DepthBounds::DepthBounds(const DepthMap& depth,
-                         const DepthMap& hides,
-                         const Raster<float>& slack) {
+DepthBounds::DepthBounds(const DepthMap& depth, const DepthMap& hides, const Raster<float>& slack) {
   Extremes cells((depth.width + 1) / 2, (depth.height + 1) / 2);
   const PixelExtremes pixels(depth, hides, slack);
   tbb::parallel_for(0, cells.height, [&](int row) { pixels.put_two_rows(2 * row, cells); });

@@ -10,6 +10,7 @@
 
 #include "libcgs/core/lanes.h"
 #include "libcgs/core/padded_raster.h"
+#include "meshing/sighting_kernel.h"
 
 namespace cgs {
 
@@ -19,11 +20,6 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kBackground = 1e6f;  // Depth of rays that hit nothing; far beyond any surface.
 constexpr float kMinSlope = 0.25f;   // At grazing incidence the local plane says little.
 constexpr float kMinFacing = 0.05f;  // Cosine of incidence.
-constexpr float kMaxBandGrowth = 3.0f;
-constexpr float kEdgeWeight = 0.25f;   // of pixels at an occlusion edge
-constexpr float kLeastBehind = 0.05f;  // of the weight at the far end of the band
-// How far behind its surface a view still measures [voxels], or what noise explains.
-constexpr float kMeasured = 2;
 
 // Depth steps between neighbours, in footprints of a pixel.
 constexpr float kSmallStep = 3.0f;     // A surface tilted by 72 degrees.
@@ -38,30 +34,6 @@ Floats norm(const std::array<Floats, 3>& v) {
 }
 
 Ints is_finite(Floats values) { return values - values == 0.0f; }
-
-Floats gathered(const float* values, Ints index) {
-  return _mm256_i32gather_ps(values, std::bit_cast<__m256i>(index), sizeof(float));
-}
-
-// The four floats from 4 * index on, for each of eight indices: all the first ones, and so on.
-// Eight loads, where gathering them would take 32.
-std::array<Floats, 4> four_of_each(const float* values, Ints index) {
-  std::array<Floats, 4> pairs;  // of indices k and k + 4
-  for (int k = 0; k < 4; ++k) {
-    pairs[size_t(k)] = _mm256_insertf128_ps(
-        _mm256_castps128_ps256(_mm_loadu_ps(values + 4 * std::ptrdiff_t(index[k]))),
-        _mm_loadu_ps(values + 4 * std::ptrdiff_t(index[k + 4])),
-        1);
-  }
-  const Floats a = _mm256_unpacklo_ps(pairs[0], pairs[1]);
-  const Floats b = _mm256_unpackhi_ps(pairs[0], pairs[1]);
-  const Floats c = _mm256_unpacklo_ps(pairs[2], pairs[3]);
-  const Floats d = _mm256_unpackhi_ps(pairs[2], pairs[3]);
-  return {_mm256_shuffle_ps(a, c, 0x44),
-          _mm256_shuffle_ps(a, c, 0xee),
-          _mm256_shuffle_ps(b, d, 0x44),
-          _mm256_shuffle_ps(b, d, 0xee)};
-}
 
 float least(Floats values) {
   const __m128 four = _mm_min_ps(_mm256_castps256_ps128(values), _mm256_extractf128_ps(values, 1));
@@ -199,31 +171,6 @@ Floats given_sigma(const TsdfView& view, int x, int y) {
   return out;
 }
 
-struct InterpolatedLanes {
-  Floats depth;
-  Ints one_surface;  // Elsewhere the depth means nothing.
-};
-
-// DepthField::interpolated() for eight points; `first` is the first of pixels of four floats.
-InterpolatedLanes interpolated_lanes(
-    const float* first, int width, int height, Floats u, Floats v, Ints inside) {
-  const auto depth_of = [&](Ints index) { return gathered(first, index * 4); };
-  const Floats left = _mm256_floor_ps(u - 0.5f);
-  const Floats top = _mm256_floor_ps(v - 0.5f);
-  const Ints has_quad = inside & (left >= 0.0f) & (top >= 0.0f) &
-                        (left < static_cast<float>(width - 1)) &
-                        (top < static_cast<float>(height - 1));
-  const Ints corner = __builtin_convertvector(select(has_quad, top, Floats{}), Ints) * width +
-                      __builtin_convertvector(select(has_quad, left, Floats{}), Ints);
-  const Floats at_corner = depth_of(corner);
-  const Floats a = (u - 0.5f) - left;
-  const Floats b = (v - 0.5f) - top;
-  const auto at_quad = [&](int offset) { return magnitude(depth_of(corner + offset)); };
-  const Floats above = (1.0f - a) / magnitude(at_corner) + a / at_quad(1);
-  const Floats below = (1.0f - a) / at_quad(width) + a / at_quad(width + 1);
-  return {1.0f / ((1.0f - b) * above + b * below), has_quad & (at_corner < 0.0f)};
-}
-
 }  // namespace
 
 Raster<uint8_t> continuous_quads(const DepthMap& depth, const Camera& camera) {
@@ -237,7 +184,9 @@ Raster<uint8_t> continuous_quads(const DepthMap& depth, const Camera& camera) {
   };
   tbb::parallel_for(0, std::max(0, depth.height - 1), [&](int y) {
     std::vector<int32_t> down(size_t(depth.width) + 2 * size_t{kLanes});
-    const auto is_empty = [&](int x) { return !any(is_finite(load<Floats>(&padded(x + 1, y + 1)))); };
+    const auto is_empty = [&](int x) {
+      return !any(is_finite(load<Floats>(&padded(x + 1, y + 1))));
+    };
     for (int x = 0; x < depth.width; x += kLanes) {
       if (!is_empty(x)) store(step(x, y, 0, 1), &down[size_t(x)]);
     }
@@ -378,56 +327,6 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   return out;
 }
 
-// Without branches that depend on the points: guessed wrong, each would cost as much as all.
-inline void DepthField::see(const EightPoints& points, Sightings& out) const {
-  const auto x = load<Floats>(points.x.data());
-  const auto y = load<Floats>(points.y.data());
-  const auto z = load<Floats>(points.z.data());
-  // In the order in which Eigen adds up: the bits are those of at().
-  const auto moved = [&](int r) { return (R_(r, 0) * x + (R_(r, 1) * y + R_(r, 2) * z)) + t_[r]; };
-  const Floats depth = moved(2);
-  const Floats u = fx_ * moved(0) / depth + cx_;
-  const Floats v = fy_ * moved(1) / depth + cy_;
-  const Ints inside = (depth > 0.0f) & (u >= 0.0f) & (v >= 0.0f) &
-                      (u < static_cast<float>(width_)) & (v < static_cast<float>(height_));
-  const Ints px = __builtin_convertvector(select(inside, u, Floats{}), Ints);
-  const Ints py = __builtin_convertvector(select(inside, v, Floats{}), Ints);
-  const Ints pixel = py * width_ + px;
-  static_assert(sizeof(Pixel) == 4 * sizeof(float));
-  const float* const first = &pixels_.data.front().depth;
-  const auto [between, one_surface] = interpolated_lanes(first, width_, height_, u, v, inside);
-  const auto [own_depth, slope, own_weight, hides] = four_of_each(first, pixel);
-  const Floats d = select(one_surface, between, magnitude(own_depth));
-  const Ints known = inside & (d - d == 0.0f);
-
-  const Floats distance = (d - depth) * slope;
-  out.has_sigma = !sigma_.empty();
-  const Floats sigma = out.has_sigma ? gathered(sigma_.data.data(), pixel) : Floats{};
-  const Floats wanted = max(Floats{} + truncation_, 3.0f * sigma);
-  const Floats band = min(wanted, Floats{} + kMaxBandGrowth * truncation_);
-  const Ints in_band = known & (distance >= -band) & (distance <= band);
-  const Floats weight = select(one_surface, own_weight, own_weight * kEdgeWeight);
-  const Ints is_free = known & (distance > wanted) & (weight > 0.0f);
-  out.free = bits(is_free);
-  out.hidden = bits((known & (distance < -band)) | (inside & ~known & (depth > hides)));
-  out.band = bits(in_band);
-  store(select(is_free, weight, Floats{}), out.free_weight.data());
-
-  const Floats behind = -distance - voxel_;
-  const Floats less = max(Floats{} + kLeastBehind, 1.0f - behind / (band - voxel_));
-  const Floats lessened = select(behind > 0.0f, weight * less, weight);
-  const Floats measured = max(Floats{} + kMeasured * voxel_, 3.0f * sigma);
-  out.assumed = bits(in_band & (-distance > measured));
-  store(select(in_band, lessened, Floats{}), out.weight_in_band.data());
-  store(select(in_band, distance, Floats{}), out.distance_in_band.data());
-  store(select(in_band, sigma, Floats{}), out.sigma.data());
-  store(pixel, out.pixel.data());
-}
-
-void DepthField::at(std::span<const EightPoints> points, Sightings* out) const {
-  for (const EightPoints& eight : points) see(eight, *out++);
-}
-
 Looks DepthField::look(const EightBoxes& boxes) const {
   const auto x = load<Floats>(boxes.x.data());
   const auto y = load<Floats>(boxes.y.data());
@@ -439,8 +338,8 @@ Looks DepthField::look(const EightBoxes& boxes) const {
   const float rounding = kRounding * voxel_ + kFloatRounding * (far_off + t_.lpNorm<1>());
   const Eigen::Vector3f half = boxes.half.array() + rounding;
   const Floats depth = moved(2);
-  const float deep = std::abs(R_(2, 0)) * half[0] + std::abs(R_(2, 1)) * half[1] +
-                     std::abs(R_(2, 2)) * half[2];
+  const float deep =
+      std::abs(R_(2, 0)) * half[0] + std::abs(R_(2, 1)) * half[1] + std::abs(R_(2, 2)) * half[2];
   const Floats z_min = depth - deep;
   const Floats z_max = depth + deep;
   const Ints is_before_camera = z_max > 0.0f;
@@ -469,8 +368,8 @@ Looks DepthField::look(const EightBoxes& boxes) const {
                        (u - reach_u < w) & (v - reach_v < h);
   out.nothing |= bits(is_clear & ~is_seen);
   if (!any(is_seen)) return out;
-  const Ints is_inside = is_seen & (u >= reach_u) & (v >= reach_v) & (u + reach_u < w) &
-                         (v + reach_v < h);
+  const Ints is_inside =
+      is_seen & (u >= reach_u) & (v >= reach_v) & (u + reach_u < w) & (v + reach_v < h);
   const auto within = [&](Floats at, float size) {
     return select(is_seen, min(max(at, Floats{}), Floats{} + (size - 1)), Floats{});
   };

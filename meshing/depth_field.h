@@ -40,8 +40,8 @@ struct EightPoints {
 struct Sightings {
   unsigned free = 0;  ///< Where the weight is above 0.
   unsigned band = 0, hidden = 0;
-  unsigned assumed = 0;    ///< Of the band, as in Sighting.
-  bool has_sigma = false;  ///< False where sigma is 0 throughout.
+  unsigned assumed = 0;                               ///< Of the band, as in Sighting.
+  bool has_sigma = false;                             ///< False where sigma is 0 throughout.
   alignas(32) std::array<float, 8> free_weight;       ///< 0 where the point is not.
   alignas(32) std::array<float, 8> weight_in_band;    ///< 0 where the point is not.
   alignas(32) std::array<float, 8> distance_in_band;  ///< 0 where the point is not.
@@ -112,7 +112,6 @@ class DepthField {
                            const DepthMap& depth,
                            const Raster<uint8_t>& continuous);
 
-  void see(const EightPoints& points, Sightings& out) const;
   bool shows_one_surface(float u, float v) const;
   float interpolated(float u, float v) const;
 

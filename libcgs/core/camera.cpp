@@ -116,15 +116,16 @@ Vectors down_tangents(const Stencil& s, const double* across, const double* down
 
 // In world axes; 0 where there are none.
 Vectors unit_normals(const Vectors& a, const Vectors& b, const Eigen::Matrix3d& R) {
-  const Vectors n = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  const Vectors n = {
+      a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
   // Sums in the order of Eigen's.
   const Doubles length = _mm256_sqrt_pd(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
   const Vectors unit = {n[0] / length, n[1] / length, n[2] / length};
   Vectors out;
   for (int k = 0; k < 3; ++k) {
     const Doubles turned = R(k, 0) * unit[0] + (R(k, 1) * unit[1] + R(k, 2) * unit[2]);
-    out[size_t(k)] = _mm256_blendv_pd(
-        Doubles{}, turned, _mm256_cmp_pd(length, Doubles{}, _CMP_GT_OQ));
+    out[size_t(k)] =
+        _mm256_blendv_pd(Doubles{}, turned, _mm256_cmp_pd(length, Doubles{}, _CMP_GT_OQ));
   }
   return out;
 }

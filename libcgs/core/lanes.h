@@ -31,9 +31,7 @@ inline Floats max(Floats a, Floats b) { return _mm256_max_ps(a, b); }
 /// a * b + c, rounded once.
 inline Floats multiply_add(Floats a, Floats b, Floats c) { return _mm256_fmadd_ps(a, b, c); }
 
-inline Floats magnitude(Floats values) {
-  return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), values);
-}
+inline Floats magnitude(Floats values) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), values); }
 
 /// By a comparison.
 inline Floats select(Ints mask, Floats yes, Floats no) {
