@@ -202,7 +202,7 @@ Raster<uint8_t> continuous_quads(const DepthMap& depth, const Camera& camera) {
   return out;
 }
 
-DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double voxel)
+DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double voxel, Asked asked)
     : R_(view.camera.cam_from_world().rotation().cast<float>()),
       t_(view.camera.cam_from_world().translation().cast<float>()),
       fx_(static_cast<float>(view.camera.fx)),
@@ -212,20 +212,28 @@ DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double 
       width_(view.camera.width),
       height_(view.camera.height),
       truncation_(static_cast<float>(options.truncation * voxel)),
-      voxel_(static_cast<float>(voxel)),
-      pixels_(width_, height_, {kNaN, 1, 1, kNaN}) {
+      voxel_(static_cast<float>(voxel)) {
   DepthMap depth = usable_depth(view, options.depth_trunc);
   drop_hanging_pixels(depth, continuous_quads(depth, view.camera));
-  const Raster<uint8_t> continuous = continuous_quads(depth, view.camera);
   const DepthMap hides = with_gaps_filled(depth, options.gap_pixels * options.gap_pixels);
-  if (!view.sigma.empty()) sigma_ = DepthMap(width_, height_, 0);
-  for (size_t i = 0; i < pixels_.data.size(); ++i) pixels_.data[i].hides = hides.data[i];
-  bounds_.emplace(depth, hides, look_along(view, depth, continuous));
+  if (asked == Asked::Points) {
+    pixels_ = std::make_unique_for_overwrite<Pixel[]>(depth.data.size());
+    if (!view.sigma.empty()) sigma_ = DepthMap(width_, height_, 0);
+    put_depth(depth, continuous_quads(depth, view.camera), hides);
+  }
+  bounds_.emplace(depth, hides, look_along(view, depth));
 }
 
-Raster<float> DepthField::look_along(const TsdfView& view,
-                                     const DepthMap& depth,
-                                     const Raster<uint8_t>& continuous) {
+void DepthField::put_depth(const DepthMap& depth,
+                           const Raster<uint8_t>& continuous,
+                           const DepthMap& hides) {
+  for (size_t i = 0; i < depth.data.size(); ++i) {
+    const float d = depth.data[i];
+    pixels_[i] = {continuous.data[i] != 0 ? -d : d, 1, 1, hides.data[i]};
+  }
+}
+
+Raster<float> DepthField::look_along(const TsdfView& view, const DepthMap& depth) {
   const SmoothNormals normals(depth, view.camera);
   std::vector<float> across(size_t(width_) + kLanes);
   for (int x = 0; x < width_; ++x) {
@@ -254,13 +262,13 @@ Raster<float> DepthField::look_along(const TsdfView& view,
       const Floats noise = sigma / voxel_;
       const Floats weight = facing * facing / (1.0f + noise * noise);
       const Floats limit = max(Floats{} + truncation_, 3.0f * sigma) / slope;
-      for (int k = 0; k < std::min(kLanes, width_ - x); ++k) {
-        const float d = depth(x + k, y);
-        Pixel& pixel = pixels_(x + k, y);
-        pixel.depth = continuous(x + k, y) != 0 ? -d : d;
-        pixel.slope = slope[k];
-        pixel.weight = weight[k];
-        slack(x + k, y) = limit[k];
+      const int count = std::min(kLanes, width_ - x);
+      for (int k = 0; k < count; ++k) slack(x + k, y) = limit[k];
+      if (!pixels_) continue;
+      Pixel* const pixels = &pixels_[slack.index(x, y)];
+      for (int k = 0; k < count; ++k) {
+        pixels[k].slope = slope[k];
+        pixels[k].weight = weight[k];
         if (!sigma_.empty()) sigma_(x + k, y) = sigma[k];
       }
     }
@@ -271,7 +279,7 @@ Raster<float> DepthField::look_along(const TsdfView& view,
 bool DepthField::shows_one_surface(float u, float v) const {
   const int x0 = static_cast<int>(std::floor(u - 0.5f));
   const int y0 = static_cast<int>(std::floor(v - 0.5f));
-  return pixels_.contains(x0, y0) && pixels_(x0, y0).depth < 0;
+  return x0 >= 0 && y0 >= 0 && pixel_at(x0, y0).depth < 0;
 }
 
 float DepthField::interpolated(float u, float v) const {
@@ -281,7 +289,7 @@ float DepthField::interpolated(float u, float v) const {
   const int y0 = static_cast<int>(std::floor(fv));
   const float a = fu - static_cast<float>(x0);
   const float b = fv - static_cast<float>(y0);
-  const auto depth = [&](int x, int y) { return std::abs(pixels_(x, y).depth); };
+  const auto depth = [&](int x, int y) { return std::abs(pixel_at(x, y).depth); };
   // Inverse depth is linear in pixel coordinates on a plane, depth is not.
   const float top = (1 - a) / depth(x0, y0) + a / depth(x0 + 1, y0);
   const float bottom = (1 - a) / depth(x0, y0 + 1) + a / depth(x0 + 1, y0 + 1);
@@ -300,7 +308,7 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   out.x = static_cast<int>(u);
   out.y = static_cast<int>(v);
   const bool one_surface = shows_one_surface(u, v);
-  const Pixel& pixel = pixels_(out.x, out.y);
+  const Pixel& pixel = pixel_at(out.x, out.y);
   const float d = one_surface ? interpolated(u, v) : std::abs(pixel.depth);
   if (!std::isfinite(d)) {
     if (p.z() > pixel.hides) out.sight = Sight::Hidden;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -80,8 +81,13 @@ struct Looks {
 /// A depth map prepared for fusion: answers what it says about points and boxes.
 class DepthField {
  public:
+  /// What a field will be asked about: boxes alone need less preparation and memory.
+  enum class Asked : uint8_t { Boxes, Points };
   /// \param voxel       voxel edge [internal units]
-  DepthField(const TsdfView& view, const TsdfOptions& options, double voxel);
+  DepthField(const TsdfView& view,
+             const TsdfOptions& options,
+             double voxel,
+             Asked asked = Asked::Points);
 
   /// What the view says about a point [internal units].
   Sighting at(const Eigen::Vector3f& point) const;
@@ -107,11 +113,13 @@ class DepthField {
     float hides;   // depth with its small gaps filled
   };
 
-  // Sets depth, slope, weight and sigma. \return the slack of DepthBounds of every pixel
-  Raster<float> look_along(const TsdfView& view,
-                           const DepthMap& depth,
-                           const Raster<uint8_t>& continuous);
+  void put_depth(const DepthMap& depth,
+                 const Raster<uint8_t>& continuous,
+                 const DepthMap& hides);
+  // Sets slope, weight and sigma. \return the slack of DepthBounds of every pixel
+  Raster<float> look_along(const TsdfView& view, const DepthMap& depth);
 
+  const Pixel& pixel_at(int x, int y) const { return pixels_[size_t(y) * size_t(width_) + size_t(x)]; }
   bool shows_one_surface(float u, float v) const;
   float interpolated(float u, float v) const;
 
@@ -121,7 +129,7 @@ class DepthField {
   int width_, height_;
   float truncation_;  // [internal units]
   float voxel_;       // [internal units]
-  Raster<Pixel> pixels_;
+  std::unique_ptr<Pixel[]> pixels_;  // Null where only boxes are asked about.
   DepthMap sigma_;  // of distance [internal units], 0 = not known; empty = nowhere known
   std::optional<DepthBounds> bounds_;
 };

@@ -82,7 +82,7 @@ void DepthField::at(std::span<const EightPoints> points, Sightings* out) const {
                            .height = height_,
                            .truncation = truncation_,
                            .voxel = voxel_,
-                           .pixels = &pixels_.data.front().depth,
+                           .pixels = &pixels_[0].depth,
                            .sigma = sigma_.empty() ? nullptr : sigma_.data.data()};
   for (size_t r = 0; r < 3; ++r) {
     for (size_t k = 0; k < 3; ++k) source.R[r][k] = R_(Eigen::Index(r), Eigen::Index(k));

@@ -223,7 +223,7 @@ class Fuser {
     for (size_t first = 0; first < views_.size(); first += kViewsAtOnce) {
       const size_t last = std::min(first + kViewsAtOnce, views_.size());
       views_.each(first, last, false, [&](size_t v, const TsdfView& view) {
-        const DepthField field(view, options_, rules_.voxel);
+        const DepthField field(view, options_, rules_.voxel, DepthField::Asked::Boxes);
         const std::vector<const DepthField*> fields = {&field};
         Found& of_view = found[v - first];
         of_view = {};
