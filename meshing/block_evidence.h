@@ -21,7 +21,6 @@ class BlockEvidence {
  public:
   /// An eighth of a block: 4 x 4 x 4 voxels.
   static constexpr size_t kParts = 8;
-  static constexpr unsigned kAllParts = 0xff;
 
   /// \param touched  a bit per part that the surface of any view may touch; what is free and hidden
   ///                 in others is quick to tell, and needs a hundredth of the memory if all are

@@ -48,11 +48,18 @@ struct Witness {
   const TsdfView& view() const { return in_memory != nullptr ? *in_memory : own; }
 };
 
-std::vector<std::optional<Witness>> witnesses(
-    const FusionViews& views, size_t first, size_t last, const TsdfOptions& options, double voxel) {
+using Fields = std::vector<std::optional<DepthField>>;
+
+// \param made  fields of the first views, which are taken
+std::vector<std::optional<Witness>> witnesses(const FusionViews& views,
+                                              size_t first,
+                                              size_t last,
+                                              const TsdfOptions& options,
+                                              double voxel,
+                                              Fields& made) {
   std::vector<std::optional<Witness>> out(last - first);
   views.each(first, last, true, [&](size_t i, auto&& view) {
-    DepthField field(view, options, voxel);
+    DepthField field = i < made.size() ? std::move(*made[i]) : DepthField(view, options, voxel);
     if (views.are_in_memory()) {
       out[i - first] = Witness{{}, &view, std::move(field)};
       return;
@@ -102,12 +109,6 @@ class CubeLook {
       if (sight == Sight::Free || out == Sight::Nothing) out = sight;
     }
     return out;
-  }
-  bool any_touches(size_t n) const {
-    for (size_t i = 0; i < of_fields_.size(); ++i) {
-      if (at(i, n).may_touch) return true;
-    }
-    return false;
   }
 
  private:
@@ -162,7 +163,8 @@ class Fuser {
   }
 
   void fuse_at_once() {
-    const auto held = witnesses(views_, 0, views_.size(), options_, rules_.voxel);
+    Fields none;
+    const auto held = witnesses(views_, 0, views_.size(), options_, rules_.voxel, none);
     const std::vector<const DepthField*> fields = fields_of(held);
     std::vector<Sight> sights(grid_.size());
     tbb::parallel_for(size_t(0), grid_.cube_count(), [&](size_t c) {
@@ -179,7 +181,11 @@ class Fuser {
       const CubeLook look(fields, grid_, c);
       grid_.each_in_cube(c, [&](size_t i, size_t n) {
         if (sights[i] != Sight::Mixed) return;
-        const unsigned touched = look.any_touches(n) ? BlockEvidence::kAllParts : 0;
+        const BlockEvidence::Place place(grid_.origin(i), rules_.voxel);
+        unsigned touched = 0;
+        for (size_t v = 0; v < fields.size(); ++v) {
+          if (look.at(v, n).may_touch) touched |= fields[v]->look(place.part_boxes()).may_touch;
+        }
         evidence_[i] = std::make_unique<BlockEvidence>(touched);
       });
       ask(c, held, look);
@@ -188,12 +194,14 @@ class Fuser {
   }
 
   void fuse_in_portions() {
-    find_surface(part(0.1, 0.4));
+    Fields made(portion_);
+    find_surface(made, part(0.1, 0.4));
     evidence_.resize(grid_.size());
     std::vector<Sight> whole(grid_.size(), Sight::Nothing);  // Where there is no evidence.
     for (size_t first = 0; first < views_.size(); first += portion_) {
       const size_t last = std::min(first + portion_, views_.size());
-      const auto held = witnesses(views_, first, last, options_, rules_.voxel);
+      const auto held = witnesses(views_, first, last, options_, rules_.voxel, made);
+      made.clear();
       const std::vector<const DepthField*> fields = fields_of(held);
       tbb::parallel_for(size_t(0), grid_.cube_count(), [&](size_t c) {
         const CubeLook look(fields, grid_, c);
@@ -213,7 +221,8 @@ class Fuser {
   }
 
   // Marks the blocks that the surface of any view may touch, and those that must be looked into.
-  void find_surface(const Progress& progress) {
+  // Keeps the fields of as many views as `made` has room for.
+  void find_surface(Fields& made, const Progress& progress) {
     touched_.assign(grid_.size(), 0);
     std::vector<uint8_t> is_mixed(grid_.size(), 0);
     struct Found {
@@ -223,7 +232,9 @@ class Fuser {
     for (size_t first = 0; first < views_.size(); first += kViewsAtOnce) {
       const size_t last = std::min(first + kViewsAtOnce, views_.size());
       views_.each(first, last, false, [&](size_t v, const TsdfView& view) {
-        const DepthField field(view, options_, rules_.voxel, DepthField::Asked::Boxes);
+        using Asked = DepthField::Asked;
+        const bool is_kept = v < made.size();
+        DepthField field(view, options_, rules_.voxel, is_kept ? Asked::Points : Asked::Boxes);
         const std::vector<const DepthField*> fields = {&field};
         Found& of_view = found[v - first];
         of_view = {};
@@ -241,6 +252,7 @@ class Fuser {
             of_view.mixed.emplace_back(i, static_cast<uint8_t>(parts));
           });
         }
+        if (is_kept) made[v] = std::move(field);
       });
       for (size_t v = first; v < last; ++v) {
         for (const auto& [i, parts] : found[v - first].mixed) {
