@@ -28,12 +28,9 @@ class DepthBounds {
   /// Of all pixels at most `reach` from places within the picture [pixels].
   Lanes around(Floats u, Floats v, float reach) const;
 
-  /// Memory per pixel of the depth map [bytes].
-  static constexpr size_t kPixelBytes = 4;
-
  private:
-  // Every 2^shift pixels, over windows of at least `reach` pixels to all sides. Negative (-0 too)
-  // where a pixel has no depth (near), or where there is nothing (far).
+  // Every 2^shift pixels, over windows of at least `reach` pixels to all sides. `near` is negative
+  // (-0 too) where a pixel has no depth, `far` where there is nothing.
   struct Rung {
     int shift;
     float reach;

@@ -113,13 +113,13 @@ class DepthField {
     float hides;   // depth with its small gaps filled
   };
 
-  void put_depth(const DepthMap& depth,
-                 const Raster<uint8_t>& continuous,
-                 const DepthMap& hides);
+  void put_depth(const DepthMap& depth, const Raster<uint8_t>& continuous, const DepthMap& hides);
   // Sets slope, weight and sigma. \return the slack of DepthBounds of every pixel
   Raster<float> look_along(const TsdfView& view, const DepthMap& depth);
 
-  const Pixel& pixel_at(int x, int y) const { return pixels_[size_t(y) * size_t(width_) + size_t(x)]; }
+  const Pixel& pixel_at(int x, int y) const {
+    return pixels_[size_t(y) * size_t(width_) + size_t(x)];
+  }
   bool shows_one_surface(float u, float v) const;
   float interpolated(float u, float v) const;
 
@@ -127,8 +127,8 @@ class DepthField {
   Eigen::Vector3f t_;
   float fx_, fy_, cx_, cy_;
   int width_, height_;
-  float truncation_;  // [internal units]
-  float voxel_;       // [internal units]
+  float truncation_;                 // [internal units]
+  float voxel_;                      // [internal units]
   std::unique_ptr<Pixel[]> pixels_;  // Null where only boxes are asked about.
   DepthMap sigma_;  // of distance [internal units], 0 = not known; empty = nowhere known
   std::optional<DepthBounds> bounds_;
