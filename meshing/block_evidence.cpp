@@ -4,18 +4,63 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
+
+#include "libcgs/core/lanes.h"
 
 namespace cgs {
 
 namespace {
 
-constexpr size_t kPartSide = 4;
+using Four = double __attribute__((vector_size(sizeof(double) * 4)));
+constexpr size_t kHalf = 4;
 
-size_t part_x(size_t part) { return part / 2 * kPartSide; }
-// Stays at the largest number.
-void count_up(uint16_t& count) { count = static_cast<uint16_t>(count + (count < UINT16_MAX)); }
+Four as_doubles(const float* four) { return _mm256_cvtps_pd(_mm_loadu_ps(four)); }
 
-size_t part_y(size_t part) { return part % 2 * kPartSide; }
+void increase(double* four, Four by) { store(load<Four>(four) + by, four); }
+
+Ints lanes_of(unsigned bits_set) {
+  return ((Ints{} + static_cast<int>(bits_set)) & Ints{1, 2, 4, 8, 16, 32, 64, 128}) != 0;
+}
+
+// Adds 1 where a bit is set; stays at the largest number.
+void count_up(uint16_t* counts, unsigned bits_set) {
+  const auto bit = _mm_setr_epi16(1, 2, 4, 8, 16, 32, 64, 128);
+  const auto is_set = _mm_and_si128(_mm_set1_epi16(static_cast<short>(bits_set)), bit);
+  const auto one = _mm_min_epi16(is_set, _mm_set1_epi16(1));
+  store(_mm_adds_epu16(load<__m128i>(counts), one), counts);
+}
+
+// A bit per point.
+unsigned guesses(const Sightings& seen, const MaskMap& guessed) {
+  unsigned out = 0;
+  for (size_t lane = 0; lane < kLanes; ++lane) {
+    if (guessed.data[size_t(seen.pixel[lane])] != 0) out |= 1U << lane;
+  }
+  return out;
+}
+
+// Positions of voxels, or of anything eight of which make up a cube: bits of x, y, z from each of
+// a part, a group and a voxel in it.
+size_t bit_x(size_t of_eight) { return of_eight >> 2 & 1; }
+size_t bit_y(size_t of_eight) { return of_eight >> 1 & 1; }
+size_t bit_z(size_t of_eight) { return of_eight & 1; }
+
+constexpr size_t kGroupsPerPart = 8;
+
+// The position in the order of groups of the voxel at position n of an OpenVDB leaf.
+constexpr std::array<uint16_t, kBlockVoxels> order_of_groups() {
+  std::array<uint16_t, kBlockVoxels> out{};
+  for (size_t n = 0; n < out.size(); ++n) {
+    size_t at = 0;
+    for (size_t bit = 0; bit < 3; ++bit) {
+      at |= ((n >> (6 + bit) & 1) << 2 | (n >> (3 + bit) & 1) << 1 | (n >> bit & 1)) << 3 * bit;
+    }
+    out[n] = static_cast<uint16_t>(at);
+  }
+  return out;
+}
+constexpr std::array<uint16_t, kBlockVoxels> kOrderOfGroups = order_of_groups();
 
 }  // namespace
 
@@ -23,100 +68,129 @@ BlockEvidence::BlockEvidence(unsigned touched)
     : touched_(touched),
       free_weight_(touched != 0 ? std::make_unique<std::array<float, kBlockVoxels>>() : nullptr) {}
 
-BlockEvidence::Place::Place(const openvdb::Coord& origin, double voxel) {
+BlockEvidence::Place::Place(const openvdb::Coord& origin, double voxel_size)
+    : voxel(static_cast<float>(voxel_size)) {
   for (int i = 0; i < kBlockSide; ++i) {
     const auto at = static_cast<size_t>(i);
-    x[at] = static_cast<float>(voxel * (origin.x() + i));
-    y[at] = static_cast<float>(voxel * (origin.y() + i));
-    z[at] = static_cast<float>(voxel * (origin.z() + i));
+    x[at] = static_cast<float>(voxel_size * (origin.x() + i));
+    y[at] = static_cast<float>(voxel_size * (origin.y() + i));
+    z[at] = static_cast<float>(voxel_size * (origin.z() + i));
   }
 }
 
-Eigen::AlignedBox3f BlockEvidence::Place::box() const {
-  return {Eigen::Vector3f(x.front(), y.front(), z.front()),
-          Eigen::Vector3f(x.back(), y.back(), z.back())};
+EightBoxes BlockEvidence::Place::part_boxes() const {
+  EightBoxes out;
+  const auto middle = [](const auto& at, size_t upper) {
+    return 0.5f * (at[4 * upper] + at[4 * upper + 3]);
+  };
+  for (size_t part = 0; part < kParts; ++part) {
+    out.x[part] = middle(x, bit_x(part));
+    out.y[part] = middle(y, bit_y(part));
+    out.z[part] = middle(z, bit_z(part));
+  }
+  out.half.setConstant(1.5f * voxel);
+  return out;
 }
 
-Eigen::AlignedBox3f BlockEvidence::Place::part_box(size_t part) const {
-  const size_t i = part_x(part);
-  const size_t j = part_y(part);
-  return {Eigen::Vector3f(x[i], y[j], z.front()),
-          Eigen::Vector3f(x[i + kPartSide - 1], y[j + kPartSide - 1], z.back())};
+EightPoints BlockEvidence::Place::group(size_t g) const {
+  const size_t part = g / kGroupsPerPart;
+  const size_t i = 4 * bit_x(part) + 2 * bit_x(g);
+  const size_t j = 4 * bit_y(part) + 2 * bit_y(g);
+  const size_t k = 4 * bit_z(part) + 2 * bit_z(g);
+  EightPoints out;
+  store(Floats{x[i], x[i], x[i], x[i], x[i + 1], x[i + 1], x[i + 1], x[i + 1]}, out.x.data());
+  store(Floats{y[j], y[j], y[j + 1], y[j + 1], y[j], y[j], y[j + 1], y[j + 1]}, out.y.data());
+  store(Floats{z[k], z[k + 1], z[k], z[k + 1], z[k], z[k + 1], z[k], z[k + 1]}, out.z.data());
+  return out;
 }
 
 void BlockEvidence::add(const Place& place, const DepthField& field, const TsdfView& view) {
+  const Looks looks = field.look(place.part_boxes());
   for (size_t part = 0; part < kParts; ++part) {
-    const DepthField::Look look = field.look(place.part_box(part));
+    const Look look = looks[part];
     if (look.sight == Sight::Nothing) continue;
     const bool may_hide_only = !look.may_touch && !look.may_free;
     const bool is_touched = (touched_ >> part & 1) != 0;
-    for (size_t i = part_x(part); i < part_x(part) + kPartSide; ++i) {
-      for (size_t j = part_y(part); j < part_y(part) + kPartSide; ++j) {
-        const size_t row = i * kBlockSide + j;
-        // What is free stays so, whatever hides it elsewhere.
-        const int told = may_hide_only ? free_[row] | hidden_[row] : is_touched ? 0 : free_[row];
-        if (told == 0xff) continue;
-        if (look.sight == Sight::Hidden) {
-          hidden_[row] = 0xff;
-        } else if (look.sight == Sight::Free && !is_touched) {
-          free_[row] = 0xff;
-        } else {
-          add_row(row, field.row(place.x[i], place.y[j], place.z), view);
-        }
+    std::array<size_t, kGroupsPerPart> asked;
+    std::array<EightPoints, kGroupsPerPart> points;
+    size_t count = 0;
+    for (size_t g = part * kGroupsPerPart; g < (part + 1) * kGroupsPerPart; ++g) {
+      // What is free stays so, whatever hides it elsewhere.
+      const int told = may_hide_only ? free_[g] | hidden_[g] : is_touched ? 0 : free_[g];
+      if (told == 0xff) continue;
+      if (look.sight == Sight::Hidden) {
+        hidden_[g] = 0xff;
+      } else if (look.sight == Sight::Free && !is_touched) {
+        free_[g] = 0xff;
+      } else {
+        asked[count] = g;
+        points[count++] = place.group(g);
       }
     }
+    std::array<Sightings, kGroupsPerPart> sightings;
+    field.at(std::span(points).first(count), sightings.data());
+    for (size_t k = 0; k < count; ++k) add_group(asked[k], sightings[k], view);
   }
 }
 
-void BlockEvidence::add_row(size_t row, const SightingRow& sightings, const TsdfView& view) {
-  hidden_[row] = static_cast<uint8_t>(hidden_[row] | sightings.hidden);
-  free_[row] = static_cast<uint8_t>(free_[row] | sightings.free);
+void BlockEvidence::add_group(size_t group, const Sightings& sightings, const TsdfView& view) {
+  hidden_[group] = static_cast<uint8_t>(hidden_[group] | sightings.hidden);
+  free_[group] = static_cast<uint8_t>(free_[group] | sightings.free);
   if (!has_band()) return;
-  const size_t first = row * kBlockSide;
-  for (unsigned left = sightings.free; left != 0; left &= left - 1) {
-    const auto lane = size_t(std::countr_zero(left));
-    (*free_weight_)[first + lane] += sightings.weight[lane];
+  if (sightings.free != 0) {
+    float* const sum = &(*free_weight_)[group * kLanes];
+    store(load<Floats>(sum) + load<Floats>(sightings.free_weight.data()), sum);
   }
-  if (sightings.band != 0) add_band(row, sightings, view);
+  if (sightings.band != 0) add_band(group, sightings, view);
 }
 
-void BlockEvidence::add_band(size_t at, const SightingRow& row, const TsdfView& view) {
+void BlockEvidence::add_band(size_t group, const Sightings& seen, const TsdfView& view) {
   if (!sums_) sums_ = std::make_unique<Sums>();
   Sums& s = *sums_;
-  const bool has_color = !view.color.empty();
-  if (row.has_sigma && !sigma_) sigma_ = std::make_unique<SigmaSums>();
-  if (has_color && !color_) color_ = std::make_unique<ColorSums>();
-  const size_t first = at * kBlockSide;
-  const unsigned measured = row.band & ~row.assumed;
-  for (unsigned left = measured & ~unsigned{measured_[at]}; left != 0; left &= left - 1) {
+  const size_t first = group * kLanes;
+  const unsigned measured = seen.band & ~seen.assumed;
+  for (unsigned left = measured & ~unsigned{measured_[group]}; left != 0; left &= left - 1) {
     forget_band(first + size_t(std::countr_zero(left)));
   }
-  measured_[at] = static_cast<uint8_t>(measured_[at] | measured);
-  const unsigned taken = measured | (row.band & ~unsigned{measured_[at]});
-  for (size_t lane = 0; lane < kBlockSide; ++lane) {  // others than taken add 0
-    const size_t n = first + lane;
-    const auto w = double(row.weight_in_band[lane]) * double(taken >> lane & 1);
-    const auto d = double(row.distance_in_band[lane]);
-    s.weight[n] += w;
-    s.distance[n] += w * d;
-    if (!row.has_sigma) continue;
-    const auto sigma = double(row.sigma[lane]);
-    sigma_->spread[n] += w * d * d;
-    sigma_->variance[n] += w * w * sigma * sigma;
+  measured_[group] = static_cast<uint8_t>(measured_[group] | measured);
+  const unsigned taken = measured | (seen.band & ~unsigned{measured_[group]});
+  alignas(32) std::array<float, kLanes> weight;  // others than taken add 0
+  const auto in_band = load<Floats>(seen.weight_in_band.data());
+  store(select(lanes_of(taken), in_band, Floats{}), weight.data());
+  unsigned has_sigma = 0;
+  if (seen.has_sigma) {
+    if (!sigma_) sigma_ = std::make_unique<SigmaSums>();
+    has_sigma = bits(load<Floats>(seen.sigma.data()) > 0.0f);
   }
+  for (size_t half = 0; half < kLanes; half += kHalf) {
+    const size_t n = first + half;
+    const Four w = as_doubles(&weight[half]);
+    const Four d = as_doubles(&seen.distance_in_band[half]);
+    increase(&s.weight[n], w);
+    increase(&s.distance[n], w * d);
+    if (!seen.has_sigma) continue;
+    const Four sigma = as_doubles(&seen.sigma[half]);
+    increase(&sigma_->spread[n], w * d * d);
+    increase(&sigma_->variance[n], w * w * sigma * sigma);
+  }
+  const unsigned guessed = view.guessed.empty() ? 0 : taken & guesses(seen, view.guessed);
+  count_up(&s.count[first], taken);
+  if (!view.is_virtual) count_up(&s.known[first], taken & ~guessed);
+  s.is_guessed[group] = static_cast<uint8_t>(s.is_guessed[group] | guessed);
+  s.lacks_sigma[group] = static_cast<uint8_t>(s.lacks_sigma[group] | (taken & ~has_sigma));
+  if (!view.color.empty()) add_color(first, taken, seen, view.color);
+}
+
+void BlockEvidence::add_color(size_t first,
+                              unsigned taken,
+                              const Sightings& seen,
+                              const ColorImage& image) {
+  if (!color_) color_ = std::make_unique<ColorSums>();
   for (unsigned left = taken; left != 0; left &= left - 1) {
     const auto lane = size_t(std::countr_zero(left));
     const size_t n = first + lane;
-    const int x = row.x[lane];
-    const int y = row.y[lane];
-    const bool is_guess = !view.guessed.empty() && view.guessed(x, y) != 0;
-    count_up(s.count[n]);
-    if (!view.is_virtual && !is_guess) count_up(s.known[n]);
-    if (is_guess) s.is_guessed[n] = 1;
-    if (!row.has_sigma || !(row.sigma[lane] > 0)) s.lacks_sigma[n] = 1;
-    if (!has_color) continue;
-    const auto w = double(row.weight_in_band[lane]);
-    const Eigen::Vector3f& c = view.color(x, y);
+    const auto w = double(seen.weight_in_band[lane]);
+    const Eigen::Vector3f& c = image.data[size_t(seen.pixel[lane])];
     color_->weight[n] += w;
     for (size_t k = 0; k < 3; ++k) color_->color[k][n] += w * double(c[Eigen::Index(k)]);
   }
@@ -126,7 +200,9 @@ void BlockEvidence::forget_band(size_t n) {
   Sums& s = *sums_;
   s.weight[n] = s.distance[n] = 0;
   s.count[n] = s.known[n] = 0;
-  s.is_guessed[n] = s.lacks_sigma[n] = 0;
+  const auto others = static_cast<uint8_t>(~(1U << n % kLanes));
+  s.is_guessed[n / kLanes] &= others;
+  s.lacks_sigma[n / kLanes] &= others;
   if (sigma_) sigma_->spread[n] = sigma_->variance[n] = 0;
   if (!color_) return;
   color_->weight[n] = 0;
@@ -143,18 +219,22 @@ void BlockEvidence::add_whole(Sight sight) {
   if (sight == Sight::Free) free_.fill(0xff);
 }
 
-BlockEvidence::Voxel BlockEvidence::operator[](size_t n) const {
+BlockEvidence::Voxel BlockEvidence::operator[](size_t in_leaf) const {
+  const size_t n = kOrderOfGroups[in_leaf];
   Voxel out;
-  out.free = (free_[n / kBlockSide] >> n % kBlockSide & 1) != 0;
-  out.hidden = (hidden_[n / kBlockSide] >> n % kBlockSide & 1) != 0;
+  const auto is_set = [&](const auto& bits_of) {
+    return (bits_of[n / kLanes] >> n % kLanes & 1) != 0;
+  };
+  out.free = is_set(free_);
+  out.hidden = is_set(hidden_);
   if (has_band()) out.free_weight = (*free_weight_)[n];
   if (!sums_) return out;
   out.weight = sums_->weight[n];
   out.distance = sums_->distance[n];
   out.count = sums_->count[n];
   out.known = sums_->known[n];
-  out.is_guessed = sums_->is_guessed[n] != 0;
-  out.has_sigma = sums_->lacks_sigma[n] == 0;
+  out.is_guessed = is_set(sums_->is_guessed);
+  out.has_sigma = !is_set(sums_->lacks_sigma);
   if (sigma_) {
     out.spread = sigma_->spread[n];
     out.variance = sigma_->variance[n];

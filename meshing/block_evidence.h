@@ -19,9 +19,8 @@ inline constexpr int kBlockVoxels = kBlockSide * kBlockSide * kBlockSide;
 /// the same views in the same order give the same bits, however they come in portions.
 class BlockEvidence {
  public:
-  /// A quarter of a block: 4 x 4 rows of voxels.
-  static constexpr size_t kParts = 4;
-  static constexpr unsigned kAllParts = 0xf;
+  /// An eighth of a block: 4 x 4 x 4 voxels.
+  static constexpr size_t kParts = 8;
 
   /// \param touched  a bit per part that the surface of any view may touch; what is free and hidden
   ///                 in others is quick to tell, and needs a hundredth of the memory if all are
@@ -29,12 +28,14 @@ class BlockEvidence {
   BlockEvidence(BlockEvidence&&) noexcept = default;
   BlockEvidence& operator=(BlockEvidence&&) noexcept = default;
 
-  /// Coordinates of the voxel centres of a block [internal units].
+  /// Where the voxel centres of a block are [internal units].
   struct Place {
     Place(const openvdb::Coord& origin, double voxel);
-    Eigen::AlignedBox3f box() const;
-    Eigen::AlignedBox3f part_box(size_t part) const;
+    EightBoxes part_boxes() const;
+    /// Of 2 x 2 x 2 voxels, x first, z last; groups of a part follow each other, in that order too.
+    EightPoints group(size_t g) const;
     std::array<float, kBlockSide> x, y, z;
+    float voxel;
   };
 
   /// Adds what a view says, voxel by voxel; never Band in parts that are not touched.
@@ -66,17 +67,19 @@ class BlockEvidence {
     /// The larger of what the views promise and how far they disagree.
     double sigma() const;
   };
+  /// \param n  position in an OpenVDB leaf
   Voxel operator[](size_t n) const;
 
   /// Forgets everything, but keeps the memory.
   void clear();
 
  private:
+  static constexpr size_t kGroups = kBlockVoxels / 8;
   using Doubles = std::array<double, kBlockVoxels>;
   struct Sums {
     Doubles weight = {}, distance = {};
     std::array<uint16_t, kBlockVoxels> count = {}, known = {};
-    std::array<uint8_t, kBlockVoxels> is_guessed = {}, lacks_sigma = {};
+    std::array<uint8_t, kGroups> is_guessed = {}, lacks_sigma = {};
   };
   struct SigmaSums {
     Doubles spread = {}, variance = {};
@@ -86,15 +89,15 @@ class BlockEvidence {
     std::array<Doubles, 3> color = {};
   };
 
-  void add_row(size_t row, const SightingRow& sightings, const TsdfView& view);
-  void add_band(size_t row, const SightingRow& sightings, const TsdfView& view);
+  void add_group(size_t group, const Sightings& seen, const TsdfView& view);
+  void add_band(size_t group, const Sightings& seen, const TsdfView& view);
+  void add_color(size_t first, unsigned taken, const Sightings& seen, const ColorImage& image);
   void forget_band(size_t n);
 
   unsigned touched_;
-  // A bit per voxel, a byte per row of them.
-  static constexpr size_t kRows = kBlockVoxels / kBlockSide;
-  std::array<uint8_t, kRows> free_ = {}, hidden_ = {};
-  std::array<uint8_t, kRows> measured_ = {};  // what is summed up is no assumption
+  // Voxels in the order of groups. A bit per voxel, a byte per group of them.
+  std::array<uint8_t, kGroups> free_ = {}, hidden_ = {};
+  std::array<uint8_t, kGroups> measured_ = {};  // what is summed up is no assumption
   std::unique_ptr<std::array<float, kBlockVoxels>> free_weight_;  // null without band
   std::unique_ptr<Sums> sums_;        // null until a voxel is in the band of a view
   std::unique_ptr<SigmaSums> sigma_;  // null until a view has a sigma

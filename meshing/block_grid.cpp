@@ -8,6 +8,25 @@
 
 namespace cgs {
 
+std::vector<EightBoxes> BlockGrid::block_boxes(size_t c) const {
+  constexpr double kMiddle = 0.5 * (kBlockSide - 1);
+  std::vector<EightBoxes> out;
+  each_in_cube(c, [&](size_t i, size_t n) {
+    const size_t lane = n % kLanes;
+    if (lane == 0) {
+      out.emplace_back();
+      out.back().half.setConstant(static_cast<float>(kMiddle * voxel));
+    }
+    const openvdb::Coord low = origin(i);
+    for (size_t k = lane; k < kLanes; ++k) {  // Lanes without a block are like the last one.
+      out.back().x[k] = static_cast<float>(voxel * (low.x() + kMiddle));
+      out.back().y[k] = static_cast<float>(voxel * (low.y() + kMiddle));
+      out.back().z[k] = static_cast<float>(voxel * (low.z() + kMiddle));
+    }
+  });
+  return out;
+}
+
 BlockGrid block_grid(const Eigen::AlignedBox3d& bounds, double voxel) {
   const Eigen::Vector3d low = (bounds.min() / (voxel * kBlockSide)).array().floor();
   const Eigen::Vector3d high = (bounds.max() / (voxel * kBlockSide)).array().floor();

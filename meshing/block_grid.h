@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <utility>
+#include <vector>
 
 #include <openvdb/openvdb.h>
 
@@ -14,6 +15,7 @@ namespace cgs {
 /// them.
 struct BlockGrid {
   static constexpr int kCube = 4;
+  static constexpr size_t kBlocksPerCube = kCube * kCube * kCube;
 
   openvdb::Coord first;  // in blocks
   openvdb::Coord count;
@@ -45,13 +47,15 @@ struct BlockGrid {
     const openvdb::Coord low(at.x() * kCube, at.y() * kCube, at.z() * kCube);
     return {low, openvdb::Coord::minComponent(low.offsetBy(kCube), count)};
   }
+  // Calls visit(block, n) for the n-th block of a cube.
   template <typename Visit>
   void each_in_cube(size_t c, const Visit& visit) const {
     const auto [low, high] = cube(c);
+    size_t n = 0;
     for (int x = low.x(); x < high.x(); ++x) {
       for (int y = low.y(); y < high.y(); ++y) {
         for (int z = low.z(); z < high.z(); ++z) {
-          visit((size_t(x) * size_t(count.y()) + size_t(y)) * size_t(count.z()) + size_t(z));
+          visit((size_t(x) * size_t(count.y()) + size_t(y)) * size_t(count.z()) + size_t(z), n++);
         }
       }
     }
@@ -66,6 +70,8 @@ struct BlockGrid {
     };
     return {corner(low, 0), corner(high, 1)};
   }
+  /// Boxes around the voxel centres of the blocks of a cube, in the order of each_in_cube().
+  std::vector<EightBoxes> block_boxes(size_t c) const;
 };
 
 /// The blocks around a box [internal units]. \throws LimitError if they are too many or too far off

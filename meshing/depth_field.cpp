@@ -5,10 +5,13 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/lanes.h"
+#include "libcgs/core/padded_raster.h"
+#include "meshing/sighting_kernel.h"
 
 namespace cgs {
 
@@ -18,11 +21,6 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kBackground = 1e6f;  // Depth of rays that hit nothing; far beyond any surface.
 constexpr float kMinSlope = 0.25f;   // At grazing incidence the local plane says little.
 constexpr float kMinFacing = 0.05f;  // Cosine of incidence.
-constexpr float kMaxBandGrowth = 3.0f;
-constexpr float kEdgeWeight = 0.25f;   // of pixels at an occlusion edge
-constexpr float kLeastBehind = 0.05f;  // of the weight at the far end of the band
-// How far behind its surface a view still measures [voxels], or what noise explains.
-constexpr float kMeasured = 2;
 
 // Depth steps between neighbours, in footprints of a pixel.
 constexpr float kSmallStep = 3.0f;     // A surface tilted by 72 degrees.
@@ -31,65 +29,17 @@ constexpr float kNoiseSteps = 5.0f;    // Steps up to this many standard deviati
 
 constexpr float kRounding = 1e-3f;  // [voxels]; far more than floats lose
 
-Floats select(Ints mask, Floats yes, Floats no) {
-  return _mm256_blendv_ps(no, yes, std::bit_cast<__m256>(mask));
-}
-
-Floats magnitude(Floats values) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), values); }
-
 // In the order in which Eigen adds up.
 Floats norm(const std::array<Floats, 3>& v) {
   return _mm256_sqrt_ps(v[0] * v[0] + (v[1] * v[1] + v[2] * v[2]));
 }
 
-// A bit per lane.
-unsigned bits(Ints mask) {
-  return static_cast<unsigned>(_mm256_movemask_ps(std::bit_cast<__m256>(mask)));
-}
-
-// Values at the indices where the mask is set, NaN elsewhere.
-Floats gathered(const float* values, Ints index, Ints mask) {
-  return _mm256_mask_i32gather_ps(Floats{} + kNaN,
-                                  values,
-                                  std::bit_cast<__m256i>(index),
-                                  std::bit_cast<__m256>(mask),
-                                  sizeof(float));
-}
-
-// The four floats from 4 * index on, for each of eight indices: all the first ones, and so on.
-// Eight loads, where gathering them would take 32.
-std::array<Floats, 4> four_of_each(const float* values, Ints index) {
-  std::array<Floats, 4> pairs;  // of indices k and k + 4
-  for (int k = 0; k < 4; ++k) {
-    pairs[size_t(k)] = _mm256_insertf128_ps(
-        _mm256_castps128_ps256(_mm_loadu_ps(values + 4 * std::ptrdiff_t(index[k]))),
-        _mm_loadu_ps(values + 4 * std::ptrdiff_t(index[k + 4])),
-        1);
-  }
-  const Floats a = _mm256_unpacklo_ps(pairs[0], pairs[1]);
-  const Floats b = _mm256_unpackhi_ps(pairs[0], pairs[1]);
-  const Floats c = _mm256_unpacklo_ps(pairs[2], pairs[3]);
-  const Floats d = _mm256_unpackhi_ps(pairs[2], pairs[3]);
-  return {_mm256_shuffle_ps(a, c, 0x44),
-          _mm256_shuffle_ps(a, c, 0xee),
-          _mm256_shuffle_ps(b, d, 0x44),
-          _mm256_shuffle_ps(b, d, 0xee)};
-}
+Ints is_finite(Floats values) { return values - values == 0.0f; }
 
 float least(Floats values) {
   const __m128 four = _mm_min_ps(_mm256_castps256_ps128(values), _mm256_extractf128_ps(values, 1));
   const __m128 two = _mm_min_ps(four, _mm_movehl_ps(four, four));
   return _mm_cvtss_f32(_mm_min_ss(two, _mm_shuffle_ps(two, two, 1)));
-}
-
-// The values of a raster with a margin around them, as long as eight lanes may reach to the right.
-Raster<float> with_margin(const Raster<float>& raster, int margin) {
-  Raster<float> out(raster.width + 2 * margin + kLanes, raster.height + 2 * margin, kNaN);
-  for (int y = 0; y < raster.height; ++y) {
-    const auto row = raster.data.begin() + std::ptrdiff_t(raster.index(0, y));
-    std::copy(row, row + raster.width, &out(margin, y + margin));
-  }
-  return out;
 }
 
 // One row or column of four depths: is the step between the middle two part of a surface?
@@ -123,32 +73,35 @@ float middle_value(std::vector<float>& values) {
 
 // Standard deviation of the pixel noise relative to depth, from the median second difference
 // along rows, which is blind to slopes and to the few pixels at edges.
-float relative_noise(const DepthMap& depth) {
-  std::vector<float> bends;
-  bends.reserve(depth.data.size());
-  for (int y = 0; y < depth.height; ++y) {
-    for (int x = 1; x + 1 < depth.width; ++x) {
-      const float d = depth(x, y);
-      const float bend = std::abs(depth(x - 1, y) - 2 * d + depth(x + 1, y)) / d;
-      if (std::isfinite(bend)) bends.push_back(bend);
+// \param padded  with a margin of one pixel
+float relative_noise(const Raster<float>& padded, int width, int height) {
+  std::vector<float> bends(size_t(width) * size_t(height));
+  size_t count = 0;
+  for (int y = 1; y <= height; ++y) {
+    for (int x = 0; x < width; x += kLanes) {
+      const auto at = [&](int k) { return load<Floats>(&padded(x + k, y)); };
+      const Floats d = at(1);
+      const Floats bend = magnitude(at(0) - 2 * d + at(2)) / d;
+      for (unsigned left = bits(bend - bend == 0.0f); left != 0; left &= left - 1) {
+        bends[count++] = bend[std::countr_zero(left)];
+      }
     }
   }
-  if (bends.empty()) return 0;
+  if (count == 0) return 0;
+  bends.resize(count);
   constexpr float kSigmaPerMedian = 1.4826f / 2.4495f;  // sqrt(1 + 4 + 1) terms in a difference
   return kSigmaPerMedian * middle_value(bends);
 }
 
 DepthMap usable_depth(const TsdfView& view, double depth_trunc) {
   DepthMap depth = view.depth;
+  for (float& d : depth.data) {
+    if (!(d > 0) || (depth_trunc > 0 && double(d) > depth_trunc && !std::isinf(d))) d = kNaN;
+    if (std::isinf(d)) d = kBackground;
+  }
+  if (view.usable.empty()) return depth;
   for (size_t i = 0; i < depth.data.size(); ++i) {
-    float& d = depth.data[i];
-    const bool usable = view.usable.empty() || view.usable.data[i] != 0;
-    const bool beyond = depth_trunc > 0 && d > depth_trunc && !std::isinf(d);
-    if (!usable || !(d > 0) || beyond) {
-      d = kNaN;
-    } else if (std::isinf(d)) {
-      d = kBackground;
-    }
+    if (view.usable.data[i] == 0) depth.data[i] = kNaN;
   }
   return depth;
 }
@@ -156,16 +109,15 @@ DepthMap usable_depth(const TsdfView& view, double depth_trunc) {
 // A pixel that no surface passes through hangs between foreground and background: it would make
 // a floater and carve a tunnel.
 void drop_hanging_pixels(DepthMap& depth, const Raster<uint8_t>& continuous) {
+  const auto width = static_cast<size_t>(depth.width);
+  std::vector<uint8_t> above(width, 0);
+  std::vector<uint8_t> either(width + 1, 0);  // of two quads one above the other, left of a pixel
   for (int y = 0; y < depth.height; ++y) {
-    for (int x = 0; x < depth.width; ++x) {
-      bool part_of_surface = false;
-      for (const int dy : {-1, 0}) {
-        for (const int dx : {-1, 0}) {
-          part_of_surface |= continuous.contains(x + dx, y + dy) && continuous(x + dx, y + dy) != 0;
-        }
-      }
-      if (!part_of_surface) depth(x, y) = kNaN;
-    }
+    const uint8_t* const own = &continuous(0, y);
+    for (size_t x = 0; x < width; ++x) either[x + 1] = own[x] | above[x];
+    std::copy_n(own, width, above.data());
+    float* const row = &depth(0, y);
+    for (size_t x = 0; x < width; ++x) row[x] = (either[x] | either[x + 1]) != 0 ? row[x] : kNaN;
   }
 }
 
@@ -175,23 +127,24 @@ class SmoothNormals {
  public:
   SmoothNormals(const DepthMap& depth, const Camera& camera) : depth_(with_margin(depth, kRadius)) {
     const NormalMap normals = normals_from_depth(depth, camera);
-    for (size_t k = 0; k < 3; ++k) {
-      Raster<float> one(depth.width, depth.height, 0);
-      for (size_t i = 0; i < one.data.size(); ++i) one.data[i] = normals.data[i][Eigen::Index(k)];
-      normal_[k] = with_margin(one, kRadius);
+    for (auto& one : normal_) one = Raster<float>(depth_.width, depth_.height, 0);
+    for (int y = 0; y < depth.height; ++y) {
+      const size_t to = depth_.index(kRadius, y + kRadius);
+      for (int x = 0; x < depth.width; ++x) {
+        const Eigen::Vector3f& n = normals(x, y);
+        for (size_t k = 0; k < 3; ++k) normal_[k].data[to + size_t(x)] = n[Eigen::Index(k)];
+      }
     }
   }
 
   // Of the eight pixels from (x, y) on: those with a depth.
   Ints known(int x, int y) const {
-    const auto here = load<Floats>(&depth_(x + kRadius, y + kRadius));
-    return here - here == 0.0f;
+    return is_finite(load<Floats>(&depth_(x + kRadius, y + kRadius)));
   }
   // Their normals, not yet of length 1.
   std::array<Floats, 3> sum(int x, int y) const {
     constexpr float kSameSurface = 0.03f;
     std::array<Floats, 3> out = {};
-    if (!any(known(x, y))) return out;
     const auto here = load<Floats>(&depth_(x + kRadius, y + kRadius));
     for (int v = y; v <= y + 2 * kRadius; ++v) {
       for (int u = x; u <= x + 2 * kRadius; ++u) {
@@ -219,60 +172,38 @@ Floats given_sigma(const TsdfView& view, int x, int y) {
   return out;
 }
 
-struct InterpolatedLanes {
-  Floats depth;
-  Ints one_surface;  // Elsewhere the depth means nothing.
-};
-
-// DepthField::interpolated() for eight points; `first` is the first of pixels of four floats.
-InterpolatedLanes interpolated_lanes(
-    const float* first, int width, Floats u, Floats v, Ints inside) {
-  const auto depth_of = [&](Ints index, Ints mask) { return gathered(first, index * 4, mask); };
-  const Floats left = _mm256_floor_ps(u - 0.5f);
-  const Floats top = _mm256_floor_ps(v - 0.5f);
-  const Ints has_quad = inside & (left >= 0.0f) & (top >= 0.0f);
-  const Ints corner = __builtin_convertvector(select(has_quad, top, Floats{}), Ints) * width +
-                      __builtin_convertvector(select(has_quad, left, Floats{}), Ints);
-  const Floats at_corner = depth_of(corner, has_quad);
-  const Ints one_surface = has_quad & (at_corner < 0.0f);
-  const Floats a = (u - 0.5f) - left;
-  const Floats b = (v - 0.5f) - top;
-  const auto at_quad = [&](int offset) {
-    return magnitude(depth_of(corner + offset, one_surface));
-  };
-  const Floats above = (1.0f - a) / magnitude(at_corner) + a / at_quad(1);
-  const Floats below = (1.0f - a) / at_quad(width) + a / at_quad(width + 1);
-  return {1.0f / ((1.0f - b) * above + b * below), one_surface};
-}
-
 }  // namespace
 
 Raster<uint8_t> continuous_quads(const DepthMap& depth, const Camera& camera) {
   Raster<uint8_t> out(depth.width, depth.height, 0);
   const auto inverse_focal = static_cast<float>(2 / (camera.fx + camera.fy));
-  const float noise = relative_noise(depth);
   const Raster<float> padded = with_margin(depth, 1);
+  const float noise = relative_noise(padded, depth.width, depth.height);
   const auto step = [&](int x, int y, int dx, int dy) {  // from (x, y)
     const auto at = [&](int k) { return load<Floats>(&padded(x + 1 + k * dx, y + 1 + k * dy)); };
     return continuous_step({at(-1), at(0), at(1), at(2)}, inverse_focal, noise);
   };
   tbb::parallel_for(0, std::max(0, depth.height - 1), [&](int y) {
     std::vector<int32_t> down(size_t(depth.width) + 2 * size_t{kLanes});
+    const auto is_empty = [&](int x) {
+      return !any(is_finite(load<Floats>(&padded(x + 1, y + 1))));
+    };
     for (int x = 0; x < depth.width; x += kLanes) {
-      store(step(x, y, 0, 1), &down[size_t(x)]);
+      if (!is_empty(x)) store(step(x, y, 0, 1), &down[size_t(x)]);
     }
     for (int x = 0; x < depth.width; x += kLanes) {
+      if (is_empty(x)) continue;
       const unsigned is_one = bits(step(x, y, 1, 0) & step(x, y + 1, 1, 0) &
                                    load<Ints>(&down[size_t(x)]) & load<Ints>(&down[size_t(x) + 1]));
-      for (int k = 0; k < std::min(kLanes, depth.width - 1 - x); ++k) {
-        out(x + k, y) = is_one >> k & 1;
-      }
+      const int count = std::min(kLanes, depth.width - 1 - x);
+      const uint64_t bytes = _pdep_u64(is_one, 0x0101010101010101);
+      if (count > 0) std::memcpy(&out(x, y), &bytes, size_t(count));
     }
   });
   return out;
 }
 
-DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double voxel)
+DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double voxel, Asked asked)
     : R_(view.camera.cam_from_world().rotation().cast<float>()),
       t_(view.camera.cam_from_world().translation().cast<float>()),
       fx_(static_cast<float>(view.camera.fx)),
@@ -282,17 +213,24 @@ DepthField::DepthField(const TsdfView& view, const TsdfOptions& options, double 
       width_(view.camera.width),
       height_(view.camera.height),
       truncation_(static_cast<float>(options.truncation * voxel)),
-      voxel_(static_cast<float>(voxel)),
-      pixels_(width_, height_, {kNaN, 1, 1, kNaN}) {
+      voxel_(static_cast<float>(voxel)) {
   DepthMap depth = usable_depth(view, options.depth_trunc);
   drop_hanging_pixels(depth, continuous_quads(depth, view.camera));
-  const Raster<uint8_t> continuous = continuous_quads(depth, view.camera);
   const DepthMap hides = with_gaps_filled(depth, options.gap_pixels * options.gap_pixels);
-  if (!view.sigma.empty()) sigma_ = DepthMap(width_, height_, 0);
-  build_pyramid(depth, hides, look_along(view, depth));
-  for (size_t i = 0; i < pixels_.data.size(); ++i) {
-    pixels_.data[i].depth = continuous.data[i] != 0 ? -depth.data[i] : depth.data[i];
-    pixels_.data[i].hides = hides.data[i];
+  if (asked == Asked::Points) {
+    pixels_ = std::make_unique_for_overwrite<Pixel[]>(depth.data.size());
+    if (!view.sigma.empty()) sigma_ = DepthMap(width_, height_, 0);
+    put_depth(depth, continuous_quads(depth, view.camera), hides);
+  }
+  bounds_.emplace(depth, hides, look_along(view, depth));
+}
+
+void DepthField::put_depth(const DepthMap& depth,
+                           const Raster<uint8_t>& continuous,
+                           const DepthMap& hides) {
+  for (size_t i = 0; i < depth.data.size(); ++i) {
+    const float d = depth.data[i];
+    pixels_[i] = {continuous.data[i] != 0 ? -d : d, 1, 1, hides.data[i]};
   }
 }
 
@@ -307,6 +245,7 @@ Raster<float> DepthField::look_along(const TsdfView& view, const DepthMap& depth
     const auto down = static_cast<float>(view.camera.ray_in_cam(0, y + 0.5).y());
     for (int x = 0; x < width_; x += kLanes) {
       const Ints known = normals.known(x, y);
+      if (!any(known)) continue;
       const std::array<Floats, 3> sum = normals.sum(x, y);
       // Sums in the order of Eigen's.
       const auto ray_x = load<Floats>(&across[size_t(x)]);
@@ -324,10 +263,13 @@ Raster<float> DepthField::look_along(const TsdfView& view, const DepthMap& depth
       const Floats noise = sigma / voxel_;
       const Floats weight = facing * facing / (1.0f + noise * noise);
       const Floats limit = max(Floats{} + truncation_, 3.0f * sigma) / slope;
-      for (int k = 0; k < std::min(kLanes, width_ - x); ++k) {
-        pixels_(x + k, y).slope = slope[k];
-        pixels_(x + k, y).weight = weight[k];
-        slack(x + k, y) = limit[k];
+      const int count = std::min(kLanes, width_ - x);
+      for (int k = 0; k < count; ++k) slack(x + k, y) = limit[k];
+      if (!pixels_) continue;
+      Pixel* const pixels = &pixels_[slack.index(x, y)];
+      for (int k = 0; k < count; ++k) {
+        pixels[k].slope = slope[k];
+        pixels[k].weight = weight[k];
         if (!sigma_.empty()) sigma_(x + k, y) = sigma[k];
       }
     }
@@ -335,49 +277,10 @@ Raster<float> DepthField::look_along(const TsdfView& view, const DepthMap& depth
   return slack;
 }
 
-void DepthField::Extremes::add(const Extremes& other) {
-  nearest = std::min(nearest, other.nearest);
-  farthest = std::max(farthest, other.farthest);
-  slack = std::max(slack, other.slack);
-  any_known |= other.any_known;
-  any_unknown |= other.any_unknown;
-}
-
-void DepthField::build_pyramid(const DepthMap& depth,
-                               const DepthMap& hides,
-                               const Raster<float>& slack) {
-  Level finest((width_ + 1) / 2, (height_ + 1) / 2, kNoExtremes);
-  tbb::parallel_for(0, finest.height, [&](int row) {
-    for (int y = 2 * row; y < std::min(2 * row + 2, height_); ++y) {
-      for (int x = 0; x < width_; ++x) {
-        Extremes& to = finest(x / 2, row);
-        const float d = depth(x, y);
-        to.slack = std::max(to.slack, slack(x, y));
-        to.any_known |= std::isfinite(hides(x, y));
-        if (std::isfinite(d)) {
-          to.nearest = std::min(to.nearest, d);
-          to.farthest = std::max(to.farthest, d);
-        } else {
-          to.any_unknown = true;
-        }
-      }
-    }
-  });
-  pyramid_.push_back(std::move(finest));
-  while (pyramid_.back().width > 1 || pyramid_.back().height > 1) {
-    const Level& fine = pyramid_.back();
-    Level coarse((fine.width + 1) / 2, (fine.height + 1) / 2, kNoExtremes);
-    for (int y = 0; y < fine.height; ++y) {
-      for (int x = 0; x < fine.width; ++x) coarse(x / 2, y / 2).add(fine(x, y));
-    }
-    pyramid_.push_back(std::move(coarse));
-  }
-}
-
 bool DepthField::shows_one_surface(float u, float v) const {
   const int x0 = static_cast<int>(std::floor(u - 0.5f));
   const int y0 = static_cast<int>(std::floor(v - 0.5f));
-  return pixels_.contains(x0, y0) && pixels_(x0, y0).depth < 0;
+  return x0 >= 0 && y0 >= 0 && pixel_at(x0, y0).depth < 0;
 }
 
 float DepthField::interpolated(float u, float v) const {
@@ -387,7 +290,7 @@ float DepthField::interpolated(float u, float v) const {
   const int y0 = static_cast<int>(std::floor(fv));
   const float a = fu - static_cast<float>(x0);
   const float b = fv - static_cast<float>(y0);
-  const auto depth = [&](int x, int y) { return std::abs(pixels_(x, y).depth); };
+  const auto depth = [&](int x, int y) { return std::abs(pixel_at(x, y).depth); };
   // Inverse depth is linear in pixel coordinates on a plane, depth is not.
   const float top = (1 - a) / depth(x0, y0) + a / depth(x0 + 1, y0);
   const float bottom = (1 - a) / depth(x0, y0 + 1) + a / depth(x0 + 1, y0 + 1);
@@ -406,7 +309,7 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   out.x = static_cast<int>(u);
   out.y = static_cast<int>(v);
   const bool one_surface = shows_one_surface(u, v);
-  const Pixel& pixel = pixels_(out.x, out.y);
+  const Pixel& pixel = pixel_at(out.x, out.y);
   const float d = one_surface ? interpolated(u, v) : std::abs(pixel.depth);
   if (!std::isfinite(d)) {
     if (p.z() > pixel.hides) out.sight = Sight::Hidden;
@@ -433,107 +336,74 @@ Sighting DepthField::at(const Eigen::Vector3f& point) const {
   return out;
 }
 
-SightingRow DepthField::row(float x, float y, const std::array<float, 8>& z) const {
-  SightingRow out;
-  const auto zs = load<Floats>(z.data());
-  // In the order in which Eigen adds up: the bits are those of at().
-  const auto moved = [&](int r) { return (R_(r, 0) * x + (R_(r, 1) * y + R_(r, 2) * zs)) + t_[r]; };
-  const Floats depth = moved(2);
-  const Floats u = fx_ * moved(0) / depth + cx_;
-  const Floats v = fy_ * moved(1) / depth + cy_;
-  const Ints inside = (depth > 0.0f) & (u >= 0.0f) & (v >= 0.0f) &
-                      (u < static_cast<float>(width_)) & (v < static_cast<float>(height_));
-  if (!any(inside)) return out;
-  const Ints px = __builtin_convertvector(select(inside, u, Floats{}), Ints);
-  const Ints py = __builtin_convertvector(select(inside, v, Floats{}), Ints);
-  const Ints pixel = py * width_ + px;
-  static_assert(sizeof(Pixel) == 4 * sizeof(float));
-  const float* const first = &pixels_.data.front().depth;
-  const auto [between, one_surface] = interpolated_lanes(first, width_, u, v, inside);
-  const auto [own_depth, slope, own_weight, hides] = four_of_each(first, pixel);
-  const Floats d = select(one_surface, between, magnitude(own_depth));
-  const Ints known = inside & (d - d == 0.0f);
-  const Ints unknown = inside & ~known;
-  if (any(unknown)) {
-    out.hidden = bits(unknown & (depth > hides));
-  }
-  if (!any(known)) return out;
-
-  const Floats distance = (d - depth) * slope;
-  out.has_sigma = !sigma_.empty();
-  const Floats sigma = out.has_sigma ? gathered(sigma_.data.data(), pixel, known) : Floats{};
-  const Floats wanted = max(Floats{} + truncation_, 3.0f * sigma);
-  const Floats band = min(wanted, Floats{} + kMaxBandGrowth * truncation_);
-  const Ints is_free = known & (distance > wanted);
-  const Ints is_hidden = known & (distance < -band);
-  const Ints in_band = known & (distance >= -band) & (distance <= band);
-  out.free = bits(is_free);  // as far as seen so far
-  out.hidden |= bits(is_hidden);
-  out.band = bits(in_band);
-  if ((out.free | out.band) == 0) return out;
-
-  Floats weight = select(one_surface, own_weight, own_weight * kEdgeWeight);
-  out.free &= bits(weight > 0.0f);
-  store(weight, out.weight.data());
-  if (out.band == 0) return out;
-  const Floats behind = -distance - voxel_;
-  const Floats less = max(Floats{} + kLeastBehind, 1.0f - behind / (band - voxel_));
-  weight = select(behind > 0.0f, weight * less, weight);
-  const Floats measured = max(Floats{} + kMeasured * voxel_, 3.0f * sigma);
-  out.assumed = bits(in_band & (-distance > measured));
-  store(select(in_band, weight, Floats{}), out.weight_in_band.data());
-  store(select(in_band, distance, Floats{}), out.distance_in_band.data());
-  store(select(in_band, sigma, Floats{}), out.sigma.data());
-  store(px, out.x.data());
-  store(py, out.y.data());
-  return out;
-}
-
-DepthField::Extremes DepthField::over_pixels(int x0, int y0, int x1, int y1) const {
-  size_t k = 0;
-  while (k + 1 < pyramid_.size() && std::max(x1 - x0, y1 - y0) >> (k + 1) > 3) ++k;
-  const Level& level = pyramid_[k];
-  Extremes out = kNoExtremes;
-  for (int y = y0 >> (k + 1); y <= y1 >> (k + 1); ++y) {
-    for (int x = x0 >> (k + 1); x <= x1 >> (k + 1); ++x) out.add(level(x, y));
-  }
-  return out;
-}
-
-DepthField::Look DepthField::look(const Eigen::AlignedBox3f& box) const {
-  // A little larger, so that no rounding makes a point say something else than its box.
-  const Eigen::Vector3f low = box.min().array() - kRounding * voxel_;
-  const Eigen::Vector3f high = box.max().array() + kRounding * voxel_;
-  const Floats x = {low[0], high[0], low[0], high[0], low[0], high[0], low[0], high[0]};
-  const Floats y = {low[1], low[1], high[1], high[1], low[1], low[1], high[1], high[1]};
-  const Floats z = {low[2], low[2], low[2], low[2], high[2], high[2], high[2], high[2]};
+Looks DepthField::look(const EightBoxes& boxes) const {
+  const auto x = load<Floats>(boxes.x.data());
+  const auto y = load<Floats>(boxes.y.data());
+  const auto z = load<Floats>(boxes.z.data());
   const auto moved = [&](int r) { return R_(r, 0) * x + R_(r, 1) * y + R_(r, 2) * z + t_[r]; };
+  // A little larger, so that no rounding makes a point say something else than its box.
+  constexpr float kFloatRounding = 0x1p-21f;  // of coordinates that are turned and moved
+  const float far_off = std::abs(boxes.x[0]) + std::abs(boxes.y[0]) + std::abs(boxes.z[0]);
+  const float rounding = kRounding * voxel_ + kFloatRounding * (far_off + t_.lpNorm<1>());
+  const Eigen::Vector3f half = boxes.half.array() + rounding;
   const Floats depth = moved(2);
-  const float z_min = least(depth);
-  const float z_max = -least(-depth);
-  if (z_max <= 0) return {Sight::Nothing, false};
-  if (!(z_min > 0.1f * z_max)) return {Sight::Mixed, true};
-  const Floats u = fx_ * moved(0) / depth + cx_;
-  const Floats v = fy_ * moved(1) / depth + cy_;
+  const float deep =
+      std::abs(R_(2, 0)) * half[0] + std::abs(R_(2, 1)) * half[1] + std::abs(R_(2, 2)) * half[2];
+  const Floats z_min = depth - deep;
+  const Floats z_max = depth + deep;
+  const Ints is_before_camera = z_max > 0.0f;
+  const Ints is_clear = is_before_camera & (z_min > 0.1f * z_max);  // of the camera
+  Looks out;
+  out.nothing = ~bits(is_before_camera) & 0xff;
+  out.may_touch = out.may_free = bits(is_before_camera & ~is_clear);
+  if (!any(is_clear)) return out;
+
+  // A point p in a box of centre c is seen off c by (e - q f) / p.z, where e and f are its offsets
+  // along x and z of the camera and q = c.x / c.z.
+  constexpr float kReach = 1.5f;  // Own and rounded pixels.
+  const auto reach = [&](int r, Floats q, float focal) {
+    const auto along = [&](int k) { return half[k] * magnitude(R_(r, k) - q * R_(2, k)); };
+    return focal * (along(0) + along(1) + along(2)) / z_min + kReach;
+  };
+  const Floats across = moved(0) / depth;
+  const Floats down = moved(1) / depth;
+  const Floats u = fx_ * across + cx_;
+  const Floats v = fy_ * down + cy_;
+  const Floats reach_u = reach(0, across, fx_);
+  const Floats reach_v = reach(1, down, fy_);
   const auto w = static_cast<float>(width_);
   const auto h = static_cast<float>(height_);
-  constexpr float kReach = 2;  // Interpolation looks one pixel further, rounding is paid too.
-  const float left = least(u) - kReach;
-  const float right = -least(-u) + kReach;
-  const float top = least(v) - kReach;
-  const float bottom = -least(-v) + kReach;
-  if (right < 0 || bottom < 0 || left >= w || top >= h) return {Sight::Nothing, false};
-  const bool inside = left >= 0 && top >= 0 && right < w && bottom < h;
-  const Extremes e = over_pixels(static_cast<int>(std::max(left, 0.0f)),
-                                 static_cast<int>(std::max(top, 0.0f)),
-                                 static_cast<int>(std::min(right, w - 1)),
-                                 static_cast<int>(std::min(bottom, h - 1)));
-  if (!e.any_known) return {Sight::Nothing, false};
-  const bool is_before = z_max < e.nearest - e.slack;
-  const bool is_behind = z_min > e.farthest + e.slack;
-  const bool may_touch = !is_before && !is_behind;
-  if (!inside || e.any_unknown) return {Sight::Mixed, may_touch, !is_behind};
-  return {is_before ? Sight::Free : is_behind ? Sight::Hidden : Sight::Mixed, may_touch};
+  const Ints is_seen = is_clear & (u + reach_u >= 0.0f) & (v + reach_v >= 0.0f) &
+                       (u - reach_u < w) & (v - reach_v < h);
+  out.nothing |= bits(is_clear & ~is_seen);
+  if (!any(is_seen)) return out;
+  const Ints is_inside =
+      is_seen & (u >= reach_u) & (v >= reach_v) & (u + reach_u < w) & (v + reach_v < h);
+  const auto within = [&](Floats at, float size) {
+    return select(is_seen, min(max(at, Floats{}), Floats{} + (size - 1)), Floats{});
+  };
+  const Floats widest = select(is_seen, max(reach_u, reach_v), Floats{});
+  const auto [near, far, is_nothing, is_partial] =
+      bounds_->around(within(u, w), within(v, h), -least(-widest));
+  const Ints is_known = is_seen & ~is_nothing;
+  const Ints is_before = is_known & (z_max < near);
+  const Ints is_behind = is_known & (z_min > far);
+  const Ints is_whole = is_inside & ~is_partial;
+  out.nothing |= bits(is_seen & is_nothing);
+  out.free = bits(is_before & is_whole);
+  out.hidden = bits(is_behind & is_whole);
+  out.may_touch |= bits(is_known & ~is_before & ~is_behind);
+  out.may_free |= bits(is_known & ~is_behind);
+  return out;
+}
+
+Look DepthField::look(const Eigen::AlignedBox3f& box) const {
+  EightBoxes boxes;
+  boxes.x.fill(box.center().x());
+  boxes.y.fill(box.center().y());
+  boxes.z.fill(box.center().z());
+  boxes.half = 0.5f * box.sizes();
+  return look(boxes)[0];
 }
 
 }  // namespace cgs

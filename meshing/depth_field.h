@@ -3,9 +3,11 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
-#include <vector>
+#include <memory>
+#include <optional>
+#include <span>
 
+#include "meshing/depth_bounds.h"
 #include "meshing/tsdf.h"
 
 namespace cgs {
@@ -30,60 +32,78 @@ struct Sighting {
   int y = 0;
 };
 
-/// Sightings of eight points in a row; a bit per point says what it is.
-struct SightingRow {
+/// Eight points of space [internal units].
+struct EightPoints {
+  alignas(32) std::array<float, 8> x, y, z;
+};
+
+/// Sightings of eight points; a bit per point says what it is.
+struct Sightings {
   unsigned free = 0;  ///< Where the weight is above 0.
   unsigned band = 0, hidden = 0;
-  unsigned assumed = 0;    ///< Of the band, as in Sighting.
-  bool has_sigma = false;  ///< False where sigma is 0 throughout.
-  alignas(32) std::array<float, 8> weight;
+  unsigned assumed = 0;                               ///< Of the band, as in Sighting.
+  bool has_sigma = false;                             ///< False where sigma is 0 throughout.
+  alignas(32) std::array<float, 8> free_weight;       ///< 0 where the point is not.
   alignas(32) std::array<float, 8> weight_in_band;    ///< 0 where the point is not.
   alignas(32) std::array<float, 8> distance_in_band;  ///< 0 where the point is not.
   alignas(32) std::array<float, 8> sigma;             ///< 0 where not known or not in the band.
-  alignas(32) std::array<int32_t, 8> x, y;
+  alignas(32) std::array<int32_t, 8> pixel;           ///< Nearest, as in Raster::data.
+};
+
+/// Eight boxes of one size [internal units].
+struct EightBoxes {
+  alignas(32) std::array<float, 8> x, y, z;  ///< Of their centres.
+  Eigen::Vector3f half;                      ///< Half of their edges.
+};
+
+/// What a depth map says about all points within a box.
+struct Look {
+  Sight sight = Sight::Mixed;  ///< Mixed if that differs or is not cheap to tell.
+  bool may_touch = true;       ///< False if no point within the box is in the band.
+  bool may_free = true;        ///< False if none is free.
+};
+
+/// Of eight boxes, a bit per box; where no sight is set it is mixed.
+struct Looks {
+  unsigned nothing = 0, free = 0, hidden = 0;
+  unsigned may_touch = 0, may_free = 0;
+
+  Look operator[](size_t box) const {
+    const auto is = [&](unsigned all) { return (all >> box & 1) != 0; };
+    const Sight sight = is(nothing)  ? Sight::Nothing
+                        : is(free)   ? Sight::Free
+                        : is(hidden) ? Sight::Hidden
+                                     : Sight::Mixed;
+    return {sight, is(may_touch), is(may_free)};
+  }
 };
 
 /// A depth map prepared for fusion: answers what it says about points and boxes.
 class DepthField {
  public:
+  /// What a field will be asked about: boxes alone need less preparation and memory.
+  enum class Asked : uint8_t { Boxes, Points };
   /// \param voxel       voxel edge [internal units]
-  DepthField(const TsdfView& view, const TsdfOptions& options, double voxel);
+  DepthField(const TsdfView& view,
+             const TsdfOptions& options,
+             double voxel,
+             Asked asked = Asked::Points);
 
   /// What the view says about a point [internal units].
   Sighting at(const Eigen::Vector3f& point) const;
 
-  /// The same, to the bit, about the points (x, y, z[0]), (x, y, z[1]) … [internal units].
-  SightingRow row(float x, float y, const std::array<float, 8>& z) const;
+  /// The same, to the bit, about many points.
+  /// \param out  one for each eight points
+  void at(std::span<const EightPoints> points, Sightings* out) const;
 
-  /// What it says about all points within a box.
-  struct Look {
-    Sight sight = Sight::Mixed;  ///< Mixed if that differs or is not cheap to tell.
-    bool may_touch = true;       ///< False if no point within the box is in the band.
-    bool may_free = true;        ///< False if none is free.
-  };
+  /// What it says about all points within boxes.
+  Looks look(const EightBoxes& boxes) const;
   Look look(const Eigen::AlignedBox3f& box) const;
 
   /// Memory per pixel of its depth map [bytes].
   static constexpr size_t kPixelBytes = 32;
 
  private:
-  // Extremes over 2^k x 2^k pixels.
-  struct Extremes {
-    float nearest;   // smallest depth; infinity if there is none
-    float farthest;  // largest depth; -infinity if there is none
-    float slack;     // largest z-distance at which a point is still not free or hidden
-    bool any_known;
-    bool any_unknown;
-
-    void add(const Extremes& other);
-  };
-  using Level = Raster<Extremes>;
-  static constexpr Extremes kNoExtremes = {std::numeric_limits<float>::infinity(),
-                                           -std::numeric_limits<float>::infinity(),
-                                           0,
-                                           false,
-                                           false};
-
   // What is asked of a pixel, in one place of memory.
   struct Pixel {
     float depth;   // NaN where not usable; negative where the 2 x 2 pixels from here on show one
@@ -93,23 +113,25 @@ class DepthField {
     float hides;   // depth with its small gaps filled
   };
 
-  // Sets slope, weight and sigma. \return the slack of Extremes of every pixel
+  void put_depth(const DepthMap& depth, const Raster<uint8_t>& continuous, const DepthMap& hides);
+  // Sets slope, weight and sigma. \return the slack of DepthBounds of every pixel
   Raster<float> look_along(const TsdfView& view, const DepthMap& depth);
-  void build_pyramid(const DepthMap& depth, const DepthMap& hides, const Raster<float>& slack);
 
+  const Pixel& pixel_at(int x, int y) const {
+    return pixels_[size_t(y) * size_t(width_) + size_t(x)];
+  }
   bool shows_one_surface(float u, float v) const;
   float interpolated(float u, float v) const;
-  Extremes over_pixels(int x0, int y0, int x1, int y1) const;
 
   Eigen::Matrix3f R_;  // cam_from_world
   Eigen::Vector3f t_;
   float fx_, fy_, cx_, cy_;
   int width_, height_;
-  float truncation_;  // [internal units]
-  float voxel_;       // [internal units]
-  Raster<Pixel> pixels_;
+  float truncation_;                 // [internal units]
+  float voxel_;                      // [internal units]
+  std::unique_ptr<Pixel[]> pixels_;  // Null where only boxes are asked about.
   DepthMap sigma_;  // of distance [internal units], 0 = not known; empty = nowhere known
-  std::vector<Level> pyramid_;  // from 2 x 2 pixels on
+  std::optional<DepthBounds> bounds_;
 };
 
 /// 1 at (x, y) where the 2 x 2 pixels from there on lie on one surface: every step of depth between

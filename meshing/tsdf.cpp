@@ -2,6 +2,7 @@
 #include "meshing/tsdf.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -10,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
@@ -48,11 +48,18 @@ struct Witness {
   const TsdfView& view() const { return in_memory != nullptr ? *in_memory : own; }
 };
 
-std::vector<std::optional<Witness>> witnesses(
-    const FusionViews& views, size_t first, size_t last, const TsdfOptions& options, double voxel) {
+using Fields = std::vector<std::optional<DepthField>>;
+
+// \param made  fields of the first views, which are taken
+std::vector<std::optional<Witness>> witnesses(const FusionViews& views,
+                                              size_t first,
+                                              size_t last,
+                                              const TsdfOptions& options,
+                                              double voxel,
+                                              Fields& made) {
   std::vector<std::optional<Witness>> out(last - first);
   views.each(first, last, true, [&](size_t i, auto&& view) {
-    DepthField field(view, options, voxel);
+    DepthField field = i < made.size() ? std::move(*made[i]) : DepthField(view, options, voxel);
     if (views.are_in_memory()) {
       out[i - first] = Witness{{}, &view, std::move(field)};
       return;
@@ -70,46 +77,47 @@ std::vector<std::optional<Witness>> witnesses(
 class CubeLook {
  public:
   CubeLook(const std::vector<const DepthField*>& fields, const BlockGrid& grid, size_t cube)
-      : fields_(fields), of_cube_(fields.size()), of_block_(fields.size()) {
+      : of_fields_(fields.size()) {
     const Eigen::AlignedBox3f box = grid.cube_box(cube);
-    for (size_t i = 0; i < fields.size(); ++i) of_cube_[i] = fields[i]->look(box);
+    std::vector<EightBoxes> eights;
+    for (size_t i = 0; i < fields.size(); ++i) {
+      of_fields_[i].all = fields[i]->look(box);
+      if (of_fields_[i].all.sight != Sight::Mixed) continue;
+      if (eights.empty()) eights = grid.block_boxes(cube);
+      for (size_t k = 0; k < eights.size(); ++k) {
+        of_fields_[i].of_eights[k] = fields[i]->look(eights[k]);
+      }
+    }
   }
   // True if nothing differs within the cube.
   bool is_told() const {
-    return std::none_of(of_cube_.begin(), of_cube_.end(), [](const auto& look) {
-      return look.sight == Sight::Mixed;
+    return std::none_of(of_fields_.begin(), of_fields_.end(), [](const OfField& field) {
+      return field.all.sight == Sight::Mixed;
     });
   }
-  // Of each field; valid until the next call.
-  const std::vector<DepthField::Look>& at(const BlockEvidence::Place& place) {
-    const Eigen::AlignedBox3f box = place.box();
-    for (size_t i = 0; i < fields_.size(); ++i) {
-      const bool is_told = of_cube_[i].sight != Sight::Mixed;
-      of_block_[i] = is_told ? of_cube_[i] : fields_[i]->look(box);
+  // Of a field about the n-th block.
+  Look at(size_t field, size_t n) const {
+    const OfField& of = of_fields_[field];
+    return of.all.sight != Sight::Mixed ? of.all : of.of_eights[n / kLanes][n % kLanes];
+  }
+  // Of all fields about the n-th block: Mixed if that is any, else what they say together.
+  Sight together(size_t n) const {
+    Sight out = Sight::Nothing;
+    for (size_t i = 0; i < of_fields_.size(); ++i) {
+      const Sight sight = at(i, n).sight;
+      if (sight == Sight::Mixed) return sight;
+      if (sight == Sight::Free || out == Sight::Nothing) out = sight;
     }
-    return of_block_;
+    return out;
   }
 
  private:
-  const std::vector<const DepthField*>& fields_;
-  std::vector<DepthField::Look> of_cube_, of_block_;
+  struct OfField {
+    Look all;
+    std::array<Looks, BlockGrid::kBlocksPerCube / kLanes> of_eights;
+  };
+  std::vector<OfField> of_fields_;
 };
-
-using Looks = std::vector<DepthField::Look>;
-
-// Mixed if any is, else what they say together.
-Sight together(const Looks& looks) {
-  Sight out = Sight::Nothing;
-  for (const DepthField::Look& look : looks) {
-    if (look.sight == Sight::Mixed) return Sight::Mixed;
-    if (look.sight == Sight::Free || out == Sight::Nothing) out = look.sight;
-  }
-  return out;
-}
-
-bool any_touches(const Looks& looks) {
-  return std::any_of(looks.begin(), looks.end(), [](const auto& look) { return look.may_touch; });
-}
 
 // Fuses views in portions, each of as many as are held at once.
 class Fuser {
@@ -155,76 +163,66 @@ class Fuser {
   }
 
   void fuse_at_once() {
-    const auto held = witnesses(views_, 0, views_.size(), options_, rules_.voxel);
+    Fields none;
+    const auto held = witnesses(views_, 0, views_.size(), options_, rules_.voxel, none);
     const std::vector<const DepthField*> fields = fields_of(held);
     std::vector<Sight> sights(grid_.size());
     tbb::parallel_for(size_t(0), grid_.cube_count(), [&](size_t c) {
-      CubeLook look(fields, grid_, c);
-      grid_.each_in_cube(c, [&](size_t i) {
-        sights[i] = together(look.at({grid_.origin(i), rules_.voxel}));
-      });
+      const CubeLook look(fields, grid_, c);
+      grid_.each_in_cube(c, [&](size_t i, size_t n) { sights[i] = look.together(n); });
     });
     const auto mixed = size_t(std::count(sights.begin(), sights.end(), Sight::Mixed));
     constexpr size_t kPixelBytes = 80;  // A prepared depth map, with its pyramid and normals.
     check_memory(out_.report,
                  pixels_ * kPixelBytes + grid_.size() * kBlockBytes + mixed * kLeafBytes,
                  options_.memory_limit);
-    tbb::enumerable_thread_specific<BlockEvidence> scratch(
-        [] { return BlockEvidence(BlockEvidence::kAllParts); });
+    evidence_.resize(grid_.size());
     collect(0.15, [&](size_t c, const auto& keep) {
-      CubeLook look(fields, grid_, c);
-      grid_.each_in_cube(c, [&](size_t i) {
-        if (sights[i] != Sight::Mixed) {
-          keep(i, whole_block(sights[i]));
-          return;
-        }
+      const CubeLook look(fields, grid_, c);
+      grid_.each_in_cube(c, [&](size_t i, size_t n) {
+        if (sights[i] != Sight::Mixed) return;
         const BlockEvidence::Place place(grid_.origin(i), rules_.voxel);
-        const Looks& looks = look.at(place);
-        if (!any_touches(looks)) {
-          BlockEvidence plain(0);
-          ask(held, looks, place, plain);
-          keep(i, fused_block(plain, grid_.origin(i), rules_));
-          return;
+        unsigned touched = 0;
+        for (size_t v = 0; v < fields.size(); ++v) {
+          if (look.at(v, n).may_touch) touched |= fields[v]->look(place.part_boxes()).may_touch;
         }
-        BlockEvidence& evidence = scratch.local();
-        evidence.clear();
-        ask(held, looks, place, evidence);
-        keep(i, fused_block(evidence, grid_.origin(i), rules_));
+        evidence_[i] = std::make_unique<BlockEvidence>(touched);
       });
+      ask(c, held, look);
+      grid_.each_in_cube(c, [&](size_t i, size_t) { keep(i, finished(i, sights[i])); });
     });
   }
 
   void fuse_in_portions() {
-    find_surface(part(0.1, 0.4));
+    Fields made(portion_);
+    find_surface(made, part(0.1, 0.4));
     evidence_.resize(grid_.size());
-    whole_.assign(grid_.size(), Sight::Nothing);
+    std::vector<Sight> whole(grid_.size(), Sight::Nothing);  // Where there is no evidence.
     for (size_t first = 0; first < views_.size(); first += portion_) {
       const size_t last = std::min(first + portion_, views_.size());
-      const auto held = witnesses(views_, first, last, options_, rules_.voxel);
+      const auto held = witnesses(views_, first, last, options_, rules_.voxel, made);
+      made.clear();
       const std::vector<const DepthField*> fields = fields_of(held);
       tbb::parallel_for(size_t(0), grid_.cube_count(), [&](size_t c) {
-        CubeLook look(fields, grid_, c);
-        grid_.each_in_cube(c, [&](size_t i) {
-          const BlockEvidence::Place place(grid_.origin(i), rules_.voxel);
-          ask_portion(i, held, look.at(place), place);
+        const CubeLook look(fields, grid_, c);
+        grid_.each_in_cube(c, [&](size_t i, size_t n) { begin(i, look.together(n), whole[i]); });
+        ask(c, held, look);
+        grid_.each_in_cube(c, [&](size_t i, size_t) {
+          if (!evidence_[i] || !evidence_[i]->is_settled()) return;
+          evidence_[i].reset();
+          whole[i] = Sight::Free;
         });
       });
       report(progress_, 0.4 + 0.5 * static_cast<double>(last) / static_cast<double>(views_.size()));
     }
     collect(0.9, [&](size_t c, const auto& keep) {
-      grid_.each_in_cube(c, [&](size_t i) {
-        if (!evidence_[i]) {
-          keep(i, whole_block(whole_[i]));
-          return;
-        }
-        keep(i, fused_block(*evidence_[i], grid_.origin(i), rules_));
-        evidence_[i].reset();
-      });
+      grid_.each_in_cube(c, [&](size_t i, size_t) { keep(i, finished(i, whole[i])); });
     });
   }
 
   // Marks the blocks that the surface of any view may touch, and those that must be looked into.
-  void find_surface(const Progress& progress) {
+  // Keeps the fields of as many views as `made` has room for.
+  void find_surface(Fields& made, const Progress& progress) {
     touched_.assign(grid_.size(), 0);
     std::vector<uint8_t> is_mixed(grid_.size(), 0);
     struct Found {
@@ -234,24 +232,27 @@ class Fuser {
     for (size_t first = 0; first < views_.size(); first += kViewsAtOnce) {
       const size_t last = std::min(first + kViewsAtOnce, views_.size());
       views_.each(first, last, false, [&](size_t v, const TsdfView& view) {
-        const DepthField field(view, options_, rules_.voxel);
+        using Asked = DepthField::Asked;
+        const bool is_kept = v < made.size();
+        DepthField field(view, options_, rules_.voxel, is_kept ? Asked::Points : Asked::Boxes);
         const std::vector<const DepthField*> fields = {&field};
         Found& of_view = found[v - first];
         of_view = {};
         for (size_t c = 0; c < grid_.cube_count(); ++c) {
-          CubeLook look(fields, grid_, c);
+          const CubeLook look(fields, grid_, c);
           if (look.is_told()) continue;
-          grid_.each_in_cube(c, [&](size_t i) {
-            const BlockEvidence::Place place(grid_.origin(i), rules_.voxel);
-            const DepthField::Look of_block = look.at(place)[0];
+          grid_.each_in_cube(c, [&](size_t i, size_t n) {
+            const Look of_block = look.at(0, n);
             if (of_block.sight != Sight::Mixed) return;
             unsigned parts = 0;
-            for (size_t p = 0; of_block.may_touch && p < BlockEvidence::kParts; ++p) {
-              if (field.look(place.part_box(p)).may_touch) parts |= 1U << p;
+            if (of_block.may_touch) {
+              const BlockEvidence::Place place(grid_.origin(i), rules_.voxel);
+              parts = field.look(place.part_boxes()).may_touch;
             }
             of_view.mixed.emplace_back(i, static_cast<uint8_t>(parts));
           });
         }
+        if (is_kept) made[v] = std::move(field);
       });
       for (size_t v = first; v < last; ++v) {
         for (const auto& [i, parts] : found[v - first].mixed) {
@@ -286,40 +287,41 @@ class Fuser {
     return out;
   }
 
-  static void ask(const Held& held,
-                  const Looks& looks,
-                  const BlockEvidence::Place& place,
-                  BlockEvidence& evidence) {
-    for (size_t i = 0; i < held.size() && !evidence.is_settled(); ++i) {
-      const Sight sight = looks[i].sight;
-      if (sight == Sight::Nothing) continue;
-      if (sight == Sight::Hidden || (sight == Sight::Free && !evidence.has_band())) {
-        evidence.add_whole(sight);
-      } else {
-        evidence.add(place, held[i]->field, held[i]->view());
-      }
+  // What a portion says together about a block either is all there is to say, or evidence begins.
+  void begin(size_t i, Sight together, Sight& whole) {
+    if (whole == Sight::Free || evidence_[i]) return;
+    if (touched_[i] == 0 && together != Sight::Mixed) {
+      if (together != Sight::Nothing) whole = together;
+      return;
+    }
+    evidence_[i] = std::make_unique<BlockEvidence>(touched_[i]);
+    evidence_[i]->add_whole(whole);
+  }
+
+  // Adds what views say to the evidence in a cube: one view after the other, since a cube is small
+  // in its picture.
+  void ask(size_t cube, const Held& held, const CubeLook& look) {
+    for (size_t v = 0; v < held.size(); ++v) {
+      grid_.each_in_cube(cube, [&](size_t i, size_t n) {
+        if (!evidence_[i]) return;
+        BlockEvidence& evidence = *evidence_[i];
+        const Sight sight = look.at(v, n).sight;
+        if (sight == Sight::Nothing || evidence.is_settled()) return;
+        if (sight == Sight::Hidden || (sight == Sight::Free && !evidence.has_band())) {
+          evidence.add_whole(sight);
+        } else {
+          evidence.add({grid_.origin(i), rules_.voxel}, held[v]->field, held[v]->view());
+        }
+      });
     }
   }
 
-  void ask_portion(size_t i,
-                   const Held& held,
-                   const Looks& looks,
-                   const BlockEvidence::Place& place) {
-    if (whole_[i] == Sight::Free) return;
-    std::unique_ptr<BlockEvidence>& evidence = evidence_[i];
-    const Sight sight = together(looks);
-    if (!evidence && touched_[i] == 0 && sight != Sight::Mixed) {
-      if (sight != Sight::Nothing) whole_[i] = sight;
-      return;
-    }
-    if (!evidence) {
-      evidence = std::make_unique<BlockEvidence>(touched_[i]);
-      evidence->add_whole(whole_[i]);
-    }
-    ask(held, looks, place, *evidence);
-    if (!evidence->is_settled()) return;
-    evidence.reset();
-    whole_[i] = Sight::Free;
+  // A block of which all is known, or that has no evidence since it is one thing.
+  FusedBlock finished(size_t i, Sight whole) {
+    if (!evidence_[i]) return whole_block(whole);
+    FusedBlock block = fused_block(*evidence_[i], grid_.origin(i), rules_);
+    evidence_[i].reset();
+    return block;
   }
 
   static FusedBlock whole_block(Sight sight) {
@@ -362,8 +364,7 @@ class Fuser {
   size_t pixels_ = 0;             // Of all views.
   size_t portion_ = 0;            // Views held at once.
   std::vector<uint8_t> touched_;  // A bit per part, by the surface of any view.
-  std::vector<std::unique_ptr<BlockEvidence>> evidence_;  // Null where a block is one thing …
-  std::vector<Sight> whole_;                              // … namely this.
+  std::vector<std::unique_ptr<BlockEvidence>> evidence_;  // Null where a block is one thing.
 };
 
 }  // namespace

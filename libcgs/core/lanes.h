@@ -31,8 +31,20 @@ inline Floats max(Floats a, Floats b) { return _mm256_max_ps(a, b); }
 /// a * b + c, rounded once.
 inline Floats multiply_add(Floats a, Floats b, Floats c) { return _mm256_fmadd_ps(a, b, c); }
 
+inline Floats magnitude(Floats values) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), values); }
+
+/// By a comparison.
+inline Floats select(Ints mask, Floats yes, Floats no) {
+  return _mm256_blendv_ps(no, yes, std::bit_cast<__m256>(mask));
+}
+
+/// A bit per lane of a comparison.
+inline unsigned bits(Ints mask) {
+  return static_cast<unsigned>(_mm256_movemask_ps(std::bit_cast<__m256>(mask)));
+}
+
 /// True if any lane of a comparison holds.
-inline bool any(Ints mask) { return _mm256_movemask_ps(std::bit_cast<__m256>(mask)) != 0; }
+inline bool any(Ints mask) { return bits(mask) != 0; }
 
 /// 2^x for x in [-126, 0], relative error < 3e-7. Not std::exp2: that is one lane at a time.
 inline Floats exp2_negative(Floats x) {

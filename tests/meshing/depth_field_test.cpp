@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/depth_field.h"
 
+#include <array>
 #include <cmath>
+#include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -75,7 +78,7 @@ TEST(DepthField, SaysTheSameOverABoxAsAtItsPoints) {
   EXPECT_GT(told, 2000);
 }
 
-TEST(DepthField, SaysTheSameOfARowAsOfItsPoints) {
+TEST(DepthField, SaysTheSameOfManyPointsAsOfEach) {
   const auto shape = test::nearest({test::sphere({0, 0, 0}, 0.15), test::plane({0, 0.2, 1}, 0.4)});
   TsdfView view = test::photographed(shape, test::camera_at({0.4, 0.1, -1}, {0, 0, 0}, 96));
   test::spoil(view, 0.01, 1);
@@ -86,31 +89,81 @@ TEST(DepthField, SaysTheSameOfARowAsOfItsPoints) {
     for (int i = 0; i < 40 * 40; ++i) {
       const float x = -0.7f + 0.035f * float(i % 40);
       const float y = -0.5f + 0.025f * float(i / 40);
-      for (int part = 0; part < 20; ++part) {
-        std::array<float, 8> z{};
-        for (int k = 0; k < 8; ++k) z[size_t(k)] = -1.2f + 0.1f * float(part) + 0.0125f * float(k);
-        const SightingRow row = field.row(x, y, z);
-        for (size_t k = 0; k < 8; ++k) {
-          const Sighting one = field.at({x, y, z[k]});
-          ++told[size_t(one.sight)];
-          const auto is = [&](unsigned bits) { return (bits >> k & 1) != 0; };
-          ASSERT_EQ(is(row.free), one.sight == Sight::Free);
-          ASSERT_EQ(is(row.hidden), one.sight == Sight::Hidden);
-          ASSERT_EQ(is(row.band), one.sight == Sight::Band);
-          ASSERT_EQ(is(row.assumed), one.is_assumed);
-          if (is(row.free)) ASSERT_EQ(row.weight[k], one.weight);
-          if (row.band == 0) continue;
-          ASSERT_EQ(row.weight_in_band[k], is(row.band) ? one.weight : 0);
-          ASSERT_EQ(row.distance_in_band[k], is(row.band) ? one.distance : 0);
-          ASSERT_EQ(row.sigma[k], is(row.band) ? one.sigma : 0);
-          if (!is(row.band)) continue;
-          ASSERT_EQ(row.x[k], one.x);
-          ASSERT_EQ(row.y[k], one.y);
-        }
+      std::vector<EightPoints> points(21);
+      for (size_t n = 0; n < 8 * points.size(); ++n) {
+        points[n / 8].x[n % 8] = x;
+        points[n / 8].y[n % 8] = y + 0.01f * float(n % 3);
+        points[n / 8].z[n % 8] = -1.2f + 0.0125f * float(n);
+      }
+      std::vector<Sightings> many(points.size());
+      field.at(points, many.data());
+      for (size_t n = 0; n < 8 * points.size(); ++n) {
+        const size_t k = n % 8;
+        const EightPoints& eight = points[n / 8];
+        const Sightings& row = many[n / 8];
+        const Sighting one = field.at({eight.x[k], eight.y[k], eight.z[k]});
+        ++told[size_t(one.sight)];
+        const auto is = [&](unsigned bits) { return (bits >> k & 1) != 0; };
+        ASSERT_EQ(is(row.free), one.sight == Sight::Free);
+        ASSERT_EQ(is(row.hidden), one.sight == Sight::Hidden);
+        ASSERT_EQ(is(row.band), one.sight == Sight::Band);
+        ASSERT_EQ(is(row.assumed), one.is_assumed);
+        ASSERT_EQ(row.free_weight[k], is(row.free) ? one.weight : 0);
+        ASSERT_EQ(row.weight_in_band[k], is(row.band) ? one.weight : 0);
+        ASSERT_EQ(row.distance_in_band[k], is(row.band) ? one.distance : 0);
+        ASSERT_EQ(row.sigma[k], is(row.band) ? one.sigma : 0);
+        if (is(row.free | row.band)) ASSERT_EQ(row.pixel[k], view.depth.index(one.x, one.y));
       }
     }
     for (const int count : told) EXPECT_GT(count, 1000);
   }
+}
+
+// Boxes of all sizes and places, also around, behind and beside the camera.
+TEST(DepthField, SaysOfBoxesOnlyWhatHoldsAtAllTheirPoints) {
+  const auto shape = test::nearest({test::sphere({0, 0, 0}, 0.15), test::plane({0, 0.2, 1}, 0.4)});
+  TsdfView view = test::photographed(shape, test::camera_at({0.4, 0.1, -1}, {0, 0, 0}, 97));
+  view.sigma = DepthMap(view.depth.width, view.depth.height, 0.004f);
+  for (int y = 20; y < 40; ++y) {
+    for (int x = 0; x < 30; ++x) view.depth(x, y) = std::nanf("");
+    view.depth(50, y) *= 0.7f;
+  }
+  const DepthField field(view, {}, 0.01);
+  std::mt19937 random(7);
+  const auto uniform = [&](float low, float high) {
+    return low + (high - low) * float(random()) / 4294967296.0f;
+  };
+  std::array<int, 5> told = {};
+  int untouched = 0;
+  for (int i = 0; i < 4000; ++i) {
+    EightBoxes boxes;
+    const float size = std::exp(uniform(-7, -1));
+    boxes.half = size * Eigen::Vector3f(1, uniform(0.3f, 1), uniform(0.3f, 1));
+    for (size_t k = 0; k < 8; ++k) {
+      boxes.x[k] = uniform(-0.8f, 0.8f);
+      boxes.y[k] = uniform(-0.8f, 0.8f);
+      boxes.z[k] = uniform(-1.4f, 1.6f);
+    }
+    const Looks looks = field.look(boxes);
+    for (size_t k = 0; k < 8; ++k) {
+      const Look look = looks[k];
+      ++told[size_t(look.sight)];
+      untouched += look.sight == Sight::Mixed && !look.may_touch;
+      for (int n = 0; n < 27; ++n) {
+        const Eigen::Vector3f corner(float(n % 3 - 1), float(n / 3 % 3 - 1), float(n / 9 - 1));
+        const Eigen::Vector3f p =
+            Eigen::Vector3f(boxes.x[k], boxes.y[k], boxes.z[k]) + corner.cwiseProduct(boxes.half);
+        const Sight sight = field.at(p).sight;
+        if (look.sight != Sight::Mixed) ASSERT_EQ(sight, look.sight) << p.transpose();
+        if (!look.may_touch) ASSERT_NE(sight, Sight::Band) << p.transpose();
+        if (!look.may_free && look.sight == Sight::Mixed) ASSERT_NE(sight, Sight::Free);
+      }
+    }
+  }
+  for (const Sight sight : {Sight::Nothing, Sight::Free, Sight::Hidden, Sight::Mixed}) {
+    EXPECT_GT(told[size_t(sight)], 100) << int(sight);
+  }
+  EXPECT_GT(untouched, 500);
 }
 
 TEST(DepthField, TellsOfBoxesThatNoBandTouches) {
