@@ -31,7 +31,7 @@ if [ ! -f "$tbb/CMakeLists.txt" ]; then
 fi
 cmake -G Ninja -S "$tbb" -B "$tbb/build" -DCMAKE_CXX_COMPILER=clang++-14 -DCMAKE_C_COMPILER=clang-14 \
   -DCMAKE_BUILD_TYPE=RelWithDebInfo -DTBB_TEST=OFF -DTBB_STRICT=OFF -DTBBMALLOC_BUILD=OFF \
-  -DTBB_SANITIZE=thread -DCMAKE_LIBRARY_OUTPUT_DIRECTORY="$tbb/lib" >/dev/null
+  -DTBB_SANITIZE=thread -DTBB_OUTPUT_DIR_BASE=lib >/dev/null
 cmake --build "$tbb/build"
 
 if [ $# -gt 0 ]; then
@@ -46,7 +46,7 @@ cmake --build --preset race --target "${tests[@]}"
 status=0
 for test in "${tests[@]}"; do
   verdict=clean
-  LD_LIBRARY_PATH="$tbb/lib" TSAN_OPTIONS="halt_on_error=1 second_deadlock_stack=1" \
+  LD_LIBRARY_PATH="$tbb/build/lib_relwithdebinfo" TSAN_OPTIONS="halt_on_error=1 suppressions=tests/races.supp" \
     "build/race/bin/$test" >"build/race/$test.log" 2>&1 || verdict="FAILED, see build/race/$test.log"
   printf '%-45s %s\n' "$test" "$verdict"
   [ "$verdict" = clean ] || status=1
