@@ -114,16 +114,22 @@ class Frames {
         const double z = double(view.given_depth(x, y)) * internal_per_value;
         if (!(z > 0) || is_at_depth_edge(view.given_depth, x, y)) continue;
         out.depth(x, y) = static_cast<float>(z);
-        out.sigma(x, y) = static_cast<float>(kSensorSigma * z);
+        out.sigma(x, y) = static_cast<float>(relative_sigma_ * z);
       }
     }
     return out;
+  }
+
+  /// Of depth, where it is worse than that of a sensor. \param relative  may be NaN: nobody knows
+  void expect(double relative) {
+    if (relative > relative_sigma_) relative_sigma_ = relative;
   }
 
   std::vector<std::string> warnings() const { return {warnings_.begin(), warnings_.end()}; }
 
  private:
   const Scene& scene_;
+  double relative_sigma_ = kSensorSigma;
   mutable std::mutex mutex_;
   mutable std::set<std::string> warnings_;  // in an order that no thread decides
 };
@@ -205,7 +211,7 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   to_canonical(scene);
   scene.frame.up = up;
 
-  const Frames frames(scene);
+  Frames frames(scene);
   std::vector<Camera> cameras;
   for (const int i : scene.input) cameras.push_back(scene.views[static_cast<size_t>(i)].camera);
   const DepthAgreement agreement =
@@ -221,6 +227,7 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
     judge_scale(agreement, scene, is_said, out.frame, out.warnings);
   } else {
     judge_fit(agreement, scene, out.warnings);
+    frames.expect(agreement.off);  // no sensor measured it
   }
   TsdfOptions fusing;
   if (!request.voxel_size.empty()) {

@@ -247,10 +247,13 @@ namespace {
 
 // Null where there was none; scale null where it tells none.
 nlohmann::ordered_json given_depth_to_json(const PriorsReport& priors) {
-  static constexpr std::array<const char*, 4> kKinds = {"", "metric", "depth", "disparity"};
   const GivenDepthReport& given = priors.given;
   if (given.kind == DepthKind::Unknown) return nullptr;
-  nlohmann::ordered_json out = {{"kind", kKinds.at(static_cast<size_t>(given.kind))}};
+  const char* kind = given.kind == DepthKind::Relative ? "depth" : "disparity";
+  if (given.kind == DepthKind::Metric) {
+    kind = given.metres_per_unit > 0 ? "metric" : "in units of the scene";
+  }
+  nlohmann::ordered_json out = {{"kind", kind}};
   if (given.metres_per_unit > 0) {
     out["metres_per_unit"] = given.metres_per_unit;
     out["metres_sigma"] = given.metres_sigma;

@@ -27,9 +27,8 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kSameSurface = 0.05f;  // relative step between values that may be averaged
 
-// The file in a folder "depth" in or beside the folder of a photograph, beneath the scene, else
-// where COLMAP's dense stereo puts it.
-fs::path depth_beside(const Scene& scene, const SceneRoot& root, const fs::path& photograph) {
+// The file in a folder "depth" in or beside the folder of a photograph, beneath the scene.
+fs::path depth_beside(const SceneRoot& root, const fs::path& photograph) {
   std::error_code ignored;  // what cannot be resolved stays as it is, and is not found
   const fs::path top = fs::weakly_canonical(root.folder, ignored);
   const fs::path folder = fs::weakly_canonical(photograph.parent_path(), ignored);
@@ -41,10 +40,7 @@ fs::path depth_beside(const Scene& scene, const SceneRoot& root, const fs::path&
     fs::path file = depth_file_of({inside, root.allow_external}, photograph);
     if (!file.empty()) return file;
   }
-  const std::string maps = "stereo/depth_maps";
-  if (scene.kind != "COLMAP" || !is_folder(root.folder / maps)) return {};
-  const fs::path inside = resolve_in_scene(root, maps, root.folder);
-  return colmap_depth_of({inside, root.allow_external}, photograph);
+  return {};
 }
 
 // The file that goes with the depth of a view as Polycam lays it out; empty if there is none.
@@ -203,7 +199,7 @@ std::map<fs::path, int> uses_of_files_beside(const Scene& scene, const SceneRoot
   for (const View& view : scene.views) {
     if (view.image_path.empty() || !view.depth_path.empty()) continue;
     try {
-      ++out[depth_beside(scene, root, view.image_path)];
+      ++out[depth_beside(root, view.image_path)];
     } catch (const Error&) {
       continue;  // told of input views
     }
@@ -213,12 +209,11 @@ std::map<fs::path, int> uses_of_files_beside(const Scene& scene, const SceneRoot
 
 // Gives a view the file that lies beside its photograph, if it can be its depth. Nobody named it,
 // so what is wrong with it is no reason to stop. \return that, or nothing
-std::string find_depth_beside(const Scene& scene,
-                              View& view,
+std::string find_depth_beside(View& view,
                               const SceneRoot& root,
                               const std::map<fs::path, int>& uses) {
   try {
-    const fs::path file = depth_beside(scene, root, view.image_path);
+    const fs::path file = depth_beside(root, view.image_path);
     if (file.empty()) return "";
     if (uses.at(file) > 1) throw BadInput(Defect::Ref, file, "lies beside several photographs");
     view.depth_path = file;
@@ -238,7 +233,7 @@ std::set<int> find_all_beside(Scene& scene, const SceneRoot& root) {
   for (const int i : scene.input) {
     View& view = scene.views[static_cast<size_t>(i)];
     if (view.image_path.empty() || !view.depth_path.empty()) continue;
-    const std::string why = find_depth_beside(scene, view, root, uses);
+    const std::string why = find_depth_beside(view, root, uses);
     if (why.empty()) continue;
     scene.warnings.push_back("the depth beside view " + printable(view.name) +
                              " is not used: " + why);
@@ -270,22 +265,32 @@ DepthMap resampled(const Raster<float>& values, const View& view) {
   return out;
 }
 
-// Depth maps of COLMAP are in units of the scene, and more photographs than these may have shaped
+// Whether dense stereo has made a map of a photograph, too, in the folder of another map.
+bool has_map_beside(const fs::path& map, const View& view) {
+  const SceneRoot folder = {map.parent_path(), /*allow_external=*/true};
+  return !colmap_depth_of(folder, view.image_path).empty();
+}
+
+// Depth maps of COLMAP are in units of the scene, and photographs that are held out may have shaped
 // them.
-void check_colmap_maps(Scene& scene, const DepthOptions& options) {
+void check_colmap_maps(Scene& scene) {
   const auto is_map = [&](int i) {
     return is_colmap_depth_name(scene.views[static_cast<size_t>(i)].depth_path);
   };
-  if (std::none_of(scene.input.begin(), scene.input.end(), is_map)) return;
-  if (options.kind == DepthKind::Metric || options.scale > 0) {
+  const auto first = std::find_if(scene.input.begin(), scene.input.end(), is_map);
+  if (first == scene.input.end()) return;
+  if (scene.depth_kind == DepthKind::Metric || scene.depth_scale > 0) {
     throw InvalidInput(
         "depth maps of COLMAP are in units of the scene, not in metres: leave --depth-kind metric "
-        "and --depth-scale out; --known-distance or --assume-unit tell the scale");
+        "and --depth-scale out; --assume-unit tells the scale");
   }
-  if (scene.held_out.empty()) return;
+  const fs::path& map = scene.views[static_cast<size_t>(*first)].depth_path;
+  const auto shaped_them = [&](int i) {
+    return has_map_beside(map, scene.views[static_cast<size_t>(i)]);
+  };
+  if (std::none_of(scene.held_out.begin(), scene.held_out.end(), shaped_them)) return;
   scene.warnings.emplace_back(
-      "depth maps of COLMAP are used; if held-out photographs were among those it made them from, "
-      "figures on these flatter");
+      "COLMAP made these depth maps with photographs that are held out: figures on these flatter");
 }
 
 // Of two photographs with one file of depth, it belongs to one at most.
@@ -343,7 +348,7 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
                    ".geometric.bin of COLMAP");
   }
   if (count == 0) return;
-  check_colmap_maps(scene, options);
+  check_colmap_maps(scene);
   std::vector<std::string> lacking;
   for (const int i : scene.input) {
     if (has_depth(i) || explained.contains(i)) continue;

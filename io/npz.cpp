@@ -12,6 +12,7 @@ namespace cgs {
 namespace {
 
 constexpr std::string_view kEnding = ".npy";
+constexpr size_t kStart = 4096;  // NumPy's own headers of plain arrays have 128 bytes
 
 std::vector<std::string> array_files(const ZipArchive& archive) {
   std::vector<std::string> out;
@@ -26,11 +27,11 @@ std::string array_name(const std::string& file) {
 }
 
 // "conf (480 x 640), K (3 x 3), names (no floats)"
-std::string listed(const ZipArchive& archive, const std::vector<std::string>& files, size_t start) {
+std::string listed(const ZipArchive& archive, const std::vector<std::string>& files) {
   constexpr size_t kShown = 8;
   std::string out;
   for (size_t i = 0; i < std::min(files.size(), kShown); ++i) {
-    const auto shape = npy_shape(archive.read_start(files[i], start));
+    const auto shape = npy_shape(archive.read_start(files[i], kStart));
     std::string sides;
     for (const size_t n : shape.value_or(std::vector<size_t>{})) {
       sides += (sides.empty() ? "" : " x ") + std::to_string(n);
@@ -47,7 +48,12 @@ std::string depth_file(const ZipArchive& archive, const std::filesystem::path& p
   if (files.empty()) throw BadInput(Defect::Empty, path, "holds no array");
   if (files.size() == 1) return files[0];
   if (archive.has("depth.npy")) return "depth.npy";
-  constexpr size_t kStart = 4096;  // NumPy's own headers of plain arrays have 128 bytes
+  constexpr size_t kMostArrays = 64;  // that are looked into
+  if (files.size() > kMostArrays) {
+    throw LimitError(printable(path) + ": holds " + std::to_string(files.size()) +
+                     " arrays, none named depth; of so many at most " +
+                     std::to_string(kMostArrays) + " are looked into");
+  }
   std::vector<std::string> pictures;
   for (const std::string& file : files) {
     const auto shape = npy_shape(archive.read_start(file, kStart));
@@ -57,7 +63,7 @@ std::string depth_file(const ZipArchive& archive, const std::filesystem::path& p
   throw BadInput(Defect::Schema,
                  path,
                  "expected an array named depth, or one of height x width floats; its arrays are " +
-                     listed(archive, files, kStart));
+                     listed(archive, files));
 }
 
 }  // namespace
@@ -70,6 +76,13 @@ NpyArray read_npz_depth(const std::filesystem::path& path, const ReadLimits& lim
   }
   const ZipArchive archive(bytes, path);
   const std::string file = depth_file(archive, path);
+  const auto shape = npy_shape(archive.read_start(file, kStart));
+  double pixels = 1;
+  for (const size_t side : shape.value_or(std::vector<size_t>{})) pixels *= double(side);
+  if (pixels > double(limits.max_pixels)) {
+    throw LimitError(printable(path / file) + ": more than " + std::to_string(limits.max_pixels) +
+                     " values");
+  }
   const uint64_t most = limits.max_pixels * sizeof(double) + limits.max_header_bytes;
   return parse_npy(archive.read(file, most), path / file, limits);
 }

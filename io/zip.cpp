@@ -72,7 +72,9 @@ Directory find_directory(std::string_view bytes, const std::filesystem::path& pa
   const auto comment_bytes = tail.get<uint16_t>("comment");
   if (tail.remaining() < comment_bytes) throw BadInput(Defect::Truncated, path, "ZIP comment");
   Directory out = {offset, count, end};
-  if (offset == UINT32_MAX || count == UINT16_MAX) {
+  const bool has_64_bits =
+      end >= kEnd64PlaceBytes && bytes.substr(end - kEnd64PlaceBytes, 4) == kEnd64PlaceMagic;
+  if (offset == UINT32_MAX || (count == UINT16_MAX && has_64_bits)) {
     out = directory_of_64_bits(bytes, end, path);
   } else if (here != count) {
     throw BadInput(Defect::Unsupported, path, "a ZIP archive of several disks");
@@ -157,6 +159,7 @@ ZipArchive::ZipArchive(std::string_view bytes, std::filesystem::path path)
   ByteReader reader(bytes.substr(0, directory.end), path_);
   (void)reader.take(directory.offset, "files");
   reader.expect_records(directory.count, kEntryBytes, "files");
+  uint64_t packed = 0;  // files lie one after the other
   uint64_t unpacked = 0;
   for (uint64_t i = 0; i < directory.count; ++i) {
     std::string name;
@@ -164,7 +167,13 @@ ZipArchive::ZipArchive(std::string_view bytes, std::filesystem::path path)
     if (leaves_a_folder(name)) {
       throw BadInput(Defect::Path, path_, "holds a file named '" + shown_name(name) + "'");
     }
-    if (entry.method == kStored || entry.method == kDeflated) unpacked += entry.size;
+    const bool is_read = entry.method == kStored || entry.method == kDeflated;
+    if (is_read) unpacked += entry.size;
+    if (is_read) packed += entry.packed;
+    if (packed > bytes.size()) {
+      throw BadInput(
+          Defect::Count, path_, "its files overlap: together they are longer than it is");
+    }
     if (!entries_.emplace(name, entry).second) {
       reader.fail(Defect::Schema, "a second file " + shown_name(name));
     }

@@ -261,6 +261,9 @@ GivenDepth fit_given_depth(const Scene& scene, const std::vector<ViewPriors>& pr
 void merge_sensor_depth(const FittedDepth& sensor, const View& view, ViewPriors& priors) {
   constexpr double kSigmas = 3;
   constexpr float kConfidence = 0.5f;  // of a pixel that no other view confirms
+  // COLMAP's was made of the same photographs: no second witness where these measured by
+  // themselves.
+  const bool is_of_photographs = view.depth_path.extension() == ".bin";
   const double relative = std::max(kSensorSigma, sensor.scatter);
   for (int y = 0; y < sensor.depth.height; ++y) {
     for (int x = 0; x < sensor.depth.width; ++x) {
@@ -269,6 +272,7 @@ void merge_sensor_depth(const FittedDepth& sensor, const View& view, ViewPriors&
       if (!(z > 0) || !is_usable || is_at_depth_edge(sensor.depth, x, y)) continue;
       const double sigma = relative * z;
       if (priors.origin(x, y) == DepthOrigin::Measured) {
+        if (is_of_photographs) continue;
         const auto own = double(priors.depth(x, y));
         const auto own_sigma = double(priors.sigma(x, y));
         if (std::abs(own - z) > kSigmas * std::hypot(own_sigma, sigma)) continue;

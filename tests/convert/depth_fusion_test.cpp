@@ -8,6 +8,7 @@
 #include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "meshing/isosurface.h"
 #include "meshing/watertight.h"
 #include "tests/support/depth_scenes.h"
@@ -260,16 +261,19 @@ TEST_F(SphereFrames, OfCamerasThatStandStillTellNoScale) {
 // COLMAP's depth is in units of its cameras, whatever these are.
 TEST_F(SphereFrames, OfColmapAreFusedInUnitsOfTheirCamerasAndTellNoScale) {
   constexpr double kUnits = 3;  // per metre
+  const auto write_map = [&](int i, double units) {
+    std::string map = std::to_string(kWidth) + "&" + std::to_string(kHeight) + "&1&";
+    for (const float z : views_[size_t(i)].depth.data) {
+      map += test::packed(z > 0 ? float(units) * z : 0.0f);
+    }
+    test::write_bytes(dir_ / "maps" / (name(i) + ".png.geometric.bin"), map);
+  };
   for (int i = 0; i < kFrames; ++i) {
     for (int r = 0; r < 3; ++r) {
       json& value = document_["frames"][size_t(i)]["transform_matrix"][r][3];
       value = kUnits * value.get<double>();
     }
-    std::string map = std::to_string(kWidth) + "&" + std::to_string(kHeight) + "&1&";
-    for (const float z : views_[size_t(i)].depth.data) {
-      map += test::packed(z > 0 ? float(kUnits) * z : 0.0f);
-    }
-    test::write_bytes(dir_ / "maps" / (name(i) + ".png.geometric.bin"), map);
+    write_map(i, kUnits);
   }
   test::write_bytes(dir_ / "transforms.json", document_.dump());
   for (const char* unit : {"", "mm"}) {
@@ -286,6 +290,18 @@ TEST_F(SphereFrames, OfColmapAreFusedInUnitsOfTheirCamerasAndTellNoScale) {
       ASSERT_NEAR((p - kUnits * kCenter).norm(), kUnits * kRadius, 0.03);
     }
   }
+  // What maps disagree by is their sigma: no sensor states one.
+  const auto median_sigma = [&] {
+    DepthFusionRequest colmap = request();
+    colmap.options.depth.folder = dir_ / "maps";
+    colmap.voxel_size = "";
+    std::vector<float> sigma = open_surface(fuse_depth(colmap, {}).fused.volume, {}).sigma;
+    std::erase_if(sigma, [](float s) { return std::isnan(s); });
+    return double{median(sigma)};
+  };
+  const double of_exact = median_sigma();
+  for (int i = 1; i < kFrames; i += 2) write_map(i, 1.02 * kUnits);
+  EXPECT_GT(median_sigma(), 1.5 * of_exact);
   for (json& frame : document_["frames"]) {
     for (int r = 0; r < 3; ++r) {
       frame["transform_matrix"][r][3] = 0.8 * frame["transform_matrix"][r][3].get<double>();

@@ -187,11 +187,14 @@ TEST_F(GivenDepthFiles, OfAnotherShapeAreRefusedOrLeftOut) {
   expect_unusable("PATH");
 }
 
-TEST_F(GivenDepthFiles, MapsOfColmapAreFoundInItsWorkspace) {
+TEST_F(GivenDepthFiles, MapsOfColmapAreReadWhereTheyAreNamed) {
   const std::string maps = "stereo/depth_maps/";
   write_map(maps + "v1.png.photometric.bin", kWidth, kHeight, ramp);
   write_map(maps + "v2.png.photometric.bin", kWidth, kHeight, ramp);
-  View view = first();
+  EXPECT_TRUE(first().given_depth.empty()) << "nobody asked for them";
+  SceneOptions options;
+  options.depth.folder = dir_ / maps;
+  View view = first(options);
   EXPECT_EQ(warnings_, 0u) << all_warnings_;
   EXPECT_NEAR(view.given_depth(20, 10), ramp(20.5, 10.5), 1e-6);
   EXPECT_FALSE(view.depth_states_metres);
@@ -199,32 +202,25 @@ TEST_F(GivenDepthFiles, MapsOfColmapAreFoundInItsWorkspace) {
   write_map(maps + "v1.png.geometric.bin", kWidth / 2, kHeight / 2, [](double u, double v) {
     return 2 * ramp(u, v);
   });
-  view = first();
+  view = first(options);
   EXPECT_NEAR(view.given_depth(20, 10), 2 * ramp(20.5, 10.5), 1e-5);
-  SceneOptions options;
-  options.depth.folder = dir_ / maps;
-  EXPECT_NEAR(first(options).given_depth(20, 10), 2 * ramp(20.5, 10.5), 1e-5);
-  // What somebody put beside the photographs counts more.
-  write("depth/v1.npy", kWidth, kHeight, [](double, double) { return 7; });
-  EXPECT_EQ(first().given_depth(20, 10), 7);
-  std::filesystem::remove(dir_ / "depth/v1.npy");
   test::write_bytes(dir_ / maps / "v1.png.geometric.bin", "64&48&1&");
-  EXPECT_TRUE(first().given_depth.empty()) << "what is damaged becomes a warning";
-  EXPECT_NE(all_warnings_.find("COUNT"), std::string::npos) << all_warnings_;
+  EXPECT_EQ(test::defect_of([&] { (void)first(options); }), "COUNT");
 }
 
 TEST_F(GivenDepthFiles, MapsOfColmapAreNotInMetres) {
   write_map("stereo/depth_maps/v1.png.geometric.bin", kWidth, kHeight, ramp);
   write_map("stereo/depth_maps/v2.png.geometric.bin", kWidth, kHeight, ramp);
   SceneOptions options;
+  options.depth.folder = dir_ / "stereo/depth_maps";
   options.depth.kind = DepthKind::Metric;
   EXPECT_THROW((void)first(options), InvalidInput);
-  options = {};
+  options.depth.kind = DepthKind::Unknown;
   options.depth.scale = 1000;
   EXPECT_THROW((void)first(options), InvalidInput);
 }
 
-TEST_F(GivenDepthFiles, MapsOfColmapMayComeFromPhotographsThatAreHeldOut) {
+TEST_F(GivenDepthFiles, MapsOfColmapMayBeMadeWithPhotographsThatAreHeldOut) {
   std::string images;
   for (const int i : {1, 2, 3}) {
     const std::string name = "v" + std::to_string(i) + ".png";
@@ -233,13 +229,17 @@ TEST_F(GivenDepthFiles, MapsOfColmapMayComeFromPhotographsThatAreHeldOut) {
     write_map("stereo/depth_maps/" + name + ".geometric.bin", kWidth, kHeight, ramp);
   }
   test::write_bytes(dir_ / "sparse/0/images.txt", images);
-  (void)first();
-  EXPECT_EQ(warnings_, 0u);
   SceneOptions options;
+  options.depth.folder = dir_ / "stereo/depth_maps";
+  (void)first(options);
+  EXPECT_EQ(warnings_, 0u) << all_warnings_;
   options.views = "v1,v2";
   (void)first(options);
   ASSERT_EQ(warnings_, 1u);
-  EXPECT_NE(all_warnings_.find("held-out"), std::string::npos) << all_warnings_;
+  EXPECT_NE(all_warnings_.find("held out"), std::string::npos) << all_warnings_;
+  std::filesystem::remove(dir_ / "stereo/depth_maps/v3.png.geometric.bin");
+  (void)first(options);
+  EXPECT_EQ(warnings_, 0u) << all_warnings_;
 }
 
 TEST_F(GivenDepthFiles, AFileIsTheDepthOfOnePhotograph) {
@@ -303,8 +303,6 @@ TEST_F(DistortedGivenDepth, LosesTheDistortionAsThePhotographDoes) {
 
 TEST_F(DistortedGivenDepth, IsNoneOfColmapsUndistortedPictures) {
   write_map("stereo/depth_maps/v1.png.geometric.bin", kWidth, kHeight, ramp);
-  EXPECT_TRUE(first().given_depth.empty());
-  EXPECT_NE(all_warnings_.find("undistorted"), std::string::npos) << all_warnings_;
   SceneOptions options;
   options.depth.folder = dir_ / "stereo/depth_maps";
   EXPECT_EQ(test::defect_of([&] { (void)first(options); }), "MISMATCH");

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "io/depth_file.h"
+#include "libcgs/core/error.h"
 #include "tests/support/python.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
@@ -69,6 +70,17 @@ TEST_F(Npz, RefusesSeveralPicturesAndListsThem) {
   EXPECT_NE(said.find("conf (3 x 4), f (one number), ids (no floats), pred (3 x 4)"),
             std::string::npos)
       << said;
+}
+
+TEST_F(Npz, LooksIntoNoMoreThanItMay) {
+  Files files;
+  for (int i = 0; i < 65; ++i) files.emplace_back(std::to_string(i) + ".npy", array("(2,)", 2));
+  EXPECT_THROW((void)read(files), LimitError);
+  files.emplace_back("depth.npy", array("(3, 4)", 12));
+  EXPECT_EQ(read(files).values.size(), 12u);
+  ReadLimits limits;
+  limits.max_pixels = 11;
+  EXPECT_THROW((void)read_npz_depth(dir_ / "a.npz", limits), LimitError);
 }
 
 TEST_F(Npz, RefusesWhatHoldsNoDepth) {

@@ -90,6 +90,17 @@ TEST(Zip, RefusesWhatUnpacksToTooMuch) {
   EXPECT_EQ(opened(test::zip_bytes({{"a", large}, {"b", large}}, {.method = 8})), "LIMIT");
 }
 
+// Many entries of one stream would be read as often as there are entries.
+TEST(Zip, RefusesFilesThatOverlap) {
+  std::string bytes = test::zip_bytes({{"a.txt", kText}, {"b.txt", "xyz"}});
+  const size_t second = bytes.rfind("PK\x01\x02");
+  for (const size_t field : {20, 24}) {  // sizes packed and unpacked
+    bytes.replace(second + field, 4, test::packed(static_cast<uint32_t>(kText.size())));
+  }
+  bytes.replace(second + 42, 4, std::string(4, '\0'));  // its place
+  EXPECT_EQ(defect(bytes), "COUNT");
+}
+
 TEST(Zip, RefusesNamesThatLeaveAFolder) {
   for (const char* name : {"../a.txt", "x/../../a", "/etc/a", "..\\a", "C:/a", ""}) {
     EXPECT_EQ(defect(test::zip_bytes({{"a.txt", kText}, {name, "b"}})), "PATH") << name;
