@@ -211,7 +211,7 @@ void BlockEvidence::forget_band(size_t n) {
 
 bool BlockEvidence::is_settled() const {
   return !has_band() &&
-         std::all_of(free_.begin(), free_.end(), [](uint8_t row) { return row == 0xff; });
+         std::all_of(free_.begin(), free_.end(), [](uint8_t group) { return group == 0xff; });
 }
 
 void BlockEvidence::add_whole(Sight sight) {
@@ -244,16 +244,6 @@ BlockEvidence::Voxel BlockEvidence::operator[](size_t in_leaf) const {
     for (size_t k = 0; k < 3; ++k) out.color[Eigen::Index(k)] = color_->color[k][n];
   }
   return out;
-}
-
-void BlockEvidence::clear() {
-  free_ = {};
-  hidden_ = {};
-  measured_ = {};
-  if (free_weight_) *free_weight_ = {};
-  if (sums_) *sums_ = {};
-  if (sigma_) *sigma_ = {};
-  if (color_) *color_ = {};
 }
 
 float BlockEvidence::Voxel::support() const {

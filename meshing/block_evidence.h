@@ -70,9 +70,6 @@ class BlockEvidence {
   /// \param n  position in an OpenVDB leaf
   Voxel operator[](size_t n) const;
 
-  /// Forgets everything, but keeps the memory.
-  void clear();
-
  private:
   static constexpr size_t kGroups = kBlockVoxels / 8;
   using Doubles = std::array<double, kBlockVoxels>;

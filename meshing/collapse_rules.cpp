@@ -48,6 +48,23 @@ Foot foot_on(const Triangle& f, const Vector3f& x) {
   return {(x - v * f.ab - w * f.ac).squaredNorm(), v, w};
 }
 
+/// The new face that a witness lies nearest to.
+struct Heir {
+  const NewFace* face = nullptr;  ///< Null where no new face has its label.
+  Foot foot{std::numeric_limits<float>::infinity(), 0, 0};
+};
+
+/// \param x  of the witness, from the new vertex
+Heir heir_of(const std::vector<NewFace>& fresh, Provenance label, const Vector3f& x) {
+  Heir out;
+  for (const NewFace& face : fresh) {
+    if (face.label != label) continue;
+    const Foot foot = foot_on(face, x);
+    if (foot.squared_distance < out.foot.squared_distance) out = {&face, foot};
+  }
+  return out;
+}
+
 float squared_distance_to_segment(const Vector3f& x, const Vector3f& a, const Vector3f& b) {
   const Vector3f ab = b - a;
   const float length = ab.squaredNorm();
@@ -270,15 +287,7 @@ bool Collapser::witnesses_allow(Attempt& attempt, const Vector3f& p) const {
     const bool compare_colors = !mesh_.colors.empty() && label != Provenance::Inferred;
     for (uint32_t w = witness_[f]; w != kNone; w = next_witness_[w]) {
       const Vector3f x = original_.vertices[w] - p;
-      const NewFace* nearest = nullptr;
-      Foot foot{std::numeric_limits<float>::infinity(), 0, 0};
-      for (const NewFace& fresh : attempt.fresh) {
-        if (fresh.label != label) continue;
-        const Foot other = foot_on(fresh, x);
-        if (!(other.squared_distance < foot.squared_distance)) continue;
-        foot = other;
-        nearest = &fresh;
-      }
+      const auto [nearest, foot] = heir_of(attempt.fresh, label, x);
       if (!(foot.squared_distance <= limits_.tolerance[w] * limits_.tolerance[w])) return false;
       if (compare_colors) {
         const Vector3f color =
@@ -295,19 +304,18 @@ bool Collapser::witnesses_allow(Attempt& attempt, const Vector3f& p) const {
          std::all_of(attempt.moving.begin(), attempt.moving.end(), find);
 }
 
-// Gives the witnesses of faces that vanish to any other one of their label; there must be one.
+// Gives the witnesses of faces that vanish to the nearest other one of their label; there must be
+// one. Those of faces that move stay with them.
 bool Collapser::hand_over_witnesses(Attempt& attempt) const {
   attempt.points.clear();
   attempt.face_of_point.clear();
+  const Vector3f p = (attempt.to.point + center_).cast<float>();
   for (const uint32_t f : attempt.dying) {
-    const auto heir =
-        std::find_if(attempt.fresh.begin(), attempt.fresh.end(), [&](const NewFace& fresh) {
-          return fresh.label == mesh_.provenance[f];
-        });
     for (uint32_t w = witness_[f]; w != kNone; w = next_witness_[w]) {
-      if (heir == attempt.fresh.end()) return false;
+      const Heir heir = heir_of(attempt.fresh, mesh_.provenance[f], original_.vertices[w] - p);
+      if (heir.face == nullptr) return false;
       attempt.points.push_back(w);
-      attempt.face_of_point.push_back(heir->face);
+      attempt.face_of_point.push_back(heir.face->face);
     }
   }
   return true;

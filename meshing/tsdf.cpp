@@ -26,6 +26,8 @@ namespace {
 
 using openvdb::Coord;
 
+constexpr size_t kEvidenceBytes =
+    BlockEvidence::kBandBytes + BlockEvidence::kSigmaBytes + BlockEvidence::kColorBytes;
 constexpr size_t kHeldPixelBytes = DepthField::kPixelBytes + sizeof(Eigen::Vector3f) + 1;
 constexpr size_t kBlockBytes = 16;  // Of any block, in lists.
 
@@ -172,9 +174,14 @@ class Fuser {
       grid_.each_in_cube(c, [&](size_t i, size_t n) { sights[i] = look.together(n); });
     });
     const auto mixed = size_t(std::count(sights.begin(), sights.end(), Sight::Mixed));
-    constexpr size_t kPixelBytes = 80;  // A prepared depth map, with its pyramid and normals.
+    constexpr size_t kPixelBytes = 80;  // A prepared depth map, with its bounds and normals.
+    constexpr size_t kMostThreads =
+        16;  // Whose cubes hold evidence; no more, as it is foreseen alike.
+    const size_t held_blocks =
+        std::min(mixed, std::min(kMostThreads, grid_.cube_count()) * BlockGrid::kBlocksPerCube);
     check_memory(out_.report,
-                 pixels_ * kPixelBytes + grid_.size() * kBlockBytes + mixed * kLeafBytes,
+                 pixels_ * kPixelBytes + grid_.size() * kBlockBytes + mixed * kLeafBytes +
+                     held_blocks * kEvidenceBytes,
                  options_.memory_limit);
     evidence_.resize(grid_.size());
     collect(0.15, [&](size_t c, const auto& keep) {
@@ -223,6 +230,8 @@ class Fuser {
   // Marks the blocks that the surface of any view may touch, and those that must be looked into.
   // Keeps the fields of as many views as `made` has room for.
   void find_surface(Fields& made, const Progress& progress) {
+    const size_t view_bytes = pixels_ / views_.size() * kHeldPixelBytes * portion_;
+    check_memory(out_.report, view_bytes + grid_.size() * kBlockBytes, options_.memory_limit);
     touched_.assign(grid_.size(), 0);
     std::vector<uint8_t> is_mixed(grid_.size(), 0);
     struct Found {
@@ -269,10 +278,7 @@ class Fuser {
       mixed += touched_[i] == 0 && is_mixed[i] != 0 ? 1 : 0;
     }
     // Of a block on the surface, leaves take the place of evidence.
-    constexpr size_t kTouchedBytes = std::max(
-        kLeafBytes,
-        BlockEvidence::kBandBytes + BlockEvidence::kSigmaBytes + BlockEvidence::kColorBytes);
-    const size_t view_bytes = pixels_ / views_.size() * kHeldPixelBytes * portion_;
+    constexpr size_t kTouchedBytes = std::max(kLeafBytes, kEvidenceBytes);
     check_memory(out_.report,
                  view_bytes + grid_.size() * kBlockBytes + touched * kTouchedBytes +
                      mixed * (BlockEvidence::kPlainBytes + kStateLeafBytes),

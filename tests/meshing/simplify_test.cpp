@@ -319,8 +319,8 @@ TEST(Simplify, KeepsColoursThatTheFacesCarry) {
   EXPECT_GT(kept.faces_after, 4 * lost.faces_after);
 }
 
-TEST(Simplify, DoesNotLetTwoNearSheetsIntersect) {
-  // Bumpy sheets an eighth of the error apart: simplified on their own they would cross.
+// Bumpy sheets a thousandth apart: simplified on their own they would cross.
+TriangleMesh near_sheets() {
   const auto bumpy = [](float lift) {
     return grid(32, 32, false, false, [lift](float u, float v) {
       return Vector3f(u, v, lift + 8e-3f * std::sin(40 * u) * std::sin(33 * v));
@@ -332,9 +332,23 @@ TEST(Simplify, DoesNotLetTwoNearSheetsIntersect) {
   mesh.vertices.insert(mesh.vertices.end(), upper.vertices.begin(), upper.vertices.end());
   for (const auto& f : upper.faces) mesh.faces.push_back({f[0] + n, f[1] + n, f[2] + n});
   mesh.provenance.assign(mesh.faces.size(), Provenance::Inferred);
-  const SimplifyResult result = simplify(mesh, {.max_error = 8e-3});
+  return mesh;
+}
+
+TEST(Simplify, DoesNotLetTwoNearSheetsIntersect) {
+  const SimplifyResult result = simplify(near_sheets(), {.max_error = 8e-3});
   EXPECT_EQ(certify(result.mesh).self_intersections, 0U);
   EXPECT_LT(result.faces_after, result.faces_before);
+  EXPECT_GT(result.rounds, 1);
+}
+
+// Neither where the error has no bound, and what crosses is first found by looking.
+TEST(Simplify, DoesNotLetTwoNearSheetsIntersectForANumberOfFaces) {
+  const TriangleMesh mesh = near_sheets();
+  const SimplifyResult result =
+      simplify(mesh, {.max_error = 4, .max_color_error = 1, .target_faces = mesh.faces.size() / 8});
+  EXPECT_EQ(certify(result.mesh).self_intersections, 0U);
+  EXPECT_LT(result.faces_after, result.faces_before / 2);
   EXPECT_GT(result.rounds, 1);
 }
 
