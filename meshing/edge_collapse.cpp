@@ -240,6 +240,7 @@ float Collapser::pass_cost() {
 
 // So few that hardly any of them looks at what another one changes, and is tried in vain.
 size_t Collapser::batch_size() const {
+  if (limits_.batch > 0) return limits_.batch;
   return std::clamp<size_t>(mesh_.faces.size() / 2000, 32, 4096);
 }
 

@@ -21,6 +21,7 @@ struct CollapseLimits {
   /// How far each pass goes, as an earlier run gave it; empty = the cheapest third of what is left.
   /// Two runs that go as far differ only near the vertices whose limits differ.
   std::vector<float> pass_costs;
+  size_t batch = 0;  ///< Collapses tried at once; any number gives the same mesh, 0 is fast.
 };
 
 struct CollapsedMesh {

@@ -157,7 +157,7 @@ SimplifyResult simplify(const TriangleMesh& mesh,
   SimplifyResult result = unchanged(mesh);
   if (mesh.faces.empty()) return result;
   CollapseLimits limits{
-      tolerances(mesh, options), float(options.max_color_error), options.target_faces, {}};
+      tolerances(mesh, options), float(options.max_color_error), options.target_faces, {}, 0};
   constexpr int kRounds = 6;
   for (int round = 1; round <= kRounds; ++round) {
     report(progress, double(round - 1) / kRounds);

@@ -97,6 +97,16 @@ TEST(DepthField, SaysTheSameOfManyPointsAsOfEach) {
       }
       std::vector<Sightings> many(points.size());
       field.at(points, many.data());
+      for (size_t n = 0; n < points.size(); ++n) {  // eight at once, where sixteen are otherwise
+        Sightings alone;
+        field.at(std::span(points).subspan(n, 1), &alone);
+        ASSERT_EQ(alone.free, many[n].free);
+        ASSERT_EQ(alone.hidden, many[n].hidden);
+        ASSERT_EQ(alone.band, many[n].band);
+        ASSERT_EQ(alone.weight_in_band, many[n].weight_in_band);
+        ASSERT_EQ(alone.distance_in_band, many[n].distance_in_band);
+        ASSERT_EQ(alone.sigma, many[n].sigma);
+      }
       for (size_t n = 0; n < 8 * points.size(); ++n) {
         const size_t k = n % 8;
         const EightPoints& eight = points[n / 8];

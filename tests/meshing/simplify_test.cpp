@@ -13,6 +13,7 @@
 
 #include "libcgs/core/error.h"
 #include "meshing/certificate.h"
+#include "meshing/edge_collapse.h"
 
 namespace cgs {
 namespace {
@@ -387,6 +388,40 @@ TEST(Simplify, GivesTheSameBitsForAnyNumberOfThreads) {
     if (threads == 1) first = result;
     EXPECT_EQ(result.faces, first.faces);
     EXPECT_EQ(result.vertices, first.vertices);
+  }
+}
+
+// One at a time is what the order of collapses means.
+TEST(CollapseEdges, GiveTheSameBitsTriedOneByOneOrManyAtOnce) {
+  TriangleMesh mesh = grid(60, 40, false, true, [](float u, float v) {
+    const float r = 0.2f + 0.03f * std::sin(20 * u) * std::cos(float(3 * kTau) * v);
+    return Vector3f(u, r * std::cos(float(kTau) * v), r * std::sin(float(kTau) * v));
+  });
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    mesh.provenance.push_back(f / 7 % 5 == 0 ? Provenance::Inferred : Provenance::Observed);
+  }
+  for (const Vector3f& p : mesh.vertices) {
+    mesh.colors.push_back((Vector3f(0.5f, 0.5f, 0.5f) + p).cwiseMax(0).cwiseMin(1));
+    mesh.sigma.push_back(0.01f + p.y() * p.y());
+  }
+  mesh.support.assign(mesh.vertices.size(), 2);
+  for (const float tolerance : {0.01f, 100.0f}) {  // the second looks at no distances
+    CollapseLimits limits;
+    limits.tolerance.assign(mesh.vertices.size(), tolerance);
+    limits.color = tolerance < 1 ? 0.1f : 1;
+    limits.target_faces = 600;
+    limits.batch = 1;
+    const CollapsedMesh first = collapse_edges(mesh, limits);
+    EXPECT_LT(first.mesh.faces.size(), mesh.faces.size() * 3 / 4);
+    for (const size_t batch : {7, 100, 1 << 20}) {
+      limits.batch = batch;
+      const CollapsedMesh other = collapse_edges(mesh, limits);
+      EXPECT_EQ(other.mesh.faces, first.mesh.faces) << batch;
+      EXPECT_EQ(other.mesh.vertices, first.mesh.vertices) << batch;
+      EXPECT_EQ(other.mesh.colors, first.mesh.colors) << batch;
+      EXPECT_EQ(other.mesh.sigma, first.mesh.sigma) << batch;
+      EXPECT_EQ(other.witness_of, first.witness_of) << batch;
+    }
   }
 }
 
