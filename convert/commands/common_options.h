@@ -17,7 +17,7 @@ namespace cgs {
 class OptionGroup {
  public:
   OptionGroup(CLI::App& command, const std::string& heading);
-  ~OptionGroup();
+  ~OptionGroup();  // NOLINT(bugprone-exception-escape)
   OptionGroup(const OptionGroup&) = delete;
   OptionGroup& operator=(const OptionGroup&) = delete;
 
