@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -102,38 +103,53 @@ WrittenSurfaces write_surfaces(Surfaces surfaces,
   return out;
 }
 
-/// Largest distance of each mesh file, as it reads, from what was fused [internal units].
-std::map<std::string, double> deviations_of_files(const Surfaces& fused,
-                                                  const WrittenSurfaces& written,
-                                                  const Scene& scene,
-                                                  const std::filesystem::path& folder) {
+/// What the mesh files are once they are read again.
+struct FileDeviations {
+  std::map<std::string, double> largest;  ///< Distance from what was fused [internal units].
+  std::vector<std::string> too_large;     ///< Files that are above what is read of their format.
+};
+
+FileDeviations deviations_of_files(const Surfaces& fused,
+                                   const WrittenSurfaces& written,
+                                   const Scene& scene,
+                                   const std::filesystem::path& folder) {
   const Frame& frame = scene.frame;
-  std::map<std::string, double> out;
+  FileDeviations out;
   if (!fused.open.faces.empty()) {
     const TriangleMesh read = read_mesh_ply(folder / "surface.ply", frame).mesh;
-    out["surface.ply"] = surface_deviation(read, fused.open).max();
+    out.largest["surface.ply"] = surface_deviation(read, fused.open).max();
   }
   const TriangleMesh read = read_mesh_ply(folder / "watertight.ply", frame).mesh;
-  out["watertight.ply"] = surface_deviation(read, fused.closed.mesh).max();
+  const double of_mesh = surface_deviation(read, fused.closed.mesh).max();
+  out.largest["watertight.ply"] = of_mesh;
   for (const Json& file : written.files["files"]) {
     const auto name = file.get<std::string>();
     if (name != "watertight.stl" && name != "watertight.3mf") continue;
     // The same mesh: it is as far off, and what its vertices were rounded by.
-    out[name] = out["watertight.ply"] + vertex_moves(folder / name, read, frame);
+    try {
+      out.largest[name] = of_mesh + vertex_moves(folder / name, read, frame);
+    } catch (const LimitError&) {
+      if (name != "watertight.3mf") throw;  // its text is many times as long as the others
+      out.too_large.push_back(name);
+    }
   }
   return out;
 }
 
-std::string words_for(const std::map<std::string, double>& deviations,
+std::string words_for(const FileDeviations& deviations,
                       double promise,
                       const KnownArea& known,
                       const Frame& frame) {
   std::string out;
-  for (const auto& [file, deviation] : deviations) {
+  for (const auto& [file, deviation] : deviations.largest) {
     out += (out.empty() ? "" : ", ") + file + " is at most " + format_length(deviation, frame);
   }
-  return out + " off the fused surface, " + format_length(promise, frame) +
-         " were asked for. That is the conversion; what the photographs tell is another matter: "
+  out += " off the fused surface, " + format_length(promise, frame) + " were asked for. ";
+  for (const std::string& file : deviations.too_large) {
+    out += file + " was not read again because of its size. ";
+  }
+  return out +
+         "That is the conversion; what the photographs tell is another matter: "
          "of the surface they show, " +
          number(100 * known.share(), "%.1f") + " % is known to " + format_length(promise, frame) +
          " (one standard deviation)";
@@ -150,9 +166,9 @@ WrittenSurfaces write_surfaces_within(const Surfaces& fused,
     std::optional<SimplifyOptions> options;
     if (share > 0) options = SimplifyOptions{.max_error = share * promise};
     WrittenSurfaces out = write_surfaces(fused, options, scene, folder, progress);
-    const std::map<std::string, double> deviations = deviations_of_files(fused, out, scene, folder);
+    const FileDeviations deviations = deviations_of_files(fused, out, scene, folder);
     double worst = 0;
-    for (const auto& [file, deviation] : deviations) worst = std::max(worst, deviation);
+    for (const auto& [file, deviation] : deviations.largest) worst = std::max(worst, deviation);
     // Twice the room: other samples of the same surface may lie somewhat farther off.
     if (worst > (1 - 2 * kRoomForRounding) * promise) continue;
     const KnownArea known = known_within(fused.closed.mesh, promise);
@@ -160,10 +176,11 @@ WrittenSurfaces write_surfaces_within(const Surfaces& fused,
     out.promise = {{"promised", promise * frame.scale},
                    {"units", frame.unit_name()},
                    {"files", Json::object()},
+                   {"not_read_again", deviations.too_large},
                    {"area_seen", known.seen * area_unit},
                    {"area_known_as_well", known.within * area_unit},
                    {"words", words_for(deviations, promise, known, frame)}};
-    for (const auto& [file, deviation] : deviations) {
+    for (const auto& [file, deviation] : deviations.largest) {
       out.promise["files"][file] = deviation * frame.scale;
     }
     return out;

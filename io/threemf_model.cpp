@@ -2,9 +2,8 @@
 #include "io/threemf_model.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <set>
+#include <utility>
 
 #include "io/byte_reader.h"
 #include "io/text_lines.h"
@@ -40,19 +39,24 @@ std::string metres_of(const XmlElement& model) {
 // Twelve numbers; rows of a matrix that row vectors are multiplied with.
 Eigen::Affine3d transform_of(const XmlElement& element) {
   Eigen::Affine3d out = Eigen::Affine3d::Identity();
-  const auto text = element.find("transform");
-  if (!text) return out;
-  const std::vector<std::string_view> words = tokens(*text);
-  if (words.size() != 12) {
+  if (!element.find("transform")) return out;
+  const std::vector<double> values = element.numbers("transform");
+  if (values.size() != 12) {
     element.fail(Defect::Schema,
-                 "a transform has 12 numbers, this one " + std::to_string(words.size()));
+                 "a transform has 12 numbers, this one " + std::to_string(values.size()));
   }
-  for (size_t i = 0; i < words.size(); ++i) {
-    double& value = out(static_cast<int>(i % 3), static_cast<int>(i / 3));
-    if (!parse_number(words[i], value)) element.fail(Defect::Syntax, "transform: no number");
-    if (!std::isfinite(value)) element.fail(Defect::Value, "transform: a number is not finite");
+  for (size_t i = 0; i < values.size(); ++i) {
+    out(static_cast<int>(i % 3), static_cast<int>(i / 3)) = values[i];
   }
   return out;
+}
+
+ThreeMfType type_of(const XmlElement& object) {
+  const std::string_view type = object.find("type").value_or("model");
+  if (type == "model") return ThreeMfType::Model;
+  if (type == "surface") return ThreeMfType::Surface;
+  if (type == "support" || type == "solidsupport" || type == "other") return ThreeMfType::Accessory;
+  object.fail(Defect::Schema, "type \"" + std::string(type.substr(0, 40)) + "\" is not known");
 }
 
 ThreeMfPlacement placement_of(const XmlElement& element) {
@@ -66,20 +70,24 @@ ThreeMfPlacement placement_of(const XmlElement& element) {
 /// Gathers a model from the elements of its file.
 class ModelReader {
  public:
-  explicit ModelReader(const std::filesystem::path& path) : path_(path) {}
+  ModelReader(const std::filesystem::path& path, size_t entries_before) : path_(path) {
+    model_.entries = entries_before;
+  }
 
   ThreeMfModel read(std::string_view xml) {
-    const XmlHandlers handlers = {
-        [&](const XmlElement& element) { start(element); },
-        [&](std::string_view name) { end(name); },
-        [&](std::string_view text) { add_text(text); },
-        [&](std::string_view prefix, std::string_view uri) { uris_[std::string(prefix)] = uri; }};
+    const XmlHandlers handlers = {[&](const XmlElement& element) { start(element); },
+                                  [&](std::string_view name) { end(name); },
+                                  [&](std::string_view text) { add_text(text); },
+                                  [&](std::string_view prefix, std::string_view uri) {
+                                    if (!has_root_) uris_[std::string(prefix)] = uri;
+                                  }};
     read_xml(xml, path_, handlers);
     return std::move(model_);
   }
 
  private:
   void start(const XmlElement& element) {
+    ++depth_;
     std::string_view name = element.name();
     const bool is_core = name.starts_with(kCore);
     if (is_core) name.remove_prefix(kCore.size());
@@ -100,18 +108,22 @@ class ModelReader {
     } else if (name == "triangle") {
       add_triangle(element);
     } else if (name == "component") {
+      count_entry();
       inside(element).components.push_back(placement_of(element));
     } else if (name == "object") {
       start_object(element);
     } else if (name == "basematerials") {
+      count_entry();
       const uint64_t id = element.count("id");
       refuse_second(element, id);
       names_ = &model_.material_names[id];
     } else if (name == "base" && names_ != nullptr) {
+      count_entry();
       names_->emplace_back(element.at("name"));
     } else if (name == "item") {
+      count_entry();
       model_.build.push_back(placement_of(element));
-    } else if (name == "metadata" && object_ == nullptr) {
+    } else if (name == "metadata" && depth_ == 2) {  // of the model itself
       const std::string_view key = element.at("name");
       text_ = key == "Application"   ? &model_.application
               : key == "Description" ? &model_.description
@@ -120,11 +132,19 @@ class ModelReader {
   }
 
   void end(std::string_view name) {
+    --depth_;
     if (!name.starts_with(kCore)) return;
     name.remove_prefix(kCore.size());
     if (name == "object") object_ = nullptr;
     if (name == "basematerials") names_ = nullptr;
     if (name == "metadata") text_ = nullptr;
+  }
+
+  void count_entry() {
+    constexpr size_t kMost = 1'000'000;
+    if (++model_.entries <= kMost) return;
+    throw LimitError(printable(path_) +
+                     ": more than 1,000,000 objects, components, items and base materials");
   }
 
   void add_text(std::string_view text) {
@@ -150,9 +170,11 @@ class ModelReader {
 
   void start_object(const XmlElement& element) {
     if (object_ != nullptr) element.fail(Defect::Schema, "stands inside another");
+    count_entry();
     const uint64_t id = element.count("id");
     refuse_second(element, id);
     object_ = &model_.objects[id];
+    object_->type = type_of(element);
     material_ = {};
     if (!element.find("pid")) return;
     material_.group = element.count("pid");
@@ -194,6 +216,7 @@ class ModelReader {
   std::map<std::string, std::string> uris_;  // by prefix
   std::set<uint64_t> ids_;
   bool has_root_ = false;
+  int depth_ = 0;                              // of the element that comes; 1 = the root
   ThreeMfObject* object_ = nullptr;            // the one whose elements come
   ThreeMfMaterial material_;                   // of its triangles that name none
   std::vector<std::string>* names_ = nullptr;  // of the group whose elements come
@@ -202,8 +225,10 @@ class ModelReader {
 
 }  // namespace
 
-ThreeMfModel parse_threemf_model(std::string_view xml, const std::filesystem::path& path) {
-  return ModelReader(path).read(xml);
+ThreeMfModel parse_threemf_model(std::string_view xml,
+                                 const std::filesystem::path& path,
+                                 size_t entries_before) {
+  return ModelReader(path, entries_before).read(xml);
 }
 
 }  // namespace cgs

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -26,8 +27,16 @@ struct ThreeMfMaterial {
   uint64_t index = 0;
 };
 
+/// What an object is for; it says so of its own mesh, not of its components.
+enum class ThreeMfType : uint8_t {
+  Model,
+  Surface,    ///< Part of the model, but encloses nothing.
+  Accessory,  ///< "support", "solidsupport", "other": not part of the model.
+};
+
 /// A mesh, or what it is made of.
 struct ThreeMfObject {
+  ThreeMfType type = ThreeMfType::Model;
   std::vector<Eigen::Vector3d> vertices;  ///< In units of the model; finite.
   std::vector<std::array<uint32_t, 3>> triangles;
   std::vector<ThreeMfMaterial> materials;  ///< One per triangle.
@@ -40,16 +49,21 @@ struct ThreeMfModel {
   std::map<uint64_t, ThreeMfObject> objects;
   std::map<uint64_t, std::vector<std::string>> material_names;  ///< By group.
   std::vector<ThreeMfPlacement> build;
-  std::string application;  ///< Metadata; empty = not stated.
+  std::string application;  ///< Metadata of the model; empty = not stated.
   std::string description;
+  size_t entries = 0;  ///< Objects, components, items, material groups and their materials.
 };
 
 /// Reads a model file: unit, meshes, components, base materials and build, of the core
 /// specification and the production extension.
-/// \param path  for messages
+/// \param path            for messages
+/// \param entries_before  of other models of the archive; ThreeMfModel::entries goes on from there
 /// \throws BadInput as read_xml(); Schema, Value, Ref (a corner that is not there), Unsupported (an
-///         extension is required that changes the shape)
+///         extension is required that changes the shape); LimitError (more than a million entries:
+///         each takes ten times its text)
 /// Source: 3MF Core Specification 1.3 and Production Extension 1.1, 3MF Consortium.
-ThreeMfModel parse_threemf_model(std::string_view xml, const std::filesystem::path& path);
+ThreeMfModel parse_threemf_model(std::string_view xml,
+                                 const std::filesystem::path& path,
+                                 size_t entries_before = 0);
 
 }  // namespace cgs

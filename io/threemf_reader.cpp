@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "io/mesh_arrays.h"
 #include "io/threemf_model.h"
@@ -69,35 +70,39 @@ class Assembly {
     const std::string root = root_part(archive_, path_);
     const ThreeMfModel& model = part(root);
     is_ours_ = model.application == "cgs";
-    std::vector<ThreeMfPlacement> items;
     double cost = 0;
-    for (const ThreeMfPlacement& item : model.build) {
-      items.push_back(placed(item, root));
-      cost += cost_of(items.back());
-    }
+    for (const ThreeMfPlacement& item : model.build) cost += cost_of(placed(item, root));
     refuse_multiplication(cost);
-    for (const ThreeMfPlacement& item : items) append(item, Eigen::Affine3d::Identity());
-    if (out_.mesh.faces.empty()) throw BadInput(Defect::Empty, path_, "builds nothing");
+    for (const ThreeMfPlacement& item : model.build) {
+      append(placed(item, root), Eigen::Affine3d::Identity(), true);
+    }
+    if (out_.mesh.faces.empty()) {
+      throw BadInput(Defect::Empty,
+                     path_,
+                     accessories_.empty() ? "builds nothing" : "builds nothing but supports");
+    }
     if (out_.mesh.provenance.size() != out_.mesh.faces.size()) out_.mesh.provenance.clear();
     out_.comments.push_back("metres_per_unit " + model.metres_per_unit);
-    if (is_ours_) add_origin(model.description);
+    if (is_ours_) add_origin(model);
+    warn_of_types();
     return std::move(out_);
   }
 
  private:
   using Key = std::pair<std::string, uint64_t>;
 
-  const ThreeMfModel& part(const std::string& name) {
+  ThreeMfModel& part(const std::string& name) {
     const auto known = parts_.find(name);
     if (known != parts_.end()) return known->second;
     const std::string xml = archive_.read(name, kMostModel);
-    const auto added = parts_.emplace(name, parse_threemf_model(xml, path_ / name)).first;
+    const auto added = parts_.emplace(name, parse_threemf_model(xml, path_ / name, entries_)).first;
+    entries_ = added->second.entries;
     for (const auto& [id, object] : added->second.objects) stored_ += own_cost(object);
     return added->second;
   }
 
-  const ThreeMfObject& object_at(const ThreeMfPlacement& at) {
-    const auto& objects = part(at.part).objects;
+  ThreeMfObject& object_at(const ThreeMfPlacement& at) {
+    auto& objects = part(at.part).objects;
     const auto found = objects.find(at.object);
     if (found != objects.end()) return found->second;
     throw BadInput(
@@ -114,9 +119,11 @@ class Assembly {
     return 1 + static_cast<double>(std::max(object.vertices.size(), object.triangles.size()));
   }
 
-  // Vertices or faces that an object becomes with all its components; each is looked at once.
+  // Vertices or faces that an object becomes with all its components; each is looked at once, so
+  // that every mention of an object, by an item or a component, counts once.
   double cost_of(const ThreeMfPlacement& at) {
     const Key key(at.part, at.object);
+    ++mentions_[key];
     if (const auto known = costs_.find(key); known != costs_.end()) return known->second;
     constexpr size_t kDeepest = 64;
     if (!open_.insert(key).second) {
@@ -139,12 +146,32 @@ class Assembly {
   void refuse_multiplication(double cost) const {
     constexpr double kMayMultiplyTo = 1 << 25;
     if (cost <= std::max(kMayMultiplyTo, stored_)) return;
-    throw LimitError(printable(path_) + ": its components multiply to more than 33 million faces");
+    throw LimitError(printable(path_) + ": items and components place more than 33 million faces");
   }
 
-  void append(const ThreeMfPlacement& at, const Eigen::Affine3d& world_from_parent) {
-    const ThreeMfObject& object = object_at(at);
+  // \param is_last  what mentions the object is not placed again
+  void append(const ThreeMfPlacement& at, const Eigen::Affine3d& world_from_parent, bool is_last) {
+    const Key key(at.part, at.object);
+    if (is_last) is_last = --mentions_[key] == 0;
+    ThreeMfObject& object = object_at(at);
     const Eigen::Affine3d world = world_from_parent * at.transform;
+    if (object.type == ThreeMfType::Accessory && !object.triangles.empty()) {
+      accessories_.insert(key);
+    } else {
+      if (object.type == ThreeMfType::Surface && !object.triangles.empty()) surfaces_.insert(key);
+      if (!is_last || at.transform.matrix() != Eigen::Matrix4d::Identity()) is_moved_ = true;
+      append_mesh(object, at, world, is_last);
+    }
+    for (const ThreeMfPlacement& component : object.components) {
+      append(placed(component, at.part), world, is_last);
+    }
+  }
+
+  // \param is_last  what is read of the mesh is given back as soon as it is appended
+  void append_mesh(ThreeMfObject& object,
+                   const ThreeMfPlacement& at,
+                   const Eigen::Affine3d& world,
+                   bool is_last) {
     const auto first = static_cast<uint32_t>(out_.positions.size());
     if (out_.positions.size() + object.vertices.size() > std::numeric_limits<uint32_t>::max()) {
       throw LimitError(printable(path_) + ": more than 2^32 - 1 vertices");
@@ -156,15 +183,20 @@ class Assembly {
                      path_ / at.part,
                      "object " + std::to_string(at.object) + " is placed at infinity");
     }
+    if (is_last) give_back(object.vertices);
     const bool is_mirrored = world.linear().determinant() < 0;  // outside stays outside
     for (std::array<uint32_t, 3> corners : object.triangles) {
       if (is_mirrored) std::swap(corners[1], corners[2]);
       out_.mesh.faces.push_back({first + corners[0], first + corners[1], first + corners[2]});
     }
+    if (is_last) give_back(object.triangles);
     if (is_ours_) append_provenance(object, part(at.part));
-    for (const ThreeMfPlacement& component : object.components) {
-      append(placed(component, at.part), world);
-    }
+    if (is_last) give_back(object.materials);
+  }
+
+  template <typename T>
+  static void give_back(std::vector<T>& values) {
+    std::vector<T>().swap(values);
   }
 
   // Stops where a triangle has no label; then the mesh has none.
@@ -178,23 +210,52 @@ class Assembly {
     }
   }
 
-  // As write_3mf() says what to add to the coordinates.
-  void add_origin(const std::string& description) {
+  // As write_3mf() says what to add to the coordinates: where the file was changed since, what it
+  // says need not hold.
+  void add_origin(const ThreeMfModel& model) {
+    const std::string& description = model.description;
     constexpr std::string_view kAdd = "Coordinates of the scene: add ";
     const size_t at = description.find(kAdd);
     const size_t end = description.find(" mm.", at);
     if (at == std::string::npos || end == std::string::npos) return;
+    if (model.metres_per_unit != "0.001") {
+      out_.warnings.emplace_back(
+          "the origin in the description is left out: it is in mm, the file is not");
+      return;
+    }
+    if (is_moved_) {
+      out_.warnings.emplace_back(
+          "the origin in the description is left out: the file moves, turns or repeats objects");
+      return;
+    }
     const size_t begin = at + kAdd.size();
     out_.comments.push_back("file_origin " + description.substr(begin, end - begin));
+  }
+
+  void warn_of_types() {
+    if (!accessories_.empty()) {
+      out_.warnings.push_back("left out " + std::to_string(accessories_.size()) +
+                              " objects that are no part of the model (type support, "
+                              "solidsupport or other)");
+    }
+    if (!surfaces_.empty()) {
+      out_.warnings.push_back(std::to_string(surfaces_.size()) +
+                              " objects are stated to be surfaces, which enclose nothing");
+    }
   }
 
   const ZipArchive& archive_;
   const fs::path& path_;
   std::map<std::string, ThreeMfModel> parts_;
+  size_t entries_ = 0;              // of all parts
+  std::map<Key, size_t> mentions_;  // by items and components, that are still to be placed
+  std::set<Key> accessories_;       // objects that were left out
+  std::set<Key> surfaces_;
   std::map<Key, double> costs_;
   std::set<Key> open_;  // objects between the build and the one that is looked at
   double stored_ = 0;   // cost of all objects once
   bool is_ours_ = false;
+  bool is_moved_ = false;  // an object, or built more than once
   ParsedMesh out_;
 };
 

@@ -10,6 +10,7 @@
 #include <expat.h>
 
 #include "io/byte_reader.h"
+#include "io/text_lines.h"
 
 namespace cgs {
 
@@ -48,6 +49,7 @@ class Reader {
           XML_Parse(parser_.get(), piece.data(), static_cast<int>(piece.size()), is_last ? 1 : 0);
       if (thrown_) std::rethrow_exception(thrown_);
       if (state != XML_STATUS_OK) refuse();
+      refuse_long_token(at + piece.size());
     }
   }
 
@@ -55,6 +57,15 @@ class Reader {
   struct Free {
     void operator()(XML_Parser parser) const { XML_ParserFree(parser); }
   };
+
+  // What is not told yet of the bytes that were given is one token.
+  void refuse_long_token(size_t given) const {
+    constexpr size_t kLongest = size_t{4} << 20;
+    const XML_Index told = XML_GetCurrentByteIndex(parser_.get());
+    if (told < 0 || given - static_cast<size_t>(told) <= kLongest) return;
+    throw LimitError(printable(path_) + ": line " + std::to_string(line()) +
+                     ": one tag, comment or text of more than 4 MiB");
+  }
 
   uint64_t line() const { return XML_GetCurrentLineNumber(parser_.get()); }
 
@@ -141,12 +152,28 @@ std::string_view XmlElement::at(std::string_view attribute) const {
 }
 
 double XmlElement::number(std::string_view attribute) const {
-  const std::string_view text = trimmed(at(attribute));
-  double out = 0;
-  if (!parse_number(text, out)) {
-    fail(Defect::Syntax, std::string(attribute) + " is " + quoted(text) + ", no number");
+  return parse(attribute, trimmed(at(attribute)));
+}
+
+std::vector<double> XmlElement::numbers(std::string_view attribute) const {
+  std::vector<double> out;
+  for (const std::string_view word : tokens(at(attribute))) out.push_back(parse(attribute, word));
+  return out;
+}
+
+double XmlElement::parse(std::string_view attribute, std::string_view word) const {
+  constexpr std::string_view kStarts = "0123456789.";
+  std::string_view digits = word;
+  if (word.size() > 1 && word[0] == '+' && kStarts.find(word[1]) != std::string_view::npos) {
+    digits.remove_prefix(1);
   }
-  if (!std::isfinite(out)) fail(Defect::Value, std::string(attribute) + " is not finite");
+  double out = 0;
+  if (!parse_number(digits, out)) {
+    fail(Defect::Syntax, std::string(attribute) + ": " + quoted(word) + " is no number");
+  }
+  if (!std::isfinite(out)) {
+    fail(Defect::Value, std::string(attribute) + ": " + quoted(word) + " is not finite");
+  }
   return out;
 }
 

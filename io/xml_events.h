@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "libcgs/core/error.h"
 
@@ -27,14 +28,18 @@ class XmlElement {
   std::optional<std::string_view> find(std::string_view attribute) const;
   /// \throws BadInput Schema if it is not there
   std::string_view at(std::string_view attribute) const;
-  /// \throws BadInput Schema, Syntax (no number), Value (not finite)
+  /// Also with a leading '+'. \throws BadInput Schema, Syntax (no number), Value (not finite)
   double number(std::string_view attribute) const;
+  /// As number(), of all that blanks separate.
+  std::vector<double> numbers(std::string_view attribute) const;
   /// A whole number. \throws BadInput Schema, Syntax
   uint64_t count(std::string_view attribute) const;
   /// \throws BadInput that names the line
   [[noreturn]] void fail(Defect defect, const std::string& reason) const;
 
  private:
+  double parse(std::string_view attribute, std::string_view word) const;
+
   std::string_view name_;
   const char** attributes_;
   uint64_t line_;
@@ -53,7 +58,8 @@ struct XmlHandlers {
 /// \param path  for messages
 /// \throws BadInput Syntax naming line and column, Truncated (it ends too early), Unsupported (a
 ///         document type declaration: entities are not expanded); LimitError (elements more than 64
-///         deep); whatever a handler throws
+///         deep; a tag or comment of more than 4 MiB: before version 2.6, expat starts over with
+///         these at each piece, CVE-2023-52425); whatever a handler throws
 /// Source: XML 1.0 and Namespaces in XML 1.0, W3C.
 void read_xml(std::string_view bytes,
               const std::filesystem::path& path,

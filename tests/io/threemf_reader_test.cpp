@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/threemf_reader.h"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "io/mesh_file.h"
@@ -173,7 +175,10 @@ TEST_F(Read3mf, LabelsOfOthersAreNoProvenance) {
       "</basematerials><object id=\"1\" pid=\"5\" pindex=\"0\">" +
       ThreeMfFile::tetrahedron() + "</object>";
   EXPECT_TRUE(read(file).mesh.provenance.empty());
-  file.resources = "<metadata name=\"Application\">cgs</metadata>" + file.resources;
+  const std::string ours = "<metadata name=\"Application\">cgs</metadata>";
+  file.build = "<item objectid=\"1\"><metadatagroup>" + ours + "</metadatagroup></item>";
+  EXPECT_TRUE(read(file).mesh.provenance.empty()) << "what an item says is not of the model";
+  file.metadata = ours;
   EXPECT_EQ(read(file).mesh.provenance, std::vector<Provenance>(4, Provenance::Observed));
   file.resources += ThreeMfFile::object(2, ThreeMfFile::tetrahedron());
   file.build += "<item objectid=\"2\"/>";
@@ -210,6 +215,137 @@ TEST_F(Read3mf, RefusesWhatDoesNotLeadAnywhere) {
   EXPECT_EQ(test::defect_of([&] { (void)read_3mf(dir_ / "b.3mf"); }), "MAGIC");
   test::write_bytes(dir_ / "b.3mf", test::zip_bytes({{"meta.json", "{}"}}));
   EXPECT_EQ(test::defect_of([&] { (void)read_3mf(dir_ / "b.3mf"); }), "MISSING");
+}
+
+std::string repeated(int times, const std::string& text) {
+  std::string out;
+  for (int i = 0; i < times; ++i) out += text;
+  return out;
+}
+
+// Half a million more of one kind and of another, in one file and in two.
+TEST_F(Read3mf, RefusesMoreThanAMillionEntries) {
+  constexpr int kHalf = 500'000;
+  ThreeMfFile file;
+  const std::string objects = file.resources;
+  const std::string items = repeated(kHalf, "<item objectid=\"1\"/>");
+  const std::string bases =
+      "<basematerials id=\"5\">" + repeated(kHalf, "<base name=\"a\"/>") + "</basematerials>";
+  file.build = items;
+  EXPECT_EQ(read(file).mesh.faces.size(), size_t{4} * kHalf);
+  file.resources = objects + bases;
+  const std::string said = test::message_of([&] { (void)read(file); });
+  EXPECT_NE(said.find("more than 1,000,000 objects, components, items"), std::string::npos) << said;
+  file.resources = objects + "<object id=\"6\"><components>" +
+                   repeated(kHalf, "<component objectid=\"1\"/>") + "</components></object>";
+  EXPECT_EQ(refused(file), "LIMIT");
+  file.resources = objects;
+  for (int id = 7; id < 7 + kHalf; ++id) file.resources += ThreeMfFile::object(id, "");
+  EXPECT_EQ(refused(file), "LIMIT");
+  file.resources = objects;
+  file.build = items + "<item objectid=\"1\" p:path=\"/3D/o.model\"/>";
+  file.more_files = {
+      {"3D/o.model", ThreeMfFile::document("", "<resources>" + objects + bases + "</resources>")}};
+  EXPECT_EQ(refused(file), "LIMIT") << "two parts";
+}
+
+TEST_F(Read3mf, RefusesItemsThatMultiply) {
+  ThreeMfFile file;
+  std::string vertices;
+  for (int i = 0; i < 1000; ++i) vertices += "<vertex x=\"0\" y=\"1\" z=\"2\"/>";
+  file.resources = ThreeMfFile::object(1,
+                                       "<mesh><vertices>" + vertices +
+                                           "</vertices><triangles><triangle v1=\"0\" v2=\"1\" "
+                                           "v3=\"2\"/></triangles></mesh>");
+  file.build = repeated(34'000, "<item objectid=\"1\"/>");
+  const std::string said = test::message_of([&] { (void)read(file); });
+  EXPECT_NE(said.find("LIMIT"), std::string::npos) << said;
+  EXPECT_NE(said.find("items and components place more than 33 million"), std::string::npos)
+      << said;
+}
+
+// What write_3mf() says of the origin holds for the file as it was written.
+TEST_F(Read3mf, TakesTheOriginOnlyOfFilesThatWereNotChanged) {
+  const auto ours = [] {
+    ThreeMfFile file;
+    file.metadata =
+        "<metadata name=\"Application\">cgs</metadata><metadata name=\"Description\">Coordinates "
+        "of the scene: add 1000 2000 3000 mm.</metadata>";
+    return file;
+  };
+  const auto has_origin = [](const ParsedMesh& mesh) {
+    return std::find(mesh.comments.begin(), mesh.comments.end(), "file_origin 1000 2000 3000") !=
+           mesh.comments.end();
+  };
+  const auto is_left_out = [&](const ThreeMfFile& file) {
+    const ParsedMesh mesh = read(file);
+    return !has_origin(mesh) && mesh.warnings.size() == 1 &&
+           mesh.warnings[0].starts_with("the origin in the description is left out: ");
+  };
+  ThreeMfFile file = ours();
+  EXPECT_TRUE(has_origin(read(file)));
+  EXPECT_TRUE(read(file).warnings.empty());
+  file.build = "<item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 0 0 0\"/>";
+  EXPECT_TRUE(has_origin(read(file)));
+  file.build = "<item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 0 0 5\"/>";
+  EXPECT_TRUE(is_left_out(file)) << "moved";
+  file.build = "<item objectid=\"1\" transform=\"0 1 0 -1 0 0 0 0 1 0 0 0\"/>";
+  EXPECT_TRUE(is_left_out(file)) << "turned";
+  file.build = "<item objectid=\"1\"/><item objectid=\"1\"/>";
+  EXPECT_TRUE(is_left_out(file)) << "twice";
+  file = ours();
+  file.resources += ThreeMfFile::object(
+      2, ThreeMfFile::components({{1, "transform=\"1 0 0 0 1 0 0 0 1 0 0 5\""}}));
+  file.build = "<item objectid=\"2\"/>";
+  EXPECT_TRUE(is_left_out(file)) << "moved by a component";
+  file = ours();
+  file.attributes = "unit=\"meter\"";
+  EXPECT_TRUE(is_left_out(file)) << "another unit";
+  file = ours();
+  file.build = "<item objectid=\"1\"><metadatagroup>" + file.metadata + "</metadatagroup></item>";
+  file.metadata = "<metadata name=\"Application\">cgs</metadata>";
+  EXPECT_FALSE(has_origin(read(file))) << "of the item";
+}
+
+TEST_F(Read3mf, LeavesOutSupportsAndSaysSo) {
+  const auto object = [](int id, const std::string& type, const std::string& content) {
+    return "<object id=\"" + std::to_string(id) + "\" type=\"" + type + "\">" + content +
+           "</object>";
+  };
+  const std::string mesh = ThreeMfFile::tetrahedron();
+  ThreeMfFile file;
+  file.resources = object(1, "model", mesh) + object(2, "support", mesh) +
+                   object(3, "solidsupport", mesh) + object(4, "other", mesh);
+  // The type of an object with components says nothing of them.
+  file.resources += object(5, "other", ThreeMfFile::components({{1, ""}, {4, ""}, {4, ""}}));
+  file.build = "<item objectid=\"5\"/><item objectid=\"2\"/><item objectid=\"3\"/>";
+  const ParsedMesh part = read(file);
+  EXPECT_EQ(part.mesh.faces.size(), 4u);
+  EXPECT_EQ(part.positions.size(), 4u);
+  EXPECT_EQ(part.warnings,
+            (std::vector<std::string>{"left out 3 objects that are no part of the model (type "
+                                      "support, solidsupport or other)"}));
+  file.build = "<item objectid=\"2\"/>";
+  EXPECT_EQ(refused(file), "EMPTY");
+  file.resources = object(1, "surface", mesh);
+  file.build = "<item objectid=\"1\"/>";
+  const ParsedMesh surface = read(file);
+  EXPECT_EQ(surface.mesh.faces.size(), 4u);
+  EXPECT_EQ(surface.warnings,
+            std::vector<std::string>{"1 objects are stated to be surfaces, which enclose nothing"});
+  file.resources = object(1, "soup", mesh);
+  EXPECT_EQ(refused(file), "SCHEMA");
+}
+
+TEST_F(Read3mf, TakesNumbersWithASign) {
+  ThreeMfFile file;
+  file.resources.replace(file.resources.find("x=\"1\""), 5, "x=\"+1\"");
+  file.build = "<item objectid=\"1\" transform=\"+1 0 0 0 +1.0 0 0 0 1e+0 +2 -3 +.5\"/>";
+  const ParsedMesh mesh = read(file);
+  EXPECT_EQ(mesh.positions[1], Vector3d(3, -3, 0.5));
+  file.build = "<item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 2 0,5 0\"/>";
+  const std::string said = test::message_of([&] { (void)read(file); });
+  EXPECT_NE(said.find("<item>: transform: \"0,5\" is no number"), std::string::npos) << said;
 }
 
 TEST_F(Read3mf, RefusesComponentsThatMultiply) {

@@ -13,6 +13,7 @@ namespace cgs::test {
 /// built once.
 struct ThreeMfFile {
   std::string attributes = "unit=\"millimeter\"";
+  std::string metadata;  ///< Elements before the resources.
   std::string resources = object(1, tetrahedron());
   std::string build = "<item objectid=\"1\"/>";
   std::string target = "/3D/3dmodel.model";
@@ -44,8 +45,9 @@ struct ThreeMfFile {
   }
   std::string model() const {
     return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>" + before +
-           document(attributes,
-                    "<resources>" + resources + "</resources><build>" + build + "</build>");
+           document(
+               attributes,
+               metadata + "<resources>" + resources + "</resources><build>" + build + "</build>");
   }
   std::string bytes(ZipDamage damage = {.method = 8}) const {
     std::vector<std::pair<std::string, std::string>> files = {
