@@ -216,6 +216,8 @@ void add_odd_files(PerTarget& each) {
   each.add_without_rights("G05", "no permission", "OPEN", [](const fs::path& file) {
     fs::permissions(file, fs::perms::none);
   });
+  // Else the folder could be what cannot be read.
+  each.add_without_rights("G05", "a reader of no rights", "OK", [](const fs::path&) {});
 }
 
 void add_foreign_content(PerTarget& each) {
