@@ -11,8 +11,9 @@ namespace cgs {
 bool has_depth_extension(const std::filesystem::path& path);
 
 /// The file of a photograph in a folder of depth files: as colmap_depth_of(), else of the same
-/// stem, and of several the one whose format comes first above; empty if there is none. \param
-/// folder  in which links must not lead elsewhere unless allow_external \throws BadInput Path
+/// stem, and of several the one whose format comes first above; empty if there is none.
+/// \param folder  in which links must not lead elsewhere unless allow_external
+/// \throws BadInput Path
 std::filesystem::path depth_file_of(const SceneRoot& folder,
                                     const std::filesystem::path& photograph);
 
@@ -22,8 +23,8 @@ std::filesystem::path depth_file_of(const SceneRoot& folder,
 ///
 /// Of an EXR the channel Z, else depth.Z, depth.V, Y, R or the only one is taken; of an NPY arrays
 /// with two sides beside any of length 1; of an NPZ what read_npz_depth() chooses.
-/// \throws BadInput as the readers of the formats; Schema (no such
-///         channel, another shape), Unsupported (another extension); LimitError
+/// \throws BadInput as the readers of the formats; Schema (no such channel, another shape),
+///         Unsupported (another extension); LimitError
 StoredSamples read_depth_file(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 }  // namespace cgs

@@ -15,6 +15,7 @@
 #include "io/colmap_depth.h"
 #include "io/depth_file.h"
 #include "io/fisheye_map.h"
+#include "io/lens.h"
 #include "io/orientation.h"
 #include "libcgs/core/error.h"
 
@@ -88,8 +89,7 @@ Raster<float> upright(const Raster<float>& values, const View& view, const Image
 
 // COLMAP makes depth maps of pictures that it has undistorted itself, of another camera than this.
 void refuse_map_of_distorted(const View& view) {
-  const bool is_bent = view.fisheye || view.distortion != std::array<double, 5>{};
-  if (!is_bent || !is_colmap_depth_name(view.depth_path)) return;
+  if (!has_lens_distortion(view) || !is_colmap_depth_name(view.depth_path)) return;
   throw BadInput(Defect::Mismatch,
                  view.depth_path,
                  "is the depth of COLMAP's undistorted picture, but this photograph has lens "
@@ -244,8 +244,8 @@ std::set<int> find_all_beside(Scene& scene, const SceneRoot& root) {
 
 DepthMap resampled(const Raster<float>& values, const View& view) {
   const Camera& camera = view.camera;
-  const bool is_bent = view.fisheye || view.distortion != std::array<double, 5>{};
-  if (!is_bent && values.width == camera.width && values.height == camera.height) return values;
+  const bool has_same_size = values.width == camera.width && values.height == camera.height;
+  if (has_same_size && !has_lens_distortion(view)) return values;
   const Lens lens(view);
   const Eigen::Array2d size(values.width, values.height);
   const Eigen::Array2d under = lens.pixel() * size;  // values under a pixel, across and down

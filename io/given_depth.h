@@ -23,12 +23,12 @@ struct DepthOptions {
 
 /// Gives every view that has a photograph the file with its depth, if there is one: in the folder
 /// of the options, else where the layout of the scene says, else in a folder "depth" beside that of
-/// the photograph, or in it, else in stereo/depth_maps of COLMAP's layout. In these three only
-/// input views get one, and a file that cannot be used (of colours, of another shape, damaged)
-/// becomes a warning, as do input views that have none while others do. \throws BadInput Missing
-/// (the folder of the options holds no file for an input view), Path,
-///         Ref (one file for two views); InvalidInput where the options say that depth maps of
-///         COLMAP, which are in units of the scene, are in metres
+/// the photograph, or in it. There only input views get one, and a file that cannot be used (of
+/// colours, of another shape, damaged) becomes a warning, as do input views that have none while
+/// others do. So does depth that COLMAP made with photographs that are held out.
+/// \throws BadInput Missing (the folder of the options holds no file for an input view), Path,
+///         Ref (one file for two views); InvalidInput where the scene or the options say that depth
+///         maps of COLMAP, which are in units of the scene, are in metres
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external);
 
 /// Reads the depth of a view at the size of its camera, which has no distortion. In Polycam's

@@ -15,6 +15,10 @@ FisheyeMap fisheye_map(const View& view) {
 
 }  // namespace
 
+bool has_lens_distortion(const View& view) {
+  return view.fisheye || view.distortion != std::array<double, 5>{};
+}
+
 Camera picture_camera(const View& view) {
   if (!view.fisheye) {
     const ImageSize size = photograph_size(view);

@@ -9,6 +9,9 @@
 
 namespace cgs {
 
+/// Whether the photograph of a view differs from its undistorted picture.
+bool has_lens_distortion(const View& view);
+
 /// The camera of the undistorted picture of a view before it is made smaller: for a fisheye that of
 /// its FisheyeMap, at the size of the photograph. \throws as photograph_size()
 Camera picture_camera(const View& view);

@@ -17,6 +17,7 @@
 #include "io/exif.h"
 #include "io/fisheye_map.h"
 #include "io/image.h"
+#include "io/lens.h"
 #include "io/llff.h"
 #include "io/masks.h"
 #include "io/metashape.h"
@@ -333,8 +334,7 @@ void check_places(const Scene& scene) {
 bool is_whole(const View& view, const SceneRoot& root) {
   const fs::path extension = view.image_path.extension();
   const bool is_jpeg = extension == ".jpg" || extension == ".jpeg";  // has no transparent pixels
-  const bool is_bent = view.fisheye || view.distortion != std::array<double, 5>{};
-  return is_jpeg && !is_bent && !mask_file(root, view.image_path);
+  return is_jpeg && !has_lens_distortion(view) && !mask_file(root, view.image_path);
 }
 
 void load_image(const Scene& scene, View& view, std::vector<std::string>& warnings) {

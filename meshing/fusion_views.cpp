@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 
 namespace cgs {
 
@@ -31,13 +32,8 @@ std::vector<Pixel> trustworthy_pixels(const TsdfView& view, double depth_trunc) 
     }
   }
   if (pixels.empty()) return pixels;
-  const auto percentile = [&](size_t percent) {
-    const auto at = depths.begin() + std::ptrdiff_t((depths.size() - 1) * percent / 100);
-    std::nth_element(depths.begin(), at, depths.end());
-    return *at;
-  };
-  const float low = percentile(1);
-  const float high = percentile(99);
+  const float low = nth_smallest(depths, (depths.size() - 1) / 100);
+  const float high = nth_smallest(depths, (depths.size() - 1) * 99 / 100);
   std::erase_if(pixels, [&](const Pixel& p) { return p.depth < low || p.depth > high; });
   return pixels;
 }
@@ -63,12 +59,6 @@ ViewExtent view_extent(const TsdfView& view, double depth_trunc, size_t most) {
     out.footprints.push_back(2 * double(p.depth) / (view.camera.fx + view.camera.fy));
   }
   return out;
-}
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double voxels_in(const Eigen::AlignedBox3d& surface, double voxel, double margin) {

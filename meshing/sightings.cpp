@@ -61,13 +61,6 @@ struct Lanes8 {
   }
 };
 
-bool has_wide_lanes() {
-  static const bool kFound = __builtin_cpu_supports("avx512f") != 0 &&
-                             __builtin_cpu_supports("avx512dq") != 0 &&
-                             __builtin_cpu_supports("avx512vl") != 0;
-  return kFound;
-}
-
 }  // namespace
 
 void DepthField::at(std::span<const EightPoints> points, Sightings* out) const {
@@ -88,7 +81,7 @@ void DepthField::at(std::span<const EightPoints> points, Sightings* out) const {
     for (size_t k = 0; k < 3; ++k) source.R[r][k] = R_(Eigen::Index(r), Eigen::Index(k));
   }
   size_t i = 0;
-  if (has_wide_lanes()) {
+  if (has_sixteen_lanes()) {
     for (; i + 1 < points.size(); i += 2) see_wide(source, &points[i], out + i);
   }
   for (; i < points.size(); ++i) see<Lanes8>(source, &points[i], out + i);

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <memory>
 #include <sstream>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -97,7 +98,7 @@ void add_surface_options(CLI::App& command, RunArgs& args) {
           args.request.lods,
           "Coarser levels of asset.glb to write, 0 to 5, with a tileset.json (3D Tiles) for "
           "viewers that show the one that the distance asks for; default 0")
-      ->check(CLI::Range(size_t{0}, kMostLods).description("0 to 5"));
+      ->check(CLI::Range(size_t{0}, kMostLods).description("0 to " + std::to_string(kMostLods)));
 }
 
 void add_promises(CLI::App& command, RunArgs& args) {

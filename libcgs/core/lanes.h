@@ -13,6 +13,14 @@ inline constexpr int kLanes = 8;  ///< Pixels of a row that blending handles at 
 using Floats = float __attribute__((vector_size(sizeof(float) * kLanes)));
 using Ints = int32_t __attribute__((vector_size(sizeof(int32_t) * kLanes)));
 
+/// Whether the processor has what the loops of sixteen lanes need (AVX-512 F, DQ and VL).
+inline bool has_sixteen_lanes() {
+  static const bool kFound = __builtin_cpu_supports("avx512f") != 0 &&
+                             __builtin_cpu_supports("avx512dq") != 0 &&
+                             __builtin_cpu_supports("avx512vl") != 0;
+  return kFound;
+}
+
 template <typename Vector, typename Scalar>
 Vector load(const Scalar* from) {
   Vector out;

@@ -38,13 +38,6 @@ struct Lanes8 {
   static void add_product(Floats& sum, Values a, Values b) { sum = multiply_add(a, b, sum); }
 };
 
-bool has_wide_lanes() {
-  static const bool kFound = __builtin_cpu_supports("avx512f") != 0 &&
-                             __builtin_cpu_supports("avx512dq") != 0 &&
-                             __builtin_cpu_supports("avx512vl") != 0;
-  return kFound;
-}
-
 // Bits of the windows in eight pixel rows, from `row` on, that the support of a splat reaches;
 // the bits of one row in each lane.
 inline Ints windows_reached(const BandSplat& s, float ridge_at_top, int row) {
@@ -151,7 +144,7 @@ void draw_tile(const TileSplats& splats, std::array<int, 2> size, TileEnd& end, 
   uint32_t open = unfinished_windows(end.transmittance);
   size_t visited = 0;
   WindowList list;
-  list.pairs = has_wide_lanes();
+  list.pairs = has_sixteen_lanes();
   while (visited < splats.nearest_first.size() && open != 0) {
     const size_t count = std::min(WindowList::kSplats, splats.nearest_first.size() - visited);
     list.count = 0;
@@ -175,7 +168,7 @@ void differentiate_tile(const TileSplats& splats,
     records.moments[place] = {};
     if (channels.color_derivative) records.color[place] = {};
   }
-  const auto differentiate = has_wide_lanes() ? differentiate_wide : differentiate_with<Lanes8>;
+  const auto differentiate = has_sixteen_lanes() ? differentiate_wide : differentiate_with<Lanes8>;
   differentiate(splats, end, loss, channels, records);
 }
 

@@ -32,10 +32,6 @@ namespace fs = std::filesystem;
 using Kinds = std::vector<FileKind>;
 using Folder = const fs::path&;
 
-void require(bool holds, const char* what) {
-  if (!holds) throw std::logic_error(what);
-}
-
 // --- splats ---------------------------------------------------------------------------------
 
 std::string ascii_splats() {

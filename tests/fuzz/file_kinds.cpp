@@ -39,10 +39,6 @@ namespace fs = std::filesystem;
 using Kinds = std::vector<FileKind>;
 using Folder = const fs::path&;
 
-void require(bool holds, const char* what) {
-  if (!holds) throw std::logic_error(what);
-}
-
 /// A kind whose valid file has these bytes and whose reader needs nothing but its path.
 template <typename Read>
 FileKind of_bytes(const std::string& name,

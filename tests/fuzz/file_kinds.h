@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,11 @@ struct FileKind {
   std::function<void(const std::filesystem::path& folder)> read;
   bool is_isolated = false;  ///< Decoded in a child process, where a fuzzer sees nothing.
 };
+
+/// For what must hold of anything that was read. \throws std::logic_error
+inline void require(bool holds, const char* what) {
+  if (!holds) throw std::logic_error(what);
+}
 
 std::vector<FileKind> asset_kinds();  ///< Of splats and meshes.
 
