@@ -19,6 +19,7 @@
 #include "io/png.h"
 #include "io/tiff.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/provenance_colors.h"
 #include "meshing/orthophoto.h"
 
 namespace cgs {
@@ -167,19 +168,9 @@ std::string world_file(const Placed& placed) {
 }
 
 Eigen::Vector3f label_color(int8_t label) {
-  switch (static_cast<Provenance>(label)) {
-    case Provenance::Observed:
-      return {0.10f, 0.45f, 0.20f};
-    case Provenance::SingleView:
-      return {0.55f, 0.80f, 0.35f};
-    case Provenance::Interpolated:
-      return {1.0f, 0.6f, 0.1f};
-    case Provenance::Inferred:
-      return {0.95f, 0.1f, 0.85f};
-    case Provenance::Virtual:
-      return {0.35f, 0.45f, 0.9f};
-  }
-  return Eigen::Vector3f::Constant(0.6f);  // the mesh states none
+  const bool is_stated = label >= 0 && static_cast<size_t>(label) < kProvenanceCount;
+  return is_stated ? provenance_color(static_cast<Provenance>(label))
+                   : Eigen::Vector3f::Constant(0.5f);
 }
 
 ColorImage label_picture(const Orthophoto& photo) {

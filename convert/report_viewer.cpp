@@ -19,6 +19,7 @@
 #include "io/mesh_arrays.h"
 #include "io/resample.h"
 #include "io/texture_images.h"
+#include "libcgs/core/provenance_colors.h"
 #include "meshing/simplify.h"
 
 namespace cgs {
@@ -205,7 +206,10 @@ Json viewer_scene(const Model& model, const TriangleMesh& mesh) {
   }
   Json labels = Json::array();
   for (const Provenance label : kProvenanceOrder) {
-    labels.push_back({{"number", label}, {"name", provenance_name(label)}});
+    const auto number = static_cast<size_t>(label);
+    labels.push_back({{"number", number},
+                      {"name", provenance_name(label)},
+                      {"color", kProvenanceColors.at(number)}});
   }
   return {
       {"unit", {{"name", unit.name}, {"length", unit.length}, {"sigma", unit.relative_sigma}}},

@@ -58,8 +58,9 @@ bool is_stage(const Json& stage) {
          stage.contains("result");
 }
 
-// The record, or null if the file holds none.
-Json read_record(const std::filesystem::path& path) {
+}  // namespace
+
+Json read_run_record(const std::filesystem::path& path) {
   Json record;
   try {
     (void)read_json(path);  // refuses what is nested too deep to be copied
@@ -76,8 +77,6 @@ Json read_record(const std::filesystem::path& path) {
   return std::all_of(stages.begin(), stages.end(), is_stage) ? record : Json();
 }
 
-}  // namespace
-
 RunRecord::RunRecord(std::filesystem::path folder,
                      Json request,
                      bool overwrite,
@@ -87,7 +86,7 @@ RunRecord::RunRecord(std::filesystem::path folder,
   const std::filesystem::path path = folder_ / "run.json";
   Json stages = Json::object();
   if (is_present(path)) {
-    const Json old = read_record(path);
+    const Json old = read_run_record(path);
     const bool readable = !old.is_null();
     if (readable && old["request"] == request) {
       json_ = old;

@@ -44,6 +44,10 @@ class RunRecord {
   nlohmann::ordered_json json_;
 };
 
+/// The record in such a file: an object with "request" and with "stages", of which each has
+/// "seconds", "peak_memory" and "result"; null if the file holds none.
+nlohmann::ordered_json read_run_record(const std::filesystem::path& path);
+
 /// 64-bit FNV-1a of a file's content, as 16 hexadecimal digits. \throws BadInput
 std::string file_hash(const std::filesystem::path& file);
 

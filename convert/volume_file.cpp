@@ -170,6 +170,14 @@ void write_volume(const std::filesystem::path& path, const Volume& volume, const
   write_vdb(path, grids, about);
 }
 
+std::optional<Frame> frame_of_volume(const std::vector<openvdb::GridBase::Ptr>& grids,
+                                     const std::filesystem::path& path) {
+  for (const auto& grid : grids) {
+    if (grid->getMetadata<openvdb::StringMetadata>(kFrameKey)) return frame_of(*grid, path);
+  }
+  return std::nullopt;
+}
+
 VolumeFile read_volume(const std::filesystem::path& path) {
   const openvdb::GridPtrVec grids = read_vdb(path);
   VolumeFile file;

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <vector>
 
 #include "libcgs/core/frame.h"
 #include "meshing/volume.h"
@@ -21,6 +23,11 @@ struct VolumeFile {
   Volume volume;
   Frame frame;
 };
+/// The frame of the grids of such a file; none if they are no volume of ours. \throws BadInput
+/// Schema
+std::optional<Frame> frame_of_volume(const std::vector<openvdb::GridBase::Ptr>& grids,
+                                     const std::filesystem::path& path);
+
 /// \throws BadInput if it is no volume of ours.
 VolumeFile read_volume(const std::filesystem::path& path);
 

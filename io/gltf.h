@@ -64,7 +64,7 @@ struct GlbReport {
 ///
 /// - One primitive and material per provenance class that is present ("observed", "single view",
 ///   "interpolated", "inferred", or "surface" if the mesh has no labels), double-sided and opaque;
-///   inferred surface is tinted magenta, interpolated surface blue.
+///   inferred surface is tinted magenta, interpolated surface orange.
 /// - POSITION is relative to options.center. asset.extras tells where that lies
 ///   (origin_in_world), the axes (gltf_from_world, row by row), units ("m" or "unknown"),
 ///   metres_per_unit, metres_sigma, scale_source, the area of each class, and the summary.

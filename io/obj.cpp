@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -12,6 +14,7 @@
 #include "io/ply_frame.h"
 #include "io/texture_images.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/provenance_colors.h"
 
 namespace cgs {
 
@@ -55,14 +58,20 @@ std::string image_name(const std::filesystem::path& path, const std::string& nam
   return path.stem().string() + "." + name + ".jpg";
 }
 
+std::string diffuse_text(Provenance label) {
+  std::string out;
+  for (const uint8_t value : kProvenanceColors.at(static_cast<size_t>(label))) {
+    if (!out.empty()) out += ' ';
+    append_number(out, std::round(100 * value / 255.0) / 100);
+  }
+  return out;
+}
+
 /// Always all classes, so that writing it again never changes what an older OBJ refers to.
 std::string materials_text(const std::filesystem::path& path, const ObjTexture& texture) {
-  constexpr std::array<const char*, kProvenanceCount> kDiffuse = {
-      "0.8 0.8 0.8", "0.8 0.74 0.56", "0.56 0.68 0.8", "0.8 0.28 0.68", "0.74 0.7 0.8"};
   std::string out = "# cgs: materials tell where a surface comes from\n";
-  for (size_t i = 0; i < kProvenanceOrder.size(); ++i) {
-    out +=
-        "newmtl " + group_name(kProvenanceOrder.at(i)) + "\nKd " + kDiffuse.at(i) + "\nillum 1\n";
+  for (const Provenance label : kProvenanceOrder) {
+    out += "newmtl " + group_name(label) + "\nKd " + diffuse_text(label) + "\nillum 1\n";
   }
   for (size_t i = 0; i < texture.images.size(); ++i) {
     if (texture.images[i].jpeg.empty()) continue;

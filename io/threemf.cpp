@@ -15,6 +15,7 @@
 #include "io/content_uuid.h"
 #include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/provenance_colors.h"
 
 namespace cgs {
 
@@ -89,15 +90,12 @@ void set_geometry(NMR::PLib3MFBase* object,
 }
 
 void set_materials(NMR::PLib3MFBase* model, NMR::PLib3MFBase* object, const TriangleMesh& mesh) {
-  constexpr std::array<std::array<BYTE, 3>, kProvenanceCount> kColors = {
-      // by label
-      {{255, 90, 217}, {255, 235, 179}, {200, 200, 200}, {179, 217, 255}, {226, 214, 240}}};
   Handle group;
   check(NMR::lib3mf_model_addbasematerialgroup(model, group.out()), "add materials");
   std::array<DWORD, kProvenanceCount> index{};
   for (const Provenance label : kProvenanceOrder) {
     const auto i = static_cast<size_t>(label);
-    const auto& [red, green, blue] = kColors.at(i);
+    const auto& [red, green, blue] = kProvenanceColors.at(i);
     const std::string name(provenance_name(label));
     check(NMR::lib3mf_basematerial_addmaterialutf8(
               group.get(), name.c_str(), red, green, blue, &index.at(i)),

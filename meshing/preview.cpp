@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/provenance_colors.h"
 #include "meshing/projected_faces.h"
 
 namespace cgs {
@@ -20,8 +21,10 @@ Eigen::Vector3f base_color(const TriangleMesh& mesh,
                            const Eigen::Vector3f& weights,
                            bool by_provenance) {
   if (by_provenance && !mesh.provenance.empty()) {
-    if (mesh.provenance[f] == Provenance::Inferred) return {0.95f, 0.1f, 0.85f};
-    if (mesh.provenance[f] == Provenance::Interpolated) return {1.0f, 0.6f, 0.1f};
+    const Provenance label = mesh.provenance[f];
+    if (label == Provenance::Inferred || label == Provenance::Interpolated) {
+      return provenance_color(label);
+    }
   }
   if (mesh.colors.empty()) return Eigen::Vector3f::Constant(0.75f);
   const auto& face = mesh.faces[f];

@@ -9,13 +9,10 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/conversion.h"
+#include "convert/commands/info_file.h"
 #include "convert/html.h"
-#include "convert/measured_file.h"
-#include "convert/mesh_files.h"
 #include "convert/scene_request.h"
 #include "io/json_file.h"
-#include "io/splat_reader.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -195,92 +192,6 @@ void print_scene(const Json& info) {
   }
 }
 
-Json mesh_json(const MeasurableFile& file, const Json& certificate) {
-  const MeasurableMesh& mesh = file.content;
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& p : mesh.points) box.extend(mesh.file_from_internal(p));
-  return {{"kind", mesh.mesh.faces.empty() ? "point cloud" : "mesh"},
-          {"counts", {{"vertices", mesh.points.size()}, {"faces", mesh.mesh.faces.size()}}},
-          {"bounds", {{"min", vector_json(box.min())}, {"max", vector_json(box.max())}}},
-          {"units", mesh.frame.unit_name()},
-          {"states",
-           {{"provenance", mesh.states_provenance()},
-            {"sigma", mesh.states_sigma()},
-            {"colors", !mesh.mesh.colors.empty()}}},
-          {"certificate", certificate},
-          {"warnings", file.warnings}};
-}
-
-void print_mesh(const Json& info, const Certificate& certificate) {
-  const Json& box = info["bounds"];
-  std::printf("%s: %zu vertices, %zu faces, unit %s\n",
-              info["kind"].get<std::string>().c_str(),
-              info["counts"]["vertices"].get<size_t>(),
-              info["counts"]["faces"].get<size_t>(),
-              info["units"].get<std::string>().c_str());
-  std::printf("bounds: %s ... %s\n", box["min"].dump().c_str(), box["max"].dump().c_str());
-  std::printf("provenance %s, sigma %s\n",
-              info["states"]["provenance"].get<bool>() ? "stated" : "not stated",
-              info["states"]["sigma"].get<bool>() ? "stated" : "not stated");
-  if (!info["certificate"].is_null()) {
-    std::printf("%s: %s, Euler number %ld, smallest angle %.3g degrees, volume %.6g\n",
-                certificate.passed() ? "certified watertight" : "NOT watertight",
-                certificate_line(certificate).c_str(),
-                certificate.euler_number,
-                certificate.smallest_angle * 180 / M_PI,
-                info["certificate"]["volume"].get<double>());
-  }
-  for (const Json& text : info["warnings"]) {
-    std::printf("warning: %s\n", one_line(text.get<std::string>()).c_str());
-  }
-}
-
-void print_splats(const Json& info) {
-  const Json& counts = info["counts"];
-  std::printf("%s: %zu splats of %zu in the file, harmonics of degree %d\nunits: %s\n",
-              info["format"].get<std::string>().c_str(),
-              counts["splats"].get<size_t>(),
-              counts["in_file"].get<size_t>(),
-              counts["sh_degree"].get<int>(),
-              info["units"].get<std::string>().c_str());
-  for (const char* corner : {"min", "max"}) {
-    const Json& p = info["bounds"][corner];
-    std::printf("%s %12.6g %12.6g %12.6g\n",
-                corner,
-                p[0].get<double>(),
-                p[1].get<double>(),
-                p[2].get<double>());
-  }
-  std::printf("fill ratio %.3g\n", info["findings"]["fill_ratio"].get<double>());
-  for (const Json& text : info["warnings"]) {
-    std::printf("warning: %s\n", one_line(text.get<std::string>()).c_str());
-  }
-}
-
-void run_mesh_info(const InfoArgs& args) {
-  const MeasurableFile file = read_mesh_file(args.scene.path);
-  const TriangleMesh& mesh = file.content.mesh;
-  Certificate certificate;
-  Json proved = nullptr;
-  if (!mesh.faces.empty()) {
-    certificate = certify(mesh);
-    proved = certificate_to_json(certificate, mesh, file.content.frame);
-  }
-  const Json info = mesh_json(file, proved);
-  if (args.json) {
-    std::cout << json_text(info) << "\n";
-  } else {
-    print_mesh(info, certificate);
-  }
-}
-
-/// Files that no mesh reader takes, and those of its kinds that hold splats.
-bool holds_splats(const std::filesystem::path& path) {
-  std::error_code none;
-  if (!std::filesystem::is_regular_file(path, none)) return false;
-  return !is_mesh_name(path) || is_splat_file(path);
-}
-
 // info tells what is wrong with a scene, photographs that cannot be read too, and nothing else.
 Json checked_cameras(const SceneRequest& request, OpenedScene& opened) {
   Terminal quiet(true);
@@ -297,16 +208,7 @@ Json checked_cameras(const SceneRequest& request, OpenedScene& opened) {
 }
 
 void run_info(const InfoArgs& args) {
-  if (holds_splats(args.scene.path)) {
-    const Json info = splat_file_to_json(read_splats(args.scene.path));
-    if (args.json) std::cout << json_text(info) << "\n";
-    if (!args.json) print_splats(info);
-    return;
-  }
-  if (is_mesh_name(args.scene.path) && !std::filesystem::is_directory(args.scene.path)) {
-    run_mesh_info(args);
-    return;
-  }
+  if (print_file_info(args.scene.path, args.json)) return;
   Terminal terminal(args.json);
   OpenedScene opened = open_scene(args.scene, {}, terminal);
   const Json fit = checked_cameras(args.scene, opened);
@@ -327,13 +229,15 @@ void add_info(CLI::App& app) {
   auto args = std::make_shared<InfoArgs>();
   auto* cmd = app.add_subcommand(
       "info",
-      "What a scene, mesh or file of splats holds and what is wrong with it (exit code 3 if it "
+      "What a scene, a file or a finished run holds and what is wrong with it (exit code 3 if it "
       "cannot be used)");
   cmd->add_option(
          "scene",
          args->scene.path,
-         "Folder of a scene, as for run, a mesh (.ply, .obj, .stl, .off, .3mf, .glb), which gets a "
-         "certificate, or splats (.ply, .spz, .splat, .sog, .ksplat, .glb)")
+         "Folder of a scene, as for run, or what run made of one, or its model; a mesh (.ply, "
+         ".obj, "
+         ".stl, .off, .3mf, .glb), which gets a certificate; splats (.ply, .spz, .splat, .sog, "
+         ".ksplat, .glb); a volume (.vdb); layers of a picture (.exr)")
       ->required();
   add_scene_options(*cmd, args->scene.options);
   add_camera_options(*cmd, args->scene);

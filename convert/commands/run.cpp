@@ -106,15 +106,18 @@ void add_promises(CLI::App& command, RunArgs& args) {
   command.add_option("--max-error",
                      args.request.max_error,
                      "Every mesh written, asset.glb too, lies within this of the fused "
-                     "surface, measured on the files, e.g. 1mm, or in scene units");
+                     "surface, measured on the files, e.g. 1mm, or in scene units; in place "
+                     "of --simplify and --compression-error");
   command.add_option("--max-size",
                      args.max_size,
                      "asset.glb with its textures is no larger, e.g. 2MB; leaves out the "
                      "least detail that is needed and says how much that is");
-  command.add_option("--budget",
-                     args.budget,
-                     "Time for all of it, e.g. 3min: tries small pictures, then takes the largest "
-                     "size and the training that this machine can do in it");
+  command.add_option(
+      "--budget",
+      args.budget,
+      "Time for all of it, e.g. 3min: tries small pictures, then takes the largest "
+      "size and the training that this machine can do in it; in place of --downscale and "
+      "--preset");
 }
 
 }  // namespace

@@ -136,13 +136,14 @@
 
   // ---- Looks --------------------------------------------------------------------------------
 
-  const looksOfLabel = {  // by number, as Provenance has them
-    0: [242, 26, 217], 1: [91, 155, 213], 2: [196, 200, 204], 3: [255, 153, 26], 4: [154, 127, 209],
-  };
   const unknownColor = [128, 128, 128];
   const ramp = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
   const nameOf = {};
-  for (const label of scene.labels) nameOf[label.number] = label.name;
+  const looksOfLabel = {};
+  for (const label of scene.labels) {
+    nameOf[label.number] = label.name;
+    looksOfLabel[label.number] = label.color;
+  }
 
   const share = (value) => (100 * value).toPrecision(value < 0.1 ? 2 : 3) + ' %';
   const [leastSigma, mostSigma] = (() => {  // what all but the extreme 2 % lie between

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// cgs measure, cgs compare and cgs info MESH as a user calls them.
+// cgs measure and cgs compare as a user calls them.
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -222,17 +222,6 @@ TEST(Compare, MatchesUnits) {
 TEST(Compare, SaysWhoseSideIsPositive) {
   const std::string help = run_cgs("compare --help").out;
   EXPECT_NE(help.find("with --m3c2: that A's look to"), std::string::npos) << help;
-}
-
-TEST(Info, CertifiesAMesh) {
-  const TempDir dir;
-  test::write_bytes(dir / "a.obj", obj_text(test::torus_mesh(0.6, 0.2)));
-  const json out = json_of("info " + (dir / "a.obj").string());
-  EXPECT_EQ(out["kind"], "mesh");
-  EXPECT_EQ(out["certificate"]["genus"], 1);
-  EXPECT_EQ(out["certificate"]["euler_number"], 0);
-  EXPECT_TRUE(out["certificate"]["passed"]);
-  EXPECT_EQ(out["counts"]["faces"], 2 * 128 * 64);
 }
 
 }  // namespace

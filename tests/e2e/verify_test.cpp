@@ -71,6 +71,35 @@ class Verify : public testing::Test {
 };
 TempDir* Verify::dir_ = nullptr;
 
+TEST_F(Verify, InfoTellsOfEveryAssetOfARunAndOfTheRun) {
+  const std::map<std::string, std::string> kinds = {{".vdb", "volume"},
+                                                    {".exr", "raster"},
+                                                    {".spz", "splats"},
+                                                    {".obj", "mesh"},
+                                                    {".stl", "mesh"},
+                                                    {".3mf", "mesh"},
+                                                    {".ply", ""},
+                                                    {".glb", ""}};
+  std::set<std::string> told;
+  for (const auto& [name, bytes] : results_in(out())) {
+    const auto kind = kinds.find(fs::path(name).extension());
+    if (kind == kinds.end()) continue;
+    const auto info = run_cgs("info " + (out() / name).string() + " --json");
+    ASSERT_EQ(info.exit_code, 0) << name << ": " << info.err;
+    const auto json = nlohmann::json::parse(info.out);
+    if (!kind->second.empty()) EXPECT_EQ(json["kind"], kind->second) << name;
+    if (kind->first == ".vdb") EXPECT_EQ(json["units"], "m");
+    told.insert(kind->first);
+  }
+  EXPECT_EQ(told.size(), kinds.size());
+  const auto run = nlohmann::json::parse(run_cgs("info " + out().string() + " --json").out);
+  EXPECT_EQ(run["kind"], "run");
+  EXPECT_TRUE(run["finished"]);
+  EXPECT_GT(run["stages"].size(), 4u);
+  const std::string model = (out() / "model").string();
+  EXPECT_EQ(nlohmann::json::parse(run_cgs("info " + model + " --json").out)["kind"], "splats");
+}
+
 /// A setting of the environment while it lives.
 class Environment {
  public:

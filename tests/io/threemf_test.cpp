@@ -93,7 +93,7 @@ TEST(Write3mf, KeepsFacesTheirOrderAndTheirClass) {
     EXPECT_EQ(v3[i], mesh.faces[i][2]);
     EXPECT_EQ(p1[i], kMaterial.at(static_cast<size_t>(mesh.provenance[i])));
   }
-  EXPECT_NE(xml.find("<base name=\"inferred\" displaycolor=\"#FF5AD9FF\""), std::string::npos);
+  EXPECT_NE(xml.find("<base name=\"inferred\" displaycolor=\"#F21AD9FF\""), std::string::npos);
   EXPECT_NE(xml.find("Surface by origin: observed "), std::string::npos);
 }
 

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/commands/info_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <optional>
+#include <string>
+
+#include <nlohmann/json.hpp>
+#include <openvdb/tools/Count.h>
+
+#include "convert/conversion.h"
+#include "convert/measured_file.h"
+#include "convert/mesh_files.h"
+#include "convert/run_record.h"
+#include "convert/volume_file.h"
+#include "io/exr.h"
+#include "io/json_file.h"
+#include "io/splat_reader.h"
+#include "io/vdb.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+Json vector_json(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
+
+void print_warnings(const Json& info) {
+  for (const Json& text : info["warnings"]) {
+    std::printf("warning: %s\n", one_line(text.get<std::string>()).c_str());
+  }
+}
+
+template <typename Print>
+void print_info(const Json& info, bool as_json, Print print) {
+  if (as_json) {
+    std::cout << json_text(info) << "\n";
+  } else {
+    print(info);
+  }
+}
+
+// --- meshes and splats ----------------------------------------------------------------------
+
+Json mesh_json(const MeasurableFile& file, const Json& certificate) {
+  const MeasurableMesh& mesh = file.content;
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : mesh.points) box.extend(mesh.file_from_internal(p));
+  return {{"kind", mesh.mesh.faces.empty() ? "point cloud" : "mesh"},
+          {"counts", {{"vertices", mesh.points.size()}, {"faces", mesh.mesh.faces.size()}}},
+          {"bounds", {{"min", vector_json(box.min())}, {"max", vector_json(box.max())}}},
+          {"units", mesh.frame.unit_name()},
+          {"states",
+           {{"provenance", mesh.states_provenance()},
+            {"sigma", mesh.states_sigma()},
+            {"colors", !mesh.mesh.colors.empty()}}},
+          {"certificate", certificate},
+          {"warnings", file.warnings}};
+}
+
+void print_mesh(const Json& info, const Certificate& certificate) {
+  const Json& box = info["bounds"];
+  std::printf("%s: %zu vertices, %zu faces, unit %s\n",
+              info["kind"].get<std::string>().c_str(),
+              info["counts"]["vertices"].get<size_t>(),
+              info["counts"]["faces"].get<size_t>(),
+              info["units"].get<std::string>().c_str());
+  std::printf("bounds: %s ... %s\n", box["min"].dump().c_str(), box["max"].dump().c_str());
+  std::printf("provenance %s, sigma %s\n",
+              info["states"]["provenance"].get<bool>() ? "stated" : "not stated",
+              info["states"]["sigma"].get<bool>() ? "stated" : "not stated");
+  if (!info["certificate"].is_null()) {
+    std::printf("%s: %s, Euler number %ld, smallest angle %.3g degrees, volume %.6g\n",
+                certificate.passed() ? "certified watertight" : "NOT watertight",
+                certificate_line(certificate).c_str(),
+                certificate.euler_number,
+                certificate.smallest_angle * 180 / M_PI,
+                info["certificate"]["volume"].get<double>());
+  }
+  print_warnings(info);
+}
+
+void print_splats(const Json& info) {
+  const Json& counts = info["counts"];
+  std::printf("%s: %zu splats of %zu in the file, harmonics of degree %d\nunits: %s\n",
+              info["format"].get<std::string>().c_str(),
+              counts["splats"].get<size_t>(),
+              counts["in_file"].get<size_t>(),
+              counts["sh_degree"].get<int>(),
+              info["units"].get<std::string>().c_str());
+  for (const char* corner : {"min", "max"}) {
+    const Json& p = info["bounds"][corner];
+    std::printf("%s %12.6g %12.6g %12.6g\n",
+                corner,
+                p[0].get<double>(),
+                p[1].get<double>(),
+                p[2].get<double>());
+  }
+  std::printf("fill ratio %.3g\n", info["findings"]["fill_ratio"].get<double>());
+  print_warnings(info);
+}
+
+void tell_mesh(const fs::path& path, bool as_json) {
+  const MeasurableFile file = read_mesh_file(path);
+  const TriangleMesh& mesh = file.content.mesh;
+  Certificate certificate;
+  Json proved = nullptr;
+  if (!mesh.faces.empty()) {
+    certificate = certify(mesh);
+    proved = certificate_to_json(certificate, mesh, file.content.frame);
+  }
+  print_info(
+      mesh_json(file, proved), as_json, [&](const Json& info) { print_mesh(info, certificate); });
+}
+
+void tell_splats(const fs::path& path, bool as_json) {
+  print_info(splat_file_to_json(read_splats(path)), as_json, print_splats);
+}
+
+// --- volumes --------------------------------------------------------------------------------
+
+// Smallest and largest of the active values of a grid of numbers; null for other grids and where
+// nothing is active.
+Json range_json(const openvdb::GridBase& grid) {
+  Json out = nullptr;
+  if (grid.activeVoxelCount() == 0) return out;
+  using Numbers = openvdb::
+      TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid, openvdb::Int64Grid>;
+  grid.apply<Numbers>([&](const auto& numbers) {
+    const auto range = openvdb::tools::minMax(numbers.tree());
+    out = {range.min(), range.max()};
+  });
+  return out;
+}
+
+Json grid_json(const openvdb::GridBase& grid) {
+  const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+  const bool is_empty = grid.activeVoxelCount() == 0;
+  Json bounds = nullptr;
+  if (!is_empty) {
+    const openvdb::BBoxd placed = grid.transform().indexToWorld(box);
+    bounds = {{"min", vector_json(placed.min())}, {"max", vector_json(placed.max())}};
+  }
+  return {{"name", grid.getName()},
+          {"values", grid.valueType()},
+          {"class", openvdb::GridBase::gridClassToString(grid.getGridClass())},
+          {"voxel_size", vector_json(grid.voxelSize())},
+          {"active_voxels", grid.activeVoxelCount()},
+          {"bounds", bounds},
+          {"range", range_json(grid)}};
+}
+
+Json volume_json(const fs::path& path) {
+  const auto grids = read_vdb(path);
+  const std::optional<Frame> frame = frame_of_volume(grids, path);
+  Json rows = Json::array();
+  for (const auto& grid : grids) rows.push_back(grid_json(*grid));
+  return {{"kind", "volume"},
+          {"units", frame ? frame->unit_name() : "unknown"},
+          {"fused_here", frame.has_value()},
+          {"grids", rows}};
+}
+
+void print_volume(const Json& info) {
+  std::printf("volume: %zu grids, unit %s%s\n\n%-16s %-7s %-10s %12s %10s   %s\n",
+              info["grids"].size(),
+              info["units"].get<std::string>().c_str(),
+              info["fused_here"].get<bool>() ? "" : ", not made by cgs",
+              "grid",
+              "values",
+              "class",
+              "active",
+              "voxel",
+              "range of active values");
+  for (const Json& grid : info["grids"]) {
+    std::printf("%-16s %-7s %-10s %12llu %10.4g",
+                one_line(grid["name"].get<std::string>()).c_str(),
+                grid["values"].get<std::string>().c_str(),
+                grid["class"].get<std::string>().c_str(),
+                grid["active_voxels"].get<unsigned long long>(),
+                grid["voxel_size"][0].get<double>());
+    const Json& range = grid["range"];
+    if (!range.is_null()) {
+      std::printf("   %.4g ... %.4g", range[0].get<double>(), range[1].get<double>());
+    }
+    std::printf("\n");
+  }
+}
+
+// --- rasters --------------------------------------------------------------------------------
+
+Json channel_json(const std::string& name, const std::vector<float>& values) {
+  size_t finite = 0;
+  double low = HUGE_VAL;
+  double high = -HUGE_VAL;
+  for (const float v : values) {
+    if (!std::isfinite(v)) continue;
+    ++finite;
+    low = std::min<double>(low, v);
+    high = std::max<double>(high, v);
+  }
+  return {{"name", name},
+          {"finite", double(finite) / double(values.size())},
+          {"range", finite == 0 ? Json() : Json({low, high})}};
+}
+
+Json raster_json(const ExrImage& image) {
+  Json channels = Json::array();
+  for (const auto& [name, values] : image.channels) channels.push_back(channel_json(name, values));
+  return {{"kind", "raster"},
+          {"width", image.width},
+          {"height", image.height},
+          {"channels", channels},
+          {"attributes", image.text},
+          {"camera_stated", image.world_to_camera.has_value()}};
+}
+
+void print_raster(const Json& info) {
+  std::printf("raster: %d x %d pixels, %zu channels, camera %s\n",
+              info["width"].get<int>(),
+              info["height"].get<int>(),
+              info["channels"].size(),
+              info["camera_stated"].get<bool>() ? "stated" : "not stated");
+  for (const Json& channel : info["channels"]) {
+    std::printf("  %-16s", one_line(channel["name"].get<std::string>()).c_str());
+    const Json& range = channel["range"];
+    if (!range.is_null()) {
+      std::printf(" %10.4g ... %-10.4g", range[0].get<double>(), range[1].get<double>());
+    }
+    const double finite = channel["finite"].get<double>();
+    if (finite < 1) std::printf(" %.1f %% not finite", 100 * (1 - finite));
+    std::printf("\n");
+  }
+  for (const auto& [key, value] : info["attributes"].items()) {
+    std::printf("%s: %s\n", one_line(key).c_str(), one_line(value.get<std::string>()).c_str());
+  }
+}
+
+// --- what run wrote -------------------------------------------------------------------------
+
+Json run_json(const fs::path& path) {
+  const Json record = read_run_record(path);
+  const auto asked = [&](const char* key) {
+    const Json& request = record["request"];
+    const bool is_text = request.is_object() && request.contains(key) && request[key].is_string();
+    if (!is_text) throw BadInput(Defect::Schema, path, std::string("request states no ") + key);
+    return request[key];
+  };
+  if (record.is_null()) throw BadInput(Defect::Schema, path, "is no record of a run");
+  Json stages = Json::array();
+  for (const auto& [name, stage] : record["stages"].items()) {
+    stages.push_back(
+        {{"name", name}, {"seconds", stage["seconds"]}, {"peak_memory", stage["peak_memory"]}});
+  }
+  const bool is_finished = record.contains("outputs");
+  return {{"kind", "run"},
+          {"scene", asked("scene")},
+          {"views", asked("views")},
+          {"finished", is_finished},
+          {"files", is_finished ? record["outputs"].size() : 0},
+          {"stages", stages}};
+}
+
+void print_run(const Json& info) {
+  const std::string views = one_line(info["views"].get<std::string>());
+  std::printf("%s of %s, %s %s\n",
+              info["finished"].get<bool>() ? "finished run" : "run that is NOT finished",
+              one_line(info["scene"].get<std::string>()).c_str(),
+              views.empty() ? "all" : "views",
+              views.empty() ? "views" : views.c_str());
+  for (const Json& stage : info["stages"]) {
+    std::printf("  %-12s %8.1f s %8.0f MiB\n",
+                one_line(stage["name"].get<std::string>()).c_str(),
+                stage["seconds"].get<double>(),
+                stage["peak_memory"].get<double>() / (1 << 20));
+  }
+  if (info["finished"].get<bool>()) {
+    std::printf("%zu files; report.html shows them, and cgs verify checks them\n",
+                info["files"].get<size_t>());
+  } else {
+    std::printf("the command that began it goes on where it stopped\n");
+  }
+}
+
+// Files that no mesh reader takes, and those of its kinds that hold splats.
+bool holds_splats(const fs::path& path) { return !is_mesh_name(path) || is_splat_file(path); }
+
+bool print_folder_info(const fs::path& folder, bool as_json) {
+  if (fs::exists(folder / "run.json")) {
+    print_info(run_json(folder / "run.json"), as_json, print_run);
+    return true;
+  }
+  if (!fs::exists(folder / "gaussians.ply")) return false;
+  tell_splats(folder / "gaussians.ply", as_json);
+  return true;
+}
+
+}  // namespace
+
+bool print_file_info(const fs::path& path, bool as_json) {
+  std::error_code none;
+  if (fs::is_directory(path, none)) return print_folder_info(path, as_json);
+  if (path.extension() == ".vdb") {
+    print_info(volume_json(path), as_json, print_volume);
+  } else if (path.extension() == ".exr") {
+    print_info(raster_json(read_exr(path)), as_json, print_raster);
+  } else if (fs::is_regular_file(path, none) && holds_splats(path)) {
+    tell_splats(path, as_json);
+  } else if (is_mesh_name(path)) {
+    tell_mesh(path, as_json);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+}  // namespace cgs

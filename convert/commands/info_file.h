@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+namespace cgs {
+
+/// Prints, as text or as JSON, what a file holds: a mesh with its certificate, splats, the grids of
+/// a volume or the channels of an EXR; of a folder that run wrote, what was done; of a model, its
+/// splats.
+/// \return false if the path is none of these, but perhaps a scene
+/// \throws as the readers of the formats
+bool print_file_info(const std::filesystem::path& path, bool as_json);
+
+}  // namespace cgs

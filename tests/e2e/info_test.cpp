@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// cgs info of files, and of folders that are no scene.
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <openvdb/tools/LevelSetSphere.h>
+
+#include "io/exr.h"
+#include "io/vdb.h"
+#include "tests/support/run_cgs.h"
+
+namespace cgs {
+namespace {
+
+using nlohmann::json;
+using test::run_cgs;
+using test::TempDir;
+
+json json_of(const std::filesystem::path& path) {
+  const auto result = run_cgs("info " + path.string() + " --json");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  return json::parse(result.out);
+}
+
+TEST(Info, CertifiesAMesh) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj",
+                    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  const json out = json_of(dir / "a.obj");
+  EXPECT_EQ(out["kind"], "mesh");
+  EXPECT_EQ(out["certificate"]["genus"], 0);
+  EXPECT_EQ(out["certificate"]["euler_number"], 2);
+  EXPECT_TRUE(out["certificate"]["passed"]);
+  EXPECT_EQ(out["counts"]["faces"], 4);
+}
+
+TEST(Info, ListsTheGridsOfAVolumeOfAnotherProgram) {
+  const TempDir dir;
+  openvdb::initialize();
+  auto sphere =
+      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(6, openvdb::Vec3f(10, 20, 30), 0.5f);
+  sphere->setName("ls_sphere");
+  auto empty = openvdb::Vec3SGrid::create(openvdb::Vec3s(0));
+  empty->setName("velocity");
+  write_vdb(dir / "a.vdb", {sphere, empty}, {});
+  const json out = json_of(dir / "a.vdb");
+  EXPECT_EQ(out["kind"], "volume");
+  EXPECT_EQ(out["units"], "unknown");
+  ASSERT_EQ(out["grids"].size(), 2u);
+  const json& grid = out["grids"][0];
+  EXPECT_EQ(grid["name"], "ls_sphere");
+  EXPECT_EQ(grid["class"], "level set");
+  EXPECT_EQ(grid["active_voxels"], sphere->activeVoxelCount());
+  EXPECT_DOUBLE_EQ(grid["voxel_size"][1], 0.5);
+  for (int k = 0; k < 3; ++k) {  // a sphere and three voxels of 0.5 around it
+    EXPECT_NEAR(grid["bounds"]["min"][k].get<double>(), 10 * (k + 1) - 7.5, 0.51);
+    EXPECT_NEAR(grid["bounds"]["max"][k].get<double>(), 10 * (k + 1) + 7.5, 0.51);
+  }
+  EXPECT_NEAR(grid["range"][0].get<double>(), -1.5, 0.05);
+  EXPECT_NEAR(grid["range"][1].get<double>(), 1.5, 0.05);
+  EXPECT_TRUE(out["grids"][1]["bounds"].is_null());
+  const std::string text = run_cgs("info " + (dir / "a.vdb").string()).out;
+  EXPECT_NE(text.find("not made by cgs"), std::string::npos) << text;
+  EXPECT_NE(text.find("velocity"), std::string::npos) << text;
+}
+
+TEST(Info, ListsTheChannelsOfAnExr) {
+  const TempDir dir;
+  ExrImage image;
+  image.width = 2;
+  image.height = 2;
+  image.channels = {{"Z", {1, 2, std::numeric_limits<float>::quiet_NaN(), 4}}};
+  image.text["units"] = "mm";
+  write_exr(dir / "a.exr", image);
+  const json out = json_of(dir / "a.exr");
+  EXPECT_EQ(out["kind"], "raster");
+  ASSERT_EQ(out["channels"].size(), 1u);
+  EXPECT_EQ(out["channels"][0]["range"], json({1, 4}));
+  EXPECT_DOUBLE_EQ(out["channels"][0]["finite"], 0.75);
+  EXPECT_EQ(out["attributes"]["units"], "mm");
+}
+
+TEST(Info, SaysWhereARunStoppedAndRefusesWhatIsNoRecord) {
+  const TempDir dir;
+  std::filesystem::create_directory(dir / "run");
+  test::write_bytes(dir / "run/run.json",
+                    R"({"program": "cgs", "request": {"scene": "photos", "views": "1,2"}, "stages":
+                    {"model": {"seconds": 3, "peak_memory": 1048576, "result": null}}})");
+  const json out = json_of(dir / "run");
+  EXPECT_EQ(out["kind"], "run");
+  EXPECT_FALSE(out["finished"]);
+  EXPECT_EQ(out["stages"][0]["name"], "model");
+  EXPECT_NE(run_cgs("info " + (dir / "run").string()).out.find("NOT finished"), std::string::npos);
+  for (const char* text : {"[]", "{\"request\": 3, \"stages\": {}}", "{\"request\": {}"}) {
+    test::write_bytes(dir / "run/run.json", text);
+    const auto refused = run_cgs("info " + (dir / "run").string());
+    EXPECT_EQ(refused.exit_code, 3) << text;
+    EXPECT_NE(refused.err.find("run.json"), std::string::npos) << refused.err;
+  }
+}
+
+}  // namespace
+}  // namespace cgs
