@@ -36,12 +36,15 @@ struct ExrImage {
 /// Source: OpenEXR file layout, openexr.com.
 void write_exr(const std::filesystem::path& path, const ExrImage& image);
 
-/// Reads a single-part scanline image; half and unsigned channels become float.
+/// Reads an image of a single part, of a tiled one the finest level; half and unsigned channels
+/// become float.
 ///
-/// The header and the table of chunks are checked before the library sees a byte.
-/// \throws BadInput Magic, Unsupported (deep, multi-part, tiled, compression other than NONE, RLE,
-///         ZIPS and ZIP, subsampled channels), Syntax, Truncated, Schema (no channel); LimitError
-///         (pixels, size or number of attributes)
+/// The header and the table of chunks are checked before the library sees a byte. What its decoders
+/// are not proof against (tiles; compression other than NONE, RLE, ZIPS and ZIP) is decoded in a
+/// child process.
+/// \throws BadInput Magic, Unsupported (deep, multi-part, subsampled channels), Syntax, Truncated,
+///         Schema (no channel); LimitError (pixels, size or number of attributes; memory or time of
+///         the child process)
 ExrImage read_exr(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 }  // namespace cgs

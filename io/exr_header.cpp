@@ -12,6 +12,8 @@ constexpr uint32_t kMagic = 0x01312f76;
 constexpr uint32_t kTiled = 0x200;
 constexpr uint32_t kDeep = 0x800;
 constexpr uint32_t kMultiPart = 0x1000;
+constexpr uint8_t kZip = 3;  // methods of compression, by number
+constexpr uint8_t kDwab = 9;
 constexpr size_t kMaxAttributes = 1024;
 constexpr uint32_t kMaxAttributeBytes = uint32_t{1} << 20;
 constexpr size_t kMaxAttributeName = 255;
@@ -30,11 +32,14 @@ class ExrScreen {
   ExrScreen(std::string_view bytes, const std::filesystem::path& path, const ReadLimits& limits)
       : reader_(bytes, path), limits_(limits), size_(bytes.size()) {}
 
-  void run() {
+  ExrScreening run() {
     check_version();
     read_attributes();
     check_window();
-    check_chunks();
+    if (found_.is_harmless) check_chunks();
+    found_.decoded_bytes = channels_ * sizeof(float) * static_cast<uint64_t>(window_.width()) *
+                           static_cast<uint64_t>(window_.height());
+    return found_;
   }
 
  private:
@@ -46,9 +51,10 @@ class ExrScreen {
     if ((version & 0xff) != 2) {
       reader_.fail(Defect::Magic, "OpenEXR version " + std::to_string(version & 0xff));
     }
-    if ((version & (kTiled | kDeep | kMultiPart)) != 0) {
-      reader_.fail(Defect::Unsupported, "only single-part scanline images, not deep or tiled");
+    if ((version & (kDeep | kMultiPart)) != 0) {
+      reader_.fail(Defect::Unsupported, "only images of a single part that are not deep");
     }
+    found_.is_harmless = (version & kTiled) == 0;
   }
 
   void read_attributes() {
@@ -81,12 +87,14 @@ class ExrScreen {
     }
     if (name == "compression" && type == "compression") {
       const auto method = field.get<uint8_t>("compression");
-      if (method > 3) {
-        reader_.fail(Defect::Unsupported,
-                     "compression method " + std::to_string(method) +
-                         ", allowed are NONE, RLE, ZIPS and ZIP");
+      if (method > kDwab) {
+        reader_.fail(
+            Defect::Unsupported,
+            "compression method " + std::to_string(method) +
+                ", allowed are NONE, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA and DWAB");
       }
-      lines_per_chunk_ = method == 3 ? 16 : 1;
+      found_.is_harmless = found_.is_harmless && method <= kZip;
+      lines_per_chunk_ = method == kZip ? 16 : 1;
       has_compression_ = true;
     }
     if (name == "channels" && type == "chlist") {
@@ -95,10 +103,10 @@ class ExrScreen {
     }
   }
 
-  void read_channels(ByteReader& field) const {
-    bool any = false;
+  void read_channels(ByteReader& field) {
+    channels_ = 0;
     while (!field.take_c_string(kMaxAttributeName, "channel name").empty()) {
-      any = true;
+      ++channels_;
       (void)field.take(8, "channel");  // pixel type, linearity
       const auto x_sampling = field.get<int32_t>("channel sampling");
       const auto y_sampling = field.get<int32_t>("channel sampling");
@@ -106,7 +114,7 @@ class ExrScreen {
         reader_.fail(Defect::Unsupported, "subsampled channels");
       }
     }
-    if (!any) reader_.fail(Defect::Schema, "no channels");
+    if (channels_ == 0) reader_.fail(Defect::Schema, "no channels");
   }
 
   void check_window() const {
@@ -169,6 +177,8 @@ class ExrScreen {
   const ReadLimits& limits_;
   size_t size_;
   Window window_;
+  ExrScreening found_;
+  uint64_t channels_ = 0;
   int64_t lines_per_chunk_ = 1;
   bool has_window_ = false;
   bool has_compression_ = false;
@@ -177,10 +187,10 @@ class ExrScreen {
 
 }  // namespace
 
-void screen_exr(std::string_view bytes,
-                const std::filesystem::path& path,
-                const ReadLimits& limits) {
-  ExrScreen(bytes, path, limits).run();
+ExrScreening screen_exr(std::string_view bytes,
+                        const std::filesystem::path& path,
+                        const ReadLimits& limits) {
+  return ExrScreen(bytes, path, limits).run();
 }
 
 }  // namespace cgs

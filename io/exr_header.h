@@ -8,14 +8,20 @@
 
 namespace cgs {
 
-/// Lets pass only what the OpenEXR library may see: a single-part flat scanline image of bounded
-/// size, compressed with NONE, RLE, ZIPS or ZIP, whose chunks lie inside the file, one per block of
-/// lines.
-///
-/// Older releases of the library have known defects in everything else.
+/// What screen_exr() found.
+struct ExrScreening {
+  /// A scanline image, compressed with NONE, RLE, ZIPS or ZIP, whose chunks lie inside the file,
+  /// one per block of lines. In the decoders of everything else older releases of the library have
+  /// known defects: it must not be decoded in this process.
+  bool is_harmless = false;
+  uint64_t decoded_bytes = 0;  ///< All channels as 32-bit floats.
+};
+
+/// Lets pass only what the OpenEXR library may see, in a child process if it is not harmless: a
+/// single-part flat image of bounded size without subsampled channels.
 /// \throws BadInput, LimitError as read_exr()
-void screen_exr(std::string_view bytes,
-                const std::filesystem::path& path,
-                const ReadLimits& limits);
+ExrScreening screen_exr(std::string_view bytes,
+                        const std::filesystem::path& path,
+                        const ReadLimits& limits);
 
 }  // namespace cgs

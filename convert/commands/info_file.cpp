@@ -236,7 +236,7 @@ void print_raster(const Json& info) {
       std::printf(" %10.4g ... %-10.4g", range[0].get<double>(), range[1].get<double>());
     }
     const double finite = channel["finite"].get<double>();
-    if (finite < 1) std::printf(" %.1f %% not finite", 100 * (1 - finite));
+    if (finite < 1) std::printf(" %.2g %% not finite", 100 * (1 - finite));
     std::printf("\n");
   }
   for (const auto& [key, value] : info["attributes"].items()) {

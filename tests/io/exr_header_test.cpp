@@ -72,11 +72,20 @@ TEST(ScreenExr, RefusesOtherFilesAndKinds) {
   EXPECT_EQ(defect({.version = 3}), "MAGIC");
   EXPECT_EQ(defect({.version = 2 | 0x800}), "UNSUPPORTED");
   EXPECT_EQ(defect({.version = 2 | 0x1000}), "UNSUPPORTED");
-  EXPECT_EQ(defect({.version = 2 | 0x200}), "UNSUPPORTED");
-  for (uint8_t method = 4; method < 12; ++method) {
-    EXPECT_EQ(defect({.compression = method}), "UNSUPPORTED");
-  }
+  EXPECT_EQ(defect({.compression = 10}), "UNSUPPORTED");
   EXPECT_EQ(defect({.compression = 2}), "OK");
+}
+
+TEST(ScreenExr, TellsWhatMustNotBeDecodedHere) {
+  const auto screening = [](const RawExr& file) {
+    return screen_exr(file.bytes(), "a.exr", ReadLimits{});
+  };
+  EXPECT_TRUE(screening({}).is_harmless);
+  EXPECT_TRUE(screening({.compression = 2}).is_harmless);
+  for (uint8_t method = 4; method < 10; ++method) {
+    EXPECT_FALSE(screening({.compression = method}).is_harmless);
+  }
+  EXPECT_FALSE(screening({.version = 2 | 0x200}).is_harmless);
 }
 
 TEST(ScreenExr, RefusesWindowsThatAreNone) {

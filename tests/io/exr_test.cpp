@@ -2,8 +2,16 @@
 #include "io/exr.h"
 
 #include <bit>
+#include <cmath>
 #include <limits>
+#include <map>
 
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
+#include <ImfTiledOutputFile.h>
 #include <gtest/gtest.h>
 
 #include "tests/support/full_disk.h"
@@ -74,6 +82,77 @@ TEST(Exr, GivesEqualBytesForEqualImages) {
   write_exr(dir / "a.exr", image);
   write_exr(dir / "b.exr", image);
   EXPECT_EQ(test::read_bytes(dir / "a.exr"), test::read_bytes(dir / "b.exr"));
+}
+
+// Writes the channel Z with OpenEXR as it is.
+void write_compressed(const std::filesystem::path& path,
+                      const ExrImage& image,
+                      Imf::Compression method,
+                      bool tiled) {
+  Imf::Header header(image.width, image.height);
+  header.compression() = method;
+  header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
+  header.insert("note", Imf::StringAttribute("by another program"));
+  const std::vector<float>& values = *image.find("Z");
+  auto* base = const_cast<char*>(reinterpret_cast<const char*>(values.data()));
+  Imf::FrameBuffer buffer;
+  buffer.insert("Z", {Imf::FLOAT, base, sizeof(float), sizeof(float) * size_t(image.width)});
+  if (tiled) {
+    header.setTileDescription(Imf::TileDescription(16, 8));
+    Imf::TiledOutputFile file(path.c_str(), header);
+    file.setFrameBuffer(buffer);
+    file.writeTiles(0, file.numXTiles() - 1, 0, file.numYTiles() - 1);
+  } else {
+    Imf::OutputFile file(path.c_str(), header);
+    file.setFrameBuffer(buffer);
+    file.writePixels(image.height);
+  }
+}
+
+ExrImage ramp(int width, int height) {
+  ExrImage image = sample(width, height);
+  std::vector<float>& values = image.channels[2].second;
+  for (size_t i = 0; i < values.size(); ++i) values[i] = 5 + 0.01f * static_cast<float>(i);
+  return image;
+}
+
+TEST(Exr, ReadsEveryCompressionAndTiles) {
+  const test::TempDir dir;
+  const ExrImage image = ramp(37, 45);
+  const std::vector<float>& expected = *image.find("Z");
+  const std::map<Imf::Compression, float> largest_errors = {{Imf::ZIP_COMPRESSION, 0},
+                                                            {Imf::PIZ_COMPRESSION, 0},
+                                                            {Imf::PXR24_COMPRESSION, 1e-4f},
+                                                            {Imf::B44_COMPRESSION, 0},
+                                                            {Imf::B44A_COMPRESSION, 0},
+                                                            {Imf::DWAA_COMPRESSION, 0},
+                                                            {Imf::DWAB_COMPRESSION, 0}};
+  for (const auto& [method, largest] : largest_errors) {
+    for (const bool tiled : {false, true}) {
+      SCOPED_TRACE(std::to_string(method) + (tiled ? ", tiled" : ""));
+      write_compressed(dir / "a.exr", image, method, tiled);
+      const ExrImage back = read_exr(dir / "a.exr");
+      ASSERT_EQ(back.width, 37);
+      ASSERT_EQ(back.height, 45);
+      EXPECT_EQ(back.text.at("note"), "by another program");
+      ASSERT_EQ(back.channels.size(), 1u);
+      const std::vector<float>& values = *back.find("Z");
+      for (size_t i = 0; i < expected.size(); ++i) {
+        ASSERT_LE(std::abs(values[i] - expected[i]), largest * expected[i]);
+      }
+    }
+  }
+}
+
+TEST(Exr, RefusesEveryTruncationOfWhatAChildDecodes) {
+  const test::TempDir dir;
+  write_compressed(dir / "a.exr", ramp(20, 24), Imf::PIZ_COMPRESSION, false);
+  const std::string whole = test::read_bytes(dir / "a.exr");
+  for (size_t size = whole.size() - 1; size > 0; size -= std::min(size, whole.size() / 23)) {
+    const std::string defect =
+        test::defect_of(whole.substr(0, size), [](const auto& path) { (void)read_exr(path); });
+    EXPECT_NE(defect, "OK") << size << " of " << whole.size();
+  }
 }
 
 TEST(Exr, RefusesEveryTruncation) {
