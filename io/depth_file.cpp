@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "io/colmap_depth.h"
 #include "io/exr.h"
@@ -53,18 +54,18 @@ Raster<float> from_exr(const fs::path& path, const ReadLimits& limits) {
   return out;
 }
 
-Raster<float> from_array(const NpyArray& array, const fs::path& path, const ReadLimits& limits) {
+StoredSamples from_array(const NpyArray& array, const fs::path& path, const ReadLimits& limits) {
   const auto sides = picture_sides(array.shape);
   if (!sides) throw BadInput(Defect::Schema, path, "expected an array of height x width values");
   if (array.values.size() > limits.max_pixels) {
     throw LimitError(printable(path) + ": " + std::to_string(array.values.size()) +
                      " pixels, allowed are " + std::to_string(limits.max_pixels));
   }
-  Raster<float> out(static_cast<int>((*sides)[1]), static_cast<int>((*sides)[0]), 0);
-  std::transform(array.values.begin(), array.values.end(), out.data.begin(), [](double value) {
+  Raster<float> values(static_cast<int>((*sides)[1]), static_cast<int>((*sides)[0]), 0);
+  std::transform(array.values.begin(), array.values.end(), values.data.begin(), [](double value) {
     return static_cast<float>(value);
   });
-  return out;
+  return {std::move(values), array.whole_bits};
 }
 
 }  // namespace
@@ -92,11 +93,11 @@ StoredSamples read_depth_file(const fs::path& path, const ReadLimits& limits) {
   } else if (extension == ".pfm") {
     out.values = read_pfm(path, limits);
   } else if (extension == ".npy") {
-    out.values = from_array(read_npy(path, limits), path, limits);
+    out = from_array(read_npy(path, limits), path, limits);
   } else if (is_colmap_depth_name(path)) {
     out.values = read_colmap_depth(path, limits);
   } else if (extension == ".npz") {
-    out.values = from_array(read_npz_depth(path, limits), path, limits);
+    out = from_array(read_npz_depth(path, limits), path, limits);
   } else if (has_depth_extension(path)) {
     out = read_samples(path, limits);
   } else {

@@ -2,11 +2,14 @@
 #include "io/npy.h"
 
 #include <algorithm>
-#include <bit>
+#include <array>
+#include <cstdint>
 #include <cstring>
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include <half.h>
 
 namespace cgs {
 
@@ -146,17 +149,44 @@ size_t element_count(const std::vector<size_t>& shape, const ByteReader& file) {
   return count;
 }
 
-template <typename Word, typename Float>
+template <typename T>
+double number(T value) {
+  return static_cast<double>(value);
+}
+double number(Imath::half value) { return static_cast<double>(static_cast<float>(value)); }
+
+template <typename T>
 void convert(std::string_view bytes, bool swap, std::vector<double>& values) {
   for (size_t i = 0; i < values.size(); ++i) {
-    Word word = 0;
-    std::memcpy(&word, bytes.data() + i * sizeof(Word), sizeof(Word));
-    if (swap) {
-      word = sizeof(Word) == 4 ? static_cast<Word>(__builtin_bswap32(static_cast<uint32_t>(word)))
-                               : static_cast<Word>(__builtin_bswap64(word));
-    }
-    values[i] = static_cast<double>(std::bit_cast<Float>(word));
+    std::array<char, sizeof(T)> element{};
+    std::memcpy(element.data(), bytes.data() + i * sizeof(T), sizeof(T));
+    if (swap) std::reverse(element.begin(), element.end());
+    T value;
+    std::memcpy(&value, element.data(), sizeof(T));
+    values[i] = number(value);
   }
+}
+
+struct ElementType {
+  std::string_view name;  ///< Of the type, without the byte order.
+  size_t bytes = 0;
+  int whole_bits = 0;
+  void (*convert)(std::string_view bytes, bool swap, std::vector<double>& values) = nullptr;
+};
+constexpr std::array<ElementType, 5> kElementTypes = {{{"f2", 2, 0, convert<Imath::half>},
+                                                       {"f4", 4, 0, convert<float>},
+                                                       {"f8", 8, 0, convert<double>},
+                                                       {"i2", 2, 16, convert<int16_t>},
+                                                       {"u2", 2, 16, convert<uint16_t>}}};
+
+// nullptr for others
+const ElementType* element_type(std::string_view descr) {
+  if (!descr.starts_with('<') && !descr.starts_with('>')) return nullptr;
+  const auto* const found =
+      std::find_if(kElementTypes.begin(), kElementTypes.end(), [&](const ElementType& type) {
+        return type.name == descr.substr(1);
+      });
+  return found == kElementTypes.end() ? nullptr : found;
 }
 
 // Fortran order has the first index fastest: walk it with an odometer over C order.
@@ -175,15 +205,13 @@ std::vector<double> from_fortran_order(const NpyArray& array) {
   return out;
 }
 
-// \throws BadInput Unsupported for other elements than floats
-Header float_header(ByteReader& file, const ReadLimits& limits) {
+// \throws BadInput Unsupported for elements of other types
+Header known_header(ByteReader& file, const ReadLimits& limits) {
   const std::string_view text = header_text(file, limits);
   Header header = HeaderParser(text, file).parse();
-  const std::string_view descr = header.descr;
-  const bool is_known = descr == "<f8" || descr == ">f8" || descr == "<f4" || descr == ">f4";
-  if (!is_known) {
+  if (element_type(header.descr) == nullptr) {
     file.fail(Defect::Unsupported,
-              "element type '" + header.descr + "', known are <f8, >f8, <f4 and >f4");
+              "element type '" + header.descr + "', known are f2, f4, f8, i2 and u2 after < or >");
   }
   return header;
 }
@@ -203,10 +231,11 @@ std::optional<std::array<size_t, 2>> picture_sides(const std::vector<size_t>& sh
   return std::array{sides[0], sides[1]};
 }
 
-std::optional<std::vector<size_t>> npy_shape(std::string_view start) {
+std::optional<NpyArray> npy_outline(std::string_view start) {
   try {
     ByteReader file(start, "");
-    return float_header(file, {}).shape;
+    const Header header = known_header(file, {});
+    return NpyArray{header.shape, {}, element_type(header.descr)->whole_bits};
   } catch (const Error&) {
     return std::nullopt;
   }
@@ -216,27 +245,21 @@ NpyArray parse_npy(std::string_view bytes,
                    const std::filesystem::path& path,
                    const ReadLimits& limits) {
   ByteReader file(bytes, path);
-  const Header header = float_header(file, limits);
-  const std::string_view descr = header.descr;
-  const size_t width = descr[2] == '8' ? 8 : 4;
+  const Header header = known_header(file, limits);
+  const ElementType& type = *element_type(header.descr);
   const size_t count = element_count(header.shape, file);
   size_t needed = 0;
-  if (__builtin_mul_overflow(count, width, &needed) || needed > file.remaining()) {
+  if (__builtin_mul_overflow(count, type.bytes, &needed) || needed > file.remaining()) {
     // A file that holds part of what it promises was cut; one that could never hold it lies.
     constexpr size_t kAbsurd = size_t{1} << 40;
     const bool is_absurd = count > kAbsurd;
     file.fail(is_absurd ? Defect::Count : Defect::Truncated,
-              "the shape needs " + std::to_string(count) + " values of " + std::to_string(width) +
-                  " bytes, " + std::to_string(file.remaining()) + " bytes are left");
+              "the shape needs " + std::to_string(count) + " values of " +
+                  std::to_string(type.bytes) + " bytes, " + std::to_string(file.remaining()) +
+                  " bytes are left");
   }
-  NpyArray array{header.shape, std::vector<double>(count)};
-  const std::string_view data = file.take(needed, "npy values");
-  const bool swap = descr[0] == '>';
-  if (width == 8) {
-    convert<uint64_t, double>(data, swap, array.values);
-  } else {
-    convert<uint32_t, float>(data, swap, array.values);
-  }
+  NpyArray array{header.shape, std::vector<double>(count), type.whole_bits};
+  type.convert(file.take(needed, "npy values"), header.descr.starts_with('>'), array.values);
   if (header.fortran_order && array.shape.size() > 1) array.values = from_fortran_order(array);
   return array;
 }

@@ -16,14 +16,15 @@ namespace cgs {
 struct NpyArray {
   std::vector<size_t> shape;   ///< Empty for a scalar.
   std::vector<double> values;  ///< Product of shape.
+  int whole_bits = 0;          ///< 16 if elements are whole numbers, else 0.
 };
 
 /// Its sides where it is a picture: two, beside any of length 1; else nothing.
 /// \param shape  height before width
 std::optional<std::array<size_t, 2>> picture_sides(const std::vector<size_t>& shape);
 
-/// Reads a NumPy .npy file of float32 or float64 values, versions 1 to 3, either byte order, C or
-/// Fortran order; values come back as double in C order.
+/// Reads a NumPy .npy file of float16, float32, float64, int16 or uint16 values, versions 1 to 3,
+/// either byte order, C or Fortran order; values come back as double in C order.
 ///
 /// The header is matched against the fixed grammar NumPy writes, never evaluated.
 /// \throws BadInput Open, Empty, Magic, Syntax, Count (a declared size the file cannot hold),
@@ -36,7 +37,8 @@ NpyArray parse_npy(std::string_view bytes,
                    const std::filesystem::path& path,
                    const ReadLimits& limits = {});
 
-/// The shape of an array that parse_npy() reads, from the start of its file; nothing for others.
-std::optional<std::vector<size_t>> npy_shape(std::string_view start);
+/// An array that parse_npy() reads without its values, from the start of its file; nothing for
+/// others.
+std::optional<NpyArray> npy_outline(std::string_view start);
 
 }  // namespace cgs

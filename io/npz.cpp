@@ -26,17 +26,17 @@ std::string array_name(const std::string& file) {
   return file.substr(0, file.size() - kEnding.size());
 }
 
-// "conf (480 x 640), K (3 x 3), names (no floats)"
+// "conf (480 x 640), K (3 x 3), names (of a type that is not read)"
 std::string listed(const ZipArchive& archive, const std::vector<std::string>& files) {
   constexpr size_t kShown = 8;
   std::string out;
   for (size_t i = 0; i < std::min(files.size(), kShown); ++i) {
-    const auto shape = npy_shape(archive.read_start(files[i], kStart));
+    const auto array = npy_outline(archive.read_start(files[i], kStart));
     std::string sides;
-    for (const size_t n : shape.value_or(std::vector<size_t>{})) {
+    for (const size_t n : array.value_or(NpyArray{}).shape) {
       sides += (sides.empty() ? "" : " x ") + std::to_string(n);
     }
-    if (sides.empty()) sides = shape ? "one number" : "no floats";
+    if (sides.empty()) sides = array ? "one number" : "of a type that is not read";
     out += (i > 0 ? ", " : "") + one_line(array_name(files[i]).substr(0, 60)) + " (" + sides + ")";
   }
   return files.size() > kShown ? out + ", …" : out;
@@ -54,16 +54,20 @@ std::string depth_file(const ZipArchive& archive, const std::filesystem::path& p
                      " arrays, none named depth; of so many at most " +
                      std::to_string(kMostArrays) + " are looked into");
   }
-  std::vector<std::string> pictures;
+  std::vector<std::string> of_floats;
+  std::vector<std::string> of_whole_numbers;
   for (const std::string& file : files) {
-    const auto shape = npy_shape(archive.read_start(file, kStart));
-    if (shape && picture_sides(*shape)) pictures.push_back(file);
+    const auto array = npy_outline(archive.read_start(file, kStart));
+    if (!array || !picture_sides(array->shape)) continue;
+    (array->whole_bits == 0 ? of_floats : of_whole_numbers).push_back(file);
   }
-  if (pictures.size() == 1) return pictures[0];
-  throw BadInput(Defect::Schema,
-                 path,
-                 "expected an array named depth, or one of height x width floats; its arrays are " +
-                     listed(archive, files));
+  if (of_floats.size() == 1) return of_floats[0];
+  if (of_floats.empty() && of_whole_numbers.size() == 1) return of_whole_numbers[0];
+  throw BadInput(
+      Defect::Schema,
+      path,
+      "expected an array named depth, or only one of height x width numbers; its arrays are " +
+          listed(archive, files));
 }
 
 }  // namespace
@@ -76,9 +80,9 @@ NpyArray read_npz_depth(const std::filesystem::path& path, const ReadLimits& lim
   }
   const ZipArchive archive(bytes, path);
   const std::string file = depth_file(archive, path);
-  const auto shape = npy_shape(archive.read_start(file, kStart));
+  const auto outline = npy_outline(archive.read_start(file, kStart));
   double pixels = 1;
-  for (const size_t side : shape.value_or(std::vector<size_t>{})) pixels *= double(side);
+  for (const size_t side : outline.value_or(NpyArray{}).shape) pixels *= double(side);
   if (pixels > double(limits.max_pixels)) {
     throw LimitError(printable(path / file) + ": more than " + std::to_string(limits.max_pixels) +
                      " values");

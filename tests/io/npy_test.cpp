@@ -2,6 +2,7 @@
 #include "io/npy.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -42,6 +43,21 @@ TEST_F(ReadNpy, ReadsEitherByteOrderAndWidth) {
   EXPECT_EQ(read(npy("<f4", "(3,)", packed(1.5f, -2.25f, 3e8f))).values, expected);
   EXPECT_EQ(read(npy(">f4", "(3,)", swapped(1.5f) + swapped(-2.25f) + swapped(3e8f))).values,
             expected);
+}
+
+TEST_F(ReadNpy, ReadsHalvesAndWholeNumbersOf16Bits) {
+  const uint16_t one_and_a_half = 0x3e00;  // IEEE 754 binary16
+  const uint16_t largest = 0x7bff;
+  const uint16_t smallest = 0x0001;
+  const NpyArray halves = read(npy("<f2", "(3,)", packed(one_and_a_half, largest, smallest)));
+  EXPECT_EQ(halves.values, (std::vector<double>{1.5, 65504, std::ldexp(1, -24)}));
+  EXPECT_EQ(halves.whole_bits, 0);
+  EXPECT_EQ(read(npy(">f2", "(1,)", swapped(one_and_a_half))).values, std::vector<double>{1.5});
+  const NpyArray whole = read(npy("<u2", "(2,)", packed(uint16_t{1500}, uint16_t{65535})));
+  EXPECT_EQ(whole.values, (std::vector<double>{1500, 65535}));
+  EXPECT_EQ(whole.whole_bits, 16);
+  EXPECT_EQ(read(npy(">i2", "(2,)", swapped(int16_t{-7}) + swapped(int16_t{300}))).values,
+            (std::vector<double>{-7, 300}));
 }
 
 TEST_F(ReadNpy, TurnsFortranOrderIntoCOrder) {

@@ -43,15 +43,20 @@ np.savez("unnamed.npz", d)
 np.savez_compressed("doubles.npz", np.asfortranarray(d, dtype=">f8"))
 np.savez_compressed("one_picture.npz", pred=d[None, :, :, None], focal=np.float32(55),
                     names=np.array(["a", "b"]), count=np.arange(12).reshape(3, 4))
+np.savez_compressed("halves.npz", pred=d.astype(np.float16), ids=np.ones((3, 4), np.uint16))
+np.savez_compressed("millimetres.npz", mm=(1000 * d).astype(np.uint16), names=np.array(["a"]))
 )",
                                dir_.path()))
       << "needs python3-numpy";
-  for (const char* name : {"packed", "stored", "unnamed", "doubles", "one_picture"}) {
+  for (const char* name : {"packed", "stored", "unnamed", "doubles", "one_picture", "halves"}) {
     const Raster<float> read = read_depth_file(dir_ / (std::string(name) + ".npz")).values;
     ASSERT_EQ(read.width, 4) << name;
     ASSERT_EQ(read.height, 3) << name;
     for (int i = 0; i < 12; ++i) EXPECT_EQ(read(i % 4, i / 4), float(i) + 0.5f) << name;
   }
+  const StoredSamples whole = read_depth_file(dir_ / "millimetres.npz");
+  EXPECT_EQ(whole.whole_bits, 16);
+  EXPECT_EQ(whole.values(3, 2), 11500);
 }
 
 TEST_F(Npz, TakesTheArrayOfThatNameAmongPictures) {
@@ -67,8 +72,9 @@ TEST_F(Npz, RefusesSeveralPicturesAndListsThem) {
                        {"pred.npy", array("(3, 4)", 12)}};
   EXPECT_EQ(refused(files), "SCHEMA");
   const std::string said = test::message_of([&] { (void)read(files); });
-  EXPECT_NE(said.find("conf (3 x 4), f (one number), ids (no floats), pred (3 x 4)"),
-            std::string::npos)
+  EXPECT_NE(
+      said.find("conf (3 x 4), f (one number), ids (of a type that is not read), pred (3 x 4)"),
+      std::string::npos)
       << said;
 }
 
