@@ -19,6 +19,7 @@
 #include "convert/volume_file.h"
 #include "io/exr.h"
 #include "io/json_file.h"
+#include "io/scene_path.h"
 #include "io/splat_reader.h"
 #include "io/vdb.h"
 #include "libcgs/core/error.h"
@@ -294,11 +295,11 @@ void print_run(const Json& info) {
 bool holds_splats(const fs::path& path) { return !is_mesh_name(path) || is_splat_file(path); }
 
 bool print_folder_info(const fs::path& folder, bool as_json) {
-  if (fs::exists(folder / "run.json")) {
+  if (is_present(folder / "run.json")) {
     print_info(run_json(folder / "run.json"), as_json, print_run);
     return true;
   }
-  if (!fs::exists(folder / "gaussians.ply")) return false;
+  if (!is_present(folder / "gaussians.ply")) return false;
   tell_splats(folder / "gaussians.ply", as_json);
   return true;
 }
