@@ -129,14 +129,14 @@ uint64_t training_key(const Model& model, const TrainingOptions& options) {
 /// The state of a training on the disk; without a folder there is none.
 class TrainingCheckpoint {
  public:
-  TrainingCheckpoint(std::filesystem::path folder, uint64_t key, std::vector<std::string>& warnings)
-      : folder_(std::move(folder)), key_(key), warnings_(warnings) {}
+  TrainingCheckpoint(std::filesystem::path folder, uint64_t key, std::vector<std::string>& hitches)
+      : folder_(std::move(folder)), key_(key), hitches_(hitches) {}
 
   void restore(Trainer& trainer) {
     if (folder_.empty()) return;
     const SavedState saved = read_checkpoint(folder_, kCheckpointName, key_);
     if (saved.state) trainer.restore(*saved.state);
-    if (!saved.warning.empty()) warnings_.push_back(saved.warning);
+    if (!saved.warning.empty()) hitches_.push_back(saved.warning);
   }
 
   /// \throws IoError
@@ -152,7 +152,7 @@ class TrainingCheckpoint {
     try {
       save(trainer);
     } catch (const IoError& error) {
-      if (!has_failed_) warnings_.push_back(std::string(error.what()) + "; going on without it");
+      if (!has_failed_) hitches_.push_back(std::string(error.what()) + "; going on without it");
       has_failed_ = true;
     }
   }
@@ -165,7 +165,7 @@ class TrainingCheckpoint {
  private:
   std::filesystem::path folder_;
   uint64_t key_;
-  std::vector<std::string>& warnings_;
+  std::vector<std::string>& hitches_;
   std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
   bool has_failed_ = false;
 };
@@ -174,7 +174,7 @@ void optimise(TrainedModel& trained, const ModelRequest& request, const Progress
   Model& model = trained.model;
   Trainer trainer(model.scene, model.priors, request.training);
   TrainingCheckpoint checkpoint(
-      request.checkpoints, training_key(model, request.training), model.scene.warnings);
+      request.checkpoints, training_key(model, request.training), trained.hitches);
   checkpoint.restore(trainer);
   while (!trainer.done()) {
     trainer.step();

@@ -86,6 +86,7 @@ Json run_model(Run& run, const Progress& progress) {
       found.begin() + static_cast<std::ptrdiff_t>(run.scene.warnings.size()), found.end());
   write_model(folder, trained.model);
   write_file(folder / "training.json", json_text(report) + "\n");
+  for (const std::string& hitch : trained.hitches) report["warnings"].push_back(hitch);
   return report;
 }
 

@@ -2,7 +2,6 @@
 #include "convert/commands/info_file.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <iostream>

@@ -63,6 +63,7 @@ void run_train(const TrainArgs& args) {
   report["seconds"] = terminal.end(std::to_string(count) + " Gaussians");
   if (args.common.json) std::cout << json_text(report) << "\n";
   terminal.warn(found);
+  terminal.warn(trained.hitches);
 }
 
 }  // namespace

@@ -24,9 +24,10 @@ namespace fs = std::filesystem;
 
 /// One call of the program's first thread and what befalls it.
 struct Fault {
-  std::string call;    ///< Of the system, as strace names it.
-  int nth = 0;         ///< Counted per call, from 1.
-  std::string effect;  ///< As strace injects it: "error=EIO", "signal=KILL".
+  std::string call;             ///< Of the system, as strace names it.
+  int nth = 0;                  ///< Counted per call, from 1.
+  std::string effect;           ///< As strace injects it: "error=EIO", "signal=KILL".
+  bool concerns_state = false;  ///< The state of the training.
 
   std::string options() const {
     const std::string when = ":when=" + std::to_string(nth);
@@ -142,7 +143,8 @@ class Faults : public testing::Test {
       if (parts[1] != first_thread) continue;
       const int nth = ++count[parts[2]];
       if (parts[3].str().find(folder) == std::string::npos) continue;
-      places_.push_back({parts[2], nth, ""});
+      const bool concerns_state = parts[3].str().find("training.checkpoint") != std::string::npos;
+      places_.push_back({parts[2], nth, "", concerns_state});
     }
   }
 
@@ -208,6 +210,24 @@ TEST_F(Faults, AnErrorOfTheSystemIsReportedAndNothingIsLost) {
   }
   // The others concern what may fail, such as a file that is only looked for.
   EXPECT_GE(4 * reported, static_cast<int>(tried.size()));
+}
+
+TEST_F(Faults, AStateThatCannotBeSavedIsSaidAndChangesNoFile) {
+  std::vector<std::string> tried;
+  for (const Fault& place : places_) {
+    const bool writes = place.call == "openat" || place.call == "write" || place.call == "fsync";
+    const bool is_first = std::find(tried.begin(), tried.end(), place.call) == tried.end();
+    if (!place.concerns_state || !writes || !is_first) continue;
+    tried.push_back(place.call);
+    const Fault fault = {place.call, place.nth, "error=ENOSPC"};
+    SCOPED_TRACE(fault.options());
+    const Counted counted;
+    EXPECT_EQ(run("out", fault.options() + " -o /dev/null"), 0) << message();
+    EXPECT_NE(message().find("going on without it"), std::string::npos) << message();
+    EXPECT_TRUE(test::files_of_run(*dir_ / "out") == expected_);
+    fs::remove_all(*dir_ / "out");
+  }
+  EXPECT_EQ(tried.size(), 3u);
 }
 
 TEST_F(Faults, AKillAnywhereLosesNothing) {
