@@ -22,7 +22,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::array<float, 4> kLadder = {0.0015f, 0.003f, 0.006f, 0.012f};
+constexpr std::array<float, 4> kLadder = {0.001f, 0.003f, 0.006f, 0.012f};
 
 std::vector<Camera> input_cameras(const Scene& scene) {
   std::vector<Camera> out;
@@ -150,13 +150,21 @@ double loss_of(const Trials& t, const Gaussians& g) {
   return sum / double(count);
 }
 
+// Of those that a camera sees, for each pixel of a photograph has one.
+float pixel_of_nearest(const WeighedSplats& s) {
+  std::vector<float> pixels;
+  for (size_t i = 0; i < s.pixel.size(); ++i) {
+    if (!s.ray[i].isZero(0)) pixels.push_back(s.pixel[i]);
+  }
+  return quantile(pixels, 0.01);
+}
+
 Trials prepare(const Gaussians& gaussians, const Scene& scene, double unseen_psnr) {
   const std::vector<Camera> inputs = input_cameras(scene);
   std::vector<Camera> cameras = with_cameras_between(inputs, {0.5, -0.3, 1.3});
   Trials out;
   out.weighed = weigh_splats(gaussians, cameras);
-  std::vector<float> pixels = out.weighed.pixel;
-  out.pixel = quantile(pixels, 0.01);
+  out.pixel = pixel_of_nearest(out.weighed);
   out.inputs = inputs.size();
   out.fitted = cameras.size();
   const std::vector<Camera> judged = with_cameras_between(inputs, {0.25, -0.2});

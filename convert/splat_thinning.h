@@ -41,7 +41,7 @@ inline constexpr double kMostThinningLoss = 0.1;
 /// The splats of input views without those that its pictures do not need: merge_splats() and
 /// refit_splats() on the input views and on cameras between and beside them, by the strongest
 /// setting of a fixed ladder of four that loses at most kMostThinningLoss. Two of them are tried,
-/// by bisection, or three if all but the weakest lose too much.
+/// by bisection, or three where only the weakest may do.
 ///
 /// Photographs held out have no say. How well the model shows what it was not trained on is told by
 /// each input photograph and the splats of the others: its mean squared error E, where they show
