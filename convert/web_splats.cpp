@@ -16,7 +16,6 @@
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
-#include "meshing/kd_tree.h"
 
 namespace cgs {
 
@@ -63,23 +62,6 @@ class Exchange {
   Gaussians& b_;
 };
 
-// Neighbours beside each other compress better, and viewers find them in the cache.
-void sort_by_place(Gaussians& g) {
-  const KdTree tree(g.position);
-  const auto harmonics = static_cast<size_t>(g.sh_count());
-  Gaussians out;
-  out.sh_degree = g.sh_degree;
-  for (const uint32_t i : tree.order()) {
-    out.position.push_back(g.position[i]);
-    out.scale.push_back(g.scale[i]);
-    out.rotation.push_back(g.rotation[i]);
-    out.opacity.push_back(g.opacity[i]);
-    const auto first = g.sh.begin() + static_cast<std::ptrdiff_t>(i * harmonics);
-    out.sh.insert(out.sh.end(), first, first + static_cast<std::ptrdiff_t>(harmonics));
-  }
-  g = std::move(out);
-}
-
 // How they show what was held out, as the evaluation of the model says of all of them; null
 // without.
 Json held_out_figures(Model& model, Gaussians& splats, const Progress& progress) {
@@ -95,7 +77,6 @@ Json write_web_splats(const std::filesystem::path& folder, Model& model, const P
   const Eigen::Matrix3d y_up = y_up_from(model.scene.frame.up);
   make_output_folder(folder);
   ThinnedSplats thinned = thinned_splats(model, part_of(progress, 0, 0.9));
-  if (thinned.most_cost) sort_by_place(thinned.splats);
   const size_t glb_bytes =
       write_splat_glb(folder / "splats.glb", thinned.splats, frame, {.y_up = y_up});
   Json thinning = thinning_to_json(thinned, model.gaussians.size());
