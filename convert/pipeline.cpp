@@ -315,7 +315,7 @@ void warn_of(const Json& result, const Terminal& terminal) {
   terminal.warn(result["warnings"].get<std::vector<std::string>>());
 }
 
-// What a user would not expect of a stage: "53703 of 142884".
+// What a user would not expect of a stage: "33165 of 142884".
 std::string remark_on(const std::string& stage, const Json& result) {
   if (stage != "splats") return "";
   const Json& thinning = result["thinning"];

@@ -150,13 +150,13 @@ double loss_of(const Trials& t, const Gaussians& g) {
   return sum / double(count);
 }
 
-// Of those that a camera sees, for each pixel of a photograph has one.
+// Of those that a camera sees; 0 if there are none.
 float pixel_of_nearest(const WeighedSplats& s) {
   std::vector<float> pixels;
   for (size_t i = 0; i < s.pixel.size(); ++i) {
     if (!s.ray[i].isZero(0)) pixels.push_back(s.pixel[i]);
   }
-  return quantile(pixels, 0.01);
+  return pixels.empty() ? 0 : quantile(pixels, 0.01);
 }
 
 Trials prepare(const Gaussians& gaussians, const Scene& scene, double unseen_psnr) {
