@@ -316,6 +316,14 @@ void warn_of(const Json& result, const Terminal& terminal) {
   terminal.warn(result["warnings"].get<std::vector<std::string>>());
 }
 
+// What a user would not expect of a stage: "33165 of 142884".
+std::string remark_on(const std::string& stage, const Json& result) {
+  if (stage != "splats") return "";
+  const Json& thinning = result["thinning"];
+  return std::to_string(thinning["kept"].get<size_t>()) + " of " +
+         std::to_string(thinning["of"].get<size_t>());
+}
+
 Json run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
   for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
@@ -328,7 +336,7 @@ Json run_stages(Run& run, Terminal& terminal) {
     stale = true;
     const CostMeter meter;  // from here on the peak of memory is that of the stage
     const Json result = stage.work(run, terminal.begin(stage.title));
-    run.record.finish(stage.name, terminal.end(""), result);
+    run.record.finish(stage.name, terminal.end(remark_on(stage.name, result)), result);
     warn_of(result, terminal);
   }
   forget_checkpoints(run.request.output / "model");

@@ -16,9 +16,9 @@ namespace cgs {
 namespace {
 
 // Steps of Adam where gradients agree, at first.
-constexpr float kOpacityRate = 0.05f;   // of the logit
-constexpr float kColorRate = 0.004f;    // of 1
-constexpr float kScaleRate = 0.06f;     // of the logarithm
+constexpr float kOpacityRate = 0.1f;    // of the logit
+constexpr float kColorRate = 0.008f;    // of 1
+constexpr float kScaleRate = 0.09f;     // of the logarithm
 constexpr float kPositionRate = 0.03f;  // [pixels]
 
 constexpr float kLeastOpacity = 0.002f;

@@ -26,6 +26,9 @@ struct ThinnedSplats {
   std::vector<ThinningTrial> tried;
   std::optional<float>
       most_cost;  ///< Of the setting that was chosen; empty = all splats were kept.
+  /// Edge of a pixel at all but the nearest hundredth of them [internal units]; 0 = nothing was
+  /// chosen.
+  float pixel = 0;
   /// PSNR of photographs against splats of the other photographs alone [dB]; empty = they show
   /// hardly anything of each other, so that there is nothing to judge by.
   std::optional<double> unseen_psnr;
@@ -37,8 +40,8 @@ inline constexpr double kMostThinningLoss = 0.1;
 
 /// The splats of input views without those that its pictures do not need: merge_splats() and
 /// refit_splats() on the input views and on cameras between and beside them, by the strongest
-/// setting of a fixed ladder of three (the middle one is tried, and then one of the others) that
-/// loses at most kMostThinningLoss.
+/// setting of a fixed ladder of four that loses at most kMostThinningLoss. Two of them are tried,
+/// by bisection, or three where only the weakest may do.
 ///
 /// Photographs held out have no say. How well the model shows what it was not trained on is told by
 /// each input photograph and the splats of the others: its mean squared error E, where they show

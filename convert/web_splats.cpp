@@ -83,7 +83,9 @@ Json write_web_splats(const std::filesystem::path& folder, Model& model, const P
   thinning["held_out"] = held_out_figures(model, thinned.splats, part_of(progress, 0.9, 1));
   Json out = {{"thinning", thinning}, {"splats.glb", {{"bytes", glb_bytes}}}};
   try {
-    const SpzReport spz = write_spz(folder / "splats.spz", thinned.splats, frame);
+    constexpr double kOfPixel = 1.0 / 16;
+    const SpzReport spz = write_spz(
+        folder / "splats.spz", thinned.splats, frame, {.finest = kOfPixel * double{thinned.pixel}});
     out["splats.spz"] = {{"bytes", spz.bytes},
                          {"fractional_bits", spz.fractional_bits},
                          {"clamped_splats", spz.clamped}};

@@ -292,7 +292,7 @@ class Packer {
 };
 
 /// Fractional bits with which every position fits into 24 bits, see write_spz().
-int fitting_bits(const Gaussians& g, const Frame& frame) {
+int fitting_bits(const Gaussians& g, const Frame& frame, double finest) {
   double farthest = 0;
   std::array<std::vector<float>, 3> axes;
   for (const Eigen::Vector3f& position : g.position) {
@@ -311,8 +311,10 @@ int fitting_bits(const Gaussians& g, const Frame& frame) {
   constexpr double kReach = (1 << 23) - 1;  // steps to either side
   constexpr double kFineSteps = 1 << 16;    // across the scene, wanted
   constexpr double kCoarseSteps = 1 << 10;  // needed
-  int bits = 12;
-  while (bits < kMostFractionalBits && std::ldexp(extent, bits) < kFineSteps) ++bits;
+  int bits = finest > 0 ? 0 : 12;
+  const double fine =
+      finest > 0 ? std::min(finest * frame.scale, extent / kCoarseSteps) : extent / kFineSteps;
+  while (bits < kMostFractionalBits && std::ldexp(fine, bits) < 1) ++bits;
   while (bits > 0 && std::ldexp(farthest, bits) > kReach) --bits;
   const bool fits = std::ldexp(farthest, bits) <= kReach &&
                     (extent == 0 || std::ldexp(extent, bits) >= kCoarseSteps || bits >= 12);
@@ -352,6 +354,7 @@ RawSplats parse_spz(std::string_view bytes, const std::filesystem::path& path) {
 
 void SpzOptions::validate() const {
   require(version == 2 || version == 3, "SpzOptions.version must be 2 or 3", version);
+  require(finest >= 0 && std::isfinite(finest), "SpzOptions.finest must be >= 0", finest);
 }
 
 SpzReport write_spz(const std::filesystem::path& path,
@@ -361,7 +364,7 @@ SpzReport write_spz(const std::filesystem::path& path,
   options.validate();
   require_writable(gaussians);
   SpzReport report;
-  report.fractional_bits = fitting_bits(gaussians, frame);
+  report.fractional_bits = fitting_bits(gaussians, frame, options.finest);
   Packer packer(gaussians, frame, options.version, report.fractional_bits);
   for (size_t i = 0; i < gaussians.size(); ++i) packer.add(i);
   report.clamped = packer.clamped_splats();

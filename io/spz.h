@@ -25,6 +25,9 @@ RawSplats parse_spz(std::string_view bytes, const std::filesystem::path& path);
 
 struct SpzOptions {
   int version = 3;  ///< 2 (rotations in 3 bytes, what glTF extensions embed) or 3 (in 4 bytes).
+  /// Up to this far, places need not be told apart [internal units]; 0 = as write_spz() says. What
+  /// no picture can show takes a third of the bits of a place, and compresses like noise.
+  double finest = 0;
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
@@ -39,8 +42,8 @@ struct SpzReport {
 /// Writes an SPZ file in file coordinates, axes turned as parse_spz() turns them back.
 ///
 /// Positions have 24 bits. 12 of them are fractional, as everywhere, unless the scene reaches
-/// beyond
-/// +-2048 units (then fewer) or is so small that a step would be more than 2^-16 of it (then more).
+/// beyond +-2048 units (then fewer) or is so small that a step would be more than 2^-16 of it (then
+/// more); or as many as SpzOptions::finest asks for.
 /// \throws InvalidInput as write_gaussian_ply(), or if positions reach so far that a step would be
 ///         more than a thousandth of the scene's size; IoError
 SpzReport write_spz(const std::filesystem::path& path,

@@ -13,6 +13,7 @@
 #include "convert/splat_selection.h"
 #include "libcgs/core/error.h"
 #include "libcgs/render/rasterizer.h"
+#include "tests/support/reference_rasterizer.h"
 
 namespace cgs {
 namespace {
@@ -124,13 +125,14 @@ TEST_P(ThinSplatsOfAWall, NeedsFarFewerAndNobodySees) {
   const WallScene w = wall_scene({.noise = GetParam()});
   const ThinnedSplats out = thinned(w);
   ASSERT_TRUE(out.most_cost.has_value()) << thinning_to_json(out, w.splats.size());
-  EXPECT_LT(out.splats.size(), w.splats.size() / 5);
+  EXPECT_LT(out.splats.size(), w.splats.size() / 8);
   const auto chosen = std::find_if(out.tried.begin(), out.tried.end(), [&](const auto& t) {
     return t.most_cost == *out.most_cost;
   });
   ASSERT_NE(chosen, out.tried.end());
   EXPECT_LE(chosen->loss, kMostThinningLoss);
   EXPECT_EQ(chosen->splats, out.splats.size());
+  EXPECT_NEAR(out.pixel, kPixel, 1e-3 * kPixel);
   EXPECT_LT(off_between(w, out.splats, 0), 2 * kInvisible);
   EXPECT_LT(off_between(w, out.splats, 1), 2 * kInvisible);
 }
@@ -153,7 +155,7 @@ TEST_P(ThinSplatsOfAWall, KeepsASharpStripe) {
   const WallScene w = wall_scene({.noise = GetParam(), .color = striped_color});
   const ThinnedSplats out = thinned(w);
   ASSERT_TRUE(out.most_cost.has_value()) << thinning_to_json(out, w.splats.size());
-  EXPECT_LT(out.splats.size(), w.splats.size() / 5);
+  EXPECT_LT(out.splats.size(), w.splats.size() / 8);
   const std::vector<double> all = profile(w, w.splats);
   const std::vector<double> fewer = profile(w, out.splats);
   const std::vector<double> bare = profile(wall_scene({}), wall_scene({}).splats);
@@ -166,6 +168,36 @@ TEST_P(ThinSplatsOfAWall, KeepsASharpStripe) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Noise, ThinSplatsOfAWall, testing::Values(0.0, 0.02, 0.05));
+
+// By another renderer than the one that was fitted with: slow, and in double.
+TEST(ThinSplatsOfASmallWall, LooksTheSameToTheReference) {
+  const WallScene w = wall_scene({.noise = 0.02, .side = 32});
+  const ThinnedSplats out = thinned(w);
+  ASSERT_TRUE(out.most_cost.has_value());
+  EXPECT_LT(out.splats.size(), w.splats.size() / 8);
+  Camera camera = w.scene.views[0].camera;
+  camera.world_from_cam.translation().x() += 0.02;
+  const Eigen::Vector3d white = Eigen::Vector3d::Ones();
+  const auto all = test::rasterize_reference(w.splats, camera, white);
+  const auto fewer = test::rasterize_reference(out.splats, camera, white);
+  constexpr double kStep = 1.0 / 255;
+  for (size_t i = 0; i < all.color.data.size(); ++i) {
+    EXPECT_LT((all.color.data[i] - fewer.color.data[i]).cwiseAbs().maxCoeff(), 4 * kStep) << i;
+    EXPECT_NEAR(all.alpha.data[i], fewer.alpha.data[i], 4 * kStep) << i;
+  }
+}
+
+// What differs from pixel to pixel by more than photographs differ from each other is no detail to
+// merge.
+TEST(ThinSplatsOfATexturedWall, KeepsWhatPhotographsShow) {
+  const auto texture = [](const Eigen::Vector3d& p) -> Eigen::Vector3f {
+    return wall_color(p) + Eigen::Vector3f::Constant(static_cast<float>(
+                               0.4 * chance(int(64 * p.x() + 99), int(64 * p.y() + 99), 0)));
+  };
+  const WallScene plain = wall_scene({.noise = 0.02});
+  const WallScene textured = wall_scene({.noise = 0.02, .color = texture});
+  EXPECT_GT(thinned(textured).splats.size(), 4 * thinned(plain).splats.size());
+}
 
 class ThinSplatsTest : public testing::Test {
  protected:
@@ -216,7 +248,8 @@ TEST_F(ThinSplatsTest, KeepsAllWhereAnyLossWouldShow) {
   EXPECT_FALSE(out.tried.empty());
 }
 
-// What is empty around an object has no say.
+// What is empty around an object has no say; the last bits of a picture have, as each pass of a
+// refit goes on from the one before.
 TEST(ThinSplatsOfADisc, ChoosesAlikeInFramesOfAnySize) {
   const auto textured = [](const Eigen::Vector3d& p) -> Eigen::Vector3f {
     return wall_color(p) + Eigen::Vector3f::Constant(static_cast<float>(
@@ -233,7 +266,7 @@ TEST(ThinSplatsOfADisc, ChoosesAlikeInFramesOfAnySize) {
   EXPECT_EQ(out[0].most_cost, out[1].most_cost);
   for (size_t k = 0; k < out[0].tried.size(); ++k) {
     EXPECT_EQ(out[0].tried[k].most_cost, out[1].tried[k].most_cost);
-    EXPECT_NEAR(out[0].tried[k].loss, out[1].tried[k].loss, 0.1 * out[0].tried[k].loss);
+    EXPECT_NEAR(out[0].tried[k].loss, out[1].tried[k].loss, 0.3 * out[0].tried[k].loss);
   }
 }
 

@@ -204,6 +204,31 @@ TEST(Spz, FitsTheFractionalBitsToTheScene) {
   EXPECT_THROW(bits(1, 1e9), InvalidInput);
 }
 
+// As fine as asked for, whatever the unit, and never coarser than a thousandth of the scene.
+TEST(Spz, TellsPlacesApartAsFinelyAsAskedFor) {
+  const test::TempDir dir;
+  const Gaussians g = test::varied_splats(300, 0);
+  const auto written = [&](double finest, double scale) {
+    Frame frame;
+    frame.scale = scale;
+    const SpzReport report = write_spz(dir / "a.spz", g, frame, {.finest = finest});
+    const Gaussians back = read_splats(dir / "a.spz", frame).gaussians;
+    const double half = std::ldexp(0.5, -report.fractional_bits) / scale * 1.001 + 1e-7;
+    for (size_t i = 0; i < g.size(); ++i) {
+      EXPECT_LT((back.position[i] - g.position[i]).cwiseAbs().maxCoeff(), half);
+    }
+    return report;
+  };
+  EXPECT_EQ(written(1.0 / 4096, 1).fractional_bits, 12);
+  EXPECT_EQ(written(1.0 / 4095, 1).fractional_bits, 12);
+  EXPECT_EQ(written(1.0 / 4097, 1).fractional_bits, 13);
+  EXPECT_EQ(written(1.0 / 4096, 0.25).fractional_bits, 14);
+  EXPECT_LT(written(1.0 / 4096, 1).bytes, written(0, 0.0625).bytes);
+  EXPECT_EQ(written(1e9, 1).fractional_bits, 11);  // 0.8 across
+  EXPECT_THROW(written(-1, 1), InvalidInput);
+  EXPECT_THROW(written(NAN, 1), InvalidInput);
+}
+
 TEST(Spz, CountsWhatBytesCannotHold) {
   const test::TempDir dir;
   Gaussians g = test::varied_splats(5, 0);
