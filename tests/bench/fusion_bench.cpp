@@ -128,7 +128,9 @@ void fuse_frames(const std::filesystem::path& folder, double voxel, size_t view_
 // One line "mean accuracy, mean completeness [diagonals], components" of a surface.
 void judge(const TriangleMesh& truth, const std::filesystem::path& path) {
   constexpr size_t kSamples = 200'000;
-  const TriangleMesh mesh = read_mesh_ply(path).mesh;
+  // In the coordinates of the truth: without a frame, the mesh would move to the middle of its
+  // bounds.
+  const TriangleMesh mesh = read_mesh_ply(path, Frame{}).mesh;
   const MeshDistance distance = mesh_distance(mesh, truth, kSamples);
   std::printf("%g\t%g\t%zu\n",
               distance.accuracy.mean,
