@@ -44,8 +44,7 @@ struct TrainedModel {
   Model model;
   PriorsReport priors;
   std::vector<StepReport> steps;  ///< Of the training; empty = aligned initialisation.
-  /// Checkpoints that could not be read or written. They change nothing about the result, so that
-  /// none of its files tells of them.
+  /// Checkpoints that could not be read or written, for the terminal: they change no result.
   std::vector<std::string> hitches;
 };
 TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress);

@@ -5,7 +5,9 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -48,6 +50,7 @@ struct Run {
   // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
   std::optional<Model> model;
   std::optional<TriangleMesh> mesh;  ///< Watertight.
+  std::vector<std::string> hitches;  ///< Of the stage that runs, for the terminal alone.
 };
 
 // Decodes every photograph once before anything is written: a run must not stop halfway, or leave
@@ -86,7 +89,7 @@ Json run_model(Run& run, const Progress& progress) {
       found.begin() + static_cast<std::ptrdiff_t>(run.scene.warnings.size()), found.end());
   write_model(folder, trained.model);
   write_file(folder / "training.json", json_text(report) + "\n");
-  for (const std::string& hitch : trained.hitches) report["warnings"].push_back(hitch);
+  run.hitches = trained.hitches;
   return report;
 }
 
@@ -338,6 +341,7 @@ Json run_stages(Run& run, Terminal& terminal) {
     const Json result = stage.work(run, terminal.begin(stage.title));
     run.record.finish(stage.name, terminal.end(remark_on(stage.name, result)), result);
     warn_of(result, terminal);
+    terminal.warn(std::exchange(run.hitches, {}));
   }
   forget_checkpoints(run.request.output / "model");
   run.record.note("focal", run.request.scene.focal);
@@ -400,6 +404,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
           std::move(markers),
           std::move(opened.control),
           opened.refined ? std::move(opened.refined->report) : Json(),
+          {},
           {},
           {}};
   try {

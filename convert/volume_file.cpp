@@ -170,10 +170,11 @@ void write_volume(const std::filesystem::path& path, const Volume& volume, const
   write_vdb(path, grids, about);
 }
 
-std::optional<Frame> frame_of_volume(const std::vector<openvdb::GridBase::Ptr>& grids,
-                                     const std::filesystem::path& path) {
+std::optional<VolumeStatement> volume_statement(const std::vector<openvdb::GridBase::Ptr>& grids,
+                                                const std::filesystem::path& path) {
   for (const auto& grid : grids) {
-    if (grid->getMetadata<openvdb::StringMetadata>(kFrameKey)) return frame_of(*grid, path);
+    if (!grid->getMetadata<openvdb::StringMetadata>(kFrameKey)) continue;
+    return VolumeStatement{frame_of(*grid, path), stretch_of(*grid, path)};
   }
   return std::nullopt;
 }

@@ -23,10 +23,15 @@ struct VolumeFile {
   Volume volume;
   Frame frame;
 };
-/// The frame of the grids of such a file; none if they are no volume of ours. \throws BadInput
-/// Schema
-std::optional<Frame> frame_of_volume(const std::vector<openvdb::GridBase::Ptr>& grids,
-                                     const std::filesystem::path& path);
+/// What the grids of such a file say of themselves.
+struct VolumeStatement {
+  Frame frame;
+  double stretch = 1;  ///< What all places and lengths of the file are multiplied by.
+};
+/// \return nothing if they are no volume of ours
+/// \throws BadInput Schema, Value
+std::optional<VolumeStatement> volume_statement(const std::vector<openvdb::GridBase::Ptr>& grids,
+                                                const std::filesystem::path& path);
 
 /// \throws BadInput if it is no volume of ours.
 VolumeFile read_volume(const std::filesystem::path& path);

@@ -143,8 +143,10 @@ std::string take_text(ByteReader& in) {
 }
 
 // An image as one string, for the way out of a child process, and back.
-std::string packed(const ExrImage& image) {
+std::string packed(const ExrImage& image, size_t decoded_bytes) {
+  constexpr size_t kOfAttributes = size_t{1} << 20;
   std::string out;
+  out.reserve(decoded_bytes + kOfAttributes);
   append_bytes(out, image.width);
   append_bytes(out, image.height);
   append_bytes(out, static_cast<uint64_t>(image.channels.size()));
@@ -191,10 +193,12 @@ ExrImage decode_isolated(std::string_view bytes,
                          uint64_t decoded_bytes,
                          const std::filesystem::path& path) {
   constexpr uint64_t kLeast = uint64_t{256} << 20;
-  constexpr uint64_t kCopies = 4;  // of the library, as floats, packed, and a growing string
+  // A row of tiles of the library, each tile as read and as decoded, all as floats, and packed.
+  constexpr uint64_t kCopies = 6;
   IsolationLimits limits;
   limits.memory = kLeast + kCopies * decoded_bytes;
-  return unpacked(run_isolated([&] { return packed(decode(bytes, path)); }, path, limits), path);
+  return unpacked(
+      run_isolated([&] { return packed(decode(bytes, path), decoded_bytes); }, path, limits), path);
 }
 
 }  // namespace

@@ -37,8 +37,6 @@ class ExrScreen {
     read_attributes();
     check_window();
     if (found_.is_harmless) check_chunks();
-    found_.decoded_bytes = channels_ * sizeof(float) * static_cast<uint64_t>(window_.width()) *
-                           static_cast<uint64_t>(window_.height());
     return found_;
   }
 
@@ -94,6 +92,7 @@ class ExrScreen {
                 ", allowed are NONE, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA and DWAB");
       }
       found_.is_harmless = found_.is_harmless && method <= kZip;
+      is_compressed_ = method > 0;
       lines_per_chunk_ = method == kZip ? 16 : 1;
       has_compression_ = true;
     }
@@ -105,9 +104,13 @@ class ExrScreen {
 
   void read_channels(ByteReader& field) {
     channels_ = 0;
+    pixel_bytes_ = 0;
     while (!field.take_c_string(kMaxAttributeName, "channel name").empty()) {
       ++channels_;
-      (void)field.take(8, "channel");  // pixel type, linearity
+      const auto type = field.get<uint32_t>("pixel type");  // unsigned, half, float
+      if (type > 2) reader_.fail(Defect::Syntax, "pixel type " + std::to_string(type));
+      pixel_bytes_ += type == 1 ? 2 : 4;
+      (void)field.take(4, "channel");  // linearity
       const auto x_sampling = field.get<int32_t>("channel sampling");
       const auto y_sampling = field.get<int32_t>("channel sampling");
       if (x_sampling != 1 || y_sampling != 1) {
@@ -117,7 +120,7 @@ class ExrScreen {
     if (channels_ == 0) reader_.fail(Defect::Schema, "no channels");
   }
 
-  void check_window() const {
+  void check_window() {
     if (window_.width() < 1 || window_.height() < 1) {
       reader_.fail(Defect::Syntax, "dataWindow is empty");
     }
@@ -130,6 +133,12 @@ class ExrScreen {
     if (pixels > limits_.max_pixels) {
       throw LimitError(printable(reader_.path()) + ": " + std::to_string(pixels) +
                        " pixels, allowed are " + std::to_string(limits_.max_pixels));
+    }
+    found_.decoded_bytes = channels_ * sizeof(float) * pixels;
+    if (found_.decoded_bytes > limits_.max_file_bytes) {
+      throw LimitError(printable(reader_.path()) + ": its " + std::to_string(channels_) +
+                       " channels take " + std::to_string(found_.decoded_bytes) +
+                       " bytes, allowed are " + std::to_string(limits_.max_file_bytes));
     }
   }
 
@@ -164,6 +173,12 @@ class ExrScreen {
     const auto size = chunk.get<int32_t>("size of a chunk");
     if (size < 0) reader_.fail(Defect::Syntax, "a chunk has a negative size");
     (void)chunk.take(static_cast<size_t>(size), "pixels of a chunk");
+    // The library takes what it does not find from the chunk before.
+    const bool is_whole =
+        is_compressed_ || static_cast<uint64_t>(size) == pixel_bytes_ * uint64_t(window_.width());
+    if (size == 0 || !is_whole) {
+      reader_.fail(Defect::Syntax, "a chunk of " + std::to_string(size) + " bytes");
+    }
   }
 
   ByteReader reader_at(uint64_t offset) const {
@@ -179,6 +194,8 @@ class ExrScreen {
   Window window_;
   ExrScreening found_;
   uint64_t channels_ = 0;
+  uint64_t pixel_bytes_ = 0;  ///< As stored.
+  bool is_compressed_ = false;
   int64_t lines_per_chunk_ = 1;
   bool has_window_ = false;
   bool has_compression_ = false;

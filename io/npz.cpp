@@ -54,15 +54,12 @@ std::string depth_file(const ZipArchive& archive, const std::filesystem::path& p
                      " arrays, none named depth; of so many at most " +
                      std::to_string(kMostArrays) + " are looked into");
   }
-  std::vector<std::string> of_floats;
-  std::vector<std::string> of_whole_numbers;
+  std::vector<std::string> pictures;
   for (const std::string& file : files) {
     const auto array = npy_outline(archive.read_start(file, kStart));
-    if (!array || !picture_sides(array->shape)) continue;
-    (array->whole_bits == 0 ? of_floats : of_whole_numbers).push_back(file);
+    if (array && picture_sides(array->shape)) pictures.push_back(file);
   }
-  if (of_floats.size() == 1) return of_floats[0];
-  if (of_floats.empty() && of_whole_numbers.size() == 1) return of_whole_numbers[0];
+  if (pictures.size() == 1) return pictures[0];
   throw BadInput(
       Defect::Schema,
       path,

@@ -8,8 +8,7 @@
 namespace cgs {
 
 /// Reads depth from what numpy.savez() and savez_compressed() write: the array named "depth", else
-/// the only array, else the only picture (see picture_sides()) of floats among them, or where there
-/// is none of floats, of whole numbers.
+/// the only array, else the only picture (see picture_sides()) among those that read_npy() reads.
 ///
 /// \throws BadInput Magic, Empty (no array), Schema (no array is the only one that fits; the
 ///         message lists them), as ZipArchive and read_npy(); LimitError

@@ -160,16 +160,19 @@ Json grid_json(const openvdb::GridBase& grid) {
 
 Json volume_json(const fs::path& path) {
   const auto grids = read_vdb(path);
-  const std::optional<Frame> frame = frame_of_volume(grids, path);
+  const std::optional<VolumeStatement> stated = volume_statement(grids, path);
   Json rows = Json::array();
   for (const auto& grid : grids) rows.push_back(grid_json(*grid));
   return {{"kind", "volume"},
-          {"units", frame ? frame->unit_name() : "unknown"},
-          {"fused_here", frame.has_value()},
+          {"units", stated ? stated->frame.unit_name() : "unknown"},
+          {"fused_here", stated.has_value()},
+          {"lengths_times", stated ? stated->stretch : 1},
           {"grids", rows}};
 }
 
 void print_volume(const Json& info) {
+  const auto times = info["lengths_times"].get<double>();
+  if (times != 1) std::printf("all places and lengths below are multiplied by %.0f\n", times);
   std::printf("volume: %zu grids, unit %s%s\n\n%-16s %-7s %-10s %12s %10s   %s\n",
               info["grids"].size(),
               info["units"].get<std::string>().c_str(),
@@ -246,15 +249,13 @@ void print_raster(const Json& info) {
 
 // --- what run wrote -------------------------------------------------------------------------
 
-Json run_json(const fs::path& path) {
-  const Json record = read_run_record(path);
+Json run_json(const Json& record, const fs::path& path) {
   const auto asked = [&](const char* key) {
     const Json& request = record["request"];
     const bool is_text = request.is_object() && request.contains(key) && request[key].is_string();
     if (!is_text) throw BadInput(Defect::Schema, path, std::string("request states no ") + key);
     return request[key];
   };
-  if (record.is_null()) throw BadInput(Defect::Schema, path, "is no record of a run");
   Json stages = Json::array();
   for (const auto& [name, stage] : record["stages"].items()) {
     stages.push_back(
@@ -294,11 +295,13 @@ void print_run(const Json& info) {
 bool holds_splats(const fs::path& path) { return !is_mesh_name(path) || is_splat_file(path); }
 
 bool print_folder_info(const fs::path& folder, bool as_json) {
-  if (is_present(folder / "run.json")) {
-    print_info(run_json(folder / "run.json"), as_json, print_run);
+  const fs::path path = folder / "run.json";
+  const Json record = is_present(path) ? read_run_record(path) : Json();
+  if (!record.is_null()) {
+    print_info(run_json(record, path), as_json, print_run);
     return true;
   }
-  if (!is_present(folder / "gaussians.ply")) return false;
+  if (!is_present(folder / "gaussians.ply") || !is_present(folder / "cameras.json")) return false;
   tell_splats(folder / "gaussians.ply", as_json);
   return true;
 }
@@ -308,9 +311,10 @@ bool print_folder_info(const fs::path& folder, bool as_json) {
 bool print_file_info(const fs::path& path, bool as_json) {
   std::error_code none;
   if (fs::is_directory(path, none)) return print_folder_info(path, as_json);
-  if (path.extension() == ".vdb") {
+  const std::string extension = lower_extension(path);
+  if (extension == ".vdb") {
     print_info(volume_json(path), as_json, print_volume);
-  } else if (path.extension() == ".exr") {
+  } else if (extension == ".exr") {
     print_info(raster_json(read_exr(path)), as_json, print_raster);
   } else if (fs::is_regular_file(path, none) && holds_splats(path)) {
     tell_splats(path, as_json);

@@ -8,8 +8,9 @@
 
 namespace cgs {
 
-/// The colour of each label in pictures, materials and the report, by its number; sRGB-coded.
-/// What was observed is neutral, so that shape stays visible and the rest stands out.
+/// The colour of each label in orthophotos, the report, and materials of OBJ and 3MF, by its
+/// number; sRGB-coded. What shines through elsewhere, as in glTF, is of the same hue. What was
+/// observed is neutral, so that shape stays visible and the rest stands out.
 inline constexpr std::array<std::array<uint8_t, 3>, kProvenanceCount> kProvenanceColors = {{
     {242, 26, 217},   // inferred: magenta
     {91, 155, 213},   // single view: blue

@@ -101,9 +101,15 @@ TEST(VolumeFile, HoldsVoxelsOfAMillionthOfAUnitStretched) {
   EXPECT_EQ(file.volume.voxel_size, volume.voxel_size);
   EXPECT_EQ(file.frame.origin, frame.origin);
   EXPECT_NEAR(file.volume.tsdf->indexToWorld(at).x(), 0.3, 1e-12);
-  for (const auto& grid : read_vdb(dir / "v.vdb")) {
+  const auto grids = read_vdb(dir / "v.vdb");
+  const auto stated = volume_statement(grids, dir / "v.vdb");
+  ASSERT_TRUE(stated.has_value());
+  EXPECT_EQ(stated->frame.scale, frame.scale);
+  for (const auto& grid : grids) {
     if (grid->getName() != "tsdf") continue;
     const double stretch = std::stod(grid->metaValue<std::string>("cgs_stretch"));
+    EXPECT_GT(stretch, 1);
+    EXPECT_EQ(stated->stretch, stretch);
     const openvdb::Vec3d in_file = grid->indexToWorld(at) / stretch;
     const Eigen::Vector3d world = frame.world_from_internal({0.3, -0.2, 0.7});
     EXPECT_NEAR(in_file.x(), world.x(), 1e-20);

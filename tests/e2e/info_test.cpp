@@ -93,12 +93,17 @@ TEST(Info, SaysWhereARunStoppedAndRefusesWhatIsNoRecord) {
   EXPECT_FALSE(out["finished"]);
   EXPECT_EQ(out["stages"][0]["name"], "model");
   EXPECT_NE(run_cgs("info " + (dir / "run").string()).out.find("NOT finished"), std::string::npos);
-  for (const char* text : {"[]", "{\"request\": 3, \"stages\": {}}", "{\"request\": {}"}) {
+  for (const char* text : {"[]", "{\"request\": {}}", "{\"request\": {}"}) {
     test::write_bytes(dir / "run/run.json", text);
     const auto refused = run_cgs("info " + (dir / "run").string());
     EXPECT_EQ(refused.exit_code, 3) << text;
-    EXPECT_NE(refused.err.find("run.json"), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find("no known layout"), std::string::npos) << refused.err;
   }
+  test::write_bytes(dir / "run/run.json", R"({"request": 3, "stages": {}})");
+  const auto refused = run_cgs("info " + (dir / "run").string());
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_NE(refused.err.find("run.json: request states no scene"), std::string::npos)
+      << refused.err;
 }
 
 }  // namespace

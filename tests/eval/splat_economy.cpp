@@ -68,7 +68,7 @@ void print(const char* name, const Files& files) {
               files.shown["ssim"].get<double>());
 }
 
-// Writes the picture in the middle of the path, of both.
+// Writes one picture of the path, of both.
 void print_along_spiral(const cgs::Gaussians& all,
                         const cgs::Model& fewer,
                         const std::filesystem::path& output) {

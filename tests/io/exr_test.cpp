@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/exr.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -13,6 +14,7 @@
 #include <ImfStringAttribute.h>
 #include <ImfTiledOutputFile.h>
 #include <gtest/gtest.h>
+#include <half.h>
 
 #include "tests/support/full_disk.h"
 
@@ -142,6 +144,65 @@ TEST(Exr, ReadsEveryCompressionAndTiles) {
       }
     }
   }
+}
+
+// Colours of 16 bits are what the lossy methods are made for.
+TEST(Exr, ReadsHalvesOfLossyCompression) {
+  const test::TempDir dir;
+  constexpr int kWidth = 40;
+  constexpr int kHeight = 50;
+  std::vector<Imath::half> values(kWidth * kHeight);
+  for (size_t i = 0; i < values.size(); ++i) {
+    values[i] = Imath::half(0.5f + 0.4f * std::sin(0.01f * static_cast<float>(i)));
+  }
+  for (const auto method : {Imf::RLE_COMPRESSION,
+                            Imf::ZIPS_COMPRESSION,
+                            Imf::B44_COMPRESSION,
+                            Imf::B44A_COMPRESSION,
+                            Imf::DWAA_COMPRESSION,
+                            Imf::DWAB_COMPRESSION}) {
+    SCOPED_TRACE(method);
+    Imf::Header header(kWidth, kHeight);
+    header.compression() = method;
+    Imf::FrameBuffer buffer;
+    for (const char* name : {"R", "G", "B"}) {
+      header.channels().insert(name, Imf::Channel(Imf::HALF));
+      auto* base = reinterpret_cast<char*>(values.data());
+      buffer.insert(name, {Imf::HALF, base, sizeof(Imath::half), sizeof(Imath::half) * kWidth});
+    }
+    {
+      Imf::OutputFile file((dir / "a.exr").c_str(), header);
+      file.setFrameBuffer(buffer);
+      file.writePixels(kHeight);
+    }
+    const ExrImage back = read_exr(dir / "a.exr");
+    ASSERT_EQ(back.channels.size(), 3u);
+    for (size_t i = 0; i < values.size(); ++i) {
+      ASSERT_NEAR((*back.find("G"))[i], static_cast<float>(values[i]), 0.03f) << i;
+    }
+  }
+}
+
+TEST(Exr, RefusesLinesWithoutPixels) {
+  const test::TempDir dir;
+  write_compressed(dir / "a.exr", ramp(16, 4), Imf::NO_COMPRESSION, false);
+  std::string bytes = test::read_bytes(dir / "a.exr");
+  ASSERT_NO_THROW((void)read_exr(dir / "a.exr"));
+  const size_t last = bytes.size() - 16 * sizeof(float) - 4;  // the size of the last chunk
+  bytes.replace(last, 4, std::string(4, '\0'));
+  EXPECT_EQ(test::defect_of(bytes, [](const auto& path) { (void)read_exr(path); }), "SYNTAX");
+}
+
+TEST(Exr, RefusesMoreChannelsThanFitIntoMemory) {
+  const test::TempDir dir;
+  ExrImage even = ramp(64, 64);
+  std::fill(even.channels[2].second.begin(), even.channels[2].second.end(), 1.0f);
+  write_compressed(dir / "a.exr", even, Imf::PIZ_COMPRESSION, true);
+  ReadLimits limits;
+  limits.max_file_bytes = 64 * 64 * sizeof(float);
+  EXPECT_NO_THROW((void)read_exr(dir / "a.exr", limits));
+  --limits.max_file_bytes;
+  EXPECT_THROW((void)read_exr(dir / "a.exr", limits), LimitError);
 }
 
 TEST(Exr, RefusesEveryTruncationOfWhatAChildDecodes) {

@@ -43,7 +43,7 @@ np.savez("unnamed.npz", d)
 np.savez_compressed("doubles.npz", np.asfortranarray(d, dtype=">f8"))
 np.savez_compressed("one_picture.npz", pred=d[None, :, :, None], focal=np.float32(55),
                     names=np.array(["a", "b"]), count=np.arange(12).reshape(3, 4))
-np.savez_compressed("halves.npz", pred=d.astype(np.float16), ids=np.ones((3, 4), np.uint16))
+np.savez_compressed("halves.npz", pred=d.astype(np.float16), ids=np.ones((3, 4), np.int64))
 np.savez_compressed("millimetres.npz", mm=(1000 * d).astype(np.uint16), names=np.array(["a"]))
 )",
                                dir_.path()))
@@ -71,6 +71,10 @@ TEST_F(Npz, RefusesSeveralPicturesAndListsThem) {
                        {"ids.npy", test::npy("<i8", "(3, 4)", std::string(96, '\0'))},
                        {"pred.npy", array("(3, 4)", 12)}};
   EXPECT_EQ(refused(files), "SCHEMA");
+  // Depth in millimetres and its confidence, or the other way round?
+  EXPECT_EQ(refused({{"a.npy", array("(3, 4)", 12)},
+                     {"b.npy", test::npy("<u2", "(3, 4)", std::string(24, 'x'))}}),
+            "SCHEMA");
   const std::string said = test::message_of([&] { (void)read(files); });
   EXPECT_NE(
       said.find("conf (3 x 4), f (one number), ids (of a type that is not read), pred (3 x 4)"),
