@@ -106,7 +106,8 @@ TEST(ScreenExr, RefusesBadTablesOfChunks) {
   EXPECT_EQ(defect({.offset_error = {0, 1 << 20, 0}}), "TRUNCATED");
   EXPECT_EQ(defect({.offset_error = {0, -100, 0}}), "SYNTAX");
   EXPECT_EQ(defect({.offset_error = {16, 0, 0}}), "SYNTAX");
-  EXPECT_EQ(defect({.size_error = 1}), "TRUNCATED");
+  EXPECT_EQ(defect({.compression = 2, .size_error = 1}), "TRUNCATED");
+  EXPECT_EQ(defect({.size_error = 1}), "SYNTAX");
   EXPECT_EQ(defect({.size_error = -9}), "SYNTAX");
 }
 
