@@ -96,6 +96,10 @@ class ExrScreen {
       lines_per_chunk_ = method == kZip ? 16 : 1;
       has_compression_ = true;
     }
+    if (name == "tiles" && type == "tiledesc") {
+      const auto width = field.get<uint32_t>("width of tiles");
+      tile_pixels_ = uint64_t{width} * field.get<uint32_t>("height of tiles");
+    }
     if (name == "channels" && type == "chlist") {
       read_channels(field);
       has_channels_ = true;
@@ -134,7 +138,8 @@ class ExrScreen {
       throw LimitError(printable(reader_.path()) + ": " + std::to_string(pixels) +
                        " pixels, allowed are " + std::to_string(limits_.max_pixels));
     }
-    found_.decoded_bytes = channels_ * sizeof(float) * pixels;
+    const uint64_t most_pixels = std::max(pixels, std::min(tile_pixels_, limits_.max_file_bytes));
+    found_.decoded_bytes = channels_ * sizeof(float) * most_pixels;
     if (found_.decoded_bytes > limits_.max_file_bytes) {
       throw LimitError(printable(reader_.path()) + ": its " + std::to_string(channels_) +
                        " channels take " + std::to_string(found_.decoded_bytes) +
@@ -194,6 +199,7 @@ class ExrScreen {
   Window window_;
   ExrScreening found_;
   uint64_t channels_ = 0;
+  uint64_t tile_pixels_ = 0;
   uint64_t pixel_bytes_ = 0;  ///< As stored.
   bool is_compressed_ = false;
   int64_t lines_per_chunk_ = 1;

@@ -14,7 +14,8 @@ struct ExrScreening {
   /// one per block of lines. In the decoders of everything else older releases of the library have
   /// known defects: it must not be decoded in this process.
   bool is_harmless = false;
-  uint64_t decoded_bytes = 0;  ///< All channels as 32-bit floats.
+  /// All channels as 32-bit floats; of a tile if that is larger than the image.
+  uint64_t decoded_bytes = 0;
 };
 
 /// Lets pass only what the OpenEXR library may see, in a child process if it is not harmless: a
