@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <ostream>
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -21,6 +22,12 @@
 #include "tests/support/temp_dir.h"
 
 namespace cgs {
+
+namespace test {
+/// For the names that CTest shows.
+static void PrintTo(const FileKind& kind, std::ostream* out) { *out << kind.name; }
+}  // namespace test
+
 namespace {
 
 namespace fs = std::filesystem;

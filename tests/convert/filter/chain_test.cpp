@@ -5,6 +5,9 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <ostream>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -19,6 +22,10 @@
 #include "tests/support/temp_dir.h"
 
 namespace cgs {
+
+/// For the names that CTest shows.
+static void PrintTo(const FilterOperation& operation, std::ostream* out) { *out << operation.name; }
+
 namespace {
 
 // What an operation may do to the observed surface.
@@ -198,8 +205,10 @@ class EveryOperation : public testing::TestWithParam<FilterOperation> {
 
 TEST_P(EveryOperation, HasACase) { EXPECT_EQ(cases().count(name()), 1U); }
 
-TEST_P(EveryOperation, KeepsWhatIsKnownOfAMesh) {
-  if (!cases().at(name()).mesh) GTEST_SKIP() << "for point clouds only";
+class OperationOnMeshes : public EveryOperation {};
+class OperationOnClouds : public EveryOperation {};
+
+TEST_P(OperationOnMeshes, KeepsWhatIsKnown) {
   const Case& the = cases().at(name());
   const FilterState before = labelled_mesh(the.closed);
   const FilterState after = filtered(before, typed(name(), dir_), 2);
@@ -231,8 +240,7 @@ TEST_P(EveryOperation, KeepsWhatIsKnownOfACloud) {
   expect_evidence_where_it_was(after.mesh, kSeenBelow + 0.05);
 }
 
-TEST_P(EveryOperation, AddsNoClaimToACloudThatMakesNone) {
-  if (!cases().at(name()).cloud) GTEST_SKIP() << "for meshes only";
+TEST_P(OperationOnClouds, AddsNoClaimToOneThatMakesNone) {
   FilterState state = labelled_cloud();
   state.mesh.support.clear();
   state.mesh.sigma.clear();
@@ -274,14 +282,31 @@ TEST(SimplifyTo, SigmaHoldsTheErrorThatWasMeasured) {
   EXPECT_GT(smallest_sigma(after), smallest_sigma(before));
 }
 
+std::string test_name(const testing::TestParamInfo<FilterOperation>& info) {
+  std::string name(info.param.name);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+std::vector<FilterOperation> operations_on(bool Case::*what) {
+  const auto& all = filter_operations();
+  std::vector<FilterOperation> out(all.begin(), all.end());
+  std::erase_if(out, [&](const FilterOperation& operation) {
+    const auto found = cases().find(std::string(operation.name));
+    return found == cases().end() || !(found->second.*what);
+  });
+  return out;
+}
+
+INSTANTIATE_TEST_SUITE_P(Filter, EveryOperation, testing::ValuesIn(filter_operations()), test_name);
 INSTANTIATE_TEST_SUITE_P(Filter,
-                         EveryOperation,
-                         testing::ValuesIn(filter_operations()),
-                         [](const auto& info) {
-                           std::string name(info.param.name);
-                           std::replace(name.begin(), name.end(), '-', '_');
-                           return name;
-                         });
+                         OperationOnMeshes,
+                         testing::ValuesIn(operations_on(&Case::mesh)),
+                         test_name);
+INSTANTIATE_TEST_SUITE_P(Filter,
+                         OperationOnClouds,
+                         testing::ValuesIn(operations_on(&Case::cloud)),
+                         test_name);
 
 TEST(RunFilters, KeepsTheOrder) {
   const FilterState cloud = labelled_cloud();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ostream>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -73,6 +74,8 @@ struct Case {
   Size size;
   ConvDecoderOptions options;
 };
+
+void PrintTo(const Case& the, std::ostream* out) { *out << the.name; }
 
 // Sizes around those where something changes: no power of two and no multiple of anything; one
 // axis that stops growing early; a band of its own for the last rows; Winograd and direct.
