@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/coherence/convolution.h"
 
+#include <ostream>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -11,6 +12,10 @@ namespace {
 struct Size {
   int in_channels, out_channels, width, rows;
 };
+void PrintTo(const Size& size, std::ostream* out) {
+  *out << size.in_channels << " to " << size.out_channels << " channels, " << size.width << " x "
+       << size.rows;
+}
 
 // A band of channels, indexed as such.
 struct Block {
