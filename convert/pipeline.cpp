@@ -319,11 +319,11 @@ void warn_of(const Json& result, const Terminal& terminal) {
   terminal.warn(result["warnings"].get<std::vector<std::string>>());
 }
 
-// What a user would not expect of a stage: "33165 of 142884".
+// What a user would not expect of a stage: "kept 33165 of 142884".
 std::string remark_on(const std::string& stage, const Json& result) {
   if (stage != "splats") return "";
   const Json& thinning = result["thinning"];
-  return std::to_string(thinning["kept"].get<size_t>()) + " of " +
+  return "kept " + std::to_string(thinning["kept"].get<size_t>()) + " of " +
          std::to_string(thinning["of"].get<size_t>());
 }
 
