@@ -54,22 +54,34 @@ float plane_at(const SweptView& view, double u, double v, double expected) {
   return best;
 }
 
-// Difference of t between a pixel and what `other` sees there, if that view confirms it.
-std::optional<double> difference(const SweptView& view,
-                                 const SweptView& other,
-                                 const Lifted& p,
-                                 double max_disagreement) {
-  const std::optional<Lifted> there = transfer(view, towards(view, other), p);
+struct Confirmation {
+  double difference;  // of t [planes]
+  double parallax;    // [pixels per plane]
+};
+
+// How a pixel compares with what `other` sees there, if that view confirms it.
+std::optional<Confirmation> confirmation(const SweptView& view,
+                                         const SweptView& other,
+                                         const Lifted& p,
+                                         const AgreementLimits& limits) {
+  const SweepSource& source = towards(view, other);
+  const std::optional<Lifted> there = transfer(view, source, p);
   if (!there) return std::nullopt;
+  // Without parallax any two depths agree, and both may come from a third view that saw another
+  // surface.
+  const double parallax = source.parallax(p.u, p.v, view.geometry.plane_of(p.inverse_depth));
+  const double disparity = parallax * p.inverse_depth / view.geometry.step;
+  if (!(disparity >= limits.least_disparity)) return std::nullopt;
   const double expected = other.geometry.plane_of(there->inverse_depth);
   const double t = static_cast<double>(plane_at(other, there->u, there->v, expected));
   if (std::isnan(t) || other.geometry.inverse_depth(t) <= 0) return std::nullopt;
   const Lifted seen{there->u, there->v, other.geometry.inverse_depth(t)};
   const std::optional<Lifted> back = transfer(other, towards(other, view), seen);
-  if (!back || std::hypot(back->u - p.u, back->v - p.v) > max_disagreement) return std::nullopt;
+  if (!back || std::hypot(back->u - p.u, back->v - p.v) > limits.max_disagreement)
+    return std::nullopt;
   const double d = (back->inverse_depth - p.inverse_depth) / view.geometry.step;
-  if (std::abs(d) > max_disagreement) return std::nullopt;
-  return d;
+  if (std::abs(d) > limits.max_disagreement) return std::nullopt;
+  return Confirmation{d, parallax};
 }
 
 // The plane n of the scene (n . X = 1 in camera axes) that a pixel lies on.
@@ -87,7 +99,7 @@ Eigen::Vector3d plane_normal(const SweptView& view, int x, int y) {
 
 Raster<Agreement> cross_check(const std::vector<SweptView>& views,
                               size_t view,
-                              double max_disagreement) {
+                              const AgreementLimits& limits) {
   const SweptView& here = views[view];
   Raster<Agreement> out(here.pixels.width, here.pixels.height, Agreement{});
   tbb::parallel_for(0, out.height, [&](int y) {
@@ -99,10 +111,11 @@ Raster<Agreement> cross_check(const std::vector<SweptView>& views,
       double sum = 0;
       for (size_t j = 0; j < views.size(); ++j) {
         if (j == view) continue;
-        const std::optional<double> d = difference(here, views[j], p, max_disagreement);
-        if (!d) continue;
-        sum += *d * *d;
+        const auto c = confirmation(here, views[j], p, limits);
+        if (!c) continue;
+        sum += c->difference * c->difference;
         ++out(x, y).views;
+        out(x, y).parallax = std::max(out(x, y).parallax, static_cast<float>(c->parallax));
       }
       const int n = out(x, y).views;
       if (n > 0) out(x, y).difference = static_cast<float>(std::sqrt(sum / n));

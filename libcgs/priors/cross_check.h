@@ -18,13 +18,22 @@ struct SweptView {
 struct Agreement {
   uint8_t views = 0;     ///< Other views that confirm it.
   float difference = 0;  ///< Root mean square difference of t to those views [planes].
+  float parallax = 0;    ///< Largest way that the pixel makes in one of them [pixels per plane].
+};
+
+/// What counts as agreement.
+struct AgreementLimits {
+  double max_disagreement;  ///< [pixels, and planes]; > 0.
+  double least_disparity;   ///< Way of the pixel in the other view, from infinity to its depth
+                            ///< [pixels]; > 0.
 };
 
 /// Checks a view against all others: another view confirms a pixel if its own depth, at the place
-/// the pixel projects to, leads back to within `max_disagreement` [pixels, and planes].
+/// the pixel projects to, leads back to within `max_disagreement`. A view from so nearly the same
+/// place that the pixel moves by less than `least_disparity` confirms nothing.
 Raster<Agreement> cross_check(const std::vector<SweptView>& views,
                               size_t view,
-                              double max_disagreement);
+                              const AgreementLimits& limits);
 
 /// The surface that other views confirm at the pixels of a view, nearest in front; t is NaN where
 /// they show none. `agreements` are those of all views.

@@ -57,7 +57,9 @@ void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options) {
     small.views.push_back(reduced(scene.views[static_cast<size_t>(scene.input[k])]));
     small.input.push_back(static_cast<int>(k));
   }
-  const std::vector<ViewPriors> measured = plane_sweep(small, options);
+  PlaneSweepOptions coarse = options;
+  coarse.least_disparity /= kReduction;  // what the full sweep can tell must lie in the range
+  const std::vector<ViewPriors> measured = plane_sweep(small, coarse);
   for (size_t k = 0; k < measured.size(); ++k) {
     if (states_range(scene.input[k])) continue;
     std::vector<float> depths;
@@ -66,7 +68,8 @@ void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options) {
         depths.push_back(measured[k].depth.data[i]);
       }
     }
-    if (depths.size() < measured[k].depth.data.size() / 5) continue;
+    // A fifth of a picture of four pixels is none: there must be at least one depth.
+    if (depths.empty() || 5 * depths.size() < measured[k].depth.data.size()) continue;
     const DepthRange range = range_of(std::move(depths), depth_range(scene, scene.input[k]));
     View& view = scene.views[static_cast<size_t>(scene.input[k])];
     view.near = range.near;

@@ -31,45 +31,85 @@ void require_images(const Scene& scene) {
   }
 }
 
-// Takes back confirmations of small patches that continue no surface around them: agreements by
-// chance, which completion would spread.
-void remove_speckles(const SweptView& view, Raster<Agreement>& agreement) {
-  constexpr float kSameSurface = 1.0f;  // largest step inside a patch [planes]
-  constexpr double kSmallest = 4e-4;    // share of the image
-  const auto smallest = static_cast<size_t>(kSmallest * double(agreement.data.size()) + 5);
-  MaskMap visited(agreement.width, agreement.height, 0);
-  std::vector<std::pair<int, int>> patch;
+// Errors of a match [pixels], fitted as depth_sigma() says.
+constexpr float kTexture = 0.45f;    // of the bound from texture: neighbours help each other,
+constexpr float kMostNoise = 0.17f;  // and where there is none at all, they decide
+
+using Patch = std::vector<std::pair<int, int>>;
+
+// Calls visit(patch) for every connected patch of pixels with is_member(x, y) in which no step
+// between neighbours' planes is as large as `same_surface` [planes].
+template <typename IsMember, typename Visit>
+void for_each_patch(const SweptView& view,
+                    float same_surface,
+                    const IsMember& is_member,
+                    const Visit& visit) {
+  MaskMap visited(view.pixels.width, view.pixels.height, 0);
+  Patch patch;
   const auto grow = [&](int x, int y) {
-    if (visited(x, y) != 0 || agreement(x, y).views == 0) return;
+    if (visited(x, y) != 0 || !is_member(x, y)) return;
     visited(x, y) = 1;
     patch.emplace_back(x, y);
   };
-  for (int y0 = 0; y0 < agreement.height; ++y0) {
-    for (int x0 = 0; x0 < agreement.width; ++x0) {
+  for (int y0 = 0; y0 < visited.height; ++y0) {
+    for (int x0 = 0; x0 < visited.width; ++x0) {
       patch.clear();
       grow(x0, y0);
       for (size_t i = 0; i < patch.size(); ++i) {
         const auto [x, y] = patch[i];
         const SlantedPlane& here = view.pixels(x, y).plane;
         for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-          if (!agreement.contains(x + dx, y + dy)) continue;
+          if (!visited.contains(x + dx, y + dy)) continue;
           const SlantedPlane& there = view.pixels(x + dx, y + dy).plane;
           // Either plane may be the one that continues.
           const float step =
               std::min(std::abs(there.at(-dx, -dy) - here.t), std::abs(here.at(dx, dy) - there.t));
-          if (step < kSameSurface) grow(x + dx, y + dy);
+          if (step < same_surface) grow(x + dx, y + dy);
         }
       }
-      if (patch.size() >= smallest) continue;
-      for (const auto& [x, y] : patch) agreement(x, y) = {};
+      if (!patch.empty()) visit(patch);
     }
   }
 }
 
-std::vector<Raster<Agreement>> check_all(const std::vector<SweptView>& views, double tolerance) {
+void take_back(const Patch& patch, Raster<Agreement>& agreement) {
+  for (const auto& [x, y] : patch) agreement(x, y) = {};
+}
+
+// Takes back confirmations of small patches that continue no surface around them: agreements by
+// chance, which completion would spread.
+void remove_speckles(const SweptView& view, Raster<Agreement>& agreement) {
+  constexpr float kSameSurface = 1.0f;
+  constexpr double kSmallest = 4e-4;  // share of the image
+  const auto smallest = static_cast<size_t>(kSmallest * double(agreement.data.size()) + 5);
+  const auto is_confirmed = [&](int x, int y) { return agreement(x, y).views > 0; };
+  for_each_patch(view, kSameSurface, is_confirmed, [&](const Patch& patch) {
+    if (patch.size() < smallest) take_back(patch, agreement);
+  });
+}
+
+// Takes back confirmations of surfaces that show next to nothing anywhere, as in pictures of one
+// colour: their views agree only because ties are broken in the same way. Where a surface shows
+// something in places, those hold the rest.
+void remove_bare(const SweptView& view, Raster<Agreement>& agreement) {
+  constexpr float kSameSurface = 2.0f;  // wider than above: bare surfaces fall into pieces
+  constexpr float kPlaces = 0.5f;       // largest error of a match that places a surface [pixels]
+  constexpr double kTextured = 0.1;     // share of a surface
+  const auto is_known = [&](int x, int y) { return !std::isnan(view.pixels(x, y).plane.t); };
+  for_each_patch(view, kSameSurface, is_known, [&](const Patch& patch) {
+    const auto textured = std::count_if(patch.begin(), patch.end(), [&](const auto& p) {
+      return kTexture * view.pixels(p.first, p.second).sigma < kPlaces;
+    });
+    if (double(textured) < kTextured * double(patch.size())) take_back(patch, agreement);
+  });
+}
+
+std::vector<Raster<Agreement>> check_all(const std::vector<SweptView>& views,
+                                         const PlaneSweepOptions& options) {
   std::vector<Raster<Agreement>> out;
   for (size_t i = 0; i < views.size(); ++i) {
-    out.push_back(cross_check(views, i, tolerance));
+    out.push_back(cross_check(views, i, {options.max_disagreement, options.least_disparity}));
+    remove_bare(views[i], out.back());
     remove_speckles(views[i], out.back());
   }
   return out;
@@ -93,16 +133,20 @@ float roughness(const SweptView& view, const Raster<Agreement>& agreement, int x
   return count > 0 ? sum / static_cast<float>(count) : kMost;
 }
 
-// Standard deviation of t [planes]. The terms and their weights are fitted to the errors on three
-// Middlebury 2014 pairs and the three photographs of the portal capture, whose truths are known:
-// tests/eval/stereo_accuracy prints the shares within 1, 2, 3 and 5 sigma.
+// Standard deviation of t [planes]: errors of the match over the parallax of the best view that
+// confirms it, however much a view that does not would have told. The terms and their weights are
+// fitted to the errors on three Middlebury 2014 pairs and the three photographs of the portal
+// capture, whose truths are known: tests/eval/stereo_accuracy prints the shares within 1, 2, 3 and
+// 5 sigma.
 float depth_sigma(const RefinedPixel& pixel, const Agreement& agreement, float roughness) {
-  constexpr float kFloor = 0.05f;      // calibration and interpolation, however good the texture
-  constexpr float kTexture = 0.45f;    // of the bound from texture: neighbours help each other,
-  constexpr float kMostNoise = 0.17f;  // and where there is none at all, they decide
-  constexpr float kMore = 1.12f;       // what terms of this form leave out
-  const float noise = std::min(kTexture * pixel.sigma, kMostNoise);
-  return kMore * std::sqrt(kFloor * kFloor + noise * noise +
+  constexpr float kFloor = 0.05f;  // calibration and interpolation, however good the texture
+  constexpr float kMore = 1.12f;   // what terms of this form leave out
+  // Where a plane is more than a pixel, floor and noise are of the plane, as neighbours are.
+  const float planes_per_pixel = 1 / std::min(agreement.parallax, 1.0f);
+  const float floor = kFloor * planes_per_pixel;
+  const float noise =
+      std::min(kTexture * pixel.sigma / agreement.parallax, kMostNoise * planes_per_pixel);
+  return kMore * std::sqrt(floor * floor + noise * noise +
                            agreement.difference * agreement.difference + roughness * roughness);
 }
 
@@ -158,6 +202,7 @@ void PlaneSweepOptions::validate() const {
           "PlaneSweepOptions.refinement_rounds must be in [0, 100]",
           refinement_rounds);
   require(max_disagreement > 0, "PlaneSweepOptions.max_disagreement must be > 0", max_disagreement);
+  require(least_disparity > 0, "PlaneSweepOptions.least_disparity must be > 0", least_disparity);
 }
 
 std::vector<ViewPriors> plane_sweep(const Scene& scene,
@@ -186,12 +231,12 @@ std::vector<ViewPriors> plane_sweep(const Scene& scene,
   for (int round = 0; round < options.refinement_rounds; ++round) {
     for (size_t i = 0; i < count; ++i) refinements[i].round(extra[i]);
     for (size_t i = 0; i < count; ++i) views[i].pixels = refinements[i].result();
-    const auto agreements = check_all(views, options.max_disagreement);
+    const auto agreements = check_all(views, options);
     for (size_t i = 0; i < count; ++i) extra[i] = planes_of_others(views, i, agreements);
     report(progress, 0.5 + 0.5 * (round + 1) / options.refinement_rounds);
   }
   for (size_t i = 0; i < count; ++i) views[i].pixels = refinements[i].result();
-  const auto agreements = check_all(views, options.max_disagreement);
+  const auto agreements = check_all(views, options);
   std::vector<ViewPriors> priors;
   for (size_t i = 0; i < count; ++i) priors.push_back(view_priors(views[i], agreements[i]));
   return priors;

@@ -15,9 +15,11 @@ namespace cgs {
 struct PlaneSweepOptions {
   SweepSampling sampling;
   SmoothnessPenalties smoothness;
-  int refinement_rounds = 4;    ///< >= 0; each costs about as much as the sweep.
-  double max_disagreement = 1;  ///< Another view confirms a depth if the pixel comes back this
-                                ///< close [pixels]; > 0.
+  int refinement_rounds = 4;     ///< >= 0; each costs about as much as the sweep.
+  double max_disagreement = 1;   ///< Another view confirms a depth if the pixel comes back this
+                                 ///< close [pixels]; > 0.
+  double least_disparity = 1.5;  ///< … and if a point at infinity would lie this far off in it
+                                 ///< [pixels]; > 0. Less tells depth from nothing.
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
 };

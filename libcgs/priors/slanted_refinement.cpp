@@ -166,6 +166,7 @@ struct SlantedRefinement::Normal {
   Eigen::Vector3f g = Eigen::Vector3f::Zero();
   float residual = 0;  // weighted sum of squares
   float weight = 0;
+  float parallax = 0;  // largest of the sources [pixels per plane]
 };
 
 SlantedRefinement::SlantedRefinement(const std::vector<SweepImage>& images,
@@ -288,6 +289,7 @@ bool SlantedRefinement::normal_equations(const Window& w,
   const SweepImage& image = images_[static_cast<size_t>(s.image)];
   const LocalMap map = local_map(image, s, {w.x, w.y}, plane);
   if (!map.seen) return false;
+  total.parallax = std::max(total.parallax, std::hypot(map.ut, map.vt));
   const Cells cells(image.gray, map);
   // Unknowns: t, slope_x, slope_y, gain, offset; last the right side: the reference.
   std::array<Samples, 6> rows;
@@ -406,10 +408,11 @@ Raster<RefinedPixel> SlantedRefinement::result() const {
       if (reference_.valid(x, y) == 0) continue;
       const Window w = window(x, y);
       const Normal n = normal_equations(w, planes_(x, y));
-      // Cramer-Rao: residual variance over information on t, the slopes eliminated.
+      // Cramer-Rao: residual variance over information on the match, the slopes eliminated.
       const float total = std::max(n.weight, 1e-6f);
       const double least = 1e-6 * double(total);
-      Eigen::Matrix3d H = n.H.cast<double>();
+      const double planes_per_pixel = n.parallax > 0 ? 1 / double(n.parallax) : 0;
+      Eigen::Matrix3d H = planes_per_pixel * planes_per_pixel * n.H.cast<double>();
       H.diagonal().array() += least;
       // Without texture H is singular but for rounding, and its inverse may come out negative.
       const double inverse = H.inverse()(0, 0);

@@ -22,7 +22,8 @@ struct SlantedPlane {
 struct RefinedPixel {
   SlantedPlane plane;
   float score = 0;  ///< Normalised correlation with the better half of the sources, in [-1, 1].
-  float sigma = 0;  ///< Standard deviation of t from image noise and texture [planes]; > 0.
+  float sigma = 0;  ///< Standard deviation of the match from image noise and texture [pixels, in
+                    ///< the source that sees it move most]; > 0.
 };
 
 /// Continuous local refinement of a sweep.

@@ -77,7 +77,7 @@ double largest_speed(const Camera& reference, const Camera& other, double near_t
         const bool seen =
             h.z() > 0 && q.x() >= 0 && q.y() >= 0 && q.x() <= other.width && q.y() <= other.height;
         if (!seen) continue;
-        speed = std::max(speed, (s.b.head<2>() - q * s.b.z()).norm() / h.z());
+        speed = std::max(speed, s.parallax(u, v, near_t * k / kSteps));
       }
     }
   }

@@ -29,6 +29,11 @@ struct SweepSource {
   Eigen::Vector3d project(double u, double v, double t) const {
     return A * Eigen::Vector3d(u, v, 1) + t * b;
   }
+  /// Way in the source when t grows by one [pixels], of a point in front of it.
+  double parallax(double u, double v, double t) const {
+    const Eigen::Vector3d h = project(u, v, t);
+    return (b.head<2>() - h.head<2>() / h.z() * b.z()).norm() / h.z();
+  }
 };
 
 /// The planes of one reference view: 1 / z = inverse_far + t * step for t = 0 … planes - 1.

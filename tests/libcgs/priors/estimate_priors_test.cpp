@@ -55,6 +55,7 @@ TEST(EstimatePriors, SurvivesPhotographsWithoutTexture) {
   }
   const EstimatedPriors priors = estimate_priors(scene, {});
   for (const float z : priors.views[0].depth.data) ASSERT_TRUE(z > 0 && std::isfinite(z));
+  for (const PriorsCoverage& coverage : priors.report.coverage) EXPECT_EQ(coverage.measured, 0);
 }
 
 }  // namespace

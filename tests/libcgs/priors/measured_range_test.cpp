@@ -54,5 +54,42 @@ TEST(NarrowDepthRanges, NeverWidenTheGuessWhereTextureIsMissing) {
   EXPECT_LE(depth_range(scene, 0).far, guess.far);
 }
 
+// Its disparity is two pixels, in the small pictures half of one.
+TEST(NarrowDepthRanges, HoldABackgroundThatHardlyMoves) {
+  const std::vector<test::TexturedPatch> patches = {
+      {Vector3d(0, 0, 45), Vector3d::UnitX(), Vector3d::UnitY()},
+      {Vector3d(2, 0, 4), Vector3d::UnitX(), Vector3d::UnitY(), 2, 4}};
+  std::vector<Camera> cameras;
+  for (const double x : {-0.25, 0.25}) {
+    cameras.push_back(test::looking_at({x, 0, 0}, {x, 0, 4}, 320, 240, 200));
+  }
+  Scene scene = test::photographed_scene(patches, cameras, 0.25);
+  to_canonical(scene);
+  for (View& view : scene.views) view.near = view.far = 0;
+  ASSERT_GT(depth_range(scene, 0).far * scene.frame.scale, 45);
+  narrow_depth_ranges(scene, {});
+  for (const View& view : scene.views) {
+    EXPECT_LE(view.near * scene.frame.scale, 4);
+    EXPECT_GE(view.far * scene.frame.scale, 45);
+  }
+}
+
+// Quarters of such pictures have four pixels, and none of them a depth.
+TEST(NarrowDepthRanges, KeepTheGuessOfTinyPictures) {
+  for (const int side : {8, 11}) {
+    std::vector<Camera> cameras;
+    for (const double x : {-0.25, 0.25}) {
+      cameras.push_back(test::looking_at({x, 0, 0}, {x, 0, 4}, side, side, 8));
+    }
+    const std::vector<test::TexturedPatch> wall = {
+        {Vector3d(0, 0, 6), Vector3d::UnitX(), Vector3d::UnitY()}};
+    Scene scene = test::photographed_scene(wall, cameras, 0.5);
+    to_canonical(scene);
+    for (View& view : scene.views) view.near = view.far = 0;
+    narrow_depth_ranges(scene, {});
+    for (const View& view : scene.views) EXPECT_EQ(view.far, 0);
+  }
+}
+
 }  // namespace
 }  // namespace cgs

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/plane_sweep.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <vector>
@@ -189,6 +190,125 @@ TEST(PlaneSweep, StaysTheSameWhenTheSceneIsScaledByAPowerOfTwo) {
   }
 }
 
+double measured_share(const ViewPriors& priors) {
+  const auto& origin = priors.origin.data;
+  return double(std::count(origin.begin(), origin.end(), DepthOrigin::Measured)) /
+         double(origin.size());
+}
+
+TEST(PlaneSweep, MeasuresNothingOnPicturesOfOneColour) {
+  for (const float level : {0.0f, 200 / 255.0f}) {
+    for (const size_t views : {2u, 3u}) {
+      std::vector<Camera> cameras = three_cameras();
+      cameras.resize(views);
+      Scene scene = test::photographed_scene(slanted_plane(), cameras, kFinest);
+      for (View& view : scene.views) {
+        for (Eigen::Vector3f& c : view.image.data) c.setConstant(level);
+      }
+      for (const ViewPriors& p : plane_sweep(scene, {})) EXPECT_EQ(measured_share(p), 0);
+    }
+  }
+}
+
+// Neighbours decide where a surface shows nothing, as long as they see it go on.
+TEST(PlaneSweep, MeasuresABareSpotOfATexturedSurface) {
+  std::vector<TexturedPatch> patches = {
+      {Vector3d(0, 0, 4), Vector3d::UnitX(), Vector3d::UnitY(), 1e9, 1e9, 1},
+      {Vector3d(0, 0, 3.9999), Vector3d::UnitX(), Vector3d::UnitY(), 0.25, 0.25, 0}};
+  const Scene scene = test::photographed_scene(patches, three_cameras(), kFinest);
+  const ViewPriors priors = plane_sweep(scene, {})[1];
+  const DepthMap truth = test::true_depth(patches, scene.views[1].camera);
+  const auto bare = [&](int x, int y) { return truth(x, y) < 3.99995f; };
+  EXPECT_GT(share_within(priors, truth, 0.02, bare), 0.95);
+}
+
+// A half wall before a farther one. The first two cameras stand `baseline` apart; of the far wall
+// they see a part that the third, far to the right, does not.
+struct Corner {
+  std::vector<TexturedPatch> patches;
+  Scene scene;
+  DepthMap truth;      // of the first view
+  MaskMap pair_alone;  // where it shows what the third does not see
+};
+
+Corner corner(double baseline) {
+  Corner c;
+  c.patches = {{Vector3d(0, 0, 6), Vector3d::UnitX(), Vector3d::UnitY(), 1e9, 1e9, 1},
+               {Vector3d(5, 0, 3), Vector3d::UnitX(), Vector3d::UnitY(), 5, 1e9, 1}};
+  std::vector<Camera> cameras;
+  for (const double x : {0.0, baseline, 1.5}) {
+    cameras.push_back(test::looking_at({x, 0, 0}, {x, 0, 4}, kWidth, kHeight, kFocal));
+  }
+  c.scene = test::photographed_scene(c.patches, cameras, kFinest);
+  // As the third camera does not see the far wall, what it shows is not what bounds it.
+  for (View& view : c.scene.views) {
+    view.near = 2;
+    view.far = 12;
+  }
+  c.truth = test::true_depth(c.patches, cameras[0]);
+  c.pair_alone = MaskMap(kWidth, kHeight, 0);
+  Scene wide = c.scene;
+  wide.views = {c.scene.views[0], c.scene.views[2]};
+  for (int y = 0; y < kHeight; ++y) {
+    // Windows next to the edge of the near wall see that wall.
+    for (int x = 0; x < kWidth / 2 - 4; ++x) {
+      c.pair_alone(x, y) = !test::seen_elsewhere(c.patches, wide, 0, x, y, c.truth(x, y));
+    }
+  }
+  return c;
+}
+
+struct Judged {
+  double pixels = 0;
+  double measured = 0;  // share
+  double within = 0;    // share of the measured, within three sigmas
+};
+
+Judged judged(const Corner& corner, const ViewPriors& priors) {
+  Judged out;
+  for (size_t i = 0; i < priors.depth.data.size(); ++i) {
+    if (corner.pair_alone.data[i] == 0) continue;
+    out.pixels += 1;
+    if (priors.origin.data[i] != DepthOrigin::Measured) continue;
+    out.measured += 1;
+    out.within += std::abs(priors.depth.data[i] - corner.truth.data[i]) < 3 * priors.sigma.data[i];
+  }
+  out.within /= std::max(out.measured, 1.0);
+  out.measured /= out.pixels;
+  return out;
+}
+
+TEST(PlaneSweep, CamerasAtOnePlaceDoNotConfirmEachOther) {
+  for (const double baseline : {0.0, 1e-9, 0.004, 0.01}) {
+    const Corner c = corner(baseline);
+    const std::vector<ViewPriors> priors = plane_sweep(c.scene, {});
+    const Judged alone = judged(c, priors[0]);
+    EXPECT_GT(alone.pixels, 0.3 * kWidth * kHeight);
+    EXPECT_LT(alone.measured, 0.02) << baseline;
+    // What the third camera sees, too, is measured, with that view alone as witness.
+    const auto near = [&](int x, int y) { return x > kWidth / 2 + 26 && c.truth(x, y) < 4; };
+    EXPECT_GT(share_within(priors[0], c.truth, 0.01, near), 0.95) << baseline;
+    EXPECT_EQ(
+        *std::max_element(priors[0].matched_views.data.begin(), priors[0].matched_views.data.end()),
+        1)
+        << baseline;
+  }
+}
+
+// Cameras nearly at one place tell little, and what they tell is as uncertain as said.
+TEST(PlaneSweep, SigmaIsOfThePairThatConfirms) {
+  for (const double baseline : {0.02, 0.03, 0.04, 0.05, 0.06}) {
+    const Corner c = corner(baseline);
+    EXPECT_LT(judged(c, plane_sweep(c.scene, {})[0]).measured, 0.02) << baseline;
+  }
+  for (const double baseline : {0.1, 0.3}) {
+    const Corner c = corner(baseline);
+    const Judged alone = judged(c, plane_sweep(c.scene, {})[0]);
+    EXPECT_GT(alone.measured, 0.3) << baseline;
+    EXPECT_GT(alone.within, 0.97) << baseline;
+  }
+}
+
 TEST(PlaneSweep, RefusesCamerasAtOnePlace) {
   std::vector<Camera> cameras = three_cameras();
   Scene scene = test::photographed_scene(slanted_plane(), cameras, kFinest);
@@ -210,7 +330,7 @@ TEST(PlaneSweep, RefusesWhatItCannotMatch) {
 
 TEST(PlaneSweepOptions, RefusesEachFieldOutOfRange) {
   EXPECT_NO_THROW(PlaneSweepOptions{}.validate());
-  std::vector<PlaneSweepOptions> bad(8);
+  std::vector<PlaneSweepOptions> bad(9);
   bad[0].sampling.pixels_per_plane = 0;
   bad[1].sampling.max_planes = 7;
   bad[2].sampling.range_margin = std::nan("");
@@ -219,6 +339,7 @@ TEST(PlaneSweepOptions, RefusesEachFieldOutOfRange) {
   bad[5].smoothness.edge_level = std::nanf("");
   bad[6].refinement_rounds = -1;
   bad[7].max_disagreement = 0;
+  bad[8].least_disparity = 0;
   for (const PlaneSweepOptions& options : bad) EXPECT_THROW(options.validate(), InvalidInput);
 }
 
