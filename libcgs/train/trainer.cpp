@@ -139,7 +139,8 @@ void take(std::string_view& from, std::vector<float>& values, size_t count, bool
           "a saved state must fit the model",
           found);
   values.resize(static_cast<size_t>(found));
-  std::memcpy(values.data(), from.data(), values.size() * sizeof(float));
+  // Nothing may be copied to nowhere, not even no bytes.
+  if (!values.empty()) std::memcpy(values.data(), from.data(), values.size() * sizeof(float));
   from.remove_prefix(values.size() * sizeof(float));
 }
 
@@ -334,7 +335,10 @@ size_t Trainer::update() {
 }
 
 StepReport Trainer::step() {
-  if (time() >= options_.free_from) model_.free_shapes();
+  if (!model_.shapes_are_free() && time() >= options_.free_from) {
+    model_.free_shapes();
+    model_.decode();  // gradients of shapes are those of the ellipses that they now are
+  }
   StepReport report;
   GaussianGradients gaussians;
   for (size_t n = 0; n < full_.size(); ++n) add_view(n, gaussians, report);

@@ -125,6 +125,23 @@ TEST(Trainer, LosesLessAndLess) {
   EXPECT_LT(trainer.history().back().total(), 0.9 * trainer.history().front().total());
 }
 
+// Shapes that become free are ellipses in that very step, as their gradients take them for such.
+TEST(Trainer, FreesShapesBeforeItsStepNotAfter) {
+  const PlantedScene planted = planted_scene(0.03);
+  TrainingOptions options = short_training(4);
+  options.depth_rate = options.opacity_rate = options.shape_rate = 0;
+  options.free_from = 0;
+  Trainer from_the_start(planted.scene, planted.priors, options);
+  options.free_from = 0.25;
+  Trainer from_the_second(planted.scene, planted.priors, options);
+  for (Trainer* trainer : {&from_the_start, &from_the_second}) run(*trainer);
+  const auto loss = [](const Trainer& trainer, size_t step) {
+    return trainer.history()[step].total();
+  };
+  EXPECT_NE(loss(from_the_start, 0), loss(from_the_second, 0));
+  EXPECT_EQ(loss(from_the_start, 1), loss(from_the_second, 1));
+}
+
 void expect_same_bits_for_any_number_of_threads(const TrainingOptions& options) {
   const PlantedScene planted = planted_scene(0.02);
   Gaussians first;
