@@ -159,20 +159,28 @@ void check_picture(const View& view, const JsonValue& entry) {
   entry.fail(Defect::Mismatch, "the camera is not that of the undistorted picture of its fisheye");
 }
 
-// Files are named after views: a name must not lead into another folder.
-std::string read_name(const JsonValue& value, std::set<std::string>& taken) {
+bool is_file_name(const std::string& name) {
+  return !name.empty() && name != "." && name != ".." && name.find('\0') == std::string::npos;
+}
+
+// Files are named after views: a name must not lead into another folder. Other programs name
+// photographs of several cameras by their folders.
+std::string read_name(const JsonValue& value, bool is_foreign, std::set<std::string>& taken) {
   std::string name = value.text();
-  const bool is_plain = !name.empty() && name != "." && name != ".." &&
-                        name.find('/') == std::string::npos && name.find('\0') == std::string::npos;
+  bool is_plain = is_foreign || name.find('/') == std::string::npos;
+  for (size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
+    end = name.find('/', begin);
+    is_plain = is_plain && is_file_name(name.substr(begin, end - begin));
+  }
   if (!is_plain) value.fail(Defect::Path, "a view must have the name of a file without a folder");
+  std::replace(name.begin(), name.end(), '/', '_');
   if (!taken.insert(name).second) value.fail(Defect::Syntax, "two views are named " + name);
   return name;
 }
 
-View read_view(const JsonValue& entry, const Frame& frame, std::set<std::string>& names) {
+View read_view(const JsonValue& entry, const Frame& frame) {
   const Refuse refuse = [&](Defect defect, const std::string& why) { entry.fail(defect, why); };
   View view;
-  view.name = read_name(entry.at("img_name"), names);
   Camera& camera = view.camera;
   camera.width = entry.at("width").count();
   camera.height = entry.at("height").count();
@@ -231,7 +239,7 @@ void write_cameras_json(const std::filesystem::path& path, const Scene& scene) {
   write_file(path, document.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
-Scene read_cameras_json(const std::filesystem::path& path) {
+Scene read_cameras_json(const std::filesystem::path& path, std::vector<std::string>* names) {
   const ReadLimits limits;
   const json document = read_json(path, limits);
   const JsonValue entries(document, path);
@@ -242,11 +250,14 @@ Scene read_cameras_json(const std::filesystem::path& path) {
   Scene scene;
   scene.kind = kForeignCameras;
   scene.folder = path.parent_path();
-  if (const auto frame = entries.at(size_t{0}).find("frame")) read_frame(*frame, scene);
-  std::set<std::string> names;
+  const auto frame = entries.at(size_t{0}).find("frame");
+  if (frame) read_frame(*frame, scene);
+  std::set<std::string> taken;
   for (size_t i = 0; i < entries.size(); ++i) {
     const JsonValue entry = entries.at(i);
-    View view = read_view(entry, scene.frame, names);
+    View view = read_view(entry, scene.frame);
+    view.name = read_name(entry.at("img_name"), !frame, taken);
+    if (names != nullptr) names->push_back(entry.at("img_name").text());
     read_image_path(entry, view, scene);
     if (const auto role = entry.find("role")) {
       if (role->text() == "input") scene.input.push_back(static_cast<int>(i));

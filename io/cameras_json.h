@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "libcgs/core/scene.h"
 
@@ -24,9 +26,11 @@ void write_cameras_json(const std::filesystem::path& path, const Scene& scene);
 /// internal cameras come back bit for bit. A position that was edited in the file counts.
 ///
 /// In files of other programs the principal point is the centre, the frame the identity, the kind
-/// kForeignCameras, and neither input nor held-out views are known. Images that no longer exist are
-/// listed as missing. \throws BadInput Syntax, Schema, Value, naming the JSON pointer; Empty (no
-/// camera); LimitError.
-Scene read_cameras_json(const std::filesystem::path& path);
+/// kForeignCameras, and neither input nor held-out views are known; of "cam1/0.png" the view is
+/// cam1_0.png. Images that no longer exist are listed as missing.
+/// \param names  gets the name of each view as the file has it
+/// \throws BadInput Syntax, Schema, Value, naming the JSON pointer; Empty (no camera); LimitError.
+Scene read_cameras_json(const std::filesystem::path& path,
+                        std::vector<std::string>* names = nullptr);
 
 }  // namespace cgs

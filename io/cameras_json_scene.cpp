@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/cameras_json_scene.h"
 
+#include <string>
+#include <vector>
+
 #include "io/byte_reader.h"
 #include "io/cameras_json.h"
 #include "io/photograph_index.h"
@@ -10,6 +13,16 @@ namespace cgs {
 namespace {
 
 constexpr const char* kName = "cameras.json";
+
+// Where a photograph that is named with its folder lies; empty if it is not there.
+std::filesystem::path photograph_in_folder(const SceneRoot& root, const std::string& name) {
+  if (name.find('/') == std::string::npos) return {};
+  for (const std::string& place : {"images/" + name, name}) {
+    std::filesystem::path file = resolve_in_scene(root, place, root.folder / kName);
+    if (is_present(file)) return file;
+  }
+  return {};
+}
 
 }  // namespace
 
@@ -27,16 +40,19 @@ bool is_cameras_json(const std::filesystem::path& folder) {
 }
 
 Scene read_cameras_json_scene(const SceneRoot& root) {
-  Scene scene = read_cameras_json(resolve_in_scene(root, kName, root.folder));
+  std::vector<std::string> names;
+  Scene scene = read_cameras_json(resolve_in_scene(root, kName, root.folder), &names);
   PhotographIndex photographs(root);
   scene.kind = kName;
   scene.folder = root.folder;
   scene.input.clear();
   scene.held_out.clear();
   scene.missing.clear();
-  for (View& view : scene.views) {
-    view.image_path = photographs.take(view.name);
-    if (view.image_path.empty()) scene.missing.push_back(view.name);
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    View& view = scene.views[i];
+    view.image_path = photograph_in_folder(root, names[i]);
+    if (view.image_path.empty()) view.image_path = photographs.take(names[i]);
+    if (view.image_path.empty()) scene.missing.push_back(names[i]);
     // What this program wrote is in its internal frame.
     Camera& camera = view.camera;
     const Eigen::Isometry3d pose = world_from_internal(scene.frame, camera.world_from_cam);

@@ -246,8 +246,11 @@ class Cells {
   }
   static uint64_t key(const Eigen::Vector3d& whole) {
     constexpr int kBits = kMaxDracoBits;
-    return static_cast<uint64_t>(whole.x()) << 2 * kBits |
-           static_cast<uint64_t>(whole.y()) << kBits | static_cast<uint64_t>(whole.z());
+    // A decoded vertex may lie before the grid: by way of numbers that may be negative.
+    const auto bits = [](double coordinate) {
+      return static_cast<uint64_t>(static_cast<int64_t>(coordinate));
+    };
+    return bits(whole.x()) << 2 * kBits | bits(whole.y()) << kBits | bits(whole.z());
   }
   std::optional<uint32_t> number(uint64_t k) const {
     const auto it = std::lower_bound(unique_.begin(), unique_.end(), k);

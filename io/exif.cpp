@@ -11,6 +11,7 @@
 
 #include "io/byte_reader.h"
 #include "io/heif.h"
+#include "io/image_header.h"
 
 namespace cgs {
 
@@ -129,7 +130,11 @@ LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size) {
 int exif_orientation(const std::filesystem::path& path) {
   constexpr int kUpright = 1;
   constexpr int kLast = 8;
-  if (is_heif(read_file_start(path, 16))) return kUpright;  // its decoder has turned it already
+  const std::string start = read_file_start(path, 16);
+  if (is_heif(start)) return kUpright;  // its decoder has turned it already
+  if (start.starts_with("II") || start.starts_with("MM")) {
+    return parse_image_header(read_file(path), path).orientation;  // TIFF has a tag of its own
+  }
   const Exif exif = read_exif(path);
   if (!exif) return kUpright;
   const double value = number(exif.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION);

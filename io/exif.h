@@ -28,9 +28,9 @@ LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size);
 
 /// How a photograph lies in its file, as the Exif tag counts: 1 upright, 2 mirrored, 3 upside down,
 /// 4 mirrored and upside down, 5 to 8 with rows and columns exchanged (6 and 8 as phones store
-/// pictures held upright). 1 for what is no JPEG or says nothing valid.
-/// \throws BadInput as read_file_start()
-/// Source: CIPA DC-008 (Exif 2.32) 4.6.4, Orientation.
+/// pictures held upright). 1 for what is neither JPEG nor TIFF or says nothing valid.
+/// \throws BadInput as read_file_start(); of a TIFF as parse_image_header()
+/// Source: CIPA DC-008 (Exif 2.32) 4.6.4, Orientation; TIFF 6.0 section 8.
 int exif_orientation(const std::filesystem::path& path);
 
 }  // namespace cgs

@@ -71,7 +71,7 @@ class ExrScreen {
       }
       read_value(name, type, reader_.take(size, "attribute value"));
     }
-    if (!has_window_ || !has_compression_ || !has_channels_) {
+    if (!has_window_ || !has_compression_ || channels_ == 0) {
       reader_.fail(Defect::Schema, "dataWindow, compression or channels are missing");
     }
   }
@@ -102,7 +102,6 @@ class ExrScreen {
     }
     if (name == "channels" && type == "chlist") {
       read_channels(field);
-      has_channels_ = true;
     }
   }
 
@@ -205,7 +204,6 @@ class ExrScreen {
   int64_t lines_per_chunk_ = 1;
   bool has_window_ = false;
   bool has_compression_ = false;
-  bool has_channels_ = false;
 };
 
 }  // namespace

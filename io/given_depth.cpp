@@ -309,6 +309,13 @@ void refuse_shared_files(const Scene& scene) {
 
 }  // namespace
 
+std::map<std::string, DepthKind> depth_kinds() {
+  return {{"auto", DepthKind::Unknown},
+          {"metric", DepthKind::Metric},
+          {"depth", DepthKind::Relative},
+          {"disparity", DepthKind::Disparity}};
+}
+
 void DepthOptions::validate() const {
   require(scale >= 0 && std::isfinite(scale), "DepthOptions.scale must be >= 0", scale);
   if (network.empty()) return;

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <string>
 
 #include "io/image.h"
 #include "libcgs/core/scene.h"
@@ -20,6 +22,9 @@ struct DepthOptions {
   /// \throws InvalidInput naming the first field out of range, or what excludes each other.
   void validate() const;
 };
+
+/// What --depth-kind takes.
+std::map<std::string, DepthKind> depth_kinds();
 
 /// Gives every view that has a photograph the file with its depth, if there is one: in the folder
 /// of the options, else where the layout of the scene says, else in a folder "depth" beside that of

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <csetjmp>
 #include <cstddef>
+#include <mutex>
 #include <new>
 #include <string>
 #include <vector>
@@ -48,6 +49,10 @@ void on_jpeg_message(j_common_ptr info, int level) {
   constexpr int kWarning = -1;
   if (level != kWarning) return;
   auto* errors = reinterpret_cast<JpegErrors*>(info->err);
+  // Some cameras pad the picture before its end marker; a cut one would be another warning.
+  const bool is_padding =
+      info->err->msg_code == JWRN_EXTRANEOUS_DATA && info->err->msg_parm.i[1] == JPEG_EOI;
+  if (is_padding) return;
   if (info->err->num_warnings++ == 0) info->err->format_message(info, errors->message);
 }
 
@@ -139,17 +144,22 @@ ColorImage read_jpeg(std::string_view bytes,
   return from_bytes(header, rgb.data(), 3);
 }
 
-/// Sends standard error nowhere while it lives: the decoders behind OpenCV print their complaints
-/// and offer no way to take them.
+/// Sends standard error nowhere while any of its kind lives: the decoders behind OpenCV print their
+/// complaints and offer no way to take them. The first redirects, the last restores, as several
+/// threads decode at once.
 class Silence {
  public:
-  Silence() : saved_(::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3)) {
+  Silence() {
+    const std::lock_guard lock(mutex_);
+    if (count_++ > 0) return;
+    saved_ = ::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
     const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
     if (saved_ >= 0 && nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
     if (nowhere >= 0) ::close(nowhere);
   }
   ~Silence() {
-    if (saved_ < 0) return;
+    const std::lock_guard lock(mutex_);
+    if (--count_ > 0 || saved_ < 0) return;
     ::dup2(saved_, STDERR_FILENO);
     ::close(saved_);
   }
@@ -157,7 +167,9 @@ class Silence {
   Silence& operator=(const Silence&) = delete;
 
  private:
-  int saved_;
+  static inline std::mutex mutex_;
+  static inline int count_ = 0;
+  static inline int saved_ = -1;
 };
 
 // Decoders tell a lack of memory as they tell damage, or abort: throws std::bad_alloc before.
@@ -180,7 +192,7 @@ cv::Mat decode_with_opencv(std::string_view bytes,
   cv::Mat pixels;
   try {
     const Silence silence;
-    // Unchanged keeps 16 bits and alpha, and does not apply the orientation tag.
+    // Unchanged keeps 16 bits and alpha.
     pixels = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception& error) {
     throw_if_out_of_memory(error);
@@ -204,7 +216,9 @@ std::string read_image_file(const std::filesystem::path& path, const ReadLimits&
 cv::Mat decode_as_announced(std::string_view bytes,
                             const ImageHeader& header,
                             const std::filesystem::path& path) {
-  cv::Mat pixels = decode_with_opencv(bytes, header, path);
+  cv::Mat pixels = header.orientation == 1
+                       ? decode_with_opencv(bytes, header, path)
+                       : decode_with_opencv(upright_tiff(bytes, path), header, path);
   if (pixels.cols != header.width || pixels.rows != header.height || pixels.channels() > 4) {
     throw BadInput(Defect::Syntax, path, "the decoded image is not what its header announces");
   }

@@ -115,31 +115,16 @@ class TiffDirectory {
 
   // The whole-number values of a tag; empty if it is absent.
   std::vector<uint64_t> values(uint64_t tag) const {
-    const uint64_t entry_size = is_big_tiff_ ? 20 : 12;
-    for (uint64_t i = 0; i < count_; ++i) {
-      const uint64_t entry = start_ + (is_big_tiff_ ? 8 : 2) + i * entry_size;
-      if (number(entry, 2) == tag) return entry_values(entry);
-    }
-    return {};
+    const auto entry = find(tag);
+    return entry ? entry_values(*entry) : std::vector<uint64_t>();
   }
 
-  [[noreturn]] void fail(Defect defect, const std::string& reason) const {
-    throw BadInput(defect, path_, "TIFF directory: " + reason);
-  }
-
- private:
-  std::vector<uint64_t> entry_values(uint64_t entry) const {
-    const uint64_t type = number(entry + 2, 2);
-    const uint64_t width = type == 3 ? 2 : type == 4 ? 4 : type == 16 ? 8 : 0;
-    if (width == 0) fail(Defect::Syntax, "a size or position is not a whole number");
+  // Where the one 16-bit value of a tag lies in the file; empty if it has none such.
+  std::optional<uint64_t> place_of_short(uint64_t tag) const {
+    const auto entry = find(tag);
     const uint64_t field = is_big_tiff_ ? 8 : 4;
-    const uint64_t count = number(entry + 4, field);
-    if (count > bytes_.size() / width) fail(Defect::Count, "declares more values than fit");
-    const uint64_t place = entry + 4 + field;
-    const uint64_t first = count * width <= field ? place : number(place, field);
-    std::vector<uint64_t> out(count);
-    for (uint64_t i = 0; i < count; ++i) out[i] = number(first + i * width, width);
-    return out;
+    if (!entry || number(*entry + 2, 2) != kShort || number(*entry + 4, field) != 1) return {};
+    return *entry + 4 + field;
   }
 
   uint64_t number(uint64_t at, uint64_t width) const {
@@ -150,6 +135,38 @@ class TiffDirectory {
     if (!is_big_endian_) return little_endian(bytes);
     if (width <= 4) return big_endian(bytes);
     return uint64_t{big_endian(bytes.substr(0, 4))} << 32 | big_endian(bytes.substr(4));
+  }
+  bool is_big_endian() const { return is_big_endian_; }
+
+  [[noreturn]] void fail(Defect defect, const std::string& reason) const {
+    throw BadInput(defect, path_, "TIFF directory: " + reason);
+  }
+
+ private:
+  static constexpr uint64_t kShort = 3;
+
+  // Where the entry of a tag begins.
+  std::optional<uint64_t> find(uint64_t tag) const {
+    const uint64_t entry_size = is_big_tiff_ ? 20 : 12;
+    for (uint64_t i = 0; i < count_; ++i) {
+      const uint64_t entry = start_ + (is_big_tiff_ ? 8 : 2) + i * entry_size;
+      if (number(entry, 2) == tag) return entry;
+    }
+    return std::nullopt;
+  }
+
+  std::vector<uint64_t> entry_values(uint64_t entry) const {
+    const uint64_t type = number(entry + 2, 2);
+    const uint64_t width = type == kShort ? 2 : type == 4 ? 4 : type == 16 ? 8 : 0;
+    if (width == 0) fail(Defect::Syntax, "a size or position is not a whole number");
+    const uint64_t field = is_big_tiff_ ? 8 : 4;
+    const uint64_t count = number(entry + 4, field);
+    if (count > bytes_.size() / width) fail(Defect::Count, "declares more values than fit");
+    const uint64_t place = entry + 4 + field;
+    const uint64_t first = count * width <= field ? place : number(place, field);
+    std::vector<uint64_t> out(count);
+    for (uint64_t i = 0; i < count; ++i) out[i] = number(first + i * width, width);
+    return out;
   }
 
   std::string_view bytes_;
@@ -163,6 +180,7 @@ class TiffDirectory {
 constexpr uint64_t kTiffWidth = 256;
 constexpr uint64_t kTiffHeight = 257;
 constexpr uint64_t kTiffStripOffsets = 273;
+constexpr uint64_t kTiffOrientation = 274;
 constexpr uint64_t kTiffStripBytes = 279;
 constexpr uint64_t kTiffTileOffsets = 324;
 constexpr uint64_t kTiffTileBytes = 325;
@@ -300,11 +318,27 @@ ImageHeader parse_image_header(std::string_view bytes,
         Defect::Unsupported, path, "raw camera file; develop it, " + std::string(kFormats));
   }
   const TiffDirectory directory(bytes, path);
-  return checked(ImageFormat::Tiff,
-                 directory.value(kTiffWidth).value_or(0),
-                 directory.value(kTiffHeight).value_or(0),
-                 path,
-                 limits);
+  ImageHeader header = checked(ImageFormat::Tiff,
+                               directory.value(kTiffWidth).value_or(0),
+                               directory.value(kTiffHeight).value_or(0),
+                               path,
+                               limits);
+  if (const auto place = directory.place_of_short(kTiffOrientation)) {
+    const uint64_t stated = directory.number(*place, 2);
+    if (stated >= 1 && stated <= 8) header.orientation = static_cast<int>(stated);
+  }
+  return header;
+}
+
+std::string upright_tiff(std::string_view bytes, const std::filesystem::path& path) {
+  const TiffDirectory directory(bytes, path);
+  std::string out(bytes);
+  if (const auto place = directory.place_of_short(kTiffOrientation)) {
+    (void)directory.number(*place, 2);  // refuses what lies past the end
+    out[*place] = char(directory.is_big_endian() ? 0 : 1);
+    out[*place + 1] = char(directory.is_big_endian() ? 1 : 0);
+  }
+  return out;
 }
 
 void check_image_is_whole(std::string_view bytes,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 #include "io/byte_reader.h"
@@ -15,6 +16,9 @@ struct ImageHeader {
   ImageFormat format = ImageFormat::Png;
   int width = 0;   ///< [pixels]
   int height = 0;  ///< [pixels]
+  /// How the picture lies in its file, as Exif counts (1 = upright), by the tag of TIFF; others
+  /// state it in their Exif part.
+  int orientation = 1;
 };
 
 /// Recognises the format by its magic bytes and reads the size, without decoding. That of HEIC and
@@ -27,6 +31,11 @@ struct ImageHeader {
 ImageHeader parse_image_header(std::string_view bytes,
                                const std::filesystem::path& path,
                                const ReadLimits& limits = {});
+
+/// The same TIFF but for its orientation tag, which says upright: decoders that turn what it says
+/// otherwise then give the pixels as they are stored.
+/// Source: TIFF 6.0 section 8, Orientation.
+std::string upright_tiff(std::string_view bytes, const std::filesystem::path& path);
 
 /// Checks that every byte the file's own structure promises is there, since decoders accept some
 /// cut files: PNG chunks with their checksums up to IEND, TIFF strips and tiles, the RIFF length

@@ -280,8 +280,7 @@ void choose_views(Scene& scene, const std::string& list, bool all_views) {
     for (const int i : scene.input) {
       const View& view = scene.views[static_cast<size_t>(i)];
       if (!view.image_path.empty()) continue;
-      throw InvalidInput("SceneOptions.views: view \"" + printable(view.name) +
-                         "\" has no image file");
+      throw InvalidInput("--views: view \"" + printable(view.name) + "\" has no image file");
     }
   } else {
     const bool takes_all = all_views || usable.size() <= kTakeAll;
@@ -419,7 +418,7 @@ int find_view(const Scene& scene, const std::string& token) {
   if (parse_number(token, index) && index < scene.views.size()) return static_cast<int>(index);
   std::vector<std::string> names;
   for (const View& view : scene.views) names.push_back(view.name);
-  throw InvalidInput("SceneOptions.views: there is no view \"" + printable(token) + "\" among " +
+  throw InvalidInput("--views: there is no view \"" + printable(token) + "\" among " +
                      std::to_string(names.size()) + ": " + first_of(names));
 }
 
@@ -434,7 +433,7 @@ std::vector<int> select_views(const Scene& scene, const std::string& list) {
     const int view = find_view(scene, token);
     if (std::find(out.begin(), out.end(), view) != out.end()) {
       const std::string& name = scene.views[static_cast<size_t>(view)].name;
-      throw InvalidInput("SceneOptions.views: view \"" + printable(name) + "\" is named twice");
+      throw InvalidInput("--views: view \"" + printable(name) + "\" is named twice");
     }
     out.push_back(view);
     at = end + 1;

@@ -39,6 +39,26 @@ TEST_F(CamerasJsonScene, ReadsWhatGaussianSplattingWrites) {
   EXPECT_NEAR(uvz.y(), 2 * (15 + 55 * 0.5 / 4.0), 1e-9);
 }
 
+// Names of photographs that lie in folders, as COLMAP has them of several cameras.
+TEST_F(CamerasJsonScene, FindsPhotographsInTheirFolders) {
+  test::write_bytes(dir_ / "images/left/0.png", test::rgb_png(80, 60, 1));
+  test::write_bytes(dir_ / "images/right/0.png", test::rgb_png(80, 60, 2));
+  std::string text = kOther;
+  text.replace(text.find("\"a\""), 3, "\"left/0.png\"");
+  text.replace(text.find("\"b.png\""), 7, "\"right/0.png\"");
+  test::write_bytes(dir_ / "cameras.json", text);
+  const Scene scene = read_scene(dir_.path());
+  ASSERT_EQ(scene.views.size(), 2u);
+  EXPECT_EQ(scene.views[0].image_path, dir_ / "images/left/0.png");
+  EXPECT_EQ(scene.views[1].image_path, dir_ / "images/right/0.png");
+  EXPECT_EQ(scene.views[0].name, "left_0");
+  for (const char* name : {"/left/0.png", "left//0.png", "left/../0.png", "left/"}) {
+    std::string bad = text;
+    test::write_bytes(dir_ / "cameras.json", bad.replace(bad.find("left/0.png"), 10, name));
+    EXPECT_EQ(test::defect_of([&] { read_scene(dir_.path()); }), "PATH") << name;
+  }
+}
+
 TEST_F(CamerasJsonScene, BringsOurOwnBackToTheWorld) {
   test::write_bytes(dir_ / "cameras.json", kOther);
   Scene scene = read_scene(dir_.path());

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/image.h"
 
+#include <thread>
+#include <vector>
+
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
@@ -89,6 +94,18 @@ TEST_F(ReadImage, RefusesJpegCutAnywhere) {
   }
 }
 
+TEST_F(ReadImage, TakesJpegPaddedBeforeItsEndMarker) {
+  const std::string whole = test::jpeg(64, 48);
+  std::string padded = whole;
+  padded.insert(padded.size() - 2, std::string(3, '\0'));
+  const ColorImage image = read(padded);
+  EXPECT_TRUE(image.data == read(whole).data);
+  EXPECT_EQ(refused(padded.substr(0, padded.size() - 2)), "TRUNCATED");
+  // Nothing but padding in place of the second half of the pixels.
+  const size_t half = whole.size() / 2;
+  EXPECT_NE(refused(whole.substr(0, half) + std::string(40, '\0') + "\xff\xd9"), "");
+}
+
 TEST_F(ReadImage, RefusesPngCutAnywhere) {
   const std::string whole = test::rgb_png(16, 12);
   ASSERT_EQ(refused(whole), "");
@@ -116,6 +133,24 @@ TEST_F(ReadImage, SurvivesDamagedJpegBytes) {
       EXPECT_NO_FATAL_FAILURE(refused(bytes));
     }
   }
+}
+
+// What decoders print is kept from standard error, and nothing but that.
+TEST_F(ReadImage, LeavesStandardErrorToOthersWhenThreadsDecodeAtOnce) {
+  test::write_bytes(dir_ / "a.png", test::rgb_png(64, 48));
+  struct ::stat before = {};
+  struct ::stat after = {};
+  ASSERT_EQ(::fstat(STDERR_FILENO, &before), 0);
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 8; ++i) {
+    threads.emplace_back([&] {
+      for (int k = 0; k < 40; ++k) (void)read_image(dir_ / "a.png");
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  ASSERT_EQ(::fstat(STDERR_FILENO, &after), 0);
+  EXPECT_EQ(before.st_dev, after.st_dev);
+  EXPECT_EQ(before.st_ino, after.st_ino);
 }
 
 TEST_F(ReadImage, SizeComesFromTheHeaderEvenBehindLargeMetadata) {

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/orientation.h"
 
+#include <tuple>
+
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "io/exif.h"
+#include "io/image.h"
 #include "tests/support/exif_segment.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
@@ -68,6 +71,78 @@ TEST_P(OrientedJpeg, TurnsMasksAsPictures) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, OrientedJpeg, testing::Range(1, 9));
+
+std::string number(uint32_t value, int width, bool is_big_endian) {
+  std::string out;
+  for (int i = 0; i < width; ++i) {
+    out += char(value >> (8 * (is_big_endian ? width - 1 - i : i)) & 0xff);
+  }
+  return out;
+}
+
+/// An uncompressed TIFF of 3 x 2 pixels with 8 bits for each of `channels`, sample i of which is
+/// 10 i, and a tag of orientation.
+std::string oriented_tiff(int orientation, int channels, bool is_big_endian) {
+  const auto word = [&](uint32_t value) { return number(value, 2, is_big_endian); };
+  const auto dword = [&](uint32_t value) { return number(value, 4, is_big_endian); };
+  std::string samples;
+  for (int i = 0; i < 6 * channels; ++i) samples += char(10 * i);
+  constexpr uint32_t kFirst = 8;
+  const auto bits = kFirst + uint32_t(samples.size());
+  const std::string bits_text = word(8) + word(8) + word(8);
+  const uint32_t directory = bits + uint32_t(bits_text.size());
+  std::string out = (is_big_endian ? "MM" : "II") + word(42) + dword(directory);
+  out += samples + bits_text;
+  const std::vector<std::pair<uint32_t, std::string>> tags = {
+      {256, word(3) + word(0)},
+      {257, word(2) + word(0)},
+      {258, channels == 3 ? dword(bits) : word(8) + word(0)},
+      {259, word(1) + word(0)},
+      {262, word(channels == 3 ? 2 : 1) + word(0)},
+      {273, word(kFirst) + word(0)},
+      {274, word(uint32_t(orientation)) + word(0)},
+      {277, word(uint32_t(channels)) + word(0)},
+      {278, word(2) + word(0)},
+      {279, word(uint32_t(samples.size())) + word(0)}};
+  out += word(uint32_t(tags.size()));
+  for (const auto& [tag, value] : tags) {
+    const bool is_of_each = tag == 258 && channels == 3;
+    out += word(tag) + word(3) + dword(is_of_each ? 3 : 1) + value;
+  }
+  return out + dword(0);
+}
+
+class OrientedTiff : public testing::TestWithParam<std::tuple<int, bool>> {};
+
+// Known cameras are calibrated on the pixels as they are stored.
+TEST_P(OrientedTiff, IsReadAsItIsStored) {
+  const auto& [orientation, is_big_endian] = GetParam();
+  const test::TempDir dir;
+  const auto path = dir / "photo.tif";
+  test::write_bytes(path, oriented_tiff(orientation, 3, is_big_endian));
+  const ColorImage image = read_image(path);
+  ASSERT_EQ(image.width, 3);
+  ASSERT_EQ(image.height, 2);
+  for (int i = 0; i < 6; ++i) {
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(image.data[size_t(i)][c], float(10 * (3 * i + c)) / 255, 1e-6f) << i;
+    }
+  }
+  test::write_bytes(path, oriented_tiff(orientation, 1, is_big_endian));
+  const StoredSamples samples = read_samples(path);
+  for (size_t i = 0; i < 6; ++i) EXPECT_EQ(samples.values.data[i], 10 * float(i));
+}
+
+TEST_P(OrientedTiff, SaysHowItLies) {
+  const auto& [orientation, is_big_endian] = GetParam();
+  const test::TempDir dir;
+  test::write_bytes(dir / "photo.tif", oriented_tiff(orientation, 3, is_big_endian));
+  EXPECT_EQ(exif_orientation(dir / "photo.tif"), orientation);
+}
+
+INSTANTIATE_TEST_SUITE_P(All,
+                         OrientedTiff,
+                         testing::Combine(testing::Range(1, 9), testing::Bool()));
 
 TEST(Orientation, IsUprightWhereNothingValidIsSaid) {
   const test::TempDir dir;
