@@ -200,21 +200,23 @@ Json run_report(Run& run, const Progress& progress) {
 }
 
 /// Which stage a part of the request first has a say in; what is not here decides all.
-const std::map<std::string, std::string>& decided_stages() {
-  static const std::map<std::string, std::string> kStages = {{"assume_unit", "scale"},
-                                                             {"up", "scale"},
-                                                             {"known_distances", "scale"},
-                                                             {"marker_size", "scale"},
-                                                             {"control_points", "scale"},
-                                                             {"held_out_images", "evaluation"},
-                                                             {"voxel_size", "mesh"},
-                                                             {"simplify", "mesh"},
-                                                             {"max_error", "mesh"},
-                                                             {"compression_error", "web"},
-                                                             {"glb_encoding", "web"},
-                                                             {"lods", "web"},
-                                                             {"max_size", "web"}};
-  return kStages;
+std::map<std::string, std::string> decided_stages(const RunRequest& request, const Scene& scene) {
+  std::map<std::string, std::string> out = {{"assume_unit", "scale"},
+                                            {"up", "scale"},
+                                            {"known_distances", "scale"},
+                                            {"marker_size", "scale"},
+                                            {"control_points", "scale"},
+                                            {"held_out_images", "evaluation"},
+                                            {"voxel_size", "mesh"},
+                                            {"simplify", "mesh"},
+                                            {"max_error", "mesh"},
+                                            {"compression_error", "web"},
+                                            {"glb_encoding", "web"},
+                                            {"lods", "web"},
+                                            {"max_size", "web"}};
+  // Metric depth is brought into the scene by its unit where photographs do not tell how.
+  if (has_given_depth(request.scene, scene)) out.erase("assume_unit");
+  return out;
 }
 
 /// A stage: its files (whose absence means it must run), what it does, and a remark for the user.
@@ -241,16 +243,7 @@ std::vector<Stage> stages_of(const Scene& scene, size_t lods) {
   std::vector<std::string> web_files = {
       "web/asset.glb", "mesh/watertight.obj", "mesh/watertight.mtl"};
   for (const std::string& name : level_files(lods)) web_files.push_back("web/" + name);
-  return {{"model",
-           "depth and Gaussians",
-           model_files,
-           run_model,
-           {"model/training.json",
-            "model/refined_poses.json",
-            "model/colmap/poses.json",
-            "model/colmap/sparse/0/cameras.txt",
-            "model/colmap/sparse/0/images.txt",
-            "model/colmap/sparse/0/points3D.txt"}},
+  return {{"model", "depth and Gaussians", model_files, run_model, {"model/training.json"}},
           {"scale", "scale", {}, run_scale},
           {"views", "views", view_files, run_views},
           {"evaluation", "held-out views", {}, run_evaluation},
@@ -264,7 +257,8 @@ std::vector<Stage> stages_of(const Scene& scene, size_t lods) {
             "mesh/side.png",
             "mesh/front.provenance.png",
             "mesh/side.provenance.png"},
-           run_mesh},
+           run_mesh,
+           {"mesh/watertight.stl", "mesh/watertight.3mf"}},
           {"web",
            "textured assets",
            web_files,
@@ -285,11 +279,27 @@ std::vector<int> views_with_photograph(const Scene& scene) {
 
 namespace {
 
+// What OpenedScene::keep() writes, before the first stage.
+std::set<std::string> camera_files() {
+  return {"model/refined_poses.json",
+          "model/colmap/poses.json",
+          "model/colmap/sparse/0/cameras.txt",
+          "model/colmap/sparse/0/images.txt",
+          "model/colmap/sparse/0/points3D.txt"};
+}
+
+std::set<std::string> outputs_of(const Stage& stage, const Run& run) {
+  std::set<std::string> names(stage.files.begin(), stage.files.end());
+  names.insert(stage.further.begin(), stage.further.end());
+  const std::vector<std::string> outputs = named_outputs(run.request.output, names);
+  return {outputs.begin(), outputs.end()};
+}
+
 // Hashes of what is on disk tell what the stages wrote only right after they did; later,
 // verify_run() holds the disk against them.
 void note_outputs(Run& run, bool is_fresh) {
   if (!is_fresh && run.record.json().contains("outputs")) return;
-  std::set<std::string> names;
+  std::set<std::string> names = camera_files();
   for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
     names.insert(stage.files.begin(), stage.files.end());
     names.insert(stage.further.begin(), stage.further.end());
@@ -328,18 +338,24 @@ std::string remark_on(const std::string& stage, const Json& result) {
 }
 
 Json run_stages(Run& run, Terminal& terminal) {
-  bool stale = false;  // a stage that ran makes everything after it stale
+  bool stale = false;             // a stage that ran makes everything after it stale
+  std::set<std::string> earlier;  // files of stages before
   for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
     if (!stale && run.record.is_done(stage.name, stage.files)) {
       terminal.say(stage.title + ": done before");
       warn_of(run.record.result(stage.name), terminal);
+      earlier.merge(outputs_of(stage, run));
       continue;
     }
     if (!stale) remove_outputs_after(stage, run);
     stale = true;
     const CostMeter meter;  // from here on the peak of memory is that of the stage
     const Json result = stage.work(run, terminal.begin(stage.title));
-    run.record.finish(stage.name, terminal.end(remark_on(stage.name, result)), result);
+    const double seconds = terminal.end(remark_on(stage.name, result));
+    std::set<std::string> outputs = outputs_of(stage, run);
+    for (const std::string& name : earlier) outputs.erase(name);
+    run.record.finish(stage.name, seconds, result, {outputs.begin(), outputs.end()});
+    earlier.merge(outputs);
     warn_of(result, terminal);
     terminal.warn(std::exchange(run.hitches, {}));
   }
@@ -379,8 +395,10 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   check_lengths(request, scene.frame);
   make_output_folder(request.output);
   const FolderLock lock(request.output);
-  RunRecord record(
-      request.output, request_json(request, scene), request.overwrite, decided_stages());
+  RunRecord record(request.output,
+                   request_json(request, scene),
+                   request.overwrite,
+                   decided_stages(request, scene));
   for (const char* folder : {"",
                              "model",
                              "model/colmap",

@@ -52,10 +52,39 @@ Json unaffected_stages(const Json& stages,
   return kept;
 }
 
+// What a stage wrote; a name that leads out of the folder is none of ours.
+std::vector<std::string> files_of(const Json& stage) {
+  std::vector<std::string> out;
+  for (const Json& name : stage.value("files", Json::array())) {
+    const auto file = name.get<std::string>();
+    const bool is_inside =
+        std::filesystem::path(file).is_relative() && file.find("..") == std::string::npos;
+    if (is_inside) out.push_back(file);
+  }
+  return out;
+}
+
 bool is_stage(const Json& stage) {
-  return stage.is_object() && stage.contains("seconds") && stage["seconds"].is_number() &&
+  if (!stage.is_object()) return false;
+  const Json files = stage.value("files", Json::array());
+  const bool lists_files =
+      files.is_array() &&
+      std::all_of(files.begin(), files.end(), [](const Json& file) { return file.is_string(); });
+  return lists_files && stage.contains("seconds") && stage["seconds"].is_number() &&
          stage.contains("peak_memory") && stage["peak_memory"].is_number() &&
          stage.contains("result");
+}
+
+void remove_files_of_others(const std::filesystem::path& folder,
+                            const Json& stages,
+                            const Json& kept) {
+  for (const auto& [name, stage] : stages.items()) {
+    if (kept.contains(name)) continue;
+    for (const std::string& file : files_of(stage)) {
+      std::error_code leaves_it;  // as a folder would be
+      std::filesystem::remove(folder / file, leaves_it);
+    }
+  }
 }
 
 }  // namespace
@@ -101,6 +130,8 @@ RunRecord::RunRecord(std::filesystem::path folder,
                          "; choose another folder, or say --overwrite" +
                          (stages.empty() ? "" : ", which keeps what this does not change"));
     }
+    // First, as a stage without its files is not done, whichever request the record states.
+    if (readable) remove_files_of_others(folder_, old["stages"], stages);
   }
   json_ = {
       {"program", kProgramVersion}, {"request", std::move(request)}, {"stages", std::move(stages)}};
@@ -109,17 +140,20 @@ RunRecord::RunRecord(std::filesystem::path folder,
 
 bool RunRecord::is_done(const std::string& stage, const std::vector<std::string>& files) const {
   if (!json_["stages"].contains(stage)) return false;
-  for (const std::string& file : files) {
-    if (!is_present(folder_ / file)) return false;
-  }
-  return true;
+  const auto is_there = [&](const std::string& file) { return is_present(folder_ / file); };
+  const std::vector<std::string> written = files_of(json_["stages"][stage]);
+  return std::all_of(files.begin(), files.end(), is_there) &&
+         std::all_of(written.begin(), written.end(), is_there);
 }
 
 Json RunRecord::result(const std::string& stage) const {
   return json_["stages"].contains(stage) ? json_["stages"][stage]["result"] : Json();
 }
 
-void RunRecord::finish(const std::string& stage, double seconds, const Json& result) {
+void RunRecord::finish(const std::string& stage,
+                       double seconds,
+                       const Json& result,
+                       const std::vector<std::string>& files) {
   Json& stages = json_["stages"];
   Json kept = Json::object();
   for (const auto& [name, value] : stages.items()) {
@@ -129,6 +163,7 @@ void RunRecord::finish(const std::string& stage, double seconds, const Json& res
   stages = kept;
   json_.erase("outputs");
   stages[stage] = {{"seconds", seconds}, {"peak_memory", peak_memory()}, {"result", result}};
+  if (!files.empty()) stages[stage]["files"] = files;
   save();
 }
 

@@ -19,18 +19,23 @@ class RunRecord {
   /// `request` is everything that decides the result: arguments and hashes of the input files.
   /// \param decides  for keys of the request the first stage they have a say in; others decide all
   /// \throws InvalidInput if the folder holds another request's results and `overwrite` is not
-  ///         set; with it, the stages that another answer would come from are forgotten.
+  ///         set; with it, the stages that another answer would come from are forgotten, and
+  ///         their files removed: the new ones may have other names.
   RunRecord(std::filesystem::path folder,
             nlohmann::ordered_json request,
             bool overwrite,
             const std::map<std::string, std::string>& decides = {});
 
-  /// True if the stage was finished and each of its files is still there.
+  /// True if the stage was finished, and each of these files and of those it wrote is there.
   bool is_done(const std::string& stage, const std::vector<std::string>& files) const;
   /// What the stage reported when it finished; null if it did not.
   nlohmann::ordered_json result(const std::string& stage) const;
   /// Records a finished stage. Stages after it, done from older data, are forgotten.
-  void finish(const std::string& stage, double seconds, const nlohmann::ordered_json& result);
+  /// \param files  what it wrote, as paths below the folder
+  void finish(const std::string& stage,
+              double seconds,
+              const nlohmann::ordered_json& result,
+              const std::vector<std::string>& files = {});
 
   /// Keeps something else that is known of the run beside its stages; finish() forgets "outputs".
   void note(const std::string& key, const nlohmann::ordered_json& value);
@@ -45,7 +50,8 @@ class RunRecord {
 };
 
 /// The record in such a file: an object with "request" and with "stages", of which each has
-/// "seconds", "peak_memory" and "result"; null if the file holds none.
+/// "seconds", "peak_memory" and "result", and "files" unless an earlier version wrote it; null if
+/// the file holds none.
 nlohmann::ordered_json read_run_record(const std::filesystem::path& path);
 
 /// 64-bit FNV-1a of a file's content, as 16 hexadecimal digits. \throws BadInput

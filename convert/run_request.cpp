@@ -28,14 +28,25 @@ std::filesystem::path confidence_file(const std::filesystem::path& depth) {
   return is_folder(folder) ? depth_file_of({folder, false}, depth) : std::filesystem::path();
 }
 
-// Hashes of what goes in, by what it is.
-Json input_hashes(const SceneRequest& request, const Scene& scene) {
+// Hashes of the photographs and masks of views.
+Json photograph_hashes(const SceneRequest& request,
+                       const Scene& scene,
+                       const std::vector<int>& views) {
   Json out = Json::object();
-  for (const int i : scene.input) {
+  for (const int i : views) {
     const View& view = scene.views[static_cast<size_t>(i)];
     out[view.name] = file_hash(view.image_path);
     const auto mask = mask_file({request.path, request.options.allow_external}, view.image_path);
     if (mask) out[view.name + ", mask"] = file_hash(*mask);
+  }
+  return out;
+}
+
+// Hashes of what the model is made of, by what it is.
+Json input_hashes(const SceneRequest& request, const Scene& scene) {
+  Json out = photograph_hashes(request, scene, scene.input);
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
     if (view.depth_path.empty()) continue;
     out[view.name + ", depth"] = file_hash(view.depth_path);
     const std::filesystem::path confidence = confidence_file(view.depth_path);
@@ -46,6 +57,7 @@ Json input_hashes(const SceneRequest& request, const Scene& scene) {
   return out;
 }
 
+// Of the cameras, and of what came with them that says how far away to look.
 uint64_t cameras_hash(const Scene& scene) {
   Json cameras = Json::array();
   for (const View& view : scene.views) {
@@ -55,6 +67,11 @@ uint64_t cameras_hash(const Scene& scene) {
                        {c.width, c.height, c.fx, c.fy, c.cx, c.cy},
                        std::vector<double>(pose.data(), pose.data() + pose.size()),
                        lens_numbers(view)});
+    if (view.near > 0) cameras.push_back({view.near, view.far});
+  }
+  for (const SparsePoint& point : scene.points) {
+    const Eigen::Vector3d& p = point.position;
+    cameras.push_back({p.x(), p.y(), p.z(), point.views});
   }
   return content_hash(json_text(cameras, -1));
 }
@@ -88,12 +105,14 @@ void refuse_contradictions(const RunRequest& request) {
   }
 }
 
+bool has_given_depth(const SceneRequest& request, const Scene& scene) {
+  const bool has_files = std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
+    return !scene.views[static_cast<size_t>(i)].depth_path.empty();
+  });
+  return has_files || !request.options.depth.network.empty();
+}
+
 Json request_json(const RunRequest& request, const Scene& scene) {
-  Json held_out = Json::object();
-  for (const int i : scene.held_out) {
-    const View& view = scene.views[static_cast<size_t>(i)];
-    held_out[view.name] = file_hash(view.image_path);
-  }
   Json out = {{"scene", std::filesystem::weakly_canonical(request.scene.path).string()},
               {"views", request.scene.options.views},
               {"downscale", request.scene.options.downscale.value_or(0)},
@@ -108,7 +127,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
               {"compression_error", request.compression_error},
               {"max_size", request.max_size},
               {"input_images", input_hashes(request.scene, scene)},
-              {"held_out_images", held_out},
+              {"held_out_images", photograph_hashes(request.scene, scene, scene.held_out)},
               {"cameras", cameras_hash(scene)}};
   // The cameras have moved with it; what is left is the sigma of the scale.
   const ControlRequest& control = request.scene.control;
@@ -122,10 +141,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     const bool is_default = encoding == GlbEncoding::Draco;
     if (encoding == request.glb_encoding && !is_default) out["glb_encoding"] = name;
   }
-  const bool has_depth = std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
-    return !scene.views[static_cast<size_t>(i)].depth_path.empty();
-  });
-  if (has_depth || !request.scene.options.depth.network.empty()) {
+  if (has_given_depth(request.scene, scene)) {
     out["depth"] = {static_cast<int>(scene.depth_kind), scene.depth_scale};
   }
   return out;

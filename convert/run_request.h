@@ -47,6 +47,9 @@ void refuse_contradictions(const RunRequest& request);
 /// \throws InvalidInput as parse_length()
 void check_lengths(const RunRequest& request, Frame frame);
 
+/// True if depth goes in beside the photographs, from files or a network.
+bool has_given_depth(const SceneRequest& request, const Scene& scene);
+
 /// Everything that decides the result of a request: arguments, and hashes of what goes in.
 nlohmann::ordered_json request_json(const RunRequest& request, const Scene& scene);
 

@@ -29,6 +29,14 @@ struct RunArgs {
   std::string budget;
 };
 
+size_t asked_size(const std::string& text) {
+  constexpr size_t kLeast = 1000;  // of a file with nothing in it
+  const size_t bytes = parse_file_size(text);
+  if (bytes >= kLeast) return bytes;
+  throw InvalidInput("--max-size " + text + " is " + std::to_string(bytes) +
+                     " bytes, too few for any asset; write 800kB or 2MB");
+}
+
 // One paragraph a user reads after a run: what was made, how far to trust it, what to open.
 void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Terminal& terminal) {
   const auto& scale = report["scale"];
@@ -60,7 +68,7 @@ void run_run(const RunArgs& args) {
   RunRequest request = args.request;
   request.training = training_options(args.training);
   request.memory_limit = stated_memory_limit(args.common);
-  if (!args.max_size.empty()) request.max_size = parse_file_size(args.max_size);
+  if (!args.max_size.empty()) request.max_size = asked_size(args.max_size);
   if (!request.scene.assume_unit.empty()) (void)metres_in(request.scene.assume_unit);
   Terminal terminal(args.common.quiet, args.common.strict);
   const auto start = std::chrono::steady_clock::now();

@@ -23,6 +23,16 @@ TEST(RunRecord, AStageIsDoneOnceFinishedAndItsFilesAreThere) {
   EXPECT_TRUE(record.is_done("model", {"gaussians.ply"}));
 }
 
+TEST(RunRecord, AStageIsDoneWhileWhatItWroteIsThere) {
+  const test::TempDir dir;
+  write_file(dir / "splats.glb", "glb");
+  write_file(dir / "splats.spz", "spz");
+  RunRecord(dir.path(), {}, false).finish("splats", 1, nullptr, {"splats.glb", "splats.spz"});
+  EXPECT_TRUE(RunRecord(dir.path(), {}, false).is_done("splats", {"splats.glb"}));
+  std::filesystem::remove(dir / "splats.spz");
+  EXPECT_FALSE(RunRecord(dir.path(), {}, false).is_done("splats", {"splats.glb"}));
+}
+
 TEST(RunRecord, SurvivesReopening) {
   const test::TempDir dir;
   RunRecord(dir.path(), {{"scene", "a"}}, false).finish("model", 1, {{"gaussians", 7}});
@@ -75,6 +85,31 @@ TEST(RunRecord, OverwriteKeepsTheStagesAnotherAnswerDoesNotChange) {
   changed["views"] = "1,3";
   const RunRecord record(dir.path(), changed, true, decides);
   EXPECT_FALSE(record.is_done("model", {}));
+}
+
+TEST(RunRecord, OverwriteRemovesTheFilesOfWhatItForgets) {
+  const test::TempDir dir;
+  for (const char* name : {"a.ply", "b.glb", "c.txt"}) write_file(dir / name, "of a stage");
+  write_file(dir.path().parent_path() / "outside.txt", "of somebody else");
+  {
+    RunRecord record(dir.path(), {{"views", "1"}, {"size", 1}}, false);
+    record.finish("model", 1, nullptr, {"a.ply"});
+    record.finish("web", 1, nullptr, {"b.glb", "../outside.txt"});
+  }
+  const std::map<std::string, std::string> decides = {{"size", "web"}};
+  const RunRecord record(dir.path(), {{"views", "1"}, {"size", 2}}, true, decides);
+  EXPECT_TRUE(std::filesystem::exists(dir / "a.ply"));
+  EXPECT_FALSE(std::filesystem::exists(dir / "b.glb"));
+  EXPECT_TRUE(std::filesystem::exists(dir / "c.txt"));
+  EXPECT_TRUE(std::filesystem::remove(dir.path().parent_path() / "outside.txt"));
+}
+
+TEST(RunRecord, RefusesStagesWhoseFilesAreNone) {
+  const test::TempDir dir;
+  write_file(dir / "run.json",
+             R"({"request":{},"stages":{"model":{"seconds":1,"peak_memory":1,"result":1,)"
+             R"("files":[7]}}})");
+  EXPECT_TRUE(read_run_record(dir / "run.json").is_null());
 }
 
 TEST(RunRecord, RunningAStageAgainForgetsWhatFollowed) {

@@ -182,6 +182,45 @@ TEST_F(Verify, NamesTheInputThatChanged) {
   EXPECT_EQ(verify().exit_code, 0);
 }
 
+TEST_F(Verify, NamesTheMaskOfAHeldOutPhotographThatIsNew) {
+  fs::create_directories(scene() / "masks");
+  fs::copy_file(scene() / "images/v21.png", scene() / "masks/v21.png");
+  const auto masked = verify();
+  fs::remove_all(scene() / "masks");
+  EXPECT_EQ(masked.exit_code, 3);
+  EXPECT_NE(masked.out.find("input v21, mask: new"), std::string::npos) << masked.out;
+}
+
+TEST_F(Verify, ARunAgainBringsBackWhatIsMissing) {
+  const fs::path copy = *dir_ / "copy";
+  for (const char* name : {"mesh/watertight.stl", "web/splats.spz", "mesh/watertight.v11.jpg"}) {
+    fs::copy(out(), copy, fs::copy_options::recursive);
+    ASSERT_TRUE(fs::remove(copy / name)) << name;
+    const auto again = run_cgs(run_arguments(scene(), copy));
+    EXPECT_EQ(again.exit_code, 0) << again.err;
+    EXPECT_TRUE(results_in(copy) == results_in(out())) << name;
+    EXPECT_EQ(run_cgs("verify " + copy.string()).exit_code, 0);
+    fs::remove_all(copy);
+  }
+}
+
+TEST_F(Verify, OverwritingLeavesNothingOfWhatWasBefore) {
+  const fs::path copy = *dir_ / "copy";
+  fs::copy(out(), copy, fs::copy_options::recursive);
+  write_bytes(copy / "remarks.txt", "of the user");
+  const auto result = run_cgs("run " + scene().string() +
+                              " --views v12,v13 --set steps=3 --overwrite -q -o " + copy.string());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto outputs = nlohmann::json::parse(read_bytes(copy / "run.json"))["outputs"];
+  for (const auto& [name, bytes] : results_in(copy)) {
+    EXPECT_TRUE(outputs.contains(name) || name == "remarks.txt") << name;
+  }
+  EXPECT_FALSE(fs::exists(copy / "model/priors/v11.exr"));
+  EXPECT_FALSE(fs::exists(copy / "mesh/watertight.stl"));  // of unknown scale now
+  EXPECT_EQ(run_cgs("verify " + copy.string()).exit_code, 0);
+  fs::remove_all(copy);
+}
+
 // A second run does nothing, so it must not vouch for what happened to the files since the first.
 TEST_F(Verify, ARunThatDoesNothingLeavesTheHashes) {
   const std::string before = read_bytes(out() / "web/asset.glb");
@@ -232,6 +271,16 @@ TEST_F(Verify, FindsDepthThatWasGivenAndLeavesOutFilesOfTheUser) {
   const auto same = run_cgs("verify " + with_depth.string());
   EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
   EXPECT_NE(same.out.find("28 inputs"), std::string::npos) << same.out;
+
+  // Depth in metres is brought into the scene by its unit: another one makes another model.
+  const fs::path in_feet = *dir_ / "in_feet";
+  fs::copy(with_depth, in_feet, fs::copy_options::recursive);
+  const auto again = run_cgs("run " + scene().string() + " --views " + kInputViews +
+                             " --assume-unit ft --set steps=20 --overwrite -o " + in_feet.string() +
+                             " --depth " + depth.string() + " --depth-kind metric --depth-scale 1");
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ((again.out + again.err).find("done before"), std::string::npos) << again.err;
+  fs::remove_all(in_feet);
 
   // What low confidence takes out is no longer the same depth.
   fs::create_directories(*dir_ / "sensor/confidence");

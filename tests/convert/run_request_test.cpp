@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/run_request.h"
+
+#include <gtest/gtest.h>
+
+#include "io/atomic_file.h"
+#include "libcgs/core/error.h"
+#include "tests/support/temp_dir.h"
+
+namespace cgs {
+namespace {
+
+// Two photographs, the second of them held out.
+class RequestJson : public testing::Test {
+ protected:
+  RequestJson() {
+    request_.scene.path = dir_.path();
+    for (const char* name : {"a", "b"}) {
+      write_file(dir_ / (name + std::string(".png")), name);
+      View view;
+      view.name = name;
+      view.image_path = dir_ / (name + std::string(".png"));
+      scene_.views.push_back(view);
+    }
+    scene_.input = {0};
+    scene_.held_out = {1};
+  }
+  nlohmann::ordered_json json() const { return request_json(request_, scene_); }
+
+  test::TempDir dir_;
+  RunRequest request_;
+  Scene scene_;
+};
+
+TEST_F(RequestJson, TellsHowFarAwayIsLooked) {
+  const auto plain = json();
+  EXPECT_EQ(json(), plain);
+  scene_.views[0].near = 1;
+  scene_.views[0].far = 5;
+  const auto bounded = json();
+  EXPECT_NE(bounded["cameras"], plain["cameras"]);
+  scene_.views[0].far = 6;
+  EXPECT_NE(json()["cameras"], bounded["cameras"]);
+}
+
+TEST_F(RequestJson, TellsSparsePointsAndWhoSawThem) {
+  const auto plain = json();
+  scene_.points = {{{1, 2, 3}, {0, 1}}};
+  const auto seen = json();
+  EXPECT_NE(seen["cameras"], plain["cameras"]);
+  scene_.points[0].views = {0};
+  EXPECT_NE(json()["cameras"], seen["cameras"]);
+}
+
+TEST_F(RequestJson, TellsMasksOfHeldOutPhotographs) {
+  const auto plain = json();
+  std::filesystem::create_directory(dir_ / "masks");
+  for (const char* name : {"a", "b"}) {
+    write_file(dir_ / "masks" / (name + std::string(".png")), "mask");
+  }
+  const auto masked = json();
+  EXPECT_EQ(plain["held_out_images"].size(), 1u);
+  EXPECT_TRUE(masked["held_out_images"].contains("b, mask"));
+  EXPECT_TRUE(masked["input_images"].contains("a, mask"));
+}
+
+TEST_F(RequestJson, KnowsOfDepthFromFilesAndNetworks) {
+  EXPECT_FALSE(has_given_depth(request_.scene, scene_));
+  scene_.views[1].depth_path = dir_ / "b.png";  // held out: goes in nowhere
+  EXPECT_FALSE(has_given_depth(request_.scene, scene_));
+  scene_.views[0].depth_path = dir_ / "a.png";
+  EXPECT_TRUE(has_given_depth(request_.scene, scene_));
+  scene_.views[0].depth_path.clear();
+  request_.scene.options.depth.network = dir_ / "depth.onnx";
+  EXPECT_TRUE(has_given_depth(request_.scene, scene_));
+}
+
+}  // namespace
+}  // namespace cgs
