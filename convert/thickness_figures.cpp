@@ -58,7 +58,7 @@ Json thickness_json(const ThicknessSummary& summary, const FigureUnit& unit) {
           {"samples", summary.samples},
           {"without_far_side", summary.without_far_side},
           {"seen", part_json(summary.seen, unit.length)},
-          {"inferred", part_json(summary.inferred, unit.length)}};
+          {"unseen", part_json(summary.unseen, unit.length)}};
 }
 
 std::string thickness_text(const ThicknessPart& part, const FigureUnit& unit) {
@@ -84,15 +84,15 @@ void write_thickness_ply(const std::filesystem::path& path,
   TriangleMesh out = mesh.mesh;
   const Range range = range_of(thickness.value);
   VertexScalar value{"scalar_thickness", {}};
-  VertexScalar inferred{"scalar_thickness_inferred", {}};
+  VertexScalar unseen{"scalar_thickness_unseen", {}};
   out.colors.clear();
   for (size_t v = 0; v < thickness.value.size(); ++v) {
     const float t = thickness.value[v];
     out.colors.push_back(color_of(t, range));
     value.values.push_back(static_cast<float>(double(t) * mesh.frame.scale));
-    inferred.values.push_back(static_cast<float>(thickness.is_inferred[v]));
+    unseen.values.push_back(static_cast<float>(thickness.is_unseen[v]));
   }
-  write_mesh_ply(path, out, mesh.frame, {value, inferred});
+  write_mesh_ply(path, out, mesh.frame, {value, unseen});
 }
 
 }  // namespace cgs

@@ -2,7 +2,7 @@
 #include "meshing/block_grid.h"
 
 #include <algorithm>
-#include <string>
+#include <cstdio>
 
 #include "libcgs/core/error.h"
 
@@ -36,7 +36,17 @@ BlockGrid block_grid(const Eigen::AlignedBox3d& bounds, double voxel) {
   const double blocks = (high - low + Eigen::Vector3d::Ones()).prod();
   constexpr double kMaxBlocks = 1 << 28;
   if (!(largest < kMaxIndex) || !(blocks < kMaxBlocks)) {
-    throw LimitError("voxel size " + std::to_string(voxel) + " is too small for the bounds");
+    // In voxels, for nobody outside knows the unit of this one.
+    char text[200];  // NOLINT(modernize-avoid-c-arrays)
+    std::snprintf(text,
+                  sizeof(text),
+                  "the voxels are too small: %.3g of them along the longest side, %.3g in all; "
+                  "at most %.3g and %.3g can be made",
+                  (high - low).maxCoeff() * kBlockSide,
+                  blocks * double(kBlockVoxels),
+                  kMaxIndex,
+                  kMaxBlocks * double(kBlockVoxels));
+    throw LimitError(text);
   }
   const Eigen::Vector3i first = low.cast<int>();
   const Eigen::Vector3i count = (high - low).cast<int>() + Eigen::Vector3i::Ones();

@@ -12,6 +12,7 @@
 
 #include "meshing/components.h"
 #include "meshing/self_intersections.h"
+#include "meshing/shells.h"
 
 namespace cgs {
 
@@ -114,19 +115,24 @@ bool vertex_manifold(const TriangleMesh& mesh, const std::vector<HalfEdge>& edge
 
 // Components of negative volume are cavities: right only inside a component of positive volume.
 bool cavities_are_inside(const TriangleMesh& mesh, const MeshComponents& parts) {
-  std::vector<Eigen::AlignedBox3f> boxes(parts.area.size());
-  for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    for (const uint32_t v : mesh.faces[f]) boxes[parts.of_face[f]].extend(mesh.vertices[v]);
+  std::vector<uint32_t> cavities;
+  std::vector<uint32_t> bodies;
+  for (uint32_t c = 0; c < parts.volume.size(); ++c) {
+    (parts.volume[c] > 0 ? bodies : cavities).push_back(c);
   }
-  for (size_t c = 0; c < boxes.size(); ++c) {
-    if (parts.volume[c] > 0) continue;
-    bool inside = false;
-    for (size_t outer = 0; outer < boxes.size() && !inside; ++outer) {
-      inside = parts.volume[outer] > 0 && boxes[outer].contains(boxes[c]);
-    }
-    if (!inside) return false;
+  if (cavities.empty()) return true;
+  // The largest first: it has most of the cavities, if not all.
+  std::stable_sort(bodies.begin(), bodies.end(), [&](uint32_t a, uint32_t b) {
+    return parts.volume[a] > parts.volume[b];
+  });
+  const ShellNesting nesting(mesh, parts);
+  for (const uint32_t body : bodies) {
+    const std::vector<uint32_t> inside = nesting.within(body, cavities);
+    std::erase_if(cavities,
+                  [&](uint32_t c) { return std::binary_search(inside.begin(), inside.end(), c); });
+    if (cavities.empty()) return true;
   }
-  return true;
+  return false;
 }
 
 size_t used_vertices(const TriangleMesh& mesh) {

@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "meshing/measured_value.h"
 #include "meshing/mesh_distance.h"
 #include "meshing/triangle_tree.h"
 
@@ -19,10 +20,6 @@ Change judge(double distance, double sigma, bool both_observed) {
   constexpr double kSigmas = 2;
   if (std::abs(distance) <= kSigmas * sigma) return Change::None;
   return distance < 0 ? Change::Nearer : Change::Farther;
-}
-
-bool was_seen(Provenance provenance) {
-  return provenance == Provenance::Observed || provenance == Provenance::SingleView;
 }
 
 ComparedPoints cloud_points(const MeasurableMesh& mesh) {

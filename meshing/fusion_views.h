@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <atomic>
 #include <cstddef>
+#include <exception>
+#include <mutex>
 #include <span>
 #include <utility>
 
@@ -26,23 +29,41 @@ class FusionViews {
   size_t size() const { return count_; }
   bool are_in_memory() const { return source_ == nullptr; }
   /// Calls work(i, view) for views first ... last - 1, several at once.
+  /// \throws what the first view throws that fails, whichever thread met which
   template <typename Work>
   void each(size_t first, size_t last, bool with_color, const Work& work) const {
+    std::atomic<size_t> first_failed = last;
+    std::exception_ptr failure;
+    std::mutex mutex;
     tbb::parallel_for(first, last, [&](size_t i) {
-      if (are_in_memory()) {
-        work(i, views_[i]);
-        return;
+      if (i > first_failed) return;
+      try {
+        do_one(i, with_color, work);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        if (i > first_failed) return;
+        first_failed = i;
+        failure = std::current_exception();
       }
-      // Nested loops of a waiting thread must not begin another view: that would hold one more.
-      tbb::this_task_arena::isolate([&] {
-        TsdfView view = source_->view(i, with_color);
-        validate_view(view, i);
-        work(i, std::move(view));
-      });
     });
+    if (failure) std::rethrow_exception(failure);
   }
 
  private:
+  template <typename Work>
+  void do_one(size_t i, bool with_color, const Work& work) const {
+    if (are_in_memory()) {
+      work(i, views_[i]);
+      return;
+    }
+    // Nested loops of a waiting thread must not begin another view: that would hold one more.
+    tbb::this_task_arena::isolate([&] {
+      TsdfView view = source_->view(i, with_color);
+      validate_view(view, i);
+      work(i, std::move(view));
+    });
+  }
+
   std::span<const TsdfView> views_;
   const TsdfSource* source_ = nullptr;
   size_t count_;

@@ -19,6 +19,11 @@ inline Provenance weaker_evidence(Provenance a, Provenance b) {
   return evidence_rank(a) < evidence_rank(b) ? a : b;
 }
 
+/// Whether a photograph vouches for surface of this label.
+inline bool was_seen(Provenance label) {
+  return label == Provenance::Observed || label == Provenance::SingleView;
+}
+
 /// A figure taken from a mesh, with what it rests on.
 struct MeasuredValue {
   double value = 0;   ///< [internal units to the power of `dimension`], as sigma and the parts.

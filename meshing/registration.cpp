@@ -104,9 +104,10 @@ Vector7 step(const std::vector<Pair>& all,
   constexpr double kSliding = 1e-8;
   if (!(eigen.eigenvalues()[0] > kSliding * eigen.eigenvalues()[unknowns - 1])) {
     throw NumericalError(
-        "the surfaces do not hold each other in every direction (a plane, a ball or a tube "
-        "slides); "
-        "register without --icp");
+        "the surfaces do not hold each other in every direction: a plane, a ball or a tube slides, "
+        "and so do surfaces that hardly meet, being of other units or elsewhere; lay them onto "
+        "each "
+        "other first, and compare without --icp");
   }
   Vector7 out = Vector7::Zero();
   out.head(unknowns) = part.ldlt().solve(right.head(unknowns));

@@ -250,7 +250,7 @@ ShapeFit common_part(const Patch& patch, Shape shape, double radius) {
   out.vertices = patch.vertices;
   out.area.dimension = 2;
   out.area.value = patch.area * radius * radius;
-  for (size_t i = 0; i < 4; ++i) {
+  for (size_t i = 0; i < kProvenanceCount; ++i) {
     out.area.by_provenance.at(i) = patch.area_of_label.at(i) * radius * radius;
   }
   out.area.stated = patch.stated_area / patch.area;
@@ -261,7 +261,7 @@ void set_radius(ShapeFit& out, double value, double variance, const Patch& patch
   out.radius.value = value;
   out.radius.sigma = std::sqrt(variance);
   out.radius.stated = patch.stated_area / patch.area;
-  for (size_t i = 0; i < 4; ++i) {
+  for (size_t i = 0; i < kProvenanceCount; ++i) {
     out.radius.by_provenance.at(i) = value * patch.area_of_label.at(i) / patch.area;
   }
 }

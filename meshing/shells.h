@@ -2,10 +2,39 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
+#include <Eigen/Geometry>
+
+#include "libcgs/core/measurable_mesh.h"
 #include "libcgs/core/triangle_mesh.h"
+#include "meshing/components.h"
 
 namespace cgs {
+
+class NearestSurface;
+
+/// Tells which shells of a mesh lie within which. Mesh and parts must outlive it.
+/// \pre every shell is closed, neighbours agree on the winding
+class ShellNesting {
+ public:
+  ShellNesting(const TriangleMesh& mesh, const MeshComponents& parts);
+
+  /// Those of `shells` on the inner side of `outer`, whichever way that one looks. Costs no more
+  /// than boxes where none lies in the box of `outer`. Shells that cut it are on the side of the
+  /// first vertex off its surface; those that lie on it are not within.
+  std::vector<uint32_t> within(uint32_t outer, const std::vector<uint32_t>& shells) const;
+
+ private:
+  MeasurableMesh alone(uint32_t shell) const;
+  bool is_within(uint32_t shell, const NearestSurface& outer, bool inside_out) const;
+
+  const TriangleMesh& mesh_;
+  const MeshComponents& parts_;
+  std::vector<std::vector<uint32_t>> faces_;  // per shell
+  std::vector<Eigen::AlignedBox3f> boxes_;    // per shell
+};
 
 /// A mesh whose shells bound one solid.
 struct SettledShells {

@@ -111,9 +111,6 @@ MeasuredValue enclosed_volume(const MeasurableMesh& mesh) {
     out.value += (t.a - middle).dot((t.b - middle).cross(t.c - middle)) / 6;
   }
   const auto areas = surface_area(mesh);
-  for (size_t i = 0; i < kProvenanceCount && areas.value > 0; ++i) {
-    out.by_provenance.at(i) = out.value * areas.by_provenance.at(i) / areas.value;
-  }
   out.stated = areas.stated;
   if (out.stated == 0) return out;
   // A vertex that moves by d sweeps d times its share of the area vectors around it.

@@ -31,9 +31,10 @@ class SigmaSum {
 /// Area of all faces.
 MeasuredValue surface_area(const MeasurableMesh& mesh);
 
-/// Volume within the faces; its parts are the shares of the area around it. sigma is that of the
-/// part of the surface that states one: the rest is unknown, and moves the volume by its area times
-/// its own error. \pre the mesh is closed and oriented, else the figure means nothing
+/// Volume within the faces. It has no parts by provenance: what is observed is the surface around
+/// it. sigma is that of the part of the surface that states one: the rest is unknown, and moves the
+/// volume by its area times its own error. \pre the mesh is closed and oriented, else the figure
+/// means nothing
 MeasuredValue enclosed_volume(const MeasurableMesh& mesh);
 
 /// Centre of the area of all faces [internal units]. \pre the mesh has area

@@ -40,9 +40,12 @@ double twice_area(const MeasurableMesh& mesh, uint32_t face) {
   return (mesh.points[f[1]] - a).cross(mesh.points[f[2]] - a).norm();
 }
 
-bool is_inferred(const Thickness& t, bool states_provenance) {
-  return states_provenance &&
-         t.value.by_provenance.at(static_cast<size_t>(Provenance::Inferred)) > 0;
+// One end at least has a label that no photograph vouches for.
+bool is_unseen(const Thickness& t) {
+  for (size_t label = 0; label < kProvenanceCount; ++label) {
+    if (t.value.by_provenance.at(label) > 0) return !was_seen(static_cast<Provenance>(label));
+  }
+  return false;  // the mesh states no labels
 }
 
 ThicknessPart part_of_all(std::vector<double> values, size_t all) {
@@ -183,17 +186,17 @@ ThicknessSummary summarize_thickness(const MeasurableMesh& mesh,
     found[i] = gauge.at(on_face(mesh, places.faces[i], weights));
   });
   std::vector<double> seen;
-  std::vector<double> inferred;
+  std::vector<double> unseen;
   for (const Thickness& t : found) {
     if (!t.has_far_side()) continue;
-    (is_inferred(t, mesh.states_provenance()) ? inferred : seen).push_back(t.value.value);
+    (is_unseen(t) ? unseen : seen).push_back(t.value.value);
   }
   ThicknessSummary out;
   out.samples = found.size();
   out.without_far_side =
-      1 - static_cast<double>(seen.size() + inferred.size()) / static_cast<double>(found.size());
+      1 - static_cast<double>(seen.size() + unseen.size()) / static_cast<double>(found.size());
   out.seen = part_of_all(std::move(seen), found.size());
-  out.inferred = part_of_all(std::move(inferred), found.size());
+  out.unseen = part_of_all(std::move(unseen), found.size());
   return out;
 }
 
@@ -208,16 +211,16 @@ VertexThickness thickness_of_vertices(const MeasurableMesh& mesh, const NearestS
   std::vector<double> sums(mesh.points.size(), 0);
   std::vector<double> areas(mesh.points.size(), 0);
   VertexThickness out;
-  out.is_inferred.assign(mesh.points.size(), 0);
+  out.is_unseen.assign(mesh.points.size(), 0);
   for (size_t f = 0; f < of_face.size(); ++f) {
     if (!of_face[f].has_far_side()) continue;
     const double area = twice_area(mesh, static_cast<uint32_t>(f));
-    const bool invented = is_inferred(of_face[f], mesh.states_provenance());
+    const bool unseen = is_unseen(of_face[f]);
     for (const uint32_t v : mesh.mesh.faces[f]) {
       const bool is_first = areas[v] == 0;
       sums[v] += area * of_face[f].value.value;
       areas[v] += area;
-      out.is_inferred[v] = invented && (is_first || out.is_inferred[v] != 0) ? 1 : 0;
+      out.is_unseen[v] = unseen && (is_first || out.is_unseen[v] != 0) ? 1 : 0;
     }
   }
   for (size_t v = 0; v < sums.size(); ++v) {

@@ -71,8 +71,8 @@ struct ThicknessPart {
 struct ThicknessSummary {
   size_t samples = 0;
   double without_far_side = 0;  ///< Share of the samples.
-  ThicknessPart seen;           ///< Neither end is inferred, or the mesh has no labels.
-  ThicknessPart inferred;       ///< One end at least was invented: so is the thickness.
+  ThicknessPart seen;           ///< A photograph vouches for both ends, or the mesh has no labels.
+  ThicknessPart unseen;         ///< One end at least is interpolated, virtual or invented.
 };
 
 /// \throws InvalidInput if the mesh has no area
@@ -84,7 +84,7 @@ ThicknessSummary summarize_thickness(const MeasurableMesh& mesh,
 /// has a far side.
 struct VertexThickness {
   std::vector<float> value;
-  std::vector<uint8_t> is_inferred;  ///< 1 where one end was invented behind each of its faces.
+  std::vector<uint8_t> is_unseen;  ///< 1 where no photograph vouches for one end behind each face.
 };
 VertexThickness thickness_of_vertices(const MeasurableMesh& mesh, const NearestSurface& surface);
 

@@ -405,7 +405,9 @@ FusedVolume fuse_streamed(const TsdfSource& source,
                           size_t view_memory) {
   options.validate();
   require(view_memory > 0, "fuse needs memory for views [bytes]", view_memory);
-  return Fuser(FusionViews(source), options, progress).run(view_memory);
+  // The rest of a small limit is for the voxels.
+  const size_t most = std::max(size_t{1}, options.memory_limit / 4);
+  return Fuser(FusionViews(source), options, progress).run(std::min(view_memory, most));
 }
 
 }  // namespace cgs

@@ -78,7 +78,7 @@ struct TsdfSource {
 };
 
 /// Fuses depth maps into a volume of three states.
-//////
+///
 /// - Bounds: the box of all surface points whose depth lies within the 1st and 99th percentile of
 ///   their view, plus truncation and two voxels.
 /// - Distance of a voxel in a view: depth difference along z times the cosine factor of the local
@@ -93,8 +93,9 @@ struct TsdfSource {
 ///   and others a voxel behind their surface, the larger weight wins; a tie keeps it.
 /// The result is bit-identical for any number of threads.
 ///
-/// Of a source, only as many views are held at once as fit into `view_memory`; beyond these, what
-/// has been summed up so far near the surface is kept instead. The result is that of all at once;
+/// Of a source, only as many views are held at once as fit into `view_memory` and into a quarter of
+/// options.memory_limit; beyond these, what has been summed up so far near the surface is kept
+/// instead. The result is that of all at once;
 /// a voxel size that is chosen is the median of at most kFootprints pixels, evenly spaced.
 ///
 /// \throws InvalidInput   if there is no view, a raster does not match its camera, or no pixel has

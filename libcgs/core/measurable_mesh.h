@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include <Eigen/Core>
@@ -28,7 +30,11 @@ struct MeasurableMesh {
     return (frame.origin - file_origin) + frame.scale * p;
   }
   bool states_provenance() const { return !mesh.provenance.empty(); }
-  bool states_sigma() const { return !mesh.sigma.empty(); }
+  /// Of any of its vertices: files of meshes without sigma may have the place for it.
+  bool states_sigma() const {
+    return std::any_of(
+        mesh.sigma.begin(), mesh.sigma.end(), [](float s) { return std::isfinite(s); });
+  }
 };
 
 }  // namespace cgs

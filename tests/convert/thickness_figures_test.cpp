@@ -21,10 +21,10 @@ TEST(ThicknessFigures, AreInTheUnitAskedForAndNullWithoutSamples) {
   const auto json = thickness_json(summary, millimetres);
   EXPECT_DOUBLE_EQ(json["seen"]["median"].get<double>(), 300);
   EXPECT_DOUBLE_EQ(json["seen"]["share"].get<double>(), 1);
-  EXPECT_TRUE(json["inferred"].is_null());
+  EXPECT_TRUE(json["unseen"].is_null());
   EXPECT_EQ(thickness_text(summary.seen, millimetres),
             "median 300 mm, 5 % below 200 and 5 % above 500, 100 to 600 (100.0 % of the surface)");
-  EXPECT_EQ(thickness_text(summary.inferred, millimetres), "none");
+  EXPECT_EQ(thickness_text(summary.unseen, millimetres), "none");
 }
 
 TEST(ThicknessFigures, ThePlyHasColoursAndScalarsInWorldUnits) {
@@ -34,11 +34,11 @@ TEST(ThicknessFigures, ThePlyHasColoursAndScalarsInWorldUnits) {
   VertexThickness thickness;
   for (int i = 0; i < 8; ++i) thickness.value.push_back(0.1f * float(i));
   thickness.value[3] = std::nanf("");
-  thickness.is_inferred = {0, 0, 0, 1, 0, 0, 0, 1};
+  thickness.is_unseen = {0, 0, 0, 1, 0, 0, 0, 1};
   write_thickness_ply(dir / "a.ply", mesh, thickness);
   const std::string bytes = test::read_bytes(dir / "a.ply");
   EXPECT_NE(bytes.find("property float scalar_thickness\n"), std::string::npos);
-  EXPECT_NE(bytes.find("property float scalar_thickness_inferred\n"), std::string::npos);
+  EXPECT_NE(bytes.find("property float scalar_thickness_unseen\n"), std::string::npos);
   const TriangleMesh read = read_mesh_ply(dir / "a.ply").mesh;
   ASSERT_EQ(read.colors.size(), 8U);
   EXPECT_GT(read.colors[0].x(), 2 * read.colors[0].y());       // thin is red

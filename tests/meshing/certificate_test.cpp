@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/solid_meshes.h"
+
 namespace cgs {
 namespace {
 
@@ -110,6 +112,39 @@ TEST(Certify, AllowsACavityButNotASecondBodyInsideOut) {
   TriangleMesh wrong = cube({0, 0, 0}, {4, 4, 4});
   append(wrong, cube({5, 5, 5}, {6, 6, 6}), true);
   EXPECT_FALSE(certify(wrong).oriented_outward);
+}
+
+TEST(Certify, ABodyInsideOutBesideTheMatterIsNoCavity) {
+  const TriangleMesh prism = test::l_prism_mesh().mesh;
+  EXPECT_TRUE(certify(prism).passed());
+  EXPECT_NEAR(certify(prism).volume, 5, 1e-12);
+  // The box around the prism has this one in it, its matter does not.
+  TriangleMesh wrong = prism;
+  append(wrong, cube({1.5f, 1.5f, 0.25f}, {2.5f, 2.5f, 0.75f}), true);
+  EXPECT_TRUE(certify(wrong).closed);
+  EXPECT_FALSE(certify(wrong).oriented_outward);
+  TriangleMesh beside = prism;
+  append(beside, cube({1.5f, 1.5f, 0.25f}, {2.5f, 2.5f, 0.75f}));
+  EXPECT_TRUE(certify(beside).passed());
+  TriangleMesh hollow = prism;
+  append(hollow, cube({0.25f, 1.5f, 0.25f}, {0.75f, 2.5f, 0.75f}), true);
+  EXPECT_TRUE(certify(hollow).passed());
+  append(hollow, cube({1.5f, 1.5f, 0.25f}, {2.5f, 2.5f, 0.75f}), true);
+  EXPECT_FALSE(certify(hollow).oriented_outward);
+}
+
+TEST(Certify, ACavityMayTouchAndMayLieBesideABodyWithinABody) {
+  TriangleMesh touching = cube({0, 0, 0}, {4, 4, 4});
+  TriangleMesh tip;
+  tip.vertices = {{2, 2, 4}, {2, 1, 3}, {1, 3, 3}, {3, 3, 3}};  // the first on the upper side
+  tip.faces = {{0, 1, 3}, {0, 2, 1}, {0, 3, 2}, {1, 2, 3}};
+  EXPECT_GT(certify(tip).volume, 0);
+  append(touching, tip, true);
+  EXPECT_TRUE(certify(touching).oriented_outward);
+  TriangleMesh nested = cube({0, 0, 0}, {4, 4, 4});
+  append(nested, cube({1, 1, 1}, {3, 2, 2}));
+  append(nested, cube({1, 2.5f, 1}, {3, 3, 2}), true);
+  EXPECT_TRUE(certify(nested).oriented_outward);
 }
 
 TEST(Certify, FindsTwoCubesThatShareOneVertex) {

@@ -85,6 +85,20 @@ TEST(Repaired, TurnsAClosedSolidOutwards) {
   EXPECT_EQ(out.turned_faces, 12U);
 }
 
+TEST(Repaired, TurnsABodyThatOnlyTheBoxOfAnotherHolds) {
+  TriangleMesh mesh = test::l_prism_mesh().mesh;
+  const auto first = static_cast<uint32_t>(mesh.vertices.size());
+  const TriangleMesh cube = test::cube_mesh(0.5).mesh;
+  for (const auto& p : cube.vertices) mesh.vertices.push_back(p + Eigen::Vector3f(2, 2, 0.25f));
+  for (const auto& f : cube.faces) {
+    mesh.faces.push_back({f[1] + first, f[0] + first, f[2] + first});
+  }
+  const RepairedMesh out = repaired(mesh);
+  EXPECT_EQ(out.turned_faces, 12U);
+  EXPECT_NEAR(certify(out.mesh).volume, 5.125, 1e-9);
+  EXPECT_TRUE(certify(out.mesh).passed());
+}
+
 TEST(Repaired, SplitsEdgesOfThreeFaces) {
   TriangleMesh fan;
   fan.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}};

@@ -84,6 +84,17 @@ TEST(FitShape, ACommonErrorReachesThePlane) {
   EXPECT_NEAR(fit.area.stated, 1, 1e-12);
 }
 
+TEST(FitShape, EveryLabelHasItsPart) {
+  for (size_t label = 0; label < kProvenanceCount; ++label) {
+    const MeasurableMesh ball = test::with_labels(test::sphere_mesh(0.4), [&](const auto& p) {
+      return p.z() > 0 ? static_cast<Provenance>(label) : Provenance::Observed;
+    });
+    const ShapeFit fit = fit_shape(ball, Shape::Sphere, {0, 0, 0.4}, 0.2);  // above z = 0 only
+    EXPECT_DOUBLE_EQ(fit.area.by_provenance.at(label), fit.area.value) << label;
+    EXPECT_DOUBLE_EQ(fit.radius.by_provenance.at(label), fit.radius.value) << label;
+  }
+}
+
 TEST(FitShape, RefusesWhatDeterminesNothing) {
   const MeasurableMesh mesh = test::cube_mesh();
   EXPECT_THROW(fit_shape(mesh, Shape::Sphere, {0.5, 0.5, 1}, 0.3), NumericalError);

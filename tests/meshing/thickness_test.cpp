@@ -236,8 +236,28 @@ TEST(Thickness, BelongsToTheWeakerOfItsEnds) {
   const NearestSurface surface(plate);
   const ThicknessSummary all = summarize_thickness(plate, surface, 2000);
   EXPECT_EQ(all.seen.share, 0);  // every ball touches the lower side or the rim
-  EXPECT_NEAR(all.inferred.median, 0.02, 1e-9);
-  EXPECT_NEAR(all.seen.share + all.inferred.share, 1, 1e-12);
+  EXPECT_NEAR(all.unseen.median, 0.02, 1e-9);
+  EXPECT_NEAR(all.seen.share + all.unseen.share, 1, 1e-12);
+}
+
+TEST(Thickness, IsSeenOnlyWhereAPhotographVouchesForBothEnds) {
+  for (const auto& [label, is_seen] : {std::pair(Provenance::Observed, true),
+                                       std::pair(Provenance::SingleView, true),
+                                       std::pair(Provenance::Interpolated, false),
+                                       std::pair(Provenance::Virtual, false),
+                                       std::pair(Provenance::Inferred, false)}) {
+    const MeasurableMesh plate =
+        test::with_labels(box_mesh(1, 1, 0.02), [&, below = label](const Vector3d& p) {
+          return p.z() > 0.015 ? Provenance::Observed : below;
+        });
+    const NearestSurface surface(plate);
+    const ThicknessSummary all = summarize_thickness(plate, surface, 2000);
+    EXPECT_EQ(all.seen.share, is_seen ? 1 : 0) << int(label);
+    EXPECT_EQ(all.unseen.share, is_seen ? 0 : 1) << int(label);
+    for (const uint8_t unseen : thickness_of_vertices(plate, surface).is_unseen) {
+      EXPECT_EQ(unseen, is_seen ? 0 : 1) << int(label);
+    }
+  }
 }
 
 TEST(Thickness, IsNoneWhereNothingLiesBehind) {
@@ -248,7 +268,7 @@ TEST(Thickness, IsNoneWhereNothingLiesBehind) {
   EXPECT_EQ(summarize_thickness(sheet, surface, 100).without_far_side, 1);
   const VertexThickness vertices = thickness_of_vertices(sheet, surface);
   EXPECT_TRUE(std::isnan(vertices.value[12]));
-  EXPECT_EQ(vertices.is_inferred[12], 0);  // nobody invented a far side: there is none
+  EXPECT_EQ(vertices.is_unseen[12], 0);  // nobody invented a far side: there is none
 }
 
 TEST(Thickness, OfVerticesIsThatOfTheirFaces) {
@@ -261,7 +281,7 @@ TEST(Thickness, OfVerticesIsThatOfTheirFaces) {
       return p.z() > 0.015 || is_seen_below ? Provenance::Observed : Provenance::Inferred;
     });
     const VertexThickness found = thickness_of_vertices(plate, NearestSurface(plate));
-    for (const uint8_t inferred : found.is_inferred) EXPECT_EQ(inferred, is_seen_below ? 0 : 1);
+    for (const uint8_t unseen : found.is_unseen) EXPECT_EQ(unseen, is_seen_below ? 0 : 1);
   }
 }
 

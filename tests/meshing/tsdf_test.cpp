@@ -486,6 +486,8 @@ TEST(Fuse, GivesTheSameBitsAtTwiceTheScale) {
 TEST(Fuse, HoldsASourceToItsMemoryAndItsViewsToTheirCameras) {
   std::vector<TsdfView> views = varied_views();
   EXPECT_THROW(fuse_streamed(source_of(views), {.memory_limit = 1000000}, {}, 1), LimitError);
+  const TsdfOptions coarse = {.voxel_size = 0.05, .memory_limit = size_t{12} << 20};
+  EXPECT_GT(fuse_streamed(source_of(views), coarse).report.portions, 1U);
   views[3].sigma = DepthMap(3, 3, 1);
   EXPECT_THROW(fuse_streamed(source_of(views), {}, {}, 1), InvalidInput);
   EXPECT_THROW(fuse_streamed(TsdfSource{}, {}), InvalidInput);

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <sstream>
+#include <string>
+#include <utility>
 
 #include "libcgs/core/measurable_mesh.h"
 
@@ -61,6 +64,34 @@ inline MeasurableMesh cube_mesh(double side = 1) {
                     {2, 4, 6},
                     {1, 3, 5},
                     {3, 7, 5}};
+  return with_vertices(std::move(out));
+}
+
+/// A prism over an L of height 1 and volume 5: the box [0, 3] x [0, 3] without what lies beyond
+/// (1, 1).
+inline MeasurableMesh l_prism_mesh() {
+  MeasurableMesh out;
+  for (const double z : {0.0, 1.0}) {
+    for (const auto& [x, y] : {std::pair(0, 0),
+                               std::pair(3, 0),
+                               std::pair(3, 1),
+                               std::pair(1, 1),
+                               std::pair(1, 3),
+                               std::pair(0, 3)}) {
+      out.points.emplace_back(x, y, z);
+    }
+  }
+  constexpr uint32_t kInner = 3;  // the corner that sees all others
+  for (const uint32_t v : {4U, 5U, 0U, 1U}) {
+    const uint32_t next = (v + 1) % 6;
+    out.mesh.faces.push_back({kInner, next, v});
+    out.mesh.faces.push_back({kInner + 6, v + 6, next + 6});
+  }
+  for (uint32_t v = 0; v < 6; ++v) {
+    const uint32_t next = (v + 1) % 6;
+    out.mesh.faces.push_back({v, next, next + 6});
+    out.mesh.faces.push_back({v, next + 6, v + 6});
+  }
   return with_vertices(std::move(out));
 }
 
@@ -137,6 +168,20 @@ inline MeasurableMesh with_labels(MeasurableMesh mesh,
         label((mesh.points[f[0]] + mesh.points[f[1]] + mesh.points[f[2]]) / 3));
   }
   return mesh;
+}
+
+/// The mesh as an OBJ file, moved by `shift`.
+inline std::string obj_text(const MeasurableMesh& mesh, const Eigen::Vector3d& shift = {0, 0, 0}) {
+  std::ostringstream out;
+  out.precision(17);
+  for (const Eigen::Vector3d& p : mesh.points) {
+    const Eigen::Vector3d q = p + shift;
+    out << "v " << q.x() << ' ' << q.y() << ' ' << q.z() << '\n';
+  }
+  for (const auto& f : mesh.mesh.faces) {
+    out << "f " << f[0] + 1 << ' ' << f[1] + 1 << ' ' << f[2] + 1 << '\n';
+  }
+  return out.str();
 }
 
 }  // namespace cgs::test
