@@ -10,6 +10,7 @@
 #include <Eigen/Eigenvalues>
 #include <nlohmann/json.hpp>
 
+#include "convert/frame_json.h"
 #include "convert/html.h"
 #include "convert/length.h"
 #include "convert/model.h"
@@ -228,8 +229,6 @@ ControlFit checked_fit(const std::vector<Sighted>& points, const std::filesystem
   }
 }
 
-Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 Json rms_json(const Json& points, const std::string& role) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   int count = 0;
@@ -247,7 +246,7 @@ Json rms_json(const Json& points, const std::string& role) {
 Json point_json(const Sighted& s, const ControlResidual* residual) {
   Json out = {{"name", s.point.name},
               {"role", s.point.is_check ? "check" : "control"},
-              {"known", vector_json(s.point.position)},
+              {"known", vector_to_json(s.point.position)},
               {"sigma", s.point.sigma},
               {"photographs", s.photographs},
               {"reprojection", nullptr},
@@ -257,7 +256,7 @@ Json point_json(const Sighted& s, const ControlResidual* residual) {
               {"remark", s.remark}};
   if (residual == nullptr) return out;
   out["reprojection"] = s.reprojection;
-  out["residual"] = vector_json(residual->off);
+  out["residual"] = vector_to_json(residual->off);
   out["sigmas"] = residual->sigmas;
   out["used"] = residual->is_used;
   if (!residual->is_used && !s.point.is_check) out["remark"] = "disagrees with the others";

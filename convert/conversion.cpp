@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <initializer_list>
 #include <optional>
 #include <utility>
 
@@ -313,47 +314,63 @@ Json leave_out_floaters(GaussianFile& file, size_t memory_limit, const Terminal&
   return floaters_to_json(found, file.frame);
 }
 
-void refuse_for_splats(const ConversionRequest& request) {
+/// Refuses every option that would change nothing between this input and this output.
+void refuse_without_effect(const ConversionRequest& request, const Source& source, Content wanted) {
   const ConversionRequest usual;
   const VirtualCameraOptions& cameras = request.volume.cameras;
-  const bool is_spz = lower_extension(request.output) == ".spz";
-  const std::initializer_list<std::pair<bool, const char*>> options = {
-      {request.open_surface, "--open"},
-      {!request.simplify.empty(), "--simplify"},
-      {!request.volume.voxel_size.empty(), "--voxel-size"},
-      {request.encoding != usual.encoding, "--glb-encoding"},
-      {cameras.placement != usual.volume.cameras.placement, "--look-from"},
-      {cameras.views != usual.volume.cameras.views, "--virtual-views"},
-      {cameras.size != usual.volume.cameras.size, "--virtual-size"},
-      {!is_spz && request.spz_version != usual.spz_version, "--spz-version"}};
-  for (const auto& [is_given, name] : options) {
-    if (is_given) {
-      throw InvalidInput(std::string(name) + " has no effect on " +
-                         printable(request.output.filename()));
-    }
+  const VirtualCameraOptions& usual_cameras = usual.volume.cameras;
+  const std::string extension = lower_extension(request.output);
+  const bool to_mesh = wanted == Content::Mesh;
+  const bool to_glb = to_mesh && extension == ".glb";
+  const bool to_other = wanted != Content::Splats;
+  const bool from_file = source.splats.has_value();
+  const char* const splats_alone = "is for files of splats alone";
+  struct Option {
+    const char* name;
+    bool is_given;
+    bool fits;
+    const char* otherwise;
+    bool fits_output = true;
+  };
+  const std::initializer_list<Option> options = {
+      {"--open",
+       request.open_surface,
+       source.content != Content::Mesh,
+       "has no effect on an input that is a mesh already",
+       to_mesh},
+      {"--filter-floaters", request.filter_floaters, from_file, splats_alone},
+      {"--voxel-size",
+       !request.volume.voxel_size.empty(),
+       source.content == Content::Splats,
+       "has no effect on an input that holds no splats",
+       to_other},
+      {"--compression-error",
+       !request.compression_error.empty(),
+       to_glb,
+       "is for meshes in .glb alone"},
+      {"--simplify", !request.simplify.empty(), true, "", to_mesh},
+      {"--glb-encoding", request.encoding != usual.encoding, true, "", to_glb},
+      {"--look-from",
+       cameras.placement != usual_cameras.placement,
+       from_file,
+       splats_alone,
+       to_other},
+      {"--virtual-views", cameras.views != usual_cameras.views, from_file, splats_alone, to_other},
+      {"--virtual-size", cameras.size != usual_cameras.size, from_file, splats_alone, to_other},
+      {"--spz-version", request.spz_version != usual.spz_version, true, "", extension == ".spz"}};
+  for (const Option& option : options) {
+    if (!option.is_given || (option.fits && option.fits_output)) continue;
+    throw InvalidInput(std::string(option.name) + " " +
+                       (option.fits ? "has no effect on " + printable(request.output.filename())
+                                    : option.otherwise));
   }
 }
 
 /// Refuses at once what would be refused after minutes of work.
 void check_before_work(const ConversionRequest& request, const Source& source, Content wanted) {
   require_writable_as(request.output, source.frame);
-  if (source.content == Content::Mesh && request.open_surface) {
-    throw InvalidInput("--open has no effect on an input that is a mesh already");
-  }
-  if (!source.splats && request.filter_floaters) {
-    throw InvalidInput("--filter-floaters is for files of splats alone");
-  }
-  if (source.content != Content::Splats && !request.volume.voxel_size.empty()) {
-    throw InvalidInput("--voxel-size has no effect on an input that holds no splats");
-  }
-  if (!request.compression_error.empty() &&
-      (wanted != Content::Mesh || lower_extension(request.output) != ".glb")) {
-    throw InvalidInput("--compression-error is for meshes in .glb alone");
-  }
-  if (wanted == Content::Splats) {
-    refuse_for_splats(request);
-    return;
-  }
+  refuse_without_effect(request, source, wanted);
+  if (wanted == Content::Splats) return;
   if (!request.volume.voxel_size.empty())
     (void)parse_length(request.volume.voxel_size, source.frame);
   if (!request.compression_error.empty()) {

@@ -25,48 +25,83 @@ constexpr std::array<double, 23> kFactors = {0.001, 0.01, 0.0254, 0.1, 0.3048, 0
                                              0.9,   0.95, 0.975,  1,   1.025,  1.05, 1.1,   1.25,
                                              1.5,   2,    3.281,  10,  39.37,  100,  1000};
 
-/// Some frames, and what they measured of what others did.
+/// Some frames at some of their pixels, and what these measured of what others did.
+///
+/// Every frame is asked for when it is needed and let go: of full size, only one is there at a
+/// time.
 class Comparison {
  public:
   Comparison(const std::vector<Camera>& cameras, const std::function<TsdfView(size_t)>& frame)
-      : cameras_(cameras), frame_(frame) {}
-
-  /// Median of what depth multiplied by `factor` is off; NaN if too little is shown twice.
-  double off(double factor) {
-    std::vector<double> all;
-    size_t looked_at = 0;
-    const size_t count = std::min(kFrames, cameras_.size());
+      : cameras_(cameras), frame_(frame) {
+    const size_t count = std::min(kFrames, cameras.size());
     for (size_t n = 0; n < count; ++n) {
-      const size_t i = n * cameras_.size() / count;
-      const size_t k = partner(i, kFarthest * factor * frame(i).median_depth);
-      if (k != i) looked_at += compare(i, k, factor, all);
+      const size_t i = n * cameras.size() / count;
+      sampled_.push_back(sampled(frame(i)));
+      for (size_t f = 0; f < kFactors.size(); ++f) {
+        const size_t k = partner(i, kFarthest * kFactors.at(f) * sampled_.back().median_depth);
+        if (k != i) asked_[k].push_back({n, f});
+      }
     }
-    if (all.size() < kFewest || double(all.size()) < kFewestShare * double(looked_at)) {
-      return std::numeric_limits<double>::quiet_NaN();
+  }
+
+  /// Per factor the median of what depth multiplied by it is off; NaN if too little is shown twice.
+  std::map<double, double> off() {
+    std::array<Found, kFactors.size()> found;
+    for (const auto& [k, pairs] : asked_) {
+      const TsdfView to = frame_(k);
+      for (const Pair& pair : pairs) {
+        compare(sampled_[pair.from], to, kFactors.at(pair.factor), found.at(pair.factor));
+      }
     }
-    return median(all);
+    std::map<double, double> out;
+    for (size_t f = 0; f < kFactors.size(); ++f) {
+      auto& [off, looked_at] = found.at(f);
+      const bool is_enough =
+          off.size() >= kFewest && double(off.size()) >= kFewestShare * double(looked_at);
+      out[kFactors.at(f)] = is_enough ? median(off) : std::numeric_limits<double>::quiet_NaN();
+    }
+    return out;
   }
 
  private:
   static constexpr double kFarthest = 1.5;  // partner [depths]
 
+  // A pixel with depth.
+  struct Pixel {
+    int x = 0;
+    int y = 0;
+    float depth = 0;
+  };
   // What is kept of a frame.
-  struct Frame {
+  struct Sampled {
     Camera camera;
-    DepthMap depth;
+    std::vector<Pixel> pixels;
     double median_depth = 0;
   };
+  // Indices of a sampled frame and a factor.
+  struct Pair {
+    size_t from = 0;
+    size_t factor = 0;
+  };
+  struct Found {
+    std::vector<double> off;
+    size_t looked_at = 0;
+  };
 
-  const Frame& frame(size_t i) {
-    const auto found = frames_.find(i);
-    if (found != frames_.end()) return found->second;
-    TsdfView view = frame_(i);
+  static Sampled sampled(const TsdfView& view) {
+    Sampled out;
+    out.camera = view.camera;
+    for (int y = 0; y < view.depth.height; y += kStep) {
+      for (int x = 0; x < view.depth.width; x += kStep) {
+        if (view.depth(x, y) > 0) out.pixels.push_back({x, y, view.depth(x, y)});
+      }
+    }
     std::vector<double> values;
     for (const float z : view.depth.data) {
       if (z > 0) values.push_back(double(z));
     }
-    const double middle = values.empty() ? 0 : median(values);
-    return frames_.emplace(i, Frame{view.camera, std::move(view.depth), middle}).first->second;
+    if (!values.empty()) out.median_depth = median(values);
+    return out;
   }
 
   // The frame from as far off as allowed that looks the same way; itself if there is none.
@@ -84,43 +119,36 @@ class Comparison {
     return best;
   }
 
-  // Appends what pixels of a frame are off in its partner. \return how many were looked at
-  size_t compare(size_t i, size_t k, double factor, std::vector<double>& off) {
+  // Adds what pixels of a frame are off in its partner.
+  static void compare(const Sampled& from, const TsdfView& to, double factor, Found& found) {
     constexpr double kHidden = 0.7;  // of the depth: the partner shows something before it
-    const Frame& from = frame(i);
-    const Frame& to = frame(k);
-    size_t looked_at = 0;
-    for (int y = 0; y < from.depth.height; y += kStep) {
-      for (int x = 0; x < from.depth.width; x += kStep) {
-        const double z = factor * double(from.depth(x, y));
-        if (!(z > 0)) continue;
-        ++looked_at;
-        const Eigen::Vector3d uvz = to.camera.project(from.camera.unproject(x + 0.5, y + 0.5, z));
-        if (!to.camera.sees(uvz)) continue;
-        const double measured = factor * double(to.depth(int(uvz.x()), int(uvz.y())));
-        if (measured > kHidden * uvz.z()) off.push_back(std::abs(measured / uvz.z() - 1));
-      }
+    found.looked_at += from.pixels.size();
+    for (const Pixel& pixel : from.pixels) {
+      const double z = factor * double(pixel.depth);
+      const Eigen::Vector3d uvz =
+          to.camera.project(from.camera.unproject(pixel.x + 0.5, pixel.y + 0.5, z));
+      if (!to.camera.sees(uvz)) continue;
+      const double measured = factor * double(to.depth(int(uvz.x()), int(uvz.y())));
+      if (measured > kHidden * uvz.z()) found.off.push_back(std::abs(measured / uvz.z() - 1));
     }
-    return looked_at;
   }
 
   const std::vector<Camera>& cameras_;
   const std::function<TsdfView(size_t)>& frame_;
-  std::map<size_t, Frame> frames_;
+  std::vector<Sampled> sampled_;
+  std::map<size_t, std::vector<Pair>> asked_;  // per partner
 };
 
 }  // namespace
 
 DepthAgreement depth_agreement(const std::vector<Camera>& cameras,
                                const std::function<TsdfView(size_t)>& frame) {
-  Comparison comparison(cameras, frame);
   constexpr double kClearly = 1.5;
   constexpr double kNoise = 0.01;  // of sensors
   const auto is_worse = [&](double off, double than) {
     return !(off <= std::max(kNoise, kClearly * than));
   };
-  std::map<double, double> off;
-  for (const double factor : kFactors) off[factor] = comparison.off(factor);
+  const std::map<double, double> off = Comparison(cameras, frame).off();
   DepthAgreement out;
   out.off = off.at(1);
   double least = out.off;

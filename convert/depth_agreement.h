@@ -27,7 +27,8 @@ struct DepthAgreement {
 /// Compares some of the frames, at some of their pixels, with depth as it is and with depth of
 /// other units.
 /// \param cameras  of all frames [internal units]
-/// \param frame    the depth frame of a number; asked for some of them, which are kept
+/// \param frame    the depth frame of a number; asked for some of them, one after the other, of
+///                 which samples are kept
 DepthAgreement depth_agreement(const std::vector<Camera>& cameras,
                                const std::function<TsdfView(size_t)>& frame);
 

@@ -7,13 +7,13 @@ namespace cgs {
 
 namespace {
 
-nlohmann::ordered_json vector_to_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 Eigen::Vector3d vector_from_json(const nlohmann::ordered_json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
 }
 
 }  // namespace
+
+nlohmann::ordered_json vector_to_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 nlohmann::ordered_json frame_to_json(const Frame& frame) {
   return {{"origin", vector_to_json(frame.origin)},

@@ -7,6 +7,9 @@
 
 namespace cgs {
 
+/// [x, y, z]
+nlohmann::ordered_json vector_to_json(const Eigen::Vector3d& v);
+
 /// A frame as JSON, numbers in the shortest form that reads back to the same bits.
 nlohmann::ordered_json frame_to_json(const Frame& frame);
 Frame frame_from_json(const nlohmann::ordered_json& json);

@@ -308,6 +308,9 @@ Model read_model(const std::filesystem::path& folder) {
   if (!is_folder(folder)) {
     throw BadInput(Defect::Open, folder, "no such folder; give the model folder of a run");
   }
+  const bool is_of_run = !is_present(folder / "cameras.json") && is_present(folder / "run.json") &&
+                         is_folder(folder / "model");
+  if (is_of_run) return read_model(folder / "model");
   Model model;
   model.scene = read_cameras_json(folder / "cameras.json");
   const bool has_frame = model.scene.kind != kForeignCameras;

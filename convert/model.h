@@ -66,7 +66,8 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
 void write_model(const std::filesystem::path& folder, const Model& model);
 
 /// Reads what write_model() wrote, or gaussians.ply and cameras.json of 3DGS, which state no frame:
-/// it is then the canonical one of the splats. \throws BadInput
+/// it is then the canonical one of the splats. Of the folder of a run, the model in it.
+/// \throws BadInput
 Model read_model(const std::filesystem::path& folder);
 
 /// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model

@@ -10,6 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/frame_json.h"
 #include "convert/length.h"
 #include "convert/measured_file.h"
 #include "convert/memory_plan.h"
@@ -209,9 +210,9 @@ Heights heights_of(const Orthophoto& photo, const Placed& placed, const FigureUn
   return out;
 }
 
-std::filesystem::path with_ending(const std::filesystem::path& prefix, const char* ending) {
-  return prefix.string() + ending;
-}
+// Pictures first, then their world files in the same order.
+constexpr std::array<const char*, 6> kEndings = {
+    ".png", ".provenance.png", ".tif", ".pgw", ".provenance.pgw", ".tfw"};
 
 Json shares_json(const Orthophoto& photo, size_t covered, bool states_provenance) {
   std::array<size_t, kProvenanceCount> counts = {};
@@ -228,8 +229,6 @@ Json shares_json(const Orthophoto& photo, size_t covered, bool states_provenance
   return out;
 }
 
-Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 // Colour and label pictures, heights, and their world files; names as they lie in the folder. What
 // may run out of memory comes before the first file is there, so that none is left alone: heights
 // go first, as they are encoded while they are written. The photo's colours are gone afterwards.
@@ -242,19 +241,24 @@ Json write_files(const std::filesystem::path& prefix,
   const std::string colors = encode_png(photo.color, shown);
   photo.color = ColorImage();  // the largest part of a photo
   const std::string labels = encode_png(label_picture(photo), shown);
-  write_tiff(with_ending(prefix, ".tif"), heights);
-  write_file(with_ending(prefix, ".png"), colors);
-  write_file(with_ending(prefix, ".provenance.png"), labels);
-  Json out = {
-      prefix.string() + ".png", prefix.string() + ".provenance.png", prefix.string() + ".tif"};
-  for (const char* ending : {".pgw", ".provenance.pgw", ".tfw"}) {
-    write_file(with_ending(prefix, ending), world);
-    out.push_back(prefix.string() + ending);
-  }
+  const std::vector<std::filesystem::path> files = orthophoto_files(prefix);
+  write_tiff(files[2], heights);
+  write_file(files[0], colors);
+  write_file(files[1], labels);
+  for (size_t k = 3; k < files.size(); ++k) write_file(files[k], world);
+  Json out = Json::array();
+  for (const auto& file : files) out.push_back(file.string());
   return out;
 }
 
 }  // namespace
+
+std::vector<std::filesystem::path> orthophoto_files(const std::filesystem::path& prefix) {
+  std::vector<std::filesystem::path> out;
+  out.reserve(kEndings.size());
+  for (const char* ending : kEndings) out.emplace_back(prefix.string() + ending);
+  return out;
+}
 
 Json write_orthophoto(const OrthophotoRequest& request,
                       const MeasurableMesh& mesh,
@@ -284,9 +288,9 @@ Json write_orthophoto(const OrthophotoRequest& request,
       {"width", placed.grid.width},
       {"height", placed.grid.height},
       {"axes",
-       {{"right", vector_json(axes.right)},
-        {"up", vector_json(axes.up)},
-        {"toward", vector_json(axes.toward)}}},
+       {{"right", vector_to_json(axes.right)},
+        {"up", vector_to_json(axes.up)},
+        {"toward", vector_to_json(axes.toward)}}},
       {"corner", {placed.corner.x(), placed.corner.y()}},
       {"height_zero", heights.zero},
       {"lowest", heights.lowest},

@@ -23,6 +23,10 @@ struct OrthophotoRequest {
                                    ///< the longer side has 1000 to 2500 pixels.
 };
 
+/// The files that write_orthophoto() writes: pictures of colours, labels and heights, then a world
+/// file for each.
+std::vector<std::filesystem::path> orthophoto_files(const std::filesystem::path& prefix);
+
 /// Writes PREFIX.png (colour, transparent outside), PREFIX.tif (height of the surface toward the
 /// viewer, 32-bit float, NaN outside), PREFIX.provenance.png (which surface was seen) and a world
 /// file for each (.pgw, .tfw): the world coordinates of the middle of the top left pixel.

@@ -46,7 +46,7 @@ double limit_of(Quantity quantity, const std::string& text, const Frame& frame) 
     case Quantity::Error:
       return parse_length(text, frame) * frame.scale;
     case Quantity::Size:
-      return static_cast<double>(parse_bytes(text));
+      return static_cast<double>(parse_file_size(text));
     case Quantity::Psnr:
       return amount(text, {{"dB", 1}}, "24dB");
     default:

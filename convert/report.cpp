@@ -67,7 +67,7 @@ std::string mesh_section(const std::filesystem::path& folder) {
          figure(folder / "mesh/front.png", "watertight mesh, from the middle input view") +
          figure(folder / "mesh/side.png", "from the side") +
          figure(folder / "mesh/front.provenance.png",
-                "magenta = inferred, never seen by any input view") +
+                "magenta = inferred, never seen by any input view; orange = interpolated") +
          figure(folder / "mesh/side.provenance.png", "the same from the side") + "</div>\n";
 }
 

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/figures.h"
+#include "convert/frame_json.h"
 #include "convert/html.h"
 #include "convert/page_files.h"
 #include "convert/texture.h"
@@ -27,8 +28,6 @@ namespace cgs {
 using Json = nlohmann::ordered_json;
 
 namespace {
-
-Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 double diagonal(const TriangleMesh& mesh) {
   Eigen::AlignedBox3f box;
@@ -211,15 +210,15 @@ Json viewer_scene(const Model& model, const TriangleMesh& mesh) {
                       {"name", provenance_name(label)},
                       {"color", kProvenanceColors.at(number)}});
   }
-  return {
-      {"unit", {{"name", unit.name}, {"length", unit.length}, {"sigma", unit.relative_sigma}}},
-      {"file", {{"origin", vector_json(frame.origin - frame.file_origin)}, {"scale", frame.scale}}},
-      {"up", vector_json(frame.up)},
-      {"labels", labels},
-      {"mesh", mesh_json(mesh, texture)},
-      {"photographs", photographs_json(mesh, texture)},
-      {"cameras", cameras},
-      {"gaussians", gaussians_json(model.gaussians)}};
+  return {{"unit", {{"name", unit.name}, {"length", unit.length}, {"sigma", unit.relative_sigma}}},
+          {"file",
+           {{"origin", vector_to_json(frame.origin - frame.file_origin)}, {"scale", frame.scale}}},
+          {"up", vector_to_json(frame.up)},
+          {"labels", labels},
+          {"mesh", mesh_json(mesh, texture)},
+          {"photographs", photographs_json(mesh, texture)},
+          {"cameras", cameras},
+          {"gaussians", gaussians_json(model.gaussians)}};
 }
 
 std::string viewer_section(const Model& model,

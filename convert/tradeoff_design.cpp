@@ -128,6 +128,13 @@ std::string command_line(const RunRequest& request) {
   };
   add("--views", scene.options.views);
   if (scene.options.downscale) add("--downscale", std::to_string(*scene.options.downscale));
+  const DepthOptions& depth = scene.options.depth;
+  add("--depth", depth.folder.string());
+  for (const auto& [name, kind] : depth_kinds()) {
+    if (kind == depth.kind && kind != DepthKind::Unknown) add("--depth-kind", name);
+  }
+  if (depth.scale > 0) add("--depth-scale", exact(depth.scale));
+  add("--depth-model", depth.network.string());
   if (scene.options.allow_external) out += " --allow-external";
   if (scene.focal > 0) add("--focal", exact(scene.focal));
   if (scene.refine_poses) out += " --refine-poses";

@@ -2,7 +2,6 @@
 #include "convert/commands/common_options.h"
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -77,10 +76,6 @@ void add_depth_options(CLI::App& command, SceneOptions& options) {
                    options.allow_external,
                    "Follow links and absolute paths that leave the scene folder");
   const OptionGroup group(command, kDepthHeading);
-  const std::map<std::string, DepthKind> kinds = {{"auto", DepthKind::Unknown},
-                                                  {"metric", DepthKind::Metric},
-                                                  {"depth", DepthKind::Relative},
-                                                  {"disparity", DepthKind::Disparity}};
   command.add_option(
       "--depth",
       options.depth.folder,
@@ -92,7 +87,8 @@ void add_depth_options(CLI::App& command, SceneOptions& options) {
                   options.depth.kind,
                   "metric (of a sensor), depth or disparity (up to scale and offset, of a "
                   "network); default auto: whichever fits what the photographs show")
-      ->transform(CLI::CheckedTransformer(kinds).description("auto, metric, depth, disparity"));
+      ->transform(
+          CLI::CheckedTransformer(depth_kinds()).description("auto, metric, depth, disparity"));
   command.add_option("--depth-scale",
                      options.depth.scale,
                      "Values of metric depth files per metre; default: 1000 where they are whole "

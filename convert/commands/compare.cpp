@@ -117,8 +117,23 @@ void print_m3c2(const CompareArgs& args,
   }
 }
 
+// The unit of one file is not that of the other. Only a registration finds it out.
+void check_units(const CompareArgs& args, const Frame& a, const Frame& b) {
+  if (a.has_metric_scale() == b.has_metric_scale() || args.scale) return;
+  const auto& [known, unknown] =
+      a.has_metric_scale() ? std::pair(args.a, args.b) : std::pair(args.b, args.a);
+  throw InvalidInput(printable(unknown) + " does not say how long a unit of it is, " +
+                     printable(known) +
+                     " does; say it with --assume-unit, or let --icp --scale find it");
+}
+
 void run_compare(const CompareArgs& args) {
   limit_threads(args.common.threads);
+  for (const auto& output : {args.ply, args.svg}) {
+    for (const auto& input : {args.a, args.b}) {
+      if (!output.empty()) keep_apart(output, input);
+    }
+  }
   require(args.samples >= 100 && args.samples <= 100'000'000,
           "--samples must be in 100 ... 100000000",
           args.samples);
@@ -132,6 +147,7 @@ void run_compare(const CompareArgs& args) {
         printable(args.b) +
         " is a point cloud; distances need a surface: name the cloud first, or say --m3c2");
   }
+  check_units(args, first.content.frame, second.content.frame);
   MeasurableMesh a = std::move(first.content);
   const MeasurableMesh b = in_frame_of(second.content, a.frame);
   const FigureUnit unit = figure_unit(a.frame, args.unit);

@@ -12,6 +12,7 @@
 #include "convert/length.h"
 #include "convert/volume_file.h"
 #include "io/json_file.h"
+#include "io/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -26,7 +27,8 @@ struct FuseArgs {
 
 bool is_model(const std::filesystem::path& folder) {
   std::error_code ignored;
-  return std::filesystem::exists(folder / "gaussians.ply", ignored);
+  return std::filesystem::exists(folder / "gaussians.ply", ignored) ||
+         std::filesystem::exists(folder / "model/gaussians.ply", ignored);
 }
 
 void refuse_depth_options(const DepthFusionRequest& request) {
@@ -61,6 +63,9 @@ void run_fuse(const FuseArgs& args) {
   limit_threads(args.common.threads);
   const DepthFusionRequest& request = args.request;
   keep_apart(args.output, request.scene);
+  if (lower_extension(args.output) != ".vdb") {
+    throw InvalidInput(printable(args.output) + " is no name of a volume: write NAME.vdb");
+  }
   Terminal terminal(args.common.quiet, args.common.strict);
   if (is_model(request.scene)) {
     refuse_depth_options(request);

@@ -10,6 +10,7 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/commands/info_file.h"
+#include "convert/frame_json.h"
 #include "convert/html.h"
 #include "convert/scene_request.h"
 #include "io/json_file.h"
@@ -26,8 +27,6 @@ struct InfoArgs {
   bool json = false;
   bool strict = false;
 };
-
-Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 Json camera_json(const Scene& scene, int index) {
   const View& view = scene.views[static_cast<size_t>(index)];
@@ -48,7 +47,7 @@ Json camera_json(const Scene& scene, int index) {
           {"fy", camera.fy},
           {"cx", camera.cx},
           {"cy", camera.cy},
-          {"center", vector_json(camera.center())},
+          {"center", vector_to_json(camera.center())},
           {"near", range.near},
           {"far", range.far}};
 }
@@ -101,22 +100,22 @@ Json scene_json(const OpenedScene& opened, const Json& fit) {
   const Json baselines = baselines_json(scene);
   Json warnings = scene.warnings;
   add_baseline_warnings(baselines, warnings);
-  return {
-      {"kind", scene.kind},
-      {"counts",
-       {{"views", scene.views.size()},
-        {"input", scene.input.size()},
-        {"held_out", scene.held_out.size()},
-        {"missing_images", scene.missing.size()},
-        {"sparse_points", scene.points.size()}}},
-      {"bounds", {{"camera_min", vector_json(box.min())}, {"camera_max", vector_json(box.max())}}},
-      {"units", scene.frame.unit_name()},
-      {"cameras", cameras},
-      {"baselines", baselines},
-      {"camera_fit", fit},
-      {"refined_poses", opened.refined ? opened.refined->report : Json()},
-      {"missing", scene.missing},
-      {"warnings", warnings}};
+  return {{"kind", scene.kind},
+          {"counts",
+           {{"views", scene.views.size()},
+            {"input", scene.input.size()},
+            {"held_out", scene.held_out.size()},
+            {"missing_images", scene.missing.size()},
+            {"sparse_points", scene.points.size()}}},
+          {"bounds",
+           {{"camera_min", vector_to_json(box.min())}, {"camera_max", vector_to_json(box.max())}}},
+          {"units", scene.frame.unit_name()},
+          {"cameras", cameras},
+          {"baselines", baselines},
+          {"camera_fit", fit},
+          {"refined_poses", opened.refined ? opened.refined->report : Json()},
+          {"missing", scene.missing},
+          {"warnings", warnings}};
 }
 
 void print_fit(const Json& info) {
@@ -187,9 +186,7 @@ void print_scene(const Json& info) {
   for (const Json& name : info["missing"]) {
     std::printf("missing: %s\n", one_line(name.get<std::string>()).c_str());
   }
-  for (const Json& text : info["warnings"]) {
-    std::printf("warning: %s\n", one_line(text.get<std::string>()).c_str());
-  }
+  print_warnings(info);
 }
 
 // info tells what is wrong with a scene, photographs that cannot be read too, and nothing else.
@@ -235,8 +232,8 @@ void add_info(CLI::App& app) {
          "scene",
          args->scene.path,
          "Folder of a scene, as for run, or what run made of one, or its model; a mesh (.ply, "
-         ".obj, "
-         ".stl, .off, .3mf, .glb), which gets a certificate; splats (.ply, .spz, .splat, .sog, "
+         ".obj, .stl, .off, .3mf, .glb), which gets a certificate; splats (.ply, .spz, .splat, "
+         ".sog, "
          ".ksplat, .glb); a volume (.vdb); layers of a picture (.exr)")
       ->required();
   add_scene_options(*cmd, args->scene.options);

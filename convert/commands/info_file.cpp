@@ -12,6 +12,7 @@
 #include <openvdb/tools/Count.h>
 
 #include "convert/conversion.h"
+#include "convert/frame_json.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
 #include "convert/run_record.h"
@@ -30,14 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-Json vector_json(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
-
-void print_warnings(const Json& info) {
-  for (const Json& text : info["warnings"]) {
-    std::printf("warning: %s\n", one_line(text.get<std::string>()).c_str());
-  }
-}
+Json vec3d_to_json(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 
 template <typename Print>
 void print_info(const Json& info, bool as_json, Print print) {
@@ -56,7 +50,7 @@ Json mesh_json(const MeasurableFile& file, const Json& certificate) {
   for (const Eigen::Vector3d& p : mesh.points) box.extend(mesh.file_from_internal(p));
   return {{"kind", mesh.mesh.faces.empty() ? "point cloud" : "mesh"},
           {"counts", {{"vertices", mesh.points.size()}, {"faces", mesh.mesh.faces.size()}}},
-          {"bounds", {{"min", vector_json(box.min())}, {"max", vector_json(box.max())}}},
+          {"bounds", {{"min", vector_to_json(box.min())}, {"max", vector_to_json(box.max())}}},
           {"units", mesh.frame.unit_name()},
           {"states",
            {{"provenance", mesh.states_provenance()},
@@ -127,11 +121,9 @@ void tell_splats(const fs::path& path, bool as_json) {
 
 // --- volumes --------------------------------------------------------------------------------
 
-// Smallest and largest of the active values of a grid of numbers; null for other grids and where
-// nothing is active.
+// Smallest and largest of the active values, of which there must be one; null unless numbers.
 Json range_json(const openvdb::GridBase& grid) {
   Json out = nullptr;
-  if (grid.activeVoxelCount() == 0) return out;
   using Numbers = openvdb::
       TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid, openvdb::Int64Grid>;
   grid.apply<Numbers>([&](const auto& numbers) {
@@ -142,20 +134,21 @@ Json range_json(const openvdb::GridBase& grid) {
 }
 
 Json grid_json(const openvdb::GridBase& grid) {
-  const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
-  const bool is_empty = grid.activeVoxelCount() == 0;
+  const openvdb::Index64 active = grid.activeVoxelCount();
   Json bounds = nullptr;
-  if (!is_empty) {
-    const openvdb::BBoxd placed = grid.transform().indexToWorld(box);
-    bounds = {{"min", vector_json(placed.min())}, {"max", vector_json(placed.max())}};
+  Json range = nullptr;
+  if (active > 0) {
+    const openvdb::BBoxd box = grid.transform().indexToWorld(grid.evalActiveVoxelBoundingBox());
+    bounds = {{"min", vec3d_to_json(box.min())}, {"max", vec3d_to_json(box.max())}};
+    range = range_json(grid);
   }
   return {{"name", grid.getName()},
           {"values", grid.valueType()},
           {"class", openvdb::GridBase::gridClassToString(grid.getGridClass())},
-          {"voxel_size", vector_json(grid.voxelSize())},
-          {"active_voxels", grid.activeVoxelCount()},
+          {"voxel_size", vec3d_to_json(grid.voxelSize())},
+          {"active_voxels", active},
           {"bounds", bounds},
-          {"range", range_json(grid)}};
+          {"range", range}};
 }
 
 Json volume_json(const fs::path& path) {
@@ -307,6 +300,12 @@ bool print_folder_info(const fs::path& folder, bool as_json) {
 }
 
 }  // namespace
+
+void print_warnings(const Json& info) {
+  for (const Json& text : info["warnings"]) {
+    std::printf("warning: %s\n", one_line(text.get<std::string>()).c_str());
+  }
+}
 
 bool print_file_info(const fs::path& path, bool as_json) {
   std::error_code none;

@@ -3,6 +3,8 @@
 
 #include <filesystem>
 
+#include <nlohmann/json_fwd.hpp>
+
 namespace cgs {
 
 /// Prints, as text or as JSON, what a file holds: a mesh with its certificate, splats, the grids of
@@ -11,5 +13,8 @@ namespace cgs {
 /// \return false if the path is none of these, but perhaps a scene
 /// \throws as the readers of the formats
 bool print_file_info(const std::filesystem::path& path, bool as_json);
+
+/// A line for each of "warnings".
+void print_warnings(const nlohmann::ordered_json& info);
 
 }  // namespace cgs

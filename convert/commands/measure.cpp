@@ -11,6 +11,7 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/figures.h"
+#include "convert/html.h"
 #include "convert/length.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
@@ -97,12 +98,14 @@ class Measuring {
 
  private:
   void require_inside(const char* option);
+  Json surface_shares(const MeasuredValue& area) const;
   SurfacePoint pick(const std::string& text);
   Json point_json(const Eigen::Vector3d& internal) const {
     const Eigen::Vector3d p = mesh_.file_from_internal(internal);
     return {p.x(), p.y(), p.z()};
   }
   Json picked_json(const std::string& asked, const SurfacePoint& point) const;
+  void say_moved(const Json& from, const Json& to) const;
   const Certificate& certified() {
     if (!certificate_) certificate_ = certify(mesh_.mesh);
     return *certificate_;
@@ -118,6 +121,27 @@ class Measuring {
   std::optional<Certificate> certificate_;
   std::unique_ptr<NearestSurface> surface_;
 };
+
+// Of an area, by provenance; null where the mesh states none.
+Json Measuring::surface_shares(const MeasuredValue& area) const {
+  if (!mesh_.states_provenance()) return nullptr;
+  Json out = Json::object();
+  for (const Provenance label : kProvenanceOrder) {
+    out[provenance_key(label)] = area.by_provenance.at(static_cast<size_t>(label)) / area.value;
+  }
+  return out;
+}
+
+std::string shares_text(const MeasuredValue& area) {
+  std::string out;
+  for (const Provenance label : kProvenanceOrder) {
+    const double part = area.by_provenance.at(static_cast<size_t>(label));
+    if (part == 0) continue;
+    out += (out.empty() ? "" : ", ") + number(100 * part / area.value, "%.3g") + " % " +
+           std::string(provenance_name(label));
+  }
+  return out;
+}
 
 void Measuring::volume() {
   const Certificate& c = certified();
@@ -137,7 +161,14 @@ void Measuring::volume() {
     more["interval"] = {figure_value(value, unit_) - 2 * sigma,
                         figure_value(value, unit_) + 2 * sigma};
   }
-  figure("volume", value, more);
+  // Nobody sees a volume: what can be observed of it is the surface around.
+  Json out = figure_json(value, unit_, false);
+  for (const Provenance label : kProvenanceOrder) out.erase(provenance_key(label));
+  out.update(more);
+  out["surface_shares"] = surface_shares(around);
+  figures["volume"] = out;
+  say("volume", figure_text(value, unit_, false));
+  if (mesh_.states_provenance()) say("", "the surface around it: " + shares_text(around));
   if (value.stated > 0 && value.stated < 1) {
     char text[200];  // NOLINT(modernize-avoid-c-arrays)
     std::snprintf(text,
@@ -182,40 +213,48 @@ Json Measuring::picked_json(const std::string& asked, const SurfacePoint& point)
   return out;
 }
 
+// Measured is between points of the surface, the nearest to those that were given.
+void Measuring::say_moved(const Json& from, const Json& to) const {
+  say("",
+      "the points given lie " + number(from["moved"].get<double>(), "%.3g") + " and " +
+          number(to["moved"].get<double>(), "%.3g") + " " + unit_.name + " off the surface");
+}
+
 void Measuring::distance(const std::vector<std::string>& ends) {
   const SurfacePoint a = pick(ends[0]);
   const SurfacePoint b = pick(ends[1]);
-  figure("distance",
-         straight_distance(mesh_, a, b),
-         {{"from", picked_json(ends[0], a)}, {"to", picked_json(ends[1], b)}});
+  const Json from = picked_json(ends[0], a);
+  const Json to = picked_json(ends[1], b);
+  figure("distance", straight_distance(mesh_, a, b), {{"from", from}, {"to", to}});
+  say_moved(from, to);
 }
 
 void Measuring::along(const std::vector<std::string>& ends) {
   const SurfacePoint a = pick(ends[0]);
   const SurfacePoint b = pick(ends[1]);
   const SurfacePath path = distance_along(mesh_, a, b);
+  const Json from = picked_json(ends[0], a);
+  const Json to = picked_json(ends[1], b);
   Json points = Json::array();
   for (const Eigen::Vector3d& p : path.points) points.push_back(point_json(p));
   figure("along",
          path.length,
-         {{"from", picked_json(ends[0], a)},
-          {"to", picked_json(ends[1], b)},
-          {"exact", path.exact},
-          {"points", points}});
+         {{"from", from}, {"to", to}, {"exact", path.exact}, {"points", points}});
+  say_moved(from, to);
   if (!path.exact) say("", "an upper bound: the surface has too many faces for the exact way");
 }
 
 void Measuring::section(const MeasureArgs& args) {
   const CutPlane plane = parse_plane(args.section, mesh_);
   const Section cut = cgs::section(mesh_, plane);
+  if (cut.lines.empty())
+    throw InvalidInput("--section " + args.section + " does not meet the mesh");
   figure("section_length", cut.length, {{"lines", cut.lines.size()}, {"open", cut.open_lines}});
   figure("section_area", cut.area);
   for (const Provenance label : kProvenanceOrder) {
     figures["section_area"].erase(provenance_key(label));
   }
   if (args.svg.empty() && args.dxf.empty()) return;
-  if (cut.lines.empty())
-    throw InvalidInput("--section " + args.section + " does not meet the mesh");
   Drawing drawing = section_drawing(cut, plane, mesh_, unit_);
   drawing.title = args.mesh.filename().string() + ", section " + args.section;
   drawing.notes.insert(drawing.notes.begin(),
@@ -313,7 +352,8 @@ void Measuring::thickness() {
   say("thickness", thickness_text(summary.seen, unit_));
   if (mesh_.states_provenance()) {
     say("",
-        "where the near or the far side is inferred: " + thickness_text(summary.inferred, unit_));
+        "where no photograph shows the near or the far side: " +
+            thickness_text(summary.unseen, unit_));
   }
   if (summary.without_far_side > 0) {
     char text[80];  // NOLINT(modernize-avoid-c-arrays)
@@ -356,8 +396,19 @@ void Measuring::certificate() {
   say("certificate", certificate_line(certified()));
 }
 
+void keep_outputs_apart(const MeasureArgs& args) {
+  std::vector<std::filesystem::path> outputs = {args.svg, args.dxf, args.thickness_ply};
+  if (!args.orthophoto.prefix.empty()) {
+    for (const auto& file : orthophoto_files(args.orthophoto.prefix)) outputs.push_back(file);
+  }
+  for (const auto& output : outputs) {
+    if (!output.empty()) keep_apart(output, args.mesh);
+  }
+}
+
 void run_measure(const MeasureArgs& args) {
   limit_threads(args.common.threads);
+  keep_outputs_apart(args);
   const Terminal terminal(args.common.quiet, args.common.strict);
   MeasurableFile file = read_measured(args.mesh, args.assume_unit);
   terminal.warn(file.warnings);

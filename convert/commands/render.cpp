@@ -25,9 +25,11 @@ struct RenderArgs {
   std::filesystem::path output;
   std::string views;
   std::string path;
-  int frames = 60;
+  std::optional<int> frames;
   CommonOptions common;
 };
+
+constexpr int kFrames = 60;
 
 void run_render(const RenderArgs& args) {
   limit_threads(args.common.threads);
@@ -42,8 +44,13 @@ void run_render(const RenderArgs& args) {
       throw InvalidInput("--path: " + printable(args.path) +
                          " would be replaced by the cameras of the frames; choose another folder");
     }
+    if (is_file && args.frames) {
+      throw InvalidInput("--frames is for spiral and orbit; " + printable(args.path) +
+                         " says which cameras there are");
+    }
     const std::vector<Camera> path =
-        is_file ? camera_path_from(args.path, model) : camera_path(model, args.path, args.frames);
+        is_file ? camera_path_from(args.path, model)
+                : camera_path(model, args.path, args.frames.value_or(kFrames));
     const nlohmann::ordered_json report =
         write_path(model, path, args.output, terminal.begin("render"));
     terminal.end(std::to_string(path.size()) + " frames");
@@ -75,8 +82,7 @@ void add_render(CLI::App& app) {
       "Pictures and hole masks along a path instead: between (the input views), spiral (before "
       "them), orbit (once around what they look at), or a .json of cameras as in cameras.json");
   path->excludes(views);
-  cmd->add_option("--frames", args->frames, "Number of pictures along a path")
-      ->capture_default_str()
+  cmd->add_option("--frames", args->frames, "Number of pictures along a path; default 60")
       ->needs(path);
   add_output_options(*cmd, args->common);
   cmd->footer(

@@ -70,6 +70,7 @@ FilterStep prepare_simplify_to(FilterArguments& arguments) {
     const SimplifyOptions options{.max_error = std::max(1e-30, 2 * double(box.diagonal().norm())),
                                   .max_color_error = 1,
                                   .target_faces = faces};
+    if (state.mesh.faces.size() <= faces) return std::string("there are no more than that");
     SimplifyResult result = simplify(state.mesh, options, progress);
     // The error is not bounded here, so that it has to be told where sigma is.
     const double rms = std::max(result.evidence.accuracy.rms, result.evidence.completeness.rms);

@@ -35,7 +35,9 @@ class Conversion : public testing::Test {
     const std::string ending = request.output.extension();
     const bool stays_splats = request.as == "splats" || ending == ".splat" || ending == ".spz" ||
                               (ending == ".ply" && request.as.empty());
-    if (!stays_splats) request.volume.cameras = {.views = 16, .size = 160};
+    if (!stays_splats && is_splat_file(request.input)) {
+      request.volume.cameras = {.views = 16, .size = 160};
+    }
     if (from == "ball.ply" && !stays_splats) request.volume.voxel_size = "0.02";
     Terminal terminal(true);
     return convert_file(request, terminal);
@@ -190,6 +192,37 @@ TEST_F(Conversion, RefusesWhatHasNoEffectOnSplats) {
       convert("ball.ply", "a.obj", [](ConversionRequest& r) { r.compression_error = "1"; }),
       InvalidInput);
   EXPECT_FALSE(std::filesystem::exists(dir_ / "a.spz"));
+}
+
+TEST_F(Conversion, RefusesWhatHasNoEffectBetweenAnyTwo) {
+  convert("ball.ply", "v.vdb");
+  write_mesh_ply(dir_ / "mesh.ply", test::labelled_sphere(), Frame{});
+  const auto refused = [&](const char* from, const char* to, auto set) {
+    const std::string message = test::message_of([&] { convert(from, to, set); });
+    EXPECT_FALSE(std::filesystem::exists(dir_ / to)) << from;
+    return message;
+  };
+  const auto views = [](auto& r) { r.volume.cameras.views = 5; };
+  const auto size = [](auto& r) { r.volume.cameras.size = 99; };
+  const auto inside = [](auto& r) { r.volume.cameras.placement = VirtualPlacement::Inside; };
+  const auto plain = [](auto& r) { r.encoding = GlbEncoding::Plain; };
+  const auto version = [](auto& r) { r.spz_version = 2; };
+  const auto simplified = [](auto& r) { r.simplify = "0.01"; };
+  const auto open = [](auto& r) { r.open_surface = true; };
+  for (const char* from : {"mesh.ply", "v.vdb"}) {
+    EXPECT_EQ(refused(from, "a.obj", views), "--virtual-views is for files of splats alone");
+    EXPECT_EQ(refused(from, "a.obj", size), "--virtual-size is for files of splats alone");
+    EXPECT_EQ(refused(from, "a.obj", inside), "--look-from is for files of splats alone");
+  }
+  for (const char* from : {"mesh.ply", "v.vdb", "ball.ply"}) {
+    EXPECT_EQ(refused(from, "a.obj", plain), "--glb-encoding has no effect on a.obj");
+    EXPECT_EQ(refused(from, "a.obj", version), "--spz-version has no effect on a.obj");
+  }
+  EXPECT_EQ(refused("ball.ply", "a.vdb", simplified), "--simplify has no effect on a.vdb");
+  EXPECT_EQ(refused("ball.ply", "a.vdb", open), "--open has no effect on a.vdb");
+  EXPECT_EQ(refused("ball.ply", "a.vdb", plain), "--glb-encoding has no effect on a.vdb");
+  EXPECT_EQ(refused("mesh.ply", "a.obj", open),
+            "--open has no effect on an input that is a mesh already");
 }
 
 TEST_F(Conversion, LeavesOutFloatersWhereAsked) {

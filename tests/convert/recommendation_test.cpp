@@ -35,7 +35,11 @@ TEST(ParseWant, KnowsItsQuantitiesAndUnits) {
   EXPECT_DOUBLE_EQ(parse_want("time<3min", Frame()).limit, 180);
   EXPECT_DOUBLE_EQ(parse_want("time<1.5h", Frame()).limit, 5400);
   EXPECT_DOUBLE_EQ(parse_want("cpu<90", Frame()).limit, 90);
-  EXPECT_DOUBLE_EQ(parse_want("size<1MB", Frame()).limit, 1 << 20);
+  // As --max-size reads it.
+  EXPECT_DOUBLE_EQ(parse_want("size<1MB", Frame()).limit, 1e6);
+  EXPECT_DOUBLE_EQ(parse_want("size<800kB", Frame()).limit, 8e5);
+  EXPECT_DOUBLE_EQ(parse_want("size<1.5MiB", Frame()).limit, 1.5 * (1 << 20));
+  EXPECT_DOUBLE_EQ(parse_want("size<300000", Frame()).limit, 3e5);
   EXPECT_DOUBLE_EQ(parse_want("psnr>24.5dB", Frame()).limit, 24.5);
   EXPECT_EQ(parse_want("psnr>24", Frame()).quantity, Quantity::Psnr);
 }

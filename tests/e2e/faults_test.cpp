@@ -2,8 +2,8 @@
 // Every call by which a run asks the system for something in its folders fails once, and at every
 // one the process is killed once. The run must end with the right exit code and one line, what it
 // leaves must be whole, and the run that goes on must end with the files of one that was never
-// disturbed; so must one that lacks memory. CGS_FAULTS says how many of some thousand errors, and
-// of the kills, are tried.
+// disturbed; so must one that lacks memory. CGS_FAULTS says how many of some thousand errors, of
+// the kills and of the limits of memory are tried.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -148,10 +148,15 @@ class Faults : public testing::Test {
     }
   }
 
-  // Where an effect is tried: at all places, or at `share` of them.
-  static std::vector<Fault> sample(std::vector<Fault> all, size_t share) {
-    if (const char* const wish = std::getenv("CGS_FAULTS")) share = std::stoul(wish);
-    share = std::min(share, all.size());
+  // How many faults of a kind are tried, of `most`; `few` if nothing is said.
+  static size_t share_of(size_t most, size_t few) {
+    const char* const wish = std::getenv("CGS_FAULTS");
+    return std::min(most, wish != nullptr ? std::stoul(wish) : few);
+  }
+
+  // Where an effect is tried: at all places, or at some of them.
+  static std::vector<Fault> sample(std::vector<Fault> all, size_t few) {
+    const size_t share = share_of(all.size(), few);
     std::vector<Fault> out;
     for (size_t i = 0; i < share; ++i) out.push_back(all[i * all.size() / share]);
     return out;
@@ -269,9 +274,9 @@ TEST_F(Faults, MemoryThatRunsOutAnywhereIsSaidAndNothingIsLost) {
   const size_t least = bisect(0, kMost, 256, starts).second;  // below, its libraries do not load
   const size_t need = bisect(least, kMost, 4096, ends).first;
   ASSERT_GT(need, least + 8192);
-  constexpr size_t kTried = 12;
-  for (size_t i = 0; i < kTried; ++i) {
-    const size_t limit = least + 1024 + i * (need - least - 1024) / kTried;
+  const size_t tried = share_of(120, 12);
+  for (size_t i = 0; i < tried; ++i) {
+    const size_t limit = least + 1024 + i * (need - least - 1024) / tried;
     SCOPED_TRACE(std::to_string(limit) + " of " + std::to_string(need) + " KiB");
     const Counted counted;
     EXPECT_EQ(run_within(limit, "out"), 4);

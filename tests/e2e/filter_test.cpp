@@ -323,6 +323,10 @@ TEST_F(Filter, KeepsWhatIsUp) {
   ASSERT_EQ(filter("y.glb", "x.glb", "-q --op repair --up 1 0 0").exit_code, 0);
   EXPECT_LT((read_mesh_file(dir_ / "x.glb").content.frame.up - Eigen::Vector3d::UnitX()).norm(),
             1e-9);
+  const auto moved = filter("x.glb", "moved.glb", "-q --op translate=0,0,1 --op rotate=z,30");
+  ASSERT_EQ(moved.exit_code, 0) << moved.err;
+  EXPECT_LT((read_mesh_file(dir_ / "moved.glb").content.frame.up - Eigen::Vector3d::UnitX()).norm(),
+            1e-9);
   ASSERT_EQ(filter("ball.ply", "z.glb", "-q --op repair").exit_code, 0);
   EXPECT_LT((read_mesh_file(dir_ / "z.glb").content.frame.up - Eigen::Vector3d::UnitZ()).norm(),
             1e-9);

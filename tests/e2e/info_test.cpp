@@ -10,6 +10,7 @@
 #include "io/exr.h"
 #include "io/vdb.h"
 #include "tests/support/run_cgs.h"
+#include "tests/support/solid_meshes.h"
 
 namespace cgs {
 namespace {
@@ -26,14 +27,13 @@ json json_of(const std::filesystem::path& path) {
 
 TEST(Info, CertifiesAMesh) {
   const TempDir dir;
-  test::write_bytes(dir / "a.obj",
-                    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  test::write_bytes(dir / "a.obj", test::obj_text(test::torus_mesh(0.6, 0.2)));
   const json out = json_of(dir / "a.obj");
   EXPECT_EQ(out["kind"], "mesh");
-  EXPECT_EQ(out["certificate"]["genus"], 0);
-  EXPECT_EQ(out["certificate"]["euler_number"], 2);
+  EXPECT_EQ(out["certificate"]["genus"], 1);
+  EXPECT_EQ(out["certificate"]["euler_number"], 0);
   EXPECT_TRUE(out["certificate"]["passed"]);
-  EXPECT_EQ(out["counts"]["faces"], 4);
+  EXPECT_EQ(out["counts"]["faces"], 2 * 128 * 64);
 }
 
 TEST(Info, ListsTheGridsOfAVolumeOfAnotherProgram) {

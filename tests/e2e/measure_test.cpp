@@ -3,7 +3,7 @@
 // cgs measure and cgs compare as a user calls them.
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <filesystem>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -15,21 +15,9 @@ namespace cgs {
 namespace {
 
 using nlohmann::json;
+using test::obj_text;
 using test::run_cgs;
 using test::TempDir;
-
-std::string obj_text(const MeasurableMesh& mesh, const Eigen::Vector3d& shift = {0, 0, 0}) {
-  std::ostringstream out;
-  out.precision(17);
-  for (const Eigen::Vector3d& p : mesh.points) {
-    const Eigen::Vector3d q = p + shift;
-    out << "v " << q.x() << ' ' << q.y() << ' ' << q.z() << '\n';
-  }
-  for (const auto& f : mesh.mesh.faces) {
-    out << "f " << f[0] + 1 << ' ' << f[1] + 1 << ' ' << f[2] + 1 << '\n';
-  }
-  return out.str();
-}
 
 json json_of(const std::string& arguments) {
   const auto result = run_cgs(arguments + " --json");
@@ -172,6 +160,7 @@ TEST(Measure, DegenerateInputsEndWithOneLine) {
   expect(triangle, " --volume", 0);
   expect(triangle, " --distance 0,0,0 1,0,0 --along 0,0,0 1,0,0 --section x=0.2", 0);
   expect(triangle, " --distance 0,0,0 1,0", 2);
+  expect(triangle, " --section z=9", 2);
   expect(triangle, " --section w=1", 2);
   expect(triangle, " --section x=9 --svg " + (dir / "no.svg").string(), 2);
   expect(triangle, " --unit mm", 2);
@@ -206,6 +195,44 @@ TEST(Compare, MovedSphereAndBack) {
             std::string::npos);
 }
 
+// What `arguments` would write over `input` is refused, by another name of the file as well.
+void expect_kept(const TempDir& dir, const std::string& arguments, const char* input) {
+  const std::string before = test::read_bytes(dir / input);
+  const auto result = run_cgs(arguments);
+  EXPECT_EQ(result.exit_code, 2) << arguments << result.err;
+  EXPECT_NE(result.err.find("lies in the input"), std::string::npos) << arguments << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(test::read_bytes(dir / input), before) << arguments;
+}
+
+TEST(Measure, WritesNothingOverItsInput) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));
+  const std::string a = (dir / "a.obj").string();
+  std::filesystem::create_symlink(dir / "a.obj", dir / "link.obj");
+  for (const std::string& to : {a, (dir / ".." / dir.path().filename() / "link.obj").string()}) {
+    expect_kept(dir, "measure " + a + " --section z=1 --svg " + to, "a.obj");
+    expect_kept(dir, "measure " + a + " --section z=1 --dxf " + to, "a.obj");
+    expect_kept(dir, "measure " + a + " --thickness-ply " + to, "a.obj");
+  }
+  std::filesystem::create_symlink(dir / "a.obj", dir / "top.tfw");
+  expect_kept(dir, "measure " + a + " --orthophoto " + (dir / "top").string(), "a.obj");
+  EXPECT_EQ(test::entries(dir.path()), 3);
+}
+
+TEST(Compare, WritesNothingOverItsInputs) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));
+  test::write_bytes(dir / "b.obj", obj_text(test::cube_mesh(2), {0.01, 0, 0}));
+  const std::string both = (dir / "a.obj").string() + " " + (dir / "b.obj").string();
+  for (const char* input : {"a.obj", "b.obj"}) {
+    for (const char* option : {" --ply ", " --svg ", " --m3c2 --ply ", " --m3c2 --svg "}) {
+      expect_kept(dir, "compare " + both + option + (dir / input).string(), input);
+    }
+  }
+}
+
 TEST(Compare, MatchesUnits) {
   const TempDir dir;
   const std::string ply = "ply\nformat ascii 1.0\ncomment metres_per_unit ";
@@ -217,6 +244,39 @@ TEST(Compare, MatchesUnits) {
   const json out = json_of("compare " + (dir / "m.ply").string() + " " + (dir / "mm.ply").string() +
                            " --unit mm");
   EXPECT_NEAR(out["distance"]["mean"].get<double>(), 1, 1e-9);
+}
+
+// A unit that only one file states is not that of the other.
+TEST(Compare, RefusesToGuessAUnit) {
+  const TempDir dir;
+  const std::string ply =
+      "\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0\n1000 0 0\n0 1000 0\n3 0 1 2\n";
+  test::write_bytes(dir / "mm.ply", "ply\nformat ascii 1.0\ncomment metres_per_unit 0.001" + ply);
+  test::write_bytes(dir / "none.ply", "ply\nformat ascii 1.0" + ply);
+  const std::string mm = (dir / "mm.ply").string();
+  const std::string none = (dir / "none.ply").string();
+  for (const std::string& both : {mm + " " + none, none + " " + mm}) {
+    const auto refused = run_cgs("compare " + both);
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_NE(refused.err.find("none.ply does not say"), std::string::npos) << refused.err;
+    EXPECT_LT(json_of("compare " + both + " --assume-unit mm")["distance"]["max_absolute"], 1e-12);
+  }
+  EXPECT_LT(json_of("compare " + none + " " + none)["distance"]["max_absolute"], 1e-9);
+}
+
+TEST(Measure, TellsHowFarPointsWereOffAndWhatIsSeenOfAVolume) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::cube_mesh(2)));
+  const std::string mesh = "measure " + (dir / "a.obj").string();
+  const auto far = run_cgs(mesh + " --distance 100,0,0 -100,0,0");
+  EXPECT_NE(far.out.find("the points given lie 98 and 100 units off the surface"),
+            std::string::npos)
+      << far.out;
+  const json volume = json_of(mesh)["figures"]["volume"];
+  EXPECT_FALSE(volume.contains("observed"));
+  EXPECT_TRUE(volume["surface_shares"].is_null());
 }
 
 TEST(Compare, SaysWhoseSideIsPositive) {

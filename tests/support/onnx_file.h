@@ -29,7 +29,7 @@ inline std::string tensor(const std::string& name,
   for (const uint64_t side : shape) out += field(1, side);
   out += field(2, 1);  // float
   std::string raw(values.size() * sizeof(float), '\0');
-  std::memcpy(raw.data(), values.data(), raw.size());
+  if (!raw.empty()) std::memcpy(raw.data(), values.data(), raw.size());
   return out + field(8, name) + field(9, raw);
 }
 inline std::string value_info(const std::string& name, const std::vector<uint64_t>& shape) {
