@@ -94,6 +94,18 @@ void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimi
   }
 }
 
+void set_intrinsics(Camera& camera, const Eigen::Matrix3d& K, const Refuse& refuse) {
+  const bool has_skew = std::abs(K(0, 1)) > 1e-9 * std::abs(K(0, 0));
+  if (has_skew || K(1, 0) != 0 || K(2, 0) != 0 || K(2, 1) != 0 || K(2, 2) != 1) {
+    refuse(Defect::Unsupported, "K must be fx 0 cx / 0 fy cy / 0 0 1");
+  }
+  camera.fx = K(0, 0);
+  camera.fy = K(1, 1);
+  camera.cx = K(0, 2);
+  camera.cy = K(1, 2);
+  check_intrinsics(camera, refuse);
+}
+
 void check_coefficient(double value, const Refuse& refuse) {
   constexpr double kLargest = 1e50;  // far above any lens; its powers are finite
   if (std::abs(value) <= kLargest) return;

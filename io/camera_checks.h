@@ -28,6 +28,11 @@ Eigen::Isometry3d checked_pose(const Eigen::Matrix3d& rotation,
 /// principal point lies within ten image sizes of the image, and that it has at most max_pixels.
 void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimits& limits = {});
 
+/// Sets focal lengths and principal point from fx 0 cx / 0 fy cy / 0 0 1; the size is that of the
+/// camera already. Calls refuse(Unsupported) for a matrix of another form, and as
+/// check_intrinsics().
+void set_intrinsics(Camera& camera, const Eigen::Matrix3d& K, const Refuse& refuse);
+
 /// Distorted radius as a function of the undistorted one (both in units of the focal length)
 /// grows only up to a largest undistorted radius; infinity if it grows for ever.
 ///

@@ -82,6 +82,17 @@ bool has_image_extension(const fs::path& path) {
   return std::find(kKnown.begin(), kKnown.end(), lower_extension(path)) != kKnown.end();
 }
 
+std::vector<std::string> sorted_entries(const fs::path& folder) {
+  std::vector<std::string> out;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    out.push_back(entry->path().filename().string());
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
 std::vector<fs::path> image_files(const SceneRoot& root, const std::string& subfolder) {
   const fs::path folder = resolve_in_scene(root, subfolder, root.folder);
   std::vector<fs::path> files;

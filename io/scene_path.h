@@ -31,6 +31,9 @@ bool is_present(const std::filesystem::path& path);
 /// True if the path leads to a folder; never throws.
 bool is_folder(const std::filesystem::path& path);
 
+/// The names of what lies in a folder, sorted; empty if it cannot be listed.
+std::vector<std::string> sorted_entries(const std::filesystem::path& folder);
+
 /// The ending of a name with its dot, ASCII letters in lower case.
 std::string lower_extension(const std::filesystem::path& path);
 

@@ -25,6 +25,7 @@
 #include "io/polycam.h"
 #include "io/realitycapture.h"
 #include "io/resample.h"
+#include "io/rgbd_frames.h"
 #include "io/significance.h"
 #include "io/strecha.h"
 #include "io/transforms_json.h"
@@ -48,6 +49,7 @@ Scene read_layout(const SceneRoot& root) {
   if (is_colmap(root.folder)) return read_colmap(root);
   if (is_strecha(root.folder)) return read_strecha(root);
   if (is_polycam(root.folder)) return read_polycam(root);
+  if (is_rgbd_frames(root.folder)) return read_rgbd_frames(root);
   if (is_metashape(root.folder)) return read_metashape(root);
   if (is_realitycapture(root.folder)) return read_realitycapture(root);
   if (is_cameras_json(root.folder)) return read_cameras_json_scene(root);
@@ -55,8 +57,9 @@ Scene read_layout(const SceneRoot& root) {
                  root.folder,
                  "no known layout: understood are LLFF (poses_bounds.npy), transforms.json "
                  "(nerfstudio, instant-ngp), COLMAP (sparse/0/cameras.bin or .txt), Strecha "
-                 "(<image>.camera), Polycam (keyframes/), Metashape (.xml), RealityCapture (.csv), "
-                 "cameras.json (3DGS) and photographs with nothing else");
+                 "(<image>.camera), Polycam (keyframes/), frames of a depth camera (7-Scenes, "
+                 "Open3D), Metashape (.xml), RealityCapture (.csv), cameras.json (3DGS) and "
+                 "photographs with nothing else");
 }
 
 std::string without_extension(const std::string& name) {

@@ -15,28 +15,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<fs::path> entries_sorted(const fs::path& folder) {
-  std::vector<fs::path> out;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    out.push_back(entry->path());
-  }
-  std::sort(out.begin(), out.end());
-  return out;
-}
-
-std::vector<fs::path> camera_files(const fs::path& folder) {
-  std::vector<fs::path> out = entries_sorted(folder);
-  std::erase_if(out, [](const fs::path& path) { return path.extension() != ".camera"; });
+std::vector<std::string> camera_files(const fs::path& folder) {
+  std::vector<std::string> out = sorted_entries(folder);
+  std::erase_if(out, [](const std::string& name) { return !name.ends_with(".camera"); });
   return out;
 }
 
 // Name, relative to the scene, of the first folder that holds .camera files.
 std::optional<std::string> camera_folder(const fs::path& folder) {
   if (!camera_files(folder).empty()) return ".";
-  for (const fs::path& entry : entries_sorted(folder)) {
-    if (is_folder(entry) && !camera_files(entry).empty()) return entry.filename().string();
+  for (const std::string& name : sorted_entries(folder)) {
+    if (is_folder(folder / name) && !camera_files(folder / name).empty()) return name;
   }
   return std::nullopt;
 }
@@ -70,10 +59,6 @@ Camera read_camera(const fs::path& path) {
   if (distortion != Eigen::Vector3d::Zero()) {
     refuse(Defect::Unsupported, "lens distortion is not read in this layout");
   }
-  const bool has_skew = std::abs(K(0, 1)) > 1e-9 * std::abs(K(0, 0));
-  if (has_skew || K(1, 0) != 0 || K(2, 0) != 0 || K(2, 1) != 0 || K(2, 2) != 1) {
-    refuse(Defect::Unsupported, "K must be fx 0 cx / 0 fy cy / 0 0 1");
-  }
   Camera camera;
   constexpr double kMaxSide = 1e6;
   const double width = numbers[24];
@@ -85,11 +70,7 @@ Camera read_camera(const fs::path& path) {
   }
   camera.width = static_cast<int>(width);
   camera.height = static_cast<int>(height);
-  camera.fx = K(0, 0);
-  camera.fy = K(1, 1);
-  camera.cx = K(0, 2);
-  camera.cy = K(1, 2);
-  check_intrinsics(camera, refuse);
+  set_intrinsics(camera, K, refuse);
   camera.world_from_cam = checked_pose(R, center, refuse);
   return camera;
 }
@@ -104,7 +85,9 @@ Scene read_strecha(const SceneRoot& root) {
   Scene scene;
   scene.kind = "Strecha";
   scene.folder = root.folder;
-  for (const fs::path& path : camera_files(resolve_in_scene(root, *folder, root.folder))) {
+  const fs::path cameras = resolve_in_scene(root, *folder, root.folder);
+  for (const std::string& name : camera_files(cameras)) {
+    const fs::path path = cameras / name;
     View view;
     view.camera = read_camera(path);
     view.name = path.stem().string();  // 0000.jpg.camera belongs to 0000.jpg

@@ -19,6 +19,7 @@
 #include "io/npy.h"
 #include "io/polycam.h"
 #include "io/realitycapture.h"
+#include "io/rgbd_frames.h"
 #include "io/strecha.h"
 #include "io/transforms_json.h"
 #include "io/vdb.h"
@@ -273,6 +274,31 @@ void add_scene_descriptions(Kinds& kinds) {
                      write_bytes(folder / camera, keyframe);
                    },
                    [](Folder folder) { (void)read_polycam({folder}); }});
+  const auto write_frames = [](Folder folder) {
+    write_bytes(folder / "camera-intrinsics.txt", "30 0 16\n0 30 12\n0 0 1\n");
+    for (const char* name : {"frame-0", "frame-1"}) {
+      write_bytes(folder / (std::string(name) + ".color.png"), rgb_png(32, 24));
+      write_bytes(folder / (std::string(name) + ".pose.txt"),
+                  "1 0 0 0.5\n0 1 0 -1e-1\n0 0 1 2\n0 0 0 1\n");
+    }
+  };
+  const auto read_frames = [](Folder folder) { (void)read_rgbd_frames({folder}); };
+  kinds.push_back({"rgbd-pose", "frame-0.pose.txt", write_frames, read_frames});
+  kinds.push_back({"rgbd-intrinsics", "camera-intrinsics.txt", write_frames, read_frames});
+  const auto write_open3d = [](Folder folder) {
+    write_bytes(folder / "intrinsic.json",
+                R"({"width": 32, "height": 24,
+"intrinsic_matrix": [30, 0, 0, 0, 30, 0, 15.5, 11.5, 1]})");
+    write_bytes(folder / "trajectory.log",
+                "0 0 1\n1 0 0 0.5\n0 1 0 -1e-1\n0 0 1 2\n0 0 0 1\n"
+                "1 1 2\n1 0 0 0\n0 1 0 nan\n0 0 1 2\n0 0 0 1\n");
+    for (const char* name : {"0.png", "1.png"}) {
+      write_bytes(folder / ("color/" + std::string(name)), rgb_png(32, 24));
+      write_bytes(folder / ("depth/" + std::string(name)), rgb_png(32, 24));
+    }
+  };
+  kinds.push_back({"open3d-trajectory", "trajectory.log", write_open3d, read_frames});
+  kinds.push_back({"open3d-intrinsics", "intrinsic.json", write_open3d, read_frames});
   kinds.push_back({"strecha",
                    "0.png.camera",
                    [](Folder folder) {
