@@ -161,6 +161,9 @@ struct WrittenSplats {
   std::vector<uint32_t> order;  ///< Of the splats in the file, if it is another.
 };
 
+/// Formats that hold splats and nothing of the scene that they are in.
+bool is_bare(const std::string& extension) { return extension == ".spz" || extension == ".splat"; }
+
 WrittenSplats write_splats(const ConversionRequest& request,
                            const Gaussians& g,
                            const Frame& frame) {
@@ -199,18 +202,51 @@ WrittenSplats write_splats(const ConversionRequest& request,
   return {{{"format", "3DGS PLY"}, {"splats", g.size()}}, {}};
 }
 
+/// What a format has no place for, of what is known of a scene: "" if nothing.
+std::string lost_of_frame(const std::string& extension, const Frame& frame) {
+  if (!is_bare(extension)) return "";
+  std::string out;
+  const auto add = [&](bool is_lost, const std::string& what) {
+    if (is_lost) out += (out.empty() ? "" : ", ") + what;
+  };
+  add(frame.has_metric_scale(), "unit");
+  add(!frame.file_origin.isZero(0), "origin");
+  add(!frame.up.isApprox(-Eigen::Vector3d::UnitY()), "direction that is up");
+  return out.empty() ? out : extension + " files hold no " + out + " of the scene";
+}
+
+/// Where a hundredth of the splats cannot be held as it is; "" elsewhere.
+std::string clamped_text(const Json& report) {
+  for (const auto& [key, what] :
+       {std::pair("clamped_splats", "sizes or colours"), std::pair("clamped_colors", "colours")}) {
+    const auto clamped = report.value(key, uint64_t{0});
+    const auto splats = report["splats"].get<uint64_t>();
+    if (100 * clamped < splats || clamped == 0) continue;
+    return std::to_string(clamped) + " of " + std::to_string(splats) + " splats have " + what +
+           " beyond what " + report["format"].get<std::string>() + " can hold: clamped";
+  }
+  return "";
+}
+
 /// Writes splats, reads them back and says what they lost.
 Json convert_splats(const ConversionRequest& request, const Source& source, Terminal& terminal) {
   const Gaussians& g = source.model ? source.model->gaussians : source.splats->gaussians;
   const WrittenSplats written = write_splats(request, g, source.frame);
   Json report = written.report;
-  std::vector<std::string> missing;  // why splats are
+  const std::string lost = lost_of_frame(lower_extension(request.output), source.frame);
+  if (!lost.empty()) terminal.say(lost);
+  std::vector<std::string> missing;  // why splats are, or parts of them
+  if (const std::string clamped = clamped_text(report); !clamped.empty()) {
+    missing.push_back(clamped);
+  }
   try {
     const Progress progress = terminal.begin("read back");
     cgs::report(progress, 0);
     check_reading_back(request, g);
     const GaussianFile back = read_splats(request.output, source.frame);
-    if (back.gaussians.size() < g.size()) missing = back.warnings;
+    if (back.gaussians.size() < g.size()) {
+      missing.insert(missing.end(), back.warnings.begin(), back.warnings.end());
+    }
     const SplatLoss loss = splat_loss(g, back.gaussians, written.order, progress);
     report["loss"] = splat_loss_to_json(loss, source.frame);
     terminal.end(splat_loss_line(loss, source.frame));
@@ -323,6 +359,7 @@ void refuse_without_effect(const ConversionRequest& request, const Source& sourc
   const bool to_mesh = wanted == Content::Mesh;
   const bool to_glb = to_mesh && extension == ".glb";
   const bool to_other = wanted != Content::Splats;
+  const bool to_bare = is_bare(extension);
   const bool from_file = source.splats.has_value();
   const char* const splats_alone = "is for files of splats alone";
   struct Option {
@@ -357,6 +394,8 @@ void refuse_without_effect(const ConversionRequest& request, const Source& sourc
        to_other},
       {"--virtual-views", cameras.views != usual_cameras.views, from_file, splats_alone, to_other},
       {"--virtual-size", cameras.size != usual_cameras.size, from_file, splats_alone, to_other},
+      {"--up", !request.up.empty(), true, "", !to_bare},
+      {"--assume-unit", !request.assume_unit.empty(), true, "", !to_bare},
       {"--spz-version", request.spz_version != usual.spz_version, true, "", extension == ".spz"}};
   for (const Option& option : options) {
     if (!option.is_given || (option.fits && option.fits_output)) continue;

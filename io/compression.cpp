@@ -59,6 +59,19 @@ class Inflater {
     return out;
   }
 
+  /// What still comes, of at most `most` bytes.
+  std::string rest(size_t most) {
+    std::string out(most, '\0');
+    size_t made = 0;
+    while (made < most) {
+      const size_t more = step(out.data() + made, most - made);
+      if (more == 0) break;
+      made += more;
+    }
+    out.resize(made);
+    return out;
+  }
+
   /// Nothing more may come, and the checksum must be there and right.
   void expect_end() {
     char more = 0;
@@ -110,6 +123,19 @@ std::string inflate(std::string_view bytes,
                     std::string_view what) {
   Inflater inflater(bytes, wrapping, path, what);
   std::string out = inflater.take(size);
+  inflater.expect_end();
+  return out;
+}
+
+std::string inflate_with_more(std::string_view bytes,
+                              DeflateWrapping wrapping,
+                              size_t size,
+                              size_t more,
+                              const std::filesystem::path& path,
+                              std::string_view what) {
+  Inflater inflater(bytes, wrapping, path, what);
+  std::string out = inflater.take(size);
+  out += inflater.rest(more);
   inflater.expect_end();
   return out;
 }

@@ -22,6 +22,15 @@ std::string inflate(std::string_view bytes,
                     const std::filesystem::path& path,
                     std::string_view what);
 
+/// The content of a deflate stream that must hold `size` bytes, and at most `more` after them.
+/// \throws BadInput as inflate()
+std::string inflate_with_more(std::string_view bytes,
+                              DeflateWrapping wrapping,
+                              size_t size,
+                              size_t more,
+                              const std::filesystem::path& path,
+                              std::string_view what);
+
 /// The first `size` bytes of the content; what follows them is not looked at.
 /// \throws BadInput Truncated, Syntax, Count as above
 std::string inflate_start(std::string_view bytes,

@@ -48,8 +48,9 @@ bool is_plausible(const Record& record) {
   for (const float p : record.position) {
     good = good && std::abs(p) < kFarthest && (p == 0 || std::abs(p) > kSmallest);
   }
-  for (const float s : record.scale) good = good && s > kSmallest && s < kFarthest;
-  return good;
+  // Flat splats have a scale of 0.
+  const auto [low, high] = std::minmax_element(record.scale.begin(), record.scale.end());
+  return good && *low >= 0 && *high > kSmallest && *high < kFarthest;
 }
 
 uint8_t rotation_byte(float q) {

@@ -85,11 +85,11 @@ class ColumnFinder {
     return out;
   }
 
-  /// Colour as a byte, a 16-bit number, or a float in [0, 1].
+  /// Colour as a byte, in a wider whole number too, as 16 bits, or a float in [0, 1].
   double color_range(int red) const {
     const PlyType type = vertex_.properties[static_cast<size_t>(red)].type;
-    if (type == PlyType::UInt8) return 255;
-    return type == PlyType::UInt16 ? 65535 : 1;
+    if (type == PlyType::Float32 || type == PlyType::Float64) return 1;
+    return type == PlyType::UInt16 ? 65535 : 255;
   }
 
   std::vector<int> rest_columns() const {

@@ -45,6 +45,7 @@ double fill_ratio(const std::vector<Eigen::Vector3f>& scales, double extent, ToL
   double area = 0;
   for (const Eigen::Vector3f& s : scales) {
     const Eigen::Vector3d d = s.cast<double>().unaryExpr(length);
+    if (!(d.maxCoeff() <= kLargestScale * extent)) continue;  // will be dropped
     area += 9 * std::numbers::pi * d.prod() / std::max(d.minCoeff(), kSmallestScale);
   }
   return extent > 0 ? area / (extent * extent) : 0;
@@ -67,6 +68,8 @@ class Examination {
     const std::vector<Eigen::Vector3d> corners = inner_corners(raw_.position);
     const double extent = (corners[1] - corners[0]).maxCoeff();
     judge_coding(extent);
+    if (findings_.linear_opacity) drop_unusable();  // opacity 0 is only known now
+    if (raw_.size() == 0) throw BadInput(Defect::Value, path_, "no splat can be seen");
     const std::string odd = check_significance(path_, widened(corners), raw_.digits);
     count_flyaways(corners, extent);
     PlyPlacement placement = ply_placement(raw_.comments, corners, frame);
@@ -147,16 +150,22 @@ class Examination {
     const auto& scales = raw_.log_scale;
     findings_.fill_ratio = fill_ratio(scales, extent, [](double s) { return std::exp(s); });
     if (!raw_.may_be_linear) return;
+    judge_opacities();
+    // A flat splat has a length of 0.
     all_scales_positive_ =
-        std::all_of(scales.begin(), scales.end(), [](const auto& s) { return s.minCoeff() > 0; });
-    if (all_scales_positive_ && !(findings_.fill_ratio < kSuspiciousFill)) {
-      const double as_lengths = fill_ratio(scales, extent, [](double s) { return s; });
-      if (as_lengths < kSuspiciousFill) {
-        findings_.linear_scales = true;
-        findings_.fill_ratio = as_lengths;
-        for (Eigen::Vector3f& s : raw_.log_scale) s = s.array().log();
-      }
-    }
+        std::all_of(scales.begin(), scales.end(), [](const auto& s) { return s.minCoeff() >= 0; });
+    // A file that holds one thing as it is will not hold the other as a logarithm.
+    const bool is_suspicious =
+        findings_.linear_opacity || !(findings_.fill_ratio < kSuspiciousFill);
+    if (!all_scales_positive_ || !is_suspicious) return;
+    const double as_lengths = fill_ratio(scales, extent, [](double s) { return s; });
+    if (!(as_lengths < kSuspiciousFill)) return;
+    findings_.linear_scales = true;
+    findings_.fill_ratio = as_lengths;
+    for (Eigen::Vector3f& s : raw_.log_scale) s = s.array().log();
+  }
+
+  void judge_opacities() {
     const auto [low, high] = std::minmax_element(raw_.logit.begin(), raw_.logit.end());
     constexpr float kSpread = 0.1f;
     all_probabilities_ = *low >= 0 && *high <= 1;

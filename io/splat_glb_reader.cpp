@@ -188,6 +188,9 @@ class SplatScene {
     if (has_unknown_) {
       splats_.notes.emplace_back("kernel or colour space is not known; read as ellipses in sRGB");
     }
+    if (has_logarithms_) {
+      splats_.notes.emplace_back("scales below 0: read as logarithms, as drafts of the format had");
+    }
     if (is_linear_) {
       splats_.notes.emplace_back(
           "colours were in linear light, now in sRGB: where splats overlap, they blend "
@@ -303,7 +306,14 @@ class SplatScene {
     if (!linear.allFinite() || linear.determinant() == 0 || !std::isfinite(linear.determinant())) {
       primitive.fail(Defect::Value, "lies in a node that flattens splats");
     }
-    const Attributes in = attributes_of(primitive, extension);
+    Attributes in = attributes_of(primitive, extension);
+    // The extension's text says lengths; files after its draft hold logarithms.
+    const bool is_negative =
+        std::any_of(in.scale.begin(), in.scale.end(), [](float s) { return s < 0; });
+    if (is_negative) {
+      for (float& s : in.scale) s = std::exp(s);
+      has_logarithms_ = true;
+    }
     const SplatTurn turn(linear);
     for (size_t i = 0; i < in.count; ++i) {
       const Eigen::Vector3d p = in.three(in.position, i);
@@ -348,6 +358,7 @@ class SplatScene {
   size_t others_ = 0;           // primitives
   bool has_unknown_ = false;    // kernel or colour space
   bool is_linear_ = false;
+  bool has_logarithms_ = false;
 };
 
 }  // namespace

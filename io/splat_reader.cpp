@@ -53,10 +53,15 @@ std::optional<SplatCount> stated_splats(const std::filesystem::path& path) {
     out.harmonics = found.harmonics;
     return out;
   }
+  if (looks_like_spz(start)) {
+    const SpzCount found = stated_spz_splats(start, path);
+    out.splats = std::min(found.splats, kSpzSplatsPerByte * out.file_bytes);
+    out.harmonics = found.harmonics;
+    return out;
+  }
   if (start.substr(0, 3) != "ply") {
     constexpr uint64_t kRecord = 32;
-    const bool is_plain =
-        !looks_like_spz(start) && !looks_like_sog(start) && !looks_like_ksplat(start);
+    const bool is_plain = !looks_like_sog(start) && !looks_like_ksplat(start);
     if (!is_plain || out.file_bytes % kRecord != 0) return {};
     out.splats = out.file_bytes / kRecord;
     return out;

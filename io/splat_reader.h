@@ -17,7 +17,7 @@ struct SplatCount {
 };
 
 /// Tells what a file holds by its header (a .glb is read for that), if it holds splats; none for
-/// SPZ and SOG, whose headers are compressed, and for .ksplat. Nothing is promised: headers can
+/// SOG, whose header is compressed, and for .ksplat. Nothing is promised: headers can
 /// lie. \throws BadInput as parse_ply_header() and count_glb_splats(), or if the file cannot be
 /// opened
 std::optional<SplatCount> stated_splats(const std::filesystem::path& path);

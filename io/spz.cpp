@@ -5,11 +5,13 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "io/atomic_file.h"
 #include "io/byte_reader.h"
 #include "io/byte_writer.h"
 #include "io/compression.h"
+#include "io/sh_rotation.h"
 #include "io/splat_arrays.h"
 #include "libcgs/core/order_statistics.h"
 
@@ -23,6 +25,29 @@ constexpr size_t kHeaderBytes = 16;   // of versions 2 and 3
 constexpr size_t kHeader4Bytes = 32;  // of version 4
 constexpr double kColorScale = 0.15;
 constexpr int kMostFractionalBits = 23;
+constexpr uint8_t kHasExtensions = 2;  // flag
+constexpr size_t kMostExtensionBytes = 1 << 20;
+constexpr uint32_t kCoordinateSystem = 0xADBE0003;  // extension of Adobe
+
+/// Where x, y and z point (right, left, up, down, back, forward) by the numbers of that extension;
+/// 0 is not stated.
+constexpr std::array<std::string_view, 17> kAxes = {"RUB",
+                                                    "LDB",
+                                                    "RDB",
+                                                    "LUB",
+                                                    "RUB",
+                                                    "LDF",
+                                                    "RDF",
+                                                    "LUF",
+                                                    "RUF",
+                                                    "LFD",
+                                                    "RFD",
+                                                    "LFU",
+                                                    "RFU",
+                                                    "LBD",
+                                                    "RBD",
+                                                    "LBU",
+                                                    "RBU"};
 
 /// Signs of the harmonics beyond degree 0 when y and z change theirs.
 constexpr std::array<float, 15> kShSigns = {-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1};
@@ -66,6 +91,16 @@ Header header_of(ByteReader& reader) {
   return out;
 }
 
+/// That of the beginning of a file.
+Header header_at(std::string_view bytes, const std::filesystem::path& path) {
+  std::string start;
+  if (bytes.substr(0, 2) == kGzipMagic) {
+    start = inflate_start(bytes, DeflateWrapping::Gzip, kHeaderBytes, path, "SPZ header");
+  }
+  ByteReader reader(start.empty() ? bytes : std::string_view(start), path);
+  return header_of(reader);
+}
+
 /// The parts of a file in their order: all of one attribute, then all of the next.
 enum Part : size_t { Positions, Opacities, Colors, Scales, Rotations, Harmonics, PartCount };
 
@@ -82,6 +117,7 @@ struct Parts {
   std::string storage;
   std::array<std::string, PartCount> own;
   std::array<std::string_view, PartCount> bytes;
+  std::string_view extensions;
 };
 
 Parts parts_of_one_stream(std::string_view file,
@@ -90,15 +126,17 @@ Parts parts_of_one_stream(std::string_view file,
   const std::array<size_t, PartCount> sizes = part_sizes(header);
   size_t total = kHeaderBytes;
   for (const size_t size : sizes) total += size;
+  const size_t more = (header.flags & kHasExtensions) != 0 ? kMostExtensionBytes : 0;
   Parts out;
   std::string_view all = file;
   if (file.substr(0, 2) == kGzipMagic) {
-    out.storage = inflate(file, DeflateWrapping::Gzip, total, path, "SPZ content");
+    out.storage = inflate_with_more(file, DeflateWrapping::Gzip, total, more, path, "SPZ content");
     all = out.storage;
   }
   ByteReader reader(all, path);
   (void)reader.take(kHeaderBytes, "header");
   for (size_t k = 0; k < PartCount; ++k) out.bytes.at(k) = reader.take(sizes[k], kPartNames.at(k));
+  if (more > 0) out.extensions = all.substr(total);
   return out;
 }
 
@@ -117,10 +155,12 @@ Parts parts_of_streams(std::string_view file,
     reader.fail(Defect::Schema,
                 std::to_string(header.streams) + " streams, needed are " + std::to_string(needed));
   }
-  (void)reader.take(table_at - reader.offset(), "header");
+  (void)reader.take(kHeader4Bytes - reader.offset(), "header");
+  const std::string_view extensions = reader.take(table_at - kHeader4Bytes, "extensions");
   ByteReader streams = reader;
   (void)streams.take(16 * size_t{header.streams}, "table of streams");
   Parts out;
+  if ((header.flags & kHasExtensions) != 0) out.extensions = extensions;
   for (size_t k = 0; k < needed; ++k) {
     const auto packed = reader.get<uint64_t>("length of a stream");
     const auto unpacked = reader.get<uint64_t>("length of a stream");
@@ -134,6 +174,59 @@ Parts parts_of_streams(std::string_view file,
     out.bytes.at(k) = out.own.at(k);
   }
   return out;
+}
+
+/// What follows the splats, or precedes them in version 4: records of a number, a length and a
+/// content.
+struct Extensions {
+  std::string_view axes = kAxes[0];
+  size_t others = 0;
+};
+
+Extensions extensions_of(std::string_view records, const std::filesystem::path& path) {
+  Extensions out;
+  ByteReader reader(records, path);
+  while (reader.remaining() > 0) {
+    const auto type = reader.get<uint32_t>("extension");
+    const auto length = reader.get<uint32_t>("length of an extension");
+    ByteReader content(reader.take(length, "extension"), path);
+    if (type != kCoordinateSystem) {
+      ++out.others;
+      continue;
+    }
+    const auto system = content.get<uint32_t>("coordinate system");
+    if (system >= kAxes.size()) {
+      reader.fail(Defect::Unsupported,
+                  "coordinate system " + std::to_string(system) + ", known are 0 to 16");
+    }
+    out.axes = kAxes.at(system);
+  }
+  return out;
+}
+
+/// Turns splats, read as if x, y and z were right, up and back, from other axes.
+void turn_from(std::string_view axes, RawSplats& splats) {
+  const std::string_view letters = "RDF";  // axes of the 3DGS PLY
+  const std::string_view opposites = "LUB";
+  Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    for (int j = 0; j < 3; ++j) {
+      const char letter = axes[static_cast<size_t>(k)];
+      if (letter == letters[static_cast<size_t>(j)]) M(j, k) = 1;
+      if (letter == opposites[static_cast<size_t>(j)]) M(j, k) = -1;
+    }
+  }
+  const Eigen::Matrix3d turn = M * Eigen::Vector3d(1, -1, -1).asDiagonal();
+  // A mirrored ellipsoid is also one that was turned, and not mirrored.
+  const Eigen::Quaterniond q(Eigen::Matrix3d(turn.determinant() * turn));
+  const ShRotation harmonics(turn);
+  for (size_t i = 0; i < splats.size(); ++i) {
+    splats.position[i] = turn * splats.position[i];
+    const Eigen::Vector4d r = splats.rotation[i].cast<double>();
+    const Eigen::Quaterniond out = q * Eigen::Quaterniond(r[0], r[1], r[2], r[3]);
+    splats.rotation[i] = Eigen::Vector4d(out.w(), out.x(), out.y(), out.z()).cast<float>();
+    harmonics.apply(std::span(splats.sh).subspan(i * splats.sh_count(), splats.sh_count()));
+  }
 }
 
 double byte_at(std::string_view bytes, size_t i) { return static_cast<uint8_t>(bytes[i]); }
@@ -330,26 +423,33 @@ bool looks_like_spz(std::string_view bytes) {
   return bytes.substr(0, 4) == kMagic || bytes.substr(0, 2) == kGzipMagic;
 }
 
+SpzCount stated_spz_splats(std::string_view start, const std::filesystem::path& path) {
+  const Header header = header_at(start, path);
+  const auto side = static_cast<uint64_t>(std::min(header.degree, 3)) + 1;
+  return {header.count, side * side};
+}
+
 RawSplats parse_spz(std::string_view bytes, const std::filesystem::path& path) {
-  std::string start;
-  if (bytes.substr(0, 2) == kGzipMagic) {
-    start = inflate_start(bytes, DeflateWrapping::Gzip, kHeaderBytes, path, "SPZ header");
-  }
-  ByteReader reader(start.empty() ? bytes : std::string_view(start), path);
-  const Header header = header_of(reader);
-  if (header.version == 4 && !start.empty()) {
+  const Header header = header_at(bytes, path);
+  if (header.version == 4 && bytes.substr(0, 2) == kGzipMagic) {
     throw BadInput(Defect::Schema, path, "SPZ 4 inside a gzip stream");
   }
-  // Nothing compresses better than this; told before memory is taken.
-  constexpr size_t kSplatsPerByte = 1 << 12;
-  if (header.count / kSplatsPerByte > bytes.size()) {
-    reader.fail(Defect::Count,
-                "declares " + std::to_string(header.count) + " splats, " +
-                    std::to_string(bytes.size()) + " bytes cannot hold them");
+  // Told before memory is taken.
+  if (header.count / kSpzSplatsPerByte > bytes.size()) {
+    throw BadInput(Defect::Count,
+                   path,
+                   "declares " + std::to_string(header.count) + " splats, " +
+                       std::to_string(bytes.size()) + " bytes cannot hold them");
   }
-  return splats_of(header.version == 4 ? parts_of_streams(bytes, header, path)
-                                       : parts_of_one_stream(bytes, header, path),
-                   header);
+  const Parts parts = header.version == 4 ? parts_of_streams(bytes, header, path)
+                                          : parts_of_one_stream(bytes, header, path);
+  const Extensions extensions = extensions_of(parts.extensions, path);
+  RawSplats out = splats_of(parts, header);
+  if (extensions.axes != kAxes[0]) turn_from(extensions.axes, out);
+  if (extensions.others > 0) {
+    out.notes.push_back(std::to_string(extensions.others) + " extensions of the SPZ left out");
+  }
+  return out;
 }
 
 void SpzOptions::validate() const {

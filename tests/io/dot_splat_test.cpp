@@ -79,6 +79,10 @@ TEST(DotSplat, IsOnlyWhatIsPlausibleThroughout) {
     good += record({static_cast<float>(i), 0, 0}, 0.1f, 0xff804020, kNoTurn);
   }
   EXPECT_EQ(defect(good), "OK");
+  // Flat: the third scale is 0.
+  std::string flat = record({0, 0, 0}, 0.1f, 0xff804020, kNoTurn);
+  flat.replace(20, 4, std::string(4, '\0'));
+  EXPECT_EQ(defect(flat), "OK");
   EXPECT_EQ(defect(good + "x"), "MAGIC");
   EXPECT_EQ(defect(std::string(320, 'x')), "MAGIC");
   EXPECT_EQ(defect(record({0, 0, 0}, -1, 0xff000000, kNoTurn)), "MAGIC");

@@ -117,6 +117,49 @@ TEST(SplatDoctor, ReadsLengthsAndProbabilitiesAsWhatTheyAre) {
   }
 }
 
+TEST(SplatDoctor, ReadsFlatLengthsAndInvisibleProbabilities) {
+  const Gaussians g = test::varied_splats(3000, 1);
+  const GaussianFile out = examined(
+      [&](RawSplats& raw) {
+        for (size_t i = 0; i < raw.size(); ++i) {
+          raw.log_scale[i] = g.scale[i];
+          raw.logit[i] = g.opacity[i];
+        }
+        raw.log_scale[7].z() = 0;
+        raw.logit[0] = raw.logit[1] = 0;
+      },
+      3000);
+  EXPECT_TRUE(out.findings.linear_scales);
+  EXPECT_EQ(out.findings.transparent, 2u);
+  EXPECT_EQ(out.gaussians.size(), 2998u);
+  EXPECT_NEAR(out.gaussians.scale[5].x(), g.scale[7].x(), 1e-6f);
+  EXPECT_LT(out.gaussians.scale[5].z(), 1e-15f);
+}
+
+// A scene so wide that sizes read as logarithms would not cover it often.
+TEST(SplatDoctor, TakesScalesForLengthsWhereOpacitiesAreProbabilities) {
+  const Gaussians g = test::varied_splats(300, 1);
+  const GaussianFile out = examined(
+      [&](RawSplats& raw) {
+        for (size_t i = 0; i < raw.size(); ++i) {
+          raw.position[i] *= 100;
+          raw.log_scale[i] = g.scale[i];
+          raw.logit[i] = g.opacity[i];
+        }
+      },
+      300);
+  EXPECT_TRUE(out.findings.linear_scales);
+  EXPECT_NEAR(out.gaussians.scale[0].x(), g.scale[0].x(), 1e-6f);
+}
+
+TEST(SplatDoctor, LeavesWhatIsTooLargeOutOfTheFillRatio) {
+  const double usual = examined([](RawSplats&) {}).findings.fill_ratio;
+  const GaussianFile out = examined([](RawSplats& raw) { raw.log_scale[3].x() = 200; });
+  EXPECT_EQ(out.findings.out_of_range, 1u);
+  EXPECT_NEAR(out.findings.fill_ratio, usual, 0.02 * usual);
+  EXPECT_FALSE(warns(out, "fill ratio"));
+}
+
 TEST(SplatDoctor, DoesNotTakeLargeSplatsForLengths) {
   const GaussianFile out = examined([](RawSplats& raw) {  // a few, as wide as the scene
     raw.position = {{0, 0, 0}, {10, 0, 0}, {0, 10, 0}};

@@ -121,13 +121,6 @@ OthersGlb others(int count, int degree) {
 /// A point of another program's file in the axes of the 3DGS PLY.
 Eigen::Vector3d half_turned(const Eigen::Vector3d& p) { return {-p.x(), -p.y(), p.z()}; }
 
-Eigen::Matrix3d covariance_of(const RawSplats& raw, size_t i) {
-  const Eigen::Vector4d q = raw.rotation[i].cast<double>().normalized();
-  const Eigen::Matrix3d axes = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).matrix() *
-                               raw.log_scale[i].cast<double>().array().exp().matrix().asDiagonal();
-  return axes * axes.transpose();
-}
-
 /// Splat i shows and is what the source splat does and is once `linear` has moved it.
 void expect_moved(const RawSplats& raw,
                   const Gaussians& g,
@@ -146,7 +139,7 @@ void expect_moved(const RawSplats& raw,
                                  Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().matrix() *
                                  g.scale[i].cast<double>().asDiagonal();
     const Eigen::Matrix3d covariance = axes * axes.transpose();
-    EXPECT_LT((covariance_of(raw, i) - covariance).norm(), 1e-5 * covariance.norm()) << i;
+    EXPECT_LT((test::covariance_of(raw, i) - covariance).norm(), 1e-5 * covariance.norm()) << i;
     EXPECT_NEAR(1 / (1 + std::exp(-raw.logit[i])), g.opacity[i], 1e-6);
     for (const Eigen::Vector3f& p : directions.position) {
       const Eigen::Vector3f d = p.normalized();
@@ -285,6 +278,18 @@ TEST(SplatGlbReader, TakesWholeNumbersOfEveryType) {
             (std::vector<float>{logit_of_byte(255), std::log(0.25f)}));
   const RawSplats fine = with("OPACITY", UnsignedShorts{65535, 0}, "SCALAR", kUnsignedShort, true);
   EXPECT_TRUE(std::isfinite(fine.logit[0]) && std::isfinite(fine.logit[1]));
+}
+
+TEST(SplatGlbReader, ReadsScalesOfDraftsAsLogarithms) {
+  const Gaussians g = test::varied_splats(20, 0);
+  Gaussians draft = g;
+  for (Eigen::Vector3f& s : draft.scale) s = s.array().log();
+  OthersGlb file;
+  file.add(draft);
+  const RawSplats raw = file.read();
+  expect_moved(raw, g, kHalfTurn, kHalfTurn, {0, 0, 0});
+  ASSERT_EQ(raw.notes.size(), 1u);
+  EXPECT_NE(raw.notes[0].find("read as logarithms"), std::string::npos);
 }
 
 TEST(SplatGlbReader, TurnsLinearLightIntoSrgb) {

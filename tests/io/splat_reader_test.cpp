@@ -46,7 +46,8 @@ TEST(SplatReader, TellsSizesBeforeReading) {
   write_dot_splat(dir / "some.splat", test::varied_splats(7, 0), Frame{});
   EXPECT_EQ(stated_splats(dir / "some.splat")->splats, 7u);
   write_spz(dir / "some.spz", test::varied_splats(7, 0), Frame{});
-  EXPECT_FALSE(stated_splats(dir / "some.spz").has_value());
+  EXPECT_EQ(stated_splats(dir / "some.spz")->splats, 7u);
+  EXPECT_EQ(stated_splats(dir / "some.spz")->harmonics, 1u);
 }
 
 /// Files that other programs made. Counts and corners are those that another reader finds.

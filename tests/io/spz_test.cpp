@@ -8,6 +8,7 @@
 #include <zstd.h>
 
 #include "io/byte_writer.h"
+#include "io/compression.h"
 #include "io/splat_reader.h"
 #include "libcgs/render/spherical_harmonics.h"
 #include "tests/support/full_disk.h"
@@ -113,6 +114,76 @@ TEST(Spz, ReadsTheStreamsOfVersion4) {
   std::string late = out;
   late[17] = 1;  // the table of streams beyond the file
   EXPECT_EQ(defect(late), "SCHEMA");
+}
+
+std::string extension(uint32_t type, const std::string& content) {
+  std::string out;
+  append_bytes(out, type);
+  append_bytes(out, static_cast<uint32_t>(content.size()));
+  return out + content;
+}
+
+TEST(Spz, ReadsExtensionsAfterTheSplats) {
+  SpzBytes header;
+  header.flags = 2;
+  const std::string splats =
+      header.header() + kPositions + kOpacities + kColors + kScales + kRotations2;
+  const std::string orbit = extension(0xADBE0002, std::string(12, '\0'));
+  const RawSplats out = parsed(splats + orbit);
+  expect_the_two_splats(out);
+  ASSERT_EQ(out.notes.size(), 1u);
+  EXPECT_EQ(out.notes[0], "1 extensions of the SPZ left out");
+  expect_the_two_splats(parsed(gzip(splats + orbit)));
+  expect_the_two_splats(parsed(gzip(splats)));
+  EXPECT_EQ(defect(gzip(splats + orbit.substr(0, 15))), "TRUNCATED");
+  EXPECT_EQ(defect(gzip(splats + extension(1, std::string(1 << 20, '\0')))), "COUNT");
+  SpzBytes without;
+  EXPECT_EQ(defect(gzip(without.header() + splats.substr(16) + orbit)), "COUNT");
+}
+
+TEST(Spz, TurnsSplatsFromTheAxesThatItStates) {
+  SpzBytes header;
+  header.flags = 2;
+  header.degree = 1;
+  std::string harmonics;
+  for (int k = 0; k < 18; ++k) harmonics += text({100 + 3 * k});
+  const auto with_axes = [&](uint8_t system) {
+    return parsed(header.header() + kPositions + kOpacities + kColors + kScales + kRotations2 +
+                  harmonics + extension(0xADBE0003, text({system, 0, 0, 0})));
+  };
+  const RawSplats usual = with_axes(4);
+  EXPECT_EQ(usual.position[0], Eigen::Vector3d(1, 2, -0.5));
+  // Right, down, forward, as they are kept; right, forward, up; and mirrored: left, up, back.
+  EXPECT_EQ(with_axes(6).position[0], Eigen::Vector3d(1, -2, 0.5));
+  EXPECT_EQ(with_axes(12).position[0], Eigen::Vector3d(1, -0.5, -2));
+  EXPECT_EQ(with_axes(3).position[0], Eigen::Vector3d(-1, 2, -0.5));
+  EXPECT_TRUE(with_axes(0).position == usual.position);
+  for (const uint8_t system : {6, 12, 3}) {
+    const RawSplats out = with_axes(system);
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();  // from what the usual axes would have given
+    if (system == 6) turn.diagonal() << 1, -1, -1;
+    if (system == 3) turn.diagonal() << -1, 1, 1;
+    if (system == 12) {
+      turn(0, 0) = 1;
+      turn(2, 1) = -1;
+      turn(1, 2) = 1;
+    }
+    for (size_t i = 0; i < 2; ++i) {
+      EXPECT_TRUE(out.position[i].isApprox(turn * usual.position[i]));
+      const Eigen::Matrix3d shape = turn * test::covariance_of(usual, i) * turn.transpose();
+      EXPECT_TRUE(test::covariance_of(out, i).isApprox(shape, 1e-5));
+      for (const Eigen::Vector3d& d :
+           {Eigen::Vector3d(0.6, 0, 0.8), Eigen::Vector3d(0, 0.8, -0.6)}) {
+        const auto shown = [&](const RawSplats& splats, const Eigen::Vector3d& direction) {
+          return sh_color({splats.sh.data() + 4 * i, 4}, 1, direction.cast<float>());
+        };
+        EXPECT_LT((shown(out, turn * d) - shown(usual, d)).norm(), 1e-6f);
+      }
+    }
+  }
+  EXPECT_EQ(defect(header.header() + kPositions + kOpacities + kColors + kScales + kRotations2 +
+                   harmonics + extension(0xADBE0003, text({17, 0, 0, 0}))),
+            "UNSUPPORTED");
 }
 
 TEST(Spz, RefusesWhatItDoesNotKnow) {

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstdint>
 
+#include <Eigen/Geometry>
+
+#include "io/raw_splats.h"
 #include "libcgs/core/gaussians.h"
 
 namespace cgs::test {
@@ -30,6 +33,15 @@ inline Gaussians varied_splats(int count, int sh_degree) {
     }
   }
   return out;
+}
+
+/// Of a splat [file units squared].
+inline Eigen::Matrix3d covariance_of(const RawSplats& splats, size_t i) {
+  const Eigen::Vector4d q = splats.rotation[i].cast<double>().normalized();
+  const Eigen::Vector3d size = splats.log_scale[i].cast<double>().array().exp();
+  const Eigen::Matrix3d axes =
+      Eigen::Quaterniond(q[0], q[1], q[2], q[3]).matrix() * size.asDiagonal();
+  return axes * axes.transpose();
 }
 
 /// Angle between two rotations [rad], whatever the sign of their quaternions.
