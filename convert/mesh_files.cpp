@@ -25,6 +25,10 @@ Json certificate_to_json(const Certificate& certificate,
                          const TriangleMesh& mesh,
                          const Frame& frame) {
   const double area_unit = frame.scale * frame.scale;
+  // What the mesh does not state is unknown, not nothing.
+  const auto area_of = [&](double area) {
+    return mesh.provenance.empty() ? Json() : Json(area * area_unit);
+  };
   return {{"passed", certificate.passed()},
           {"closed", certificate.closed},
           {"edge_manifold", certificate.edge_manifold},
@@ -36,11 +40,11 @@ Json certificate_to_json(const Certificate& certificate,
           {"euler_number", certificate.euler_number},
           {"smallest_angle_degrees", certificate.smallest_angle * 180 / std::numbers::pi},
           {"volume", certificate.volume * area_unit * frame.scale},
-          {"area_observed", certificate.observed_area * area_unit},
-          {"area_single_view", certificate.single_view_area * area_unit},
-          {"area_interpolated", certificate.interpolated_area * area_unit},
-          {"area_inferred", certificate.inferred_area * area_unit},
-          {"area_virtual", certificate.virtual_area * area_unit},
+          {"area_observed", area_of(certificate.observed_area)},
+          {"area_single_view", area_of(certificate.single_view_area)},
+          {"area_interpolated", area_of(certificate.interpolated_area)},
+          {"area_inferred", area_of(certificate.inferred_area)},
+          {"area_virtual", area_of(certificate.virtual_area)},
           {"units", frame.unit_name()},
           {"vertices", mesh.vertices.size()},
           {"faces", mesh.faces.size()}};

@@ -59,8 +59,8 @@ class Groups {
 };
 
 int insunits(const std::string& unit) {
-  constexpr std::array<std::pair<const char*, int>, 6> kCodes = {
-      {{"in", 1}, {"ft", 2}, {"mm", 4}, {"cm", 5}, {"m", 6}, {"km", 7}}};
+  constexpr std::array<std::pair<const char*, int>, 7> kCodes = {
+      {{"in", 1}, {"ft", 2}, {"mm", 4}, {"cm", 5}, {"m", 6}, {"km", 7}, {"um", 13}}};
   for (const auto& [name, code] : kCodes) {
     if (unit == name) return code;
   }

@@ -168,11 +168,10 @@ class MeshRows {
                          std::to_string(vertex_count_));
     }
     if (corners.size() < 3) ++dropped_faces;
-    for (size_t k = 2; k < corners.size(); ++k) {
-      mesh.faces.push_back({static_cast<uint32_t>(corners[0]),
-                            static_cast<uint32_t>(corners[k - 1]),
-                            static_cast<uint32_t>(corners[k])});
-      if (provenance_ >= 0) mesh.provenance.push_back(label(row_number, row));
+    polygon_.assign(corners.begin(), corners.end());
+    append_polygon(polygon_, positions, mesh.faces);
+    if (provenance_ >= 0 && mesh.faces.size() > mesh.provenance.size()) {
+      mesh.provenance.resize(mesh.faces.size(), label(row_number, row));
     }
   }
 
@@ -196,6 +195,7 @@ class MeshRows {
   uint64_t vertex_count_ = 0;
   int indices_ = -1;
   int provenance_ = -1;
+  std::vector<uint32_t> polygon_;
 };
 
 }  // namespace

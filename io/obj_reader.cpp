@@ -105,7 +105,7 @@ class ObjRows {
     std::vector<uint32_t> corners;
     corners.reserve(words.size() - 1);
     for (size_t k = 1; k < words.size(); ++k) corners.push_back(corner(words[k]));
-    append_fan(corners, out_.mesh.faces);
+    append_polygon(corners, out_.positions, out_.mesh.faces);
     all_grouped_ = all_grouped_ && group_.has_value();
     if (all_grouped_) out_.mesh.provenance.resize(out_.mesh.faces.size(), *group_);
   }

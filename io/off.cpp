@@ -69,7 +69,7 @@ ParsedMesh read_off(const std::filesystem::path& path) {
   for (uint64_t i = 0; i < faces; ++i) {
     const auto corners = read_polygon(lines, vertices);
     if (corners.size() < 3) ++dropped;
-    append_fan(corners, out.mesh.faces);
+    append_polygon(corners, out.positions, out.mesh.faces);
   }
   if (dropped > 0) {
     out.warnings.push_back("dropped " + std::to_string(dropped) + " faces of fewer than 3 corners");

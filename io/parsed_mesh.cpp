@@ -1,14 +1,113 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/parsed_mesh.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace cgs {
 
-void append_fan(const std::vector<uint32_t>& corners,
-                std::vector<std::array<uint32_t, 3>>& triangles) {
+namespace {
+
+// A polygon laid into the plane of its two largest extents, counter-clockwise.
+class FlatPolygon {
+ public:
+  FlatPolygon(const std::vector<uint32_t>& corners, const std::vector<Eigen::Vector3d>& positions) {
+    const Eigen::Vector3d& first = positions[corners[0]];
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+    for (size_t k = 0; k < corners.size(); ++k) {
+      const Eigen::Vector3d a = positions[corners[k]] - first;
+      const Eigen::Vector3d b = positions[corners[(k + 1) % corners.size()]] - first;
+      normal += a.cross(b);
+    }
+    Eigen::Index across = 0;
+    normal.cwiseAbs().maxCoeff(&across);
+    const Eigen::Index x = (across + 1) % 3;
+    const Eigen::Index y = (across + 2) % 3;
+    const double sign = normal[across] < 0 ? -1 : 1;
+    for (const uint32_t corner : corners) {
+      const Eigen::Vector3d p = positions[corner] - first;
+      places_.emplace_back(p[x], sign * p[y]);
+    }
+    for (size_t k = 0; k < corners.size(); ++k) left_.push_back(k);
+  }
+
+  bool is_convex() const {
+    for (size_t i = 0; i < left_.size(); ++i) {
+      if (turn(before(i), left_[i], after(i)) < 0) return false;
+    }
+    return true;
+  }
+
+  // Cuts off an ear: a corner whose triangle holds no other. \return its place, none if there is
+  // none
+  std::optional<std::array<size_t, 3>> cut_ear() {
+    for (size_t i = 0; i < left_.size(); ++i) {
+      const std::array<size_t, 3> ear = {before(i), left_[i], after(i)};
+      if (!(turn(ear[0], ear[1], ear[2]) > 0) || holds_another(ear)) continue;
+      left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(i));
+      return ear;
+    }
+    return std::nullopt;
+  }
+
+  size_t size() const { return left_.size(); }
+
+ private:
+  size_t before(size_t i) const { return left_[(i + left_.size() - 1) % left_.size()]; }
+  size_t after(size_t i) const { return left_[(i + 1) % left_.size()]; }
+  // Twice the area of a triangle.
+  double turn(size_t a, size_t b, size_t c) const {
+    const Eigen::Vector2d ab = places_[b] - places_[a];
+    const Eigen::Vector2d ac = places_[c] - places_[a];
+    return ab.x() * ac.y() - ab.y() * ac.x();
+  }
+  bool holds_another(const std::array<size_t, 3>& ear) const {
+    return std::any_of(left_.begin(), left_.end(), [&](size_t k) {
+      const auto is_corner = [&](size_t e) { return places_[e] == places_[k]; };
+      if (std::any_of(ear.begin(), ear.end(), is_corner)) return false;
+      return turn(ear[0], ear[1], k) >= 0 && turn(ear[1], ear[2], k) >= 0 &&
+             turn(ear[2], ear[0], k) >= 0;
+    });
+  }
+
+  std::vector<Eigen::Vector2d> places_;
+  std::vector<size_t> left_;  // corners that are not cut off yet
+};
+
+// The triangles of a polygon with reflex corners; none if it cannot be cut up.
+std::vector<std::array<uint32_t, 3>> ears_of(const std::vector<uint32_t>& corners,
+                                             FlatPolygon polygon) {
+  std::vector<std::array<uint32_t, 3>> out;
+  const auto add = [&](const std::array<size_t, 3>& ear) {
+    out.push_back({corners[ear[0]], corners[ear[1]], corners[ear[2]]});
+  };
+  while (polygon.size() > 2) {
+    const auto ear = polygon.cut_ear();
+    if (!ear) return {};
+    add(*ear);
+  }
+  return out;
+}
+
+}  // namespace
+
+void append_polygon(const std::vector<uint32_t>& corners,
+                    const std::vector<Eigen::Vector3d>& positions,
+                    std::vector<std::array<uint32_t, 3>>& triangles) {
+  constexpr size_t kMost = 1024;
+  const auto is_placed = [&](uint32_t corner) { return corner < positions.size(); };
+  if (corners.size() > 3 && corners.size() <= kMost &&
+      std::all_of(corners.begin(), corners.end(), is_placed)) {
+    const FlatPolygon polygon(corners, positions);
+    if (!polygon.is_convex()) {
+      const auto ears = ears_of(corners, polygon);
+      triangles.insert(triangles.end(), ears.begin(), ears.end());
+      if (!ears.empty()) return;
+    }
+  }
   for (size_t k = 2; k < corners.size(); ++k) {
     triangles.push_back({corners[0], corners[k - 1], corners[k]});
   }

@@ -24,9 +24,14 @@ struct ParsedMesh {
   int digits = kDoubleDigits;         ///< Binary digits of the coordinates as stored.
 };
 
-/// Appends a polygon as a fan of triangles.
-void append_fan(const std::vector<uint32_t>& corners,
-                std::vector<std::array<uint32_t, 3>>& triangles);
+/// Appends a polygon as triangles: a fan where no corner is reflex, else ears cut off in its plane.
+/// Polygons that cross themselves, those of more than 1024 corners and those with corners that have
+/// no position yet become fans.
+/// \param positions  finite
+/// Source: ear clipping, Meisters 1975; normal of a polygon, Newell.
+void append_polygon(const std::vector<uint32_t>& corners,
+                    const std::vector<Eigen::Vector3d>& positions,
+                    std::vector<std::array<uint32_t, 3>>& triangles);
 
 /// Numbers places in the order they first appear, for formats that repeat a vertex per face.
 class PlaceNumbers {

@@ -82,11 +82,17 @@ TriangleMesh cropped_by_plane(const TriangleMesh& mesh,
                               const Eigen::Vector3d& normal) {
   std::vector<double> heights;
   heights.reserve(mesh.vertices.size());
-  // What float cannot tell from the plane lies on it, so that no face is cut into a sliver.
+  // What float cannot tell from the plane lies on it, so that no face is cut into a sliver; near 0,
+  // where floats are finer than the mesh is, what is nothing beside its size.
   constexpr double kOnPlane = 0x1p-21;
+  Eigen::AlignedBox3f box;
+  for (const auto& p : mesh.vertices) box.extend(p);
+  const Eigen::Vector3d size =
+      mesh.vertices.empty() ? Eigen::Vector3d::Zero().eval() : box.sizes().cast<double>().eval();
   for (const auto& p : mesh.vertices) {
     const double height = (p.cast<double>() - point).dot(normal);
-    const double least = kOnPlane * p.cast<double>().cwiseAbs().dot(normal.cwiseAbs());
+    const Eigen::Vector3d reach = p.cast<double>().cwiseAbs().cwiseMax(size);
+    const double least = kOnPlane * reach.dot(normal.cwiseAbs());
     heights.push_back(std::abs(height) <= least ? 0 : height);
   }
   return without_unused(PlaneCut(mesh, std::move(heights)).result(), mesh.faces.empty());

@@ -173,9 +173,11 @@ Part part_of_mesh(const MeasurableMesh& mesh, const std::vector<uint32_t>& faces
   return out;
 }
 
+enum class End { Source, Target };
+
 // The same point on the part, whose faces may have been turned round and their corners renumbered.
 std::optional<std::pair<Mesh::Face_index, Traits::Barycentric_coordinates>> locate(
-    const Part& part, const MeasurableMesh& mesh, const SurfacePoint& point) {
+    const Part& part, const MeasurableMesh& mesh, const SurfacePoint& point, End end) {
   const auto at = std::lower_bound(part.face_of.begin(), part.face_of.end(), point.face);
   if (at == part.face_of.end() || *at != point.face) return std::nullopt;
   const Mesh::Face_index face(static_cast<Mesh::size_type>(at - part.face_of.begin()));
@@ -186,7 +188,14 @@ std::optional<std::pair<Mesh::Face_index, Traits::Barycentric_coordinates>> loca
   // On an edge or vertex but for rounding means on it: ways then start into all faces around.
   constexpr double kOnBorder = 1e-9;
   Eigen::Vector3d at_corner = (point.weights.array() < kOnBorder).select(0, point.weights);
-  if (at_corner.maxCoeff() > 1 - kOnBorder) at_corner = at_corner.array().round();
+  if (at_corner.maxCoeff() > 1 - kOnBorder) {
+    at_corner = at_corner.array().round();
+  } else if (end == End::Source) {
+    // CGAL 5.5 takes a source on an edge for its mirror image there.
+    constexpr double kBesideEdge = 1e-8;
+    at_corner = at_corner.cwiseMax(kBesideEdge);
+    at_corner /= at_corner.sum();
+  }
   Traits::Barycentric_coordinates weights{};
   for (size_t k = 0; k < 3; ++k) {
     const Kernel::Point_3& p = part.mesh.point(corner.at(k));
@@ -205,8 +214,8 @@ std::vector<Eigen::Vector3d> shortest_path(const MeasurableMesh& mesh,
                                            const SurfacePoint& from,
                                            const SurfacePoint& to) {
   const Part part = part_of_mesh(mesh, faces);
-  const auto source = locate(part, mesh, to);
-  const auto target = locate(part, mesh, from);
+  const auto source = locate(part, mesh, to, End::Source);
+  const auto target = locate(part, mesh, from, End::Target);
   std::vector<Eigen::Vector3d> out;
   if (!source || !target) return out;
   ShortestPath solver(part.mesh);
@@ -216,6 +225,7 @@ std::vector<Eigen::Vector3d> shortest_path(const MeasurableMesh& mesh,
       target->first, target->second, std::back_inserter(points));
   out.reserve(points.size());
   for (const Kernel::Point_3& p : points) out.emplace_back(p.x(), p.y(), p.z());
+  if (!out.empty()) out.back() = to.position;
   return out;
 }
 
@@ -287,8 +297,11 @@ SurfacePath distance_along(const MeasurableMesh& mesh,
     auto best = shortest_path(mesh, reachable, from, to);
     if (length_of(best) <= length_of(out.points)) out.points = std::move(best);
   }
-  if (out.points.size() < 2) {
-    throw NumericalError("no shortest way along the surface was found between the two points");
+  if (out.points.size() < 2) {  // as where three faces meet in an edge
+    out.exact = false;
+    out.points = {from.position};
+    for (const uint32_t v : edges.vertices) out.points.push_back(mesh.points[v]);
+    out.points.push_back(to.position);
   }
   out.length = measure(mesh, out.points);
   return out;

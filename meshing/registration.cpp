@@ -106,8 +106,7 @@ Vector7 step(const std::vector<Pair>& all,
     throw NumericalError(
         "the surfaces do not hold each other in every direction: a plane, a ball or a tube slides, "
         "and so do surfaces that hardly meet, being of other units or elsewhere; lay them onto "
-        "each "
-        "other first, and compare without --icp");
+        "each other first, and compare without --icp");
   }
   Vector7 out = Vector7::Zero();
   out.head(unknowns) = part.ldlt().solve(right.head(unknowns));

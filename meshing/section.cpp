@@ -190,37 +190,6 @@ double signed_area(const DrawnLine& line) {
   return sum / 2;
 }
 
-bool contains(const DrawnLine& line, const Eigen::Vector2d& p) {
-  bool inside = false;
-  for (size_t i = 0; i < line.points.size(); ++i) {
-    const Eigen::Vector2d& a = line.points[i];
-    const Eigen::Vector2d& b = line.points[(i + 1) % line.points.size()];
-    if ((a.y() > p.y()) == (b.y() > p.y())) continue;
-    if (p.x() < a.x() + (p.y() - a.y()) / (b.y() - a.y()) * (b.x() - a.x())) inside = !inside;
-  }
-  return inside;
-}
-
-// +1 for lines around material, -1 for holes, 0 for open lines; by how many lines are around.
-std::vector<int> nesting(const std::vector<DrawnLine>& lines) {
-  std::vector<Eigen::AlignedBox2d> boxes;
-  for (const DrawnLine& line : lines) {
-    Eigen::AlignedBox2d box;
-    for (const Eigen::Vector2d& p : line.points) box.extend(p);
-    boxes.push_back(box);
-  }
-  std::vector<int> out(lines.size(), 0);
-  for (size_t i = 0; i < lines.size(); ++i) {
-    if (!lines[i].closed) continue;
-    out[i] = 1;
-    for (size_t j = 0; j < lines.size(); ++j) {
-      if (j == i || !lines[j].closed || !boxes[j].contains(boxes[i])) continue;
-      if (contains(lines[j], lines[i].points.front())) out[i] = -out[i];
-    }
-  }
-  return out;
-}
-
 // What the surface moves the line by, within the plane: more, the flatter they meet.
 double shift_in_plane(const MeasurableMesh& mesh, const CutPlane& plane, uint32_t face) {
   const auto& f = mesh.mesh.faces[face];
@@ -307,13 +276,15 @@ Section section(const MeasurableMesh& mesh, const CutPlane& plane) {
     out.lines.push_back(std::move(line));
     kept.push_back(&chain);
   }
-  const std::vector<int> sides = nesting(out.lines);
   Uncertainty sum;
   out.area.dimension = 2;
   for (size_t i = 0; i < out.lines.size(); ++i) {
-    if (out.lines[i].closed) out.area.value += sides[i] * std::abs(signed_area(out.lines[i]));
-    add_uncertainty({mesh, plane, crossings}, *kept[i], sides[i], sum);
+    // Material lies to the left of lines, as it lies behind faces for the volume.
+    const double area = out.lines[i].closed ? signed_area(out.lines[i]) : 0;
+    out.area.value += area;
+    add_uncertainty({mesh, plane, crossings}, *kept[i], area < 0 ? -1 : area > 0 ? 1 : 0, sum);
   }
+  out.area.value = std::abs(out.area.value);  // faces may all look inward
   out.length.stated = sum.stated_length / (out.length.value > 0 ? out.length.value : 1);
   out.area.stated = out.length.stated;
   if (out.length.stated > 0) {

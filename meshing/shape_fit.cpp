@@ -30,31 +30,59 @@ struct Patch {
   double stated_area = 0;
 };
 
-// Splits a face into n x n equal triangles and takes the middles of those within the ball.
-void add_face(Patch& patch,
-              const MeasurableMesh& mesh,
-              uint32_t f,
-              const std::array<Eigen::Vector3d, 3>& corner,
-              std::vector<uint8_t>& used) {
-  const Eigen::Vector3d u = corner[1] - corner[0];
-  const Eigen::Vector3d v = corner[2] - corner[0];
+// A part of a face: its corners [radii from the middle of the ball], and their weights in the face.
+struct Piece {
+  std::array<Eigen::Vector3d, 3> corner;
+  std::array<Eigen::Vector3d, 3> weights;
+
+  bool meets_ball() const {
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& c : corner) box.extend(c);
+    return box.squaredExteriorDistance(Eigen::Vector3d::Zero()) <= 1;
+  }
+  double longest() const {
+    return std::sqrt(std::max({(corner[1] - corner[0]).squaredNorm(),
+                               (corner[2] - corner[1]).squaredNorm(),
+                               (corner[0] - corner[2]).squaredNorm()}));
+  }
+  std::array<Piece, 4> quarters() const {
+    const auto half = [&](const auto& of, size_t i, size_t j) {
+      return Eigen::Vector3d((of.at(i) + of.at(j)) / 2);
+    };
+    const auto part = [&](size_t k) {
+      const size_t next = (k + 1) % 3;
+      const size_t last = (k + 2) % 3;
+      return Piece{{corner.at(k), half(corner, k, next), half(corner, k, last)},
+                   {weights.at(k), half(weights, k, next), half(weights, k, last)}};
+    };
+    const Piece middle{{half(corner, 0, 1), half(corner, 1, 2), half(corner, 2, 0)},
+                       {half(weights, 0, 1), half(weights, 1, 2), half(weights, 2, 0)}};
+    return {part(0), part(1), part(2), middle};
+  }
+};
+
+// Splits a piece of face f into n x n equal triangles and takes the middles of those within the
+// ball.
+void add_samples(Patch& patch, const MeasurableMesh& mesh, uint32_t f, const Piece& piece) {
+  constexpr double kFinest = 24;  // pieces per radius
+  const Eigen::Vector3d u = piece.corner[1] - piece.corner[0];
+  const Eigen::Vector3d v = piece.corner[2] - piece.corner[0];
   const Eigen::Vector3d twice = u.cross(v);
   if (twice.squaredNorm() == 0) return;
-  constexpr double kFinest = 24;  // pieces per radius
-  constexpr double kMost = 512;
-  const double longest =
-      std::sqrt(std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()}));
-  const int n = static_cast<int>(std::clamp(std::ceil(longest * kFinest), 1.0, kMost));
+  const int n = static_cast<int>(std::max(std::ceil(piece.longest() * kFinest), 1.0));
   const double area = twice.norm() / 2 / n / n;
   const bool invented = mesh.states_provenance() && mesh.mesh.provenance[f] == Provenance::Inferred;
   const auto& face = mesh.mesh.faces[f];
   const auto add = [&](double s, double t) {
-    const Eigen::Vector3d p = corner[0] + s * u + t * v;
+    const Eigen::Vector3d p = piece.corner[0] + s * u + t * v;
     if (p.squaredNorm() > 1) return;
     double sigma = std::nan("");
     if (mesh.states_sigma() && !invented) {
-      sigma = (1 - s - t) * double(mesh.mesh.sigma[face[0]]) +
-              s * double(mesh.mesh.sigma[face[1]]) + t * double(mesh.mesh.sigma[face[2]]);
+      const Eigen::Vector3d weights =
+          (1 - s - t) * piece.weights[0] + s * piece.weights[1] + t * piece.weights[2];
+      sigma = weights[0] * double(mesh.mesh.sigma[face[0]]) +
+              weights[1] * double(mesh.mesh.sigma[face[1]]) +
+              weights[2] * double(mesh.mesh.sigma[face[2]]);
     }
     patch.samples.push_back({p, twice.normalized(), area, sigma});
     patch.area += area;
@@ -62,7 +90,6 @@ void add_face(Patch& patch,
     if (mesh.states_provenance()) {
       patch.area_of_label.at(static_cast<size_t>(mesh.mesh.provenance[f])) += area;
     }
-    for (const uint32_t w : face) used[w] = 1;
   };
   for (int i = 0; i < n; ++i) {
     for (int j = 0; i + j < n; ++j) {
@@ -72,18 +99,32 @@ void add_face(Patch& patch,
   }
 }
 
+// Of a large face only what is near the ball. \param depth  how often the face was quartered
+void add_piece(
+    Patch& patch, const MeasurableMesh& mesh, uint32_t f, const Piece& piece, int depth) {
+  constexpr double kLongest = 16;  // [radii]
+  constexpr int kDeepest = 64;     // for balls so small that nothing is within reach of double
+  if (!piece.meets_ball() || depth > kDeepest) return;
+  if (piece.longest() <= kLongest) {
+    add_samples(patch, mesh, f, piece);
+    return;
+  }
+  for (const Piece& quarter : piece.quarters()) add_piece(patch, mesh, f, quarter, depth + 1);
+}
+
 Patch patch_within(const MeasurableMesh& mesh, const Eigen::Vector3d& center, double radius) {
   Patch out;
   std::vector<uint8_t> used(mesh.points.size(), 0);
   for (uint32_t f = 0; f < mesh.mesh.faces.size(); ++f) {
-    std::array<Eigen::Vector3d, 3> corner;
-    Eigen::AlignedBox3d box;
+    Piece whole;
     for (size_t k = 0; k < 3; ++k) {
-      corner.at(k) = (mesh.points[mesh.mesh.faces[f].at(k)] - center) / radius;
-      box.extend(corner.at(k));
+      whole.corner.at(k) = (mesh.points[mesh.mesh.faces[f].at(k)] - center) / radius;
+      whole.weights.at(k) = Eigen::Vector3d::Unit(static_cast<Eigen::Index>(k));
     }
-    if (box.squaredExteriorDistance(Eigen::Vector3d::Zero()) <= 1)
-      add_face(out, mesh, f, corner, used);
+    const size_t before = out.samples.size();
+    add_piece(out, mesh, f, whole, 0);
+    if (out.samples.size() == before) continue;
+    for (const uint32_t v : mesh.mesh.faces[f]) used[v] = 1;
   }
   out.vertices = static_cast<size_t>(std::count(used.begin(), used.end(), uint8_t{1}));
   return out;

@@ -95,8 +95,8 @@ struct TsdfSource {
 ///
 /// Of a source, only as many views are held at once as fit into `view_memory` and into a quarter of
 /// options.memory_limit; beyond these, what has been summed up so far near the surface is kept
-/// instead. The result is that of all at once;
-/// a voxel size that is chosen is the median of at most kFootprints pixels, evenly spaced.
+/// instead. The result is that of all at once; a voxel size that is chosen is the median of at most
+/// kFootprints pixels, evenly spaced.
 ///
 /// \throws InvalidInput   if there is no view, a raster does not match its camera, or no pixel has
 ///                        a depth.

@@ -238,8 +238,9 @@
 
   // ---- Measuring ----------------------------------------------------------------------------
 
-  function toFile(place) {
-    const decimals = Math.max(0, 7 - Math.floor(Math.log10(scene.file.scale)));
+  // With so many significant digits of the scene's size.
+  function toFile(place, digits = 8) {
+    const decimals = Math.min(Math.max(0, digits - 1 - Math.floor(Math.log10(scene.file.scale))), 100);
     return place.toArray().map((value, k) => (scene.file.origin[k] + scene.file.scale * value).toFixed(decimals));
   }
   // Two digits of sigma decide how many the value has.
@@ -334,7 +335,7 @@
       const sign = side.getAttribute('aria-pressed') === 'true' ? -1 : 1;
       const at = bounds.min[name] + (bounds.max[name] - bounds.min[name]) * cut.value / 1000;
       clip.value.set(0, 0, 0, -sign * at)[name] = sign;
-      text.textContent = `${name} = ${toFile(new THREE.Vector3(at, at, at))['xyz'.indexOf(name)].slice(0, -4)}`;
+      text.textContent = `${name} = ${toFile(new THREE.Vector3(at, at, at), 4)['xyz'.indexOf(name)]}`;
       cut.setAttribute('aria-valuetext', text.textContent);
     }
     redraw();

@@ -26,6 +26,37 @@ TEST(ReadOff, ReadsCountsOnEitherLineCommentsAndColours) {
   }
 }
 
+double area_of(const ParsedMesh& mesh) {
+  double sum = 0;
+  for (const auto& f : mesh.mesh.faces) {
+    const Eigen::Vector3d u = mesh.positions[f[1]] - mesh.positions[f[0]];
+    sum += u.cross(mesh.positions[f[2]] - mesh.positions[f[0]]).norm() / 2;
+  }
+  return sum;
+}
+
+// A U whose outline begins at any of its corners, either way round.
+TEST(ReadOff, CutsConcavePolygonsWithinTheirOutline) {
+  const test::TempDir dir;
+  const std::string points = "0 0 1\n3 0 1\n3 3 1\n2 3 1\n2 1 1\n1 1 1\n1 3 1\n0 3 1\n";
+  for (const bool turned : {false, true}) {
+    for (int first = 0; first < 8; ++first) {
+      std::string face = "8";
+      for (int k = 0; k < 8; ++k) {
+        face += ' ' + std::to_string(turned ? (first + 8 - k) % 8 : (first + k) % 8);
+      }
+      test::write_bytes(dir / "u.off", "OFF\n8 1 0\n" + points + face + "\n");
+      const ParsedMesh mesh = read_off(dir / "u.off");
+      ASSERT_EQ(mesh.mesh.faces.size(), 6U);
+      EXPECT_NEAR(area_of(mesh), 7, 1e-12);
+      const auto& f = mesh.mesh.faces[0];
+      const Eigen::Vector3d normal = (mesh.positions[f[1]] - mesh.positions[f[0]])
+                                         .cross(mesh.positions[f[2]] - mesh.positions[f[0]]);
+      EXPECT_EQ(normal.z() < 0, turned);
+    }
+  }
+}
+
 TEST(ReadOff, RefusesWhatIsDamaged) {
   EXPECT_EQ(defect("PLY\n4 2 0\n"), "MAGIC");
   EXPECT_EQ(defect("4OFF\n4 2 0\n"), "UNSUPPORTED");

@@ -35,7 +35,7 @@ TEST(WriteSvg, DrawsLabelsApartWithYDownwards) {
   EXPECT_TRUE(std::regex_match(points, std::regex("4\\.0+ 3\\.0+ L4\\.0+ 0\\.0+ L0\\.0+ 3\\.0+")))
       << points;
   EXPECT_NE(text.find("a &lt; b &amp; &quot;c&quot;"), std::string::npos);
-  EXPECT_NE(text.find("(5e+06, 13) of the drawing"), std::string::npos);
+  EXPECT_NE(text.find("(5000000, 13) of the drawing"), std::string::npos);
   EXPECT_NE(text.find(".inferred { stroke: #c02a8a; stroke-dasharray"), std::string::npos);
 }
 

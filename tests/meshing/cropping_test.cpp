@@ -43,6 +43,17 @@ TEST(CroppedByPlane, SplitsNothingWhereItPassesThroughVertices) {
   EXPECT_EQ(half.vertices.size(), 15U);
 }
 
+// Where sine and cosine give 6e-16 for 0.
+TEST(CroppedByPlane, SplitsNothingBesideVerticesAtZeroButForRounding) {
+  TriangleMesh mesh = test::torus_mesh(20, 5, 48, 24).mesh;
+  for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+    float& z = mesh.vertices[i].z();
+    if (std::abs(z) < 1e-5f) z = i % 2 == 0 ? 6e-16f : -6e-16f;
+  }
+  const TriangleMesh half = cropped_by_plane(mesh, {0, 0, 0}, {0, 0, 1});
+  EXPECT_EQ(half.faces.size(), mesh.faces.size() / 2);
+}
+
 TEST(CroppedByPlane, BothSidesTogetherHaveTheAreaOfEveryLabel) {
   const TriangleMesh ball = test::labelled_sphere();
   const Eigen::Vector3d point(0.06, -0.1, 0.13);

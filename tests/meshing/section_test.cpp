@@ -50,6 +50,30 @@ TEST(Section, OfATorusIsARing) {
   EXPECT_NEAR(upright.area.value / (2 * kPi * 0.01), 1, 2e-3);
 }
 
+// As their volume: what lies behind faces counts once for each of them.
+TEST(Section, CountsShellsAsTheVolumeDoes) {
+  const auto together = [](const MeasurableMesh& a, const MeasurableMesh& b) {
+    MeasurableMesh out = a;
+    const auto first = static_cast<uint32_t>(a.points.size());
+    for (const Eigen::Vector3d& p : b.points) out.points.push_back(p);
+    for (const auto& f : b.mesh.faces) {
+      out.mesh.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
+    }
+    return test::with_vertices(std::move(out));
+  };
+  MeasurableMesh inner = test::cube_mesh(0.5);
+  for (Eigen::Vector3d& p : inner.points) p.array() += 0.25;
+  const CutPlane plane = cut_plane({0, 0, 0.4}, {0, 0, 1});
+  const MeasurableMesh outer = test::cube_mesh();
+  EXPECT_NEAR(section(together(outer, outer), plane).area.value, 2, 1e-12);
+  EXPECT_NEAR(section(together(outer, inner), plane).area.value, 1.25, 1e-12);
+  for (auto& f : inner.mesh.faces) std::swap(f[1], f[2]);  // a cavity
+  EXPECT_NEAR(section(together(outer, inner), plane).area.value, 0.75, 1e-12);
+  MeasurableMesh turned = outer;
+  for (auto& f : turned.mesh.faces) std::swap(f[1], f[2]);
+  EXPECT_NEAR(section(turned, plane).area.value, 1, 1e-12);
+}
+
 TEST(Section, OfAnOpenTubeAcrossAndAlong) {
   const MeasurableMesh mesh = test::tube_mesh(0.2, 0.6);
   const Section along = section(mesh, cut_plane({0.01, 0, 0}, {1, 0, 0}));

@@ -42,6 +42,16 @@ TEST(FitShape, PlaneOnTwoTriangles) {
   EXPECT_NEAR(fit.area.value / (std::numbers::pi * 0.09), 1, 0.02);
 }
 
+// A ball in the middle of a face, however much larger that is.
+TEST(FitShape, PlaneOnASmallPartOfALargeFace) {
+  const MeasurableMesh mesh = test::cube_mesh(1);
+  for (const double radius : {0.3, 0.01, 1e-4, 1e-6}) {
+    const ShapeFit fit = fit_shape(mesh, Shape::Plane, {0.5, 0.4, 1}, radius);
+    EXPECT_NEAR(fit.area.value / (std::numbers::pi * radius * radius), 1, 0.01) << radius;
+    EXPECT_NEAR(std::abs(fit.direction.z()), 1, 1e-9) << radius;
+  }
+}
+
 TEST(FitShape, SphereAndCylinderOfFineMeshes) {
   const auto ball = turned(test::sphere_mesh(0.4, 200, 400));
   const ShapeFit sphere = fit_shape(ball, Shape::Sphere, turned(Eigen::Vector3d(0.4, 0, 0)), 0.3);
