@@ -15,6 +15,7 @@
 #include <opencv2/core.hpp>
 
 #include "convert/commands/commands.h"
+#include "convert/commands/usage.h"
 #include "convert/terminal.h"
 #include "libcgs/core/error.h"
 
@@ -45,6 +46,7 @@ int run_program(int argc, char** argv) {
   CLI::App app(kDescription, "cgs");
   app.footer(kFooter);
   app.require_subcommand(1);
+  app.failure_message(cgs::usage_message);
   app.set_version_flag("--version", cgs::kProgramVersion);
   cgs::add_run(app);
   cgs::add_info(app);

@@ -29,6 +29,7 @@
 #include "io/depth_file.h"
 #include "io/image.h"
 #include "io/json_file.h"
+#include "io/photographs.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -372,10 +373,21 @@ Json run_stages(Run& run, Terminal& terminal) {
   return report_json(run);
 }
 
+// Lengths that will be refused, before minutes are spent on cameras.
+void check_lengths_of_photographs(const RunRequest& request) {
+  if (!is_photographs(request.scene.path)) return;
+  Frame frame;
+  const bool states_unit =
+      !request.scene.assume_unit.empty() || !request.scene.control.file.empty();
+  if (states_unit) frame.metres_per_unit = 1;
+  check_lengths(request, frame);
+}
+
 }  // namespace
 
 Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   refuse_contradictions(request);
+  check_lengths_of_photographs(request);
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   Scene& scene = opened.scene;
   terminal.warn(scene.warnings);

@@ -44,6 +44,18 @@ void refine(const SceneRequest& request,
   warnings.insert(warnings.end(), out.refined->warnings.begin(), out.refined->warnings.end());
 }
 
+// Which photographs there are is known before their cameras are, minutes earlier.
+void check_names(const SceneRoot& root, const std::string& views) {
+  if (views.empty()) return;
+  Scene named;
+  for (const PhotoFile& photograph : list_photographs(root)) {
+    View& view = named.views.emplace_back();
+    view.name = photograph.path.stem().string();
+    view.image_path = photograph.path;
+  }
+  (void)select_views(named, views);
+}
+
 }  // namespace
 
 bool SceneRequest::states_lengths() const {
@@ -66,6 +78,7 @@ OpenedScene open_scene(const SceneRequest& request,
     }
     request.options.validate();
     const SceneRoot root{request.path, request.options.allow_external};
+    check_names(root, request.options.views);
     const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
     out.poses = photo_poses(root, request.focal, stored, terminal);
     out.scene = scene_of_photographs(request.path, out.poses->model, request.options);

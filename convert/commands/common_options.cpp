@@ -10,6 +10,7 @@
 #include <tbb/global_control.h>
 
 #include "convert/length.h"
+#include "io/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -193,6 +194,12 @@ void keep_apart(const std::filesystem::path& output, const std::filesystem::path
   if (end != from.end()) return;
   throw InvalidInput("the output " + printable(output) + " lies in the input " + printable(input) +
                      "; choose another place");
+}
+
+void require_ending(const std::filesystem::path& output, const char* ending, const char* option) {
+  if (output.empty() || lower_extension(output) == ending) return;
+  throw InvalidInput(std::string(option) + " " + printable(output) +
+                     " is no name of such a file: write NAME" + ending);
 }
 
 void limit_threads(int threads) {

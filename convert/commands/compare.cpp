@@ -61,7 +61,7 @@ Agreement agreement(const CompareArgs& args,
 }
 
 std::string title_of(const CompareArgs& args) {
-  return args.a.filename().string() + " against " + args.b.filename().string();
+  return printable(args.a.filename()) + " against " + printable(args.b.filename());
 }
 
 Registration lay_onto(MeasurableMesh& a,
@@ -117,18 +117,19 @@ void print_m3c2(const CompareArgs& args,
   }
 }
 
-// The unit of one file is not that of the other. Only a registration finds it out.
+// The unit of one file is not that of the other. Only a registration finds it out, if it is near.
 void check_units(const CompareArgs& args, const Frame& a, const Frame& b) {
   if (a.has_metric_scale() == b.has_metric_scale() || args.scale) return;
   const auto& [known, unknown] =
       a.has_metric_scale() ? std::pair(args.a, args.b) : std::pair(args.b, args.a);
   throw InvalidInput(printable(unknown) + " does not say how long a unit of it is, " +
-                     printable(known) +
-                     " does; say it with --assume-unit, or let --icp --scale find it");
+                     printable(known) + " does; say it with --assume-unit");
 }
 
 void run_compare(const CompareArgs& args) {
   limit_threads(args.common.threads);
+  require_ending(args.ply, ".ply", "--ply");
+  require_ending(args.svg, ".svg", "--svg");
   for (const auto& output : {args.ply, args.svg}) {
     for (const auto& input : {args.a, args.b}) {
       if (!output.empty()) keep_apart(output, input);

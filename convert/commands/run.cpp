@@ -137,7 +137,8 @@ void add_run(CLI::App& app) {
          "scene",
          args->request.scene.path,
          "Folder: LLFF, COLMAP, transforms.json (nerfstudio, instant-ngp), Strecha, Polycam, "
-         "Metashape, RealityCapture, cameras.json (3DGS), or nothing but photographs")
+         "7-Scenes, Open3D, Metashape, RealityCapture, cameras.json (3DGS), or nothing but "
+         "photographs")
       ->required();
   cmd->add_option("-o,--output", args->request.output, "Folder to write")->required();
   cmd->add_flag("-w,--overwrite", args->request.overwrite, "Replace the results of another run");

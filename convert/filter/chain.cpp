@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "convert/closest_name.h"
 #include "convert/filter/operations.h"
 #include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
@@ -21,13 +24,16 @@ namespace {
 const FilterOperation& operation_named(const std::string& typed) {
   std::string name = typed.substr(0, typed.find('='));
   std::replace(name.begin(), name.end(), '_', '-');
+  std::vector<std::string> names;
   std::string known;
   for (const FilterOperation& operation : filter_operations()) {
     if (operation.name == name) return operation;
-    known += (known.empty() ? "" : ", ") + std::string(operation.name);
+    names.emplace_back(operation.name);
+    known += (known.empty() ? "" : ", ") + names.back();
   }
-  throw InvalidInput("--op " + typed + ": there is no operation '" + name + "'; known are " +
-                     known);
+  const std::string meant = closest_name(name, names);
+  throw InvalidInput("--op " + typed + ": there is no operation '" + name + "'; " +
+                     (meant.empty() ? "" : "did you mean " + meant + "? ") + "known are " + known);
 }
 
 /// What is said about a mesh before and after.

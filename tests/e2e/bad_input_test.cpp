@@ -206,12 +206,35 @@ TEST(Usage, MistakesEndWithExitCode2) {
   const std::string out = " -o " + (dir / "out").string();
   EXPECT_EQ(run_cgs("run " + scene).exit_code, 2);
   EXPECT_EQ(run_cgs("fly").exit_code, 2);
+  EXPECT_EQ(run_cgs("").err, "cgs: A subcommand is required; see cgs --help\n");
+  EXPECT_EQ(run_cgs("fliter a b").err,
+            "cgs: there is no command fliter (did you mean filter?); see cgs --help\n");
+  EXPECT_EQ(run_cgs("measure a.ply --distnce 1").err,
+            "cgs: measure does not take --distnce (did you mean --distance?); see cgs measure "
+            "--help\n");
   EXPECT_EQ(run_cgs("run " + scene + out + " --views 0,9").exit_code, 2);
   EXPECT_EQ(run_cgs("run " + scene + out + " --downscale 0").exit_code, 2);
   EXPECT_EQ(run_cgs("run " + scene + out + " --assume-unit parsec").exit_code, 2);
   EXPECT_EQ(run_cgs("run " + scene + out + " --voxel-size 5mm").exit_code, 2);
   EXPECT_EQ(run_cgs("run " + scene + out + " --threads -1").exit_code, 2);
   EXPECT_FALSE(std::filesystem::exists(dir / "out"));
+}
+
+// One colour: solving for the cameras would end with exit code 6, minutes later with real ones.
+TEST(Usage, WhatPhotographsCannotHaveIsRefusedBeforeTheirCamerasAreSolvedFor) {
+  const TempDir dir;
+  std::filesystem::create_directories(dir / "photos");
+  for (const char* name : {"photos/a.png", "photos/b.png"}) {
+    write_png(dir / name, ColorImage(64, 48, Eigen::Vector3f::Constant(0.5f)));
+  }
+  const std::string run = "run " + (dir / "photos").string() + " -o " + (dir / "out").string();
+  EXPECT_EQ(run_cgs(run).exit_code, 6);
+  const ProgramResult view = run_cgs(run + " --views a.png,c");
+  EXPECT_EQ(view.exit_code, 2) << view.err;
+  EXPECT_NE(view.err.find("no view \"c\" among 2: a, b"), std::string::npos) << view.err;
+  const ProgramResult length = run_cgs(run + " --voxel-size 5mm");
+  EXPECT_EQ(length.exit_code, 2) << length.err;
+  EXPECT_NE(length.err.find("the scale of this scene is unknown"), std::string::npos) << length.err;
 }
 
 TEST(Output, AFolderThatCannotBeMadeEndsWithExitCode5) {

@@ -102,6 +102,7 @@ TEST_F(Filter, RefusesInOneLineAndWritesNothing) {
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     EXPECT_FALSE(exists("no.ply"));
   };
+  refused("--op smplify=1mm", 2, "did you mean simplify? known are translate");
   refused("--op polish", 2, "there is no operation 'polish'; known are translate");
   refused("--op taubin=many", 2, "'many' is not a whole number in 1 ... 10000; write taubin=N");
   refused("--op simplify=3furlong", 2, "not a unit of length");
