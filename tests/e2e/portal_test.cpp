@@ -39,9 +39,10 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
 
   const auto m = test::measure_portal(kRun);
   for (const auto& view : m.inputs) EXPECT_GE(view.depth_within_1_percent, 0.97) << view.name;
-  // Splats bleed over holes of one to three pixels, of which the capture has many: even with exact
-  // depth 0.76 is what this definition of a hole reaches.
+  // Many holes of the capture are one to three pixels wide: a third of what is missing, masks of
+  // exact depth miss too. Most of the rest lies where depth had to be filled in.
   EXPECT_GE(m.hole_iou, 0.53);
+  EXPECT_GE(m.hole_iou_of_exact_depth, 0.85);
   EXPECT_GE(m.hole_iou_inside, 0.72);
   EXPECT_LE(std::abs(m.volume.relative_error), 0.02);
   EXPECT_LE(m.volume.missed, 0.01);

@@ -28,11 +28,12 @@ int main(int argc, char** argv) {
                   view.hole_iou);
     }
     std::printf(
-        "mean depth within 1 %%: %.1f %%\nhole IoU over all held-out views: %.3f, without 2 px "
-        "along borders of true holes: "
-        "%.3f\n",
+        "mean depth within 1 %%: %.1f %%\n"
+        "hole IoU over all held-out views: %.3f (with exact depth: %.3f), without 2 px along "
+        "borders of true holes: %.3f\n",
         100 * m.depth_within_1_percent,
         m.hole_iou,
+        m.hole_iou_of_exact_depth,
         m.hole_iou_inside);
     std::printf("hole IoU without true holes narrower than 3 px: %.3f (they are %.1f %% of all)\n",
                 m.hole_iou_wide,

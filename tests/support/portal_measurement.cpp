@@ -7,6 +7,7 @@
 #include "io/exr.h"
 #include "io/mesh_ply.h"
 #include "libcgs/core/error.h"
+#include "libcgs/render/support.h"
 
 namespace cgs::test {
 
@@ -34,6 +35,20 @@ MaskMap holes_of(const ExrImage& image, const std::filesystem::path& path) {
   MaskMap holes(image.width, image.height, 0);
   const std::vector<float>& values = channel(image, "hole.Y", path);
   for (size_t i = 0; i < values.size(); ++i) holes.data[i] = values[i] > 0.5f;
+  return holes;
+}
+
+// The mask of a surface that lies where it truly does, judged by input views whose depth is exact.
+MaskMap holes_with_exact_depth(const ViewTruth& truth,
+                               const Camera& camera,
+                               std::span<const SupportView> inputs) {
+  RenderBuffers buffers;
+  buffers.alpha = Raster<float>(camera.width, camera.height, 1.0f);
+  buffers.depth = truth.depth;
+  buffers.median_depth = truth.depth;
+  annotate_support(buffers, camera, inputs);
+  MaskMap holes(camera.width, camera.height, 0);
+  for (size_t i = 0; i < holes.data.size(); ++i) holes.data[i] = buffers.hole.data[i] != Hole::None;
   return holes;
 }
 
@@ -100,8 +115,11 @@ PortalMeasurement measure_portal(const std::filesystem::path& run_folder) {
   const PortalScene scene = portal_scene();
   const std::vector<CaptureView> views = capture_views();
   const std::vector<Camera> inputs = input_cameras(views);
+  std::vector<SupportView> exact;
+  for (const Camera& camera : inputs) exact.push_back({camera, exact_depth(scene, camera), {}, {}});
   PortalMeasurement out;
   Overlap all;
+  Overlap best;
   Overlap inside;
   Overlap wide;
   double narrow_area = 0;
@@ -121,6 +139,7 @@ PortalMeasurement measure_portal(const std::filesystem::path& run_folder) {
         {view.name, fraction(expected), fraction(holes), mask_iou(holes, expected)});
     const MaskMap band = border_band(expected);
     add_overlap(all, holes, expected, nullptr);
+    add_overlap(best, holes_with_exact_depth(truth, view.camera, exact), expected, nullptr);
     add_overlap(inside, holes, expected, &band);
     const MaskMap narrow = narrow_parts(expected);
     add_overlap(wide, holes, expected, &narrow);
@@ -128,6 +147,7 @@ PortalMeasurement measure_portal(const std::filesystem::path& run_folder) {
     hole_area += fraction(expected);
   }
   out.hole_iou = all.iou();
+  out.hole_iou_of_exact_depth = best.iou();
   out.hole_iou_inside = inside.iou();
   out.hole_iou_wide = wide.iou();
   out.narrow_hole_share = narrow_area / hole_area;

@@ -23,8 +23,9 @@ struct PortalMeasurement {
   };
   std::vector<InputView> inputs;
   std::vector<HeldOutView> held_out;
-  double depth_within_1_percent = 0;  ///< Mean over the input views.
-  double hole_iou = 0;                ///< Over the pixels of all held-out views together.
+  double depth_within_1_percent = 0;   ///< Mean over the input views.
+  double hole_iou = 0;                 ///< Over the pixels of all held-out views together.
+  double hole_iou_of_exact_depth = 0;  ///< What masks from the exact depth of all views reach.
   /// The same without pixels within 2 px of a border of a true hole: the holes that people notice.
   double hole_iou_inside = 0;
   /// The same over all but true holes too narrow for 3 x 3 pixels, and how large a part of the true
