@@ -128,13 +128,13 @@ void check_units(const CompareArgs& args, const Frame& a, const Frame& b) {
 
 void run_compare(const CompareArgs& args) {
   limit_threads(args.common.threads);
-  require_ending(args.ply, ".ply", "--ply");
-  require_ending(args.svg, ".svg", "--svg");
   for (const auto& output : {args.ply, args.svg}) {
     for (const auto& input : {args.a, args.b}) {
       if (!output.empty()) keep_apart(output, input);
     }
   }
+  require_ending(args.ply, ".ply", "--ply");
+  require_ending(args.svg, ".svg", "--svg");
   require(args.samples >= 100 && args.samples <= 100'000'000,
           "--samples must be in 100 ... 100000000",
           args.samples);

@@ -53,9 +53,6 @@ struct MeasureArgs {
 };
 
 void check_outputs(const MeasureArgs& args) {
-  require_ending(args.svg, ".svg", "--svg");
-  require_ending(args.dxf, ".dxf", "--dxf");
-  require_ending(args.thickness_ply, ".ply", "--thickness-ply");
   std::vector<std::filesystem::path> outputs = {args.svg, args.dxf, args.thickness_ply};
   if (!args.orthophoto.prefix.empty()) {
     for (const auto& file : orthophoto_files(args.orthophoto.prefix)) outputs.push_back(file);
@@ -63,6 +60,9 @@ void check_outputs(const MeasureArgs& args) {
   for (const auto& output : outputs) {
     if (!output.empty()) keep_apart(output, args.mesh);
   }
+  require_ending(args.svg, ".svg", "--svg");
+  require_ending(args.dxf, ".dxf", "--dxf");
+  require_ending(args.thickness_ply, ".ply", "--thickness-ply");
 }
 
 void run_measure(const MeasureArgs& args) {
