@@ -3,27 +3,15 @@
 
 #include <algorithm>
 
-#include "io/cameras_json_scene.h"
-#include "io/colmap.h"
-#include "io/llff.h"
-#include "io/metashape.h"
 #include "io/orientation.h"
-#include "io/polycam.h"
-#include "io/realitycapture.h"
-#include "io/strecha.h"
-#include "io/transforms_json.h"
+#include "io/scene_layouts.h"
 
 namespace cgs {
 
 namespace fs = std::filesystem;
 
 bool is_photographs(const fs::path& folder) {
-  if (!is_folder(folder)) return false;
-  if (is_llff(folder) || is_transforms_json(folder) || is_colmap(folder) || is_strecha(folder) ||
-      is_polycam(folder) || is_metashape(folder) || is_realitycapture(folder) ||
-      is_cameras_json(folder)) {
-    return false;
-  }
+  if (!is_folder(folder) || layout_of(folder) != nullptr) return false;
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {

@@ -12,23 +12,16 @@
 #include <utility>
 
 #include "io/byte_reader.h"
-#include "io/cameras_json_scene.h"
 #include "io/colmap.h"
 #include "io/exif.h"
 #include "io/fisheye_map.h"
 #include "io/image.h"
 #include "io/lens.h"
-#include "io/llff.h"
 #include "io/masks.h"
-#include "io/metashape.h"
 #include "io/orientation.h"
-#include "io/polycam.h"
-#include "io/realitycapture.h"
 #include "io/resample.h"
-#include "io/rgbd_frames.h"
+#include "io/scene_layouts.h"
 #include "io/significance.h"
-#include "io/strecha.h"
-#include "io/transforms_json.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -44,15 +37,7 @@ Scene read_layout(const SceneRoot& root) {
     throw BadInput(Defect::Open, root.folder, error ? error.message() : "no such folder");
   }
   if (!fs::is_directory(status)) throw BadInput(Defect::Open, root.folder, "not a folder");
-  if (is_llff(root.folder)) return read_llff(root);
-  if (is_transforms_json(root.folder)) return read_transforms_json(root);
-  if (is_colmap(root.folder)) return read_colmap(root);
-  if (is_strecha(root.folder)) return read_strecha(root);
-  if (is_polycam(root.folder)) return read_polycam(root);
-  if (is_rgbd_frames(root.folder)) return read_rgbd_frames(root);
-  if (is_metashape(root.folder)) return read_metashape(root);
-  if (is_realitycapture(root.folder)) return read_realitycapture(root);
-  if (is_cameras_json(root.folder)) return read_cameras_json_scene(root);
+  if (const SceneLayout* const layout = layout_of(root.folder)) return layout->read(root);
   throw BadInput(Defect::Schema,
                  root.folder,
                  "no known layout: understood are LLFF (poses_bounds.npy), transforms.json "

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "io/photographs.h"
 #include "io/scene_reader.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
@@ -88,6 +89,11 @@ TEST_F(RgbdFrames, ReadsSequencesOfOneScene) {
   ASSERT_EQ(scene.views.size(), 2u);
   EXPECT_EQ(scene.views[0].name, "seq-01_frame-000000");
   EXPECT_EQ(scene.views[1].image_path.parent_path().filename(), "seq-02");
+}
+
+TEST_F(RgbdFrames, AreNoPhotographsWithoutCameras) {
+  write_frame("frame-000000", 0.5);
+  EXPECT_FALSE(is_photographs(dir_.path()));  // even where the intrinsics are missing
 }
 
 TEST_F(RgbdFrames, LeavesOutWhatLostTrack) {
