@@ -84,8 +84,10 @@ Json write_web_splats(const std::filesystem::path& folder, Model& model, const P
   Json out = {{"thinning", thinning}, {"splats.glb", {{"bytes", glb_bytes}}}};
   try {
     constexpr double kOfPixel = 1.0 / 16;
-    const SpzReport spz = write_spz(
-        folder / "splats.spz", thinned.splats, frame, {.finest = kOfPixel * double{thinned.pixel}});
+    const SpzReport spz = write_spz(folder / "splats.spz",
+                                    thinned.splats,
+                                    frame,
+                                    {.finest = kOfPixel * double{thinned.pixel}, .y_up = y_up});
     out["splats.spz"] = {{"bytes", spz.bytes},
                          {"fractional_bits", spz.fractional_bits},
                          {"clamped_splats", spz.clamped}};

@@ -26,4 +26,9 @@ void require_writable(const Gaussians& g) {
   }
 }
 
+void require_rotation(const Eigen::Matrix3d& matrix, const char* rule) {
+  const double off = (matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).norm();
+  require(off < 1e-6 && matrix.determinant() > 0, rule, off);
+}
+
 }  // namespace cgs

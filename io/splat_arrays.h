@@ -10,4 +10,8 @@ namespace cgs {
 /// \throws InvalidInput that names the first array or splat that is not so
 void require_writable(const Gaussians& gaussians);
 
+/// \param rule  "NAME must be a rotation; error"
+/// \throws InvalidInput if it is none
+void require_rotation(const Eigen::Matrix3d& matrix, const char* rule);
+
 }  // namespace cgs

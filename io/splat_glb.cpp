@@ -151,9 +151,7 @@ std::string splat_harmonic_name(int degree, int order) {
 }
 
 void SplatGlbOptions::validate() const {
-  const double off = (y_up * y_up.transpose() - Eigen::Matrix3d::Identity()).norm();
-  require(
-      off < 1e-6 && y_up.determinant() > 0, "SplatGlbOptions.y_up must be a rotation; error", off);
+  require_rotation(y_up, "SplatGlbOptions.y_up must be a rotation; error");
 }
 
 size_t write_splat_glb(const std::filesystem::path& path,

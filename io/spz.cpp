@@ -310,13 +310,18 @@ RawSplats splats_of(const Parts& parts, const Header& header) {
 /// Fills the parts splat by splat and counts what had to be clamped.
 class Packer {
  public:
-  Packer(const Gaussians& gaussians, const Frame& frame, int version, int bits)
-      : g_(gaussians), frame_(frame), version_(version), steps_(std::ldexp(1.0, bits)) {}
+  Packer(const Gaussians& gaussians, const Frame& frame, const SpzOptions& options, int bits)
+      : g_(gaussians),
+        frame_(frame),
+        y_up_(options.y_up),
+        quaternion_(options.y_up),
+        harmonics_(options.y_up),
+        version_(options.version),
+        steps_(std::ldexp(1.0, bits)) {}
 
   void add(size_t i) {
     clamped_ = false;
-    Eigen::Vector3d p = frame_.file_from_internal(g_.position[i].cast<double>());
-    p.tail<2>() *= -1;
+    const Eigen::Vector3d p = y_up_ * frame_.file_from_internal(g_.position[i].cast<double>());
     for (const double c : p) {
       const auto value = static_cast<uint32_t>(std::lround(c * steps_));
       for (const int shift : {0, 8, 16}) {
@@ -325,12 +330,15 @@ class Packer {
     }
     append_bytes(parts_[Opacities], unit_byte(g_.opacity[i]));
     const auto sh_count = static_cast<size_t>(g_.sh_count());
-    const Eigen::Vector3f* const sh = g_.sh.data() + i * sh_count;
+    std::array<Eigen::Vector3f, 16> turned;
+    const std::span<Eigen::Vector3f> sh(turned.data(), sh_count);
+    std::copy_n(g_.sh.begin() + static_cast<std::ptrdiff_t>(i * sh_count), sh_count, sh.begin());
+    harmonics_.apply(sh);
     for (const float c : sh[0]) add_byte(Colors, 255 * (kColorScale * c + 0.5));
     for (const float s : g_.scale[i]) add_byte(Scales, 16 * (std::log(s * frame_.scale) + 10));
     add_rotation(g_.rotation[i].cast<double>().normalized());
     for (size_t k = 1; k < sh_count; ++k) {
-      for (const float c : sh[k]) add_byte(Harmonics, 128 + 128 * kShSigns.at(k - 1) * double{c});
+      for (const float c : sh[k]) add_byte(Harmonics, 128 + 128 * double{c});
     }
     clamped_splats_ += clamped_ ? 1 : 0;
   }
@@ -356,7 +364,12 @@ class Packer {
   }
 
   void add_rotation(const Eigen::Vector4d& wxyz) {
-    Eigen::Vector4d q(wxyz[1], -wxyz[2], -wxyz[3], wxyz[0]);  // x, y, z, w
+    // The ellipsoid's own axes are turned half round, as parse_spz() turns them back.
+    const Eigen::Quaterniond half_turn(0, 1, 0, 0);
+    const Eigen::Quaterniond turned = quaternion_ *
+                                      Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]) *
+                                      half_turn.conjugate();
+    Eigen::Vector4d q = turned.coeffs();  // x, y, z, w
     if (version_ == 2) {
       if (q[3] < 0) q = -q;
       for (int k = 0; k < 3; ++k) add_byte(Rotations, 127.5 * (q[k] + 1));
@@ -377,6 +390,9 @@ class Packer {
 
   const Gaussians& g_;
   const Frame& frame_;
+  Eigen::Matrix3d y_up_;
+  Eigen::Quaterniond quaternion_;
+  ShRotation harmonics_;
   int version_;
   double steps_;
   std::array<std::string, PartCount> parts_;
@@ -385,12 +401,13 @@ class Packer {
 };
 
 /// Fractional bits with which every position fits into 24 bits, see write_spz().
-int fitting_bits(const Gaussians& g, const Frame& frame, double finest) {
+int fitting_bits(const Gaussians& g, const Frame& frame, const SpzOptions& options) {
+  const double finest = options.finest;
   double farthest = 0;
   std::array<std::vector<float>, 3> axes;
   for (const Eigen::Vector3f& position : g.position) {
     const Eigen::Vector3d p = frame.file_from_internal(position.cast<double>());
-    farthest = std::max(farthest, p.cwiseAbs().maxCoeff());
+    farthest = std::max(farthest, (options.y_up * p).cwiseAbs().maxCoeff());
     for (size_t k = 0; k < 3; ++k) axes.at(k).push_back(position[static_cast<int>(k)]);
   }
   double extent = 0;  // of the inner 98 %
@@ -455,6 +472,7 @@ RawSplats parse_spz(std::string_view bytes, const std::filesystem::path& path) {
 void SpzOptions::validate() const {
   require(version == 2 || version == 3, "SpzOptions.version must be 2 or 3", version);
   require(finest >= 0 && std::isfinite(finest), "SpzOptions.finest must be >= 0", finest);
+  require_rotation(y_up, "SpzOptions.y_up must be a rotation; error");
 }
 
 SpzReport write_spz(const std::filesystem::path& path,
@@ -464,8 +482,8 @@ SpzReport write_spz(const std::filesystem::path& path,
   options.validate();
   require_writable(gaussians);
   SpzReport report;
-  report.fractional_bits = fitting_bits(gaussians, frame, options.finest);
-  Packer packer(gaussians, frame, options.version, report.fractional_bits);
+  report.fractional_bits = fitting_bits(gaussians, frame, options);
+  Packer packer(gaussians, frame, options, report.fractional_bits);
   for (size_t i = 0; i < gaussians.size(); ++i) packer.add(i);
   report.clamped = packer.clamped_splats();
   const std::string bytes = gzip(packer.bytes(report.fractional_bits));

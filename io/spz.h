@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <string_view>
 
+#include <Eigen/Core>
+
 #include "io/raw_splats.h"
 #include "libcgs/core/frame.h"
 #include "libcgs/core/gaussians.h"
@@ -44,8 +46,11 @@ struct SpzOptions {
   /// Up to this far, places need not be told apart [internal units]; 0 = as write_spz() says. What
   /// no picture can show takes a third of the bits of a place, and compresses like noise.
   double finest = 0;
+  /// World axes to right, up and back; the usual ones are those that parse_spz() turns back. With
+  /// y_up_from(up) a scene stands upright in viewers, and is read turned.
+  Eigen::Matrix3d y_up = Eigen::Vector3d(1, -1, -1).asDiagonal();
 
-  /// \throws InvalidInput naming the first field out of range.
+  /// \throws InvalidInput naming the first field out of range, or if y_up is no rotation.
   void validate() const;
 };
 

@@ -258,6 +258,30 @@ TEST(Spz, TurnsHarmonicsWithTheAxes) {
   }
 }
 
+TEST(Spz, StandsUprightWhereAsked) {
+  const test::TempDir dir;
+  Gaussians g = test::varied_splats(40, 3);
+  for (Eigen::Vector3f& c : g.sh) c *= 0.3f;  // turned, none may grow beyond what a byte holds
+  const Eigen::Matrix3d y_up = Eigen::Quaterniond(0.4, -0.3, 0.8, 0.1).normalized().matrix();
+  write_spz(dir / "a.spz", g, Frame{});
+  write_spz(dir / "b.spz", g, Frame{}, {.y_up = y_up});
+  const RawSplats usual = parsed(test::read_bytes(dir / "a.spz"));
+  const RawSplats turned = parsed(test::read_bytes(dir / "b.spz"));
+  const Eigen::Matrix3d axes = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  const Eigen::Matrix3d turn = axes * y_up;  // as it is read
+  for (size_t i = 0; i < g.size(); ++i) {
+    EXPECT_LT((turned.position[i] - turn * usual.position[i]).norm(), 1e-4);
+    const Eigen::Matrix3d shape = turn * test::covariance_of(usual, i) * turn.transpose();
+    EXPECT_LT((test::covariance_of(turned, i) - shape).norm(), 0.02 * shape.norm());
+    const Eigen::Vector3d d = Eigen::Vector3d(0.3, -0.5, 0.8).normalized();
+    const auto shown = [&](const RawSplats& splats, const Eigen::Vector3d& direction) {
+      return sh_color({splats.sh.data() + 16 * i, 16}, 3, direction.cast<float>());
+    };
+    EXPECT_LT((shown(turned, turn * d) - shown(usual, d)).norm(), 0.05f);
+  }
+  EXPECT_THROW(write_spz(dir / "c.spz", g, Frame{}, {.y_up = 2 * y_up}), InvalidInput);
+}
+
 TEST(Spz, FitsTheFractionalBitsToTheScene) {
   const test::TempDir dir;
   const Gaussians g = test::varied_splats(300, 0);
