@@ -68,6 +68,7 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& with_
   const Model model = read_model(folder);
   SceneOptions options;
   options.downscale = 1;
+  options.allow_external = true;
   Scene scene = read_scene(with_depth, options);
   Errors inputs;
   Errors held_out;
