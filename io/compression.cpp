@@ -121,21 +121,17 @@ std::string inflate(std::string_view bytes,
                     size_t size,
                     const std::filesystem::path& path,
                     std::string_view what) {
-  Inflater inflater(bytes, wrapping, path, what);
-  std::string out = inflater.take(size);
-  inflater.expect_end();
-  return out;
+  return inflate(bytes, wrapping, SizeRange{size, size}, path, what);
 }
 
-std::string inflate_with_more(std::string_view bytes,
-                              DeflateWrapping wrapping,
-                              size_t size,
-                              size_t more,
-                              const std::filesystem::path& path,
-                              std::string_view what) {
+std::string inflate(std::string_view bytes,
+                    DeflateWrapping wrapping,
+                    const SizeRange& size,
+                    const std::filesystem::path& path,
+                    std::string_view what) {
   Inflater inflater(bytes, wrapping, path, what);
-  std::string out = inflater.take(size);
-  out += inflater.rest(more);
+  std::string out = inflater.take(size.least);
+  out += inflater.rest(size.most - size.least);
   inflater.expect_end();
   return out;
 }

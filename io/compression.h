@@ -22,14 +22,18 @@ std::string inflate(std::string_view bytes,
                     const std::filesystem::path& path,
                     std::string_view what);
 
-/// The content of a deflate stream that must hold `size` bytes, and at most `more` after them.
-/// \throws BadInput as inflate()
-std::string inflate_with_more(std::string_view bytes,
-                              DeflateWrapping wrapping,
-                              size_t size,
-                              size_t more,
-                              const std::filesystem::path& path,
-                              std::string_view what);
+/// How many bytes something has.
+struct SizeRange {
+  size_t least = 0;
+  size_t most = 0;
+};
+
+/// The same of content whose length is only known to lie in a range.
+std::string inflate(std::string_view bytes,
+                    DeflateWrapping wrapping,
+                    const SizeRange& size,
+                    const std::filesystem::path& path,
+                    std::string_view what);
 
 /// The first `size` bytes of the content; what follows them is not looked at.
 /// \throws BadInput Truncated, Syntax, Count as above

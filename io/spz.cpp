@@ -130,7 +130,8 @@ Parts parts_of_one_stream(std::string_view file,
   Parts out;
   std::string_view all = file;
   if (file.substr(0, 2) == kGzipMagic) {
-    out.storage = inflate_with_more(file, DeflateWrapping::Gzip, total, more, path, "SPZ content");
+    const SizeRange size{total, total + more};
+    out.storage = inflate(file, DeflateWrapping::Gzip, size, path, "SPZ content");
     all = out.storage;
   }
   ByteReader reader(all, path);
@@ -271,7 +272,10 @@ RawSplats splats_of(const Parts& parts, const Header& header) {
   out.sh_degree = std::min(header.degree, 3);
   out.reserve(header.count);
   if (header.degree > 3) out.notes.emplace_back("spherical harmonics of degree 4 left out");
-  if ((header.flags & 1U) != 0) out.notes.emplace_back("trained with antialiasing");
+  if ((header.flags & 1U) != 0)
+    out.notes.emplace_back(
+        "trained for viewers that smooth edges (antialiased); what is written from it does not say "
+        "so");
   const double step = std::ldexp(1.0, -header.fractional_bits);
   const size_t kept = out.sh_count() - 1;
   for (size_t i = 0; i < header.count; ++i) {
@@ -428,9 +432,13 @@ int fitting_bits(const Gaussians& g, const Frame& frame, const SpzOptions& optio
   while (bits > 0 && std::ldexp(farthest, bits) > kReach) --bits;
   const bool fits = std::ldexp(farthest, bits) <= kReach &&
                     (extent == 0 || std::ldexp(extent, bits) >= kCoarseSteps || bits >= 12);
-  require(fits,
-          "write_spz: splats must lie within what 24 bits can tell apart; the farthest coordinate",
-          farthest);
+  if (!fits) {
+    std::string text = "splats lie too far out for the 24 bits of SPZ: one has a coordinate of ";
+    append_number(text, static_cast<float>(farthest));
+    text += " in a scene of ";
+    append_number(text, static_cast<float>(extent));
+    throw InvalidInput(text + "; leave it out, or write .ply or .glb");
+  }
   return bits;
 }
 

@@ -204,6 +204,18 @@ Json checked_cameras(const SceneRequest& request, OpenedScene& opened) {
   return nullptr;
 }
 
+// Options of scenes would change nothing of what is said of a file.
+void refuse_for_files(const CLI::App& command, const std::filesystem::path& path) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) return;
+  for (const CLI::Option* option : command.get_options()) {
+    const std::string name = option->get_name(false, true);
+    const bool is_for_all = option->get_positional() || name == "--json" || name == "--strict";
+    if (option->count() == 0 || is_for_all) continue;
+    throw InvalidInput(name + " is for folders of photographs; " + printable(path) + " is a file");
+  }
+}
+
 void run_info(const InfoArgs& args) {
   if (print_file_info(args.scene.path, args.json)) return;
   Terminal terminal(args.json);
@@ -242,7 +254,10 @@ void add_info(CLI::App& app) {
   cmd->footer(
       "Example: cgs info photos/portal --views 1,10,19\n"
       "         cgs info part.stl");
-  cmd->callback([args] { run_info(*args); });
+  cmd->callback([args, cmd] {
+    refuse_for_files(*cmd, args->scene.path);
+    run_info(*args);
+  });
 }
 
 }  // namespace cgs

@@ -106,5 +106,15 @@ TEST(Info, SaysWhereARunStoppedAndRefusesWhatIsNoRecord) {
       << refused.err;
 }
 
+TEST(Info, RefusesOptionsOfScenes) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  const std::string info = "info " + (dir / "a.off").string();
+  EXPECT_EQ(run_cgs(info + " --json --strict").exit_code, 0);
+  const auto refused = run_cgs(info + " --views 1,2");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("--views is for folders of photographs"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace cgs
