@@ -261,8 +261,8 @@ size_t read_open3d(const SceneRoot& root, Scene& scene) {
 }
 
 bool is_open3d(const fs::path& folder) {
-  return !trajectory_name(folder).empty() && is_folder(folder / "depth") &&
-         is_folder(folder / photograph_folder(folder));
+  return !trajectory_name(folder).empty() && !photograph_folder(folder).empty() &&
+         is_folder(folder / "depth");
 }
 
 }  // namespace

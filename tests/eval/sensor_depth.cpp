@@ -14,10 +14,9 @@
 #include <vector>
 
 #include "convert/model.h"
-#include "io/exr.h"
 #include "io/scene_reader.h"
-#include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"
+#include "tests/support/exr_channel.h"
 
 namespace {
 
@@ -26,19 +25,11 @@ using namespace cgs;
 /// Relative errors of depth by the number of views; key -1 for all but holes.
 using Errors = std::map<int, std::vector<double>>;
 
-const std::vector<float>& channel(const ExrImage& image,
-                                  const std::string& name,
-                                  const std::filesystem::path& path) {
-  const std::vector<float>* values = image.find(name);
-  if (values == nullptr) throw BadInput(Defect::Schema, path, "has no channel " + name);
-  return *values;
-}
-
 /// \param measured  at the size of the photograph, of which the picture is a fraction
 void compare(const std::filesystem::path& path, const DepthMap& measured, Errors& errors) {
   const ExrImage image = read_exr(path);
-  const std::vector<float>& depth = channel(image, "Z", path);
-  const std::vector<float>& support = channel(image, "support.Y", path);
+  const std::vector<float>& depth = test::channel(image, "Z", path);
+  const std::vector<float>& support = test::channel(image, "support.Y", path);
   const int step = measured.width / image.width;
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {

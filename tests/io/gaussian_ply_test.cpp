@@ -304,9 +304,8 @@ TEST(GaussianPly, ReadsColourInsteadOfHarmonics) {
                    "0 0 0 2 -3 -3 -3 255 0 51 1 0 0 0");
   const Eigen::Vector3f color = bytes.gaussians.sh[0].array() * kShC0 + 0.5f;
   EXPECT_LT((color - Eigen::Vector3f(1, 0, 0.2f)).norm(), 1e-6f);
-  const GaussianFile ints =
-      read_dialect(before + lines_of({"red", "green", "blue"}, "int") + after,
-                   "0 0 0 2 -3 -3 -3 255 0 51 1 0 0 0");
+  const GaussianFile ints = read_dialect(before + lines_of({"red", "green", "blue"}, "int") + after,
+                                         "0 0 0 2 -3 -3 -3 255 0 51 1 0 0 0");
   EXPECT_LT((ints.gaussians.sh[0] - bytes.gaussians.sh[0]).norm(), 1e-6f);
   const GaussianFile floats = read_dialect(before + lines_of({"red", "green", "blue"}) + after,
                                            "0 0 0 2 -3 -3 -3 1 0 0.2 1 0 0 0");

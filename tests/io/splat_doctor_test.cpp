@@ -99,16 +99,15 @@ TEST(SplatDoctor, DropsRowsOfZeros) {
   EXPECT_EQ(out.findings.without_rotation, 4600u);
 }
 
+// Scales as lengths, opacities as probabilities.
+void store_as_they_are(const Gaussians& g, RawSplats& raw) {
+  raw.log_scale = g.scale;
+  raw.logit = g.opacity;
+}
+
 TEST(SplatDoctor, ReadsLengthsAndProbabilitiesAsWhatTheyAre) {
   const Gaussians g = test::varied_splats(3000, 1);
-  const GaussianFile out = examined(
-      [&](RawSplats& raw) {
-        for (size_t i = 0; i < raw.size(); ++i) {
-          raw.log_scale[i] = g.scale[i];
-          raw.logit[i] = g.opacity[i];
-        }
-      },
-      3000);
+  const GaussianFile out = examined([&](RawSplats& raw) { store_as_they_are(g, raw); }, 3000);
   EXPECT_TRUE(out.findings.linear_scales);
   EXPECT_TRUE(out.findings.linear_opacity);
   for (size_t i = 0; i < g.size(); ++i) {
@@ -121,10 +120,7 @@ TEST(SplatDoctor, ReadsFlatLengthsAndInvisibleProbabilities) {
   const Gaussians g = test::varied_splats(3000, 1);
   const GaussianFile out = examined(
       [&](RawSplats& raw) {
-        for (size_t i = 0; i < raw.size(); ++i) {
-          raw.log_scale[i] = g.scale[i];
-          raw.logit[i] = g.opacity[i];
-        }
+        store_as_they_are(g, raw);
         raw.log_scale[7].z() = 0;
         raw.logit[0] = raw.logit[1] = 0;
       },
@@ -141,11 +137,8 @@ TEST(SplatDoctor, TakesScalesForLengthsWhereOpacitiesAreProbabilities) {
   const Gaussians g = test::varied_splats(300, 1);
   const GaussianFile out = examined(
       [&](RawSplats& raw) {
-        for (size_t i = 0; i < raw.size(); ++i) {
-          raw.position[i] *= 100;
-          raw.log_scale[i] = g.scale[i];
-          raw.logit[i] = g.opacity[i];
-        }
+        for (Eigen::Vector3d& p : raw.position) p *= 100;
+        store_as_they_are(g, raw);
       },
       300);
   EXPECT_TRUE(out.findings.linear_scales);

@@ -4,22 +4,13 @@
 #include <algorithm>
 #include <limits>
 
-#include "io/exr.h"
 #include "io/mesh_ply.h"
-#include "libcgs/core/error.h"
 #include "libcgs/render/support.h"
+#include "tests/support/exr_channel.h"
 
 namespace cgs::test {
 
 namespace {
-
-const std::vector<float>& channel(const ExrImage& image,
-                                  const std::string& name,
-                                  const std::filesystem::path& path) {
-  const std::vector<float>* values = image.find(name);
-  if (values == nullptr) throw BadInput(Defect::Schema, path, "has no channel " + name);
-  return *values;
-}
 
 // Z of the file with its zeros, which stand for unknown, as NaN.
 DepthMap depth_of(const ExrImage& image, const std::filesystem::path& path) {
