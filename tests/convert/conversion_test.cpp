@@ -71,6 +71,39 @@ TEST_F(Conversion, OptionsOfMeshesAreRefusedForSplats) {
             "--spz-version has no effect on a.splat");
   EXPECT_EQ(refused("a.spz", [](auto& r) { r.encoding = GlbEncoding::Plain; }),
             "--glb-encoding has no effect on a.spz");
+  EXPECT_EQ(refused("a.splat", [](auto& r) { r.up = {0, 0, 1}; }), "--up has no effect on a.splat");
+  EXPECT_EQ(refused("a.spz", [](auto& r) { r.assume_unit = "mm"; }),
+            "--assume-unit has no effect on a.spz");
+  EXPECT_EQ(refused("a.ply", [](auto& r) { r.up = {0, 0, 1}; }), "");
+}
+
+TEST_F(Conversion, SaysWhatAFormatCannotHold) {
+  Gaussians g;
+  test::add_sphere(g, {0, 0, 2}, 0.5, 400);
+  for (Eigen::Vector3f& color : g.sh) color *= 100;
+  Frame frame;
+  frame.metres_per_unit = 1;
+  frame.scale_source = ScaleSource::Assumed;
+  frame.file_origin = frame.origin = Eigen::Vector3d(500'000, 0, 0);
+  frame.up = Eigen::Vector3d::UnitZ();
+  write_gaussian_ply(dir_ / "placed.ply", g, frame);
+  const auto told = [&](const std::string& output, bool is_strict) {
+    Terminal terminal(false, is_strict);
+    ConversionRequest request;
+    request.input = dir_ / "placed.ply";
+    request.output = dir_ / output;
+    testing::internal::CaptureStderr();
+    const std::string error = test::message_of([&] { convert_file(request, terminal); });
+    return testing::internal::GetCapturedStderr() + error;
+  };
+  const std::string splat = told("a.splat", true);
+  EXPECT_NE(splat.find(".splat files hold no unit, origin, direction that is up of the scene"),
+            std::string::npos)
+      << splat;
+  EXPECT_NE(splat.find("400 of 400 splats have colours beyond what .splat can hold"),
+            std::string::npos)
+      << splat;
+  EXPECT_EQ(told("a.ply", true).find("hold"), std::string::npos);
 }
 
 TEST_F(Conversion, MeshOfSplatsIsVirtualInEveryWord) {

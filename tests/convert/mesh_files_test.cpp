@@ -42,6 +42,15 @@ TEST(CertificateToJson, GivesMeasuresInFileUnits) {
   EXPECT_EQ(json["units"], "unknown");
 }
 
+TEST(CertificateToJson, SaysNothingOfLabelsThatAMeshDoesNotState) {
+  TriangleMesh mesh = corner();
+  mesh.provenance.clear();
+  const auto json = certificate_to_json(certify(mesh), mesh, frame_of_scale_2());
+  for (const char* area : {"area_observed", "area_single_view", "area_inferred"}) {
+    EXPECT_TRUE(json.at(area).is_null()) << area;
+  }
+}
+
 TEST(WriteMeshFiles, LeavesCadFilesOutWithoutAScaleAndSaysHowToGetThem) {
   const test::TempDir dir;
   const auto json = write_mesh_files(dir / "mesh", corner(), corner(), frame_of_scale_2());
