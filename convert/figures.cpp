@@ -16,6 +16,8 @@ namespace cgs {
 
 namespace {
 
+constexpr double kNearlyAll = 0.995;  // of what a figure rests on; the rest rounds to nothing
+
 std::string unit_text(const FigureUnit& unit, int dimension) {
   return dimension == 1 ? unit.name : unit.name + "^" + std::to_string(dimension);
 }
@@ -84,7 +86,11 @@ std::string figure_text(const MeasuredValue& value,
   std::string out = number(figure_value(value, unit));
   if (std::isfinite(sigma)) out += " ± " + number(sigma);
   out += ' ' + unit_text(unit, value.dimension);
-  if (!std::isfinite(sigma)) out += " (no sigma stated)";
+  if (!std::isfinite(sigma)) {
+    out += " (no sigma stated)";
+  } else if (value.stated < kNearlyAll) {
+    out += " (± covers " + number(std::round(100 * value.stated)) + " %)";
+  }
   if (!states_provenance) return out;
   std::string parts;
   for (const Provenance label : kProvenanceOrder) {

@@ -36,7 +36,8 @@ nlohmann::ordered_json figure_json(const MeasuredValue& value,
                                    const FigureUnit& unit,
                                    bool states_provenance);
 
-/// "1.234 ± 0.012 m^2 (observed 0.8, inferred 0.434)"
+/// "1.234 ± 0.012 m^2 (± covers 65 %)  (observed 0.8, inferred 0.434)": so much of what the figure
+/// rests on states a sigma
 std::string figure_text(const MeasuredValue& value, const FigureUnit& unit, bool states_provenance);
 
 }  // namespace cgs

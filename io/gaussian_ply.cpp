@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "io/atomic_file.h"
 #include "io/byte_writer.h"
@@ -56,6 +57,7 @@ struct SplatColumns {
   int opacity = -1;
   std::vector<int> scale;  ///< Three, or two of 2D splats.
   std::array<int, 4> rotation{};
+  int filter = -1;         ///< filter_3D, -1 if there is none.
   double color_range = 0;  ///< Largest value of red, green and blue; 0 = f_dc_*.
 };
 
@@ -127,6 +129,7 @@ SplatColumns splat_columns(const PlyHeader& header, const std::filesystem::path&
   if (!flat) out.scale.push_back(find.column("scale_2"));
   out.rotation = find.columns<4>("rot_");
   out.opacity = find.column("opacity");
+  if (find.has("filter_3D")) out.filter = find.column("filter_3D");
   if (!find.has("f_dc_0") && find.has("red") && find.has("green") && find.has("blue")) {
     out.color = {find.column("red"), find.column("green"), find.column("blue")};
     out.color_range = find.color_range(out.color[0]);
@@ -146,6 +149,28 @@ Vector gather(const PlyRow& row, const Columns& columns) {
   return out;
 }
 
+/// Blurs a splat by the smoothing filter of its photographs' resolution, which is no part of its
+/// scales and opacity as stored: sigma^2 + filter^2 along every axis, with as much mass as before.
+/// Source: Yu et al. 2024, "Mip-Splatting", equation 9.
+void apply_smoothing_filter(double filter, Eigen::Vector3d& log_scale, double& logit) {
+  if (filter == 0) return;
+  if (!(filter > 0) || !std::isfinite(filter)) {
+    log_scale.setConstant(std::nan(""));  // as for a scale that is no number
+    return;
+  }
+  const double log_variance = 2 * std::log(filter);
+  double log_opacity = std::min(logit, 0.0) - std::log1p(std::exp(-std::abs(logit)));
+  for (double& s : log_scale) {
+    const double larger = std::max(2 * s, log_variance);
+    const double smaller = std::min(2 * s, log_variance);
+    const double blurred = (larger + std::log1p(std::exp(smaller - larger))) / 2;
+    log_opacity += s - blurred;
+    s = blurred;
+  }
+  const double rest = std::max(-std::expm1(log_opacity), std::numeric_limits<double>::min());
+  logit = log_opacity - std::log(rest);
+}
+
 /// Collects the rows of the vertex element.
 class SplatRows {
  public:
@@ -160,6 +185,9 @@ class SplatRows {
     if (columns_.scale.size() == 2) {
       splats_.notes.emplace_back("2D splats (no scale_2): a thousandth of the smaller width thick");
     }
+    if (columns_.filter >= 0) {
+      splats_.notes.emplace_back("smoothing filter of every splat (filter_3D) applied");
+    }
     splats_.reserve(count);
   }
 
@@ -168,13 +196,17 @@ class SplatRows {
     auto scale = gather<Eigen::Vector3d>(row, columns_.scale);
     constexpr double kThickness = -6.9077552789821370;  // log of 1/1000
     if (columns_.scale.size() == 2) scale[2] = std::min(scale[0], scale[1]) + kThickness;
-    splats_.log_scale.emplace_back(scale.cast<float>());
     auto rotation = gather<Eigen::Vector4d>(row, columns_.rotation);
     constexpr double kLargest = 1e30;  // of double properties, which float may not hold
     const double largest = rotation.cwiseAbs().maxCoeff();
     if (largest > kLargest && std::isfinite(largest)) rotation /= largest;
     splats_.rotation.emplace_back(rotation.cast<float>());
-    splats_.logit.push_back(static_cast<float>(row.values[static_cast<size_t>(columns_.opacity)]));
+    double logit = row.values[static_cast<size_t>(columns_.opacity)];
+    if (columns_.filter >= 0) {
+      apply_smoothing_filter(row.values[static_cast<size_t>(columns_.filter)], scale, logit);
+    }
+    splats_.log_scale.emplace_back(scale.cast<float>());
+    splats_.logit.push_back(static_cast<float>(logit));
     add_color(row);
   }
 
@@ -232,7 +264,8 @@ RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path
       });
   RawSplats out = rows.take();
   out.comments = header.comments;
-  out.may_be_linear =
+  out.may_be_linear =  // no program that states filters writes lengths
+      vertex.find("filter_3D") < 0 &&
       std::find(out.comments.begin(), out.comments.end(), kGenerator) == out.comments.end();
   const PlyProperty& x = vertex.properties[static_cast<size_t>(vertex.find("x"))];
   if (x.type == PlyType::Float64) out.digits = kDoubleDigits;

@@ -296,6 +296,26 @@ TEST(GaussianPly, Reads2DSplatsAsThinOnes) {
   EXPECT_NEAR(out.gaussians.scale[0].z(), std::exp(-4.0f) / 1000, 1e-8f);
 }
 
+TEST(GaussianPly, AppliesTheSmoothingFilterThatSplatsState) {
+  const std::string properties = lines_of({"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"}) +
+                                 lines_of({"opacity", "scale_0", "scale_1", "scale_2"}) +
+                                 lines_of({"rot_0", "rot_1", "rot_2", "rot_3", "filter_3D"});
+  const std::string row = "0 0 0 0 0 0 0.5 0 -1 -2 1 0 0 0 ";
+  const GaussianFile out = read_dialect(properties, row + "0.25");
+  EXPECT_TRUE(warns(out, "smoothing filter"));
+  double opacity = 1 / (1 + std::exp(-0.5));
+  for (int k = 0; k < 3; ++k) {
+    const double blurred = std::hypot(std::exp(-k), 0.25);
+    opacity *= std::exp(-k) / blurred;
+    EXPECT_NEAR(out.gaussians.scale[0][k], blurred, 1e-6) << k;
+  }
+  EXPECT_NEAR(out.gaussians.opacity[0], opacity, 1e-6);
+  const GaussianFile none = read_dialect(properties, row + "0");
+  EXPECT_FLOAT_EQ(none.gaussians.scale[0].y(), std::exp(-1.0f));
+  EXPECT_THROW(read_dialect(properties, row + "nan"), BadInput);
+  EXPECT_THROW(read_dialect(properties, row + "-1"), BadInput);
+}
+
 TEST(GaussianPly, ReadsColourInsteadOfHarmonics) {
   const std::string before = lines_of({"x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2"});
   const std::string after = lines_of({"rot_0", "rot_1", "rot_2", "rot_3"});
