@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include <Eigen/Eigenvalues>
@@ -201,6 +202,23 @@ void guess_by_network(const std::filesystem::path& file, Scene& scene) {
   }
 }
 
+// Views whose depth rests on little.
+void warn_of_coverage(const std::vector<PriorsCoverage>& coverage, Scene& scene) {
+  constexpr double kLittle = 0.1;
+  for (size_t i = 0; i < coverage.size(); ++i) {
+    const View& view = scene.views[static_cast<size_t>(scene.input[i])];
+    const double share = coverage[i].measured + coverage[i].guessed;
+    if (share >= kLittle) continue;
+    std::array<char, 120> text{};
+    std::snprintf(text.data(), text.size(), "depth was found for %.1f %% of view ", 100 * share);
+    scene.warnings.push_back(
+        text.data() + view.name +
+        (is_measured(coverage[i])
+             ? "; all else is filled in from there: see that views overlap and show texture"
+             : ", so it adds nothing: hardly a point of it is seen in another input view"));
+  }
+}
+
 }  // namespace
 
 void take_sensor_scale(const GivenDepthReport& given, Frame& frame) {
@@ -224,6 +242,7 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   const GivenDepthReport& given = estimated.report.given;
   scene.warnings.insert(scene.warnings.end(), given.remarks.begin(), given.remarks.end());
   take_sensor_scale(given, scene.frame);
+  warn_of_coverage(estimated.report.coverage, scene);
   TrainedModel trained;
   trained.priors = estimated.report;
   trained.model.priors = std::move(estimated.views);
@@ -258,10 +277,19 @@ nlohmann::ordered_json given_depth_to_json(const PriorsReport& priors) {
     out["metres_per_unit"] = given.metres_per_unit;
     out["metres_sigma"] = given.metres_sigma;
   }
-  for (const PriorsCoverage& coverage : priors.coverage) {
-    out["views"].push_back({{"measured", coverage.measured},
-                            {"guessed", coverage.guessed},
-                            {"completed", coverage.completed}});
+  return out;
+}
+
+// Of the pixels of every input view.
+nlohmann::ordered_json coverage_to_json(const TrainedModel& trained) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  const Scene& scene = trained.model.scene;
+  for (size_t i = 0; i < trained.priors.coverage.size(); ++i) {
+    const PriorsCoverage& coverage = trained.priors.coverage[i];
+    out.push_back({{"view", scene.views[static_cast<size_t>(scene.input[i])].name},
+                   {"measured", coverage.measured},
+                   {"guessed", coverage.guessed},
+                   {"completed", coverage.completed}});
   }
   return out;
 }
@@ -291,6 +319,7 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
            {{"scale", trained.priors.alignment.scale},
             {"offset", trained.priors.alignment.offset},
             {"correspondences", trained.priors.alignment.correspondences}}},
+          {"depth_of_views", coverage_to_json(trained)},
           {"given_depth", given_depth_to_json(trained.priors)}};
 }
 
@@ -355,7 +384,9 @@ void relink_images(Scene& scene, const std::filesystem::path& folder) {
 }
 
 MaskMap guessed_pixels(const ViewPriors& priors) {
-  const auto is_guess = [](DepthOrigin origin) { return origin == DepthOrigin::Guessed; };
+  const auto is_guess = [](DepthOrigin origin) {
+    return origin == DepthOrigin::Guessed || origin == DepthOrigin::Completed;
+  };
   const std::vector<DepthOrigin>& origins = priors.origin.data;
   if (std::none_of(origins.begin(), origins.end(), is_guess)) return {};
   MaskMap out(priors.origin.width, priors.origin.height, 0);

@@ -74,7 +74,8 @@ Model read_model(const std::filesystem::path& folder);
 /// or photographs that were moved. \throws BadInput as read_scene()
 void relink_images(Scene& scene, const std::filesystem::path& folder);
 
-/// 1 where the depth of a view is a guess from that view alone; empty if it is nowhere.
+/// 1 where no other view confirms the depth of a view: a guess from that view alone, or filled in
+/// from neighbours; empty if it is nowhere.
 MaskMap guessed_pixels(const ViewPriors& priors);
 
 /// The input views with their depth and its uncertainty: who can vouch for a rendered pixel.

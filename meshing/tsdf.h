@@ -22,7 +22,7 @@ struct TsdfView {
                      ///< known, the pixel then counts as exact.
   ColorImage color;  ///< Empty = no colour.
   Raster<uint8_t> usable;   ///< 0 where depth must be ignored; empty = use all.
-  MaskMap guessed;          ///< 1 where depth is a guess from this view alone: guesses of several
+  MaskMap guessed;          ///< 1 where no other view confirms the depth: guesses of several
                             ///< views add no more than one to the support. Empty = nowhere.
   bool is_virtual = false;  ///< Rendered from splats, not measured: adds to the surface but not to
                             ///< its support.

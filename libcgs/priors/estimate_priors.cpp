@@ -2,8 +2,10 @@
 #include "libcgs/priors/estimate_priors.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "libcgs/core/error.h"
 #include "libcgs/priors/guessed_depth.h"
 
 namespace cgs {
@@ -23,6 +25,10 @@ PriorsCoverage coverage(const ViewPriors& priors) {
 }
 
 }  // namespace
+
+bool is_measured(const PriorsCoverage& share) {
+  return share.measured + share.guessed >= kLeastMeasured;
+}
 
 void PriorsOptions::validate() const {
   sweep.validate();
@@ -55,11 +61,35 @@ class Estimator {
       out_.views[i].layer = depth_layers(out_.views[i].depth, options_.layers);
       out_.report.coverage.push_back(coverage(out_.views[i]));
     }
+    forget_unmeasured();
     report(progress, 1);
     return std::move(out_);
   }
 
  private:
+  // A view of which nothing was measured says nothing of the scene: filled in, it would be a
+  // surface that nobody saw.
+  void forget_unmeasured() {
+    const auto& shares = out_.report.coverage;
+    const bool has_pixels = std::any_of(shares.begin(), shares.end(), [](const auto& share) {
+      return share.measured + share.completed + share.guessed > 0;
+    });
+    if (!has_pixels) throw InvalidInput("the masks leave nothing of any input view");
+    if (std::none_of(shares.begin(), shares.end(), is_measured)) {
+      throw NumericalError(
+          "no depth can be measured: hardly a point of one input view was found in another. They "
+          "must overlap and show texture, and their cameras must be right");
+    }
+    for (size_t i = 0; i < shares.size(); ++i) {
+      if (is_measured(shares[i])) continue;
+      ViewPriors& priors = out_.views[i];
+      std::fill(priors.origin.data.begin(), priors.origin.data.end(), DepthOrigin::Unknown);
+      for (DepthMap* map : {&priors.depth, &priors.sigma}) {
+        std::fill(map->data.begin(), map->data.end(), std::nanf(""));
+      }
+    }
+  }
+
   const View& view(size_t i) const { return scene_.views[static_cast<size_t>(scene_.input[i])]; }
 
   // Of a view, which may be a copy of it that knows less; others are as they are now.

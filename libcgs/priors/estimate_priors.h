@@ -31,6 +31,12 @@ struct PriorsCoverage {
   double guessed = 0;
 };
 
+/// Share of a view below which false matches may be all that was measured.
+inline constexpr double kLeastMeasured = 0.01;
+
+/// Whether anything of a view was measured; if not, its depth stays unknown.
+bool is_measured(const PriorsCoverage& share);
+
 /// What became of depth that came with the photographs.
 struct GivenDepthReport {
   DepthKind kind = DepthKind::Unknown;  ///< Unknown = there was none, or it was of no use.
@@ -51,8 +57,10 @@ struct EstimatedPriors {
 };
 
 /// Everything known about the input views before training: sweep, align, enter the depth of
-/// sensors, complete, put guesses of given depth where they are better, layers.
-/// Preconditions and errors as plane_sweep().
+/// sensors, complete, put guesses of given depth where they are better, layers. The depth of views
+/// of which nothing was measured stays unknown.
+/// Preconditions and errors as plane_sweep(); \throws InvalidInput if masks leave nothing of all
+/// views; NumericalError if nothing of any was measured
 EstimatedPriors estimate_priors(const Scene& scene,
                                 const PriorsOptions& options,
                                 const Progress& progress = {});

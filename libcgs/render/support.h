@@ -13,7 +13,7 @@ struct SupportView {
   Camera camera;
   DepthMap depth;  ///< Of the size of the camera [internal units]; NaN = saw nothing here.
   DepthMap sigma;  ///< Standard deviation of depth [internal units]; NaN, or empty, = no statement.
-  /// 1 where depth is a guess from this view alone: guesses of several views count as one view.
+  /// 1 where no other view confirms the depth: guesses of several views count as one view.
   /// Empty = nowhere.
   MaskMap guessed;
 };
