@@ -2,6 +2,7 @@
 #include "meshing/block_grid.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "libcgs/core/error.h"
@@ -37,13 +38,14 @@ BlockGrid block_grid(const Eigen::AlignedBox3d& bounds, double voxel) {
   constexpr double kMaxBlocks = 1 << 28;
   if (!(largest < kMaxIndex) || !(blocks < kMaxBlocks)) {
     // In voxels, for nobody outside knows the unit of this one.
+    const double along = (bounds.sizes() / voxel).maxCoeff();
     char text[200];  // NOLINT(modernize-avoid-c-arrays)
     std::snprintf(text,
                   sizeof(text),
                   "the voxels are too small: %.3g of them along the longest side, %.3g in all; "
                   "at most %.3g and %.3g can be made",
-                  (high - low).maxCoeff() * kBlockSide,
-                  blocks * double(kBlockVoxels),
+                  along,
+                  std::min(blocks * double(kBlockVoxels), std::pow(along, 3)),
                   kMaxIndex,
                   kMaxBlocks * double(kBlockVoxels));
     throw LimitError(text);

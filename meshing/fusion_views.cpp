@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "libcgs/core/error.h"
@@ -18,7 +20,50 @@ struct Pixel {
   int x, y;
 };
 
-// The pixels of a view whose depth lies within its 1st and 99th percentile.
+// Pixels that hang together at depths that change little from one to the next.
+class Patches {
+ public:
+  // \param wanted  1 where a pixel takes part
+  Patches(const DepthMap& depth, MaskMap wanted) : depth_(depth), left_(std::move(wanted)) {}
+
+  // Those of patches of at least so many.
+  std::vector<Pixel> of_size(size_t least) {
+    std::vector<Pixel> out;
+    for (int y = 0; y < depth_.height; ++y) {
+      for (int x = 0; x < depth_.width; ++x) {
+        if (left_(x, y) == 0) continue;
+        const std::vector<Pixel> patch = taken_around(x, y);
+        if (patch.size() >= least) out.insert(out.end(), patch.begin(), patch.end());
+      }
+    }
+    return out;
+  }
+
+ private:
+  std::vector<Pixel> taken_around(int x, int y) {
+    constexpr float kStep = 0.02f;  // of the depth
+    std::vector<Pixel> out = {{depth_(x, y), x, y}};
+    left_(x, y) = 0;
+    for (size_t i = 0; i < out.size(); ++i) {
+      const Pixel at = out[i];
+      for (const auto& [dx, dy] : {std::pair(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
+        const int u = at.x + dx;
+        const int v = at.y + dy;
+        if (!left_.contains(u, v) || left_(u, v) == 0) continue;
+        if (std::abs(depth_(u, v) - at.depth) > kStep * at.depth) continue;
+        left_(u, v) = 0;
+        out.push_back({depth_(u, v), u, v});
+      }
+    }
+    return out;
+  }
+
+  const DepthMap& depth_;
+  MaskMap left_;
+};
+
+// The pixels of a view whose depth lies within its 1st and 99th percentile, and of those beyond
+// what hangs together as no false match does: a finial before a wall, say.
 std::vector<Pixel> trustworthy_pixels(const TsdfView& view, double depth_trunc) {
   std::vector<Pixel> pixels;
   std::vector<float> depths;
@@ -34,7 +79,15 @@ std::vector<Pixel> trustworthy_pixels(const TsdfView& view, double depth_trunc) 
   if (pixels.empty()) return pixels;
   const float low = nth_smallest(depths, (depths.size() - 1) / 100);
   const float high = nth_smallest(depths, (depths.size() - 1) * 99 / 100);
+  MaskMap beyond(view.depth.width, view.depth.height, 0);
+  for (const Pixel& p : pixels) {
+    const bool is_measured = view.guessed.empty() || view.guessed(p.x, p.y) == 0;
+    beyond(p.x, p.y) = is_measured && (p.depth < low || p.depth > high) ? 1 : 0;
+  }
+  const size_t least = std::max<size_t>(16, pixels.size() / 500);
   std::erase_if(pixels, [&](const Pixel& p) { return p.depth < low || p.depth > high; });
+  const std::vector<Pixel> patches = Patches(view.depth, std::move(beyond)).of_size(least);
+  pixels.insert(pixels.end(), patches.begin(), patches.end());
   return pixels;
 }
 
@@ -109,7 +162,25 @@ SurfaceExtent surface_extent(const FusionViews& views,
 }
 
 double chosen_voxel_size(const SurfaceExtent& extent, const TsdfOptions& options) {
-  if (options.voxel_size > 0) return options.voxel_size;
+  if (options.voxel_size > 0) {
+    // Coarser, what comes out is the shape of the voxels.
+    constexpr double kLeastAcross = 4;
+    Eigen::Vector3d sides = extent.surface.sizes();
+    std::sort(sides.begin(), sides.end());
+    const double across = sides[1] / options.voxel_size;
+    if (!(across >= kLeastAcross)) {
+      char text[160];  // NOLINT(modernize-avoid-c-arrays)
+      std::snprintf(
+          text,
+          sizeof(text),
+          "the voxels are too large: the surface that was seen is %.2g of them wide; make "
+          "them %.2g times smaller",
+          across,
+          kLeastAcross / across);
+      throw InvalidInput(text);
+    }
+    return options.voxel_size;
+  }
   const double margin = double(options.truncation) + kFusionMargin;
   const auto limit = static_cast<double>(options.max_voxels);
   const double coarsest = options.coarsest_voxel > 0

@@ -77,8 +77,9 @@ struct SurfaceExtent {
   size_t pixels = 0;     ///< Of all views.
 };
 
-/// What the trustworthy pixels of all views show; those whose depth lies between the 1st and the
-/// 99th percentile of their view.
+/// What the trustworthy pixels of all views show: those whose depth lies between the 1st and the
+/// 99th percentile of their view, and patches of measured pixels beyond (2 % from pixel to pixel,
+/// a 500th of the view or more).
 /// \param most_footprints  of how many pixels medians are taken, evenly spaced
 /// \throws InvalidInput without any depth
 SurfaceExtent surface_extent(const FusionViews& views,

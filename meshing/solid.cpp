@@ -46,22 +46,23 @@ class Parts {
   explicit Parts(Solid& solid) : solid_(solid), seen_(solid.inside.size(), 0) {}
 
   SolidParts remove_small(double relative_size) {
-    struct Part {
-      size_t seed;
-      size_t size;
-    };
     std::array<std::vector<Part>, 2> parts;  // by sign; empty parts first
     for (size_t i = 0; i < seen_.size(); ++i) {
-      if (seen_[i] == 0) parts.at(solid_.inside[i]).push_back({i, flood(i, false)});
+      if (seen_[i] == 0) parts.at(solid_.inside[i]).push_back(flood(i, false));
     }
     SolidParts out;
     for (size_t sign = 0; sign < 2; ++sign) {
       size_t largest = 0;
-      for (const Part& part : parts.at(sign)) largest = std::max(largest, part.size);
+      for (const Part& part : parts.at(sign)) {
+        if (sign == 0 || part.is_observed) largest = std::max(largest, part.size);
+      }
       const auto limit = static_cast<double>(largest) * relative_size;
       for (const Part& part : parts.at(sign)) {
         const bool is_outside = sign == 0 && part.seed == 0;
-        if (is_outside || static_cast<double>(part.size) >= limit) continue;
+        // Matter that only fills what several views hide from each other is no body of its own.
+        const bool is_invented = sign == 1 && !part.is_observed && largest > 0;
+        const bool is_large = static_cast<double>(part.size) >= limit;
+        if (is_outside || (is_large && !is_invented)) continue;
         flood(part.seed, true);
         ++(sign == 0 ? out.cavities : out.floaters);
       }
@@ -70,19 +71,26 @@ class Parts {
   }
 
  private:
+  struct Part {
+    size_t seed = 0;
+    size_t size = 0;           // [voxels]
+    bool is_observed = false;  // somewhere
+  };
+
   // Visits the part of `seed`, the first time (flip = false) to count it, then to change its sign.
-  size_t flood(size_t seed, bool flip) {
+  Part flood(size_t seed, bool flip) {
     const uint8_t sign = solid_.inside[seed];
     const uint8_t mark = flip ? 2 : 1;
     const std::array<size_t, 3> strides = {
         size_t(solid_.size[1]) * size_t(solid_.size[2]), size_t(solid_.size[2]), 1};
-    size_t count = 0;
+    Part out{seed, 0, false};
     stack_.assign(1, seed);
     seen_[seed] = mark;
     while (!stack_.empty()) {
       const size_t at = stack_.back();
       stack_.pop_back();
-      ++count;
+      ++out.size;
+      out.is_observed = out.is_observed || solid_.evidence[at] != 0;
       for (size_t axis = 0; axis < 3; ++axis) {
         const size_t stride = strides.at(axis);
         const size_t place = at / stride % size_t(solid_.size.at(axis));
@@ -96,7 +104,7 @@ class Parts {
       }
       if (flip) solid_.inside[at] = sign == 0 ? 1 : 0;
     }
-    return count;
+    return out;
   }
 
   Solid& solid_;

@@ -40,7 +40,8 @@ struct SolidParts {
 };
 
 /// Removes matter, and fills emptiness, in parts (6-connected) of fewer voxels than
-/// `relative_size` of the largest part of their kind. The outside is never filled.
+/// `relative_size` of the largest part of their kind, and all matter that hangs together with
+/// nothing observed. The outside is never filled.
 SolidParts remove_small_parts(Solid& solid, double relative_size);
 
 /// A narrow-band level set (3 voxels to both sides, - inside) of the solid.

@@ -548,6 +548,35 @@ TEST(Fuse, CoarsensNoFartherThanAskedAndIsNoFinerThanTheEvidence) {
   EXPECT_DOUBLE_EQ(voxel(footprint / 10), double(sigma));
 }
 
+// A finial before a wall: fewer than a hundredth of the pixels, but no false match.
+TEST(Fuse, KeepsSmallThingsFarBeforeTheRest) {
+  const test::Shape scene = test::nearest(
+      {test::plane({0, 0, 1}, 0.35), test::box({-0.028, -0.028, 0}, {0.028, 0.028, 0.05})});
+  auto views = three_views(scene);
+  for (const TsdfView& view : views) {
+    const auto& depths = view.depth.data;
+    const auto of_finial =
+        std::count_if(depths.begin(), depths.end(), [](float z) { return z < 0.95f; });
+    ASSERT_GT(of_finial, 20);
+    ASSERT_LT(double(of_finial), 0.0099 * double(depths.size()));
+  }
+  EXPECT_LT(fuse(views, {}).report.bounds.min().z(), 0);
+  for (TsdfView& view : views) {  // as where false matches are what stands out
+    view.guessed = MaskMap(view.camera.width, view.camera.height, 1);
+  }
+  EXPECT_GT(fuse(views, {}).report.bounds.min().z(), 0.2);
+}
+
+TEST(Fuse, RefusesVoxelsThatHoldNoShape) {
+  const auto views = three_views(sphere_before_wall());
+  try {
+    fuse(views, {.voxel_size = 1});
+    ADD_FAILURE() << "voxels as wide as the scene";
+  } catch (const InvalidInput& error) {
+    EXPECT_NE(std::string(error.what()).find("too large"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Fuse, RefusesWhatDoesNotFitIntoMemory) {
   const auto views = three_views(sphere_before_wall());
   EXPECT_THROW(fuse(views, {.memory_limit = 1000000}), LimitError);

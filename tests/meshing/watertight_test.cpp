@@ -56,6 +56,20 @@ TEST(WatertightSurface, IsTheWholeSphereSeenFromAllSides) {
             0.97 * result.certificate.area);
 }
 
+// Where nothing was hit, depth cameras say nothing, and six cones that they see into behind the
+// sphere overlap beside it: no body of its own.
+TEST(WatertightSurface, MakesNoBodyOfWhatNobodyLookedInto) {
+  const double d = 0.8;
+  const auto views =
+      views_of(test::sphere(kCenter, kRadius),
+               {{d, 0, 0}, {-d, 0, 0}, {0.01, d, 0}, {0.01, -d, 0}, {0, 0, d}, {0, 0, -d}});
+  auto fused = fuse(views, {});
+  const WatertightResult result = watertight_surface(fused.volume, {});
+  EXPECT_EQ(result.certificate.components, 1U);
+  const double volume = 4.0 / 3 * M_PI * std::pow(kRadius, 3);
+  EXPECT_NEAR(result.certificate.volume / volume, 1, 0.05);
+}
+
 // What the views from one side assume behind their surface reaches beyond the other side.
 TEST(WatertightSurface, LeavesAPlateOfThreeVoxelsAsThickAsItIs) {
   const Vector3d half(0.2, 0.2, 0.016);
