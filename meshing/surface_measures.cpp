@@ -74,6 +74,29 @@ std::vector<Eigen::Vector3d> area_gradients(const MeasurableMesh& mesh) {
   return out;
 }
 
+// Across its normal, what is known of a point to sigma is known to this share of it.
+constexpr double kTangential = 0.65;
+
+// Of the area, from points that are off along the surface: what its extent is off by, all areas are
+// twice. That is most of the error of flat surface, whose area does not change along its normals.
+double sigma_from_extent(const MeasurableMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  double area = 0;
+  double squares = 0;  // of sigma, by area
+  for (size_t f = 0; f < mesh.mesh.faces.size(); ++f) {
+    if (!is_stated(mesh, f)) continue;
+    const double part = corners(mesh, f).area_vector().norm();
+    area += part;
+    for (const uint32_t v : mesh.mesh.faces[f]) {
+      box.extend(mesh.points[v]);
+      squares += part / 3 * std::pow(double(mesh.mesh.sigma[v]), 2);
+    }
+  }
+  if (!(area > 0)) return 0;
+  const double end = kTangential * std::sqrt(squares / area);
+  return 2 * area * std::sqrt(2.0) * end / box.diagonal().norm();
+}
+
 }  // namespace
 
 double SigmaSum::sigma() const { return std::sqrt(together_ * together_ + squares_); }
@@ -93,7 +116,7 @@ MeasuredValue surface_area(const MeasurableMesh& mesh) {
     if (normals[v].squaredNorm() == 0) continue;
     sum.add(double(mesh.mesh.sigma[v]) * gradients[v].dot(normals[v].stableNormalized()));
   }
-  out.sigma = sum.sigma();
+  out.sigma = std::hypot(sum.sigma(), sigma_from_extent(mesh));
   return out;
 }
 
@@ -153,7 +176,6 @@ Eigen::Vector3d volume_centroid(const MeasurableMesh& mesh) {
 
 // Standard deviation of a point of the surface along a unit direction.
 double sigma_along(const Eigen::Vector3d& direction, const SurfaceEvidence& at) {
-  constexpr double kTangential = 0.65;
   const double cosine = at.normal.dot(direction);
   return at.sigma * std::sqrt(std::lerp(kTangential * kTangential, 1.0, cosine * cosine));
 }
