@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdio>
 #include <numeric>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <Model/COM/NMR_DLLInterfaces.h>
 
 #include "io/atomic_file.h"
@@ -68,28 +70,132 @@ std::string description(const TriangleMesh& mesh, const std::string& origin) {
   return out;
 }
 
-void set_geometry(NMR::PLib3MFBase* object,
-                  const TriangleMesh& mesh,
-                  const Frame& frame,
-                  const Eigen::Matrix3d& up_rotation) {
-  std::vector<NMR::MODELMESHVERTEX> vertices(mesh.vertices.size());
-  for (size_t i = 0; i < vertices.size(); ++i) {
-    const Eigen::Vector3d p = millimetres(mesh.vertices[i], frame, up_rotation);
-    for (int k = 0; k < 3; ++k) vertices[i].m_fPosition[k] = static_cast<float>(p[k]);
+/// A unit of the format in which six decimals hold a mesh.
+struct FileUnit {
+  NMR::eModelUnit name;
+  double per_millimetre;
+};
+
+/// Millimetres, unless the mesh is too small or too far out for them.
+/// \throws InvalidInput if no unit holds it
+FileUnit file_unit(const Eigen::AlignedBox3d& box) {
+  constexpr std::array<FileUnit, 3> kUnits = {{{NMR::MODELUNIT_MILLIMETER, 1},
+                                               {NMR::MODELUNIT_MICROMETER, 1e3},
+                                               {NMR::MODELUNIT_METER, 1e-3}}};
+  constexpr double kStep = 1e-6;
+  constexpr double kLeastSteps = 1 << 16;  // across the mesh
+  constexpr double kFarthest = 1e9;        // what lib3mf takes
+  const double width = box.sizes().maxCoeff();
+  const double reach = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+  for (const FileUnit& unit : kUnits) {
+    if (width * unit.per_millimetre < kLeastSteps * kStep) continue;
+    if (reach * unit.per_millimetre < kFarthest) return unit;
   }
-  std::vector<NMR::MODELMESHTRIANGLE> triangles(mesh.faces.size());
-  for (size_t i = 0; i < triangles.size(); ++i) {
-    std::copy(mesh.faces[i].begin(), mesh.faces[i].end(), triangles[i].m_nIndices);
-  }
-  check(NMR::lib3mf_meshobject_setgeometry(object,
-                                           vertices.data(),
-                                           static_cast<DWORD>(vertices.size()),
-                                           triangles.data(),
-                                           static_cast<DWORD>(triangles.size())),
-        "take the geometry");
+  std::array<char, 160> text{};
+  std::snprintf(
+      text.data(),
+      text.size(),
+      "write_3mf: the mesh is %.3g mm wide and reaches %.3g mm from its origin; 3MF holds "
+      "widths from 6.6e-5 mm and 1e12 mm from the origin",
+      width,
+      reach);
+  throw InvalidInput(text.data());
 }
 
-void set_materials(NMR::PLib3MFBase* model, NMR::PLib3MFBase* object, const TriangleMesh& mesh) {
+/// Faces that are surface: the format forbids those that name a vertex twice.
+std::vector<size_t> faces_of_surface(const TriangleMesh& mesh) {
+  std::vector<size_t> out;
+  out.reserve(mesh.faces.size());
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto& [a, b, c] = mesh.faces[f];
+    if (a != b && b != c && c != a) out.push_back(f);
+  }
+  if (out.empty()) throw InvalidInput("write_3mf: every face names a vertex twice");
+  return out;
+}
+
+/// Whether every edge has two faces that pass it in opposite directions: what the format demands of
+/// an object that is a model, where others are surfaces.
+bool is_solid(const TriangleMesh& mesh, const std::vector<size_t>& faces) {
+  std::vector<uint64_t> up;
+  std::vector<uint64_t> down;
+  for (const size_t f : faces) {
+    for (size_t k = 0; k < 3; ++k) {
+      const uint64_t from = mesh.faces[f].at(k);
+      const uint64_t to = mesh.faces[f].at((k + 1) % 3);
+      (from < to ? up : down).push_back(std::min(from, to) << 32 | std::max(from, to));
+    }
+  }
+  std::sort(up.begin(), up.end());
+  std::sort(down.begin(), down.end());
+  return up == down && std::adjacent_find(up.begin(), up.end()) == up.end();
+}
+
+bool looks_inward(const TriangleMesh& mesh, const std::vector<size_t>& faces) {
+  const Eigen::Vector3d from = mesh.vertices[mesh.faces[faces.front()][0]].cast<double>();
+  double volume = 0;
+  for (const size_t f : faces) {
+    std::array<Eigen::Vector3d, 3> p;
+    for (size_t k = 0; k < 3; ++k) {
+      p.at(k) = mesh.vertices[mesh.faces[f].at(k)].cast<double>() - from;
+    }
+    volume += p[0].dot(p[1].cross(p[2]));
+  }
+  return volume < 0;
+}
+
+/// Vertices and faces as lib3mf takes them.
+struct Geometry {
+  std::vector<NMR::MODELMESHVERTEX> vertices;
+  std::vector<NMR::MODELMESHTRIANGLE> triangles;
+  NMR::eModelUnit unit = NMR::MODELUNIT_MILLIMETER;
+  bool is_solid = false;
+};
+
+/// Closed surfaces that look inward are turned, as the format demands.
+Geometry geometry(const TriangleMesh& mesh,
+                  const std::vector<size_t>& faces,
+                  const Frame& frame,
+                  const Eigen::Matrix3d& up_rotation) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3f& v : mesh.vertices) box.extend(millimetres(v, frame, up_rotation));
+  const FileUnit unit = file_unit(box);
+  Geometry out;
+  out.unit = unit.name;
+  out.is_solid = is_solid(mesh, faces);
+  out.vertices.resize(mesh.vertices.size());
+  for (size_t i = 0; i < out.vertices.size(); ++i) {
+    const Eigen::Vector3d p =
+        unit.per_millimetre * millimetres(mesh.vertices[i], frame, up_rotation);
+    for (int k = 0; k < 3; ++k) out.vertices[i].m_fPosition[k] = static_cast<float>(p[k]);
+  }
+  const bool is_inside_out = out.is_solid && looks_inward(mesh, faces);
+  out.triangles.resize(faces.size());
+  for (size_t i = 0; i < faces.size(); ++i) {
+    std::array<uint32_t, 3> face = mesh.faces[faces[i]];
+    if (is_inside_out) std::swap(face[1], face[2]);
+    std::copy(face.begin(), face.end(), out.triangles[i].m_nIndices);
+  }
+  return out;
+}
+
+// The library takes no const pointers, and changes nothing.
+void set_geometry(NMR::PLib3MFBase* object, Geometry& content) {
+  check(NMR::lib3mf_meshobject_setgeometry(object,
+                                           content.vertices.data(),
+                                           static_cast<DWORD>(content.vertices.size()),
+                                           content.triangles.data(),
+                                           static_cast<DWORD>(content.triangles.size())),
+        "take the geometry");
+  check(NMR::lib3mf_object_settype(
+            object, content.is_solid ? NMR::MODELOBJECTTYPE_MODEL : NMR::MODELOBJECTTYPE_SURFACE),
+        "say whether it encloses a volume");
+}
+
+void set_materials(NMR::PLib3MFBase* model,
+                   NMR::PLib3MFBase* object,
+                   const TriangleMesh& mesh,
+                   const std::vector<size_t>& faces) {
   Handle group;
   check(NMR::lib3mf_model_addbasematerialgroup(model, group.out()), "add materials");
   std::array<DWORD, kProvenanceCount> index{};
@@ -106,10 +212,10 @@ void set_materials(NMR::PLib3MFBase* model, NMR::PLib3MFBase* object, const Tria
   }
   DWORD group_id = 0;
   check(NMR::lib3mf_resource_getresourceid(group.get(), &group_id), "name the materials");
-  std::vector<NMR::ModelResourceID> groups(mesh.faces.size(), group_id);
-  std::vector<DWORD> materials(mesh.faces.size());
+  std::vector<NMR::ModelResourceID> groups(faces.size(), group_id);
+  std::vector<DWORD> materials(faces.size());
   for (size_t i = 0; i < materials.size(); ++i) {
-    materials[i] = index.at(static_cast<size_t>(mesh.provenance[i]));
+    materials[i] = index.at(static_cast<size_t>(mesh.provenance[faces[i]]));
   }
   Handle properties;
   check(NMR::lib3mf_meshobject_createpropertyhandler(object, properties.out()), "label faces");
@@ -164,20 +270,16 @@ void write_3mf(const std::filesystem::path& path,
                const Eigen::Matrix3d& up_rotation) {
   require_writable(mesh, "write_3mf");
   require_printable_solid(mesh, frame, "write_3mf");
-  for (size_t i = 0; i < mesh.faces.size(); ++i) {
-    const auto& f = mesh.faces[i];
-    require(f[0] != f[1] && f[1] != f[2] && f[2] != f[0],
-            "write_3mf: a face must name three vertices; face",
-            i);
-  }
+  const std::vector<size_t> faces = faces_of_surface(mesh);
+  Geometry content = geometry(mesh, faces, frame, up_rotation);
   Handle model;
   check(NMR::lib3mf_createmodel(model.out()), "create a model");
-  check(NMR::lib3mf_model_setunit(model.get(), NMR::MODELUNIT_MILLIMETER), "set the unit");
+  check(NMR::lib3mf_model_setunit(model.get(), content.unit), "set the unit");
   check(NMR::lib3mf_model_addmetadatautf8(model.get(), "Application", "cgs"), "add metadata");
   Handle object;
   check(NMR::lib3mf_model_addmeshobject(model.get(), object.out()), "add a mesh");
-  set_geometry(object.get(), mesh, frame, up_rotation);
-  if (!mesh.provenance.empty()) set_materials(model.get(), object.get(), mesh);
+  set_geometry(object.get(), content);
+  if (!mesh.provenance.empty()) set_materials(model.get(), object.get(), mesh, faces);
   const std::string text = description(mesh, origin_in_millimetres(frame, up_rotation));
   check(NMR::lib3mf_model_addmetadatautf8(model.get(), "Description", text.c_str()),
         "add metadata");

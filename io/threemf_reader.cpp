@@ -6,10 +6,12 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "io/byte_writer.h"
 #include "io/mesh_arrays.h"
 #include "io/threemf_model.h"
 #include "io/xml_events.h"
@@ -218,18 +220,20 @@ class Assembly {
     const size_t at = description.find(kAdd);
     const size_t end = description.find(" mm.", at);
     if (at == std::string::npos || end == std::string::npos) return;
-    if (model.metres_per_unit != "0.001") {
-      out_.warnings.emplace_back(
-          "the origin in the description is left out: it is in mm, the file is not");
-      return;
-    }
     if (is_moved_) {
       out_.warnings.emplace_back(
           "the origin in the description is left out: the file moves, turns or repeats objects");
       return;
     }
     const size_t begin = at + kAdd.size();
-    out_.comments.push_back("file_origin " + description.substr(begin, end - begin));
+    std::istringstream in(description.substr(begin, end - begin));
+    const double units_per_millimetre = 1e-3 / std::stod(model.metres_per_unit);
+    std::string comment = "file_origin";
+    for (double millimetres = 0; in >> millimetres;) {
+      comment += ' ';
+      append_number(comment, units_per_millimetre * millimetres);
+    }
+    out_.comments.push_back(comment);
   }
 
   void warn_of_types() {

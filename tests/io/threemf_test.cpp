@@ -6,9 +6,12 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include "io/mesh_file.h"
+#include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
+#include "tests/support/solid_meshes.h"
 
 namespace cgs {
 namespace {
@@ -113,13 +116,66 @@ TEST(Write3mf, WritesAMeshWithoutLabels) {
   EXPECT_EQ(xml.find("<base "), std::string::npos);
 }
 
+std::string type_of(const std::string& xml) {
+  const size_t at = xml.find(" type=\"", xml.find("<object ")) + 7;
+  return xml.substr(at, xml.find('"', at) - at);
+}
+
+TEST(Write3mf, OnlySolidsThatLookOutwardAreModels) {
+  const Eigen::Matrix3d same = Eigen::Matrix3d::Identity();
+  TriangleMesh mesh = test::sphere_mesh(0.4, 8, 16).mesh;
+  EXPECT_EQ(type_of(model_of(mesh, same)), "model");
+  TriangleMesh inside_out = mesh;
+  for (auto& face : inside_out.faces) std::swap(face[1], face[2]);
+  EXPECT_EQ(model_of(inside_out, same), model_of(mesh, same)) << "is turned";
+  std::swap(mesh.faces[3][0], mesh.faces[3][1]);
+  EXPECT_EQ(type_of(model_of(mesh, same)), "surface") << "one face is turned over";
+  mesh.faces.erase(mesh.faces.begin() + 3);
+  EXPECT_EQ(type_of(model_of(mesh, same)), "surface") << "open";
+}
+
+TEST(Write3mf, TakesAUnitThatHoldsTheMesh) {
+  const test::TempDir dir;
+  const Eigen::Matrix3d same = Eigen::Matrix3d::Identity();
+  const TriangleMesh mesh = test::sphere_mesh(0.4, 8, 16).mesh;  // 0.8 m in metres
+  for (const auto& [metres, unit] :
+       {std::pair(1e-6, "micron"), {1e-3, "millimeter"}, {1e8, "meter"}}) {
+    Frame frame;
+    frame.metres_per_unit = metres;
+    write_3mf(dir / "a.3mf", mesh, frame, same);
+    const std::string xml = unzipped(test::read_bytes(dir / "a.3mf"), "3D/3dmodel.model");
+    EXPECT_NE(xml.find(std::string(" unit=\"") + unit + "\""), std::string::npos) << metres;
+    const MeasurableFile back = read_mesh_file(dir / "a.3mf");
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& p : back.content.points) {
+      box.extend(back.content.frame.metres_per_unit * back.content.file_from_internal(p));
+    }
+    EXPECT_NEAR(box.sizes().z() / (0.8 * metres), 1, 1e-5) << metres;
+  }
+  for (const double metres : {1e-9, 1e12}) {
+    Frame frame;
+    frame.metres_per_unit = metres;
+    EXPECT_THROW(write_3mf(dir / "b.3mf", mesh, frame, same), InvalidInput) << metres;
+  }
+}
+
+TEST(Write3mf, LeavesOutFacesThatNameAVertexTwice) {
+  TriangleMesh mesh = test::labelled_sphere();
+  const size_t before = mesh.faces.size();
+  mesh.faces.insert(mesh.faces.begin(), {7, 8, 8});
+  mesh.provenance.insert(mesh.provenance.begin(), Provenance::Inferred);
+  EXPECT_EQ(model_of(mesh, Eigen::Matrix3d::Identity()),
+            model_of(test::labelled_sphere(), Eigen::Matrix3d::Identity()));
+  EXPECT_EQ(before + 1, mesh.faces.size());
+}
+
 TEST(Write3mf, RefusesAnUnknownScaleAnEmptyMeshAndCollapsedFaces) {
   const test::TempDir dir;
   const Eigen::Matrix3d same = Eigen::Matrix3d::Identity();
   TriangleMesh mesh = test::labelled_sphere();
   EXPECT_THROW(write_3mf(dir / "a.3mf", mesh, Frame{}, same), InvalidInput);
   EXPECT_THROW(write_3mf(dir / "a.3mf", {}, test::centimetre_frame(), same), InvalidInput);
-  mesh.faces[5][1] = mesh.faces[5][0];
+  for (auto& face : mesh.faces) face[1] = face[0];
   EXPECT_THROW(write_3mf(dir / "a.3mf", mesh, test::centimetre_frame(), same), InvalidInput);
   EXPECT_EQ(test::entries(dir.path()), 0);
 }
