@@ -30,6 +30,7 @@
 #include "io/image.h"
 #include "io/json_file.h"
 #include "io/photographs.h"
+#include "io/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -264,8 +265,8 @@ std::vector<Stage> stages_of(const Scene& scene, size_t lods) {
            "textured assets",
            web_files,
            run_web,
-           // Other formats, pictures of the texture, levels of a run that wanted more of them.
-           {"mesh/watertight.", "web/asset.", "web/tileset.json"}},
+           // Pictures of the texture, levels of a run that wanted more of them.
+           {"mesh/watertight.*.jpg", "web/asset.lod*.glb", "web/tileset.json"}},
           {"report", "report", {"report.html", "report.json"}, run_report}};
 }
 
@@ -279,6 +280,27 @@ std::vector<int> views_with_photograph(const Scene& scene) {
 }
 
 namespace {
+
+std::set<std::string> files_of_stages(const Scene& scene, size_t lods) {
+  std::set<std::string> out;
+  for (const Stage& stage : stages_of(scene, lods)) {
+    out.insert(stage.files.begin(), stage.files.end());
+    out.insert(stage.further.begin(), stage.further.end());
+  }
+  return out;
+}
+
+// A folder without the record of a run may hold work of somebody else under the names that a run
+// writes to.
+void refuse_foreign_files(const RunRequest& request, const Scene& scene) {
+  if (request.overwrite || is_present(request.output / "run.json")) return;
+  const auto found = named_outputs(request.output, files_of_stages(scene, request.lods));
+  if (found.empty()) return;
+  throw InvalidInput(printable(request.output) + " holds " + printable(found.front()) +
+                     (found.size() > 1 ? " and more" : "") +
+                     " but no run.json: this would replace files that no run here wrote; choose "
+                     "another folder, or say --overwrite");
+}
 
 // What OpenedScene::keep() writes, before the first stage.
 std::set<std::string> camera_files() {
@@ -300,11 +322,8 @@ std::set<std::string> outputs_of(const Stage& stage, const Run& run) {
 // verify_run() holds the disk against them.
 void note_outputs(Run& run, bool is_fresh) {
   if (!is_fresh && run.record.json().contains("outputs")) return;
-  std::set<std::string> names = camera_files();
-  for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
-    names.insert(stage.files.begin(), stage.files.end());
-    names.insert(stage.further.begin(), stage.further.end());
-  }
+  std::set<std::string> names = files_of_stages(run.scene, run.request.lods);
+  names.merge(camera_files());
   run.record.note("outputs", output_hashes(run.request.output, names));
 }
 
@@ -407,6 +426,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   check_lengths(request, scene.frame);
   make_output_folder(request.output);
   const FolderLock lock(request.output);
+  refuse_foreign_files(request, scene);
   RunRecord record(request.output,
                    request_json(request, scene),
                    request.overwrite,

@@ -98,7 +98,10 @@ std::vector<std::string> named_outputs(const fs::path& output, const std::set<st
     const std::string name = fs::relative(entry.path(), output).generic_string();
     const bool is_named = names.count(name) > 0 ||
                           std::any_of(names.begin(), names.end(), [&](const std::string& known) {
-                            return known.back() == '.' && name.starts_with(known);
+                            const size_t any = known.find('*');
+                            return any != std::string::npos && name.size() >= known.size() &&
+                                   name.starts_with(known.substr(0, any)) &&
+                                   name.ends_with(known.substr(any + 1));
                           });
     if (is_named) out.push_back(name);
   }

@@ -14,8 +14,8 @@ namespace cgs {
 
 /// Files that a run wrote, by their paths below its folder, in order.
 ///
-/// \param names  paths of what a run writes; one that ends in a dot stands for all that begin so.
-///               Other files are the user's, who may change them.
+/// \param names  paths of what a run writes; "*" in one stands for any characters. Other files are
+///               the user's, who may change them.
 std::vector<std::string> named_outputs(const std::filesystem::path& output,
                                        const std::set<std::string>& names);
 

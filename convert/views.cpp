@@ -12,6 +12,7 @@
 #include "io/cameras_json.h"
 #include "io/png.h"
 #include "io/resample.h"
+#include "io/scene_path.h"
 #include "io/scene_reader.h"
 #include "io/view_exr.h"
 #include "libcgs/core/error.h"
@@ -73,14 +74,28 @@ std::string frame_name(size_t k) {
   return "frame_" + number;
 }
 
-// Those of a longer path must not follow these.
+std::vector<std::string> pictures_of_frame(size_t k) {
+  return {frame_name(k) + ".png", frame_name(k) + ".hole.png"};
+}
+
+// Pictures of an earlier path: those of a longer one must not follow the new ones.
+// \throws InvalidInput if pictures lie there whose cameras.json does not
 void remove_frames(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> found;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with("frame_") && name.ends_with(".png")) found.push_back(entry.path());
+  size_t earlier = 0;
+  try {
+    if (is_present(folder / "cameras.json")) {
+      earlier = read_cameras_json(folder / "cameras.json").views.size();
+    }
+  } catch (const Error&) {
+    earlier = 0;  // of another program
   }
-  for (const auto& file : found) std::filesystem::remove(file);
+  if (earlier == 0 && is_present(folder / pictures_of_frame(0).front())) {
+    throw InvalidInput(printable(folder) + " holds frame_0000.png but not the cameras.json that " +
+                       "would go with it: choose another folder, or remove the frames");
+  }
+  for (size_t k = 0; k < earlier; ++k) {
+    for (const std::string& name : pictures_of_frame(k)) std::filesystem::remove(folder / name);
+  }
 }
 
 // Where the frames were taken from, in the frame of the model.
@@ -171,6 +186,7 @@ Json write_path(const Model& model,
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
   remove_frames(folder);
+  write_cameras_json(folder / "cameras.json", scene_of_path(model, path));
   constexpr size_t kOnSheet = 12;
   const auto place_on_sheet = [&](size_t k) { return k * kOnSheet / path.size(); };
   std::vector<ColorImage> sheet;
@@ -180,8 +196,9 @@ Json write_path(const Model& model,
     const RenderBuffers buffers = render_camera(model, inputs, path[k]);
     const ColorImage shown = picture(buffers);
     const MaskMap holes = hole_mask(buffers);
-    write_png(folder / (frame_name(k) + ".png"), shown);
-    write_png(folder / (frame_name(k) + ".hole.png"), holes);
+    const std::vector<std::string> names = pictures_of_frame(k);
+    write_png(folder / names[0], shown);
+    write_png(folder / names[1], holes);
     if (k == 0 || path.size() <= kOnSheet || place_on_sheet(k) != place_on_sheet(k - 1)) {
       ColorImage small = thumbnail(tinted(shown, holes));
       const bool fits =
@@ -193,7 +210,6 @@ Json write_path(const Model& model,
   }
   constexpr int kColumns = 4;
   write_png(folder / "contact.png", contact_sheet(sheet, kColumns));
-  write_cameras_json(folder / "cameras.json", scene_of_path(model, path));
   report(progress, 1);
   return out;
 }

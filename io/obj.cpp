@@ -6,12 +6,15 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/atomic_file.h"
+#include "io/byte_reader.h"
 #include "io/byte_writer.h"
 #include "io/mesh_arrays.h"
 #include "io/ply_frame.h"
+#include "io/scene_path.h"
 #include "io/texture_images.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/provenance_colors.h"
@@ -54,8 +57,32 @@ struct ObjTexture {
   }
 };
 
+/// What the files beside an OBJ begin with: its own name, in which many programs would take a blank
+/// for the end and # for a comment.
+std::string companion_stem(const std::filesystem::path& path) {
+  std::string out = path.stem().string();
+  std::replace_if(
+      out.begin(),
+      out.end(),
+      [](char c) { return c == '#' || c == '\\' || (c >= '\0' && c <= ' '); },
+      '_');
+  return out;
+}
+
 std::string image_name(const std::filesystem::path& path, const std::string& name) {
-  return path.stem().string() + "." + name + ".jpg";
+  return companion_stem(path) + "." + name + ".jpg";
+}
+
+constexpr std::string_view kOurMaterials = "# cgs:";
+
+/// Where the materials go. \throws InvalidInput if those of another program lie there
+std::filesystem::path materials_path(const std::filesystem::path& path) {
+  const std::filesystem::path out = path.parent_path() / (companion_stem(path) + ".mtl");
+  if (is_present(out) && read_file_start(out, kOurMaterials.size()) != kOurMaterials) {
+    throw InvalidInput("the materials of " + printable(path) + " would replace " + printable(out) +
+                       ", which another program wrote; choose another name");
+  }
+  return out;
 }
 
 std::string diffuse_text(Provenance label) {
@@ -69,7 +96,7 @@ std::string diffuse_text(Provenance label) {
 
 /// Always all classes, so that writing it again never changes what an older OBJ refers to.
 std::string materials_text(const std::filesystem::path& path, const ObjTexture& texture) {
-  std::string out = "# cgs: materials tell where a surface comes from\n";
+  std::string out = std::string(kOurMaterials) + " materials tell where a surface comes from\n";
   for (const Provenance label : kProvenanceOrder) {
     out += "newmtl " + group_name(label) + "\nKd " + diffuse_text(label) + "\nillum 1\n";
   }
@@ -227,7 +254,7 @@ void write_obj(const std::filesystem::path& path,
   constexpr int kQuality = 90;
   ObjTexture used{texture, safe_names(texture), {}};
   if (!texture.empty()) used.images = texture_images(mesh, texture, kQuality);
-  const std::filesystem::path materials = std::filesystem::path(path).replace_extension(".mtl");
+  const std::filesystem::path materials = materials_path(path);
   AtomicFile file(path);
   file.write("# cgs\n" + frame_comments(frame, "# ") + "mtllib " + materials.filename().string() +
              "\n");

@@ -11,6 +11,7 @@
 #include "convert/scene_request.h"
 #include "io/atomic_file.h"
 #include "io/json_file.h"
+#include "io/scene_path.h"
 
 namespace cgs {
 
@@ -20,12 +21,28 @@ struct TrainArgs {
   SceneRequest scene;
   std::filesystem::path output;
   TrainingArguments training;
+  bool overwrite = false;
   CommonOptions common;
 };
+
+// A model may have taken hours, and a run vouches for the one it made.
+void refuse_to_replace(const TrainArgs& args) {
+  std::error_code error;
+  const auto folder = std::filesystem::weakly_canonical(args.output, error);
+  if (folder.filename() == "model" && is_present(folder.parent_path() / "run.json")) {
+    throw InvalidInput(printable(args.output) +
+                       " is the model of a run, which only cgs run may change; choose another "
+                       "folder");
+  }
+  if (args.overwrite || !is_present(args.output / "cameras.json")) return;
+  throw InvalidInput(printable(args.output) +
+                     " holds a finished model; choose another folder, or say --overwrite");
+}
 
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.scene.path);
+  refuse_to_replace(args);
   const ModelRequest request = {
       {}, training_options(args.training), args.output, args.scene.options.depth.network};
   Terminal terminal(args.common.quiet, args.common.strict);
@@ -77,6 +94,7 @@ void add_train(CLI::App& app) {
   add_camera_options(*cmd, args->scene);
   add_scale_options(*cmd, args->scene);
   add_training_options(*cmd, args->training);
+  cmd->add_flag("-w,--overwrite", args->overwrite, "Replace a finished model");
   add_output_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs train photos/portal --views 1,10,19 --preset draft -o out/model\n"

@@ -192,6 +192,26 @@ TEST(WriteTexturedObj, LeavesNothingIfTheMeshCannotTakeItsPlace) {
   EXPECT_EQ(test::entries(dir.path()), 1);
 }
 
+TEST(WriteObj, LeavesTheMaterialsOfAnotherProgramAlone) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "scan.mtl", "newmtl stone\n");
+  EXPECT_THROW(write_obj(dir / "scan.obj", test::labelled_sphere(), test::centimetre_frame()),
+               InvalidInput);
+  EXPECT_EQ(test::read_bytes(dir / "scan.mtl"), "newmtl stone\n");
+  EXPECT_EQ(test::entries(dir.path()), 1);
+  write_obj(dir / "ours.obj", test::labelled_sphere(), test::centimetre_frame());
+  EXPECT_NO_THROW(write_obj(dir / "ours.obj", test::labelled_sphere(), test::centimetre_frame()));
+}
+
+// Readers end a name at a blank, and a line at #.
+TEST(WriteObj, NamesOfMaterialFilesHoldNoBlanks) {
+  const test::TempDir dir;
+  write_obj(dir / "my mesh #1.obj", test::labelled_sphere(), test::centimetre_frame());
+  EXPECT_TRUE(std::filesystem::exists(dir / "my_mesh__1.mtl"));
+  EXPECT_NE(test::read_bytes(dir / "my mesh #1.obj").find("mtllib my_mesh__1.mtl\n"),
+            std::string::npos);
+}
+
 TEST(WriteObj, LeavesNeitherFileOnAFullDisk) {
   test::expect_full_disk_is_noticed(
       [](const auto& path) { write_obj(path, test::labelled_sphere(), test::centimetre_frame()); });
