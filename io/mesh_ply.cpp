@@ -15,10 +15,14 @@ namespace cgs {
 
 namespace {
 
+constexpr const char* kGenerator = "generator cgs";
+
 std::string header_text(const TriangleMesh& mesh,
                         const Frame& frame,
                         const std::vector<VertexScalar>& scalars) {
-  std::string out = "ply\nformat binary_little_endian 1.0\ncomment generator cgs\n";
+  std::string out = "ply\nformat binary_little_endian 1.0\ncomment ";
+  out += kGenerator;
+  out += '\n';
   out += ply_frame_comments(frame);
   if (!mesh.provenance.empty()) {
     out += "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual\n";
@@ -72,6 +76,16 @@ int find_scalar(const PlyElement& element, std::string_view name) {
   return i >= 0 && !element.properties[static_cast<size_t>(i)].is_list ? i : -1;
 }
 
+/// Whether a scalar called quality is the support that write_mesh_ply() keeps there: MeshLab and
+/// others call any number of a vertex so.
+bool quality_is_support(const PlyHeader& header, const PlyElement& vertex) {
+  const PlyElement* face = header.find("face");
+  return std::find(header.comments.begin(), header.comments.end(), kGenerator) !=
+             header.comments.end() ||
+         vertex.find("scalar_sigma") >= 0 ||
+         (face != nullptr && face->find("scalar_provenance") >= 0);
+}
+
 VertexColumns vertex_columns(const PlyHeader& header, const std::filesystem::path& path) {
   const PlyElement* vertex = header.find("vertex");
   if (vertex == nullptr) throw BadInput(Defect::Schema, path, "missing element vertex");
@@ -88,7 +102,7 @@ VertexColumns vertex_columns(const PlyHeader& header, const std::filesystem::pat
       throw BadInput(Defect::Schema, path, std::string("missing property ") + kPosition.at(k));
     }
   }
-  out.quality = find_scalar(*vertex, "quality");
+  if (quality_is_support(header, *vertex)) out.quality = find_scalar(*vertex, "quality");
   out.sigma = find_scalar(*vertex, "scalar_sigma");
   if (out.has_colors()) {
     const PlyType type = vertex->properties[static_cast<size_t>(out.color[0])].type;

@@ -52,6 +52,9 @@ Json mesh_json(const MeasurableFile& file, const Json& certificate) {
           {"counts", {{"vertices", mesh.points.size()}, {"faces", mesh.mesh.faces.size()}}},
           {"bounds", {{"min", vector_to_json(box.min())}, {"max", vector_to_json(box.max())}}},
           {"units", mesh.frame.unit_name()},
+          {"scale_source", scale_source_name(mesh.frame.scale_source)},
+          {"file_origin", vector_to_json(mesh.file_origin)},
+          {"up", mesh.frame.knows_up() ? vector_to_json(mesh.frame.up) : Json(nullptr)},
           {"states",
            {{"provenance", mesh.states_provenance()},
             {"sigma", mesh.states_sigma()},
@@ -62,12 +65,17 @@ Json mesh_json(const MeasurableFile& file, const Json& certificate) {
 
 void print_mesh(const Json& info, const Certificate& certificate) {
   const Json& box = info["bounds"];
-  std::printf("%s: %zu vertices, %zu faces, unit %s\n",
+  std::printf("%s: %zu vertices, %zu faces, unit %s (scale %s)\n",
               info["kind"].get<std::string>().c_str(),
               info["counts"]["vertices"].get<size_t>(),
               info["counts"]["faces"].get<size_t>(),
-              info["units"].get<std::string>().c_str());
+              info["units"].get<std::string>().c_str(),
+              info["scale_source"].get<std::string>().c_str());
   std::printf("bounds: %s ... %s\n", box["min"].dump().c_str(), box["max"].dump().c_str());
+  if (info["file_origin"] != Json{0.0, 0.0, 0.0}) {
+    std::printf("origin: add %s to coordinates\n", info["file_origin"].dump().c_str());
+  }
+  if (!info["up"].is_null()) std::printf("up: %s\n", info["up"].dump().c_str());
   std::printf("provenance %s, sigma %s\n",
               info["states"]["provenance"].get<bool>() ? "stated" : "not stated",
               info["states"]["sigma"].get<bool>() ? "stated" : "not stated");

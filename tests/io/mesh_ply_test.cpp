@@ -120,6 +120,25 @@ TEST(MeshPly, ReadsPointCloudsAndFloatColours) {
   EXPECT_EQ(out.mesh.colors[1], Eigen::Vector3f(0, 0, 0));
 }
 
+// MeshLab and others keep any number of a vertex under that name.
+TEST(MeshPly, QualityIsSupportOnlyInFilesOfOurs) {
+  const test::TempDir dir;
+  const auto support_of = [&](const std::string& comment, const std::string& more) {
+    test::write_bytes(dir / "a.ply",
+                      "ply\nformat ascii 1.0\n" + comment +
+                          "element vertex 1\nproperty float x\nproperty float y\n"
+                          "property float z\nproperty float quality\n" +
+                          more + "end_header\n0 0 0 2 1\n");
+    return read_mesh_ply(dir / "a.ply").mesh.support;
+  };
+  const std::string other = "property float scalar_other\n";
+  EXPECT_TRUE(support_of("comment VCGLIB generated\n", other).empty());
+  EXPECT_EQ(support_of("comment generator cgs\n", other), std::vector<float>{2});
+  EXPECT_EQ(support_of("comment VCGLIB generated\n", "property float scalar_sigma\n"),
+            std::vector<float>{2})
+      << "edited in MeshLab";
+}
+
 TEST(MeshPly, RefusesWhatIsNoMesh) {
   const std::string points = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
   EXPECT_EQ(defect(kTriangle + points + "3 0 1 2\n"), "OK");
