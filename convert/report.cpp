@@ -16,6 +16,7 @@
 #include "io/image.h"
 #include "io/png.h"
 #include "io/resample.h"
+#include "io/scene_path.h"
 #include "io/scene_reader.h"
 #include "libcgs/core/error.h"
 
@@ -224,15 +225,14 @@ void write_html_report(const std::filesystem::path& folder,
                        const Scene& scene,
                        const std::string& viewer) {
   std::ostringstream html;
-  const auto title = report["folder"].get<std::string>();
+  const std::string title = escaped(folder_name(report["folder"].get<std::string>()));
   // The browser itself is told that the page loads nothing.
   html << "<!doctype html>\n<html lang=en><head><meta charset=utf-8>"
           "<meta name=viewport content=\"width=device-width,initial-scale=1\">"
           "<meta http-equiv=Content-Security-Policy content=\"default-src 'none'; img-src data:; "
           "style-src 'unsafe-inline'; script-src 'unsafe-inline'\"><title>"
-       << escaped(title) << "</title>\n<style>" << page_files().style
-       << "</style></head><body>\n<h1>" << escaped(std::filesystem::path(title).filename().string())
-       << "</h1>\n<p>" << escaped(report["scene"].get<std::string>())
+       << title << "</title>\n<style>" << page_files().style << "</style></head><body>\n<h1>"
+       << title << "</h1>\n<p>" << escaped(report["scene"].get<std::string>())
        << " scene, units of files: " << escaped(report["units"].get<std::string>()) << " (scale "
        << escaped(report["scale_source"].get<std::string>()) << ")</p>\n<p class=note>Model: "
        << escaped(report["model"]["description"].get<std::string>()) << ".</p>\n";

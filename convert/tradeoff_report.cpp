@@ -13,6 +13,7 @@
 #include "convert/scatter_plot.h"
 #include "io/atomic_file.h"
 #include "io/json_file.h"
+#include "io/scene_path.h"
 
 namespace cgs {
 
@@ -364,7 +365,7 @@ std::string tradeoff_text(const TradeoffReport& report) {
 void write_tradeoff(const std::filesystem::path& folder, const TradeoffReport& report) {
   const std::string svg = plots_svg(report.tradeoff);
   const std::string title =
-      escaped("Speed against accuracy: " + report.tradeoff.scene.folder.filename().string());
+      escaped("Speed against accuracy: " + folder_name(report.tradeoff.scene.folder));
   write_file(folder / "tradeoff.json", json_text(tradeoff_json(report)) + "\n");
   write_file(folder / "tradeoff.svg", svg);
   write_file(folder / "tradeoff.html",

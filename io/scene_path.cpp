@@ -33,6 +33,12 @@ bool looks_like_url(std::string_view name) {
 
 }  // namespace
 
+std::string folder_name(const fs::path& path) {
+  std::error_code error;
+  const fs::path whole = fs::absolute(path, error).lexically_normal();
+  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+}
+
 fs::path resolve_in_scene(const SceneRoot& root, std::string_view name, const fs::path& named_in) {
   const auto refuse = [&](const std::string& reason) {
     throw BadInput(Defect::Path, named_in, "\"" + printable(fs::path(name)) + "\" " + reason);

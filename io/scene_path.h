@@ -31,6 +31,9 @@ bool is_present(const std::filesystem::path& path);
 /// True if the path leads to a folder; never throws.
 bool is_folder(const std::filesystem::path& path);
 
+/// What a folder is called, however somebody writes the way there: "photos/", ".", "../photos".
+std::string folder_name(const std::filesystem::path& path);
+
 /// The names of what lies in a folder, sorted; empty if it cannot be listed.
 std::vector<std::string> sorted_entries(const std::filesystem::path& folder);
 
