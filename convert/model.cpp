@@ -123,6 +123,15 @@ uint64_t training_key(const Model& model, const TrainingOptions& options) {
     const DepthMap& depth = model.priors[k].depth;
     add(view.image.data.data(), view.image.data.size() * sizeof(Eigen::Vector3f));
     add(depth.data.data(), depth.data.size() * sizeof(float));
+    const ViewPriors& priors = model.priors[k];
+    add(priors.sigma.data.data(), priors.sigma.data.size() * sizeof(float));
+    add(priors.origin.data.data(), priors.origin.data.size());
+    add(priors.layer.data.data(), priors.layer.data.size());
+    add(view.valid.data.data(), view.valid.data.size());
+    const Camera& camera = view.camera;
+    const std::array<double, 4> intrinsics = {camera.fx, camera.fy, camera.cx, camera.cy};
+    add(intrinsics.data(), sizeof intrinsics);
+    add(camera.world_from_cam.data(), 16 * sizeof(double));
   }
   return key;
 }
@@ -367,19 +376,34 @@ void relink_photographs(Scene& scene, const std::vector<PhotoFile>& photographs)
   }
 }
 
-}  // namespace
-
-void relink_images(Scene& scene, const std::filesystem::path& folder) {
-  if (is_photographs(folder)) {
-    relink_photographs(scene, list_photographs({folder, false}));
-    return;
-  }
-  const Scene found = read_scene(folder);
+void relink_views(Scene& scene, const Scene& found) {
   for (View& view : scene.views) {
     const auto match = std::find_if(found.views.begin(), found.views.end(), [&](const View& other) {
       return other.name == view.name;
     });
-    if (match != found.views.end()) view.image_path = match->image_path;
+    if (match == found.views.end()) continue;
+    view.image_path = match->image_path;
+    view.mask_path = match->mask_path;
+  }
+}
+
+}  // namespace
+
+void relink_images(Scene& scene, const std::filesystem::path& folder) {
+  for (View& view : scene.views) {
+    view.image_path.clear();
+    view.mask_path.clear();
+  }
+  if (is_photographs(folder)) {
+    relink_photographs(scene, list_photographs({folder, false}));
+  } else {
+    relink_views(scene, read_scene(folder));
+  }
+  for (const View& view : scene.views) {
+    if (view.image_path.empty()) {
+      scene.warnings.push_back(printable(folder) + " has no photograph of view " +
+                               printable(view.name));
+    }
   }
 }
 

@@ -187,11 +187,32 @@ ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
 
 }  // namespace
 
+namespace {
+
+// A focal length in pixels is that of one size of photographs.
+void refuse_focal_of_two_sizes(const std::vector<PhotoFile>& photographs) {
+  const auto side = [](const PhotoFile& file) {
+    return std::max(file.size.width, file.size.height);
+  };
+  for (const PhotoFile& photograph : photographs) {
+    if (side(photograph) == side(photographs.front())) continue;
+    throw InvalidInput("--focal is in pixels of photographs of one size; " +
+                       printable(photographs.front().path.filename()) + " is " +
+                       std::to_string(side(photographs.front())) + " pixels long, " +
+                       printable(photograph.path.filename()) + " " +
+                       std::to_string(side(photograph)) +
+                       ": bring them to one size, or leave it out");
+  }
+}
+
+}  // namespace
+
 PhotoPoses photo_poses(const SceneRoot& root,
                        double focal,
                        const std::filesystem::path& stored,
                        Terminal& terminal) {
   const std::vector<PhotoFile> photographs = checked_photographs(root);
+  if (focal > 0) refuse_focal_of_two_sizes(photographs);
   const std::string inputs = inputs_text(root, photographs, focal);
   if (auto poses = stored_poses(stored, inputs)) return *poses;
   const Progress progress = terminal.begin("cameras of photographs");

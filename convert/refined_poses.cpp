@@ -48,7 +48,7 @@ std::string inputs_text(const Scene& scene, const SceneRoot& root) {
     const View& view = view_of(scene, part);
     const Camera camera = camera_of_file(view);
     const Eigen::Matrix4d pose = camera.world_from_cam.matrix();
-    const auto mask = mask_file(root, view.image_path);
+    const auto mask = mask_file(root, view);
     views.push_back({view.name,
                      part.second,
                      file_hash(view.image_path),

@@ -28,6 +28,12 @@ std::filesystem::path confidence_file(const std::filesystem::path& depth) {
   return is_folder(folder) ? depth_file_of({folder, false}, depth) : std::filesystem::path();
 }
 
+Json names_of(const Scene& scene, const std::vector<int>& views) {
+  Json out = Json::array();
+  for (const int i : views) out.push_back(scene.views[static_cast<size_t>(i)].name);
+  return out;
+}
+
 // Hashes of the photographs and masks of views.
 Json photograph_hashes(const SceneRequest& request,
                        const Scene& scene,
@@ -36,7 +42,7 @@ Json photograph_hashes(const SceneRequest& request,
   for (const int i : views) {
     const View& view = scene.views[static_cast<size_t>(i)];
     out[view.name] = file_hash(view.image_path);
-    const auto mask = mask_file({request.path, request.options.allow_external}, view.image_path);
+    const auto mask = mask_file({request.path, request.options.allow_external}, view);
     if (mask) out[view.name + ", mask"] = file_hash(*mask);
   }
   return out;
@@ -127,6 +133,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
               {"compression_error", request.compression_error},
               {"max_size", request.max_size},
               {"input_images", input_hashes(request.scene, scene)},
+              {"held_out", names_of(scene, scene.held_out)},
               {"held_out_images", photograph_hashes(request.scene, scene, scene.held_out)},
               {"cameras", cameras_hash(scene)}};
   // The cameras have moved with it; what is left is the sigma of the scale.

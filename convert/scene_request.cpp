@@ -45,15 +45,42 @@ void refine(const SceneRequest& request,
 }
 
 // Which photographs there are is known before their cameras are, minutes earlier.
-void check_names(const SceneRoot& root, const std::string& views) {
-  if (views.empty()) return;
+// \return the names that a list stands for: indices are those of all photographs, also where some
+//         cannot be placed
+std::vector<std::string> names_of(const SceneRoot& root, const std::string& views) {
+  std::vector<std::string> out;
+  if (views.empty()) return out;
   Scene named;
   for (const PhotoFile& photograph : list_photographs(root)) {
     View& view = named.views.emplace_back();
     view.name = photograph.path.stem().string();
     view.image_path = photograph.path;
   }
-  (void)select_views(named, views);
+  for (const int i : select_views(named, views)) {
+    out.push_back(named.views[static_cast<size_t>(i)].image_path.filename().string());
+  }
+  return out;
+}
+
+// The same views among those that could be placed. \throws InvalidInput if one could not
+std::string placed_views(const std::vector<std::string>& names, const ColmapModel& model) {
+  std::string out;
+  for (const std::string& name : names) {
+    const bool is_placed =
+        std::any_of(model.images.begin(), model.images.end(), [&](const ColmapImage& image) {
+          return image.name == name;
+        });
+    if (!is_placed) {
+      throw InvalidInput("--views: photograph " + printable(name) +
+                         " could not be placed: too little of what it shows is in the others");
+    }
+    if (name.find(',') != std::string::npos) {
+      throw InvalidInput("--views: photograph " + printable(name) +
+                         " has a comma in its name, which ends a name there; rename it");
+    }
+    out += (out.empty() ? "" : ",") + name;
+  }
+  return out;
 }
 
 }  // namespace
@@ -78,10 +105,12 @@ OpenedScene open_scene(const SceneRequest& request,
     }
     request.options.validate();
     const SceneRoot root{request.path, request.options.allow_external};
-    check_names(root, request.options.views);
+    const std::vector<std::string> names = names_of(root, request.options.views);
     const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
     out.poses = photo_poses(root, request.focal, stored, terminal);
-    out.scene = scene_of_photographs(request.path, out.poses->model, request.options);
+    SceneOptions options = request.options;
+    options.views = placed_views(names, out.poses->model);
+    out.scene = scene_of_photographs(request.path, out.poses->model, options);
     auto& warnings = out.scene.warnings;
     warnings.insert(warnings.end(), out.poses->warnings.begin(), out.poses->warnings.end());
   } else {

@@ -43,7 +43,15 @@ void verify_inputs(const Json& record,
                    Terminal& terminal,
                    Verification& out) {
   const RunRequest request = recorded_request(record, output / "run.json");
-  const OpenedScene opened = open_scene(request.scene, output / "model", terminal);
+  const OpenedScene opened = [&] {
+    try {
+      return open_scene(request.scene, output / "model", terminal);
+    } catch (const BadInput& error) {
+      out.differing.push_back(std::string(kInput) + error.what());
+      return OpenedScene();
+    }
+  }();
+  if (!out.differing.empty()) return;
   const Json now = request_json(request, opened.scene);
   const Json& before = record["request"];
   for (const char* kind : {"input_images", "held_out_images"}) {

@@ -82,6 +82,9 @@ json camera_json(const Scene& scene, size_t index) {
   if (!view.image_path.empty()) {
     entry["image_path"] = std::filesystem::absolute(view.image_path).lexically_normal().string();
   }
+  if (!view.mask_path.empty()) {
+    entry["mask_path"] = std::filesystem::absolute(view.mask_path).lexically_normal().string();
+  }
   return entry;
 }
 
@@ -225,6 +228,7 @@ void read_image_path(const JsonValue& entry, View& view, Scene& scene) {
   } else {
     scene.missing.push_back(name->text());
   }
+  if (const auto mask = entry.find("mask_path")) view.mask_path = mask->text();
 }
 
 }  // namespace

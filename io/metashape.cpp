@@ -29,7 +29,7 @@ std::optional<std::string> xml_name(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (entry->path().extension() == ".xml") files.push_back(entry->path());
+    if (lower_extension(entry->path()) == ".xml") files.push_back(entry->path());
   }
   std::sort(files.begin(), files.end());
   for (const fs::path& file : files) {

@@ -96,10 +96,10 @@ ColorImage read_photograph(const View& view) {
 }
 
 ColorImage read_photograph(const View& view, const SceneRoot& root, MaskMap& usable) {
-  const ColorImage stored = read_image(view.image_path, &usable);
-  apply_mask(root, view.image_path, stored.width, stored.height, usable);
+  ColorImage image = turned(read_image(view.image_path, &usable), view.orientation);
   usable = turned(usable, view.orientation);
-  return turned(stored, view.orientation);
+  apply_mask(root, view, {image.width, image.height}, usable);
+  return image;
 }
 
 }  // namespace cgs

@@ -55,7 +55,7 @@ std::optional<std::string> csv_name(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (entry->path().extension() == ".csv") files.push_back(entry->path());
+    if (lower_extension(entry->path()) == ".csv") files.push_back(entry->path());
   }
   std::sort(files.begin(), files.end());
   const auto found = std::find_if(files.begin(), files.end(), has_cameras);

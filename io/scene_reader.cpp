@@ -321,7 +321,7 @@ void check_places(const Scene& scene) {
 bool is_whole(const View& view, const SceneRoot& root) {
   const fs::path extension = view.image_path.extension();
   const bool is_jpeg = extension == ".jpg" || extension == ".jpeg";  // has no transparent pixels
-  return is_jpeg && !has_lens_distortion(view) && !mask_file(root, view.image_path);
+  return is_jpeg && !has_lens_distortion(view) && !mask_file(root, view);
 }
 
 void load_image(const Scene& scene, View& view, std::vector<std::string>& warnings) {
@@ -331,7 +331,7 @@ void load_image(const Scene& scene, View& view, std::vector<std::string>& warnin
   Camera& camera = view.camera;
   const SceneRoot root = {scene.folder, false};
   view.image = read_photograph(view, root, view.valid);
-  if (lacks_mask(root, view.image_path)) {
+  if (lacks_mask(root, view)) {
     warnings.push_back("there are masks, but none for view " + printable(view.name) +
                        ", of which everything is used");
   }

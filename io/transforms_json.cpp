@@ -234,6 +234,15 @@ Scene read_transforms_json(const SceneRoot& root) {
       const fs::path file = resolve_in_scene(root, depth->text(), path);
       if (is_present(file) && has_depth_extension(file)) view.depth_path = file;
     }
+    if (const auto mask = frame.find("mask_path")) {
+      view.mask_path = resolve_in_scene(root, mask->text(), path);
+      if (!is_present(view.mask_path)) {
+        scene.warnings.push_back(mask->pointer() + ": there is no mask \"" +
+                                 printable(fs::path(mask->text())) + "\"; all of view " +
+                                 printable(fs::path(view.name)) + " is used");
+        view.mask_path.clear();
+      }
+    }
     read_size(document, frame, view);
     view.camera.world_from_cam = read_pose(frame.at("transform_matrix"));
     const bool has_size = view.camera.width > 0 && view.camera.height > 0;

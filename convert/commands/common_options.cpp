@@ -166,11 +166,12 @@ void add_training_options(CLI::App& command, TrainingArguments& arguments) {
                   "reference: the published CoherentGS schedule with convolutional decoders, hours "
                   "instead of a minute")
       ->capture_default_str();
-  command.add_option(
-      "--set",
-      arguments.settings,
-      "One setting of the training, name=value; may be repeated. model/training.json "
-      "lists all");
+  command
+      .add_option("--set",
+                  arguments.settings,
+                  "One setting of the training, name=value; may be repeated. model/training.json "
+                  "lists all")
+      ->allow_extra_args(false);
 }
 
 TrainingOptions training_options(const TrainingArguments& arguments) {

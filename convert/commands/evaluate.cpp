@@ -53,8 +53,8 @@ void run_evaluate(const EvaluateArgs& args) {
   limit_threads(args.common.threads);
   Terminal terminal(args.common.quiet, args.common.strict);
   Model model = read_model(args.model);
-  terminal.warn(model.scene.warnings);
   if (!args.scene.empty()) relink_images(model.scene, args.scene);
+  terminal.warn(model.scene.warnings);
   const std::vector<int> views =
       args.views.empty() ? model.scene.held_out : select_views(model.scene, args.views);
   if (views.empty()) {

@@ -30,7 +30,7 @@ struct FilterArgs {
 
 // Whether what is left can be written under that name.
 void check_content(const std::filesystem::path& output, const FilterState& state) {
-  if (!state.is_cloud() || output.extension() == ".ply" || output.extension() == ".PLY") return;
+  if (!state.is_cloud() || lower_extension(output) == ".ply") return;
   throw InvalidInput("a point cloud can only be written as .ply, not as " + printable(output));
 }
 

@@ -88,7 +88,8 @@ void add_tradeoff(CLI::App& app) {
   cmd->add_option("--want",
                   args->wants,
                   "A need: error<2mm, time<3min, cpu<90s, size<1MB or psnr>24dB; may be repeated. "
-                  "Says which setting meets all");
+                  "Says which setting meets all")
+      ->allow_extra_args(false);
   add_common_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs tradeoff photos/statue --views 1,10,19 --assume-unit m -o out/tradeoff \\\n"

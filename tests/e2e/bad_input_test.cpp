@@ -235,6 +235,57 @@ TEST(Usage, WhatPhotographsCannotHaveIsRefusedBeforeTheirCamerasAreSolvedFor) {
   const ProgramResult length = run_cgs(run + " --voxel-size 5mm");
   EXPECT_EQ(length.exit_code, 2) << length.err;
   EXPECT_NE(length.err.find("the scale of this scene is unknown"), std::string::npos) << length.err;
+  write_png(dir / "photos/b.png", ColorImage(32, 24, Eigen::Vector3f::Constant(0.5f)));
+  const ProgramResult focal = run_cgs(run + " --focal 50");
+  EXPECT_EQ(focal.exit_code, 2) << focal.err;
+  EXPECT_NE(focal.err.find("a.png is 64 pixels long, b.png 32"), std::string::npos) << focal.err;
+}
+
+// Under names that a run writes to, and beside them.
+TEST(Output, FilesOfOthersAreNotReplaced) {
+  const TempDir dir;
+  write_scene(dir);
+  const std::string run =
+      "run " + (dir / "scene").string() + " -q --set steps=0 -o " + (dir / "out").string();
+  test::write_bytes(dir / "out/report.html", "mine");
+  const ProgramResult result = run_cgs(run);
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_NE(result.err.find("report.html but no run.json"), std::string::npos) << result.err;
+  EXPECT_EQ(test::read_bytes(dir / "out/report.html"), "mine");
+  for (const char* name : {"out/mesh/watertight.blend", "out/web/asset.usdz"}) {
+    test::write_bytes(dir / name, "mine");
+  }
+  const ProgramResult again = run_cgs(run + " -w");
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(run_cgs(run + " -w --assume-unit cm").exit_code, 0);
+  for (const char* name : {"out/mesh/watertight.blend", "out/web/asset.usdz"}) {
+    EXPECT_TRUE(std::filesystem::exists(dir / name)) << name;
+  }
+}
+
+TEST(Output, AModelIsReplacedOnlyWhenAskedForAndFramesOfOthersNever) {
+  const TempDir dir;
+  write_scene(dir);
+  const std::string model = (dir / "model").string();
+  const std::string train = "train " + (dir / "scene").string() + " -q --set steps=0 -o ";
+  EXPECT_EQ(run_cgs(train + model).exit_code, 0);
+  const ProgramResult again = run_cgs(train + model);
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_NE(again.err.find("holds a finished model"), std::string::npos) << again.err;
+  EXPECT_EQ(run_cgs(train + model + " -w").exit_code, 0);
+  test::write_bytes(dir / "run.json", "{}");
+  EXPECT_EQ(run_cgs(train + model + " -w").exit_code, 2) << "the model of a run";
+  test::write_bytes(dir / "video/frame_0000.png", "mine");
+  const std::string render =
+      "render " + model + " --path between -q -o " + (dir / "video").string();
+  const ProgramResult refused = run_cgs(render + " --frames 2");
+  EXPECT_EQ(refused.exit_code, 2) << refused.err;
+  std::filesystem::remove(dir / "video/frame_0000.png");
+  test::write_bytes(dir / "video/frame_0123.png", "mine");
+  EXPECT_EQ(run_cgs(render + " --frames 4").exit_code, 0);
+  EXPECT_EQ(run_cgs(render + " --frames 2").exit_code, 0);
+  EXPECT_FALSE(std::filesystem::exists(dir / "video/frame_0003.png")) << "of the longer path";
+  EXPECT_EQ(test::read_bytes(dir / "video/frame_0123.png"), "mine");
 }
 
 TEST(Output, AFolderThatCannotBeMadeEndsWithExitCode5) {

@@ -93,10 +93,57 @@ TEST_F(Masks, AddToWhatIsTransparent) {
   MaskMap usable(kWidth, kHeight, 1);
   usable(20, 3) = 0;
   write_mask("masks/v1.png", 12);
-  apply_mask({dir_.path(), false}, dir_ / "images/v1.jpg", kWidth, kHeight, usable);
+  View view;
+  view.image_path = dir_ / "images/v1.jpg";
+  apply_mask({dir_.path(), false}, view, {kWidth, kHeight}, usable);
   EXPECT_EQ(usable(20, 3), 0);
   EXPECT_EQ(usable(11, 3), 0);
   EXPECT_EQ(usable(12, 3), 1);
+}
+
+TEST_F(Masks, LieInTheSameFoldersAsPhotographs) {
+  std::filesystem::create_directories(dir_ / "images/rig1/left");
+  const std::filesystem::path photograph = dir_ / "images/rig1/left/v1.jpg";
+  std::filesystem::copy_file(dir_ / "images/v1.jpg", photograph);
+  const auto found_below = [&] { return mask_file({dir_.path(), false}, photograph); };
+  write_mask("masks/v1.jpg.png", 1);
+  EXPECT_FALSE(found_below()) << "of another photograph of that name";
+  write_mask("masks/rig1/left/v1.jpg.png", 1);
+  EXPECT_EQ(found_below(), dir_ / "masks/rig1/left/v1.jpg.png");
+}
+
+TEST_F(Masks, ThatTheDataSetNamesComeFirst) {
+  write_mask("masks/v1.png", 12);
+  write_mask("alpha/other.png", 20);
+  View view;
+  view.image_path = dir_ / "images/v1.jpg";
+  view.mask_path = dir_ / "alpha/other.png";
+  MaskMap usable;
+  apply_mask({dir_.path(), false}, view, {kWidth, kHeight}, usable);
+  EXPECT_EQ(usable(19, 0), 0);
+  EXPECT_EQ(usable(20, 0), 1);
+}
+
+// A photograph that viewers turn: its mask was painted on what they show.
+TEST_F(Masks, OfTurnedPhotographsAreUprightUnlessTheirSizeTellsOtherwise) {
+  View view;
+  view.image_path = dir_ / "images/v1.jpg";
+  const auto first_of_row = [&](int orientation, const ImageSize& size) {
+    view.orientation = orientation;
+    MaskMap usable;
+    apply_mask({dir_.path(), false}, view, size, usable);
+    const auto row = usable.data.begin();
+    return std::find(row, row + size.width, 1) - row;
+  };
+  write_mask("masks/v1.png", 12);
+  EXPECT_EQ(first_of_row(3, {kWidth, kHeight}), 12) << "half a turn";
+  EXPECT_EQ(first_of_row(6, {kWidth, kHeight}), 12) << "has the size of the upright photograph";
+  // As stored, its left 12 columns are dark; a quarter turn clockwise puts them on top.
+  view.orientation = 6;
+  MaskMap usable;
+  apply_mask({dir_.path(), false}, view, {kHeight, kWidth}, usable);
+  EXPECT_EQ(usable(0, 11), 0);
+  EXPECT_EQ(usable(0, 12), 1);
 }
 
 TEST_F(Masks, OfAnotherSizeAreRefused) {

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "libcgs/core/error.h"
 #include "tests/support/stereo_scene.h"
 
 namespace cgs {
@@ -48,14 +49,34 @@ TEST(EstimatePriors, GivesEveryPixelDepthSigmaAndLayer) {
   }
 }
 
-TEST(EstimatePriors, SurvivesPhotographsWithoutTexture) {
+void make_grey(View& view) {
+  for (Eigen::Vector3f& c : view.image.data) c.setConstant(0.5f);
+}
+
+// Filled in, they would be a surface that nobody saw.
+TEST(EstimatePriors, RefusesPhotographsOfWhichNothingCanBeMeasured) {
   Scene scene = wall_and_square();
+  for (View& view : scene.views) make_grey(view);
+  EXPECT_THROW(estimate_priors(scene, {}), NumericalError);
   for (View& view : scene.views) {
-    for (Eigen::Vector3f& c : view.image.data) c.setConstant(0.5f);
+    view.valid = MaskMap(view.camera.width, view.camera.height, 0);
   }
-  const EstimatedPriors priors = estimate_priors(scene, {});
-  for (const float z : priors.views[0].depth.data) ASSERT_TRUE(z > 0 && std::isfinite(z));
-  for (const PriorsCoverage& coverage : priors.report.coverage) EXPECT_EQ(coverage.measured, 0);
+  EXPECT_THROW(estimate_priors(scene, {}), InvalidInput);
+}
+
+TEST(EstimatePriors, LeavesOutTheViewOfWhichNothingCanBeMeasured) {
+  Scene scene = wall_and_square();
+  Scene three = scene;
+  three.views.push_back(scene.views[0]);
+  make_grey(three.views[2]);
+  three.input = {0, 1, 2};
+  const EstimatedPriors priors = estimate_priors(three, {});
+  EXPECT_TRUE(is_measured(priors.report.coverage[0]));
+  EXPECT_FALSE(is_measured(priors.report.coverage[2]));
+  for (size_t i = 0; i < priors.views[2].depth.data.size(); ++i) {
+    ASSERT_TRUE(std::isnan(priors.views[2].depth.data[i]));
+    ASSERT_EQ(priors.views[2].origin.data[i], DepthOrigin::Unknown);
+  }
 }
 
 }  // namespace
