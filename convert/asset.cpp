@@ -38,6 +38,8 @@ constexpr double kTexel = 2;
 constexpr double kLooserWhereInferred = 4;
 // Of the detail, what counts as the error of a mesh that is not simplified at all.
 constexpr double kLeastShare = 0.01;
+// The certificate of a form is known once it is written, and may take so many bytes more [bytes].
+constexpr size_t kRoomForCertificate = 256;
 // Coarser than this share of the largest side, nothing is left to recognise.
 constexpr double kCoarsest = 1.0 / 50;
 
@@ -109,6 +111,21 @@ class AssetWriter {
     return write_glb(path, form.mesh, form.texture, frame_, form.options);
   }
 
+  /// Writes a form that states the certificate of the mesh as its file holds it: rounding lets
+  /// faces vanish or touch that did not before.
+  GlbReport write_certified(Form& form) const { return write_certified(form, path_); }
+  GlbReport write_certified(Form& form, const std::filesystem::path& path) const {
+    const GlbReport first = write(form, path);
+    // In the frame that a reader would give it: where faces nearly touch, rounding decides.
+    const MeasurableMesh held = read_mesh_file(path).content;
+    Json summary = Json::parse(form.options.summary_json);
+    Json stated = certificate_to_json(certify(held.mesh), held.mesh, held.frame);
+    if (summary["certificate"] == stated) return first;
+    summary["certificate"] = std::move(stated);
+    form.options.summary_json = summary.dump();
+    return write(form, path);
+  }
+
   TriangleMesh read(const std::filesystem::path& path) const {
     return read_mesh_file(path, frame_).content.mesh;
   }
@@ -159,12 +176,6 @@ class AssetWriter {
     return out;
   }
 
-  Json summary_for(const TriangleMesh& mesh) const {
-    Json out = summary_;
-    out["certificate"] = certificate_to_json(certify(mesh), mesh, frame_);
-    return out;
-  }
-
   // Colours of vertices hold faces where photographs show them anyway, and small parts of the
   // surface: both give way with coarser detail.
   void simplify_to(double error, double inferred, double coarser, Form& out) const {
@@ -182,7 +193,7 @@ class AssetWriter {
   // \param texel  of textures, in details
   void leave_out_below(double detail, double texel, double rounding, Form& out) const {
     out.detail = detail;
-    out.options = glb_options(rounding, summary_for(out.mesh));
+    out.options = glb_options(rounding, summary_);
     out.texture_share = coarsen_texture(out.texture, out.mesh, texel * detail);
   }
 
@@ -213,18 +224,19 @@ Written write_within(const AssetWriter& writer,
                      const Frame& frame,
                      const Progress& progress) {
   Written out{writer.whole(), {}, {}};
-  out.report = writer.write(out.form);
+  out.report = writer.write_certified(out.form);
   if (limit == 0 || out.report.bytes <= limit) return out;
   const size_t whole = out.report.bytes;
   double tries = 0;
   // Just above what is there already: textures begin to shrink before the mesh does.
   const double finest = std::max(already / kSimplified, 1e-4 * writer.side());
   const double coarsest = std::max(finest, kCoarsest * writer.side());
-  const SizeSearch search = finest_within(limit, finest, coarsest, [&](double detail) {
+  const size_t target = limit - std::min(limit, kRoomForCertificate);
+  const SizeSearch search = finest_within(target, finest, coarsest, [&](double detail) {
     report(progress, 1 - 1 / (1 + 0.2 * ++tries));
     Form form = writer.coarser(detail, already);
     const GlbReport written = writer.write(form);
-    const bool fits = written.bytes <= limit;
+    const bool fits = written.bytes <= target;
     if (fits && (out.form.detail == 0 || detail < out.form.detail)) {
       out.form = std::move(form);
       out.report = written;
@@ -232,12 +244,13 @@ Written write_within(const AssetWriter& writer,
     return written.bytes;
   });
   if (!search.detail) {
-    throw LimitError("asset.glb takes " + std::to_string(std::min(whole, search.smallest())) +
+    const size_t least = std::min(whole, search.smallest()) + kRoomForCertificate;
+    throw LimitError("asset.glb takes " + std::to_string(least) +
                      " bytes at least, with all left out that is below " +
                      format_length(coarsest, frame) + "; --max-size allows " +
                      std::to_string(limit) + "; the other files are there");
   }
-  if (search.tried.back().detail != out.form.detail) writer.write(out.form);
+  out.report = writer.write_certified(out.form);
   out.tried = search.tried;
   return out;
 }
@@ -317,7 +330,7 @@ std::pair<Form, Json> write_finest(const AssetWriter& writer,
                                    const Progress& progress) {
   if (request.max_error.empty() && request.max_size == 0) {
     Form form = writer.whole();
-    Json json = glb_to_json(writer.write(form), frame);
+    Json json = glb_to_json(writer.write_certified(form), frame);
     return {std::move(form), std::move(json)};
   }
   try {
@@ -401,9 +414,9 @@ Json write_levels(const AssetWriter& writer,
   std::vector<Level> levels;
   for (const double detail : level_details(finest, writer.side(), count)) {
     report(progress, double(levels.size()) / double(count));
-    const Form form = writer.level(detail, finest > 0 ? finest : detail / kLevelStep);
+    Form form = writer.level(detail, finest > 0 ? finest : detail / kLevelStep);
     const std::string name = level_name(levels.size() + 1);
-    const GlbReport written = writer.write(form, folder / name);
+    const GlbReport written = writer.write_certified(form, folder / name);
     const TriangleMesh mesh = writer.read(folder / name);
     levels.push_back({name,
                       written.bytes,

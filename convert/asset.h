@@ -25,7 +25,7 @@ struct AssetContent {
   const TriangleMesh& mesh;               ///< Watertight, as the run wrote it.
   const PhotoTexture& texture;            ///< Of this mesh.
   const nlohmann::ordered_json& summary;  ///< Goes into the file; its certificate becomes that of
-                                          ///< the mesh in it.
+                                          ///< the mesh as the file holds it.
 };
 
 /// What was written, for the report.

@@ -159,6 +159,11 @@ TEST(Levels, AreSmallerAndAsFarOffAsTheySay) {
     const test::Glb glb = read(uri);
     expect_placed(tiles[i], glb);
     expect_provenance(glb, full);
+    const auto told = run_cgs("info --json " + (dir / ("out/web/" + uri)).string());
+    const json held = json::parse(told.out)["certificate"];
+    for (const auto& [key, value] : glb.json["asset"]["extras"]["summary"]["certificate"].items()) {
+      EXPECT_EQ(value, held[key]) << uri << " " << key;
+    }
     const double error = tile["geometricError"];
     EXPECT_LT(error, coarser);
     coarser = error;
