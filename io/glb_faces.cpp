@@ -26,7 +26,9 @@ std::vector<float> without_alpha(const std::vector<float>& rgba) {
 /// Reads what primitives hold.
 class PrimitiveReader {
  public:
-  explicit PrimitiveReader(const GlbContainer& file) : file_(file) {}
+  PrimitiveReader(const GlbContainer& file, int texcoord_set)
+      : file_(file),
+        texcoord_(texcoord_set < 0 ? "" : "TEXCOORD_" + std::to_string(texcoord_set)) {}
 
   GlbFaces read(const JsonValue& primitive) const {
     const auto extensions = primitive.find("extensions");
@@ -37,7 +39,7 @@ class PrimitiveReader {
       return values.empty() || values.size() == components * vertices;
     };
     if (!fits(out.colors, 3) || !fits(out.support, 1) || !fits(out.sigma, 1) ||
-        !fits(out.features, 1)) {
+        !fits(out.features, 1) || !fits(out.texcoords, 2)) {
       primitive.fail(Defect::Count, "has attributes of different length");
     }
     for (const auto& face : out.faces) {
@@ -76,6 +78,7 @@ class PrimitiveReader {
     out.support = attribute(attributes, "_SUPPORT", 1);
     out.sigma = attribute(attributes, "_SIGMA", 1);
     out.features = attribute(attributes, "_FEATURE_ID_0", 1);
+    if (!texcoord_.empty()) out.texcoords = attribute(attributes, texcoord_.c_str(), 2);
     std::vector<uint32_t> corners;
     if (const auto index = primitive.find("indices")) {
       corners = file_.indices(file_.element("accessors", *index));
@@ -122,7 +125,9 @@ class PrimitiveReader {
         id->fail(Defect::Ref, "names no such attribute of the compressed mesh");
       }
       std::vector<float> out = it->second.values;
-      if (std::string_view(name) == "COLOR_0") scale_colors(attributes, it->second, out);
+      if (std::string_view(name) == "COLOR_0" || name == texcoord_) {
+        scale_whole_numbers(attributes.at(name), it->second, out);
+      }
       return it->second.components == 4 ? without_alpha(out) : out;
     };
     GlbFaces out;
@@ -131,6 +136,7 @@ class PrimitiveReader {
     out.support = values("_SUPPORT", 1);
     out.sigma = values("_SIGMA", 1);
     out.features = values("_FEATURE_ID_0", 1);
+    if (!texcoord_.empty()) out.texcoords = values(texcoord_.c_str(), 2);
     out.faces = mesh.faces;
     if (out.positions.size() != 3 * mesh.vertices) {
       draco.fail(Defect::Schema, "has no positions");
@@ -139,12 +145,12 @@ class PrimitiveReader {
   }
 
   // Whole numbers that the decoder left as they are, where the accessor says how to read them.
-  void scale_colors(const JsonValue& attributes,
-                    const DracoMesh::Attribute& attribute,
-                    std::vector<float>& values) const {
+  void scale_whole_numbers(const JsonValue& index,
+                           const DracoMesh::Attribute& attribute,
+                           std::vector<float>& values) const {
     constexpr int kUnsignedByte = 5121;
     constexpr int kUnsignedShort = 5123;
-    const JsonValue accessor = file_.element("accessors", attributes.at("COLOR_0"));
+    const JsonValue accessor = file_.element("accessors", index);
     const int type = accessor.at("componentType").count();
     if (attribute.is_normalized || (type != kUnsignedByte && type != kUnsignedShort)) return;
     const float largest = type == kUnsignedByte ? 255.0f : 65535.0f;
@@ -152,12 +158,15 @@ class PrimitiveReader {
   }
 
   const GlbContainer& file_;
+  std::string texcoord_;  // name of an attribute; empty = none is read
 };
 
 }  // namespace
 
-GlbFaces read_glb_primitive(const GlbContainer& file, const JsonValue& primitive) {
-  return PrimitiveReader(file).read(primitive);
+GlbFaces read_glb_primitive(const GlbContainer& file,
+                            const JsonValue& primitive,
+                            int texcoord_set) {
+  return PrimitiveReader(file, texcoord_set).read(primitive);
 }
 
 }  // namespace cgs

@@ -14,6 +14,7 @@ namespace cgs {
 struct GlbFaces {
   std::vector<float> positions;  ///< Three each.
   std::vector<float> colors;     ///< Linear light, three each.
+  std::vector<float> texcoords;  ///< Two each.
   std::vector<float> support;    ///< Of write_glb(), as sigma.
   std::vector<float> sigma;
   std::vector<float> features;                 ///< Numbers of provenance classes.
@@ -25,6 +26,7 @@ struct GlbFaces {
 /// \throws BadInput as GlbContainer and read_draco(); Ref for an index out of range; Count for
 ///         attributes of different length
 /// Source: glTF 2.0, section 3.7.2.1, and KHR_draco_mesh_compression, Khronos Group.
-GlbFaces read_glb_primitive(const GlbContainer& file, const JsonValue& primitive);
+/// \param texcoord_set  number of the texture coordinates to read; -1 = none
+GlbFaces read_glb_primitive(const GlbContainer& file, const JsonValue& primitive, int texcoord_set);
 
 }  // namespace cgs

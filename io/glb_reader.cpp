@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 
+#include "io/glb_colors.h"
 #include "io/glb_container.h"
 #include "io/glb_faces.h"
 #include "io/glb_scene.h"
@@ -24,7 +25,8 @@ constexpr uint64_t kMostCorners = uint64_t{1} << 31;
 /// Puts the primitives of all nodes together.
 class SceneReader {
  public:
-  SceneReader(const GlbContainer& file, const GlbOrigin& origin) : file_(file), origin_(origin) {}
+  SceneReader(const GlbContainer& file, const GlbOrigin& origin)
+      : file_(file), origin_(origin), colors_(file, origin.is_ours) {}
 
   GlbMesh read() {
     for (const GlbInstance& instance : glb_instances(file_)) {
@@ -36,16 +38,15 @@ class SceneReader {
     }
     const std::string odd = check_significance(file_.path(), stored_, kFloatDigits);
     if (!odd.empty()) out_.parsed.warnings.push_back(odd);
-    if (!all_have_colors_) mesh.colors.clear();
+    if (!has_colors_) mesh.colors.clear();
     if (!all_have_support_) mesh.support.clear();
     if (!all_have_sigma_) mesh.sigma.clear();
     if (!origin_.is_ours || !all_have_labels_) mesh.provenance.clear();
     if (has_splats_) {
       out_.parsed.warnings.emplace_back("left out the splats that lie beside the triangles");
     }
-    if (has_textures_) {
-      out_.parsed.warnings.emplace_back("textures are not read; a mesh keeps colours of vertices");
-    }
+    out_.parsed.warnings.insert(
+        out_.parsed.warnings.end(), colors_.warnings().begin(), colors_.warnings().end());
     if (collapsed_ > 0) {
       out_.parsed.warnings.push_back("left out " + std::to_string(collapsed_) +
                                      " faces with two corners in one place");
@@ -60,7 +61,8 @@ class SceneReader {
       const JsonValue primitive = primitives.at(i);
       const auto extensions = primitive.find("extensions");
       has_splats_ = has_splats_ || (extensions && extensions->find(kGaussianSplatting));
-      const GlbFaces faces = read_glb_primitive(file_, primitive);
+      GlbFaces faces = read_glb_primitive(file_, primitive, colors_.texcoord_set(primitive));
+      if (!faces.faces.empty()) faces.colors = colors_.of_vertices(primitive, faces);
       add(faces, world, labels_of(primitive, faces));
       if (out_.parsed.mesh.faces.size() > kMostCorners / 3) {
         throw LimitError(printable(file_.path()) + ": more than " +
@@ -98,9 +100,6 @@ class SceneReader {
     const auto index = primitive.find("material");
     if (!index) return std::nullopt;
     const JsonValue material = file_.element("materials", *index);
-    if (const auto pbr = material.find("pbrMetallicRoughness")) {
-      has_textures_ = has_textures_ || pbr->find("baseColorTexture").has_value();
-    }
     const auto name = material.find("name");
     for (const Provenance label : kProvenanceOrder) {
       if (name && (name->text() + " ").starts_with(std::string(provenance_name(label)) + " ")) {
@@ -140,7 +139,7 @@ class SceneReader {
       mesh.provenance.push_back(labels.empty() ? Provenance::Inferred : labels[f]);
     }
     all_have_labels_ = all_have_labels_ && !labels.empty();
-    all_have_colors_ = all_have_colors_ && !in.colors.empty();
+    has_colors_ = has_colors_ || !in.colors.empty();
     all_have_support_ = all_have_support_ && !in.support.empty();
     all_have_sigma_ = all_have_sigma_ && !in.sigma.empty();
   }
@@ -151,7 +150,7 @@ class SceneReader {
     const uint32_t number = places_.number(place);
     if (number < out.positions.size()) return number;
     out.positions.push_back(place);
-    Eigen::Vector3f color = Eigen::Vector3f::Zero();
+    Eigen::Vector3f color = Eigen::Vector3f::Ones();
     for (int c = 0; c < 3 && !in.colors.empty(); ++c) {
       const float linear = in.colors[3 * v + static_cast<size_t>(c)];
       color[c] = srgb_from_linear(std::isfinite(linear) ? std::clamp(linear, 0.0f, 1.0f) : 0.0f);
@@ -165,16 +164,16 @@ class SceneReader {
 
   const GlbContainer& file_;
   const GlbOrigin& origin_;
+  GlbColors colors_;
   GlbMesh out_;
   PlaceNumbers places_;
   // Of the positions as they were rounded to float: nodes have scaled but not moved them yet.
   Eigen::AlignedBox3d stored_;
-  size_t collapsed_ = 0;  // faces
-  bool all_have_colors_ = true;
+  size_t collapsed_ = 0;     // faces
+  bool has_colors_ = false;  // any of it; the rest is white
   bool all_have_labels_ = true;
   bool all_have_support_ = true;
   bool all_have_sigma_ = true;
-  bool has_textures_ = false;
   bool has_splats_ = false;
 };
 

@@ -8,6 +8,8 @@ namespace cgs {
 
 namespace {
 
+constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
+
 /// The matrix of a node: given as such, or as translation, rotation and scale.
 Eigen::Affine3d node_matrix(const JsonValue& node) {
   const auto numbers = [&](const char* key, std::vector<double> values) {
@@ -29,6 +31,40 @@ Eigen::Affine3d node_matrix(const JsonValue& node) {
   const Eigen::Quaterniond q(r[3], r[0], r[1], r[2]);
   if (!(q.norm() > 0)) node.at("rotation").fail(Defect::Value, "is not a rotation");
   out = Eigen::Translation3d(t[0], t[1], t[2]) * q.normalized() * Eigen::Scaling(s[0], s[1], s[2]);
+  return out;
+}
+
+/// Where a node shows its mesh, seen from the node: once, or as EXT_mesh_gpu_instancing lists.
+/// Source: EXT_mesh_gpu_instancing, Khronos Group.
+std::vector<Eigen::Affine3d> places_of_mesh(const GlbContainer& file, const JsonValue& node) {
+  const auto extensions = node.find("extensions");
+  const auto instancing = extensions ? extensions->find(kInstancing) : std::nullopt;
+  if (!instancing) return {Eigen::Affine3d::Identity()};
+  const JsonValue attributes = instancing->at("attributes");
+  size_t count = 0;
+  const auto values = [&](const char* name, size_t components) -> std::vector<float> {
+    const auto index = attributes.find(name);
+    if (!index) return {};
+    auto out = file.floats(file.element("accessors", *index), static_cast<int>(components));
+    if (count != 0 && out.size() != components * count) {
+      index->fail(Defect::Count, "differs in length from the other attributes");
+    }
+    count = out.size() / components;
+    return out;
+  };
+  const std::vector<float> t = values("TRANSLATION", 3);
+  const std::vector<float> r = values("ROTATION", 4);
+  const std::vector<float> s = values("SCALE", 3);
+  std::vector<Eigen::Affine3d> out(count, Eigen::Affine3d::Identity());
+  for (size_t i = 0; i < count; ++i) {
+    if (!t.empty()) out[i].translate(Eigen::Vector3d(t[3 * i], t[3 * i + 1], t[3 * i + 2]));
+    if (!r.empty()) {
+      const Eigen::Quaterniond q(r[4 * i + 3], r[4 * i], r[4 * i + 1], r[4 * i + 2]);
+      if (!(q.norm() > 0)) attributes.at("ROTATION").fail(Defect::Value, "holds no rotation");
+      out[i].rotate(q.normalized());
+    }
+    if (!s.empty()) out[i].scale(Eigen::Vector3d(s[3 * i], s[3 * i + 1], s[3 * i + 2]));
+  }
   return out;
 }
 
@@ -86,8 +122,11 @@ class NodeVisitor {
     visited_[number] = true;
     if (depth > kDeepest) throw LimitError(printable(file_.path()) + ": nodes nest too deeply");
     const Eigen::Affine3d world = parent * node_matrix(node);
-    if (const auto mesh = node.find("mesh"))
-      out_.push_back({file_.element("meshes", *mesh), world});
+    if (const auto mesh = node.find("mesh")) {
+      for (const Eigen::Affine3d& place : places_of_mesh(file_, node)) {
+        out_.push_back({file_.element("meshes", *mesh), world * place});
+      }
+    }
     if (const auto children = node.find("children")) visit_all(*children, world, depth + 1);
   }
 
@@ -104,7 +143,7 @@ void refuse_unknown_extensions(const JsonValue& root) {
                        name == kMeshopt || name == "EXT_mesh_features" ||
                        name.starts_with("KHR_materials_") || name.starts_with("KHR_texture_") ||
                        name.starts_with("EXT_texture_") || name == "KHR_lights_punctual" ||
-                       name == "KHR_gaussian_splatting";
+                       name == kInstancing || name == "KHR_gaussian_splatting";
     if (!known) required->at(i).fail(Defect::Unsupported, name + " is required and not known");
   }
 }

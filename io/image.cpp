@@ -278,7 +278,13 @@ ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits
 ColorImage read_image(const std::filesystem::path& path,
                       MaskMap* alpha_mask,
                       const ReadLimits& limits) {
-  const std::string bytes = read_image_file(path, limits);
+  return decode_image(read_image_file(path, limits), path, alpha_mask, limits);
+}
+
+ColorImage decode_image(std::string_view bytes,
+                        const std::filesystem::path& path,
+                        MaskMap* alpha_mask,
+                        const ReadLimits& limits) {
   const ImageHeader header = parse_image_header(bytes, path, limits);
   check_image_is_whole(bytes, header, path);
   if (alpha_mask != nullptr) *alpha_mask = {};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 #include "io/byte_reader.h"
 #include "libcgs/core/raster.h"
@@ -29,6 +30,12 @@ ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits
 ColorImage read_image(const std::filesystem::path& path,
                       MaskMap* alpha_mask = nullptr,
                       const ReadLimits& limits = {});
+
+/// The same for the content of an image file. \param path  of the file that holds it, for messages
+ColorImage decode_image(std::string_view bytes,
+                        const std::filesystem::path& path,
+                        MaskMap* alpha_mask = nullptr,
+                        const ReadLimits& limits = {});
 
 /// The first channel of an image as stored, neither scaled nor clamped: what depth maps are kept
 /// in.
