@@ -113,6 +113,13 @@ VertexColumns vertex_columns(const PlyHeader& header, const std::filesystem::pat
   return out;
 }
 
+/// Whether a file has colours elsewhere than at its vertices, as MeshLab and VCG write them.
+bool states_other_colors(const PlyHeader& header) {
+  const PlyElement* face = header.find("face");
+  const bool has_texture = face != nullptr && face->find("texcoord") >= 0;
+  return has_texture || (face != nullptr && find_scalar(*face, "red") >= 0);
+}
+
 /// Collects rows; positions stay double in file coordinates until the frame is known.
 class MeshRows {
  public:
@@ -259,13 +266,18 @@ ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
       bytes, path, header, [&](const PlyElement& element, uint64_t i, const PlyRow& row) {
         rows.add(element, i, row);
       });
-  ParsedMesh out{std::move(rows.positions), std::move(rows.mesh), std::move(header.comments), {}};
+  ParsedMesh out{std::move(rows.positions), std::move(rows.mesh), header.comments, {}};
   if (const PlyElement* vertex = header.find("vertex")) {
     const int x = vertex->find("x");
     const bool is_double =
         x >= 0 && vertex->properties[static_cast<size_t>(x)].type == PlyType::Float64;
     const bool is_text = header.format == PlyFormat::Ascii;
     out.digits = is_double || is_text ? kDoubleDigits : kFloatDigits;
+  }
+  if (out.mesh.colors.empty() && states_other_colors(header)) {
+    out.warnings.emplace_back(
+        "textures and colours of faces are not read, only colours of vertices, which it has none "
+        "of");
   }
   if (trailing > 0) {
     out.warnings.push_back("trailing " + std::to_string(trailing) + " bytes ignored");

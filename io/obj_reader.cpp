@@ -54,6 +54,7 @@ class ObjRows {
     if (words.empty()) return;
     if (words[0] == "v") add_vertex(words);
     if (words[0] == "f") add_face(words);
+    if (words[0] == "usemtl") has_materials_ = true;
     if (words[0] == "g") {
       group_ = words.size() == 2 ? provenance_of_group(words[1]) : std::nullopt;
     }
@@ -74,10 +75,9 @@ class ObjRows {
     if (words.size() < 4) lines_.fail(Defect::Syntax, "a vertex needs three coordinates");
     out_.positions.emplace_back(number(words[1]), number(words[2]), number(words[3]));
     if (words.size() < 7) return;
-    Eigen::Vector3f color(static_cast<float>(number(words[4])),
-                          static_cast<float>(number(words[5])),
-                          static_cast<float>(number(words[6])));
-    out_.mesh.colors.emplace_back(color.cwiseMax(0).cwiseMin(1));
+    out_.mesh.colors.emplace_back(static_cast<float>(number(words[4])),
+                                  static_cast<float>(number(words[5])),
+                                  static_cast<float>(number(words[6])));
   }
 
   uint32_t corner(std::string_view word) const {
@@ -117,6 +117,11 @@ class ObjRows {
       throw LimitError(printable(lines_.path()) + ": more than 2^32 - 1 vertices");
     }
     if (out_.mesh.colors.size() != out_.positions.size()) out_.mesh.colors.clear();
+    settle_colors(out_);
+    if (has_materials_ && out_.mesh.colors.empty() && out_.mesh.provenance.empty()) {
+      out_.warnings.emplace_back(
+          "materials and textures are not read, only colours of vertices, which it has none of");
+    }
     if (!all_grouped_) out_.mesh.provenance.clear();
     if (small_faces_ > 0) {
       out_.warnings.push_back("dropped " + std::to_string(small_faces_) +
@@ -128,6 +133,7 @@ class ObjRows {
   ParsedMesh out_;
   std::optional<Provenance> group_;
   bool all_grouped_ = true;
+  bool has_materials_ = false;
   uint64_t small_faces_ = 0;
 };
 

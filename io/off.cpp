@@ -11,8 +11,14 @@ std::vector<std::string_view> words_of(std::string_view line) {
   return tokens(line.substr(0, line.find('#')));
 }
 
-/// Numbers of vertices and faces; they may follow the keyword on its line.
-std::array<uint64_t, 2> read_counts(TextLines& lines) {
+struct OffHeader {
+  uint64_t vertices = 0;
+  uint64_t faces = 0;
+  size_t color = 0;  ///< Place of the red of a vertex among its numbers; 0 = it has none.
+};
+
+/// The numbers may follow the keyword on its line.
+OffHeader read_header(TextLines& lines) {
   auto words = words_of(expect_line(lines, "the OFF keyword"));
   const std::string_view keyword = words.empty() ? std::string_view() : words[0];
   if (!keyword.ends_with("OFF")) lines.fail(Defect::Magic, "does not start with OFF");
@@ -20,13 +26,16 @@ std::array<uint64_t, 2> read_counts(TextLines& lines) {
   if (kind.find_first_of("4n") != std::string_view::npos) {
     lines.fail(Defect::Unsupported, "only three dimensions are supported");
   }
+  const bool has_colors = kind.find('C') != std::string_view::npos;
+  const bool has_normals = kind.find('N') != std::string_view::npos;
   words.erase(words.begin());
   if (!words.empty() && words[0] == "BINARY") {
     lines.fail(Defect::Unsupported, "binary OFF is not supported");
   }
   if (words.empty()) words = words_of(expect_line(lines, "the numbers of vertices and faces"));
   if (words.size() < 2) lines.fail(Defect::Syntax, "expected the numbers of vertices and faces");
-  return {lines.count(words[0]), lines.count(words[1])};
+  const size_t color = !has_colors ? 0 : has_normals ? 6 : 3;
+  return {lines.count(words[0]), lines.count(words[1]), color};
 }
 
 std::vector<uint32_t> read_polygon(TextLines& lines, uint64_t vertices) {
@@ -54,7 +63,7 @@ ParsedMesh read_off(const std::filesystem::path& path) {
   const std::string bytes = read_file(path);
   refuse_foreign_content(path, bytes, "OFF");
   TextLines lines(bytes, path);
-  const auto [vertices, faces] = read_counts(lines);
+  const auto [vertices, faces, color] = read_header(lines);
   ByteReader(bytes, path).expect_records(vertices, 6, "vertices");
   ByteReader(bytes, path).expect_records(faces, 2, "faces");
   if (vertices == 0) throw BadInput(Defect::Empty, path, "0 vertices");
@@ -64,7 +73,14 @@ ParsedMesh read_off(const std::filesystem::path& path) {
     if (words.size() < 3) lines.fail(Defect::Syntax, "a vertex needs three coordinates");
     out.positions.emplace_back(
         lines.number(words[0]), lines.number(words[1]), lines.number(words[2]));
+    if (color == 0 || words.size() < color + 3) continue;
+    Eigen::Vector3f& rgb = out.mesh.colors.emplace_back();
+    for (size_t c = 0; c < 3; ++c) {
+      rgb[static_cast<Eigen::Index>(c)] = static_cast<float>(lines.number(words[color + c]));
+    }
   }
+  if (out.mesh.colors.size() != vertices) out.mesh.colors.clear();
+  settle_colors(out);
   uint64_t dropped = 0;
   for (uint64_t i = 0; i < faces; ++i) {
     const auto corners = read_polygon(lines, vertices);

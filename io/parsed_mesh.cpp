@@ -94,6 +94,19 @@ std::vector<std::array<uint32_t, 3>> ears_of(const std::vector<uint32_t>& corner
 
 }  // namespace
 
+void settle_colors(ParsedMesh& parsed) {
+  std::vector<Eigen::Vector3f>& colors = parsed.mesh.colors;
+  const bool are_bytes = std::any_of(
+      colors.begin(), colors.end(), [](const Eigen::Vector3f& c) { return c.maxCoeff() > 1; });
+  if (are_bytes) {
+    parsed.warnings.emplace_back("colours above 1: taken as values from 0 to 255");
+  }
+  for (Eigen::Vector3f& c : colors) {
+    if (are_bytes) c /= 255;
+    c = c.cwiseMax(0).cwiseMin(1);
+  }
+}
+
 void append_polygon(const std::vector<uint32_t>& corners,
                     const std::vector<Eigen::Vector3d>& positions,
                     std::vector<std::array<uint32_t, 3>>& triangles) {

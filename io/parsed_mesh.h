@@ -33,6 +33,10 @@ void append_polygon(const std::vector<uint32_t>& corners,
                     const std::vector<Eigen::Vector3d>& positions,
                     std::vector<std::array<uint32_t, 3>>& triangles);
 
+/// Colours as formats of text state them: 0 to 1, or 0 to 255 where any is above 1, which a warning
+/// then says. Brings them to [0, 1].
+void settle_colors(ParsedMesh& parsed);
+
 /// Numbers places in the order they first appear, for formats that repeat a vertex per face.
 class PlaceNumbers {
  public:

@@ -139,6 +139,19 @@ TEST(MeshPly, QualityIsSupportOnlyInFilesOfOurs) {
       << "edited in MeshLab";
 }
 
+TEST(MeshPly, SaysThatItLeavesOutTextures) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply",
+                    "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\n"
+                    "property float x\nproperty float y\nproperty float z\nelement face 1\n"
+                    "property list uchar int vertex_indices\n"
+                    "property list uchar float texcoord\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+                    "3 0 1 2 6 0 0 1 0 0 1\n");
+  const MeshFile out = read_mesh_ply(dir / "a.ply");
+  ASSERT_EQ(out.warnings.size(), 1U);
+  EXPECT_TRUE(out.warnings[0].starts_with("textures and colours of faces are not read"));
+}
+
 TEST(MeshPly, RefusesWhatIsNoMesh) {
   const std::string points = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
   EXPECT_EQ(defect(kTriangle + points + "3 0 1 2\n"), "OK");

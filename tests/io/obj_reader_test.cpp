@@ -47,6 +47,19 @@ TEST(ReadObj, UnderstandsEveryWayToNameACorner) {
   EXPECT_TRUE(mesh.mesh.colors.empty());
 }
 
+TEST(ReadObj, SaysWhichColoursItLeavesOutOrChanges) {
+  const std::string faces = "f 1 2 3\n";
+  const ParsedMesh bytes = parsed("v 0 0 0 255 0 51\nv 1 0 0 0 0 0\nv 0 1 0 0 0 0\n" + faces);
+  EXPECT_LT((bytes.mesh.colors[0] - Eigen::Vector3f(1, 0, 0.2f)).norm(), 1e-6f);
+  ASSERT_EQ(bytes.warnings.size(), 1U);
+  EXPECT_TRUE(bytes.warnings[0].starts_with("colours above 1"));
+  const std::string plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  EXPECT_TRUE(parsed(plain + faces).warnings.empty());
+  const ParsedMesh textured = parsed("mtllib a.mtl\n" + plain + "usemtl stone\n" + faces);
+  ASSERT_EQ(textured.warnings.size(), 1U);
+  EXPECT_TRUE(textured.warnings[0].starts_with("materials and textures are not read"));
+}
+
 TEST(ReadObj, RefusesWhatIsDamaged) {
   EXPECT_EQ(defect("# nothing\n"), "EMPTY");
   EXPECT_EQ(defect("v 1 2\n"), "SYNTAX");

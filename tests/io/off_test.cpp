@@ -26,6 +26,24 @@ TEST(ReadOff, ReadsCountsOnEitherLineCommentsAndColours) {
   }
 }
 
+TEST(ReadOff, ReadsColoursOfVertices) {
+  const test::TempDir dir;
+  const std::string faces = "3 0 1 2\n";
+  test::write_bytes(dir / "a.off",
+                    "COFF 3 1 0\n0 0 0 255 0 51 255\n1 0 0 0 0 0 255\n1 1 0 0 0 0 255\n" + faces);
+  const ParsedMesh bytes = read_off(dir / "a.off");
+  ASSERT_EQ(bytes.mesh.colors.size(), 3U);
+  EXPECT_LT((bytes.mesh.colors[0] - Eigen::Vector3f(1, 0, 0.2f)).norm(), 1e-6f);
+  EXPECT_EQ(bytes.warnings.size(), 1U);
+  test::write_bytes(
+      dir / "a.off",
+      "CNOFF 3 1 0\n0 0 0 9 9 9 1 0 .2 1\n1 0 0 9 9 9 0 0 0 1\n1 1 0 9 9 9 0 0 0 1\n" + faces);
+  const ParsedMesh floats = read_off(dir / "a.off");
+  ASSERT_EQ(floats.mesh.colors.size(), 3U);
+  EXPECT_LT((floats.mesh.colors[0] - bytes.mesh.colors[0]).norm(), 1e-6f);
+  EXPECT_TRUE(floats.warnings.empty());
+}
+
 double area_of(const ParsedMesh& mesh) {
   double sum = 0;
   for (const auto& f : mesh.mesh.faces) {
