@@ -234,6 +234,7 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
     fusing.voxel_size = parse_length(request.voxel_size, scene.frame);
   }
   fusing.memory_limit = memory_budget(request.memory_limit);
+  fusing.common_sigma = kCommonSensorSigma;
   const TsdfSource source = {frames.size(), std::cref(frames)};
   out.fused = fuse_streamed(source, fusing, progress);
   const std::vector<std::string> odd = frames.warnings();

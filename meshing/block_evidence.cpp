@@ -250,9 +250,11 @@ float BlockEvidence::Voxel::support() const {
   return static_cast<float>(std::max(known, is_guessed ? 1 : 0));
 }
 
-double BlockEvidence::Voxel::sigma() const {
-  const double promised = variance / (weight * weight);
-  if (count < 2) return std::sqrt(promised);
+double BlockEvidence::Voxel::sigma(double common) const {
+  const double alone = variance / (weight * weight);  // were they off independently
+  if (count < 2) return std::sqrt(alone);
+  const double shared = common * common;
+  const double promised = (1 - shared) * alone + shared * count * alone;
   const double between = std::max(0.0, spread / weight - mean() * mean());
   return std::sqrt(std::max(promised, between / (count - 1)));
 }

@@ -65,7 +65,8 @@ class BlockEvidence {
     /// Guesses that agree still rest on one view each.
     float support() const;
     /// The larger of what the views promise and how far they disagree.
-    double sigma() const;
+    /// \param common  share of the sigma of each by which all are off alike
+    double sigma(double common) const;
   };
   /// \param n  position in an OpenVDB leaf
   Voxel operator[](size_t n) const;

@@ -16,7 +16,8 @@ using StateLeaf = openvdb::Int32Tree::LeafNodeType;
 void store_band(FusedBlock& block,
                 openvdb::Index n,
                 const Coord& origin,
-                const BlockEvidence::Voxel& e) {
+                const BlockEvidence::Voxel& e,
+                double common_sigma) {
   const auto leaf = [&](auto& pointer) -> auto& {
     using Leaf = std::remove_reference_t<decltype(*pointer)>;
     if (!pointer) pointer = std::make_unique<Leaf>(origin, typename Leaf::ValueType(0), false);
@@ -25,7 +26,7 @@ void store_band(FusedBlock& block,
   leaf(block.tsdf).setValueOn(n, static_cast<float>(e.mean()));
   leaf(block.weight).setValueOn(n, static_cast<float>(e.weight));
   leaf(block.support).setValueOn(n, e.support());
-  if (e.has_sigma) leaf(block.sigma).setValueOn(n, static_cast<float>(e.sigma()));
+  if (e.has_sigma) leaf(block.sigma).setValueOn(n, static_cast<float>(e.sigma(common_sigma)));
   if (e.color_weight <= 0) return;
   const Eigen::Vector3f c = (e.color / e.color_weight).cast<float>();
   leaf(block.color).setValueOn(n, openvdb::Vec3f(c.x(), c.y(), c.z()));
@@ -46,7 +47,7 @@ void store(FusedBlock& block,
   if (seen && !carved) {
     ++counts.occupied;
     block.state->setValueOn(n, int(VoxelState::Occupied));
-    store_band(block, n, origin, e);
+    store_band(block, n, origin, e, rules.common_sigma);
   } else if (e.free) {
     ++counts.free;
     block.state->setValueOn(n, int(VoxelState::Free));

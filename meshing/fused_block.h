@@ -28,6 +28,7 @@ struct FusedBlock {
 struct FusionRules {
   double voxel = 0;
   float min_weight = 0;
+  double common_sigma = 0;
 };
 
 /// The leaves of a block, from all that is known about it.

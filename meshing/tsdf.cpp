@@ -154,7 +154,7 @@ class Fuser {
         Eigen::Vector3d::Constant((double(options_.truncation) + kFusionMargin) * voxel);
     const Eigen::AlignedBox3d bounds(extent.surface.min() - margin, extent.surface.max() + margin);
     grid_ = block_grid(bounds, voxel);
-    rules_ = {voxel, options_.min_weight};
+    rules_ = {voxel, options_.min_weight, options_.common_sigma};
     out_.report.voxel_size = voxel;
     out_.report.bounds = bounds;
     out_.report.voxels = grid_.size() * kBlockVoxels;
@@ -385,6 +385,9 @@ void TsdfOptions::validate() const {
   require(max_voxels >= 4096, "TsdfOptions.max_voxels must be >= 4096", max_voxels);
   require(coarsest_voxel >= 0, "TsdfOptions.coarsest_voxel must be >= 0", coarsest_voxel);
   require(min_weight >= 0, "TsdfOptions.min_weight must be >= 0", min_weight);
+  require(common_sigma >= 0 && common_sigma <= 1,
+          "TsdfOptions.common_sigma must be in [0, 1]",
+          common_sigma);
   require(depth_trunc >= 0, "TsdfOptions.depth_trunc must be >= 0", depth_trunc);
   require(gap_pixels >= 0 && gap_pixels <= 4096,
           "TsdfOptions.gap_pixels must be in [0, 4096]",

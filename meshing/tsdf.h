@@ -38,11 +38,13 @@ struct TsdfOptions {
   double coarsest_voxel = 0;  ///< When voxel_size is chosen, max_voxels makes it no coarser than
                               ///< this or, where that is larger, the median pixel footprint or
                               ///< sigma [internal units]; 0 = any.
-  float min_weight = 0;    ///< Band voxels below this weight count as not observed; >= 0. One exact
-                           ///< view straight on gives 1, so a large value drops single views.
-  double depth_trunc = 0;  ///< Depth beyond this is ignored [internal units]; 0 = none is.
-  int gap_pixels = 16;     ///< Enclosed patches of unknown depth up to this diameter [pixels] hide
-                           ///< what is behind them as if they were surface; >= 0.
+  float min_weight = 0;  ///< Band voxels below this weight count as not observed; >= 0. One exact
+                         ///< view straight on gives 1, so a large value drops single views.
+  double common_sigma = 0;  ///< Share of sigma by which all views are off alike, such as frames of
+                            ///< one sensor: no number of them makes it smaller; in [0, 1].
+  double depth_trunc = 0;   ///< Depth beyond this is ignored [internal units]; 0 = none is.
+  int gap_pixels = 16;      ///< Enclosed patches of unknown depth up to this diameter [pixels] hide
+                            ///< what is behind them as if they were surface; >= 0.
   size_t memory_limit = size_t(4) << 30;  ///< [bytes] for the result and all it takes to make it.
 
   /// \throws InvalidInput naming the first field out of range.

@@ -39,6 +39,9 @@ GivenDepth fit_given_depth(const Scene& scene, const std::vector<ViewPriors>& pr
 /// Relative standard deviation of what the best sensors measure: their calibration.
 inline constexpr double kSensorSigma = 0.005;
 
+/// Share of it that all frames of a sensor have in common, as their calibration; assumed.
+inline constexpr double kCommonSensorSigma = 0.5;
+
 /// True next to a jump of depth, where sensors report what is on neither side.
 bool is_at_depth_edge(const DepthMap& depth, int x, int y);
 

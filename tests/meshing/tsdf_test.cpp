@@ -206,6 +206,26 @@ TEST(Fuse, CarriesTheUncertaintyOfTheViews) {
   EXPECT_GT(as_expected, mesh.vertices.size() * 9 / 10);
 }
 
+// Frames of one sensor err alike: a thousand of them are no thirty times better.
+TEST(Fuse, CommonErrorsStayHoweverManyViewsThereAre) {
+  std::vector<TsdfView> views;
+  for (int i = 0; i < 25; ++i) {
+    views.push_back(three_views(test::plane({0, 0, 1}, 0.1)).at(1));
+    views.back().sigma = DepthMap(views[0].depth.width, views[0].depth.height, 0.002f);
+  }
+  const auto range = [&](double common) {
+    const TriangleMesh mesh = open_surface(fuse(views, {.common_sigma = common}).volume, {});
+    float least = 1;
+    for (const float sigma : mesh.sigma) least = std::min(least, sigma);
+    float most = 0;
+    for (const float sigma : mesh.sigma) most = std::max(most, sigma);
+    return std::pair(double(least), double(most));
+  };
+  EXPECT_LT(range(0).second, 1.05 * 0.002 / 5);
+  EXPECT_GT(range(0.5).first, 0.7 * 0.5 * 0.002);
+  EXPECT_LT(range(0.5).second, 0.6 * 0.002);
+}
+
 TEST(Fuse, RemovesAFloaterThatTheOtherViewsSeeThrough) {
   auto views = three_views(test::plane({0, 0, 1}, 0.1));
   for (int y = 50; y < 65; ++y) {
@@ -613,6 +633,7 @@ TEST(TsdfOptions, RefusesEveryFieldOutOfRange) {
   EXPECT_THROW(TsdfOptions{.max_voxels = 0}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.coarsest_voxel = nan}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.min_weight = -1}.validate(), InvalidInput);
+  EXPECT_THROW(TsdfOptions{.common_sigma = 1.5}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.depth_trunc = nan}.validate(), InvalidInput);
   EXPECT_THROW(TsdfOptions{.gap_pixels = -1}.validate(), InvalidInput);
 }
