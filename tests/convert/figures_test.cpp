@@ -38,7 +38,8 @@ TEST(FigureJson, NamesThePartOfEveryLabel) {
 
 TEST(FigureText, NamesThePartOfEveryLabel) {
   EXPECT_EQ(figure_text(area_by_label(), {"m", 1, 0}, true),
-            "31 ± 0.5 m^2 (± covers 25 %)  (observed 4, single view 2, interpolated 8, inferred 1, virtual 16)");
+            "31 ± 0.5 m^2 (± covers 25 %)  (observed 4, single view 2, interpolated 8, inferred 1, "
+            "virtual 16)");
 }
 
 TEST(FigureText, SaysHowMuchOfItTheSigmaCovers) {
