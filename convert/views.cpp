@@ -138,6 +138,13 @@ ColorImage completed(ColorImage shown, const View& view) {
   return shown;
 }
 
+double share_of(const MaskMap& part, const MaskMap& whole) {
+  const auto count = [](const MaskMap& pixels) {
+    return static_cast<double>(std::count(pixels.data.begin(), pixels.data.end(), 1));
+  };
+  return count(part) / count(whole);
+}
+
 Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, const View& view) {
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
   const ColorImage shown = picture(buffers);
@@ -158,7 +165,7 @@ Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, c
           {"ssim", figure(ssim, all)},
           {"psnr_seen", figure(psnr, use)},
           {"ssim_seen", figure(ssim, use)},
-          {"hole_fraction", 1 - fraction(buffers.hole, Hole::None)},
+          {"hole_fraction", has_any(all) ? 1 - share_of(use, all) : 1 - share_of(seen, everywhere)},
           {"ms_ssim", has_any(all) ? Json(ms_ssim(completed(shown, view), view.image)) : Json()}};
 }
 

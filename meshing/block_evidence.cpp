@@ -105,6 +105,9 @@ EightPoints BlockEvidence::Place::group(size_t g) const {
 }
 
 void BlockEvidence::add(const Place& place, const DepthField& field, const TsdfView& view) {
+  constexpr size_t kMiddle = kBlockSide / 2;
+  const Eigen::Vector3f middle(place.x[kMiddle], place.y[kMiddle], place.z[kMiddle]);
+  looks_ = (middle - view.camera.center().cast<float>()).stableNormalized();
   const Looks looks = field.look(place.part_boxes());
   for (size_t part = 0; part < kParts; ++part) {
     const Look look = looks[part];
@@ -175,7 +178,13 @@ void BlockEvidence::add_band(size_t group, const Sightings& seen, const TsdfView
   }
   const unsigned guessed = view.guessed.empty() ? 0 : taken & guesses(seen, view.guessed);
   count_up(&s.count[first], taken);
-  if (!view.is_virtual) count_up(&s.known[first], taken & ~guessed);
+  if (!view.is_virtual) {
+    // The two sides of a thin plate lie in one band, and are no place that two photographs show.
+    constexpr float kOpposite = -0.5f;
+    if (first_looks_.isZero(0)) first_looks_ = looks_;
+    const bool is_behind = looks_.dot(first_looks_) < kOpposite;
+    count_up(&(is_behind ? s.known_behind : s.known)[first], taken & ~guessed);
+  }
   s.is_guessed[group] = static_cast<uint8_t>(s.is_guessed[group] | guessed);
   s.lacks_sigma[group] = static_cast<uint8_t>(s.lacks_sigma[group] | (taken & ~has_sigma));
   if (!view.color.empty()) add_color(first, taken, seen, view.color);
@@ -199,7 +208,7 @@ void BlockEvidence::add_color(size_t first,
 void BlockEvidence::forget_band(size_t n) {
   Sums& s = *sums_;
   s.weight[n] = s.distance[n] = 0;
-  s.count[n] = s.known[n] = 0;
+  s.count[n] = s.known[n] = s.known_behind[n] = 0;
   const auto others = static_cast<uint8_t>(~(1U << n % kLanes));
   s.is_guessed[n / kLanes] &= others;
   s.lacks_sigma[n / kLanes] &= others;
@@ -232,7 +241,7 @@ BlockEvidence::Voxel BlockEvidence::operator[](size_t in_leaf) const {
   out.weight = sums_->weight[n];
   out.distance = sums_->distance[n];
   out.count = sums_->count[n];
-  out.known = sums_->known[n];
+  out.known = std::max(sums_->known[n], sums_->known_behind[n]);
   out.is_guessed = is_set(sums_->is_guessed);
   out.has_sigma = !is_set(sums_->lacks_sigma);
   if (sigma_) {

@@ -55,7 +55,7 @@ class BlockEvidence {
     double weight = 0, distance = 0, spread = 0, variance = 0;  // weighted sums
     float free_weight = 0;
     int count = 0;  // of views in the band
-    int known = 0;  // of those that are photographs and no guess
+    int known = 0;  // of those that are photographs and no guess, and look from one side
     bool is_guessed = false, has_sigma = true;
     bool free = false, hidden = false;
     double color_weight = 0;
@@ -76,7 +76,7 @@ class BlockEvidence {
   using Doubles = std::array<double, kBlockVoxels>;
   struct Sums {
     Doubles weight = {}, distance = {};
-    std::array<uint16_t, kBlockVoxels> count = {}, known = {};
+    std::array<uint16_t, kBlockVoxels> count = {}, known = {}, known_behind = {};
     std::array<uint8_t, kGroups> is_guessed = {}, lacks_sigma = {};
   };
   struct SigmaSums {
@@ -93,6 +93,8 @@ class BlockEvidence {
   void forget_band(size_t n);
 
   unsigned touched_;
+  // Where the view that is added looks, and the first one of the band; 0 = none yet.
+  Eigen::Vector3f looks_ = Eigen::Vector3f::Zero(), first_looks_ = Eigen::Vector3f::Zero();
   // Voxels in the order of groups. A bit per voxel, a byte per group of them.
   std::array<uint8_t, kGroups> free_ = {}, hidden_ = {};
   std::array<uint8_t, kGroups> measured_ = {};  // what is summed up is no assumption
@@ -103,7 +105,7 @@ class BlockEvidence {
 
  public:
   /// Memory of one block [bytes].
-  static constexpr size_t kPlainBytes = 3 * kBlockVoxels / 8 + 5 * sizeof(void*);
+  static constexpr size_t kPlainBytes = 3 * kBlockVoxels / 8 + 8 * sizeof(void*);
   static constexpr size_t kBandBytes = kPlainBytes + kBlockVoxels * sizeof(float) + sizeof(Sums);
   static constexpr size_t kSigmaBytes = sizeof(SigmaSums);
   static constexpr size_t kColorBytes = sizeof(ColorSums);

@@ -68,6 +68,7 @@ std::vector<std::optional<Witness>> witnesses(const FusionViews& views,
     }
     out[i - first] = Witness{{}, nullptr, std::move(field)};
     TsdfView& own = out[i - first]->own;
+    own.camera = view.camera;
     own.color = std::move(view.color);
     own.guessed = std::move(view.guessed);
     own.is_virtual = view.is_virtual;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -226,6 +228,17 @@ TEST(Fuse, CommonErrorsStayHoweverManyViewsThereAre) {
   EXPECT_LT(range(0.5).second, 0.6 * 0.002);
 }
 
+TEST(Fuse, SidesOfAThinPlateSeenByOneViewEachAreNotObservedByTwo) {
+  const double half = 0.006;  // about a voxel
+  const test::Shape plate = test::box({-0.2, -0.15, -half}, {0.2, 0.15, half});
+  const std::vector<TsdfView> views = {
+      test::photographed(plate, test::camera_at({0, 0, -0.8}, {0, 0, 0}, kWidth)),
+      test::photographed(plate, test::camera_at({0, 0, 0.8}, {0, 0, 0}, kWidth))};
+  const TriangleMesh mesh = open_surface(fuse(views, {}).volume, {});
+  ASSERT_GT(mesh.vertices.size(), 1000u);
+  for (const float support : mesh.support) ASSERT_LE(support, 1);
+}
+
 TEST(Fuse, RemovesAFloaterThatTheOtherViewsSeeThrough) {
   auto views = three_views(test::plane({0, 0, 1}, 0.1));
   for (int y = 50; y < 65; ++y) {
@@ -347,15 +360,19 @@ struct SlowVoxel {
   double weight = 0, distance = 0, spread = 0, variance = 0, color_weight = 0;
   Vector3d color = Vector3d::Zero();
   float free_weight = 0;
-  int count = 0, known = 0;
+  int count = 0, known = 0, known_behind = 0;
   bool is_free = false, is_hidden = false, is_measured = false, is_guessed = false;
   bool has_sigma = true;
 
-  void add(const Sighting& s, const TsdfView& view) {
+  // Whether it adds to what is measured.
+  bool takes(const Sighting& s) const {
+    return s.sight == Sight::Band && !(s.is_assumed && is_measured);
+  }
+  void add(const Sighting& s, const TsdfView& view, bool is_behind) {
     is_free |= s.sight == Sight::Free;
     is_hidden |= s.sight == Sight::Hidden;
     if (s.sight == Sight::Free) free_weight += s.weight;
-    if (s.sight != Sight::Band || (s.is_assumed && is_measured)) return;
+    if (!takes(s)) return;
     if (!s.is_assumed && !is_measured) {
       *this = {.free_weight = free_weight, .is_free = is_free, .is_hidden = is_hidden};
       is_measured = true;
@@ -369,7 +386,7 @@ struct SlowVoxel {
     spread += w * d * d;
     variance += w * w * sigma * sigma;
     ++count;
-    known += !view.is_virtual && !is_guess ? 1 : 0;
+    (is_behind ? known_behind : known) += !view.is_virtual && !is_guess ? 1 : 0;
     is_guessed |= is_guess;
     has_sigma &= sigma > 0;
     if (view.color.empty()) return;
@@ -400,7 +417,8 @@ void expect_voxel(const Volume& volume, const openvdb::Coord& at, const SlowVoxe
   ASSERT_EQ(state, VoxelState::Occupied);
   ASSERT_EQ(volume.tsdf->tree().getValue(at), static_cast<float>(slow.distance / slow.weight));
   ASSERT_EQ(volume.weight->tree().getValue(at), static_cast<float>(slow.weight));
-  ASSERT_EQ(volume.support->tree().getValue(at), std::max(slow.known, slow.is_guessed ? 1 : 0));
+  ASSERT_EQ(volume.support->tree().getValue(at),
+            std::max({slow.known, slow.known_behind, slow.is_guessed ? 1 : 0}));
   ASSERT_EQ(volume.sigma->tree().isValueOn(at), slow.has_sigma);
   if (slow.has_sigma) {
     ASSERT_EQ(volume.sigma->tree().getValue(at), static_cast<float>(slow.sigma()));
@@ -448,6 +466,34 @@ std::vector<TsdfView> random_views(uint32_t seed) {
   return views;
 }
 
+// Which views look at a block of voxels from the other side than the first photograph that measures
+// in it.
+std::vector<bool> views_from_behind(const openvdb::Coord& origin,
+                                    double voxel,
+                                    const std::vector<TsdfView>& views,
+                                    std::vector<DepthField>& fields) {
+  const auto position = [&](int x, int y, int z) -> Eigen::Vector3f {
+    return (voxel * Vector3d(origin.x() + x, origin.y() + y, origin.z() + z)).cast<float>();
+  };
+  const auto direction = [&](size_t i) {
+    return (position(4, 4, 4) - views[i].camera.center().cast<float>()).stableNormalized().eval();
+  };
+  std::vector<SlowVoxel> voxels(512);
+  std::vector<bool> out(views.size(), false);
+  std::optional<size_t> first;
+  for (size_t i = 0; i < views.size(); ++i) {
+    bool measures = false;
+    for (int n = 0; n < 512; ++n) {
+      const Sighting s = fields[i].at(position(n / 64, n / 8 % 8, n % 8));
+      measures = measures || voxels[size_t(n)].takes(s);
+      voxels[size_t(n)].add(s, views[i], false);
+    }
+    if (!first && measures && !views[i].is_virtual) first = i;
+    out[i] = first && direction(i).dot(direction(*first)) < -0.5f;
+  }
+  return out;
+}
+
 TEST(Fuse, IsWhatEveryViewSaysOfEveryVoxelToTheBit) {
   for (const uint32_t seed : {1U, 2U, 3U}) {
     const std::vector<TsdfView> views = random_views(seed);
@@ -457,14 +503,18 @@ TEST(Fuse, IsWhatEveryViewSaysOfEveryVoxelToTheBit) {
     std::vector<DepthField> fields;
     for (const TsdfView& view : views) fields.emplace_back(view, options, voxel);
     TsdfReport slow_report;
+    std::map<openvdb::Coord, std::vector<bool>> from_behind;  // by block
     const auto block = [&](double at) { return 8 * int(std::floor(at / (8 * voxel))); };
     const Eigen::AlignedBox3d& b = fused.report.bounds;
     for (int x = block(b.min().x()); x < block(b.max().x()) + 8; ++x) {
       for (int y = block(b.min().y()); y < block(b.max().y()) + 8; ++y) {
         for (int z = block(b.min().z()); z < block(b.max().z()) + 8; ++z) {
           const Eigen::Vector3f p = (voxel * Vector3d(x, y, z)).cast<float>();
+          const openvdb::Coord origin(x & ~7, y & ~7, z & ~7);
+          auto& behind = from_behind[origin];
+          if (behind.empty()) behind = views_from_behind(origin, voxel, views, fields);
           SlowVoxel slow;
-          for (size_t i = 0; i < views.size(); ++i) slow.add(fields[i].at(p), views[i]);
+          for (size_t i = 0; i < views.size(); ++i) slow.add(fields[i].at(p), views[i], behind[i]);
           ASSERT_NO_FATAL_FAILURE(expect_voxel(fused.volume, {x, y, z}, slow)) << p.transpose();
           const bool is_conflict = slow.is_seen() && slow.free_weight > 0 &&
                                    std::abs(slow.distance / slow.weight) < voxel;
