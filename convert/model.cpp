@@ -120,10 +120,9 @@ uint64_t training_key(const Model& model, const TrainingOptions& options) {
   };
   for (size_t k = 0; k < model.priors.size(); ++k) {
     const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
-    const DepthMap& depth = model.priors[k].depth;
-    add(view.image.data.data(), view.image.data.size() * sizeof(Eigen::Vector3f));
-    add(depth.data.data(), depth.data.size() * sizeof(float));
     const ViewPriors& priors = model.priors[k];
+    add(view.image.data.data(), view.image.data.size() * sizeof(Eigen::Vector3f));
+    add(priors.depth.data.data(), priors.depth.data.size() * sizeof(float));
     add(priors.sigma.data.data(), priors.sigma.data.size() * sizeof(float));
     add(priors.origin.data.data(), priors.origin.data.size());
     add(priors.layer.data.data(), priors.layer.data.size());

@@ -185,10 +185,6 @@ ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
   return model;
 }
 
-}  // namespace
-
-namespace {
-
 // A focal length in pixels is that of one size of photographs.
 void refuse_focal_of_two_sizes(const std::vector<PhotoFile>& photographs) {
   const auto side = [](const PhotoFile& file) {

@@ -281,12 +281,15 @@ std::vector<int> views_with_photograph(const Scene& scene) {
 
 namespace {
 
+std::set<std::string> files_of(const Stage& stage) {
+  std::set<std::string> out(stage.files.begin(), stage.files.end());
+  out.insert(stage.further.begin(), stage.further.end());
+  return out;
+}
+
 std::set<std::string> files_of_stages(const Scene& scene, size_t lods) {
   std::set<std::string> out;
-  for (const Stage& stage : stages_of(scene, lods)) {
-    out.insert(stage.files.begin(), stage.files.end());
-    out.insert(stage.further.begin(), stage.further.end());
-  }
+  for (const Stage& stage : stages_of(scene, lods)) out.merge(files_of(stage));
   return out;
 }
 
@@ -312,9 +315,7 @@ std::set<std::string> camera_files() {
 }
 
 std::set<std::string> outputs_of(const Stage& stage, const Run& run) {
-  std::set<std::string> names(stage.files.begin(), stage.files.end());
-  names.insert(stage.further.begin(), stage.further.end());
-  const std::vector<std::string> outputs = named_outputs(run.request.output, names);
+  const std::vector<std::string> outputs = named_outputs(run.request.output, files_of(stage));
   return {outputs.begin(), outputs.end()};
 }
 
@@ -333,10 +334,7 @@ void remove_outputs_after(const Stage& first, const Run& run) {
   bool is_later = false;
   std::set<std::string> names;
   for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
-    if (is_later) {
-      names.insert(stage.files.begin(), stage.files.end());
-      names.insert(stage.further.begin(), stage.further.end());
-    }
+    if (is_later) names.merge(files_of(stage));
     is_later = is_later || stage.name == first.name;
   }
   for (const std::string& name : named_outputs(run.request.output, names)) {

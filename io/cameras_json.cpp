@@ -219,7 +219,7 @@ View read_view(const JsonValue& entry, const Frame& frame) {
   return view;
 }
 
-void read_image_path(const JsonValue& entry, View& view, Scene& scene) {
+void read_paths(const JsonValue& entry, View& view, Scene& scene) {
   const auto name = entry.find("image_path");
   if (!name) return;
   std::error_code ignored;
@@ -262,7 +262,7 @@ Scene read_cameras_json(const std::filesystem::path& path, std::vector<std::stri
     View view = read_view(entry, scene.frame);
     view.name = read_name(entry.at("img_name"), !frame, taken);
     if (names != nullptr) names->push_back(entry.at("img_name").text());
-    read_image_path(entry, view, scene);
+    read_paths(entry, view, scene);
     if (const auto role = entry.find("role")) {
       if (role->text() == "input") scene.input.push_back(static_cast<int>(i));
       if (role->text() == "held_out") scene.held_out.push_back(static_cast<int>(i));

@@ -194,7 +194,9 @@ class SplatPacker {
 };
 
 std::string packed_header(const Gaussians& g, const Frame& frame) {
-  std::string out = "ply\nformat binary_little_endian 1.0\ncomment generator cgs\n";
+  std::string out = "ply\nformat binary_little_endian 1.0\ncomment ";
+  out += kPlyGenerator;
+  out += '\n';
   out += ply_frame_comments(frame);
   out += "element chunk " + std::to_string((g.size() + kChunk - 1) / kChunk) + "\n";
   for (const auto& [prefix, names] : {std::pair(std::string(), "xyz"),

@@ -16,11 +16,9 @@ namespace cgs {
 
 namespace {
 
-constexpr const char* kGenerator = "generator cgs";
-
 std::string header_text(const Gaussians& g, const Frame& frame) {
   std::string out = "ply\nformat binary_little_endian 1.0\ncomment ";
-  out += kGenerator;
+  out += kPlyGenerator;
   out += '\n';
   out += ply_frame_comments(frame);
   out += "element vertex " + std::to_string(g.size()) + "\n";
@@ -265,8 +263,7 @@ RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path
   RawSplats out = rows.take();
   out.comments = header.comments;
   out.may_be_linear =  // no program that states filters writes lengths
-      vertex.find("filter_3D") < 0 &&
-      std::find(out.comments.begin(), out.comments.end(), kGenerator) == out.comments.end();
+      vertex.find("filter_3D") < 0 && !is_our_ply(out.comments);
   const PlyProperty& x = vertex.properties[static_cast<size_t>(vertex.find("x"))];
   if (x.type == PlyType::Float64) out.digits = kDoubleDigits;
   if (trailing > 0) {

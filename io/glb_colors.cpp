@@ -49,17 +49,6 @@ Eigen::Vector3f sampled(const ColorImage& image,
   return out;
 }
 
-template <size_t N>
-std::array<double, N> numbers(const JsonValue& object,
-                              const char* key,
-                              std::array<double, N> values) {
-  const auto list = object.find(key);
-  if (!list) return values;
-  if (list->size() < N) list->fail(Defect::Count, "has too few numbers");
-  for (size_t i = 0; i < N; ++i) values.at(i) = list->at(i).number();
-  return values;
-}
-
 }  // namespace
 
 std::optional<JsonValue> GlbColors::base(const JsonValue& primitive) const {
@@ -88,8 +77,8 @@ GlbColors::Texture GlbColors::texture(const JsonValue& info) const {
   const auto transform =
       extensions ? extensions->find("KHR_texture_transform") : std::optional<JsonValue>();
   if (!transform) return out;
-  out.offset = numbers<2>(*transform, "offset", {0, 0});
-  out.scale = numbers<2>(*transform, "scale", {1, 1});
+  out.offset = numbers_or(*transform, "offset", {0, 0});
+  out.scale = numbers_or(*transform, "scale", {1, 1});
   if (const auto set = transform->find("texCoord")) out.texcoord_set = set->count();
   const auto rotation = transform->find("rotation");
   if (rotation && rotation->number() != 0) out.image = -1;
@@ -137,8 +126,9 @@ std::vector<float> GlbColors::of_vertices(const JsonValue& primitive, const GlbF
   const auto material = base(primitive);
   if (!material) return out;
   const size_t vertices = faces.positions.size() / 3;
-  const auto factor = numbers<3>(*material, "baseColorFactor", {1, 1, 1});
-  const bool is_colored = !has_tints_ && factor != std::array<double, 3>{1, 1, 1};
+  const auto factor = numbers_or(*material, "baseColorFactor", {1, 1, 1, 1});
+  const bool is_white = factor[0] == 1 && factor[1] == 1 && factor[2] == 1;
+  const bool is_colored = !has_tints_ && !is_white;
   const auto info = material->find("baseColorTexture");
   const Texture looked_up = info ? texture(*info) : Texture();
   const ColorImage* picture = info && !faces.texcoords.empty() ? image(looked_up.image) : nullptr;

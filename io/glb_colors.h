@@ -35,7 +35,7 @@ class GlbColors {
   struct Texture {
     int image = -1;  ///< -1 = of a kind that is not read.
     int texcoord_set = 0;
-    std::array<double, 2> offset = {0, 0}, scale = {1, 1};
+    std::vector<double> offset = {0, 0}, scale = {1, 1};
     std::array<int, 2> wrap = {};  ///< As samplers state it.
   };
 

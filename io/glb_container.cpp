@@ -75,6 +75,16 @@ float component(const char* bytes, int type, bool is_normalized) {
 
 }  // namespace
 
+std::vector<double> numbers_or(const JsonValue& object,
+                               const char* key,
+                               std::vector<double> otherwise) {
+  const auto list = object.find(key);
+  if (!list) return otherwise;
+  if (list->size() != otherwise.size()) list->fail(Defect::Count, "has the wrong length");
+  for (size_t i = 0; i < otherwise.size(); ++i) otherwise[i] = list->at(i).number();
+  return otherwise;
+}
+
 uint64_t whole_number(const JsonValue& value) {
   constexpr double kLargest = 9007199254740992.0;  // 2^53
   const double number = value.number();

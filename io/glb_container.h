@@ -70,6 +70,12 @@ class GlbContainer {
   std::map<uint64_t, DecodedView> decoded_;  // by number
 };
 
+/// The numbers of a member of an object, or `otherwise` where it has none.
+/// \throws BadInput Count for another number of them, Schema
+std::vector<double> numbers_or(const JsonValue& object,
+                               const char* key,
+                               std::vector<double> otherwise);
+
 /// A number without sign or fraction, up to 2^53. \throws BadInput Schema
 uint64_t whole_number(const JsonValue& value);
 

@@ -12,22 +12,15 @@ constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
 
 /// The matrix of a node: given as such, or as translation, rotation and scale.
 Eigen::Affine3d node_matrix(const JsonValue& node) {
-  const auto numbers = [&](const char* key, std::vector<double> values) {
-    const auto list = node.find(key);
-    if (!list) return values;
-    if (list->size() != values.size()) list->fail(Defect::Count, "has the wrong length");
-    for (size_t i = 0; i < values.size(); ++i) values[i] = list->at(i).number();
-    return values;
-  };
   Eigen::Affine3d out = Eigen::Affine3d::Identity();
   if (node.find("matrix")) {
-    const std::vector<double> m = numbers("matrix", std::vector<double>(16));
+    const std::vector<double> m = numbers_or(node, "matrix", std::vector<double>(16));
     out.matrix() = Eigen::Map<const Eigen::Matrix4d>(m.data());
     return out;
   }
-  const std::vector<double> t = numbers("translation", {0, 0, 0});
-  const std::vector<double> r = numbers("rotation", {0, 0, 0, 1});
-  const std::vector<double> s = numbers("scale", {1, 1, 1});
+  const std::vector<double> t = numbers_or(node, "translation", {0, 0, 0});
+  const std::vector<double> r = numbers_or(node, "rotation", {0, 0, 0, 1});
+  const std::vector<double> s = numbers_or(node, "scale", {1, 1, 1});
   const Eigen::Quaterniond q(r[3], r[0], r[1], r[2]);
   if (!(q.norm() > 0)) node.at("rotation").fail(Defect::Value, "is not a rotation");
   out = Eigen::Translation3d(t[0], t[1], t[2]) * q.normalized() * Eigen::Scaling(s[0], s[1], s[2]);

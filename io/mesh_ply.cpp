@@ -15,13 +15,11 @@ namespace cgs {
 
 namespace {
 
-constexpr const char* kGenerator = "generator cgs";
-
 std::string header_text(const TriangleMesh& mesh,
                         const Frame& frame,
                         const std::vector<VertexScalar>& scalars) {
   std::string out = "ply\nformat binary_little_endian 1.0\ncomment ";
-  out += kGenerator;
+  out += kPlyGenerator;
   out += '\n';
   out += ply_frame_comments(frame);
   if (!mesh.provenance.empty()) {
@@ -80,9 +78,7 @@ int find_scalar(const PlyElement& element, std::string_view name) {
 /// others call any number of a vertex so.
 bool quality_is_support(const PlyHeader& header, const PlyElement& vertex) {
   const PlyElement* face = header.find("face");
-  return std::find(header.comments.begin(), header.comments.end(), kGenerator) !=
-             header.comments.end() ||
-         vertex.find("scalar_sigma") >= 0 ||
+  return is_our_ply(header.comments) || vertex.find("scalar_sigma") >= 0 ||
          (face != nullptr && face->find("scalar_provenance") >= 0);
 }
 

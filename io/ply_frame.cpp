@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/ply_frame.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -43,6 +44,10 @@ ScaleSource scale_source_in(const std::vector<std::string>& comments) {
 }
 
 }  // namespace
+
+bool is_our_ply(const std::vector<std::string>& comments) {
+  return std::find(comments.begin(), comments.end(), kPlyGenerator) != comments.end();
+}
 
 std::string ply_frame_comments(const Frame& frame) { return frame_comments(frame, "comment "); }
 

@@ -20,6 +20,12 @@ std::string ply_frame_comments(const Frame& frame);
 /// The same for other text formats, where lines start with `mark` instead of "comment ".
 std::string frame_comments(const Frame& frame, const std::string& mark);
 
+/// The header line by which a PLY file says that it is one of ours, without "comment ".
+inline constexpr const char* kPlyGenerator = "generator cgs";
+
+/// Whether its comments hold that line.
+bool is_our_ply(const std::vector<std::string>& comments);
+
 /// Where the coordinates of a PLY file belong.
 struct PlyPlacement {
   Frame frame;                  ///< The frame the content is read into.
