@@ -118,11 +118,11 @@ class ObjRows {
     }
     if (out_.mesh.colors.size() != out_.positions.size()) out_.mesh.colors.clear();
     settle_colors(out_);
+    if (!all_grouped_) out_.mesh.provenance.clear();
     if (has_materials_ && out_.mesh.colors.empty() && out_.mesh.provenance.empty()) {
       out_.warnings.emplace_back(
           "materials and textures are not read, only colours of vertices, which it has none of");
     }
-    if (!all_grouped_) out_.mesh.provenance.clear();
     if (small_faces_ > 0) {
       out_.warnings.push_back("dropped " + std::to_string(small_faces_) +
                               " faces of fewer than 3 corners");

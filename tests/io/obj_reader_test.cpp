@@ -58,6 +58,8 @@ TEST(ReadObj, SaysWhichColoursItLeavesOutOrChanges) {
   const ParsedMesh textured = parsed("mtllib a.mtl\n" + plain + "usemtl stone\n" + faces);
   ASSERT_EQ(textured.warnings.size(), 1U);
   EXPECT_TRUE(textured.warnings[0].starts_with("materials and textures are not read"));
+  const std::string in_part = "g observed\n" + faces + "g roof\nusemtl tiles\n" + faces;
+  EXPECT_EQ(parsed(plain + in_part).warnings.size(), 1U) << "labels that do not count";
 }
 
 TEST(ReadObj, RefusesWhatIsDamaged) {
