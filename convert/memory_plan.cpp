@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdio>
 #include <fstream>
+#include <numeric>
 
 #include "libcgs/core/error.h"
 
@@ -14,28 +15,54 @@ namespace {
 
 constexpr double kMebi = 1 << 20;
 
-/// What a stage needs without a picture, and for each pixel of the input views. Measured on the
-/// portal capture and on LLFF's fern at 36,000 to 570,000 pixels.
+/// What a stage needs without a picture, and for each pixel of pictures. Measured on the portal
+/// capture and on LLFF's fern at 36,000 to 620,000 pixels, of one size and of several.
 struct StageFactors {
   const char* stage;
-  double base;      ///< [bytes]
-  double of_pixel;  ///< [bytes]
-  double of_voxel;  ///< [bytes per pixel], up to kMostPixels
-  double of_fused;  ///< The same on top, where files are held against the fused surface.
+  double base;        ///< [bytes]
+  double of_pixel;    ///< [bytes per pixel of all input views]
+  double of_largest;  ///< [bytes per pixel of the largest picture that is drawn]
+  double of_voxel;    ///< [bytes per pixel where all views are as fine as voxels], to kMostPixels
+  double of_fused;    ///< The same on top, where files are held against the fused surface.
 };
-constexpr std::array<StageFactors, 7> kFactors = {{{"depth and Gaussians", 150 * kMebi, 520, 0, 0},
-                                                   {"views", 103 * kMebi, 200, 0, 0},
-                                                   {"held-out views", 103 * kMebi, 200, 0, 0},
-                                                   {"splats for browsers", 124 * kMebi, 670, 0, 0},
-                                                   {"volume and mesh", 160 * kMebi, 100, 1700, 720},
-                                                   {"textured assets", 124 * kMebi, 100, 145, 1500},
-                                                   {"report", 131 * kMebi, 130, 0, 0}}};
+constexpr std::array<StageFactors, 7> kFactors = {
+    {{"depth and Gaussians", 150 * kMebi, 520, 0, 0, 0},
+     {"views", 105 * kMebi, 136, 231, 0, 0},
+     {"held-out views", 105 * kMebi, 136, 231, 0, 0},
+     {"splats for browsers", 124 * kMebi, 670, 0, 0, 0},
+     {"volume and mesh", 160 * kMebi, 100, 0, 1700, 720},
+     {"textured assets", 124 * kMebi, 130, 0, 235, 1410},
+     {"report", 150 * kMebi, 105, 0, 126, 0}}};
 
 // Above, voxels grow with the pixels: TsdfOptions::max_voxels.
 constexpr double kMostPixels = 570e3;
 
-double pixels_of(const View& view) {
-  return double(view.camera.width) * double(view.camera.height);
+/// Sizes of the pictures of some views [pixels].
+struct PictureSizes {
+  double all = 0;
+  double largest = 0;
+  double as_voxels = 0;  ///< Of all, were each as fine as the voxels.
+};
+
+// A voxel is as large as the median pixel on the surface, which is one of the larger pictures, and
+// what smaller ones see gets as many voxels.
+PictureSizes picture_sizes(const Scene& scene, const std::vector<int>& views, int downscale) {
+  std::vector<double> sizes;
+  for (const int i : views) {
+    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+    sizes.push_back(double(camera.width) * camera.height / (double(downscale) * downscale));
+  }
+  if (sizes.empty()) return {};
+  std::sort(sizes.begin(), sizes.end());
+  PictureSizes out{std::accumulate(sizes.begin(), sizes.end(), 0.0), sizes.back(), 0};
+  double smaller = 0;
+  for (const double size : sizes) {
+    smaller += size;
+    if (smaller < out.all / 2) continue;
+    out.as_voxels = size * double(sizes.size());
+    break;
+  }
+  return out;
 }
 
 // What the networks of decoder=conv hold: feature maps of all views, and parameters with their
@@ -66,9 +93,8 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
                                      const MeasuredFiles& measured,
                                      const CoherenceOptions& coherence,
                                      int downscale) {
-  double pixels = 0;
-  for (const int i : scene.input) pixels += pixels_of(scene.views[static_cast<size_t>(i)]);
-  pixels /= double(downscale) * downscale;
+  const PictureSizes input = picture_sizes(scene, scene.input, downscale);
+  const PictureSizes held_out = picture_sizes(scene, scene.held_out, downscale);
   std::vector<StageMemory> plan;
   plan.reserve(kFactors.size());
   for (const StageFactors& f : kFactors) {
@@ -78,9 +104,14 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
     const bool measures = stage == "volume and mesh" ? measured.meshes : measured.asset;
     const double of_voxel = f.of_voxel + (measures ? f.of_fused : 0);
     // Voxels that must keep an error are not made coarser to save memory.
-    const double voxel_pixels = measured.meshes ? pixels : std::min(pixels, kMostPixels);
-    double bytes = f.base + f.of_pixel * pixels + of_voxel * voxel_pixels;
-    if (stage == "depth and Gaussians") bytes += of_networks(coherence, scene.input.size(), pixels);
+    const double voxel_pixels =
+        measured.meshes ? input.as_voxels : std::min(input.as_voxels, kMostPixels);
+    const double largest = stage == "held-out views" ? held_out.largest : input.largest;
+    double bytes =
+        f.base + f.of_pixel * input.all + f.of_largest * largest + of_voxel * voxel_pixels;
+    if (stage == "depth and Gaussians") {
+      bytes += of_networks(coherence, scene.input.size(), input.all);
+    }
     plan.push_back({stage, static_cast<size_t>(bytes)});
   }
   return plan;

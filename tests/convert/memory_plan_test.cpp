@@ -45,6 +45,44 @@ TEST(MemoryPlan, GrowsWithThePixelsOfTheInputViewsAlone) {
   EXPECT_GT(most(memory_plan(scene_of(3, 800, 600), true)), most(memory_plan(scene, true)));
 }
 
+Scene scene_of(const std::vector<std::pair<int, int>>& sizes) {
+  Scene scene;
+  for (const auto& [width, height] : sizes) {
+    Scene one = scene_of(1, width, height);
+    scene.input.push_back(static_cast<int>(scene.views.size()));
+    scene.views.push_back(one.views[0]);
+  }
+  return scene;
+}
+
+double of_stage(const Scene& scene, const std::string& stage) {
+  for (const StageMemory& s : memory_plan(scene, true)) {
+    if (s.stage == stage) return double(s.bytes);
+  }
+  ADD_FAILURE() << "no stage " << stage;
+  return 0;
+}
+
+TEST(MemoryPlan, ASmallPictureBesideLargeOnesGetsTheirVoxels) {
+  const Scene fine = scene_of(3, 400, 300);
+  const Scene mostly_fine = scene_of({{400, 300}, {200, 150}, {200, 150}});
+  const Scene mostly_coarse = scene_of({{280, 214}, {200, 150}, {200, 150}, {200, 150}});
+  const Scene coarse = scene_of(4, 200, 150);
+  const std::string stage = "volume and mesh";
+  EXPECT_GT(of_stage(mostly_fine, stage), 0.95 * of_stage(fine, stage));
+  EXPECT_LT(of_stage(mostly_coarse, stage), 1.05 * of_stage(coarse, stage));
+}
+
+TEST(MemoryPlan, TheLargestPictureIsDrawnAsAWhole) {
+  const Scene mixed = scene_of({{400, 300}, {200, 150}, {200, 150}});
+  const Scene even = scene_of(3, 300, 200);
+  EXPECT_GT(of_stage(mixed, "views"), of_stage(even, "views"));
+  Scene held_out = even;
+  held_out.views.push_back(mixed.views[0]);
+  held_out.held_out.push_back(3);
+  EXPECT_GT(of_stage(held_out, "held-out views"), of_stage(held_out, "views"));
+}
+
 TEST(MemoryPlan, LeavesOutWhatTheUsersVoxelsDecide) {
   const std::string text = memory_plan_text(memory_plan(scene_of(3, 400, 300), false));
   EXPECT_EQ(text.find("volume"), std::string::npos) << text;
