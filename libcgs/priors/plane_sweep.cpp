@@ -2,6 +2,7 @@
 #include "libcgs/priors/plane_sweep.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -35,7 +36,29 @@ void require_images(const Scene& scene) {
 constexpr float kTexture = 0.45f;    // of the bound from texture: neighbours help each other,
 constexpr float kMostNoise = 0.17f;  // and where there is none at all, they decide
 
+constexpr float kPlaces = 0.5f;   // largest error of a match that places a surface [pixels]
+constexpr float kBend = 0.0015f;  // of surfaces that show nothing [1 / pixels]
+
+// Largest step between neighbours' planes on one surface [planes]; bare surfaces fall into pieces
+// where it is smaller.
+constexpr float kSameSurface = 2.0f;
+
 using Patch = std::vector<std::pair<int, int>>;
+constexpr std::array<std::pair<int, int>, 4> kNeighbors = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+
+// Whether the surface at (x, y) goes on at its neighbour (x + dx, y + dy).
+bool goes_on(const SweptView& view, int x, int y, int dx, int dy, float same_surface) {
+  const SlantedPlane& here = view.pixels(x, y).plane;
+  const SlantedPlane& there = view.pixels(x + dx, y + dy).plane;
+  // Either plane may be the one that continues.
+  const float step =
+      std::min(std::abs(there.at(-dx, -dy) - here.t), std::abs(here.at(dx, dy) - there.t));
+  return step < same_surface;
+}
+
+bool is_textured(const RefinedPixel& pixel) {
+  return !std::isnan(pixel.plane.t) && kTexture * pixel.sigma < kPlaces;
+}
 
 // Calls visit(patch) for every connected patch of pixels with is_member(x, y) in which no step
 // between neighbours' planes is as large as `same_surface` [planes].
@@ -57,14 +80,9 @@ void for_each_patch(const SweptView& view,
       grow(x0, y0);
       for (size_t i = 0; i < patch.size(); ++i) {
         const auto [x, y] = patch[i];
-        const SlantedPlane& here = view.pixels(x, y).plane;
-        for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        for (const auto& [dx, dy] : kNeighbors) {
           if (!visited.contains(x + dx, y + dy)) continue;
-          const SlantedPlane& there = view.pixels(x + dx, y + dy).plane;
-          // Either plane may be the one that continues.
-          const float step =
-              std::min(std::abs(there.at(-dx, -dy) - here.t), std::abs(here.at(dx, dy) - there.t));
-          if (step < same_surface) grow(x + dx, y + dy);
+          if (goes_on(view, x, y, dx, dy, same_surface)) grow(x + dx, y + dy);
         }
       }
       if (!patch.empty()) visit(patch);
@@ -79,11 +97,11 @@ void take_back(const Patch& patch, Raster<Agreement>& agreement) {
 // Takes back confirmations of small patches that continue no surface around them: agreements by
 // chance, which completion would spread.
 void remove_speckles(const SweptView& view, Raster<Agreement>& agreement) {
-  constexpr float kSameSurface = 1.0f;
+  constexpr float kSameSpeckle = 1.0f;
   constexpr double kSmallest = 4e-4;  // share of the image
   const auto smallest = static_cast<size_t>(kSmallest * double(agreement.data.size()) + 5);
   const auto is_confirmed = [&](int x, int y) { return agreement(x, y).views > 0; };
-  for_each_patch(view, kSameSurface, is_confirmed, [&](const Patch& patch) {
+  for_each_patch(view, kSameSpeckle, is_confirmed, [&](const Patch& patch) {
     if (patch.size() < smallest) take_back(patch, agreement);
   });
 }
@@ -92,13 +110,11 @@ void remove_speckles(const SweptView& view, Raster<Agreement>& agreement) {
 // colour: their views agree only because ties are broken in the same way. Where a surface shows
 // something in places, those hold the rest.
 void remove_bare(const SweptView& view, Raster<Agreement>& agreement) {
-  constexpr float kSameSurface = 2.0f;  // wider than above: bare surfaces fall into pieces
-  constexpr float kPlaces = 0.5f;       // largest error of a match that places a surface [pixels]
-  constexpr double kTextured = 0.1;     // share of a surface
+  constexpr double kTextured = 0.1;  // share of a surface
   const auto is_known = [&](int x, int y) { return !std::isnan(view.pixels(x, y).plane.t); };
   for_each_patch(view, kSameSurface, is_known, [&](const Patch& patch) {
     const auto textured = std::count_if(patch.begin(), patch.end(), [&](const auto& p) {
-      return kTexture * view.pixels(p.first, p.second).sigma < kPlaces;
+      return is_textured(view.pixels(p.first, p.second));
     });
     if (double(textured) < kTextured * double(patch.size())) take_back(patch, agreement);
   });
@@ -111,6 +127,32 @@ std::vector<Raster<Agreement>> check_all(const std::vector<SweptView>& views,
     out.push_back(cross_check(views, i, {options.max_disagreement, options.least_disparity}));
     remove_bare(views[i], out.back());
     remove_speckles(views[i], out.back());
+  }
+  return out;
+}
+
+// Way to the nearest pixel that shows something, along the surface [pixels]; more than the image
+// is wide where there is none.
+Raster<int> distance_to_texture(const SweptView& view) {
+  const auto& pixels = view.pixels;
+  const int farthest = pixels.width + pixels.height;
+  Raster<int> out(pixels.width, pixels.height, farthest);
+  Patch reached;
+  for (int y = 0; y < pixels.height; ++y) {
+    for (int x = 0; x < pixels.width; ++x) {
+      if (!is_textured(pixels(x, y))) continue;
+      out(x, y) = 0;
+      reached.emplace_back(x, y);
+    }
+  }
+  for (size_t i = 0; i < reached.size(); ++i) {
+    const auto [x, y] = reached[i];
+    for (const auto& [dx, dy] : kNeighbors) {
+      if (!out.contains(x + dx, y + dy) || out(x + dx, y + dy) < farthest) continue;
+      if (!goes_on(view, x, y, dx, dy, kSameSurface)) continue;
+      out(x + dx, y + dy) = out(x, y) + 1;
+      reached.emplace_back(x + dx, y + dy);
+    }
   }
   return out;
 }
@@ -134,11 +176,15 @@ float roughness(const SweptView& view, const Raster<Agreement>& agreement, int x
 }
 
 // Standard deviation of t [planes]: errors of the match over the parallax of the best view that
-// confirms it, however much a view that does not would have told. The terms and their weights are
+// confirms it, however much a view that does not would have told. Between what they show, surfaces
+// may bend: by the square of the way to it. The terms and their weights are
 // fitted to the errors on three Middlebury 2014 pairs and the three photographs of the portal
 // capture, whose truths are known: tests/eval/stereo_accuracy prints the shares within 1, 2, 3 and
 // 5 sigma.
-float depth_sigma(const RefinedPixel& pixel, const Agreement& agreement, float roughness) {
+float depth_sigma(const RefinedPixel& pixel,
+                  const Agreement& agreement,
+                  float roughness,
+                  float to_texture) {
   constexpr float kFloor = 0.05f;  // calibration and interpolation, however good the texture
   constexpr float kMore = 1.12f;   // what terms of this form leave out
   // Where a plane is more than a pixel, floor and noise are of the plane, as neighbours are.
@@ -146,7 +192,8 @@ float depth_sigma(const RefinedPixel& pixel, const Agreement& agreement, float r
   const float floor = kFloor * planes_per_pixel;
   const float noise =
       std::min(kTexture * pixel.sigma / agreement.parallax, kMostNoise * planes_per_pixel);
-  return kMore * std::sqrt(floor * floor + noise * noise +
+  const float bend = kBend * to_texture * to_texture * planes_per_pixel;
+  return kMore * std::sqrt(floor * floor + noise * noise + bend * bend +
                            agreement.difference * agreement.difference + roughness * roughness);
 }
 
@@ -160,6 +207,7 @@ ViewPriors view_priors(const SweptView& view, const Raster<Agreement>& agreement
                  Raster<DepthOrigin>(w, h, DepthOrigin::Unknown),
                  Raster<uint8_t>(w, h, 0),
                  Raster<uint8_t>(w, h, 0)};
+  const Raster<int> to_texture = distance_to_texture(view);
   for (size_t i = 0; i < view.pixels.data.size(); ++i) {
     const RefinedPixel& p = view.pixels.data[i];
     const Agreement& a = agreement.data[i];
@@ -167,7 +215,8 @@ ViewPriors view_priors(const SweptView& view, const Raster<Agreement>& agreement
     if (a.views == 0 || !(rho > 0)) continue;
     const int x = static_cast<int>(i) % w;
     const int y = static_cast<int>(i) / w;
-    const float sigma_t = depth_sigma(p, a, roughness(view, agreement, x, y));
+    const float sigma_t =
+        depth_sigma(p, a, roughness(view, agreement, x, y), static_cast<float>(to_texture.data[i]));
     out.depth.data[i] = static_cast<float>(1 / rho);
     out.sigma.data[i] = static_cast<float>(double(sigma_t) * view.geometry.step / (rho * rho));
     out.confidence.data[i] = std::clamp(p.score, 0.0f, 1.0f) / (1 + sigma_t);

@@ -222,6 +222,35 @@ TEST(PlaneSweep, MeasuresABareSpotOfATexturedSurface) {
   EXPECT_GT(share_within(priors, truth, 0.02, bare), 0.95);
 }
 
+// But a surface may bend where it shows nothing: here it lies deeper than the wall around it.
+TEST(PlaneSweep, SigmaGrowsWithTheWayToWhatShowsSomething) {
+  const Vector3d u = Vector3d::UnitX();
+  const Vector3d v = Vector3d::UnitY();
+  const std::vector<TexturedPatch> patches = {{Vector3d(0, 0, 4.15), u, v, 1e9, 1e9, 0},
+                                              {Vector3d(-6, 0, 4), u, v, 5, 1e9, 1},
+                                              {Vector3d(6, 0, 4), u, v, 5, 1e9, 1},
+                                              {Vector3d(0, -5.75, 4), u, v, 1, 5, 1},
+                                              {Vector3d(0, 5.75, 4), u, v, 1, 5, 1}};
+  std::vector<Camera> cameras;
+  for (const double x : {-0.4, 0.0, 0.4}) {
+    cameras.push_back(test::looking_at({x, 0, 0}, {0.3 * x, 0, 4}, 240, 180, 225));
+  }
+  const Scene scene = test::photographed_scene(patches, cameras, 0.02);
+  const ViewPriors priors = plane_sweep(scene, {})[1];
+  const DepthMap truth = test::true_depth(patches, scene.views[1].camera);
+  int measured = 0;
+  int within = 0;
+  for (int y = 75; y < 105; ++y) {
+    for (int x = 100; x < 140; ++x) {
+      if (priors.origin(x, y) != DepthOrigin::Measured) continue;
+      ++measured;
+      within += std::abs(priors.depth(x, y) - truth(x, y)) < 3 * priors.sigma(x, y);
+    }
+  }
+  ASSERT_GT(measured, 300);
+  EXPECT_GT(within, 0.95 * measured);
+}
+
 // A half wall before a farther one. The first two cameras stand `baseline` apart; of the far wall
 // they see a part that the third, far to the right, does not.
 struct Corner {

@@ -117,6 +117,7 @@ TEST(StructuralDissimilarity, HasTheDerivativeOfTheDefinition) {
   for (const auto& [width, height] : {std::pair{13, 9}, {3, 14}, {1, 1}}) {
     const ColorPlanes photograph = noise_planes(width, height, 2);
     const MaskMap mask = noise_mask(width, height, 3);
+    const double values = 3.0 * width * height;
     for (const float distance : {1.0f, 0.05f}) {
       for (const MaskMap* use : {static_cast<const MaskMap*>(nullptr), &mask}) {
         const ColorPlanes rendered = near(photograph, distance);
@@ -124,7 +125,7 @@ TEST(StructuralDissimilarity, HasTheDerivativeOfTheDefinition) {
         structural_dissimilarity(rendered, photograph, use, 5, gradient);
         const Raster<double> b = doubled(photograph[1]);
         test::expect_gradient(gradient[1], doubled(rendered[1]), [&](const Raster<double>& moved) {
-          return 5 * reference(moved, b, use) / (3.0 * width * height);
+          return 5 * reference(moved, b, use) / values;
         });
       }
     }
