@@ -15,6 +15,8 @@
 #include "convert/size_search.h"
 #include "convert/texture.h"
 #include "convert/written_surface.h"
+#include "io/atomic_file.h"
+#include "io/byte_reader.h"
 #include "io/glb_primitive.h"
 #include "io/gltf.h"
 #include "io/mesh_file.h"
@@ -106,32 +108,30 @@ class AssetWriter {
     return out;
   }
 
-  GlbReport write(const Form& form) const { return write(form, path_); }
-  GlbReport write(const Form& form, const std::filesystem::path& path) const {
-    return write_glb(path, form.mesh, form.texture, frame_, form.options);
+  GlbFile made(const Form& form) const {
+    return make_glb(form.mesh, form.texture, frame_, form.options);
   }
 
-  /// Writes a form that states the certificate of the mesh as its file holds it: rounding lets
-  /// faces vanish or touch that did not before.
-  GlbReport write_certified(Form& form) const { return write_certified(form, path_); }
-  GlbReport write_certified(Form& form, const std::filesystem::path& path) const {
-    const GlbReport first = write(form, path);
+  /// A form that states the certificate of the mesh as its file holds it: rounding lets faces
+  /// vanish or touch that did not before.
+  GlbFile certified(Form& form) const {
+    GlbFile first = made(form);
     // In the frame that a reader would give it: where faces nearly touch, rounding decides.
-    const MeasurableMesh held = read_mesh_file(path).content;
+    const MeasurableMesh held = parse_glb_file(first.bytes, path_).content;
     Json summary = Json::parse(form.options.summary_json);
     Json stated = certificate_to_json(certify(held.mesh), held.mesh, held.frame);
     if (summary["certificate"] == stated) return first;
     summary["certificate"] = std::move(stated);
     form.options.summary_json = summary.dump();
-    return write(form, path);
+    return made(form);
   }
 
-  TriangleMesh read(const std::filesystem::path& path) const {
-    return read_mesh_file(path, frame_).content.mesh;
+  TriangleMesh read(std::string glb) const {
+    return parse_glb_file(std::move(glb), path_, frame_).content.mesh;
   }
 
-  SurfaceDeviation deviation_from(const TriangleMesh& fused) const {
-    const SurfaceDeviation out = surface_deviation(read(path_), fused);
+  SurfaceDeviation deviation_from(const TriangleMesh& fused, const GlbFile& glb) const {
+    const SurfaceDeviation out = surface_deviation(read(glb.bytes), fused);
     if (promise_ && out.max() > *promise_) {
       throw NumericalError("asset.glb is " + format_length(out.max(), frame_) +
                            " off the fused surface, promised were " +
@@ -210,23 +210,23 @@ class AssetWriter {
   std::optional<double> promise_;  ///< [internal units]
 };
 
-/// A form on disk.
+/// A form as it goes to the disk.
 struct Written {
   Form form;
-  GlbReport report;
+  GlbFile glb;
   std::vector<TriedSize> tried;  ///< Coarser forms than the whole; in internal units.
 };
 
-// Leaves the finest form on disk that is small enough.
-Written write_within(const AssetWriter& writer,
-                     size_t limit,
-                     double already,
-                     const Frame& frame,
-                     const Progress& progress) {
+// The finest form that is small enough.
+Written form_within(const AssetWriter& writer,
+                    size_t limit,
+                    double already,
+                    const Frame& frame,
+                    const Progress& progress) {
   Written out{writer.whole(), {}, {}};
-  out.report = writer.write_certified(out.form);
-  if (limit == 0 || out.report.bytes <= limit) return out;
-  const size_t whole = out.report.bytes;
+  out.glb = writer.certified(out.form);
+  if (limit == 0 || out.glb.bytes.size() <= limit) return out;
+  const size_t whole = out.glb.bytes.size();
   double tries = 0;
   // Just above what is there already: textures begin to shrink before the mesh does.
   const double finest = std::max(already / kSimplified, 1e-4 * writer.side());
@@ -235,13 +235,10 @@ Written write_within(const AssetWriter& writer,
   const SizeSearch search = finest_within(target, finest, coarsest, [&](double detail) {
     report(progress, 1 - 1 / (1 + 0.2 * ++tries));
     Form form = writer.coarser(detail, already);
-    const GlbReport written = writer.write(form);
-    const bool fits = written.bytes <= target;
-    if (fits && (out.form.detail == 0 || detail < out.form.detail)) {
-      out.form = std::move(form);
-      out.report = written;
-    }
-    return written.bytes;
+    const size_t bytes = writer.made(form).bytes.size();
+    const bool fits = bytes <= target;
+    if (fits && (out.form.detail == 0 || detail < out.form.detail)) out.form = std::move(form);
+    return bytes;
   });
   if (!search.detail) {
     const size_t least = std::min(whole, search.smallest()) + kRoomForCertificate;
@@ -250,7 +247,7 @@ Written write_within(const AssetWriter& writer,
                      format_length(coarsest, frame) + "; --max-size allows " +
                      std::to_string(limit) + "; the other files are there");
   }
-  out.report = writer.write_certified(out.form);
+  out.glb = writer.certified(out.form);
   out.tried = search.tried;
   return out;
 }
@@ -288,7 +285,7 @@ std::string words_for(const Written& written,
                       size_t limit,
                       size_t whole_faces,
                       const Frame& frame) {
-  std::string out = "asset.glb has " + format_file_size(written.report.bytes);
+  std::string out = "asset.glb has " + format_file_size(written.glb.report.bytes);
   if (limit > 0) out += " of at most " + format_file_size(limit);
   if (limit > 0 && written.form.detail == 0) out += "; nothing had to be left out";
   if (written.form.detail > 0) {
@@ -313,9 +310,10 @@ std::pair<Form, Json> write_promised(const AssetWriter& writer,
   const TriangleMesh fused = fused_surface(request.output / "volume.vdb", request.memory_limit);
   const double already = request.max_size > 0 ? surface_deviation(mesh, fused).evidence : 0;
   Written written =
-      write_within(writer, request.max_size, already, frame, part_of(progress, 0.1, 0.9));
-  const SurfaceDeviation deviation = writer.deviation_from(fused);
-  Json out = glb_to_json(written.report, frame);
+      form_within(writer, request.max_size, already, frame, part_of(progress, 0.1, 0.9));
+  const SurfaceDeviation deviation = writer.deviation_from(fused, written.glb);
+  write_file(writer.path(), written.glb.bytes);
+  Json out = glb_to_json(written.glb.report, frame);
   out["deviation"] = deviation_to_json(deviation, frame);
   out["form"] = form_to_json(written, frame);
   out["words"] = words_for(written, deviation, request.max_size, mesh.faces.size(), frame);
@@ -330,13 +328,14 @@ std::pair<Form, Json> write_finest(const AssetWriter& writer,
                                    const Progress& progress) {
   if (request.max_error.empty() && request.max_size == 0) {
     Form form = writer.whole();
-    Json json = glb_to_json(writer.write_certified(form), frame);
-    return {std::move(form), std::move(json)};
+    const GlbFile glb = writer.certified(form);
+    write_file(writer.path(), glb.bytes);
+    return {std::move(form), glb_to_json(glb.report, frame)};
   }
   try {
     return write_promised(writer, request, mesh, frame, progress);
   } catch (...) {
-    std::filesystem::remove(writer.path());  // a form that was tried may break the promise
+    std::filesystem::remove(writer.path());  // one that was there may break the promise
     throw;
   }
 }
@@ -410,17 +409,18 @@ Json write_levels(const AssetWriter& writer,
   const double finest = std::max(shown, finest_form.detail);
   finest_form = {};
   const std::filesystem::path folder = writer.path().parent_path();
-  const TriangleMesh full = writer.read(writer.path());
+  const TriangleMesh full = writer.read(read_file(writer.path()));
   std::vector<Level> levels;
   for (const double detail : level_details(finest, writer.side(), count)) {
     report(progress, double(levels.size()) / double(count));
     Form form = writer.level(detail, finest > 0 ? finest : detail / kLevelStep);
     const std::string name = level_name(levels.size() + 1);
-    const GlbReport written = writer.write_certified(form, folder / name);
-    const TriangleMesh mesh = writer.read(folder / name);
+    const GlbFile glb = writer.certified(form);
+    write_file(folder / name, glb.bytes);
+    const TriangleMesh mesh = writer.read(glb.bytes);
     levels.push_back({name,
-                      written.bytes,
-                      written.triangles,
+                      glb.report.bytes,
+                      glb.report.triangles,
                       form.texture_share,
                       detail,
                       surface_deviation(mesh, full),

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Geometry>
 
+#include "io/byte_reader.h"
 #include "io/glb_colors.h"
 #include "io/glb_container.h"
 #include "io/glb_faces.h"
@@ -179,8 +181,10 @@ class SceneReader {
 
 }  // namespace
 
-GlbMesh read_glb(const std::filesystem::path& path) {
-  const GlbContainer file(path);
+GlbMesh read_glb(const std::filesystem::path& path) { return parse_glb(read_file(path), path); }
+
+GlbMesh parse_glb(std::string content, const std::filesystem::path& path) {
+  const GlbContainer file(std::move(content), path);
   GlbOrigin origin = glb_origin(file);
   GlbMesh out = SceneReader(file, origin).read();
   out.parsed.comments = std::move(origin.comments);

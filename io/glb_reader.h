@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include <Eigen/Core>
 
@@ -29,5 +30,7 @@ struct GlbMesh {
 ///         infinite or that floats round too much, as check_significance(); LimitError
 /// Source: glTF 2.0, KHR_mesh_quantization and KHR_draco_mesh_compression, Khronos Group.
 GlbMesh read_glb(const std::filesystem::path& path);
+/// The same for the content of a file, whose name is for messages.
+GlbMesh parse_glb(std::string content, const std::filesystem::path& path);
 
 }  // namespace cgs

@@ -230,6 +230,15 @@ GlbReport write_glb(const std::filesystem::path& path,
                     const PhotoTexture& texture,
                     const Frame& frame,
                     const GlbOptions& options) {
+  const GlbFile file = make_glb(mesh, texture, frame, options);
+  write_file(path, file.bytes);
+  return file.report;
+}
+
+GlbFile make_glb(const TriangleMesh& mesh,
+                 const PhotoTexture& texture,
+                 const Frame& frame,
+                 const GlbOptions& options) {
   options.validate();
   require_writable(mesh, "write_glb");
   require_texture(mesh, texture, "write_glb");
@@ -268,8 +277,7 @@ GlbReport write_glb(const std::filesystem::path& path,
   std::string bytes = builder.bytes();
   if (store.encoding == GlbEncoding::Meshopt) bytes = meshopt_compressed(bytes);
   report.bytes = bytes.size();
-  write_file(path, bytes);
-  return report;
+  return {std::move(bytes), report};
 }
 
 }  // namespace cgs

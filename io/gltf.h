@@ -103,4 +103,16 @@ GlbReport write_glb(const std::filesystem::path& path,
                     const Frame& frame,
                     const GlbOptions& options = {});
 
+/// A file that is on no disk yet.
+struct GlbFile {
+  std::string bytes;
+  GlbReport report;
+};
+
+/// What write_glb() would write. \throws as that, but for IoError
+GlbFile make_glb(const TriangleMesh& mesh,
+                 const PhotoTexture& texture,
+                 const Frame& frame,
+                 const GlbOptions& options = {});
+
 }  // namespace cgs

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "io/glb_reader.h"
 #include "io/mesh_ply.h"
@@ -22,11 +23,6 @@ namespace {
 // \param up  what the format says, in file axes; stays where it says nothing
 ParsedMesh parse(const std::filesystem::path& path, Eigen::Vector3d& up) {
   const std::string extension = lower_extension(path);
-  if (extension == ".glb") {
-    GlbMesh glb = read_glb(path);
-    up = glb.up;
-    return std::move(glb.parsed);
-  }
   if (extension == ".ply") return parse_mesh_ply(path);
   if (extension == ".obj") return read_obj(path);
   if (extension == ".stl") {
@@ -56,18 +52,11 @@ size_t faces_without_area(const MeasurableMesh& content) {
   return count;
 }
 
-}  // namespace
-
-bool is_mesh_name(const std::filesystem::path& path) {
-  const std::string extension = lower_extension(path);
-  const auto known = {".ply", ".obj", ".stl", ".off", ".3mf", ".glb"};
-  return std::find(known.begin(), known.end(), extension) != known.end();
-}
-
-MeasurableFile read_mesh_file(const std::filesystem::path& path,
-                              const std::optional<Frame>& frame) {
-  Eigen::Vector3d up = Eigen::Vector3d::Zero();
-  ParsedMesh parsed = parse(path, up);
+// \param up  0 = the format does not say
+MeasurableFile measurable(ParsedMesh parsed,
+                          const Eigen::Vector3d& up,
+                          const std::filesystem::path& path,
+                          const std::optional<Frame>& frame) {
   check_significance(parsed, path);
   PlyPlacement placement =
       ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
@@ -87,6 +76,34 @@ MeasurableFile read_mesh_file(const std::filesystem::path& path,
     out.warnings.push_back(std::to_string(flat) + " faces have no area");
   }
   return out;
+}
+
+MeasurableFile measurable(GlbMesh glb,
+                          const std::filesystem::path& path,
+                          const std::optional<Frame>& frame) {
+  return measurable(std::move(glb.parsed), glb.up, path, frame);
+}
+
+}  // namespace
+
+bool is_mesh_name(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  const auto known = {".ply", ".obj", ".stl", ".off", ".3mf", ".glb"};
+  return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
+MeasurableFile read_mesh_file(const std::filesystem::path& path,
+                              const std::optional<Frame>& frame) {
+  if (lower_extension(path) == ".glb") return measurable(read_glb(path), path, frame);
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  ParsedMesh parsed = parse(path, up);
+  return measurable(std::move(parsed), up, path, frame);
+}
+
+MeasurableFile parse_glb_file(std::string content,
+                              const std::filesystem::path& path,
+                              const std::optional<Frame>& frame) {
+  return measurable(parse_glb(std::move(content), path), path, frame);
 }
 
 }  // namespace cgs

@@ -30,4 +30,9 @@ bool is_mesh_name(const std::filesystem::path& path);
 MeasurableFile read_mesh_file(const std::filesystem::path& path,
                               const std::optional<Frame>& frame = {});
 
+/// The same for the content of a binary glTF file, whose name is for messages.
+MeasurableFile parse_glb_file(std::string content,
+                              const std::filesystem::path& path,
+                              const std::optional<Frame>& frame = {});
+
 }  // namespace cgs

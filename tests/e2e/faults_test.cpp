@@ -186,6 +186,23 @@ class Faults : public testing::Test {
   static inline std::vector<Fault> places_;
 };
 
+// A file that is there is as it stays: what is put in its place later would leave the first where a
+// fault comes between them.
+TEST_F(Faults, NoFileIsWrittenTwice) {
+  std::ifstream log(*dir_ / "calls");
+  const std::regex form(R"re(rename\(.*"([^"]*)"\))re");
+  std::map<std::string, int> written;
+  for (std::string line; std::getline(log, line);) {
+    std::smatch parts;
+    if (std::regex_search(line, parts, form)) ++written[parts[1]];
+  }
+  ASSERT_GT(written.size(), 30u);
+  for (const auto& [name, times] : written) {
+    const bool is_of_the_run = name.ends_with("run.json") || test::is_unfinished(name);
+    EXPECT_TRUE(times == 1 || is_of_the_run) << name << ": " << times << " times";
+  }
+}
+
 TEST_F(Faults, AnErrorOfTheSystemIsReportedAndNothingIsLost) {
   std::vector<Fault> faults;
   for (const Fault& place : places_) {
