@@ -35,9 +35,9 @@ void require_images(const Scene& scene) {
 // Errors of a match [pixels], fitted as depth_sigma() says.
 constexpr float kTexture = 0.45f;    // of the bound from texture: neighbours help each other,
 constexpr float kMostNoise = 0.17f;  // and where there is none at all, they decide
+constexpr float kBend = 0.0015f;     // of surfaces that show nothing [1 / pixels]
 
-constexpr float kPlaces = 0.5f;   // largest error of a match that places a surface [pixels]
-constexpr float kBend = 0.0015f;  // of surfaces that show nothing [1 / pixels]
+constexpr float kPlaces = 0.5f;  // largest error of a match that places a surface [pixels]
 
 // Largest step between neighbours' planes on one surface [planes]; bare surfaces fall into pieces
 // where it is smaller.
@@ -97,11 +97,11 @@ void take_back(const Patch& patch, Raster<Agreement>& agreement) {
 // Takes back confirmations of small patches that continue no surface around them: agreements by
 // chance, which completion would spread.
 void remove_speckles(const SweptView& view, Raster<Agreement>& agreement) {
-  constexpr float kSameSpeckle = 1.0f;
+  constexpr float kSmooth = 1.0f;     // [planes]
   constexpr double kSmallest = 4e-4;  // share of the image
   const auto smallest = static_cast<size_t>(kSmallest * double(agreement.data.size()) + 5);
   const auto is_confirmed = [&](int x, int y) { return agreement(x, y).views > 0; };
-  for_each_patch(view, kSameSpeckle, is_confirmed, [&](const Patch& patch) {
+  for_each_patch(view, kSmooth, is_confirmed, [&](const Patch& patch) {
     if (patch.size() < smallest) take_back(patch, agreement);
   });
 }
@@ -177,10 +177,9 @@ float roughness(const SweptView& view, const Raster<Agreement>& agreement, int x
 
 // Standard deviation of t [planes]: errors of the match over the parallax of the best view that
 // confirms it, however much a view that does not would have told. Between what they show, surfaces
-// may bend: by the square of the way to it. The terms and their weights are
-// fitted to the errors on three Middlebury 2014 pairs and the three photographs of the portal
-// capture, whose truths are known: tests/eval/stereo_accuracy prints the shares within 1, 2, 3 and
-// 5 sigma.
+// may bend: by the square of the way to it. The terms and their weights are fitted to the errors on
+// three Middlebury 2014 pairs and the three photographs of the portal capture, whose truths are
+// known: tests/eval/stereo_accuracy prints the shares within 1, 2, 3 and 5 sigma.
 float depth_sigma(const RefinedPixel& pixel,
                   const Agreement& agreement,
                   float roughness,
