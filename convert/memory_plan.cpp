@@ -16,7 +16,8 @@ namespace {
 constexpr double kMebi = 1 << 20;
 
 /// What a stage needs without a picture, and for each pixel of pictures. Measured on the portal
-/// capture and on LLFF's fern at 36,000 to 620,000 pixels, of one size and of several.
+/// capture at 60,000 to 620,000 pixels, of one size and of several; depth, splats and volume on
+/// LLFF's fern, too.
 struct StageFactors {
   const char* stage;
   double base;        ///< [bytes]

@@ -8,16 +8,19 @@
 namespace cgs {
 namespace {
 
-Scene scene_of(int views, int width, int height) {
+Scene scene_of(const std::vector<std::pair<int, int>>& sizes) {
   Scene scene;
-  for (int i = 0; i < views; ++i) {
+  for (const auto& [width, height] : sizes) {
     View view;
     view.camera.width = width;
     view.camera.height = height;
+    scene.input.push_back(static_cast<int>(scene.views.size()));
     scene.views.push_back(view);
-    scene.input.push_back(i);
   }
   return scene;
+}
+Scene scene_of(size_t views, int width, int height) {
+  return scene_of(std::vector<std::pair<int, int>>(views, {width, height}));
 }
 
 size_t most(const std::vector<StageMemory>& plan) {
@@ -43,16 +46,6 @@ TEST(MemoryPlan, GrowsWithThePixelsOfTheInputViewsAlone) {
   EXPECT_EQ(memory_plan_text(memory_plan(more, true)), memory_plan_text(memory_plan(scene, true)));
   EXPECT_GT(most(memory_plan(scene_of(4, 400, 300), true)), most(memory_plan(scene, true)));
   EXPECT_GT(most(memory_plan(scene_of(3, 800, 600), true)), most(memory_plan(scene, true)));
-}
-
-Scene scene_of(const std::vector<std::pair<int, int>>& sizes) {
-  Scene scene;
-  for (const auto& [width, height] : sizes) {
-    Scene one = scene_of(1, width, height);
-    scene.input.push_back(static_cast<int>(scene.views.size()));
-    scene.views.push_back(one.views[0]);
-  }
-  return scene;
 }
 
 double of_stage(const Scene& scene, const std::string& stage) {
