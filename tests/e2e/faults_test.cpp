@@ -55,7 +55,10 @@ const std::map<std::string, std::vector<std::string>>& errors_of_calls() {
 class Counted {
  public:
   Counted() { ++tried; }
-  ~Counted() { survived += failures() == before_ ? 1 : 0; }
+  ~Counted() {
+    survived += failures() == before_ ? 1 : 0;
+    if (tried % 50 == 0) std::fprintf(stderr, "so far %d survived of %d tried\n", survived, tried);
+  }
   Counted(const Counted&) = delete;
   Counted& operator=(const Counted&) = delete;
 
