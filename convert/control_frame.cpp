@@ -14,9 +14,11 @@
 #include "convert/html.h"
 #include "convert/length.h"
 #include "convert/model.h"
+#include "convert/stated_frame.h"
 #include "io/control_points.h"
 #include "io/lens.h"
 #include "io/orientation.h"
+#include "io/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/control_fit.h"
 #include "libcgs/priors/ray_meeting.h"
@@ -50,48 +52,53 @@ struct Seen {
   PicturePoint pick;  // in the undistorted picture
 };
 
-// By the name of the view or of its file, or its index in name order.
-const View* view_of(const Scene& scene, const std::string& name) {
-  for (const View& view : scene.views) {
-    if (view.name == name || view.image_path.filename() == name) return &view;
+const View& view_of(const ControlPick& pick,
+                    const Scene& scene,
+                    const std::string& line,
+                    const std::filesystem::path& file) {
+  const std::vector<int> found = views_called(scene, pick.view);
+  if (found.size() == 1) {
+    const View& view = scene.views[static_cast<size_t>(found.front())];
+    if (!view.image_path.empty()) return view;
   }
-  uint64_t index = 0;
-  if (parse_number(name, index) && index < scene.views.size()) return &scene.views[index];
-  return nullptr;
+  if (found.size() > 1) {
+    throw BadInput(Defect::Ref,
+                   file,
+                   line + std::to_string(found.size()) + " views have a photograph \"" +
+                       printable(pick.view) + "\"; name the view, or the folder with it");
+  }
+  std::string names;
+  constexpr size_t kShown = 8;
+  for (size_t i = 0; i < std::min(kShown, scene.views.size()); ++i) {
+    names += (i == 0 ? "" : ", ") + scene.views[i].name;
+  }
+  throw BadInput(Defect::Ref,
+                 file,
+                 line + "no photograph of view \"" + printable(pick.view) + "\"; there are " +
+                     printable(names) + (scene.views.size() > kShown ? ", …" : ""));
 }
 
 Seen seen(const ControlPick& pick, const Scene& scene, const std::filesystem::path& file) {
   const std::string line = "line " + std::to_string(pick.line) + ": ";
-  const View* view = view_of(scene, pick.view);
-  if (view == nullptr || view->image_path.empty()) {
-    std::string names;
-    constexpr size_t kShown = 8;
-    for (size_t i = 0; i < std::min(kShown, scene.views.size()); ++i) {
-      names += (i == 0 ? "" : ", ") + scene.views[i].name;
-    }
-    throw BadInput(Defect::Ref,
-                   file,
-                   line + "no photograph of view \"" + printable(pick.view) + "\"; there are " +
-                       printable(names) + (scene.views.size() > kShown ? ", …" : ""));
-  }
-  const auto at = picked_pixel(*view, {pick.x, pick.y});
+  const View& view = view_of(pick, scene, line, file);
+  const auto at = picked_pixel(view, {pick.x, pick.y});
   if (!at) {
-    const ImageSize size = shown_size(*view);
+    const ImageSize size = shown_size(view);
     throw BadInput(Defect::Value,
                    file,
                    line + "lies outside of the " + std::to_string(size.width) + " x " +
-                       std::to_string(size.height) + " pixels of " + printable(view->image_path));
+                       std::to_string(size.height) + " pixels of " + printable(view.image_path));
   }
-  const Camera picture = picture_camera(*view);
-  const LensMap lens(*view, picture);
+  const Camera picture = picture_camera(view);
+  const LensMap lens(view, picture);
   const Eigen::Vector2d in_photograph = *at + Eigen::Vector2d(0.5, 0.5);
   const auto undone = lens(in_photograph);
   if (!undone) {
     throw BadInput(Defect::Value,
                    file,
-                   line + "lies where the lens of " + printable(view->name) + " cannot be undone");
+                   line + "lies where the lens of " + printable(view.name) + " cannot be undone");
   }
-  return {view->name, picture, lens, in_photograph, *undone};
+  return {view.name, picture, lens, in_photograph, *undone};
 }
 
 std::optional<RayMeeting> meeting_of(const std::vector<Seen>& picks) {
@@ -260,6 +267,7 @@ Json point_json(const Sighted& s, const ControlResidual* residual) {
   out["sigmas"] = residual->sigmas;
   out["used"] = residual->is_used;
   if (!residual->is_used && !s.point.is_check) out["remark"] = "disagrees with the others";
+  if (s.point.is_check && !residual->is_met) out["remark"] = "disagrees with the control points";
   return out;
 }
 
@@ -285,9 +293,12 @@ void warn_of_points(const std::vector<Sighted>& points,
       unpicked += (unpicked.empty() ? "" : ", ") + printable(s.point.name);
       continue;
     }
-    const std::string name = "control point " + printable(s.point.name);
-    if (!told["used"].get<bool>() && !(s.point.is_check && s.meeting)) {
-      std::string text = name + " left out: " + told["remark"].get<std::string>();
+    const bool is_compared = s.point.is_check && s.meeting;
+    const std::string name =
+        (s.point.is_check ? "check point " : "control point ") + printable(s.point.name);
+    const auto remark = told["remark"].get<std::string>();
+    if (!remark.empty()) {
+      std::string text = name + (is_compared ? " " : " left out: ") + remark;
       if (s.meeting) {
         const Json& off = told["residual"];
         const Eigen::Vector3d v(off[0], off[1], off[2]);
@@ -316,6 +327,7 @@ void move_scene(const Similarity& to_control, Scene& scene) {
     view.far *= to_control.scale;
   }
   for (SparsePoint& point : scene.points) point.position = to_control(point.position);
+  scene.world_per_stated_unit *= to_control.scale;
 }
 
 Frame control_frame(const ControlFit& fit, double metres) {
@@ -358,6 +370,10 @@ Json move_to_control_frame(const ControlRequest& request, Scene& scene) {
     points.push_back(sighted(point, scene, request.file));
   }
   const ControlFit fit = checked_fit(points, request.file);
+  const double scale = fit.control_from_scene.scale;
+  const std::string contradiction = scale_contradiction(
+      scene.frame, "the control points", metres * scale, metres * fit.scale_sigma);
+  if (!contradiction.empty()) scene.warnings.push_back(contradiction);
   move_scene(fit.control_from_scene, scene);
   scene.frame = control_frame(fit, metres);
   const Json list = points_json(points, fit);
@@ -368,7 +384,7 @@ Json move_to_control_frame(const ControlRequest& request, Scene& scene) {
           {"control_points",
            {{"file", request.file.string()},
             {"unit", unit},
-            {"scale", fit.control_from_scene.scale},
+            {"scale", scale},
             {"rotation_sigma", fit.rotation_sigma * 180 / std::numbers::pi},
             {"scatter", fit.scatter},
             {"points", list},

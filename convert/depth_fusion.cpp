@@ -107,8 +107,9 @@ class Frames {
     out.usable = std::move(view.valid);
     out.depth = DepthMap(view.camera.width, view.camera.height, kNaN);
     out.sigma = out.depth;
-    const double units = is_scaled ? 1 : scene_.frame.metres_per_unit;
-    const double internal_per_value = 1 / (units * scene_.frame.scale);
+    const double world_per_value =
+        is_scaled ? scene_.world_per_stated_unit : 1 / scene_.frame.metres_per_unit;
+    const double internal_per_value = world_per_value / scene_.frame.scale;
     for (int y = 0; y < out.depth.height; ++y) {
       for (int x = 0; x < out.depth.width; ++x) {
         const double z = double(view.given_depth(x, y)) * internal_per_value;

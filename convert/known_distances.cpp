@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/length.h"
+#include "convert/stated_frame.h"
 #include "io/lens.h"
 #include "io/orientation.h"
 #include "io/scene_reader.h"
@@ -41,7 +42,7 @@ KnownDistance::Pick pick_of(const std::string& text, const Scene& scene) {
   if (colon == std::string::npos || comma == std::string::npos) refuse_pick(text);
   KnownDistance::Pick pick;
   const std::string name = text.substr(0, colon);
-  pick.view = find_view(scene, name);
+  pick.view = find_view(scene, name, "--known-distance");
   pick.x = pixel_number(text.substr(colon + 1, comma - colon - 1), text);
   pick.y = pixel_number(text.substr(comma + 1), text);
   const View& view = scene.views[static_cast<size_t>(pick.view)];
@@ -162,6 +163,45 @@ Json warnings_of(const BarScale& scale, const std::vector<NamedBar>& bars) {
   return out;
 }
 
+std::vector<NamedBar> sides_of(const std::vector<MarkerBar>& markers) {
+  std::vector<NamedBar> out;
+  out.reserve(markers.size());
+  for (const MarkerBar& marker : markers) {
+    const std::string shown = std::to_string(marker.photographs) + " photographs";
+    out.push_back({"side of marker " + marker.name + ", " + shown, marker.bar});
+    out.back().bar.known_sigma = 0;  // is that of all of them
+  }
+  return out;
+}
+
+std::vector<ScaleBar> bars_of(const std::vector<NamedBar>& named) {
+  std::vector<ScaleBar> out;
+  out.reserve(named.size());
+  for (const NamedBar& bar : named) out.push_back(bar.bar);
+  return out;
+}
+
+// All markers as one bar: one size is stated for all, and their corners are found alike, so what is
+// wrong with either is not less wrong of many markers.
+ScaleBar bar_of_all(const std::vector<MarkerBar>& markers, const BarScale& scale) {
+  ScaleBar out = markers.front().bar;
+  double common = 0;
+  for (const MarkerBar& marker : markers) common += marker.common_sigma / double(markers.size());
+  out.measured = out.known / scale.metres_per_unit;
+  out.measured_sigma = out.measured * std::hypot(scale.sigma / scale.metres_per_unit, common);
+  return out;
+}
+
+Json bar_json(const NamedBar& named, double metres_per_unit, bool is_used) {
+  const ScaleBar& bar = named.bar;
+  return {{"distance", named.name},
+          {"known", bar.known},
+          {"measured", bar.measured * metres_per_unit},
+          {"sigma", bar.measured_sigma * metres_per_unit},
+          {"residual", bar.measured * metres_per_unit - bar.known},
+          {"used", is_used}};
+}
+
 }  // namespace
 
 std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typed,
@@ -182,37 +222,44 @@ std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typ
 Json scale_by(const std::vector<KnownDistance>& distances,
               const std::vector<MarkerBar>& markers,
               Model& model) {
-  std::vector<NamedBar> named;
-  named.reserve(distances.size() + markers.size());
+  std::vector<NamedBar> picked;
+  picked.reserve(distances.size());
   for (const KnownDistance& distance : distances) {
-    named.push_back({distance.text, bar_of(distance, model)});
+    picked.push_back({distance.text, bar_of(distance, model)});
   }
-  for (const MarkerBar& marker : markers) {
-    const std::string shown = std::to_string(marker.photographs) + " photographs";
-    named.push_back({"side of marker " + marker.name + ", " + shown, marker.bar});
+  if (picked.empty() && markers.empty()) return nullptr;
+  const std::vector<NamedBar> sides = sides_of(markers);
+  BarScale by_markers;
+  std::vector<NamedBar> all = picked;
+  if (!sides.empty()) {
+    by_markers = scale_of(bars_of(sides));
+    all.push_back({"of the markers", bar_of_all(markers, by_markers)});
   }
-  if (named.empty()) return nullptr;
-  std::vector<ScaleBar> bars;
-  bars.reserve(named.size());
-  for (const NamedBar& bar : named) bars.push_back(bar.bar);
-  const BarScale scale = scale_of(bars);
+  const BarScale scale = scale_of(bars_of(all));
+  Json list = Json::array();
+  for (size_t i = 0; i < picked.size(); ++i) {
+    list.push_back(bar_json(picked[i], scale.metres_per_unit, scale.used[i]));
+  }
+  for (size_t i = 0; i < sides.size(); ++i) {
+    const bool is_used = by_markers.used[i] && scale.used.back();
+    list.push_back(bar_json(sides[i], scale.metres_per_unit, is_used));
+  }
+  Json warnings = sides.empty() ? Json::array() : warnings_of(by_markers, sides);
+  for (const Json& warning : warnings_of(scale, all)) warnings.push_back(warning);
   Frame& frame = model.scene.frame;
+  const std::string contradiction =
+      scale_contradiction(frame,
+                          sides.empty() ? "the known distances" : "the markers",
+                          scale.metres_per_unit,
+                          scale.sigma);
+  if (!contradiction.empty()) warnings.push_back(contradiction);
   frame.metres_per_unit = scale.metres_per_unit;
   frame.metres_sigma = scale.sigma;
   frame.scale_source = ScaleSource::KnownDistance;
-  Json list = Json::array();
-  for (size_t i = 0; i < bars.size(); ++i) {
-    list.push_back({{"distance", named[i].name},
-                    {"known", bars[i].known},
-                    {"measured", bars[i].measured * scale.metres_per_unit},
-                    {"sigma", bars[i].measured_sigma * scale.metres_per_unit},
-                    {"residual", scale.residuals[i]},
-                    {"used", static_cast<bool>(scale.used[i])}});
-  }
   return {{"metres_per_unit", scale.metres_per_unit},
           {"metres_sigma", scale.sigma},
           {"distances", list},
-          {"warnings", warnings_of(scale, named)}};
+          {"warnings", warnings}};
 }
 
 }  // namespace cgs

@@ -20,19 +20,25 @@ namespace cgs {
 namespace {
 
 constexpr double kCornerSigma = 0.2;  // [pixels of the photograph]
+constexpr double kCornerBias = 0.1;   // out of the marker or into it, as light and blur have it
 
-/// The rays to the corners of a marker, per photograph.
-using Sightings = std::vector<std::array<SightRay, 4>>;
+/// A marker in a photograph.
+struct Sighting {
+  std::array<SightRay, 4> rays;  // to its corners
+  double side;                   // mean [pixels of the photograph]
+};
+using Sightings = std::vector<Sighting>;
 
 // Nothing where the lens cannot be undone.
-std::optional<std::array<SightRay, 4>> rays_of(const Marker& marker,
-                                               const LensMap& lens,
-                                               const Camera& picture) {
-  std::array<SightRay, 4> out;
+std::optional<Sighting> sighting_of(const Marker& marker,
+                                    const LensMap& lens,
+                                    const Camera& picture) {
+  Sighting out{};
   for (size_t k = 0; k < 4; ++k) {
     const auto corner = lens(marker.corners.at(k));
     if (!corner) return std::nullopt;
-    out.at(k) = sight_ray(picture, corner->at, kCornerSigma * corner->stretch);
+    out.rays.at(k) = sight_ray(picture, corner->at, kCornerSigma * corner->stretch);
+    out.side += (marker.corners.at((k + 1) % 4) - marker.corners.at(k)).norm() / 4;
   }
   return out;
 }
@@ -44,8 +50,8 @@ std::map<std::string, Sightings> sightings(const Scene& scene) {
     const Camera picture = picture_camera(view);
     const LensMap lens(view, picture);
     for (const Marker& marker : find_markers(read_photograph(view))) {
-      const auto rays = rays_of(marker, lens, picture);
-      if (rays) out[marker.name].push_back(*rays);
+      const auto sighting = sighting_of(marker, lens, picture);
+      if (sighting) out[marker.name].push_back(*sighting);
     }
   }
   return out;
@@ -54,7 +60,7 @@ std::map<std::string, Sightings> sightings(const Scene& scene) {
 std::vector<SightRay> rays_to(const Sightings& seen, size_t corner) {
   std::vector<SightRay> out;
   out.reserve(seen.size());
-  for (const auto& corners : seen) out.push_back(corners.at(corner));
+  for (const Sighting& s : seen) out.push_back(s.rays.at(corner));
   return out;
 }
 
@@ -101,6 +107,13 @@ std::optional<std::pair<double, double>> side_and_sigma(const Sightings& seen) {
   return std::pair(mean, std::sqrt(variance));
 }
 
+// Both ends of a side are shifted.
+double common_sigma(const Sightings& seen) {
+  double sum = 0;
+  for (const Sighting& s : seen) sum += 2 * kCornerBias / s.side;
+  return sum / double(seen.size());
+}
+
 [[noreturn]] void refuse(const std::map<std::string, Sightings>& seen) {
   std::string text = "--marker-size: no square marker is shown by two input photographs; found: ";
   for (const auto& [name, places] : seen) {
@@ -128,7 +141,8 @@ std::vector<MarkerBar> marker_bars(const Scene& scene, const std::string& size) 
     const double scale = scene.frame.scale;
     out.push_back({name,
                    static_cast<int>(places.size()),
-                   {scale * side->first, scale * side->second, known, known_sigma}});
+                   {scale * side->first, scale * side->second, known, known_sigma},
+                   common_sigma(places)});
   }
   if (out.empty()) refuse(seen);
   return out;

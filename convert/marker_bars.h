@@ -14,6 +14,8 @@ struct MarkerBar {
   std::string name;
   int photographs = 0;  ///< That show it.
   ScaleBar bar;
+  /// Relative standard deviation of its side by what shifts the corners of all markers alike.
+  double common_sigma = 0;
 };
 
 /// Measures the sides of square markers that two or more input photographs show, by intersecting

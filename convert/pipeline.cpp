@@ -216,8 +216,12 @@ std::map<std::string, std::string> decided_stages(const RunRequest& request, con
                                             {"glb_encoding", "web"},
                                             {"lods", "web"},
                                             {"max_size", "web"}};
-  // Metric depth is brought into the scene by its unit where photographs do not tell how.
-  if (has_given_depth(request.scene, scene)) out.erase("assume_unit");
+  // Metric depth is brought into the scene by its unit where photographs do not tell how, and held
+  // against it where they do.
+  if (has_given_depth(request.scene, scene)) {
+    out.erase("assume_unit");
+    out.erase("control_points");
+  }
   return out;
 }
 
@@ -421,7 +425,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   terminal.warn(std::vector(scene.warnings.begin() + std::ptrdiff_t(known), scene.warnings.end()));
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
   std::vector<MarkerBar> markers = marker_bars(scene, request.scene.marker_size);
-  check_lengths(request, scene.frame);
+  check_lengths(request, scene);
   make_output_folder(request.output);
   const FolderLock lock(request.output);
   refuse_foreign_files(request, scene);

@@ -314,6 +314,12 @@ void move_cameras(const RefinedPoses& refined, Scene& scene) {
   }
 }
 
+void state_in_units(double factor, RefinedPoses& refined) {
+  for (Json& view : refined.report["views"]) {
+    view["distance"] = factor * view["distance"].get<double>();
+  }
+}
+
 std::string refinement_words(const Json& report) {
   size_t inputs = 0;
   size_t held_out = 0;

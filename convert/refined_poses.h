@@ -44,6 +44,10 @@ RefinedPoses refined_poses(const Scene& scene,
 /// Moves the cameras of a scene.
 void move_cameras(const RefinedPoses& refined, Scene& scene);
 
+/// States the report in other units of length. \param factor  of those per unit of the scene as
+/// read
+void state_in_units(double factor, RefinedPoses& refined);
+
 /// One line on it for people. \param report  of RefinedPoses
 std::string refinement_words(const nlohmann::ordered_json& report);
 

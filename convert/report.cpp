@@ -141,7 +141,7 @@ std::string views_section(const std::filesystem::path& folder,
           "saw</label>\n";
   for (const Json& view : views) {
     const auto name = view["name"].get<std::string>();
-    const int index = find_view(scene, name);
+    const int index = find_view(scene, name, "report");
     const std::string holes = overlay(folder / "views" / (name + ".hole.png"));
     html << "<h3>" << escaped(name) << " (" << view["role"].get<std::string>() << "), "
          << hole_words(view) << "</h3>\n<div class=row>\n"

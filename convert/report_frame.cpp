@@ -23,12 +23,12 @@ std::string control_row(const Json& point) {
     const Json off = point["residual"].is_null() ? Json() : point["residual"][size_t(k)];
     html << "<td>" << number(off, "%.3g") << "</td>";
   }
-  const bool is_good = point["used"].get<bool>() || (is_check && !point["residual"].is_null());
+  const auto remark = point["remark"].get<std::string>();
   const std::string use = is_check ? "to check by" : "yes";
   html << "<td>" << number(point["sigmas"], "%.2f") << "</td><td>"
        << number(point["photographs"], "%.0f") << "</td><td>"
        << number(point["reprojection"], "%.2f") << "</td><td>"
-       << verdict(is_good, use, "no: " + escaped(point["remark"].get<std::string>()))
+       << verdict(remark.empty(), use, (is_check ? "" : "no: ") + escaped(remark))
        << "</td></tr>\n";
   return html.str();
 }
@@ -50,7 +50,7 @@ std::string far_origin(const Json& frame) {
   std::string out;
   bool is_far = false;
   for (const Json& coordinate : origin) {
-    out += (out.empty() ? "" : ", ") + number(coordinate, "%.10g");
+    out += (out.empty() ? "" : ", ") + number(coordinate, "%.17g");
     is_far = is_far || coordinate.get<double>() != 0;
   }
   return is_far ? "; to the coordinates in PLY, OBJ and VDB add " + out +

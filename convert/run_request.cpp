@@ -98,6 +98,15 @@ void check_lengths(const RunRequest& request, Frame frame) {
   (void)simplify_options(request.simplify, 1, frame);
 }
 
+void check_lengths(const RunRequest& request, const Scene& scene) {
+  Frame frame = scene.frame;
+  const DepthKind kind = request.scene.options.depth.kind;
+  const bool may_tell_metres = (kind == DepthKind::Metric || kind == DepthKind::Unknown) &&
+                               request.scene.options.depth.network.empty();
+  if (has_given_depth(request.scene, scene) && may_tell_metres) frame.metres_per_unit = 1;
+  check_lengths(request, frame);
+}
+
 void refuse_contradictions(const RunRequest& request) {
   // A promise is about all that is done to the fused surface; its parts are then no longer free.
   if (request.max_error.empty()) return;

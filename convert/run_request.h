@@ -46,6 +46,7 @@ void refuse_contradictions(const RunRequest& request);
 /// \param frame  of the scene as opened; where its scale will be known later, any stands for it
 /// \throws InvalidInput as parse_length()
 void check_lengths(const RunRequest& request, Frame frame);
+void check_lengths(const RunRequest& request, const Scene& scene);
 
 /// True if depth goes in beside the photographs, from files or a network.
 bool has_given_depth(const SceneRequest& request, const Scene& scene);

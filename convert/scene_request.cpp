@@ -123,6 +123,7 @@ OpenedScene open_scene(const SceneRequest& request,
   }
   if (!request.control.file.empty()) {
     out.control = move_to_control_frame(request.control, out.scene);
+    if (out.refined) state_in_units(out.scene.world_per_stated_unit, *out.refined);
     return out;
   }
   if (!request.assume_unit.empty()) {

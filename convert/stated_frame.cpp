@@ -4,6 +4,9 @@
 #include <cmath>
 #include <string>
 
+#include <nlohmann/json.hpp>
+
+#include "convert/html.h"
 #include "convert/length.h"
 #include "libcgs/core/error.h"
 
@@ -18,6 +21,24 @@ std::string assume_unit(Frame& frame, const std::string& unit) {
   }
   if (std::abs(frame.metres_per_unit / metres - 1) <= 1e-9) return "";
   return "--assume-unit " + unit + " left out: the input says its unit is " + frame.unit_name();
+}
+
+std::string scale_contradiction(const Frame& stated,
+                                const std::string& by,
+                                double metres,
+                                double sigma) {
+  constexpr double kSigmas = 3;
+  constexpr double kUsual = 0.05 / kSigmas;  // of scales that phones and programs state
+  if (!stated.has_metric_scale()) return "";
+  const double own =
+      stated.metres_sigma > 0 ? stated.metres_sigma / stated.metres_per_unit : kUsual;
+  const double off = std::abs(std::log(metres / stated.metres_per_unit));
+  if (off <= kSigmas * std::hypot(own, sigma / metres)) return "";
+  const bool is_by_depth = stated.scale_source == ScaleSource::DepthSensor;
+  return std::string(is_by_depth ? "the depth files say" : "the scene states") +
+         " that its unit is " + number(stated.metres_per_unit, "%.4g") + " m, " + by +
+         " that it is " + number(metres, "%.4g") +
+         " m; the latter was taken, so check the unit and the picks";
 }
 
 void settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats) {

@@ -15,6 +15,17 @@ namespace cgs {
 /// \throws InvalidInput for an unknown unit
 std::string assume_unit(Frame& frame, const std::string& unit);
 
+/// Says that a measured scale contradicts the one that a frame has from elsewhere, for a warning.
+///
+/// \param by      what measured it, as in "the known distances"
+/// \param metres  per unit of the frame, with its standard deviation
+/// \return empty where the frame has no scale, or both agree within 3 sigma; where the frame does
+///         not state its own, within 5 %
+std::string scale_contradiction(const Frame& stated,
+                                const std::string& by,
+                                double metres,
+                                double sigma);
+
 /// Sets what is up: as given, else as the frame knows, else +z, or -y as splats of others mostly
 /// lie. \throws InvalidInput as up_direction()
 void settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats = false);

@@ -19,6 +19,7 @@
 #include "io/lens.h"
 #include "io/masks.h"
 #include "io/orientation.h"
+#include "io/photographs.h"
 #include "io/resample.h"
 #include "io/scene_layouts.h"
 #include "io/significance.h"
@@ -363,6 +364,16 @@ void load_image(const Scene& scene, View& view, std::vector<std::string>& warnin
   }
 }
 
+// Whether a path is `end`, or goes on to it from some folder.
+bool ends_with_path(const fs::path& path, const fs::path& end) {
+  if (path.empty() || end.empty()) return false;
+  auto p = path.end();
+  for (auto e = end.end(); e != end.begin();) {
+    if (p == path.begin() || *--p != *--e) return false;
+  }
+  return true;
+}
+
 void warn_of_identical_images(Scene& scene, const std::vector<int>& views) {
   for (size_t i = 0; i < views.size(); ++i) {
     for (size_t j = i + 1; j < views.size(); ++j) {
@@ -397,17 +408,38 @@ void SceneOptions::validate() const {
   depth.validate();
 }
 
-int find_view(const Scene& scene, const std::string& token) {
+std::vector<int> views_called(const Scene& scene, const std::string& word) {
+  std::vector<int> out;
   for (size_t i = 0; i < scene.views.size(); ++i) {
-    const View& view = scene.views[i];
-    if (view.name == token || view.image_path.filename() == token) return static_cast<int>(i);
+    if (scene.views[i].name == word) return {static_cast<int>(i)};
+    if (ends_with_path(scene.views[i].image_path, word)) out.push_back(static_cast<int>(i));
   }
   uint64_t index = 0;
-  if (parse_number(token, index) && index < scene.views.size()) return static_cast<int>(index);
+  if (!out.empty() || !parse_number(word, index)) return out;
+  if (scene.photographs.empty()) {
+    if (index < scene.views.size()) out.push_back(static_cast<int>(index));
+    return out;
+  }
+  for (size_t i = 0; i < scene.views.size() && index < scene.photographs.size(); ++i) {
+    if (scene.views[i].image_path.filename() == scene.photographs[index]) {
+      out.push_back(static_cast<int>(i));
+    }
+  }
+  return out;
+}
+
+int find_view(const Scene& scene, const std::string& word, const std::string& option) {
+  const std::vector<int> found = views_called(scene, word);
+  if (found.size() == 1) return found.front();
   std::vector<std::string> names;
-  for (const View& view : scene.views) names.push_back(view.name);
-  throw InvalidInput("--views: there is no view \"" + printable(token) + "\" among " +
-                     std::to_string(names.size()) + ": " + first_of(names));
+  if (found.empty()) {
+    for (const View& view : scene.views) names.push_back(view.name);
+    throw InvalidInput(option + ": there is no view \"" + printable(word) + "\" among " +
+                       std::to_string(names.size()) + ": " + first_of(names));
+  }
+  for (const int i : found) names.push_back(scene.views[static_cast<size_t>(i)].name);
+  throw InvalidInput(option + ": \"" + printable(word) + "\" is the file of " +
+                     std::to_string(names.size()) + " views: " + first_of(names));
 }
 
 std::vector<int> select_views(const Scene& scene, const std::string& list) {
@@ -418,7 +450,7 @@ std::vector<int> select_views(const Scene& scene, const std::string& list) {
     std::string token = list.substr(at, end - at);
     token.erase(0, token.find_first_not_of(' '));
     token.erase(token.find_last_not_of(' ') + 1);
-    const int view = find_view(scene, token);
+    const int view = find_view(scene, token, "--views");
     if (std::find(out.begin(), out.end(), view) != out.end()) {
       const std::string& name = scene.views[static_cast<size_t>(view)].name;
       throw InvalidInput("--views: view \"" + printable(name) + "\" is named twice");
@@ -441,6 +473,9 @@ Scene scene_of_photographs(const fs::path& folder,
   options.validate();
   Scene scene = scene_of_colmap({folder, options.allow_external}, model);
   scene.kind = "photographs";
+  for (const PhotoFile& photograph : list_photographs({folder, options.allow_external})) {
+    scene.photographs.push_back(photograph.path.filename().string());
+  }
   for (View& view : scene.views) {
     if (!view.image_path.empty()) view.orientation = exif_orientation(view.image_path);
   }

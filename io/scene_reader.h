@@ -57,10 +57,15 @@ Scene scene_of_photographs(const std::filesystem::path& folder,
                            const ColmapModel& model,
                            const SceneOptions& options = {});
 
-/// The view of a name, or of an index in name order where no name fits.
+/// The views that a word may mean: of that name, else whose file is called so, with or without
+/// folders, else the one of that index in name order, among all photographs.
+/// \return indices into scene.views; several only for files of one name
+std::vector<int> views_called(const Scene& scene, const std::string& word);
+
+/// The one view that a word means. \param option  that the word was given to, for messages
 /// \return index into scene.views
-/// \throws InvalidInput if there is none
-int find_view(const Scene& scene, const std::string& token);
+/// \throws InvalidInput if there is none, or more than one
+int find_view(const Scene& scene, const std::string& word, const std::string& option);
 
 /// The views a list names: comma-separated file stems or indices in name order, as in
 /// SceneOptions::views. \return indices into scene.views, ascending

@@ -61,17 +61,22 @@ struct SparsePoint {
 /// Readers return it in world coordinates with the identity frame; to_canonical() moves it into
 /// its canonical frame, and everything after that works in internal units.
 struct Scene {
-  std::string kind;                 ///< "LLFF", "COLMAP", "transforms.json", "Strecha".
-  std::filesystem::path folder;     ///< What was opened.
-  std::vector<View> views;          ///< All of them, sorted by name.
+  std::string kind;              ///< "LLFF", "COLMAP", "transforms.json", "Strecha".
+  std::filesystem::path folder;  ///< What was opened.
+  std::vector<View> views;       ///< All of them, sorted by name.
+  /// Names of all photographs in their order, where some may have no camera; else empty.
+  std::vector<std::string> photographs;
   std::vector<int> input;           ///< Views to reconstruct from.
   std::vector<int> held_out;        ///< Views kept for evaluation.
   std::vector<SparsePoint> points;  ///< May be empty.
   double depth_scale = 0;  ///< Values of depth files per metre; 0 = 1000 where they are whole
                            ///< numbers, else 1.
   DepthKind depth_kind = DepthKind::Unknown;  ///< Of View::given_depth.
-  std::vector<std::string> missing;           ///< Image files that cameras name but the disk lacks.
-  std::vector<std::string> warnings;          ///< One line each: what is odd but usable.
+  /// World units per unit in which the cameras were stated, where they were moved since; depth in
+  /// units of the scene is in those.
+  double world_per_stated_unit = 1;
+  std::vector<std::string> missing;   ///< Image files that cameras name but the disk lacks.
+  std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
   Frame frame;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <numeric>
 #include <string>
@@ -368,18 +369,26 @@ ControlFit control_fit(const std::vector<ControlPair>& pairs, const Places& used
     const double squared = residual.is_used ? squared_sigmas(pairs[i], by.similarity)
                                             : squared_sigmas_outside(pairs[i], by, widened);
     residual.sigmas = std::sqrt(squared / 3);
+    residual.is_met = squared <= kChiSquared * (residual.is_used ? widened * widened : 1);
     out.residuals.push_back(residual);
   }
   return out;
 }
 
-// Points in a plane fit mirrored as well; nothing can be told of them here.
+// Whether the points fit mirrored, and as they are only badly or by leaving out more of them: a
+// mirrored table of a facade fits as it is once the points off the wall are left out. Points that
+// all lie in a plane fit mirrored as well; nothing can be told of them here.
 bool fit_mirrored(std::vector<ControlPair> pairs, const Places& candidates, const ControlFit& as) {
-  constexpr double kBad = 3;  // times what the sigmas say
-  if (as.scatter <= kBad) return false;
+  constexpr double kBad = 3;   // times what the sigmas say
+  constexpr double kGood = 2;  // what few points may scatter by chance
   for (ControlPair& pair : pairs) pair.known.z() = -pair.known.z();
-  const Fit mirrored = fit(pairs, inliers(pairs, candidates));
-  return mirrored.scatter() < as.scatter / kBad;
+  const Places used = inliers(pairs, candidates);
+  const double scatter = fit(pairs, used).scatter();
+  const auto used_as_they_are = std::count_if(
+      as.residuals.begin(), as.residuals.end(), [](const auto& r) { return r.is_used; });
+  const bool keeps_more = static_cast<std::ptrdiff_t>(used.size()) > used_as_they_are;
+  return (as.scatter > kBad && scatter < as.scatter / kBad) ||
+         (keeps_more && scatter < kGood * std::max(1.0, as.scatter));
 }
 
 }  // namespace
@@ -396,6 +405,16 @@ ControlFit fit_control(const std::vector<ControlPair>& pairs) {
         "east, north, up, so that x and y may have to change places");
   }
   constexpr double kWorstRotation = 0.1;  // [rad]
+  const double by_picks = out.rotation_sigma / std::max(1.0, out.scatter);
+  if (!(out.rotation_sigma <= kWorstRotation) && by_picks <= kWorstRotation) {
+    std::array<char, 32> times{};
+    std::snprintf(times.data(), times.size(), "%.1f", out.scatter);
+    throw NumericalError(std::string("the control points contradict each other: they scatter ") +
+                         times.data() +
+                         " times as much as their sigmas and picks say, which leaves the rotation "
+                         "of the scene open; check coordinates and picks, or add points to tell "
+                         "which is wrong");
+  }
   if (!(out.rotation_sigma <= kWorstRotation)) {
     throw NumericalError(
         "the control points leave the rotation of the scene open by more than 6 degrees; add "

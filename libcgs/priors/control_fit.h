@@ -36,6 +36,7 @@ struct ControlResidual {
   /// measurements, and of the fit for points that had no say in it. About 1 if all is well.
   double sigmas = 0;
   bool is_used = false;  ///< False for outliers and check points.
+  bool is_met = true;    ///< Misses by no more than 99.9 % of points would.
 };
 
 /// The control frame as seen from the scene.

@@ -118,6 +118,8 @@ class Fitter {
 
   // World units per metre.
   double world_scale() const { return scale_->scale * scene_.frame.scale; }
+  // Units in which the cameras were stated, per value.
+  double stated_scale() const { return world_scale() / scene_.world_per_stated_unit; }
 
   DepthKind likely_kind() const {
     const double relative = mean_scatter(lines_[0]);
@@ -127,7 +129,7 @@ class Fitter {
       constexpr double kSameUnit = 0.02;
       constexpr double kFits = 0.05;
       constexpr double kAboutAsWell = 1.5;
-      const bool may_be_metric = states_metres() || std::abs(std::log(world_scale())) < kSameUnit;
+      const bool may_be_metric = states_metres() || std::abs(std::log(stated_scale())) < kSameUnit;
       const bool fits =
           scale_->scatter < kFits && scale_->scatter < std::max(kAboutAsWell * best, kSensorSigma);
       if (may_be_metric && fits) return DepthKind::Metric;
@@ -167,9 +169,9 @@ class Fitter {
     }
     if (scale_) {
       const double sigma = scale_sigma();
-      const bool is_metres = std::abs(std::log(world_scale())) < kSigmas * sigma;
-      const double metres = is_metres ? 1 : 1 / world_scale();
-      internal_per_metre = is_metres ? 1 / frame.scale : scale_->scale;
+      const bool is_stated = std::abs(std::log(stated_scale())) < kSigmas * sigma;
+      const double metres = 1 / (is_stated ? scene_.world_per_stated_unit : world_scale());
+      internal_per_metre = is_stated ? scene_.world_per_stated_unit / frame.scale : scale_->scale;
       scatter = std::max(scatter, scale_->scatter);
       if (is_told) {
         out_.metres_per_unit = metres;

@@ -210,6 +210,45 @@ TEST_F(ControlFrame, StatesWhatCheckPointsSay) {
   EXPECT_EQ(warnings(), "");
 }
 
+TEST_F(ControlFrame, WarnsOfACheckPointThatMisses) {
+  std::string rows = points(5);
+  rows += known("wrong", in_control(kPoints[5]) + Eigen::Vector3d(1.5, 0, 0), "check");
+  rows += pick("wrong", 0, kPoints[5]) + pick("wrong", 2, kPoints[5]);
+  const auto report = move(rows);
+  EXPECT_NE(warnings().find("check point wrong disagrees with the control points by 1.5"),
+            std::string::npos)
+      << warnings();
+  EXPECT_EQ(scene_.warnings.size(), 1u);
+  EXPECT_NE(report["control_points"]["points"][5]["remark"], "");
+}
+
+TEST_F(ControlFrame, WarnsOfAScaleThatTheSceneContradicts) {
+  scene_.frame.metres_per_unit = kScale;
+  scene_.frame.scale_source = ScaleSource::CameraPoses;
+  const Scene before = scene_;
+  move(points(5));
+  EXPECT_EQ(warnings(), "");
+  EXPECT_NEAR(scene_.world_per_stated_unit, kScale, 1e-5);
+  scene_ = before;
+  move(points(5), "ft");
+  EXPECT_NE(warnings().find("the scene states that its unit is 12.5 m, the control points that it "
+                            "is 3.81 m"),
+            std::string::npos)
+      << warnings();
+}
+
+// A photograph that could not be placed counts all the same.
+TEST_F(ControlFrame, CountsAllPhotographs) {
+  scene_.photographs = {"blank.png", "photo_0.png", "photo_1.png", "photo_2.png"};
+  std::string rows = points(3);
+  for (size_t at = 0; (at = rows.find("photo_2", at)) != std::string::npos;)
+    rows.replace(at, 7, "3");
+  move(rows);
+  EXPECT_LT((scene_.views[0].camera.center() - in_control({-0.4, 0, 0})).norm(), 1e-5);
+  EXPECT_NE(refusal(points(3) + "C,1,2,3,,,0,4,5\n").find("no photograph of view \"0\""),
+            std::string::npos);
+}
+
 TEST_F(ControlFrame, NamesWhatIsLeftOut) {
   std::string rows = points(5) + known("off", in_control(kPoints[5]) + Eigen::Vector3d(2, 0, 0));
   rows += pick("off", 0, kPoints[5]) + pick("off", 1, kPoints[5]) + pick("off", 2, kPoints[5]);

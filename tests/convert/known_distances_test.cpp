@@ -173,6 +173,19 @@ TEST_F(KnownDistances, NameTheOneOfThreeThatIsWrong) {
   EXPECT_NE(report["warnings"][0].get<std::string>().find("6m"), std::string::npos);
 }
 
+TEST_F(KnownDistances, WarnOfAScaleThatTheSceneContradicts) {
+  model_.scene.frame.metres_per_unit = 1;
+  model_.scene.frame.scale_source = ScaleSource::CameraPoses;
+  const DistanceWords right = {pixel_of(0, 0, 0), pixel_of(0, 0.1, 0), "80cm"};
+  EXPECT_EQ(scale({right})["warnings"].size(), 0u);
+  const DistanceWords wrong = {pixel_of(0, 0, 0), pixel_of(0, 0.1, 0), "1.6m"};
+  const auto report = scale({wrong});
+  ASSERT_EQ(report["warnings"].size(), 1u);
+  EXPECT_NE(report["warnings"][0].get<std::string>().find("the known distances that it is 2 m"),
+            std::string::npos)
+      << report["warnings"][0];
+}
+
 TEST_F(KnownDistances, WithoutAnyNothingChanges) {
   EXPECT_TRUE(scale({}).is_null());
   EXPECT_FALSE(model_.scene.frame.has_metric_scale());

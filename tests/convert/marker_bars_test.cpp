@@ -81,6 +81,24 @@ TEST_F(MarkerBars, MeasureTheSideWithinItsSigma) {
   EXPECT_EQ(report["distances"][0]["distance"], "side of marker AprilTag 36h11 1, 3 photographs");
 }
 
+// One size is stated for all of them.
+TEST_F(MarkerBars, ManyDoNotTellTheStatedSizeBetter) {
+  photograph({marker_at({-0.35, -0.2, 1.5}, 1),
+              marker_at({0.35, -0.2, 1.5}, 2),
+              marker_at({-0.35, 0.2, 1.5}, 3),
+              marker_at({0.35, 0.2, 1.5}, 4)});
+  const std::vector<MarkerBar> bars = marker_bars(scene_, "30cm+-6mm");
+  ASSERT_EQ(bars.size(), 4u);
+  Model model;
+  model.scene = scene_;
+  const auto report = scale_by({}, bars, model);
+  const double relative = model.scene.frame.metres_sigma / model.scene.frame.metres_per_unit;
+  EXPECT_GT(relative, 0.02);
+  EXPECT_LT(relative, 0.023);
+  EXPECT_EQ(report["distances"].size(), 4u);
+  EXPECT_LT(report["distances"][0]["sigma"].get<double>(), 0.002) << "of this side alone";
+}
+
 TEST_F(MarkerBars, RefusesWhereNoTwoPhotographsShowASquare) {
   photograph({marker_at({-0.2, 0, 1.2}, 1)}, 1);
   EXPECT_NE(refusal().find("found: AprilTag 36h11 1 in 1 photograph;"), std::string::npos)

@@ -43,6 +43,15 @@ TEST_F(RequestJson, TellsHowFarAwayIsLooked) {
   EXPECT_NE(json()["cameras"], bounded["cameras"]);
 }
 
+TEST_F(RequestJson, LengthsWaitForWhatDepthFilesTell) {
+  request_.max_error = "2mm";
+  EXPECT_THROW(check_lengths(request_, scene_), InvalidInput);
+  scene_.views[0].depth_path = dir_ / "a.png";
+  EXPECT_NO_THROW(check_lengths(request_, scene_));
+  request_.scene.options.depth.kind = DepthKind::Disparity;
+  EXPECT_THROW(check_lengths(request_, scene_), InvalidInput);
+}
+
 TEST_F(RequestJson, TellsSparsePointsAndWhoSawThem) {
   const auto plain = json();
   scene_.points = {{{1, 2, 3}, {0, 1}}};

@@ -23,6 +23,23 @@ TEST(AssumeUnit, FillsInWhatIsUnknownAndNothingElse) {
   EXPECT_THROW(assume_unit(frame, "parsec"), InvalidInput);
 }
 
+TEST(ScaleContradiction, IsSaidBeyondThreeSigma) {
+  Frame frame;
+  EXPECT_EQ(scale_contradiction(frame, "the markers", 3, 0.1), "") << "nothing was stated";
+  frame.metres_per_unit = 1;
+  frame.scale_source = ScaleSource::CameraPoses;
+  EXPECT_EQ(scale_contradiction(frame, "the markers", 1.04, 0), "");
+  EXPECT_EQ(scale_contradiction(frame, "the markers", 1.2, 0.08), "");
+  EXPECT_EQ(scale_contradiction(frame, "the markers", 3.2808, 0.01),
+            "the scene states that its unit is 1 m, the markers that it is 3.281 m; the latter was "
+            "taken, so check the unit and the picks");
+  frame.scale_source = ScaleSource::DepthSensor;
+  frame.metres_sigma = 0.005;
+  EXPECT_EQ(scale_contradiction(frame, "the markers", 1.01, 0), "");
+  EXPECT_NE(scale_contradiction(frame, "the markers", 0.97, 0).find("the depth files say"),
+            std::string::npos);
+}
+
 TEST(UpDirection, IsOfUnitLength) {
   EXPECT_EQ(up_direction({0, -20, 0}), -Eigen::Vector3d::UnitY());
   EXPECT_THROW(up_direction({0, 0, 0}), InvalidInput);

@@ -68,7 +68,7 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& with_
     const std::filesystem::path picture = folder / "views" / (name + ".exr");
     if (!std::filesystem::exists(picture)) continue;
     std::vector<std::string> warnings;
-    const View view = loaded_view(scene, find_view(scene, name), true, warnings);
+    const View view = loaded_view(scene, find_view(scene, name, "--views"), true, warnings);
     const auto& chosen = model.scene.input;
     const bool is_input = std::find(chosen.begin(), chosen.end(), int(i)) != chosen.end();
     compare(picture, view.given_depth, is_input ? inputs : held_out);

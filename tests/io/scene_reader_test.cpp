@@ -185,6 +185,13 @@ TEST_F(ReadScene, TellsViewsOfOneStemApart) {
   EXPECT_EQ(scene.views[0].name, "0.jpg");
   EXPECT_EQ(scene.views[1].name, "left_0");
   EXPECT_EQ(scene.views[2].name, "right_0");
+  EXPECT_EQ(views_called(scene, "right/0.png"), Indices{2});
+  EXPECT_EQ(views_called(scene, "images/left/0.png"), Indices{1});
+  EXPECT_EQ(views_called(scene, "0.png"), (Indices{1, 2}));
+  EXPECT_EQ(views_called(scene, "ight/0.png"), Indices{});
+  EXPECT_EQ(views_called(scene, "2"), Indices{2});
+  EXPECT_EQ(test::message_of([&] { find_view(scene, "0.png", "--pick"); }),
+            "--pick: \"0.png\" is the file of 2 views: left_0, right_0");
 }
 
 TEST_F(ReadScene, NeedsPermissionForLinksThatLeaveTheFolder) {

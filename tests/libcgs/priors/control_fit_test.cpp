@@ -198,6 +198,8 @@ TEST(ControlFit, CheckPointsAreJudgedAndHaveNoSay) {
   EXPECT_FALSE(with.residuals.back().is_used);
   EXPECT_NEAR(with.residuals.back().off.z(), -0.5, 0.1);
   EXPECT_GT(with.residuals.back().sigmas, 3);
+  EXPECT_FALSE(with.residuals.back().is_met);
+  for (size_t i = 0; i < 6; ++i) EXPECT_TRUE(with.residuals[i].is_met);
 }
 
 std::string refusal(const std::vector<ControlPair>& all) {
@@ -236,6 +238,33 @@ TEST(ControlFit, TellsThatCoordinatesAreMirrored) {
   std::vector<ControlPair> all = pairs(8, 0.002, 4);
   for (ControlPair& pair : all) std::swap(pair.known.x(), pair.known.y());
   EXPECT_NE(refusal(all).find("mirrored"), std::string::npos) << refusal(all);
+}
+
+// The points off the wall are the only ones that show it, and are fewer.
+TEST(ControlFit, TellsThatCoordinatesOfAFacadeAreMirrored) {
+  for (const size_t off_the_wall : {1u, 2u}) {
+    std::vector<Eigen::Vector3d> points = {
+        {-1, -1, 4}, {1.2, -0.8, 4}, {1, 1, 4}, {-1.1, 0.9, 4}, {0.1, 0, 4}};
+    for (size_t i = 0; i < off_the_wall; ++i) points.emplace_back(0.4 - 0.7 * double(i), 0.2, 3.2);
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      Noise noise(seed);
+      std::vector<ControlPair> facade;
+      for (const Eigen::Vector3d& p : points) {
+        const Eigen::Matrix3d covariance = ellipsoid(0.002);
+        facade.push_back({p + noise(covariance), covariance, planted()(p), 0.004, false});
+      }
+      EXPECT_EQ(refusal(facade), "") << seed;
+      for (ControlPair& pair : facade) std::swap(pair.known.x(), pair.known.y());
+      EXPECT_NE(refusal(facade).find("mirrored"), std::string::npos) << seed << refusal(facade);
+    }
+  }
+}
+
+TEST(ControlFit, SaysThatThreePointsContradictEachOther) {
+  std::vector<ControlPair> three = pairs(3, 0.002, 3);
+  EXPECT_EQ(refusal(three), "");
+  three[2].known += Eigen::Vector3d(3, -2, 2.5);
+  EXPECT_NE(refusal(three).find("contradict each other"), std::string::npos) << refusal(three);
 }
 
 // Above some 27 points only some of all triples are tried.

@@ -109,6 +109,20 @@ TEST(FitGivenDepth, MetricCamerasStayMetric) {
   EXPECT_GT(given.metres_sigma, 0.004);
 }
 
+// As in the frame of control points: depth is still in the units that the cameras were stated in.
+TEST(FitGivenDepth, IsInUnitsOfTheCamerasAsTheyWereStated) {
+  Example e;
+  e.scene.frame.scale = 4;
+  e.scene.world_per_stated_unit = 12.5;
+  e.give([](double z, int) { return 4 * z / 12.5; });
+  const GivenDepth given = fit_given_depth(e.scene, e.priors);
+  EXPECT_EQ(given.kind, DepthKind::Metric);
+  EXPECT_NE(given.remarks.at(0).find("in units of the scene"), std::string::npos);
+  EXPECT_LT(e.largest_error(given), 1e-4);
+  e.scene.world_per_stated_unit = 1;
+  EXPECT_NE(fit_given_depth(e.scene, e.priors).kind, DepthKind::Metric) << "its scale is no 1";
+}
+
 TEST(FitGivenDepth, KeepsTheScaleOfTheSceneAndSaysWhereItDiffers) {
   Example e;
   e.scene.frame.metres_per_unit = 2;
