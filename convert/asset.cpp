@@ -245,7 +245,8 @@ Written form_within(const AssetWriter& writer,
     throw LimitError("asset.glb takes " + std::to_string(least) +
                      " bytes at least, with all left out that is below " +
                      format_length(coarsest, frame) + "; --max-size allows " +
-                     std::to_string(limit) + "; the other files are there");
+                     std::to_string(limit) +
+                     "; smaller pictures make smaller files: --downscale, without --budget");
   }
   out.glb = writer.certified(out.form);
   out.tried = search.tried;

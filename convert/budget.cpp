@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
 
 #include "convert/length.h"
 #include "convert/memory_plan.h"
@@ -48,6 +49,7 @@ struct Search {
   const OpenedScene& opened;
   double pixels;           // of the input views, full size
   std::vector<int> sizes;  // downscales that may be used, ascending
+  size_t larger_bytes;     // of memory, that the next larger size would need; 0 = there is none
   double deadline;         // seconds after start
   Clock::time_point start;
   Terminal& terminal;
@@ -170,7 +172,6 @@ int first_trial(Search& search, int steps) {
 void run_trials(Search& search) {
   const int draft = training_preset("draft").steps;
   const int smallest = first_trial(search, draft / 4);
-  if (!best_within(search, search.left())) return;  // what a step costs would only be added
   search.runs.insert(
       search.runs.begin(),
       {training_trial(search, smallest, draft / 4), training_trial(search, smallest, draft)});
@@ -190,8 +191,14 @@ void run_trials(Search& search) {
   }
 }
 
+/// Downscales, ascending, and the memory that the next larger pictures would need [bytes].
+struct Sizes {
+  std::vector<int> usable;
+  size_t larger_bytes = 0;
+};
+
 // Sizes whose pictures hold something and whose run fits into memory.
-std::vector<int> usable_sizes(const RunRequest& request, const Scene& scene) {
+Sizes usable_sizes(const RunRequest& request, const Scene& scene) {
   int side = std::numeric_limits<int>::max();
   for (const View& view : scene.views) {
     side = std::min({side, view.camera.width, view.camera.height});
@@ -199,16 +206,24 @@ std::vector<int> usable_sizes(const RunRequest& request, const Scene& scene) {
   const MeasuredFiles measured = measured_files(request);
   const CoherenceOptions& coherence = request.training.coherence;
   const size_t budget = memory_budget(request.memory_limit);
-  std::vector<int> out;
+  Sizes out;
   for (const int size : kSizes) {
     if (size > 1 && side / size < kLeastSide) break;
-    const auto plan = memory_plan(scene, request.voxel_size.empty(), measured, coherence, size);
-    const bool fits = std::all_of(
-        plan.begin(), plan.end(), [&](const StageMemory& stage) { return stage.bytes <= budget; });
-    if (fits) out.push_back(size);
+    size_t most = 0;
+    for (const StageMemory& stage :
+         memory_plan(scene, request.voxel_size.empty(), measured, coherence, size)) {
+      most = std::max(most, stage.bytes);
+    }
+    if (most <= budget) {
+      out.usable.push_back(size);
+    } else {
+      out.larger_bytes = most;
+    }
   }
-  if (out.empty()) {
-    check_memory_plan(scene, request.voxel_size.empty(), measured, budget, coherence);
+  if (out.usable.empty()) {
+    throw LimitError("the smallest pictures that tell something need about " +
+                     mebibytes(out.larger_bytes) + " of memory and " + mebibytes(budget) +
+                     " may be used; a larger --memory-limit allows it");
   }
   return out;
 }
@@ -222,6 +237,10 @@ std::string words_of(const Search& search, const Candidate& chosen) {
   const auto at = std::find_if(all.begin(), all.end(), [&](const Candidate& c) {
     return c.downscale == chosen.downscale && c.preset == chosen.preset;
   });
+  if (at == all.begin() && search.larger_bytes > 0) {
+    return out + "; larger pictures need about " + mebibytes(search.larger_bytes) +
+           " of memory, which a larger --memory-limit allows";
+  }
   if (at == all.begin()) return out + "; it is the best there is";
   const Candidate& better = *std::prev(at);
   return out + "; the next better, " + size_words(search.opened.scene, better.downscale) +
@@ -239,7 +258,7 @@ Json choose(Search& search) {
     throw LimitError("--budget " + format_seconds(search.deadline) +
                      " is too short; the quickest setting, " +
                      size_words(search.opened.scene, quickest.downscale) + ", needs about " +
-                     format_seconds(search.elapsed() + quickest.seconds * kReserve));
+                     format_seconds((search.elapsed() + quickest.seconds) * kReserve));
   }
   Json trials = Json::array();
   for (const TimedRun& run : search.runs) {
@@ -289,14 +308,22 @@ class TrialFolder {
   FolderLock lock_;
 };
 
-// What an earlier start chose for the same; null if there is none.
-Json chosen_before(const fs::path& file, double seconds, const std::string& request) {
+// What an earlier start chose for the same, if it still fits into memory; null if there is none.
+Json chosen_before(const fs::path& file,
+                   double seconds,
+                   const std::string& request,
+                   const std::vector<int>& sizes) {
   std::error_code ignored;
   if (!fs::is_regular_file(file, ignored)) return nullptr;
   const Json record = read_json(file);
   const bool is_same = record.is_object() && record.value("seconds", Json()) == Json(seconds) &&
-                       record.value("request", Json()) == Json(request);
-  return is_same ? record : Json();
+                       record.value("request", Json()) == Json(request) &&
+                       record.value("preset", Json()).is_string() &&
+                       record.value("words", Json()).is_string();
+  const Json size = is_same ? record.value("downscale", Json()) : Json();
+  const bool is_usable =
+      std::any_of(sizes.begin(), sizes.end(), [&](int usable) { return size == Json(usable); });
+  return is_usable ? record : Json();
 }
 
 void refuse_other_run(const RunRequest& request) {
@@ -314,9 +341,11 @@ Json choice(const RunRequest& request,
             Terminal& terminal) {
   const fs::path file = request.output / kRecordFile;
   const OpenedScene opened = open_scene(full.scene, request.output / "model", terminal);
-  const std::string asked =
-      std::to_string(content_hash(json_text(request_json(full, opened.scene), -1)));
-  Json chosen = chosen_before(file, seconds, asked);
+  Json key = request_json(full, opened.scene);
+  key["threads"] = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  const std::string asked = std::to_string(content_hash(json_text(key, -1)));
+  const Sizes sizes = usable_sizes(request, opened.scene);
+  Json chosen = chosen_before(file, seconds, asked, sizes.usable);
   if (chosen.is_null()) refuse_other_run(request);
   const TrialFolder trials(request.output);
   if (!chosen.is_null()) return chosen;
@@ -327,7 +356,7 @@ Json choice(const RunRequest& request,
     pixels += double(camera.width) * camera.height;
   }
   Search search{
-      request, opened, pixels, usable_sizes(request, opened.scene), seconds, start, terminal};
+      request, opened, pixels, sizes.usable, sizes.larger_bytes, seconds, start, terminal};
   chosen = choose(search);
   chosen["request"] = asked;
   write_file(file, json_text(chosen) + "\n");

@@ -90,13 +90,16 @@ std::string format_length(double internal_length, const Frame& frame) {
 size_t parse_bytes(const std::string& text) {
   const auto [value, suffix] = number_and_suffix(text, "amount of memory");
   static constexpr std::string_view kPrefixes = "KMGT";
-  if (suffix.empty()) return static_cast<size_t>(value);
-  const size_t power = kPrefixes.find(suffix[0]);
-  const std::string rest = suffix.substr(1);
-  if (power == std::string_view::npos || (!rest.empty() && rest != "B" && rest != "iB")) {
+  const size_t prefix = suffix.empty() ? 0 : kPrefixes.find(suffix[0]);
+  const std::string rest = suffix.empty() ? "" : suffix.substr(1);
+  const int power = suffix.empty() ? 0 : static_cast<int>(prefix) + 1;
+  const bool is_unit =
+      prefix != std::string_view::npos && (rest.empty() || rest == "B" || rest == "iB");
+  const double bytes = is_unit ? std::ldexp(value, 10 * power) : 0;
+  if (!(bytes >= 1 && bytes < 0x1p53)) {
     throw InvalidInput("'" + text + "' is not an amount of memory; write 512M or 4G");
   }
-  return static_cast<size_t>(std::ldexp(value, 10 * (static_cast<int>(power) + 1)));
+  return static_cast<size_t>(bytes);
 }
 
 size_t parse_file_size(const std::string& text) {

@@ -81,12 +81,6 @@ double of_networks(const CoherenceOptions& coherence, size_t views, double pixel
   return of_one(widths.depth) + of_one(widths.opacity);
 }
 
-std::string mebibytes(size_t bytes) {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%.0f MiB", double(bytes) / kMebi);
-  return text.data();
-}
-
 }  // namespace
 
 std::vector<StageMemory> memory_plan(const Scene& scene,
@@ -118,6 +112,12 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
   return plan;
 }
 
+std::string mebibytes(size_t bytes) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.0f MiB", double(bytes) / kMebi);
+  return text.data();
+}
+
 std::string memory_plan_text(const std::vector<StageMemory>& plan) {
   std::string out;
   for (const StageMemory& stage : plan) {
@@ -130,10 +130,11 @@ void check_memory_plan(const Scene& scene,
                        bool chooses_voxels,
                        const MeasuredFiles& measured,
                        size_t budget,
-                       const CoherenceOptions& coherence) {
+                       const CoherenceOptions& coherence,
+                       int downscale) {
   constexpr int kMostDownscale = 32;  // beyond, nothing can be made out in a photograph
-  const auto largest = [&](int downscale) {
-    const auto plan = memory_plan(scene, chooses_voxels, measured, coherence, downscale);
+  const auto largest = [&](int factor) {
+    const auto plan = memory_plan(scene, chooses_voxels, measured, coherence, factor * downscale);
     return *std::max_element(
         plan.begin(), plan.end(), [](const auto& a, const auto& b) { return a.bytes < b.bytes; });
   };

@@ -38,6 +38,9 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
                                      const CoherenceOptions& coherence = {},
                                      int downscale = 1);
 
+/// "410 MiB"
+std::string mebibytes(size_t bytes);
+
 /// "depth and Gaussians 410 MiB, views 320 MiB, …"
 std::string memory_plan_text(const std::vector<StageMemory>& plan);
 
@@ -47,7 +50,8 @@ void check_memory_plan(const Scene& scene,
                        bool chooses_voxels,
                        const MeasuredFiles& measured,
                        size_t budget,
-                       const CoherenceOptions& coherence = {});
+                       const CoherenceOptions& coherence = {},
+                       int downscale = 1);
 
 /// What `convert` makes of splats that came without cameras.
 struct SplatWork {

@@ -73,6 +73,8 @@ double value_of(const TradeoffFigures& figures, Quantity quantity) {
 double excess(const TradeoffFigures& figures, const Want& want, const TradeoffNoise& noise) {
   const double value = value_of(figures, want.quantity);
   switch (want.quantity) {
+    case Quantity::Error:
+      return figures.is_ruler ? kNotMeasured : value / want.limit;
     case Quantity::Psnr:
       return std::exp2((want.limit - value) / kDecibelsOfTwo);
     case Quantity::Time:
@@ -163,24 +165,24 @@ Recommendation recommend(const std::vector<TradeoffFigures>& figures,
                          const std::vector<Want>& wants,
                          const TradeoffNoise& noise) {
   Recommendation out;
-  std::vector<size_t> meeting;
+  std::vector<double> ratios;
   double least = std::numeric_limits<double>::infinity();
+  for (const TradeoffFigures& f : figures) {
+    ratios.push_back(std::isfinite(f.cpu) ? worst_excess(f, wants, noise) : kNotMeasured);
+    if (ratios.back() < least) least = ratios.back();
+  }
+  if (!std::isfinite(least)) return out;
+  // Those that meet the wants, or else the nearest, among which differences that are none do not
+  // decide either.
+  const double most = least <= 1 ? 1 : least * (1 + kEqualError);
+  std::vector<size_t> candidates;
   for (size_t i = 0; i < figures.size(); ++i) {
-    if (!std::isfinite(figures[i].cpu)) continue;
-    const double ratio = worst_excess(figures[i], wants, noise);
-    if (ratio <= 1) meeting.push_back(i);
-    if (ratio < least) {
-      least = ratio;
-      out.best = i;
-    }
+    if (ratios[i] <= most) candidates.push_back(i);
   }
-  if (!out.best) return out;
-  if (!meeting.empty()) {
-    const bool accuracy = std::any_of(wants.begin(), wants.end(), [](const Want& want) {
-      return want.quantity == Quantity::Error || want.quantity == Quantity::Psnr;
-    });
-    out.best = choose(figures, meeting, accuracy, noise);
-  }
+  const bool accuracy = std::any_of(wants.begin(), wants.end(), [](const Want& want) {
+    return want.quantity == Quantity::Error || want.quantity == Quantity::Psnr;
+  });
+  out.best = choose(figures, candidates, accuracy, noise);
   for (const Want& want : wants) {
     if (!(excess(figures[*out.best], want, noise) <= 1)) out.unmet.push_back(want.text);
   }

@@ -19,6 +19,9 @@ struct TradeoffFigures {
   double error = kNotMeasured;  ///< Of the surface [scene units].
   double psnr = kNotMeasured;   ///< On held-out views [dB].
   double bytes = kNotMeasured;  ///< Of the web asset.
+  /// Errors are measured from its surface: its own, that of packing alone, is the least, but meets
+  /// no want.
+  bool is_ruler = false;
 };
 
 /// How far figures differ for no reason: relative, of repeated runs.
@@ -51,8 +54,9 @@ struct Recommendation {
 /// With a want of error or PSNR the cheapest one, else the one with the least error, then the
 /// highest PSNR, then the cheapest. Differences that are none do not decide: costs within the noise
 /// of repeated runs, errors within 2 %, PSNR within 0.05 dB. A limit of time has to hold with the
-/// noise added. If no setting meets all wants, the nearest is the one whose worst ratio of figure
-/// to limit (for PSNR: decibels missing, 6 of them a factor of 2) is the least.
+/// noise added. If no setting meets all wants, those count as meeting them whose worst ratio of
+/// figure to limit (for PSNR: decibels missing, 6 of them a factor of 2) is the least or within 2 %
+/// of it.
 Recommendation recommend(const std::vector<TradeoffFigures>& figures,
                          const std::vector<Want>& wants,
                          const TradeoffNoise& noise);

@@ -7,12 +7,14 @@
 #include <cmath>
 #include <functional>
 #include <new>
+#include <thread>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "convert/comparison.h"
 #include "convert/measured_file.h"
+#include "convert/memory_plan.h"
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
 #include "convert/tradeoff_stages.h"
@@ -108,6 +110,12 @@ StageResults run_setting(Bench& bench, const Setting& setting) {
   const fs::path model = bench.folder(model_key(setting));
   const fs::path mesh = bench.folder(mesh_key(setting));
   out[kModel] = stage(bench, model_key(setting), name + ": model", [&](const Progress& progress) {
+    check_memory_plan(bench.scene,
+                      setting.voxel == 1,
+                      {},
+                      memory_budget(bench.request.memory_limit),
+                      bench.standard.training.coherence,
+                      setting.coarser);
     return make_model(request(model_key(setting)), bench.request.output, bench.scene, progress);
   });
   if (out[kModel].contains("failed")) return out;
@@ -134,8 +142,8 @@ MeasuredSetting measured(const Bench& bench, const Setting& setting, const Stage
   MeasuredSetting out;
   out.setting = setting;
   RunRequest request = request_of(setting, bench.standard, bench.downscale, bench.voxel);
-  request.output = bench.request.output / "run";
-  out.command = command_line(request);
+  request.output = bench.request.output / ("run_" + asset_key(setting));
+  out.command = command_line(request, bench.request.threads);
   out.failed = failure(results);
   if (!out.failed.empty()) return out;
   out.model = cost_of(results[kModel]);
@@ -278,7 +286,8 @@ void measure_errors(Bench& bench, Tradeoff& out) {
   for (MeasuredSetting& m : out.settings) {
     if (!m.failed.empty()) continue;
     const bool is_finest = mesh_key(m.setting) == mesh_key(finest);
-    m.deviation = is_finest ? SurfaceError() : from_finest.error_of(bench, m, model, inputs);
+    m.is_ruler = is_finest && path.empty();
+    if (!is_finest) m.deviation = from_finest.error_of(bench, m, model, inputs);
     if (!path.empty()) m.truth = from_truth.error_of(bench, m, model, inputs);
   }
 }
@@ -304,6 +313,20 @@ double MeasuredSetting::error() const {
   return deviation ? deviation->p95 : kNotMeasured;
 }
 
+namespace {
+
+// What has to be the same for measurements to be of one kind. Named, as a folder holds either a run
+// or measurements.
+Json record_request(const TradeoffRequest& request, const Scene& scene) {
+  Json out = request_json(standard_request(request), scene);
+  out["command"] = "tradeoff";
+  out["threads"] =
+      request.threads > 0 ? request.threads : static_cast<int>(std::thread::hardware_concurrency());
+  return out;
+}
+
+}  // namespace
+
 Tradeoff measure_tradeoff(const TradeoffRequest& request,
                           const OpenedScene& opened,
                           const StageCost& opening,
@@ -317,7 +340,7 @@ Tradeoff measure_tradeoff(const TradeoffRequest& request,
               standard,
               downscale_of(request.scene, opened.scene),
               terminal,
-              RunRecord(request.output, request_json(standard, opened.scene), false),
+              RunRecord(request.output, record_request(request, opened.scene), false),
               Clock::now() + std::chrono::duration_cast<Clock::duration>(limit)};
   if ((opened.poses || opened.refined) && !bench.record.is_done("cameras", {})) {
     bench.record.finish("cameras", opening.wall, {{"cpu", opening.cpu}, {"wall", opening.wall}});
@@ -351,7 +374,8 @@ std::vector<TradeoffFigures> figures_of(const Tradeoff& tradeoff) {
     TradeoffFigures& f = out.emplace_back();
     if (!m.failed.empty()) continue;
     // What is promised holds for every file, the compressed one too.
-    f = {m.cpu(), m.wall(), m.error() + m.asset_error, kNotMeasured, double(m.asset_bytes)};
+    const double error = m.is_ruler ? m.asset_error : m.asset_and_surface_error();
+    f = {m.cpu(), m.wall(), error, kNotMeasured, double(m.asset_bytes), m.is_ruler};
     if (m.pictures) f.psnr = m.pictures->psnr;
   }
   return out;

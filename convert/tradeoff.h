@@ -20,6 +20,7 @@ struct TradeoffRequest {
   std::filesystem::path reference;  ///< A mesh that counts as the truth; empty = none.
   double minutes = 20;              ///< No stage goes on for longer; 0 = only tell what is there.
   size_t memory_limit = 0;          ///< As in RunRequest.
+  int threads = 0;                  ///< That it may use, as times depend on them; 0 = all.
 };
 
 /// Rendered views against photographs that were held out, at the size of the standard setting.
@@ -40,6 +41,7 @@ struct MeasuredSetting {
   StageCost assets;     ///< From there to what a web page shows.
   std::optional<PictureQuality> pictures;  ///< Empty if no view was held out.
   std::optional<SurfaceError> deviation;   ///< From the finest surface that was measured.
+  bool is_ruler = false;                   ///< Its own surface is what errors are measured from.
   std::optional<SurfaceError> truth;       ///< From the reference.
   double voxel = 0;
   double asset_error = 0;  ///< Largest move of a vertex by compression.
@@ -50,8 +52,11 @@ struct MeasuredSetting {
 
   double cpu() const { return model.cpu + mesh.cpu + assets.cpu; }
   double wall() const { return model.wall + mesh.wall + assets.wall; }
-  /// Of the surface: 95 % of it are within, against the truth where there is one; NaN = unknown.
+  /// Of the surface: 95 % of it are within, against the truth where there is one; NaN = unknown, as
+  /// that of the ruler is.
   double error() const;
+  /// With that of compression: what asset.glb is off.
+  double asset_and_surface_error() const { return error() + asset_error; }
 };
 
 struct Tradeoff {

@@ -120,7 +120,7 @@ RunRequest request_of(const Setting& setting,
   return out;
 }
 
-std::string command_line(const RunRequest& request) {
+std::string command_line(const RunRequest& request, int threads) {
   const SceneRequest& scene = request.scene;
   std::string out = "cgs run " + shell_word(scene.path.string());
   const auto add = [&](const char* name, const std::string& value) {
@@ -150,6 +150,8 @@ std::string command_line(const RunRequest& request) {
   add("--voxel-size", request.voxel_size);
   add("--simplify", request.simplify);
   add("--compression-error", request.compression_error);
+  if (request.memory_limit > 0) add("--memory-limit", std::to_string(request.memory_limit));
+  if (threads > 0) add("--threads", std::to_string(threads));
   add("-o", request.output.string());
   return out;
 }

@@ -50,7 +50,7 @@ RunRequest request_of(const Setting& setting,
                       int downscale,
                       double standard_voxel);
 
-/// The command line of a run, to be pasted into a shell.
-std::string command_line(const RunRequest& request);
+/// The command line of a run, to be pasted into a shell. \param threads  0 = all
+std::string command_line(const RunRequest& request, int threads = 0);
 
 }  // namespace cgs

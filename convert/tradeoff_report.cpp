@@ -69,7 +69,7 @@ Trade geometry(const Tradeoff& tradeoff) {
         return s;
       },
       [](const MeasuredSetting& m) {
-        return CostAndLoss{m.model.cpu + m.mesh.cpu, m.error()};
+        return CostAndLoss{m.model.cpu + m.mesh.cpu, m.is_ruler ? 0 : m.error()};
       });
 }
 
@@ -79,7 +79,7 @@ Trade files(const Tradeoff& tradeoff) {
       "files",
       [](const Setting& s) { return s; },
       [](const MeasuredSetting& m) {
-        return CostAndLoss{double(m.asset_bytes), m.error() + m.asset_error};
+        return CostAndLoss{double(m.asset_bytes), m.is_ruler ? 0 : m.asset_and_surface_error()};
       });
 }
 
@@ -165,7 +165,8 @@ std::string geometry_text(const Tradeoff& tradeoff) {
                [](const MeasuredSetting& m) -> std::vector<std::string> {
                  const double peak =
                      double(std::max(m.model.peak_memory, m.mesh.peak_memory)) / (1 << 20);
-                 const SurfaceError& e = m.truth ? *m.truth : *m.deviation;
+                 const SurfaceError unknown = {kNotMeasured, kNotMeasured, kNotMeasured};
+                 const SurfaceError e = m.truth ? *m.truth : m.deviation.value_or(unknown);
                  return {text_of("%.1f", m.model.cpu + m.mesh.cpu),
                          text_of("%.1f", m.model.wall + m.mesh.wall),
                          m.mesh.peak_memory == 0 ? "-" : text_of("%.0f", peak),
@@ -185,7 +186,7 @@ std::string files_text(const Tradeoff& tradeoff) {
                {"setting", "glb [MiB]", "error" + unit, "packing" + unit, "PLY [MiB]", "CPU [s]"},
                [](const MeasuredSetting& m) -> std::vector<std::string> {
                  return {mebibytes(double(m.asset_bytes)),
-                         text_of("%.3g", m.error() + m.asset_error),
+                         text_of("%.3g", m.asset_and_surface_error()),
                          text_of("%.2g", m.asset_error),
                          mebibytes(double(m.mesh_bytes)),
                          text_of("%.1f", m.cpu())};
@@ -194,7 +195,7 @@ std::string files_text(const Tradeoff& tradeoff) {
 
 std::string figures_line(const MeasuredSetting& m, const std::string& unit) {
   std::string out = text_of("%.3g", m.cpu()) + " s CPU, " + text_of("%.3g", m.wall()) +
-                    " s, error " + text_of("%.3g", m.error()) + ' ' + unit;
+                    " s, error " + text_of("%.3g", m.asset_and_surface_error()) + ' ' + unit;
   if (m.pictures) out += ", PSNR " + text_of("%.2f", m.pictures->psnr) + " dB";
   return out + ", asset.glb " + mebibytes(double(m.asset_bytes)) + " MiB";
 }
@@ -219,7 +220,8 @@ std::string recommendation_text(const TradeoffReport& report) {
   out += "The next step up, " + label(next.setting) + ", costs " +
          text_of("%+.3g", next.cpu() - best.cpu()) + " s CPU (" +
          text_of("%+.0f", 100 * (next.cpu() / best.cpu() - 1)) + " %) and brings error " +
-         text_of("%.3g", best.error()) + " -> " + text_of("%.3g", next.error()) + ' ' + unit;
+         text_of("%.3g", best.asset_and_surface_error()) + " -> " +
+         text_of("%.3g", next.asset_and_surface_error()) + ' ' + unit;
   if (best.pictures && next.pictures) {
     out += ", PSNR " + text_of("%+.2f", next.pictures->psnr - best.pictures->psnr) + " dB";
   }
@@ -238,7 +240,8 @@ std::string notes_text(const Tradeoff& tradeoff) {
   }
   if (!tradeoff.settings.front().truth) {
     out +=
-        "Distances from the finest setting tell what a faster one loses, not how true it is; "
+        "Distances from the finest setting, \"" + tradeoff.finest +
+        "\", tell what a faster one loses, not how true it is, and nothing of the finest itself; "
         "--reference tells.\n";
   }
   for (const MeasuredSetting& m : tradeoff.settings) {
@@ -268,18 +271,20 @@ ScatterPlot plot(const Trade& trade, std::string title, std::string x_axis, std:
 }
 
 std::string plots_svg(const Tradeoff& tradeoff) {
-  const std::string error =
-      "error against " + ruler(tradeoff) + ", 95 % within [" + unit_of(tradeoff) + "]";
-  return scatter_svg(
-      {plot(pictures(tradeoff),
-            "Pictures: up and left is better",
-            "processor time, photographs to views [s]",
-            "held-out PSNR [dB]"),
-       plot(geometry(tradeoff),
-            "Geometry: down and left is better",
-            "processor time, photographs to meshes [s]",
-            error),
-       plot(files(tradeoff), "Files: down and left is better", "size of asset.glb [MiB]", error)});
+  const std::string error = "error against " + ruler(tradeoff) + ", 95 % within";
+  const std::string unit = " [" + unit_of(tradeoff) + "]";
+  return scatter_svg({plot(pictures(tradeoff),
+                           "Pictures: up and left is better",
+                           "processor time, photographs to views [s]",
+                           "held-out PSNR [dB]"),
+                      plot(geometry(tradeoff),
+                           "Geometry: down and left is better",
+                           "processor time, photographs to meshes [s]",
+                           error + unit),
+                      plot(files(tradeoff),
+                           "Files: down and left is better",
+                           "size of asset.glb [MiB]",
+                           error + ", and packing" + unit)});
 }
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
@@ -311,6 +316,7 @@ Json setting_json(const MeasuredSetting& m) {
   out["voxel"] = m.voxel;
   out["faces"] = m.faces;
   out["packing_error"] = m.asset_error;
+  out["error"] = number_or_null(m.asset_and_surface_error());
   out["bytes"] = {{"gaussians.ply", m.model_bytes},
                   {"watertight.ply", m.mesh_bytes},
                   {"asset.glb", m.asset_bytes}};

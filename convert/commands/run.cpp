@@ -73,7 +73,10 @@ void run_run(const RunArgs& args) {
   Terminal terminal(args.common.quiet, args.common.strict);
   const auto start = std::chrono::steady_clock::now();
   const double budget = args.budget.empty() ? 0 : parse_seconds(args.budget);
-  if (budget > 0 && request.training.steps != training_preset("standard").steps) {
+  const std::vector<std::string>& set = args.training.settings;
+  const bool sets_steps = std::any_of(
+      set.begin(), set.end(), [](const std::string& s) { return s.rfind("steps=", 0) == 0; });
+  if (budget > 0 && sets_steps) {
     throw InvalidInput("--budget chooses the steps of the training; give it or --set steps");
   }
   if (budget > 0) request = within_budget(request, budget, start, terminal);
@@ -113,9 +116,9 @@ void add_promises(CLI::App& command, RunArgs& args) {
   const OptionGroup group(command, "Promises, kept or refused");
   command.add_option("--max-error",
                      args.request.max_error,
-                     "Every mesh written, asset.glb too, lies within this of the fused "
-                     "surface, measured on the files, e.g. 1mm, or in scene units; in place "
-                     "of --simplify and --compression-error");
+                     "Every mesh written, asset.glb too but not its coarser levels, lies within "
+                     "this of the fused surface, measured on the files, e.g. 1mm, or in scene "
+                     "units; in place of --simplify and --compression-error");
   command.add_option("--max-size",
                      args.max_size,
                      "asset.glb with its textures is no larger, e.g. 2MB; leaves out the "

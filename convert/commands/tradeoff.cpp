@@ -45,6 +45,7 @@ void run_tradeoff(const TradeoffArgs& args) {
   refuse_early(args);
   TradeoffRequest request = args.request;
   request.memory_limit = stated_memory_limit(args.common);
+  request.threads = args.common.threads;
   Terminal terminal(args.common.quiet, args.common.strict);
   const CostMeter meter;
   const OpenedScene opened = open_scene(request.scene, request.output, terminal);
@@ -96,7 +97,7 @@ void add_tradeoff(CLI::App& app) {
       "           --want \"error<5mm\" --want \"size<1MB\"\n"
       "Errors are distances that 95 % of what was photographed keep, from the finest setting or "
       "the\n"
-      "reference. Running it again goes on where it stopped.");
+      "reference. Times are those of the assets. Running it again goes on where it stopped.");
   cmd->callback([args] { run_tradeoff(*args); });
 }
 

@@ -77,7 +77,7 @@ TEST(ParseBytes, KnowsBinaryPrefixes) {
   EXPECT_EQ(parse_bytes("4096"), 4096u);
   EXPECT_EQ(parse_bytes("4K"), 4096u);
   EXPECT_EQ(parse_bytes("1.5GiB"), size_t{3} << 29);
-  for (const auto* bad : {"", "G", "-1G", "4X", "4GG"}) {
+  for (const auto* bad : {"", "G", "-1G", "4X", "4GG", "0.5", "1e20"}) {
     EXPECT_THROW(parse_bytes(bad), InvalidInput) << bad;
   }
 }

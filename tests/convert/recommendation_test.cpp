@@ -109,6 +109,26 @@ TEST(Recommend, SaysWhatIsNearestWhereNothingWillDo) {
   EXPECT_EQ(both.unmet.size(), 2u);
 }
 
+TEST(Recommend, NearestIsChosenByDifferencesThatAreSome) {
+  std::vector<TradeoffFigures> table = kTable;
+  table[3].error = 0.00205;
+  table.push_back({90, 60, 0.00203, 24.5, 9e6});
+  table.push_back({50, 30, 0.00207, 24.5, 9e6});
+  EXPECT_EQ(*recommend(table, wants({"error<1mm"}), {}).best, 7u);
+}
+
+// What the others are measured from would be without error.
+TEST(Recommend, TheRulerMeetsNoWantOfErrorButIsTheMostAccurate) {
+  std::vector<TradeoffFigures> table = kTable;
+  table[3].error = 0;
+  table[3].is_ruler = true;
+  const Recommendation r = recommend(table, wants({"error<1mm"}), {});
+  EXPECT_EQ(*r.best, 1u);
+  EXPECT_EQ(r.unmet.size(), 1u);
+  EXPECT_EQ(*recommend(table, wants({"time<1h"}), {}).best, 3u);
+  EXPECT_FALSE(recommend({table[3]}, wants({"error<1mm"}), {}).best.has_value());
+}
+
 TEST(Recommend, NextStepUpIsTheCheapestThatIsBetter) {
   EXPECT_EQ(*recommend(kTable, wants({"error<5mm"}), {}).next_better, 0u);  // 1 -> more PSNR
   EXPECT_EQ(*recommend(kTable, wants({"time<15s"}), {}).next_better, 1u);

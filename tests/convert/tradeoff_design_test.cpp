@@ -98,6 +98,8 @@ TEST(CommandLine, SurvivesAShell) {
   EXPECT_EQ(command_line(r).find("--refine-poses"), std::string::npos);
   r.scene.refine_poses = true;
   EXPECT_NE(command_line(r).find(" --refine-poses"), std::string::npos);
+  r.memory_limit = 1 << 20;
+  EXPECT_NE(command_line(r, 3).find(" --memory-limit 1048576 --threads 3 -o"), std::string::npos);
 }
 
 TEST(CommandLine, HasEveryOptionThatTheSceneWasOpenedWith) {

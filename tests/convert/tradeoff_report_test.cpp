@@ -28,6 +28,9 @@ TradeoffReport report() {
                            measured({.coarser = 2}, 20, 22, 0.010, 1'000'000),
                            measured({.voxel = 0.7, .simplify = 0}, 150, 25, 0, 9'000'000),
                            measured({.steps = 0}, 60, 23, 0.004, 4'000'000)};
+  for (const size_t i : {0u, 1u, 4u}) out.tradeoff.settings[i].asset_error = 0.0005;
+  out.tradeoff.settings[3].deviation.reset();
+  out.tradeoff.settings[3].is_ruler = true;
   MeasuredSetting failed;
   failed.setting = {.coarser = 4};
   failed.failed = "too small";
@@ -51,6 +54,8 @@ TEST(TradeoffReport, NamesTheFronts) {
   EXPECT_EQ(json["recommendation"]["setting"], "draft");
   EXPECT_EQ(json["recommendation"]["next_better"], "standard");
   EXPECT_EQ(json["settings"][5]["failed"], "too small");
+  EXPECT_DOUBLE_EQ(json["settings"][0]["error"].get<double>(), 0.0045);
+  EXPECT_TRUE(json["settings"][3]["error"].is_null());
 }
 
 TEST(TradeoffReport, TellsWhatToUseAndWhatIsMissing) {
@@ -63,6 +68,7 @@ TEST(TradeoffReport, TellsWhatToUseAndWhatIsMissing) {
                            "For error<0.005: draft (40 s CPU",
                            "cgs run d1_s20",
                            "The next step up, standard, costs +60 s CPU (+150 %)",
+                           "brings error 0.0045 -> 0.0045 units",
                            "PSNR +1.00 dB"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }

@@ -80,7 +80,8 @@ TEST_F(Budget, TooLittleTimeIsRefusedAndNothingStays) {
 }
 
 TEST_F(Budget, WhatItChoosesMayNotBeStatedToo) {
-  for (const char* stated : {"--downscale 2", "--preset draft", "--set steps=5"}) {
+  for (const char* stated :
+       {"--downscale 2", "--preset draft", "--set steps=5", "--set steps=60"}) {
     const auto result = run("1h", stated);
     EXPECT_EQ(result.exit_code, 2) << stated << result.err;
     EXPECT_NE(result.err.find("--budget"), std::string::npos) << result.err;

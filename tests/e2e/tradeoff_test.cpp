@@ -81,7 +81,8 @@ TEST(Tradeoff, MeasuresRecommendsAndResumes) {
   for (const auto& [file, path] : {std::pair("gaussians.ply", "model/gaussians.ply"),
                                    std::pair("watertight.ply", "mesh/watertight.ply"),
                                    std::pair("asset.glb", "web/asset.glb")}) {
-    EXPECT_EQ(std::filesystem::file_size(dir / "whole/run" / path), draft["bytes"][file]) << file;
+    const std::filesystem::path made = command.substr(command.rfind(' ') + 1);
+    EXPECT_EQ(std::filesystem::file_size(made / path), draft["bytes"][file]) << file;
   }
 }
 
@@ -106,6 +107,12 @@ TEST(Tradeoff, RefusesBadRequestsInOneLineBeforeAnyWork) {
   const auto other = run_cgs(scene + " --minutes 0 --views 0,1");
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_NE(other.err.find("views"), std::string::npos) << other.err;
+  // A folder holds a run or measurements, and these are of one number of threads.
+  const auto run = run_cgs("run" + scene.substr(8) + " -q");
+  EXPECT_NE(run.err.find("another run (different: command, threads)"), std::string::npos)
+      << run.err;
+  const auto threads = run_cgs(scene + " --minutes 0 --threads 7");
+  EXPECT_NE(threads.err.find("different: threads"), std::string::npos) << threads.err;
 }
 
 }  // namespace
