@@ -54,34 +54,36 @@ float plane_at(const SweptView& view, double u, double v, double expected) {
   return best;
 }
 
-struct Confirmation {
-  double difference;  // of t [planes]
-  double parallax;    // [pixels per plane]
+// How a pixel compares with what another view sees there.
+struct Comparison {
+  enum { None, Confirms, SeesThrough } answer = None;
+  double difference = 0;  // of t [planes], where it confirms
+  double parallax = 0;    // likewise [pixels per plane]
 };
 
-// How a pixel compares with what `other` sees there, if that view confirms it.
-std::optional<Confirmation> confirmation(const SweptView& view,
-                                         const SweptView& other,
-                                         const Lifted& p,
-                                         const AgreementLimits& limits) {
+Comparison compared(const SweptView& view,
+                    const SweptView& other,
+                    const Lifted& p,
+                    const AgreementLimits& limits) {
   const SweepSource& source = towards(view, other);
   const std::optional<Lifted> there = transfer(view, source, p);
-  if (!there) return std::nullopt;
+  if (!there) return {};
   // Without parallax any two depths agree, and both may come from a third view that saw another
   // surface.
   const double parallax = source.parallax(p.u, p.v, view.geometry.plane_of(p.inverse_depth));
   const double disparity = parallax * p.inverse_depth / view.geometry.step;
-  if (!(disparity >= limits.least_disparity)) return std::nullopt;
+  if (!(disparity >= limits.least_disparity)) return {};
   const double expected = other.geometry.plane_of(there->inverse_depth);
   const double t = static_cast<double>(plane_at(other, there->u, there->v, expected));
-  if (std::isnan(t) || other.geometry.inverse_depth(t) <= 0) return std::nullopt;
+  if (std::isnan(t) || other.geometry.inverse_depth(t) <= 0) return {};
   const Lifted seen{there->u, there->v, other.geometry.inverse_depth(t)};
+  const Comparison otherwise = {seen.inverse_depth < there->inverse_depth ? Comparison::SeesThrough
+                                                                          : Comparison::None};
   const std::optional<Lifted> back = transfer(other, towards(other, view), seen);
-  if (!back || std::hypot(back->u - p.u, back->v - p.v) > limits.max_disagreement)
-    return std::nullopt;
+  if (!back || std::hypot(back->u - p.u, back->v - p.v) > limits.max_disagreement) return otherwise;
   const double d = (back->inverse_depth - p.inverse_depth) / view.geometry.step;
-  if (std::abs(d) > limits.max_disagreement) return std::nullopt;
-  return Confirmation{d, parallax};
+  if (std::abs(d) > limits.max_disagreement) return otherwise;
+  return {Comparison::Confirms, d, parallax};
 }
 
 // The plane n of the scene (n . X = 1 in camera axes) that a pixel lies on.
@@ -111,11 +113,12 @@ Raster<Agreement> cross_check(const std::vector<SweptView>& views,
       double sum = 0;
       for (size_t j = 0; j < views.size(); ++j) {
         if (j == view) continue;
-        const auto c = confirmation(here, views[j], p, limits);
-        if (!c) continue;
-        sum += c->difference * c->difference;
+        const Comparison c = compared(here, views[j], p, limits);
+        if (c.answer == Comparison::SeesThrough) ++out(x, y).seen_through;
+        if (c.answer != Comparison::Confirms) continue;
+        sum += c.difference * c.difference;
         ++out(x, y).views;
-        out(x, y).parallax = std::max(out(x, y).parallax, static_cast<float>(c->parallax));
+        out(x, y).parallax = std::max(out(x, y).parallax, static_cast<float>(c.parallax));
       }
       const int n = out(x, y).views;
       if (n > 0) out(x, y).difference = static_cast<float>(std::sqrt(sum / n));

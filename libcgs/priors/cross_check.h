@@ -16,9 +16,10 @@ struct SweptView {
 
 /// How far the other views agree with a pixel.
 struct Agreement {
-  uint8_t views = 0;     ///< Other views that confirm it.
-  float difference = 0;  ///< Root mean square difference of t to those views [planes].
-  float parallax = 0;    ///< Largest way that the pixel makes in one of them [pixels per plane].
+  uint8_t views = 0;         ///< Other views that confirm it.
+  uint8_t seen_through = 0;  ///< Those that see something farther away there.
+  float difference = 0;      ///< Root mean square difference of t to those views [planes].
+  float parallax = 0;  ///< Largest way that the pixel makes in one of them [pixels per plane].
 };
 
 /// What counts as agreement.

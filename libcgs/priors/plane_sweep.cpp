@@ -120,11 +120,20 @@ void remove_bare(const SweptView& view, Raster<Agreement>& agreement) {
   });
 }
 
+// Takes back what fewer views confirm than see through: two photographs from nearly one place may
+// agree on a highlight, or where a surface turns away, and all others know better.
+void remove_outvoted(Raster<Agreement>& agreement) {
+  for (Agreement& a : agreement.data) {
+    if (a.seen_through > a.views) a = {};
+  }
+}
+
 std::vector<Raster<Agreement>> check_all(const std::vector<SweptView>& views,
                                          const PlaneSweepOptions& options) {
   std::vector<Raster<Agreement>> out;
   for (size_t i = 0; i < views.size(); ++i) {
     out.push_back(cross_check(views, i, {options.max_disagreement, options.least_disparity}));
+    remove_outvoted(out.back());
     remove_bare(views[i], out.back());
     remove_speckles(views[i], out.back());
   }

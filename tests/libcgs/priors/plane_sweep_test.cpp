@@ -338,6 +338,29 @@ TEST(PlaneSweep, SigmaIsOfThePairThatConfirms) {
   }
 }
 
+// As a highlight that moves along with two photographs, and not with the others.
+TEST(PlaneSweep, TakesNothingThatMoreViewsSeeThroughThanConfirm) {
+  std::vector<Camera> cameras;
+  for (const double x : {-0.5, -0.2, 0.2, 0.5}) {
+    cameras.push_back(test::looking_at({x, 0.1 * x, 0}, {0, 0, 6}, kWidth, kHeight, kFocal));
+  }
+  const auto share_in_front = [&](size_t count) {
+    const std::vector<Camera> used(cameras.begin(), cameras.begin() + std::ptrdiff_t(count));
+    Scene scene = test::photographed_scene(wall_and_square(), used, kFinest);
+    const Scene wall = test::photographed_scene({wall_and_square()[0]}, used, kFinest);
+    for (size_t i = 2; i < count; ++i) scene.views[i].image = wall.views[i].image;
+    const ViewPriors priors = plane_sweep(scene, {})[0];
+    double out = 0;
+    for (size_t i = 0; i < priors.depth.data.size(); ++i) {
+      const bool is_measured = priors.origin.data[i] == DepthOrigin::Measured;
+      out += is_measured && priors.depth.data[i] < 4.5f ? 1 : 0;
+    }
+    return out / double(priors.depth.data.size());
+  };
+  EXPECT_GT(share_in_front(3), 0.05) << "one for it, one against";
+  EXPECT_LT(share_in_front(4), 0.005);
+}
+
 TEST(PlaneSweep, RefusesCamerasAtOnePlace) {
   std::vector<Camera> cameras = three_cameras();
   Scene scene = test::photographed_scene(slanted_plane(), cameras, kFinest);
