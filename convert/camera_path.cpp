@@ -144,9 +144,10 @@ std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Mo
   std::vector<Camera> out;
   for (const View& view : path.views) {
     Camera camera = view.camera;
-    const Eigen::Vector3d in_file =
-        states_frame ? path.frame.file_from_internal(camera.center()) : camera.center();
-    camera.world_from_cam.translation() = model.scene.frame.internal_from_file(in_file);
+    const Frame& frame = model.scene.frame;  // whose coordinates in files may have another origin
+    camera.world_from_cam.translation() =
+        states_frame ? frame.internal_from_world(path.frame.world_from_internal(camera.center()))
+                     : frame.internal_from_file(camera.center());
     out.push_back(camera);
   }
   return out;

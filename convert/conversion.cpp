@@ -525,6 +525,12 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
     terminal.say(
         "no photograph vouches for this surface: all of it is labelled virtual or inferred");
   }
+  if (source.mesh.faces.empty() && lower_extension(request.output) != ".ply") {
+    throw BadInput(
+        Defect::Empty, request.input, "has no faces; a point cloud can only be written as .ply");
+  }
+  const std::string lost = lost_in_file(request.output, source.mesh);
+  if (!lost.empty()) terminal.say(lost);
   write_mesh(request, source, source.mesh, report);
   return report;
 }

@@ -34,7 +34,13 @@ View& first_input(Scene& scene) { return scene.views[static_cast<size_t>(scene.i
 void keep_measured(Scene& scene) {
   std::erase_if(scene.input,
                 [&](int i) { return scene.views[static_cast<size_t>(i)].depth_path.empty(); });
-  if (!scene.input.empty()) return;
+  if (scene.input.size() > 1) return;
+  if (!scene.input.empty()) {
+    throw BadInput(Defect::Missing,
+                   scene.folder,
+                   "only view " + printable(first_input(scene).name) +
+                       " of those chosen has depth; two or more are needed");
+  }
   throw BadInput(Defect::Missing,
                  scene.folder,
                  "there is no depth to fuse: put a file per photograph, of the same stem, into a "

@@ -96,6 +96,20 @@ void require_writable_as(const std::filesystem::path& path, const Frame& frame) 
           "unknown");
 }
 
+std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".ply" || extension == ".glb") return "";
+  std::string out;
+  const auto add = [&](bool is_lost, const char* what) {
+    if (is_lost) out += (out.empty() ? "" : ", ") + std::string(what);
+  };
+  add(extension == ".stl" && !mesh.provenance.empty(), "labels");
+  add(extension == ".stl" && !mesh.colors.empty(), "colours");
+  add(!mesh.sigma.empty(), "sigma");
+  add(!mesh.support.empty(), "support");
+  return out.empty() ? out : extension + " files hold no " + out + "; .ply and .glb do";
+}
+
 void write_mesh_as(const std::filesystem::path& path,
                    const TriangleMesh& mesh,
                    const Frame& frame,

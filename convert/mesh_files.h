@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -35,6 +36,9 @@ bool is_writable_mesh_name(const std::filesystem::path& path);
 /// What can be refused before any work: STL and 3MF of a scene of unknown scale.
 /// \throws InvalidInput
 void require_writable_as(const std::filesystem::path& path, const Frame& frame);
+
+/// What the format of a path has no place for, of what a mesh says, for people; empty if nothing.
+std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 /// Writes a mesh in the format that the ending of the path names.
 /// \param frame    whose `up` becomes +Z in STL and 3MF, +Y in GLB, and must be known for these

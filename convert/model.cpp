@@ -389,6 +389,7 @@ void relink_views(Scene& scene, const Scene& found) {
 }  // namespace
 
 void relink_images(Scene& scene, const std::filesystem::path& folder) {
+  scene.folder = folder;  // masks lie there, too
   for (View& view : scene.views) {
     view.image_path.clear();
     view.mask_path.clear();

@@ -189,9 +189,11 @@ std::string training_section(const Json& model) {
     const double x = kWidth * double(i) / double(loss.size() - 1);
     html << number(x, "%.1f") << "," << number(kHeight * (1 - loss[i] / top), "%.1f") << " ";
   }
-  html << "\"/></svg>\n<p>Loss over " << loss.size() << " steps, from 0 to " << number(top, "%.4f")
-       << "; it is taken from smaller images at first, so it may jump.</p>\n"
-          "<details><summary>Settings</summary><table>\n";
+  const bool grows = model["settings"].value("coarse_until", "0") != "0";
+  html << "\"/></svg>\n<p>Loss over " << loss.size() << " steps: " << number(loss.front(), "%.4f")
+       << " at the start, " << number(loss.back(), "%.4f") << " at the end; the axis begins at 0."
+       << (grows ? " It is taken from smaller images at first, so it may jump." : "")
+       << "</p>\n<details><summary>Settings</summary><table>\n";
   for (const auto& [name, value] : model["settings"].items()) {
     html << "<tr><td>" << escaped(name) << "</td><td>" << escaped(value.get<std::string>())
          << "</td></tr>\n";

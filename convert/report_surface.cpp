@@ -99,8 +99,8 @@ std::string simplification_section(const Json& report) {
     html << "<tr><td>" << name << "</td><td>" << number(s["faces_before"], "%.0f") << "</td><td>"
          << number(s["faces_after"], "%.0f") << "</td><td>" << unit.length(evidence["max"])
          << "</td><td>" << unit.length(evidence["rms_from_simplified"]) << "</td><td>"
-         << unit.length(s["error_inferred"]["max"]) << "</td><td>"
-         << unit.area(s["area_observed_before"]) << "</td><td>"
+         << (s["error_inferred"].is_null() ? "-" : unit.length(s["error_inferred"]["max"]))
+         << "</td><td>" << unit.area(s["area_observed_before"]) << "</td><td>"
          << unit.area(s["area_observed_after"]) << "</td></tr>\n";
   }
   html << "</table>\n";

@@ -25,14 +25,16 @@ Json distances_to_json(const MeshDistance& distance, double scale) {
 
 Json result_to_json(const SimplifyResult& result, const Frame& frame) {
   const auto observed = size_t(Provenance::Observed);
+  const bool has_inferred = result.area_before.at(size_t(Provenance::Inferred)) > 0;
   const double area_unit = frame.scale * frame.scale;
-  return {{"faces_before", result.faces_before},
-          {"faces_after", result.faces_after},
-          {"error_with_evidence", distances_to_json(result.evidence, frame.scale)},
-          {"error_inferred", distances_to_json(result.inferred, frame.scale)},
-          {"area_observed_before", result.area_before.at(observed) * area_unit},
-          {"area_observed_after", result.area_after.at(observed) * area_unit},
-          {"rounds", result.rounds}};
+  return {
+      {"faces_before", result.faces_before},
+      {"faces_after", result.faces_after},
+      {"error_with_evidence", distances_to_json(result.evidence, frame.scale)},
+      {"error_inferred", has_inferred ? distances_to_json(result.inferred, frame.scale) : Json()},
+      {"area_observed_before", result.area_before.at(observed) * area_unit},
+      {"area_observed_after", result.area_after.at(observed) * area_unit},
+      {"rounds", result.rounds}};
 }
 
 }  // namespace

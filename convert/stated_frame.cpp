@@ -41,6 +41,17 @@ std::string scale_contradiction(const Frame& stated,
          " m; the latter was taken, so check the unit and the picks";
 }
 
+std::string turned_text(const Frame& a, const Frame& b) {
+  constexpr double kSame = 0.9998;  // about a degree
+  if (!a.knows_up() || !b.knows_up() || a.up.dot(b.up) > kSame) return "";
+  const auto words = [](const Eigen::Vector3d& up) {
+    return number(up.x(), "%.3g") + ", " + number(up.y(), "%.3g") + ", " + number(up.z(), "%.3g");
+  };
+  return "up is " + words(a.up) + " in the first file and " + words(b.up) +
+         " in the second, as STL and 3MF are written with z up: if they show one thing, the second "
+         "has to be turned (cgs filter --op rotate) or laid on (cgs compare --icp)";
+}
+
 void settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats) {
   if (!given.empty()) {
     frame.up = up_direction(given);

@@ -26,6 +26,10 @@ std::string scale_contradiction(const Frame& stated,
                                 double metres,
                                 double sigma);
 
+/// Says that two files have other directions up, so that what they show together may be turned, for
+/// a warning; empty if not, or if one does not say.
+std::string turned_text(const Frame& a, const Frame& b);
+
 /// Sets what is up: as given, else as the frame knows, else +z, or -y as splats of others mostly
 /// lie. \throws InvalidInput as up_direction()
 void settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats = false);

@@ -224,7 +224,13 @@ Json write_path(const Model& model,
 Json evaluate_views(Model& model, const std::vector<int>& views, const Progress& progress) {
   std::vector<int> with_photograph;
   for (const int i : views) {
-    if (!model.scene.views[static_cast<size_t>(i)].image_path.empty()) with_photograph.push_back(i);
+    const View& view = model.scene.views[static_cast<size_t>(i)];
+    if (view.image_path.empty()) {
+      model.scene.warnings.push_back("view " + printable(view.name) +
+                                     " has no photograph and is not evaluated");
+    } else {
+      with_photograph.push_back(i);
+    }
   }
   if (with_photograph.empty()) {
     throw BadInput(Defect::Empty, model.scene.folder, "no view to evaluate has a photograph");

@@ -53,6 +53,11 @@ class SceneReader {
       out_.parsed.warnings.push_back("left out " + std::to_string(collapsed_) +
                                      " faces with two corners in one place");
     }
+    if (recolored_ > 0) {
+      out_.parsed.warnings.push_back("surfaces of different colours meet at " +
+                                     std::to_string(recolored_) +
+                                     " corners; vertices have one, that of the first");
+    }
     return std::move(out_);
   }
 
@@ -146,17 +151,27 @@ class SceneReader {
     all_have_sigma_ = all_have_sigma_ && !in.sigma.empty();
   }
 
-  // The vertex at a place: a new one with what the primitive says of it, or the first there.
-  uint32_t number_of(const Eigen::Vector3d& place, const GlbFaces& in, size_t v) {
-    ParsedMesh& out = out_.parsed;
-    const uint32_t number = places_.number(place);
-    if (number < out.positions.size()) return number;
-    out.positions.push_back(place);
+  static Eigen::Vector3f color_of(const GlbFaces& in, size_t v) {
     Eigen::Vector3f color = Eigen::Vector3f::Ones();
     for (int c = 0; c < 3 && !in.colors.empty(); ++c) {
       const float linear = in.colors[3 * v + static_cast<size_t>(c)];
       color[c] = srgb_from_linear(std::isfinite(linear) ? std::clamp(linear, 0.0f, 1.0f) : 0.0f);
     }
+    return color;
+  }
+
+  // The vertex at a place: a new one with what the primitive says of it, or the first there.
+  uint32_t number_of(const Eigen::Vector3d& place, const GlbFaces& in, size_t v) {
+    constexpr float kOtherColor = 0.1f;  // more than compression or shading makes of one
+    ParsedMesh& out = out_.parsed;
+    const uint32_t number = places_.number(place);
+    const Eigen::Vector3f color = color_of(in, v);
+    if (number < out.positions.size()) {
+      const bool is_other = (out.mesh.colors[number] - color).cwiseAbs().maxCoeff() > kOtherColor;
+      recolored_ += !in.colors.empty() && is_other ? 1 : 0;
+      return number;
+    }
+    out.positions.push_back(place);
     out.mesh.colors.push_back(color);
     out.mesh.support.push_back(in.support.empty() ? 0.0f : in.support[v]);
     const float sigma = in.sigma.empty() ? -1.0f : in.sigma[v];
@@ -172,6 +187,7 @@ class SceneReader {
   // Of the positions as they were rounded to float: nodes have scaled but not moved them yet.
   Eigen::AlignedBox3d stored_;
   size_t collapsed_ = 0;     // faces
+  size_t recolored_ = 0;     // corners where surfaces of other colours meet
   bool has_colors_ = false;  // any of it; the rest is white
   bool all_have_labels_ = true;
   bool all_have_support_ = true;

@@ -75,6 +75,7 @@ class ObjRows {
     if (words.size() < 4) lines_.fail(Defect::Syntax, "a vertex needs three coordinates");
     out_.positions.emplace_back(number(words[1]), number(words[2]), number(words[3]));
     if (words.size() < 7) return;
+    colored_.push_back(out_.positions.size() - 1);
     out_.mesh.colors.emplace_back(static_cast<float>(number(words[4])),
                                   static_cast<float>(number(words[5])),
                                   static_cast<float>(number(words[6])));
@@ -116,8 +117,8 @@ class ObjRows {
     if (out_.positions.size() > kMost) {
       throw LimitError(printable(lines_.path()) + ": more than 2^32 - 1 vertices");
     }
-    if (out_.mesh.colors.size() != out_.positions.size()) out_.mesh.colors.clear();
     settle_colors(out_);
+    fill_in_colors(out_, colored_);
     if (!all_grouped_) out_.mesh.provenance.clear();
     if (has_materials_ && out_.mesh.colors.empty() && out_.mesh.provenance.empty()) {
       out_.warnings.emplace_back(
@@ -131,6 +132,7 @@ class ObjRows {
 
   TextLines lines_;
   ParsedMesh out_;
+  std::vector<size_t> colored_;  // vertices that state a colour
   std::optional<Provenance> group_;
   bool all_grouped_ = true;
   bool has_materials_ = false;

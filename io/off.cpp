@@ -68,19 +68,21 @@ ParsedMesh read_off(const std::filesystem::path& path) {
   ByteReader(bytes, path).expect_records(faces, 2, "faces");
   if (vertices == 0) throw BadInput(Defect::Empty, path, "0 vertices");
   ParsedMesh out;
+  std::vector<size_t> colored;  // vertices that state a colour
   for (uint64_t i = 0; i < vertices; ++i) {
     const auto words = words_of(expect_line(lines, "a vertex"));
     if (words.size() < 3) lines.fail(Defect::Syntax, "a vertex needs three coordinates");
     out.positions.emplace_back(
         lines.number(words[0]), lines.number(words[1]), lines.number(words[2]));
     if (color == 0 || words.size() < color + 3) continue;
+    colored.push_back(out.positions.size() - 1);
     Eigen::Vector3f& rgb = out.mesh.colors.emplace_back();
     for (size_t c = 0; c < 3; ++c) {
       rgb[static_cast<Eigen::Index>(c)] = static_cast<float>(lines.number(words[color + c]));
     }
   }
-  if (out.mesh.colors.size() != vertices) out.mesh.colors.clear();
   settle_colors(out);
+  fill_in_colors(out, colored);
   uint64_t dropped = 0;
   for (uint64_t i = 0; i < faces; ++i) {
     const auto corners = read_polygon(lines, vertices);

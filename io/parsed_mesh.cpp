@@ -107,6 +107,16 @@ void settle_colors(ParsedMesh& parsed) {
   }
 }
 
+void fill_in_colors(ParsedMesh& parsed, const std::vector<size_t>& colored) {
+  const size_t count = parsed.positions.size();
+  if (colored.empty() || colored.size() == count) return;
+  std::vector<Eigen::Vector3f> colors(count, Eigen::Vector3f::Ones());
+  for (size_t k = 0; k < colored.size(); ++k) colors[colored[k]] = parsed.mesh.colors[k];
+  parsed.mesh.colors = std::move(colors);
+  parsed.warnings.push_back(std::to_string(count - colored.size()) + " of " +
+                            std::to_string(count) + " vertices state no colour: white");
+}
+
 void append_polygon(const std::vector<uint32_t>& corners,
                     const std::vector<Eigen::Vector3d>& positions,
                     std::vector<std::array<uint32_t, 3>>& triangles) {

@@ -37,6 +37,10 @@ void append_polygon(const std::vector<uint32_t>& corners,
 /// then says. Brings them to [0, 1].
 void settle_colors(ParsedMesh& parsed);
 
+/// Gives the colours that some vertices state to those, and white to the others, with a warning.
+/// \param colored  the vertices of parsed.mesh.colors, ascending
+void fill_in_colors(ParsedMesh& parsed, const std::vector<size_t>& colored);
+
 /// Numbers places in the order they first appear, for formats that repeat a vertex per face.
 class PlaceNumbers {
  public:

@@ -14,6 +14,7 @@
 #include "convert/length.h"
 #include "convert/m3c2_comparison.h"
 #include "convert/measured_file.h"
+#include "convert/stated_frame.h"
 #include "convert/terminal.h"
 #include "io/json_file.h"
 #include "libcgs/core/error.h"
@@ -149,6 +150,8 @@ void run_compare(const CompareArgs& args) {
         " is a point cloud; distances need a surface: name the cloud first, or say --m3c2");
   }
   check_units(args, first.content.frame, second.content.frame);
+  const std::string turned = turned_text(first.content.frame, second.content.frame);
+  if (!turned.empty() && !args.icp) terminal.warn({turned});
   MeasurableMesh a = std::move(first.content);
   const MeasurableMesh b = in_frame_of(second.content, a.frame);
   const FigureUnit unit = figure_unit(a.frame, args.unit);

@@ -60,8 +60,17 @@ void run_evaluate(const EvaluateArgs& args) {
   if (views.empty()) {
     throw InvalidInput("no view was held out; name the views to evaluate with --views");
   }
+  for (const int i : views) {
+    const View& view = model.scene.views[static_cast<size_t>(i)];
+    if (args.views.empty() || !view.image_path.empty()) continue;
+    throw InvalidInput("--views: the photograph of view " + printable(view.name) +
+                       " is gone; --scene says where the photographs are");
+  }
+  const size_t told = model.scene.warnings.size();
   const nlohmann::ordered_json report = evaluate_views(model, views, terminal.begin("evaluate"));
-  terminal.end(std::to_string(views.size()) + " views");
+  terminal.end(std::to_string(report["views"].size()) + " views");
+  const auto& warnings = model.scene.warnings;
+  terminal.warn(std::vector(warnings.begin() + static_cast<std::ptrdiff_t>(told), warnings.end()));
   if (args.common.json) {
     std::cout << json_text(report) << "\n";
   } else {

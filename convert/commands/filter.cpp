@@ -53,6 +53,8 @@ void run_filter_command(const FilterArgs& args) {
   require_writable_as(args.output, state.frame);
   const nlohmann::ordered_json report = run_filters(state, filters, terminal);
   check_content(args.output, state);
+  const std::string lost = lost_in_file(args.output, state.mesh);
+  if (!lost.empty()) terminal.say(lost);
   write_mesh_as(args.output, state.mesh, state.frame);
   if (state.frame.file_origin != state.file_origin) {
     terminal.warn("coordinates in " + printable(args.output) +

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "convert/stated_frame.h"
 #include "io/mesh_file.h"
 #include "libcgs/core/error.h"
 #include "meshing/placement.h"
@@ -45,6 +46,8 @@ SecondMesh read_second_mesh(const FilterState& state,
     out.remark += "; only one file says what was observed: all of the other counts as inferred";
   }
   for (const std::string& warning : second.warnings) out.remark += "; " + warning;
+  const std::string turned = turned_text(state.frame, second.content.frame);
+  if (!turned.empty()) out.remark += "; " + turned;
   move_to_frame(mesh, second.content.frame, state.frame);
   out.mesh = std::move(mesh);
   return out;

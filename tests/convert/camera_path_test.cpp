@@ -103,6 +103,11 @@ TEST(CameraPath, OfAFileIsInTheCoordinatesOfTheModelsFiles) {
   const auto path = camera_path_from(dir / "path.json", model);
   ASSERT_EQ(path.size(), 3u);
   EXPECT_LT((path[2].center() - model.scene.views[2].camera.center()).norm(), 1e-9);
+  // A path of another model of the same place, whose files have another origin.
+  Model far = model;
+  far.scene.frame.file_origin = {1000, -500, 0};
+  const auto other = camera_path_from(dir / "path.json", far);
+  EXPECT_LT((other[2].center() - model.scene.views[2].camera.center()).norm(), 1e-9);
   test::write_bytes(dir / "foreign.json",
                     R"([{"id": 0, "img_name": "a", "width": 40, "height": 30, "fx": 50, "fy": 50,
                          "position": [1028, -512, 64],

@@ -145,6 +145,10 @@ TEST_F(SphereFrames, TwoAreEnough) {
   EXPECT_LT(worst_error(mesh, out.frame), 0.01);
   EXPECT_GT(area_by_provenance(mesh)[size_t(Provenance::Observed)], 0);
   EXPECT_EQ(*std::max_element(mesh.support.begin(), mesh.support.end()), 2);
+  std::filesystem::remove(dir_ / "depth" / (name(7) + ".png"));
+  const std::string one = test::message_of([&] { (void)fuse_depth(two, {}); });
+  EXPECT_NE(one.find("only view " + name(4) + " of those chosen has depth"), std::string::npos)
+      << one;
 }
 
 TEST_F(SphereFrames, KeepTheColoursOfTheirPhotographsAndTheirMasks) {

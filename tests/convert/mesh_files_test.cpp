@@ -32,6 +32,18 @@ Frame frame_of_scale_2() {
   return frame;
 }
 
+TEST(LostInFile, IsWhatTheFormatHasNoPlaceFor) {
+  EXPECT_EQ(lost_in_file("a.ply", corner()), "");
+  EXPECT_EQ(lost_in_file("a.GLB", corner()), "");
+  EXPECT_EQ(lost_in_file("a.obj", corner()), ".obj files hold no sigma, support; .ply and .glb do");
+  EXPECT_EQ(lost_in_file("a.STL", corner()),
+            ".stl files hold no labels, colours, sigma, support; .ply and .glb do");
+  TriangleMesh bare = corner();
+  bare.sigma.clear();
+  bare.support.clear();
+  EXPECT_EQ(lost_in_file("a.3mf", bare), "");
+}
+
 TEST(CertificateToJson, GivesMeasuresInFileUnits) {
   const auto json = certificate_to_json(certify(corner()), corner(), frame_of_scale_2());
   EXPECT_TRUE(json["passed"].get<bool>());

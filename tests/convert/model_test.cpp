@@ -5,6 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include "io/scene_reader.h"
+#include "tests/support/scene_files.h"
+#include "tests/support/temp_dir.h"
+
 namespace cgs {
 namespace {
 
@@ -32,6 +36,25 @@ TEST(WorldUp, IsTheMeanImageUpOfParallelCameras) {
   const Eigen::Vector3d up(0, 0, 1);
   const double cosine = world_up(arc_scene(up, 0, 0.1)).dot(up);
   EXPECT_NEAR(std::acos(cosine), 0.1, 1e-6);
+}
+
+// As masks do, which lie beside the photographs and not where these were.
+TEST(RelinkImages, FindsTheMasksOfPhotographsThatMoved) {
+  const test::TempDir dir;
+  Scene scene;
+  scene.folder = "gone";
+  for (const char* name : {"a", "b"}) {
+    const std::string file = std::string(name) + ".png";
+    test::write_bytes(dir / "photos" / file, test::rgb_png(8, 6, 1));
+    test::write_bytes(dir / "photos/masks" / file, test::rgb_png(8, 6, 0));
+    View& view = scene.views.emplace_back();
+    view.name = name;
+    view.camera = {8, 6, 9, 9, 4, 3, Eigen::Isometry3d::Identity()};
+  }
+  relink_images(scene, dir / "photos");
+  EXPECT_TRUE(scene.warnings.empty());
+  load_images(scene, {0});
+  ASSERT_FALSE(scene.views[0].valid.empty());
 }
 
 TEST(Picture, DividesByAlphaAboveOneHalfOnly) {

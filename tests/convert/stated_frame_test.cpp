@@ -40,6 +40,18 @@ TEST(ScaleContradiction, IsSaidBeyondThreeSigma) {
             std::string::npos);
 }
 
+TEST(TurnedText, SaysThatTwoFilesHaveOtherDirectionsUp) {
+  Frame a;
+  Frame b;
+  b.up = Eigen::Vector3d::UnitZ();
+  EXPECT_EQ(turned_text(a, b), "") << "one does not say";
+  a.up = Eigen::Vector3d(0, 0.001, 1).normalized();
+  EXPECT_EQ(turned_text(a, b), "");
+  a.up = -Eigen::Vector3d::UnitY();
+  EXPECT_EQ(turned_text(a, b).substr(0, 64),
+            "up is -0, -1, -0 in the first file and 0, 0, 1 in the second, as");
+}
+
 TEST(UpDirection, IsOfUnitLength) {
   EXPECT_EQ(up_direction({0, -20, 0}), -Eigen::Vector3d::UnitY());
   EXPECT_THROW(up_direction({0, 0, 0}), InvalidInput);

@@ -53,6 +53,11 @@ TEST(ReadObj, SaysWhichColoursItLeavesOutOrChanges) {
   EXPECT_LT((bytes.mesh.colors[0] - Eigen::Vector3f(1, 0, 0.2f)).norm(), 1e-6f);
   ASSERT_EQ(bytes.warnings.size(), 1U);
   EXPECT_TRUE(bytes.warnings[0].starts_with("colours above 1"));
+  const ParsedMesh some = parsed("v 0 0 0\nv 1 0 0 0 255 0\nv 0 1 0\n" + faces);
+  ASSERT_EQ(some.mesh.colors.size(), 3U);
+  EXPECT_EQ(some.mesh.colors[0], Eigen::Vector3f::Ones());
+  EXPECT_EQ(some.mesh.colors[1], Eigen::Vector3f::UnitY());
+  EXPECT_EQ(some.warnings.back(), "2 of 3 vertices state no colour: white");
   const std::string plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   EXPECT_TRUE(parsed(plain + faces).warnings.empty());
   const ParsedMesh textured = parsed("mtllib a.mtl\n" + plain + "usemtl stone\n" + faces);
