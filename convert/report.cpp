@@ -68,7 +68,8 @@ std::string mesh_section(const std::filesystem::path& folder) {
          figure(folder / "mesh/front.png", "watertight mesh, from the middle input view") +
          figure(folder / "mesh/side.png", "from the side") +
          figure(folder / "mesh/front.provenance.png",
-                "magenta = inferred, never seen by any input view; orange = interpolated") +
+                "magenta = inferred, never seen by any input view; orange = interpolated; what was "
+                "seen keeps its colour") +
          figure(folder / "mesh/side.provenance.png", "the same from the side") + "</div>\n";
 }
 

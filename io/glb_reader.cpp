@@ -53,7 +53,7 @@ class SceneReader {
       out_.parsed.warnings.push_back("left out " + std::to_string(collapsed_) +
                                      " faces with two corners in one place");
     }
-    if (recolored_ > 0) {
+    if (recolored_ > 0 && !origin_.is_ours) {  // ours are of photographs that differ a little
       out_.parsed.warnings.push_back("surfaces of different colours meet at " +
                                      std::to_string(recolored_) +
                                      " corners; vertices have one, that of the first");
