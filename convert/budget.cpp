@@ -279,23 +279,24 @@ Json choose(Search& search) {
 }
 
 // Holds the folder of the run, and takes away what trials wrote to it, those of a start that was
-// killed, too, and folders that nothing came into.
+// killed, too, and its own folders that nothing came into.
 class TrialFolder {
  public:
-  explicit TrialFolder(fs::path output) : output_(made(std::move(output))), lock_(output_) {
+  explicit TrialFolder(const fs::path& output)
+      : is_new_(!is_present(output)), output_(made(output)), lock_(output_) {
     remove_trials();
   }
   ~TrialFolder() {
     remove_trials();
     std::error_code ignored;
     fs::remove(output_ / "model", ignored);
-    fs::remove(output_, ignored);
+    if (is_new_) fs::remove(output_, ignored);
   }
   TrialFolder(const TrialFolder&) = delete;
   TrialFolder& operator=(const TrialFolder&) = delete;
 
  private:
-  static fs::path made(fs::path output) {
+  static const fs::path& made(const fs::path& output) {
     make_output_folder(output / "model");
     return output;
   }
@@ -304,6 +305,7 @@ class TrialFolder {
     fs::remove_all(output_ / kTrialFolder, ignored);
   }
 
+  bool is_new_;
   fs::path output_;
   FolderLock lock_;
 };

@@ -62,15 +62,15 @@ Camera camera_of_file(const View& view) {
   return out;
 }
 
-PosedPhoto posed_photo(const View& view, const SceneRoot& root, const FeatureOptions& options) {
+PosedPhoto posed_photo(const View& view, const FeatureOptions& options) {
   MaskMap usable;
-  const ColorImage image = read_photograph(view, root, usable);
+  const ColorImage image = read_photograph(view, usable);
   PosedPhoto out{view.name, camera_of_file(view), detect_features(image, usable, options)};
   take_out_distortion(LensMap(view, out.camera), out.camera, out.features);
   return out;
 }
 
-Json camera_fit(const Scene& scene, const SceneRoot& root, const Progress& progress) {
+Json camera_fit(const Scene& scene, const Progress& progress) {
   constexpr FeatureOptions kFew{.largest_side = 800, .most = 2000};
   const double count = static_cast<double>(scene.input.size());
   std::vector<PosedPhoto> photos;
@@ -78,7 +78,7 @@ Json camera_fit(const Scene& scene, const SceneRoot& root, const Progress& progr
   for (const int i : scene.input) {
     report(progress, 0.7 * double(photos.size()) / count);
     const View& view = scene.views[static_cast<size_t>(i)];
-    photos.push_back(posed_photo(view, root, kFew));
+    photos.push_back(posed_photo(view, kFew));
     const PosedPhoto& photo = photos.back();
     worked_on.push_back(photo.features.pixel * view.camera.width / photo.camera.width);
   }

@@ -5,7 +5,6 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "io/scene_path.h"
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/pose_fit.h"
 
@@ -17,7 +16,7 @@ Camera camera_of_file(const View& view);
 
 /// Features of the photograph of a view, without those that the undistorted picture does not hold,
 /// and camera_of_file(). \throws as read_photograph()
-PosedPhoto posed_photo(const View& view, const SceneRoot& root, const FeatureOptions& options = {});
+PosedPhoto posed_photo(const View& view, const FeatureOptions& options = {});
 
 /// How well the cameras of the input views agree with what the photographs show: a look at their
 /// strongest features, in a second or two. The error of a view is the median of its pairs, where a
@@ -29,9 +28,7 @@ PosedPhoto posed_photo(const View& view, const SceneRoot& root, const FeatureOpt
 ///          "pairs": [{"views", "matches", "error": median distance of matches from where the
 ///          cameras have them}]} in pixels of the photographs as worked on; null where no two
 ///          photographs share enough to tell
-nlohmann::ordered_json camera_fit(const Scene& scene,
-                                  const SceneRoot& root,
-                                  const Progress& progress = {});
+nlohmann::ordered_json camera_fit(const Scene& scene, const Progress& progress = {});
 
 /// Advice for cameras that do not fit; empty for those that do, and for null.
 std::string camera_fit_warning(const nlohmann::ordered_json& fit);

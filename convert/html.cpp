@@ -39,6 +39,10 @@ std::string number(const nlohmann::ordered_json& value, const char* format) {
   return text.data();
 }
 
+std::string percent(const nlohmann::ordered_json& share) {
+  return share.is_number() ? number(100 * share.get<double>(), "%.1f") + " %" : "-";
+}
+
 std::string base64(std::string_view bytes) {
   static constexpr const char* kDigits =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

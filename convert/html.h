@@ -15,6 +15,9 @@ std::string escaped(std::string_view text);
 /// A number by a printf format; "-" for what is none.
 std::string number(const nlohmann::ordered_json& value, const char* format = "%.4g");
 
+/// A share of one as "3.1 %"; "-" for what is no number.
+std::string percent(const nlohmann::ordered_json& share);
+
 /// Bytes as base64 with padding (RFC 4648, section 4).
 std::string base64(std::string_view bytes);
 

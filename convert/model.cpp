@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <set>
 
 #include <Eigen/Eigenvalues>
 #include <nlohmann/json.hpp>
@@ -18,6 +19,7 @@
 #include "io/content_hash.h"
 #include "io/exr.h"
 #include "io/gaussian_ply.h"
+#include "io/masks.h"
 #include "io/photographs.h"
 #include "io/scene_path.h"
 #include "io/scene_reader.h"
@@ -331,14 +333,36 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
           {"given_depth", given_depth_to_json(trained.priors)}};
 }
 
+namespace {
+
+// What the model that lies in a folder wrote per input view; nothing if there is none.
+std::set<std::filesystem::path> priors_in(const std::filesystem::path& folder) {
+  std::set<std::filesystem::path> out;
+  if (!is_present(folder / "cameras.json")) return out;
+  try {
+    const Scene scene = read_cameras_json(folder / "cameras.json");
+    for (const int i : scene.input) {
+      out.insert(priors_path(folder, scene.views[static_cast<size_t>(i)]));
+    }
+  } catch (const Error&) {
+    out.clear();  // damaged, or of another program: it wrote none
+  }
+  return out;
+}
+
+}  // namespace
+
 void write_model(const std::filesystem::path& folder, const Model& model) {
+  std::set<std::filesystem::path> earlier = priors_in(folder);
   make_output_folder(folder / "priors");
   for (size_t k = 0; k < model.priors.size(); ++k) {
     const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
     write_priors(priors_path(folder, view), model.priors[k]);
+    earlier.erase(priors_path(folder, view));
   }
   write_gaussian_ply(folder / "gaussians.ply", model.gaussians, model.scene.frame);
   write_cameras_json(folder / "cameras.json", model.scene);  // last: by it the scale is told
+  for (const std::filesystem::path& file : earlier) std::filesystem::remove(file);
 }
 
 Model read_model(const std::filesystem::path& folder) {
@@ -389,13 +413,14 @@ void relink_views(Scene& scene, const Scene& found) {
 }  // namespace
 
 void relink_images(Scene& scene, const std::filesystem::path& folder) {
-  scene.folder = folder;  // masks lie there, too
+  scene.folder = folder;
   for (View& view : scene.views) {
     view.image_path.clear();
     view.mask_path.clear();
   }
   if (is_photographs(folder)) {
     relink_photographs(scene, list_photographs({folder, false}));
+    find_masks({folder, false}, scene);
   } else {
     relink_views(scene, read_scene(folder));
   }

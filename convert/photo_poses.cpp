@@ -44,15 +44,13 @@ std::vector<PhotoFile> checked_photographs(const SceneRoot& root) {
   return photographs;
 }
 
-std::string inputs_text(const SceneRoot& root,
-                        const std::vector<PhotoFile>& photographs,
-                        double focal) {
+std::string inputs_text(MaskIndex& masks, const std::vector<PhotoFile>& photographs, double focal) {
   Json hashes = Json::object();
   for (const PhotoFile& photograph : photographs) {
     const std::string name = photograph.path.filename().string();
     hashes[name] = file_hash(photograph.path);
-    if (const auto mask = mask_file(root, photograph.path))
-      hashes[name + ", mask"] = file_hash(*mask);
+    const std::filesystem::path mask = masks.mask_of(photograph.path);
+    if (!mask.empty()) hashes[name + ", mask"] = file_hash(mask);
   }
   return json_text({{"program", kProgramVersion}, {"focal", focal}, {"photographs", hashes}}, -1);
 }
@@ -97,15 +95,16 @@ int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) 
 
 using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255
 
-UnposedPhoto unposed_photo(const SceneRoot& root,
+UnposedPhoto unposed_photo(MaskIndex& masks,
                            const PhotoFile& photograph,
                            double focal,
                            Colors& colors) {
   View view;
   view.image_path = photograph.path;
+  view.mask_path = masks.mask_of(photograph.path);
   view.orientation = photograph.orientation;
   MaskMap usable;
-  const ColorImage image = read_photograph(view, root, usable);
+  const ColorImage image = read_photograph(view, usable);
   UnposedPhoto out;
   out.name = photograph.path.filename().string();
   out.width = image.width;
@@ -209,7 +208,8 @@ PhotoPoses photo_poses(const SceneRoot& root,
                        Terminal& terminal) {
   const std::vector<PhotoFile> photographs = checked_photographs(root);
   if (focal > 0) refuse_focal_of_two_sizes(photographs);
-  const std::string inputs = inputs_text(root, photographs, focal);
+  MaskIndex masks(root);
+  const std::string inputs = inputs_text(masks, photographs, focal);
   if (auto poses = stored_poses(stored, inputs)) return *poses;
   const Progress progress = terminal.begin("cameras of photographs");
   std::vector<const PhotoFile*> lenses;
@@ -218,7 +218,7 @@ PhotoPoses photo_poses(const SceneRoot& root,
   constexpr double kShare = 0.4;  // of the time, for finding features
   for (size_t i = 0; i < photographs.size(); ++i) {
     report(progress, kShare * double(i) / double(photographs.size()));
-    photos.push_back(unposed_photo(root, photographs[i], focal, colors[i]));
+    photos.push_back(unposed_photo(masks, photographs[i], focal, colors[i]));
     photos.back().lens = lens_of(photographs[i], lenses);
   }
   const PoseSolution solution = solve_poses(photos, part_of(progress, kShare, 1));
@@ -235,6 +235,20 @@ void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& po
   write_colmap_text(folder / "sparse/0", poses.model);
   const Json record = {{"inputs", poses.inputs}, {"warnings", poses.warnings}};
   write_file(folder / "poses.json", json_text(record) + "\n");  // last: it says the model is whole
+}
+
+void forget_photo_poses(const std::filesystem::path& folder) {
+  if (!is_present(folder / "poses.json")) return;  // not ours
+  for (const char* name : {"poses.json",
+                           "sparse/0/cameras.txt",
+                           "sparse/0/images.txt",
+                           "sparse/0/points3D.txt",
+                           "sparse/0",
+                           "sparse",
+                           ""}) {
+    std::error_code ignored;  // a folder that holds more stays
+    std::filesystem::remove(folder / name, ignored);
+  }
 }
 
 }  // namespace cgs

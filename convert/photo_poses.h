@@ -32,7 +32,8 @@ PhotoPoses photo_poses(const SceneRoot& root,
                        Terminal& terminal);
 
 /// Stores them as a COLMAP model in sparse/0 below the folder, with poses.json beside it.
-/// \throws IoError
+/// The other removes what was stored there. \throws IoError
 void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& poses);
+void forget_photo_poses(const std::filesystem::path& folder);
 
 }  // namespace cgs

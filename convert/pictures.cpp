@@ -79,13 +79,17 @@ ColorImage tinted(ColorImage picture, const MaskMap& mask) {
 ColorImage contact_sheet(const std::vector<ColorImage>& pictures, int columns) {
   constexpr int kGap = 4;  // [pixels]
   const int rows = (static_cast<int>(pictures.size()) + columns - 1) / columns;
-  const int width = pictures.front().width + kGap;
-  const int height = pictures.front().height + kGap;
+  int width = 0;
+  int height = 0;
+  for (const ColorImage& picture : pictures) {
+    width = std::max(width, picture.width + kGap);
+    height = std::max(height, picture.height + kGap);
+  }
   ColorImage out(columns * width - kGap, rows * height - kGap, Eigen::Vector3f::Ones());
   for (size_t k = 0; k < pictures.size(); ++k) {
     const ColorImage& picture = pictures[k];
-    const int left = static_cast<int>(k) % columns * width;
-    const int top = static_cast<int>(k) / columns * height;
+    const int left = static_cast<int>(k) % columns * width + (width - kGap - picture.width) / 2;
+    const int top = static_cast<int>(k) / columns * height + (height - kGap - picture.height) / 2;
     for (int y = 0; y < picture.height; ++y) {
       for (int x = 0; x < picture.width; ++x) out(left + x, top + y) = picture(x, y);
     }

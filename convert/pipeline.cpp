@@ -421,7 +421,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
       scene, chooses_voxels, measured, memory_budget(request.memory_limit), coherence);
   refuse_unreadable_images(scene);
   const size_t known = scene.warnings.size();
-  const Json fit = check_stated_cameras(request.scene, opened, terminal);
+  const Json fit = check_stated_cameras(opened, terminal);
   terminal.warn(std::vector(scene.warnings.begin() + std::ptrdiff_t(known), scene.warnings.end()));
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
   std::vector<MarkerBar> markers = marker_bars(scene, request.scene.marker_size);

@@ -14,7 +14,6 @@
 #include "io/content_hash.h"
 #include "io/json_file.h"
 #include "io/lens.h"
-#include "io/masks.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/refine_poses.h"
 
@@ -42,17 +41,16 @@ const View& view_of(const Scene& scene, const Part& part) {
 }
 
 // Everything the result depends on.
-std::string inputs_text(const Scene& scene, const SceneRoot& root) {
+std::string inputs_text(const Scene& scene) {
   Json views = Json::array();
   for (const Part& part : parts_of(scene)) {
     const View& view = view_of(scene, part);
     const Camera camera = camera_of_file(view);
     const Eigen::Matrix4d pose = camera.world_from_cam.matrix();
-    const auto mask = mask_file(root, view);
     views.push_back({view.name,
                      part.second,
                      file_hash(view.image_path),
-                     mask ? file_hash(*mask) : "",
+                     view.mask_path.empty() ? "" : file_hash(view.mask_path),
                      {camera.fx, camera.fy, camera.cx, camera.cy},
                      lens_numbers(view),
                      std::vector<double>(pose.data(), pose.data() + pose.size())});
@@ -270,13 +268,13 @@ RefinedPoses reported(RefinedPoses refined, const Scene& scene) {
   return refined;
 }
 
-RefinedPoses solved_poses(const Scene& scene, const SceneRoot& root, const Progress& progress) {
+RefinedPoses solved_poses(const Scene& scene, const Progress& progress) {
   const std::vector<Part> parts = parts_of(scene);
   const size_t inputs = scene.input.size();
   std::vector<PosedPhoto> photos;
   for (size_t k = 0; k < inputs; ++k) {
     report(progress, 0.4 * double(k) / double(inputs));
-    photos.push_back(posed_photo(view_of(scene, parts[k]), root));
+    photos.push_back(posed_photo(view_of(scene, parts[k])));
   }
   const PoseRefinement refined = refine_poses(photos, part_of(progress, 0.4, 0.7));
   RefinedPoses out;
@@ -288,7 +286,7 @@ RefinedPoses solved_poses(const Scene& scene, const SceneRoot& root, const Progr
   for (size_t k = inputs; k < parts.size(); ++k) {
     report(progress, 0.7 + 0.3 * double(k - inputs) / double(parts.size() - inputs));
     const View& view = view_of(scene, parts[k]);
-    add_view(view, parts[k].second, refine_pose(posed_photo(view, root), refined.points), out);
+    add_view(view, parts[k].second, refine_pose(posed_photo(view), refined.points), out);
   }
   return out;
 }
@@ -296,12 +294,11 @@ RefinedPoses solved_poses(const Scene& scene, const SceneRoot& root, const Progr
 }  // namespace
 
 RefinedPoses refined_poses(const Scene& scene,
-                           const SceneRoot& root,
                            const std::filesystem::path& stored,
                            Terminal& terminal) {
-  const std::string inputs = inputs_text(scene, root);
+  const std::string inputs = inputs_text(scene);
   if (auto known = stored_poses(stored, scene, inputs)) return reported(std::move(*known), scene);
-  RefinedPoses out = reported(solved_poses(scene, root, terminal.begin("refining cameras")), scene);
+  RefinedPoses out = reported(solved_poses(scene, terminal.begin("refining cameras")), scene);
   out.inputs = inputs;
   terminal.end(refinement_words(out.report));
   return out;

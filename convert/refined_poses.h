@@ -37,7 +37,6 @@ struct RefinedPoses {  // NOLINT(bugprone-exception-escape): moving JSON does no
 /// \param stored  folder; may be empty or not exist
 /// \throws as read_photograph()
 RefinedPoses refined_poses(const Scene& scene,
-                           const SceneRoot& root,
                            const std::filesystem::path& stored,
                            Terminal& terminal);
 

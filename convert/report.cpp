@@ -84,7 +84,7 @@ ColorImage photograph_of(const Scene& scene, int index) {
 
 // "3.1 % holes: 2.0 % hidden from every input photograph, …"
 std::string hole_words(const Json& view) {
-  std::string out = number(100 * view["hole_fraction"].get<double>(), "%.1f") + " % holes";
+  std::string out = percent(view["hole_fraction"]) + " holes";
   const char* before = ": ";
   for (const auto& [key, words] :
        {std::pair("occluded_fraction", "hidden from every input photograph"),
@@ -166,7 +166,7 @@ std::string evaluation_section(const Json& evaluation) {
     html << "<tr><td>" << escaped(name) << "</td><td>" << number(r["psnr"], "%.2f") << "</td><td>"
          << number(r["ssim"], "%.3f") << "</td><td>" << number(r["psnr_seen"], "%.2f")
          << "</td><td>" << number(r["ssim_seen"], "%.3f") << "</td><td>"
-         << number(100 * r["hole_fraction"].get<double>(), "%.1f") << " %</td></tr>\n";
+         << percent(r["hole_fraction"]) << "</td></tr>\n";
   };
   for (const Json& view : evaluation["views"]) row(view["name"].get<std::string>(), view);
   row("mean", evaluation["mean"]);

@@ -13,7 +13,6 @@
 #include "io/depth_file.h"
 #include "io/json_file.h"
 #include "io/lens.h"
-#include "io/masks.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -35,22 +34,19 @@ Json names_of(const Scene& scene, const std::vector<int>& views) {
 }
 
 // Hashes of the photographs and masks of views.
-Json photograph_hashes(const SceneRequest& request,
-                       const Scene& scene,
-                       const std::vector<int>& views) {
+Json photograph_hashes(const Scene& scene, const std::vector<int>& views) {
   Json out = Json::object();
   for (const int i : views) {
     const View& view = scene.views[static_cast<size_t>(i)];
     out[view.name] = file_hash(view.image_path);
-    const auto mask = mask_file({request.path, request.options.allow_external}, view);
-    if (mask) out[view.name + ", mask"] = file_hash(*mask);
+    if (!view.mask_path.empty()) out[view.name + ", mask"] = file_hash(view.mask_path);
   }
   return out;
 }
 
 // Hashes of what the model is made of, by what it is.
 Json input_hashes(const SceneRequest& request, const Scene& scene) {
-  Json out = photograph_hashes(request, scene, scene.input);
+  Json out = photograph_hashes(scene, scene.input);
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
     if (view.depth_path.empty()) continue;
@@ -143,7 +139,7 @@ Json request_json(const RunRequest& request, const Scene& scene) {
               {"max_size", request.max_size},
               {"input_images", input_hashes(request.scene, scene)},
               {"held_out", names_of(scene, scene.held_out)},
-              {"held_out_images", photograph_hashes(request.scene, scene, scene.held_out)},
+              {"held_out_images", photograph_hashes(scene, scene.held_out)},
               {"cameras", cameras_hash(scene)}};
   // The cameras have moved with it; what is left is the sigma of the scale.
   const ControlRequest& control = request.scene.control;

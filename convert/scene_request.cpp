@@ -33,12 +33,8 @@ void refuse_two_scales(const SceneRequest& request) {
   }
 }
 
-void refine(const SceneRequest& request,
-            const std::filesystem::path& model,
-            Terminal& terminal,
-            OpenedScene& out) {
-  const SceneRoot root{request.path, request.options.allow_external};
-  out.refined = refined_poses(out.scene, root, model, terminal);
+void refine(const std::filesystem::path& model, Terminal& terminal, OpenedScene& out) {
+  out.refined = refined_poses(out.scene, model, terminal);
   move_cameras(*out.refined, out.scene);
   auto& warnings = out.scene.warnings;
   warnings.insert(warnings.end(), out.refined->warnings.begin(), out.refined->warnings.end());
@@ -119,7 +115,7 @@ OpenedScene open_scene(const SceneRequest& request,
       throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
                          " states them (" + out.scene.kind + ")");
     }
-    if (request.refine_poses) refine(request, model, terminal, out);
+    if (request.refine_poses) refine(model, terminal, out);
   }
   if (!request.control.file.empty()) {
     out.control = move_to_control_frame(request.control, out.scene);
@@ -136,16 +132,14 @@ OpenedScene open_scene(const SceneRequest& request,
 
 void OpenedScene::keep(const std::filesystem::path& model) const {
   if (poses && !poses->is_stored) write_photo_poses(model / kPosesFolder, *poses);
+  if (!poses) forget_photo_poses(model / kPosesFolder);
   if (refined && !refined->is_stored) write_refined_poses(model, *refined);
   if (!refined) forget_refined_poses(model);
 }
 
-nlohmann::ordered_json check_stated_cameras(const SceneRequest& request,
-                                            OpenedScene& opened,
-                                            Terminal& terminal) {
+nlohmann::ordered_json check_stated_cameras(OpenedScene& opened, Terminal& terminal) {
   if (opened.poses || opened.refined) return nullptr;
-  const SceneRoot root{request.path, request.options.allow_external};
-  nlohmann::ordered_json fit = camera_fit(opened.scene, root, terminal.begin("checking cameras"));
+  nlohmann::ordered_json fit = camera_fit(opened.scene, terminal.begin("checking cameras"));
   terminal.end("");
   const std::string warning = camera_fit_warning(fit);
   if (!warning.empty()) opened.scene.warnings.push_back(warning);

@@ -54,7 +54,7 @@ struct OpenedScene {
   nlohmann::ordered_json control;       ///< As move_to_control_frame() returns it; null without.
 
   /// Stores solved and refined cameras below the folder of the model, for other programs and for
-  /// the next time.
+  /// the next time, and takes away those of an earlier scene.
   void keep(const std::filesystem::path& model) const;
 };
 OpenedScene open_scene(const SceneRequest& request,
@@ -63,8 +63,6 @@ OpenedScene open_scene(const SceneRequest& request,
 
 /// How well cameras that were taken as the scene states them fit the photographs, as camera_fit();
 /// null for others. What is wrong with them is added to the warnings of the scene.
-nlohmann::ordered_json check_stated_cameras(const SceneRequest& request,
-                                            OpenedScene& opened,
-                                            Terminal& terminal);
+nlohmann::ordered_json check_stated_cameras(OpenedScene& opened, Terminal& terminal);
 
 }  // namespace cgs

@@ -334,13 +334,13 @@ Tradeoff measure_tradeoff(const TradeoffRequest& request,
   make_output_folder(request.output);
   const FolderLock lock(request.output);
   const RunRequest standard = standard_request(request);
-  const auto limit = std::chrono::duration<double>(60 * request.minutes);
+  const auto limit = std::chrono::duration<double>(60 * request.minutes - opening.wall);
   Bench bench{request,
               opened.scene,
               standard,
               downscale_of(request.scene, opened.scene),
               terminal,
-              RunRecord(request.output, record_request(request, opened.scene), false),
+              RunRecord(request.output, record_request(request, opened.scene), request.overwrite),
               Clock::now() + std::chrono::duration_cast<Clock::duration>(limit)};
   if ((opened.poses || opened.refined) && !bench.record.is_done("cameras", {})) {
     bench.record.finish("cameras", opening.wall, {{"cpu", opening.cpu}, {"wall", opening.wall}});
@@ -363,7 +363,7 @@ Tradeoff measure_tradeoff(const TradeoffRequest& request,
   } catch (const Json::exception&) {
     throw BadInput(Defect::Schema,
                    request.output / "run.json",
-                   "does not hold what finished stages wrote; choose another folder");
+                   "does not hold what finished stages wrote; say --overwrite to begin anew");
   }
   return out;
 }

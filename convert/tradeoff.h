@@ -19,6 +19,7 @@ struct TradeoffRequest {
   std::filesystem::path output;
   std::filesystem::path reference;  ///< A mesh that counts as the truth; empty = none.
   double minutes = 20;              ///< No stage goes on for longer; 0 = only tell what is there.
+  bool overwrite = false;           ///< Measurements of another scene are replaced.
   size_t memory_limit = 0;          ///< As in RunRequest.
   int threads = 0;                  ///< That it may use, as times depend on them; 0 = all.
 };

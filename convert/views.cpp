@@ -170,7 +170,7 @@ Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, c
           {"ssim", figure(ssim, all)},
           {"psnr_seen", figure(psnr, use)},
           {"ssim_seen", figure(ssim, use)},
-          {"hole_fraction", has_any(all) ? 1 - share_of(use, all) : 1 - share_of(seen, everywhere)},
+          {"hole_fraction", has_any(all) ? Json(1 - share_of(use, all)) : Json()},
           {"ms_ssim", is_nearly_whole ? Json(ms_ssim(shown, photograph)) : Json()}};
 }
 
@@ -212,10 +212,7 @@ Json write_path(const Model& model,
     write_png(folder / names[0], shown);
     write_png(folder / names[1], holes);
     if (k == 0 || path.size() <= kOnSheet || place_on_sheet(k) != place_on_sheet(k - 1)) {
-      ColorImage small = thumbnail(tinted(shown, holes));
-      const bool fits =
-          sheet.empty() || (small.width == sheet[0].width && small.height == sheet[0].height);
-      if (fits) sheet.push_back(std::move(small));
+      sheet.push_back(thumbnail(tinted(shown, holes)));
     }
     out.push_back({{"name", frame_name(k)}});
     out.back().update(hole_fractions(buffers));

@@ -30,14 +30,13 @@ constexpr float kSameSurface = 0.05f;  // relative step between values that may 
 
 // The file in a folder "depth" in or beside the folder of a photograph, beneath the scene.
 fs::path depth_beside(const SceneRoot& root, const fs::path& photograph) {
-  std::error_code ignored;  // what cannot be resolved stays as it is, and is not found
-  const fs::path top = fs::weakly_canonical(root.folder, ignored);
-  const fs::path folder = fs::weakly_canonical(photograph.parent_path(), ignored);
-  for (const fs::path& candidate : {folder / "depth", folder.parent_path() / "depth"}) {
-    const std::string below = candidate.lexically_relative(top).generic_string();
-    const bool is_below = !below.empty() && !below.starts_with("..");
-    if (!is_below || !is_folder(candidate)) continue;
-    const fs::path inside = resolve_in_scene(root, below, root.folder);
+  const std::optional<fs::path> folder = path_in_scene(root, photograph.parent_path());
+  if (!folder) return {};
+  std::vector<fs::path> candidates = {*folder / "depth"};
+  if (folder->has_relative_path()) candidates.push_back(folder->parent_path() / "depth");
+  for (const fs::path& candidate : candidates) {
+    if (!is_folder(root.folder / candidate)) continue;
+    const fs::path inside = resolve_in_scene(root, candidate.string(), root.folder);
     fs::path file = depth_file_of({inside, root.allow_external}, photograph);
     if (!file.empty()) return file;
   }
@@ -67,7 +66,14 @@ void drop_low_confidence(const fs::path& file, Raster<float>& values) {
   }
 }
 
-// Values whose shape is that of the photograph: as it is stored, or already upright.
+// True if no shape of depth could tell whether it lies as the photograph is stored or upright.
+bool may_lie_turned(const View& view) {
+  if (view.orientation == 1) return false;
+  const ImageSize size = photograph_size(view);
+  return view.orientation < 5 || size.width == size.height;
+}
+
+// Values whose shape is that of the photograph: upright, as masks are, or else as it is stored.
 Raster<float> upright(const Raster<float>& values, const View& view, const ImageSize& photograph) {
   const auto fits = [&](const ImageSize& size) {
     const double difference =
@@ -77,8 +83,8 @@ Raster<float> upright(const Raster<float>& values, const View& view, const Image
   };
   const bool is_turned = view.orientation >= 5;
   const ImageSize stored = is_turned ? ImageSize{photograph.height, photograph.width} : photograph;
-  if (fits(stored)) return turned(values, view.orientation);
   if (fits(photograph)) return values;
+  if (fits(stored)) return turned(values, view.orientation);
   throw BadInput(Defect::Mismatch,
                  view.depth_path,
                  "the depth has " + std::to_string(values.width) + " x " +
@@ -357,6 +363,13 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
   if (count == 0) return;
   check_colmap_maps(scene);
   std::vector<std::string> lacking;
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (!has_depth(i) || !may_lie_turned(view)) continue;
+    scene.warnings.push_back("the photograph of view " + printable(view.name) +
+                             " lies turned in its file and is shown upright; its depth is taken "
+                             "to be upright already");
+  }
   for (const int i : scene.input) {
     if (has_depth(i) || explained.contains(i)) continue;
     lacking.push_back(printable(scene.views[static_cast<size_t>(i)].name));

@@ -2,7 +2,9 @@
 #include "io/masks.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/exif.h"
@@ -15,20 +17,17 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Folders of the scene that may hold the masks of a photograph, as seen from the root.
+// Folders that may hold the masks of a photograph, as seen from the root.
 std::vector<std::string> mask_folders(const SceneRoot& root, const fs::path& photograph) {
+  const std::optional<fs::path> folder = path_in_scene(root, photograph.parent_path());
+  if (!folder) return {};
   std::vector<std::string> out;
-  std::error_code ignored;  // what cannot be resolved stays as it is, and is not found
-  const fs::path top = fs::weakly_canonical(root.folder, ignored);
-  const fs::path folder = fs::weakly_canonical(photograph.parent_path(), ignored);
   const auto add = [&](const fs::path& candidate) {
-    const std::string below = candidate.lexically_relative(top).lexically_normal().generic_string();
-    const bool is_below = !below.empty() && !below.starts_with("..");
-    if (is_below && is_folder(candidate)) out.push_back(below);
+    if (is_folder(root.folder / candidate)) out.push_back(candidate.string());
   };
-  add(folder / "masks");
+  add(*folder / "masks");
   fs::path within;  // the folder above which masks lie, in which the photograph does
-  for (fs::path above = folder; above != top && above.has_relative_path();) {
+  for (fs::path above = *folder; above.has_relative_path();) {
     add(above.parent_path() / "masks" / within);
     within = within.empty() ? above.filename() : above.filename() / within;
     above = above.parent_path();
@@ -45,46 +44,75 @@ ColorImage upright(ColorImage mask, const fs::path& file, int orientation, const
   return lies_as_stored ? turned(mask, orientation) : mask;
 }
 
+// From which brightness on pixels may be used.
+float brightness_of_use(const ColorImage& mask) {
+  constexpr float kHalf = 0.5f;
+  constexpr float kOne = 1.0f / 255;
+  float brightest = 0;
+  for (const Eigen::Vector3f& color : mask.data) brightest = std::max(brightest, color.mean());
+  const bool has_classes = brightest > 0 && brightest < 1.5f * kOne;
+  return has_classes ? kHalf * brightest : kHalf;
+}
+
 }  // namespace
 
-std::optional<fs::path> mask_file(const SceneRoot& root, const fs::path& photograph) {
-  const std::string whole_name = photograph.filename().string() + ".png";
-  for (const std::string& folder : mask_folders(root, photograph)) {
-    std::optional<fs::path> same_stem;
-    for (const fs::path& file : image_files(root, folder)) {
-      if (file.filename() == whole_name) return file;
-      if (!same_stem && file.stem() == photograph.stem()) same_stem = file;
-    }
-    if (same_stem) return same_stem;
+MaskIndex::MaskIndex(SceneRoot root) : root_(std::move(root)) {}
+
+const MaskIndex::Folder& MaskIndex::listed(const std::string& folder) {
+  const auto [place, is_new] = folders_.try_emplace(folder);
+  if (!is_new) return place->second;
+  for (const fs::path& file : image_files(root_, folder)) {
+    place->second.files.emplace(file.filename().string(), file);
+    place->second.stems.emplace(file.stem().string(), file);
   }
-  return std::nullopt;
+  return place->second;
 }
 
-std::optional<fs::path> mask_file(const SceneRoot& root, const View& view) {
-  if (!view.mask_path.empty()) return view.mask_path;
-  return mask_file(root, view.image_path);
+fs::path MaskIndex::mask_of(const fs::path& photograph) {
+  for (const std::string& name : mask_folders(root_, photograph)) {
+    const Folder& folder = listed(name);
+    const auto file = folder.files.find(photograph.filename().string() + ".png");
+    if (file != folder.files.end()) return file->second;
+    const auto same_stem = folder.stems.find(photograph.stem().string());
+    if (same_stem != folder.stems.end()) return same_stem->second;
+  }
+  return {};
 }
 
-bool lacks_mask(const SceneRoot& root, const View& view) {
-  return !mask_folders(root, view.image_path).empty() && !mask_file(root, view);
+bool MaskIndex::lacks(const fs::path& photograph) {
+  return !mask_folders(root_, photograph).empty() && mask_of(photograph).empty();
 }
 
-void apply_mask(const SceneRoot& root, const View& view, const ImageSize& size, MaskMap& usable) {
-  const auto file = mask_file(root, view);
-  if (!file) return;
-  ColorImage mask = read_image(*file);
-  if (view.orientation != 1) mask = upright(std::move(mask), *file, view.orientation, size);
+void find_masks(const SceneRoot& root, Scene& scene) {
+  MaskIndex masks(root);
+  for (View& view : scene.views) {
+    if (view.image_path.empty() || !view.mask_path.empty()) continue;
+    view.mask_path = masks.mask_of(view.image_path);
+  }
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (!view.mask_path.empty() || !masks.lacks(view.image_path)) continue;
+    scene.warnings.push_back("there are masks, but none for view " + printable(view.name) +
+                             ", of which everything is used");
+  }
+}
+
+void apply_mask(const View& view, const ImageSize& size, MaskMap& usable) {
+  const fs::path& file = view.mask_path;
+  if (file.empty()) return;
+  ColorImage mask = read_image(file);
+  if (view.orientation != 1) mask = upright(std::move(mask), file, view.orientation, size);
   if (mask.width != size.width || mask.height != size.height) {
     throw BadInput(Defect::Mismatch,
-                   *file,
+                   file,
                    "the mask has " + std::to_string(mask.width) + " x " +
                        std::to_string(mask.height) + " pixels, its photograph " +
                        std::to_string(size.width) + " x " + std::to_string(size.height));
   }
   if (usable.empty()) usable = MaskMap(size.width, size.height, 1);
-  constexpr float kDark = 0.5f;
+  const float bright = brightness_of_use(mask);
   for (size_t i = 0; i < mask.data.size(); ++i) {
-    if (mask.data[i].mean() < kDark) usable.data[i] = 0;
+    if (mask.data[i].mean() < bright) usable.data[i] = 0;
   }
   const auto is_set = [](uint8_t set) { return set != 0; };
   if (std::all_of(usable.data.begin(), usable.data.end(), is_set)) usable = MaskMap();

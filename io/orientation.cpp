@@ -95,10 +95,10 @@ ColorImage read_photograph(const View& view) {
   return turned(read_image(view.image_path), view.orientation);
 }
 
-ColorImage read_photograph(const View& view, const SceneRoot& root, MaskMap& usable) {
+ColorImage read_photograph(const View& view, MaskMap& usable) {
   ColorImage image = turned(read_image(view.image_path, &usable), view.orientation);
   usable = turned(usable, view.orientation);
-  apply_mask(root, view, {image.width, image.height}, usable);
+  apply_mask(view, {image.width, image.height}, usable);
   return image;
 }
 

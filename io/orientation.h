@@ -37,6 +37,6 @@ std::optional<Eigen::Vector2d> picked_pixel(const View& view, const Eigen::Vecto
 /// \throws BadInput, LimitError as image_size(), read_image() and apply_mask()
 ImageSize photograph_size(const View& view);
 ColorImage read_photograph(const View& view);
-ColorImage read_photograph(const View& view, const SceneRoot& root, MaskMap& usable);
+ColorImage read_photograph(const View& view, MaskMap& usable);
 
 }  // namespace cgs

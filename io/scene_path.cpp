@@ -64,6 +64,21 @@ fs::path resolve_in_scene(const SceneRoot& root, std::string_view name, const fs
   return joined;
 }
 
+std::optional<fs::path> path_in_scene(const SceneRoot& root, const fs::path& path) {
+  const auto below = [](const fs::path& whole, const fs::path& folder) -> std::optional<fs::path> {
+    const fs::path out = whole.lexically_relative(folder);
+    if (out.empty() || *out.begin() == "..") return std::nullopt;
+    return out == "." ? fs::path() : out;
+  };
+  std::error_code ignored;  // what cannot be followed stays as it is, and is not below
+  const fs::path whole = fs::absolute(path, ignored).lexically_normal();
+  const fs::path top = fs::absolute(root.folder / "", ignored).lexically_normal().parent_path();
+  if (auto out = below(whole, top)) return out;
+  const fs::path canonical = fs::weakly_canonical(whole, ignored);
+  if (auto out = below(canonical, fs::weakly_canonical(top, ignored))) return out;
+  return root.allow_external ? std::optional(whole) : std::nullopt;
+}
+
 bool is_present(const fs::path& path) {
   std::error_code ignored;
   return fs::exists(fs::symlink_status(path, ignored));

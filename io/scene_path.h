@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,12 @@ struct SceneRoot {
 std::filesystem::path resolve_in_scene(const SceneRoot& root,
                                        std::string_view name,
                                        const std::filesystem::path& named_in);
+
+/// What a path that is in use is called from the folder of a data set: by its names if they lead
+/// there, else by where links lead. Elsewhere it is absolute with allow_external, and nothing
+/// without. The folder itself is the empty path.
+std::optional<std::filesystem::path> path_in_scene(const SceneRoot& root,
+                                                   const std::filesystem::path& path);
 
 /// True if something has that name, even a link that leads nowhere: reading it tells what is wrong.
 /// Never throws, not for names that are too long or links that go round.

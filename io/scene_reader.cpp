@@ -319,10 +319,10 @@ void check_places(const Scene& scene) {
 }
 
 // True if every pixel of a photograph may be used, which its name and its camera tell.
-bool is_whole(const View& view, const SceneRoot& root) {
+bool is_whole(const View& view) {
   const fs::path extension = view.image_path.extension();
   const bool is_jpeg = extension == ".jpg" || extension == ".jpeg";  // has no transparent pixels
-  return is_jpeg && !has_lens_distortion(view) && !mask_file(root, view);
+  return is_jpeg && !has_lens_distortion(view) && view.mask_path.empty();
 }
 
 void load_image(const Scene& scene, View& view, std::vector<std::string>& warnings) {
@@ -330,12 +330,7 @@ void load_image(const Scene& scene, View& view, std::vector<std::string>& warnin
     throw BadInput(Defect::Missing, scene.folder, "view " + printable(view.name) + " has no image");
   }
   Camera& camera = view.camera;
-  const SceneRoot root = {scene.folder, false};
-  view.image = read_photograph(view, root, view.valid);
-  if (lacks_mask(root, view)) {
-    warnings.push_back("there are masks, but none for view " + printable(view.name) +
-                       ", of which everything is used");
-  }
+  view.image = read_photograph(view, view.valid);
   const int width = view.image.width;
   const int height = view.image.height;
   const Camera& taken = view.fisheye ? view.fisheye->photograph : camera;
@@ -396,6 +391,7 @@ Scene prepared(Scene scene, const SceneOptions& options) {
   choose_views(scene, options.views, options.all_views);
   check_baselines(scene);
   check_places(scene);
+  find_masks({scene.folder, options.allow_external}, scene);
   find_given_depth(scene, options.depth, options.allow_external);
   return scene;
 }
@@ -496,7 +492,7 @@ View loaded_view(const Scene& scene,
                  bool with_image,
                  std::vector<std::string>& warnings) {
   View out = scene.views.at(static_cast<size_t>(view));
-  if (!with_image && is_whole(out, {scene.folder, false})) {
+  if (!with_image && is_whole(out)) {
     load_given_depth(scene, out, photograph_size(out));
   } else {
     load_image(scene, out, warnings);

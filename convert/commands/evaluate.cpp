@@ -36,13 +36,13 @@ void print_table(const nlohmann::ordered_json& report) {
               "holes",
               "MS-SSIM");
   const auto row = [](const std::string& name, const nlohmann::ordered_json& r) {
-    std::printf("%-24s %8s %8s %10s %10s %7.1f%% %8s\n",
+    std::printf("%-24s %8s %8s %10s %10s %8s %8s\n",
                 name.c_str(),
                 number(r["psnr"], "%.2f").c_str(),
                 number(r["ssim"], "%.3f").c_str(),
                 number(r["psnr_seen"], "%.2f").c_str(),
                 number(r["ssim_seen"], "%.3f").c_str(),
-                100 * r["hole_fraction"].get<double>(),
+                percent(r["hole_fraction"]).c_str(),
                 number(r["ms_ssim"], "%.3f").c_str());
   };
   for (const auto& view : report["views"]) row(view["name"].get<std::string>(), view);

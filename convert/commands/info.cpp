@@ -190,11 +190,11 @@ void print_scene(const Json& info) {
 }
 
 // info tells what is wrong with a scene, photographs that cannot be read too, and nothing else.
-Json checked_cameras(const SceneRequest& request, OpenedScene& opened) {
+Json checked_cameras(OpenedScene& opened) {
   Terminal quiet(true);
   std::string reason;
   try {
-    return check_stated_cameras(request, opened, quiet);
+    return check_stated_cameras(opened, quiet);
   } catch (const BadInput& error) {
     reason = error.what();
   } catch (const LimitError& error) {
@@ -220,7 +220,7 @@ void run_info(const InfoArgs& args) {
   if (print_file_info(args.scene.path, args.json)) return;
   Terminal terminal(args.json);
   OpenedScene opened = open_scene(args.scene, {}, terminal);
-  const Json fit = checked_cameras(args.scene, opened);
+  const Json fit = checked_cameras(opened);
   const Json info = scene_json(opened, fit);
   if (args.json) {
     std::cout << json_text(info) << "\n";

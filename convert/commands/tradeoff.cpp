@@ -91,6 +91,7 @@ void add_tradeoff(CLI::App& app) {
                   "A need: error<2mm, time<3min, cpu<90s, size<1MB or psnr>24dB; may be repeated. "
                   "Says which setting meets all")
       ->allow_extra_args(false);
+  cmd->add_flag("-w,--overwrite", request.overwrite, "Replace what was measured of another scene");
   add_common_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs tradeoff photos/statue --views 1,10,19 --assume-unit m -o out/tradeoff \\\n"

@@ -47,7 +47,7 @@ void run_train(const TrainArgs& args) {
       {}, training_options(args.training), args.output, args.scene.options.depth.network};
   Terminal terminal(args.common.quiet, args.common.strict);
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
-  (void)check_stated_cameras(args.scene, opened, terminal);
+  (void)check_stated_cameras(opened, terminal);
   remove_abandoned_files(args.output);
   opened.keep(args.output);
   Scene& scene = opened.scene;

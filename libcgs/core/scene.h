@@ -28,7 +28,7 @@ enum class DepthKind : uint8_t {
 struct View {
   std::string name;                  ///< File stem; unique within a scene.
   std::filesystem::path image_path;  ///< Empty if the file is missing.
-  std::filesystem::path mask_path;   ///< As the data set names it; empty = found by its name.
+  std::filesystem::path mask_path;   ///< Says what of it may be used; empty = everything.
   /// How the picture lies in its file, as Exif counts (1 = upright); load_images() turns it. Only
   /// for cameras solved for here: others are calibrated on the pixels as they are stored.
   int orientation = 1;

@@ -32,7 +32,7 @@ TEST(PosedPhoto, HasNoFeaturesBesideTheUndistortedPicture) {
   view.fisheye =
       Fisheye{{.width = 400, .height = 400, .fx = 130, .fy = 130, .cx = 200, .cy = 200}, {}, {}, 0};
   view.camera = FisheyeMap(*view.fisheye).picture();
-  const PosedPhoto photo = posed_photo(view, {dir.path(), false});
+  const PosedPhoto photo = posed_photo(view);
   EXPECT_GT(photo.features.points.size(), 100u);
   EXPECT_EQ(size_t(photo.features.descriptors.rows()), photo.features.points.size());
   for (const Eigen::Vector2d& at : photo.features.points) {

@@ -57,6 +57,30 @@ TEST(RelinkImages, FindsTheMasksOfPhotographsThatMoved) {
   ASSERT_FALSE(scene.views[0].valid.empty());
 }
 
+TEST(WriteModel, LeavesNothingOfViewsThatAnEarlierModelHad) {
+  const test::TempDir dir;
+  Model model;
+  for (const char* name : {"a", "b", "c"}) {
+    View& view = model.scene.views.emplace_back();
+    view.name = name;
+    view.camera = {2, 2, 2, 2, 1, 1, Eigen::Isometry3d::Identity()};
+  }
+  ViewPriors priors;
+  priors.depth = priors.sigma = priors.confidence = DepthMap(2, 2, 1);
+  priors.layer = priors.matched_views = Raster<uint8_t>(2, 2, 0);
+  priors.origin = Raster<DepthOrigin>(2, 2, DepthOrigin::Measured);
+  model.priors = {priors, priors};
+  model.scene.input = {0, 1};
+  write_model(dir.path(), model);
+  std::filesystem::copy_file(dir / "priors/a.exr", dir / "priors/mine.exr");
+  model.scene.input = {1, 2};
+  write_model(dir.path(), model);
+  EXPECT_FALSE(std::filesystem::exists(dir / "priors/a.exr"));
+  for (const char* file : {"priors/b.exr", "priors/c.exr", "priors/mine.exr"}) {
+    EXPECT_TRUE(std::filesystem::exists(dir / file)) << file;
+  }
+}
+
 TEST(Picture, DividesByAlphaAboveOneHalfOnly) {
   RenderBuffers buffers;
   buffers.color = ColorImage(2, 1, Eigen::Vector3f(0.3f, 0.3f, 0.3f));

@@ -88,6 +88,9 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   EXPECT_FALSE(other.model.images[0].points.empty());
   EXPECT_EQ(other.model.cameras.begin()->second.camera.fx, truth[0].fx);
   EXPECT_TRUE(other.warnings.empty());
+
+  OpenedScene().keep(dir / "model");  // of cameras that were stated
+  EXPECT_FALSE(fs::exists(dir / "model/colmap"));
 }
 
 TEST(PhotoPoses, AreRefusedForACameraThatWasOnlyTurned) {

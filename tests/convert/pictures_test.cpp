@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/pictures.h"
 
+#include <algorithm>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -21,6 +22,19 @@ TEST(DepthPicture, IsRedNearBlueFarAndBlackWhereUnknown) {
 TEST(DepthPicture, OfNothingKnownIsBlack) {
   const DepthMap depth(3, 2, std::numeric_limits<float>::quiet_NaN());
   for (const auto& c : depth_picture(depth).data) EXPECT_EQ(c, Eigen::Vector3f::Zero());
+}
+
+TEST(ContactSheet, HoldsUprightPicturesBesideWideOnes) {
+  const ColorImage wide(8, 4, Eigen::Vector3f(1, 0, 0));
+  const ColorImage tall(4, 8, Eigen::Vector3f(0, 0, 1));
+  const ColorImage sheet = contact_sheet({wide, tall, wide}, 2);
+  EXPECT_EQ(sheet.width, 8 + 4 + 8);
+  EXPECT_EQ(sheet.height, 8 + 4 + 8);
+  const auto count = [&](const Eigen::Vector3f& color) {
+    return std::count(sheet.data.begin(), sheet.data.end(), color);
+  };
+  EXPECT_EQ(count({1, 0, 0}), 2 * 32);
+  EXPECT_EQ(count({0, 0, 1}), 32);
 }
 
 TEST(NormalPicture, ASurfaceFacingTheCameraIsTheUsualBlue) {

@@ -215,9 +215,9 @@ TEST_F(RefinedPosesTest, AreAdvisedForCamerasThatDoNotFit) {
   for (const double degrees : {0.0, 0.3, 0.5}) {
     state_cameras(degrees);
     OpenedScene small = opened(false, {}, 3);
-    EXPECT_EQ(check_stated_cameras(request, small, terminal)["fits"], degrees == 0);
+    EXPECT_EQ(check_stated_cameras(small, terminal)["fits"], degrees == 0);
     OpenedScene scene = opened(false);
-    const auto fit = check_stated_cameras(request, scene, terminal);
+    const auto fit = check_stated_cameras(scene, terminal);
     EXPECT_GT(fit["matches"], 100);
     EXPECT_EQ(fit["pairs"].size(), 3u);
     ASSERT_EQ(scene.scene.warnings.size(), degrees > 0 ? 1u : 0u) << fit;
@@ -225,7 +225,7 @@ TEST_F(RefinedPosesTest, AreAdvisedForCamerasThatDoNotFit) {
     EXPECT_GT(fit["error"], 0.5);
     EXPECT_NE(scene.scene.warnings[0].find("--refine-poses"), std::string::npos);
     OpenedScene refined = opened(true);
-    EXPECT_TRUE(check_stated_cameras(request, refined, terminal).is_null());
+    EXPECT_TRUE(check_stated_cameras(refined, terminal).is_null());
   }
 }
 

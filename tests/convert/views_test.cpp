@@ -15,9 +15,7 @@ constexpr int kSide = 40;
 // Photographs that differ only where their masks are black, from a model of nothing.
 TEST(EvaluateViews, LooksAtNoMaskedPixel) {
   const test::TempDir dir;
-  std::filesystem::create_directory(dir / "masks");
   Model model;
-  model.scene.folder = dir.path();
   for (const float masked : {0.0f, 1.0f}) {
     ColorImage photograph(kSide, kSide, Eigen::Vector3f::Constant(0.3f));
     ColorImage mask(kSide, kSide, Eigen::Vector3f::Ones());
@@ -34,13 +32,20 @@ TEST(EvaluateViews, LooksAtNoMaskedPixel) {
     view.image_path = dir / (view.name + ".png");
     view.camera = {kSide, kSide, 50, 50, 20, 20, Eigen::Isometry3d::Identity()};
     write_png(view.image_path, photograph);
-    write_png(dir / "masks" / (view.name + ".png"), mask);
+    view.mask_path = dir / (view.name + ".mask.png");
+    write_png(view.mask_path, mask);
   }
   const auto rows = evaluate_views(model, {0, 1}, {})["views"];
   ASSERT_TRUE(rows[0]["ssim"].is_number());
   EXPECT_EQ(rows[0]["ssim"], rows[1]["ssim"]);
   EXPECT_EQ(rows[0]["psnr"], rows[1]["psnr"]);
   EXPECT_TRUE(rows[0]["ms_ssim"].is_null()) << "half of it would count as equal";
+
+  write_png(model.scene.views[0].mask_path, ColorImage(kSide, kSide, Eigen::Vector3f::Zero()));
+  const auto masked = evaluate_views(model, {0, 1}, {});
+  EXPECT_TRUE(masked["views"][0]["hole_fraction"].is_null()) << "nothing may be looked at";
+  EXPECT_EQ(masked["mean"]["hole_fraction"], masked["views"][1]["hole_fraction"]);
+
   model.scene.views[1].image_path.clear();
   EXPECT_EQ(evaluate_views(model, {0, 1}, {})["views"].size(), 1u);
   EXPECT_EQ(model.scene.warnings.back(), "view magenta has no photograph and is not evaluated");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/given_depth.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -354,6 +355,20 @@ TEST(DepthOptions, RefusesAScaleOutOfRange) {
   EXPECT_NO_THROW(DepthOptions{}.validate());
   EXPECT_THROW((DepthOptions{.scale = -1}.validate()), InvalidInput);
   EXPECT_THROW((DepthOptions{.scale = NAN}.validate()), InvalidInput);
+}
+
+// A photograph that lies on its head in its file: viewers, masks and most networks show it upright.
+TEST_F(GivenDepthFiles, OfAPhotographTurnedByHalfIsUprightAlready) {
+  write("images/depth/v1.npy", kWidth, kHeight, [](double u, double) { return u; });
+  Scene scene = read_scene(dir_.path());
+  scene.views[0].orientation = 3;
+  find_given_depth(scene, {}, false);
+  const auto tells = [](const std::string& warning) {
+    return warning.find("v1 lies turned in its file") != std::string::npos;
+  };
+  EXPECT_EQ(std::count_if(scene.warnings.begin(), scene.warnings.end(), tells), 1);
+  load_given_depth(scene, scene.views[0], {kWidth, kHeight});
+  EXPECT_EQ(scene.views[0].given_depth(0, 0), 0.5f);
 }
 
 }  // namespace

@@ -42,9 +42,14 @@ class Masks : public testing::Test {
   }
 
   std::optional<std::string> found() const {
-    const auto file = mask_file({dir_.path(), false}, dir_ / "images/v1.jpg");
-    if (!file) return std::nullopt;
-    return std::filesystem::relative(*file, dir_.path()).string();
+    const auto file = mask_of(dir_.path(), dir_ / "images/v1.jpg");
+    if (file.empty()) return std::nullopt;
+    return std::filesystem::relative(file, dir_.path()).string();
+  }
+
+  static std::filesystem::path mask_of(const std::filesystem::path& root,
+                                       const std::filesystem::path& photograph) {
+    return MaskIndex({root, false}).mask_of(photograph);
   }
 
   /// Columns of the first view that may be used.
@@ -94,8 +99,8 @@ TEST_F(Masks, AddToWhatIsTransparent) {
   usable(20, 3) = 0;
   write_mask("masks/v1.png", 12);
   View view;
-  view.image_path = dir_ / "images/v1.jpg";
-  apply_mask({dir_.path(), false}, view, {kWidth, kHeight}, usable);
+  view.mask_path = dir_ / "masks/v1.png";
+  apply_mask(view, {kWidth, kHeight}, usable);
   EXPECT_EQ(usable(20, 3), 0);
   EXPECT_EQ(usable(11, 3), 0);
   EXPECT_EQ(usable(12, 3), 1);
@@ -105,9 +110,9 @@ TEST_F(Masks, LieInTheSameFoldersAsPhotographs) {
   std::filesystem::create_directories(dir_ / "images/rig1/left");
   const std::filesystem::path photograph = dir_ / "images/rig1/left/v1.jpg";
   std::filesystem::copy_file(dir_ / "images/v1.jpg", photograph);
-  const auto found_below = [&] { return mask_file({dir_.path(), false}, photograph); };
+  const auto found_below = [&] { return mask_of(dir_.path(), photograph); };
   write_mask("masks/v1.jpg.png", 1);
-  EXPECT_FALSE(found_below()) << "of another photograph of that name";
+  EXPECT_EQ(found_below(), "") << "of another photograph of that name";
   write_mask("masks/rig1/left/v1.jpg.png", 1);
   EXPECT_EQ(found_below(), dir_ / "masks/rig1/left/v1.jpg.png");
 }
@@ -115,23 +120,23 @@ TEST_F(Masks, LieInTheSameFoldersAsPhotographs) {
 TEST_F(Masks, ThatTheDataSetNamesComeFirst) {
   write_mask("masks/v1.png", 12);
   write_mask("alpha/other.png", 20);
-  View view;
-  view.image_path = dir_ / "images/v1.jpg";
-  view.mask_path = dir_ / "alpha/other.png";
-  MaskMap usable;
-  apply_mask({dir_.path(), false}, view, {kWidth, kHeight}, usable);
-  EXPECT_EQ(usable(19, 0), 0);
-  EXPECT_EQ(usable(20, 0), 1);
+  Scene scene;
+  scene.views.resize(2);
+  for (View& view : scene.views) view.image_path = dir_ / "images/v1.jpg";
+  scene.views[0].mask_path = dir_ / "alpha/other.png";
+  find_masks({dir_.path(), false}, scene);
+  EXPECT_EQ(scene.views[0].mask_path, dir_ / "alpha/other.png");
+  EXPECT_EQ(scene.views[1].mask_path, dir_ / "masks/v1.png");
 }
 
 // A photograph that viewers turn: its mask was painted on what they show.
 TEST_F(Masks, OfTurnedPhotographsAreUprightUnlessTheirSizeTellsOtherwise) {
   View view;
-  view.image_path = dir_ / "images/v1.jpg";
+  view.mask_path = dir_ / "masks/v1.png";
   const auto first_of_row = [&](int orientation, const ImageSize& size) {
     view.orientation = orientation;
     MaskMap usable;
-    apply_mask({dir_.path(), false}, view, size, usable);
+    apply_mask(view, size, usable);
     const auto row = usable.data.begin();
     return std::find(row, row + size.width, 1) - row;
   };
@@ -141,7 +146,7 @@ TEST_F(Masks, OfTurnedPhotographsAreUprightUnlessTheirSizeTellsOtherwise) {
   // As stored, its left 12 columns are dark; a quarter turn clockwise puts them on top.
   view.orientation = 6;
   MaskMap usable;
-  apply_mask({dir_.path(), false}, view, {kHeight, kWidth}, usable);
+  apply_mask(view, {kHeight, kWidth}, usable);
   EXPECT_EQ(usable(0, 11), 0);
   EXPECT_EQ(usable(0, 12), 1);
 }
@@ -154,11 +159,42 @@ TEST_F(Masks, OfAnotherSizeAreRefused) {
 TEST_F(Masks, OutsideOfTheSceneAreNotLookedAt) {
   write_mask("masks/v1.png", 4);
   const std::filesystem::path images = dir_ / "images";
-  EXPECT_FALSE(mask_file({images, false}, images / "v1.jpg"));
+  EXPECT_EQ(mask_of(images, images / "v1.jpg"), "");
   std::filesystem::rename(dir_ / "masks", dir_ / "elsewhere");
   std::filesystem::create_directories(images / "masks");
   std::filesystem::create_symlink(dir_ / "elsewhere/v1.png", images / "masks/v1.png");
-  EXPECT_EQ(test::defect_of([&] { mask_file({images, false}, images / "v1.jpg"); }), "PATH");
+  EXPECT_EQ(test::defect_of([&] { mask_of(images, images / "v1.jpg"); }), "PATH");
+}
+
+// Segmentation tools write the number of a class.
+TEST_F(Masks, OfZerosAndOnesLeaveOutTheZeros) {
+  ColorImage mask(kWidth, kHeight, Eigen::Vector3f::Zero());
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 12; x < kWidth; ++x) mask(x, y).setConstant(1.0f / 255);
+  }
+  std::filesystem::create_directories(dir_ / "masks");
+  write_png(dir_ / "masks/v1.png", mask);
+  EXPECT_EQ(usable_columns(), kWidth - 12);
+  mask.data.assign(mask.data.size(), Eigen::Vector3f::Zero());
+  write_png(dir_ / "masks/v1.png", mask);
+  EXPECT_EQ(usable_columns(), 0) << "black throughout";
+}
+
+TEST_F(Masks, AreFoundWhereFoldersOfPhotographsAreLinksThatMayLeaveTheScene) {
+  write_mask("masks/v1.png", 12);
+  const test::TempDir elsewhere;
+  for (const char* folder : {"images", "masks"}) {
+    std::filesystem::rename(dir_ / folder, elsewhere / folder);
+    std::filesystem::create_directory_symlink(elsewhere / folder, dir_ / folder);
+  }
+  EXPECT_EQ(test::defect_of([&] { usable_columns(); }), "PATH");
+  SceneOptions trusting;
+  trusting.allow_external = true;
+  Scene scene = read_scene(dir_.path(), trusting);
+  load_images(scene, scene.input);
+  ASSERT_FALSE(scene.views[0].valid.empty());
+  EXPECT_EQ(scene.views[0].valid(11, 0), 0);
+  EXPECT_EQ(scene.views[0].valid(12, 0), 1);
 }
 
 }  // namespace

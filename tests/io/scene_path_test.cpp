@@ -69,6 +69,18 @@ TEST_F(ResolveInScene, AcceptsARootThatIsItselfALink) {
   EXPECT_NO_THROW(resolve_in_scene({dir_ / "alias"}, "images/a.png", "t.json"));
 }
 
+TEST_F(ResolveInScene, IsUndoneByPathInScene) {
+  const SceneRoot root{dir_ / "scene"};
+  EXPECT_EQ(path_in_scene(root, dir_ / "scene/images"), "images");
+  EXPECT_EQ(path_in_scene(root, dir_ / "scene/./images/.."), "");
+  EXPECT_EQ(path_in_scene(root, dir_ / "scene2"), std::nullopt);
+  EXPECT_EQ(path_in_scene({dir_ / "scene", true}, dir_ / "scene2"), dir_ / "scene2");
+  fs::create_directory_symlink(dir_ / "scene", dir_ / "alias");
+  EXPECT_EQ(path_in_scene({dir_ / "alias"}, dir_ / "scene/images"), "images");
+  fs::create_directory_symlink(dir_ / "scene2", dir_ / "scene/linked");
+  EXPECT_EQ(path_in_scene(root, dir_ / "scene/linked"), "linked");
+}
+
 TEST_F(ResolveInScene, EscapesTheNameInItsMessage) {
   const std::string message =
       test::message_of([&] { resolve_in_scene({dir_ / "scene"}, "../\x1b[31m\n", "t.json"); });
