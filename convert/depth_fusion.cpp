@@ -94,12 +94,7 @@ class Frames {
   size_t size() const { return scene_.input.size(); }
 
   TsdfView operator()(size_t i, bool with_color) const {
-    std::vector<std::string> warnings;
-    View view = loaded_view(scene_, scene_.input[i], with_color, warnings);
-    if (!warnings.empty()) {
-      const std::lock_guard lock(mutex_);
-      warnings_.insert(warnings.begin(), warnings.end());
-    }
+    View view = loaded(i, with_color);
     const bool is_scaled = is_in_units_of_cameras(view);
     if (!is_scaled && !view.depth_states_metres && scene_.depth_kind != DepthKind::Metric) {
       throw BadInput(Defect::Unsupported,
@@ -132,13 +127,38 @@ class Frames {
     if (relative > relative_sigma_) relative_sigma_ = relative;
   }
 
+  size_t left_out() const { return damaged_.size(); }
   std::vector<std::string> warnings() const { return {warnings_.begin(), warnings_.end()}; }
 
  private:
+  // One damaged file of many is no reason to lose the others: its frame then has no depth.
+  View loaded(size_t i, bool with_color) const {
+    std::vector<std::string> warnings;
+    View out;
+    try {
+      out = loaded_view(scene_, scene_.input[i], with_color, warnings);
+    } catch (const BadInput& error) {
+      const std::lock_guard lock(mutex_);
+      damaged_.insert(i);
+      constexpr size_t kOneIn = 10;
+      if (damaged_.size() > size() / kOneIn) throw;
+      out = scene_.views[static_cast<size_t>(scene_.input[i])];
+      out.given_depth = DepthMap(out.camera.width, out.camera.height, kNaN);
+      out.depth_states_metres = true;
+      if (with_color)
+        out.image = ColorImage(out.camera.width, out.camera.height, Eigen::Vector3f::Zero());
+      warnings.push_back("view " + printable(out.name) + " is left out: " + error.what());
+    }
+    const std::lock_guard lock(mutex_);
+    warnings_.insert(warnings.begin(), warnings.end());
+    return out;
+  }
+
   const Scene& scene_;
   double relative_sigma_ = kSensorSigma;
   mutable std::mutex mutex_;
   mutable std::set<std::string> warnings_;  // in an order that no thread decides
+  mutable std::set<size_t> damaged_;
 };
 
 std::string percent(double part) { return std::to_string(std::lround(100 * part)) + " %"; }
@@ -183,7 +203,9 @@ void judge_scale(const DepthAgreement& agreement,
   const bool is_assumed = frame.scale_source == ScaleSource::DepthSensor;
   const bool fits =
       agreement.off <= kMost && agreement.best_factor >= 0.9 && agreement.best_factor <= 1.1;
-  if (is_assumed && !is_said && !fits && !std::isnan(agreement.off)) {
+  const bool fits_other = !std::isnan(agreement.best_factor) && agreement.best_factor != 1;
+  const bool is_refuted = !std::isnan(agreement.off) || fits_other;
+  if (is_assumed && !is_said && !fits && is_refuted) {
     throw BadInput(Defect::Mismatch,
                    scene.folder,
                    disagreement_words(agreement, frame) + " --depth-kind metric takes it as it is");
@@ -244,6 +266,7 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   fusing.common_sigma = kCommonSensorSigma;
   const TsdfSource source = {frames.size(), std::cref(frames)};
   out.fused = fuse_streamed(source, fusing, progress);
+  out.frames -= frames.left_out();
   const std::vector<std::string> odd = frames.warnings();
   out.warnings.insert(out.warnings.end(), odd.begin(), odd.end());
   return out;

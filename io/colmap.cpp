@@ -28,8 +28,25 @@ std::optional<fs::path> model_folder(const fs::path& folder) {
   return std::nullopt;
 }
 
+// COLMAP writes a model of its own for each group of photographs that it cannot connect.
+void warn_of_other_models(const fs::path& folder, Scene& scene) {
+  const fs::path all = folder.parent_path();
+  if (folder.filename() != "0") return;
+  std::string names;
+  for (const std::string& entry : sorted_entries(all)) {
+    const bool is_other =
+        entry != "0" && (holds_model(all / entry, ".bin") || holds_model(all / entry, ".txt"));
+    if (is_other) names += (names.empty() ? "" : ", ") + printable(fs::path(entry));
+  }
+  if (names.empty()) return;
+  scene.warnings.push_back("sparse/0 was read; there is another model in sparse/" + names +
+                           ", of photographs that could not be connected with it; swap the "
+                           "folders to read it");
+}
+
 ColmapModel read_model(const fs::path& folder, Scene& scene) {
   ColmapModel model;
+  warn_of_other_models(folder, scene);
   const bool is_binary = holds_model(folder, ".bin");
   if (is_binary && holds_model(folder, ".txt")) {
     scene.warnings.emplace_back("the model is there as .bin and as .txt; .bin was read");

@@ -11,7 +11,8 @@ namespace cgs {
 bool has_depth_extension(const std::filesystem::path& path);
 
 /// The file of a photograph in a folder of depth files: as colmap_depth_of(), else of the same
-/// stem, and of several the one whose format comes first above; empty if there is none.
+/// stem, in the same folders below it (cam0/0001.png for images/cam0/0001.jpg) or in itself, and of
+/// several the one whose format comes first above; empty if there is none.
 /// \param folder  in which links must not lead elsewhere unless allow_external
 /// \throws BadInput Path
 std::filesystem::path depth_file_of(const SceneRoot& folder,
@@ -26,5 +27,10 @@ std::filesystem::path depth_file_of(const SceneRoot& folder,
 /// \throws BadInput as the readers of the formats; Schema (no such channel, another shape),
 ///         Unsupported (another extension); LimitError
 StoredSamples read_depth_file(const std::filesystem::path& path, const ReadLimits& limits = {});
+
+/// The same for values that are known up to an offset: where a file holds several numbers below 0,
+/// all of its values are raised above 0. A single number below 0, however often, is none.
+StoredSamples read_relative_depth_file(const std::filesystem::path& path,
+                                       const ReadLimits& limits = {});
 
 }  // namespace cgs

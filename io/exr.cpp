@@ -99,6 +99,28 @@ Imf::Slice slice_of(const float* values, int width) {
   return {Imf::FLOAT, base, sizeof(float), sizeof(float) * static_cast<size_t>(width)};
 }
 
+// The data window, if the other is empty or beyond use.
+ExrWindow display_of(const Imath::Box2i& display, const Imath::Box2i& data) {
+  constexpr int64_t kFar = int64_t{1} << 30;
+  const auto side = [](int low, int high) { return int64_t{high} - low + 1; };
+  const int64_t left = int64_t{display.min.x} - data.min.x;
+  const int64_t top = int64_t{display.min.y} - data.min.y;
+  const int64_t width = side(display.min.x, display.max.x);
+  const int64_t height = side(display.min.y, display.max.y);
+  const bool is_usable = width > 0 && height > 0 && width < kFar && height < kFar &&
+                         std::abs(left) < kFar && std::abs(top) < kFar;
+  if (!is_usable) {
+    return {0,
+            0,
+            static_cast<int>(side(data.min.x, data.max.x)),
+            static_cast<int>(side(data.min.y, data.max.y))};
+  }
+  return {static_cast<int>(left),
+          static_cast<int>(top),
+          static_cast<int>(width),
+          static_cast<int>(height)};
+}
+
 ExrImage decode(std::string_view bytes, const std::filesystem::path& path) {
   MemoryIn stream(bytes);
   Imf::InputFile file(stream, 0);
@@ -106,6 +128,7 @@ ExrImage decode(std::string_view bytes, const std::filesystem::path& path) {
   ExrImage image;
   image.width = window.max.x - window.min.x + 1;
   image.height = window.max.y - window.min.y + 1;
+  image.display = display_of(file.header().displayWindow(), window);
   const size_t pixels = static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
   for (auto it = file.header().channels().begin(); it != file.header().channels().end(); ++it) {
     image.channels.emplace_back(it.name(), std::vector<float>(pixels));
@@ -149,6 +172,10 @@ std::string packed(const ExrImage& image, size_t decoded_bytes) {
   out.reserve(decoded_bytes + kOfAttributes);
   append_bytes(out, image.width);
   append_bytes(out, image.height);
+  const ExrWindow& shown = image.display;
+  for (const int number : {shown.left, shown.top, shown.width, shown.height}) {
+    append_bytes(out, number);
+  }
   append_bytes(out, static_cast<uint64_t>(image.channels.size()));
   for (const auto& [name, values] : image.channels) {
     append_text(out, name);
@@ -171,6 +198,10 @@ ExrImage unpacked(std::string_view bytes, const std::filesystem::path& path) {
   ExrImage image;
   image.width = in.get<int>("width");
   image.height = in.get<int>("height");
+  for (int* number :
+       {&image.display.left, &image.display.top, &image.display.width, &image.display.height}) {
+    *number = in.get<int>("display window");
+  }
   const size_t pixels = static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
   for (auto left = in.get<uint64_t>("channels"); left > 0; --left) {
     auto& [name, values] = image.channels.emplace_back(take_text(in), std::vector<float>());

@@ -14,6 +14,15 @@
 
 namespace cgs {
 
+/// Pixels, counted from the first that a file holds.
+struct ExrWindow {
+  int left = 0;
+  int top = 0;
+  int width = 0;
+  int height = 0;
+  bool operator==(const ExrWindow&) const = default;
+};
+
 /// The content of an OpenEXR file: named 32-bit float channels of one size.
 struct ExrImage {
   int width = 0;
@@ -21,6 +30,9 @@ struct ExrImage {
   /// Name and row-major values, row 0 on top. Files keep channels in the order of their names.
   std::vector<std::pair<std::string, std::vector<float>>> channels;
   std::map<std::string, std::string> text;  ///< String attributes.
+  /// The picture that a file was cropped from, or reaches beyond (displayWindow); of a file that
+  /// was read.
+  ExrWindow display;
   /// The standard attribute worldToCamera, to be multiplied from the left of column vectors:
   /// camera axes +x right, +y up, +z into the scene (left-handed, as OpenEXR defines it).
   std::optional<Eigen::Matrix4f> world_to_camera;

@@ -28,16 +28,11 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kSameSurface = 0.05f;  // relative step between values that may be averaged
 
-// The file in a folder "depth" in or beside the folder of a photograph, beneath the scene.
+// The file in a folder "depth" that goes with that of a photograph.
 fs::path depth_beside(const SceneRoot& root, const fs::path& photograph) {
-  const std::optional<fs::path> folder = path_in_scene(root, photograph.parent_path());
-  if (!folder) return {};
-  std::vector<fs::path> candidates = {*folder / "depth"};
-  if (folder->has_relative_path()) candidates.push_back(folder->parent_path() / "depth");
-  for (const fs::path& candidate : candidates) {
-    if (!is_folder(root.folder / candidate)) continue;
-    const fs::path inside = resolve_in_scene(root, candidate.string(), root.folder);
-    fs::path file = depth_file_of({inside, root.allow_external}, photograph);
+  for (const fs::path& folder : companion_folders(root, photograph.parent_path(), "depth")) {
+    const fs::path inside = resolve_in_scene(root, folder.string(), root.folder);
+    fs::path file = depth_file_of({inside, root.allow_external}, photograph.filename());
     if (!file.empty()) return file;
   }
   return {};
@@ -302,7 +297,8 @@ void check_colmap_maps(Scene& scene) {
 // Of two photographs with one file of depth, it belongs to one at most.
 void refuse_shared_files(const Scene& scene) {
   std::map<fs::path, const View*> owners;
-  for (const View& view : scene.views) {
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
     if (view.depth_path.empty()) continue;
     const auto [owner, is_new] = owners.emplace(view.depth_path.lexically_normal(), &view);
     if (is_new) continue;
@@ -387,7 +383,10 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
 void load_given_depth(const Scene& scene, View& view, const ImageSize& photograph) {
   if (view.depth_path.empty()) return;
   refuse_map_of_distorted(view);
-  StoredSamples file = read_depth_file(view.depth_path);
+  const bool is_metric =
+      scene.depth_kind == DepthKind::Metric || is_colmap_depth_name(view.depth_path);
+  StoredSamples file =
+      is_metric ? read_depth_file(view.depth_path) : read_relative_depth_file(view.depth_path);
   const fs::path confidence = confidence_file(scene, view, true);
   if (!confidence.empty()) drop_low_confidence(confidence, file.values);
   constexpr double kMillimetres = 1000;

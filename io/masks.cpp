@@ -2,7 +2,6 @@
 #include "io/masks.h"
 
 #include <algorithm>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,22 +16,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Folders that may hold the masks of a photograph, as seen from the root.
-std::vector<std::string> mask_folders(const SceneRoot& root, const fs::path& photograph) {
-  const std::optional<fs::path> folder = path_in_scene(root, photograph.parent_path());
-  if (!folder) return {};
-  std::vector<std::string> out;
-  const auto add = [&](const fs::path& candidate) {
-    if (is_folder(root.folder / candidate)) out.push_back(candidate.string());
-  };
-  add(*folder / "masks");
-  fs::path within;  // the folder above which masks lie, in which the photograph does
-  for (fs::path above = *folder; above.has_relative_path();) {
-    add(above.parent_path() / "masks" / within);
-    within = within.empty() ? above.filename() : above.filename() / within;
-    above = above.parent_path();
-  }
-  return out;
+std::vector<fs::path> mask_folders(const SceneRoot& root, const fs::path& photograph) {
+  return companion_folders(root, photograph.parent_path(), "masks");
 }
 
 // The mask of a photograph that lies turned in its file, as the upright photograph.
@@ -69,8 +54,8 @@ const MaskIndex::Folder& MaskIndex::listed(const std::string& folder) {
 }
 
 fs::path MaskIndex::mask_of(const fs::path& photograph) {
-  for (const std::string& name : mask_folders(root_, photograph)) {
-    const Folder& folder = listed(name);
+  for (const fs::path& name : mask_folders(root_, photograph)) {
+    const Folder& folder = listed(name.string());
     const auto file = folder.files.find(photograph.filename().string() + ".png");
     if (file != folder.files.end()) return file->second;
     const auto same_stem = folder.stems.find(photograph.stem().string());

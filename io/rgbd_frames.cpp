@@ -222,6 +222,35 @@ std::string photograph_folder(const fs::path& folder) {
   return first_present(folder, {"color", "image", "rgb"});
 }
 
+// "9.jpg" before "10.jpg": runs of digits compare as numbers, as Open3D orders what it reads.
+bool comes_before(const fs::path& a, const fs::path& b) {
+  const std::string one = a.filename().string();
+  const std::string other = b.filename().string();
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  const auto digits_at = [&](const std::string& text, size_t at) {
+    const auto begin = text.begin() + static_cast<std::ptrdiff_t>(at);
+    std::string out(begin, std::find_if_not(begin, text.end(), is_digit));
+    out.erase(0, std::min(out.find_first_not_of('0'), out.size() - 1));
+    return out;
+  };
+  size_t i = 0;
+  size_t j = 0;
+  while (i < one.size() && j < other.size()) {
+    if (is_digit(one[i]) && is_digit(other[j])) {
+      const std::string m = digits_at(one, i);
+      const std::string n = digits_at(other, j);
+      if (m != n) return m.size() != n.size() ? m.size() < n.size() : m < n;
+      while (i < one.size() && is_digit(one[i])) ++i;
+      while (j < other.size() && is_digit(other[j])) ++j;
+      continue;
+    }
+    if (one[i] != other[j]) return one[i] < other[j];
+    ++i;
+    ++j;
+  }
+  return one.size() - i != other.size() - j ? one.size() - i < other.size() - j : one < other;
+}
+
 size_t read_open3d(const SceneRoot& root, Scene& scene) {
   const auto inside = [&](const std::string& name) {
     return resolve_in_scene(root, name, root.folder);
@@ -239,8 +268,10 @@ size_t read_open3d(const SceneRoot& root, Scene& scene) {
   const Camera camera = read_open3d_camera(inside(intrinsics));
   const fs::path trajectory = inside(trajectory_name(root.folder));
   const auto poses = read_trajectory(trajectory);
-  const std::vector<fs::path> photographs = image_files(root, photograph_folder(root.folder));
-  const std::vector<fs::path> depths = image_files(root, "depth");
+  std::vector<fs::path> photographs = image_files(root, photograph_folder(root.folder));
+  std::vector<fs::path> depths = image_files(root, "depth");
+  std::sort(photographs.begin(), photographs.end(), comes_before);
+  std::sort(depths.begin(), depths.end(), comes_before);
   if (photographs.size() != poses.size() || depths.size() != poses.size()) {
     throw BadInput(Defect::Mismatch,
                    trajectory,

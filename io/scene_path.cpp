@@ -79,6 +79,29 @@ std::optional<fs::path> path_in_scene(const SceneRoot& root, const fs::path& pat
   return root.allow_external ? std::optional(whole) : std::nullopt;
 }
 
+std::vector<fs::path> companion_folders(const SceneRoot& root,
+                                        const fs::path& photographs,
+                                        const std::string& name) {
+  const std::optional<fs::path> folder = path_in_scene(root, photographs);
+  if (!folder) return {};
+  std::vector<fs::path> out;
+  const auto add = [&](const fs::path& candidate) {
+    if (is_folder(root.folder / candidate)) out.push_back(candidate);
+  };
+  add(*folder / name);
+  fs::path within;  // the folder above which they lie, in which the photographs do
+  for (fs::path above = *folder; above.has_relative_path();) {
+    add(above.parent_path() / name / within);
+    within = within.empty() ? above.filename() : above.filename() / within;
+    above = above.parent_path();
+  }
+  return out;
+}
+
+bool stays_below(const fs::path& path) {
+  return path.is_relative() && std::find(path.begin(), path.end(), "..") == path.end();
+}
+
 bool is_present(const fs::path& path) {
   std::error_code ignored;
   return fs::exists(fs::symlink_status(path, ignored));

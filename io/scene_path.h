@@ -31,6 +31,16 @@ std::filesystem::path resolve_in_scene(const SceneRoot& root,
 std::optional<std::filesystem::path> path_in_scene(const SceneRoot& root,
                                                    const std::filesystem::path& path);
 
+/// Folders of a data set, as path_in_scene(), in which files of the photographs in another may lie,
+/// in the order to look: those called `name` below the folder of the photographs and below any
+/// above it, there in the same folders below it (masks/rig1 for images/rig1).
+std::vector<std::filesystem::path> companion_folders(const SceneRoot& root,
+                                                     const std::filesystem::path& photographs,
+                                                     const std::string& name);
+
+/// True for a relative path without ".." in it.
+bool stays_below(const std::filesystem::path& path);
+
 /// True if something has that name, even a link that leads nowhere: reading it tells what is wrong.
 /// Never throws, not for names that are too long or links that go round.
 bool is_present(const std::filesystem::path& path);

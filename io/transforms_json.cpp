@@ -114,10 +114,13 @@ void read_distortion(const JsonValue& document, const JsonValue& frame, View& vi
 void read_intrinsics(const JsonValue& document, const JsonValue& frame, View& view) {
   Camera& camera = view.camera;
   const auto get = [&](std::string_view key) { return setting(document, frame, key); };
-  const auto fl_x = get("fl_x");
-  const auto fl_y = get("fl_y");
-  const auto angle_x = get("camera_angle_x");
-  const auto angle_y = get("camera_angle_y");
+  // A frame that states a focal length states all of it.
+  const bool is_own = frame.find("fl_x") || frame.find("camera_angle_x");
+  const auto focal = [&](std::string_view key) { return (is_own ? frame : document).find(key); };
+  const auto fl_x = focal("fl_x");
+  const auto fl_y = is_own ? focal("fl_y") : get("fl_y");
+  const auto angle_x = focal("camera_angle_x");
+  const auto angle_y = is_own ? focal("camera_angle_y") : get("camera_angle_y");
   if (fl_x) {
     camera.fx = fl_x->number();
   } else if (angle_x) {
@@ -165,6 +168,11 @@ fs::path photograph(const SceneRoot& root, const std::string& name, const fs::pa
   for (const char* extension : {".png", ".jpg", ".jpeg"}) {
     fs::path candidate = resolve_in_scene(root, name + extension, json);
     if (fs::is_regular_file(candidate, ignored)) return candidate;
+  }
+  for (const std::string& entry : sorted_entries(path.parent_path())) {  // .JPG, .webp, …
+    const fs::path file(entry);
+    if (file.stem() != path.filename() || !has_image_extension(file)) continue;
+    return resolve_in_scene(root, (fs::path(name).parent_path() / file).string(), json);
   }
   return path;
 }
@@ -232,7 +240,14 @@ Scene read_transforms_json(const SceneRoot& root) {
     view.name = view.image_path.empty() ? name : image.lexically_relative(root.folder).string();
     if (const auto depth = frame.find("depth_file_path")) {
       const fs::path file = resolve_in_scene(root, depth->text(), path);
-      if (is_present(file) && has_depth_extension(file)) view.depth_path = file;
+      if (is_present(file) && has_depth_extension(file)) {
+        view.depth_path = file;
+      } else {
+        scene.warnings.push_back(
+            depth->pointer() + ": \"" + printable(fs::path(depth->text())) +
+            (is_present(file) ? "\" is no file of depth that can be read" : "\" does not exist") +
+            "; view " + printable(fs::path(view.name)) + " has no depth");
+      }
     }
     if (const auto mask = frame.find("mask_path")) {
       view.mask_path = resolve_in_scene(root, mask->text(), path);

@@ -89,6 +89,26 @@ void add_baseline_warnings(const Json& baselines, Json& warnings) {
   }
 }
 
+// Null where no input view has any.
+Json depth_json(const Scene& scene) {
+  size_t count = 0;
+  std::filesystem::path first;
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (view.depth_path.empty()) continue;
+    if (count++ == 0) first = view.depth_path;
+  }
+  if (count == 0) return nullptr;
+  std::string kind = "auto";
+  for (const auto& [name, value] : depth_kinds()) {
+    if (value == scene.depth_kind) kind = name;
+  }
+  return {{"input_views", count},
+          {"first_file", first.string()},
+          {"kind", kind},
+          {"scale", scene.depth_scale}};
+}
+
 Json scene_json(const OpenedScene& opened, const Json& fit) {
   const Scene& scene = opened.scene;
   Json cameras = Json::array();
@@ -112,6 +132,7 @@ Json scene_json(const OpenedScene& opened, const Json& fit) {
           {"units", scene.frame.unit_name()},
           {"cameras", cameras},
           {"baselines", baselines},
+          {"depth_files", depth_json(scene)},
           {"camera_fit", fit},
           {"refined_poses", opened.refined ? opened.refined->report : Json()},
           {"missing", scene.missing},
@@ -181,6 +202,15 @@ void print_scene(const Json& info) {
                 row["length"].get<double>(),
                 100 * row["baseline_to_depth"].get<double>(),
                 row["angle_degrees"].get<double>());
+  }
+  const Json& depth = info["depth_files"];
+  if (!depth.is_null()) {
+    const auto kind = depth["kind"].get<std::string>();
+    std::printf("depth files: for %zu of %zu input views, %s …, %s\n",
+                depth["input_views"].get<size_t>(),
+                counts["input"].get<size_t>(),
+                printable(std::filesystem::path(depth["first_file"].get<std::string>())).c_str(),
+                kind == "auto" ? "of a kind that training finds out" : kind.c_str());
   }
   print_fit(info);
   for (const Json& name : info["missing"]) {

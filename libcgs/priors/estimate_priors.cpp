@@ -48,7 +48,8 @@ class Estimator {
     out_.views = plane_sweep(scene_, options_.sweep, part_of(progress, 0, kSweepShare));
     out_.report.alignment = align_depths(scene_, out_.views, options_.alignment);
     const GivenDepth given = fit_given_depth(scene_, out_.views);
-    out_.report.given = {given.kind, given.metres_per_unit, given.metres_sigma, given.remarks};
+    out_.report.given = {
+        given.kind, given.metres_per_unit, given.metres_sigma, given.found, given.remarks};
     if (given.kind == DepthKind::Metric) {
       for (size_t i = 0; i < out_.views.size(); ++i) {
         merge_sensor_depth(given.views[i], view(i), out_.views[i]);

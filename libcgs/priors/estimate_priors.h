@@ -42,6 +42,7 @@ struct GivenDepthReport {
   DepthKind kind = DepthKind::Unknown;  ///< Unknown = there was none, or it was of no use.
   double metres_per_unit = 0;           ///< As GivenDepth.
   double metres_sigma = 0;
+  std::string found;
   std::vector<std::string> remarks;
 };
 

@@ -177,11 +177,9 @@ class Fitter {
         out_.metres_per_unit = metres;
         out_.metres_sigma = sigma * metres;
       }
-      out_.remarks.push_back("depth files: " +
-                             (is_told
-                                  ? "metric, " + number(1 / world_scale()) + " m per scene unit, "
-                                  : std::string("in units of the scene, ")) +
-                             percent(scale_->scatter) + " from what the photographs show");
+      out_.found = (is_told ? "metric, " + number(1 / world_scale()) + " m per scene unit, "
+                            : std::string("in units of the scene, ")) +
+                   percent(scale_->scatter) + " from what the photographs show";
       const bool is_other = frame.has_metric_scale() && is_told &&
                             std::abs(std::log(frame.metres_per_unit / metres)) > kSigmas * sigma;
       if (is_other) {
@@ -225,9 +223,9 @@ class Fitter {
     const bool is_used = worst > 0;
     if (!is_used) out_.kind = DepthKind::Unknown;
     if (is_used) {
-      out_.remarks.push_back(std::string("depth files: ") + (is_disparity ? "disparity" : "depth") +
-                             " up to scale and offset, within " + percent(worst) +
-                             " of what the photographs show");
+      out_.found = std::string(is_disparity ? "disparity" : "depth") +
+                   " up to scale and offset, within " + percent(worst) +
+                   " of what the photographs show";
     }
   }
 

@@ -21,7 +21,8 @@ struct GivenDepth {
   std::vector<FittedDepth> views;       ///< In the order of Scene::input.
   double metres_per_unit = 0;  ///< Of world coordinates, where metric depth tells; 0 = does not.
   double metres_sigma = 0;
-  std::vector<std::string> remarks;  ///< One line each for the user.
+  std::string found;                 ///< What it is and how well it fits, in words; empty = no use.
+  std::vector<std::string> remarks;  ///< What is odd, one line each.
 };
 
 /// Brings given depth to the scale of the scene, by the pixels that the photographs measure.

@@ -50,6 +50,14 @@ TEST_F(ReadColmap, FindsTheModelInItsUsualPlaces) {
   EXPECT_FALSE(is_colmap(dir_ / "images"));
 }
 
+TEST_F(ReadColmap, SaysThatThereAreOtherModels) {
+  EXPECT_TRUE(read().warnings.empty());
+  std::filesystem::copy(dir_ / "sparse/0", dir_ / "sparse/1");
+  const Scene scene = read();
+  ASSERT_EQ(scene.warnings.size(), 1u);
+  EXPECT_NE(scene.warnings[0].find("sparse/1"), std::string::npos);
+}
+
 TEST_F(ReadColmap, PrefersBinaryOverText) {
   write("cameras.bin",
         test::packed(

@@ -75,6 +75,23 @@ TEST_F(DepthFile, WhatIsNoDepthIsNone) {
   EXPECT_EQ(read(4, 0), 1e-3f);
 }
 
+// Networks that guess up to an offset write what is far as numbers below 0.
+TEST_F(DepthFile, UpToAnOffsetMayLieBelowZero) {
+  test::write_bytes(dir_ / "a.npy",
+                    test::npy("<f4", "(1, 6)", packed(-2.f, -1.f, 1.f, 8.f, 0.f, NAN)));
+  const Raster<float> read = read_relative_depth_file(dir_ / "a.npy").values;
+  EXPECT_GT(read(0, 0), 0);
+  EXPECT_FLOAT_EQ(read(1, 0) - read(0, 0), 1);
+  EXPECT_FLOAT_EQ(read(3, 0) - read(0, 0), 10);
+  EXPECT_TRUE(std::isnan(read(4, 0)));
+  EXPECT_TRUE(std::isnan(read(5, 0)));
+  EXPECT_TRUE(std::isnan(read_depth_file(dir_ / "a.npy").values(0, 0)));
+  test::write_bytes(dir_ / "mark.npy", test::npy("<f4", "(1, 4)", packed(-1.f, -1.f, 1.f, 8.f)));
+  const Raster<float> marked = read_relative_depth_file(dir_ / "mark.npy").values;
+  EXPECT_TRUE(std::isnan(marked(0, 0)));
+  EXPECT_EQ(marked(3, 0), 8);
+}
+
 TEST_F(DepthFile, WhatStandsForInfinityIsNone) {
   const auto usable = [&](const std::string& name) {
     std::vector<bool> out;
@@ -122,6 +139,17 @@ TEST_F(DepthFile, RefusesWhatHoldsNoDepth) {
   EXPECT_EQ(refused("a.exr", "not an EXR"), "MAGIC");
   EXPECT_EQ(refused("a.pfm", ""), "EMPTY");
   EXPECT_EQ(refused("d.npy", test::npy("<f4", "(0, 4)", "")), "SCHEMA");
+}
+
+TEST_F(DepthFile, IsFoundInTheFoldersOfItsPhotographAndWithCapitalEndings) {
+  const SceneRoot root{dir_.path(), false};
+  test::write_bytes(dir_ / "cam1/0001.PNG", "");
+  EXPECT_TRUE(depth_file_of(root, "scene/images/cam0/0001.jpg").empty());
+  EXPECT_EQ(depth_file_of(root, "scene/images/cam1/0001.jpg"), dir_ / "cam1/0001.PNG");
+  EXPECT_EQ(depth_file_of(root, "/scene/images/cam1/0001.jpg"), dir_ / "cam1/0001.PNG");
+  test::write_bytes(dir_ / "0001.exr", "");
+  EXPECT_EQ(depth_file_of(root, "scene/images/cam0/0001.jpg"), dir_ / "0001.exr");
+  EXPECT_EQ(depth_file_of(root, "scene/images/cam1/0001.jpg"), dir_ / "cam1/0001.PNG");
 }
 
 TEST_F(DepthFile, IsFoundByItsStemAndFormatsWithoutLossFirst) {

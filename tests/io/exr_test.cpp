@@ -16,6 +16,7 @@
 #include <gtest/gtest.h>
 #include <half.h>
 
+#include "io/depth_file.h"
 #include "tests/support/full_disk.h"
 
 namespace cgs {
@@ -147,6 +148,35 @@ TEST(Exr, ReadsEveryCompressionAndTiles) {
 }
 
 // Colours of 16 bits are what the lossy methods are made for.
+// As compositors write what they crop to its content.
+TEST(Exr, TellsThePictureItWasCroppedFrom) {
+  const test::TempDir dir;
+  for (const Imf::Compression method : {Imf::ZIP_COMPRESSION, Imf::DWAA_COMPRESSION}) {
+    const Imath::Box2i data({8, 6}, {15, 11});
+    Imf::Header header(Imath::Box2i({-2, 0}, {37, 29}), data);
+    header.compression() = method;  // the second is decoded in a process of its own
+    header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
+    std::vector<float> values(8 * 6, 2.5f);
+    Imf::FrameBuffer buffer;
+    buffer.insert(
+        "Z", Imf::Slice::Make(Imf::FLOAT, values.data(), data, sizeof(float), 8 * sizeof(float)));
+    {
+      Imf::OutputFile file((dir / "a.exr").c_str(), header);
+      file.setFrameBuffer(buffer);
+      file.writePixels(6);
+    }
+    const ExrImage image = read_exr(dir / "a.exr");
+    EXPECT_EQ(image.width, 8);
+    EXPECT_EQ(image.display, (ExrWindow{-10, -6, 40, 30}));
+    const Raster<float> depth = read_depth_file(dir / "a.exr").values;
+    ASSERT_EQ(depth.width, 40);
+    ASSERT_EQ(depth.height, 30);
+    EXPECT_EQ(std::count(depth.data.begin(), depth.data.end(), 2.5f), 48);
+    EXPECT_EQ(depth(10, 6), 2.5f);
+    EXPECT_TRUE(std::isnan(depth(9, 6)));
+  }
+}
+
 TEST(Exr, ReadsHalvesOfLossyCompression) {
   const test::TempDir dir;
   constexpr int kWidth = 40;

@@ -120,6 +120,25 @@ TEST_F(RgbdFrames, ReadsWhatOpen3dRecords) {
   EXPECT_EQ(scene.views[1].given_depth(10, 20), 2.f);
 }
 
+TEST_F(RgbdFrames, OrdersWhatOpen3dCountsWithoutZeros) {
+  write_open3d();
+  for (const char* folder : {"color", "depth"}) std::filesystem::remove_all(dir_ / folder);
+  std::string poses;
+  for (int i = 0; i < 12; ++i) {
+    const std::string name = std::to_string(i);
+    write("color/" + name + ".jpg", test::jpeg(32, 24));
+    write("depth/" + name + ".png", depth_png(1000 + i));
+    poses += name + " " + name + " 12\n" + pose_text(i);
+  }
+  write("trajectory.log", poses);
+  Scene scene = read_rgbd_frames({dir_.path()});
+  ASSERT_EQ(scene.views.size(), 12u);
+  for (const View& view : scene.views) {
+    EXPECT_EQ(view.camera.center().x(), std::stod(view.name)) << view.name;
+    EXPECT_EQ(view.depth_path.stem(), view.name);
+  }
+}
+
 TEST_F(RgbdFrames, RefusesWhatItCannotUse) {
   write_frame("frame-000000", 0.5);
   EXPECT_EQ(refused(), "SCHEMA");  // no intrinsics

@@ -58,7 +58,31 @@ TEST_F(ReadTransforms, PutsAKnownPointWhereItBelongs) {
   EXPECT_NEAR(uvz.z(), 4, 1e-12);
 }
 
+TEST_F(ReadTransforms, SaysWhichDepthIsNotThere) {
+  document_["frames"][0]["depth_file_path"] = "depth/gone.png";
+  document_["frames"][1]["depth_file_path"] = "images/b.jpg";
+  const Scene scene = read();
+  ASSERT_EQ(scene.warnings.size(), 2u);
+  EXPECT_NE(scene.warnings[0].find("\"depth/gone.png\" does not exist"), std::string::npos);
+  EXPECT_NE(scene.warnings[1].find("no file of depth"), std::string::npos);
+  EXPECT_TRUE(scene.views[0].depth_path.empty() && scene.views[1].depth_path.empty());
+}
+
+TEST_F(ReadTransforms, TakesAllOfAFocalLengthFromTheFrameThatStatesOne) {
+  document_["frames"][0]["camera_angle_x"] = 2 * std::atan(40 / 260.0);
+  document_["frames"][1]["fl_x"] = 260;
+  const Scene scene = read();
+  for (const View& view : scene.views) {
+    EXPECT_NEAR(view.camera.fx, 260, 1e-9) << view.name;
+    EXPECT_NEAR(view.camera.fy, 260, 1e-9) << view.name;
+  }
+}
+
 TEST_F(ReadTransforms, FindsFilesWithoutExtensionAndListsMissingOnes) {
+  std::filesystem::rename(dir_ / "images/b.jpg", dir_ / "images/b.JPG");
+  EXPECT_EQ(read().views[1].image_path.filename(), "b.JPG");
+  std::filesystem::rename(dir_ / "images/b.JPG", dir_ / "images/b.jpg");
+
   document_["frames"][2] = document_["frames"][0];
   document_["frames"][2]["file_path"] = "images/gone.png";
   const Scene scene = read();
