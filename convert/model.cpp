@@ -143,9 +143,14 @@ class TrainingCheckpoint {
   TrainingCheckpoint(std::filesystem::path folder, uint64_t key, std::vector<std::string>& hitches)
       : folder_(std::move(folder)), key_(key), hitches_(hitches) {}
 
-  void restore(Trainer& trainer) {
+  void restore(Trainer& trainer, bool keeps_others) {
     if (folder_.empty()) return;
     const SavedState saved = read_checkpoint(folder_, kCheckpointName, key_);
+    if (saved.is_of_other && keeps_others) {
+      throw InvalidInput(printable(folder_) +
+                         " holds an unfinished training with other settings or inputs; choose "
+                         "another folder, or say --overwrite");
+    }
     if (saved.state) trainer.restore(*saved.state);
     if (!saved.warning.empty()) hitches_.push_back(saved.warning);
   }
@@ -186,7 +191,7 @@ void optimise(TrainedModel& trained, const ModelRequest& request, const Progress
   Trainer trainer(model.scene, model.priors, request.training);
   TrainingCheckpoint checkpoint(
       request.checkpoints, training_key(model, request.training), trained.hitches);
-  checkpoint.restore(trainer);
+  checkpoint.restore(trainer, request.keeps_others);
   while (!trainer.done()) {
     trainer.step();
     try {
@@ -262,6 +267,10 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   return trained;
 }
 
+bool has_checkpoints(const std::filesystem::path& folder) {
+  return has_checkpoint(folder, kCheckpointName);
+}
+
 void forget_checkpoints(const std::filesystem::path& folder) {
   remove_checkpoint(folder, kCheckpointName);
 }
@@ -282,7 +291,7 @@ nlohmann::ordered_json given_depth_to_json(const PriorsReport& priors) {
   if (given.kind == DepthKind::Metric) {
     kind = given.metres_per_unit > 0 ? "metric" : "in units of the scene";
   }
-  nlohmann::ordered_json out = {{"kind", kind}};
+  nlohmann::ordered_json out = {{"kind", kind}, {"words", given.found}};
   if (given.metres_per_unit > 0) {
     out["metres_per_unit"] = given.metres_per_unit;
     out["metres_sigma"] = given.metres_sigma;

@@ -35,11 +35,13 @@ struct ModelRequest {
   std::filesystem::path checkpoints;
   /// A network that guesses the depth of the photographs, as depth_network.h; empty = none.
   std::filesystem::path depth_network;
+  bool keeps_others = false;  ///< Checkpoints of other work are not replaced.
 };
 
 /// Scene -> model. Loads the images of the input views, moves the scene to its canonical frame,
 /// estimates depth and optimises the Gaussians; goes on from a checkpoint of the same work.
 /// If the progress function throws Cancelled, the training so far is saved first.
+/// \throws InvalidInput for a checkpoint of other work that is to be kept
 struct TrainedModel {
   Model model;
   PriorsReport priors;
@@ -51,6 +53,9 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
 
 /// Gives a frame without scale the one that metric depth of the photographs tells, if it does.
 void take_sensor_scale(const GivenDepthReport& given, Frame& frame);
+
+/// True if a training began in that folder and did not end.
+bool has_checkpoints(const std::filesystem::path& folder);
 
 /// Removes the checkpoints of finished work. \throws IoError
 void forget_checkpoints(const std::filesystem::path& folder);

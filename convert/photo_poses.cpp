@@ -55,6 +55,15 @@ std::string inputs_text(MaskIndex& masks, const std::vector<PhotoFile>& photogra
   return json_text({{"program", kProgramVersion}, {"focal", focal}, {"photographs", hashes}}, -1);
 }
 
+// Of the files that write_photo_poses() writes: cameras that somebody moved are not solved ones.
+Json hashes_of_model(const std::filesystem::path& folder) {
+  Json out = Json::object();
+  for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"}) {
+    out[name] = file_hash(folder / "sparse/0" / name);
+  }
+  return out;
+}
+
 std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
                                        const std::string& inputs) {
   if (folder.empty() || !is_present(folder / "poses.json")) return std::nullopt;
@@ -62,6 +71,9 @@ std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
     const nlohmann::json document = read_json(folder / "poses.json");
     const JsonValue record(document, folder / "poses.json");
     if (record.at("inputs").text() != inputs) return std::nullopt;
+    if (Json(document.value("files", nlohmann::json())) != hashes_of_model(folder)) {
+      return std::nullopt;
+    }
     PhotoPoses out;
     out.inputs = inputs;
     out.is_stored = true;
@@ -233,7 +245,8 @@ PhotoPoses photo_poses(const SceneRoot& root,
 
 void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& poses) {
   write_colmap_text(folder / "sparse/0", poses.model);
-  const Json record = {{"inputs", poses.inputs}, {"warnings", poses.warnings}};
+  const Json record = {
+      {"inputs", poses.inputs}, {"warnings", poses.warnings}, {"files", hashes_of_model(folder)}};
   write_file(folder / "poses.json", json_text(record) + "\n");  // last: it says the model is whole
 }
 

@@ -208,6 +208,7 @@ std::map<std::string, std::string> decided_stages(const RunRequest& request, con
                                             {"known_distances", "scale"},
                                             {"marker_size", "scale"},
                                             {"control_points", "scale"},
+                                            {"stated_scale", "scale"},
                                             {"held_out_images", "evaluation"},
                                             {"voxel_size", "mesh"},
                                             {"simplify", "mesh"},
@@ -221,6 +222,7 @@ std::map<std::string, std::string> decided_stages(const RunRequest& request, con
   if (has_given_depth(request.scene, scene)) {
     out.erase("assume_unit");
     out.erase("control_points");
+    out.erase("stated_scale");
   }
   return out;
 }
@@ -250,7 +252,7 @@ std::vector<Stage> stages_of(const Scene& scene, size_t lods) {
       "web/asset.glb", "mesh/watertight.obj", "mesh/watertight.mtl"};
   for (const std::string& name : level_files(lods)) web_files.push_back("web/" + name);
   return {{"model", "depth and Gaussians", model_files, run_model, {"model/training.json"}},
-          {"scale", "scale", {}, run_scale},
+          {"scale", "scale", {}, run_scale, {"model/gaussians.ply", "model/cameras.json"}},
           {"views", "views", view_files, run_views},
           {"evaluation", "held-out views", {}, run_evaluation},
           {"splats", "splats for browsers", {"web/splats.glb"}, run_splats, {"web/splats.spz"}},
@@ -323,26 +325,44 @@ std::set<std::string> outputs_of(const Stage& stage, const Run& run) {
   return {outputs.begin(), outputs.end()};
 }
 
-// Hashes of what is on disk tell what the stages wrote only right after they did; later,
-// verify_run() holds the disk against them.
+// What somebody changed of the files of a finished stage may be wanted, and stays.
+void warn_of_changed_files(const Stage& stage, const Run& run, const Terminal& terminal) {
+  std::set<std::string> unsettled;  // a later stage may have been stopped after it wrote them
+  for (const Stage& other : stages_of(run.scene, run.request.lods)) {
+    if (!run.record.is_done(other.name, other.files)) unsettled.merge(files_of(other));
+  }
+  for (const std::string& file : run.record.changed_files(stage.name)) {
+    if (unsettled.contains(file)) continue;
+    terminal.warn({printable(run.request.output / file) +
+                   " is not what the run wrote and stays as it is; remove it to have it made "
+                   "again"});
+  }
+}
+
+// Hashes of what the stages wrote when they did: verify_run() holds the disk against them.
 void note_outputs(Run& run, bool is_fresh) {
   if (!is_fresh && run.record.json().contains("outputs")) return;
-  std::set<std::string> names = files_of_stages(run.scene, run.request.lods);
-  names.merge(camera_files());
-  run.record.note("outputs", output_hashes(run.request.output, names));
+  Json outputs = output_hashes(run.request.output, camera_files());
+  outputs.update(run.record.file_hashes());
+  run.record.note("outputs", outputs);
 }
 
 // What later stages made of other settings must not stand beside what comes now, as if it belonged
-// to it, should this run end before them.
+// to it, should this run end before them. Files of like names that no stage is known to have
+// written are the user's.
 void remove_outputs_after(const Stage& first, const Run& run) {
   bool is_later = false;
+  std::set<std::string> kept;
   std::set<std::string> names;
   for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
-    if (is_later) names.merge(files_of(stage));
+    (is_later ? names : kept).insert(stage.files.begin(), stage.files.end());
+    for (const std::string& file : run.record.files(stage.name)) {
+      (is_later ? names : kept).insert(file);
+    }
     is_later = is_later || stage.name == first.name;
   }
   for (const std::string& name : named_outputs(run.request.output, names)) {
-    std::filesystem::remove(run.request.output / name);
+    if (!kept.contains(name)) std::filesystem::remove(run.request.output / name);
   }
 }
 
@@ -353,6 +373,9 @@ void warn_of(const Json& result, const Terminal& terminal) {
 
 // What a user would not expect of a stage: "kept 33165 of 142884".
 std::string remark_on(const std::string& stage, const Json& result) {
+  if (stage == "model" && result["given_depth"].is_object()) {
+    return "depth files: " + result["given_depth"].value("words", "");
+  }
   if (stage != "splats") return "";
   const Json& thinning = result["thinning"];
   return "kept " + std::to_string(thinning["kept"].get<size_t>()) + " of " +
@@ -360,13 +383,12 @@ std::string remark_on(const std::string& stage, const Json& result) {
 }
 
 Json run_stages(Run& run, Terminal& terminal) {
-  bool stale = false;             // a stage that ran makes everything after it stale
-  std::set<std::string> earlier;  // files of stages before
+  bool stale = false;  // a stage that ran makes everything after it stale
   for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
     if (!stale && run.record.is_done(stage.name, stage.files)) {
       terminal.say(stage.title + ": done before");
       warn_of(run.record.result(stage.name), terminal);
-      earlier.merge(outputs_of(stage, run));
+      warn_of_changed_files(stage, run, terminal);
       continue;
     }
     if (!stale) remove_outputs_after(stage, run);
@@ -374,10 +396,7 @@ Json run_stages(Run& run, Terminal& terminal) {
     const CostMeter meter;  // from here on the peak of memory is that of the stage
     const Json result = stage.work(run, terminal.begin(stage.title));
     const double seconds = terminal.end(remark_on(stage.name, result));
-    std::set<std::string> outputs = outputs_of(stage, run);
-    for (const std::string& name : earlier) outputs.erase(name);
-    run.record.finish(stage.name, seconds, result, {outputs.begin(), outputs.end()});
-    earlier.merge(outputs);
+    run.record.finish(stage.name, seconds, result, outputs_of(stage, run));
     warn_of(result, terminal);
     terminal.warn(std::exchange(run.hitches, {}));
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <fstream>
 #include <utility>
 
 #include "convert/terminal.h"
@@ -55,20 +56,26 @@ Json unaffected_stages(const Json& stages,
 // What a stage wrote; a name that leads out of the folder is none of ours.
 std::vector<std::string> files_of(const Json& stage) {
   std::vector<std::string> out;
-  for (const Json& name : stage.value("files", Json::array())) {
-    const auto file = name.get<std::string>();
-    const bool is_inside =
-        std::filesystem::path(file).is_relative() && file.find("..") == std::string::npos;
-    if (is_inside) out.push_back(file);
+  const Json files = stage.value("files", Json::object());
+  for (const auto& [file, hash] : files.items()) {
+    if (stays_below(file)) out.push_back(file);
   }
   return out;
 }
 
+std::string hash_or_none(const std::filesystem::path& file) {
+  try {
+    return file_hash(file);
+  } catch (const Error&) {
+    return "";
+  }
+}
+
 bool is_stage(const Json& stage) {
   if (!stage.is_object()) return false;
-  const Json files = stage.value("files", Json::array());
+  const Json files = stage.value("files", Json::object());
   const bool lists_files =
-      files.is_array() &&
+      files.is_object() &&
       std::all_of(files.begin(), files.end(), [](const Json& file) { return file.is_string(); });
   return lists_files && stage.contains("seconds") && stage["seconds"].is_number() &&
          stage.contains("peak_memory") && stage["peak_memory"].is_number() &&
@@ -150,10 +157,31 @@ Json RunRecord::result(const std::string& stage) const {
   return json_["stages"].contains(stage) ? json_["stages"][stage]["result"] : Json();
 }
 
+std::vector<std::string> RunRecord::files(const std::string& stage) const {
+  return json_["stages"].contains(stage) ? files_of(json_["stages"][stage])
+                                         : std::vector<std::string>();
+}
+
+std::vector<std::string> RunRecord::changed_files(const std::string& stage) const {
+  std::vector<std::string> out;
+  for (const std::string& file : files(stage)) {
+    if (json_["stages"][stage]["files"][file] != hash_or_none(folder_ / file)) out.push_back(file);
+  }
+  return out;
+}
+
+Json RunRecord::file_hashes() const {
+  Json out = Json::object();
+  for (const auto& [name, stage] : json_["stages"].items()) {
+    for (const std::string& file : files_of(stage)) out[file] = stage["files"][file];
+  }
+  return out;
+}
+
 void RunRecord::finish(const std::string& stage,
                        double seconds,
                        const Json& result,
-                       const std::vector<std::string>& files) {
+                       const std::set<std::string>& files) {
   Json& stages = json_["stages"];
   Json kept = Json::object();
   for (const auto& [name, value] : stages.items()) {
@@ -163,7 +191,13 @@ void RunRecord::finish(const std::string& stage,
   stages = kept;
   json_.erase("outputs");
   stages[stage] = {{"seconds", seconds}, {"peak_memory", peak_memory()}, {"result", result}};
-  if (!files.empty()) stages[stage]["files"] = files;
+  for (const std::string& file : files) {
+    Json* writer = &stages[stage];
+    for (auto& [name, earlier] : kept.items()) {
+      if (earlier.value("files", Json::object()).contains(file)) writer = &stages[name];
+    }
+    (*writer)["files"][file] = file_hash(folder_ / file);
+  }
   save();
 }
 
@@ -176,9 +210,17 @@ void RunRecord::note(const std::string& key, const Json& value) {
 void RunRecord::save() const { write_file(folder_ / "run.json", json_text(json_) + "\n"); }
 
 std::string file_hash(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw BadInput(Defect::Open, file, "cannot be opened");
+  uint64_t hash = content_hash("");
+  std::string bytes(size_t{1} << 20, '\0');  // of any size, in little memory
+  while (stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size())),
+         stream.gcount() > 0) {
+    hash = content_hash({bytes.data(), static_cast<size_t>(stream.gcount())}, hash);
+  }
+  if (stream.bad()) throw BadInput(Defect::Open, file, "cannot be read");
   std::array<char, 17> text{};
-  const auto hash = static_cast<unsigned long long>(content_hash(read_file(file)));
-  std::snprintf(text.data(), text.size(), "%016llx", hash);
+  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(hash));
   return text.data();
 }
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -30,12 +31,19 @@ class RunRecord {
   bool is_done(const std::string& stage, const std::vector<std::string>& files) const;
   /// What the stage reported when it finished; null if it did not.
   nlohmann::ordered_json result(const std::string& stage) const;
+  /// Files that a finished stage wrote, as paths below the folder.
+  std::vector<std::string> files(const std::string& stage) const;
+  /// Those of them that are not what they were then.
+  std::vector<std::string> changed_files(const std::string& stage) const;
+  /// What all stages wrote, with hashes: {"web/asset.glb": "0123456789abcdef", …}.
+  nlohmann::ordered_json file_hashes() const;
   /// Records a finished stage. Stages after it, done from older data, are forgotten.
-  /// \param files  what it wrote, as paths below the folder
+  /// \param files  what it wrote, as paths below the folder; those of an earlier stage stay that
+  ///               stage's, with the hashes that they have now
   void finish(const std::string& stage,
               double seconds,
               const nlohmann::ordered_json& result,
-              const std::vector<std::string>& files = {});
+              const std::set<std::string>& files = {});
 
   /// Keeps something else that is known of the run beside its stages; finish() forgets "outputs".
   void note(const std::string& key, const nlohmann::ordered_json& value);
@@ -50,7 +58,7 @@ class RunRecord {
 };
 
 /// The record in such a file: an object with "request" and with "stages", of which each has
-/// "seconds", "peak_memory" and "result", and "files" unless an earlier version wrote it; null if
+/// "seconds", "peak_memory" and "result", and "files" with their hashes if it wrote any; null if
 /// the file holds none.
 nlohmann::ordered_json read_run_record(const std::filesystem::path& path);
 

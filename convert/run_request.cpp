@@ -153,6 +153,12 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     const bool is_default = encoding == GlbEncoding::Draco;
     if (encoding == request.glb_encoding && !is_default) out["glb_encoding"] = name;
   }
+  const Frame& frame = scene.frame;
+  const bool is_stated = request.scene.assume_unit.empty() && control.file.empty();
+  if (is_stated && frame.has_metric_scale()) {
+    out["stated_scale"] = {
+        frame.metres_per_unit, frame.metres_sigma, static_cast<int>(frame.scale_source)};
+  }
   if (has_given_depth(request.scene, scene)) {
     out["depth"] = {static_cast<int>(scene.depth_kind), scene.depth_scale};
   }

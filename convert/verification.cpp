@@ -46,7 +46,9 @@ void verify_inputs(const Json& record,
   const OpenedScene opened = [&] {
     try {
       return open_scene(request.scene, output / "model", terminal);
-    } catch (const BadInput& error) {
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error& error) {
       out.differing.push_back(std::string(kInput) + error.what());
       return OpenedScene();
     }
@@ -64,6 +66,9 @@ void verify_inputs(const Json& record,
     }
     ++out.inputs;
   }
+  if (before.value("stated_scale", Json()) != now.value("stated_scale", Json())) {
+    out.differing.push_back(std::string(kInput) + "scale of the scene: changed");
+  }
   if (before.value("cameras", Json()) != now["cameras"]) {
     out.differing.push_back(std::string(kInput) + "cameras: changed");
   }
@@ -75,9 +80,12 @@ Json hashes_now(const Json& record, const fs::path& output) {
   Json now = Json::object();
   for (const auto& [name, hash] : record["outputs"].items()) {
     // A name that leads out of the folder is none of ours.
-    const fs::path relative(name);
-    const bool is_inside = relative.is_relative() && name.find("..") == std::string::npos;
-    if (is_inside && is_present(output / relative)) now[name] = file_hash(output / relative);
+    if (!stays_below(name) || !is_present(output / name)) continue;
+    try {
+      now[name] = file_hash(output / name);
+    } catch (const BadInput&) {
+      now[name] = nullptr;  // it was read once
+    }
   }
   return now;
 }
@@ -100,21 +108,27 @@ void remove_finished(const fs::path& fresh) {
 }  // namespace
 
 std::vector<std::string> named_outputs(const fs::path& output, const std::set<std::string>& names) {
-  std::vector<std::string> out;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(output)) {
-    if (!entry.is_regular_file() || entry.is_symlink()) continue;
-    const std::string name = fs::relative(entry.path(), output).generic_string();
-    const bool is_named = names.count(name) > 0 ||
-                          std::any_of(names.begin(), names.end(), [&](const std::string& known) {
-                            const size_t any = known.find('*');
-                            return any != std::string::npos && name.size() >= known.size() &&
-                                   name.starts_with(known.substr(0, any)) &&
-                                   name.ends_with(known.substr(any + 1));
-                          });
-    if (is_named) out.push_back(name);
+  std::set<std::string> out;
+  const auto add = [&](const fs::path& name) {
+    std::error_code ignored;  // what cannot be looked at is not there
+    const bool is_file = fs::is_regular_file(fs::symlink_status(output / name, ignored));
+    if (is_file) out.insert(name.generic_string());
+  };
+  for (const std::string& name : names) {
+    const size_t any = name.find('*');
+    if (any == std::string::npos) {
+      add(name);
+      continue;
+    }
+    const fs::path folder = fs::path(name).parent_path();
+    for (const std::string& entry : sorted_entries(output / folder)) {
+      const std::string file = (folder / entry).generic_string();
+      const bool is_named = file.size() >= name.size() && file.starts_with(name.substr(0, any)) &&
+                            file.ends_with(name.substr(any + 1));
+      if (is_named) add(file);
+    }
   }
-  std::sort(out.begin(), out.end());
-  return out;
+  return {out.begin(), out.end()};
 }
 
 Json output_hashes(const fs::path& output, const std::set<std::string>& names) {
@@ -162,15 +176,26 @@ Verification recompute_run(const fs::path& output, size_t memory_limit, Terminal
 }
 
 Verification compare_runs(const fs::path& one, const fs::path& other) {
-  const auto hashes = [](const fs::path& folder) {
-    Json out = hashes_now(finished_record(folder), folder);
-    for (const char* name : {"report.json", "report.html"}) out.erase(name);
-    return out;
+  std::set<std::string> names;
+  const auto hashes = [&](const fs::path& folder) {
+    const Json record = finished_record(folder);
+    for (const auto& [name, hash] : record["outputs"].items()) names.insert(name);
+    return hashes_now(record, folder);
   };
-  const Json first = hashes(one);
+  Json first = hashes(one);
+  Json second = hashes(other);
+  for (const char* name : {"report.json", "report.html"}) {
+    names.erase(name);
+    first.erase(name);
+    second.erase(name);
+  }
   Verification out;
-  out.outputs = first.size();
-  compare(first, hashes(other), "", out);
+  out.outputs = names.size();
+  for (const std::string& name : names) {
+    if (first.contains(name) || second.contains(name)) continue;
+    out.differing.push_back(name + ": missing");
+  }
+  compare(first, second, "", out);
   return out;
 }
 

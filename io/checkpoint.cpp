@@ -8,6 +8,7 @@
 #include "io/byte_reader.h"
 #include "io/byte_writer.h"
 #include "io/content_hash.h"
+#include "io/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -87,6 +88,7 @@ SavedState read_checkpoint(const std::filesystem::path& folder,
     if (!std::filesystem::exists(path, ignored)) continue;
     try {
       out.state = read_one(path, belongs_to);
+      out.is_of_other = !out.state;
     } catch (const BadInput& damage) {
       if (out.warning.empty()) out.warning = damage.what();
     }
@@ -95,6 +97,10 @@ SavedState read_checkpoint(const std::filesystem::path& folder,
   if (out.warning.empty()) return out;
   out.warning += out.state ? "; going on from the state before it" : "; starting anew";
   return out;
+}
+
+bool has_checkpoint(const std::filesystem::path& folder, const std::string& name) {
+  return is_present(current_path(folder, name)) || is_present(previous_path(folder, name));
 }
 
 void remove_checkpoint(const std::filesystem::path& folder, const std::string& name) {

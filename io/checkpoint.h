@@ -25,6 +25,7 @@ void write_checkpoint(const std::filesystem::path& folder,
 struct SavedState {
   std::optional<std::string> state;  ///< The newest whole one; none = work starts anew.
   std::string warning;               ///< What was damaged; empty = nothing.
+  bool is_of_other = false;          ///< There is none, but a whole one of other work.
 };
 
 /// The newest whole state that belongs to `belongs_to`, or nothing: a missing, damaged or foreign
@@ -32,6 +33,9 @@ struct SavedState {
 SavedState read_checkpoint(const std::filesystem::path& folder,
                            const std::string& name,
                            uint64_t belongs_to);
+
+/// True if there is a file of either generation, whole or not.
+bool has_checkpoint(const std::filesystem::path& folder, const std::string& name);
 
 /// Removes both generations once the work is done. \throws IoError
 void remove_checkpoint(const std::filesystem::path& folder, const std::string& name);

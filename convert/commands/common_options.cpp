@@ -185,16 +185,35 @@ TrainingOptions training_options(const TrainingArguments& arguments) {
   return options;
 }
 
-void keep_apart(const std::filesystem::path& output, const std::filesystem::path& input) {
+namespace {
+
+// False where that cannot be told: reading or writing then tells what is wrong.
+bool lies_in(const std::filesystem::path& path, const std::filesystem::path& folder) {
   std::error_code error;
-  const auto from = std::filesystem::weakly_canonical(input, error);
-  const auto to =
-      error ? std::filesystem::path() : std::filesystem::weakly_canonical(output, error);
-  if (error) return;  // reading or writing tells what is wrong
-  const auto end = std::mismatch(from.begin(), from.end(), to.begin(), to.end()).first;
-  if (end != from.end()) return;
+  const auto outer = std::filesystem::weakly_canonical(folder, error);
+  if (error) return false;
+  const auto inner = std::filesystem::weakly_canonical(path, error);
+  if (error) return false;
+  return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
+}
+
+}  // namespace
+
+void keep_apart(const std::filesystem::path& output, const std::filesystem::path& input) {
+  if (!lies_in(output, input)) return;
   throw InvalidInput("the output " + printable(output) + " lies in the input " + printable(input) +
                      "; choose another place");
+}
+
+void keep_scene_apart(const std::filesystem::path& output,
+                      const std::filesystem::path& scene,
+                      std::initializer_list<const char*> folders) {
+  keep_apart(output, scene);
+  for (const char* folder : folders) {
+    if (!lies_in(scene, output / folder)) continue;
+    throw InvalidInput("the scene " + printable(scene) + " lies in " + printable(output / folder) +
+                       ", which results are written to; choose another output");
+  }
 }
 
 void require_ending(const std::filesystem::path& output, const char* ending, const char* option) {

@@ -79,6 +79,11 @@ void require_ending(const std::filesystem::path& output, const char* ending, con
 /// \throws InvalidInput if `output` is `input` or lies in that folder.
 void keep_apart(const std::filesystem::path& output, const std::filesystem::path& input);
 
+/// The same for a scene and the folders below `output` that are written to.
+void keep_scene_apart(const std::filesystem::path& output,
+                      const std::filesystem::path& scene,
+                      std::initializer_list<const char*> folders);
+
 /// Keeps every library within the number of threads for the rest of the program.
 /// \throws InvalidInput if it is negative or above 1024.
 void limit_threads(int threads);

@@ -13,7 +13,9 @@
 #include "convert/commands/common_options.h"
 #include "convert/length.h"
 #include "convert/pipeline.h"
+#include "convert/report_frame.h"
 #include "convert/report_surface.h"
+#include "convert/verification.h"
 #include "io/json_file.h"
 #include "libcgs/core/error.h"
 
@@ -49,6 +51,8 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
     terminal.say(text.str());
     if (scale.contains("control_points")) terminal.say(control_words(scale));
   }
+  const std::string origin = far_origin(report["frame"]);
+  if (!origin.empty()) terminal.say(origin);
   const auto& certificate = report["certificate"];
   terminal.say(std::string("watertight mesh: ") +
                (certificate["passed"].get<bool>() ? "closed, manifold, no self-intersection"
@@ -64,7 +68,9 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
 
 void run_run(const RunArgs& args) {
   limit_threads(args.common.threads);
-  keep_apart(args.request.output, args.request.scene.path);
+  keep_scene_apart(args.request.output,
+                   args.request.scene.path,
+                   {"model", "views", "mesh", "web", kRecomputedFolder});
   RunRequest request = args.request;
   request.training = training_options(args.training);
   request.memory_limit = stated_memory_limit(args.common);

@@ -34,20 +34,37 @@ void refuse_to_replace(const TrainArgs& args) {
                        " is the model of a run, which only cgs run may change; choose another "
                        "folder");
   }
-  if (args.overwrite || !is_present(args.output / "cameras.json")) return;
-  throw InvalidInput(printable(args.output) +
-                     " holds a finished model; choose another folder, or say --overwrite");
+  if (is_present(args.output / "run.json")) {
+    throw InvalidInput(printable(args.output) +
+                       " holds a run, which has a model of its own; choose another folder");
+  }
+  if (args.overwrite) return;
+  if (is_present(args.output / "cameras.json")) {
+    throw InvalidInput(printable(args.output) +
+                       " holds a finished model; choose another folder, or say --overwrite");
+  }
+  if (is_present(args.output / "gaussians.ply") && !has_checkpoints(args.output)) {
+    throw InvalidInput(printable(args.output) +
+                       " holds gaussians.ply, which no training here wrote; choose another folder, "
+                       "or say --overwrite");
+  }
 }
 
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
-  keep_apart(args.output, args.scene.path);
+  keep_scene_apart(args.output, args.scene.path, {"priors", "colmap"});
   refuse_to_replace(args);
-  const ModelRequest request = {
-      {}, training_options(args.training), args.output, args.scene.options.depth.network};
+  const ModelRequest request = {{},
+                                training_options(args.training),
+                                args.output,
+                                args.scene.options.depth.network,
+                                !args.overwrite};
   Terminal terminal(args.common.quiet, args.common.strict);
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   (void)check_stated_cameras(opened, terminal);
+  make_output_folder(args.output);
+  const FolderLock lock(args.output);
+  refuse_to_replace(args);  // another start may have ended since
   remove_abandoned_files(args.output);
   opened.keep(args.output);
   Scene& scene = opened.scene;
@@ -78,6 +95,8 @@ void run_train(const TrainArgs& args) {
   forget_checkpoints(args.output);
   const size_t count = trained.model.gaussians.size();
   report["seconds"] = terminal.end(std::to_string(count) + " Gaussians");
+  const std::string& depth = trained.priors.given.found;
+  if (!depth.empty()) terminal.say("depth files: " + depth);
   if (args.common.json) std::cout << json_text(report) << "\n";
   terminal.warn(found);
   terminal.warn(trained.hitches);

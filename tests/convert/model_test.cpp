@@ -60,9 +60,11 @@ TEST(RelinkImages, FindsTheMasksOfPhotographsThatMoved) {
 TEST(WriteModel, LeavesNothingOfViewsThatAnEarlierModelHad) {
   const test::TempDir dir;
   Model model;
+  model.scene.folder = dir.path();
   for (const char* name : {"a", "b", "c"}) {
     View& view = model.scene.views.emplace_back();
     view.name = name;
+    view.image_path = dir / (view.name + ".png");
     view.camera = {2, 2, 2, 2, 1, 1, Eigen::Isometry3d::Identity()};
   }
   ViewPriors priors;

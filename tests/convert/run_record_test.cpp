@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/run_record.h"
 
+#include <cstdio>
+#include <fstream>
+
 #include <gtest/gtest.h>
 
 #include "io/atomic_file.h"
+#include "io/content_hash.h"
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
@@ -31,6 +35,28 @@ TEST(RunRecord, AStageIsDoneWhileWhatItWroteIsThere) {
   EXPECT_TRUE(RunRecord(dir.path(), {}, false).is_done("splats", {"splats.glb"}));
   std::filesystem::remove(dir / "splats.spz");
   EXPECT_FALSE(RunRecord(dir.path(), {}, false).is_done("splats", {"splats.glb"}));
+}
+
+TEST(RunRecord, KnowsWhatSomebodyChanged) {
+  const test::TempDir dir;
+  RunRecord record(dir.path(), {}, false);
+  for (const char* name : {"model.ply", "cameras.json", "asset.glb"}) write_file(dir / name, "a");
+  record.finish("model", 1, nullptr, {"model.ply", "cameras.json"});
+  EXPECT_TRUE(record.changed_files("model").empty());
+  write_file(dir / "cameras.json", "b");
+  EXPECT_EQ(record.changed_files("model"), std::vector<std::string>{"cameras.json"});
+  record.finish(
+      "scale", 1, nullptr, {"cameras.json"});  // a stage may write those of an earlier one
+  EXPECT_TRUE(record.changed_files("model").empty());
+  EXPECT_EQ(record.files("model").size(), 2u);
+  EXPECT_TRUE(record.files("scale").empty());
+  record.finish("web", 1, nullptr, {"asset.glb"});
+  const Json before = record.file_hashes();
+  EXPECT_EQ(before.size(), 3u);
+  std::ofstream(dir / "asset.glb").flush();  // empty now
+  const RunRecord again(dir.path(), {}, false);
+  EXPECT_EQ(again.changed_files("web"), std::vector<std::string>{"asset.glb"});
+  EXPECT_EQ(again.file_hashes(), before);
 }
 
 TEST(RunRecord, SurvivesReopening) {
@@ -133,6 +159,14 @@ TEST(ContentHash, IsFnv1aOfTheBytes) {
   const test::TempDir dir;
   write_file(dir / "a", "a");
   EXPECT_EQ(file_hash(dir / "a"), "af63dc4c8601ec8c");  // published FNV-1a test vector
+  std::ofstream(dir / "empty").flush();
+  EXPECT_EQ(file_hash(dir / "empty"), "cbf29ce484222325");
+  const std::string large(3'000'001, 'x');  // read in parts
+  write_file(dir / "large", large);
+  char expected[17];
+  std::snprintf(
+      expected, sizeof expected, "%016llx", static_cast<unsigned long long>(content_hash(large)));
+  EXPECT_EQ(file_hash(dir / "large"), expected);
 }
 
 }  // namespace

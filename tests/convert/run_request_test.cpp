@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "io/atomic_file.h"
+#include "io/masks.h"
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
@@ -52,6 +53,17 @@ TEST_F(RequestJson, LengthsWaitForWhatDepthFilesTell) {
   EXPECT_THROW(check_lengths(request_, scene_), InvalidInput);
 }
 
+// A scene whose stated scale changed is another one; a scale that is assumed is told by its option.
+TEST_F(RequestJson, TellsTheScaleThatTheSceneStates) {
+  EXPECT_FALSE(json().contains("stated_scale"));
+  scene_.frame.metres_per_unit = 1;
+  const auto one = json();
+  scene_.frame.metres_per_unit = 0.5;
+  EXPECT_NE(json()["stated_scale"], one["stated_scale"]);
+  request_.scene.assume_unit = "m";
+  EXPECT_FALSE(json().contains("stated_scale"));
+}
+
 TEST_F(RequestJson, TellsSparsePointsAndWhoSawThem) {
   const auto plain = json();
   scene_.points = {{{1, 2, 3}, {0, 1}}};
@@ -67,6 +79,7 @@ TEST_F(RequestJson, TellsMasksOfHeldOutPhotographs) {
   for (const char* name : {"a", "b"}) {
     write_file(dir_ / "masks" / (name + std::string(".png")), "mask");
   }
+  find_masks({dir_.path()}, scene_);
   const auto masked = json();
   EXPECT_EQ(plain["held_out_images"].size(), 1u);
   EXPECT_TRUE(masked["held_out_images"].contains("b, mask"));

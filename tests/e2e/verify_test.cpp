@@ -204,6 +204,57 @@ TEST_F(Verify, ARunAgainBringsBackWhatIsMissing) {
   }
 }
 
+// What a run goes on from may have been changed since: it stays, is told, and verify still knows.
+TEST_F(Verify, KnowsWhatWasChangedBeforeARunWentOn) {
+  const fs::path copy = *dir_ / "copy";
+  fs::copy(out(), copy, fs::copy_options::recursive);
+  write_bytes(copy / "views/v11.color.png", "of somebody else");
+  write_bytes(copy / "web/splats.glb", "");
+  write_bytes(copy / "mesh/watertight.mine.jpg", "of the user");
+  fs::remove(copy / "mesh/watertight.stl");
+  const auto again = run_cgs(run_arguments(scene(), copy));
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  for (const char* name : {"views/v11.color.png", "web/splats.glb"}) {
+    EXPECT_NE(again.err.find(std::string(name) + " is not what the run wrote"), std::string::npos)
+        << again.err;
+  }
+  EXPECT_EQ(read_bytes(copy / "mesh/watertight.mine.jpg"), "of the user");
+  const auto verified = run_cgs("verify " + copy.string());
+  EXPECT_EQ(verified.exit_code, 3);
+  for (const char* name : {"views/v11.color.png", "web/splats.glb"}) {
+    EXPECT_NE(verified.out.find(std::string(name) + ": changed"), std::string::npos)
+        << verified.out;
+  }
+  EXPECT_NE(verified.out.find(" 2 differ"), std::string::npos) << verified.out;
+  fs::remove_all(copy);
+}
+
+TEST_F(Verify, SeesWhatLiesBehindALinkedFolder) {
+  const fs::path copy = *dir_ / "copy";
+  const fs::path elsewhere = *dir_ / "elsewhere";
+  fs::copy(out(), copy, fs::copy_options::recursive);
+  fs::rename(copy / "web", elsewhere);
+  fs::create_directory_symlink(elsewhere, copy / "web");
+  fs::remove(copy / "web/splats.spz");
+  const auto again = run_cgs(run_arguments(scene(), copy));
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  const std::string whole = run_cgs("verify " + copy.string()).out;
+  EXPECT_EQ(whole, verify().out);
+  write_bytes(copy / "web/asset.glb", "of somebody else");
+  EXPECT_EQ(run_cgs("verify " + copy.string()).exit_code, 3);
+  fs::remove_all(copy);
+  fs::remove_all(elsewhere);
+}
+
+TEST_F(Verify, ListsOutputsWhereAPhotographIsGone) {
+  fs::rename(scene() / "images/v11.png", *dir_ / "v11.png");
+  const auto result = verify();
+  fs::rename(*dir_ / "v11.png", scene() / "images/v11.png");
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_NE(result.out.find("input "), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("outputs checked"), std::string::npos) << result.out;
+}
+
 TEST_F(Verify, OverwritingLeavesNothingOfWhatWasBefore) {
   const fs::path copy = *dir_ / "copy";
   fs::copy(out(), copy, fs::copy_options::recursive);
@@ -398,6 +449,10 @@ TEST_F(Verify, ComparesTwoRuns) {
     names_splats = names_splats || line == "model/gaussians.ply: changed";
   }
   EXPECT_TRUE(names_splats) << compared.out;
+  for (const fs::path& folder : {out(), other}) fs::rename(folder / "volume.vdb", folder / "v");
+  const auto both = run_cgs("verify " + out().string() + " " + other.string());
+  for (const fs::path& folder : {out(), other}) fs::rename(folder / "v", folder / "volume.vdb");
+  EXPECT_NE(both.out.find("volume.vdb: missing"), std::string::npos) << both.out;
 }
 
 }  // namespace
