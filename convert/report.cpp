@@ -95,6 +95,7 @@ std::string hole_words(const Json& view) {
     out += before + number(100 * share, "%.1f") + " % " + words;
     before = ", ";
   }
+  if (view.contains("masked_fraction")) out += "; " + percent(view["masked_fraction"]) + " masked";
   return out;
 }
 
@@ -228,6 +229,7 @@ void write_html_report(const std::filesystem::path& folder,
                        const Scene& scene,
                        const std::string& viewer) {
   std::ostringstream html;
+  const std::string origin = far_origin(report["frame"]);
   const std::string title = escaped(folder_name(report["folder"].get<std::string>()));
   // The browser itself is told that the page loads nothing.
   html << "<!doctype html>\n<html lang=en><head><meta charset=utf-8>"
@@ -237,8 +239,13 @@ void write_html_report(const std::filesystem::path& folder,
        << title << "</title>\n<style>" << page_files().style << "</style></head><body>\n<h1>"
        << title << "</h1>\n<p>" << escaped(report["scene"].get<std::string>())
        << " scene, units of files: " << escaped(report["units"].get<std::string>()) << " (scale "
-       << escaped(report["scale_source"].get<std::string>()) << ")</p>\n<p class=note>Model: "
+       << escaped(report["scale_source"].get<std::string>()) << ")" << (origin.empty() ? "" : "; ")
+       << origin << "</p>\n<p class=note>Model: "
        << escaped(report["model"]["description"].get<std::string>()) << ".</p>\n";
+  const Json depth = report["model"].value("given_depth", Json());
+  if (depth.is_object()) {
+    html << "<p>Depth files: " << escaped(depth.value("words", "")) << ".</p>\n";
+  }
   if (report.contains("settings_reason")) {
     html << "<p class=note>" << escaped(report["settings_reason"].get<std::string>()) << ".</p>\n";
   }

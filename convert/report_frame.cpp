@@ -44,7 +44,8 @@ std::string rms_row(const std::string& name, const Json& rms) {
   return html.str();
 }
 
-// What to add to coordinates in files to come to those of the table; empty if nothing.
+}  // namespace
+
 std::string far_origin(const Json& frame) {
   const Json& origin = frame["file_origin"];
   std::string out;
@@ -53,18 +54,21 @@ std::string far_origin(const Json& frame) {
     out += (out.empty() ? "" : ", ") + number(coordinate, "%.17g");
     is_far = is_far || coordinate.get<double>() != 0;
   }
-  return is_far ? "; to the coordinates in PLY, OBJ and VDB add " + out +
+  return is_far ? "to coordinates in PLY, OBJ, VDB and in the report add " + out +
                       ", which keeps micrometres of coordinates this large"
                 : "";
 }
 
-std::string control_section(const Json& scale, const Json& frame) {
+namespace {
+
+std::string control_section(const Json& scale) {
   const Json& control = scale["control_points"];
   const std::string unit = escaped(control["unit"].get<std::string>());
   std::ostringstream html;
   html << "<h2>Control points</h2>\n<p>Files are in the coordinates of "
-       << escaped(control["file"].get<std::string>()) << ", z up" << far_origin(frame)
-       << ". GLB is in metres and y up, STL and 3MF are in millimetres; each states its own origin."
+       << escaped(control["file"].get<std::string>())
+       << ", z up. GLB is in metres and y up, STL and 3MF are in millimetres; each states its own "
+          "origin."
           " Standard deviations of the frame: "
        << "scale "
        << number(100 * scale["metres_sigma"].get<double>() / scale["metres_per_unit"].get<double>(),
@@ -106,7 +110,7 @@ std::string refinement_section(const Json& report) {
 std::string scale_section(const Json& report) {
   const Json& scale = report["scale"];
   if (scale.is_null()) return "";
-  if (scale.contains("control_points")) return control_section(scale, report["frame"]);
+  if (scale.contains("control_points")) return control_section(scale);
   std::ostringstream html;
   html << "<h2>Scale</h2>\n<p>One scene unit is " << number(scale["metres_per_unit"], "%.6g")
        << " m, with a standard deviation of " << number(scale["metres_sigma"], "%.2g")

@@ -10,6 +10,10 @@ namespace cgs {
 // Sections of report.html as HTML, made from the content of report.json: where the scene lies.
 // Empty where a run has nothing to say on it.
 
+/// What to add to coordinates in files to come to those of the scene, as words; empty if nothing.
+/// \param frame  as frame_to_json() makes it
+std::string far_origin(const nlohmann::ordered_json& frame);
+
 /// How far cameras were moved, if they were refined.
 std::string refinement_section(const nlohmann::ordered_json& report);
 

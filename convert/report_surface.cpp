@@ -147,7 +147,7 @@ std::string deviation_section(const Json& report) {
          "how far the depth that was measured lies from each step, by up to "
       << samples
       << " samples of each surface. Bars: 95 % lie within, from the step before (upper) and from "
-         "measured depth (lower).</p>\n<div style=\"overflow-x:auto;white-space:nowrap\"><table>\n"
+         "measured depth (lower).</p>\n<div class=scrolling><table>\n"
          "<tr><th rowspan=2>step</th><th rowspan=2>against</th><th colspan=3>seen surface</th>"
          "<th colspan=3>inferred surface</th><th colspan=3>measured depth to this step</th>"
          "<th rowspan=2></th></tr>\n<tr>"

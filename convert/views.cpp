@@ -2,6 +2,7 @@
 #include "convert/views.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 
@@ -24,16 +25,46 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-double fraction(const Raster<Hole>& holes, Hole kind) {
-  const auto count = std::count(holes.data.begin(), holes.data.end(), kind);
-  return static_cast<double>(count) / static_cast<double>(holes.data.size());
+// Of the pixels that may be looked at; all may if there is no mask.
+Json hole_fractions(const RenderBuffers& buffers, const MaskMap& valid) {
+  const std::vector<Hole>& holes = buffers.hole.data;
+  std::array<size_t, 4> counts{};
+  size_t looked_at = 0;
+  for (size_t i = 0; i < holes.size(); ++i) {
+    if (!valid.empty() && valid.data[i] == 0) continue;
+    ++counts.at(static_cast<size_t>(holes[i]));
+    ++looked_at;
+  }
+  const auto fraction = [&](Hole kind) {
+    const size_t count = counts.at(static_cast<size_t>(kind));
+    return looked_at > 0 ? static_cast<double>(count) / static_cast<double>(looked_at) : 0;
+  };
+  Json out = {{"hole_fraction", looked_at > 0 ? 1 - fraction(Hole::None) : 0},
+              {"transparent_fraction", fraction(Hole::Transparent)},
+              {"occluded_fraction", fraction(Hole::Occluded)},
+              {"outside_fraction", fraction(Hole::Outside)}};
+  if (looked_at < holes.size()) {
+    out["masked_fraction"] = 1 - static_cast<double>(looked_at) / static_cast<double>(holes.size());
+  }
+  return out;
 }
 
-Json hole_fractions(const RenderBuffers& buffers) {
-  return {{"hole_fraction", 1 - fraction(buffers.hole, Hole::None)},
-          {"transparent_fraction", fraction(buffers.hole, Hole::Transparent)},
-          {"occluded_fraction", fraction(buffers.hole, Hole::Occluded)},
-          {"outside_fraction", fraction(buffers.hole, Hole::Outside)}};
+MaskMap intersection(const MaskMap& a, const MaskMap& b) {
+  if (b.empty()) return a;
+  MaskMap out = a;
+  for (size_t i = 0; i < out.data.size(); ++i) out.data[i] = a.data[i] & b.data[i];
+  return out;
+}
+
+// Where the photograph of a view may be looked at; empty = everywhere, also where it is gone.
+MaskMap valid_pixels(const Scene& scene, int view) {
+  if (scene.views[static_cast<size_t>(view)].image_path.empty()) return {};
+  std::vector<std::string> told_before;
+  try {
+    return loaded_view(scene, view, /*with_image=*/false, told_before).valid;
+  } catch (const BadInput&) {
+    return {};
+  }
 }
 
 ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
@@ -60,11 +91,14 @@ Json write_view(const Model& model,
   write_png(png("color"), picture(buffers));
   write_png(png("depth"), depth_picture(rasters.depth));
   write_png(png("normal"), normal_picture(rasters.normal, view.camera.cam_from_world()));
-  write_png(png("hole"), hole_mask(buffers));
+  // What is masked was seen, and is not wanted.
+  const MaskMap valid = valid_pixels(model.scene, index);
+  const MaskMap holes = hole_mask(buffers);
+  write_png(png("hole"), intersection(holes, valid));
   const auto& input = model.scene.input;
   const bool is_input = std::find(input.begin(), input.end(), index) != input.end();
   Json out = {{"name", view.name}, {"role", is_input ? "input" : "held out"}};
-  out.update(hole_fractions(buffers));
+  out.update(hole_fractions(buffers, valid));
   return out;
 }
 
@@ -121,13 +155,6 @@ ColorImage thumbnail(ColorImage picture) {
   const int height = std::max(1, picture.height * kWidest / picture.width);
   area_downscale(picture, all, kWidest, height);
   return picture;
-}
-
-MaskMap intersection(const MaskMap& a, const MaskMap& b) {
-  if (b.empty()) return a;
-  MaskMap out = a;
-  for (size_t i = 0; i < out.data.size(); ++i) out.data[i] = a.data[i] & b.data[i];
-  return out;
 }
 
 // With black where nothing may be compared: windows beside it reach there.
@@ -215,7 +242,7 @@ Json write_path(const Model& model,
       sheet.push_back(thumbnail(tinted(shown, holes)));
     }
     out.push_back({{"name", frame_name(k)}});
-    out.back().update(hole_fractions(buffers));
+    out.back().update(hole_fractions(buffers, {}));
   }
   constexpr int kColumns = 4;
   write_png(folder / "contact.png", contact_sheet(sheet, kColumns));
@@ -233,6 +260,11 @@ Json evaluate_views(Model& model, const std::vector<int>& views, const Progress&
     } else {
       with_photograph.push_back(i);
     }
+  }
+  if (with_photograph.empty() && !is_folder(model.scene.folder)) {
+    throw BadInput(Defect::Open,
+                   model.scene.folder,
+                   "the folder of the photographs is gone; --scene says where they are");
   }
   if (with_photograph.empty()) {
     throw BadInput(Defect::Empty, model.scene.folder, "no view to evaluate has a photograph");

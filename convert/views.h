@@ -11,7 +11,8 @@
 namespace cgs {
 
 /// Writes <name>.exr and <name>.{color,depth,normal,hole}.png for each of the given views of the
-/// model, and returns per view {"name", "role", "hole_fraction", …}.
+/// model, and returns per view {"name", "role", "hole_fraction", …}, of pixels that
+/// are not masked.
 nlohmann::ordered_json write_views(const Model& model,
                                    const std::vector<int>& views,
                                    const std::filesystem::path& folder,

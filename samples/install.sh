@@ -3,6 +3,13 @@
 # tests use. Does nothing, and needs no network, where they are all there.
 set -euo pipefail
 list="$(dirname "$0")/packages.txt"
+case "$*" in
+  "" | --tests) ;;
+  *)
+    echo "usage: samples/install.sh [--tests]" >&2
+    exit 2
+    ;;
+esac
 
 if [ "${1:-}" = "--tests" ]; then
   packages=$(grep -v '^#' "$list")
@@ -22,7 +29,10 @@ fi
 
 echo "packages: installing ${#missing[@]}: ${missing[*]}"
 as_root=()
-[ "$(id -u)" -eq 0 ] || as_root=(sudo)
+if [ "$(id -u)" -ne 0 ]; then
+  command -v sudo >/dev/null || { echo "installing needs root: run it as root, or install sudo" >&2; exit 1; }
+  as_root=(sudo)
+fi
 "${as_root[@]}" apt-get update -qq
 "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
   apt-get install -y -q --no-install-recommends "${missing[@]}"

@@ -6,6 +6,12 @@
 # usage: samples/run.sh [OUTPUT]     (default: out/portal; relative to the repository)
 set -euo pipefail
 cd "$(dirname "$0")/.."
+case "${1:-}" in
+  -*)
+    echo "usage: samples/run.sh [OUTPUT]" >&2
+    exit 2
+    ;;
+esac
 output="${1:-out/portal}"
 
 samples/install.sh

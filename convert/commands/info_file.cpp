@@ -65,12 +65,16 @@ Json mesh_json(const MeasurableFile& file, const Json& certificate) {
 
 void print_mesh(const Json& info, const Certificate& certificate) {
   const Json& box = info["bounds"];
-  std::printf("%s: %zu vertices, %zu faces, unit %s (scale %s)\n",
-              info["kind"].get<std::string>().c_str(),
-              info["counts"]["vertices"].get<size_t>(),
-              info["counts"]["faces"].get<size_t>(),
-              info["units"].get<std::string>().c_str(),
-              info["scale_source"].get<std::string>().c_str());
+  const auto source = info["scale_source"].get<std::string>();
+  const bool is_known = info["units"] != Frame().unit_name();
+  const bool has_source = source != scale_source_name(ScaleSource::Unknown);
+  std::printf(
+      "%s: %zu vertices, %zu faces, unit %s (%s)\n",
+      info["kind"].get<std::string>().c_str(),
+      info["counts"]["vertices"].get<size_t>(),
+      info["counts"]["faces"].get<size_t>(),
+      info["units"].get<std::string>().c_str(),
+      is_known && !has_source ? "nothing says how that is known" : ("scale " + source).c_str());
   std::printf("bounds: %s ... %s\n", box["min"].dump().c_str(), box["max"].dump().c_str());
   if (info["file_origin"] != Json{0.0, 0.0, 0.0}) {
     std::printf("origin: add %s to coordinates\n", info["file_origin"].dump().c_str());
@@ -323,6 +327,11 @@ bool print_file_info(const fs::path& path, bool as_json) {
     print_info(volume_json(path), as_json, print_volume);
   } else if (extension == ".exr") {
     print_info(raster_json(read_exr(path)), as_json, print_raster);
+  } else if (fs::is_regular_file(path, none) && has_image_extension(path)) {
+    throw BadInput(Defect::Unsupported,
+                   path,
+                   "is one picture; give the folder of the photographs, or a file of splats, a "
+                   "mesh or a volume");
   } else if (fs::is_regular_file(path, none) && holds_splats(path)) {
     tell_splats(path, as_json);
   } else if (is_mesh_name(path)) {

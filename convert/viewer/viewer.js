@@ -5,14 +5,13 @@
 // `cgs measure` takes them, and in the unit of figures.
 'use strict';
 (() => {
+  let asked = false;  // for a picture
   const part = (id) => document.getElementById('viewer-' + id);
   const root = document.getElementById('viewer');
   const canvas = part('canvas');
   const context = canvas.getContext('webgl', { antialias: true, alpha: true });
-  if (!context) {
-    root.dataset.state = 'failed';
-    return;
-  }
+  root.dataset.state = 'failed';  // unless it comes to its end
+  if (!context || context.isContextLost()) return;
 
   const scene = JSON.parse(document.getElementById('viewer-scene').textContent);
   const {
@@ -22,6 +21,7 @@
   } = viewerScene(scene, () => redraw());
 
   const renderer = new THREE.WebGLRenderer({ canvas, context, antialias: true, alpha: true });
+  canvas.addEventListener('webglcontextrestored', () => redraw());  // after what the renderer does
   const world = new THREE.Scene();
   const camera = new THREE.PerspectiveCamera(45, 1, 0.002, 40);
   camera.up.fromArray(scene.up).normalize();
@@ -42,11 +42,12 @@
   canvas.addEventListener('focus', () => { controls.enableZoom = true; });
   canvas.addEventListener('blur', () => { controls.enableZoom = false; });
 
+  const pixelRatio = () => Math.min(window.devicePixelRatio, 2);
   let lens = null;  // of the photograph whose place was taken; null = our own
   function applyLens() {
     const width = canvas.parentElement.clientWidth;
     const height = canvas.parentElement.clientHeight;
-    renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    renderer.setPixelRatio(pixelRatio());
     renderer.setSize(width, height, false);
     camera.fov = 45;
     camera.aspect = width / height;
@@ -78,7 +79,13 @@
   function standBack() {
     lens = null;
     applyLens();
-    const forward = forwardOf(scene.cameras[scene.cameras.length >> 1].camera);
+    const middle = scene.cameras[scene.cameras.length >> 1].camera;
+    const forward = forwardOf(middle);
+    const steepness = forward.dot(camera.up);
+    if (Math.abs(steepness) > 0.95) {  // from above or below, the photograph says which side is up
+      const upright = new THREE.Vector3(0, -1, 0).transformDirection(poseOf(middle));
+      forward.addScaledVector(upright, -0.2 * Math.sign(steepness)).normalize();
+    }
     const points = seenVertices();
     const target = new THREE.Box3().setFromPoints(points).getCenter(new THREE.Vector3());
     camera.position.copy(target).sub(forward);
@@ -99,8 +106,8 @@
         const depth = distance - p.z;
         onScreen.expandByPoint(new THREE.Vector2((p.x - shift.x) / depth, (p.y - shift.y) / depth));
       }
-      const middle = onScreen.getCenter(new THREE.Vector2()).multiplyScalar(distance);
-      if (round < 2) shift.add(new THREE.Vector3(middle.x, middle.y, 0));
+      const center = onScreen.getCenter(new THREE.Vector2()).multiplyScalar(distance);
+      if (round < 2) shift.add(new THREE.Vector3(center.x, center.y, 0));
     }
     target.add(shift.applyQuaternion(camera.quaternion));
     camera.position.copy(target).addScaledVector(forward, -distance);
@@ -145,7 +152,14 @@
     looksOfLabel[label.number] = label.color;
   }
 
-  const share = (value) => (100 * value).toPrecision(value < 0.1 ? 2 : 3) + ' %';
+  // Two digits that count, without an exponent.
+  function rounded(value, digits = 2) {
+    const decimals = digits - 1 - Math.floor(Math.log10(value));
+    if (!Number.isFinite(decimals)) return String(value);
+    const unit = 10 ** -decimals;
+    return decimals < 0 ? String(Math.round(value / unit) * unit) : value.toFixed(Math.min(decimals, 12));
+  }
+  const share = (value) => rounded(100 * value, value < 0.1 ? 2 : 3) + ' %';
   const [leastSigma, mostSigma] = (() => {  // what all but the extreme 2 % lie between
     const stated = sigmas.filter((s) => s > 0 && Number.isFinite(s)).sort();
     const at = (part) => stated[Math.floor(part * (stated.length - 1))] || 1e-9;
@@ -196,7 +210,7 @@
     bar.className = 'ramp';
     bar.style.background = `linear-gradient(to right, ${ramp.map((c) => `rgb(${c})`)})`;
     const line = document.createElement('span');
-    const text = (s) => `${(s * scene.unit.length).toPrecision(2)} ${scene.unit.name}`;
+    const text = (s) => `${rounded(s * scene.unit.length)} ${scene.unit.name}`;
     line.append(`standard deviation ${text(leastSigma)} or less`, bar, `${text(mostSigma)} or more (logarithmic)`);
     legend.append(line);
     explain(unknownColor, 'unknown: inferred, no photograph saw it');
@@ -265,7 +279,7 @@
     const label = statesLabels ? nameOf[provenance[end.face]] : 'provenance not stated';
     let text = `${name} (${toFile(end.place).join(', ')}): ${label}`;
     if (isInvented(end.face)) text += '. No photograph saw this place: it was invented and has no sigma';
-    else if (Number.isFinite(sigma)) text += `, ± ${(sigma * scene.unit.length).toPrecision(2)} ${scene.unit.name}`;
+    else if (Number.isFinite(sigma)) text += `, ± ${rounded(sigma * scene.unit.length)} ${scene.unit.name}`;
     else text += ', no sigma stated';
     line('span', text + '.');
   }
@@ -376,13 +390,13 @@
 
   // ---- Drawing ------------------------------------------------------------------------------
 
-  let asked = false;
   function redraw() {
     if (asked) return;
     asked = true;
     requestAnimationFrame(() => {
       asked = false;
       if (!isComplete()) return;  // the last photograph asks again
+      if (renderer.getPixelRatio() !== pixelRatio()) return applyLens();  // on another screen now
       renderer.render(world, camera);
       placeMarks();
       if (root.dataset.state) return;
@@ -398,4 +412,6 @@
   clearEnds();
   standBack();
   new ResizeObserver(applyLens).observe(canvas.parentElement);
+  window.addEventListener('resize', redraw);
+  delete root.dataset.state;
 })();

@@ -41,14 +41,15 @@ TEST(EvaluateViews, LooksAtNoMaskedPixel) {
   EXPECT_EQ(rows[0]["psnr"], rows[1]["psnr"]);
   EXPECT_TRUE(rows[0]["ms_ssim"].is_null()) << "half of it would count as equal";
 
+  Model without = model;
+  without.scene.views[1].image_path.clear();
+  EXPECT_EQ(evaluate_views(without, {0, 1}, {})["views"].size(), 1u);
+  EXPECT_EQ(without.scene.warnings.back(), "view magenta has no photograph and is not evaluated");
+
   write_png(model.scene.views[0].mask_path, ColorImage(kSide, kSide, Eigen::Vector3f::Zero()));
   const auto masked = evaluate_views(model, {0, 1}, {});
   EXPECT_TRUE(masked["views"][0]["hole_fraction"].is_null()) << "nothing may be looked at";
   EXPECT_EQ(masked["mean"]["hole_fraction"], masked["views"][1]["hole_fraction"]);
-
-  model.scene.views[1].image_path.clear();
-  EXPECT_EQ(evaluate_views(model, {0, 1}, {})["views"].size(), 1u);
-  EXPECT_EQ(model.scene.warnings.back(), "view magenta has no photograph and is not evaluated");
 }
 
 }  // namespace
