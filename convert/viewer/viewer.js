@@ -10,8 +10,9 @@
   const root = document.getElementById('viewer');
   const canvas = part('canvas');
   const context = canvas.getContext('webgl', { antialias: true, alpha: true });
-  root.dataset.state = 'failed';  // unless it comes to its end
-  if (!context || context.isContextLost()) return;
+  const fail = () => { root.dataset.state ||= 'failed'; };  // but for what fails once it runs
+  if (!context || context.isContextLost()) return fail();
+  window.addEventListener('error', fail);
 
   const scene = JSON.parse(document.getElementById('viewer-scene').textContent);
   const {
@@ -413,5 +414,5 @@
   standBack();
   new ResizeObserver(applyLens).observe(canvas.parentElement);
   window.addEventListener('resize', redraw);
-  delete root.dataset.state;
+  window.addEventListener('beforeprint', () => renderer.render(world, camera));  // kept till then
 })();

@@ -355,10 +355,21 @@ class OtherBrowsers(unittest.TestCase):
         self.assertIn('Pick the second point', page.measured())
         page.driver.save_screenshot(str(SCREENS / 'phone_touched.png'))
 
+    def test_comes_back_after_the_graphics_context_was_lost(self):
+        page = self.open('context')
+        before = page.picture()
+        page.driver.execute_async_script('''
+            const [canvas, done] = arguments;
+            const context = canvas.getContext('webgl').getExtension('WEBGL_lose_context');
+            canvas.addEventListener('webglcontextlost', () => setTimeout(() => context.restoreContext(), 200));
+            canvas.addEventListener('webglcontextrestored', () => setTimeout(done, 1000));
+            context.loseContext();''', page.canvas())
+        self.assertLess(changed(before, page.picture()), 0.01)
+
     def test_without_webgl(self):
         page = self.open('no_webgl', '--disable-3d-apis')
         self.assertEqual(page.state(), 'failed')
-        self.assertIn('no WebGL', page.viewer().text)
+        self.assertIn('needs WebGL', page.viewer().text)
         self.assertFalse(page.canvas().is_displayed())
         self.assertGreater(len(page.driver.find_elements(By.CSS_SELECTOR, 'figure img')), 8)
 
