@@ -283,30 +283,22 @@ Json choose(Search& search) {
 class TrialFolder {
  public:
   explicit TrialFolder(const fs::path& output)
-      : is_new_(!is_present(output)), output_(made(output)), lock_(output_) {
+      : output_(output), folder_(output), model_(output / "model"), lock_(output) {
     remove_trials();
   }
-  ~TrialFolder() {
-    remove_trials();
-    std::error_code ignored;
-    fs::remove(output_ / "model", ignored);
-    if (is_new_) fs::remove(output_, ignored);
-  }
+  ~TrialFolder() { remove_trials(); }
   TrialFolder(const TrialFolder&) = delete;
   TrialFolder& operator=(const TrialFolder&) = delete;
 
  private:
-  static const fs::path& made(const fs::path& output) {
-    make_output_folder(output / "model");
-    return output;
-  }
   void remove_trials() const {
     std::error_code ignored;
     fs::remove_all(output_ / kTrialFolder, ignored);
   }
 
-  bool is_new_;
   fs::path output_;
+  NewFolder folder_;
+  NewFolder model_;
   FolderLock lock_;
 };
 

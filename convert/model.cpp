@@ -147,9 +147,10 @@ class TrainingCheckpoint {
     if (folder_.empty()) return;
     const SavedState saved = read_checkpoint(folder_, kCheckpointName, key_);
     if (saved.is_of_other && keeps_others) {
-      throw InvalidInput(printable(folder_) +
-                         " holds an unfinished training with other settings or inputs; choose "
-                         "another folder, or say --overwrite");
+      throw BadInput(Defect::Mismatch,
+                     folder_,
+                     "holds an unfinished training with other settings or inputs; choose another "
+                     "folder, or say --overwrite");
     }
     if (saved.state) trainer.restore(*saved.state);
     if (!saved.warning.empty()) hitches_.push_back(saved.warning);

@@ -41,7 +41,7 @@ struct ModelRequest {
 /// Scene -> model. Loads the images of the input views, moves the scene to its canonical frame,
 /// estimates depth and optimises the Gaussians; goes on from a checkpoint of the same work.
 /// If the progress function throws Cancelled, the training so far is saved first.
-/// \throws InvalidInput for a checkpoint of other work that is to be kept
+/// \throws BadInput Mismatch for a checkpoint of other work that is to be kept
 struct TrainedModel {
   Model model;
   PriorsReport priors;

@@ -483,7 +483,8 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   } catch (const Json::exception&) {
     throw BadInput(Defect::Schema,
                    request.output / "run.json",
-                   "does not hold what finished stages wrote; say --overwrite to begin anew");
+                   "does not hold what finished stages wrote; remove it and say --overwrite to "
+                   "begin anew");
   }
 }
 

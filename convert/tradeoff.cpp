@@ -363,7 +363,7 @@ Tradeoff measure_tradeoff(const TradeoffRequest& request,
   } catch (const Json::exception&) {
     throw BadInput(Defect::Schema,
                    request.output / "run.json",
-                   "does not hold what finished stages wrote; say --overwrite to begin anew");
+                   "does not hold what finished stages wrote; remove it to begin anew");
   }
   return out;
 }

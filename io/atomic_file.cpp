@@ -152,4 +152,14 @@ void make_output_folder(const std::filesystem::path& folder) {
   const AtomicFile probe(folder / ".probe");  // removed again, as it is never committed
 }
 
+NewFolder::NewFolder(std::filesystem::path folder)
+    : folder_(std::move(folder)), is_new_(!std::filesystem::exists(folder_)) {
+  make_output_folder(folder_);
+}
+
+NewFolder::~NewFolder() {
+  std::error_code is_not_empty;
+  if (is_new_) std::filesystem::remove(folder_, is_not_empty);
+}
+
 }  // namespace cgs

@@ -271,6 +271,9 @@ void choose_views(Scene& scene, const std::string& list, bool all_views) {
       if (!view.image_path.empty()) continue;
       throw InvalidInput("--views: view \"" + printable(view.name) + "\" has no image file");
     }
+    if (scene.input.size() < 2) {
+      throw InvalidInput("--views names one view; two or more are needed, from different places");
+    }
   } else {
     const bool takes_all = all_views || usable.size() <= kTakeAll;
     scene.input = takes_all ? usable : llff_protocol(usable);

@@ -62,7 +62,7 @@ void run_train(const TrainArgs& args) {
   Terminal terminal(args.common.quiet, args.common.strict);
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   (void)check_stated_cameras(opened, terminal);
-  make_output_folder(args.output);
+  const NewFolder folder(args.output);
   const FolderLock lock(args.output);
   refuse_to_replace(args);  // another start may have ended since
   remove_abandoned_files(args.output);

@@ -91,9 +91,10 @@ Cases checkpoint_cases() {
                           "OK+W",
                           {"version", falls_back},
                           edit(kNewest, [](std::string& bytes) { bytes[7] = '2'; })));
-  cases.push_back(resumed("K04", "of other photographs", "OK", {}, [](const fs::path& folder) {
-    write_bytes(folder / "scene/images/1.png", picture_png(2));
-  }));
+  cases.push_back(resumed(
+      "K04", "of other photographs", "MISMATCH", {"--overwrite"}, [](const fs::path& folder) {
+        write_bytes(folder / "scene/images/1.png", picture_png(2));
+      }));
   cases.push_back(resumed("K05", "only a part is left", "OK", {}, [](const fs::path& folder) {
     fs::rename(folder / kNewest, folder / "out/training.checkpoint.part999999999");
     fs::remove(folder / kBefore);
