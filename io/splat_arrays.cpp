@@ -10,14 +10,17 @@ void require_writable(const Gaussians& g) {
   const size_t n = g.size();
   const size_t sh = n * static_cast<size_t>(g.sh_count());
   require(g.scale.size() == n, "Gaussians.scale must be as long as position", g.scale.size());
-  require(g.rotation.size() == n, "Gaussians.rotation must be as long as position", n);
-  require(g.opacity.size() == n, "Gaussians.opacity must be as long as position", n);
+  require(
+      g.rotation.size() == n, "Gaussians.rotation must be as long as position", g.rotation.size());
+  require(g.opacity.size() == n, "Gaussians.opacity must be as long as position", g.opacity.size());
   require(g.sh.size() == sh, "Gaussians.sh must have sh_count() entries per Gaussian", g.sh.size());
   for (size_t i = 0; i < n; ++i) {
     require(g.position[i].allFinite() && g.rotation[i].allFinite(),
             "Gaussians: positions and rotations must be finite; index",
             i);
-    require(g.scale[i].allFinite() && g.scale[i].minCoeff() > 0, "Gaussians.scale must be > 0", i);
+    require(g.scale[i].allFinite() && g.scale[i].minCoeff() > 0,
+            "Gaussians.scale must be > 0",
+            g.scale[i].transpose());
     require(
         g.opacity[i] > 0 && g.opacity[i] < 1, "Gaussians.opacity must be in (0, 1)", g.opacity[i]);
   }

@@ -355,7 +355,7 @@ bool Collapser::stays_near(const Attempt& attempt, const Vector3f& p) const {
   });
 }
 
-// A vertex between two is known no better than the worse of them; at one of them, as that one is.
+// A vertex between two has the smaller support and a sigma between theirs; at one of them, its own.
 void Collapser::merge_knowledge(uint32_t u, uint32_t v, float t) {
   if (t <= 0) return;
   if (!mesh_.support.empty()) {

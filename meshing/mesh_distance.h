@@ -62,7 +62,6 @@ DistanceStatistics statistics(std::vector<float> distances);
 struct MeshDistance {
   DistanceStatistics accuracy;      ///< From samples of the mesh to the reference.
   DistanceStatistics completeness;  ///< From samples of the reference to the mesh.
-  double chamfer() const { return 0.5 * (accuracy.mean + completeness.mean); }
   double hausdorff() const { return std::max(accuracy.max, completeness.max); }
 };
 

@@ -182,7 +182,7 @@ SimplifyResult simplify(const TriangleMesh& mesh,
       report(progress, 1);
       return result;
     }
-    result.tightened += tightening.apply();
+    tightening.apply();
   }
   const int rounds = result.rounds;
   result = unchanged(mesh);

@@ -35,8 +35,7 @@ struct SimplifyResult {
   std::array<double, kProvenanceCount> area_before =
       {};  ///< By provenance [internal units squared].
   std::array<double, kProvenanceCount> area_after = {};
-  int rounds = 0;        ///< Times the collapses were run.
-  size_t tightened = 0;  ///< Input vertices held nearer, to end a violation found by measuring.
+  int rounds = 0;  ///< Times the collapses were run.
 };
 
 /// A mesh with fewer faces that stays within a stated distance of the input.

@@ -23,7 +23,8 @@ struct Volume {
                                     ///< surface; active on observed voxels of the band only.
   openvdb::FloatGrid::Ptr weight;   ///< Sum of the weights of the views in the band.
   openvdb::Vec3SGrid::Ptr color;    ///< sRGB-coded RGB in [0, 1]; active where a view gave colour.
-  openvdb::FloatGrid::Ptr support;  ///< Number of views in the band.
+  openvdb::FloatGrid::Ptr support;  ///< Photographs in the band that look at it from one side, the
+                                    ///< side with more of them; guesses count as one at most.
   openvdb::FloatGrid::Ptr sigma;    ///< Standard deviation of tsdf [internal units]; active where
                                     ///< the views came with one.
   openvdb::Int32Grid::Ptr state;    ///< VoxelState, tiles where constant.

@@ -45,9 +45,7 @@ WatertightResult watertight_surface(Volume& volume,
     Solid matter = solid(volume);
     smooth(matter);
     report(progress, 0.2);
-    const SolidParts removed = remove_small_parts(matter, options.min_part);
-    result.floaters_removed = removed.floaters;
-    result.cavities_filled = removed.cavities;
+    (void)remove_small_parts(matter, options.min_part);
     report(progress, 0.3);
     volume.surface = level_set(matter, volume);
   }

@@ -27,11 +27,9 @@ struct WatertightOptions {
 struct WatertightResult {
   TriangleMesh mesh;  ///< All attributes; see Provenance.
   Certificate certificate;
-  std::string method;           ///< "level set", "level set, locally smoothed" or
-                                ///< "level set, marching tetrahedra".
-  size_t floaters_removed = 0;  ///< Parts of matter.
-  size_t cavities_filled = 0;   ///< Enclosed empty parts.
-  size_t voxels_smoothed = 0;   ///< Changed to end self-intersections.
+  std::string method;          ///< "level set", "level set, locally smoothed" or
+                               ///< "level set, marching tetrahedra".
+  size_t voxels_smoothed = 0;  ///< Changed to end self-intersections.
 };
 
 /// Closes a fused volume and meshes it.

@@ -41,7 +41,7 @@ std::vector<Run> runs_of_equal(const DepthMap& depth, int step) {
   return runs;
 }
 
-// A quadratic number of steps, which thousands of samples can afford.
+// A quadratic number of steps, which ten thousand samples can afford.
 void merge_to(std::vector<Run>& runs, size_t count) {
   while (runs.size() > count) {
     size_t best = 0;
@@ -68,7 +68,9 @@ void DepthLayersOptions::validate() const {
 
 Raster<uint8_t> depth_layers(const DepthMap& depth, const DepthLayersOptions& options) {
   options.validate();
-  std::vector<Run> runs = runs_of_equal(depth, options.sample_step);
+  constexpr double kMostSamples = 10'000;
+  const int coarsest = static_cast<int>(std::sqrt(double(depth.data.size()) / kMostSamples));
+  std::vector<Run> runs = runs_of_equal(depth, std::max(options.sample_step, coarsest));
   merge_to(runs, static_cast<size_t>(options.count));
   Raster<uint8_t> layers(depth.width, depth.height, 0);
   for (size_t i = 0; i < depth.data.size(); ++i) {

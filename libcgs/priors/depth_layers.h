@@ -8,7 +8,8 @@ namespace cgs {
 /// How a depth map is cut into layers.
 struct DepthLayersOptions {
   int count = 5;         ///< In [1, 255].
-  int sample_step = 10;  ///< Every so many pixels along both axes are clustered; >= 1.
+  int sample_step = 10;  ///< Every so many pixels along both axes are clustered; >= 1. More
+                         ///< than one where that would be above 10,000.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

@@ -272,16 +272,18 @@ std::vector<ViewPriors> plane_sweep(const Scene& scene,
   for (const int i : scene.input)
     images.push_back(sweep_image(scene.views[static_cast<size_t>(i)]));
   std::vector<SweptView> views(count);
+  std::vector<SweepGeometry> matched(count);  // outlives what refines on it
   std::vector<SlantedRefinement> refinements;
   refinements.reserve(count);
   for (size_t i = 0; i < count; ++i) {
     views[i].camera = scene.views[static_cast<size_t>(scene.input[i])].camera;
     views[i].geometry = sweep_geometry(scene, static_cast<int>(i), options.sampling);
+    matched[i] = with_parallax(views[i].geometry);
   }
   for (size_t i = 0; i < count; ++i) {
-    const CostVolume volume = matching_cost(images, views[i].geometry);
+    const CostVolume volume = matching_cost(images, matched[i]);
     const Raster<float> start = semi_global_planes(volume, images[i].gray, options.smoothness);
-    refinements.emplace_back(images, views[i].geometry, start);
+    refinements.emplace_back(images, matched[i], start);
     report(progress, 0.5 * static_cast<double>(i + 1) / static_cast<double>(count));
   }
   std::vector<Raster<SlantedPlane>> extra(count);

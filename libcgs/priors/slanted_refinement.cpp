@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include <Eigen/Cholesky>
 #include <tbb/parallel_for.h>
@@ -151,6 +153,20 @@ struct Cells {
   }
 };
 
+/// One number per source, without an allocation for the usual few: it is asked for per candidate.
+class Scratch {
+ public:
+  explicit Scratch(size_t count) : count_(count), many_(count > few_.size() ? count : 0) {}
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  std::span<float> values() { return {many_.empty() ? few_.data() : many_.data(), count_}; }
+
+ private:
+  size_t count_;
+  std::array<float, 16> few_;
+  std::vector<float> many_;
+};
+
 }  // namespace
 
 // The reference side of a match.
@@ -249,16 +265,16 @@ float SlantedRefinement::correlation(const Window& w,
 }
 
 float SlantedRefinement::data_cost(const Window& w, const SlantedPlane& plane) const {
-  std::array<float, 16> scores;
-  const size_t count = std::min(geometry_.sources.size(), scores.size());
+  Scratch scratch(geometry_.sources.size());
+  const std::span<float> scores = scratch.values();
   size_t seen = 0;
-  for (size_t s = 0; s < count; ++s) {
+  for (size_t s = 0; s < scores.size(); ++s) {
     const float c = correlation(w, s, plane);
     if (!std::isnan(c)) scores[seen++] = 1 - c;
   }
   if (seen == 0) return kUnseenCost;
   std::sort(scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(seen));
-  return combined_cost({scores.data(), seen});
+  return combined_cost(scores.first(seen));
 }
 
 float SlantedRefinement::smoothness(const Window& w, const SlantedPlane& plane) const {
@@ -336,16 +352,16 @@ bool SlantedRefinement::normal_equations(const Window& w,
 
 SlantedRefinement::Normal SlantedRefinement::normal_equations(const Window& w,
                                                               const SlantedPlane& plane) const {
-  std::array<float, 16> scores;
-  const size_t count = std::min(geometry_.sources.size(), scores.size());
+  Scratch scratch(geometry_.sources.size());
+  const std::span<float> scores = scratch.values();
   float best = -2;
-  for (size_t s = 0; s < count; ++s) {
+  for (size_t s = 0; s < scores.size(); ++s) {
     scores[s] = correlation(w, s, plane);
     if (scores[s] > best) best = scores[s];
   }
   Normal total;
   constexpr float kBelowBest = 0.3f;  // a source this much worse is taken for occluded
-  for (size_t s = 0; s < count; ++s) {
+  for (size_t s = 0; s < scores.size(); ++s) {
     if (scores[s] >= best - kBelowBest) normal_equations(w, s, plane, total);
   }
   return total;

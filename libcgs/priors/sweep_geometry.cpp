@@ -115,7 +115,8 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
     const Camera& other = input_view(scene, j).camera;
     SweepSource source = source_of(reference, other, geometry.inverse_far);
     source.image = j;
-    speed = std::max(speed, largest_speed(reference, other, span, source));
+    source.speed = largest_speed(reference, other, span, source);
+    speed = std::max(speed, source.speed);
     baseline = std::max(baseline, (other.center() - reference.center()).norm());
     geometry.sources.push_back(source);
   }
@@ -130,6 +131,15 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
       wanted, double(kFewestPlanes), std::max<double>(kFewestPlanes, sampling.max_planes)));
   geometry.step = span / (geometry.planes - 1);
   for (SweepSource& source : geometry.sources) source.b *= geometry.step;
+  return geometry;
+}
+
+SweepGeometry with_parallax(SweepGeometry geometry) {
+  constexpr double kHardlyAny = 0.05;  // of the most
+  double most = 0;
+  for (const SweepSource& source : geometry.sources) most = std::max(most, source.speed);
+  std::erase_if(geometry.sources,
+                [&](const SweepSource& source) { return source.speed < kHardlyAny * most; });
   return geometry;
 }
 

@@ -22,7 +22,8 @@ SweepImage sweep_image(const View& view);
 /// Reference point (u, v) [pixels] on plane t lies at A (u, v, 1) + t b, homogeneous, in the
 /// source; the third coordinate is source depth divided by reference depth.
 struct SweepSource {
-  int image = 0;  ///< Position in Scene::input.
+  int image = 0;     ///< Position in Scene::input.
+  double speed = 0;  ///< Longest way of a seen pixel [pixels of the source per 1 / depth].
   Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
 
@@ -59,5 +60,9 @@ struct SweepSampling {
 
 /// \throws BadInput(Value) if the cameras share one centre.
 SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling& sampling);
+
+/// With the sources alone that tell planes apart. What was taken from almost the same place as the
+/// reference, as of a burst, agrees with it on every plane and would outvote what does not.
+SweepGeometry with_parallax(SweepGeometry geometry);
 
 }  // namespace cgs

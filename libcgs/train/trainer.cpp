@@ -48,6 +48,19 @@ Raster<T> every_other(const Raster<T>& in) {
   return out;
 }
 
+// Where all four pixels may be used, of which halved() takes the mean.
+MaskMap all_usable(const MaskMap& in) {
+  if (in.empty()) return in;
+  MaskMap out(in.width / 2, in.height / 2, 0);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      const auto is_set = [&](int dx, int dy) { return in(2 * x + dx, 2 * y + dy) != 0; };
+      out(x, y) = is_set(0, 0) && is_set(1, 0) && is_set(0, 1) && is_set(1, 1) ? 1 : 0;
+    }
+  }
+  return out;
+}
+
 // The camera of the image that halved() gives: odd rows and columns at the end are cut off.
 Camera halved(const Camera& camera) {
   Camera out = camera;
@@ -187,7 +200,7 @@ Trainer::Trainer(const Scene& scene,
     full_.push_back({view.camera, planes_of(view.image), view.valid, priors[n].layer});
     if (!(options.coarse_until > 0)) continue;
     TrainingView coarse{
-        halved(view.camera), {}, every_other(view.valid), every_other(priors[n].layer)};
+        halved(view.camera), {}, all_usable(view.valid), every_other(priors[n].layer)};
     for (int c = 0; c < 3; ++c) coarse.photograph[c] = halved(full_.back().photograph[c]);
     coarse_.push_back(std::move(coarse));
   }

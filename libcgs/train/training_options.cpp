@@ -164,7 +164,8 @@ TrainingOptions reference_options() {
   options.final_rate = 1;
   options.tv_weight = 5;
   options.tv_to_layers = 1;
-  options.flow_weight = 0.5;  // 0.1 in units of which the extent of a scene has about five
+  // 0.1 in units of which the extent of a scene has about five, of a mean over three coordinates.
+  options.flow_weight = 0.5 / 3;
   options.prior_weight = 0;
   options.opacity_prior = 0;
   return options;

@@ -58,8 +58,8 @@ struct TrainingOptions {
 ///   Networks; balls for 8/13 of the time, drawn at twice the size from 5/13 on; its losses but the
 ///   perceptual one; no prior that holds depth or opacity. A step here looks at all views, so the
 ///   13 000 steps of one view each are 4333, with rates higher by the root of three. Where paper
-///   and implementation differ, the paper: total variation goes over to layers from none to all,
-///   the flow term counts in full.
+///   and implementation differ, the paper: total variation goes over to layers from none to all
+///   (as a mean over pairs within layers, not over all five), the flow term counts in full.
 TrainingOptions training_preset(std::string_view name);
 
 /// Sets one field by its name, e.g. ("steps", "500") or ("depth_spacing", "64,16"); the names are

@@ -242,6 +242,30 @@ TEST(Trainer, WithoutStepsIsTheInitialisation) {
   EXPECT_EQ(trainer.model().depth(0).data, planted.priors[0].depth.data);
 }
 
+// At half the size a pixel is the mean of four, of which some may be masked.
+TEST(Trainer, LearnsNothingFromMaskedPixelsWhileImagesAreCoarse) {
+  std::vector<double> losses;
+  for (const float masked : {0.0f, 1.0f}) {
+    PlantedScene planted = planted_scene(0);
+    for (size_t n = 0; n < planted.priors.size(); ++n) {
+      View& view = planted.scene.views[n];
+      view.valid = MaskMap(view.image.width, view.image.height, 1);
+      for (int y = 0; y < view.image.height; ++y) {
+        for (int x = 31; x < view.image.width; ++x) {
+          view.valid(x, y) = 0;
+          view.image(x, y).setConstant(masked);
+          planted.priors[n].depth(x, y) = std::nanf("");
+          planted.priors[n].origin(x, y) = DepthOrigin::Unknown;
+        }
+      }
+    }
+    TrainingOptions options = short_training(2);
+    options.coarse_until = 1;
+    losses.push_back(Trainer(planted.scene, planted.priors, options).step().l1);
+  }
+  EXPECT_EQ(losses[0], losses[1]);
+}
+
 TEST(Trainer, ChangesNoColour) {
   const PlantedScene planted = planted_scene(0.02);
   Trainer trainer(planted.scene, planted.priors, short_training(5));
