@@ -71,7 +71,9 @@ int run_program(int argc, char** argv) {
 
 // Ends at once: what libraries do at a regular end may need memory, too, and abort without.
 [[noreturn]] void end_without_memory() {
-  std::fprintf(stderr, "cgs: LIMIT: out of memory; try --downscale 2 or a larger --voxel-size\n");
+  std::fprintf(stderr,
+               "cgs: LIMIT: out of memory; smaller pictures, larger voxels or a smaller file "
+               "need less\n");
   std::fflush(nullptr);
   std::_Exit(4);
 }

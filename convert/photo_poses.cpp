@@ -13,6 +13,7 @@
 #include "convert/run_record.h"
 #include "io/atomic_file.h"
 #include "io/colmap_writer.h"
+#include "io/content_hash.h"
 #include "io/image.h"
 #include "io/json_file.h"
 #include "io/masks.h"

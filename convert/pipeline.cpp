@@ -227,7 +227,7 @@ std::map<std::string, std::string> decided_stages(const RunRequest& request, con
   return out;
 }
 
-/// A stage: its files (whose absence means it must run), what it does, and a remark for the user.
+/// A stage: its files (whose absence means it must run) and what it does.
 struct Stage {
   std::string name;
   std::string title;
@@ -423,6 +423,19 @@ void check_lengths_of_photographs(const RunRequest& request) {
   check_lengths(request, frame);
 }
 
+void remove_all_abandoned_files(const std::filesystem::path& output) {
+  for (const char* folder : {"",
+                             "model",
+                             "model/colmap",
+                             "model/colmap/sparse/0",
+                             "model/priors",
+                             "views",
+                             "mesh",
+                             "web"}) {
+    remove_abandoned_files(output / folder);
+  }
+}
+
 }  // namespace
 
 Json run_pipeline(const RunRequest& request, Terminal& terminal) {
@@ -452,16 +465,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
                    request_json(request, scene),
                    request.overwrite,
                    decided_stages(request, scene));
-  for (const char* folder : {"",
-                             "model",
-                             "model/colmap",
-                             "model/colmap/sparse/0",
-                             "model/priors",
-                             "views",
-                             "mesh",
-                             "web"}) {
-    remove_abandoned_files(request.output / folder);
-  }
+  remove_all_abandoned_files(request.output);
   opened.keep(request.output / "model");
   Json predicted = Json::object();
   for (const StageMemory& stage : plan) predicted[stage.stage] = stage.bytes;

@@ -2,9 +2,6 @@
 #include "convert/run_record.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
-#include <fstream>
 #include <utility>
 
 #include "convert/terminal.h"
@@ -208,20 +205,5 @@ void RunRecord::note(const std::string& key, const Json& value) {
 }
 
 void RunRecord::save() const { write_file(folder_ / "run.json", json_text(json_) + "\n"); }
-
-std::string file_hash(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw BadInput(Defect::Open, file, "cannot be opened");
-  uint64_t hash = content_hash("");
-  std::string bytes(size_t{1} << 20, '\0');  // of any size, in little memory
-  while (stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size())),
-         stream.gcount() > 0) {
-    hash = content_hash({bytes.data(), static_cast<size_t>(stream.gcount())}, hash);
-  }
-  if (stream.bad()) throw BadInput(Defect::Open, file, "cannot be read");
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(hash));
-  return text.data();
-}
 
 }  // namespace cgs

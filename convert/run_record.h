@@ -62,7 +62,4 @@ class RunRecord {
 /// the file holds none.
 nlohmann::ordered_json read_run_record(const std::filesystem::path& path);
 
-/// 64-bit FNV-1a of a file's content, as 16 hexadecimal digits. \throws BadInput
-std::string file_hash(const std::filesystem::path& file);
-
 }  // namespace cgs

@@ -21,12 +21,6 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-// What load_given_depth() reads beside a depth file; empty if there is none.
-std::filesystem::path confidence_file(const std::filesystem::path& depth) {
-  const std::filesystem::path folder = depth.parent_path().parent_path() / "confidence";
-  return is_folder(folder) ? depth_file_of({folder, false}, depth) : std::filesystem::path();
-}
-
 Json names_of(const Scene& scene, const std::vector<int>& views) {
   Json out = Json::array();
   for (const int i : views) out.push_back(scene.views[static_cast<size_t>(i)].name);
@@ -51,7 +45,7 @@ Json input_hashes(const SceneRequest& request, const Scene& scene) {
     const View& view = scene.views[static_cast<size_t>(i)];
     if (view.depth_path.empty()) continue;
     out[view.name + ", depth"] = file_hash(view.depth_path);
-    const std::filesystem::path confidence = confidence_file(view.depth_path);
+    const std::filesystem::path confidence = confidence_file(scene, view, true);
     if (!confidence.empty()) out[view.name + ", confidence"] = file_hash(confidence);
   }
   const std::filesystem::path& network = request.options.depth.network;

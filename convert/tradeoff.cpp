@@ -19,6 +19,7 @@
 #include "convert/run_stages.h"
 #include "convert/tradeoff_stages.h"
 #include "io/atomic_file.h"
+#include "io/content_hash.h"
 #include "io/lens.h"
 #include "libcgs/core/error.h"
 

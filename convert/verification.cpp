@@ -11,6 +11,7 @@
 #include "convert/run_record.h"
 #include "io/atomic_file.h"
 #include "io/byte_reader.h"
+#include "io/content_hash.h"
 #include "io/scene_path.h"
 #include "libcgs/core/error.h"
 

@@ -66,8 +66,8 @@ void write_file(const std::filesystem::path& path, std::string_view bytes);
 /// Creates a folder and its parents and checks that files can be created in it. \throws IoError
 void make_output_folder(const std::filesystem::path& folder);
 
-/// Makes a folder as make_output_folder() and, if there was none, takes it away again should nothing
-/// have come into it while this lives.
+/// Makes a folder as make_output_folder() and, if there was none, takes it away again should
+/// nothing have come into it while this lives.
 class NewFolder {
  public:
   explicit NewFolder(std::filesystem::path folder);

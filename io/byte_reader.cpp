@@ -46,8 +46,13 @@ uint64_t regular_file_size(const Descriptor& file, const std::filesystem::path& 
   if (::fstat(file.get(), &info) != 0)
     throw BadInput(Defect::Open, path, std::generic_category().message(errno));
   if (!S_ISREG(info.st_mode)) throw BadInput(Defect::Open, path, "not a regular file");
-  if (info.st_size == 0) throw BadInput(Defect::Empty, path, "empty file");
   return static_cast<uint64_t>(info.st_size);
+}
+
+uint64_t size_of_content(const Descriptor& file, const std::filesystem::path& path) {
+  const uint64_t size = regular_file_size(file, path);
+  if (size == 0) throw BadInput(Defect::Empty, path, "empty file");
+  return size;
 }
 
 std::string first_bytes(const Descriptor& file, uint64_t count, const std::filesystem::path& path) {
@@ -70,7 +75,7 @@ std::string first_bytes(const Descriptor& file, uint64_t count, const std::files
 
 std::string read_file(const std::filesystem::path& path, const ReadLimits& limits) {
   const Descriptor file(open_for_reading(path));
-  const uint64_t size = regular_file_size(file, path);
+  const uint64_t size = size_of_content(file, path);
   if (size > limits.max_file_bytes) {
     throw LimitError(printable(path) + ": " + mebibytes(size) + ", allowed are " +
                      mebibytes(limits.max_file_bytes));
@@ -80,7 +85,21 @@ std::string read_file(const std::filesystem::path& path, const ReadLimits& limit
 
 std::string read_file_start(const std::filesystem::path& path, uint64_t max_bytes) {
   const Descriptor file(open_for_reading(path));
-  return first_bytes(file, std::min(regular_file_size(file, path), max_bytes), path);
+  return first_bytes(file, std::min(size_of_content(file, path), max_bytes), path);
+}
+
+void read_in_parts(const std::filesystem::path& path,
+                   const std::function<void(std::string_view)>& take) {
+  const Descriptor file(open_for_reading(path));
+  (void)regular_file_size(file, path);
+  std::string part(size_t{1} << 20, '\0');
+  while (true) {
+    const ssize_t n = ::read(file.get(), part.data(), part.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) throw BadInput(Defect::Open, path, std::generic_category().message(errno));
+    if (n == 0) return;
+    take(std::string_view(part).substr(0, static_cast<size_t>(n)));
+  }
 }
 
 void refuse_foreign_content(const std::filesystem::path& path,

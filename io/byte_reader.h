@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -29,6 +30,11 @@ struct ReadLimits {
 /// The whole content of a regular file, opened without following a FIFO or device into a hang.
 /// \throws BadInput Open (missing, not a regular file, no permission), Empty; LimitError.
 std::string read_file(const std::filesystem::path& path, const ReadLimits& limits = {});
+
+/// Hands a regular file over in parts, whatever its size; an empty one in none. \throws BadInput
+/// Open
+void read_in_parts(const std::filesystem::path& path,
+                   const std::function<void(std::string_view)>& take);
 
 /// The first `max_bytes` of a regular file, or all of it if it is shorter: enough for most headers.
 /// \throws BadInput as read_file()

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <string>
 #include <string_view>
 
 namespace cgs {
@@ -14,5 +16,8 @@ inline uint64_t content_hash(std::string_view bytes, uint64_t state = kHashStart
   for (const char c : bytes) state = (state ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
   return state;
 }
+
+/// The same of a file's content, as 16 hexadecimal digits. \throws BadInput as read_in_parts()
+std::string file_hash(const std::filesystem::path& file);
 
 }  // namespace cgs

@@ -38,18 +38,6 @@ fs::path depth_beside(const SceneRoot& root, const fs::path& photograph) {
   return {};
 }
 
-// The file that goes with the depth of a view as Polycam lays it out; empty if there is none.
-fs::path confidence_file(const Scene& scene, const View& view, bool allow_external) {
-  if (scene.kind != "Polycam") return {};
-  const fs::path depth = view.depth_path.lexically_relative(scene.folder).parent_path();
-  if (depth.filename() != "depth" || *depth.begin() == "..") return {};
-  const fs::path name = depth.parent_path() / "confidence";
-  if (!is_folder(scene.folder / name)) return {};
-  const SceneRoot root = {scene.folder, allow_external};
-  const fs::path folder = resolve_in_scene(root, name.string(), scene.folder);
-  return depth_file_of({folder, allow_external}, view.depth_path);
-}
-
 // Takes out what a file calls 0: low.
 void drop_low_confidence(const fs::path& file, Raster<float>& values) {
   const Raster<float> confidence = read_samples(file).values;
@@ -325,6 +313,17 @@ void DepthOptions::validate() const {
   require(kind != DepthKind::Metric,
           "a network measures nothing: its kind is depth or disparity, the network",
           network);
+}
+
+fs::path confidence_file(const Scene& scene, const View& view, bool allow_external) {
+  if (scene.kind != "Polycam") return {};
+  const fs::path depth = view.depth_path.lexically_relative(scene.folder).parent_path();
+  if (depth.filename() != "depth" || *depth.begin() == "..") return {};
+  const fs::path name = depth.parent_path() / "confidence";
+  if (!is_folder(scene.folder / name)) return {};
+  const SceneRoot root = {scene.folder, allow_external};
+  const fs::path folder = resolve_in_scene(root, name.string(), scene.folder);
+  return depth_file_of({folder, allow_external}, view.depth_path);
 }
 
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external) {

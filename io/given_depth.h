@@ -36,6 +36,10 @@ std::map<std::string, DepthKind> depth_kinds();
 ///         maps of COLMAP, which are in units of the scene, are in metres
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external);
 
+/// The file that says how far to trust the depth of a view, as Polycam lays it out; empty if there
+/// is none. \throws BadInput Path where it leads out of the scene and that is not allowed
+std::filesystem::path confidence_file(const Scene& scene, const View& view, bool allow_external);
+
 /// Reads the depth of a view at the size of its camera, which has no distortion. In Polycam's
 /// layout there is none where a file in the folder "confidence" says 0.
 ///

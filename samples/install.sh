@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Installs the Debian 12 packages that build and run this project; with --tests, also those its
 # tests use. Does nothing, and needs no network, where they are all there.
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Installs what is needed, builds, makes a capture of a carved portal whose truth is known, and
 # turns three of its photographs into every asset. Run again, it only does what is missing; after an
 # update of the sources, remove the folder out first to see what they do.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Looks for data races: what works in threads is built with ThreadSanitizer, and so is TBB, from
 # Debian's source, for how the packaged one hands work from thread to thread would not be seen and
 # all of it be reported. The source is fetched once and kept in build/race.

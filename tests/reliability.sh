@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # The figures of reliability, one line each; more of everything than the tests try.
 #
 # usage: tests/reliability.sh [--long]

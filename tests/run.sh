@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Installs what is needed, builds everything, checks the format and runs all tests. Run again, it
 # only builds what changed.
 #

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # clang-tidy over every source but those of tests, warnings as errors. A file that passed is not checked again until
 # it, a header of ours, or the rules change; the stamps are in build/release/tidy.
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Opens the files of a finished run with other people's programs and checks what they see:
 # vdb_print, exrheader, Open3D, Python, ezdxf, and the Khronos glTF validator where npm has it installed.
 #
@@ -7,20 +8,22 @@
 # Open3D compares every pair of faces: minutes for a mesh of 200,000 faces, hours for 2,000,000.
 set -euo pipefail
 out="$1"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
 failures=0
 passed=0
 
 expect() {  # expect NAME COMMAND...: the command must succeed
   local name="$1"
   shift
-  if "$@" >/tmp/other_reader.$$ 2>&1; then
+  if "$@" >"$log" 2>&1; then
     passed=$((passed + 1))
   else
     failures=$((failures + 1))
     echo "FAILED: $name"
-    sed 's/^/    /' /tmp/other_reader.$$ | tail -5
+    sed 's/^/    /' "$log" | tail -5
   fi
-  rm -f /tmp/other_reader.$$
+  rm -f "$log"
 }
 
 grids=$(vdb_print "$out/volume.vdb")

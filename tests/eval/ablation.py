@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What each part of the training brings on held-out views, as a Markdown table.
 
 usage: tests/eval/ablation.py CGS_BUILD MODEL... [--rows NAME,NAME] [--limit VIEWS | --views NAME,NAME]

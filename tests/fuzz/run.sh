@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Lets libFuzzer loose on every reader (but that of Draco, which works in a child process), built
 # with AddressSanitizer and UndefinedBehaviorSanitizer. What it learns stays in
 # build/sanitize/fuzz/corpus for the next time; what it breaks a reader with lies in
