@@ -325,6 +325,18 @@ std::set<std::string> outputs_of(const Stage& stage, const Run& run) {
   return {outputs.begin(), outputs.end()};
 }
 
+// Hashes of what stages before wrote and this one may write anew.
+Json earlier_outputs(const Stage& stage, const Run& run) {
+  std::set<std::string> names;
+  for (const Stage& other : stages_of(run.scene, run.request.lods)) {
+    if (other.name == stage.name) break;
+    for (const std::string& file : run.record.files(other.name)) {
+      if (files_of(stage).contains(file)) names.insert(file);
+    }
+  }
+  return output_hashes(run.request.output, names);
+}
+
 // What somebody changed of the files of a finished stage may be wanted, and stays.
 void warn_of_changed_files(const Stage& stage, const Run& run, const Terminal& terminal) {
   std::set<std::string> unsettled;  // a later stage may have been stopped after it wrote them
@@ -393,10 +405,16 @@ Json run_stages(Run& run, Terminal& terminal) {
     }
     if (!stale) remove_outputs_after(stage, run);
     stale = true;
+    const Json before = earlier_outputs(stage, run);
     const CostMeter meter;  // from here on the peak of memory is that of the stage
     const Json result = stage.work(run, terminal.begin(stage.title));
     const double seconds = terminal.end(remark_on(stage.name, result));
-    run.record.finish(stage.name, seconds, result, outputs_of(stage, run));
+    std::set<std::string> outputs = outputs_of(stage, run);
+    const Json after = earlier_outputs(stage, run);
+    for (const auto& [name, hash] : after.items()) {
+      if (before.value(name, Json()) == hash) outputs.erase(name);
+    }
+    run.record.finish(stage.name, seconds, result, outputs);
     warn_of(result, terminal);
     terminal.warn(std::exchange(run.hitches, {}));
   }

@@ -229,6 +229,26 @@ TEST_F(Verify, KnowsWhatWasChangedBeforeARunWentOn) {
   fs::remove_all(copy);
 }
 
+// The stage of the scale may write the model anew, and here has no reason to.
+TEST_F(Verify, KnowsThatTheModelWasChangedBeforeItsScaleWasToldAgain) {
+  const fs::path copy = *dir_ / "copy";
+  fs::copy(out(), copy, fs::copy_options::recursive);
+  std::string splats = read_bytes(copy / "model/gaussians.ply");
+  splats[splats.size() / 2] = char(splats[splats.size() / 2] ^ 1);
+  write_bytes(copy / "model/gaussians.ply", splats);
+  auto record = nlohmann::ordered_json::parse(read_bytes(copy / "run.json"));
+  nlohmann::ordered_json stages;
+  stages["model"] = record["stages"]["model"];  // as a run that was stopped after it
+  record["stages"] = stages;
+  write_bytes(copy / "run.json", record.dump());
+  const auto again = run_cgs(run_arguments(scene(), copy));
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  const auto verified = run_cgs("verify " + copy.string());
+  EXPECT_EQ(verified.exit_code, 3);
+  EXPECT_NE(verified.out.find("model/gaussians.ply: changed"), std::string::npos) << verified.out;
+  fs::remove_all(copy);
+}
+
 TEST_F(Verify, SeesWhatLiesBehindALinkedFolder) {
   const fs::path copy = *dir_ / "copy";
   const fs::path elsewhere = *dir_ / "elsewhere";
