@@ -3,11 +3,15 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
+#include <utility>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/box_intersection_d.h>
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
+
+#include "libcgs/core/error.h"
 
 namespace cgs {
 
@@ -17,6 +21,7 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
 using Face = std::array<uint32_t, 3>;
 using FacePair = std::pair<uint32_t, uint32_t>;
+using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 3, uint32_t>;
 
 Point point(const TriangleMesh& mesh, uint32_t v) {
   const auto& p = mesh.vertices[v];
@@ -81,9 +86,46 @@ std::vector<uint8_t> degenerate_faces(const TriangleMesh& mesh) {
   return degenerate;
 }
 
-// Pairs of faces whose bounding boxes touch.
-std::vector<FacePair> candidates(const TriangleMesh& mesh, const std::vector<uint8_t>& skip) {
-  using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 3, uint32_t>;
+/// Tests pairs as they come, some millions at once: of a fan of n faces all n²/2 boxes touch, which
+/// must not be held.
+class PairTests {
+ public:
+  explicit PairTests(const TriangleMesh& mesh) : mesh_(mesh) {}
+
+  void add(const FacePair& pair) {
+    constexpr size_t kAtOnce = size_t{1} << 22;
+    waiting_.push_back(pair);
+    if (waiting_.size() == kAtOnce) test_waiting();
+  }
+  std::vector<FacePair> found() {
+    test_waiting();
+    return std::move(found_);
+  }
+
+ private:
+  void test_waiting() {
+    hit_.assign(waiting_.size(), 0);
+    tbb::parallel_for(size_t(0), waiting_.size(), [&](size_t i) {
+      hit_[i] = intersect(mesh_, mesh_.faces[waiting_[i].first], mesh_.faces[waiting_[i].second]);
+    });
+    for (size_t i = 0; i < waiting_.size(); ++i) {
+      if (hit_[i] != 0) found_.push_back(waiting_[i]);
+    }
+    waiting_.clear();
+    constexpr size_t kMost = 20'000'000;
+    if (found_.size() <= kMost) return;
+    throw LimitError("more than " + std::to_string(kMost) +
+                     " pairs of faces cut each other or lie on each other");
+  }
+
+  const TriangleMesh& mesh_;
+  std::vector<FacePair> waiting_;
+  std::vector<uint8_t> hit_;
+  std::vector<FacePair> found_;
+};
+
+// The bounding boxes of all faces but some.
+std::vector<Box> face_boxes(const TriangleMesh& mesh, const std::vector<uint8_t>& skip) {
   std::vector<Box> boxes;
   boxes.reserve(mesh.faces.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
@@ -98,11 +140,7 @@ std::vector<FacePair> candidates(const TriangleMesh& mesh, const std::vector<uin
                                     box.max().z()),
                        f);
   }
-  std::vector<FacePair> pairs;
-  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& a, const Box& b) {
-    pairs.push_back(std::minmax(a.info(), b.info()));
-  });
-  return pairs;
+  return boxes;
 }
 
 }  // namespace
@@ -110,15 +148,12 @@ std::vector<FacePair> candidates(const TriangleMesh& mesh, const std::vector<uin
 std::vector<FacePair> self_intersections(const TriangleMesh& mesh) {
   CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
   const std::vector<uint8_t> degenerate = degenerate_faces(mesh);
-  const std::vector<FacePair> pairs = candidates(mesh, degenerate);
-  std::vector<uint8_t> hit(pairs.size());
-  tbb::parallel_for(size_t(0), pairs.size(), [&](size_t i) {
-    hit[i] = intersect(mesh, mesh.faces[pairs[i].first], mesh.faces[pairs[i].second]);
+  std::vector<Box> boxes = face_boxes(mesh, degenerate);
+  PairTests tests(mesh);
+  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& a, const Box& b) {
+    tests.add(std::minmax(a.info(), b.info()));
   });
-  std::vector<FacePair> found;
-  for (size_t i = 0; i < pairs.size(); ++i) {
-    if (hit[i] != 0) found.push_back(pairs[i]);
-  }
+  std::vector<FacePair> found = tests.found();
   for (uint32_t f = 0; f < degenerate.size(); ++f) {
     if (degenerate[f] != 0) found.emplace_back(f, f);
   }

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/self_intersections.h"
 
+#include <cmath>
+#include <numbers>
+
 #include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
 
 namespace cgs {
 namespace {
@@ -40,6 +45,26 @@ TEST(SelfIntersections, FindDuplicatesAndFacesWithoutArea) {
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 5, 5}, {6, 6, 6}, {7, 7, 7}};
   mesh.faces = {{0, 1, 2}, {0, 1, 2}, {3, 4, 5}};
   EXPECT_EQ(self_intersections(mesh).size(), 2U);
+}
+
+// All faces of a fan touch each other's boxes: eight million pairs, none of which cut.
+TEST(SelfIntersections, OfAWideFanTakeNoMemoryForItsPairs) {
+  TriangleMesh fan;
+  constexpr uint32_t kFaces = 4000;
+  fan.vertices.emplace_back(0, 0, 1);
+  for (uint32_t i = 0; i < kFaces; ++i) {
+    const double around = 2 * std::numbers::pi * i / kFaces;
+    fan.vertices.emplace_back(float(std::cos(around)), float(std::sin(around)), 0);
+    fan.faces.push_back({0, i + 1, (i + 1) % kFaces + 1});
+  }
+  EXPECT_TRUE(self_intersections(fan).empty());
+}
+
+TEST(SelfIntersections, AreRefusedWhereThereAreTooMany) {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.faces.assign(7000, {0, 1, 2});  // 24 million pairs
+  EXPECT_THROW(self_intersections(mesh), LimitError);
 }
 
 }  // namespace
