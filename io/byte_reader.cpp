@@ -166,7 +166,10 @@ bool parse_whole(std::string_view token, T& value) {
 
 }  // namespace
 
-bool parse_number(std::string_view token, double& value) { return parse_whole(token, value); }
+bool parse_number(std::string_view token, double& value) {
+  if (token.starts_with('+') && !token.starts_with("+-")) token.remove_prefix(1);
+  return parse_whole(token, value);
+}
 bool parse_number(std::string_view token, int64_t& value) { return parse_whole(token, value); }
 bool parse_number(std::string_view token, uint64_t& value) { return parse_whole(token, value); }
 

@@ -84,7 +84,8 @@ class ByteReader {
   std::filesystem::path path_;
 };
 
-/// The whole token as a number: no locale, no leftovers, no overflow. \return false if it is not.
+/// The whole token as a number: no locale, no leftovers, no overflow; a number that need not be
+/// whole may begin with "+". \return false if it is none.
 bool parse_number(std::string_view token, double& value);
 bool parse_number(std::string_view token, int64_t& value);
 bool parse_number(std::string_view token, uint64_t& value);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
+#include <string_view>
 
 #include "io/atomic_file.h"
 #include "io/byte_writer.h"
@@ -103,8 +105,9 @@ VertexColumns vertex_columns(const PlyHeader& header, const std::filesystem::pat
   if (out.has_colors()) {
     const PlyType type = vertex->properties[static_cast<size_t>(out.color[0])].type;
     const bool coded = type == PlyType::UInt8 || type == PlyType::Int8;
+    const bool whole = type == PlyType::UInt32 || type == PlyType::Int32;
     const bool wide = type == PlyType::UInt16 || type == PlyType::Int16;
-    out.color_scale = coded ? 1.0f / 255.0f : wide ? 1.0f / 65535.0f : 1.0f;
+    out.color_scale = coded || whole ? 1.0f / 255.0f : wide ? 1.0f / 65535.0f : 1.0f;
   }
   return out;
 }
@@ -114,6 +117,43 @@ bool states_other_colors(const PlyHeader& header) {
   const PlyElement* face = header.find("face");
   const bool has_texture = face != nullptr && face->find("texcoord") >= 0;
   return has_texture || (face != nullptr && find_scalar(*face, "red") >= 0);
+}
+
+/// What a file says beyond what is read, for a warning: numbers of vertices by name, and elements
+/// that may be faces of another form.
+std::string unread_properties(const PlyHeader& header, bool has_colors) {
+  constexpr std::array<std::string_view, 14> kKnown = {"x",
+                                                       "y",
+                                                       "z",
+                                                       "nx",
+                                                       "ny",
+                                                       "nz",
+                                                       "red",
+                                                       "green",
+                                                       "blue",
+                                                       "alpha",
+                                                       "quality",
+                                                       "scalar_sigma",
+                                                       "s",
+                                                       "t"};
+  std::string out;
+  const auto add = [&](const std::string& what) {
+    constexpr size_t kShown = 200;  // characters
+    if (out.size() < kShown) out += (out.empty() ? "" : ", ") + printable(what);
+  };
+  for (const PlyProperty& property : header.find("vertex")->properties) {
+    const bool is_known = std::find(kKnown.begin(), kKnown.end(), property.name) != kKnown.end();
+    if (!is_known) add(property.name);
+  }
+  if (header.find("tristrips") != nullptr) add("triangle strips, which hold its faces");
+  const auto names_texture = [](const std::string& comment) {
+    return comment.starts_with("TextureFile");
+  };
+  if (has_colors &&  // else the texture is missed, and another warning says so
+      std::any_of(header.comments.begin(), header.comments.end(), names_texture)) {
+    add("its texture");
+  }
+  return out;
 }
 
 /// Collects rows; positions stay double in file coordinates until the frame is known.
@@ -162,7 +202,7 @@ class MeshRows {
     }
     if (columns_.has_colors()) {
       Eigen::Vector3f color = columns_.color_scale * triple(row, columns_.color).cast<float>();
-      for (float& c : color) c = c > 0 ? std::min(c, 1.0f) : 0.0f;  // NaN too
+      for (float& c : color) c = c > 0 ? c : 0.0f;  // NaN too
       mesh.colors.push_back(color);
     }
     if (columns_.quality >= 0) {
@@ -270,11 +310,14 @@ ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
     const bool is_text = header.format == PlyFormat::Ascii;
     out.digits = is_double || is_text ? kDoubleDigits : kFloatDigits;
   }
+  settle_colors(out);
   if (out.mesh.colors.empty() && states_other_colors(header)) {
     out.warnings.emplace_back(
         "textures and colours of faces are not read, only colours of vertices, which it has none "
         "of");
   }
+  const std::string unread = unread_properties(header, !out.mesh.colors.empty());
+  if (!unread.empty()) out.warnings.push_back("not read: " + unread);
   if (trailing > 0) {
     out.warnings.push_back("trailing " + std::to_string(trailing) + " bytes ignored");
   }

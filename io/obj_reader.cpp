@@ -21,6 +21,12 @@ std::optional<Provenance> provenance_of_group(std::string_view name) {
   return std::nullopt;
 }
 
+// Comments and names of files may end like a line that goes on: "# from C:\models\".
+bool may_go_on(std::string_view line) {
+  const auto words = tokens(line);
+  return !words.empty() && !words[0].starts_with('#') && words[0] != "mtllib";
+}
+
 class ObjRows {
  public:
   ObjRows(std::string_view bytes, const std::filesystem::path& path) : lines_(bytes, path) {}
@@ -29,7 +35,7 @@ class ObjRows {
     std::string joined;
     while (const auto line = lines_.next()) {
       if (line->starts_with("# ")) out_.comments.emplace_back(line->substr(2, 200));
-      const bool goes_on = line->ends_with('\\');
+      const bool goes_on = line->ends_with('\\') && (!joined.empty() || may_go_on(*line));
       joined.append(*line, 0, line->size() - (goes_on ? 1 : 0));
       constexpr size_t kLongest = size_t{4} << 20;
       if (joined.size() > kLongest) {
@@ -55,13 +61,13 @@ class ObjRows {
     if (words[0] == "v") add_vertex(words);
     if (words[0] == "f") add_face(words);
     if (words[0] == "usemtl") has_materials_ = true;
+    if (words[0] == "vt") has_texture_ = true;
     if (words[0] == "g") {
       group_ = words.size() == 2 ? provenance_of_group(words[1]) : std::nullopt;
     }
   }
 
   double number(std::string_view word) const {
-    if (word.starts_with('+')) word.remove_prefix(1);
     double value = 0;
     if (!parse_number(word, value)) {
       lines_.fail(Defect::Syntax,
@@ -123,6 +129,8 @@ class ObjRows {
     if (has_materials_ && out_.mesh.colors.empty() && out_.mesh.provenance.empty()) {
       out_.warnings.emplace_back(
           "materials and textures are not read, only colours of vertices, which it has none of");
+    } else if (has_materials_ && has_texture_) {
+      out_.warnings.emplace_back("textures are not read");
     }
     if (small_faces_ > 0) {
       out_.warnings.push_back("dropped " + std::to_string(small_faces_) +
@@ -136,6 +144,7 @@ class ObjRows {
   std::optional<Provenance> group_;
   bool all_grouped_ = true;
   bool has_materials_ = false;
+  bool has_texture_ = false;
   uint64_t small_faces_ = 0;
 };
 

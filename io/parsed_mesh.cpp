@@ -95,11 +95,13 @@ std::vector<std::array<uint32_t, 3>> ears_of(const std::vector<uint32_t>& corner
 }  // namespace
 
 void settle_colors(ParsedMesh& parsed) {
+  constexpr float kBeyondWhite = 2;
   std::vector<Eigen::Vector3f>& colors = parsed.mesh.colors;
-  const bool are_bytes = std::any_of(
-      colors.begin(), colors.end(), [](const Eigen::Vector3f& c) { return c.maxCoeff() > 1; });
+  const bool are_bytes = std::any_of(colors.begin(), colors.end(), [](const Eigen::Vector3f& c) {
+    return c.maxCoeff() > kBeyondWhite;
+  });
   if (are_bytes) {
-    parsed.warnings.emplace_back("colours above 1: taken as values from 0 to 255");
+    parsed.warnings.emplace_back("colours above 2: taken as values from 0 to 255");
   }
   for (Eigen::Vector3f& c : colors) {
     if (are_bytes) c /= 255;

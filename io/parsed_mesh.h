@@ -33,8 +33,8 @@ void append_polygon(const std::vector<uint32_t>& corners,
                     const std::vector<Eigen::Vector3d>& positions,
                     std::vector<std::array<uint32_t, 3>>& triangles);
 
-/// Colours as formats of text state them: 0 to 1, or 0 to 255 where any is above 1, which a warning
-/// then says. Brings them to [0, 1].
+/// Colours as formats of text state them: 0 to 1, or 0 to 255 where any is above 2 (brighter than
+/// white by a little they may be), which a warning then says. Brings them to [0, 1].
 void settle_colors(ParsedMesh& parsed);
 
 /// Gives the colours that some vertices state to those, and white to the others, with a warning.

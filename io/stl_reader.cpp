@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/stl_reader.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "io/byte_reader.h"
@@ -113,23 +115,37 @@ ParsedMesh read_text(const std::string& bytes, const std::filesystem::path& path
   return out;
 }
 
+// In any case: some programs write SOLID.
+bool starts_with_solid(std::string_view bytes) {
+  constexpr std::string_view kSolid = "solid";
+  return bytes.size() >= kSolid.size() &&
+         std::equal(kSolid.begin(), kSolid.end(), bytes.begin(), [](char a, char b) {
+           return a == std::tolower(static_cast<unsigned char>(b));
+         });
+}
+
 bool is_binary(const std::string& bytes) {
   if (bytes.size() < kHeaderBytes) return false;
   uint32_t count = 0;
   std::memcpy(&count, bytes.data() + 80, sizeof(count));
   if (kHeaderBytes + uint64_t{kFacetBytes} * count == bytes.size()) return true;
-  return !std::string_view(bytes).starts_with("solid");
+  return !starts_with_solid(bytes);
 }
 
 }  // namespace
 
 ParsedMesh read_stl(const std::filesystem::path& path) {
-  const std::string bytes = read_file(path);
+  std::string bytes = read_file(path);
   refuse_foreign_content(path, bytes, "STL");
-  if (!is_binary(bytes) && !std::string_view(bytes).starts_with("solid")) {
+  if (!is_binary(bytes) && !starts_with_solid(bytes)) {
     throw BadInput(Defect::Truncated,
                    path,
                    std::to_string(bytes.size()) + " bytes, a binary STL file has at least 84");
+  }
+  if (!is_binary(bytes) && !bytes.starts_with("solid")) {
+    std::transform(bytes.begin(), bytes.end(), bytes.begin(), [](char c) {
+      return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    });
   }
   ParsedMesh out = is_binary(bytes) ? read_binary(bytes, path) : read_text(bytes, path);
   if (out.mesh.faces.empty()) throw BadInput(Defect::Empty, path, "no facet");

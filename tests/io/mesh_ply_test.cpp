@@ -215,5 +215,30 @@ TEST(MeshPly, RefusesArraysThatDoNotFit) {
   EXPECT_EQ(test::entries(dir.path()), 0);
 }
 
+TEST(MeshPly, ReadsColoursAsNumbersUpTo255) {
+  const test::TempDir dir;
+  for (const std::string type : {"float", "int", "double", "uint"}) {
+    test::write_bytes(dir / "a.ply",
+                      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                      "property float y\nproperty float z\nproperty " +
+                          type + " red\nproperty " + type + " green\nproperty " + type +
+                          " blue\nend_header\n0 0 0 51 255 0\n");
+    const Eigen::Vector3f color = read_mesh_ply(dir / "a.ply").mesh.colors.at(0);
+    EXPECT_LT((color - Eigen::Vector3f(0.2f, 1, 0)).norm(), 1e-6f) << type;
+  }
+}
+
+TEST(MeshPly, NamesWhatItDoesNotRead) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                    "property float y\nproperty float z\nproperty float scalar_Intensity\n"
+                    "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+                    "0 0 0 7\n3 0 0 0\n");
+  const MeshFile out = read_mesh_ply(dir / "a.ply");
+  ASSERT_EQ(out.warnings.size(), 1U);
+  EXPECT_EQ(out.warnings[0], "not read: scalar_Intensity, triangle strips, which hold its faces");
+}
+
 }  // namespace
 }  // namespace cgs

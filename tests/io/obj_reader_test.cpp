@@ -52,7 +52,7 @@ TEST(ReadObj, SaysWhichColoursItLeavesOutOrChanges) {
   const ParsedMesh bytes = parsed("v 0 0 0 255 0 51\nv 1 0 0 0 0 0\nv 0 1 0 0 0 0\n" + faces);
   EXPECT_LT((bytes.mesh.colors[0] - Eigen::Vector3f(1, 0, 0.2f)).norm(), 1e-6f);
   ASSERT_EQ(bytes.warnings.size(), 1U);
-  EXPECT_TRUE(bytes.warnings[0].starts_with("colours above 1"));
+  EXPECT_TRUE(bytes.warnings[0].starts_with("colours above 2"));
   const ParsedMesh some = parsed("v 0 0 0\nv 1 0 0 0 255 0\nv 0 1 0\n" + faces);
   ASSERT_EQ(some.mesh.colors.size(), 3U);
   EXPECT_EQ(some.mesh.colors[0], Eigen::Vector3f::Ones());
@@ -84,6 +84,20 @@ TEST(ReadObj, AGroupOfAnotherNameLeavesProvenanceUnstated) {
   const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   EXPECT_EQ(parsed(vertices + "g observed\nf 1 2 3\n").mesh.provenance.size(), 1U);
   EXPECT_TRUE(parsed(vertices + "g observed\nf 1 2 3\ng door\nf 1 2 3\n").mesh.provenance.empty());
+}
+
+TEST(ReadObj, CommentsAndFileNamesEndWithTheirLine) {
+  const ParsedMesh mesh =
+      parsed("# from C:\\models\\\nv 0 0 0\nmtllib C:\\a\\\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_EQ(mesh.positions.size(), 3U);
+  EXPECT_EQ(mesh.positions[0], Eigen::Vector3d::Zero());
+}
+
+TEST(ReadObj, SaysThatATextureIsLostBesideColours) {
+  const ParsedMesh mesh =
+      parsed("v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
+  ASSERT_EQ(mesh.warnings.size(), 1U);
+  EXPECT_EQ(mesh.warnings[0], "textures are not read");
 }
 
 }  // namespace

@@ -67,5 +67,15 @@ TEST(ReadStl, RefusesWhatIsDamaged) {
   EXPECT_EQ(defect(infinite), "VALUE");
 }
 
+TEST(ReadStl, ReadsTextInCapitalsAndSigns) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.stl",
+                    "SOLID X\nFACET NORMAL 0 0 1\nOUTER LOOP\nVERTEX +1.0E0 0 0\nVERTEX 2 0 0\n"
+                    "VERTEX 1 +1 0\nENDLOOP\nENDFACET\nENDSOLID X\n");
+  const ParsedMesh mesh = read_stl(dir / "a.stl");
+  ASSERT_EQ(mesh.mesh.faces.size(), 1U);
+  EXPECT_EQ(mesh.positions[0], Eigen::Vector3d(1, 0, 0));
+}
+
 }  // namespace
 }  // namespace cgs
