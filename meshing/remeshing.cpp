@@ -8,6 +8,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include <CGAL/Polygon_mesh_processing/connected_components.h>
+#include <CGAL/Polygon_mesh_processing/detect_features.h>
 #include <CGAL/Polygon_mesh_processing/remesh.h>
 
 #include "libcgs/core/error.h"
@@ -52,6 +54,32 @@ void check_size(const TriangleMesh& mesh, double edge) {
                    " faces, allowed are 67108864");
 }
 
+/// Parts of the surface that are remeshed apart, so that what borders them stays: edges that turn
+/// by more than 40 degrees, at which corners would be cut off, and those between labels.
+struct Patches {
+  PolygonMesh::Property_map<PolygonMesh::Edge_index, bool> is_border;
+  PolygonMesh::Property_map<PolygonMesh::Face_index, size_t> of_face;
+  std::vector<Provenance> labels;  // per patch; empty where faces have none
+
+  Patches(PolygonMesh& mesh, const std::vector<Provenance>& label_of) {
+    constexpr double kSharp = 40;  // [degrees]
+    is_border = mesh.add_property_map<PolygonMesh::Edge_index, bool>("e:border", false).first;
+    of_face = mesh.add_property_map<PolygonMesh::Face_index, size_t>("f:patch", 0).first;
+    CGAL::Polygon_mesh_processing::detect_sharp_edges(mesh, kSharp, is_border);
+    for (const auto edge : mesh.edges()) {
+      if (mesh.is_border(edge) || label_of.empty()) continue;
+      const auto side = mesh.halfedge(edge);
+      const auto label = [&](auto halfedge) { return label_of[size_t(mesh.face(halfedge))]; };
+      if (label(side) != label(mesh.opposite(side))) is_border[edge] = true;
+    }
+    const size_t count = CGAL::Polygon_mesh_processing::connected_components(
+        mesh, of_face, CGAL::parameters::edge_is_constrained_map(is_border));
+    if (label_of.empty()) return;
+    labels.resize(count);
+    for (const auto f : mesh.faces()) labels[of_face[f]] = label_of[size_t(f)];
+  }
+};
+
 }  // namespace
 
 void require_room_to_subdivide(const TriangleMesh& mesh, size_t times) {
@@ -79,19 +107,18 @@ TriangleMesh remeshed(const TriangleMesh& mesh, double edge) {
     throw NumericalError("remeshing: " + std::to_string(pairs) +
                          " pairs of faces cut each other; cut these out first");
   }
-  auto label = halfedges.add_property_map<PolygonMesh::Face_index, int>("f:label", 0).first;
-  for (uint32_t f = 0; f < mesh.provenance.size(); ++f) {
-    label[PolygonMesh::Face_index(f)] = static_cast<int>(mesh.provenance[f]);
-  }
+  const Patches patches(halfedges, mesh.provenance);
   constexpr unsigned kIterations = 3;
   CGAL::Polygon_mesh_processing::isotropic_remeshing(
       halfedges.faces(),
       edge,
       halfedges,
-      CGAL::parameters::number_of_iterations(kIterations).face_patch_map(label));
+      CGAL::parameters::number_of_iterations(kIterations)
+          .face_patch_map(patches.of_face)
+          .edge_is_constrained_map(patches.is_border));
   TriangleMesh out = polygon_mesh::to_triangles(halfedges);
   for (const auto f : halfedges.faces()) {
-    if (!mesh.provenance.empty()) out.provenance.push_back(static_cast<Provenance>(label[f]));
+    if (!mesh.provenance.empty()) out.provenance.push_back(patches.labels[patches.of_face[f]]);
   }
   take_attributes(out, StatedSurface(mesh));
   if (!mesh.normals.empty()) out.normals = vertex_normals(out);

@@ -74,5 +74,14 @@ TEST(Remeshed, RefusesWhatMightNotEnd) {
   EXPECT_THROW(remeshed(test::cube_mesh(1).mesh, 0), InvalidInput);
 }
 
+TEST(Remeshed, CutsOffNoCorner) {
+  const TriangleMesh cube = test::cube_mesh(1).mesh;
+  const TriangleMesh out = remeshed(cube, 0.3);
+  EXPECT_TRUE(certify(out).passed());
+  EXPECT_GT(out.faces.size(), cube.faces.size());
+  EXPECT_NEAR(certify(out).volume, 1, 1e-4);
+  EXPECT_LT(mesh_distance(out, cube, 20'000).hausdorff(), 1e-3);
+}
+
 }  // namespace
 }  // namespace cgs
