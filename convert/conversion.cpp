@@ -485,7 +485,10 @@ std::string conversion_table() {
 Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   ConversionRequest request = given;
   Source source = read_source(request.input, request.volume.memory_limit);
-  settle_up(source.frame, request.up, source.content == Content::Splats);
+  const bool keeps_axes = source.content == Content::Mesh && !is_turned_upright(request.output);
+  if (!keeps_axes || !request.up.empty()) {
+    settle_up(source.frame, request.up, source.content == Content::Splats);
+  }
   if (!request.assume_unit.empty()) {
     const std::string refused = assume_unit(source.frame, request.assume_unit);
     if (!refused.empty()) source.warnings.push_back(refused);

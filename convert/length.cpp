@@ -57,6 +57,20 @@ double parse_length(const std::string& text, const Frame& frame) {
   return metres / frame.metres_per_unit / frame.scale;
 }
 
+double parse_coordinate(const std::string& text, const Frame& frame) {
+  const bool is_negative = text.starts_with('-');
+  const std::string size = is_negative ? text.substr(1) : text;
+  double value = 0;
+  const auto [end, error] = std::from_chars(size.data(), size.data() + size.size(), value);
+  if (error == std::errc() && value == 0) {  // which is no length, but a place
+    const std::string unit(end, size.data() + size.size());
+    if (!unit.empty()) (void)parse_length("1" + unit, frame);
+    return 0;
+  }
+  const double length = parse_length(size, frame) * frame.scale;
+  return is_negative ? -length : length;
+}
+
 double parse_metres(const std::string& text) {
   const auto [value, unit] = number_and_suffix(text, "length");
   return value * metres_in(unit);

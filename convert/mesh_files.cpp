@@ -16,6 +16,7 @@
 #include "io/threemf.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
+#include "meshing/repair.h"
 
 namespace cgs {
 
@@ -66,8 +67,8 @@ Json write_mesh_files(const std::filesystem::path& folder,
   for (const char* name : {"watertight.stl", "watertight.3mf"}) {
     if (!frame.has_metric_scale()) {
       left_out[name] =
-          "the scale of this scene is unknown and CAD files are in millimetres; "
-          "--assume-unit m writes them as if one scene unit were a metre";
+          "the scale of this scene is unknown and CAD files are in millimetres; --known-distance "
+          "tells it, --assume-unit m says that one scene unit is a metre";
       std::filesystem::remove(folder / name);  // of a time when the scale was known
       continue;
     }
@@ -87,6 +88,11 @@ bool is_writable_mesh_name(const std::filesystem::path& path) {
   return std::find(kKnown.begin(), kKnown.end(), lower_extension(path)) != kKnown.end();
 }
 
+bool is_turned_upright(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  return extension == ".stl" || extension == ".3mf" || extension == ".glb";
+}
+
 void require_writable_as(const std::filesystem::path& path, const Frame& frame) {
   const std::string extension = lower_extension(path);
   if (extension != ".stl" && extension != ".3mf") return;
@@ -94,6 +100,15 @@ void require_writable_as(const std::filesystem::path& path, const Frame& frame) 
           "CAD files are in millimetres; say what a unit is with --assume-unit m (cm, mm, in, ft); "
           "the scale of this input must be known",
           "unknown");
+}
+
+std::string seams_text(const TriangleMesh& mesh) {
+  constexpr double kMany = 0.01;
+  const size_t repeated = repeated_vertices(mesh);
+  if (double(repeated) <= kMany * double(mesh.vertices.size())) return "";
+  return std::to_string(repeated) + " of " + std::to_string(mesh.vertices.size()) +
+         " vertices lie where others do, so that faces that touch do not hang together: cgs filter "
+         "--op repair joins them";
 }
 
 std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& mesh) {
@@ -104,7 +119,7 @@ std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& 
     if (is_lost) out += (out.empty() ? "" : ", ") + std::string(what);
   };
   add(extension == ".stl" && !mesh.provenance.empty(), "labels");
-  add(extension == ".stl" && !mesh.colors.empty(), "colours");
+  add((extension == ".stl" || extension == ".3mf") && !mesh.colors.empty(), "colours");
   add(!mesh.sigma.empty(), "sigma");
   add(!mesh.support.empty(), "support");
   return out.empty() ? out : extension + " files hold no " + out + "; .ply and .glb do";

@@ -33,9 +33,17 @@ nlohmann::ordered_json write_mesh_files(const std::filesystem::path& folder,
 /// True for the endings that write_mesh_as() takes: .ply, .obj, .stl, .3mf, .glb, in any case.
 bool is_writable_mesh_name(const std::filesystem::path& path);
 
+/// True for the endings whose format says which axis is up, so that a mesh is turned: .stl, .3mf
+/// and .glb. What else is written keeps its axes, and says what is up only where that is known.
+bool is_turned_upright(const std::filesystem::path& path);
+
 /// What can be refused before any work: STL and 3MF of a scene of unknown scale.
 /// \throws InvalidInput
 void require_writable_as(const std::filesystem::path& path, const Frame& frame);
+
+/// Says that a mesh falls apart where many of its vertices lie in one place, and what helps; empty
+/// if it does not.
+std::string seams_text(const TriangleMesh& mesh);
 
 /// What the format of a path has no place for, of what a mesh says, for people; empty if nothing.
 std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& mesh);

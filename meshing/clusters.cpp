@@ -64,7 +64,8 @@ PointClusters numbered(const std::vector<uint32_t>& host, DisjointSets& sets) {
 
 PointClusters dense_clusters(const std::vector<Eigen::Vector3f>& points,
                              double radius,
-                             size_t neighbors) {
+                             size_t neighbors,
+                             const Progress& progress) {
   require(radius > 0, "the radius must be > 0", radius);
   require(neighbors > 0, "the number of neighbours must be > 0", neighbors);
   const KdTree tree(points);
@@ -72,7 +73,10 @@ PointClusters dense_clusters(const std::vector<Eigen::Vector3f>& points,
   DisjointSets sets(points.size());
   std::vector<uint32_t> host(points.size(), PointClusters::kNoise);
   std::vector<Neighbor> around;
+  size_t done = 0;
   for (const uint32_t p : tree.order()) {
+    constexpr size_t kBetweenReports = 64;  // a point may have all others around it
+    if (done++ % kBetweenReports == 0) report(progress, double(done) / double(points.size()));
     tree.within(points[p], float(radius), around);
     if (dense[p] == 0) {
       host[p] = host_of(around, dense);

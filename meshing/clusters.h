@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 
+#include "libcgs/core/progress.h"
+
 namespace cgs {
 
 /// Which cluster each point belongs to.
@@ -25,6 +27,7 @@ struct PointClusters {
 /// InvalidInput unless radius > 0 and neighbors > 0
 PointClusters dense_clusters(const std::vector<Eigen::Vector3f>& points,
                              double radius,
-                             size_t neighbors);
+                             size_t neighbors,
+                             const Progress& progress = {});
 
 }  // namespace cgs

@@ -122,6 +122,18 @@ void turn_like(std::vector<Eigen::Vector3f>& normals, const std::vector<Eigen::V
   }
 }
 
+void turn_parts_like(std::vector<Eigen::Vector3f>& normals,
+                     const std::vector<Eigen::Vector3f>& hints,
+                     const std::vector<uint32_t>& part_of) {
+  std::vector<double> agreement(normals.size(), 0.0);
+  for (size_t i = 0; i < normals.size(); ++i) {
+    agreement[part_of[i]] += double(normals[i].dot(hints[i]));
+  }
+  for (size_t i = 0; i < normals.size(); ++i) {
+    if (agreement[part_of[i]] < 0) normals[i] = -normals[i];
+  }
+}
+
 void turn_towards(std::vector<Eigen::Vector3f>& normals,
                   const std::vector<Eigen::Vector3f>& points,
                   const Eigen::Vector3f& eye) {

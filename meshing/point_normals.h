@@ -21,6 +21,12 @@ std::vector<Eigen::Vector3f> estimated_normals(const std::vector<Eigen::Vector3f
 /// stays.
 void turn_like(std::vector<Eigen::Vector3f>& normals, const std::vector<Eigen::Vector3f>& hints);
 
+/// Turns the normals of each part together, to the side that most hints for its points say; parts
+/// without any stay. \param part_of  per point a number of its part, as from turn_consistently()
+void turn_parts_like(std::vector<Eigen::Vector3f>& normals,
+                     const std::vector<Eigen::Vector3f>& hints,
+                     const std::vector<uint32_t>& part_of);
+
 /// Turns each normal to the side on which `eye` lies.
 void turn_towards(std::vector<Eigen::Vector3f>& normals,
                   const std::vector<Eigen::Vector3f>& points,

@@ -32,13 +32,18 @@ auto place_of(const TriangleMesh& mesh, uint32_t v) {
   return std::make_tuple(p.x(), p.y(), p.z());
 }
 
-// Gives vertices at the same place one number, the smallest, and what can be said for all of them.
-size_t merge_vertices(TriangleMesh& mesh) {
+std::vector<uint32_t> sorted_by_place(const TriangleMesh& mesh) {
   std::vector<uint32_t> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), 0U);
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
     return std::make_pair(place_of(mesh, a), a) < std::make_pair(place_of(mesh, b), b);
   });
+  return order;
+}
+
+// Gives vertices at the same place one number, the smallest, and what can be said for all of them.
+size_t merge_vertices(TriangleMesh& mesh) {
+  const std::vector<uint32_t> order = sorted_by_place(mesh);
   std::vector<uint32_t> renamed(order.size());
   size_t merged = 0;
   uint32_t kept = 0;
@@ -271,6 +276,15 @@ RepairedMesh repaired(const TriangleMesh& mesh) {
   orient_outward(out);
   if (!mesh.normals.empty()) out.mesh.normals = vertex_normals(out.mesh);
   return out;
+}
+
+size_t repeated_vertices(const TriangleMesh& mesh) {
+  const std::vector<uint32_t> order = sorted_by_place(mesh);
+  size_t count = 0;
+  for (size_t i = 1; i < order.size(); ++i) {
+    count += place_of(mesh, order[i]) == place_of(mesh, order[i - 1]) ? 1 : 0;
+  }
+  return count;
 }
 
 TriangleMesh without_self_intersections(const TriangleMesh& mesh) {

@@ -32,6 +32,10 @@ struct RepairedMesh {
 /// \pre face indices are below mesh.vertices.size()
 RepairedMesh repaired(const TriangleMesh& mesh);
 
+/// How many vertices lie exactly where another one does, so that faces that touch do not hang
+/// together: of a mesh whose program writes the corners of every face, or of every seam, anew.
+size_t repeated_vertices(const TriangleMesh& mesh);
+
 /// The mesh without the faces that cut others; the gaps are open.
 TriangleMesh without_self_intersections(const TriangleMesh& mesh);
 

@@ -44,7 +44,7 @@ void run_filter_command(const FilterArgs& args) {
   (void)prepare_filters(args.operations, Frame{.metres_per_unit = 1});  // before a long read
   MeasurableFile file = read_measured(args.input, args.assume_unit);
   terminal.warn(file.warnings);
-  settle_up(file.content.frame, args.up);
+  if (!args.up.empty()) file.content.frame.up = up_direction(args.up);
   FilterState state{std::move(file.content.mesh), file.content.frame, file.content.file_origin};
   const std::vector<PreparedFilter> filters = prepare_filters(args.operations, state.frame);
   for (const PreparedFilter& filter : filters) {
@@ -55,7 +55,12 @@ void run_filter_command(const FilterArgs& args) {
   check_content(args.output, state);
   const std::string lost = lost_in_file(args.output, state.mesh);
   if (!lost.empty()) terminal.say(lost);
-  write_mesh_as(args.output, state.mesh, state.frame);
+  Frame written = state.frame;
+  if (is_turned_upright(args.output)) settle_up(written, {});
+  // Nothing is rounded, so that what was certified stays that: cgs convert compresses.
+  GlbOptions exact;
+  exact.encoding = GlbEncoding::Plain;
+  write_mesh_as(args.output, state.mesh, written, exact);
   if (state.frame.file_origin != state.file_origin) {
     terminal.warn("coordinates in " + printable(args.output) +
                   " are from another origin, which the file states: floats would lose digits");

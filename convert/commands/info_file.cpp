@@ -13,6 +13,7 @@
 
 #include "convert/conversion.h"
 #include "convert/frame_json.h"
+#include "convert/html.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
 #include "convert/run_record.h"
@@ -84,12 +85,13 @@ void print_mesh(const Json& info, const Certificate& certificate) {
               info["states"]["provenance"].get<bool>() ? "stated" : "not stated",
               info["states"]["sigma"].get<bool>() ? "stated" : "not stated");
   if (!info["certificate"].is_null()) {
-    std::printf("%s: %s, Euler number %ld, smallest angle %.3g degrees, volume %.6g\n",
+    const auto volume = info["certificate"]["volume"].get<double>();
+    std::printf("%s: %s, Euler number %ld, smallest angle %.3g degrees%s\n",
                 certificate.passed() ? "certified watertight" : "NOT watertight",
                 certificate_line(certificate).c_str(),
                 certificate.euler_number,
                 certificate.smallest_angle * 180 / M_PI,
-                info["certificate"]["volume"].get<double>());
+                certificate.closed ? (", volume " + number(volume, "%.6g")).c_str() : "");
   }
   print_warnings(info);
 }
@@ -115,13 +117,15 @@ void print_splats(const Json& info) {
 }
 
 void tell_mesh(const fs::path& path, bool as_json) {
-  const MeasurableFile file = read_mesh_file(path);
+  MeasurableFile file = read_mesh_file(path);
   const TriangleMesh& mesh = file.content.mesh;
   Certificate certificate;
   Json proved = nullptr;
   if (!mesh.faces.empty()) {
     certificate = certify(mesh);
     proved = certificate_to_json(certificate, mesh, file.content.frame);
+    const std::string seams = certificate.closed ? "" : seams_text(mesh);
+    if (!seams.empty()) file.warnings.push_back(seams);
   }
   print_info(
       mesh_json(file, proved), as_json, [&](const Json& info) { print_mesh(info, certificate); });

@@ -88,12 +88,14 @@ Json Measuring::surface_shares(const MeasuredValue& area) const {
 void Measuring::volume() {
   const Certificate& c = certified();
   if (!c.closed || !c.oriented_outward) {
-    const char* const reason =
+    std::string reason =
         c.closed ? "its faces look inward, or disagree on which side is outside; cgs filter --op "
                    "repair turns them"
                  : "the surface is not closed";
+    const std::string seams = c.closed ? "" : seams_text(mesh_.mesh);
+    if (!seams.empty()) reason += "; " + seams;
     figures_["volume"] = {{"value", nullptr}, {"reason", reason}};
-    say("volume", std::string("none: ") + reason);
+    say("volume", "none: " + reason);
     return;
   }
   const MeasuredValue value = enclosed_volume(mesh_);

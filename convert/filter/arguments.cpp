@@ -60,12 +60,8 @@ size_t FilterArguments::count(size_t least, size_t most) {
 
 double FilterArguments::coordinate() {
   const std::string text = word();
-  double value = 0;
-  if (parse_number(text, value) && std::isfinite(value)) return value;
-  const bool negative = !text.empty() && text[0] == '-';
   try {
-    const double size = parse_length(negative ? text.substr(1) : text, frame_) * frame_.scale;
-    return negative ? -size : size;
+    return parse_coordinate(text, frame_);
   } catch (const InvalidInput& error) {
     fail(error.what());
   }

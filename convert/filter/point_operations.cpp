@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <utility>
 
 #include "convert/filter/operations.h"
@@ -46,6 +47,9 @@ FilterStep prepare_voxel(FilterArguments& arguments) {
   };
 }
 
+// Other programs write 0 0 0 where they know of none.
+bool is_stated(const Eigen::Vector3f& normal) { return !normal.isZero(0); }
+
 FilterStep prepare_normals(FilterArguments& arguments) {
   const bool given = arguments.more();
   constexpr size_t kDefault = 30;
@@ -58,13 +62,20 @@ FilterStep prepare_normals(FilterArguments& arguments) {
       mesh.normals = vertex_normals(mesh);
       return "from the faces";
     }
-    std::vector<Eigen::Vector3f> normals = estimated_normals(mesh.vertices, neighbors);
-    const bool had_normals = !mesh.normals.empty();
+    const std::vector<Eigen::Vector3f> before = std::move(mesh.normals);
+    mesh.normals = estimated_normals(mesh.vertices, neighbors);
+    const auto stated = static_cast<size_t>(std::count_if(before.begin(), before.end(), is_stated));
+    if (stated > 0 && stated == before.size()) {
+      turn_like(mesh.normals, before);
+      return "on the side of those before";
+    }
     constexpr size_t kJoined = 10;
-    if (had_normals) turn_like(normals, mesh.normals);
-    if (!had_normals) turn_consistently(normals, mesh.vertices, kJoined);
-    mesh.normals = std::move(normals);
-    return had_normals ? "on the side of those before" : "neighbours turned alike";
+    const std::vector<uint32_t> parts = turn_consistently(mesh.normals, mesh.vertices, kJoined);
+    if (stated == 0) return "neighbours turned alike";
+    turn_parts_like(mesh.normals, before, parts);
+    turn_like(mesh.normals, before);
+    return "on the side of those before, which " + std::to_string(before.size() - stated) +
+           " points did not state: these like their neighbours";
   };
 }
 

@@ -14,12 +14,18 @@ namespace cgs {
 
 namespace {
 
-void require_normals(const TriangleMesh& cloud) {
-  const bool any = std::any_of(cloud.normals.begin(),
-                               cloud.normals.end(),
-                               [](const Eigen::Vector3f& n) { return !n.isZero(0); });
-  if (any) return;
-  throw InvalidInput("--op poisson: the points have no normals; put --op normals before it");
+// \return what is to be said of points that state none
+std::string require_normals(const TriangleMesh& cloud) {
+  const auto none = static_cast<size_t>(
+      std::count_if(cloud.normals.begin(), cloud.normals.end(), [](const Eigen::Vector3f& n) {
+        return n.isZero(0);
+      }));
+  if (none == cloud.normals.size()) {
+    throw InvalidInput("--op poisson: the points have no normals; put --op normals before it");
+  }
+  if (none == 0) return "";
+  return "; " + std::to_string(none) + " of " + std::to_string(cloud.normals.size()) +
+         " points have no normal and were LEFT OUT: --op normals gives them one";
 }
 
 std::string behind_remark(const EvidenceTransfer& evidence) {
@@ -32,12 +38,12 @@ FilterStep prepare_poisson(FilterArguments& arguments) {
   const double spacing = arguments.more() ? arguments.length() : 0;
   return [spacing](FilterState& state, const Progress& progress) {
     require_cloud(state, "poisson");
-    require_normals(state.mesh);
+    const std::string left_out = require_normals(state.mesh);
     PoissonSurface made =
         poisson_surface(state.mesh, {.spacing = spacing / state.frame.scale}, progress);
     state.mesh = std::move(made.mesh);
     return "triangles of " + format_length(made.spacing, state.frame) + "; " +
-           bridge_remark(made.evidence, state.mesh) + behind_remark(made.evidence);
+           bridge_remark(made.evidence, state.mesh) + behind_remark(made.evidence) + left_out;
   };
 }
 

@@ -3,6 +3,7 @@
 
 #include "convert/filter/operations.h"
 #include "convert/length.h"
+#include "convert/mesh_files.h"
 #include "libcgs/core/error.h"
 #include "meshing/hole_filling.h"
 #include "meshing/hull.h"
@@ -51,6 +52,7 @@ FilterStep prepare_fill_holes(FilterArguments& arguments) {
   const double widest = arguments.more() ? arguments.length() : std::numeric_limits<double>::max();
   return [widest](FilterState& state, const Progress& progress) {
     require_faces(state, "fill-holes");
+    const std::string seams = seams_text(state.mesh);
     FilledMesh result = holes_filled(state.mesh, widest / state.frame.scale, progress);
     state.mesh = std::move(result.mesh);
     std::string remark = std::to_string(result.filled) + " holes filled, " +
@@ -58,7 +60,7 @@ FilterStep prepare_fill_holes(FilterArguments& arguments) {
     if (state.mesh.provenance.empty()) {
       remark += "; the file does not say what was observed, so what is filled is not marked";
     }
-    return remark;
+    return seams.empty() ? remark : remark + "; " + seams;
   };
 }
 

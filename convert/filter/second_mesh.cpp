@@ -23,7 +23,7 @@ void require_both_units(const std::filesystem::path& path,
                        " states its unit, the first file does not: say it by --assume-unit");
   }
   throw InvalidInput(operation + "the first file states its unit, " + printable(path) +
-                     " does not: cgs convert with --assume-unit writes it with one");
+                     " does not: cgs filter with --assume-unit writes it with one");
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "convert/filter/operations.h"
 #include "convert/length.h"
+#include "convert/mesh_files.h"
 #include "libcgs/core/error.h"
 #include "meshing/clusters.h"
 #include "meshing/components.h"
@@ -48,12 +49,14 @@ FilterStep prepare_crop_plane(FilterArguments& arguments) {
 // Keeps the parts for which the rule says so.
 template <typename Rule>
 std::string keep_parts(FilterState& state, const MeshComponents& parts, const Rule& rule) {
+  const std::string seams = seams_text(state.mesh);
   std::vector<uint8_t> keep(state.mesh.faces.size());
   for (size_t f = 0; f < keep.size(); ++f) keep[f] = rule(parts.of_face[f]) ? 1 : 0;
   state.mesh = with_faces(state.mesh, keep);
   size_t kept = 0;
   for (uint32_t part = 0; part < parts.area.size(); ++part) kept += rule(part) ? 1 : 0;
-  return std::to_string(parts.area.size()) + " -> " + std::to_string(kept) + " parts";
+  return std::to_string(parts.area.size()) + " -> " + std::to_string(kept) + " parts" +
+         (seams.empty() ? "" : "; " + seams);
 }
 
 // Which ones are the `count` largest; of equal ones the first.
@@ -103,9 +106,9 @@ FilterStep prepare_dbscan(FilterArguments& arguments) {
   const double radius = arguments.length();
   const size_t neighbors = arguments.count(1, 1'000'000);
   const size_t count = arguments.more() ? arguments.count(1, 1'000'000'000) : 1;
-  return [=](FilterState& state, const Progress&) {
+  return [=](FilterState& state, const Progress& progress) {
     const PointClusters clusters =
-        dense_clusters(state.mesh.vertices, radius / state.frame.scale, neighbors);
+        dense_clusters(state.mesh.vertices, radius / state.frame.scale, neighbors, progress);
     const std::vector<uint8_t> wanted = largest_of(clusters.size, count);
     std::vector<uint8_t> keep(clusters.of_point.size(), 0);
     size_t noise = 0;

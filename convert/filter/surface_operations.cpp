@@ -9,6 +9,7 @@
 #include "convert/length.h"
 #include "libcgs/core/error.h"
 #include "meshing/loop_subdivision.h"
+#include "meshing/mesh_distance.h"
 #include "meshing/remeshing.h"
 #include "meshing/simplify.h"
 #include "meshing/smoothing.h"
@@ -40,8 +41,20 @@ FilterStep prepare_taubin(FilterArguments& arguments) {
                         {.iterations = arguments.count(1, kMostIterations), .outward = kBack});
 }
 
+double rms_of(const MeshDistance& moved) {
+  return std::max(moved.accuracy.rms, moved.completeness.rms);
+}
+
+// What is known of a surface is known of it to within how far it was moved.
+void widen_sigma(TriangleMesh& mesh, double rms) {
+  for (float& sigma : mesh.sigma) {
+    if (!std::isnan(sigma)) sigma = static_cast<float>(std::hypot(double{sigma}, rms));
+  }
+}
+
 std::string take_simplified(FilterState& state, SimplifyResult result) {
   state.mesh = std::move(result.mesh);
+  widen_sigma(state.mesh, rms_of(result.evidence));
   if (result.faces_after == result.faces_before) {
     return "nothing left out, as the result would be too far off or cut itself; where the input "
            "cuts "
@@ -71,13 +84,10 @@ FilterStep prepare_simplify_to(FilterArguments& arguments) {
                                   .max_color_error = 1,
                                   .target_faces = faces};
     if (state.mesh.faces.size() <= faces) return std::string("there are no more than that");
-    SimplifyResult result = simplify(state.mesh, options, progress);
-    // The error is not bounded here, so that it has to be told where sigma is.
-    const double rms = std::max(result.evidence.accuracy.rms, result.evidence.completeness.rms);
-    for (float& sigma : result.mesh.sigma) {
-      if (!std::isnan(sigma)) sigma = static_cast<float>(std::hypot(double{sigma}, rms));
-    }
-    return take_simplified(state, std::move(result));
+    std::string remark = take_simplified(state, simplify(state.mesh, options, progress));
+    if (state.mesh.faces.size() <= faces) return remark;
+    return "STOPPED at " + std::to_string(state.mesh.faces.size()) +
+           " faces, as fewer would fold or be slivers; " + remark;
   };
 }
 
@@ -85,8 +95,12 @@ FilterStep prepare_remesh(FilterArguments& arguments) {
   const double edge = arguments.length();
   return [edge](FilterState& state, const Progress&) {
     require_faces(state, "remesh");
-    state.mesh = remeshed(state.mesh, edge / state.frame.scale);
-    return std::string();
+    const TriangleMesh before = std::move(state.mesh);
+    state.mesh = remeshed(before, edge / state.frame.scale);
+    constexpr size_t kSamples = 100'000;
+    const MeshDistance moved = mesh_distance(state.mesh, before, kSamples);
+    widen_sigma(state.mesh, rms_of(moved));
+    return "largest error measured " + format_length(moved.hausdorff(), state.frame);
   };
 }
 

@@ -41,6 +41,9 @@ TEST(LostInFile, IsWhatTheFormatHasNoPlaceFor) {
   TriangleMesh bare = corner();
   bare.sigma.clear();
   bare.support.clear();
+  EXPECT_EQ(lost_in_file("a.3mf", bare), ".3mf files hold no colours; .ply and .glb do")
+      << "but those of labels";
+  bare.colors.clear();
   EXPECT_EQ(lost_in_file("a.3mf", bare), "");
 }
 

@@ -346,5 +346,61 @@ TEST_F(Filter, RefusesSplatsAndOptionsWithoutEffect) {
   EXPECT_EQ(filter("ball.ply", "no.ply", "--op repair --memory-limit 1G").exit_code, 2);
 }
 
+TEST_F(Filter, ClaimsNoDirectionUpThatNobodyStated) {
+  test::write_bytes(dir_ / "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  for (const char* name : {"b.ply", "b.obj"}) {
+    ASSERT_EQ(filter("a.obj", name, "-q --op repair").exit_code, 0);
+    EXPECT_FALSE(read_mesh_file(dir_ / name).content.frame.knows_up()) << name;
+    ASSERT_EQ(filter("a.obj", name, "-q --op repair --up 0 1 0").exit_code, 0);
+    EXPECT_TRUE(read_mesh_file(dir_ / name).content.frame.knows_up()) << name;
+  }
+}
+
+TEST_F(Filter, WritesGlbAsExactAsPly) {
+  for (const char* name : {"exact.ply", "exact.glb"}) {
+    ASSERT_EQ(filter("ball.ply", name, "-q --op repair").exit_code, 0);
+  }
+  const MeasurableFile ply = read_mesh_file(dir_ / "exact.ply");
+  const MeasurableFile glb = read_mesh_file(dir_ / "exact.glb");
+  EXPECT_NEAR(certify(glb.content.mesh).volume * std::pow(glb.content.frame.scale, 3) /
+                  (certify(ply.content.mesh).volume * std::pow(ply.content.frame.scale, 3)),
+              1,
+              1e-5);
+}
+
+// Other programs write normals of 0 where they know of none.
+TEST_F(Filter, TakesNormalsOfZeroForNone) {
+  TriangleMesh cloud = test::labelled_sphere(32, 48);
+  cloud.faces.clear();
+  cloud.provenance.clear();
+  const auto volume_with = [&](size_t every) {
+    TriangleMesh some = cloud;
+    for (size_t i = 0; i < some.normals.size(); ++i) {
+      if (every == 0 || i % every != 0) some.normals[i].setZero();
+    }
+    write_mesh_ply(dir_ / "some.ply", some, test::centimetre_frame());
+    const ProgramResult made = filter("some.ply", "made.ply", "--op normals --op poisson=4cm");
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    return certify(read_mesh_file(dir_ / "made.ply").content.mesh).volume;
+  };
+  const double all = volume_with(1);
+  EXPECT_NEAR(volume_with(0) / all, 1, 0.02);
+  EXPECT_NEAR(volume_with(7) / all, 1, 0.02);
+}
+
+TEST_F(Filter, SaysThatCornersAreNotJoined) {
+  std::string soup;
+  for (const char* face : {"0 0 0 1 0 0 0 1 0", "1 0 0 0 1 0 0 0 1", "0 0 0 0 1 0 0 0 1"}) {
+    const std::string text = face;
+    for (size_t k = 0; k < 3; ++k) soup += "v " + text.substr(6 * k, 5) + "\n";
+  }
+  test::write_bytes(dir_ / "soup.obj", soup + "f 1 2 3\nf 4 5 6\nf 7 8 9\n");
+  for (const char* op : {"largest", "fill-holes"}) {
+    const ProgramResult result = filter("soup.obj", "o.ply", std::string("--op ") + op);
+    EXPECT_NE(result.err.find("5 of 9 vertices lie where others do"), std::string::npos)
+        << result.err;
+  }
+}
+
 }  // namespace
 }  // namespace cgs

@@ -78,5 +78,20 @@ TEST(TurnLike, FollowsTheHints) {
   EXPECT_EQ(normals[1], Eigen::Vector3f(0, 1, 0));
 }
 
+TEST(TurnPartsLike, FollowsTheFewThatStateASide) {
+  auto points = ball_points(2000);
+  const size_t ball = points.size();
+  for (const auto& p : ball_points(2000)) points.emplace_back(p + Eigen::Vector3f(9, 0, 0));
+  auto normals = estimated_normals(points, 20);
+  const auto parts = turn_consistently(normals, points, 10);
+  std::vector<Eigen::Vector3f> hints(points.size(), Eigen::Vector3f::Zero());
+  for (size_t i = 0; i < ball; i += 100) hints[i] = kCenter - points[i];  // inwards
+  turn_parts_like(normals, hints, parts);
+  for (size_t i = 0; i < ball; ++i) EXPECT_LT(normals[i].dot(points[i] - kCenter), 0) << i;
+  for (size_t i = ball; i < points.size(); ++i) {
+    EXPECT_GT(normals[i].dot(points[i] - kCenter - Eigen::Vector3f(9, 0, 0)), 0) << i;
+  }
+}
+
 }  // namespace
 }  // namespace cgs

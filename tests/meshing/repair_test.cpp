@@ -158,5 +158,17 @@ TEST(WithoutSelfIntersections, DropsTheFacesThatCut) {
   EXPECT_EQ(certify(out).self_intersections, 0U);
 }
 
+TEST(RepeatedVertices, AreCounted) {
+  const TriangleMesh ball = test::labelled_sphere();
+  EXPECT_EQ(repeated_vertices(ball), 0U);
+  TriangleMesh soup;
+  for (const auto& f : ball.faces) {
+    const auto first = static_cast<uint32_t>(soup.vertices.size());
+    for (const uint32_t v : f) soup.vertices.push_back(ball.vertices[v]);
+    soup.faces.push_back({first, first + 1, first + 2});
+  }
+  EXPECT_EQ(repeated_vertices(soup), soup.vertices.size() - ball.vertices.size());
+}
+
 }  // namespace
 }  // namespace cgs

@@ -34,6 +34,13 @@ TEST(FilterArguments, AreReadFromLeftToRight) {
   EXPECT_EQ(a.files().size(), 1U);
 }
 
+TEST(FilterArguments, PlacesMayBeZeroInAnyUnit) {
+  const Frame frame = centimetres();
+  EXPECT_EQ(arguments("op=0mm,-0m,0", frame).point(), Eigen::Vector3d::Zero());
+  EXPECT_THROW((void)arguments("op=0parsec,0,0", frame).point(), InvalidInput);
+  EXPECT_THROW((void)arguments("op=0mm,0,0", Frame()).point(), InvalidInput);
+}
+
 TEST(FilterArguments, LengthsAreInWorldUnitsWhateverTheFrame) {
   const Frame frame = centimetres();
   FilterArguments a = arguments("op=3,2m", frame);
