@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <optional>
 #include <tuple>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -90,10 +91,12 @@ std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
   }
 }
 
-// Photographs of one camera, size and stated focal length share a lens.
+// Photographs of one camera, size and stated focal length, also where that is no number of pixels,
+// share a lens.
 int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) {
   const auto key = [](const PhotoFile& p) {
-    return std::tie(p.size.width, p.size.height, p.hint.camera, p.hint.focal);
+    return std::tie(
+        p.size.width, p.size.height, p.hint.camera, p.hint.focal, p.hint.marked, p.hint.zoom);
   };
   const auto same = std::find_if(lenses.begin(), lenses.end(), [&](const PhotoFile* other) {
     return key(*other) == key(photograph);
@@ -142,6 +145,21 @@ std::string percent(double share) {
   return text;
 }
 
+// Pairs of placed photographs that are next to no way apart: a burst, or two copies of one.
+std::vector<std::pair<size_t, size_t>> photos_from_one_place(const PoseSolution& solution) {
+  constexpr double kNoWay = 1e-3;  // of the way to the farthest
+  std::vector<std::pair<size_t, size_t>> out;
+  for (size_t a = 0; a < solution.photos.size(); ++a) {
+    for (size_t b = a + 1; b < solution.photos.size(); ++b) {
+      if (!solution.photos[a].is_placed || !solution.photos[b].is_placed) continue;
+      const Eigen::Vector3d way =
+          solution.photos[b].camera.center() - solution.photos[a].camera.center();
+      if (way.norm() < kNoWay) out.emplace_back(a, b);
+    }
+  }
+  return out;
+}
+
 std::vector<std::string> remarks(const std::vector<UnposedPhoto>& photos,
                                  const PoseSolution& solution) {
   std::vector<std::string> out;
@@ -158,9 +176,16 @@ std::vector<std::string> remarks(const std::vector<UnposedPhoto>& photos,
                     " solved for: " + std::to_string(std::lround(solved.camera.fx)) +
                     " pixels, uncertain by " + percent(solved.focal_sigma) +
                     (photo.focal > 0
-                         ? " (Exif says " + std::to_string(std::lround(photo.focal)) + ")"
-                         : " (the file does not say)"));
+                         ? " (Exif says " + std::to_string(std::lround(photo.focal)) +
+                               (solved.is_refuted ? ", which the photographs contradict: they may "
+                                                    "have been cut or zoomed)"
+                                                  : ")")
+                         : " (its Exif, read from JPEG, HEIC and AVIF, does not say)"));
     }
+  }
+  for (const auto& [a, b] : photos_from_one_place(solution)) {
+    out.push_back("photographs " + printable(photos[a].name) + " and " + printable(photos[b].name) +
+                  " were taken from one place: together they tell nothing of depth");
   }
   return out;
 }
@@ -197,8 +222,8 @@ ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
   return model;
 }
 
-// A focal length in pixels is that of one size of photographs.
-void refuse_focal_of_two_sizes(const std::vector<PhotoFile>& photographs) {
+// A focal length in pixels is that of one size of photographs, and no lens is 28 pixels long.
+void check_focal(double focal, const std::vector<PhotoFile>& photographs) {
   const auto side = [](const PhotoFile& file) {
     return std::max(file.size.width, file.size.height);
   };
@@ -211,6 +236,17 @@ void refuse_focal_of_two_sizes(const std::vector<PhotoFile>& photographs) {
                        std::to_string(side(photograph)) +
                        ": bring them to one size, or leave it out");
   }
+  constexpr double kShortest = 0.2;  // [larger sides]; as photographs' own are taken
+  constexpr double kLongest = 50;
+  const double larger = side(photographs.front());
+  if (focal >= kShortest * larger && focal <= kLongest * larger) return;
+  throw InvalidInput("--focal is in pixels, not millimetres, and of photographs of " +
+                     std::to_string(side(photographs.front())) + " pixels allowed from " +
+                     std::to_string(std::lround(kShortest * larger)) + " to " +
+                     std::to_string(std::lround(kLongest * larger)) +
+                     " (a lens of f mm as on "
+                     "film: f / 36 of the larger side), got " +
+                     std::to_string(focal));
 }
 
 }  // namespace
@@ -220,7 +256,7 @@ PhotoPoses photo_poses(const SceneRoot& root,
                        const std::filesystem::path& stored,
                        Terminal& terminal) {
   const std::vector<PhotoFile> photographs = checked_photographs(root);
-  if (focal > 0) refuse_focal_of_two_sizes(photographs);
+  if (focal > 0) check_focal(focal, photographs);
   MaskIndex masks(root);
   const std::string inputs = inputs_text(masks, photographs, focal);
   if (auto poses = stored_poses(stored, inputs)) return *poses;

@@ -123,6 +123,12 @@ LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size) {
   constexpr double kLongest = 50;
   const double side = std::max(size.width, size.height);
   if (!(hint.focal >= kShortest * side && hint.focal <= kLongest * side)) hint = {};
+  const double zoom = number(exif.get(), EXIF_IFD_EXIF, EXIF_TAG_DIGITAL_ZOOM_RATIO);
+  if (zoom > 1) {
+    hint = {};
+    hint.zoom = zoom;
+  }
+  hint.marked = focal;
   hint.camera = text(exif.get(), EXIF_TAG_MAKE) + " " + text(exif.get(), EXIF_TAG_MODEL);
   return hint;
 }

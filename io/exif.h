@@ -13,11 +13,14 @@ struct LensHint {
   std::string camera;  ///< Maker and model, as printable text; empty = not said.
   double focal = 0;    ///< [pixels of the stored image]; 0 = not said.
   double sigma = 0;    ///< Relative standard deviation of `focal`.
+  double marked = 0;   ///< Focal length as the lens is marked [mm]; 0 = not said.
+  double zoom = 1;     ///< Times the camera enlarged the picture by itself; `focal` is 0 then.
 };
 
 /// Reads the Exif part of a JPEG, HEIC or AVIF file: focal length from the resolution of the focal
 /// plane, else from the focal length as on 35 mm film. What is damaged or absurd counts as not
-/// said.
+/// said, and so does any where the camera enlarged the picture by itself: programs differ in
+/// whether they count that in.
 ///
 /// The film equivalent compares diagonals and is rounded to whole millimetres. Where the picture
 /// has another shape than the usual sensors (3:2 and 4:3) it was cut, and sigma is larger.

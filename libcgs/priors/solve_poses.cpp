@@ -24,6 +24,9 @@ namespace {
 // widest lenses (13 mm as on film) to short telephoto lenses (115 mm).
 constexpr std::array<double, 8> kFocals = {0.36, 0.5, 0.7, 0.9, 1.15, 1.5, 2.2, 3.2};
 
+// Errors of focal lengths on nine sets of photographs, RMS, beside what adjustment claims.
+constexpr double kOptimism = 3;
+
 double larger_side(const UnposedPhoto& photo) {
   return std::max(photo.width, photo.height) / photo.features.pixel;
 }
@@ -97,6 +100,14 @@ double unexplained_share(const Reconstruction& scene) {
   return all > 0 ? double(unexplained) / double(all) : 0;
 }
 
+// Whether a photograph of that lens has a pose; its focal length means nothing otherwise.
+bool places_lens(const Reconstruction& scene, size_t lens) {
+  for (size_t i = 0; i < scene.poses.size(); ++i) {
+    if (scene.poses[i] && static_cast<size_t>(scene.lens_of[i]) == lens) return true;
+  }
+  return false;
+}
+
 // Whether the points are explained about as well at quite another focal length. What the best
 // attempt explains counts: what nothing explains would make all look alike.
 bool has_rival(const Attempt& best,
@@ -109,6 +120,7 @@ bool has_rival(const Attempt& best,
   return std::any_of(attempts.begin(), attempts.end(), [&](const Attempt& attempt) {
     if (!attempt.begun || attempt.error > most) return false;
     for (size_t i = 0; i < priors.size(); ++i) {
+      if (!places_lens(best.scene, i) || !places_lens(attempt.scene, i)) continue;
       const double ratio = attempt.scene.lenses[i].focal / best.scene.lenses[i].focal;
       if (priors[i].focal == 0 && std::abs(std::log(ratio)) > kOther) return true;
     }
@@ -170,27 +182,34 @@ std::vector<double> polish_with_shape(const std::vector<LensPrior>& priors,
   options.solve_shape = true;
   std::vector<double> sigmas = polish(priors, options, scene);
   for (size_t i = 0; i < scene.lenses.size(); ++i) {
-    if (std::abs(std::log(scene.lenses[i].focal / plain.lenses[i].focal)) <= kMostPull) continue;
+    const double pull = std::abs(std::log(scene.lenses[i].focal / plain.lenses[i].focal));
+    if (pull <= kMostPull) {
+      if (sigmas[i] > 0) sigmas[i] = std::hypot(sigmas[i], pull);
+      continue;
+    }
     scene = std::move(plain);
     return plain_sigmas;
   }
   return sigmas;
 }
 
-// Makes the first placed photograph the origin and its distance to the second the unit.
+// Makes the first placed photograph the origin and its distance to the farthest the unit. (To the
+// second it may be next to nothing: two pictures of a burst.)
 void move_to_first(Reconstruction& scene) {
-  std::vector<size_t> placed;
+  std::optional<size_t> first;
+  double unit = 0;
   for (size_t i = 0; i < scene.poses.size(); ++i) {
-    if (scene.poses[i]) placed.push_back(i);
+    if (!scene.poses[i]) continue;
+    if (!first) first = i;
+    unit = std::max(unit, (scene.poses[i]->center() - scene.poses[*first]->center()).norm());
   }
-  const PhotoPose origin = *scene.poses[placed[0]];
-  const double unit = (scene.poses[placed[1]]->center() - origin.center()).norm();
+  const PhotoPose origin = *scene.poses[*first];
   for (auto& pose : scene.poses) {
     if (!pose) continue;
     const Eigen::Quaterniond rotation = (pose->rotation * origin.rotation.conjugate()).normalized();
     pose = PhotoPose{rotation, (pose->translation - rotation * origin.translation) / unit};
   }
-  scene.poses[placed[0]] = PhotoPose{};
+  scene.poses[*first] = PhotoPose{};
   for (Track& track : scene.tracks) track.position = origin * track.position / unit;
 }
 
@@ -234,28 +253,28 @@ void add_points(const std::vector<UnposedPhoto>& photos,
   out.rms = count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
 }
 
-}  // namespace
+/// What is solved from: what photographs share.
+struct Matched {
+  std::vector<PhotoPair> pairs;
+  std::vector<Track> tracks;
+};
 
-PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress) {
-  require(photos.size() >= 2, "poses need at least 2 photographs", photos.size());
+PoseSolution solve(const std::vector<UnposedPhoto>& photos,
+                   const Matched& matched,
+                   const Progress& progress) {
   const std::vector<LensPrior> priors = lens_priors(photos);
   std::vector<int> lens_of;
   lens_of.reserve(photos.size());
   for (const UnposedPhoto& photo : photos) lens_of.push_back(photo.lens);
-  const std::vector<PhotoPair> pairs = match_photos(photos, part_of(progress, 0, 0.5));
-  refuse_unconnected(photos, pairs);
-  refuse_turned_only(photos, priors, pairs);
-
-  const std::vector<Track> tracks = chain_matches(photos, pairs);
-  report(progress, 0.5);
-  Attempt attempt = best_attempt(lens_of, priors, pairs, tracks);
-  report(progress, 0.8);
-  if (!attempt.begun) throw NumericalError(unexplained_matches(photos, pairs));
+  refuse_turned_only(photos, priors, matched.pairs);
+  Attempt attempt = best_attempt(lens_of, priors, matched.pairs, matched.tracks);
+  report(progress, 0.6);
+  if (!attempt.begun) throw NumericalError(unexplained_matches(photos, matched.pairs));
   Reconstruction scene = std::move(attempt.scene);
-  scene.tracks = tracks;
+  scene.tracks = matched.tracks;
   place_more(scene, priors, *attempt.begun);
   const std::vector<double> sigmas = polish_with_shape(priors, *attempt.begun, scene);
-  refuse_unsure(photos, priors, pairs, scene, sigmas);
+  refuse_unsure(photos, priors, matched.pairs, scene, sigmas);
   move_to_first(scene);
 
   PoseSolution out;
@@ -264,9 +283,51 @@ PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress
     out.photos.push_back(scene.poses[i]
                              ? solved_photo(photos[i], scene.lenses[lens], *scene.poses[i])
                              : SolvedPhoto{});
-    out.photos.back().focal_sigma = sigmas[lens];
+    out.photos.back().focal_sigma = kOptimism * sigmas[lens];
   }
   add_points(photos, scene, out);
+  return out;
+}
+
+// The photographs without the focal lengths that a solution lies three sigma away from, if any.
+std::optional<std::vector<UnposedPhoto>> without_refuted(const std::vector<UnposedPhoto>& photos,
+                                                         const PoseSolution& solution) {
+  constexpr double kSigmas = 3;
+  std::vector<UnposedPhoto> out = photos;
+  bool any = false;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    if (!solution.photos[i].is_placed || !(photos[i].focal_sigma > 0)) continue;
+    const double off = std::abs(std::log(solution.photos[i].camera.fx / photos[i].focal));
+    if (off <= kSigmas * photos[i].focal_sigma) continue;
+    any = true;
+    for (UnposedPhoto& photo : out) {
+      if (photo.lens == photos[i].lens) photo.focal = photo.focal_sigma = 0;
+    }
+  }
+  if (!any) return std::nullopt;
+  return out;
+}
+
+}  // namespace
+
+PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress) {
+  require(photos.size() >= 2, "poses need at least 2 photographs", photos.size());
+  Matched matched;
+  matched.pairs = match_photos(photos, part_of(progress, 0, 0.5));
+  refuse_unconnected(photos, matched.pairs);
+  matched.tracks = chain_matches(photos, matched.pairs);
+  report(progress, 0.5);
+  PoseSolution out = solve(photos, matched, part_of(progress, 0.5, 1));
+  if (const auto relaxed = without_refuted(photos, out)) {
+    try {
+      out = solve(*relaxed, matched, part_of(progress, 0.5, 1));
+      for (size_t i = 0; i < photos.size(); ++i) {
+        out.photos[i].is_refuted = photos[i].focal > 0 && (*relaxed)[i].focal == 0;
+      }
+    } catch (const NumericalError&) {
+      // the photographs tell less than what was known of the lens: that stays
+    }
+  }
   report(progress, 1);
   return out;
 }

@@ -29,6 +29,8 @@ struct SolvedPhoto {
   Camera camera;
   double k1 = 0;           ///< Distorted = (1 + k1 r²) undistorted, in units of the focal length.
   double focal_sigma = 0;  ///< Relative standard deviation of the focal length; 0 = it was given.
+  bool is_refuted =
+      false;  ///< The focal length known beforehand cannot be right, and was not used.
   /// cam_from_world as solved; camera.world_from_cam is its inverse, with rounding.
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
@@ -42,7 +44,7 @@ struct SolvedPoint {
 };
 
 /// World axes and origin are those of the first photograph that was placed; the unit is the
-/// distance to the second: there is no scale in photographs.
+/// distance to the farthest: there is no scale in photographs.
 struct PoseSolution {
   std::vector<SolvedPhoto> photos;  ///< As given.
   std::vector<SolvedPoint> points;
@@ -51,7 +53,11 @@ struct PoseSolution {
 
 /// Cameras of photographs from nothing but what they show: matched features, relative pose of a
 /// pair that shows much depth, resection of the others, bundle adjustment. Where a focal length is
-/// unknown, the one from which the matches are explained best.
+/// unknown, the one from which the matches are explained best. A focal length that is known but for
+/// its sigma and turns out to lie three of them away is taken as unknown, if one is found then.
+///
+/// focal_sigma is wider than adjustment has it, which knows nothing of what lenses do that no model
+/// states: by what errors were on photographs with known focal lengths (tests/eval/pose_accuracy).
 ///
 /// The result does not depend on the number of threads, and on the order of the photographs only
 /// by rounding and by the choice of world axes.

@@ -22,6 +22,7 @@ struct Entry {
 
 constexpr uint16_t kFocalLength = 0x920a;
 constexpr uint16_t kFilm = 0xa405;
+constexpr uint16_t kZoom = 0xa404;
 constexpr uint16_t kPlaneX = 0xa20e;
 constexpr uint16_t kPlaneUnit = 0xa210;
 constexpr uint16_t kPixelX = 0xa002;
@@ -81,6 +82,15 @@ TEST_F(ExifFile, GivesTheFocalLengthFromThatOnFilm) {
   }
   // A sensor of 4:3 with the diagonal of film is 34.6 mm wide; portrait is no different.
   EXPECT_NEAR(hint({{kFilm, 3, 26}}, {3024, 4032}).focal, 4032 * 26 / 34.613, 1);
+}
+
+TEST_F(ExifFile, AZoomOfTheCameraLeavesNoFocalLengthButTellsLensesApart) {
+  const LensHint lens = hint({{kFocalLength, 5, 50}, {kZoom, 5, 20}, {kFilm, 3, 28}}, {3600, 2400});
+  EXPECT_EQ(lens.focal, 0);
+  EXPECT_DOUBLE_EQ(lens.marked, 5);
+  EXPECT_DOUBLE_EQ(lens.zoom, 2);
+  const LensHint none = hint({{kFocalLength, 5, 50}, {kZoom, 5, 10}, {kFilm, 3, 28}}, {3600, 2400});
+  EXPECT_GT(none.focal, 0);
 }
 
 // HEIC and AVIF say in a way of their own how they are to be turned, and decoders have done so.

@@ -2,6 +2,7 @@
 #include "libcgs/priors/solve_poses.h"
 
 #include <algorithm>
+#include <random>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -108,7 +109,7 @@ TEST(SolvePoses, PointsAreWhereTheyWere) {
   scene.noise = 1e-6;
   const std::vector<UnposedPhoto> photos = with_focal(unposed_photos(scene), kFocal, 0);
   const PoseSolution solution = solve_poses(photos);
-  const double unit = (scene.cameras[1].center() - scene.cameras[0].center()).norm();
+  const double unit = (scene.cameras[2].center() - scene.cameras[0].center()).norm();
   double worst = 0;
   for (const SolvedPoint& point : solution.points) {
     const Eigen::Vector3d world =
@@ -215,6 +216,48 @@ TEST(SolvePoses, LeavesOutWhatItCannotPlace) {
   EXPECT_TRUE(solution.photos[0].is_placed);
   EXPECT_TRUE(solution.photos[1].is_placed);
   EXPECT_FALSE(solution.photos[2].is_placed);
+}
+
+TEST(SolvePoses, DropsAFocalLengthThatThePhotographsContradict) {
+  const PointScene scene = three_views();
+  const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), 0.5 * kFocal, 0.03));
+  const auto errors = pose_errors(cameras_of(solution), scene.cameras);
+  EXPECT_LT(errors.focal, 0.02);
+  for (const SolvedPhoto& photo : solution.photos) EXPECT_TRUE(photo.is_refuted);
+  const PoseSolution right = solve_poses(with_focal(unposed_photos(scene), 1.03 * kFocal, 0.03));
+  for (const SolvedPhoto& photo : right.photos) EXPECT_FALSE(photo.is_refuted);
+}
+
+// Its lens is another one, of which nothing is known and nothing can be told.
+TEST(SolvePoses, AStrayPhotographOfAnotherLensStopsNothing) {
+  const PointScene scene = three_views();
+  std::vector<UnposedPhoto> photos = unposed_photos(scene);
+  PointScene other = scene;
+  other.seed = 99;
+  photos.push_back(test::unposed_photo(other, 1));
+  photos.back().lens = 1;
+  std::mt19937 random(5);
+  for (Eigen::Index i = 0; i < photos.back().features.descriptors.size(); ++i) {
+    photos.back().features.descriptors.data()[i] =
+        float(std::normal_distribution<double>()(random));
+  }
+  photos.back().features.descriptors.rowwise().normalize();
+  const PoseSolution solution = solve_poses(photos);
+  for (size_t i = 0; i < 3; ++i) EXPECT_TRUE(solution.photos[i].is_placed);
+  EXPECT_FALSE(solution.photos[3].is_placed);
+}
+
+TEST(SolvePoses, TheUnitIsTheWayToTheFarthest) {
+  PointScene scene = three_views();
+  scene.cameras.insert(scene.cameras.begin() + 1, scene.cameras[0]);  // of a burst
+  scene.cameras[1].world_from_cam.translation().x() += 1e-5;
+  const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kFocal, 0));
+  double farthest = 0;
+  for (const SolvedPhoto& photo : solution.photos) {
+    ASSERT_TRUE(photo.is_placed);
+    farthest = std::max(farthest, photo.camera.center().norm());
+  }
+  EXPECT_NEAR(farthest, 1, 1e-9);
 }
 
 }  // namespace
