@@ -400,12 +400,20 @@ Model read_model(const std::filesystem::path& folder) {
 
 namespace {
 
-// Photographs whose cameras were solved for have their file names as names of views.
+// Photographs whose cameras were solved for have their file names as names of views: without what
+// comes after the dot, but for the second of one stem.
 void relink_photographs(Scene& scene, const std::vector<PhotoFile>& photographs) {
   for (View& view : scene.views) {
-    for (const PhotoFile& photograph : photographs) {
-      if (photograph.path.stem() == view.name) view.image_path = photograph.path;
+    const auto find = [&](const auto& name_of) {
+      return std::find_if(photographs.begin(), photographs.end(), [&](const PhotoFile& photograph) {
+        return name_of(photograph.path) == view.name;
+      });
+    };
+    auto found = find([](const std::filesystem::path& path) { return path.filename(); });
+    if (found == photographs.end()) {
+      found = find([](const std::filesystem::path& path) { return path.stem(); });
     }
+    if (found != photographs.end()) view.image_path = found->path;
   }
 }
 

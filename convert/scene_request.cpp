@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "convert/baselines.h"
 #include "convert/camera_fit.h"
 #include "convert/stated_frame.h"
 #include "io/photographs.h"
@@ -117,6 +118,9 @@ OpenedScene open_scene(const SceneRequest& request,
     }
     if (request.refine_poses) refine(model, terminal, out);
   }
+  for (std::string& warning : baseline_warnings(out.scene)) {
+    out.scene.warnings.push_back(std::move(warning));
+  }
   if (!request.control.file.empty()) {
     out.control = move_to_control_frame(request.control, out.scene);
     if (out.refined) state_in_units(out.scene.world_per_stated_unit, *out.refined);
@@ -125,6 +129,12 @@ OpenedScene open_scene(const SceneRequest& request,
   if (!request.assume_unit.empty()) {
     const std::string refused = assume_unit(out.scene.frame, request.assume_unit);
     if (!refused.empty()) out.scene.warnings.push_back(refused);
+    if (out.poses && refused.empty()) {
+      out.scene.warnings.emplace_back(
+          "--assume-unit: the cameras were solved for, so that a unit is the way from the first to "
+          "the farthest of them, however long it was; --known-distance and --marker-size tell the "
+          "scale");
+    }
   }
   out.scene.frame.up = request.up.empty() ? world_up(out.scene) : up_direction(request.up);
   return out;

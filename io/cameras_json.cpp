@@ -23,15 +23,17 @@ json vector_json(const Eigen::Vector3d& v) { return json::array({v.x(), v.y(), v
 
 json frame_json(const Scene& scene) {
   const Frame& frame = scene.frame;
-  return {{"origin", vector_json(frame.origin)},
-          {"scale", frame.scale},
-          {"file_origin", vector_json(frame.file_origin)},
-          {"metres_per_unit", frame.metres_per_unit},
-          {"metres_sigma", frame.metres_sigma},
-          {"scale_source", scale_source_name(frame.scale_source)},
-          {"up", vector_json(frame.up)},
-          {"kind", scene.kind},
-          {"folder", std::filesystem::absolute(scene.folder).lexically_normal().string()}};
+  json out = {{"origin", vector_json(frame.origin)},
+              {"scale", frame.scale},
+              {"file_origin", vector_json(frame.file_origin)},
+              {"metres_per_unit", frame.metres_per_unit},
+              {"metres_sigma", frame.metres_sigma},
+              {"scale_source", scale_source_name(frame.scale_source)},
+              {"up", vector_json(frame.up)},
+              {"kind", scene.kind},
+              {"folder", std::filesystem::absolute(scene.folder).lexically_normal().string()}};
+  if (!scene.photographs.empty()) out["photographs"] = scene.photographs;
+  return out;
 }
 
 json fisheye_json(const Fisheye& fisheye) {
@@ -117,6 +119,12 @@ void read_frame(const JsonValue& value, Scene& scene) {
   }
   scene.kind = value.at("kind").text();
   scene.folder = value.at("folder").text();
+  // Numbers of views count them, those that have no camera, too.
+  if (const auto names = value.find("photographs")) {
+    for (size_t i = 0; i < names->size(); ++i) {
+      scene.photographs.push_back(names->at(i).text());
+    }
+  }
 }
 
 Eigen::Vector3d read_position(const JsonValue& entry, const Frame& frame) {

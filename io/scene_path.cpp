@@ -144,6 +144,7 @@ std::vector<fs::path> image_files(const SceneRoot& root, const std::string& subf
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     if (!has_image_extension(entry->path())) continue;
+    if (entry->path().filename().native().starts_with('.')) continue;  // "._a.jpg" of macOS
     const fs::path name = fs::path(subfolder) / entry->path().filename();
     files.push_back(resolve_in_scene(root, name.string(), folder));
     if (files.size() > ReadLimits{}.max_views) {

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <numbers>
 
 #include <nlohmann/json.hpp>
 
+#include "convert/baselines.h"
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/commands/info_file.h"
@@ -54,39 +55,15 @@ Json camera_json(const Scene& scene, int index) {
 
 Json baselines_json(const Scene& scene) {
   Json rows = Json::array();
-  for (size_t i = 0; i < scene.input.size(); ++i) {
-    for (size_t j = i + 1; j < scene.input.size(); ++j) {
-      const View& a = scene.views[static_cast<size_t>(scene.input[i])];
-      const View& b = scene.views[static_cast<size_t>(scene.input[j])];
-      const double length = (a.camera.center() - b.camera.center()).norm();
-      const double cosine =
-          a.camera.world_from_cam.rotation().col(2).dot(b.camera.world_from_cam.rotation().col(2));
-      const DepthRange range = depth_range(scene, scene.input[i]);
-      const double middle = 2 / (1 / range.near + 1 / range.far);
-      rows.push_back({{"views", {a.name, b.name}},
-                      {"length", length},
-                      {"baseline_to_depth", length / middle},
-                      {"angle_degrees", std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / M_PI}});
-    }
+  for (const Baseline& pair : baselines(scene)) {
+    rows.push_back({{"views",
+                     {scene.views[static_cast<size_t>(pair.a)].name,
+                      scene.views[static_cast<size_t>(pair.b)].name}},
+                    {"length", pair.length},
+                    {"baseline_to_depth", pair.to_depth},
+                    {"angle_degrees", pair.angle * 180 / std::numbers::pi}});
   }
   return rows;
-}
-
-// What a user should know before spending minutes: too little or too much baseline.
-void add_baseline_warnings(const Json& baselines, Json& warnings) {
-  double largest = 0;
-  for (const Json& row : baselines) {
-    largest = std::max(largest, row["baseline_to_depth"].get<double>());
-    if (row["angle_degrees"].get<double>() > 60) {
-      warnings.push_back(
-          "views " + row["views"][0].get<std::string>() + " and " +
-          row["views"][1].get<std::string>() +
-          " look in directions more than 60 degrees apart; they may share too little");
-    }
-  }
-  if (largest < 0.02) {
-    warnings.push_back("the largest baseline is below 2 % of the depth; depth will be uncertain");
-  }
 }
 
 // Null where no input view has any.
@@ -117,9 +94,6 @@ Json scene_json(const OpenedScene& opened, const Json& fit) {
   }
   Eigen::AlignedBox3d box;
   for (const View& view : scene.views) box.extend(view.camera.center());
-  const Json baselines = baselines_json(scene);
-  Json warnings = scene.warnings;
-  add_baseline_warnings(baselines, warnings);
   return {{"kind", scene.kind},
           {"counts",
            {{"views", scene.views.size()},
@@ -131,12 +105,12 @@ Json scene_json(const OpenedScene& opened, const Json& fit) {
            {{"camera_min", vector_to_json(box.min())}, {"camera_max", vector_to_json(box.max())}}},
           {"units", scene.frame.unit_name()},
           {"cameras", cameras},
-          {"baselines", baselines},
+          {"baselines", baselines_json(scene)},
           {"depth_files", depth_json(scene)},
           {"camera_fit", fit},
           {"refined_poses", opened.refined ? opened.refined->report : Json()},
           {"missing", scene.missing},
-          {"warnings", warnings}};
+          {"warnings", scene.warnings}};
 }
 
 void print_fit(const Json& info) {

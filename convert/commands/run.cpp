@@ -162,7 +162,7 @@ void add_run(CLI::App& app) {
   }
   add_common_options(*cmd, args->common);
   cmd->footer(
-      "Example: cgs run photos/portal --views 1,10,19 --assume-unit m -o out/portal\n"
+      "Example: cgs run photos/portal --views 1,10,19 -o out/portal\n"
       "         cgs run photos/portal --max-size 2MB -o out/portal_small\n"
       "         cgs run photos/portal --budget 3min -o out/portal_soon\n"
       "         cgs run photos/portal --assume-unit m --max-error 2mm -o out/portal_true\n"

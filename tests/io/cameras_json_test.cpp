@@ -97,6 +97,13 @@ TEST_F(CamerasJson, RestoresTheSceneBitForBit) {
   EXPECT_EQ(out.frame.scale_source, ScaleSource::KnownDistance);
 }
 
+TEST_F(CamerasJson, CountsPhotographsWithoutCamera) {
+  Scene scene = far_away_scene();
+  scene.photographs = {"0.jpg", "1.jpg", "2.jpg", "3.jpg"};
+  write_cameras_json(path_, scene);
+  EXPECT_EQ(read_cameras_json(path_).photographs, scene.photographs);
+}
+
 TEST_F(CamerasJson, IsThePlainLayoutThatViewersRead) {
   const Scene scene = far_away_scene();
   write_cameras_json(path_, scene);

@@ -92,6 +92,7 @@ TEST_F(ResolveInScene, ListsImagesByName) {
   test::write_bytes(dir_ / "scene/images/B.JPG", "x");
   test::write_bytes(dir_ / "scene/images/K.txt", "x");
   test::write_bytes(dir_ / "scene/images/.hidden", "x");
+  test::write_bytes(dir_ / "scene/images/._B.JPG", "x");  // of macOS
   const auto files = image_files({dir_ / "scene"}, "images");
   ASSERT_EQ(files.size(), 2u);
   EXPECT_EQ(files[0].filename(), "B.JPG");
