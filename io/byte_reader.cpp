@@ -167,7 +167,10 @@ bool parse_whole(std::string_view token, T& value) {
 }  // namespace
 
 bool parse_number(std::string_view token, double& value) {
-  if (token.starts_with('+') && !token.starts_with("+-")) token.remove_prefix(1);
+  constexpr std::string_view kStarts = "0123456789.";
+  if (token.size() > 1 && token[0] == '+' && kStarts.find(token[1]) != std::string_view::npos) {
+    token.remove_prefix(1);
+  }
   return parse_whole(token, value);
 }
 bool parse_number(std::string_view token, int64_t& value) { return parse_whole(token, value); }

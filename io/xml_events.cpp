@@ -162,13 +162,8 @@ std::vector<double> XmlElement::numbers(std::string_view attribute) const {
 }
 
 double XmlElement::parse(std::string_view attribute, std::string_view word) const {
-  constexpr std::string_view kStarts = "0123456789.";
-  std::string_view digits = word;
-  if (word.size() > 1 && word[0] == '+' && kStarts.find(word[1]) != std::string_view::npos) {
-    digits.remove_prefix(1);
-  }
   double out = 0;
-  if (!parse_number(digits, out)) {
+  if (!parse_number(word, out)) {
     fail(Defect::Syntax, std::string(attribute) + ": " + quoted(word) + " is no number");
   }
   if (!std::isfinite(out)) {

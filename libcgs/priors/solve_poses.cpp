@@ -317,10 +317,10 @@ PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress
   refuse_unconnected(photos, matched.pairs);
   matched.tracks = chain_matches(photos, matched.pairs);
   report(progress, 0.5);
-  PoseSolution out = solve(photos, matched, part_of(progress, 0.5, 1));
+  PoseSolution out = solve(photos, matched, part_of(progress, 0.5, 0.9));
   if (const auto relaxed = without_refuted(photos, out)) {
     try {
-      out = solve(*relaxed, matched, part_of(progress, 0.5, 1));
+      out = solve(*relaxed, matched, part_of(progress, 0.9, 1));
       for (size_t i = 0; i < photos.size(); ++i) {
         out.photos[i].is_refuted = photos[i].focal > 0 && (*relaxed)[i].focal == 0;
       }

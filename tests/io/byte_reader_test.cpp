@@ -82,7 +82,11 @@ TEST(ParseNumber, WantsTheWholeToken) {
   double value = 0;
   EXPECT_TRUE(parse_number("1.5e3", value));
   EXPECT_EQ(value, 1500);
-  for (const auto* bad : {"", "1,5", "1.5x", "1e999", " 1"}) EXPECT_FALSE(parse_number(bad, value));
+  EXPECT_TRUE(parse_number("+.5", value));
+  EXPECT_EQ(value, 0.5);
+  for (const auto* bad : {"", "1,5", "1.5x", "1e999", " 1", "+", "++1", "+-1", "+inf"}) {
+    EXPECT_FALSE(parse_number(bad, value)) << bad;
+  }
 }
 
 }  // namespace
