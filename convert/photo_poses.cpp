@@ -244,8 +244,7 @@ void check_focal(double focal, const std::vector<PhotoFile>& photographs) {
                      std::to_string(side(photographs.front())) + " pixels allowed from " +
                      std::to_string(std::lround(kShortest * larger)) + " to " +
                      std::to_string(std::lround(kLongest * larger)) +
-                     " (a lens of f mm as on "
-                     "film: f / 36 of the larger side), got " +
+                     " (a lens of f mm as on film: f / 36 of the larger side), got " +
                      std::to_string(focal));
 }
 
