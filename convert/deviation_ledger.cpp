@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "meshing/volume.h"
 #include "meshing/volume_distance.h"
 
 namespace cgs {

@@ -12,6 +12,7 @@
 #include <tbb/parallel_for.h>
 
 #include "meshing/face_adjacency.h"
+#include "meshing/volume.h"
 
 namespace cgs {
 

@@ -5,9 +5,10 @@
 #include <vector>
 
 #include "libcgs/core/triangle_mesh.h"
-#include "meshing/volume.h"
 
 namespace cgs {
+
+struct Volume;
 
 /// What the volume says about a vertex of a surface made from it.
 enum class Evidence : uint8_t {

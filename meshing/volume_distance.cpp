@@ -8,6 +8,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "meshing/volume.h"
+
 namespace cgs {
 
 namespace {

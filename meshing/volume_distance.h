@@ -5,9 +5,9 @@
 
 #include <Eigen/Core>
 
-#include "meshing/volume.h"
-
 namespace cgs {
+
+struct Volume;
 
 /// Distance from each point to the observed surface of a fused volume [internal units]: |d| / |g|
 /// of the trilinear signed distance d with gradient g, which is exact for a plane and first order

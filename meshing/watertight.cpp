@@ -9,6 +9,7 @@
 #include "meshing/closed_isosurface.h"
 #include "meshing/provenance.h"
 #include "meshing/solid.h"
+#include "meshing/volume.h"
 
 namespace cgs {
 

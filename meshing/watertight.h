@@ -7,9 +7,10 @@
 #include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
 #include "meshing/certificate.h"
-#include "meshing/volume.h"
 
 namespace cgs {
+
+struct Volume;
 
 /// How the observed surface is closed.
 struct WatertightOptions {

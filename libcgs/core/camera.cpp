@@ -12,6 +12,8 @@
 
 namespace cgs {
 
+Eigen::Isometry3d Camera::cam_from_world() const { return world_from_cam.inverse(); }
+
 Eigen::Matrix3d Camera::intrinsics() const {
   Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
   K(0, 0) = fx;

@@ -21,7 +21,7 @@ struct Camera {
   double cy = 0;   ///< [pixels]
   Eigen::Isometry3d world_from_cam = Eigen::Isometry3d::Identity();
 
-  Eigen::Isometry3d cam_from_world() const { return world_from_cam.inverse(); }
+  Eigen::Isometry3d cam_from_world() const;
   Eigen::Vector3d center() const { return world_from_cam.translation(); }
   /// The calibration matrix [pixels].
   Eigen::Matrix3d intrinsics() const;

@@ -18,6 +18,22 @@ std::string scale_source_name(ScaleSource source) {
   return kNames.at(static_cast<size_t>(source));
 }
 
+Eigen::Vector3d Frame::world_from_internal(const Eigen::Vector3d& p) const {
+  return origin + scale * p;
+}
+
+Eigen::Vector3d Frame::internal_from_world(const Eigen::Vector3d& p) const {
+  return (p - origin) / scale;
+}
+
+Eigen::Vector3d Frame::file_from_internal(const Eigen::Vector3d& p) const {
+  return (origin - file_origin) + scale * p;
+}
+
+Eigen::Vector3d Frame::internal_from_file(const Eigen::Vector3d& p) const {
+  return (p - (origin - file_origin)) / scale;
+}
+
 void Frame::validate() const {
   constexpr double kFarthest = 1e15;  // [world units]
   constexpr double kLargest = 1e30;

@@ -38,16 +38,10 @@ struct Frame {
   /// "m", "mm", … for a known metres_per_unit of that name, "<x> m" for others, "unknown".
   std::string unit_name() const;
 
-  Eigen::Vector3d world_from_internal(const Eigen::Vector3d& p) const { return origin + scale * p; }
-  Eigen::Vector3d internal_from_world(const Eigen::Vector3d& p) const {
-    return (p - origin) / scale;
-  }
-  Eigen::Vector3d file_from_internal(const Eigen::Vector3d& p) const {
-    return (origin - file_origin) + scale * p;
-  }
-  Eigen::Vector3d internal_from_file(const Eigen::Vector3d& p) const {
-    return (p - (origin - file_origin)) / scale;
-  }
+  Eigen::Vector3d world_from_internal(const Eigen::Vector3d& p) const;
+  Eigen::Vector3d internal_from_world(const Eigen::Vector3d& p) const;
+  Eigen::Vector3d file_from_internal(const Eigen::Vector3d& p) const;
+  Eigen::Vector3d internal_from_file(const Eigen::Vector3d& p) const;
 };
 
 /// A frame for a scene whose cameras and roughly whose surface lie at `points_in_world`.

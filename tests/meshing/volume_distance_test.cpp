@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "meshing/volume.h"
+
 namespace cgs {
 namespace {
 
