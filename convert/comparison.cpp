@@ -163,7 +163,7 @@ std::string comparison_text(const Comparison& comparison, const FigureUnit& unit
            text_of("%12.6g", value * unit.length) + ' ' + unit.name + "\n";
   }
   if (comparison.agreement) {
-    const Agreement& a = *comparison.agreement;
+    const SurfaceAgreement& a = *comparison.agreement;
     out += "within " + text_of("%.4g", a.threshold * unit.length) + ' ' + unit.name +
            ": accuracy " + text_of("%.2f", 100 * a.accuracy) + " %, completeness " +
            text_of("%.2f", 100 * a.completeness) + " %, F-score " +

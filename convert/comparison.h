@@ -20,7 +20,7 @@ MeasurableMesh in_frame_of(const MeasurableMesh& mesh, const Frame& frame);
 MeasurableMesh moved(const MeasurableMesh& mesh, const Registration& motion);
 
 /// How much of both surfaces lies within a distance of the other.
-struct Agreement {
+struct SurfaceAgreement {
   double threshold = 0;     ///< [internal units]
   double accuracy = 0;      ///< Share of A's points within it of B.
   double completeness = 0;  ///< Share of B's points within it of A.
@@ -35,7 +35,7 @@ struct Comparison {
   std::vector<Deviation> by_area;
   DeviationSummary summary;
   std::optional<Registration> registration;
-  std::optional<Agreement> agreement;
+  std::optional<SurfaceAgreement> agreement;
   double half_range = 0;        ///< Of histogram and colours [internal units]: 98 % lie within.
   size_t without_distance = 0;  ///< Points of A that are not in by_area, as B has nothing there.
   std::string change_rule = "beyond 2 sigma";  ///< What counts as change, for people.

@@ -142,7 +142,7 @@ bool Collapser::link_allows(Attempt& attempt, bool& border) const {
   neighbors_of(v, attempt.around_v);
   if (dying.empty() || dying.size() > 2) return false;
   size_t shared = 0;
-  for (const Neighbor& n : attempt.around_u) {
+  for (const EdgeNeighbor& n : attempt.around_u) {
     if (n.vertex == v) border = n.border;
     const auto at = std::find_if(attempt.around_v.begin(),
                                  attempt.around_v.end(),
@@ -183,10 +183,10 @@ bool Collapser::reachable(const Attempt& attempt, const Vector3f& p) const {
 bool Collapser::border_allows(const Attempt& attempt, const Vector3f& p) const {
   const auto [u, v] = std::pair(attempt.u, attempt.v);
   std::array<uint32_t, 2> ends = {kNone, kNone};
-  for (const Neighbor& n : attempt.around_u) {
+  for (const EdgeNeighbor& n : attempt.around_u) {
     if (n.border && n.vertex != v && kind_[u] == Kind::Border) ends[0] = n.vertex;
   }
-  for (const Neighbor& n : attempt.around_v) {
+  for (const EdgeNeighbor& n : attempt.around_v) {
     if (n.border && n.vertex != u) ends[1] = n.vertex;
   }
   const auto near = [&](uint32_t of) {

@@ -35,7 +35,7 @@ inline bool has(const Face& face, uint32_t v) {
 }
 
 /// A vertex joined to another by an edge.
-struct Neighbor {
+struct EdgeNeighbor {
   uint32_t vertex = 0;
   int faces = 0;        ///< At the edge.
   int winding = 0;      ///< Faces that run the edge one way minus those that run it the other way.
@@ -82,7 +82,7 @@ struct Attempt {
   std::vector<uint32_t> moving, dying;          ///< Faces around; those at the edge.
   std::vector<uint32_t> points, face_of_point;  ///< Witnesses that change hands, and to whom.
   std::vector<NewFace> fresh;                   ///< The moving faces, moved.
-  std::vector<Neighbor> around_u, around_v;
+  std::vector<EdgeNeighbor> around_u, around_v;
 };
 
 /// One run of collapse_edges().
@@ -101,11 +101,11 @@ class Collapser {
   };
 
   void index_faces();
-  void neighbors_of(uint32_t v, std::vector<Neighbor>& out) const;
-  Kind kind_of(uint32_t v, const std::vector<Neighbor>& neighbors) const;
+  void neighbors_of(uint32_t v, std::vector<EdgeNeighbor>& out) const;
+  Kind kind_of(uint32_t v, const std::vector<EdgeNeighbor>& neighbors) const;
   bool one_fan(uint32_t v) const;
   void classify();
-  Quadric quadric_around(uint32_t v, const std::vector<Neighbor>& neighbors) const;
+  Quadric quadric_around(uint32_t v, const std::vector<EdgeNeighbor>& neighbors) const;
   void find_candidates();
   bool may_collapse(uint32_t u, uint32_t v) const;
   Placement placement(uint32_t u, uint32_t v) const;

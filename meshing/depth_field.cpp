@@ -297,8 +297,8 @@ float DepthField::interpolated(float u, float v) const {
   return 1 / ((1 - b) * top + b * bottom);
 }
 
-Sighting DepthField::at(const Eigen::Vector3f& point) const {
-  Sighting out;
+PointSighting DepthField::at(const Eigen::Vector3f& point) const {
+  PointSighting out;
   const Eigen::Vector3f p = R_ * point + t_;
   if (!(p.z() > 0)) return out;
   const float u = fx_ * p.x() / p.z() + cx_;

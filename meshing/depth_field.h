@@ -22,7 +22,7 @@ enum class Sight : uint8_t {
 };
 
 /// A depth map seen from one point of space.
-struct Sighting {
+struct PointSighting {
   Sight sight = Sight::Nothing;
   float distance = 0;       ///< To the surface, + in front [internal units].
   float weight = 0;         ///< In (0, 1].
@@ -41,7 +41,7 @@ struct EightPoints {
 struct Sightings {
   unsigned free = 0;  ///< Where the weight is above 0.
   unsigned band = 0, hidden = 0;
-  unsigned assumed = 0;                               ///< Of the band, as in Sighting.
+  unsigned assumed = 0;                               ///< Of the band, as in PointSighting.
   bool has_sigma = false;                             ///< False where sigma is 0 throughout.
   alignas(32) std::array<float, 8> free_weight;       ///< 0 where the point is not.
   alignas(32) std::array<float, 8> weight_in_band;    ///< 0 where the point is not.
@@ -90,7 +90,7 @@ class DepthField {
              Asked asked = Asked::Points);
 
   /// What the view says about a point [internal units].
-  Sighting at(const Eigen::Vector3f& point) const;
+  PointSighting at(const Eigen::Vector3f& point) const;
 
   /// The same, to the bit, about many points.
   /// \param out  one for each eight points

@@ -70,7 +70,7 @@ void Collapser::index_faces() {
   }
 }
 
-void Collapser::neighbors_of(uint32_t v, std::vector<Neighbor>& out) const {
+void Collapser::neighbors_of(uint32_t v, std::vector<EdgeNeighbor>& out) const {
   out.clear();
   for (uint32_t i = first_[v]; i < first_[v + 1]; ++i) {
     const uint32_t f = around_[i];
@@ -112,10 +112,10 @@ bool Collapser::one_fan(uint32_t v) const {
   return rest.empty();
 }
 
-Kind Collapser::kind_of(uint32_t v, const std::vector<Neighbor>& neighbors) const {
+Kind Collapser::kind_of(uint32_t v, const std::vector<EdgeNeighbor>& neighbors) const {
   if (neighbors.empty() || !(limits_.tolerance[v] > 0) || !one_fan(v)) return Kind::Fixed;
   size_t borders = 0;
-  for (const Neighbor& n : neighbors) {
+  for (const EdgeNeighbor& n : neighbors) {
     const bool consistent = n.faces == 1 || (n.faces == 2 && n.winding == 0);
     if (n.vertex == v || !consistent) return Kind::Fixed;
     borders += size_t(n.border);
@@ -126,7 +126,7 @@ Kind Collapser::kind_of(uint32_t v, const std::vector<Neighbor>& neighbors) cons
 
 void Collapser::classify() {
   tbb::parallel_for(tbb::blocked_range<uint32_t>(0, uint32_t(kind_.size())), [&](const auto& r) {
-    std::vector<Neighbor> neighbors;
+    std::vector<EdgeNeighbor> neighbors;
     for (uint32_t v = r.begin(); v != r.end(); ++v) {
       neighbors_of(v, neighbors);
       kind_[v] = kind_of(v, neighbors);
@@ -136,7 +136,7 @@ void Collapser::classify() {
 }
 
 // The planes of the faces around a vertex, weighted by area, and planes that hold its borders.
-Quadric Collapser::quadric_around(uint32_t v, const std::vector<Neighbor>& neighbors) const {
+Quadric Collapser::quadric_around(uint32_t v, const std::vector<EdgeNeighbor>& neighbors) const {
   Quadric sum;
   for (uint32_t i = first_[v]; i < first_[v + 1]; ++i) {
     const Face& face = mesh_.faces[around_[i]];
@@ -144,7 +144,7 @@ Quadric Collapser::quadric_around(uint32_t v, const std::vector<Neighbor>& neigh
     const double length = n.norm();
     if (!(length > 0)) continue;
     sum.add_plane(n / length, vertex(v), 0.5 * length);
-    for (const Neighbor& to : neighbors) {
+    for (const EdgeNeighbor& to : neighbors) {
       if (!to.border || !has(face, to.vertex)) continue;
       const Vector3d along = vertex(to.vertex) - vertex(v);
       const Vector3d across = along.cross(n);

@@ -45,11 +45,11 @@ double share_within(const std::vector<Deviation>& deviations, double threshold) 
   return static_cast<double>(count) / static_cast<double>(std::max<size_t>(1, deviations.size()));
 }
 
-Agreement agreement(const CompareArgs& args,
-                    const MeasurableMesh& a,
-                    const MeasurableMesh& b,
-                    const std::vector<Deviation>& a_to_b) {
-  Agreement out;
+SurfaceAgreement agreement(const CompareArgs& args,
+                           const MeasurableMesh& a,
+                           const MeasurableMesh& b,
+                           const std::vector<Deviation>& a_to_b) {
+  SurfaceAgreement out;
   out.threshold = parse_length(args.threshold, a.frame);
   out.accuracy = share_within(a_to_b, out.threshold);
   if (a.mesh.faces.empty()) {

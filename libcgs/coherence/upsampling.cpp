@@ -68,7 +68,7 @@ std::vector<UpsampledTap> upsampled_axis(int from, int to) {
   return out;
 }
 
-void upsample(const FeatureMap& in, const Upsampling& how, RowRange rows, float* out) {
+void upsample(const FeatureMap& in, const Upsampling& how, RowSpan rows, float* out) {
   const size_t low_size = in.row_size();
   const size_t high_size = how.x.size() * static_cast<size_t>(in.lanes);
   FloatBuffer between(low_size);
@@ -86,7 +86,7 @@ void upsample(const FeatureMap& in, const Upsampling& how, RowRange rows, float*
 
 void upsample_transposed(const float* gradient,
                          const Upsampling& how,
-                         RowRange rows,
+                         RowSpan rows,
                          const FeatureMap& shape,
                          RowBlock& out) {
   const size_t low_size = shape.row_size();

@@ -26,7 +26,7 @@ struct Upsampling {
 };
 
 /// Rows [first, first + count) of a convolution's output; their input is two rows higher.
-struct RowRange {
+struct RowSpan {
   int first = 0;
   int count = 0;
 };
@@ -34,11 +34,11 @@ struct RowRange {
 /// What a 3x3 convolution needs for some rows of its output. Repeats nothing beyond `in`.
 ///
 /// \param out  in.groups() x (rows.count + 2) x how.x.size() x lanes, overwritten
-void upsample(const FeatureMap& in, const Upsampling& how, RowRange rows, float* out);
+void upsample(const FeatureMap& in, const Upsampling& how, RowSpan rows, float* out);
 
 /// Rows of a [group][row][x][lane] block.
 struct RowBlock {
-  RowRange rows;
+  RowSpan rows;
   FloatBuffer data;
 };
 
@@ -49,7 +49,7 @@ struct RowBlock {
 /// \param out       overwritten; its buffer is used again
 void upsample_transposed(const float* gradient,
                          const Upsampling& how,
-                         RowRange rows,
+                         RowSpan rows,
                          const FeatureMap& shape,
                          RowBlock& out);
 

@@ -66,7 +66,7 @@ Block block_at(float across, float up, const Eigen::Vector2f& size, uint32_t see
   return {mixed(stone.index, row.index), std::min(row.joint, stone.joint)};
 }
 
-Block masonry(const SurfacePoint& s) {
+Block masonry(const PatternPoint& s) {
   const Vector3f& p = s.position;
   const Vector3f n = s.normal.cwiseAbs();
   if (s.material == Material::Arch) {
@@ -87,7 +87,7 @@ Block masonry(const SurfacePoint& s) {
 }
 
 // Brightness pattern of all sizes from centimetres to metres, as a factor.
-float grain(const SurfacePoint& s, uint32_t seed, float strength) {
+float grain(const PatternPoint& s, uint32_t seed, float strength) {
   const float all = band_noise(
       s.position, {.longest = 1.3F, .shortest = 0.018F, .gain = 1.08F}, s.footprint, seed);
   return std::exp(strength * all);
@@ -103,7 +103,7 @@ Vector3f stone_tint(const Block& block, uint32_t part, bool paving) {
   return tint * (0.72F + 0.5F * uniform(h, 3));
 }
 
-Vector3f stone(const SurfacePoint& s) {
+Vector3f stone(const PatternPoint& s) {
   const Vector3f& p = s.position;
   const float f = s.footprint;
   const Block block = masonry(s);
@@ -111,7 +111,7 @@ Vector3f stone(const SurfacePoint& s) {
   // The pattern of a block is its own: it was cut from another place of the quarry.
   const Vector3f quarry =
       p + Vector3f(7 * uniform(own, 4), 7 * uniform(own, 5), 7 * uniform(own, 6));
-  SurfacePoint cut = s;
+  PatternPoint cut = s;
   cut.position = quarry;
   Vector3f color =
       stone_tint(block, s.part, s.material == Material::Paving) * grain(cut, 11, 0.30F);
@@ -156,7 +156,7 @@ Vector3f stone(const SurfacePoint& s) {
   return mix(color, joint, (jointed ? 0.85F : 0.5F) * mortar);
 }
 
-Vector3f wood(const SurfacePoint& s) {
+Vector3f wood(const PatternPoint& s) {
   const Vector3f& p = s.position;
   const Course plank = course(p.x(), 0.19F, 0.3F, 3);
   const float own = 9 * uniform(plank.index, 1);
@@ -169,7 +169,7 @@ Vector3f wood(const SurfacePoint& s) {
   return color * (1 - 0.75F * smooth_step(0.008F + s.footprint, 0.006F, plank.joint));
 }
 
-Vector3f iron(const SurfacePoint& s) {
+Vector3f iron(const PatternPoint& s) {
   const float rust =
       band_noise(s.position, {.longest = 0.2F, .shortest = 0.02F, .gain = 0.9F}, s.footprint, 51);
   const Vector3f color =
@@ -177,7 +177,7 @@ Vector3f iron(const SurfacePoint& s) {
   return color * grain(s, 52, 0.25F);
 }
 
-Vector3f painted(const SurfacePoint& s) {
+Vector3f painted(const PatternPoint& s) {
   const Vector3f& p = s.position;
   const float wear = band_noise(
       p, {.longest = 0.30F, .shortest = 0.018F, .gain = 0.85F}, s.footprint, 55 + s.part);
@@ -193,7 +193,7 @@ Vector3f painted(const SurfacePoint& s) {
 
 }  // namespace
 
-Vector3f albedo(const SurfacePoint& point) {
+Vector3f albedo(const PatternPoint& point) {
   const auto color = [&]() -> Vector3f {
     switch (point.material) {
       case Material::Wood:

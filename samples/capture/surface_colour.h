@@ -8,7 +8,7 @@
 namespace cgs {
 
 /// A point of a surface as its pattern sees it.
-struct SurfacePoint {
+struct PatternPoint {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  ///< World [m].
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();    ///< World, outward, unit length.
   Material material = Material::Ashlar;
@@ -19,6 +19,6 @@ struct SurfacePoint {
 /// Linear RGB reflectance in [0, 1]: weathered stone with joints, stains, lichen and pits, wood,
 /// rusty iron, chipped paint. A function of the place alone but for what the footprint cannot
 /// resolve, so that it looks the same from everywhere.
-Eigen::Vector3f albedo(const SurfacePoint& point);
+Eigen::Vector3f albedo(const PatternPoint& point);
 
 }  // namespace cgs

@@ -111,7 +111,7 @@ TEST(DepthField, SaysTheSameOfManyPointsAsOfEach) {
         const size_t k = n % 8;
         const EightPoints& eight = points[n / 8];
         const Sightings& row = many[n / 8];
-        const Sighting one = field.at({eight.x[k], eight.y[k], eight.z[k]});
+        const PointSighting one = field.at({eight.x[k], eight.y[k], eight.z[k]});
         ++told[size_t(one.sight)];
         const auto is = [&](unsigned bits) { return (bits >> k & 1) != 0; };
         ASSERT_EQ(is(row.free), one.sight == Sight::Free);

@@ -51,7 +51,7 @@ class Upsample : public testing::TestWithParam<int> {};
 TEST_P(Upsample, InterpolatesEachChannelAlongBothAxes) {
   const FeatureMap map = random_map(GetParam());
   const Upsampling how{upsampled_axis(5, 11), upsampled_axis(7, 14)};
-  const RowRange rows{4, 6};
+  const RowSpan rows{4, 6};
   std::vector<float> out(static_cast<size_t>(map.groups() * 8 * 13 * map.lanes));
   upsample(map, how, rows, out.data());
   for (int c = 0; c < map.channels; ++c) {
@@ -81,7 +81,7 @@ TEST_P(Upsample, TransposedIsItsTranspose) {
   std::normal_distribution<float> normal;
   double above = 0;
   double below = 0;
-  for (const RowRange rows : {RowRange{0, 4}, RowRange{4, 4}, RowRange{8, 7}}) {
+  for (const RowSpan rows : {RowSpan{0, 4}, RowSpan{4, 4}, RowSpan{8, 7}}) {
     std::vector<float> up(static_cast<size_t>(map.groups() * (rows.count + 2) * 12 * map.lanes));
     upsample(map, how, rows, up.data());
     std::vector<float> gradient(up.size());

@@ -6,7 +6,7 @@
 namespace cgs {
 namespace {
 
-SurfacePoint wall_point(int i, Material material) {
+PatternPoint wall_point(int i, Material material) {
   return {
       .position = {0.0137F * static_cast<float>(i % 300), 0, 0.0193F * static_cast<float>(i / 300)},
       .normal = {0, -1, 0},
@@ -41,7 +41,7 @@ TEST(Albedo, LosesOnlyDetailWithAWiderFootprint) {
   double fine = 0;
   double coarse = 0;
   for (int i = 0; i < 60000; ++i) {
-    SurfacePoint point = wall_point(i, Material::Ashlar);
+    PatternPoint point = wall_point(i, Material::Ashlar);
     const auto near = static_cast<double>(albedo(point).mean());
     point.footprint = 0.02F;
     const auto far = static_cast<double>(albedo(point).mean());
