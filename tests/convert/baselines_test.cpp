@@ -7,7 +7,7 @@
 
 #include "tests/support/stereo_scene.h"
 
-namespace cgs {
+namespace cgs::baselines_test {
 namespace {
 
 Scene scene_of(const std::vector<Eigen::Vector3d>& centers) {
@@ -48,4 +48,4 @@ TEST(BaselineWarnings, NameWhatSharesTooLittleAndWhatTellsTooLittle) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::baselines_test

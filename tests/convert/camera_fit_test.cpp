@@ -9,7 +9,7 @@
 #include "io/png.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::camera_fit_test {
 namespace {
 
 // Towards 90 degrees a pixel of the photograph is ever more pixels of the picture, and so is what
@@ -41,4 +41,4 @@ TEST(PosedPhoto, HasNoFeaturesBesideTheUndistortedPicture) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::camera_fit_test

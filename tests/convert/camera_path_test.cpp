@@ -10,7 +10,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::camera_path_test {
 namespace {
 
 /// Three cameras in a row, a metre apart, that look along +z at a wall five metres away; y is down.
@@ -128,4 +128,4 @@ TEST(CameraPath, RefusesWhatLeadsNowhere) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::camera_path_test

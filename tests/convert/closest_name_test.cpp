@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::closest_name_test {
 namespace {
 
 const std::vector<std::string> kNames = {"run", "info", "filter", "measure", "simplify", "render"};
@@ -26,4 +26,4 @@ TEST(ClosestName, IsNoneWhereNothingIsNear) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::closest_name_test

@@ -14,7 +14,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::control_frame_test {
 namespace {
 
 constexpr int kWidth = 320;  // of the photographs; worked on at half
@@ -347,4 +347,4 @@ TEST_F(ControlFrame, RefusesWhatDoesNotTellAFrame) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::control_frame_test

@@ -15,7 +15,7 @@
 #include "tests/support/splat_shapes.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::conversion_test {
 namespace {
 
 class Conversion : public testing::Test {
@@ -310,4 +310,4 @@ TEST_F(Conversion, ReportsWhatTheFileHolds) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::conversion_test

@@ -9,7 +9,7 @@
 #include "convert/stage_cost.h"
 #include "io/sanitized.h"
 
-namespace cgs {
+namespace cgs::depth_agreement_test {
 namespace {
 
 constexpr int kWidth = 1200;
@@ -55,4 +55,4 @@ TEST(DepthAgreement, KeepsNoFramesOfFullSize) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::depth_agreement_test

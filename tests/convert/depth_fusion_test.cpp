@@ -15,7 +15,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::depth_fusion_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -379,4 +379,4 @@ TEST_F(SphereFrames, AreRefusedWhereTheirDepthCannotBeFused) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::depth_fusion_test

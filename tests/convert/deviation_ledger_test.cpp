@@ -9,7 +9,7 @@
 #include "tests/support/depth_scenes.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::deviation_ledger_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -139,4 +139,4 @@ TEST(MeasuredPoints, AreOfMeasuredPixelsEvenlyAndAtMostAsManyAsAsked) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::deviation_ledger_test

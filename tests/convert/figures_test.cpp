@@ -6,7 +6,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::figures_test {
 namespace {
 
 MeasuredValue area_by_label() {
@@ -58,4 +58,4 @@ TEST(FigureSigma, HoldsTheScaleOncePerDimension) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::figures_test

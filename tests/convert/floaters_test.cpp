@@ -10,7 +10,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/splat_shapes.h"
 
-namespace cgs {
+namespace cgs::floaters_test {
 namespace {
 
 constexpr double kRadius = 0.4;
@@ -155,4 +155,4 @@ TEST_F(FloatersTest, JudgesNothingFarOutsideAndTakesOddInput) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::floaters_test

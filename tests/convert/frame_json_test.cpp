@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-namespace cgs {
+namespace cgs::frame_json_test {
 namespace {
 
 TEST(FrameJson, ReadsBackTheSameBits) {
@@ -36,4 +36,4 @@ TEST(FrameJson, UpMayBeUnknown) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::frame_json_test

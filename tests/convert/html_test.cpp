@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-namespace cgs {
+namespace cgs::html_test {
 namespace {
 
 TEST(Escaped, LeavesNothingThatOpensATagOrEndsAnAttribute) {
@@ -36,4 +36,4 @@ TEST(TableRow, EscapesItsNameAlone) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::html_test

@@ -12,7 +12,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::known_distances_test {
 namespace {
 
 using test::message_of;
@@ -212,4 +212,4 @@ TEST_F(KnownDistances, RefusesWhatCannotBeMeasured) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::known_distances_test

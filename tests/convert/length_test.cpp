@@ -5,7 +5,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::length_test {
 namespace {
 
 Frame frame_in_millimetres() {
@@ -83,4 +83,4 @@ TEST(ParseBytes, KnowsBinaryPrefixes) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::length_test

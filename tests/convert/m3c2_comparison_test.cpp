@@ -13,7 +13,7 @@
 #include "tests/support/solid_meshes.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::m3c2_comparison_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -219,4 +219,4 @@ TEST(CompareM3c2, ARegistrationMayHaveNoErrorInAnyUnit) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::m3c2_comparison_test

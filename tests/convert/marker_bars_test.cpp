@@ -12,7 +12,7 @@
 #include "tests/support/marker_photo.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::marker_bars_test {
 namespace {
 
 using test::PrintedMarker;
@@ -133,4 +133,4 @@ TEST_F(MarkerBars, DoesNotBelieveAMarkerThatMoved) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::marker_bars_test

@@ -7,7 +7,7 @@
 #include "tests/support/splat_ply.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::measured_file_test {
 namespace {
 
 TEST(ReadMeasured, RefusesSplatsAndSaysWhatMakesAMeshOfThem) {
@@ -33,4 +33,4 @@ TEST(ReadMeasured, TakesThePointsOfACloud) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::measured_file_test

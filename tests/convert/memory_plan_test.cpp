@@ -5,7 +5,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::memory_plan_test {
 namespace {
 
 Scene scene_of(const std::vector<std::pair<int, int>>& sizes) {
@@ -173,4 +173,4 @@ TEST(SplatMemoryPlan, NamesTheStageThatDoesNotFitAndWhatToLower) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::memory_plan_test

@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::mesh_files_test {
 namespace {
 
 // The corner of a cube of edge 1: volume 1/6, one slanted face that nobody saw.
@@ -96,4 +96,4 @@ TEST(WriteMeshFiles, RefusesAMeshWithoutSurfaceAndWritesNothing) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::mesh_files_test

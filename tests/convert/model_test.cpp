@@ -9,7 +9,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::model_test {
 namespace {
 
 // Cameras on an arc in the y-z plane normal `up`, pitched down by `pitch` radians.
@@ -94,4 +94,4 @@ TEST(Picture, DividesByAlphaAboveOneHalfOnly) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::model_test

@@ -13,7 +13,7 @@
 #include "tests/support/solid_meshes.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::orthophoto_files_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -209,4 +209,4 @@ TEST(WriteOrthophoto, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::orthophoto_files_test

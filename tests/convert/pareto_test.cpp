@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::pareto_test {
 namespace {
 
 // The definition, word by word.
@@ -52,4 +52,4 @@ TEST(ParetoFront, IsWhatNobodyBeats) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::pareto_test

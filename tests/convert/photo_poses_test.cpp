@@ -14,7 +14,7 @@
 #include "tests/support/temp_dir.h"
 #include "tests/support/unposed_photos.h"
 
-namespace cgs {
+namespace cgs::photo_poses_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -130,4 +130,4 @@ TEST(PhotoPoses, NeedTwoPhotographsAndNotTooMany) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::photo_poses_test

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::pictures_test {
 namespace {
 
 TEST(DepthPicture, IsRedNearBlueFarAndBlackWhereUnknown) {
@@ -44,4 +44,4 @@ TEST(NormalPicture, ASurfaceFacingTheCameraIsTheUsualBlue) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::pictures_test

@@ -5,7 +5,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::recommendation_test {
 namespace {
 
 Frame in_metres() {
@@ -147,4 +147,4 @@ TEST(Recommend, LeavesOutWhatWasNotMeasured) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::recommendation_test

@@ -7,7 +7,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::recorded_request_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -84,4 +84,4 @@ TEST(RecordedRequest, OfAnotherShapeIsRefused) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::recorded_request_test

@@ -14,7 +14,7 @@
 #include "tests/support/temp_dir.h"
 #include "tests/support/unposed_photos.h"
 
-namespace cgs {
+namespace cgs::refined_poses_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -257,4 +257,4 @@ TEST(RefinedPoses, OfPicturesThatShowNothingInCommonStayWithAWarning) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::refined_poses_test

@@ -15,7 +15,7 @@
 #include "tests/support/temp_dir.h"
 #include "tests/support/textured_cube.h"
 
-namespace cgs {
+namespace cgs::report_viewer_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -186,4 +186,4 @@ TEST(ShownMesh, HasFewerFacesAndSaysHowFarItIsOff) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::report_viewer_test

@@ -11,7 +11,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::run_record_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -170,4 +170,4 @@ TEST(ContentHash, IsFnv1aOfTheBytes) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::run_record_test

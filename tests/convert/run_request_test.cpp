@@ -8,7 +8,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::run_request_test {
 namespace {
 
 // Two photographs, the second of them held out.
@@ -98,4 +98,4 @@ TEST_F(RequestJson, KnowsOfDepthFromFilesAndNetworks) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::run_request_test

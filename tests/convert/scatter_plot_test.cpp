@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::scatter_plot_test {
 namespace {
 
 struct Text {
@@ -93,4 +93,4 @@ TEST(ScatterSvg, StandsPointsThatAreOneAndPlotsWithoutAny) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::scatter_plot_test

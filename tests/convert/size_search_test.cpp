@@ -7,7 +7,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::size_search_test {
 namespace {
 
 // A file of a fixed part and one that falls as a power of the detail.
@@ -84,4 +84,4 @@ TEST(FinestWithin, EndsWhereAllSizesAreEqual) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::size_search_test

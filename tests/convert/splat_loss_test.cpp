@@ -8,7 +8,7 @@
 
 #include "tests/support/splat_shapes.h"
 
-namespace cgs {
+namespace cgs::splat_loss_test {
 namespace {
 
 Gaussians ball() {
@@ -85,4 +85,4 @@ TEST(SplatLoss, SaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::splat_loss_test

@@ -11,7 +11,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/render/rasterizer.h"
 
-namespace cgs {
+namespace cgs::splat_merging_test {
 namespace {
 
 constexpr int kSide = 48;  // splats along a side of the wall
@@ -278,4 +278,4 @@ TEST(MergeSplats, RefusesOptionsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::splat_merging_test

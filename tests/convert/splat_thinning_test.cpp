@@ -15,7 +15,7 @@
 #include "libcgs/render/rasterizer.h"
 #include "tests/support/reference_rasterizer.h"
 
-namespace cgs {
+namespace cgs::splat_thinning_test {
 namespace {
 
 constexpr int kSide = 64;
@@ -385,4 +385,4 @@ TEST(MeanSquareDifference, SeesWhatIsMissingOnAnyBackground) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::splat_thinning_test

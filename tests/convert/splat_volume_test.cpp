@@ -8,7 +8,7 @@
 #include "meshing/watertight.h"
 #include "tests/support/splat_shapes.h"
 
-namespace cgs {
+namespace cgs::splat_volume_test {
 namespace {
 
 const Eigen::Vector3d kCenter(0.1, -0.2, 0.3);
@@ -88,4 +88,4 @@ TEST(SplatVolume, FlyawaysDoNotHideTheScene) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::splat_volume_test

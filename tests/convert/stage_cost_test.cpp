@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::stage_cost_test {
 namespace {
 
 TEST(CostMeter, CountsTheWorkOfAllThreadsAndNoSleep) {
@@ -41,4 +41,4 @@ TEST(CostMeter, PeakForgetsWhatWasBefore) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::stage_cost_test

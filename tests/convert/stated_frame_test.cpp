@@ -7,7 +7,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::stated_frame_test {
 namespace {
 
 TEST(AssumeUnit, FillsInWhatIsUnknownAndNothingElse) {
@@ -60,4 +60,4 @@ TEST(UpDirection, IsOfUnitLength) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::stated_frame_test

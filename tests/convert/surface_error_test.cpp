@@ -6,7 +6,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::surface_error_test {
 namespace {
 
 // The square [0, 1]^2 at height z, in halves: what lies beyond x = 0.5 is invented.
@@ -65,4 +65,4 @@ TEST(ShownSurface, WithoutLabelsIsWhatTwoCamerasSee) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::surface_error_test

@@ -8,7 +8,7 @@
 #include "tests/support/temp_dir.h"
 #include "tests/support/textured_cube.h"
 
-namespace cgs {
+namespace cgs::texture_test {
 namespace {
 
 const Eigen::AlignedBox3d kBox(Eigen::Vector3d::Constant(-0.2), Eigen::Vector3d::Constant(0.2));
@@ -103,4 +103,4 @@ TEST(TextureFromPhotographs, SaysWhenAPhotographIsGone) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::texture_test

@@ -10,7 +10,7 @@
 #include "tests/support/solid_meshes.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::thickness_figures_test {
 namespace {
 
 TEST(ThicknessFigures, AreInTheUnitAskedForAndNullWithoutSamples) {
@@ -47,4 +47,4 @@ TEST(ThicknessFigures, ThePlyHasColoursAndScalarsInWorldUnits) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::thickness_figures_test

@@ -7,7 +7,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::time_model_test {
 namespace {
 
 // A machine whose costs are known: a sweep with a power of 1.25, training, a mesh with a fixed
@@ -70,4 +70,4 @@ TEST(TimeModel, RefusesNothingToJudgeBy) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::time_model_test

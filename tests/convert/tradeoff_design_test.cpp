@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::tradeoff_design_test {
 namespace {
 
 bool same_model(const Setting& a, const Setting& b) {
@@ -122,4 +122,4 @@ TEST(CommandLine, HasEveryOptionThatTheSceneWasOpenedWith) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::tradeoff_design_test

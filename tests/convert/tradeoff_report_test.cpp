@@ -6,7 +6,7 @@
 
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::tradeoff_report_test {
 namespace {
 
 MeasuredSetting measured(
@@ -95,4 +95,4 @@ TEST(TradeoffReport, WritesAPageThatNeedsNothingElse) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::tradeoff_report_test

@@ -7,7 +7,7 @@
 #include "io/png.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::views_test {
 namespace {
 
 constexpr int kSide = 40;
@@ -53,4 +53,4 @@ TEST(EvaluateViews, LooksAtNoMaskedPixel) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::views_test

@@ -7,7 +7,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::volume_file_test {
 namespace {
 
 Volume small_volume() {
@@ -119,4 +119,4 @@ TEST(VolumeFile, HoldsVoxelsOfAMillionthOfAUnitStretched) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::volume_file_test

@@ -13,7 +13,7 @@
 #include "tests/support/solid_meshes.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::written_surface_test {
 namespace {
 
 // The unit square at a height, in n x n quads.
@@ -97,4 +97,4 @@ TEST(KnownWithin, WeighsSeenAreaAlone) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::written_surface_test

@@ -11,7 +11,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::atomic_file_test {
 namespace {
 
 TEST(AtomicFile, AppearsOnlyOnCommit) {
@@ -99,4 +99,4 @@ TEST(MakeOutputFolder, RefusesAFileInItsPlace) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::atomic_file_test

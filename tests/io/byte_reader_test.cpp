@@ -8,7 +8,7 @@
 
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::byte_reader_test {
 namespace {
 
 using namespace std::string_view_literals;
@@ -90,4 +90,4 @@ TEST(ParseNumber, WantsTheWholeToken) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::byte_reader_test

@@ -10,7 +10,7 @@
 
 #include "io/byte_reader.h"
 
-namespace cgs {
+namespace cgs::byte_writer_test {
 namespace {
 
 TEST(AppendBytes, IsLittleEndian) {
@@ -50,4 +50,4 @@ TEST(AppendNumber, ReadsBackExactly) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::byte_writer_test

@@ -8,7 +8,7 @@
 
 #include "tests/support/scene_files.h"
 
-namespace cgs {
+namespace cgs::camera_checks_test {
 namespace {
 
 using test::defect_of;
@@ -111,4 +111,4 @@ TEST(CheckDistortion, RefusesAFoldInsideTheImage) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::camera_checks_test

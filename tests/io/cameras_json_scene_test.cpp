@@ -8,7 +8,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::cameras_json_scene_test {
 namespace {
 
 class CamerasJsonScene : public testing::Test {
@@ -87,4 +87,4 @@ TEST_F(CamerasJsonScene, RefusesWhatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::cameras_json_scene_test

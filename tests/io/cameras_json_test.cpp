@@ -11,7 +11,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::cameras_json_test {
 namespace {
 
 using nlohmann::json;
@@ -192,4 +192,4 @@ TEST_F(CamerasJson, RefusesToWriteCamerasThatAreNotFinite) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::cameras_json_test

@@ -11,9 +11,8 @@
 #include "io/byte_reader.h"
 #include "tests/support/temp_dir.h"
 
+namespace cgs::checkpoint_test {
 namespace {
-
-using cgs::write_checkpoint;
 
 std::optional<std::string> read_checkpoint(const std::filesystem::path& folder,
                                            const std::string& name,
@@ -21,12 +20,12 @@ std::optional<std::string> read_checkpoint(const std::filesystem::path& folder,
   return cgs::read_checkpoint(folder, name, belongs_to).state;
 }
 
-std::string warning(const cgs::test::TempDir& folder) {
+std::string warning(const test::TempDir& folder) {
   return cgs::read_checkpoint(folder.path(), "work", 7).warning;
 }
 
 TEST(Checkpoint, GivesBackTheNewestState) {
-  const cgs::test::TempDir folder;
+  const test::TempDir folder;
   EXPECT_FALSE(read_checkpoint(folder.path(), "work", 7));
   write_checkpoint(folder.path(), "work", 7, "one");
   write_checkpoint(folder.path(), "work", 7, std::string("t\0wo", 4));
@@ -35,65 +34,66 @@ TEST(Checkpoint, GivesBackTheNewestState) {
 }
 
 TEST(Checkpoint, OfOtherWorkIsNotUsed) {
-  const cgs::test::TempDir folder;
+  const test::TempDir folder;
   write_checkpoint(folder.path(), "work", 7, "one");
   EXPECT_FALSE(read_checkpoint(folder.path(), "work", 8));
   EXPECT_EQ(cgs::read_checkpoint(folder.path(), "work", 8).warning, "");
 }
 
 TEST(Checkpoint, ADamagedOneNeverTakesThePlaceOfAWholeOne) {
-  const cgs::test::TempDir folder;
+  const test::TempDir folder;
   write_checkpoint(folder.path(), "work", 7, "first state");
   write_checkpoint(folder.path(), "work", 7, "second state");
   const std::filesystem::path newest = folder.path() / "work.checkpoint";
-  cgs::write_file(newest, "CGS");
+  write_file(newest, "CGS");
   write_checkpoint(folder.path(), "work", 7, "third state");
   std::filesystem::remove(newest);
   EXPECT_EQ(read_checkpoint(folder.path(), "work", 7), "first state");
 }
 
 TEST(Checkpoint, DamageIsTold) {
-  const cgs::test::TempDir folder;
+  const test::TempDir folder;
   EXPECT_EQ(warning(folder), "");
   write_checkpoint(folder.path(), "work", 7, "first state");
   EXPECT_EQ(warning(folder), "");
   const std::filesystem::path newest = folder.path() / "work.checkpoint";
-  cgs::write_file(newest, "CGSCKPT2" + cgs::read_file(newest).substr(8));
+  write_file(newest, "CGSCKPT2" + read_file(newest).substr(8));
   EXPECT_NE(warning(folder).find("this version"), std::string::npos) << warning(folder);
   EXPECT_NE(warning(folder).find("starting anew"), std::string::npos) << warning(folder);
   write_checkpoint(folder.path(), "work", 7, "second state");
   EXPECT_EQ(warning(folder), "");  // the damaged one is older
-  cgs::write_file(newest, "CGS");
+  write_file(newest, "CGS");
   EXPECT_NE(warning(folder).find("work.checkpoint: "), std::string::npos) << warning(folder);
 }
 
 TEST(Checkpoint, EveryDamageFallsBackToTheOneBefore) {
-  const cgs::test::TempDir folder;
+  const test::TempDir folder;
   write_checkpoint(folder.path(), "work", 7, "first state");
   write_checkpoint(folder.path(), "work", 7, "second state");
   const std::filesystem::path newest = folder.path() / "work.checkpoint";
-  const std::string whole = cgs::read_file(newest);
+  const std::string whole = read_file(newest);
   for (size_t i = 0; i < whole.size(); ++i) {
     std::string changed = whole;
     changed[i] = static_cast<char>(changed[i] ^ 0x10);
-    cgs::write_file(newest, changed);
+    write_file(newest, changed);
     EXPECT_EQ(read_checkpoint(folder.path(), "work", 7), "first state") << "byte " << i;
-    cgs::write_file(newest, whole.substr(0, i));
+    write_file(newest, whole.substr(0, i));
     EXPECT_EQ(read_checkpoint(folder.path(), "work", 7), "first state") << "cut at " << i;
   }
-  cgs::write_file(newest, whole + "x");
+  write_file(newest, whole + "x");
   EXPECT_EQ(read_checkpoint(folder.path(), "work", 7), "first state");
   std::filesystem::remove(newest);  // as a kill between the two renames leaves it
   EXPECT_EQ(read_checkpoint(folder.path(), "work", 7), "first state");
 }
 
 TEST(Checkpoint, RemovingLeavesNothingBehind) {
-  const cgs::test::TempDir folder;
+  const test::TempDir folder;
   write_checkpoint(folder.path(), "work", 7, "one");
   write_checkpoint(folder.path(), "work", 7, "two");
-  cgs::remove_checkpoint(folder.path(), "work");
+  remove_checkpoint(folder.path(), "work");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
-  EXPECT_NO_THROW(cgs::remove_checkpoint(folder.path(), "work"));
+  EXPECT_NO_THROW(remove_checkpoint(folder.path(), "work"));
 }
 
 }  // namespace
+}  // namespace cgs::checkpoint_test

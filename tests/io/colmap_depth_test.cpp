@@ -7,7 +7,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::colmap_depth_test {
 namespace {
 
 class ColmapDepth : public testing::Test {
@@ -78,4 +78,4 @@ TEST_F(ColmapDepth, IsFoundByTheNameOfItsPhotograph) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::colmap_depth_test

@@ -8,7 +8,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::colmap_model_test {
 namespace {
 
 using test::defect_of;
@@ -187,4 +187,4 @@ TEST_F(ColmapModel, ReadsPointsInBothForms) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::colmap_model_test

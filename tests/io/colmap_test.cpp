@@ -8,7 +8,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::colmap_test {
 namespace {
 
 using test::defect_of;
@@ -161,4 +161,4 @@ TEST_F(ReadColmap, KeepsGoodPointsAndCountsTheRest) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::colmap_test

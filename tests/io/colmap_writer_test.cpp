@@ -7,7 +7,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::colmap_writer_test {
 namespace {
 
 ColmapCamera camera(double fx, double fy, const std::array<double, 5>& distortion) {
@@ -98,4 +98,4 @@ TEST(SceneOfColmap, IsTheSceneOfTheFiles) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::colmap_writer_test

@@ -13,7 +13,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/sample_splats.h"
 
-namespace cgs {
+namespace cgs::compressed_ply_test {
 namespace {
 
 using test::PackedFile;
@@ -212,4 +212,4 @@ TEST_F(WrittenPackedPly, CountsWhatAByteCannotSayAndTakesOneSplat) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::compressed_ply_test

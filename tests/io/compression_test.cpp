@@ -8,7 +8,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::compression_test {
 namespace {
 
 std::string sample_text() {
@@ -77,4 +77,4 @@ TEST(Compression, ZstandardMustHoldWhatWasPromised) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::compression_test

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::content_uuid_test {
 namespace {
 
 TEST(ContentUuid, HasTheFormOfVersionEight) {
@@ -27,4 +27,4 @@ TEST(ContentUuid, DependsOnContentAndPurposeAlone) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::content_uuid_test

@@ -6,7 +6,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::control_points_test {
 namespace {
 
 class ReadControlPoints : public testing::Test {
@@ -130,4 +130,4 @@ TEST_F(ReadControlPoints, IsBounded) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::control_points_test

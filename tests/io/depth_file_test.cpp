@@ -11,7 +11,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::depth_file_test {
 namespace {
 
 using test::packed;
@@ -168,4 +168,4 @@ TEST_F(DepthFile, IsFoundByItsStemAndFormatsWithoutLossFirst) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::depth_file_test

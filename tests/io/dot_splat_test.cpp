@@ -11,7 +11,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/sample_splats.h"
 
-namespace cgs {
+namespace cgs::dot_splat_test {
 namespace {
 
 std::string record(const Eigen::Vector3f& position,
@@ -96,4 +96,4 @@ TEST(DotSplat, NoticesAFullDisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::dot_splat_test

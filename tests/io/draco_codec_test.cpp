@@ -8,7 +8,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::draco_codec_test {
 namespace {
 
 GlbPrimitive sphere() {
@@ -104,4 +104,4 @@ TEST(DracoCompress, GivesEqualBytesForEqualInput) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::draco_codec_test

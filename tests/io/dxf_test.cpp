@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/full_disk.h"
 
-namespace cgs {
+namespace cgs::dxf_test {
 namespace {
 
 constexpr Provenance kSeen = Provenance::Observed;
@@ -91,4 +91,4 @@ TEST(WriteDxf, NeedsALineAndADisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::dxf_test

@@ -10,7 +10,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::exif_test {
 namespace {
 
 /// An entry of a TIFF directory with one value, or a rational of value / 10.
@@ -164,4 +164,4 @@ TEST(Exif, OfACameraIsNearWhatCalibrationFound) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::exif_test

@@ -6,7 +6,7 @@
 #include "io/byte_writer.h"
 #include "tests/support/full_disk.h"
 
-namespace cgs {
+namespace cgs::exr_header_test {
 namespace {
 
 /// A small file made by hand from the specification, with every part open to damage.
@@ -129,4 +129,4 @@ TEST(ScreenExr, RefusesEveryTruncation) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::exr_header_test

@@ -19,7 +19,7 @@
 #include "io/depth_file.h"
 #include "tests/support/full_disk.h"
 
-namespace cgs {
+namespace cgs::exr_test {
 namespace {
 
 ExrImage sample(int width, int height) {
@@ -286,4 +286,4 @@ TEST(Exr, NoticesAFullDisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::exr_test

@@ -11,7 +11,7 @@
 #include "io/resample.h"
 #include "tests/support/scene_files.h"
 
-namespace cgs {
+namespace cgs::fisheye_map_test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -267,4 +267,4 @@ TEST(UndistortFisheye, CarriesTheMaskAlongAndStopsAtTheImageCircle) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::fisheye_map_test

@@ -10,7 +10,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/splat_ply.h"
 
-namespace cgs {
+namespace cgs::gaussian_ply_test {
 namespace {
 
 Frame exact_frame() {
@@ -377,4 +377,4 @@ TEST(GaussianPly, RefusesToWriteWhatItCouldNotRead) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::gaussian_ply_test

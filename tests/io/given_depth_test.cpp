@@ -11,7 +11,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::given_depth_test {
 namespace {
 
 constexpr int kWidth = 64;
@@ -372,4 +372,4 @@ TEST_F(GivenDepthFiles, OfAPhotographTurnedByHalfIsUprightAlready) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::given_depth_test

@@ -11,7 +11,7 @@
 #include "tests/support/full_disk.h"
 #include "tests/support/triangle_glb.h"
 
-namespace cgs {
+namespace cgs::glb_colors_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -92,4 +92,4 @@ TEST(GlbColors, TexturesThatCannotBeReadAreTold) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::glb_colors_test

@@ -16,7 +16,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::glb_meshopt_test {
 namespace {
 
 using Corners = std::array<std::array<float, 3>, 3>;
@@ -195,4 +195,4 @@ TEST(GlbMeshopt, RefusesManyViewsOfOneStream) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::glb_meshopt_test

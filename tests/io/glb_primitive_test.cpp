@@ -8,7 +8,7 @@
 #include "libcgs/core/up_axis.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::glb_primitive_test {
 namespace {
 
 TEST(GlbPrimitives, SplitTheMeshIntoItsClasses) {
@@ -93,4 +93,4 @@ TEST(GlbPrimitives, DropFacesWithoutThreePlaces) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::glb_primitive_test

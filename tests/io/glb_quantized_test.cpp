@@ -7,7 +7,7 @@
 
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::glb_quantized_test {
 namespace {
 
 GlbPrimitive sphere_with_texture(const Eigen::Vector2i& size) {
@@ -60,4 +60,4 @@ TEST(Quantized, LeavesLowBitsZeroThatNobodyNeeds) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::glb_quantized_test

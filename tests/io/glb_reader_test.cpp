@@ -15,7 +15,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/triangle_glb.h"
 
-namespace cgs {
+namespace cgs::glb_reader_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -304,4 +304,4 @@ TEST(ReadGlb, SurvivesDamagedCompression) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::glb_reader_test

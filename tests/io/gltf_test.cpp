@@ -18,7 +18,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/textured_cube.h"
 
-namespace cgs {
+namespace cgs::gltf_test {
 namespace {
 
 using test::Glb;
@@ -471,4 +471,4 @@ TEST(WriteGlb, NoticesAFullDisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::gltf_test

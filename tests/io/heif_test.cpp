@@ -7,7 +7,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::heif_test {
 namespace {
 
 using namespace std::string_literals;
@@ -125,4 +125,4 @@ TEST(Heif, RefusesWhatIsCutOrDamaged) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::heif_test

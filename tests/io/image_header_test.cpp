@@ -5,7 +5,7 @@
 
 #include "tests/support/scene_files.h"
 
-namespace cgs {
+namespace cgs::image_header_test {
 namespace {
 
 using test::defect_of;
@@ -141,4 +141,4 @@ TEST(CheckImageIsWhole, RefusesTiffAndWebPThatPromiseMoreThanTheyHold) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::image_header_test

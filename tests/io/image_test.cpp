@@ -11,7 +11,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::image_test {
 namespace {
 
 using test::defect_of;
@@ -173,4 +173,4 @@ TEST_F(ReadImage, EnforcesThePixelLimitBeforeDecoding) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::image_test

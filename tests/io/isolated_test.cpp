@@ -11,7 +11,7 @@
 #include "io/sanitized.h"
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::isolated_test {
 namespace {
 
 TEST(RunIsolated, HandsOverWhatTheChildReturns) {
@@ -58,4 +58,4 @@ TEST(RunIsolated, LimitsTime) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::isolated_test

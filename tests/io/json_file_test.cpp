@@ -7,7 +7,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::json_file_test {
 namespace {
 
 using test::defect_of;
@@ -86,4 +86,4 @@ TEST(JsonValue, CountsAreWholeAndFitAnInt) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::json_file_test

@@ -9,7 +9,7 @@
 #include "tests/support/full_disk.h"
 #include "tests/support/ksplat_file.h"
 
-namespace cgs {
+namespace cgs::ksplat_test {
 namespace {
 
 using test::KSplat;
@@ -122,4 +122,4 @@ TEST(KSplat, RefusesEveryTruncation) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::ksplat_test

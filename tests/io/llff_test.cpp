@@ -8,7 +8,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::llff_test {
 namespace {
 
 using test::defect_of;
@@ -149,4 +149,4 @@ TEST_F(ReadLlff, TakesSparsePointsOnlyWhereTheyFitTheCameras) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::llff_test

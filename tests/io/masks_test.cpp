@@ -11,7 +11,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::masks_test {
 namespace {
 
 constexpr int kWidth = 32;
@@ -198,4 +198,4 @@ TEST_F(Masks, AreFoundWhereFoldersOfPhotographsAreLinksThatMayLeaveTheScene) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::masks_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::mesh_arrays_test {
 namespace {
 
 TEST(ColorByte, RoundsAndClamps) {
@@ -30,4 +30,4 @@ TEST(ProvenanceName, NamesEveryClassOnce) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::mesh_arrays_test

@@ -10,7 +10,7 @@
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::mesh_file_test {
 namespace {
 
 TEST(ReadMeshFile, KeepsEvidenceUnitAndPlace) {
@@ -98,4 +98,4 @@ TEST(ReadMeshFile, SurvivesFilesOfOthers) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::mesh_file_test

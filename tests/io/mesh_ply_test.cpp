@@ -8,7 +8,7 @@
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::mesh_ply_test {
 namespace {
 
 /// Origin of the file and of the frame agree: coordinates are the internal ones times 2^k, exact.
@@ -241,4 +241,4 @@ TEST(MeshPly, NamesWhatItDoesNotRead) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::mesh_ply_test

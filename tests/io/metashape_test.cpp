@@ -9,7 +9,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::metashape_test {
 namespace {
 
 constexpr double kF = 70;
@@ -241,4 +241,4 @@ TEST_F(ReadMetashape, SurvivesEveryTruncation) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::metashape_test

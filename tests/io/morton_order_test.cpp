@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::morton_order_test {
 namespace {
 
 TEST(MortonOrder, FollowsTheZCurveOfAGrid) {
@@ -30,4 +30,4 @@ TEST(MortonOrder, KeepsTheOrderOfPointsInOnePlace) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::morton_order_test

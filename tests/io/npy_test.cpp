@@ -9,7 +9,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::npy_test {
 namespace {
 
 using test::defect_of;
@@ -137,4 +137,4 @@ TEST_F(ReadNpy, RefusesHeadersOutsideTheGrammar) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::npy_test

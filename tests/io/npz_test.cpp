@@ -10,7 +10,7 @@
 #include "tests/support/temp_dir.h"
 #include "tests/support/zip_bytes.h"
 
-namespace cgs {
+namespace cgs::npz_test {
 namespace {
 
 std::string array(const std::string& shape, size_t count) {
@@ -108,4 +108,4 @@ TEST_F(Npz, RefusesWhatHoldsNoDepth) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::npz_test

@@ -7,7 +7,7 @@
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::obj_reader_test {
 namespace {
 
 std::string defect(const std::string& text) {
@@ -101,4 +101,4 @@ TEST(ReadObj, SaysThatATextureIsLostBesideColours) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::obj_reader_test

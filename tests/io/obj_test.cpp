@@ -14,7 +14,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/textured_cube.h"
 
-namespace cgs {
+namespace cgs::obj_test {
 namespace {
 
 struct Obj {
@@ -226,4 +226,4 @@ TEST(WriteObj, LeavesNeitherFileIfTheMeshCannotTakeItsPlace) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::obj_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/full_disk.h"
 
-namespace cgs {
+namespace cgs::off_test {
 namespace {
 
 std::string defect(const std::string& text) {
@@ -89,4 +89,4 @@ TEST(ReadOff, RefusesWhatIsDamaged) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::off_test

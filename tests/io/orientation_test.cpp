@@ -12,7 +12,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::orientation_test {
 namespace {
 
 constexpr int kWidth = 24;
@@ -160,4 +160,4 @@ TEST(Orientation, IsUprightWhereNothingValidIsSaid) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::orientation_test

@@ -12,7 +12,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::pfm_test {
 namespace {
 
 using test::packed;
@@ -90,4 +90,4 @@ TEST_F(ReadPfm, ReadsMiddleburysDisparities) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::pfm_test

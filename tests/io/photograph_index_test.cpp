@@ -6,7 +6,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::photograph_index_test {
 namespace {
 
 TEST(PhotographIndex, FindsPhotographsByTheNamesProgramsGiveThem) {
@@ -42,4 +42,4 @@ TEST(PhotographIndex, GivesAPhotographToOneCamera) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::photograph_index_test

@@ -6,7 +6,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::photographs_test {
 namespace {
 
 using test::defect_of;
@@ -68,4 +68,4 @@ TEST(Photographs, ThatCannotBeReadAreRefused) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::photographs_test

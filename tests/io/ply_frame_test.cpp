@@ -5,7 +5,7 @@
 
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::ply_frame_test {
 namespace {
 
 std::vector<std::string> comments_of(const Frame& frame) {
@@ -78,4 +78,4 @@ TEST(PlyFrame, IgnoresCommentsItDidNotWrite) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::ply_frame_test

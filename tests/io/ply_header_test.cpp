@@ -5,7 +5,7 @@
 
 #include "tests/support/full_disk.h"
 
-namespace cgs {
+namespace cgs::ply_header_test {
 namespace {
 
 const std::string kStart = "ply\nformat ascii 1.0\n";
@@ -86,4 +86,4 @@ TEST(ParsePlyHeader, RefusesEveryTruncation) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::ply_header_test

@@ -9,7 +9,7 @@
 #include "io/byte_writer.h"
 #include "tests/support/full_disk.h"
 
-namespace cgs {
+namespace cgs::ply_rows_test {
 namespace {
 
 struct Seen {
@@ -129,4 +129,4 @@ TEST(ReadPlyRows, HoldsAsciiToItsLinesAndTypes) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::ply_rows_test

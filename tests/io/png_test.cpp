@@ -11,7 +11,7 @@
 
 #include "tests/support/full_disk.h"
 
-namespace cgs {
+namespace cgs::png_test {
 namespace {
 
 std::string decoded_png(const std::string& bytes, uint32_t format, int width, int height) {
@@ -117,4 +117,4 @@ TEST(WritePng, NoticesAFullDisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::png_test

@@ -8,7 +8,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::polycam_test {
 namespace {
 
 /// A capture of two frames with depth of 16 x 12 pixels at 1.5 m.
@@ -144,4 +144,4 @@ TEST_F(ReadPolycam, NamesTheMissingPhotograph) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::polycam_test

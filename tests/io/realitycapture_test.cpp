@@ -11,7 +11,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::realitycapture_test {
 namespace {
 
 const std::string kHeader = "#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2";
@@ -126,4 +126,4 @@ TEST_F(ReadRealityCapture, NamesTheMissingPhotograph) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::realitycapture_test

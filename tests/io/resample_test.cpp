@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::resample_test {
 namespace {
 
 // A smooth picture defined on undistorted image coordinates, slow enough to be interpolated well.
@@ -154,4 +154,4 @@ TEST(AreaDownscale, LeavesMaskedPixelsOutOfTheAverage) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::resample_test

@@ -11,7 +11,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::rgbd_frames_test {
 namespace {
 
 constexpr const char* kMatrix = "30 0 16\n0 31 12\n0 0 1\n";
@@ -201,4 +201,4 @@ TEST_F(RgbdFrames, FramesOfRealSensorsAgree) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::rgbd_frames_test

@@ -6,7 +6,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::scene_path_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -101,4 +101,4 @@ TEST_F(ResolveInScene, ListsImagesByName) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::scene_path_test

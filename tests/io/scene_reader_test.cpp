@@ -9,7 +9,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::scene_reader_test {
 namespace {
 
 using test::defect_of;
@@ -357,4 +357,4 @@ TEST(ReadSceneOnRealData, FindsFernWithItsSparsePoints) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::scene_reader_test

@@ -9,7 +9,7 @@
 #include "libcgs/render/spherical_harmonics.h"
 #include "tests/support/sample_splats.h"
 
-namespace cgs {
+namespace cgs::sh_rotation_test {
 namespace {
 
 /// Colours before the cut at 0, so that every direction counts.
@@ -50,4 +50,4 @@ TEST(ShRotation, Mirrors) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::sh_rotation_test

@@ -12,7 +12,7 @@
 #include "tests/support/splat_ply.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::significance_test {
 namespace {
 
 using test::defect_of;
@@ -123,4 +123,4 @@ TEST(CheckSignificance, KnowsSplatsThatRoundingHasMoved) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::significance_test

@@ -11,7 +11,7 @@
 #include "tests/support/sample_splats.h"
 #include "tests/support/sog_file.h"
 
-namespace cgs {
+namespace cgs::sog_test {
 namespace {
 
 using test::SogFile;
@@ -88,4 +88,4 @@ TEST(Sog, RefusesEveryTruncation) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::sog_test

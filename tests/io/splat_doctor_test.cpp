@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/sample_splats.h"
 
-namespace cgs {
+namespace cgs::splat_doctor_test {
 namespace {
 
 /// A healthy file of the sample splats.
@@ -184,4 +184,4 @@ TEST(SplatDoctor, RefusesAFileOfNothing) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::splat_doctor_test

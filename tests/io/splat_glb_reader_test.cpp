@@ -16,7 +16,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/sample_splats.h"
 
-namespace cgs {
+namespace cgs::splat_glb_reader_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -385,4 +385,4 @@ TEST(SplatGlbReader, TellsSplatsFromMeshes) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::splat_glb_reader_test

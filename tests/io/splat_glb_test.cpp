@@ -13,7 +13,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/sample_splats.h"
 
-namespace cgs {
+namespace cgs::splat_glb_test {
 namespace {
 
 /// The container as its specification describes it.
@@ -134,4 +134,4 @@ TEST(SplatGlb, RefusesWhatGltfCannotHold) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::splat_glb_test

@@ -13,7 +13,7 @@
 #include "tests/support/sample_splats.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::splat_reader_test {
 namespace {
 
 std::string defect(const std::string& bytes) {
@@ -172,4 +172,4 @@ TEST_F(RealSplats, WhatIsNoneIsRefusedWithItsReason) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::splat_reader_test

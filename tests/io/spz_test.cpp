@@ -15,7 +15,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/sample_splats.h"
 
-namespace cgs {
+namespace cgs::spz_test {
 namespace {
 
 /// The bytes of a gzip file by zlib's own reader.
@@ -348,4 +348,4 @@ TEST(Spz, NoticesAFullDisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::spz_test

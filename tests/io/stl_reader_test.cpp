@@ -8,7 +8,7 @@
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::stl_reader_test {
 namespace {
 
 std::string defect(const std::string& bytes) {
@@ -78,4 +78,4 @@ TEST(ReadStl, ReadsTextInCapitalsAndSigns) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::stl_reader_test

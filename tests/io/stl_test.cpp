@@ -12,7 +12,7 @@
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::stl_test {
 namespace {
 
 struct Facet {
@@ -109,4 +109,4 @@ TEST(WriteStl, NoticesAFullDisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::stl_test

@@ -6,7 +6,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::strecha_test {
 namespace {
 
 using test::defect_of;
@@ -71,4 +71,4 @@ TEST_F(ReadStrecha, ListsMissingImages) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::strecha_test

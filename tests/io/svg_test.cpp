@@ -8,7 +8,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/full_disk.h"
 
-namespace cgs {
+namespace cgs::svg_test {
 namespace {
 
 Drawing triangle() {
@@ -57,4 +57,4 @@ TEST(WriteSvg, NeedsALineAndADisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::svg_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/scene_files.h"
 
-namespace cgs {
+namespace cgs::text_lines_test {
 namespace {
 
 using test::defect_of;
@@ -37,4 +37,4 @@ TEST(TextLines, RefusesNumbersThatAreNotFiniteOrOverflow) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::text_lines_test

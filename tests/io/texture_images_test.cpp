@@ -8,7 +8,7 @@
 #include "tests/support/temp_dir.h"
 #include "tests/support/textured_cube.h"
 
-namespace cgs {
+namespace cgs::texture_images_test {
 namespace {
 
 // A square before the camera that reaches over the given pixels.
@@ -143,4 +143,4 @@ TEST(RequireTexture, RefusesWhatDoesNotFitTheMesh) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::texture_images_test

@@ -14,7 +14,7 @@
 #include "tests/support/temp_dir.h"
 #include "tests/support/threemf_file.h"
 
-namespace cgs {
+namespace cgs::threemf_reader_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -369,4 +369,4 @@ TEST_F(Read3mf, RefusesComponentsThatMultiply) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::threemf_reader_test

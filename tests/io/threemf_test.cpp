@@ -13,7 +13,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::threemf_test {
 namespace {
 
 template <typename T>
@@ -187,4 +187,4 @@ TEST(Write3mf, NoticesAFullDisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::threemf_test

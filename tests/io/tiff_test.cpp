@@ -10,7 +10,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::tiff_test {
 namespace {
 
 // What Python's imaging library finds in the file: mode, width, height and every value.
@@ -53,4 +53,4 @@ TEST(WriteTiff, RefusesAnEmptyRasterAndAFolderThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::tiff_test

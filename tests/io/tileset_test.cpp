@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::tileset_test {
 namespace {
 
 Tileset two_levels() {
@@ -86,4 +86,4 @@ TEST(WriteTileset, RefusesWhatNoViewerCouldFollow) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::tileset_test

@@ -10,7 +10,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::transforms_json_test {
 namespace {
 
 using nlohmann::json;
@@ -222,4 +222,4 @@ TEST_F(ReadTransforms, RefusesFilesWithoutFrames) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::transforms_json_test

@@ -8,7 +8,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::vdb_screen_test {
 namespace {
 
 constexpr size_t kUuidVersionAt = 21 + 14;
@@ -144,4 +144,4 @@ TEST(ReadVdb, RefusesEveryChangedByteOfItsOwnFiles) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::vdb_screen_test

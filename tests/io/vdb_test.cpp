@@ -6,7 +6,7 @@
 
 #include "tests/support/full_disk.h"
 
-namespace cgs {
+namespace cgs::vdb_test {
 namespace {
 
 std::vector<openvdb::GridBase::ConstPtr> sample(float radius = 6) {
@@ -113,4 +113,4 @@ TEST(Vdb, NoticesAFullDisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::vdb_test

@@ -10,7 +10,7 @@
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::view_exr_test {
 namespace {
 
 Camera camera() {
@@ -130,4 +130,4 @@ TEST(WriteViewExr, NoticesAFullDisk) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::view_exr_test

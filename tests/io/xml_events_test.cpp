@@ -5,7 +5,7 @@
 
 #include "tests/support/scene_files.h"
 
-namespace cgs {
+namespace cgs::xml_events_test {
 namespace {
 
 std::string defect(const std::string& xml, const XmlHandlers& handlers = {}) {
@@ -99,4 +99,4 @@ TEST(XmlEvents, RefusesWhatIsDamagedOrExpands) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::xml_events_test

@@ -7,7 +7,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/zip_bytes.h"
 
-namespace cgs {
+namespace cgs::zip_test {
 namespace {
 
 const std::string kText(5000, 'a');
@@ -119,4 +119,4 @@ TEST(Zip, RefusesEveryTruncation) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::zip_test

@@ -14,7 +14,7 @@
 #include "tests/support/solid_meshes.h"
 #include "tests/support/sphere_cloud.h"
 
-namespace cgs {
+namespace cgs::advancing_front_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -200,4 +200,4 @@ TEST(AdvancingFront, RefusesWhatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::advancing_front_test

@@ -13,7 +13,7 @@
 #include "tests/support/depth_scenes.h"
 #include "tests/support/fused_volumes.h"
 
-namespace cgs {
+namespace cgs::block_evidence_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -219,4 +219,4 @@ TEST(BlockEvidence, GivesTheSameBitsAtTwiceTheScale) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::block_evidence_test

@@ -12,7 +12,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::boolean_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -156,4 +156,4 @@ TEST(WhyNoSolid, ShellsWithinShellsMustAlternate) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::boolean_test

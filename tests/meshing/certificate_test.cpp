@@ -7,7 +7,7 @@
 
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::certificate_test {
 namespace {
 
 using Eigen::Vector3f;
@@ -198,4 +198,4 @@ TEST(Certificate, TellsEulerNumberAndSmallestAngle) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::certificate_test

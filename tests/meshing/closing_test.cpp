@@ -14,7 +14,7 @@
 #include "tests/support/damaged_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::closing_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -183,4 +183,4 @@ TEST(ClosedMesh, RefusesWhatHasNoSurface) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::closing_test

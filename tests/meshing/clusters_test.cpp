@@ -9,7 +9,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::clusters_test {
 namespace {
 
 constexpr float kRadius = 0.08f;
@@ -98,4 +98,4 @@ TEST(DenseClusters, AreNumberedByTheirFirstPointAndCounted) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::clusters_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::components_test {
 namespace {
 
 // A unit right triangle and one of a hundredth of its area.
@@ -42,4 +42,4 @@ TEST(WithoutSmallComponents, TakesAnEmptyMesh) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::components_test

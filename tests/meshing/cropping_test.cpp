@@ -10,7 +10,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::cropping_test {
 namespace {
 
 double area(const TriangleMesh& mesh) {
@@ -99,4 +99,4 @@ TEST(CroppedByBall, KeepsFacesWhoseCornersAllLieInIt) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::cropping_test

@@ -10,7 +10,7 @@
 
 #include "tests/support/depth_scenes.h"
 
-namespace cgs {
+namespace cgs::depth_field_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -207,4 +207,4 @@ TEST(DepthField, CarvesAlongRaysThatHitNothing) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::depth_field_test

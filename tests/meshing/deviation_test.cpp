@@ -5,7 +5,7 @@
 
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::deviation_test {
 namespace {
 
 MeasurableMesh half_invented(const MeasurableMesh& mesh) {
@@ -85,4 +85,4 @@ TEST(PointsByArea, TakesAllPointsOfACloud) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::deviation_test

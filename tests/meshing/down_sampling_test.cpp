@@ -9,7 +9,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::down_sampling_test {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -72,4 +72,4 @@ TEST(DownSampling, RefusesMeshesAndGridsBeyondCounting) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::down_sampling_test

@@ -7,7 +7,7 @@
 #include "libcgs/core/srgb.h"
 #include "tests/support/textured_cube.h"
 
-namespace cgs {
+namespace cgs::exposure_test {
 namespace {
 
 using Eigen::Vector3f;
@@ -84,4 +84,4 @@ TEST(ApplyGain, MultipliesLinearLightAndKeepsEveryBitAtOne) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::exposure_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::face_adjacency_test {
 namespace {
 
 TEST(AdjacentFaces, ShareTheEdgeTheyStandFor) {
@@ -35,4 +35,4 @@ TEST(AdjacentFaces, AreTheFaceItselfAtABorder) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::face_adjacency_test

@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/textured_cube.h"
 
-namespace cgs {
+namespace cgs::face_views_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -251,4 +251,4 @@ TEST(ChooseFaceViews, RefusesOptionsAndScoresThatDoNotFit) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::face_views_test

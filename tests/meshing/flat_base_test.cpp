@@ -9,7 +9,7 @@
 #include "meshing/certificate.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::flat_base_test {
 namespace {
 
 // A ball of radius 1 at (4, 5, 6), seen from the side of `front` down to its middle.
@@ -63,4 +63,4 @@ TEST(FlatBase, KnowsNoSideWhereNothingOrEverythingWasSeen) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::flat_base_test

@@ -15,7 +15,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/depth_scenes.h"
 
-namespace cgs {
+namespace cgs::fusion_views_test {
 namespace {
 
 TsdfView view_of_wall() {
@@ -76,4 +76,4 @@ TEST(SurfaceExtent, NeedsDepth) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::fusion_views_test

@@ -6,7 +6,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::geodesic_test {
 namespace {
 
 SurfacePath between(const MeasurableMesh& mesh,
@@ -91,4 +91,4 @@ TEST(DistanceAlong, CopesWithThreeFacesAtAnEdgeAndOppositeWindings) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::geodesic_test

@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/sphere_cloud.h"
 
-namespace cgs {
+namespace cgs::hidden_points_test {
 namespace {
 
 // A point of a ball is seen from a place at distance d if its height above the center is > 1 / d.
@@ -70,4 +70,4 @@ TEST(SeenFrom, RefusesWhatHasNoOutside) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::hidden_points_test

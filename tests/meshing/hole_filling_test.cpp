@@ -10,7 +10,7 @@
 #include "meshing/components.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::hole_filling_test {
 namespace {
 
 const Eigen::Vector3f kCenter(0.05f, -0.1f, 0.15f);
@@ -87,4 +87,4 @@ TEST(HolesFilled, RefusesWhatIsNotManifold) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::hole_filling_test

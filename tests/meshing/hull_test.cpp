@@ -8,7 +8,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::hull_test {
 namespace {
 
 TEST(ConvexHull, OfACloudInACubeIsTheCube) {
@@ -46,4 +46,4 @@ TEST(ConvexHull, RefusesPointsInAPlane) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::hull_test

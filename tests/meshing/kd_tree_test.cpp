@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::kd_tree_test {
 namespace {
 
 // Half of the points on a coarse grid, so that many distances are equal and points coincide.
@@ -88,4 +88,4 @@ TEST(KdTree, TakesNoPoints) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::kd_tree_test

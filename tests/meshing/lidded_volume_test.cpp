@@ -10,7 +10,7 @@
 #include "meshing/vertex_attributes.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::lidded_volume_test {
 namespace {
 
 TEST(LiddedVolume, ClosesATubeByFlatLids) {
@@ -39,4 +39,4 @@ TEST(LiddedVolume, IsUnknownWhereFacesDisagree) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::lidded_volume_test

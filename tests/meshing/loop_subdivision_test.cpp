@@ -11,7 +11,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::loop_subdivision_test {
 namespace {
 
 TEST(LoopSubdivided, MovesAnOctahedronAsLoopSays) {
@@ -86,4 +86,4 @@ TEST(LoopSubdivided, SigmaHoldsHowFarAVertexMoved) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::loop_subdivision_test

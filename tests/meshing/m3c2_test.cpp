@@ -10,7 +10,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::m3c2_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -256,4 +256,4 @@ TEST(M3c2Options, AreRefusedByName) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::m3c2_test

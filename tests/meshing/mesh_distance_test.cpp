@@ -7,7 +7,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::mesh_distance_test {
 namespace {
 
 // The square [0, side]^2 at height z.
@@ -77,4 +77,4 @@ TEST(Cast, RefusesArraysOfDifferentLength) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::mesh_distance_test

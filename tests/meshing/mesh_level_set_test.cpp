@@ -12,7 +12,7 @@
 #include "meshing/vertex_attributes.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::mesh_level_set_test {
 namespace {
 
 TEST(EnclosingLevelSet, IsAsLargeAsTheSolidAndItsMeshLiesOnIt) {
@@ -41,4 +41,4 @@ TEST(EnclosingLevelSet, RefusesTooManyVoxels) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::mesh_level_set_test

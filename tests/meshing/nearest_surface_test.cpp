@@ -8,7 +8,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::nearest_surface_test {
 namespace {
 
 // Distance to the cube [0, 1]^3, negative inside.
@@ -84,4 +84,4 @@ TEST(EvidenceAt, InterpolatesSigma) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::nearest_surface_test

@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::orthophoto_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -138,4 +138,4 @@ TEST(PictureAxes, OfThreePointsLookAtTheirPlane) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::orthophoto_test

@@ -9,7 +9,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::outliers_test {
 namespace {
 
 // A flat patch and some points far off it; outliers come last.
@@ -72,4 +72,4 @@ TEST(Outliers, TakeFewPointsAndRefuseNonsense) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::outliers_test

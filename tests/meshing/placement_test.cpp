@@ -9,7 +9,7 @@
 #include "meshing/certificate.h"
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::placement_test {
 namespace {
 
 TEST(MoveMesh, MovesWorldPointsAndKeepsTheUnit) {
@@ -74,4 +74,4 @@ TEST(MoveToFrame, MatchesUnitsWhereBothAreKnown) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::placement_test

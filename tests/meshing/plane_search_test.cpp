@@ -9,7 +9,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::plane_search_test {
 namespace {
 
 // 3000 points within 2 mm of a tilted plane, 1500 of another one, 1500 anywhere.
@@ -52,4 +52,4 @@ TEST(LargestPlane, RefusesWhatHasNone) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::plane_search_test

@@ -8,7 +8,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::point_normals_test {
 namespace {
 
 const Eigen::Vector3f kCenter(3, -2, 1);
@@ -94,4 +94,4 @@ TEST(TurnPartsLike, FollowsTheFewThatStateASide) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::point_normals_test

@@ -10,7 +10,7 @@
 #include "tests/support/solid_meshes.h"
 #include "tests/support/sphere_cloud.h"
 
-namespace cgs {
+namespace cgs::point_smoothing_test {
 namespace {
 
 double rms_of_radius(const TriangleMesh& cloud) {
@@ -101,4 +101,4 @@ TEST(SmoothedPoints, RefuseWhatIsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::point_smoothing_test

@@ -13,7 +13,7 @@
 #include "tests/support/solid_meshes.h"
 #include "tests/support/sphere_cloud.h"
 
-namespace cgs {
+namespace cgs::poisson_surface_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -206,4 +206,4 @@ TEST(PoissonSurface, RefusesWhatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::poisson_surface_test

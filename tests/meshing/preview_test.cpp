@@ -7,7 +7,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::preview_test {
 namespace {
 
 using Eigen::Vector3f;
@@ -82,4 +82,4 @@ TEST(OverviewCamera, GoesRightForPositiveAzimuthAndUpForPositiveElevation) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::preview_test

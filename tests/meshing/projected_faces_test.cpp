@@ -5,7 +5,7 @@
 
 #include "tests/support/textured_cube.h"
 
-namespace cgs {
+namespace cgs::projected_faces_test {
 namespace {
 
 TEST(NearnessMap, AgreesWithRays) {
@@ -56,4 +56,4 @@ TEST(ForEachPixel, WeighsTheCorners) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::projected_faces_test

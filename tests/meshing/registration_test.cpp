@@ -6,7 +6,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::registration_test {
 namespace {
 
 // Waves that hold in every direction, a part of which may stand out.
@@ -58,4 +58,4 @@ TEST(RegisterPoints, SaysWhatSlides) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::registration_test

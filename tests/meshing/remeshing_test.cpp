@@ -11,7 +11,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::remeshing_test {
 namespace {
 
 TEST(Subdivided, LeavesTheSurfaceWhereItIs) {
@@ -84,4 +84,4 @@ TEST(Remeshed, CutsOffNoCorner) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::remeshing_test

@@ -11,7 +11,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::repair_test {
 namespace {
 
 // Every face with corners of its own, as in an STL.
@@ -171,4 +171,4 @@ TEST(RepeatedVertices, AreCounted) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::repair_test

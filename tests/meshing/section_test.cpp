@@ -6,7 +6,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::section_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -122,4 +122,4 @@ TEST(CutPlane, AxesAreThoseOfTheFile) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::section_test

@@ -8,7 +8,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::self_intersections_test {
 namespace {
 
 TEST(SelfIntersections, IgnoreNeighboursThatOnlyTouchWhereTheyShare) {
@@ -68,4 +68,4 @@ TEST(SelfIntersections, AreRefusedWhereThereAreTooMany) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::self_intersections_test

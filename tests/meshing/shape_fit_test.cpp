@@ -8,7 +8,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::shape_fit_test {
 namespace {
 
 const Eigen::Quaterniond kTurn(Eigen::AngleAxisd(0.8, Eigen::Vector3d(3, -1, 2).normalized()));
@@ -114,4 +114,4 @@ TEST(FitShape, RefusesWhatDeterminesNothing) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::shape_fit_test

@@ -9,7 +9,7 @@
 #include "meshing/vertex_attributes.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::shells_test {
 namespace {
 
 TriangleMesh cube(double side, double corner, bool inside_out = false) {
@@ -64,4 +64,4 @@ TEST(SettledShells, LabelsStayWithTheirFaces) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::shells_test

@@ -15,7 +15,7 @@
 #include "meshing/certificate.h"
 #include "meshing/edge_collapse.h"
 
-namespace cgs {
+namespace cgs::simplify_test {
 namespace {
 
 using Eigen::Vector3f;
@@ -443,4 +443,4 @@ TEST(SimplifyOptions, RefusesEveryFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::simplify_test

@@ -13,7 +13,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::smoothing_test {
 namespace {
 
 using test::labelled_sphere;
@@ -106,4 +106,4 @@ TEST(Smoothed, RefusesOptionsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::smoothing_test

@@ -8,7 +8,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::stated_surface_test {
 namespace {
 
 // The unit square at z = 0 that looks up; observed for x < 0.5, else inferred.
@@ -162,4 +162,4 @@ TEST(PointSpacing, OfAGrid) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::stated_surface_test

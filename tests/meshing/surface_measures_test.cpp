@@ -6,7 +6,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::surface_measures_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -165,4 +165,4 @@ TEST(OrientedBox, OfFlatAndSinglePoints) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::surface_measures_test

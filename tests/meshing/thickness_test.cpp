@@ -11,7 +11,7 @@
 #include "meshing/triangle_tree.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::thickness_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -286,4 +286,4 @@ TEST(Thickness, OfVerticesIsThatOfTheirFaces) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::thickness_test

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-namespace cgs {
+namespace cgs::triangle_tree_test {
 namespace {
 
 using Triangles = std::vector<TriangleTree::Triangle>;
@@ -110,4 +110,4 @@ TEST(TriangleTree, GivesTheSameForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::triangle_tree_test

@@ -12,7 +12,7 @@
 #include "tests/support/depth_scenes.h"
 #include "tests/support/fused_volumes.h"
 
-namespace cgs {
+namespace cgs::tsdf_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -457,4 +457,4 @@ TEST(TsdfOptions, RefusesEveryFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::tsdf_test

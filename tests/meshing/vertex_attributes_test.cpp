@@ -7,7 +7,7 @@
 
 #include "tests/support/sample_mesh.h"
 
-namespace cgs {
+namespace cgs::vertex_attributes_test {
 namespace {
 
 TEST(AppendBlend, LiesBetweenAndClaimsNoMoreThanItsParts) {
@@ -61,4 +61,4 @@ TEST(Joined, FillsInNothingThatWouldBeAClaim) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::vertex_attributes_test

@@ -7,7 +7,7 @@
 
 #include "meshing/volume.h"
 
-namespace cgs {
+namespace cgs::volume_distance_test {
 namespace {
 
 constexpr float kVoxel = 0.01f;
@@ -75,4 +75,4 @@ TEST(DistancesToObserved, SayNothingWhereNothingWasObservedOrTheFieldIsFlat) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::volume_distance_test

@@ -12,7 +12,7 @@
 #include "meshing/tsdf.h"
 #include "tests/support/depth_scenes.h"
 
-namespace cgs {
+namespace cgs::watertight_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -245,4 +245,4 @@ TEST(WatertightOptions, RefusesEveryFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::watertight_test

@@ -13,7 +13,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 
-namespace cgs {
+namespace cgs::wrapping_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -235,4 +235,4 @@ TEST(Wrapped, RefusesWhatIsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::wrapping_test

@@ -5,7 +5,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::arguments_test {
 namespace {
 
 Frame centimetres() {
@@ -86,4 +86,4 @@ TEST(FilterArguments, UnitsNeedAScale) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::arguments_test

@@ -21,7 +21,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::chain_test {
 
 /// For the names that CTest shows.
 static void PrintTo(const FilterOperation& operation, std::ostream* out) { *out << operation.name; }
@@ -392,4 +392,4 @@ TEST(Transform, RefusesFilesThatHoldNoMotion) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::chain_test

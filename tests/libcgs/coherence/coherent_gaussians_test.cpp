@@ -11,7 +11,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/reference_conv_decoder.h"
 
-namespace cgs {
+namespace cgs::coherent_gaussians_test {
 namespace {
 
 constexpr int kWidth = 14;
@@ -371,4 +371,4 @@ TEST(CoherenceOptions, NameTheFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::coherent_gaussians_test

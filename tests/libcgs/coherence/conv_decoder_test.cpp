@@ -15,7 +15,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/reference_conv_decoder.h"
 
-namespace cgs {
+namespace cgs::conv_decoder_test {
 namespace {
 
 using Maps = std::vector<Raster<float>>;
@@ -372,4 +372,4 @@ TEST(ConvDecoder, RefusesSpansAndMapsOfOtherSizes) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::conv_decoder_test

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::convolution_test {
 namespace {
 
 struct Size {
@@ -158,4 +158,4 @@ INSTANTIATE_TEST_SUITE_P(Sizes,
                                          Size{18, 33, 40, 12}));
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::convolution_test

@@ -8,7 +8,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::initialisation_test {
 namespace {
 
 Scene scene_of(size_t views) {
@@ -87,4 +87,4 @@ TEST(InitialisationOptions, RefusesEachFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::initialisation_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::layer_convolution_test {
 namespace {
 
 constexpr int kChannels = 11;
@@ -115,4 +115,4 @@ TEST_P(LayerConvolutionCase, GradientByTheParametersIsTheTranspose) {
 INSTANTIATE_TEST_SUITE_P(Lanes, LayerConvolutionCase, testing::Values(8, 16));
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::layer_convolution_test

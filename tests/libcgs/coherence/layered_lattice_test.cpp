@@ -12,7 +12,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/loss_checks.h"
 
-namespace cgs {
+namespace cgs::layered_lattice_test {
 namespace {
 
 // Slanted bands, a lone pixel of a layer of its own, and a layer number that is never used.
@@ -305,4 +305,4 @@ TEST(LayeredLattice, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::layered_lattice_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::upsampling_test {
 namespace {
 
 std::vector<double> sources(int from, int to) {
@@ -105,4 +105,4 @@ TEST_P(Upsample, TransposedIsItsTranspose) {
 INSTANTIATE_TEST_SUITE_P(Lanes, Upsample, testing::Values(8, 16));
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::upsampling_test

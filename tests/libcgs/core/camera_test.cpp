@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::camera_test {
 namespace {
 
 Camera tilted_camera() {
@@ -78,4 +78,4 @@ TEST(NormalsFromDepth, AreZeroWhereDepthIsUnknown) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::camera_test

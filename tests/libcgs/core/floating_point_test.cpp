@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::floating_point_test {
 namespace {
 
 // Values the compiler cannot know.
@@ -44,4 +44,4 @@ TEST(FloatingPoint, RoundsProductsBeforeItAddsThem) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::floating_point_test

@@ -8,7 +8,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::frame_test {
 namespace {
 
 std::vector<Eigen::Vector3d> cloud(double scale, const Eigen::Vector3d& offset) {
@@ -106,4 +106,4 @@ TEST(Frame, NamesItsUnit) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::frame_test

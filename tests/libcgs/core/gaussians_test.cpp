@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::gaussians_test {
 namespace {
 
 TEST(RotationMatrix, IsOrthonormalForAnyQuaternionLength) {
@@ -28,4 +28,4 @@ TEST(Covariance, HasTheScalesAsStandardDeviations) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::gaussians_test

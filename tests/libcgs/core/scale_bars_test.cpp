@@ -9,7 +9,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::scale_bars_test {
 namespace {
 
 TEST(ScaleBars, OneBarGivesItsRatioAndTheSigmaOfBothSides) {
@@ -90,4 +90,4 @@ TEST(ScaleBars, RefusesLengthsThatNoneCanHave) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::scale_bars_test

@@ -5,7 +5,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::scene_test {
 namespace {
 
 // Three cameras on a line, turned towards (0, 0, 4).
@@ -92,4 +92,4 @@ TEST(ToCanonical, OfAFarSceneGivesTheSameBits) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::scene_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::srgb_test {
 namespace {
 
 TEST(LinearFromSrgb, AgreesWithTheStandard) {
@@ -24,4 +24,4 @@ TEST(SrgbFromLinear, UndoesLinearFromSrgb) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::srgb_test

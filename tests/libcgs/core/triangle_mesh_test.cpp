@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::triangle_mesh_test {
 namespace {
 
 TriangleMesh unit_square() {
@@ -31,4 +31,4 @@ TEST(AreaByProvenance, SplitsTheArea) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::triangle_mesh_test

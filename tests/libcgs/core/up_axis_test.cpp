@@ -8,7 +8,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::up_axis_test {
 namespace {
 
 const std::vector<Eigen::Vector3d>& directions() {
@@ -55,4 +55,4 @@ TEST(UpAxis, RefusesADirectionThatIsNone) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::up_axis_test

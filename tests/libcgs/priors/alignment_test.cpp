@@ -10,7 +10,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/stereo_scene.h"
 
-namespace cgs {
+namespace cgs::alignment_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -108,4 +108,4 @@ TEST(AlignmentOptions, RefusesEachFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::alignment_test

@@ -8,7 +8,7 @@
 
 #include "tests/support/unposed_photos.h"
 
-namespace cgs {
+namespace cgs::bundle_adjustment_test {
 namespace {
 
 // Cameras around points, all of them known; sightings with noise [working pixels].
@@ -128,4 +128,4 @@ TEST(AdjustBundle, WeighsWhatIsKnownOfTheFocalLength) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::bundle_adjustment_test

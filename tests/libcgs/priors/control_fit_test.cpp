@@ -9,7 +9,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::control_fit_test {
 namespace {
 
 const Eigen::Vector3d kUtm(512'345.678, 5'403'210.123, 287.456);
@@ -282,4 +282,4 @@ TEST(ControlFit, FindsOutliersAmongManyPoints) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::control_fit_test

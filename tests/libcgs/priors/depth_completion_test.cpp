@@ -9,7 +9,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::depth_completion_test {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -181,4 +181,4 @@ TEST(DepthCompletionOptions, RefusesEachFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::depth_completion_test

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::depth_fit_test {
 namespace {
 
 // y = scale x + offset with relative noise; of every hundred points `wild` are anything.
@@ -74,4 +74,4 @@ TEST(RobustDeviation, IsThatOfANormalDistribution) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::depth_fit_test

@@ -10,7 +10,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::depth_layers_test {
 namespace {
 
 // Ward's method over all pairs of clusters, not only neighbours: cluster of every value.
@@ -97,4 +97,4 @@ TEST(DepthLayersOptions, RefusesEachFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::depth_layers_test

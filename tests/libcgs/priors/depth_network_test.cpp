@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/onnx_file.h"
 
-namespace cgs {
+namespace cgs::depth_network_test {
 namespace {
 
 using test::kOnnxBias;
@@ -121,4 +121,4 @@ TEST(DepthNetwork, RefusesWeightsThatAreNotThere) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::depth_network_test

@@ -8,7 +8,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/stereo_scene.h"
 
-namespace cgs {
+namespace cgs::estimate_priors_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -80,4 +80,4 @@ TEST(EstimatePriors, LeavesOutTheViewOfWhichNothingCanBeMeasured) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::estimate_priors_test

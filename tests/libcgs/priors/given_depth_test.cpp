@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::given_depth_test {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -214,4 +214,4 @@ TEST(MergeSensorDepth, LeavesOutDepthEdges) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::given_depth_test

@@ -11,7 +11,7 @@
 #include "libcgs/priors/estimate_priors.h"
 #include "tests/support/stereo_scene.h"
 
-namespace cgs {
+namespace cgs::guessed_depth_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -227,4 +227,4 @@ TEST(RemoveContradictions, TakesOutWhatFloatsBeforeOtherViews) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::guessed_depth_test

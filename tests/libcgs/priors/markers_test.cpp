@@ -5,7 +5,7 @@
 
 #include "tests/support/marker_photo.h"
 
-namespace cgs {
+namespace cgs::markers_test {
 namespace {
 
 using test::PrintedMarker;
@@ -91,4 +91,4 @@ TEST(FindMarkers, LeavesOutWhatIsThereTwiceAndFindsNoneInNone) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::markers_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/stereo_scene.h"
 
-namespace cgs {
+namespace cgs::measured_range_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -92,4 +92,4 @@ TEST(NarrowDepthRanges, KeepTheGuessOfTinyPictures) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::measured_range_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/onnx_file.h"
 
-namespace cgs {
+namespace cgs::onnx_input_test {
 namespace {
 
 using Shape = std::vector<int64_t>;
@@ -89,4 +89,4 @@ TEST(OnnxInputShape, SurvivesWhatIsNoNetwork) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::onnx_input_test

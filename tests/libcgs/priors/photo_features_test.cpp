@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/stereo_scene.h"
 
-namespace cgs {
+namespace cgs::photo_features_test {
 namespace {
 
 // Round spots on a grey ground, at places that are no multiple of anything.
@@ -148,4 +148,4 @@ TEST(PhotoFeatures, LieWhereTheMaskLetsThem) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::photo_features_test

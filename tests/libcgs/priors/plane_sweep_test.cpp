@@ -12,7 +12,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/stereo_scene.h"
 
-namespace cgs {
+namespace cgs::plane_sweep_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -445,4 +445,4 @@ TEST(PlaneSweepOptions, RefusesEachFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::plane_sweep_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/unposed_photos.h"
 
-namespace cgs {
+namespace cgs::pose_fit_test {
 namespace {
 
 PosedPhoto posed(const test::PointScene& scene, size_t i) {
@@ -91,4 +91,4 @@ TEST(EpipolarFits, LeaveOutPairsThatShareTooLittle) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::pose_fit_test

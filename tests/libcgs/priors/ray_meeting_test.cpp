@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::ray_meeting_test {
 namespace {
 
 Camera camera_at(const Eigen::Vector3d& place, double turn) {
@@ -74,4 +74,4 @@ TEST(RayMeeting, IsNoneWhereRaysDoNotMeet) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::ray_meeting_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::reconstruction_test {
 namespace {
 
 // Two cameras side by side, and a third that is not placed.
@@ -70,4 +70,4 @@ TEST(ReprojectionError, IsInfiniteBehindTheCamera) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::reconstruction_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/unposed_photos.h"
 
-namespace cgs {
+namespace cgs::refine_poses_test {
 namespace {
 
 using test::PointScene;
@@ -234,4 +234,4 @@ TEST(RefinePose, LeavesACameraThatFitsOrSharesTooLittle) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::refine_poses_test

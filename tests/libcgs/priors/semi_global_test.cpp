@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::semi_global_test {
 namespace {
 
 // Path costs by the recurrence, one direction after the other, on a guide without edges.
@@ -72,4 +72,4 @@ TEST(SemiGlobalPlanes, EqualsTheRecurrence) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::semi_global_test

@@ -10,7 +10,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/unposed_photos.h"
 
-namespace cgs {
+namespace cgs::solve_poses_test {
 namespace {
 
 using test::PointScene;
@@ -261,4 +261,4 @@ TEST(SolvePoses, TheUnitIsTheWayToTheFarthest) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::solve_poses_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/unposed_photos.h"
 
-namespace cgs {
+namespace cgs::two_view_test {
 namespace {
 
 // Exact images of points in two cameras, from the image centres, and a share of wrong ones.
@@ -98,4 +98,4 @@ TEST(HomographyInliers, AreThoseOnAPlane) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::two_view_test

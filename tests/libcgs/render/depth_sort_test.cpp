@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::depth_sort_test {
 namespace {
 
 TEST(SortDepthKeys, OrdersByDepthThenIndexAtAnySizeAndSpreadOfDepths) {
@@ -29,4 +29,4 @@ TEST(SortDepthKeys, OrdersByDepthThenIndexAtAnySizeAndSpreadOfDepths) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::depth_sort_test

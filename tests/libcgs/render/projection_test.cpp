@@ -10,7 +10,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::projection_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -225,4 +225,4 @@ TEST(DepthOrder, EqualsAStableSortAndLeavesOutWhatIsNotDrawn) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::projection_test

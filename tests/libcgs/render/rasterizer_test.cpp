@@ -14,7 +14,7 @@
 #include "libcgs/core/error.h"
 #include "tests/support/reference_rasterizer.h"
 
-namespace cgs {
+namespace cgs::rasterizer_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -341,4 +341,4 @@ TEST(Rasterize, LeavesTheFloatingPointModeOfTheCallerAlone) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::rasterizer_test

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::seen_surface_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -129,4 +129,4 @@ TEST(SeenSurface, LeavesOutWhatLiesBehindTheCamera) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::seen_surface_test

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::spherical_harmonics_test {
 namespace {
 
 using Coefficients = std::array<Eigen::Vector3f, 16>;
@@ -124,4 +124,4 @@ TEST(ShBasis, GivesTheColourAndItsSlope) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::spherical_harmonics_test

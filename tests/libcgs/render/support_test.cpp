@@ -15,7 +15,7 @@
 #include "libcgs/core/gaussians.h"
 #include "libcgs/render/rasterizer.h"
 
-namespace cgs {
+namespace cgs::support_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -286,4 +286,4 @@ TEST(AnnotateSupport, RefusesSizesThatDisagreeAndOptionsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::support_test

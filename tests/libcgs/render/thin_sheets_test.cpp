@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::thin_sheets_test {
 namespace {
 
 /// A camera `height` above (below, if negative) the plane z = 0 that looks straight at it and sees
@@ -81,4 +81,4 @@ TEST(ThinSheets, IsNotMisledByWhatStandsBehind) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::thin_sheets_test

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::tile_blending_test {
 namespace {
 
 Splat splat_at(double u, double v, float sigma, float opacity) {
@@ -99,4 +99,4 @@ TEST(BlendTile, StopsBlendingAFinishedPixel) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::tile_blending_test

@@ -19,7 +19,7 @@
 #include "tests/support/reference_rasterizer.h"
 #include "tests/support/reference_training_rasterizer.h"
 
-namespace cgs {
+namespace cgs::training_rasterizer_test {
 namespace {
 
 // Neither the image nor the principal point is a multiple of anything.
@@ -470,4 +470,4 @@ TEST(TrainingRasterizer, RefusesMoreRowsOfTilesThanItCanList) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::training_rasterizer_test

@@ -7,7 +7,7 @@
 #include "tests/support/loss_checks.h"
 #include "tests/support/splat_shapes.h"
 
-namespace cgs {
+namespace cgs::virtual_cameras_test {
 namespace {
 
 const Eigen::Vector3d kCenter(0.1, -0.2, 0.3);
@@ -101,4 +101,4 @@ TEST(VirtualCameras, RefuseWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::virtual_cameras_test

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::adam_test {
 namespace {
 
 void expect_published_algorithm(float decay) {
@@ -127,4 +127,4 @@ TEST(Adam, RateZeroDoesNothing) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::adam_test

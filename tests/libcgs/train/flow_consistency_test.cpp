@@ -10,7 +10,7 @@
 #include "libcgs/train/losses.h"
 #include "tests/support/loss_checks.h"
 
-namespace cgs {
+namespace cgs::flow_consistency_test {
 namespace {
 
 using test::doubled;
@@ -233,4 +233,4 @@ TEST(FlowConsistency, RefusesDepthThatDoesNotFitItsCamera) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::flow_consistency_test

@@ -13,7 +13,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::image_metrics_test {
 namespace {
 
 ColorImage flat(int width, int height, float value) {
@@ -227,4 +227,4 @@ TEST(ImageMetrics, RefuseUnequalSizesAndEmptySelections) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::image_metrics_test

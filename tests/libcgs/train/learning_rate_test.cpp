@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::learning_rate_test {
 namespace {
 
 TEST(Triangular2, StartsAtTheBaseAndPeaksAfterHalfAPeriod) {
@@ -24,4 +24,4 @@ TEST(Triangular2, IsLinearBetween) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::learning_rate_test

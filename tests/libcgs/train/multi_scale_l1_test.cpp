@@ -9,7 +9,7 @@
 #include "libcgs/train/losses.h"
 #include "tests/support/loss_checks.h"
 
-namespace cgs {
+namespace cgs::multi_scale_l1_test {
 namespace {
 
 using test::doubled;
@@ -144,4 +144,4 @@ TEST(MultiScaleL1, RefusesUnequalSizesAndNoLevel) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::multi_scale_l1_test

@@ -10,7 +10,7 @@
 #include "libcgs/train/losses.h"
 #include "tests/support/loss_checks.h"
 
-namespace cgs {
+namespace cgs::structural_dissimilarity_test {
 namespace {
 
 using test::doubled;
@@ -205,4 +205,4 @@ TEST(StructuralDissimilarity, RefusesUnequalSizes) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::structural_dissimilarity_test

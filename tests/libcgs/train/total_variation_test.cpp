@@ -9,7 +9,7 @@
 #include "libcgs/train/losses.h"
 #include "tests/support/loss_checks.h"
 
-namespace cgs {
+namespace cgs::total_variation_test {
 namespace {
 
 using test::doubled;
@@ -165,4 +165,4 @@ TEST(TotalVariation, RefusesUnequalSizesAndUnitsThatAreNotPositive) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::total_variation_test

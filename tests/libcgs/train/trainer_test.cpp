@@ -12,7 +12,7 @@
 #include "libcgs/train/image_metrics.h"
 #include "tests/support/stereo_scene.h"
 
-namespace cgs {
+namespace cgs::trainer_test {
 namespace {
 
 struct PlantedScene {
@@ -275,4 +275,4 @@ TEST(Trainer, ChangesNoColour) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::trainer_test

@@ -5,7 +5,7 @@
 
 #include "libcgs/core/error.h"
 
-namespace cgs {
+namespace cgs::training_options_test {
 namespace {
 
 TEST(TrainingOptions, EveryFieldSurvivesPrintingAndReading) {
@@ -75,4 +75,4 @@ TEST(TrainingPreset, EveryNameIsValidAndOthersAreRefused) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::training_options_test

@@ -5,7 +5,7 @@
 
 #include "samples/capture/solids.h"
 
-namespace cgs {
+namespace cgs::arch_test {
 namespace {
 
 using std::numbers::pi;
@@ -56,4 +56,4 @@ TEST(Column, IsClosedAndReachesFromThresholdToImpost) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::arch_test

@@ -7,7 +7,7 @@
 
 #include "samples/capture/solids.h"
 
-namespace cgs {
+namespace cgs::bvh_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -121,4 +121,4 @@ TEST(FaceNormal, PointsToTheCounterClockwiseSide) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::bvh_test

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::carving_test {
 namespace {
 
 struct Range {
@@ -52,4 +52,4 @@ TEST(FriezeHeight, DoesNotRepeat) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::carving_test

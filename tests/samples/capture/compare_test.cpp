@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "samples/capture/solids.h"
 
-namespace cgs {
+namespace cgs::compare_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -127,4 +127,4 @@ TEST(ObservedVolumeError, RefusesAnEmptyGridAndASingleView) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::compare_test

@@ -12,7 +12,7 @@
 #include "samples/capture/solids.h"
 #include "tests/support/temp_dir.h"
 
-namespace cgs {
+namespace cgs::files_test {
 namespace {
 
 PortalScene wall() {
@@ -90,4 +90,4 @@ TEST(WriteCapture, GivesTheSamePictureAloneAndAmongOthers) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::files_test

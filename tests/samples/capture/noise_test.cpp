@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::noise_test {
 namespace {
 
 using Eigen::Vector3f;
@@ -46,4 +46,4 @@ TEST(BandNoise, LeavesOutWhatAFootprintCannotResolve) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::noise_test

@@ -8,7 +8,7 @@
 
 #include "samples/capture/solids.h"
 
-namespace cgs {
+namespace cgs::portal_test {
 namespace {
 
 double polygon_area(double radius, int sides) {
@@ -48,4 +48,4 @@ TEST(PortalScene, HasMachinePartsOfKnownVolume) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::portal_test

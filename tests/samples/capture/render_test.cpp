@@ -9,7 +9,7 @@
 #include "samples/capture/solids.h"
 #include "samples/capture/truth.h"
 
-namespace cgs {
+namespace cgs::render_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -132,4 +132,4 @@ TEST(RenderView, HasTextureNearlyEverywhere) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::render_test

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::solids_test {
 namespace {
 
 using std::numbers::pi;
@@ -108,4 +108,4 @@ TEST(IsClosed, FindsAMissingAndATurnedFace) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::solids_test

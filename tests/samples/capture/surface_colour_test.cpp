@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace cgs {
+namespace cgs::surface_colour_test {
 namespace {
 
 PatternPoint wall_point(int i, Material material) {
@@ -52,4 +52,4 @@ TEST(Albedo, LosesOnlyDetailWithAWiderFootprint) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::surface_colour_test

@@ -9,7 +9,7 @@
 #include "libcgs/core/error.h"
 #include "samples/capture/solids.h"
 
-namespace cgs {
+namespace cgs::truth_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -160,4 +160,4 @@ TEST(ViewTruth, CoversEveryPixelOfTheCaptureAndShowsHolesOutsideTheInputs) {
 }
 
 }  // namespace
-}  // namespace cgs
+}  // namespace cgs::truth_test

@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Runs the tests of one source out of a program of many. Takes the options of the program, too.
+#
+# usage: tests/one.sh build/release/bin/io_tests tests/io/npy_test.cpp [--gtest_...]
+set -euo pipefail
+program=$1
+source=$2
+shift 2
+filter=$(sed -nE 's/^TEST(_F|_P)?\((\w+),.*/\2.*:*\/\2.*/p' "$source" | sort -u | paste -sd :)
+if [ -z "$filter" ]; then
+  echo "$source: no test found" >&2
+  exit 1
+fi
+exec "$program" --gtest_filter="$filter" "$@"
