@@ -38,13 +38,18 @@ OffHeader read_header(TextLines& lines) {
   return {lines.count(words[0]), lines.count(words[1]), color};
 }
 
-std::vector<uint32_t> read_polygon(TextLines& lines, uint64_t vertices) {
+struct Polygon {
+  std::vector<uint32_t> corners;
+  bool has_color = false;  ///< Numbers follow the corners.
+};
+
+Polygon read_polygon(TextLines& lines, uint64_t vertices) {
   const auto words = words_of(expect_line(lines, "a face"));
   const uint64_t count = words.empty() ? 0 : lines.count(words[0]);
   if (words.empty() || count > words.size() - 1) {
     lines.fail(Defect::Count, "a face has fewer corners than it says");
   }
-  std::vector<uint32_t> corners;
+  Polygon out{{}, words.size() > count + 1};
   for (uint64_t k = 1; k <= count; ++k) {
     const uint64_t corner = lines.count(words[k]);
     if (corner >= vertices) {
@@ -52,9 +57,9 @@ std::vector<uint32_t> read_polygon(TextLines& lines, uint64_t vertices) {
           Defect::Ref,
           "a face names vertex " + std::to_string(corner) + " of " + std::to_string(vertices));
     }
-    corners.push_back(static_cast<uint32_t>(corner));
+    out.corners.push_back(static_cast<uint32_t>(corner));
   }
-  return corners;
+  return out;
 }
 
 }  // namespace
@@ -84,11 +89,14 @@ ParsedMesh read_off(const std::filesystem::path& path) {
   settle_colors(out);
   fill_in_colors(out, colored);
   uint64_t dropped = 0;
+  bool has_face_colors = false;
   for (uint64_t i = 0; i < faces; ++i) {
-    const auto corners = read_polygon(lines, vertices);
-    if (corners.size() < 3) ++dropped;
-    append_polygon(corners, out.positions, out.mesh.faces);
+    const Polygon polygon = read_polygon(lines, vertices);
+    if (polygon.corners.size() < 3) ++dropped;
+    has_face_colors |= polygon.has_color;
+    append_polygon(polygon.corners, out.positions, out.mesh.faces);
   }
+  if (has_face_colors) out.warnings.emplace_back("colours of faces are not read");
   if (dropped > 0) {
     out.warnings.push_back("dropped " + std::to_string(dropped) + " faces of fewer than 3 corners");
   }

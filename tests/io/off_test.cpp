@@ -44,6 +44,17 @@ TEST(ReadOff, ReadsColoursOfVertices) {
   EXPECT_TRUE(floats.warnings.empty());
 }
 
+TEST(ReadOff, TellsThatColoursOfFacesAreNotRead) {
+  const test::TempDir dir;
+  const std::string points = "OFF\n3 1 0\n0 0 0\n1 0 0\n1 1 0\n";
+  test::write_bytes(dir / "a.off", points + "3 0 1 2 255 0 0\n");
+  const ParsedMesh mesh = read_off(dir / "a.off");
+  EXPECT_EQ(mesh.warnings, std::vector<std::string>{"colours of faces are not read"});
+  EXPECT_EQ(mesh.mesh.faces.size(), 1U);
+  test::write_bytes(dir / "a.off", points + "3 0 1 2 # a comment\n");
+  EXPECT_TRUE(read_off(dir / "a.off").warnings.empty());
+}
+
 double area_of(const ParsedMesh& mesh) {
   double sum = 0;
   for (const auto& f : mesh.mesh.faces) {
