@@ -138,23 +138,37 @@ std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-// The divisor the options leave open, of the largest photograph or, as that is what is worked on,
-// undistorted picture of a fisheye.
-int chosen_downscale(Scene& scene) {
+// The divisors that the options leave open, one per view: that of the largest photograph or, as
+// that is what is worked on, undistorted picture of a fisheye. Where it would leave half or less of
+// what a photograph has to give, that one has its own: cameras whose sizes differ little agree.
+std::vector<int> chosen_divisors(Scene& scene) {
   const auto longest = [](const View& view) {
     return view.image_path.empty() ? 0 : std::max(view.camera.width, view.camera.height);
   };
+  const auto divisor = [&](const View& view) {
+    constexpr int kLongest = SceneOptions::kLongestSide;
+    return std::max(1, (longest(view) + kLongest - 1) / kLongest);
+  };
   const auto is_shorter = [&](const View& a, const View& b) { return longest(a) < longest(b); };
   const View& largest = *std::max_element(scene.views.begin(), scene.views.end(), is_shorter);
-  constexpr int kLongest = SceneOptions::kLongestSide;
-  const int downscale = std::max(1, (longest(largest) + kLongest - 1) / kLongest);
-  if (downscale > 1) {
-    scene.warnings.push_back((largest.fisheye ? "undistorted pictures of " : "photographs of ") +
-                             size_text(largest.camera.width, largest.camera.height) +
-                             " pixels are worked on at 1/" + std::to_string(downscale) +
-                             " of their size; --downscale 1 takes all of it, and longer");
+  const int common = divisor(largest);
+  std::vector<int> out(scene.views.size(), common);
+  int others = 0;
+  for (size_t i = 0; i < out.size(); ++i) {
+    const View& view = scene.views[i];
+    if (view.image_path.empty() || 2 * divisor(view) > common) continue;
+    out[i] = divisor(view);
+    ++others;
   }
-  return downscale;
+  if (common > 1) {
+    scene.warnings.push_back(
+        (largest.fisheye ? "undistorted pictures of " : "photographs of ") +
+        size_text(largest.camera.width, largest.camera.height) + " pixels are worked on at 1/" +
+        std::to_string(common) + " of their size" +
+        (others > 0 ? ", " + std::to_string(others) + " smaller ones at more" : std::string()) +
+        "; --downscale 1 takes all of it, and longer");
+  }
+  return out;
 }
 
 void fit_cameras(Scene& scene) {
@@ -205,14 +219,15 @@ void make_pinholes(Scene& scene) {
   }
 }
 
-void divide_sizes(Scene& scene, int downscale) {
-  for (View& view : scene.views) {
-    Camera& camera = view.camera;
-    const int width = camera.width / downscale;
-    const int height = camera.height / downscale;
+void divide_sizes(Scene& scene, const std::vector<int>& divisors) {
+  for (size_t i = 0; i < divisors.size(); ++i) {
+    const View& view = scene.views[i];
+    Camera& camera = scene.views[i].camera;
+    const int width = camera.width / divisors[i];
+    const int height = camera.height / divisors[i];
     constexpr int kSmallest = 8;  // below, no stage has anything to work on
     if (width < kSmallest || height < kSmallest) {
-      throw InvalidInput("SceneOptions.downscale " + std::to_string(downscale) + " leaves " +
+      throw InvalidInput("SceneOptions.downscale " + std::to_string(divisors[i]) + " leaves " +
                          size_text(width, height) + " pixels of view " + printable(view.name));
     }
     camera = resized(camera, width, height);
@@ -390,7 +405,9 @@ Scene prepared(Scene scene, const SceneOptions& options) {
   check_presence(scene);
   fit_cameras(scene);
   make_pinholes(scene);
-  divide_sizes(scene, options.downscale ? *options.downscale : chosen_downscale(scene));
+  divide_sizes(scene,
+               options.downscale ? std::vector<int>(scene.views.size(), *options.downscale)
+                                 : chosen_divisors(scene));
   choose_views(scene, options.views, options.all_views);
   check_baselines(scene);
   check_places(scene);

@@ -20,7 +20,8 @@ struct SceneOptions {
   std::string views;
   bool all_views = false;  ///< Where `views` is empty, take every one.
   /// Divide image sizes by this; >= 1. Empty = choose: the smallest that leaves no side above
-  /// kLongestSide; what was chosen becomes a warning.
+  /// kLongestSide, for photographs much smaller than the largest one of their own; what was chosen
+  /// becomes a warning.
   std::optional<int> downscale;
   bool allow_external = false;  ///< Follow links and absolute paths that leave the scene folder.
   DepthOptions depth;

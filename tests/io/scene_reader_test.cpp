@@ -160,6 +160,25 @@ TEST_F(ReadScene, ChoosesASizeThatEndsInMinutesAndSaysSo) {
   EXPECT_TRUE(whole.warnings.empty());
 }
 
+TEST_F(ReadScene, PhotographsOfHalfTheSizeAndLessKeepMoreOfIt) {
+  write(4, "SIMPLE_PINHOLE 4096 64 6000 2048 32");
+  const std::array<std::pair<int, int>, 4> sizes = {{{4096, 64}, {3072, 48}, {2048, 32}, {512, 8}}};
+  for (size_t i = 0; i < sizes.size(); ++i) {
+    test::write_bytes(dir_ / "images" / ("v0" + std::to_string(i) + ".png"),
+                      test::rgb_png(sizes[i].first, sizes[i].second, 1));
+  }
+  const Scene chosen = read();
+  EXPECT_EQ(chosen.views[0].camera.width, 1024);
+  EXPECT_EQ(chosen.views[1].camera.width, 768);   // a third would do, a quarter is not far off
+  EXPECT_EQ(chosen.views[2].camera.width, 1024);  // a half instead of a quarter
+  EXPECT_EQ(chosen.views[3].camera.width, 512);
+  EXPECT_EQ(chosen.views[3].camera.fx, 750);
+  const std::string& warning = chosen.warnings.back();
+  EXPECT_NE(warning.find("4096 x 64 pixels are worked on at 1/4 of their size, 2 smaller ones"),
+            std::string::npos)
+      << warning;
+}
+
 TEST_F(ReadScene, ScalesIntrinsicsToTheImageAndRefusesOtherShapes) {
   write(2, "SIMPLE_PINHOLE 320 240 400 160 120");
   const Scene scene = read({.downscale = 2});
