@@ -101,12 +101,9 @@ int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) 
   const auto same = std::find_if(lenses.begin(), lenses.end(), [&](const PhotoFile* other) {
     return key(*other) == key(photograph);
   });
+  const auto index = static_cast<int>(same - lenses.begin());
   if (same == lenses.end()) lenses.push_back(&photograph);
-  return static_cast<int>(
-      std::find_if(lenses.begin(),
-                   lenses.end(),
-                   [&](const PhotoFile* other) { return key(*other) == key(photograph); }) -
-      lenses.begin());
+  return index;
 }
 
 using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255

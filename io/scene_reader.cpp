@@ -153,20 +153,19 @@ std::vector<int> chosen_divisors(Scene& scene) {
   const View& largest = *std::max_element(scene.views.begin(), scene.views.end(), is_shorter);
   const int common = divisor(largest);
   std::vector<int> out(scene.views.size(), common);
-  int others = 0;
+  bool has_smaller = false;
   for (size_t i = 0; i < out.size(); ++i) {
     const View& view = scene.views[i];
     if (view.image_path.empty() || 2 * divisor(view) > common) continue;
     out[i] = divisor(view);
-    ++others;
+    has_smaller = true;
   }
   if (common > 1) {
-    scene.warnings.push_back(
-        (largest.fisheye ? "undistorted pictures of " : "photographs of ") +
-        size_text(largest.camera.width, largest.camera.height) + " pixels are worked on at 1/" +
-        std::to_string(common) + " of their size" +
-        (others > 0 ? ", " + std::to_string(others) + " smaller ones at more" : std::string()) +
-        "; --downscale 1 takes all of it, and longer");
+    scene.warnings.push_back((largest.fisheye ? "undistorted pictures of " : "photographs of ") +
+                             size_text(largest.camera.width, largest.camera.height) +
+                             " pixels are worked on at 1/" + std::to_string(common) +
+                             " of their size" + (has_smaller ? ", smaller ones at more" : "") +
+                             "; --downscale 1 takes all of it, and longer");
   }
   return out;
 }

@@ -104,6 +104,34 @@ TEST(PhotoPoses, AreRefusedForACameraThatWasOnlyTurned) {
   EXPECT_NE(message_of([&] { solved(dir / "photos"); }).find("turned"), std::string::npos);
 }
 
+TEST(PhotoPoses, TellWhichPhotographsAreFromOnePlace) {
+  const test::TempDir dir;
+  const auto views = capture_views();
+  for (const auto& [name, view] :
+       {std::pair("a.png", 0), {"b.png", 1}, {"c.png", 2}, {"d.png", 2}}) {
+    photograph(dir / "photos" / name, views[size_t(view)].camera, uint32_t(name[0]));
+  }
+  const std::vector<std::string> warnings = solved(dir / "photos").warnings;
+  EXPECT_EQ(warnings.back(),
+            "photographs c.png and d.png were taken from one place: together they tell nothing of "
+            "depth");
+}
+
+TEST(PhotoPoses, TakeAFocalLengthInPixelsOfPhotographsOfOneSize) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "photos/0.png", test::rgb_png(160, 120));
+  test::write_bytes(dir / "photos/1.png", test::rgb_png(120, 160, 1));
+  const auto refusal = [&](double focal) {
+    return message_of([&] { solved(dir / "photos", focal); });
+  };
+  EXPECT_NE(refusal(28).find("allowed from 32 to 8000"), std::string::npos) << refusal(28);
+  EXPECT_NE(refusal(9000).find("not millimetres"), std::string::npos) << refusal(9000);
+  EXPECT_EQ(refusal(150).find("--focal"), std::string::npos) << refusal(150);
+  test::write_bytes(dir / "photos/2.png", test::rgb_png(80, 60, 2));
+  EXPECT_NE(refusal(150).find("0.png is 160 pixels long, 2.png 80"), std::string::npos)
+      << refusal(150);
+}
+
 TEST(PhotoPoses, AreRefusedForABlankWall) {
   const test::TempDir dir;
   std::mt19937 random(4);
