@@ -4,7 +4,8 @@
 # Debian's source, for how the packaged one hands work from thread to thread would not be seen and
 # all of it be reported. The source is fetched once and kept in build/race.
 #
-# usage: tests/races.sh [TEST...]     those that set a number of threads if nothing is said
+# usage: tests/races.sh [SOURCE...]   such as tests/meshing/tsdf_test.cpp, of those that share a
+#                                     program; if nothing is said, those that set a number of threads
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -36,20 +37,23 @@ cmake -G Ninja -S "$tbb" -B "$tbb/build" -DCMAKE_CXX_COMPILER=clang++-14 -DCMAKE
 cmake --build "$tbb/build"
 
 if [ $# -gt 0 ]; then
-  tests=("$@")
+  sources=("$@")
 else
-  mapfile -t tests < <(grep -rl max_allowed_parallelism tests --include='*_test.cpp' |
-    sed 's|^tests/||; s|\.cpp$||; s|/|_|g' | sort)
+  mapfile -t sources < <(grep -rl max_allowed_parallelism tests --include='*_test.cpp' | sort)
 fi
+# tests/meshing/tsdf_test.cpp is in meshing_tests
+mapfile -t programs < <(printf '%s\n' "${sources[@]}" | sed -E 's|^tests/([^/]+)/.*|\1_tests|' | sort -u)
 cmake --preset race >/dev/null
-cmake --build --preset race --target "${tests[@]}"
+cmake --build --preset race --target "${programs[@]}"
 
 status=0
-for test in "${tests[@]}"; do
+for source in "${sources[@]}"; do
+  name=${source#tests/}
+  log=build/race/$(basename "$source" .cpp).log
   verdict=clean
   LD_LIBRARY_PATH="$tbb/build/lib_relwithdebinfo" TSAN_OPTIONS="halt_on_error=1 suppressions=tests/races.supp" \
-    "build/race/bin/$test" >"build/race/$test.log" 2>&1 || verdict="FAILED, see build/race/$test.log"
-  printf '%-45s %s\n' "$test" "$verdict"
+    tests/one.sh "build/race/bin/${name%%/*}_tests" "$source" >"$log" 2>&1 || verdict="FAILED, see $log"
+  printf '%-55s %s\n' "$source" "$verdict"
   [ "$verdict" = clean ] || status=1
 done
 exit $status
