@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/lens.h"
 
+#include <array>
 #include <set>
 
 #include <gtest/gtest.h>
