@@ -24,6 +24,7 @@
 #include "io/scene_layouts.h"
 #include "io/significance.h"
 #include "libcgs/core/error.h"
+#include "libcgs/priors/input_views.h"
 
 namespace cgs {
 
@@ -260,9 +261,10 @@ void check_presence(Scene& scene) {
   scene.warnings.push_back(text);
 }
 
+constexpr int kInputs = 3;  // of many views
+
 std::vector<int> llff_protocol(const std::vector<int>& usable) {
   constexpr size_t kHoldEvery = 8;
-  constexpr int kInputs = 3;
   std::vector<int> pool;
   for (size_t i = 0; i < usable.size(); ++i) {
     if (i % kHoldEvery != 0) pool.push_back(usable[i]);
@@ -273,6 +275,13 @@ std::vector<int> llff_protocol(const std::vector<int>& usable) {
     out.push_back(pool[static_cast<size_t>(std::nearbyint(at))]);  // ties to even
   }
   return out;
+}
+
+// LLFF's scenes have a protocol that others publish figures for.
+std::vector<int> some_views(const Scene& scene, const std::vector<int>& usable) {
+  std::vector<int> out;
+  if (scene.kind != "LLFF") out = choose_input_views(scene, usable, kInputs);
+  return out.empty() ? llff_protocol(usable) : out;
 }
 
 void choose_views(Scene& scene, const std::string& list, bool all_views) {
@@ -290,7 +299,7 @@ void choose_views(Scene& scene, const std::string& list, bool all_views) {
     }
   } else {
     const bool takes_all = all_views || usable.size() <= kTakeAll;
-    scene.input = takes_all ? usable : llff_protocol(usable);
+    scene.input = takes_all ? usable : some_views(scene, usable);
   }
   if (scene.input.size() < 2) throw BadInput(Defect::Empty, scene.folder, "need at least 2 views");
   std::set_difference(usable.begin(),

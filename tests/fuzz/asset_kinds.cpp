@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <initializer_list>
 #include <stdexcept>
+#include <utility>
 
 #include "io/compressed_ply.h"
 #include "io/dot_splat.h"
@@ -40,12 +43,19 @@ std::string ascii_splats() {
          "1 1e0 -2 .1 .2 .3 0.5 -4 -4 -5 1 0 0 0\n";
 }
 
-// What was read is written as 3DGS PLY, and comes back.
-void read_splats_twice(const fs::path& file) {
-  const GaussianFile first = read_splats(file);
-  const fs::path again = file.parent_path() / "again.ply";
-  write_gaussian_ply(again, first.gaussians, first.frame);
-  const GaussianFile second = read_splats(again, first.frame);
+using WriteSplats =
+    std::function<void(const fs::path& file, const Gaussians& splats, const Frame& frame)>;
+
+void write_splat_ply(const fs::path& file, const Gaussians& splats, const Frame& frame) {
+  write_gaussian_ply(file, splats, frame);
+}
+
+// What was read is written, and comes back.
+void expect_splats_back(const GaussianFile& first,
+                        const fs::path& again,
+                        const WriteSplats& write) {
+  write(again, first.gaussians, first.frame);
+  const GaussianFile second = read_back([&] { return read_splats(again, first.frame); });
   require(second.gaussians.size() == first.gaussians.size(), "splats were lost");
 }
 
@@ -55,54 +65,72 @@ FileKind of_splats(const std::string& name,
   return {name,
           file,
           [=](Folder folder) { write(folder / file); },
-          [=](Folder folder) { read_splats_twice(folder / file); }};
+          [=](Folder folder) {
+            expect_splats_back(read_splats(folder / file), folder / "again.ply", write_splat_ply);
+          }};
+}
+
+// Of a format that we write, too.
+FileKind of_own_splats(const std::string& name, const std::string& file, const WriteSplats& write) {
+  return {name,
+          file,
+          [=](Folder folder) { write(folder / file, varied_splats(3, 1), centimetre_frame()); },
+          [=](Folder folder) {
+            expect_splats_back(read_splats(folder / file), folder / ("again_" + file), write);
+          }};
 }
 
 void add_splats(Kinds& kinds) {
-  const auto ours = [] { return varied_splats(3, 1); };
-  kinds.push_back(of_splats("splat-ply", "a.ply", [=](const fs::path& file) {
-    write_gaussian_ply(file, ours(), centimetre_frame());
-  }));
+  kinds.push_back(of_own_splats("splat-ply", "a.ply", write_splat_ply));
   kinds.push_back(of_splats(
       "splat-ply-ascii", "a.ply", [](const fs::path& file) { write_bytes(file, ascii_splats()); }));
   kinds.push_back(of_splats("packed-ply", "a.ply", [](const fs::path& file) {
     write_bytes(file, PackedFile{.splats = {{1, 2, 3, 4}, {}}, .coefficients = 9}.bytes());
   }));
   for (const int version : {2, 3}) {
-    kinds.push_back(of_splats("spz-" + std::to_string(version), "a.spz", [=](const fs::path& file) {
-      write_spz(file, ours(), centimetre_frame(), {.version = version});
-    }));
+    kinds.push_back(of_own_splats("spz-" + std::to_string(version),
+                                  "a.spz",
+                                  [=](const fs::path& file, const Gaussians& g, const Frame& f) {
+                                    write_spz(file, g, f, {.version = version});
+                                  }));
   }
   kinds.push_back(of_splats("sog", "a.sog", [](const fs::path& file) {
     SogFile sog;
     sog.add_harmonics();
     write_bytes(file, sog.bytes());
   }));
-  kinds.push_back(of_splats("packed-ply-of-ours", "a.ply", [=](const fs::path& file) {
-    write_compressed_ply(file, ours(), centimetre_frame());
-  }));
-  kinds.push_back(of_splats("splat-glb", "a.glb", [=](const fs::path& file) {
-    write_splat_glb(file, ours(), centimetre_frame());
-  }));
+  kinds.push_back(of_own_splats("packed-ply-of-ours",
+                                "a.compressed.ply",
+                                [](const fs::path& file, const Gaussians& g, const Frame& f) {
+                                  write_compressed_ply(file, g, f);
+                                }));
+  kinds.push_back(of_own_splats(
+      "splat-glb", "a.glb", [](const fs::path& file, const Gaussians& g, const Frame& f) {
+        write_splat_glb(file, g, f);
+      }));
   for (const uint16_t level : {0, 1, 2}) {
     const std::string name = "ksplat-" + std::to_string(level);
     kinds.push_back(of_splats(name, "a.ksplat", [=](const fs::path& file) {
       write_bytes(file, KSplatFile{.level = level, .degree = 1, .splats = {{}, {}, {}}}.bytes());
     }));
   }
-  kinds.push_back(of_splats("dot-splat", "a.splat", [=](const fs::path& file) {
-    write_dot_splat(file, ours(), centimetre_frame());
-  }));
+  kinds.push_back(of_own_splats(
+      "dot-splat", "a.splat", [](const fs::path& file, const Gaussians& g, const Frame& f) {
+        write_dot_splat(file, g, f);
+      }));
 }
 
 // --- meshes ---------------------------------------------------------------------------------
 
+/// \return the triangles that the file holds
+using WriteMesh =
+    std::function<size_t(const fs::path& file, const TriangleMesh& mesh, const Frame& frame)>;
+
 // What was read is written as PLY, and comes back.
-void read_mesh_twice(const fs::path& file) {
-  const MeasurableFile first = read_mesh_file(file);
-  const fs::path again = file.parent_path() / "again.ply";
+void expect_mesh_back(const MeasurableFile& first, const fs::path& again) {
   write_mesh_ply(again, first.content.mesh, first.content.frame);
-  const MeasurableFile second = read_mesh_file(again, first.content.frame);
+  const MeasurableFile second =
+      read_back([&] { return read_mesh_file(again, first.content.frame); });
   require(second.content.mesh.vertices.size() == first.content.mesh.vertices.size(),
           "vertices were lost");
   require(second.content.mesh.faces == first.content.mesh.faces, "faces were changed");
@@ -114,20 +142,68 @@ FileKind of_mesh(const std::string& name,
   return {name,
           file,
           [=](Folder folder) { write(folder / file); },
-          [=](Folder folder) { read_mesh_twice(folder / file); }};
+          [=](Folder folder) {
+            expect_mesh_back(read_mesh_file(folder / file), folder / "again.ply");
+          }};
+}
+
+// Of a format that we write, too.
+FileKind of_own_mesh(const std::string& name, const std::string& file, const WriteMesh& write) {
+  return {name,
+          file,
+          [=](Folder folder) { write(folder / file, labelled_sphere(4, 4), centimetre_frame()); },
+          [=](Folder folder) {
+            const MeasurableFile first = read_mesh_file(folder / file);
+            expect_mesh_back(first, folder / "again.ply");
+            const fs::path again = folder / ("again_" + file);
+            const size_t triangles = write(again, first.content.mesh, first.content.frame);
+            const MeasurableFile second =
+                read_back([&] { return read_mesh_file(again, first.content.frame); });
+            require(second.content.mesh.faces.size() == triangles, "triangles were lost");
+          }};
+}
+
+void add_own_meshes(Kinds& kinds) {
+  kinds.push_back(of_own_mesh(
+      "mesh-ply", "a.ply", [](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
+        write_mesh_ply(file, mesh, frame);
+        return mesh.faces.size();
+      }));
+  kinds.push_back(of_own_mesh(
+      "obj", "a.obj", [](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
+        write_obj(file, mesh, frame);
+        return mesh.faces.size();
+      }));
+  kinds.push_back(of_own_mesh(
+      "stl", "a.stl", [](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
+        write_stl(file, mesh, frame, Eigen::Matrix3d::Identity());
+        return mesh.faces.size();
+      }));
+  kinds.push_back(
+      of_own_mesh("3mf-of-ours",
+                  "a.3mf",
+                  [](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
+                    write_3mf(file, mesh, frame, Eigen::Matrix3d::Identity());
+                    return static_cast<size_t>(
+                        std::count_if(mesh.faces.begin(), mesh.faces.end(), [](const auto& face) {
+                          return face[0] != face[1] && face[1] != face[2] && face[2] != face[0];
+                        }));
+                  }));
+  const std::initializer_list<std::pair<const char*, GlbEncoding>> encodings = {
+      {"glb", GlbEncoding::Plain},
+      {"glb-quantized", GlbEncoding::Quantized},
+      {"glb-meshopt", GlbEncoding::Meshopt},
+      {"glb-draco", GlbEncoding::Draco}};
+  for (const auto& [name, encoding] : encodings) {
+    kinds.push_back(of_own_mesh(
+        name, "a.glb", [=](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
+          return write_glb(file, mesh, frame, {.encoding = encoding}).triangles;
+        }));
+    kinds.back().is_isolated = encoding == GlbEncoding::Draco;
+  }
 }
 
 void add_meshes(Kinds& kinds) {
-  const auto sphere = [] { return labelled_sphere(4, 4); };
-  kinds.push_back(of_mesh("mesh-ply", "a.ply", [=](const fs::path& file) {
-    write_mesh_ply(file, sphere(), centimetre_frame());
-  }));
-  kinds.push_back(of_mesh("obj", "a.obj", [=](const fs::path& file) {
-    write_obj(file, sphere(), centimetre_frame());
-  }));
-  kinds.push_back(of_mesh("stl", "a.stl", [=](const fs::path& file) {
-    write_stl(file, sphere(), centimetre_frame(), Eigen::Matrix3d::Identity());
-  }));
   kinds.push_back(of_mesh("stl-ascii", "a.stl", [](const fs::path& file) {
     write_bytes(file,
                 "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
@@ -135,15 +211,6 @@ void add_meshes(Kinds& kinds) {
   }));
   kinds.push_back(of_mesh("off", "a.off", [](const fs::path& file) {
     write_bytes(file, "OFF\n# a\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2 255 0 0\n4 0 1 3 2\n");
-  }));
-  kinds.push_back(of_mesh("glb", "a.glb", [=](const fs::path& file) {
-    write_glb(file, sphere(), centimetre_frame(), {.encoding = GlbEncoding::Plain});
-  }));
-  kinds.push_back(of_mesh("glb-meshopt", "a.glb", [=](const fs::path& file) {
-    write_glb(file, sphere(), centimetre_frame(), {.encoding = GlbEncoding::Meshopt});
-  }));
-  kinds.push_back(of_mesh("3mf-of-ours", "a.3mf", [=](const fs::path& file) {
-    write_3mf(file, sphere(), centimetre_frame(), Eigen::Matrix3d::Identity());
   }));
   const auto placed = [] {
     ThreeMfFile out;
@@ -162,11 +229,6 @@ void add_meshes(Kinds& kinds) {
                      const fs::path file = folder / "3dmodel.model";
                      (void)parse_threemf_model(read_bytes(file), file);
                    }});
-  FileKind draco = of_mesh("glb-draco", "a.glb", [=](const fs::path& file) {
-    write_glb(file, sphere(), centimetre_frame());
-  });
-  draco.is_isolated = true;
-  kinds.push_back(draco);
 }
 
 }  // namespace
@@ -174,6 +236,7 @@ void add_meshes(Kinds& kinds) {
 std::vector<FileKind> asset_kinds() {
   Kinds kinds;
   add_splats(kinds);
+  add_own_meshes(kinds);
   add_meshes(kinds);
   return kinds;
 }

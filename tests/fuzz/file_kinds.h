@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "libcgs/core/error.h"
+
 namespace cgs::test {
 
 /// A kind of file that a reader of ours takes, for tests that damage such files.
@@ -24,6 +26,17 @@ struct FileKind {
 /// For what must hold of anything that was read. \throws std::logic_error
 inline void require(bool holds, const char* what) {
   if (!holds) throw std::logic_error(what);
+}
+
+/// What a reader returns of a file that we wrote: there is no reason to refuse it.
+/// \throws std::logic_error if it does
+template <typename Read>
+auto read_back(const Read& read) {
+  try {
+    return read();
+  } catch (const Error& error) {
+    throw std::logic_error(std::string("what was written is refused: ") + error.what());
+  }
 }
 
 std::vector<FileKind> asset_kinds();  ///< Of splats and meshes.

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/input_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+#include <utility>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+/// A place of the scene and which of the candidates see it, as positions among them.
+struct Sight {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  std::vector<size_t> seen_by;
+};
+
+// What two views tell of a point between whose directions this angle lies, 0 to 1.
+double worth_of_angle(double radians) {
+  constexpr double kBest = 10;  // [degrees]
+  constexpr double kNarrower = 4;
+  constexpr double kWider = 12;
+  const double off = radians * 180 / std::numbers::pi - kBest;
+  const double sigma = off < 0 ? kNarrower : kWider;
+  return std::exp(-off * off / (2 * sigma * sigma));
+}
+
+// As many at most, evenly spread.
+template <typename T>
+std::vector<T> some_of(const std::vector<T>& all, size_t most) {
+  if (all.size() <= most) return all;
+  std::vector<T> out;
+  for (size_t i = 0; i < most; ++i) out.push_back(all[i * all.size() / most]);
+  return out;
+}
+
+// Points that at least two candidates are known to see.
+std::vector<Sight> known_sights(const Scene& scene, const std::vector<int>& candidates) {
+  constexpr size_t kMost = 20000;
+  std::vector<Sight> out;
+  for (const SparsePoint& point : scene.points) {
+    Sight sight{point.position, {}};
+    for (size_t i = 0; i < candidates.size(); ++i) {
+      if (std::binary_search(point.views.begin(), point.views.end(), candidates[i])) {
+        sight.seen_by.push_back(i);
+      }
+    }
+    if (sight.seen_by.size() >= 2) out.push_back(std::move(sight));
+  }
+  return some_of(out, kMost);
+}
+
+// Places all over each picture, as far as what the cameras look at, and who has them in the
+// picture. What hides them is not known: opposite cameras see the same, at an angle worth nothing.
+std::vector<Sight> guessed_sights(const Scene& scene, const std::vector<int>& candidates) {
+  constexpr int kGrid = 4;  // places per side of a picture
+  Scene all = scene;
+  all.input = candidates;
+  const std::vector<Eigen::Vector3d> subject = subject_points(all);  // camera, subject, camera, …
+  std::vector<Sight> out;
+  for (size_t i = 0; i < candidates.size(); ++i) {
+    const Camera& camera = scene.views[static_cast<size_t>(candidates[i])].camera;
+    const double depth = (subject[2 * i + 1] - subject[2 * i]).norm();
+    for (int k = 0; k < kGrid * kGrid; ++k) {
+      const double u = (k % kGrid + 0.5) / kGrid * camera.width;
+      const double v = (k / kGrid + 0.5) / kGrid * camera.height;
+      Sight sight{camera.unproject(u, v, depth), {}};
+      for (size_t j = 0; j < candidates.size(); ++j) {
+        const Camera& other = scene.views[static_cast<size_t>(candidates[j])].camera;
+        if (other.sees(other.project(sight.position))) sight.seen_by.push_back(j);
+      }
+      out.push_back(std::move(sight));
+    }
+  }
+  return out;
+}
+
+/// What pairs of candidates tell of each place.
+class Worth {
+ public:
+  Worth(const Scene& scene, const std::vector<int>& candidates, const std::vector<Sight>& sights)
+      : sights_(sights) {
+    for (const int i : candidates) {
+      centers_.push_back(scene.views[static_cast<size_t>(i)].camera.center());
+    }
+  }
+
+  double of_pair(const Sight& sight, size_t a, size_t b) const {
+    const Eigen::Vector3d to_a = centers_[a] - sight.position;
+    const Eigen::Vector3d to_b = centers_[b] - sight.position;
+    return worth_of_angle(std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b)));
+  }
+
+  // The two that tell the most; equal if no two tell anything.
+  std::pair<size_t, size_t> best_pair() const {
+    const auto n = static_cast<Eigen::Index>(centers_.size());
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(n, n);
+    for (const Sight& sight : sights_) {
+      for (size_t k = 0; k < sight.seen_by.size(); ++k) {
+        for (size_t l = k + 1; l < sight.seen_by.size(); ++l) {
+          const size_t a = sight.seen_by[k];
+          const size_t b = sight.seen_by[l];
+          sum(Eigen::Index(a), Eigen::Index(b)) += of_pair(sight, a, b);
+        }
+      }
+    }
+    Eigen::Index a = 0;
+    Eigen::Index b = 0;
+    return sum.maxCoeff(&a, &b) > 0 ? std::pair(size_t(a), size_t(b)) : std::pair<size_t, size_t>();
+  }
+
+  // What is known of a place from some views, and one more.
+  double with(const Sight& sight, const std::vector<size_t>& chosen, size_t more) const {
+    const auto sees = [&](size_t view) {
+      return std::binary_search(sight.seen_by.begin(), sight.seen_by.end(), view);
+    };
+    double best = 0;
+    if (!sees(more)) return best;
+    for (const size_t view : chosen) {
+      if (sees(view)) best = std::max(best, of_pair(sight, view, more));
+    }
+    return best;
+  }
+
+  // Adds the view that adds the most to what the chosen ones tell. \return false if none does
+  bool add_best(std::vector<size_t>& chosen, std::vector<double>& told) const {
+    double most = 0;
+    size_t best = 0;
+    for (size_t view = 0; view < centers_.size(); ++view) {
+      if (std::find(chosen.begin(), chosen.end(), view) != chosen.end()) continue;
+      double gain = 0;
+      for (size_t i = 0; i < sights_.size(); ++i) {
+        gain += std::max(0.0, with(sights_[i], chosen, view) - told[i]);
+      }
+      if (gain > most) std::tie(most, best) = std::pair(gain, view);
+    }
+    if (!(most > 0)) return false;
+    for (size_t i = 0; i < sights_.size(); ++i) {
+      told[i] = std::max(told[i], with(sights_[i], chosen, best));
+    }
+    chosen.push_back(best);
+    return true;
+  }
+
+ private:
+  const std::vector<Sight>& sights_;
+  std::vector<Eigen::Vector3d> centers_;
+};
+
+}  // namespace
+
+std::vector<int> choose_input_views(const Scene& scene,
+                                    const std::vector<int>& candidates,
+                                    size_t count) {
+  require(candidates.size() >= 2, "views to choose among", candidates.size());
+  require(count >= 2, "views to choose", count);
+  constexpr size_t kMostCandidates = 500;
+  const std::vector<int> some = some_of(candidates, kMostCandidates);
+  std::vector<Sight> sights = known_sights(scene, some);
+  constexpr size_t kEnough = 50;
+  if (sights.size() < kEnough) sights = guessed_sights(scene, some);
+
+  const Worth worth(scene, some, sights);
+  const auto [a, b] = worth.best_pair();
+  if (a == b) return {};
+  std::vector<size_t> chosen = {a};
+  std::vector<double> told(sights.size(), 0.0);
+  for (size_t i = 0; i < sights.size(); ++i) told[i] = worth.with(sights[i], chosen, b);
+  chosen.push_back(b);
+  while (chosen.size() < count && worth.add_best(chosen, told)) {
+  }
+  std::vector<int> out;
+  for (const size_t i : chosen) out.push_back(some[i]);
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+}  // namespace cgs
