@@ -196,7 +196,9 @@ void add_own_meshes(Kinds& kinds) {
       {"glb-draco", GlbEncoding::Draco}};
   for (const auto& [name, encoding] : encodings) {
     kinds.push_back(of_own_mesh(
-        name, "a.glb", [=](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
+        name,
+        "a.glb",
+        [encoding = encoding](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
           return write_glb(file, mesh, frame, {.encoding = encoding}).triangles;
         }));
     kinds.back().is_isolated = encoding == GlbEncoding::Draco;
