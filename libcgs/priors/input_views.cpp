@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -126,7 +127,8 @@ class Worth {
     return best;
   }
 
-  // Adds the view that adds the most to what the chosen ones tell. \return false if none does
+  // Adds the view that adds the most to what the chosen ones tell. \return false if none adds
+  // anything to speak of
   bool add_best(std::vector<size_t>& chosen, std::vector<double>& told) const {
     double most = 0;
     size_t best = 0;
@@ -138,7 +140,8 @@ class Worth {
       }
       if (gain > most) std::tie(most, best) = std::pair(gain, view);
     }
-    if (!(most > 0)) return false;
+    constexpr double kLeast = 0.01;
+    if (!(most > kLeast * std::accumulate(told.begin(), told.end(), 0.0))) return false;
     for (size_t i = 0; i < sights_.size(); ++i) {
       told[i] = std::max(told[i], with(sights_[i], chosen, best));
     }
