@@ -59,9 +59,24 @@ TEST_F(ReadScene, TakesAllOfUpToFourViews) {
   EXPECT_TRUE(read().held_out.empty());
 }
 
-TEST_F(ReadScene, FollowsTheLlffProtocolAboveFourViews) {
-  write(20);
+TEST_F(ReadScene, OfManyViewsTakesThreeThatGoWellTogether) {
+  write(20);  // side by side, 60 degrees of view
   const Scene scene = read();
+  ASSERT_EQ(scene.input.size(), 3u);
+  EXPECT_LT(scene.input[2] - scene.input[0], 12);
+  EXPECT_EQ(scene.held_out.size(), 17u);
+}
+
+TEST_F(ReadScene, FollowsTheLlffProtocolAboveFourViewsOfLlff) {
+  std::vector<std::vector<double>> rows;
+  for (int i = 0; i < 20; ++i) {
+    test::write_bytes(dir_ / ("images/v" + std::to_string(10 + i) + ".png"),
+                      test::rgb_png(32, 24, i));
+    rows.push_back({0, 1, 0, 0.1 * i, 24, -1, 0, 0, 0, 32, 0, 0, 1, 0, 30, 1, 10});
+  }
+  test::write_bytes(dir_ / "poses_bounds.npy", test::npy_of_rows(rows));
+  const Scene scene = read();
+  EXPECT_EQ(scene.kind, "LLFF");
   EXPECT_EQ(scene.input, (Indices{1, 10, 19}));  // as published for the 20 views of "fern"
   EXPECT_EQ(scene.held_out.size(), 17u);
   EXPECT_EQ(scene.held_out[0], 0);
@@ -137,8 +152,8 @@ TEST_F(ReadScene, CopesWithSomeMissingImagesButNotWithAll) {
   const Scene scene = read();
   EXPECT_EQ(scene.missing, (std::vector<std::string>{"v00.png"}));
   EXPECT_EQ(scene.warnings.size(), 1u);
-  EXPECT_EQ(scene.input, (Indices{2, 4, 5}));  // of v01 … v05, v01 is kept out
-  EXPECT_EQ(scene.held_out, (Indices{1, 3}));
+  EXPECT_EQ(scene.input, (Indices{2, 3, 4}));
+  EXPECT_EQ(scene.held_out, (Indices{1, 5}));
   EXPECT_THROW(read({.views = "v00,v01"}), InvalidInput);
   std::filesystem::remove_all(dir_ / "images");
   EXPECT_EQ(refused(), "MISSING");
