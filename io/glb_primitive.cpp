@@ -15,15 +15,27 @@ namespace {
 
 constexpr uint32_t kUnused = std::numeric_limits<uint32_t>::max();
 
+/// What says something of where the surface is: NaN does not, nor what exceeds all coordinates.
+bool is_known_sigma(double sigma) {
+  constexpr double kMost = 1e18;
+  return sigma >= 0 && sigma <= kMost;
+}
+
 /// glTF forbids NaN: no statement becomes a negative number, smaller than the others so that it
 /// hardly coarsens a quantisation of them.
 float unknown_sigma(const TriangleMesh& mesh, double scale) {
-  constexpr float kShare = 1.0f / 8;
-  float largest = 0;
+  constexpr double kShare = 1.0 / 8;
+  double largest = 0;
   for (const float s : mesh.sigma) {
-    if (std::isfinite(s)) largest = std::max(largest, s);
+    if (is_known_sigma(s * scale)) largest = std::max(largest, s * scale);
   }
-  return largest > 0 ? -static_cast<float>(kShare * largest * scale) : -1.0f;
+  return largest > 0 ? -static_cast<float>(kShare * largest) : -1.0f;
+}
+
+/// A number of views, as every encoding can hold it: Draco's encoder crashes beyond its grid.
+float stored_support(float support) {
+  constexpr float kMost = 65535;
+  return support > 0 ? std::min(support, kMost) : 0.0f;  // NaN is none
 }
 
 /// Splats hold the light of the scene, as photographs do. Also where no photograph fits: beside
@@ -109,11 +121,11 @@ class Splitter {
       out.colors.push_back(color);
     }
     if (!mesh_.support.empty()) {
-      out.support.push_back(std::isfinite(mesh_.support[v]) ? mesh_.support[v] : 0.0f);
+      out.support.push_back(stored_support(mesh_.support[v]));
     }
     if (!mesh_.sigma.empty()) {
-      const auto sigma = static_cast<float>(mesh_.sigma[v] * placement_.scale);
-      out.sigma.push_back(sigma >= 0 && std::isfinite(sigma) ? sigma : unknown_sigma_);
+      const double sigma = mesh_.sigma[v] * placement_.scale;
+      out.sigma.push_back(is_known_sigma(sigma) ? static_cast<float>(sigma) : unknown_sigma_);
     }
   }
 

@@ -24,7 +24,7 @@
 #include "io/scene_layouts.h"
 #include "io/significance.h"
 #include "libcgs/core/error.h"
-#include "libcgs/priors/input_views.h"
+#include "libcgs/core/input_views.h"
 
 namespace cgs {
 

@@ -16,8 +16,8 @@ namespace cgs {
 /// What to take of a scene on disk.
 struct SceneOptions {
   /// Input views: comma-separated names (file stems) or indices in name order; a name wins where
-  /// both fit. Empty = choose: all of at most four, of more three that go well together, of an LLFF
-  /// scene those of its protocol.
+  /// both fit. Empty = choose: all of at most four, of more up to three that go well together, of
+  /// an LLFF scene those of its protocol.
   std::string views;
   bool all_views = false;  ///< Where `views` is empty, take every one.
   /// Divide image sizes by this; >= 1. Empty = choose: the smallest that leaves no side above
@@ -40,10 +40,11 @@ struct SceneOptions {
 /// The result is in world coordinates with the identity frame, views sorted by name. Cameras have
 /// the size of the image file divided by `downscale`, rounded down; where the layout states
 /// another size of the same shape, intrinsics are scaled to the file. Input views as the options
-/// say, else as choose_input_views() does; held out are all others that have a file. LLFF protocol
-/// (of the views that have a file, in name order: those at 0, 8, 16 … are not taken, three at even
-/// distances of the rest are): Niemeyer et al. 2022, "RegNeRF", supplement.
-/// \throws InvalidInput (options; a view that does not exist, is named twice or has no file),
+/// say, else as choose_input_views() does; of an LLFF scene, and where that finds none, by the
+/// LLFF protocol. Held out are all others that have a file. LLFF protocol (of the views that have a
+/// file, in name order: those at 0, 8, 16 … are not taken, three at even distances of the rest
+/// are): Niemeyer et al. 2022, "RegNeRF", supplement. \throws InvalidInput (options; a view that
+/// does not exist, is named twice or has no file),
 ///         BadInput Open (no such folder), Schema (layout not recognised), Empty (fewer than two
 ///         views), Missing (no image at all), Mismatch (image of another shape than its camera),
 ///         Value (input cameras in one place; as check_significance()), and as the readers of the

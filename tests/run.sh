@@ -5,7 +5,8 @@
 #
 # usage: tests/run.sh [--tidy|--long]
 #   --tidy adds static analysis (tests/tidy.sh), half an hour
-#   --long adds all faults, kills and hours of fuzzing (tests/reliability.sh --long), a night
+#   --long adds all faults, kills and ten million runs of the fuzzer (tests/reliability.sh --long), two
+#   hours
 set -euo pipefail
 cd "$(dirname "$0")/.."
 case "$*" in

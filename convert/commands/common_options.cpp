@@ -57,7 +57,7 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
         "--views",
         options.views,
         "Input views: names, or indices in name order from 0, e.g. 1,10,19; the rest is "
-        "held out. Default: all of up to four, else three evenly spaced");
+        "held out. Default: all of up to four, else three that go well together");
     command.add_option(
         "--downscale",
         options.downscale,

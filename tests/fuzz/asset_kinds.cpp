@@ -122,7 +122,7 @@ void add_splats(Kinds& kinds) {
 
 // --- meshes ---------------------------------------------------------------------------------
 
-/// \return the triangles that the file holds
+/// \return the most triangles that the file may hold
 using WriteMesh =
     std::function<size_t(const fs::path& file, const TriangleMesh& mesh, const Frame& frame)>;
 
@@ -147,8 +147,12 @@ FileKind of_mesh(const std::string& name,
           }};
 }
 
-// Of a format that we write, too.
-FileKind of_own_mesh(const std::string& name, const std::string& file, const WriteMesh& write) {
+// Of a format that we write, too. \param is_exact  else coordinates are rounded, and triangles, or
+// all of them, may have no area left
+FileKind of_own_mesh(const std::string& name,
+                     const std::string& file,
+                     const WriteMesh& write,
+                     bool is_exact = true) {
   return {name,
           file,
           [=](Folder folder) { write(folder / file, labelled_sphere(4, 4), centimetre_frame()); },
@@ -157,9 +161,15 @@ FileKind of_own_mesh(const std::string& name, const std::string& file, const Wri
             expect_mesh_back(first, folder / "again.ply");
             const fs::path again = folder / ("again_" + file);
             const size_t triangles = write(again, first.content.mesh, first.content.frame);
-            const MeasurableFile second =
-                read_back([&] { return read_mesh_file(again, first.content.frame); });
-            require(second.content.mesh.faces.size() == triangles, "triangles were lost");
+            const size_t back = read_back([&]() -> size_t {
+              try {
+                return read_mesh_file(again, first.content.frame).content.mesh.faces.size();
+              } catch (const BadInput& error) {
+                if (is_exact || error.defect() != Defect::Empty) throw;
+                return 0;
+              }
+            });
+            require(is_exact ? back == triangles : back <= triangles, "triangles were lost");
           }};
 }
 
@@ -200,7 +210,8 @@ void add_own_meshes(Kinds& kinds) {
         "a.glb",
         [encoding = encoding](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
           return write_glb(file, mesh, frame, {.encoding = encoding}).triangles;
-        }));
+        },
+        encoding == GlbEncoding::Plain));
     kinds.back().is_isolated = encoding == GlbEncoding::Draco;
   }
 }

@@ -34,7 +34,7 @@ template <typename Read>
 auto read_back(const Read& read) {
   try {
     return read();
-  } catch (const Error& error) {
+  } catch (const BadInput& error) {
     throw std::logic_error(std::string("what was written is refused: ") + error.what());
   }
 }

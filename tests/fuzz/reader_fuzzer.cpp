@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <stdexcept>
 #include <string>
 
 #include <unistd.h>
@@ -61,10 +62,13 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  cgs::test::write_bytes(folder() / chosen->file,
-                         std::string(reinterpret_cast<const char*>(data), size));
+  const std::filesystem::path file = folder() / chosen->file;
+  cgs::test::write_bytes(file, std::string(reinterpret_cast<const char*>(data), size));
+  cgs::test::require(std::filesystem::file_size(file) == size, "no room for the file to try");
   try {
     chosen->read(folder().path());
+  } catch (const cgs::IoError&) {
+    throw std::logic_error("the disk is full, or the like: nothing was tried");
   } catch (const cgs::Error&) {
     return 0;  // refused, as it should be
   }

@@ -23,15 +23,14 @@ wanted=${CGS_FUZZ_RUNS:-0}
 most=$((2 * wanted / $(wc -l <<<"$kinds")))
 [ "$most" -gt 0 ] || most=-1 # as many as there is time for
 export fuzzer results seconds most
-memory=/dev/shm # a disk would be waited for
-[ -w "$memory" ] || memory=${TMPDIR:-/tmp}
-TMPDIR=$(mktemp -d -p "$memory")
+TMPDIR=$(mktemp -d -p "$(tests/memory_folder.sh)")
 export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
 fuzz() {
   local corpus="$results/corpus/$1"
   mkdir -p "$corpus"
+  rm -f "$results/$1.log"
   "$fuzzer" --kind="$1" --seed="$corpus/valid" || { echo "$1: its valid file cannot be made"; return 1; }
   local verdict=clean
   "$fuzzer" --kind="$1" -max_total_time="$seconds" -runs="$most" -max_len=65536 -timeout=20 -rss_limit_mb=6000 \

@@ -69,6 +69,22 @@ TEST(GlbPrimitives, HoldNoNanWhateverTheMeshHolds) {
   }
 }
 
+TEST(GlbPrimitives, HoldSupportAndSigmaWithinBoundsWhateverTheMeshHolds) {
+  TriangleMesh mesh = test::labelled_sphere();
+  constexpr float kHuge = std::numeric_limits<float>::max();
+  for (size_t i = 0; i < mesh.vertices.size(); i += 2) {
+    mesh.support[i] = i % 4 == 0 ? -kHuge : kHuge;
+    mesh.sigma[i] = i % 4 == 0 ? -kHuge : kHuge;
+  }
+  for (const GlbPrimitive& part : glb_primitives(mesh, {})) {
+    for (size_t i = 0; i < part.positions.size(); ++i) {
+      EXPECT_GE(part.support[i], 0);
+      EXPECT_LE(part.support[i], 65535);
+      EXPECT_LE(std::abs(part.sigma[i]), 1e18);
+    }
+  }
+}
+
 TEST(GlbPrimitives, UnknownSigmaIsNegativeAndNotLarge) {
   const TriangleMesh mesh = test::labelled_sphere();
   const auto parts = glb_primitives(mesh, {.scale = 3});

@@ -140,6 +140,15 @@ TEST(WriteGlb, QuantizedFileHoldsWholeNumbersOnOneGrid) {
   EXPECT_EQ(std::max({high[0], high[1], high[2]}), 65535);
 }
 
+TEST(WriteGlb, DracoTakesSupportAndSigmaBeyondAllBounds) {
+  const test::TempDir dir;
+  TriangleMesh mesh = test::labelled_sphere();
+  mesh.support.front() = std::numeric_limits<float>::max();  // crashed the encoder
+  mesh.sigma.front() = std::numeric_limits<float>::max();
+  const GlbReport report = write_glb(dir / "a.glb", mesh, test::centimetre_frame());
+  EXPECT_EQ(report.triangles, mesh.faces.size());
+}
+
 TEST(WriteGlb, DracoFileHoldsTheMeshWithinItsReport) {
   const TriangleMesh mesh = test::labelled_sphere();
   const Frame frame = test::centimetre_frame();

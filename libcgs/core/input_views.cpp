@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "libcgs/priors/input_views.h"
+#include "libcgs/core/input_views.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -25,9 +27,13 @@ double worth_of_angle(double radians) {
   constexpr double kBest = 10;  // [degrees]
   constexpr double kNarrower = 4;
   constexpr double kWider = 12;
+  const auto bell = [](double off, double sigma) {
+    return std::exp(-off * off / (2 * sigma * sigma));
+  };
   const double off = radians * 180 / std::numbers::pi - kBest;
-  const double sigma = off < 0 ? kNarrower : kWider;
-  return std::exp(-off * off / (2 * sigma * sigma));
+  if (off >= 0) return bell(off, kWider);
+  const double at_none = bell(kBest, kNarrower);  // views from one place tell nothing
+  return std::max(0.0, (bell(off, kNarrower) - at_none) / (1 - at_none));
 }
 
 // As many at most, evenly spread.
@@ -39,27 +45,53 @@ std::vector<T> some_of(const std::vector<T>& all, size_t most) {
   return out;
 }
 
+// The first of each place: a tripod's photographs, or copies of one.
+std::vector<int> in_different_places(const Scene& scene, const std::vector<int>& candidates) {
+  const auto before = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  };
+  std::set<Eigen::Vector3d, decltype(before)> places(before);
+  std::vector<int> out;
+  for (const int view : candidates) {
+    if (places.insert(scene.views[size_t(view)].camera.center()).second) out.push_back(view);
+  }
+  return out;
+}
+
 // Points that at least two candidates are known to see.
 std::vector<Sight> known_sights(const Scene& scene, const std::vector<int>& candidates) {
-  constexpr size_t kMost = 20000;
-  std::vector<Sight> out;
+  constexpr size_t kMost = 5000;
+  constexpr size_t kNone = std::numeric_limits<size_t>::max();
+  std::vector<size_t> place_of(scene.views.size(), kNone);
+  for (size_t i = 0; i < candidates.size(); ++i) place_of[size_t(candidates[i])] = i;
+  const auto is_candidate = [&](int view) { return place_of[size_t(view)] != kNone; };
+  std::vector<const SparsePoint*> shared;
   for (const SparsePoint& point : scene.points) {
-    Sight sight{point.position, {}};
-    for (size_t i = 0; i < candidates.size(); ++i) {
-      if (std::binary_search(point.views.begin(), point.views.end(), candidates[i])) {
-        sight.seen_by.push_back(i);
-      }
+    if (std::count_if(point.views.begin(), point.views.end(), is_candidate) >= 2) {
+      shared.push_back(&point);
     }
-    if (sight.seen_by.size() >= 2) out.push_back(std::move(sight));
   }
-  return some_of(out, kMost);
+  std::vector<Sight> out;
+  for (const SparsePoint* const point : some_of(shared, kMost)) {
+    Sight& sight = out.emplace_back();
+    sight.position = point->position;
+    for (const int view : point->views) {
+      if (is_candidate(view)) sight.seen_by.push_back(place_of[size_t(view)]);
+    }
+    std::sort(sight.seen_by.begin(), sight.seen_by.end());
+  }
+  return out;
 }
 
 // Places all over each picture, as far as what the cameras look at, and who has them in the
 // picture. What hides them is not known: opposite cameras see the same, at an angle worth nothing.
 std::vector<Sight> guessed_sights(const Scene& scene, const std::vector<int>& candidates) {
   constexpr int kGrid = 4;  // places per side of a picture
-  Scene all = scene;
+  constexpr size_t kMostPoints = 20000;
+  Scene all;
+  all.folder = scene.folder;
+  all.views = scene.views;
+  all.points = some_of(scene.points, kMostPoints);
   all.input = candidates;
   const std::vector<Eigen::Vector3d> subject = subject_points(all);  // camera, subject, camera, …
   std::vector<Sight> out;
@@ -105,7 +137,8 @@ class Worth {
         for (size_t l = k + 1; l < sight.seen_by.size(); ++l) {
           const size_t a = sight.seen_by[k];
           const size_t b = sight.seen_by[l];
-          sum(Eigen::Index(a), Eigen::Index(b)) += of_pair(sight, a, b);
+          const double worth = of_pair(sight, a, b);
+          if (worth > 0) sum(Eigen::Index(a), Eigen::Index(b)) += worth;  // NaN is not
         }
       }
     }
@@ -161,8 +194,9 @@ std::vector<int> choose_input_views(const Scene& scene,
                                     size_t count) {
   require(candidates.size() >= 2, "views to choose among", candidates.size());
   require(count >= 2, "views to choose", count);
-  constexpr size_t kMostCandidates = 500;
-  const std::vector<int> some = some_of(candidates, kMostCandidates);
+  constexpr size_t kMostCandidates = 100;
+  const std::vector<int> some = some_of(in_different_places(scene, candidates), kMostCandidates);
+  if (some.size() < 2) return {};
   std::vector<Sight> sights = known_sights(scene, some);
   constexpr size_t kEnough = 50;
   if (sights.size() < kEnough) sights = guessed_sights(scene, some);
