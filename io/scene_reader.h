@@ -43,8 +43,9 @@ struct SceneOptions {
 /// say, else as choose_input_views() does; of an LLFF scene, and where that finds none, by the
 /// LLFF protocol. Held out are all others that have a file. LLFF protocol (of the views that have a
 /// file, in name order: those at 0, 8, 16 … are not taken, three at even distances of the rest
-/// are): Niemeyer et al. 2022, "RegNeRF", supplement. \throws InvalidInput (options; a view that
-/// does not exist, is named twice or has no file),
+/// are): Niemeyer et al. 2022, "RegNeRF", supplement.
+///
+/// \throws InvalidInput (options; a view that does not exist, is named twice or has no file),
 ///         BadInput Open (no such folder), Schema (layout not recognised), Empty (fewer than two
 ///         views), Missing (no image at all), Mismatch (image of another shape than its camera),
 ///         Value (input cameras in one place; as check_significance()), and as the readers of the

@@ -5,8 +5,8 @@
 #
 # usage: tests/run.sh [--tidy|--long]
 #   --tidy adds static analysis (tests/tidy.sh), half an hour
-#   --long adds all faults, kills and ten million runs of the fuzzer (tests/reliability.sh --long), two
-#   hours
+#   --long adds all faults and kills, and ten million runs of the fuzzer, two hours
+#     (tests/reliability.sh --long)
 set -euo pipefail
 cd "$(dirname "$0")/.."
 case "$*" in
