@@ -175,11 +175,6 @@ FileKind of_own_mesh(const std::string& name,
 
 void add_own_meshes(Kinds& kinds) {
   kinds.push_back(of_own_mesh(
-      "mesh-ply", "a.ply", [](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
-        write_mesh_ply(file, mesh, frame);
-        return mesh.faces.size();
-      }));
-  kinds.push_back(of_own_mesh(
       "obj", "a.obj", [](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
         write_obj(file, mesh, frame);
         return mesh.faces.size();
@@ -217,6 +212,9 @@ void add_own_meshes(Kinds& kinds) {
 }
 
 void add_meshes(Kinds& kinds) {
+  kinds.push_back(of_mesh("mesh-ply", "a.ply", [](const fs::path& file) {
+    write_mesh_ply(file, labelled_sphere(4, 4), centimetre_frame());
+  }));
   kinds.push_back(of_mesh("stl-ascii", "a.stl", [](const fs::path& file) {
     write_bytes(file,
                 "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
