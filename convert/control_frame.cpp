@@ -19,6 +19,7 @@
 #include "io/lens.h"
 #include "io/orientation.h"
 #include "io/scene_reader.h"
+#include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/control_fit.h"
 #include "libcgs/priors/ray_meeting.h"
@@ -119,7 +120,7 @@ double distance_to(const Seen& seen, const Eigen::Vector3d& point) {
   const Camera& c = seen.picture;
   const Eigen::Vector3d ray = c.ray_in_cam(seen.pick.at.x(), seen.pick.at.y());
   const Eigen::Vector3d away = c.cam_from_world() * point;
-  return std::sqrt(c.fx * c.fy) * std::atan2(ray.cross(away).norm(), ray.dot(away));
+  return std::sqrt(c.fx * c.fy) * angle_between(ray, away);
 }
 
 double largest_distance(const std::vector<Seen>& picks, const Eigen::Vector3d& point) {

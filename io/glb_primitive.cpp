@@ -16,10 +16,7 @@ namespace {
 constexpr uint32_t kUnused = std::numeric_limits<uint32_t>::max();
 
 /// What says something of where the surface is: NaN does not, nor what exceeds all coordinates.
-bool is_known_sigma(double sigma) {
-  constexpr double kMost = 1e18;
-  return sigma >= 0 && sigma <= kMost;
-}
+bool is_known_sigma(double sigma) { return sigma >= 0 && sigma <= kFarthestInGlb; }
 
 /// glTF forbids NaN: no statement becomes a negative number, smaller than the others so that it
 /// hardly coarsens a quantisation of them.

@@ -31,6 +31,9 @@ struct GlbPrimitive {
   std::vector<std::array<uint32_t, 3>> faces;  ///< No two corners at one place.
 };
 
+/// Beyond it no coordinate is written and no length: the float arithmetic of encoders overflows.
+constexpr double kFarthestInGlb = 1e18;  // [units of the file]
+
 /// From internal coordinates to those of a glTF file: scale * rotation * (p - center).
 struct GlbPlacement {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();

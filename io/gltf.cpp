@@ -122,8 +122,7 @@ GlbPlacement placement_for(const TriangleMesh& mesh,
   out.center = options.center.value_or(0.5 * (low.cast<double>() + high.cast<double>()));
   const double reach = out.scale * std::max((high.cast<double>() - out.center).norm(),
                                             (low.cast<double>() - out.center).norm());
-  constexpr double kFarthest = 1e18;  // the encoder's float arithmetic overflows beyond
-  require(reach > 1 / kFarthest && reach < kFarthest,
+  require(reach > 1 / kFarthestInGlb && reach < kFarthestInGlb,
           "write_glb: the mesh must have an extent between 1e-18 and 1e18",
           reach);
   return out;

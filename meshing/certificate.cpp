@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <tbb/parallel_sort.h>
 
+#include "libcgs/core/angle_between.h"
 #include "meshing/components.h"
 #include "meshing/self_intersections.h"
 #include "meshing/shells.h"
@@ -150,7 +151,7 @@ double smallest_angle(const TriangleMesh& mesh) {
       const Eigen::Vector3d p = mesh.vertices[f.at(k)].cast<double>();
       const Eigen::Vector3d u = mesh.vertices[f.at((k + 1) % 3)].cast<double>() - p;
       const Eigen::Vector3d v = mesh.vertices[f.at((k + 2) % 3)].cast<double>() - p;
-      smallest = std::min(smallest, std::atan2(u.cross(v).norm(), u.dot(v)));
+      smallest = std::min(smallest, angle_between(u, v));
     }
   }
   return smallest;

@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <tbb/parallel_sort.h>
 
+#include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
 #include "meshing/triangle_tree.h"
 
@@ -88,7 +89,7 @@ void NearestSurface::Parts::add_pseudonormals() {
       const Eigen::Vector3d u = (mesh.points[next] - mesh.points[v]).stableNormalized();
       const Eigen::Vector3d w =
           (mesh.points[face.at((k + 2) % 3)] - mesh.points[v]).stableNormalized();
-      vertex_normals[v] += std::atan2(u.cross(w).norm(), u.dot(w)) * normal;
+      vertex_normals[v] += angle_between(u, w) * normal;
       edges.push_back({std::min(v, next), std::max(v, next), f});
     }
   }

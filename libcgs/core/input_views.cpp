@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -125,7 +126,7 @@ class Worth {
   double of_pair(const Sight& sight, size_t a, size_t b) const {
     const Eigen::Vector3d to_a = centers_[a] - sight.position;
     const Eigen::Vector3d to_b = centers_[b] - sight.position;
-    return worth_of_angle(std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b)));
+    return worth_of_angle(angle_between(to_a, to_b));
   }
 
   // The two that tell the most; equal if no two tell anything.

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "libcgs/core/angle_between.h"
 #include "libcgs/priors/depth_fit.h"
 #include "libcgs/priors/photo_pairs.h"
 
@@ -18,10 +19,6 @@ Eigen::Vector3d ray(const Eigen::Vector2d& at, double focal) {
 // finite where a ray along the baseline leaves no line.
 double distance(const Eigen::Vector3d& line, const Eigen::Vector3d& at) {
   return std::abs(line.dot(at)) / line.head<2>().norm();
-}
-
-double angle(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 // Mean of the distances in both photographs [working pixels], per match that has any.
@@ -44,7 +41,7 @@ std::vector<double> epipolar_errors(const PosedPhoto& a,
     const Eigen::Vector3d in_a = ray(points.a[i], focal_a);
     const Eigen::Vector3d in_b = ray(points.b[i], focal_b);
     if (baseline.isZero(0)) {
-      out.push_back(0.5 * (focal_a + focal_b) * angle(b_from_a * in_a, in_b));
+      out.push_back(0.5 * (focal_a + focal_b) * angle_between(b_from_a * in_a, in_b));
       continue;
     }
     const double off_a = focal_a * distance(E.transpose() * in_b, in_a);

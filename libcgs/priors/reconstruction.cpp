@@ -7,6 +7,8 @@
 
 #include <Eigen/Dense>
 
+#include "libcgs/core/angle_between.h"
+
 namespace cgs {
 
 namespace {
@@ -18,10 +20,6 @@ bool counts(const Reconstruction& scene, const Sighting& s) {
 Eigen::Vector3d ray_in_world(const Reconstruction& scene, const Sighting& s) {
   const Eigen::Vector2d direction = direction_at(scene.lens(s.photo), s.at);
   return scene.pose(s.photo)->rotation.conjugate() * direction.homogeneous().normalized();
-}
-
-double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 // The two sightings whose rays meet under the largest angle.
