@@ -40,10 +40,11 @@ Eigen::Vector4f rotation_of(const Record& record) {
   return q;
 }
 
+constexpr float kFarthest = 1e12F;
+constexpr float kSmallest = 1e-12F;
+
 /// Quaternions say little: some writers quantise them without normalising them first.
 bool is_plausible(const Record& record) {
-  constexpr float kFarthest = 1e12F;
-  constexpr float kSmallest = 1e-12F;
   bool good = true;
   for (const float p : record.position) {
     good = good && std::abs(p) < kFarthest && (p == 0 || std::abs(p) > kSmallest);
@@ -53,20 +54,58 @@ bool is_plausible(const Record& record) {
   return good && *low >= 0 && *high > kSmallest && *high < kFarthest;
 }
 
+constexpr size_t kSamples = 1000;  // records from the start that tell whether a file is one
+
+/// Single records may be damaged.
+bool are_enough(size_t plausible, size_t seen) { return 100 * plausible >= 99 * seen; }
+
 uint8_t rotation_byte(float q) {
   return static_cast<uint8_t>(std::lround(std::clamp(128 * double{q} + 128, 0.0, 255.0)));
+}
+
+/// Zero where a difference that is rounded away would make the number implausible.
+float coordinate(double c) {
+  const auto rounded = static_cast<float>(c);
+  return std::abs(rounded) > kSmallest ? rounded : 0.0F;
+}
+
+Eigen::Vector3d color_of(const Eigen::Vector3f& dc) {
+  return (double{kShC0} * dc.cast<double>()).array() + 0.5;
+}
+
+Record record_of(const Gaussians& g, size_t i, const Frame& frame) {
+  Record out{};
+  const Eigen::Vector3d p = frame.file_from_internal(g.position[i].cast<double>());
+  const Eigen::Vector3d color = color_of(g.sh[i * static_cast<size_t>(g.sh_count())]);
+  for (int k = 0; k < 3; ++k) {
+    const auto at = static_cast<size_t>(k);
+    out.position.at(at) = coordinate(p[k]);
+    out.scale.at(at) = static_cast<float>(g.scale[i][k] * frame.scale);
+    out.color.at(at) = unit_byte(color[k]);
+  }
+  out.color[3] = unit_byte(g.opacity[i]);
+  for (size_t k = 0; k < 4; ++k) {
+    out.rotation.at(k) = rotation_byte(g.rotation[i][static_cast<int>(k)]);
+  }
+  return out;
+}
+
+void append_record(std::string& out, const Record& record) {
+  for (const float value : record.position) append_bytes(out, value);
+  for (const float value : record.scale) append_bytes(out, value);
+  for (const uint8_t value : record.color) append_bytes(out, value);
+  for (const uint8_t value : record.rotation) append_bytes(out, value);
 }
 
 }  // namespace
 
 bool looks_like_dot_splat(std::string_view bytes) {
   if (bytes.empty() || bytes.size() % kRecord != 0) return false;
-  constexpr size_t kSamples = 1000;
   ByteReader reader(bytes, {});
   size_t good = 0;
   size_t seen = 0;
   for (; seen < kSamples && reader.remaining() > 0; ++seen) good += is_plausible(record_at(reader));
-  return 100 * good >= 99 * seen;  // single records may be damaged
+  return are_enough(good, seen);
 }
 
 RawSplats parse_dot_splat(std::string_view bytes, const std::filesystem::path& path) {
@@ -99,19 +138,26 @@ DotSplatReport write_dot_splat(const std::filesystem::path& path,
   report.bytes = g.size() * kRecord;
   report.dropped_sh = g.sh_degree > 0;
   AtomicFile file(path);
-  std::string record;
+  std::string bytes;
+  size_t plausible = 0;
+  size_t seen = 0;
   for (size_t i = 0; i < g.size(); ++i) {
-    record.clear();
-    const Eigen::Vector3d p = frame.file_from_internal(g.position[i].cast<double>());
-    for (const double c : p) append_bytes(record, static_cast<float>(c));
-    for (const float s : g.scale[i]) append_bytes(record, static_cast<float>(s * frame.scale));
-    const Eigen::Vector3f& dc = g.sh[i * static_cast<size_t>(g.sh_count())];
-    const Eigen::Vector3d color = (double{kShC0} * dc.cast<double>()).array() + 0.5;
+    const Eigen::Vector3d color = color_of(g.sh[i * static_cast<size_t>(g.sh_count())]);
     if (color.minCoeff() < 0 || color.maxCoeff() > 1) ++report.clamped_colors;
-    for (const double c : color) append_bytes(record, unit_byte(c));
-    append_bytes(record, unit_byte(g.opacity[i]));
-    for (const float q : g.rotation[i]) append_bytes(record, rotation_byte(q));
-    file.write(record);
+    const Record record = record_of(g, i, frame);
+    if (seen < kSamples) {
+      ++seen;
+      plausible += is_plausible(record);
+    }
+    bytes.clear();
+    append_record(bytes, record);
+    file.write(bytes);
+  }
+  if (!are_enough(plausible, seen)) {
+    throw InvalidInput("write_dot_splat: " + std::to_string(seen - plausible) + " of the first " +
+                       std::to_string(seen) +
+                       " splats are not between 1e-12 and 1e12 in size and place, and a .splat, "
+                       "which has no header, is known by that; write .ply or .glb");
   }
   file.commit();
   return report;

@@ -7,6 +7,7 @@
 
 #include "io/byte_reader.h"
 #include "io/byte_writer.h"
+#include "io/significance.h"
 
 namespace cgs {
 
@@ -28,6 +29,22 @@ std::optional<Eigen::Vector3d> numbers_after(const std::vector<std::string>& com
     if (good) return out;
   }
   return std::nullopt;
+}
+
+std::vector<Eigen::Vector3d> moved(std::vector<Eigen::Vector3d> points, const Eigen::Vector3d& by) {
+  for (Eigen::Vector3d& p : points) p += by;
+  return points;
+}
+
+/// Whether double coordinates from the world's zero keep as much of the content as is asked of
+/// float ones in a file.
+bool is_told_apart_at(const Eigen::Vector3d& file_origin,
+                      const std::vector<Eigen::Vector3d>& corners) {
+  constexpr double kFewest = 10;  // binary digits
+  const std::vector<Eigen::Vector3d> there = moved(corners, file_origin);
+  Eigen::AlignedBox3d box(there[0]);
+  for (const Eigen::Vector3d& p : there) box.extend(p);
+  return corners[0] == corners[1] || significant_bits(box, kDoubleDigits) >= kFewest;
 }
 
 ScaleSource scale_source_in(const std::vector<std::string>& comments) {
@@ -84,12 +101,16 @@ PlyPlacement ply_placement(const std::vector<std::string>& comments,
     }
     return out;
   }
-  const Eigen::Vector3d file_origin = origin.value_or(Eigen::Vector3d::Zero());
-  std::vector<Eigen::Vector3d> in_world;
-  in_world.reserve(bounds.size());
-  for (const Eigen::Vector3d& corner : bounds) in_world.emplace_back(corner + file_origin);
-  PlyPlacement out{canonical_frame(in_world), file_origin, {}};
-  if (origin) out.frame.file_origin = file_origin;
+  const bool is_bearable = !origin || is_told_apart_at(*origin, bounds);
+  const Eigen::Vector3d file_origin =
+      origin && is_bearable ? *origin : Eigen::Vector3d::Zero().eval();
+  PlyPlacement out{canonical_frame(moved(bounds, file_origin)), file_origin, {}};
+  if (!is_bearable) {
+    out.warnings.push_back(
+        "the file_origin that the file states is ignored: the content is too "
+        "small for a place so far away");
+  }
+  out.frame.file_origin = file_origin_near(out.frame, file_origin);
   const auto up = numbers_after(comments, "up", 3);
   if (up && up->norm() > 0) out.frame.up = up->normalized();
   if (has_unit) {

@@ -42,7 +42,8 @@ struct PlyPlacement {
 /// \param comments  of its header; lines that ply_frame_comments() did not write are ignored
 /// \param bounds    two opposite corners of its content in file coordinates; finite
 /// \param wanted    read into exactly this frame; empty = a canonical frame made from the bounds,
-///                  with the unit and the file origin that the comments tell
+///                  with the unit and the file origin that the comments tell. Where the content
+///                  is too far from that for float, files written in the frame have another one
 PlyPlacement ply_placement(const std::vector<std::string>& comments,
                            const std::vector<Eigen::Vector3d>& bounds,
                            const std::optional<Frame>& wanted);

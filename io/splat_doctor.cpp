@@ -90,12 +90,13 @@ class Examination {
 
  private:
   /// The box of the splats. Where rounding has put all of them in one place, they tell how large it
-  /// was.
+  /// was, unless their scales vanish.
   Eigen::AlignedBox3d widened(const std::vector<Eigen::Vector3d>& corners) const {
     Eigen::AlignedBox3d box(corners[0], corners[1]);
     if (raw_.size() == 1 || !box.sizes().isZero(0)) return box;
     const double radius = std::exp(double{raw_.log_scale.front().maxCoeff()});
-    if (radius < box.min().cwiseAbs().maxCoeff()) box.max().x() += radius;
+    const bool is_told = radius > 2 * kSmallestScale;  // 2: that one, rounded, tells nothing either
+    if (is_told && radius < box.min().cwiseAbs().maxCoeff()) box.max().x() += radius;
     return box;
   }
 

@@ -12,15 +12,12 @@ namespace cgs {
 
 namespace {
 
-constexpr double kFarAway = 256;  // of the scale, as in canonical_frame()
-
 // The frame for the moved points: canonical, but with the unit and the up direction of the old one
 // (what moves is the mesh, not the axes of its file), and its file origin as long as floats can
 // bear that.
 Frame frame_for(const std::vector<Eigen::Vector3d>& points_in_world, const Frame& old) {
   Frame out = canonical_frame(points_in_world);
-  const bool near = (out.origin - old.file_origin).norm() <= kFarAway * out.scale;
-  out.file_origin = near ? old.file_origin : out.origin;
+  out.file_origin = file_origin_near(out, old.file_origin);
   out.metres_per_unit = old.metres_per_unit;
   out.metres_sigma = old.metres_sigma;
   out.scale_source = old.scale_source;

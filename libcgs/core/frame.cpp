@@ -91,9 +91,14 @@ Frame canonical_frame(const std::vector<Eigen::Vector3d>& points_in_world) {
   // up on both sides of zero: rounded away from it, they would depend on the place.
   const double cell = std::ldexp(frame.scale, -10);
   frame.origin = (box.center() / cell + Eigen::Vector3d::Constant(0.5)).array().floor() * cell;
-  constexpr double kFarAway = 256;  // of the extent: float coordinates then keep < 16 bits of it
-  if (frame.origin.norm() > kFarAway * frame.scale) frame.file_origin = frame.origin;
+  frame.file_origin = file_origin_near(frame, Eigen::Vector3d::Zero());
   return frame;
+}
+
+Eigen::Vector3d file_origin_near(const Frame& frame, const Eigen::Vector3d& wanted) {
+  constexpr double kFarAway = 256;  // of the extent: float coordinates then keep < 16 bits of it
+  const bool is_near = (frame.origin - wanted).norm() <= kFarAway * frame.scale;
+  return is_near ? wanted : frame.origin;
 }
 
 double significant_bits(const Eigen::AlignedBox3d& box, int digits) {

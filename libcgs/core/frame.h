@@ -50,6 +50,10 @@ struct Frame {
 /// \throws InvalidInput if there is no point, or one is not finite.
 Frame canonical_frame(const std::vector<Eigen::Vector3d>& points_in_world);
 
+/// Where the zero of files with the content of `frame` lies: at `wanted`, unless float coordinates
+/// from there would keep fewer than 16 bits of the content, then at the origin of the frame.
+Eigen::Vector3d file_origin_near(const Frame& frame, const Eigen::Vector3d& wanted);
+
 /// How many binary digits of the coordinates in a box tell its points apart: log2 of its largest
 /// side over the spacing of numbers where the box is farthest from zero.
 ///

@@ -14,7 +14,7 @@ shift || true
 
 samples/install.sh --tests
 cmake --preset sanitize >/dev/null
-cmake --build --preset sanitize --target reader_fuzzer
+cmake --build --preset fuzz
 fuzzer=$PWD/build/sanitize/bin/reader_fuzzer
 results=$PWD/build/sanitize/fuzz
 mkdir -p "$results/crashes"

@@ -90,6 +90,22 @@ TEST(DotSplat, IsOnlyWhatIsPlausibleThroughout) {
   EXPECT_EQ(defect(std::string(3200, '\0')), "MAGIC");
 }
 
+TEST(DotSplat, IsKnownAgainWhereADifferenceIsAllButZero) {
+  const test::TempDir dir;
+  Gaussians g = test::varied_splats(5, 0);
+  for (Eigen::Vector3f& p : g.position) p.y() = -1e-16F;
+  write_dot_splat(dir / "a.splat", g, Frame{});
+  EXPECT_EQ(read_splats(dir / "a.splat", Frame{}).gaussians.position[0].y(), 0);
+}
+
+TEST(DotSplat, RefusesWhatNobodyWouldKnowAgain) {
+  const test::TempDir dir;
+  Frame huge;
+  huge.scale = 0x1p60;
+  EXPECT_THROW(write_dot_splat(dir / "a.splat", test::varied_splats(5, 0), huge), InvalidInput);
+  EXPECT_FALSE(std::filesystem::exists(dir / "a.splat"));
+}
+
 TEST(DotSplat, NoticesAFullDisk) {
   test::expect_full_disk_is_noticed(
       [](const auto& path) { write_dot_splat(path, test::varied_splats(100, 0), Frame{}); });

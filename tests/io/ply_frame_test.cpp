@@ -50,6 +50,26 @@ TEST(PlyFrame, PlacesContentInTheWorld) {
   EXPECT_EQ(back.frame.scale, 16);  // the largest side is 9
 }
 
+TEST(PlyFrame, FilesOfContentFarFromTheStatedOriginGetAnother) {
+  const Eigen::Vector3d corner(21.8, -6, -0.7);
+  const std::vector<Eigen::Vector3d> bounds = {corner, corner + Eigen::Vector3d(0, 0, 1e-5)};
+  const PlyPlacement out = ply_placement({"file_origin 1024 -2048 512"}, bounds, {});
+  EXPECT_EQ(out.file_origin, Eigen::Vector3d(1024, -2048, 512));
+  for (const Eigen::Vector3d& p : bounds) {
+    const Eigen::Vector3d in_written_file = out.frame.file_from_internal(out.internal(p));
+    EXPECT_LT(in_written_file.norm(), 256 * 2e-5);
+    EXPECT_LT((in_written_file + out.frame.file_origin - out.file_origin - p).norm(), 1e-12);
+  }
+}
+
+TEST(PlyFrame, IgnoresAnOriginWhereDoubleCoordinatesWouldLoseTheContent) {
+  const std::vector<Eigen::Vector3d> bounds = {{0, 0, 0}, {0, 0, 1e-5}};
+  const PlyPlacement out = ply_placement({"file_origin 1e14 0 0"}, bounds, {});
+  EXPECT_EQ(out.file_origin, Eigen::Vector3d::Zero());
+  EXPECT_EQ(out.warnings.size(), 1u);
+  EXPECT_EQ(ply_placement({"file_origin 1e4 0 0"}, bounds, {}).file_origin.x(), 1e4);
+}
+
 TEST(PlyFrame, ReadsIntoAGivenFrame) {
   const Frame frame = test::centimetre_frame();
   const PlyPlacement plain = ply_placement({}, kBounds, frame);

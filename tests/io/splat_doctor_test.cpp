@@ -176,6 +176,20 @@ TEST(SplatDoctor, CountsFlyawaysAndKeepsThem) {
   EXPECT_TRUE(warns(out, "2 splats more than ten times"));
 }
 
+// Rounding has put them in one place; their scales, where they have some, say that they were apart.
+TEST(SplatDoctor, TakesTheSizeOfSplatsInOnePlaceFromScalesThatDoNotVanish) {
+  const auto in_one_place = [](float log_scale) {
+    return [=](RawSplats& raw) {
+      raw.position.assign(raw.size(), Eigen::Vector3d(4.5e5, 5.4e6, 100));
+      raw.log_scale.assign(raw.size(), Eigen::Vector3f::Constant(log_scale));
+    };
+  };
+  EXPECT_THROW(examined(in_one_place(-8)), BadInput);
+  const GaussianFile out = examined(in_one_place(-300));
+  const float written = std::log(out.gaussians.scale[0].x());
+  EXPECT_NO_THROW(examined(in_one_place(written)));
+}
+
 TEST(SplatDoctor, RefusesAFileOfNothing) {
   const auto nothing = [](RawSplats& raw) {
     for (auto& q : raw.rotation) q.setZero();
