@@ -106,9 +106,9 @@ PlyPlacement ply_placement(const std::vector<std::string>& comments,
       origin && is_bearable ? *origin : Eigen::Vector3d::Zero().eval();
   PlyPlacement out{canonical_frame(moved(bounds, file_origin)), file_origin, {}};
   if (!is_bearable) {
-    out.warnings.push_back(
-        "the file_origin that the file states is ignored: the content is too "
-        "small for a place so far away");
+    out.warnings.emplace_back(
+        "the file_origin that the file states is ignored: the content is too small for a place so "
+        "far away");
   }
   out.frame.file_origin = file_origin_near(out.frame, file_origin);
   const auto up = numbers_after(comments, "up", 3);
