@@ -18,7 +18,7 @@
 #include "io/control_points.h"
 #include "io/lens.h"
 #include "io/orientation.h"
-#include "io/scene_reader.h"
+#include "io/view_names.h"
 #include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/control_fit.h"

@@ -13,7 +13,7 @@
 #include "convert/stated_frame.h"
 #include "io/lens.h"
 #include "io/orientation.h"
-#include "io/scene_reader.h"
+#include "io/view_names.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/scale_bars.h"
 

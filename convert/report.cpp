@@ -18,6 +18,7 @@
 #include "io/resample.h"
 #include "io/scene_path.h"
 #include "io/scene_reader.h"
+#include "io/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -8,6 +8,7 @@
 #include "convert/camera_fit.h"
 #include "convert/stated_frame.h"
 #include "io/photographs.h"
+#include "io/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

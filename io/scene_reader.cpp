@@ -5,9 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <map>
 #include <numeric>
-#include <set>
 #include <sstream>
 #include <utility>
 
@@ -23,6 +21,8 @@
 #include "io/resample.h"
 #include "io/scene_layouts.h"
 #include "io/significance.h"
+#include "io/view_names.h"
+#include "io/view_sizes.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/input_views.h"
 
@@ -49,65 +49,6 @@ Scene read_layout(const SceneRoot& root) {
                  "photographs with nothing else");
 }
 
-std::string without_extension(const std::string& name) {
-  const fs::path path(name);
-  return has_image_extension(path) ? fs::path(path).replace_extension().string() : name;
-}
-
-// Length of the UTF-8 sequence at the start of a text that can be shown; 0 if there is none.
-// Source: RFC 3629 section 4.
-size_t shown_sequence(std::string_view text) {
-  const auto byte = [&](size_t i) {
-    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
-  };
-  const unsigned first = byte(0);
-  if (first < 0x80) return first >= 0x20 && first != 0x7f ? 1 : 0;
-  const size_t length = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
-  if (first < 0xc2 || first > 0xf4) return 0;
-  for (size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xc0) != 0x80) return 0;
-  }
-  const bool is_too_long = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xf0 && byte(1) < 0x90);
-  const bool is_no_character =
-      (first == 0xed && byte(1) > 0x9f) || (first == 0xf4 && byte(1) > 0x8f);
-  const bool is_control = first == 0xc2 && byte(1) < 0xa0;
-  return is_too_long || is_no_character || is_control ? 0 : length;
-}
-
-// A name that can be printed, stand in JSON and begin the names of output files.
-std::string clean_name(std::string_view name) {
-  constexpr size_t kLongest = 200;  // bytes; file systems allow 255 with what is appended
-  name = name.substr(0, kLongest);
-  std::string out;
-  while (!name.empty()) {
-    const size_t length = shown_sequence(name);
-    out += length > 0 ? name.substr(0, length) : "_";
-    name.remove_prefix(std::max(length, size_t{1}));
-  }
-  return out;
-}
-
-// Turns names as files state them into stems, or into whole paths where stems would collide.
-void name_views(Scene& scene) {
-  std::map<std::string, int> uses;
-  for (const View& view : scene.views) ++uses[fs::path(without_extension(view.name)).filename()];
-  std::set<std::string> taken;
-  for (View& view : scene.views) {
-    const std::string whole = without_extension(view.name);
-    std::string name = fs::path(whole).filename().string();
-    if (uses[name] > 1) {
-      name = fs::path(whole).lexically_normal().string();
-      std::replace(name.begin(), name.end(), '/', '_');
-    }
-    // Files that differ in nothing but their extension.
-    if (taken.contains(name)) name = fs::path(view.name).filename().string();
-    name = clean_name(name);
-    std::string unique = name;
-    for (int i = 2; !taken.insert(unique).second; ++i) unique = name + "_" + std::to_string(i);
-    view.name = unique;
-  }
-}
-
 void sort_views(Scene& scene) {
   std::vector<size_t> order(scene.views.size());
   std::iota(order.begin(), order.end(), size_t{0});
@@ -128,121 +69,6 @@ void sort_views(Scene& scene) {
   std::sort(scene.missing.begin(), scene.missing.end());
 }
 
-// True if one size is the other, scaled and rounded to whole pixels.
-bool have_same_shape(int width_a, int height_a, int width_b, int height_b) {
-  const double difference =
-      static_cast<double>(height_a) * width_b - static_cast<double>(height_b) * width_a;
-  return std::abs(difference) <= std::max({width_a, height_a, width_b, height_b});
-}
-
-std::string size_text(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height);
-}
-
-// The divisors that the options leave open, one per view: that of the largest photograph or, as
-// that is what is worked on, undistorted picture of a fisheye. Where it would leave half or less of
-// what a photograph has to give, that one has its own: cameras whose sizes differ little agree.
-std::vector<int> chosen_divisors(Scene& scene) {
-  const auto longest = [](const View& view) {
-    return view.image_path.empty() ? 0 : std::max(view.camera.width, view.camera.height);
-  };
-  const auto divisor = [&](const View& view) {
-    constexpr int kLongest = SceneOptions::kLongestSide;
-    return std::max(1, (longest(view) + kLongest - 1) / kLongest);
-  };
-  const auto is_shorter = [&](const View& a, const View& b) { return longest(a) < longest(b); };
-  const View& largest = *std::max_element(scene.views.begin(), scene.views.end(), is_shorter);
-  const int common = divisor(largest);
-  std::vector<int> out(scene.views.size(), common);
-  bool has_smaller = false;
-  for (size_t i = 0; i < out.size(); ++i) {
-    const View& view = scene.views[i];
-    if (view.image_path.empty() || 2 * divisor(view) > common) continue;
-    out[i] = divisor(view);
-    has_smaller = true;
-  }
-  if (common > 1) {
-    scene.warnings.push_back((largest.fisheye ? "undistorted pictures of " : "photographs of ") +
-                             size_text(largest.camera.width, largest.camera.height) +
-                             " pixels are worked on at 1/" + std::to_string(common) +
-                             " of their size" + (has_smaller ? ", smaller ones at more" : "") +
-                             "; --downscale 1 takes all of it, and longer");
-  }
-  return out;
-}
-
-void fit_cameras(Scene& scene) {
-  int rescaled = 0;
-  for (View& view : scene.views) {
-    Camera& camera = view.camera;
-    if (!view.image_path.empty()) {
-      const ImageSize size = photograph_size(view);
-      if (!have_same_shape(camera.width, camera.height, size.width, size.height)) {
-        throw BadInput(Defect::Mismatch,
-                       view.image_path,
-                       "the image has " + size_text(size.width, size.height) +
-                           " pixels, its camera is for " + size_text(camera.width, camera.height));
-      }
-      rescaled += camera.width != size.width ? 1 : 0;
-      camera = resized(camera, size.width, size.height);
-    }
-  }
-  const bool is_expected = scene.kind == "LLFF";  // states the size of the full photographs
-  if (rescaled > 0 && !is_expected) {
-    scene.warnings.push_back(std::to_string(rescaled) +
-                             " images are of another size than their camera states; intrinsics "
-                             "were scaled to the images");
-  }
-}
-
-// From here on a view through a fisheye has the camera of its undistorted picture.
-void make_pinholes(Scene& scene) {
-  int cropped = 0;
-  for (View& view : scene.views) {
-    if (!view.fisheye) continue;
-    const Eigen::Isometry3d pose = view.camera.world_from_cam;
-    view.fisheye->radius *= double(view.camera.width) / view.fisheye->photograph.width;
-    view.fisheye->photograph = view.camera;
-    view.fisheye->photograph.world_from_cam.setIdentity();
-    check_fisheye(*view.fisheye, [&](Defect defect, const std::string& why) {
-      throw BadInput(defect, scene.folder, "view " + printable(view.name) + ": " + why);
-    });
-    const FisheyeMap map(*view.fisheye);
-    view.camera = map.picture();
-    view.camera.world_from_cam = pose;
-    cropped += map.is_cropped() ? 1 : 0;
-  }
-  if (cropped > 0) {
-    scene.warnings.push_back(std::to_string(cropped) +
-                             " fisheye photographs show more than 60 degrees to a side of their "
-                             "axis; what lies beyond is left out");
-  }
-}
-
-void divide_sizes(Scene& scene, const std::vector<int>& divisors) {
-  for (size_t i = 0; i < divisors.size(); ++i) {
-    const View& view = scene.views[i];
-    Camera& camera = scene.views[i].camera;
-    const int width = camera.width / divisors[i];
-    const int height = camera.height / divisors[i];
-    constexpr int kSmallest = 8;  // below, no stage has anything to work on
-    if (width < kSmallest || height < kSmallest) {
-      throw InvalidInput("SceneOptions.downscale " + std::to_string(divisors[i]) + " leaves " +
-                         size_text(width, height) + " pixels of view " + printable(view.name));
-    }
-    camera = resized(camera, width, height);
-  }
-}
-
-std::string first_of(const std::vector<std::string>& names) {
-  constexpr size_t kShown = 5;
-  std::string out;
-  for (size_t i = 0; i < std::min(names.size(), kShown); ++i) {
-    out += (i > 0 ? ", " : "") + printable(names[i]);
-  }
-  return names.size() > kShown ? out + ", …" : out;
-}
-
 std::vector<int> views_with_files(const Scene& scene) {
   std::vector<int> out;
   for (size_t i = 0; i < scene.views.size(); ++i) {
@@ -256,7 +82,7 @@ void check_presence(Scene& scene) {
   const size_t present = views_with_files(scene).size();
   const std::string text = std::to_string(scene.missing.size()) + " of " +
                            std::to_string(scene.missing.size() + present) +
-                           " images are missing: " + first_of(scene.missing);
+                           " images are missing: " + first_few(scene.missing);
   if (present == 0) throw BadInput(Defect::Missing, scene.folder, text);
   scene.warnings.push_back(text);
 }
@@ -385,16 +211,6 @@ void load_image(const Scene& scene, View& view, std::vector<std::string>& warnin
   }
 }
 
-// Whether a path is `end`, or goes on to it from some folder.
-bool ends_with_path(const fs::path& path, const fs::path& end) {
-  if (path.empty() || end.empty()) return false;
-  auto p = path.end();
-  for (auto e = end.end(); e != end.begin();) {
-    if (p == path.begin() || *--p != *--e) return false;
-  }
-  return true;
-}
-
 void warn_of_identical_images(Scene& scene, const std::vector<int>& views) {
   for (size_t i = 0; i < views.size(); ++i) {
     for (size_t j = i + 1; j < views.size(); ++j) {
@@ -430,60 +246,6 @@ void SceneOptions::validate() const {
   require(
       !downscale || *downscale >= 1, "SceneOptions.downscale must be >= 1", downscale.value_or(1));
   depth.validate();
-}
-
-std::vector<int> views_called(const Scene& scene, const std::string& word) {
-  std::vector<int> out;
-  for (size_t i = 0; i < scene.views.size(); ++i) {
-    if (scene.views[i].name == word) return {static_cast<int>(i)};
-    if (ends_with_path(scene.views[i].image_path, word)) out.push_back(static_cast<int>(i));
-  }
-  uint64_t index = 0;
-  if (!out.empty() || !parse_number(word, index)) return out;
-  if (scene.photographs.empty()) {
-    if (index < scene.views.size()) out.push_back(static_cast<int>(index));
-    return out;
-  }
-  for (size_t i = 0; i < scene.views.size() && index < scene.photographs.size(); ++i) {
-    if (scene.views[i].image_path.filename() == scene.photographs[index]) {
-      out.push_back(static_cast<int>(i));
-    }
-  }
-  return out;
-}
-
-int find_view(const Scene& scene, const std::string& word, const std::string& option) {
-  const std::vector<int> found = views_called(scene, word);
-  if (found.size() == 1) return found.front();
-  std::vector<std::string> names;
-  if (found.empty()) {
-    for (const View& view : scene.views) names.push_back(view.name);
-    throw InvalidInput(option + ": there is no view \"" + printable(word) + "\" among " +
-                       std::to_string(names.size()) + ": " + first_of(names));
-  }
-  for (const int i : found) names.push_back(scene.views[static_cast<size_t>(i)].name);
-  throw InvalidInput(option + ": \"" + printable(word) + "\" is the file of " +
-                     std::to_string(names.size()) + " views: " + first_of(names));
-}
-
-std::vector<int> select_views(const Scene& scene, const std::string& list) {
-  std::vector<int> out;
-  size_t at = 0;
-  while (at <= list.size()) {
-    const size_t end = std::min(list.find(',', at), list.size());
-    std::string token = list.substr(at, end - at);
-    token.erase(0, token.find_first_not_of(' '));
-    token.erase(token.find_last_not_of(' ') + 1);
-    const int view = find_view(scene, token, "--views");
-    if (std::find(out.begin(), out.end(), view) != out.end()) {
-      const std::string& name = scene.views[static_cast<size_t>(view)].name;
-      throw InvalidInput("--views: view \"" + printable(name) + "\" is named twice");
-    }
-    out.push_back(view);
-    at = end + 1;
-  }
-  std::sort(out.begin(), out.end());
-  return out;
 }
 
 Scene read_scene(const fs::path& folder, const SceneOptions& options) {

@@ -61,21 +61,6 @@ Scene scene_of_photographs(const std::filesystem::path& folder,
                            const ColmapModel& model,
                            const SceneOptions& options = {});
 
-/// The views that a word may mean: of that name, else whose file is called so, with or without
-/// folders, else the one of that index in name order, among all photographs.
-/// \return indices into scene.views; several only for files of one name
-std::vector<int> views_called(const Scene& scene, const std::string& word);
-
-/// The one view that a word means. \param option  that the word was given to, for messages
-/// \return index into scene.views
-/// \throws InvalidInput if there is none, or more than one
-int find_view(const Scene& scene, const std::string& word, const std::string& option);
-
-/// The views a list names: comma-separated file stems or indices in name order, as in
-/// SceneOptions::views. \return indices into scene.views, ascending
-/// \throws InvalidInput for a view that does not exist or is named twice
-std::vector<int> select_views(const Scene& scene, const std::string& list);
-
 /// Decodes the images of some views, takes lens distortion out and averages them down to the size
 /// of their camera, in place. View::distortion stays, as it describes the file; View::valid marks
 /// the usable pixels where not all are. Odd pictures (constant, fully masked, identical) become

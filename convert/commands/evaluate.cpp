@@ -12,7 +12,7 @@
 #include "convert/terminal.h"
 #include "convert/views.h"
 #include "io/json_file.h"
-#include "io/scene_reader.h"
+#include "io/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -13,7 +13,7 @@
 #include "convert/views.h"
 #include "io/json_file.h"
 #include "io/scene_path.h"
-#include "io/scene_reader.h"
+#include "io/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -18,6 +18,7 @@
 #include "io/image.h"
 #include "io/scene_reader.h"
 #include "io/text_lines.h"
+#include "io/view_names.h"
 #include "libcgs/core/error.h"
 #include "tests/support/unposed_photos.h"
 

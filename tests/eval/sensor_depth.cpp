@@ -15,6 +15,7 @@
 
 #include "convert/model.h"
 #include "io/scene_reader.h"
+#include "io/view_names.h"
 #include "libcgs/core/order_statistics.h"
 #include "tests/support/exr_channel.h"
 

@@ -23,10 +23,10 @@
 #include "convert/web_splats.h"
 #include "io/atomic_file.h"
 #include "io/png.h"
-#include "io/scene_reader.h"
 #include "io/splat_glb.h"
 #include "io/splat_reader.h"
 #include "io/spz.h"
+#include "io/view_names.h"
 #include "libcgs/render/rasterizer.h"
 
 namespace {

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/view_names.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "io/byte_reader.h"
+#include "io/scene_path.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string without_extension(const std::string& name) {
+  const fs::path path(name);
+  return has_image_extension(path) ? fs::path(path).replace_extension().string() : name;
+}
+
+// Length of the UTF-8 sequence at the start of a text that can be shown; 0 if there is none.
+// Source: RFC 3629 section 4.
+size_t shown_sequence(std::string_view text) {
+  const auto byte = [&](size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
+  };
+  const unsigned first = byte(0);
+  if (first < 0x80) return first >= 0x20 && first != 0x7f ? 1 : 0;
+  const size_t length = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
+  if (first < 0xc2 || first > 0xf4) return 0;
+  for (size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xc0) != 0x80) return 0;
+  }
+  const bool is_too_long = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xf0 && byte(1) < 0x90);
+  const bool is_no_character =
+      (first == 0xed && byte(1) > 0x9f) || (first == 0xf4 && byte(1) > 0x8f);
+  const bool is_control = first == 0xc2 && byte(1) < 0xa0;
+  return is_too_long || is_no_character || is_control ? 0 : length;
+}
+
+// A name that can be printed, stand in JSON and begin the names of output files.
+std::string clean_name(std::string_view name) {
+  constexpr size_t kLongest = 200;  // bytes; file systems allow 255 with what is appended
+  name = name.substr(0, kLongest);
+  std::string out;
+  while (!name.empty()) {
+    const size_t length = shown_sequence(name);
+    out += length > 0 ? name.substr(0, length) : "_";
+    name.remove_prefix(std::max(length, size_t{1}));
+  }
+  return out;
+}
+
+// Whether a path is `end`, or goes on to it from some folder.
+bool ends_with_path(const fs::path& path, const fs::path& end) {
+  if (path.empty() || end.empty()) return false;
+  auto p = path.end();
+  for (auto e = end.end(); e != end.begin();) {
+    if (p == path.begin() || *--p != *--e) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void name_views(Scene& scene) {
+  std::map<std::string, int> uses;
+  for (const View& view : scene.views) ++uses[fs::path(without_extension(view.name)).filename()];
+  std::set<std::string> taken;
+  for (View& view : scene.views) {
+    const std::string whole = without_extension(view.name);
+    std::string name = fs::path(whole).filename().string();
+    if (uses[name] > 1) {
+      name = fs::path(whole).lexically_normal().string();
+      std::replace(name.begin(), name.end(), '/', '_');
+    }
+    // Files that differ in nothing but their extension.
+    if (taken.contains(name)) name = fs::path(view.name).filename().string();
+    name = clean_name(name);
+    std::string unique = name;
+    for (int i = 2; !taken.insert(unique).second; ++i) unique = name + "_" + std::to_string(i);
+    view.name = unique;
+  }
+}
+
+std::string first_few(const std::vector<std::string>& names) {
+  constexpr size_t kShown = 5;
+  std::string out;
+  for (size_t i = 0; i < std::min(names.size(), kShown); ++i) {
+    out += (i > 0 ? ", " : "") + printable(names[i]);
+  }
+  return names.size() > kShown ? out + ", …" : out;
+}
+
+std::vector<int> views_called(const Scene& scene, const std::string& word) {
+  std::vector<int> out;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    if (scene.views[i].name == word) return {static_cast<int>(i)};
+    if (ends_with_path(scene.views[i].image_path, word)) out.push_back(static_cast<int>(i));
+  }
+  uint64_t index = 0;
+  if (!out.empty() || !parse_number(word, index)) return out;
+  if (scene.photographs.empty()) {
+    if (index < scene.views.size()) out.push_back(static_cast<int>(index));
+    return out;
+  }
+  for (size_t i = 0; i < scene.views.size() && index < scene.photographs.size(); ++i) {
+    if (scene.views[i].image_path.filename() == scene.photographs[index]) {
+      out.push_back(static_cast<int>(i));
+    }
+  }
+  return out;
+}
+
+int find_view(const Scene& scene, const std::string& word, const std::string& option) {
+  const std::vector<int> found = views_called(scene, word);
+  if (found.size() == 1) return found.front();
+  std::vector<std::string> names;
+  if (found.empty()) {
+    for (const View& view : scene.views) names.push_back(view.name);
+    throw InvalidInput(option + ": there is no view \"" + printable(word) + "\" among " +
+                       std::to_string(names.size()) + ": " + first_few(names));
+  }
+  for (const int i : found) names.push_back(scene.views[static_cast<size_t>(i)].name);
+  throw InvalidInput(option + ": \"" + printable(word) + "\" is the file of " +
+                     std::to_string(names.size()) + " views: " + first_few(names));
+}
+
+std::vector<int> select_views(const Scene& scene, const std::string& list) {
+  std::vector<int> out;
+  size_t at = 0;
+  while (at <= list.size()) {
+    const size_t end = std::min(list.find(',', at), list.size());
+    std::string token = list.substr(at, end - at);
+    token.erase(0, token.find_first_not_of(' '));
+    token.erase(token.find_last_not_of(' ') + 1);
+    const int view = find_view(scene, token, "--views");
+    if (std::find(out.begin(), out.end(), view) != out.end()) {
+      const std::string& name = scene.views[static_cast<size_t>(view)].name;
+      throw InvalidInput("--views: view \"" + printable(name) + "\" is named twice");
+    }
+    out.push_back(view);
+    at = end + 1;
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+}  // namespace cgs

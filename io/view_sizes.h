@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "libcgs/core/scene.h"
+
+namespace cgs {
+
+/// True if one size is the other, scaled and rounded to whole pixels.
+bool have_same_shape(int width_a, int height_a, int width_b, int height_b);
+
+/// "4032 x 3024", for messages.
+std::string size_text(int width, int height);
+
+/// Scales cameras to the size of their photographs, which becomes a warning where a layout does not
+/// state the size of other files than these. \throws BadInput Mismatch (another shape)
+void fit_cameras(Scene& scene);
+
+/// From here on a view through a fisheye has the camera of its undistorted picture.
+/// \throws BadInput as check_fisheye()
+void make_pinholes(Scene& scene);
+
+/// The divisors that options leave open, one per view: that of the largest photograph or, as that
+/// is what is worked on, undistorted picture of a fisheye, so that no side is above
+/// SceneOptions::kLongestSide. Where it would leave half or less of what a photograph has to give,
+/// that one has its own: cameras whose sizes differ little agree. What was chosen becomes a
+/// warning.
+std::vector<int> chosen_divisors(Scene& scene);
+
+/// Makes cameras smaller, rounded down to whole pixels. \param divisors  one per view
+/// \throws InvalidInput (a side would be shorter than 8 pixels)
+void divide_sizes(Scene& scene, const std::vector<int>& divisors);
+
+}  // namespace cgs
