@@ -376,12 +376,21 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
 }
 
 Model read_model(const std::filesystem::path& folder) {
+  Model model = read_model_as_written(folder);
+  Frame& frame = model.scene.frame;
+  const bool is_measured = frame.scale_source == ScaleSource::KnownDistance ||
+                           frame.scale_source == ScaleSource::DepthSensor;
+  if (model.scene.kind == "photographs" && is_measured) frame = in_metres(frame);
+  return model;
+}
+
+Model read_model_as_written(const std::filesystem::path& folder) {
   if (!is_folder(folder)) {
     throw BadInput(Defect::Open, folder, "no such folder; give the model folder of a run");
   }
   const bool is_of_run = !is_present(folder / "cameras.json") && is_present(folder / "run.json") &&
                          is_folder(folder / "model");
-  if (is_of_run) return read_model(folder / "model");
+  if (is_of_run) return read_model_as_written(folder / "model");
   Model model;
   model.scene = read_cameras_json(folder / "cameras.json");
   const bool has_frame = model.scene.kind != kForeignCameras;

@@ -72,8 +72,14 @@ void write_model(const std::filesystem::path& folder, const Model& model);
 
 /// Reads what write_model() wrote, or gaussians.ply and cameras.json of 3DGS, which state no frame:
 /// it is then the canonical one of the splats. Of the folder of a run, the model in it.
+///
+/// Where cameras were solved from photographs alone and something measured tells their scale, the
+/// frame is in metres: nobody else knows the unit of these cameras.
 /// \throws BadInput
 Model read_model(const std::filesystem::path& folder);
+
+/// The same in the unit of its cameras, whatever that is: to give it a scale, and to write it.
+Model read_model_as_written(const std::filesystem::path& folder);
 
 /// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model
 /// or photographs that were moved. \throws BadInput as read_scene()

@@ -107,7 +107,7 @@ GivenDepthReport sensor_scale(const Json& model) {
 
 // The scale is told apart from the model: people learn a length after they saw a first result.
 Json run_scale(Run& run, const Progress& progress) {
-  Model& model = loaded_model(run);
+  Model model = read_model_as_written(run.request.output / "model");
   report(progress, 0);
   Frame& frame = model.scene.frame;
   const Frame before = frame;
@@ -122,6 +122,7 @@ Json run_scale(Run& run, const Progress& progress) {
                       frame.metres_sigma != before.metres_sigma ||
                       frame.scale_source != before.scale_source || frame.up != before.up;
   if (is_new) write_model(run.request.output / "model", model);
+  run.model.reset();
   return result;
 }
 

@@ -107,14 +107,26 @@ std::string refinement_section(const Json& report) {
   return html.str();
 }
 
+std::string scale_words(const Json& report) {
+  const Json& scale = report["scale"];
+  const auto metres = scale["metres_per_unit"].get<double>();
+  const std::string sigma =
+      number(100 * scale["metres_sigma"].get<double>() / metres, "%.2g") + " %";
+  if (report["frame"]["metres_per_unit"] == scale["metres_per_unit"]) {
+    return "one scene unit is " + number(metres, "%.6g") + " m +- " + sigma;
+  }
+  return "all files but those in model are in metres, +- " + sigma +
+         "; one unit of the solved cameras is " + number(metres, "%.6g") + " m";
+}
+
 std::string scale_section(const Json& report) {
   const Json& scale = report["scale"];
   if (scale.is_null()) return "";
   if (scale.contains("control_points")) return control_section(scale);
   std::ostringstream html;
-  html << "<h2>Scale</h2>\n<p>One scene unit is " << number(scale["metres_per_unit"], "%.6g")
-       << " m, with a standard deviation of " << number(scale["metres_sigma"], "%.2g")
-       << " m.</p>\n<table>\n<tr><th>known distance</th><th>known [m]</th><th>measured [m]</th>"
+  html << "<h2>Scale</h2>\n<p>" << scale_words(report)
+       << " (one standard deviation).</p>\n<table>\n<tr><th>known distance</th><th>known "
+          "[m]</th><th>measured [m]</th>"
           "<th>sigma</th><th>residual</th><th>used</th></tr>\n";
   for (const Json& d : scale["distances"]) {
     html << "<tr><td>" << escaped(d["distance"].get<std::string>()) << "</td><td>"

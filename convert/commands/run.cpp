@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <chrono>
-#include <iomanip>
 #include <iostream>
 #include <memory>
-#include <sstream>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -43,12 +41,7 @@ size_t asked_size(const std::string& text) {
 void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Terminal& terminal) {
   const auto& scale = report["scale"];
   if (!scale.is_null()) {
-    std::ostringstream text;
-    text << "scale: one scene unit is " << scale["metres_per_unit"].get<double>() << " m +- "
-         << std::setprecision(2)
-         << 100 * scale["metres_sigma"].get<double>() / scale["metres_per_unit"].get<double>()
-         << " %";
-    terminal.say(text.str());
+    terminal.say("scale: " + scale_words(report));
     if (scale.contains("control_points")) terminal.say(control_words(scale));
   }
   const std::string origin = far_origin(report["frame"]);

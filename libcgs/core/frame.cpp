@@ -101,6 +101,19 @@ Eigen::Vector3d file_origin_near(const Frame& frame, const Eigen::Vector3d& want
   return is_near ? wanted : frame.origin;
 }
 
+Frame in_metres(Frame frame) {
+  require(frame.has_metric_scale(),
+          "in_metres: Frame.metres_per_unit must be > 0",
+          frame.metres_per_unit);
+  const double metres = frame.metres_per_unit;
+  frame.origin *= metres;
+  frame.scale *= metres;
+  frame.file_origin *= metres;
+  frame.metres_sigma /= metres;
+  frame.metres_per_unit = 1;
+  return frame;
+}
+
 double significant_bits(const Eigen::AlignedBox3d& box, int digits) {
   const double farthest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
   if (farthest == 0) return -std::numeric_limits<double>::infinity();

@@ -9,6 +9,10 @@
 
 namespace cgs {
 
+double bias_correction(double decay, int64_t steps) {
+  return -1 / std::expm1(static_cast<double>(steps) * std::log(decay));
+}
+
 size_t adam_step(ParameterBlock& block, AdamState& state, float rate, float decay) {
   const size_t count = block.value.size();
   std::atomic<size_t> skipped = 0;
@@ -21,9 +25,8 @@ size_t adam_step(ParameterBlock& block, AdamState& state, float rate, float deca
     // Gradients of a mean over some 10^5 pixels are small: the usual 1e-8 would hold them back.
     constexpr float kTiny = 1e-12f;
     constexpr float kLargest = 1e15f;
-    const auto steps = static_cast<double>(state.steps);
-    const auto unbias_mean = static_cast<float>(1 / (1 - std::pow(kMeanDecay, steps)));
-    const auto unbias_square = static_cast<float>(1 / (1 - std::pow(kSquareDecay, steps)));
+    const auto unbias_mean = static_cast<float>(bias_correction(kMeanDecay, state.steps));
+    const auto unbias_square = static_cast<float>(bias_correction(kSquareDecay, state.steps));
     constexpr auto kB1 = static_cast<float>(kMeanDecay);
     constexpr auto kB2 = static_cast<float>(kSquareDecay);
     const float kept = 1 - rate * decay;

@@ -15,6 +15,11 @@ struct AdamState {
   int64_t steps = 0;
 };
 
+/// What a running mean of `steps` values that began at 0 is multiplied by: 1 / (1 - decay^steps),
+/// in double and without taking nearly equal numbers from each other. \param decay  in (0, 1)
+/// \param steps  > 0
+double bias_correction(double decay, int64_t steps);
+
 /// One step of Adam with bias correction, beta = (0.9, 0.999); the gradient is set to zero
 /// afterwards. Entries whose gradient and mean are both zero stay as they are, but for decay. The
 /// state is created on first use.

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "io/scene_reader.h"
+#include "tests/support/sample_splats.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
@@ -81,6 +82,43 @@ TEST(WriteModel, LeavesNothingOfViewsThatAnEarlierModelHad) {
   for (const char* file : {"priors/b.exr", "priors/c.exr", "priors/mine.exr"}) {
     EXPECT_TRUE(std::filesystem::exists(dir / file)) << file;
   }
+}
+
+TEST(ReadModel, OfPhotographsAloneIsInMetresOnceSomethingMeasuredTellsTheirScale) {
+  const test::TempDir dir;
+  Model model;
+  model.gaussians = test::varied_splats(5, 0);
+  model.scene.folder = dir.path();
+  for (const char* name : {"a", "b"}) {
+    View& view = model.scene.views.emplace_back();
+    view.name = name;
+    view.image_path = dir / (view.name + ".png");
+    view.camera = {2, 2, 2, 2, 1, 1, Eigen::Isometry3d::Identity()};
+  }
+  Frame& frame = model.scene.frame;
+  frame.scale = 4;
+  frame.origin = {1, 2, 3};
+  frame.up = Eigen::Vector3d::UnitY();
+  frame.metres_per_unit = 0.3;
+  const auto read_with = [&](const std::string& kind, ScaleSource source) {
+    model.scene.kind = kind;
+    frame.scale_source = source;
+    write_model(dir.path(), model);
+    EXPECT_EQ(read_model_as_written(dir.path()).scene.frame.scale, 4);
+    return read_model(dir.path());
+  };
+  for (const ScaleSource source : {ScaleSource::KnownDistance, ScaleSource::DepthSensor}) {
+    const Model metric = read_with("photographs", source);
+    EXPECT_EQ(metric.scene.frame.unit_name(), "m");
+    EXPECT_DOUBLE_EQ(metric.scene.frame.scale, 4 * 0.3);
+    for (size_t i = 0; i < model.gaussians.size(); ++i) {
+      EXPECT_LT((metric.gaussians.position[i] - model.gaussians.position[i]).norm(), 1e-6f);
+    }
+  }
+  // Somebody else knows these coordinates, or nobody measured anything.
+  EXPECT_EQ(read_with("COLMAP", ScaleSource::KnownDistance).scene.frame.scale, 4);
+  EXPECT_EQ(read_with("photographs", ScaleSource::Assumed).scene.frame.scale, 4);
+  EXPECT_EQ(read_with("photographs", ScaleSource::ControlPoints).scene.frame.scale, 4);
 }
 
 TEST(Picture, DividesByAlphaAboveOneHalfOnly) {

@@ -85,6 +85,21 @@ TEST(SplatDoctor, CountsEveryDefectApart) {
 }
 
 // Rows that were never written: drawn, they would be opaque balls at the origin.
+TEST(SplatDoctor, OpacitiesAreThoseOfDoubleAndNeverOne) {
+  const std::vector<float> logits = {
+      -1e30f, -88, -17, -16.6f, -12, -8, 0, 3, 4.5f, 8, 12, 16.6f, 17, 88, 1e30f};
+  const GaussianFile out = examined([&](RawSplats& raw) {
+    for (size_t i = 0; i < logits.size(); ++i) raw.logit[i] = logits[i];
+  });
+  EXPECT_EQ(out.findings.transparent, 400 - out.gaussians.size());
+  const size_t dropped = 400 - out.gaussians.size();  // the first ones: 0 in float
+  EXPECT_LE(dropped, 2u);
+  for (size_t i = dropped; i < logits.size(); ++i) {
+    const double exact = std::min(0.99, 1 / (1 + std::exp(-double{logits[i]})));
+    EXPECT_NEAR(double{out.gaussians.opacity[i - dropped]} / exact, 1, 1e-5) << logits[i];
+  }
+}
+
 TEST(SplatDoctor, DropsRowsOfZeros) {
   const GaussianFile out = examined([](RawSplats& raw) {
     const size_t good = raw.size();

@@ -50,6 +50,26 @@ TEST(Boolean, TwoBoxesHaveTheVolumesOfArithmetic) {
   EXPECT_NEAR(volume(BooleanOperation::Difference), 7, 1e-6);
 }
 
+TEST(Boolean, TwoBoxesHaveTheVolumesOfArithmeticAtAnyScale) {
+  const auto bounds = [](const TriangleMesh& mesh) {
+    Eigen::AlignedBox3d out;
+    for (const Eigen::Vector3f& p : mesh.vertices) out.extend(p.cast<double>());
+    return out;
+  };
+  for (const float s : {1e-6f, 1e-3f, 1.0f, 1e3f, 1e6f}) {
+    const TriangleMesh a = box({0, 0, 0}, {2 * s, 2 * s, 2 * s});
+    const TriangleMesh b = box({s, s, s}, {3 * s, 4 * s, 2.5f * s});
+    const double common = bounds(a).intersection(bounds(b)).volume();
+    const auto ratio = [&](BooleanOperation operation, double expected) {
+      return certify(boolean(a, b, operation).mesh).volume / expected;
+    };
+    const double both = bounds(a).volume() + bounds(b).volume() - common;
+    EXPECT_NEAR(ratio(BooleanOperation::Union, both), 1, 1e-12) << s;
+    EXPECT_NEAR(ratio(BooleanOperation::Intersection, common), 1, 1e-12) << s;
+    EXPECT_NEAR(ratio(BooleanOperation::Difference, bounds(a).volume() - common), 1, 1e-12) << s;
+  }
+}
+
 TEST(Boolean, FacesInOnePlaneMeetCleanly) {
   const TriangleMesh a = box({0, 0, 0}, {1, 1, 1});
   const TriangleMesh b = box({1, 0, 0}, {2, 1, 1});

@@ -36,6 +36,24 @@ TEST(EnclosingLevelSet, IsTheOutsideOfFacesThatCutEachOther) {
   EXPECT_TRUE(closed_isosurface(*field).certificate.passed());
 }
 
+// Its faces pass through voxels, where the field is 0.
+TEST(EnclosingLevelSet, OfABoxOnTheGridHasNoDegenerateFacesAndTheEulerNumberOfABall) {
+  const TriangleMesh cube = test::cube_mesh(1).mesh;
+  const auto field = enclosing_level_set(cube, 1.0 / 16);
+  size_t zeros = 0;
+  for (auto value = field->cbeginValueOn(); value; ++value) zeros += *value == 0 ? 1 : 0;
+  ASSERT_GT(zeros, 1000u);
+  const ClosedIsosurface out = closed_isosurface(*field);
+  EXPECT_TRUE(out.certificate.passed());
+  EXPECT_EQ(out.certificate.components, 1u);
+  EXPECT_EQ(out.certificate.genus, 0);
+  for (const auto& f : out.mesh.faces) {
+    const Eigen::Vector3f u = out.mesh.vertices[f[1]] - out.mesh.vertices[f[0]];
+    const Eigen::Vector3f v = out.mesh.vertices[f[2]] - out.mesh.vertices[f[0]];
+    ASSERT_GT(u.cross(v).norm(), 0);
+  }
+}
+
 TEST(EnclosingLevelSet, RefusesTooManyVoxels) {
   EXPECT_THROW(enclosing_level_set(test::cube_mesh(1).mesh, 1e-5), LimitError);
 }

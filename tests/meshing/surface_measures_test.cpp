@@ -42,6 +42,8 @@ TEST(EnclosedVolume, TheSameFromAnyPlace) {
     const MeasurableMesh there = moved(rounded, far);
     EXPECT_NEAR(enclosed_volume(there).value / enclosed_volume(rounded).value, 1, 1e-12);
     EXPECT_NEAR(surface_area(there).value / surface_area(rounded).value, 1, 1e-12);
+    EXPECT_LT((volume_centroid(there) - far - volume_centroid(rounded)).norm(), 1e-8);
+    EXPECT_LT((area_centroid(there) - far - area_centroid(rounded)).norm(), 1e-8);
   }
 }
 

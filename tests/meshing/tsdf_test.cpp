@@ -72,11 +72,14 @@ TEST(Fuse, PutsTheZeroCrossingOnASphere) {
 
 TEST(Fuse, PutsTheZeroCrossingOnATiltedPlane) {
   const Vector3d n = Vector3d(0.4, 0.3, 1).normalized();
-  const auto fused = fuse(three_views(test::plane(n, 0.1)), {});
-  const TriangleMesh mesh = open_surface(fused.volume, {});
-  ASSERT_GT(mesh.vertices.size(), 1000U);
-  EXPECT_LT(rms(mesh, fused.report.voxel_size, [&](const Vector3d& p) { return n.dot(p) - 0.1; }),
-            0.02);
+  for (const float truncation : {3.0f, 4.0f, 5.0f, 8.0f}) {
+    const auto fused = fuse(three_views(test::plane(n, 0.1)), {.truncation = truncation});
+    const TriangleMesh mesh = open_surface(fused.volume, {});
+    ASSERT_GT(mesh.vertices.size(), 1000U);
+    EXPECT_LT(rms(mesh, fused.report.voxel_size, [&](const Vector3d& p) { return n.dot(p) - 0.1; }),
+              0.02)
+        << truncation;
+  }
 }
 
 TEST(Fuse, MeshesAPlaneThroughVoxelCentresWithoutDegenerateFaces) {

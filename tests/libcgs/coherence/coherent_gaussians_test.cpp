@@ -254,6 +254,28 @@ TEST(CoherentGaussians, MoveByNoMoreThanTheBound) {
   }
 }
 
+// Logits are the start plus what is bounded: parameters of any size leave values and derivatives
+// finite.
+TEST(CoherentGaussians, OpacitiesAndTheirGradientsStayFiniteForParametersOfAnySize) {
+  for (const float with : {8.0f, 12.0f, 16.6f, 17.0f, 88.0f, 1e30f}) {
+    for (const float sign : {-1.0f, 1.0f}) {
+      CoherentGaussians model(scene_of(2), priors_of(2), small_lattices());
+      for (ParameterBlock& block : model.parameters) {
+        if (block.role != ParameterRole::Opacity) continue;
+        for (float& value : block.value) value = sign * with;
+      }
+      model.decode();
+      const LinearLoss loss(model, false);
+      model.add_gradients(loss.weights, loss.depth);
+      model.add_opacity_prior(1);
+      for (const float o : model.gaussians().opacity) EXPECT_TRUE(o > 0 && o < 1) << sign * with;
+      for (const ParameterBlock& block : model.parameters) {
+        for (const float g : block.gradient) ASSERT_TRUE(std::isfinite(g)) << sign * with;
+      }
+    }
+  }
+}
+
 // All of decode() in double, by the definition, with one network in its place.
 struct DoubleChain {
   Scene scene;

@@ -83,6 +83,20 @@ TEST(CanonicalFrame, FarScenesKeepTheirDetailInFiles) {
   }
 }
 
+TEST(Frame, InMetresPutsPointsWhereTheyWereSeenByTheMetre) {
+  Frame frame = canonical_frame(cloud(1, {30, -20, 5}));
+  EXPECT_THROW(in_metres(frame), InvalidInput);
+  frame.metres_per_unit = 0.3;
+  frame.metres_sigma = 0.003;
+  frame.file_origin = {28, 0, 0};
+  const Frame metric = in_metres(frame);
+  const Eigen::Vector3d p(0.1, -0.2, 0.3);
+  EXPECT_LT((metric.world_from_internal(p) - 0.3 * frame.world_from_internal(p)).norm(), 1e-14);
+  EXPECT_LT((metric.file_from_internal(p) - 0.3 * frame.file_from_internal(p)).norm(), 1e-14);
+  EXPECT_EQ(metric.unit_name(), "m");
+  EXPECT_DOUBLE_EQ(metric.metres_sigma, 0.01);
+}
+
 TEST(CanonicalFrame, NearScenesKeepTheirWorldCoordinatesInFiles) {
   EXPECT_EQ(canonical_frame(cloud(1, Eigen::Vector3d(3, 2, 1))).file_origin.norm(), 0);
 }

@@ -123,6 +123,30 @@ TEST(PlaneSweep, SigmaCoversTheErrors) {
   EXPECT_GT(within, 0.95 * measured);
 }
 
+// A baseline of a thousandth of the distance moves nothing by a tenth of a pixel: sigma must say
+// so.
+TEST(PlaneSweep, SigmaGrowsAsTheBaselineShrinks) {
+  double last = 0;
+  for (const double baseline : {0.4, 0.04, 0.004, 0.0004}) {
+    const std::vector<Camera> cameras = {
+        test::looking_at({0, 0, 0}, {0, 0, 4}, kWidth, kHeight, kFocal),
+        test::looking_at({baseline, 0, 0}, {baseline, 0, 4}, kWidth, kHeight, kFocal)};
+    const Scene scene = test::photographed_scene(slanted_plane(), cameras, kFinest);
+    std::vector<float> sigma;
+    for (const ViewPriors& view : plane_sweep(scene, one_round())) {
+      for (size_t i = 0; i < view.sigma.data.size(); ++i) {
+        if (view.origin.data[i] != DepthOrigin::Measured) continue;
+        ASSERT_TRUE(std::isfinite(view.sigma.data[i])) << baseline;
+        sigma.push_back(view.sigma.data[i] / view.depth.data[i]);
+      }
+    }
+    if (sigma.empty()) continue;  // where nothing is measured nothing is claimed
+    std::nth_element(sigma.begin(), sigma.begin() + std::ptrdiff_t(sigma.size() / 2), sigma.end());
+    EXPECT_GT(double{sigma[sigma.size() / 2]}, last) << baseline;
+    last = double{sigma[sigma.size() / 2]};
+  }
+}
+
 TEST(PlaneSweep, NeverReadsMaskedPixels) {
   Scene scene = test::photographed_scene(wall_and_square(), three_cameras(), kFinest);
   for (View& view : scene.views) {

@@ -154,11 +154,11 @@ TEST(ProjectGaussians, NamesWhatBecameOfEachGaussian) {
 }
 
 TEST(ProjectGaussians, CullsAtTheNearDepthAndStaysFiniteJustBehindIt) {
-  for (const double z : {1e-3 * (1 - 1e-6), 1e-3 * (1 + 1e-6), 1e-6, 0.0, -1e-6, -1.0}) {
+  for (const double z : {1e-3 * (1 - 1e-6), 1e-3, 1e-3 * (1 + 1e-6), 1e-6, 0.0, -1e-6, -1.0}) {
     const Gaussians g = one({0.001f, 0.001f, float(z)}, {0.1f, 0.2f, 0.3f});
     const auto projected = project_gaussians(g, camera_at({0, 0, 0}));
-    EXPECT_EQ(projected.fate[0], z > 1e-3 ? SplatFate::Drawn : SplatFate::Behind) << z;
-    if (z > 1e-3) EXPECT_TRUE(image_covariance(projected.splats[0]).allFinite());
+    EXPECT_EQ(projected.fate[0], z >= 1e-3 ? SplatFate::Drawn : SplatFate::Behind) << z;
+    if (z >= 1e-3) EXPECT_TRUE(image_covariance(projected.splats[0]).allFinite());
   }
 }
 

@@ -146,6 +146,16 @@ TEST(Rasterize, EqualsTheReferenceForNeedlesUpToTenThousandPixels) {
                           .min_opacity = 0.02f,
                           .max_opacity = 0.2f};
       expect_reference(random_gaussians(camera, spread, 3), camera, 1e-5, 1e-3);
+      // One at a time at full opacity: nothing of its error is hidden by what lies before it.
+      for (unsigned seed = 100; seed < 120; ++seed) {
+        const Spread alone{.count = 1,
+                           .sigma_px = sigma_px,
+                           .anisotropy = anisotropy,
+                           .min_opacity = 0.99f,
+                           .max_opacity = 0.99f};
+        const double tolerance = sigma_px > 100 ? 2e-3 : 3e-5;
+        expect_reference(random_gaussians(camera, alone, seed), camera, tolerance, 1e-3);
+      }
     }
   }
 }

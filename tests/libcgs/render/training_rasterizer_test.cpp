@@ -142,7 +142,8 @@ double loss_of(const test::ReferencePlanes& planes_of_scene, TrainingBuffers& we
 struct Comparison {
   std::vector<unsigned> channels = {1, 2, 4, 8, 16, 32, kEveryChannel};
   Camera camera = oblique_camera();
-  size_t every = 1;  // compares one derivative in so many
+  size_t every = 1;          // compares one derivative in so many
+  size_t most = size_t(-1);  // of the first so many
   double step = 1e-6;
 };
 
@@ -163,7 +164,7 @@ void expect_differences(const Gaussians& g,
   const Eigen::Vector3d background = options.background.cast<double>();
   std::vector<std::vector<double>> truth(losses.size());
   std::vector<size_t> compared;
-  for (size_t e = 0; e < entries[0].size(); e += how.every) {
+  for (size_t e = 0; e < std::min(how.most, entries[0].size()); e += how.every) {
     auto scene = test::reference_gaussians(g);
     entries[0][e].add(scene, how.step);
     const auto plus = test::draw_reference(scene, how.camera, background);
@@ -250,6 +251,22 @@ TEST(TrainingRasterizer, DifferentiatesManySplatsAtOneDepth) {
     expect_differences(
         g, {}, {.channels = {1, 8, kEveryChannel}, .camera = camera, .every = 15, .step = 1e-3});
   }
+}
+
+// The first of them are seen, all count.
+TEST(TrainingRasterizer, DifferentiatesAHundredThousandSplatsAtOneDepth) {
+  const Camera camera{.width = 2, .height = 2, .fx = 2, .fy = 2, .cx = 1, .cy = 1};
+  Gaussians g;
+  for (int i = 0; i < 100'000; ++i) {
+    g.position.emplace_back(0.01f * float(i % 10), 0.01f * float(i % 7), 0.5f);
+    g.scale.push_back(Eigen::Vector3f::Constant(2));
+    g.rotation.emplace_back(1, 0, 0, 0);
+    g.opacity.push_back(0.0045f);
+    g.sh.push_back(Eigen::Vector3f::Constant(0.01f * float(i % 17)));
+  }
+  const Comparison some = {
+      .channels = {kEveryChannel}, .camera = camera, .every = 15, .most = 3000, .step = 1e-3};
+  expect_differences(g, {}, some);
 }
 
 // Compares what is drawn with the reference of rasterize(), which knows the pixels that rounding
@@ -421,7 +438,7 @@ TEST(TrainingRasterizer, GivesRotationsWhatIsOrthogonalToThemAtAnyLength) {
   const TrainingRasterizerOptions options{.shape = GaussianShape::Ellipsoids};
   Gaussians g = random_gaussians(camera, {.sigma_px = 3, .anisotropy = 3}, 19);
   const GaussianGradients expected = gradients(g, camera, options);
-  for (const int exponent : {-40, -10, 0, 10, 40}) {
+  for (const int exponent : {-100, -40, -10, 0, 10, 40, 100}) {
     Gaussians scaled = g;
     for (Eigen::Vector4f& q : scaled.rotation) q *= std::ldexp(1.0f, exponent);
     const GaussianGradients got = gradients(scaled, camera, options);

@@ -41,6 +41,17 @@ TEST(Adam, FollowsThePublishedAlgorithm) { expect_published_algorithm(0); }
 
 TEST(Adam, DecaysWeightsApartFromTheGradient) { expect_published_algorithm(0.5f); }
 
+TEST(Adam, CorrectsTheBiasOfTheFirstStepsToTheLastDigits) {
+  for (const double decay : {0.9, 0.999}) {
+    long double power = 1;
+    for (int64_t t = 1; t <= 100'000; ++t) {
+      power *= static_cast<long double>(decay);
+      const double expected = static_cast<double>(1 / (1 - power));
+      ASSERT_NEAR(bias_correction(decay, t) / expected, 1, 1e-12) << decay << ", step " << t;
+    }
+  }
+}
+
 TEST(Adam, StepsHaveTheLengthOfTheRateHoweverSmallTheGradient) {
   for (const float size : {1e-9f, 1.0f, 1e9f}) {
     ParameterBlock block;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
 
@@ -81,6 +82,35 @@ TEST(Psnr, KeepsItsDigitsOnALargeImage) {
   const ColorImage a = flat(2000, 2000, 0);
   const ColorImage b = flat(2000, 2000, 1e-3f);
   EXPECT_NEAR(psnr(a, b), -20 * std::log10(double(1e-3f)), 1e-10);
+}
+
+TEST(Psnr, IsThatOfSquaresAddedInLongDouble) {
+  const ColorImage a = noise(701, 499, 1);
+  const ColorImage b = noise(701, 499, 2);
+  long double sum = 0;
+  for (size_t i = 0; i < a.data.size(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      const auto d = static_cast<long double>(a.data[i][c]) - b.data[i][c];
+      sum += d * d;
+    }
+  }
+  const long double mean = sum / (3.0L * static_cast<long double>(a.data.size()));
+  EXPECT_NEAR(psnr(a, b) / static_cast<double>(-10 * std::log10(mean)), 1, 1e-12);
+}
+
+TEST(ImageMetrics, GiveTheSameBitsForAnyNumberOfThreads) {
+  const ColorImage a = noise(411, 305, 1);
+  const ColorImage b = noise(411, 305, 2);
+  const auto all = [&] { return std::array{psnr(a, b), ssim(a, b), ms_ssim(a, b)}; };
+  std::array<double, 3> expected{};
+  {
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    expected = all();
+  }
+  for (const size_t threads : {2, 3, 4}) {
+    const tbb::global_control many(tbb::global_control::max_allowed_parallelism, threads);
+    EXPECT_EQ(all(), expected) << threads;
+  }
 }
 
 TEST(Ssim, OfEqualImagesIsOne) {

@@ -160,6 +160,18 @@ TEST(StructuralDissimilarity, OfEqualImagesOrAnEmptyMaskIsZeroToTheLastBit) {
   }
 }
 
+TEST(StructuralDissimilarity, OfConstantImagesIsZeroWithoutAGradient) {
+  for (const float value : {0.0f, 0.3f, 1.0f}) {
+    ColorPlanes image;
+    image.fill(Raster<float>(40, 30, value));
+    ColorPlanes gradient;
+    EXPECT_NEAR(structural_dissimilarity(image, image, nullptr, 1, gradient), 0, 1e-6) << value;
+    for (const Raster<float>& plane : gradient) {
+      EXPECT_EQ(plane.data, std::vector<float>(size_t(40 * 30), 0)) << value;
+    }
+  }
+}
+
 TEST(StructuralDissimilarity, AddsToTheGradient) {
   const ColorPlanes a = noise_planes(20, 13, 1);
   const ColorPlanes b = noise_planes(20, 13, 2);

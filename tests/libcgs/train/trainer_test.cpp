@@ -2,6 +2,7 @@
 #include "libcgs/train/trainer.h"
 
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -220,6 +221,16 @@ TEST(Trainer, NetworksMoveDepthTowardsTheTruth) {
   const double before = mean_depth_error(planted, trainer.model());
   run(trainer);
   EXPECT_LT(mean_depth_error(planted, trainer.model()), 0.8 * before) << "from " << before;
+}
+
+// The parameters are then those of the last good step: the same step would fail again.
+TEST(Trainer, EndsWhereTheLossIsNotFiniteAndChangesNothing) {
+  PlantedScene planted = planted_scene(0.1);
+  planted.scene.views[0].image(20, 20).x() = std::numeric_limits<float>::quiet_NaN();
+  Trainer trainer(planted.scene, planted.priors, short_training(5));
+  const Gaussians before = trainer.model().gaussians();
+  EXPECT_THROW(trainer.step(), NumericalError);
+  EXPECT_TRUE(same_bits(trainer.model().gaussians(), before));
 }
 
 TEST(Trainer, RefusesAStateThatDoesNotFit) {
