@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <new>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <CLI/App.hpp>
@@ -41,6 +43,14 @@ std::vector<std::string> with_dashes(int argc, char** argv) {
   return arguments;
 }
 
+// A report that was cut off by a full disk, or that nobody took, must not look like a whole one.
+void check_standard_output() {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
+  throw cgs::IoError("standard output",
+                     errno != 0 ? std::generic_category().message(errno) : "cannot be written");
+}
+
 int run_program(int argc, char** argv) {
   FLAGS_minloglevel = google::GLOG_FATAL;  // steps that Ceres tries in vain are no news to a user
   CLI::App app(kDescription, "cgs");
@@ -64,8 +74,9 @@ int run_program(int argc, char** argv) {
   try {
     app.parse(with_dashes(argc, argv));
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    if (app.exit(error) != 0) return 2;  // else it was --help or --version
   }
+  check_standard_output();
   return 0;
 }
 

@@ -4,12 +4,16 @@
 #include <cerrno>
 #include <charconv>
 #include <csignal>
+#include <fstream>
+#include <sstream>
+#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "libcgs/core/error.h"
@@ -48,6 +52,22 @@ void write_all(int descriptor, std::string_view bytes, const std::filesystem::pa
 
 void sync_to_disk(int descriptor, const std::filesystem::path& path) {
   if (::fsync(descriptor) != 0) throw IoError(path, std::generic_category().message(errno));
+}
+
+// The process that holds a lock of an open file, as Linux lists them; 0 where it does not say.
+pid_t holder_of_lock(int descriptor) {
+  struct stat file = {};
+  if (::fstat(descriptor, &file) != 0) return 0;
+  const std::string inode = ":" + std::to_string(file.st_ino);
+  std::ifstream locks("/proc/locks");
+  for (std::string line; std::getline(locks, line);) {
+    std::istringstream words(line);
+    std::string number, kind, mode, access, place;
+    pid_t process = 0;
+    words >> number >> kind >> mode >> access >> process >> place;
+    if (words && kind == "FLOCK" && place.ends_with(inode)) return process;
+  }
+  return 0;
 }
 
 }  // namespace
@@ -109,8 +129,11 @@ FolderLock::FolderLock(const std::filesystem::path& folder)
     : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (descriptor_ < 0 || ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
   if (errno != EWOULDBLOCK) return;  // a file system without locks
+  const pid_t holder = holder_of_lock(descriptor_);
   ::close(descriptor_);
-  throw IoError(folder, "another run is writing to this folder; wait for it or choose another");
+  const std::string who = holder > 0 ? " (process " + std::to_string(holder) + ")" : "";
+  throw IoError(folder,
+                "another run" + who + " is writing to this folder; wait for it or choose another");
 }
 
 FolderLock::~FolderLock() {

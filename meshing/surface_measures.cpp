@@ -147,15 +147,17 @@ MeasuredValue enclosed_volume(const MeasurableMesh& mesh) {
 }
 
 Eigen::Vector3d area_centroid(const MeasurableMesh& mesh) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();  // from a point of the mesh, which may be far away
   double all = 0;
+  const Eigen::Vector3d zero =
+      mesh.mesh.faces.empty() ? Eigen::Vector3d::Zero().eval() : corners(mesh, 0).a;
   for (size_t f = 0; f < mesh.mesh.faces.size(); ++f) {
     const Corners t = corners(mesh, f);
     const double area = t.area_vector().norm();
-    sum += area * (t.a + t.b + t.c) / 3;
+    sum += area * ((t.a - zero) + (t.b - zero) + (t.c - zero)) / 3;
     all += area;
   }
-  return sum / all;
+  return zero + sum / all;
 }
 
 Eigen::Vector3d volume_centroid(const MeasurableMesh& mesh) {

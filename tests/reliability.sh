@@ -52,7 +52,8 @@ injected_faults() {
   for pid in "${pids[@]}"; do wait "$pid" || result=1; done
   sed 's/^faults:/of these/' "$folder"/*
   awk '/^faults:/ { survived += $2; tried += $5 }
-    END { printf "faults: %d survived of %d tried\n", survived, tried }' "$folder"/*
+    END { printf "faults: %d survived of %d tried\n", survived, tried; exit tried == 0 }' \
+    "$folder"/* || result=1
   rm -rf "$folder"
   return $result
 }
@@ -62,7 +63,9 @@ figures 'extremes cells' "$bin/extremes_test" || status=1
 CGS_KILLS=$kills figures '\(cancel\|kills\|lost\)' "$bin/e2e_kill_test" || status=1
 figures 'hashes:' "$bin/e2e_verify_test" || status=1
 figures 'memory:' foreseen_memory || status=1
-# Nothing here is held to a time.
+CGS_FAULTS=$faults figures 'power cuts:' tests/e2e/power_loss_test.py "$bin/cgs" "$bin/cgs_make_capture" \
+  build/release/tests/power_loss || status=1
+# Nothing from here on is held to a time.
 CGS_FAULTS=$faults figures 'faults:' injected_faults &
 faults_pid=$!
 CGS_FUZZ_RUNS=$runs tests/fuzz/run.sh "$seconds" || status=1

@@ -8,6 +8,7 @@
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include "io/exr.h"
+#include "io/mesh_ply.h"
 #include "io/vdb.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/solid_meshes.h"
@@ -104,6 +105,23 @@ TEST(Info, SaysWhereARunStoppedAndRefusesWhatIsNoRecord) {
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_NE(refused.err.find("run.json: request states no scene"), std::string::npos)
       << refused.err;
+}
+
+TEST(Info, AReportThatIsNotTakenWholeIsAnError) {
+  const test::TempDir dir;
+  const std::string error = " 2>" + (dir / "err").string();
+  const std::string info =
+      std::string(CGS_BINARY) + " info " + dir.path().string() + "/a.ply --json";
+  write_mesh_ply(dir / "a.ply", test::cube_mesh(1).mesh, Frame{});
+  for (const std::string& command :
+       {info + " >/dev/full" + error,
+        std::string(CGS_BINARY) + " --help >/dev/full" + error,
+        "bash -c 'set -o pipefail; { sleep 0.3; " + info + error + "; } | true'"}) {
+    const int status = std::system(command.c_str());
+    ASSERT_TRUE(WIFEXITED(status)) << command;
+    EXPECT_EQ(WEXITSTATUS(status), 5) << command;
+    EXPECT_EQ(test::read_bytes(dir / "err").rfind("cgs: IO: standard output: ", 0), 0u) << command;
+  }
 }
 
 TEST(Info, RefusesOptionsOfScenes) {

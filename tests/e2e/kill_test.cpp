@@ -75,13 +75,17 @@ End signal_after(Seconds wait, int signal, const Arguments& arguments) {
   return {code, std::chrono::steady_clock::now() - sent};
 }
 
-void print_latency(std::vector<double> seconds) {
+// Of few interrupts, or on a machine that does other things, the times say nothing.
+void expect_soon(std::vector<double> seconds) {
+  constexpr size_t kEnough = 50;
   if (seconds.empty()) return;
   std::sort(seconds.begin(), seconds.end());
+  const double most = seconds[(seconds.size() * 95 + 99) / 100 - 1];
   std::printf("cancel: %zu interrupts, median %.2f s, 95 %% within %.2f s\n",
               seconds.size(),
               seconds[seconds.size() / 2],
-              seconds[(seconds.size() * 95 + 99) / 100 - 1]);
+              most);
+  if (seconds.size() >= kEnough) EXPECT_LE(most, 1);
 }
 
 // How often a program is stopped, if the environment does not say.
@@ -124,6 +128,64 @@ TEST(Killed, TrainingLosesWhatWasDoneSinceItsLastState) {
   EXPECT_LT(worst, kBetweenStates + 5);
 }
 
+// Interrupted, a training saves its state: whatever moments these are, it ends with the same model.
+TEST(Killed, InterruptedTrainingEndsWithTheModelOfOneThatWasNot) {
+  const test::TempDir dir;
+  write_small_capture(dir / "capture");
+  const auto arguments = [&](const char* model) {
+    return Arguments{"train",
+                     dir / "capture",
+                     "--views",
+                     "view_01,view_02,view_03",
+                     "--downscale",
+                     "4",
+                     "--set",
+                     "steps=600",
+                     "-q",
+                     "-o",
+                     dir / model};
+  };
+  const auto start = std::chrono::steady_clock::now();
+  ASSERT_EQ(exit_code_of(start_cgs(arguments("whole"))), 0);
+  const Seconds whole = std::chrono::steady_clock::now() - start;
+  std::mt19937 random(5);
+  int stopped = 0;
+  for (int i = 0; i < 15 && stopped < 5; ++i) {
+    const double part = std::uniform_real_distribution<>(0.1, 0.6)(random);
+    const End end = signal_after(whole * part, i % 2 == 0 ? SIGINT : SIGTERM, arguments("stopped"));
+    if (end.code == 0) break;
+    EXPECT_EQ(end.code, i % 2 == 0 ? 130 : 143);
+    stopped += fs::exists(dir / "stopped/training.checkpoint") ? 1 : 0;
+  }
+  EXPECT_GE(stopped, 1);
+  EXPECT_EQ(exit_code_of(start_cgs(arguments("stopped"))), 0);
+  EXPECT_TRUE(test::read_bytes(dir / "whole/gaussians.ply") ==
+              test::read_bytes(dir / "stopped/gaussians.ply"));
+}
+
+// The second ends the program at once, wherever it is.
+TEST(Killed, TwoInterruptsLeaveNoHalfFile) {
+  const test::TempDir dir;
+  write_small_capture(dir / "capture");
+  const Arguments arguments = run_arguments(dir / "capture", dir / "out");
+  ASSERT_EQ(exit_code_of(start_cgs(run_arguments(dir / "capture", dir / "whole"))), 0);
+  const auto expected = test::files_of_run(dir / "whole");
+  for (const double wait : {1.0, 2.0, 3.0}) {
+    const pid_t child = start_cgs(arguments);
+    std::this_thread::sleep_for(Seconds(wait));
+    ::kill(child, SIGINT);
+    std::this_thread::sleep_for(Seconds(0.01));
+    ::kill(child, SIGINT);
+    const int code = exit_code_of(child);
+    EXPECT_TRUE(code == 130 || code == -1) << code;
+    for (const auto& [name, bytes] : test::files_of_run(dir / "out")) {
+      if (!test::is_unfinished(name)) EXPECT_TRUE(bytes == expected.at(name)) << name;
+    }
+  }
+  EXPECT_EQ(exit_code_of(start_cgs(arguments)), 0);
+  EXPECT_TRUE(test::files_of_run(dir / "out") == expected);
+}
+
 TEST(Killed, RunGoesOnToTheFilesOfOneThatWasNotKilled) {
   const test::TempDir dir;
   const fs::path capture = dir / "capture";
@@ -158,7 +220,7 @@ TEST(Killed, RunGoesOnToTheFilesOfOneThatWasNotKilled) {
     ++stopped;
     if (signal != SIGKILL) latency.push_back(after.count());
   }
-  print_latency(latency);
+  expect_soon(latency);
   std::printf("kills and interrupts: %d of %d runs stopped\n", stopped, kills);
   EXPECT_GE(stopped, kills / 4);
   EXPECT_EQ(exit_code_of(start_cgs(arguments)), 0);

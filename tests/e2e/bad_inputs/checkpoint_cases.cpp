@@ -77,6 +77,7 @@ Cases checkpoint_cases() {
                             {"training.checkpoint", falls_back},
                             edit(kNewest, [=](std::string& bytes) { bytes.resize(kept); })));
   }
+  // The photographs are there: what is lost is time, which is no reason to refuse.
   cases.push_back(
       resumed("K01", "both cut", "OK+W", {"starting anew"}, [=](const fs::path& folder) {
         for (const char* name : {kNewest, kBefore}) fs::resize_file(folder / name, 4096);
@@ -86,6 +87,7 @@ Cases checkpoint_cases() {
                           "OK+W",
                           {"hash", falls_back},
                           edit(kNewest, [](std::string& bytes) { bytes[bytes.size() / 2] ^= 1; })));
+  // As any state that cannot be used: one that another version wrote must not end the work, either.
   cases.push_back(resumed("K03",
                           "of another version",
                           "OK+W",

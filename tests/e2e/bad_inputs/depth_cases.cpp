@@ -60,6 +60,7 @@ double plane(int /*x*/, int /*y*/) { return 1.5; }
 void add_values(Cases& cases) {
   const auto nothing = [](int, int) { return 0.0; };
   cases.push_back(depth_case("D01", "no depth anywhere", "OK+W", ".png", png16_depth(nothing)));
+  // What phones and depth cameras write is that; the photographs show whether it fits.
   cases.push_back(depth_case(
       "D02", "whole numbers count as millimetres", "OK|OK+W", ".png", png16_depth([](int, int) {
         return 1500.0;

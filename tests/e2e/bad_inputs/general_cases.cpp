@@ -205,6 +205,7 @@ void add_odd_files(PerTarget& each) {
       fs::create_symlink(device, file);
     });
   }
+  // A scene may lack photographs that its cameras name: these are counted.
   each.add("G06", "link to nothing", "OPEN|PATH|MISSING|OK", [](const fs::path& file) {
     fs::remove(file);
     fs::create_symlink(file.filename().string() + ".gone", file);

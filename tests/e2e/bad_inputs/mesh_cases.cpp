@@ -267,6 +267,7 @@ void add_obj(Cases& cases) {
   for (int i = 0; i < 3'000'000; ++i) continued += " \\\n";
   obj("M08", "a line of 8 MB", "LIMIT", vertices + "#" + std::string(8 << 20, 'x') + "\n");
   obj("M08", "a line that goes on and on", "LIMIT|SYNTAX", vertices + continued);
+  // Its corners are in memory anyway, and its triangles are no more than those.
   obj("M08", "a face of a million corners", "OK+W", vertices + polygon + "\n");
 }
 

@@ -266,7 +266,7 @@ Cases output_cases() {
   cases.push_back({"E06",
                    "two runs in one folder",
                    "IO",
-                   {"out"},
+                   {"out", "another run (process "},
                    [](const fs::path& folder) {
                      write_transforms_scene(folder);
                      fs::create_directory(folder / "out");
