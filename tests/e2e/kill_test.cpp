@@ -150,15 +150,17 @@ TEST(Killed, InterruptedTrainingEndsWithTheModelOfOneThatWasNot) {
   const Seconds whole = std::chrono::steady_clock::now() - start;
   std::mt19937 random(5);
   int stopped = 0;
+  bool is_finished = false;
   for (int i = 0; i < 15 && stopped < 5; ++i) {
     const double part = std::uniform_real_distribution<>(0.1, 0.6)(random);
     const End end = signal_after(whole * part, i % 2 == 0 ? SIGINT : SIGTERM, arguments("stopped"));
-    if (end.code == 0) break;
+    is_finished = end.code == 0;
+    if (is_finished) break;
     EXPECT_EQ(end.code, i % 2 == 0 ? 130 : 143);
     stopped += fs::exists(dir / "stopped/training.checkpoint") ? 1 : 0;
   }
   EXPECT_GE(stopped, 1);
-  EXPECT_EQ(exit_code_of(start_cgs(arguments("stopped"))), 0);
+  if (!is_finished) EXPECT_EQ(exit_code_of(start_cgs(arguments("stopped"))), 0);
   EXPECT_TRUE(test::read_bytes(dir / "whole/gaussians.ply") ==
               test::read_bytes(dir / "stopped/gaussians.ply"));
 }
