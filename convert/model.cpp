@@ -377,11 +377,14 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
 
 Model read_model(const std::filesystem::path& folder) {
   Model model = read_model_as_written(folder);
-  Frame& frame = model.scene.frame;
-  const bool is_measured = frame.scale_source == ScaleSource::KnownDistance ||
-                           frame.scale_source == ScaleSource::DepthSensor;
-  if (model.scene.kind == "photographs" && is_measured) frame = in_metres(frame);
+  use_metres_where_measured(model.scene);
   return model;
+}
+
+void use_metres_where_measured(Scene& scene) {
+  const bool is_measured = scene.frame.scale_source == ScaleSource::KnownDistance ||
+                           scene.frame.scale_source == ScaleSource::DepthSensor;
+  if (scene.kind == "photographs" && is_measured) scene.frame = in_metres(scene.frame);
 }
 
 Model read_model_as_written(const std::filesystem::path& folder) {

@@ -81,6 +81,9 @@ Model read_model(const std::filesystem::path& folder);
 /// The same in the unit of its cameras, whatever that is: to give it a scale, and to write it.
 Model read_model_as_written(const std::filesystem::path& folder);
 
+/// What read_model() does to what read_model_as_written() gives.
+void use_metres_where_measured(Scene& scene);
+
 /// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model
 /// or photographs that were moved. \throws BadInput as read_scene()
 void relink_images(Scene& scene, const std::filesystem::path& folder);

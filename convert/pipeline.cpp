@@ -122,7 +122,8 @@ Json run_scale(Run& run, const Progress& progress) {
                       frame.metres_sigma != before.metres_sigma ||
                       frame.scale_source != before.scale_source || frame.up != before.up;
   if (is_new) write_model(run.request.output / "model", model);
-  run.model.reset();
+  use_metres_where_measured(model.scene);
+  run.model = std::move(model);
   return result;
 }
 

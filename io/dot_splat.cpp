@@ -73,10 +73,9 @@ Eigen::Vector3d color_of(const Eigen::Vector3f& dc) {
   return (double{kShC0} * dc.cast<double>()).array() + 0.5;
 }
 
-Record record_of(const Gaussians& g, size_t i, const Frame& frame) {
+Record record_of(const Gaussians& g, size_t i, const Eigen::Vector3d& color, const Frame& frame) {
   Record out{};
   const Eigen::Vector3d p = frame.file_from_internal(g.position[i].cast<double>());
-  const Eigen::Vector3d color = color_of(g.sh[i * static_cast<size_t>(g.sh_count())]);
   for (int k = 0; k < 3; ++k) {
     const auto at = static_cast<size_t>(k);
     out.position.at(at) = coordinate(p[k]);
@@ -144,7 +143,7 @@ DotSplatReport write_dot_splat(const std::filesystem::path& path,
   for (size_t i = 0; i < g.size(); ++i) {
     const Eigen::Vector3d color = color_of(g.sh[i * static_cast<size_t>(g.sh_count())]);
     if (color.minCoeff() < 0 || color.maxCoeff() > 1) ++report.clamped_colors;
-    const Record record = record_of(g, i, frame);
+    const Record record = record_of(g, i, color, frame);
     if (seen < kSamples) {
       ++seen;
       plausible += is_plausible(record);

@@ -40,6 +40,20 @@ Arguments run_arguments(const fs::path& capture, const fs::path& out) {
           out.string()};
 }
 
+Arguments train_arguments(const fs::path& capture, const char* steps, const fs::path& out) {
+  return {"train",
+          capture.string(),
+          "--views",
+          "view_01,view_02,view_03",
+          "--downscale",
+          "4",
+          "--set",
+          steps,
+          "-q",
+          "-o",
+          out.string()};
+}
+
 pid_t start_cgs(const Arguments& arguments) {
   std::vector<const char*> argv = {CGS_BINARY};
   for (const std::string& argument : arguments) argv.push_back(argument.c_str());
@@ -103,17 +117,7 @@ TEST(Killed, TrainingLosesWhatWasDoneSinceItsLastState) {
   constexpr double kBetweenStates = 20;  // [s]
   const test::TempDir dir;
   write_small_capture(dir / "capture");
-  const Arguments arguments = {"train",
-                               dir / "capture",
-                               "--views",
-                               "view_01,view_02,view_03",
-                               "--downscale",
-                               "4",
-                               "--set",
-                               "steps=100000",
-                               "-q",
-                               "-o",
-                               dir / "model"};
+  const Arguments arguments = train_arguments(dir / "capture", "steps=100000", dir / "model");
   std::mt19937 random(11);
   double worst = 0;
   for (int i = 0; i < std::max(1, wished_kills(1) / 20); ++i) {
@@ -133,17 +137,7 @@ TEST(Killed, InterruptedTrainingEndsWithTheModelOfOneThatWasNot) {
   const test::TempDir dir;
   write_small_capture(dir / "capture");
   const auto arguments = [&](const char* model) {
-    return Arguments{"train",
-                     dir / "capture",
-                     "--views",
-                     "view_01,view_02,view_03",
-                     "--downscale",
-                     "4",
-                     "--set",
-                     "steps=600",
-                     "-q",
-                     "-o",
-                     dir / model};
+    return train_arguments(dir / "capture", "steps=600", dir / model);
   };
   const auto start = std::chrono::steady_clock::now();
   ASSERT_EQ(exit_code_of(start_cgs(arguments("whole"))), 0);

@@ -207,6 +207,20 @@ TEST_F(ReadScene, ScalesIntrinsicsToTheImageAndRefusesOtherShapes) {
   EXPECT_EQ(refused(), "MISMATCH");
 }
 
+TEST_F(ReadScene, TellsViewsOfOneStemApart) {
+  test::write_bytes(dir_ / "sparse/0/cameras.txt", "1 SIMPLE_PINHOLE 80 60 100 40 30\n");
+  test::write_bytes(dir_ / "sparse/0/images.txt",
+                    "1 1 0 0 0 0 0 0 1 left/0.png\n\n2 1 0 0 0 1 0 0 1 right/0.png\n\n"
+                    "3 1 0 0 0 2 0 0 1 right/0.jpg\n\n");
+  test::write_bytes(dir_ / "images/left/0.png", test::rgb_png(80, 60, 1));
+  test::write_bytes(dir_ / "images/right/0.png", test::rgb_png(80, 60, 2));
+  test::write_bytes(dir_ / "images/right/0.jpg", test::jpeg(80, 60));
+  const Scene scene = read();
+  EXPECT_EQ(scene.views[0].name, "0.jpg");
+  EXPECT_EQ(scene.views[1].name, "left_0");
+  EXPECT_EQ(scene.views[2].name, "right_0");
+}
+
 TEST_F(ReadScene, NeedsPermissionForLinksThatLeaveTheFolder) {
   write(2);
   std::filesystem::rename(dir_ / "images", dir_ / "elsewhere");

@@ -84,7 +84,6 @@ TEST(SplatDoctor, CountsEveryDefectApart) {
   EXPECT_EQ(out.gaussians.sh[4 * 2 + 3], g.sh[4 * 9 + 3]);
 }
 
-// Rows that were never written: drawn, they would be opaque balls at the origin.
 TEST(SplatDoctor, OpacitiesAreThoseOfDoubleAndNeverOne) {
   const std::vector<float> logits = {
       -1e30f, -88, -17, -16.6f, -12, -8, 0, 3, 4.5f, 8, 12, 16.6f, 17, 88, 1e30f};
@@ -102,6 +101,7 @@ TEST(SplatDoctor, OpacitiesAreThoseOfDoubleAndNeverOne) {
   }
 }
 
+// Rows that were never written: drawn, they would be opaque balls at the origin.
 TEST(SplatDoctor, DropsRowsOfZeros) {
   const GaussianFile out = examined([](RawSplats& raw) {
     const size_t good = raw.size();
