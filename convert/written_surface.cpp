@@ -58,11 +58,31 @@ Places places_on(const TriangleMesh& mesh) {
 // One way.
 void add_distances(const TriangleMesh& from, const TriangleMesh& to, SurfaceDeviation& out) {
   const Places places = places_on(from);
-  const std::vector<float> distances = distances_to(to, places.points);
+  const DistanceToMesh distance(to);
+  const std::vector<float> distances = distance.of(places.points);
+  float evidence = 0;
+  float inferred = 0;
   for (size_t i = 0; i < distances.size(); ++i) {
-    double& worst = places.inferred[i] != 0 ? out.inferred : out.evidence;
-    worst = std::max(worst, double(distances[i]));
+    float& worst = places.inferred[i] != 0 ? inferred : evidence;
+    worst = std::max(worst, distances[i]);
   }
+  std::vector<float> known(from.faces.size());
+  for (size_t f = 0; f < known.size(); ++f) known[f] = is_inferred(from, f) ? inferred : evidence;
+  constexpr double kOfFarthest = 1.0 / 1024;
+  constexpr double kOfSize = 1e-6;  // coordinates are not known better
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : from.vertices) box.extend(p);
+  const std::vector<float> on_edges =
+      distance.of_edges(from,
+                        known,
+                        std::max(kOfFarthest * double(std::max(evidence, inferred)),
+                                 kOfSize * double(box.diagonal().norm())));
+  for (size_t f = 0; f < on_edges.size(); ++f) {
+    float& worst = is_inferred(from, f) ? inferred : evidence;
+    worst = std::max(worst, on_edges[f]);
+  }
+  out.evidence = std::max(out.evidence, double(evidence));
+  out.inferred = std::max(out.inferred, double(inferred));
   out.places += distances.size();
 }
 

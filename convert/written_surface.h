@@ -15,7 +15,8 @@ struct SurfaceDeviation {
   double evidence = 0;  ///< From places on faces that are not Inferred; all without provenance.
   double inferred = 0;  ///< From places on Inferred faces.
   size_t places = 0;    ///< Where it was measured: all corners, and as many places spread over the
-                        ///< area as there are faces, 100,000 at least.
+                        ///< area as there are faces, 100,000 at least. Along the edges the
+                        ///< farthest place is searched besides.
 
   double max() const { return evidence > inferred ? evidence : inferred; }
 };

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <tuple>
+#include <utility>
 
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
@@ -39,6 +41,89 @@ std::vector<TriangleTree::Triangle> proper_triangles(const TriangleMesh& mesh) {
   }
   return out;
 }
+
+double distance_from(const TriangleTree::Triangle& t, const Eigen::Vector3d& p) {
+  const Eigen::Vector3d w = nearest_weights(t[0], t[1], t[2], p);
+  return (w[0] * t[0] + w[1] * t[1] + w[2] * t[2] - p).norm();
+}
+
+// A side of a face, with its lower corner first.
+struct Side {
+  uint32_t a, b, face;
+  bool same_edge(const Side& other) const { return a == other.a && b == other.b; }
+};
+
+std::vector<Side> sides_by_edge(const TriangleMesh& mesh) {
+  std::vector<Side> out;
+  out.reserve(3 * mesh.faces.size());
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    for (size_t k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax(mesh.faces[f].at(k), mesh.faces[f].at((k + 1) % 3));
+      out.push_back({a, b, f});
+    }
+  }
+  std::sort(out.begin(), out.end(), [](const Side& l, const Side& r) {
+    return std::tie(l.a, l.b, l.face) < std::tie(r.a, r.b, r.face);
+  });
+  return out;
+}
+
+// A place and the triangle of the reference that is nearest to it.
+struct Place {
+  Eigen::Vector3d point;
+  uint32_t triangle = 0;
+  double distance = 0;
+};
+
+// Finds how far the places between two of them are at most.
+class EdgeSearch {
+ public:
+  EdgeSearch(const std::vector<TriangleTree::Triangle>& triangles,
+             const TriangleTree& tree,
+             double accuracy)
+      : triangles_(triangles), tree_(tree), accuracy_(accuracy) {}
+
+  Place place(const Eigen::Vector3d& point) const {
+    const auto nearest = tree_.nearest(point);
+    return {point, nearest->triangle, std::sqrt(nearest->squared_distance)};
+  }
+  /// \param pieces  to work in
+  double farthest(const Place& a,
+                  const Place& b,
+                  double enough,
+                  std::vector<std::pair<Place, Place>>& pieces) const {
+    double found = std::max(a.distance, b.distance);
+    double bound = found;
+    pieces.assign(1, {a, b});
+    while (!pieces.empty()) {
+      const auto [p, q] = pieces.back();
+      pieces.pop_back();
+      const double goal = std::max(enough, found + accuracy_);
+      const double most = bound_between(p, q);
+      if (most <= goal) {
+        bound = std::max(bound, most);
+        continue;
+      }
+      const Place middle = place(0.5 * (p.point + q.point));
+      found = std::max(found, middle.distance);
+      pieces.emplace_back(p, middle);
+      pieces.emplace_back(middle, q);
+    }
+    return bound;
+  }
+
+ private:
+  double bound_between(const Place& p, const Place& q) const {
+    const double by_way = 0.5 * (p.distance + q.distance + (p.point - q.point).norm());
+    const double by_first = std::max(p.distance, distance_from(triangles_[p.triangle], q.point));
+    const double by_last = std::max(q.distance, distance_from(triangles_[q.triangle], p.point));
+    return std::min({by_way, by_first, by_last});
+  }
+
+  const std::vector<TriangleTree::Triangle>& triangles_;
+  const TriangleTree& tree_;
+  double accuracy_;
+};
 
 // The same for rays.
 Triangles triangles(const TriangleMesh& mesh) {
@@ -102,7 +187,8 @@ std::vector<Eigen::Vector3f> sample_surface(const TriangleMesh& mesh, size_t cou
 }
 
 struct DistanceToMesh::Parts {
-  explicit Parts(const TriangleMesh& mesh) : tree(proper_triangles(mesh)) {}
+  explicit Parts(const TriangleMesh& mesh) : triangles(proper_triangles(mesh)), tree(triangles) {}
+  std::vector<TriangleTree::Triangle> triangles;
   TriangleTree tree;
 };
 
@@ -117,6 +203,45 @@ std::vector<float> DistanceToMesh::of(const std::vector<Eigen::Vector3f>& points
     const auto nearest = parts_->tree.nearest(points[i].cast<double>());
     out[i] = static_cast<float>(std::sqrt(nearest->squared_distance));
   });
+  return out;
+}
+
+std::vector<float> DistanceToMesh::of_edges(const TriangleMesh& mesh,
+                                            const std::vector<float>& enough,
+                                            double accuracy) const {
+  require(accuracy > 0, "DistanceToMesh::of_edges: accuracy must be > 0", accuracy);
+  require(enough.size() == mesh.faces.size(),
+          "DistanceToMesh::of_edges needs what is enough for every face, values",
+          enough.size());
+  const EdgeSearch search(parts_->triangles, parts_->tree, accuracy);
+  const std::vector<Side> sides = sides_by_edge(mesh);
+  std::vector<Place> corners(mesh.vertices.size());
+  tbb::parallel_for(size_t(0), corners.size(), [&](size_t v) {
+    corners[v] = search.place(mesh.vertices[v].cast<double>());
+  });
+  // Of every side the bound of its edge, found once at the first of them.
+  std::vector<float> of_side(sides.size(), 0);
+  constexpr size_t kBlock = 512;
+  tbb::parallel_for(size_t(0), (sides.size() + kBlock - 1) / kBlock, [&](size_t block) {
+    std::vector<std::pair<Place, Place>> pieces;
+    for (size_t i = block * kBlock; i < std::min(sides.size(), (block + 1) * kBlock); ++i) {
+      if (i > 0 && sides[i].same_edge(sides[i - 1])) continue;
+      double least = double(enough[sides[i].face]);
+      size_t end = i + 1;
+      for (; end < sides.size() && sides[end].same_edge(sides[i]); ++end) {
+        least = std::min(least, double(enough[sides[end].face]));
+      }
+      const double bound = search.farthest(corners[sides[i].a], corners[sides[i].b], least, pieces);
+      if (bound <= least) continue;
+      std::fill(of_side.begin() + std::ptrdiff_t(i),
+                of_side.begin() + std::ptrdiff_t(end),
+                std::nextafter(float(bound), std::numeric_limits<float>::infinity()));
+    }
+  });
+  std::vector<float> out(mesh.faces.size(), 0);
+  for (size_t i = 0; i < sides.size(); ++i) {
+    out[sides[i].face] = std::max(out[sides[i].face], of_side[i]);
+  }
   return out;
 }
 

@@ -38,6 +38,25 @@ class DistanceToMesh {
   /// Distance from each point to the nearest point of the mesh [internal units].
   std::vector<float> of(const std::vector<Eigen::Vector3f>& points) const;
 
+  /// How far the edges of another mesh are away, where that is farther than something known.
+  ///
+  /// Between two surfaces of triangles that run side by side the distance is largest at a corner
+  /// of either or where edges of both cross, so on an edge of one of them; points spread over the
+  /// area miss it. Every edge is halved until no place on it can be farther than the farthest one
+  /// found: the distance from one triangle is convex, so it is largest at an end of a piece, and
+  /// from place to place a distance changes by no more than the way.
+  /// \param enough    per face: edges that are surely no farther than this are not looked at
+  ///                  closer; of an edge the least of its faces [internal units]
+  /// \param accuracy  what is found is beyond the farthest place by no more than this
+  ///                  [internal units]; > 0
+  /// \return  per face an upper bound over its edges; 0 = not beyond what is enough
+  ///          [internal units]
+  /// Source: the bounds of M. Guthe, P. Borodin, R. Klein 2005, "Fast and accurate Hausdorff
+  ///         distance calculation between meshes", section 3.
+  std::vector<float> of_edges(const TriangleMesh& mesh,
+                              const std::vector<float>& enough,
+                              double accuracy) const;
+
  private:
   struct Parts;
   std::unique_ptr<Parts> parts_;

@@ -18,27 +18,48 @@ bool is_inferred(const TriangleMesh& mesh, size_t f) {
   return !mesh.provenance.empty() && mesh.provenance[f] == Provenance::Inferred;
 }
 
-// Distances from samples of one mesh to another, by whether the sampled face has evidence.
+// Of the largest error on edges, as a share of the error allowed.
+constexpr double kAccuracy = 1.0 / 256;
+
+// Distances from places of one mesh to another, by whether their face has evidence.
 struct Measured {
-  std::vector<float> evidence;
-  std::vector<float> inferred;
-  std::vector<uint32_t> too_far;  ///< Faces with a sample beyond the limit, ascending.
+  DistanceStatistics evidence;
+  DistanceStatistics inferred;
+  std::vector<uint32_t> too_far;  ///< Faces with a place beyond the limit, ascending.
 };
 
 Measured measure(const TriangleMesh& from, const TriangleMesh& to, const SimplifyOptions& options) {
   constexpr size_t kLeast = 10000;
-  constexpr size_t kMost = 300000;
+  constexpr size_t kMost = 100000;
   const SurfaceSamples samples =
       sample_faces(from, std::clamp(2 * from.faces.size(), kLeast, kMost));
-  const std::vector<float> distances = distances_to(to, samples.points);
-  Measured out;
+  const DistanceToMesh distance(to);
+  const std::vector<float> distances = distance.of(samples.points);
+  std::array<std::vector<float>, 2> by_label;
+  std::vector<float> of_face(from.faces.size(), 0);
   for (size_t i = 0; i < distances.size(); ++i) {
-    const bool inferred = is_inferred(from, samples.faces[i]);
-    (inferred ? out.inferred : out.evidence).push_back(distances[i]);
-    const double limit = inferred ? options.max_error_inferred : options.max_error;
-    if (double(distances[i]) > limit) out.too_far.push_back(samples.faces[i]);
+    const uint32_t f = samples.faces[i];
+    by_label[is_inferred(from, f) ? 1 : 0].push_back(distances[i]);
+    of_face[f] = std::max(of_face[f], distances[i]);
   }
-  out.too_far.erase(std::unique(out.too_far.begin(), out.too_far.end()), out.too_far.end());
+  std::array<DistanceStatistics, 2> statistics_of = {statistics(by_label[0]),
+                                                     statistics(by_label[1])};
+  // Points over the area miss the farthest places, which lie on edges.
+  std::vector<float> known(from.faces.size());
+  for (size_t f = 0; f < known.size(); ++f) {
+    known[f] = float(statistics_of.at(is_inferred(from, f) ? 1 : 0).max);
+  }
+  const std::vector<float> on_edges = distance.of_edges(from, known, kAccuracy * options.max_error);
+  Measured out;
+  for (uint32_t f = 0; f < on_edges.size(); ++f) {
+    const bool inferred = is_inferred(from, f);
+    double& most = statistics_of.at(inferred ? 1 : 0).max;
+    most = std::max(most, double(on_edges[f]));
+    const double limit = inferred ? options.max_error_inferred : options.max_error;
+    if (double(std::max(of_face[f], on_edges[f])) > limit) out.too_far.push_back(f);
+  }
+  out.evidence = statistics_of[0];
+  out.inferred = statistics_of[1];
   return out;
 }
 
@@ -177,8 +198,8 @@ SimplifyResult simplify(const TriangleMesh& mesh,
     if (bad.empty() && back.too_far.empty()) {
       result.mesh = out.mesh;
       result.faces_after = out.mesh.faces.size();
-      result.evidence = {statistics(forth.evidence), statistics(back.evidence)};
-      result.inferred = {statistics(forth.inferred), statistics(back.inferred)};
+      result.evidence = {forth.evidence, back.evidence};
+      result.inferred = {forth.inferred, back.inferred};
       report(progress, 1);
       return result;
     }

@@ -29,9 +29,10 @@ struct SimplifyResult {
   TriangleMesh mesh;
   size_t faces_before = 0;
   size_t faces_after = 0;
-  MeshDistance evidence;  ///< Measured from samples of all faces but the Inferred ones to the other
-                          ///< mesh: accuracy from the result, completeness from the input.
-  MeshDistance inferred;  ///< The same from samples of Inferred faces.
+  MeshDistance evidence;  ///< Measured from all faces but the Inferred ones to the other mesh:
+                          ///< accuracy from the result, completeness from the input. The largest
+                          ///< one is of points over the area and of all places on edges.
+  MeshDistance inferred;  ///< The same from Inferred faces.
   std::array<double, kProvenanceCount> area_before =
       {};  ///< By provenance [internal units squared].
   std::array<double, kProvenanceCount> area_after = {};
@@ -42,8 +43,9 @@ struct SimplifyResult {
 ///
 /// Faces keep their labels, borders between labels and open rims stay where they are within the
 /// error, topology is kept; see collapse_edges(). A mesh without provenance counts as evidence.
-/// What comes out is then measured: by samples in both directions, by the area of every label with
-/// evidence, and for self-intersections. Where a check fails, the
+/// What comes out is then measured: in both directions by points over the area and along all edges
+/// (see DistanceToMesh::of_edges()), by the area of every label with evidence, and for
+/// self-intersections. Where a check fails, the
 /// tolerance of the input vertices nearby is quartered, finally to zero, and the collapses are run
 /// again. If that does not help within a few rounds, the result is the input.
 /// \throws InvalidInput if a vertex is not finite.

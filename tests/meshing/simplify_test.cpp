@@ -166,6 +166,35 @@ TEST(Simplify, StaysWithinTheErrorOfATorusAndKeepsItsHandle) {
   EXPECT_NEAR(certificate.area / certify(mesh).area, 1, 0.01);
 }
 
+// Stones in a wall: plane faces with sharp edges, so that edges of both meshes cross far apart.
+TriangleMesh wall(float size) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> height(0, 0.02f);
+  std::vector<float> heights(40 * 40);
+  for (float& h : heights) h = height(random);
+  return grid(119, 119, false, false, [&](float u, float v) {
+    const auto stone = size_t(std::lround(119 * v)) / 3 * 40 + size_t(std::lround(119 * u)) / 3;
+    return Vector3f(size * u, size * v, size * heights[stone]);
+  });
+}
+
+TEST(Simplify, IsNowhereFartherThanItStates) {
+  constexpr double kMaxError = 0.004;
+  SimplifyResult at_one;
+  for (const int exponent : {0, -20, 20}) {
+    const double scale = std::ldexp(1.0, exponent);
+    const TriangleMesh mesh = wall(float(scale));
+    const SimplifyResult result = simplify(mesh, {.max_error = scale * kMaxError});
+    EXPECT_LT(result.faces_after, result.faces_before * 9 / 10);
+    const MeshDistance dense = mesh_distance(result.mesh, mesh, 1'000'000);
+    EXPECT_LE(dense.hausdorff(), result.evidence.hausdorff() * (1 + 1e-6)) << exponent;
+    EXPECT_LE(result.evidence.hausdorff(), scale * kMaxError * (1 + 1e-6)) << exponent;
+    if (exponent == 0) at_one = result;
+    EXPECT_EQ(result.faces_after, at_one.faces_after) << exponent;
+    EXPECT_EQ(result.evidence.hausdorff(), scale * at_one.evidence.hausdorff()) << exponent;
+  }
+}
+
 TEST(Simplify, GivesFewerFacesForALargerError) {
   const TriangleMesh mesh = torus(30);
   size_t last = mesh.faces.size();
