@@ -70,13 +70,18 @@ class Examination {
     judge_coding(extent);
     if (findings_.linear_opacity) drop_unusable();  // opacity 0 is only known now
     if (raw_.size() == 0) throw BadInput(Defect::Value, path_, "no splat can be seen");
-    const std::string odd = check_significance(path_, widened(corners), raw_.digits);
+    const Eigen::AlignedBox3d box = widened({corners[0], corners[1]}, largest_radius(raw_));
+    const std::string odd = check_significance(path_, box, raw_.digits);
     count_flyaways(corners, extent);
-    PlyPlacement placement = ply_placement(raw_.comments, corners, frame);
+    PlyPlacement placement = ply_placement(raw_.comments, {box.min(), box.max()}, frame);
     GaussianFile out;
+    const size_t usable = raw_.size();
     out.gaussians = into_frame(placement);
     if (out.gaussians.size() == 0) {
       throw BadInput(Defect::Value, path_, "no finite splats: every one leaves the range of float");
+    }
+    if (out.gaussians.size() < usable || raw_.digits > kFloatDigits) {
+      check_as_floats(out.gaussians, placement.frame);
     }
     out.frame = placement.frame;
     out.file_origin = placement.file_origin;
@@ -89,15 +94,38 @@ class Examination {
   }
 
  private:
-  /// The box of the splats. Where rounding has put all of them in one place, they tell how large it
-  /// was, unless their scales vanish.
-  Eigen::AlignedBox3d widened(const std::vector<Eigen::Vector3d>& corners) const {
-    Eigen::AlignedBox3d box(corners[0], corners[1]);
-    if (raw_.size() == 1 || !box.sizes().isZero(0)) return box;
-    const double radius = std::exp(double{raw_.log_scale.front().maxCoeff()});
-    const bool is_told = radius > 2 * kSmallestScale;  // 2: that one, rounded, tells nothing either
-    if (is_told && radius < box.min().cwiseAbs().maxCoeff()) box.max().x() += radius;
+  /// Of splats that a file can hold. Vanishing ones tell no size: 2, for the smallest one, rounded.
+  static double largest_radius(const RawSplats& raw) {
+    double out = 0;
+    for (const Eigen::Vector3f& s : raw.log_scale) {
+      const double radius = std::exp(double{s.maxCoeff()});
+      if (radius > 2 * kSmallestScale && radius <= kFarthest) out = std::max(out, radius);
+    }
+    return raw.size() > 1 ? out : 0;
+  }
+
+  /// Where rounding has put all splats in one place, their radii tell how large the box was.
+  static Eigen::AlignedBox3d widened(Eigen::AlignedBox3d box, double radius) {
+    if (radius == 0 || !box.sizes().isZero(0)) return box;
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    double& high = box.max().x();
+    high = std::max(high + radius, std::nextafter(high, kInfinity));
     return box;
+  }
+
+  /// What is left must be told apart where it is written again.
+  void check_as_floats(const Gaussians& g, const Frame& frame) const {
+    std::vector<Eigen::Vector3d> in_file;
+    double radius = 0;
+    for (size_t i = 0; i < g.size(); ++i) {
+      const Eigen::Vector3d p = frame.file_from_internal(g.position[i].cast<double>());
+      in_file.emplace_back(p.cast<float>().cast<double>());
+      radius = std::max(radius, double{g.scale[i].maxCoeff()} * frame.scale);
+    }
+    const std::vector<Eigen::Vector3d> corners = inner_corners(in_file);
+    const bool is_told = g.size() > 1 && radius > 2 * kSmallestScale;
+    (void)check_significance(
+        path_, widened({corners[0], corners[1]}, is_told ? radius : 0), kFloatDigits);
   }
 
   /// Where the judgement of splat i is counted; null for a good one.

@@ -24,7 +24,7 @@ std::optional<std::string_view> TextLines::next() {
 
 std::optional<std::string_view> TextLines::next_data() {
   while (const auto line = next()) {
-    const size_t first = line->find_first_not_of(" \t");
+    const size_t first = line->find_first_not_of(" \t\r");
     if (first != std::string_view::npos && (*line)[first] != '#') return line;
   }
   return std::nullopt;

@@ -197,7 +197,7 @@ class PowerLoss(unittest.TestCase):
                 self.assertEqual(result.returncode, 0, result.stderr)
                 self.assertTrue(files_of(OUT) == self.expected, 'other files than those of a run that was not cut off')
                 survived += 1
-        print(f'power cuts: {survived} survived of {share} tried, {len(self.states)} disks', flush=True)
+        print(f'\npower cuts: {survived} survived of {share} tried, {len(self.states)} disks', flush=True)
         self.assertGreater(len(self.states), 100)
 
 

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "io/significance.h"
 #include "libcgs/core/error.h"
 #include "tests/support/sample_splats.h"
 
@@ -205,6 +206,41 @@ TEST(SplatDoctor, TakesTheSizeOfSplatsInOnePlaceFromScalesThatDoNotVanish) {
   const GaussianFile out = examined(in_one_place(-300));
   const float written = std::log(out.gaussians.scale[0].x());
   EXPECT_NO_THROW(examined(in_one_place(written)));
+}
+
+// What is read can be written as floats and read again: it is refused at once, not the second time.
+TEST(SplatDoctor, JudgesTheSizeOfWhatIsLeft) {
+  const auto two_and_a_huge_one = [](float position, float log_scale) {
+    return [=](RawSplats& raw) {
+      raw.position.assign(3, Eigen::Vector3d(0, 0, position));
+      raw.log_scale.assign(3, Eigen::Vector3f::Constant(log_scale));
+      raw.log_scale[0].setConstant(1000);
+      raw.rotation.resize(3);
+      raw.logit.resize(3);
+      raw.sh.resize(12);
+    };
+  };
+  EXPECT_THROW(examined(two_and_a_huge_one(1e9f, 0)), BadInput);
+  EXPECT_EQ(examined(two_and_a_huge_one(1e9f, 15)).gaussians.size(), 2u);
+  EXPECT_THROW(examined([&](RawSplats& raw) {
+                 two_and_a_huge_one(1e9f, 0)(raw);
+                 raw.position[0].setZero();  // is dropped, and with it the extent
+               }),
+               BadInput);
+}
+
+TEST(SplatDoctor, KeepsApartInFloatsWhatDoublesTellApart) {
+  RawSplats raw = healthy(2);
+  const Eigen::Vector3d place(1, 2, 3);
+  raw.digits = kDoubleDigits;
+  raw.position.assign(raw.size(), place);
+  raw.log_scale.assign(raw.size(), Eigen::Vector3f::Constant(-20));
+  const GaussianFile out = examine_splats(raw, "a.ply", std::nullopt);
+  const Eigen::Vector3d read =
+      out.frame.world_from_internal(out.gaussians.position[0].cast<double>());
+  EXPECT_LT((read - place).norm(), 1e-15);
+  EXPECT_LT((place - out.frame.file_origin).norm(), 256 * std::exp(-20.0));
+  EXPECT_THROW(examine_splats(raw, "a.ply", Frame{}), BadInput) << "files of that frame are floats";
 }
 
 TEST(SplatDoctor, RefusesAFileOfNothing) {

@@ -59,6 +59,7 @@ TEST(ReadStl, RefusesWhatIsDamaged) {
   EXPECT_EQ(defect("solid x\nendsolid\n"), "EMPTY");
   EXPECT_EQ(defect("solid x\nfacet normal 0 0 1\nvertex 0 0 0\n"), "SYNTAX");
   EXPECT_EQ(defect("solid x\n" + std::string(kFacet).replace(40, 1, "q") + "endsolid\n"), "SYNTAX");
+  EXPECT_EQ(defect("solid x\n \r \nq"), "SYNTAX");  // the line between holds nothing
   EXPECT_EQ(defect("short"), "TRUNCATED");
   std::string infinite(80, ' ');
   append_bytes(infinite, uint32_t{1});
