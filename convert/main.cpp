@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <new>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -89,14 +90,33 @@ int run_program(int argc, char** argv) {
   std::_Exit(4);
 }
 
+// A thread takes 8 MiB of addresses for its stack; the library of threads throws this text.
+bool is_for_want_of_a_thread(const std::exception& error) {
+  return std::string_view(error.what()).find("pthread_create has failed") != std::string_view::npos;
+}
+
 int end_unexpectedly(const std::exception& error) {
+  if (is_for_want_of_a_thread(error)) end_without_memory();
   std::fprintf(stderr, "cgs: unexpected: %s\n", cgs::one_line(error.what()).c_str());
   return 1;
+}
+
+// What is thrown where nobody can catch it: a worker thread that starts another one.
+[[noreturn]] void end_in_thread() {
+  try {
+    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+  } catch (const std::bad_alloc&) {
+    end_without_memory();
+  } catch (const std::exception& error) {
+    (void)end_unexpectedly(error);
+  }
+  std::abort();
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::set_terminate(end_in_thread);
   cgs::catch_interrupts();
   try {
     return run_program(argc, argv);

@@ -31,8 +31,9 @@ RawSplats parse(std::string bytes, const std::filesystem::path& path) {
   if (all.find("\"asset\"") < 65536) {
     throw BadInput(Defect::Unsupported, path, "glTF as text; splats are read from .glb");
   }
-  refuse_foreign_content(path, all, "splats");
+  // First: the bytes of a coordinate may be those that another format starts with.
   if (looks_like_dot_splat(all)) return parse_dot_splat(all, path);
+  refuse_foreign_content(path, all, "splats");
   throw BadInput(
       Defect::Magic,
       path,
