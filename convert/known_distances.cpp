@@ -219,6 +219,10 @@ std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typ
   return out;
 }
 
+void check_picks(const std::vector<KnownDistance>& distances, const Model& model) {
+  for (const KnownDistance& distance : distances) (void)bar_of(distance, model);
+}
+
 Json scale_by(const std::vector<KnownDistance>& distances,
               const std::vector<MarkerBar>& markers,
               Model& model) {

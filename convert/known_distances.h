@@ -36,6 +36,10 @@ using DistanceWords = std::array<std::string, 3>;
 std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typed,
                                            const Scene& scene);
 
+/// Whether depth was measured where every distance ends: known before the training.
+/// \throws InvalidInput as scale_by()
+void check_picks(const std::vector<KnownDistance>& distances, const Model& model);
+
 /// Gives a model the scale by which its depths fit the distances, and its cameras the markers; with
 /// none of both, does nothing.
 ///

@@ -263,6 +263,7 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   trained.priors = estimated.report;
   trained.model.priors = std::move(estimated.views);
   trained.model.scene = std::move(scene);
+  if (request.inspect) request.inspect(trained.model);
   optimise(trained, request, part_of(progress, kPriorsShare, 1));
   report(progress, 1);
   return trained;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,9 @@ struct ModelRequest {
   /// A network that guesses the depth of the photographs, as depth_network.h; empty = none.
   std::filesystem::path depth_network;
   bool keeps_others = false;  ///< Checkpoints of other work are not replaced.
+  /// Sees the cameras and what was measured, before the training, which takes much longer: what it
+  /// throws ends the work.
+  std::function<void(const Model&)> inspect = {};
 };
 
 /// Scene -> model. Loads the images of the input views, moves the scene to its canonical frame,

@@ -81,8 +81,9 @@ const TriangleMesh& loaded_mesh(Run& run) {
 
 Json run_model(Run& run, const Progress& progress) {
   const std::filesystem::path folder = run.request.output / "model";
-  const ModelRequest request = {
+  ModelRequest request = {
       {}, run.request.training, folder, run.request.scene.options.depth.network};
+  request.inspect = [&](const Model& model) { check_picks(run.distances, model); };
   const TrainedModel trained = train_model(run.scene, request, progress);
   // Pixels were read for the first time: more may be odd than the cameras told.
   const std::vector<std::string>& found = trained.model.scene.warnings;

@@ -445,7 +445,7 @@ int fitting_bits(const Gaussians& g, const Frame& frame, const SpzOptions& optio
 }  // namespace
 
 bool looks_like_spz(std::string_view bytes) {
-  return bytes.substr(0, 4) == kMagic || bytes.substr(0, 2) == kGzipMagic;
+  return bytes.substr(0, 4) == kMagic || bytes.substr(0, 3) == "\x1f\x8b\x08";  // gzip, deflated
 }
 
 SpzCount stated_spz_splats(std::string_view start, const std::filesystem::path& path) {

@@ -208,6 +208,8 @@ TEST_F(KnownDistances, RefusesWhatCannotBeMeasured) {
   EXPECT_NE(refusal(good, "1m").find("one point"), std::string::npos);
   model_.priors[0].origin = Raster<DepthOrigin>(60, 40, DepthOrigin::Completed);
   EXPECT_NE(refusal("left:1,2", "1m").find("no depth was measured at left:1,2"), std::string::npos);
+  const auto picks = known_distances({{"left:1,2", good, "1m"}}, model_.scene);
+  EXPECT_THROW(check_picks(picks, model_), InvalidInput) << "before the training";
   EXPECT_FALSE(model_.scene.frame.has_metric_scale());
 }
 
