@@ -89,7 +89,7 @@ struct Attempt {
 class Collapser {
  public:
   Collapser(const TriangleMesh& mesh, const CollapseLimits& limits);
-  CollapsedMesh run();
+  CollapsedMesh run(const Progress& progress);
 
  private:
   struct Candidate {
@@ -110,7 +110,7 @@ class Collapser {
   bool may_collapse(uint32_t u, uint32_t v) const;
   Placement placement(uint32_t u, uint32_t v) const;
   float pass_cost();
-  bool pass();
+  bool pass(const Progress& progress);
   size_t batch_size() const;
   void try_all(size_t first, size_t count);
   void try_collapse(uint32_t slot, Attempt& out) const;

@@ -258,7 +258,7 @@ void Collapser::try_all(size_t first, size_t count) {
 }
 
 // Collapses the cheapest part of what may be collapsed. False if there is nothing.
-bool Collapser::pass() {
+bool Collapser::pass(const Progress& progress) {
   find_candidates();
   if (candidates_.empty()) return false;
   const float most = pass_cost();
@@ -287,6 +287,7 @@ bool Collapser::pass() {
       left -= attempt.dying.size();
     }
     first += tried;
+    report(progress, 1 - double(left) / double(original_.faces.size()));
   }
   drop_dead_faces();
   index_faces();
@@ -309,8 +310,8 @@ void Collapser::drop_dead_faces() {
   witness_.resize(n);
 }
 
-CollapsedMesh Collapser::run() {
-  while (mesh_.faces.size() > limits_.target_faces && pass()) {
+CollapsedMesh Collapser::run(const Progress& progress) {
+  while (mesh_.faces.size() > limits_.target_faces && pass(progress)) {
   }
   CollapsedMesh out;
   out.pass_costs = pass_costs_;
@@ -326,8 +327,10 @@ CollapsedMesh Collapser::run() {
 
 }  // namespace edge_collapse
 
-CollapsedMesh collapse_edges(const TriangleMesh& mesh, const CollapseLimits& limits) {
-  return edge_collapse::Collapser(mesh, limits).run();
+CollapsedMesh collapse_edges(const TriangleMesh& mesh,
+                             const CollapseLimits& limits,
+                             const Progress& progress) {
+  return edge_collapse::Collapser(mesh, limits).run(progress);
 }
 
 }  // namespace cgs

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {
@@ -45,6 +46,9 @@ struct CollapsedMesh {
 /// Sources: Garland, Heckbert 1997 (cost); Ciampalini et al. 1997, "Multiresolution decimation
 /// based on global error" (witnesses); Dey et al. 1999 (link condition).
 /// \pre face indices are below mesh.vertices.size(); limits.tolerance is as long as mesh.vertices.
-CollapsedMesh collapse_edges(const TriangleMesh& mesh, const CollapseLimits& limits);
+/// Progress is the share of the faces that are gone.
+CollapsedMesh collapse_edges(const TriangleMesh& mesh,
+                             const CollapseLimits& limits,
+                             const Progress& progress = {});
 
 }  // namespace cgs

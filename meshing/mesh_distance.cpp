@@ -47,6 +47,16 @@ double distance_from(const TriangleTree::Triangle& t, const Eigen::Vector3d& p) 
   return (w[0] * t[0] + w[1] * t[1] + w[2] * t[2] - p).norm();
 }
 
+// In parallel, and with a report now and then, which may end it.
+template <typename Work>
+void for_each_in_parts(size_t count, const Progress& progress, const Work& work) {
+  constexpr size_t kPart = size_t{1} << 16;
+  for (size_t begin = 0; begin < count; begin += kPart) {
+    tbb::parallel_for(begin, std::min(count, begin + kPart), work);
+    report(progress, double(begin) / double(count));
+  }
+}
+
 // A side of a face, with its lower corner first.
 struct Side {
   uint32_t a, b, face;
@@ -87,14 +97,10 @@ class EdgeSearch {
     const auto nearest = tree_.nearest(point);
     return {point, nearest->triangle, std::sqrt(nearest->squared_distance)};
   }
-  /// \param pieces  to work in
-  double farthest(const Place& a,
-                  const Place& b,
-                  double enough,
-                  std::vector<std::pair<Place, Place>>& pieces) const {
+  double farthest(const Place& a, const Place& b, double enough) const {
     double found = std::max(a.distance, b.distance);
     double bound = found;
-    pieces.assign(1, {a, b});
+    std::vector<std::pair<Place, Place>> pieces = {{a, b}};
     while (!pieces.empty()) {
       const auto [p, q] = pieces.back();
       pieces.pop_back();
@@ -208,7 +214,8 @@ std::vector<float> DistanceToMesh::of(const std::vector<Eigen::Vector3f>& points
 
 std::vector<float> DistanceToMesh::of_edges(const TriangleMesh& mesh,
                                             const std::vector<float>& enough,
-                                            double accuracy) const {
+                                            double accuracy,
+                                            const Progress& progress) const {
   require(accuracy > 0, "DistanceToMesh::of_edges: accuracy must be > 0", accuracy);
   require(enough.size() == mesh.faces.size(),
           "DistanceToMesh::of_edges needs what is enough for every face, values",
@@ -216,27 +223,23 @@ std::vector<float> DistanceToMesh::of_edges(const TriangleMesh& mesh,
   const EdgeSearch search(parts_->triangles, parts_->tree, accuracy);
   const std::vector<Side> sides = sides_by_edge(mesh);
   std::vector<Place> corners(mesh.vertices.size());
-  tbb::parallel_for(size_t(0), corners.size(), [&](size_t v) {
+  for_each_in_parts(corners.size(), part_of(progress, 0, 0.3), [&](size_t v) {
     corners[v] = search.place(mesh.vertices[v].cast<double>());
   });
   // Of every side the bound of its edge, found once at the first of them.
   std::vector<float> of_side(sides.size(), 0);
-  constexpr size_t kBlock = 512;
-  tbb::parallel_for(size_t(0), (sides.size() + kBlock - 1) / kBlock, [&](size_t block) {
-    std::vector<std::pair<Place, Place>> pieces;
-    for (size_t i = block * kBlock; i < std::min(sides.size(), (block + 1) * kBlock); ++i) {
-      if (i > 0 && sides[i].same_edge(sides[i - 1])) continue;
-      double least = double(enough[sides[i].face]);
-      size_t end = i + 1;
-      for (; end < sides.size() && sides[end].same_edge(sides[i]); ++end) {
-        least = std::min(least, double(enough[sides[end].face]));
-      }
-      const double bound = search.farthest(corners[sides[i].a], corners[sides[i].b], least, pieces);
-      if (bound <= least) continue;
-      std::fill(of_side.begin() + std::ptrdiff_t(i),
-                of_side.begin() + std::ptrdiff_t(end),
-                std::nextafter(float(bound), std::numeric_limits<float>::infinity()));
+  for_each_in_parts(sides.size(), part_of(progress, 0.3, 1), [&](size_t i) {
+    if (i > 0 && sides[i].same_edge(sides[i - 1])) return;
+    double least = double(enough[sides[i].face]);
+    size_t end = i + 1;
+    for (; end < sides.size() && sides[end].same_edge(sides[i]); ++end) {
+      least = std::min(least, double(enough[sides[end].face]));
     }
+    const double bound = search.farthest(corners[sides[i].a], corners[sides[i].b], least);
+    if (bound <= least) return;
+    std::fill(of_side.begin() + std::ptrdiff_t(i),
+              of_side.begin() + std::ptrdiff_t(end),
+              std::nextafter(float(bound), std::numeric_limits<float>::infinity()));
   });
   std::vector<float> out(mesh.faces.size(), 0);
   for (size_t i = 0; i < sides.size(); ++i) {

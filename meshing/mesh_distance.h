@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {
@@ -55,7 +56,8 @@ class DistanceToMesh {
   ///         distance calculation between meshes", section 3.
   std::vector<float> of_edges(const TriangleMesh& mesh,
                               const std::vector<float>& enough,
-                              double accuracy) const;
+                              double accuracy,
+                              const Progress& progress = {}) const;
 
  private:
   struct Parts;

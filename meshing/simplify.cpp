@@ -28,7 +28,10 @@ struct Measured {
   std::vector<uint32_t> too_far;  ///< Faces with a place beyond the limit, ascending.
 };
 
-Measured measure(const TriangleMesh& from, const TriangleMesh& to, const SimplifyOptions& options) {
+Measured measure(const TriangleMesh& from,
+                 const TriangleMesh& to,
+                 const SimplifyOptions& options,
+                 const Progress& progress) {
   constexpr size_t kLeast = 10000;
   constexpr size_t kMost = 100000;
   const SurfaceSamples samples =
@@ -49,7 +52,8 @@ Measured measure(const TriangleMesh& from, const TriangleMesh& to, const Simplif
   for (size_t f = 0; f < known.size(); ++f) {
     known[f] = float(statistics_of.at(is_inferred(from, f) ? 1 : 0).max);
   }
-  const std::vector<float> on_edges = distance.of_edges(from, known, kAccuracy * options.max_error);
+  const std::vector<float> on_edges =
+      distance.of_edges(from, known, kAccuracy * options.max_error, progress);
   Measured out;
   for (uint32_t f = 0; f < on_edges.size(); ++f) {
     const bool inferred = is_inferred(from, f);
@@ -181,8 +185,10 @@ SimplifyResult simplify(const TriangleMesh& mesh,
       tolerances(mesh, options), float(options.max_color_error), options.target_faces, {}, 0};
   constexpr int kRounds = 6;
   for (int round = 1; round <= kRounds; ++round) {
-    report(progress, double(round - 1) / kRounds);
-    const CollapsedMesh out = collapse_edges(mesh, limits);
+    const auto part = [&](double begin, double end) {
+      return part_of(progress, (round - 1 + begin) / kRounds, (round - 1 + end) / kRounds);
+    };
+    const CollapsedMesh out = collapse_edges(mesh, limits, part(0, 0.6));
     result.rounds = round;
     if (round == 1) limits.pass_costs = out.pass_costs;
     result.area_after = area_by_provenance(out.mesh);
@@ -190,8 +196,8 @@ SimplifyResult simplify(const TriangleMesh& mesh,
     Tightening tightening(limits.tolerance, options.max_error / 32);
     std::vector<uint32_t> bad;
     for (const auto& [f, g] : self_intersections(out.mesh)) bad.insert(bad.end(), {f, g});
-    const Measured forth = measure(out.mesh, mesh, options);
-    const Measured back = measure(mesh, out.mesh, options);
+    const Measured forth = measure(out.mesh, mesh, options, part(0.7, 0.8));
+    const Measured back = measure(mesh, out.mesh, options, part(0.8, 1));
     bad.insert(bad.end(), forth.too_far.begin(), forth.too_far.end());
     if (!bad.empty()) tightening.output_faces(out, bad);
     for (const uint32_t f : back.too_far) tightening.input_face(mesh, f);

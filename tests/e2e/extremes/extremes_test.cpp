@@ -155,7 +155,11 @@ Finding render(const Cell& cell) {
     }
   }
   mean /= double(values);
-  return {largest(largest(colour * 255 / 3, mean / 5e-5), depth / 1e-3),
+  int exponent = 0;
+  const bool is_power_of_two = std::frexp(cell.scale, &exponent) == 0.5;
+  const double most = is_power_of_two ? 1.0 / 255 : 3.0 / 255;
+  const double mean_at_most = is_power_of_two ? 1e-5 : 5e-5;
+  return {largest(largest(colour / most, mean / mean_at_most), depth / 1e-3),
           text("colour off by %.1e, depth by %.1e", colour, depth)};
 }
 
