@@ -204,10 +204,10 @@ DistanceToMesh::DistanceToMesh(DistanceToMesh&& other) noexcept = default;
 DistanceToMesh& DistanceToMesh::operator=(DistanceToMesh&& other) noexcept = default;
 
 std::vector<float> DistanceToMesh::of(const std::vector<Eigen::Vector3f>& points) const {
-  std::vector<float> out(points.size());
+  std::vector<float> out(points.size(), std::numeric_limits<float>::infinity());
   tbb::parallel_for(size_t(0), points.size(), [&](size_t i) {
     const auto nearest = parts_->tree.nearest(points[i].cast<double>());
-    out[i] = static_cast<float>(std::sqrt(nearest->squared_distance));
+    if (nearest) out[i] = static_cast<float>(std::sqrt(nearest->squared_distance));
   });
   return out;
 }
@@ -220,6 +220,9 @@ std::vector<float> DistanceToMesh::of_edges(const TriangleMesh& mesh,
   require(enough.size() == mesh.faces.size(),
           "DistanceToMesh::of_edges needs what is enough for every face, values",
           enough.size());
+  if (parts_->triangles.empty()) {
+    return std::vector<float>(mesh.faces.size(), std::numeric_limits<float>::infinity());
+  }
   const EdgeSearch search(parts_->triangles, parts_->tree, accuracy);
   const std::vector<Side> sides = sides_by_edge(mesh);
   std::vector<Place> corners(mesh.vertices.size());

@@ -31,12 +31,13 @@ SurfaceSamples sample_faces(const TriangleMesh& mesh, size_t count);
 /// Answers how far points are from a mesh that is asked more than once.
 class DistanceToMesh {
  public:
-  explicit DistanceToMesh(const TriangleMesh& mesh);  ///< \pre a face has an area
+  explicit DistanceToMesh(const TriangleMesh& mesh);
   ~DistanceToMesh();
   DistanceToMesh(DistanceToMesh&& other) noexcept;
   DistanceToMesh& operator=(DistanceToMesh&& other) noexcept;
 
-  /// Distance from each point to the nearest point of the mesh [internal units].
+  /// Distance from each point to the nearest point of the mesh [internal units]; infinite where no
+  /// face has an area, as are those of edges.
   std::vector<float> of(const std::vector<Eigen::Vector3f>& points) const;
 
   /// How far the edges of another mesh are away, where that is farther than something known.

@@ -36,6 +36,7 @@ Measured measure(const TriangleMesh& from,
   constexpr size_t kMost = 100000;
   const SurfaceSamples samples =
       sample_faces(from, std::clamp(2 * from.faces.size(), kLeast, kMost));
+  if (samples.points.empty()) return {};  // faces without area
   const DistanceToMesh distance(to);
   const std::vector<float> distances = distance.of(samples.points);
   std::array<std::vector<float>, 2> by_label;

@@ -92,6 +92,9 @@ TEST(DistanceToMeshOfEdges, SeesTheTwoDiagonalsOfABentSquareApart) {
   EXPECT_NEAR(double(found[1]), nearest, 2e-6);
   const std::vector<float> none = DistanceToMesh(other).of_edges(mesh, {1, 1}, 1e-6);
   EXPECT_EQ(none, std::vector<float>(2, 0)) << "not beyond what is enough";
+  const DistanceToMesh nowhere{TriangleMesh()};
+  EXPECT_TRUE(std::isinf(nowhere.of({{0, 0, 0}})[0]));
+  EXPECT_TRUE(std::isinf(nowhere.of_edges(mesh, {1, 1}, 1e-6)[0]));
   EXPECT_THROW(DistanceToMesh(other).of_edges(mesh, {1}, 1e-6), InvalidInput);
   EXPECT_THROW(DistanceToMesh(other).of_edges(mesh, {1, 1}, 0), InvalidInput);
 }
