@@ -80,7 +80,8 @@ class Examination {
     if (out.gaussians.size() == 0) {
       throw BadInput(Defect::Value, path_, "no finite splats: every one leaves the range of float");
     }
-    if (out.gaussians.size() < usable || raw_.digits > kFloatDigits) {
+    const bool is_own_frame = !frame.has_value();
+    if (is_own_frame && out.gaussians.size() < usable) {
       check_as_floats(out.gaussians, placement.frame);
     }
     out.frame = placement.frame;

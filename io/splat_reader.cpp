@@ -20,7 +20,7 @@ namespace {
 
 RawSplats parse(std::string bytes, const std::filesystem::path& path) {
   const std::string_view all = bytes;
-  if (all.substr(0, 3) == "ply") {
+  if (all.substr(0, 4) == "ply\n" || all.substr(0, 4) == "ply\r") {
     return is_compressed_ply(parse_ply_header(all, path)) ? parse_compressed_ply(all, path)
                                                           : parse_gaussian_ply(all, path);
   }

@@ -222,11 +222,10 @@ TEST(SplatDoctor, JudgesTheSizeOfWhatIsLeft) {
   };
   EXPECT_THROW(examined(two_and_a_huge_one(1e9f, 0)), BadInput);
   EXPECT_EQ(examined(two_and_a_huge_one(1e9f, 15)).gaussians.size(), 2u);
-  EXPECT_THROW(examined([&](RawSplats& raw) {
-                 two_and_a_huge_one(1e9f, 0)(raw);
-                 raw.position[0].setZero();  // is dropped, and with it the extent
-               }),
-               BadInput);
+  RawSplats raw = healthy(3);
+  two_and_a_huge_one(1e9f, 0)(raw);
+  raw.position[0].setZero();  // is dropped, and with it the extent
+  EXPECT_THROW(examine_splats(raw, "a.ply", std::nullopt), BadInput);
 }
 
 TEST(SplatDoctor, KeepsApartInFloatsWhatDoublesTellApart) {
@@ -240,7 +239,6 @@ TEST(SplatDoctor, KeepsApartInFloatsWhatDoublesTellApart) {
       out.frame.world_from_internal(out.gaussians.position[0].cast<double>());
   EXPECT_LT((read - place).norm(), 1e-15);
   EXPECT_LT((place - out.frame.file_origin).norm(), 256 * std::exp(-20.0));
-  EXPECT_THROW(examine_splats(raw, "a.ply", Frame{}), BadInput) << "files of that frame are floats";
 }
 
 TEST(SplatDoctor, RefusesAFileOfNothing) {

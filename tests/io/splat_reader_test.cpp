@@ -36,7 +36,7 @@ TEST(SplatReader, TakesNoCoordinateForTheStartOfAnotherFormat) {
   const test::TempDir dir;
   write_dot_splat(dir / "some.splat", test::varied_splats(7, 0), Frame{});
   const std::string bytes = test::read_bytes(dir / "some.splat");
-  for (const std::string start : {"<HTML", "\x1f\x8b\x40\x40", "PK\x03\x04"}) {
+  for (const std::string start : {"<HTML", "plyA", "\x1f\x8b\x40\x40", "PK\x03\x04"}) {
     test::write_bytes(dir / "odd.splat", start + bytes.substr(start.size()));
     const bool is_small = start[0] == 'P';  // 1.5e-36, which no coordinate of a splat is
     if (is_small) {
