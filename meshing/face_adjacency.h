@@ -13,4 +13,13 @@ namespace cgs {
 /// k + 1); the face itself at a border. Where more than two faces share an edge, some pair.
 std::vector<std::array<uint32_t, 3>> adjacent_faces(const TriangleMesh& mesh);
 
+/// A side of a face, from corner `side` to the next one: the lower vertex and the higher one.
+struct FaceSide {
+  uint32_t low, high, face, side;
+  bool same_edge(const FaceSide& other) const { return low == other.low && high == other.high; }
+};
+
+/// The sides of all faces, those of one edge next to each other: by low, high, face and side.
+std::vector<FaceSide> sides_by_edge(const TriangleMesh& mesh);
+
 }  // namespace cgs

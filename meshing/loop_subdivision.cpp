@@ -8,6 +8,7 @@
 #include <tuple>
 #include <vector>
 
+#include "meshing/face_adjacency.h"
 #include "meshing/face_split.h"
 #include "meshing/remeshing.h"
 #include "meshing/vertex_attributes.h"
@@ -28,31 +29,17 @@ struct Edge {
   bool sharp;
 };
 
-struct Side {
-  uint32_t low, high, face, tip;
-};
-
 std::vector<Edge> edges_of(const TriangleMesh& mesh) {
-  std::vector<Side> sides;
-  sides.reserve(3 * mesh.faces.size());
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    for (size_t k = 0; k < 3; ++k) {
-      const auto [low, high] = std::minmax(mesh.faces[f].at(k), mesh.faces[f].at((k + 1) % 3));
-      sides.push_back({low, high, f, mesh.faces[f].at((k + 2) % 3)});
-    }
-  }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return std::tie(a.low, a.high, a.face) < std::tie(b.low, b.high, b.face);
-  });
+  const std::vector<FaceSide> sides = sides_by_edge(mesh);
+  const auto tip = [&](const FaceSide& s) { return mesh.faces[s.face].at((s.side + 2) % 3); };
   std::vector<Edge> out;
   for (size_t i = 0; i < sides.size();) {
     size_t end = i + 1;
-    while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high)
-      ++end;
-    const Side& last = sides[end - 1];
+    while (end < sides.size() && sides[end].same_edge(sides[i])) ++end;
+    const FaceSide& last = sides[end - 1];
     const bool inside =
         end - i == 2 && has_evidence(mesh, sides[i].face) == has_evidence(mesh, last.face);
-    out.push_back({last.low, last.high, sides[i].tip, last.tip, !inside});
+    out.push_back({last.low, last.high, tip(sides[i]), tip(last), !inside});
     i = end;
   }
   return out;

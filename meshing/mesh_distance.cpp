@@ -6,7 +6,6 @@
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <tuple>
 #include <utility>
 
 #include <CGAL/AABB_traits.h>
@@ -16,6 +15,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "meshing/face_adjacency.h"
 #include "meshing/triangle_tree.h"
 
 namespace cgs {
@@ -55,27 +55,6 @@ void for_each_in_parts(size_t count, const Progress& progress, const Work& work)
     tbb::parallel_for(begin, std::min(count, begin + kPart), work);
     report(progress, double(begin) / double(count));
   }
-}
-
-// A side of a face, with its lower corner first.
-struct Side {
-  uint32_t a, b, face;
-  bool same_edge(const Side& other) const { return a == other.a && b == other.b; }
-};
-
-std::vector<Side> sides_by_edge(const TriangleMesh& mesh) {
-  std::vector<Side> out;
-  out.reserve(3 * mesh.faces.size());
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    for (size_t k = 0; k < 3; ++k) {
-      const auto [a, b] = std::minmax(mesh.faces[f].at(k), mesh.faces[f].at((k + 1) % 3));
-      out.push_back({a, b, f});
-    }
-  }
-  std::sort(out.begin(), out.end(), [](const Side& l, const Side& r) {
-    return std::tie(l.a, l.b, l.face) < std::tie(r.a, r.b, r.face);
-  });
-  return out;
 }
 
 // A place and the triangle of the reference that is nearest to it.
@@ -224,7 +203,7 @@ std::vector<float> DistanceToMesh::of_edges(const TriangleMesh& mesh,
     return std::vector<float>(mesh.faces.size(), std::numeric_limits<float>::infinity());
   }
   const EdgeSearch search(parts_->triangles, parts_->tree, accuracy);
-  const std::vector<Side> sides = sides_by_edge(mesh);
+  const std::vector<FaceSide> sides = sides_by_edge(mesh);
   std::vector<Place> corners(mesh.vertices.size());
   for_each_in_parts(corners.size(), part_of(progress, 0, 0.3), [&](size_t v) {
     corners[v] = search.place(mesh.vertices[v].cast<double>());
@@ -238,7 +217,7 @@ std::vector<float> DistanceToMesh::of_edges(const TriangleMesh& mesh,
     for (; end < sides.size() && sides[end].same_edge(sides[i]); ++end) {
       least = std::min(least, double(enough[sides[end].face]));
     }
-    const double bound = search.farthest(corners[sides[i].a], corners[sides[i].b], least);
+    const double bound = search.farthest(corners[sides[i].low], corners[sides[i].high], least);
     if (bound <= least) return;
     std::fill(of_side.begin() + std::ptrdiff_t(i),
               of_side.begin() + std::ptrdiff_t(end),
