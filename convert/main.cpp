@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -90,13 +91,26 @@ int run_program(int argc, char** argv) {
   std::_Exit(4);
 }
 
+// Whether an allocation failed: clearing up after that, a library may throw something else.
+std::atomic<bool> memory_ran_out = false;
+
+[[noreturn]] void note_lack_of_memory() {
+  memory_ran_out = true;
+  throw std::bad_alloc();
+}
+
+int note_error_of_opencv(int status, const char*, const char*, const char*, int, void*) {
+  if (status == cv::Error::StsNoMem) memory_ran_out = true;
+  return 0;
+}
+
 // A thread takes 8 MiB of addresses for its stack; the library of threads throws this text.
 bool is_for_want_of_a_thread(const std::exception& error) {
   return std::string_view(error.what()).find("pthread_create has failed") != std::string_view::npos;
 }
 
 int end_unexpectedly(const std::exception& error) {
-  if (is_for_want_of_a_thread(error)) end_without_memory();
+  if (memory_ran_out || is_for_want_of_a_thread(error)) end_without_memory();
   std::fprintf(stderr, "cgs: unexpected: %s\n", cgs::one_line(error.what()).c_str());
   return 1;
 }
@@ -117,6 +131,8 @@ int end_unexpectedly(const std::exception& error) {
 
 int main(int argc, char** argv) {
   std::set_terminate(end_in_thread);
+  std::set_new_handler(note_lack_of_memory);
+  cv::redirectError(note_error_of_opencv);
   cgs::catch_interrupts();
   try {
     return run_program(argc, argv);
@@ -132,9 +148,6 @@ int main(int argc, char** argv) {
     return io.exit_code();
   } catch (const std::bad_alloc&) {
     end_without_memory();
-  } catch (const cv::Exception& error) {
-    if (error.code == cv::Error::StsNoMem) end_without_memory();
-    return end_unexpectedly(error);
   } catch (const std::exception& error) {
     return end_unexpectedly(error);
   }

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/memory_plan.h"
 
+#include <cstdio>
+#include <cstdlib>
+
 #include <gtest/gtest.h>
 
+#include "convert/terminal.h"
 #include "libcgs/core/error.h"
+#include "libcgs/render/rasterizer.h"
 
 namespace cgs::memory_plan_test {
 namespace {
@@ -170,6 +175,34 @@ TEST(SplatMemoryPlan, NamesTheStageThatDoesNotFitAndWhatToLower) {
       EXPECT_NE(message.find(lower), std::string::npos) << message;
     }
   }
+}
+
+// Ten thousand splats that each cover a picture of 3840 x 2160 pixels. Drawing is only a part of
+// taking pictures: the plan may not be less, but be more.
+TEST(SplatMemoryPlan, HoldsWhereEverySplatCoversThePicture) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // a process of its own, for its own peak
+  const auto ratio = [] {
+    const Camera camera = {
+        .width = 3840, .height = 2160, .fx = 2000, .fy = 2000, .cx = 1920, .cy = 1080};
+    Gaussians splats;
+    for (int i = 0; i < 10'000; ++i) {
+      splats.position.emplace_back(0, 0, 2 + 1e-4f * float(i));
+      splats.scale.push_back(Eigen::Vector3f::Constant(20));
+      splats.rotation.emplace_back(1, 0, 0, 0);
+      splats.opacity.push_back(0.5f);
+      splats.sh.push_back(Eigen::Vector3f::Zero());
+    }
+    const RenderBuffers picture = rasterize(splats, camera);
+    const std::vector<StageMemory> plan = splat_memory_plan(
+        {.splats = splats.size(), .pictures = 1, .picture_pixels = picture.alpha.data.size()});
+    return double(plan.back().bytes) / double(peak_memory());
+  };
+  const auto check = [&] {
+    const double r = ratio();
+    std::fprintf(stderr, "predicted over actual: %.2f\n", r);
+    std::_Exit(r >= 0.8 ? 0 : 1);
+  };
+  EXPECT_EXIT(check(), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

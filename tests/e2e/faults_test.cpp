@@ -2,8 +2,9 @@
 // Every call by which a run asks the system for something in its folders fails once, and at every
 // one the process is killed once. The run must end with the right exit code and one line, what it
 // leaves must be whole, and the run that goes on must end with the files of one that was never
-// disturbed; so must one that lacks memory. CGS_FAULTS says how many of some thousand errors, of
-// the kills and of the limits of memory are tried.
+// disturbed; so must one that lacks memory, all of it or for one allocation. CGS_FAULTS says how
+// many of some thousand errors, of the kills, of the limits of memory and of the allocations are
+// tried.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -186,6 +187,14 @@ class Faults : public testing::Test {
     fs::remove_all(*dir_ / "out");
   }
 
+  static void expect_want_of_memory_is_said() {
+    const std::string text = message();
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+    EXPECT_NE(text.find("LIMIT"), std::string::npos) << text;
+    if (fs::exists(*dir_ / "out")) expect_whole_files("out", false);
+    expect_going_on();
+  }
+
   static inline test::TempDir* dir_ = nullptr;
   static inline std::string reason_;
   static inline std::map<std::string, std::string> expected_;
@@ -303,12 +312,34 @@ TEST_F(Faults, MemoryThatRunsOutAnywhereIsSaidAndNothingIsLost) {
     SCOPED_TRACE(std::to_string(limit) + " of " + std::to_string(need) + " KiB");
     const Counted counted;
     EXPECT_EQ(run_within(limit, "out"), 4);
-    const std::string text = message();
-    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
-    EXPECT_NE(text.find("LIMIT"), std::string::npos) << text;
-    if (fs::exists(*dir_ / "out")) expect_whole_files("out", false);
-    expect_going_on();
+    expect_want_of_memory_is_said();
   }
+}
+
+TEST_F(Faults, AnyAllocationMayFail) {
+  const std::string preload = std::string("LD_PRELOAD=") + CGS_FAILING_ALLOCATION + " ";
+  const std::string count_file = (*dir_ / "allocations").string();
+  ASSERT_EQ(run_after(preload + "COUNT_ALLOCATIONS=" + count_file + " ", "out"), 0) << message();
+  fs::remove_all(*dir_ / "out");
+  const size_t count = std::stoul(test::read_bytes(count_file));
+  ASSERT_GT(count, 100'000u);
+  const size_t tried = share_of(400, 12);
+  size_t said = 0;
+  for (size_t i = 0; i < tried; ++i) {
+    const size_t nth = 1 + i * count / tried;
+    SCOPED_TRACE("allocation " + std::to_string(nth) + " of " + std::to_string(count));
+    const Counted counted;
+    const int code = run_after(preload + "FAILING_ALLOCATION=" + std::to_string(nth) + " ", "out");
+    EXPECT_TRUE(code == 0 || code == 4) << code << ": " << message();
+    if (code == 0) {  // a library did without
+      EXPECT_TRUE(test::files_of_run(*dir_ / "out") == expected_);
+      fs::remove_all(*dir_ / "out");
+      continue;
+    }
+    ++said;
+    expect_want_of_memory_is_said();
+  }
+  EXPECT_GE(2 * said, tried);
 }
 
 }  // namespace

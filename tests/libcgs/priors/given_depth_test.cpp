@@ -89,6 +89,31 @@ TEST(FitGivenDepth, TellsTheKindFromWhatFits) {
   EXPECT_TRUE(given.remarks.empty()) << "nothing is odd";
 }
 
+// A disparity of zero or less, once its offset is known, is farther than can be said.
+TEST(FitGivenDepth, WhatADisparityPutsAtInfinityHasNoDepth) {
+  Example e;
+  e.give([](double z, int) { return 3 / z - 0.2; });
+  for (View& view : e.scene.views) {
+    for (int y = 0; y < kHeight; y += 2) {
+      for (int x = 0; x < kWidth; ++x) view.given_depth(x, y) = x % 2 == 0 ? -0.2f : -0.3f;
+    }
+  }
+  const GivenDepth given = fit_given_depth(e.scene, e.priors);
+  ASSERT_EQ(given.kind, DepthKind::Disparity);
+  for (const FittedDepth& view : given.views) {
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const float depth = view.depth(x, y);
+        if (y % 2 == 1) {
+          EXPECT_NEAR(depth / Example::truth(x, y), 1, 0.01);
+        } else {
+          EXPECT_TRUE(std::isnan(depth) || (depth > 100 && std::isfinite(depth))) << depth;
+        }
+      }
+    }
+  }
+}
+
 TEST(FitGivenDepth, MetresTellTheScale) {
   Example e;
   e.scene.frame.scale = 4;  // depths above are internal

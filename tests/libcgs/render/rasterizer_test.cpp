@@ -343,6 +343,29 @@ TEST(Rasterize, ShowsTheBackgroundWhereThereIsNothing) {
   EXPECT_EQ(report.behind, g.size());
 }
 
+TEST(Rasterize, HasDepthOnlyWhereItIsOpaqueEnough) {
+  const Camera camera = {.width = 5, .height = 5, .fx = 5, .fy = 5, .cx = 2.5, .cy = 2.5};
+  Gaussians g;
+  g.position = {{0, 0, 2}};
+  g.scale = {{4, 4, 4}};
+  g.rotation = {{1, 0, 0, 0}};
+  g.sh = {{0, 0, 0}};
+  for (const float opacity : {0.0f, 1e-38f, 1e-6f, 1e-3f, 0.01f, 0.45f, 0.55f, 0.9f, 1.0f}) {
+    g.opacity = {opacity};
+    const RenderBuffers seen = rasterize(g, camera);
+    EXPECT_EQ(seen.alpha(2, 2) > 0, opacity >= 0.01f);
+    EXPECT_NEAR(seen.alpha(2, 2), opacity >= 0.01f ? std::min(opacity, 0.99f) : 0, 1e-6);
+    if (opacity > 0.5f) {
+      EXPECT_NEAR(seen.depth(2, 2), 2, 1e-6);
+      EXPECT_NEAR(seen.median_depth(2, 2), 2, 1e-6);
+    } else {
+      EXPECT_TRUE(std::isnan(seen.depth(2, 2))) << opacity;
+      EXPECT_TRUE(std::isnan(seen.median_depth(2, 2))) << opacity;
+    }
+    EXPECT_GE(seen.depth_variance(2, 2), 0);
+  }
+}
+
 TEST(Rasterize, LeavesTheFloatingPointModeOfTheCallerAlone) {
   const Camera camera = oblique_camera();
   rasterize(random_gaussians(camera, {}, 11), camera);

@@ -121,6 +121,27 @@ TEST(TotalVariation, IgnoresPixelsThatAreNearlyTransparent) {
   EXPECT_EQ(gradient.depth_sum.data, std::vector<float>(48, 0));
 }
 
+TEST(TotalVariation, StaysFiniteForAnyOpacity) {
+  for (const float alpha : {0.0f, 1e-38f, 1e-6f, 1e-3f, 0.05f, 1.0f}) {
+    for (const float depth : {0.0f, 1e-6f, 1.0f, 1e6f}) {
+      TrainingBuffers rendered;
+      rendered.alpha = test::noise_raster(8, 6, 1, 0, alpha);
+      rendered.alpha(3, 3) = alpha;
+      rendered.depth_sum = Raster<float>(8, 6, 0);
+      for (size_t i = 0; i < 48; ++i) rendered.depth_sum.data[i] = depth * rendered.alpha.data[i];
+      TrainingBuffers gradient;
+      EXPECT_TRUE(std::isfinite(total_variation(rendered, kUnit, nullptr, 1, gradient)));
+      for (size_t i = 0; i < 48; ++i) {
+        EXPECT_TRUE(std::isfinite(gradient.alpha.data[i])) << alpha << " at " << depth;
+        EXPECT_TRUE(std::isfinite(gradient.depth_sum.data[i])) << alpha << " at " << depth;
+        if (rendered.alpha.data[i] >= 1e-3f) continue;
+        EXPECT_EQ(gradient.alpha.data[i], 0) << "nothing is learnt from depth that is not there";
+        EXPECT_EQ(gradient.depth_sum.data[i], 0);
+      }
+    }
+  }
+}
+
 TEST(TotalVariation, AddsToTheGradient) {
   const TrainingBuffers rendered = scene(19, 14, 3);
   TrainingBuffers once;
