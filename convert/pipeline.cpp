@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/asset.h"
+#include "convert/disk_plan.h"
 #include "convert/frame_json.h"
 #include "convert/marker_bars.h"
 #include "convert/memory_plan.h"
@@ -482,6 +483,8 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   make_output_folder(request.output);
   const FolderLock lock(request.output);
   refuse_foreign_files(request, scene);
+  const std::string little_room = little_room_warning(scene, request.output);
+  if (!little_room.empty()) terminal.warn(little_room);
   RunRecord record(request.output,
                    request_json(request, scene),
                    request.overwrite,
