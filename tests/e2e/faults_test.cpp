@@ -323,7 +323,7 @@ TEST_F(Faults, AnyAllocationMayFail) {
   fs::remove_all(*dir_ / "out");
   const size_t count = std::stoul(test::read_bytes(count_file));
   ASSERT_GT(count, 100'000u);
-  const size_t tried = share_of(400, 12);
+  const size_t tried = share_of(200, 6);
   size_t said = 0;
   for (size_t i = 0; i < tried; ++i) {
     const size_t nth = 1 + i * count / tried;
