@@ -2,6 +2,7 @@
 #include "io/exr.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <set>
 #include <stdexcept>
@@ -19,6 +20,7 @@
 #include "io/byte_writer.h"
 #include "io/exr_header.h"
 #include "io/isolated.h"
+#include "io/lack_of_memory.h"
 
 namespace cgs {
 
@@ -265,6 +267,7 @@ ExrImage read_exr(const std::filesystem::path& path, const ReadLimits& limits) {
   const std::string bytes = read_file(path, limits);
   const ExrScreening found = screen_exr(bytes, path, limits);
   if (!found.is_harmless) return decode_isolated(bytes, found.decoded_bytes, path);
+  errno = 0;
   try {
     return decode(bytes, path);
   } catch (const Error&) {
@@ -272,6 +275,7 @@ ExrImage read_exr(const std::filesystem::path& path, const ReadLimits& limits) {
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {
+    throw_if_memory_ran_out();
     throw BadInput(Defect::Syntax, path, error.what());
   }
 }

@@ -8,6 +8,7 @@
 #include <jerror.h>
 // clang-format on
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <csetjmp>
 #include <cstddef>
@@ -22,6 +23,7 @@
 
 #include "io/heif.h"
 #include "io/image_header.h"
+#include "io/lack_of_memory.h"
 #include "libcgs/core/opencv_memory.h"
 
 namespace cgs {
@@ -172,7 +174,8 @@ class Silence {
   static inline int saved_ = -1;
 };
 
-// Decoders tell a lack of memory as they tell damage, or abort: throws std::bad_alloc before.
+// Decoders tell a lack of memory as they tell damage, or abort: throws std::bad_alloc before. What
+// small allocations fail in spite of it is seen by errno afterwards.
 void ensure_memory_to_decode(const ImageHeader& header) {
   constexpr size_t kBytesPerPixel = 16;  // four channels of 16 bits, and as much to work with
   constexpr size_t kTables = size_t{16} << 20;
@@ -189,20 +192,25 @@ cv::Mat decode_with_opencv(std::string_view bytes,
                        static_cast<int>(bytes.size()),
                        CV_8UC1,
                        const_cast<char*>(bytes.data()));  // NOLINT: OpenCV has no const matrix
+  const auto refuse = [&](Defect defect, const char* what) {
+    throw_if_memory_ran_out();
+    throw BadInput(defect, path, what);
+  };
   cv::Mat pixels;
+  errno = 0;
   try {
     const Silence silence;
     // Unchanged keeps 16 bits and alpha.
     pixels = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception& error) {
     throw_if_out_of_memory(error);
-    throw BadInput(Defect::Syntax, path, "the image decoder refused the content");
+    refuse(Defect::Syntax, "the image decoder refused the content");
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception&) {
-    throw BadInput(Defect::Syntax, path, "the image decoder refused the content");
+    refuse(Defect::Syntax, "the image decoder refused the content");
   }
-  if (pixels.empty()) throw BadInput(Defect::Truncated, path, "the pixels are cut or damaged");
+  if (pixels.empty()) refuse(Defect::Truncated, "the pixels are cut or damaged");
   return pixels;
 }
 
