@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -17,6 +18,7 @@
 #include <CLI/Formatter.hpp>
 #include <glog/logging.h>
 #include <opencv2/core.hpp>
+#include <unistd.h>
 
 #include "convert/commands/commands.h"
 #include "convert/commands/usage.h"
@@ -82,17 +84,30 @@ int run_program(int argc, char** argv) {
   return 0;
 }
 
+constexpr std::string_view kOutOfMemory =
+    "cgs: LIMIT: out of memory; smaller pictures, larger voxels or a smaller file need less\n";
+
 // Ends at once: what libraries do at a regular end may need memory, too, and abort without.
 [[noreturn]] void end_without_memory() {
-  std::fprintf(stderr,
-               "cgs: LIMIT: out of memory; smaller pictures, larger voxels or a smaller file "
-               "need less\n");
+  std::fwrite(kOutOfMemory.data(), 1, kOutOfMemory.size(), stderr);
   std::fflush(nullptr);
   std::_Exit(4);
 }
 
-// Whether an allocation failed: clearing up after that, a library may throw something else.
+// Whether an allocation failed: clearing up after that, a library may throw something else or
+// crash.
 std::atomic<bool> memory_ran_out = false;
+
+// Calls nothing that may not be called in a signal handler.
+void end_at_crash(int signal) {
+  if (memory_ran_out) {
+    [[maybe_unused]] const ssize_t ignored =
+        ::write(STDERR_FILENO, kOutOfMemory.data(), kOutOfMemory.size());
+    std::_Exit(4);
+  }
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+}
 
 [[noreturn]] void note_lack_of_memory() {
   memory_ran_out = true;
@@ -132,6 +147,7 @@ int end_unexpectedly(const std::exception& error) {
 int main(int argc, char** argv) {
   std::set_terminate(end_in_thread);
   std::set_new_handler(note_lack_of_memory);
+  std::signal(SIGSEGV, end_at_crash);
   cv::redirectError(note_error_of_opencv);
   cgs::catch_interrupts();
   try {
