@@ -24,10 +24,12 @@ TEST(DiskPlan, GrowsWithThePixelsMostWithThoseOfInputViews) {
   Scene scene = two_views();
   const uint64_t both = disk_plan(scene);
   scene.input = {0};
-  EXPECT_EQ(2 * disk_plan(scene), both);
+  const uint64_t one = disk_plan(scene);
+  EXPECT_LT(one, both);
+  EXPECT_GT(one, both / 2);
   scene.held_out = {1};
-  EXPECT_GT(2 * disk_plan(scene), both);
-  EXPECT_LT(disk_plan(scene), both);
+  EXPECT_GT(disk_plan(scene), one);
+  EXPECT_LT(disk_plan(scene), one + (both - one) / 2);
 }
 
 TEST(LittleRoomWarning, SaysHowMuchIsMissingOfWhatIsNotWrittenYet) {
@@ -37,7 +39,7 @@ TEST(LittleRoomWarning, SaysHowMuchIsMissingOfWhatIsNotWrittenYet) {
   EXPECT_EQ(little_room_warning(scene, dir.path(), need), "");
   const std::string line = little_room_warning(scene, dir.path(), 20 << 20);
   EXPECT_NE(line.find("room for 20 MiB"), std::string::npos) << line;
-  EXPECT_NE(line.find("about 320 MiB"), std::string::npos) << line;
+  EXPECT_NE(line.find("about 332 MiB"), std::string::npos) << line;
   EXPECT_NE(little_room_warning(scene, dir.path(), need - 1), "");
   test::write_bytes(dir / "volume.vdb", std::string(1000, 'v'));
   EXPECT_EQ(little_room_warning(scene, dir.path(), need - 1000), "");
