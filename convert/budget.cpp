@@ -344,13 +344,14 @@ Json choice(const RunRequest& request,
   const TrialFolder trials(request.output);
   if (!chosen.is_null()) return chosen;
   opened.keep(request.output / "model");
-  double pixels = 0;
-  for (const int i : opened.scene.input) {
-    const Camera& camera = opened.scene.views[static_cast<size_t>(i)].camera;
-    pixels += double(camera.width) * camera.height;
-  }
-  Search search{
-      request, opened, pixels, sizes.usable, sizes.larger_bytes, seconds, start, terminal};
+  Search search{request,
+                opened,
+                pixels_of(opened.scene, opened.scene.input),
+                sizes.usable,
+                sizes.larger_bytes,
+                seconds,
+                start,
+                terminal};
   chosen = choose(search);
   chosen["request"] = asked;
   write_file(file, json_text(chosen) + "\n");

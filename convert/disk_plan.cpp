@@ -2,7 +2,6 @@
 #include "convert/disk_plan.h"
 
 #include <system_error>
-#include <vector>
 
 #include "convert/memory_plan.h"
 
@@ -11,15 +10,6 @@ namespace cgs {
 namespace {
 
 namespace fs = std::filesystem;
-
-double pixels(const Scene& scene, const std::vector<int>& views) {
-  double sum = 0;
-  for (const int i : views) {
-    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
-    sum += double(camera.width) * camera.height;
-  }
-  return sum;
-}
 
 uint64_t bytes_in(const fs::path& folder) {
   uint64_t sum = 0;
@@ -42,8 +32,8 @@ uint64_t disk_plan(const Scene& scene) {
   constexpr double kBase = 12e6;
   constexpr double kOfDrawn = 36;
   constexpr double kOfInput = 300;
-  const double input = pixels(scene, scene.input);
-  const double drawn = input + pixels(scene, scene.held_out);
+  const double input = pixels_of(scene, scene.input);
+  const double drawn = input + pixels_of(scene, scene.held_out);
   return static_cast<uint64_t>(kBase + kOfDrawn * drawn + kOfInput * input);
 }
 

@@ -112,6 +112,15 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
   return plan;
 }
 
+double pixels_of(const Scene& scene, const std::vector<int>& views) {
+  double sum = 0;
+  for (const int i : views) {
+    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+    sum += double(camera.width) * camera.height;
+  }
+  return sum;
+}
+
 std::string mebibytes(size_t bytes) {
   std::array<char, 40> text{};
   std::snprintf(text.data(), text.size(), "%.0f MiB", double(bytes) / kMebi);

@@ -38,6 +38,9 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
                                      const CoherenceOptions& coherence = {},
                                      int downscale = 1);
 
+/// How many pixels these views have together.
+double pixels_of(const Scene& scene, const std::vector<int>& views);
+
 /// "410 MiB"
 std::string mebibytes(size_t bytes);
 
