@@ -9,6 +9,7 @@
 #include "convert/model.h"
 #include "convert/run_request.h"
 #include "libcgs/core/photo_texture.h"
+#include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {

@@ -12,7 +12,7 @@
 
 #include "convert/length.h"
 #include "convert/memory_plan.h"
-#include "convert/model.h"
+#include "convert/model_training.h"
 #include "convert/pipeline.h"
 #include "convert/time_model.h"
 #include "io/atomic_file.h"

@@ -10,7 +10,6 @@
 #include "convert/splat_volume.h"
 #include "convert/terminal.h"
 #include "io/gltf.h"
-#include "io/splat_doctor.h"
 
 namespace cgs {
 
@@ -40,13 +39,5 @@ nlohmann::ordered_json convert_file(const ConversionRequest& request, Terminal& 
 
 /// The pairs that convert_file() knows, as a table for people.
 std::string conversion_table();
-
-/// True for a PLY file whose vertices have what makes a splat, and for a .glb file of splats.
-/// \throws BadInput as parse_ply_header() and is_splat_glb()
-bool is_splat_file(const std::filesystem::path& path);
-
-/// What a file of splats holds and what is wrong with it: {"kind", "format", "counts", "bounds",
-/// "units", "findings", "warnings"}.
-nlohmann::ordered_json splat_file_to_json(const GaussianFile& file);
 
 }  // namespace cgs

@@ -18,6 +18,7 @@
 #include "io/colmap_depth.h"
 #include "io/depth_file.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/progress.h"
 #include "libcgs/priors/given_depth.h"
 
 namespace cgs {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/model.h"
+#include "libcgs/core/progress.h"
 #include "meshing/tsdf.h"
 
 namespace cgs {

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/conversion.h"
+#include "convert/splat_files.h"
 #include "convert/stated_frame.h"
 #include "io/byte_reader.h"
 #include "libcgs/core/error.h"

@@ -17,6 +17,7 @@
 #include "convert/marker_bars.h"
 #include "convert/memory_plan.h"
 #include "convert/model.h"
+#include "convert/model_training.h"
 #include "convert/recorded_request.h"
 #include "convert/report.h"
 #include "convert/report_viewer.h"

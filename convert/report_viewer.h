@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "convert/model.h"
+#include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
 #include "meshing/mesh_distance.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "convert/length.h"
-#include "convert/model.h"
+#include "convert/model_training.h"
 #include "convert/run_record.h"
 #include "convert/simplification.h"
 #include "io/content_hash.h"

@@ -7,6 +7,7 @@
 
 #include "convert/model.h"
 #include "convert/run_request.h"
+#include "libcgs/core/progress.h"
 
 namespace cgs {
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "convert/model.h"
+#include "libcgs/core/progress.h"
 
 namespace cgs {
 

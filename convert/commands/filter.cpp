@@ -6,7 +6,6 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/conversion.h"
 #include "convert/filter/chain.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"

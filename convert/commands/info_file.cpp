@@ -11,12 +11,12 @@
 #include <nlohmann/json.hpp>
 #include <openvdb/tools/Count.h>
 
-#include "convert/conversion.h"
 #include "convert/frame_json.h"
 #include "convert/html.h"
 #include "convert/measured_file.h"
 #include "convert/mesh_files.h"
 #include "convert/run_record.h"
+#include "convert/splat_files.h"
 #include "convert/volume_file.h"
 #include "io/exr.h"
 #include "io/json_file.h"

@@ -8,6 +8,7 @@
 #include "convert/commands/common_options.h"
 #include "convert/marker_bars.h"
 #include "convert/model.h"
+#include "convert/model_training.h"
 #include "convert/scene_request.h"
 #include "io/atomic_file.h"
 #include "io/json_file.h"

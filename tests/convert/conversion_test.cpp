@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "convert/splat_files.h"
 #include "io/gaussian_ply.h"
 #include "io/mesh_file.h"
 #include "io/mesh_ply.h"
@@ -77,35 +78,6 @@ TEST_F(Conversion, OptionsOfMeshesAreRefusedForSplats) {
   EXPECT_EQ(refused("a.ply", [](auto& r) { r.up = {0, 0, 1}; }), "");
 }
 
-TEST_F(Conversion, SaysWhatAFormatCannotHold) {
-  Gaussians g;
-  test::add_sphere(g, {0, 0, 2}, 0.5, 400);
-  for (Eigen::Vector3f& color : g.sh) color *= 100;
-  Frame frame;
-  frame.metres_per_unit = 1;
-  frame.scale_source = ScaleSource::Assumed;
-  frame.file_origin = frame.origin = Eigen::Vector3d(500'000, 0, 0);
-  frame.up = Eigen::Vector3d::UnitZ();
-  write_gaussian_ply(dir_ / "placed.ply", g, frame);
-  const auto told = [&](const std::string& output, bool is_strict) {
-    Terminal terminal(false, is_strict);
-    ConversionRequest request;
-    request.input = dir_ / "placed.ply";
-    request.output = dir_ / output;
-    testing::internal::CaptureStderr();
-    const std::string error = test::message_of([&] { convert_file(request, terminal); });
-    return testing::internal::GetCapturedStderr() + error;
-  };
-  const std::string splat = told("a.splat", true);
-  EXPECT_NE(splat.find(".splat files hold no unit, origin, direction that is up of the scene"),
-            std::string::npos)
-      << splat;
-  EXPECT_NE(splat.find("400 of 400 splats have colours beyond what .splat can hold"),
-            std::string::npos)
-      << splat;
-  EXPECT_EQ(told("a.ply", true).find("hold"), std::string::npos);
-}
-
 TEST_F(Conversion, MeshOfSplatsIsVirtualInEveryWord) {
   const auto report = convert("ball.ply", "m.ply", [](ConversionRequest& r) { r.as = "mesh"; });
   EXPECT_TRUE(report["certificate"]["passed"].get<bool>());
@@ -176,18 +148,6 @@ TEST_F(Conversion, PacksSplatsWhereTheNameSaysSo) {
   EXPECT_THROW(convert("mesh.ply", "mesh.compressed.ply"), InvalidInput);
   EXPECT_THROW(convert("ball.ply", "m.compressed.ply", [](auto& r) { r.as = "mesh"; }),
                InvalidInput);
-}
-
-TEST_F(Conversion, SaysWhatEveryFileOfSplatsLost) {
-  for (const char* name : {"a.splat", "a.spz", "a.compressed.ply", "a.glb", "a.ply"}) {
-    const auto report = convert("ball.ply", name, [](ConversionRequest& r) { r.as = "splats"; });
-    const auto& loss = report["output"]["loss"];
-    EXPECT_EQ(loss["dropped"], 0) << name;
-    EXPECT_LT(loss["centres"]["largest_move"].get<double>(), 1e-3) << name;
-    EXPECT_GE(loss["centres"]["largest_move"], loss["centres"]["rms_move"]) << name;
-    EXPECT_TRUE(loss["pictures"]["psnr"] == "same" || loss["pictures"]["psnr"] > 35.0) << name;
-    EXPECT_GE(loss["pictures"]["views"], 8) << name;
-  }
 }
 
 TEST_F(Conversion, WhatIsUpComesFromTheUserTheFileOrCustom) {
@@ -300,13 +260,6 @@ TEST_F(Conversion, CadFilesNeedAUnit) {
   convert("ball.ply", "a.stl", [](ConversionRequest& r) { r.assume_unit = "cm"; });
   convert("ball.ply", "a.3mf", [](ConversionRequest& r) { r.assume_unit = "cm"; });
   EXPECT_GT(std::filesystem::file_size(dir_ / "a.stl"), 10'000u);
-}
-
-TEST_F(Conversion, ReportsWhatTheFileHolds) {
-  const auto info = splat_file_to_json(read_splats(dir_ / "ball.ply"));
-  EXPECT_EQ(info["format"], "3DGS PLY");
-  EXPECT_EQ(info["counts"]["splats"], 4000);
-  EXPECT_NEAR(info["bounds"]["max"][2].get<double>(), 2.5, 1e-2);
 }
 
 }  // namespace

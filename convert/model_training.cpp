@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/model_training.h"
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/terminal.h"
+#include "io/atomic_file.h"
+#include "io/checkpoint.h"
+#include "io/content_hash.h"
+#include "io/scene_reader.h"
+#include "libcgs/core/error.h"
+#include "libcgs/priors/depth_network.h"
+#include "libcgs/priors/measured_range.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr const char* kCheckpointName = "training";
+
+// Everything the training depends on.
+uint64_t training_key(const Model& model, const TrainingOptions& options) {
+  uint64_t key = content_hash(kProgramVersion);
+  for (const auto& [name, value] : training_fields(options)) {
+    key = content_hash(value, content_hash(name, key));
+  }
+  const auto add = [&](const void* data, size_t bytes) {
+    key = content_hash({static_cast<const char*>(data), bytes}, key);
+  };
+  for (size_t k = 0; k < model.priors.size(); ++k) {
+    const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
+    const ViewPriors& priors = model.priors[k];
+    add(view.image.data.data(), view.image.data.size() * sizeof(Eigen::Vector3f));
+    add(priors.depth.data.data(), priors.depth.data.size() * sizeof(float));
+    add(priors.sigma.data.data(), priors.sigma.data.size() * sizeof(float));
+    add(priors.origin.data.data(), priors.origin.data.size());
+    add(priors.layer.data.data(), priors.layer.data.size());
+    add(view.valid.data.data(), view.valid.data.size());
+    const Camera& camera = view.camera;
+    const std::array<double, 4> intrinsics = {camera.fx, camera.fy, camera.cx, camera.cy};
+    add(intrinsics.data(), sizeof intrinsics);
+    add(camera.world_from_cam.data(), 16 * sizeof(double));
+  }
+  return key;
+}
+
+/// The state of a training on the disk; without a folder there is none.
+class TrainingCheckpoint {
+ public:
+  TrainingCheckpoint(std::filesystem::path folder, uint64_t key, std::vector<std::string>& hitches)
+      : folder_(std::move(folder)), key_(key), hitches_(hitches) {}
+
+  void restore(Trainer& trainer, bool keeps_others) {
+    if (folder_.empty()) return;
+    const SavedState saved = read_checkpoint(folder_, kCheckpointName, key_);
+    if (saved.is_of_other && keeps_others) {
+      throw BadInput(Defect::Mismatch,
+                     folder_,
+                     "holds an unfinished training with other settings or inputs; choose another "
+                     "folder, or say --overwrite");
+    }
+    if (saved.state) trainer.restore(*saved.state);
+    if (!saved.warning.empty()) hitches_.push_back(saved.warning);
+  }
+
+  /// \throws IoError
+  void save(const Trainer& trainer) {
+    saved_ = std::chrono::steady_clock::now();
+    if (folder_.empty()) return;
+    make_output_folder(folder_);
+    write_checkpoint(folder_, kCheckpointName, key_, trainer.save());
+  }
+
+  /// What cannot be saved ends no work: the next state may be, and so may the result.
+  void try_to_save(const Trainer& trainer) {
+    try {
+      save(trainer);
+    } catch (const IoError& error) {
+      if (!has_failed_) hitches_.push_back(std::string(error.what()) + "; going on without it");
+      has_failed_ = true;
+    }
+  }
+
+  void try_to_save_at_times(const Trainer& trainer) {
+    constexpr auto kBetween = std::chrono::seconds(20);
+    if (std::chrono::steady_clock::now() - saved_ >= kBetween) try_to_save(trainer);
+  }
+
+ private:
+  std::filesystem::path folder_;
+  uint64_t key_;
+  std::vector<std::string>& hitches_;
+  std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
+  bool has_failed_ = false;
+};
+
+void optimise(TrainedModel& trained, const ModelRequest& request, const Progress& progress) {
+  Model& model = trained.model;
+  Trainer trainer(model.scene, model.priors, request.training);
+  TrainingCheckpoint checkpoint(
+      request.checkpoints, training_key(model, request.training), trained.hitches);
+  checkpoint.restore(trainer, request.keeps_others);
+  while (!trainer.done()) {
+    trainer.step();
+    try {
+      report(progress, double(trainer.steps_done()) / request.training.steps);
+    } catch (const Cancelled&) {
+      checkpoint.save(trainer);
+      throw;
+    }
+    checkpoint.try_to_save_at_times(trainer);
+  }
+  checkpoint.try_to_save(trainer);
+  model.gaussians = trainer.model().gaussians();
+  // The depth of the priors stays that of the sweep: meshes and support rest on what was measured,
+  // pictures on what was optimised to look right.
+  trained.steps = trainer.history();
+}
+
+void guess_by_network(const std::filesystem::path& file, Scene& scene) {
+  DepthNetwork network(read_file(file), file);
+  for (const int i : scene.input) {
+    View& view = scene.views[static_cast<size_t>(i)];
+    view.given_depth = network(view);
+  }
+}
+
+// Views whose depth rests on little.
+void warn_of_coverage(const std::vector<PriorsCoverage>& coverage, Scene& scene) {
+  constexpr double kLittle = 0.1;
+  for (size_t i = 0; i < coverage.size(); ++i) {
+    const View& view = scene.views[static_cast<size_t>(scene.input[i])];
+    const double share = coverage[i].measured + coverage[i].guessed;
+    if (share >= kLittle) continue;
+    std::array<char, 120> text{};
+    std::snprintf(text.data(), text.size(), "depth was found for %.1f %% of view ", 100 * share);
+    scene.warnings.push_back(
+        text.data() + view.name +
+        (is_measured(coverage[i])
+             ? "; all else is filled in from there: see that views overlap and show texture"
+             : ", so it adds nothing: hardly a point of it is seen in another input view"));
+  }
+}
+
+// Null where there was none; scale null where it tells none.
+nlohmann::ordered_json given_depth_to_json(const PriorsReport& priors) {
+  const GivenDepthReport& given = priors.given;
+  if (given.kind == DepthKind::Unknown) return nullptr;
+  const char* kind = given.kind == DepthKind::Relative ? "depth" : "disparity";
+  if (given.kind == DepthKind::Metric) {
+    kind = given.metres_per_unit > 0 ? "metric" : "in units of the scene";
+  }
+  nlohmann::ordered_json out = {{"kind", kind}, {"words", given.found}};
+  if (given.metres_per_unit > 0) {
+    out["metres_per_unit"] = given.metres_per_unit;
+    out["metres_sigma"] = given.metres_sigma;
+  }
+  return out;
+}
+
+// Of the pixels of every input view.
+nlohmann::ordered_json coverage_to_json(const TrainedModel& trained) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  const Scene& scene = trained.model.scene;
+  for (size_t i = 0; i < trained.priors.coverage.size(); ++i) {
+    const PriorsCoverage& coverage = trained.priors.coverage[i];
+    out.push_back({{"view", scene.views[static_cast<size_t>(scene.input[i])].name},
+                   {"measured", coverage.measured},
+                   {"guessed", coverage.guessed},
+                   {"completed", coverage.completed}});
+  }
+  return out;
+}
+
+}  // namespace
+
+void take_sensor_scale(const GivenDepthReport& given, Frame& frame) {
+  if (frame.has_metric_scale() || !(given.metres_per_unit > 0)) return;
+  frame.metres_per_unit = given.metres_per_unit;
+  frame.metres_sigma = given.metres_sigma;
+  frame.scale_source = ScaleSource::DepthSensor;
+}
+
+TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress) {
+  request.priors.validate();
+  request.training.validate();
+  require_decodable(scene, request.training.coherence);
+  constexpr double kPriorsShare = 0.2;
+  load_images(scene, scene.input, part_of(progress, 0, 0.01));
+  if (!request.depth_network.empty()) guess_by_network(request.depth_network, scene);
+  to_canonical(scene);
+  narrow_depth_ranges(scene, request.priors.sweep);
+  EstimatedPriors estimated =
+      estimate_priors(scene, request.priors, part_of(progress, 0.01, kPriorsShare));
+  const GivenDepthReport& given = estimated.report.given;
+  scene.warnings.insert(scene.warnings.end(), given.remarks.begin(), given.remarks.end());
+  take_sensor_scale(given, scene.frame);
+  warn_of_coverage(estimated.report.coverage, scene);
+  TrainedModel trained;
+  trained.priors = estimated.report;
+  trained.model.priors = std::move(estimated.views);
+  trained.model.scene = std::move(scene);
+  if (request.inspect) request.inspect(trained.model);
+  optimise(trained, request, part_of(progress, kPriorsShare, 1));
+  report(progress, 1);
+  return trained;
+}
+
+bool has_checkpoints(const std::filesystem::path& folder) {
+  return has_checkpoint(folder, kCheckpointName);
+}
+
+void forget_checkpoints(const std::filesystem::path& folder) {
+  remove_checkpoint(folder, kCheckpointName);
+}
+
+nlohmann::ordered_json settings_to_json(const TrainingOptions& options) {
+  nlohmann::ordered_json settings = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : training_fields(options)) settings[name] = value;
+  return settings;
+}
+
+nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request) {
+  nlohmann::ordered_json loss = nlohmann::ordered_json::array();
+  size_t skipped = 0;
+  for (const StepReport& step : trained.steps) {
+    loss.push_back(step.total());
+    skipped += step.skipped;
+  }
+  const std::string start = "one Gaussian per pixel at the depth of a multi-view plane sweep; ";
+  return {{"description",
+           trained.steps.empty()
+               ? "aligned initialisation: " + start + "not optimised against the photographs"
+               : "coherent Gaussians: " + start +
+                     "depth, opacity and shape optimised against the "
+                     "photographs in " +
+                     std::to_string(trained.steps.size()) + " steps"},
+          {"gaussians", trained.model.gaussians.size()},
+          {"settings", settings_to_json(request.training)},
+          {"loss", loss},
+          {"gradients_not_finite", skipped},
+          {"alignment",
+           {{"scale", trained.priors.alignment.scale},
+            {"offset", trained.priors.alignment.offset},
+            {"correspondences", trained.priors.alignment.correspondences}}},
+          {"depth_of_views", coverage_to_json(trained)},
+          {"given_depth", given_depth_to_json(trained.priors)}};
+}
+
+}  // namespace cgs

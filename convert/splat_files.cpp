@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/splat_files.h"
+
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/memory_plan.h"
+#include "convert/splat_loss.h"
+#include "io/byte_reader.h"
+#include "io/compressed_ply.h"
+#include "io/dot_splat.h"
+#include "io/gaussian_ply.h"
+#include "io/ply_header.h"
+#include "io/scene_path.h"
+#include "io/splat_glb.h"
+#include "io/splat_glb_reader.h"
+#include "io/splat_reader.h"
+#include "io/spz.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/up_axis.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+/// \throws LimitError before what was written is read again, beside what it was made from
+void check_reading_back(const std::filesystem::path& path,
+                        const Gaussians& g,
+                        size_t memory_limit) {
+  check_splat_memory_plan({.splats = g.size(),
+                           .harmonics = static_cast<uint64_t>(g.sh_count()),
+                           .read_back_bytes = std::filesystem::file_size(path)},
+                          memory_budget(memory_limit));
+}
+
+/// What was written, for the report.
+struct WrittenSplats {
+  Json report;
+  std::vector<uint32_t> order;  ///< Of the splats in the file, if it is another.
+};
+
+WrittenSplats write_splats(const std::filesystem::path& path,
+                           const Gaussians& g,
+                           const Frame& frame,
+                           int spz_version) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".splat") {
+    const DotSplatReport made = write_dot_splat(path, g, frame);
+    return {{{"format", ".splat"},
+             {"splats", g.size()},
+             {"bytes", made.bytes},
+             {"clamped_colors", made.clamped_colors},
+             {"dropped_harmonics", made.dropped_sh}},
+            {}};
+  }
+  if (extension == ".spz") {
+    const SpzReport made = write_spz(path, g, frame, {.version = spz_version});
+    return {{{"format", "SPZ " + std::to_string(spz_version)},
+             {"splats", g.size()},
+             {"bytes", made.bytes},
+             {"fractional_bits", made.fractional_bits},
+             {"clamped_splats", made.clamped}},
+            {}};
+  }
+  if (extension == ".glb") {
+    const size_t bytes = write_splat_glb(path, g, frame, {.y_up = y_up_from(frame.up)});
+    return {{{"format", "KHR_gaussian_splatting"}, {"splats", g.size()}, {"bytes", bytes}}, {}};
+  }
+  if (is_compressed_ply_name(path)) {
+    CompressedPlyReport made = write_compressed_ply(path, g, frame);
+    return {{{"format", "compressed PLY"},
+             {"splats", g.size()},
+             {"bytes", made.bytes},
+             {"clamped_splats", made.clamped}},
+            std::move(made.order)};
+  }
+  write_gaussian_ply(path, g, frame);
+  return {{{"format", "3DGS PLY"}, {"splats", g.size()}}, {}};
+}
+
+/// What a format has no place for, of what is known of a scene: "" if nothing.
+std::string lost_of_frame(const std::filesystem::path& path, const Frame& frame) {
+  if (!is_bare_splat_name(path)) return "";
+  std::string out;
+  const auto add = [&](bool is_lost, const std::string& what) {
+    if (is_lost) out += (out.empty() ? "" : ", ") + what;
+  };
+  add(frame.has_metric_scale(), "unit");
+  add(!frame.file_origin.isZero(0), "origin");
+  add(!frame.up.isApprox(-Eigen::Vector3d::UnitY()), "direction that is up");
+  return out.empty() ? out : lower_extension(path) + " files hold no " + out + " of the scene";
+}
+
+/// Where a hundredth of the splats cannot be held as it is; "" elsewhere.
+std::string clamped_text(const Json& report) {
+  for (const auto& [key, what] :
+       {std::pair("clamped_splats", "sizes or colours"), std::pair("clamped_colors", "colours")}) {
+    const auto clamped = report.value(key, uint64_t{0});
+    const auto splats = report["splats"].get<uint64_t>();
+    if (100 * clamped < splats || clamped == 0) continue;
+    return std::to_string(clamped) + " of " + std::to_string(splats) + " splats have " + what +
+           " beyond what " + report["format"].get<std::string>() + " can hold: clamped";
+  }
+  return "";
+}
+
+Json bounds_json(const Gaussians& gaussians, const Frame& frame) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3f& p : gaussians.position) {
+    box.extend(frame.file_from_internal(p.cast<double>()));
+  }
+  const Eigen::Vector3d& a = box.min();
+  const Eigen::Vector3d& b = box.max();
+  return {{"min", {a.x(), a.y(), a.z()}}, {"max", {b.x(), b.y(), b.z()}}};
+}
+
+}  // namespace
+
+bool is_bare_splat_name(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  return extension == ".spz" || extension == ".splat";
+}
+
+bool is_compressed_ply_name(const std::filesystem::path& path) {
+  return lower_extension(path) == ".ply" && lower_extension(path.stem()) == ".compressed";
+}
+
+bool is_splat_file(const std::filesystem::path& path) {
+  if (is_folder(path)) return false;
+  if (lower_extension(path) == ".glb") return is_splat_glb(path);
+  if (lower_extension(path) != ".ply") return false;
+  const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
+  if (start.substr(0, 3) != "ply") return false;
+  const PlyHeader header = parse_ply_header(start, path);
+  const PlyElement* vertex = header.find("vertex");
+  if (vertex == nullptr) return false;
+  const auto has = [&](const char* name) { return vertex->find(name) >= 0; };
+  return has("packed_position") || has("rot_0") || (has("scale_0") && has("f_dc_0"));
+}
+
+Json write_splat_file(const std::filesystem::path& path,
+                      const Gaussians& g,
+                      const Frame& frame,
+                      const SplatFileOptions& options,
+                      Terminal& terminal) {
+  const WrittenSplats written = write_splats(path, g, frame, options.spz_version);
+  Json report = written.report;
+  const std::string lost = lost_of_frame(path, frame);
+  if (!lost.empty()) terminal.say(lost);
+  std::vector<std::string> missing;  // why splats are, or parts of them
+  if (const std::string clamped = clamped_text(report); !clamped.empty()) {
+    missing.push_back(clamped);
+  }
+  try {
+    const Progress progress = terminal.begin("read back");
+    cgs::report(progress, 0);
+    check_reading_back(path, g, options.memory_limit);
+    const GaussianFile back = read_splats(path, frame);
+    if (back.gaussians.size() < g.size()) {
+      missing.insert(missing.end(), back.warnings.begin(), back.warnings.end());
+    }
+    const SplatLoss loss = splat_loss(g, back.gaussians, written.order, progress);
+    report["loss"] = splat_loss_to_json(loss, frame);
+    terminal.end(splat_loss_line(loss, frame));
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    // The file is there: that it holds too little, or was not looked at, is a finding.
+    report["loss"] = {{"not_measured", error.what()}};
+    missing.push_back(std::string("what the file lost could not be measured: ") + error.what());
+  }
+  terminal.warn(missing);
+  return report;
+}
+
+Json splat_file_to_json(const GaussianFile& file) {
+  const SplatFindings& f = file.findings;
+  return {{"kind", "splats"},
+          {"format", file.format},
+          {"counts",
+           {{"in_file", f.in_file},
+            {"splats", file.gaussians.size()},
+            {"sh_degree", file.gaussians.sh_degree}}},
+          {"bounds", bounds_json(file.gaussians, file.frame)},
+          {"units", file.frame.unit_name()},
+          {"findings",
+           {{"not_finite", f.not_finite},
+            {"without_rotation", f.without_rotation},
+            {"transparent", f.transparent},
+            {"out_of_range", f.out_of_range},
+            {"clamped", f.clamped},
+            {"flyaways", f.flyaways},
+            {"linear_scales", f.linear_scales},
+            {"linear_opacity", f.linear_opacity},
+            {"fill_ratio", f.fill_ratio}}},
+          {"warnings", file.warnings}};
+}
+
+}  // namespace cgs
