@@ -257,6 +257,7 @@ Json glb_to_json(const GlbReport& glb, const Frame& frame) {
   return {{"bytes", glb.bytes},
           {"texture_bytes", glb.texture_bytes},
           {"textured_triangles", glb.textured_triangles},
+          {"collapsed_triangles", glb.collapsed_triangles},
           {"measured_texture_error", glb.measured_texture_error},
           {"position_bits", glb.position_bits},
           {"measured_max_error", glb.measured_max_error},

@@ -196,17 +196,18 @@ void simplify_mesh(const ConversionRequest& request, Source& source, Terminal& t
   terminal.end(std::to_string(source.mesh.faces.size()) + " faces");
 }
 
-void write_mesh(const ConversionRequest& request,
-                const Source& source,
-                const TriangleMesh& mesh,
-                const Json& report) {
+/// \return what the file lost by its encoding, for people; empty if nothing
+std::string write_mesh(const ConversionRequest& request,
+                       const Source& source,
+                       const TriangleMesh& mesh,
+                       const Json& report) {
   GlbOptions options;
   options.encoding = request.encoding;
   if (!request.compression_error.empty()) {
     options.max_error = parse_length(request.compression_error, source.frame) * source.frame.scale;
   }
   options.summary_json = json_text(report, -1);
-  write_mesh_as(request.output, mesh, source.frame, options);
+  return write_mesh_as(request.output, mesh, source.frame, options);
 }
 
 /// \return what was left out, for the report
@@ -368,7 +369,8 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   }
   const std::string lost = lost_in_file(request.output, source.mesh);
   if (!lost.empty()) terminal.say(lost);
-  write_mesh(request, source, source.mesh, report);
+  const std::string lost_by_encoding = write_mesh(request, source, source.mesh, report);
+  if (!lost_by_encoding.empty()) terminal.say(lost_by_encoding);
   return report;
 }
 

@@ -125,18 +125,23 @@ std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& 
   return out.empty() ? out : extension + " files hold no " + out + "; .ply and .glb do";
 }
 
-void write_mesh_as(const std::filesystem::path& path,
-                   const TriangleMesh& mesh,
-                   const Frame& frame,
-                   GlbOptions options) {
+std::string write_mesh_as(const std::filesystem::path& path,
+                          const TriangleMesh& mesh,
+                          const Frame& frame,
+                          GlbOptions options) {
   require_writable_as(path, frame);
   const std::string extension = lower_extension(path);
-  if (extension == ".stl") return write_stl(path, mesh, frame, z_up_from(frame.up));
-  if (extension == ".3mf") return write_3mf(path, mesh, frame, z_up_from(frame.up));
-  if (extension == ".obj") return write_obj(path, mesh, frame);
-  if (extension == ".ply") return write_mesh_ply(path, mesh, frame);
+  if (extension == ".stl") write_stl(path, mesh, frame, z_up_from(frame.up));
+  if (extension == ".3mf") write_3mf(path, mesh, frame, z_up_from(frame.up));
+  if (extension == ".obj") write_obj(path, mesh, frame);
+  if (extension == ".ply") write_mesh_ply(path, mesh, frame);
+  if (extension != ".glb") return "";
   options.y_up = y_up_from(frame.up);
-  write_glb(path, mesh, frame, options);
+  const GlbReport made = write_glb(path, mesh, frame, options);
+  if (made.collapsed_triangles == 0) return "";
+  return std::to_string(made.collapsed_triangles) + " of " + std::to_string(made.triangles) +
+         " faces have no area in the file, as its grid is coarser than they are; a smaller "
+         "--compression-error or --glb-encoding plain keeps them";
 }
 
 }  // namespace cgs

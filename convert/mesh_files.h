@@ -51,10 +51,11 @@ std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& 
 /// Writes a mesh in the format that the ending of the path names.
 /// \param frame    whose `up` becomes +Z in STL and 3MF, +Y in GLB, and must be known for these
 /// \param options  for a GLB; its y_up is set from there
+/// \return what the encoding of a GLB lost of the mesh, for people; empty if nothing
 /// \throws as the writers and require_writable_as()
-void write_mesh_as(const std::filesystem::path& path,
-                   const TriangleMesh& mesh,
-                   const Frame& frame,
-                   GlbOptions options = {});
+std::string write_mesh_as(const std::filesystem::path& path,
+                          const TriangleMesh& mesh,
+                          const Frame& frame,
+                          GlbOptions options = {});
 
 }  // namespace cgs

@@ -308,35 +308,38 @@ double texture_error(const GlbPrimitive& input,
   return worst;
 }
 
-struct Errors {
-  double position = 0;  // [units of the file]
-  double texture = 0;   // [pixels]
+struct Losses {
+  double position = 0;  // the largest move [units of the file]
+  double texture = 0;   // the same [pixels]
+  size_t collapsed_faces = 0;
 };
 
-/// \return the largest distances between what went in and what came out
-Errors compare(const GlbPrimitive& input, const Decoded& decoded, const DracoGrid& grid) {
+/// What went in against what came out.
+Losses compare(const GlbPrimitive& input, const Decoded& decoded, const DracoGrid& grid) {
   const Cells cells(decoded.positions, grid);
   std::vector<uint32_t> cell_of(input.positions.size());
   std::vector<bool> hit(cells.size(), false);
-  Errors worst;
+  Losses out;
   for (size_t i = 0; i < input.positions.size(); ++i) {
     const std::optional<uint32_t> cell = cells.nearest(input.positions[i]);
     if (!cell) fail("vertex " + std::to_string(i) + " of '" + input.name + "' is lost");
     cell_of[i] = *cell;
     hit[*cell] = true;
     const Eigen::Vector3f move = cells.place(*cell) - input.positions[i];
-    worst.position = std::max(worst.position, move.cast<double>().norm());
+    out.position = std::max(out.position, move.cast<double>().norm());
   }
   if (std::find(hit.begin(), hit.end(), false) != hit.end()) fail("a vertex appeared");
   const auto before = faces_by_cell(input.faces, [&](uint32_t v) { return cell_of[v]; });
   const auto after = faces_by_cell(decoded.faces, [&](uint32_t v) { return cells.of_decoded(v); });
   if (before != after) fail("faces of '" + input.name + "' changed");
-  worst.texture = texture_error(input, cell_of, decoded, cells);
-  if (!(worst.texture <= kDracoTextureError)) {
-    fail("texture coordinates of '" + input.name + "' moved by " + std::to_string(worst.texture) +
+  out.texture = texture_error(input, cell_of, decoded, cells);
+  if (!(out.texture <= kDracoTextureError)) {
+    fail("texture coordinates of '" + input.name + "' moved by " + std::to_string(out.texture) +
          " pixels");
   }
-  return worst;
+  out.collapsed_faces = static_cast<size_t>(std::count_if(
+      after.begin(), after.end(), [](const auto& f) { return f[0] == f[1] || f[1] == f[2]; }));
+  return out;
 }
 
 }  // namespace
@@ -348,9 +351,10 @@ DracoPrimitive draco_compress(const GlbPrimitive& primitive, const DracoGrid& gr
     const Decoded decoded = decode(out.bytes);
     out.vertices = decoded.positions.size();
     out.faces = decoded.faces.size();
-    const Errors errors = compare(primitive, decoded, grid);
-    out.max_error = errors.position;
-    out.max_texture_error = errors.texture;
+    const Losses losses = compare(primitive, decoded, grid);
+    out.max_error = losses.position;
+    out.max_texture_error = losses.texture;
+    out.collapsed_faces = losses.collapsed_faces;
     out.min = out.max = decoded.positions.front();
     for (const Eigen::Vector3f& p : decoded.positions) {
       out.min = out.min.cwiseMin(p);

@@ -27,6 +27,7 @@ struct DracoPrimitive {
   std::map<std::string, int> attribute_ids;  ///< glTF attribute name to Draco's unique id.
   size_t vertices = 0;                       ///< Decoded; more than before at non-manifold places.
   size_t faces = 0;
+  size_t collapsed_faces = 0;  ///< Of these, with two corners in one cell of the grid.
   Eigen::Vector3f min = Eigen::Vector3f::Zero();  ///< Bounds of the decoded positions.
   Eigen::Vector3f max = Eigen::Vector3f::Zero();
   double max_error = 0;          ///< Largest distance of a vertex from its decoded place.

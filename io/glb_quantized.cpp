@@ -56,6 +56,10 @@ QuantizedPrimitive quantized(const GlbPrimitive& primitive,
     const Eigen::Vector3d moved = steps - Eigen::Vector3d(q[0], q[1], q[2]);
     out.max_error = std::max(out.max_error, grid.step * moved.norm());
   }
+  for (const auto& [a, b, c] : primitive.faces) {
+    const auto& q = out.positions;
+    if (q[a] == q[b] || q[b] == q[c] || q[c] == q[a]) ++out.collapsed_faces;
+  }
   for (const Eigen::Vector3f& n : primitive.normals) {
     const auto part = [&](int k) { return static_cast<int8_t>(std::lround(127 * n[k])); };
     out.normals.push_back({part(0), part(1), part(2), 0});

@@ -35,6 +35,7 @@ struct QuantizedPrimitive {
   std::vector<std::array<uint16_t, 4>> colors;     ///< Normalized, alpha 1; may be empty.
   double max_error = 0;          ///< Largest move of a position [units of the file].
   double max_texture_error = 0;  ///< Largest move of a texture coordinate [pixels].
+  size_t collapsed_faces = 0;    ///< With two corners at one place of the grid.
 };
 
 /// How much of 16 bits is used; the rest stays zero, which codecs pack to nothing.

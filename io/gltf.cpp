@@ -181,6 +181,7 @@ double add_primitive(GlbBuilder& builder,
     vertices = compressed.vertices;
     error = compressed.max_error;
     texture_error = compressed.max_texture_error;
+    report.collapsed_triangles += compressed.collapsed_faces;
   } else if (store.encoding == GlbEncoding::Plain) {
     builder.add_plain(primitive);
   } else {
@@ -190,6 +191,7 @@ double add_primitive(GlbBuilder& builder,
     builder.add_quantized(primitive, stored, store.whole);
     error = stored.max_error;
     texture_error = stored.max_texture_error;
+    report.collapsed_triangles += stored.collapsed_faces;
   }
   report.vertices += vertices;
   report.measured_texture_error = std::max(report.measured_texture_error, texture_error);
@@ -260,6 +262,11 @@ GlbFile make_glb(const TriangleMesh& mesh,
     if (is_compressed(store.encoding) && primitive.is_unlit) primitive.normals.clear();
     if (store.encoding == GlbEncoding::Meshopt) primitive = in_cache_order(std::move(primitive));
     worst = std::max(worst, add_primitive(builder, primitive, store, report));
+  }
+  if (report.collapsed_triangles == report.triangles) {
+    throw NumericalError(
+        "write_glb: rounded to the grid of the encoding, no triangle has an area left; plain "
+        "encoding keeps them, or a smaller error where one was given");
   }
   // Half a rounding error of float coordinates is not the compression's.
   const double slack = 1e-6 * double{store.draco.range};

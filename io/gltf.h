@@ -52,9 +52,10 @@ struct GlbReport {
   size_t primitives = 0;  ///< One per provenance class and photograph that have faces.
   size_t vertices = 0;    ///< Of all primitives; borders between them count twice.
   size_t triangles = 0;
-  size_t dropped_triangles = 0;   ///< Without area: two corners at one place.
-  int position_bits = 0;          ///< Per coordinate; 0 = floats.
-  double measured_max_error = 0;  ///< Largest distance of a decoded vertex [world units].
+  size_t dropped_triangles = 0;    ///< Without area: two corners at one place.
+  size_t collapsed_triangles = 0;  ///< Written, but without area once rounded: readers drop them.
+  int position_bits = 0;           ///< Per coordinate; 0 = floats.
+  double measured_max_error = 0;   ///< Largest distance of a decoded vertex [world units].
   size_t textured_triangles = 0;
   size_t texture_bytes = 0;           ///< Of all images.
   double measured_texture_error = 0;  ///< Largest move of a decoded texture coordinate [pixels].

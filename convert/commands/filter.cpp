@@ -59,7 +59,7 @@ void run_filter_command(const FilterArgs& args) {
   // Nothing is rounded, so that what was certified stays that: cgs convert compresses.
   GlbOptions exact;
   exact.encoding = GlbEncoding::Plain;
-  write_mesh_as(args.output, state.mesh, written, exact);
+  (void)write_mesh_as(args.output, state.mesh, written, exact);
   if (state.frame.file_origin != state.file_origin) {
     terminal.warn("coordinates in " + printable(args.output) +
                   " are from another origin, which the file states: floats would lose digits");

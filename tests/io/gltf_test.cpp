@@ -217,6 +217,54 @@ TEST(WriteGlb, KeepsTheErrorItWasGiven) {
                InvalidInput);
 }
 
+/// Triangles whose stored corners share a place, by trying all.
+size_t without_area(const Glb& glb) {
+  size_t out = 0;
+  for (const Part& part : glb.parts) {
+    const auto& p = part.values.at("POSITION");
+    for (const auto& [a, b, c] : part.faces) {
+      out += p[a] == p[b] || p[b] == p[c] || p[c] == p[a] ? 1 : 0;
+    }
+  }
+  return out;
+}
+
+TEST(WriteGlb, CountsTrianglesThatItsGridCannotHold) {
+  const TriangleMesh mesh = test::labelled_sphere();
+  const Written coarse = written(mesh, test::centimetre_frame(), {.max_error = 10});
+  EXPECT_GT(coarse.report.collapsed_triangles, 10u);
+  EXPECT_EQ(coarse.report.collapsed_triangles, without_area(coarse.glb));
+  EXPECT_EQ(written(mesh, {}, {.max_error = 1e-4}).report.collapsed_triangles, 0u);
+}
+
+TEST(WriteGlb, RefusesToWriteNothingButTrianglesWithoutArea) {
+  TriangleMesh far_apart;
+  for (const float z : {0.0f, 1.0f}) {
+    far_apart.vertices.emplace_back(0, 0, z);
+    far_apart.vertices.emplace_back(1e-6f, 0, z);
+    far_apart.vertices.emplace_back(0, 1e-6f, z);
+  }
+  far_apart.faces = {{0, 1, 2}, {3, 4, 5}};
+  TriangleMesh joined = far_apart;
+  joined.vertices.emplace_back(1, 0, 0);
+  joined.faces.push_back({0, 3, 6});
+  const test::TempDir dir;
+  for (const auto& [name, encoding] : glb_encodings()) {
+    const bool keeps = encoding == GlbEncoding::Plain;
+    const GlbOptions options = {.encoding = encoding};
+    const GlbReport report = write_glb(dir / "joined", joined, {}, options);
+    EXPECT_EQ(report.triangles, 3u) << name;
+    EXPECT_EQ(report.collapsed_triangles, keeps ? 0u : 2u) << name;
+    const auto write = [&] { write_glb(dir / name, far_apart, {}, options); };
+    if (keeps) {
+      write();
+    } else {
+      EXPECT_THROW(write(), NumericalError) << name;
+    }
+    EXPECT_EQ(std::filesystem::exists(dir / name), keeps) << name;
+  }
+}
+
 TEST(WriteGlb, TellsUnitsOriginAreasAndSummary) {
   const TriangleMesh mesh = test::labelled_sphere();
   const Frame frame = test::centimetre_frame();
