@@ -177,7 +177,7 @@ std::vector<std::string> remarks(const std::vector<UnposedPhoto>& photos,
                                (solved.is_refuted ? ", which the photographs contradict: they may "
                                                     "have been cut or zoomed)"
                                                   : ")")
-                         : " (its Exif, read from JPEG, HEIC and AVIF, does not say)"));
+                         : " (its Exif does not say)"));
     }
   }
   for (const auto& [a, b] : photos_from_one_place(solution)) {

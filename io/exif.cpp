@@ -10,6 +10,7 @@
 #include <libexif/exif-data.h>
 
 #include "io/byte_reader.h"
+#include "io/exif_part.h"
 #include "io/heif.h"
 #include "io/image_header.h"
 
@@ -88,16 +89,14 @@ LensHint from_film(double millimetres, const ImageSize& size) {
   return {"", focal, std::hypot(rounding, kCut)};
 }
 
-// The Exif part of a JPEG, HEIC or AVIF file; null for what is none or has none.
+constexpr std::string_view kJpegMagic = "\xff\xd8";
+
+// The Exif part of an image; null for what is none or has none.
 Exif read_exif(const std::filesystem::path& path) {
   // A JPEG segment has at most 64 KiB, and Exif is to be among the first.
   constexpr uint64_t kEnough = uint64_t{256} << 10;
   std::string bytes = read_file_start(path, kEnough);
-  if (is_heif(bytes)) {
-    bytes = heif_exif(read_file(path), path);
-  } else if (!bytes.starts_with("\xff\xd8")) {
-    bytes.clear();
-  }
+  if (!bytes.starts_with(kJpegMagic)) bytes = exif_part(read_file(path), path);
   if (bytes.empty()) return {nullptr, &exif_data_unref};
   return {exif_data_new_from_data(reinterpret_cast<const unsigned char*>(bytes.data()),
                                   static_cast<unsigned>(bytes.size())),
@@ -141,6 +140,7 @@ int exif_orientation(const std::filesystem::path& path) {
   if (start.starts_with("II") || start.starts_with("MM")) {
     return parse_image_header(read_file(path), path).orientation;  // TIFF has a tag of its own
   }
+  if (!start.starts_with(kJpegMagic)) return kUpright;
   const Exif exif = read_exif(path);
   if (!exif) return kUpright;
   const double value = number(exif.get(), EXIF_IFD_0, EXIF_TAG_ORIENTATION);

@@ -17,9 +17,9 @@ struct LensHint {
   double zoom = 1;     ///< Times the camera enlarged the picture by itself; `focal` is 0 then.
 };
 
-/// Reads the Exif part of a JPEG, HEIC or AVIF file: focal length from the resolution of the focal
-/// plane, else from the focal length as on 35 mm film. What is damaged or absurd counts as not
-/// said, and so does any where the camera enlarged the picture by itself: programs differ in
+/// Reads the Exif part of an image, as exif_part() finds it: focal length from the resolution of
+/// the focal plane, else from the focal length as on 35 mm film. What is damaged or absurd counts
+/// as not said, and so does any where the camera enlarged the picture by itself: programs differ in
 /// whether they count that in.
 ///
 /// The film equivalent compares diagonals and is rounded to whole millimetres. Where the picture
@@ -31,7 +31,8 @@ LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size);
 
 /// How a photograph lies in its file, as the Exif tag counts: 1 upright, 2 mirrored, 3 upside down,
 /// 4 mirrored and upside down, 5 to 8 with rows and columns exchanged (6 and 8 as phones store
-/// pictures held upright). 1 for what is neither JPEG nor TIFF or says nothing valid.
+/// pictures held upright). 1 for what says nothing valid, and for what is neither JPEG nor
+/// TIFF: HEIC and AVIF were turned by their decoder, and of PNG and WebP most programs turn none.
 /// \throws BadInput as read_file_start(); of a TIFF as parse_image_header()
 /// Source: CIPA DC-008 (Exif 2.32) 4.6.4, Orientation; TIFF 6.0 section 8.
 int exif_orientation(const std::filesystem::path& path);

@@ -7,6 +7,7 @@
 #include <zlib.h>
 
 #include "io/heif.h"
+#include "io/tiff_directory.h"
 
 namespace cgs {
 
@@ -95,87 +96,6 @@ JpegFrame find_jpeg_frame(ByteReader& file) {
 }
 
 // --- TIFF -----------------------------------------------------------------------------------
-
-// The tags of the first directory, of either byte order, classic or BigTIFF.
-class TiffDirectory {
- public:
-  TiffDirectory(std::string_view bytes, const std::filesystem::path& path)
-      : bytes_(bytes), path_(path), is_big_endian_(bytes.starts_with("MM")) {
-    is_big_tiff_ = number(2, 2) == 43;
-    start_ = is_big_tiff_ ? number(8, 8) : number(4, 4);
-    count_ = number(start_, is_big_tiff_ ? 8 : 2);
-    constexpr uint64_t kMaxEntries = 4096;
-    if (count_ > kMaxEntries) fail(Defect::Count, "declares too many tags");
-  }
-
-  std::optional<uint64_t> value(uint64_t tag) const {
-    const auto all = values(tag);
-    return all.empty() ? std::nullopt : std::optional<uint64_t>(all.front());
-  }
-
-  // The whole-number values of a tag; empty if it is absent.
-  std::vector<uint64_t> values(uint64_t tag) const {
-    const auto entry = find(tag);
-    return entry ? entry_values(*entry) : std::vector<uint64_t>();
-  }
-
-  // Where the one 16-bit value of a tag lies in the file; empty if it has none such.
-  std::optional<uint64_t> place_of_short(uint64_t tag) const {
-    const auto entry = find(tag);
-    const uint64_t field = is_big_tiff_ ? 8 : 4;
-    if (!entry || number(*entry + 2, 2) != kShort || number(*entry + 4, field) != 1) return {};
-    return *entry + 4 + field;
-  }
-
-  uint64_t number(uint64_t at, uint64_t width) const {
-    if (at > bytes_.size() || width > bytes_.size() - at) {
-      fail(Defect::Truncated, "byte " + std::to_string(at) + " is past the end");
-    }
-    const std::string_view bytes = bytes_.substr(at, width);
-    if (!is_big_endian_) return little_endian(bytes);
-    if (width <= 4) return big_endian(bytes);
-    return uint64_t{big_endian(bytes.substr(0, 4))} << 32 | big_endian(bytes.substr(4));
-  }
-  bool is_big_endian() const { return is_big_endian_; }
-
-  [[noreturn]] void fail(Defect defect, const std::string& reason) const {
-    throw BadInput(defect, path_, "TIFF directory: " + reason);
-  }
-
- private:
-  static constexpr uint64_t kShort = 3;
-
-  // Where the entry of a tag begins.
-  std::optional<uint64_t> find(uint64_t tag) const {
-    const uint64_t entry_size = is_big_tiff_ ? 20 : 12;
-    for (uint64_t i = 0; i < count_; ++i) {
-      const uint64_t entry = start_ + (is_big_tiff_ ? 8 : 2) + i * entry_size;
-      if (number(entry, 2) == tag) return entry;
-    }
-    return std::nullopt;
-  }
-
-  std::vector<uint64_t> entry_values(uint64_t entry) const {
-    const uint64_t type = number(entry + 2, 2);
-    const uint64_t width = type == kShort ? 2 : type == 4 ? 4 : type == 16 ? 8 : 0;
-    if (width == 0) fail(Defect::Syntax, "a size or position is not a whole number");
-    const uint64_t field = is_big_tiff_ ? 8 : 4;
-    const uint64_t count = number(entry + 4, field);
-    if (count > bytes_.size() / width) fail(Defect::Count, "declares more values than fit");
-    const uint64_t place = entry + 4 + field;
-    const uint64_t first = count * width <= field ? place : number(place, field);
-    std::vector<uint64_t> out(count);
-    for (uint64_t i = 0; i < count; ++i) out[i] = number(first + i * width, width);
-    return out;
-  }
-
-  std::string_view bytes_;
-  const std::filesystem::path& path_;
-  bool is_big_endian_;
-  bool is_big_tiff_ = false;
-  uint64_t start_ = 0;
-  uint64_t count_ = 0;
-};
 
 constexpr uint64_t kTiffWidth = 256;
 constexpr uint64_t kTiffHeight = 257;

@@ -102,6 +102,15 @@ void add_pictures(Kinds& kinds) {
   heic.is_isolated = true;
   kinds.push_back(heic);
   kinds.push_back(of_bytes("tiff", "a.tif", tiff_bytes, read));
+  const auto read_lens = [](const fs::path& file) { return lens_hint(file, {36, 24}); };
+  const auto exif = [] { return exif_tiff({{0x920a, 5, 280}, {0xa405, 3, 28}}, true); };
+  kinds.push_back(of_bytes("exif-of-tiff", "a.tif", exif, read_lens));
+  const auto exif_in_png = [=] {
+    std::string bytes = rgb_png(12, 9);
+    constexpr size_t kEnd = 12;  // the last chunk
+    return bytes.insert(bytes.size() - kEnd, png_chunk("eXIf", exif()));
+  };
+  kinds.push_back(of_bytes("exif-of-png", "a.png", exif_in_png, read_lens));
 }
 
 void add_arrays(Kinds& kinds) {

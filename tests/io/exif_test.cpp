@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/exif_segment.h"
 #include "tests/support/heif_file.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
@@ -13,12 +14,8 @@
 namespace cgs::exif_test {
 namespace {
 
-/// An entry of a TIFF directory with one value, or a rational of value / 10.
-struct Entry {
-  uint16_t tag;
-  uint16_t type;  // 3 = short, 4 = long, 5 = rational
-  uint32_t value;
-};
+using test::exif_tiff;
+using test::ExifEntry;
 
 constexpr uint16_t kFocalLength = 0x920a;
 constexpr uint16_t kFilm = 0xa405;
@@ -28,41 +25,15 @@ constexpr uint16_t kPlaneUnit = 0xa210;
 constexpr uint16_t kPixelX = 0xa002;
 constexpr uint16_t kPixelY = 0xa003;
 
-std::string number(uint32_t value, int bytes, bool is_big) {
-  std::string out;
-  for (int i = 0; i < bytes; ++i) {
-    out += static_cast<char>(value >> (8 * (is_big ? bytes - 1 - i : i)));
-  }
-  return out;
-}
-
 // The Exif segment of a JPEG with the given entries in its Exif directory.
-std::string exif_segment(const std::vector<Entry>& entries, bool is_big) {
-  const auto n16 = [&](uint32_t v) { return number(v, 2, is_big); };
-  const auto n32 = [&](uint32_t v) { return number(v, 4, is_big); };
-  std::string tiff = (is_big ? "MM" : "II") + n16(42) + n32(8);
-  tiff += n16(1) + n16(0x8769) + n16(4) + n32(1) + n32(26) + n32(0);  // where the Exif part is
-  const auto count = static_cast<uint32_t>(entries.size());
-  const uint32_t values = 26 + 2 + 12 * count + 4;
-  std::string data;
-  tiff += n16(count);
-  for (const Entry& entry : entries) {
-    tiff += n16(entry.tag) + n16(entry.type) + n32(1);
-    if (entry.type == 5) {
-      tiff += n32(values + static_cast<uint32_t>(data.size()));
-      data += n32(entry.value) + n32(10);
-    } else {
-      tiff += entry.type == 3 ? n16(entry.value) + n16(0) : n32(entry.value);
-    }
-  }
-  tiff += n32(0) + data;
-  const std::string body = std::string("Exif\0\0", 6) + tiff;
-  return "\xff\xe1" + number(static_cast<uint32_t>(body.size()) + 2, 2, true) + body;
+std::string exif_segment(const std::vector<ExifEntry>& entries, bool is_big) {
+  const std::string body = std::string("Exif\0\0", 6) + exif_tiff(entries, is_big);
+  return "\xff\xe1" + test::exif_number(static_cast<uint32_t>(body.size()) + 2, 2, true) + body;
 }
 
 class ExifFile : public testing::Test {
  protected:
-  LensHint hint(const std::vector<Entry>& entries, const ImageSize& size, bool is_big = false) {
+  LensHint hint(const std::vector<ExifEntry>& entries, const ImageSize& size, bool is_big = false) {
     std::string jpeg = test::jpeg(16, 12);
     jpeg.insert(2, exif_segment(entries, is_big));
     test::write_bytes(dir_ / "photo.jpg", jpeg);
@@ -105,6 +76,55 @@ TEST_F(ExifFile, IsReadFromHeicButForItsOrientation) {
   EXPECT_EQ(lens_hint(dir_ / "b.heic", {3600, 2400}).focal, 0);
 }
 
+TEST_F(ExifFile, IsReadFromPng) {
+  std::string png = test::rgb_png(48, 32);
+  constexpr size_t kEnd = 12;  // the last chunk
+  png.insert(png.size() - kEnd, test::png_chunk("eXIf", exif_tiff({{kFilm, 3, 28}}, true)));
+  test::write_bytes(dir_ / "a.png", png);
+  EXPECT_NO_THROW(read_image(dir_ / "a.png"));
+  EXPECT_NEAR(lens_hint(dir_ / "a.png", {3600, 2400}).focal, 2800, 0.5);
+}
+
+TEST_F(ExifFile, IsReadFromWebpWithAndWithoutTheHeadOfJpeg) {
+  for (const char* head : {"", "Exif"}) {
+    std::string exif = head;
+    if (!exif.empty()) exif += std::string(2, '\0');
+    exif += exif_tiff({{kFilm, 3, 28}}, false);
+    const auto chunk = [](const std::string& name, const std::string& body) {
+      const auto size = static_cast<uint32_t>(body.size());
+      return name + test::exif_number(size, 4, false) + body + std::string(size % 2, '\0');
+    };
+    const std::string chunks = "WEBP" + chunk("VP8 ", "odd") + chunk("EXIF", exif);
+    test::write_bytes(dir_ / "a.webp", chunk("RIFF", chunks));
+    EXPECT_NEAR(lens_hint(dir_ / "a.webp", {3600, 2400}).focal, 2800, 0.5);
+    test::write_bytes(dir_ / "cut.webp", chunk("RIFF", chunks).substr(0, 20 + exif.size()));
+    EXPECT_EQ(lens_hint(dir_ / "cut.webp", {3600, 2400}).focal, 0);
+  }
+}
+
+// Whose directories may stand behind all pixels, farther than Exif may reach.
+TEST_F(ExifFile, IsReadFromTiffWhereverItsDirectoriesLie) {
+  for (const bool is_big : {false, true}) {
+    for (const uint32_t pixels : {0U, 200'000U}) {
+      const std::string tiff = exif_tiff({{kFocalLength, 5, 100},
+                                          {kPixelX, 4, 2000},
+                                          {kPixelY, 4, 1500},
+                                          {kPlaneX, 5, 25400},
+                                          {kPlaneUnit, 3, 2}},
+                                         is_big,
+                                         pixels);
+      test::write_bytes(dir_ / "a.tif", tiff);
+      const LensHint lens = lens_hint(dir_ / "a.tif", {2000, 1500});
+      EXPECT_NEAR(lens.focal, 1000, 1e-6);
+      EXPECT_DOUBLE_EQ(lens.marked, 10);
+      for (size_t cut = 1; cut < tiff.size() - pixels; ++cut) {
+        test::write_bytes(dir_ / "cut.tif", tiff.substr(0, tiff.size() - cut));
+        EXPECT_NO_THROW(lens_hint(dir_ / "cut.tif", {2000, 1500}));
+      }
+    }
+  }
+}
+
 TEST_F(ExifFile, IsLessSureOfPicturesThatWereCut) {
   const LensHint whole = hint({{kFilm, 3, 50}}, {3000, 2000});
   const LensHint wide = hint({{kFilm, 3, 50}}, {3000, 1688});
@@ -117,12 +137,12 @@ TEST_F(ExifFile, IsLessSureOfPicturesThatWereCut) {
 
 TEST_F(ExifFile, PrefersTheResolutionOfTheFocalPlane) {
   // 10 mm at 2540 pixels per inch = 100 per millimetre, halved since.
-  const std::vector<Entry> entries = {{kFocalLength, 5, 100},
-                                      {kPixelX, 4, 2000},
-                                      {kPixelY, 4, 1500},
-                                      {kPlaneX, 5, 25400},
-                                      {kPlaneUnit, 3, 2},
-                                      {kFilm, 3, 90}};
+  const std::vector<ExifEntry> entries = {{kFocalLength, 5, 100},
+                                          {kPixelX, 4, 2000},
+                                          {kPixelY, 4, 1500},
+                                          {kPlaneX, 5, 25400},
+                                          {kPlaneUnit, 3, 2},
+                                          {kFilm, 3, 90}};
   EXPECT_NEAR(hint(entries, {2000, 1500}).focal, 1000, 1e-6);
   EXPECT_NEAR(hint(entries, {1000, 750}).focal, 500, 1e-6);
   EXPECT_NEAR(hint(entries, {1500, 1500}).focal, 1500 * 90 / 25, 300);  // cut: says nothing

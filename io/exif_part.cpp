@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/exif_part.h"
+
+#include <cstdint>
+#include <vector>
+
+#include "io/byte_reader.h"
+#include "io/heif.h"
+#include "io/tiff_directory.h"
+
+namespace cgs {
+
+namespace {
+
+using std::string_view_literals::operator""sv;
+
+constexpr std::string_view kExif = "Exif\0\0"sv;
+constexpr uint64_t kLargest = 65'000;  // what a segment of JPEG holds
+
+std::string with_header(std::string_view tiff) {
+  if (tiff.starts_with(kExif)) tiff.remove_prefix(kExif.size());
+  return std::string(kExif) + std::string(tiff.substr(0, kLargest));
+}
+
+std::string of_png(std::string_view bytes, const std::filesystem::path& path) {
+  ByteReader file(bytes, path);
+  file.take(8, "PNG magic");
+  while (true) {
+    uint32_t length = 0;
+    for (const char c : file.take(4, "PNG chunk length")) {
+      length = length << 8 | static_cast<uint8_t>(c);
+    }
+    const std::string_view name = file.take(4, "PNG chunk");
+    const std::string_view body = file.take(size_t{length}, "PNG chunk");
+    file.take(4, "PNG checksum");
+    if (name == "eXIf") return with_header(body);
+    if (name == "IEND") return "";
+  }
+}
+
+std::string of_webp(std::string_view bytes, const std::filesystem::path& path) {
+  ByteReader file(bytes, path);
+  file.take(12, "WebP header");
+  while (file.offset() < bytes.size()) {
+    const std::string_view name = file.take(4, "WebP chunk");
+    const auto length = file.get<uint32_t>("WebP chunk length");
+    const std::string_view body = file.take(size_t{length} + length % 2, "WebP chunk");
+    if (name == "EXIF") return with_header(body);
+  }
+  return "";
+}
+
+// A TIFF file of one directory and that of its Exif part, in the byte order of another file.
+class SmallTiff {
+ public:
+  explicit SmallTiff(bool is_big_endian) : is_big_endian_(is_big_endian) {}
+
+  std::string bytes(const std::vector<std::pair<uint16_t, TiffField>>& main,
+                    const std::vector<std::pair<uint16_t, TiffField>>& exif) {
+    const size_t exif_start = 8 + size_of(main.size() + 1);
+    values_start_ = exif_start + size_of(exif.size());
+    std::string pointer;
+    append(pointer, exif_start, 4);
+    std::vector<std::pair<uint16_t, TiffField>> first = main;
+    first.push_back({kExifDirectory, {kLong, 1, pointer}});
+    std::string out = is_big_endian_ ? "MM" : "II";
+    append(out, 42, 2);
+    append(out, 8, 4);
+    out += directory(first) + directory(exif);
+    return out + values_;
+  }
+
+  static constexpr uint16_t kExifDirectory = 0x8769;
+
+ private:
+  static constexpr uint16_t kLong = 4;
+  static size_t size_of(size_t entries) { return 2 + 12 * entries + 4; }
+
+  void append(std::string& out, uint64_t value, int width) const {
+    for (int i = 0; i < width; ++i) {
+      const int place = is_big_endian_ ? width - 1 - i : i;
+      out += static_cast<char>(value >> (8 * place));
+    }
+  }
+
+  std::string directory(const std::vector<std::pair<uint16_t, TiffField>>& fields) {
+    std::string out;
+    append(out, fields.size(), 2);
+    for (const auto& [tag, field] : fields) {
+      append(out, tag, 2);
+      append(out, field.type, 2);
+      append(out, field.count, 4);
+      if (field.bytes.size() <= 4) {
+        out += std::string(field.bytes) + std::string(4 - field.bytes.size(), '\0');
+      } else {
+        append(out, values_start_ + values_.size(), 4);
+        values_ += field.bytes;
+      }
+    }
+    append(out, 0, 4);  // no further directory
+    return out;
+  }
+
+  bool is_big_endian_;
+  size_t values_start_ = 0;
+  std::string values_;
+};
+
+std::vector<std::pair<uint16_t, TiffField>> fields_of(const TiffDirectory& directory,
+                                                      std::initializer_list<uint16_t> tags) {
+  constexpr size_t kLongestField = 1024;
+  std::vector<std::pair<uint16_t, TiffField>> out;
+  for (const uint16_t tag : tags) {
+    const auto field = directory.field(tag);
+    const bool fits = field && field->type <= 12 && field->bytes.size() <= kLongestField;
+    if (fits) out.emplace_back(tag, *field);
+  }
+  return out;
+}
+
+// The directories may lie anywhere in the file, far beyond what an Exif part may hold.
+std::string of_tiff(std::string_view bytes, const std::filesystem::path& path) {
+  constexpr uint16_t kMaker = 0x010f;
+  constexpr uint16_t kModel = 0x0110;
+  const TiffDirectory first(bytes, path);
+  const auto exif = first.directory(SmallTiff::kExifDirectory);
+  if (!exif) return "";
+  // Focal length, size as taken, resolution of the focal plane and its unit, zoom, length on film.
+  const auto lens =
+      fields_of(*exif, {0x920a, 0xa002, 0xa003, 0xa20e, 0xa20f, 0xa210, 0xa404, 0xa405});
+  return with_header(
+      SmallTiff(first.is_big_endian()).bytes(fields_of(first, {kMaker, kModel}), lens));
+}
+
+}  // namespace
+
+std::string exif_part(std::string_view bytes, const std::filesystem::path& path) {
+  try {
+    if (bytes.starts_with("\xff\xd8")) return std::string(bytes);
+    if (bytes.starts_with("\x89PNG")) return of_png(bytes, path);
+    if (bytes.starts_with("RIFF") && bytes.substr(0, 12).ends_with("WEBP")) {
+      return of_webp(bytes, path);
+    }
+    if (bytes.starts_with("II") || bytes.starts_with("MM")) return of_tiff(bytes, path);
+    if (is_heif(bytes)) return heif_exif(bytes, path);
+  } catch (const BadInput&) {
+    return "";  // of the picture as a whole its decoder tells
+  }
+  return "";
+}
+
+}  // namespace cgs
