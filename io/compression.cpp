@@ -14,12 +14,18 @@ namespace cgs {
 namespace {
 
 constexpr int kRawWindow = -15;       // zlib's numbers for a stream without header …
+constexpr int kZlibWindow = 15;       // … with its own …
 constexpr int kGzipWindow = 15 + 16;  // … and for gzip
 constexpr uInt kPiece = 1U << 30;     // zlib counts in 32 bits
 
 Bytef* bytes_of(const char* text) {
   // zlib takes its input without const but does not write to it.
   return reinterpret_cast<Bytef*>(const_cast<char*>(text));
+}
+
+int window_of(DeflateWrapping wrapping) {
+  if (wrapping == DeflateWrapping::Gzip) return kGzipWindow;
+  return wrapping == DeflateWrapping::Zlib ? kZlibWindow : kRawWindow;
 }
 
 /// zlib's state and how far it is, released on every way out.
@@ -30,8 +36,7 @@ class Inflater {
            const std::filesystem::path& path,
            std::string_view what)
       : bytes_(bytes), path_(path), what_(what) {
-    const int window = wrapping == DeflateWrapping::Gzip ? kGzipWindow : kRawWindow;
-    if (inflateInit2(&stream_, window) != Z_OK) throw std::bad_alloc();
+    if (inflateInit2(&stream_, window_of(wrapping)) != Z_OK) throw std::bad_alloc();
   }
   ~Inflater() { inflateEnd(&stream_); }
   Inflater(const Inflater&) = delete;

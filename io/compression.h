@@ -9,7 +9,7 @@
 namespace cgs {
 
 /// How a deflate stream is wrapped.
-enum class DeflateWrapping { Gzip, None };
+enum class DeflateWrapping { Gzip, Zlib, None };
 
 /// The content of a deflate stream that must hold exactly `size` bytes.
 /// \param what  names the content in the message

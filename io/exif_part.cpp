@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "io/byte_reader.h"
+#include "io/compression.h"
 #include "io/heif.h"
 #include "io/tiff_directory.h"
 
@@ -22,6 +23,48 @@ std::string with_header(std::string_view tiff) {
   return std::string(kExif) + std::string(tiff.substr(0, kLargest));
 }
 
+int hex_digit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+}
+
+// What a text chunk holds after its keyword where that names a raw profile, as ImageMagick and
+// Exiv2 write Exif: a line break, a name, the number of bytes, and these in hexadecimal, in lines.
+std::string of_raw_profile(std::string_view text) {
+  for (int line = 0; line < 3; ++line) {
+    const size_t end = text.find('\n');
+    if (end == std::string_view::npos) return "";
+    text.remove_prefix(end + 1);
+  }
+  std::string out;
+  int high = -1;
+  for (const char c : text) {
+    const int digit = hex_digit(c);
+    if (digit < 0) continue;
+    if (high >= 0) out += static_cast<char>(16 * high + digit);
+    high = high >= 0 ? -1 : digit;
+  }
+  return out.starts_with(kExif) ? with_header(out) : "";
+}
+
+std::string of_text_chunk(std::string_view name,
+                          std::string_view body,
+                          const std::filesystem::path& path) {
+  // ImageMagick calls so what else stands there, too, as XMP.
+  for (const std::string_view keyword :
+       {"Raw profile type exif\0"sv, "Raw profile type APP1\0"sv}) {
+    if (!body.starts_with(keyword)) continue;
+    body.remove_prefix(keyword.size());
+    if (name == "tEXt") return of_raw_profile(body);
+    if (!body.empty()) body.remove_prefix(1);  // the method: deflate
+    constexpr size_t kLongest = 3 * kLargest;
+    return of_raw_profile(
+        inflate(body, DeflateWrapping::Zlib, SizeRange{0, kLongest}, path, "PNG raw profile"));
+  }
+  return "";
+}
+
 std::string of_png(std::string_view bytes, const std::filesystem::path& path) {
   ByteReader file(bytes, path);
   file.take(8, "PNG magic");
@@ -34,6 +77,10 @@ std::string of_png(std::string_view bytes, const std::filesystem::path& path) {
     const std::string_view body = file.take(size_t{length}, "PNG chunk");
     file.take(4, "PNG checksum");
     if (name == "eXIf") return with_header(body);
+    if (name == "tEXt" || name == "zTXt") {
+      std::string found = of_text_chunk(name, body, path);
+      if (!found.empty()) return found;
+    }
     if (name == "IEND") return "";
   }
 }

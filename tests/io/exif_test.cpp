@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/exif.h"
 
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 
 #include <gtest/gtest.h>
@@ -83,6 +85,29 @@ TEST_F(ExifFile, IsReadFromPng) {
   test::write_bytes(dir_ / "a.png", png);
   EXPECT_NO_THROW(read_image(dir_ / "a.png"));
   EXPECT_NEAR(lens_hint(dir_ / "a.png", {3600, 2400}).focal, 2800, 0.5);
+}
+
+// As Exiv2 writes it, and with it GIMP and darktable.
+TEST_F(ExifFile, IsReadFromRawProfilesOfPng) {
+  const std::string exif = std::string("Exif\0\0", 6) + exif_tiff({{kFilm, 3, 28}}, false);
+  std::string text = "\nexif\n      " + std::to_string(exif.size());
+  for (size_t i = 0; i < exif.size(); ++i) {
+    std::array<char, 3> hex{};
+    std::snprintf(hex.data(), hex.size(), "%02x", static_cast<unsigned char>(exif[i]));
+    text += (i % 36 == 0 ? "\n" : "") + std::string(hex.data());
+  }
+  const std::string keyword = std::string("Raw profile type exif") + '\0';
+  for (const bool is_packed : {false, true}) {
+    std::string png = test::rgb_png(48, 32);
+    constexpr size_t kEnd = 12;  // the last chunk
+    const std::string body = is_packed ? '\0' + test::deflated(text + "\n") : text + "\n";
+    png.insert(png.size() - kEnd, test::png_chunk(is_packed ? "zTXt" : "tEXt", keyword + body));
+    test::write_bytes(dir_ / "a.png", png);
+    EXPECT_NO_THROW(read_image(dir_ / "a.png"));
+    EXPECT_NEAR(lens_hint(dir_ / "a.png", {3600, 2400}).focal, 2800, 0.5);
+    test::write_bytes(dir_ / "cut.png", png.substr(0, png.size() - 40));
+    EXPECT_EQ(lens_hint(dir_ / "cut.png", {3600, 2400}).focal, 0);
+  }
 }
 
 TEST_F(ExifFile, IsReadFromWebpWithAndWithoutTheHeadOfJpeg) {
