@@ -50,6 +50,7 @@ struct Source {
   std::optional<VolumeFile> volume;
   TriangleMesh mesh;
   std::vector<std::string> warnings;  ///< Of reading the mesh.
+  bool has_textures = false;          ///< As MeasurableFile.
   Frame frame;
 };
 
@@ -99,6 +100,7 @@ Source read_source(const std::filesystem::path& path, size_t memory_limit) {
     out.mesh = std::move(file.content.mesh);
     out.frame = file.content.frame;
     out.warnings = std::move(file.warnings);
+    out.has_textures = file.has_textures;
   } else {
     check_size(path, memory_limit);
     out.splats = read_splats(path);
@@ -367,8 +369,10 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
     throw BadInput(
         Defect::Empty, request.input, "has no faces; a point cloud can only be written as .ply");
   }
-  const std::string lost = lost_in_file(request.output, source.mesh);
-  if (!lost.empty()) terminal.say(lost);
+  for (const std::string& lost :
+       {textures_text(source.has_textures), lost_in_file(request.output, source.mesh)}) {
+    if (!lost.empty()) terminal.say(lost);
+  }
   const std::string lost_by_encoding = write_mesh(request, source, source.mesh, report);
   if (!lost_by_encoding.empty()) terminal.say(lost_by_encoding);
   return report;

@@ -125,6 +125,11 @@ std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& 
   return out.empty() ? out : extension + " files hold no " + out + "; .ply and .glb do";
 }
 
+std::string textures_text(bool has_textures) {
+  if (!has_textures) return "";
+  return "textures became colours of vertices: what is finer than the triangles is not kept";
+}
+
 std::string write_mesh_as(const std::filesystem::path& path,
                           const TriangleMesh& mesh,
                           const Frame& frame,

@@ -45,6 +45,10 @@ void require_writable_as(const std::filesystem::path& path, const Frame& frame);
 /// if it does not.
 std::string seams_text(const TriangleMesh& mesh);
 
+/// Says that a mesh from a file with textures has their colours at its vertices only; empty
+/// without.
+std::string textures_text(bool has_textures);
+
 /// What the format of a path has no place for, of what a mesh says, for people; empty if nothing.
 std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& mesh);
 

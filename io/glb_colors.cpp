@@ -133,6 +133,7 @@ std::vector<float> GlbColors::of_vertices(const JsonValue& primitive, const GlbF
   const Texture looked_up = info ? texture(*info) : Texture();
   const ColorImage* picture = info && !faces.texcoords.empty() ? image(looked_up.image) : nullptr;
   if (!is_colored && picture == nullptr) return out;
+  has_textures_ = has_textures_ || picture != nullptr;
   if (out.empty()) out.assign(3 * vertices, 1.0f);
   for (size_t v = 0; v < vertices; ++v) {
     Eigen::Vector3f times = Eigen::Vector3f::Ones();

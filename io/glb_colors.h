@@ -28,6 +28,9 @@ class GlbColors {
   /// \param faces  of the primitive, with the texture coordinates that texcoord_set() names
   std::vector<float> of_vertices(const JsonValue& primitive, const GlbFaces& faces);
 
+  /// True once colours of a texture went to vertices.
+  bool has_textures() const { return has_textures_; }
+
   /// What of it could not be read, one line each.
   const std::vector<std::string>& warnings() const { return warnings_; }
 
@@ -47,6 +50,7 @@ class GlbColors {
   const GlbContainer& file_;
   bool has_tints_;
   std::map<int, ColorImage> images_;  // an empty one could not be read
+  bool has_textures_ = false;
   std::vector<std::string> warnings_;
 };
 

@@ -49,6 +49,7 @@ class SceneReader {
     }
     out_.parsed.warnings.insert(
         out_.parsed.warnings.end(), colors_.warnings().begin(), colors_.warnings().end());
+    out_.parsed.has_textures = colors_.has_textures();
     if (collapsed_ > 0) {
       out_.parsed.warnings.push_back("left out " + std::to_string(collapsed_) +
                                      " faces with two corners in one place");

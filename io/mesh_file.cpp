@@ -64,7 +64,8 @@ MeasurableFile measurable(ParsedMesh parsed,
   placement.frame.validate();
   MeasurableFile out{
       {std::move(parsed.mesh), std::move(parsed.positions), placement.frame, placement.file_origin},
-      std::move(parsed.warnings)};
+      std::move(parsed.warnings),
+      parsed.has_textures};
   out.warnings.insert(out.warnings.end(), placement.warnings.begin(), placement.warnings.end());
   out.content.mesh.vertices.reserve(out.content.points.size());
   for (Eigen::Vector3d& p : out.content.points) {

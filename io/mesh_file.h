@@ -14,6 +14,7 @@ namespace cgs {
 struct MeasurableFile {
   MeasurableMesh content;
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
+  bool has_textures = false;          ///< Whose colours the vertices took.
 };
 
 /// True for the endings that read_mesh_file() takes: .ply, .obj, .stl, .off, .3mf, .glb, in any

@@ -21,6 +21,7 @@ struct ParsedMesh {
   TriangleMesh mesh;                       ///< All but the vertices; sigma in units of the file.
   std::vector<std::string> comments;  ///< Unit and origin, in the words of ply_frame_comments().
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
+  bool has_textures = false;          ///< Whose colours the vertices took.
   int digits = kDoubleDigits;         ///< Binary digits of the coordinates as stored.
 };
 

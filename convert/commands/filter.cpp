@@ -52,8 +52,10 @@ void run_filter_command(const FilterArgs& args) {
   require_writable_as(args.output, state.frame);
   const nlohmann::ordered_json report = run_filters(state, filters, terminal);
   check_content(args.output, state);
-  const std::string lost = lost_in_file(args.output, state.mesh);
-  if (!lost.empty()) terminal.say(lost);
+  for (const std::string& lost :
+       {textures_text(file.has_textures), lost_in_file(args.output, state.mesh)}) {
+    if (!lost.empty()) terminal.say(lost);
+  }
   Frame written = state.frame;
   if (is_turned_upright(args.output)) settle_up(written, {});
   // Nothing is rounded, so that what was certified stays that: cgs convert compresses.

@@ -62,6 +62,7 @@ TEST(GlbColors, VerticesTakeTheColoursOfTexturesAndMaterials) {
   TexturedTriangle t;
   auto colors = t.linear_colors();
   ASSERT_EQ(colors.size(), 3U);
+  EXPECT_TRUE(t.read().parsed.has_textures);
   EXPECT_LT((colors[0] - Eigen::Vector3f(1, 0, 0)).norm(), 1e-5f);
   EXPECT_LT((colors[1] - Eigen::Vector3f(0, 1, 0)).norm(), 1e-5f);
   EXPECT_LT((colors[2] - Eigen::Vector3f(0.5f, 0.5f, 0.5f)).norm(), 1e-5f)
@@ -81,6 +82,7 @@ TEST(GlbColors, TexturesThatCannotBeReadAreTold) {
   t.json["images"][0] = {{"uri", "a.png"}};
   const GlbMesh elsewhere = t.read();
   EXPECT_TRUE(elsewhere.parsed.mesh.colors.empty());
+  EXPECT_FALSE(elsewhere.parsed.has_textures);
   ASSERT_EQ(elsewhere.parsed.warnings.size(), 1U);
   EXPECT_EQ(elsewhere.parsed.warnings[0], "textures in other files are not read");
   t.json["images"][0] = {{"bufferView", 0}};
