@@ -11,6 +11,7 @@
 #include <draco/compression/expert_encode.h>
 #include <draco/mesh/mesh.h>
 
+#include "io/spare_color_bits.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -111,6 +112,18 @@ struct StoredSigma {
   }
 };
 
+/// Colours with zeros where bits say nothing, which the encoder packs to nothing.
+std::vector<Eigen::Vector3f> stored_colors(std::vector<Eigen::Vector3f> colors) {
+  constexpr auto kMost = static_cast<float>((1 << kDracoColorBits) - 1);
+  for (Eigen::Vector3f& color : colors) {
+    for (float& c : color) {
+      const auto place = static_cast<float>(1 << spare_color_bits(c, kDracoColorBits));
+      c = std::min(1.0f, std::round(c * kMost / place) * place / kMost);
+    }
+  }
+  return colors;
+}
+
 std::string encode(const GlbPrimitive& primitive,
                    const DracoGrid& grid,
                    int speed,
@@ -124,7 +137,9 @@ std::string encode(const GlbPrimitive& primitive,
   if (!primitive.texcoords.empty()) {
     ids["TEXCOORD_0"] = input.add(Attribute::TEX_COORD, primitive.texcoords);
   }
-  if (!primitive.colors.empty()) ids["COLOR_0"] = input.add(Attribute::COLOR, primitive.colors);
+  if (!primitive.colors.empty()) {
+    ids["COLOR_0"] = input.add(Attribute::COLOR, stored_colors(primitive.colors));
+  }
   if (!primitive.support.empty())
     ids["_SUPPORT"] = input.add(Attribute::GENERIC, primitive.support);
   const StoredSigma sigma(primitive.sigma);

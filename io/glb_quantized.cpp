@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/spare_color_bits.h"
+
 namespace cgs {
 
 namespace {
@@ -73,7 +75,11 @@ QuantizedPrimitive quantized(const GlbPrimitive& primitive,
     out.max_texture_error = std::max(out.max_texture_error, off.norm());
   }
   for (const Eigen::Vector3f& c : primitive.colors) {
-    const auto part = [&](int k) { return whole(kMost * c[k], kBits - rounding.color_bits); };
+    const auto part = [&](int k) {
+      const bool is_rounded = rounding.color_bits < kBits;
+      const int spare = is_rounded ? spare_color_bits(c[k], rounding.color_bits) : 0;
+      return whole(kMost * c[k], kBits - rounding.color_bits + spare);
+    };
     out.colors.push_back({part(0), part(1), part(2), uint16_t{65535}});
   }
   return out;

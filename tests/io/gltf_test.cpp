@@ -65,9 +65,10 @@ void expect_same(const Glb& glb, const TriangleMesh& mesh, const Frame& frame, d
       nearest.push_back(index);
       EXPECT_EQ(part.values.at("_SUPPORT")[i][0], mesh.support[index]);
       for (int k = 0; k < 3; ++k) {
-        EXPECT_NEAR(part.values.at("COLOR_0")[i][static_cast<size_t>(k)],
-                    linear_from_srgb(mesh.colors[index][k]),
-                    1 / 4094.0);
+        constexpr double kHalfPlaceOf11Bits = 0.81;  // [levels of 255], at black
+        const double linear = part.values.at("COLOR_0")[i][static_cast<size_t>(k)];
+        EXPECT_NEAR(
+            255 * srgb_from_linear(float(linear)), 255 * mesh.colors[index][k], kHalfPlaceOf11Bits);
       }
     }
     std::multiset<std::array<uint32_t, 3>> before;
