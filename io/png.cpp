@@ -90,6 +90,8 @@ bool compress_jpeg(JpegJob& job) {
   jpeg_set_quality(&info, job.quality, TRUE);
   info.comp_info[0].h_samp_factor = 1;
   info.comp_info[0].v_samp_factor = 1;
+  info.optimize_coding = TRUE;
+  jpeg_simple_progression(&info);
   jpeg_start_compress(&info, TRUE);
   while (info.next_scanline < info.image_height) {
     const size_t offset = size_t{info.next_scanline} * static_cast<size_t>(job.width) * 3;
