@@ -98,9 +98,10 @@ constexpr std::string_view kOutOfMemory =
 // crash.
 std::atomic<bool> memory_ran_out = false;
 
-// Calls nothing that may not be called in a signal handler.
+// Calls nothing that may not be called in a signal handler. Libraries in C may use what they were
+// not given (Blosc 1.21 does): errno still tells why.
 void end_at_crash(int signal) {
-  if (memory_ran_out) {
+  if (memory_ran_out || errno == ENOMEM) {
     [[maybe_unused]] const ssize_t ignored =
         ::write(STDERR_FILENO, kOutOfMemory.data(), kOutOfMemory.size());
     std::_Exit(4);

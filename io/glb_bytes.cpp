@@ -21,10 +21,10 @@ void append_chunk(std::string& out, std::string_view type, const std::string& co
 }  // namespace
 
 std::string glb_bytes(std::string json, std::string binary) {
-  constexpr size_t kHeaders = 12 + 8 + 8;
+  const size_t headers = 12 + 8 + (binary.empty() ? 0 : 8);
   json.resize((json.size() + 3) / 4 * 4, ' ');
   binary.resize((binary.size() + 3) / 4 * 4, '\0');
-  const size_t size = kHeaders + json.size() + binary.size();
+  const size_t size = headers + json.size() + binary.size();
   if (size > std::numeric_limits<uint32_t>::max()) {
     throw LimitError("glTF binary files end at 4 GiB");
   }
@@ -33,7 +33,7 @@ std::string glb_bytes(std::string json, std::string binary) {
   append_bytes(out, uint32_t{2});
   append_bytes(out, static_cast<uint32_t>(size));
   append_chunk(out, "JSON", json);
-  append_chunk(out, std::string_view("BIN\0", 4), binary);
+  if (!binary.empty()) append_chunk(out, std::string_view("BIN\0", 4), binary);
   return out;
 }
 
