@@ -96,7 +96,8 @@ Exif read_exif(const std::filesystem::path& path) {
   // A JPEG segment has at most 64 KiB, and Exif is to be among the first.
   constexpr uint64_t kEnough = uint64_t{256} << 10;
   std::string bytes = read_file_start(path, kEnough);
-  if (!bytes.starts_with(kJpegMagic)) bytes = exif_part(read_file(path), path);
+  if (!bytes.starts_with(kJpegMagic)) bytes = read_file(path);
+  bytes = exif_part(bytes, path);
   if (bytes.empty()) return {nullptr, &exif_data_unref};
   return {exif_data_new_from_data(reinterpret_cast<const unsigned char*>(bytes.data()),
                                   static_cast<unsigned>(bytes.size())),
