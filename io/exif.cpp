@@ -11,7 +11,6 @@
 
 #include "io/byte_reader.h"
 #include "io/exif_part.h"
-#include "io/heif.h"
 #include "io/image_header.h"
 
 namespace cgs {
@@ -137,7 +136,6 @@ int exif_orientation(const std::filesystem::path& path) {
   constexpr int kUpright = 1;
   constexpr int kLast = 8;
   const std::string start = read_file_start(path, 16);
-  if (is_heif(start)) return kUpright;  // its decoder has turned it already
   if (start.starts_with("II") || start.starts_with("MM")) {
     return parse_image_header(read_file(path), path).orientation;  // TIFF has a tag of its own
   }
