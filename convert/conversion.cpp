@@ -20,7 +20,6 @@
 #include "convert/splat_selection.h"
 #include "convert/stated_frame.h"
 #include "convert/volume_file.h"
-#include "io/byte_reader.h"
 #include "io/gltf.h"
 #include "io/json_file.h"
 #include "io/mesh_file.h"
@@ -59,10 +58,8 @@ bool holds_mesh(const std::filesystem::path& path) {
   if (!is_mesh_name(path)) return false;
   if (lower_extension(path) == ".glb") return !is_splat_glb(path);
   if (lower_extension(path) != ".ply") return true;
-  const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
-  if (start.substr(0, 3) != "ply") return false;
-  const PlyHeader header = parse_ply_header(start, path);
-  const PlyElement* face = header.find("face");
+  const std::optional<PlyHeader> header = read_ply_header(path);
+  const PlyElement* face = header ? header->find("face") : nullptr;
   return face != nullptr && face->count > 0;
 }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/splat_files.h"
 
+#include <optional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "convert/memory_plan.h"
 #include "convert/splat_loss.h"
-#include "io/byte_reader.h"
 #include "io/compressed_ply.h"
 #include "io/dot_splat.h"
 #include "io/gaussian_ply.h"
@@ -132,10 +132,8 @@ bool is_splat_file(const std::filesystem::path& path) {
   if (is_folder(path)) return false;
   if (lower_extension(path) == ".glb") return is_splat_glb(path);
   if (lower_extension(path) != ".ply") return false;
-  const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
-  if (start.substr(0, 3) != "ply") return false;
-  const PlyHeader header = parse_ply_header(start, path);
-  const PlyElement* vertex = header.find("vertex");
+  const std::optional<PlyHeader> header = read_ply_header(path);
+  const PlyElement* vertex = header ? header->find("vertex") : nullptr;
   if (vertex == nullptr) return false;
   const auto has = [&](const char* name) { return vertex->find(name) >= 0; };
   return has("packed_position") || has("rot_0") || (has("scale_0") && has("f_dc_0"));

@@ -14,7 +14,7 @@
 namespace cgs {
 
 /// True for a PLY file whose vertices have what makes a splat, and for a .glb file of splats.
-/// \throws BadInput as parse_ply_header() and is_splat_glb()
+/// \throws BadInput as read_ply_header() and is_splat_glb()
 bool is_splat_file(const std::filesystem::path& path);
 
 /// True for the endings of formats that hold splats and nothing of the scene that they are in:

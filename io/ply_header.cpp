@@ -210,4 +210,10 @@ PlyHeader parse_ply_header(std::string_view bytes,
   return HeaderParser(bytes, path, limits).parse();
 }
 
+std::optional<PlyHeader> read_ply_header(const std::filesystem::path& path) {
+  const std::string start = read_file_start(path, ReadLimits().max_header_bytes);
+  if (!start.starts_with("ply")) return std::nullopt;
+  return parse_ply_header(start, path);
+}
+
 }  // namespace cgs

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -50,5 +51,9 @@ struct PlyHeader {
 PlyHeader parse_ply_header(std::string_view bytes,
                            const std::filesystem::path& path,
                            const ReadLimits& limits = {});
+
+/// The header of a file, of which no more is read; empty if it does not begin as a PLY file.
+/// \throws as above, and as read_file_start()
+std::optional<PlyHeader> read_ply_header(const std::filesystem::path& path);
 
 }  // namespace cgs
