@@ -20,7 +20,8 @@ std::string encode_png(const ColorImage& image, const MaskMap& shown);
 std::string encode_png(const MaskMap& mask);
 
 /// A JPEG file in memory, for textures and pictures inside HTML: 4:4:4, so that colour edges stay
-/// where they are, and progressive, which is a twelfth smaller for the same pixels. \param quality 1 … 100  \throws InvalidInput
+/// where they are, and progressive, which is a twelfth smaller for the same pixels. \param quality
+/// 1 … 100  \throws InvalidInput
 std::string encode_jpeg(const ColorImage& image, int quality);
 
 /// encode_png() into a file. \throws InvalidInput, IoError
