@@ -13,7 +13,7 @@ double bias_correction(double decay, int64_t steps) {
   return -1 / std::expm1(static_cast<double>(steps) * std::log(decay));
 }
 
-size_t adam_step(ParameterBlock& block, AdamState& state, float rate, float decay) {
+size_t adam_step(ParameterBlock& block, AdamState& state, float rate, float decay, float epsilon) {
   const size_t count = block.value.size();
   std::atomic<size_t> skipped = 0;
   if (rate > 0) {
@@ -22,8 +22,6 @@ size_t adam_step(ParameterBlock& block, AdamState& state, float rate, float deca
     ++state.steps;
     constexpr double kMeanDecay = 0.9;
     constexpr double kSquareDecay = 0.999;
-    // Gradients of a mean over some 10^5 pixels are small: the usual 1e-8 would hold them back.
-    constexpr float kTiny = 1e-12f;
     constexpr float kLargest = 1e15f;
     const auto unbias_mean = static_cast<float>(bias_correction(kMeanDecay, state.steps));
     const auto unbias_square = static_cast<float>(bias_correction(kSquareDecay, state.steps));
@@ -46,7 +44,7 @@ size_t adam_step(ParameterBlock& block, AdamState& state, float rate, float deca
         m = kB1 * m + (1 - kB1) * g;
         s = kB2 * s + (1 - kB2) * g * g;
         block.value[i] *= kept;
-        block.value[i] -= rate * m * unbias_mean / (std::sqrt(s * unbias_square) + kTiny);
+        block.value[i] -= rate * m * unbias_mean / (std::sqrt(s * unbias_square) + epsilon);
       }
       skipped += skipped_here;
     });

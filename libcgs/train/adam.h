@@ -29,9 +29,12 @@ double bias_correction(double decay, int64_t steps);
 /// does not hold the entry back for ever.
 /// \param rate   length of a step where gradients agree; 0 leaves values and state alone
 /// \param decay  values shrink by rate times this share of themselves (AdamW)
+/// \param epsilon  in the unit of the gradient: what is far below it makes no step. Gradients of a
+///        mean over some 10^5 pixels are small: the usual 1e-8 would hold them back
 /// \return number of entries whose gradient was not finite
 /// Source: Kingma and Ba 2015, "Adam", algorithm 1; Loshchilov and Hutter 2019, "Decoupled weight
 ///         decay regularization", algorithm 2.
-size_t adam_step(ParameterBlock& block, AdamState& state, float rate, float decay = 0);
+size_t adam_step(
+    ParameterBlock& block, AdamState& state, float rate, float decay = 0, float epsilon = 1e-12f);
 
 }  // namespace cgs

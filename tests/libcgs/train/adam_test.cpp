@@ -111,18 +111,20 @@ TEST(Adam, AHugeGradientDoesNotFreezeAnEntry) {
 }
 
 TEST(Adam, TakesTheSameStepsForGradientsOfAnyPowerOfTwo) {
-  const auto values_after = [](int power) {
+  const auto values_after = [](int power, float epsilon) {
     ParameterBlock block;
     block.resize(1);
     AdamState state;
     for (int step = 0; step < 20; ++step) {
       block.gradient = {std::ldexp(1.0f + 0.1f * float(step % 3), power)};
-      adam_step(block, state, 0.01f);
+      adam_step(block, state, 0.01f, 0, epsilon);
     }
     return block.value[0];
   };
   for (const int power : {-20, -10, 10, 20}) {
-    EXPECT_NEAR(values_after(power), values_after(0), 1e-6f) << power;
+    // To the bit if epsilon is scaled along; as it is, what is left of it is far below a step.
+    EXPECT_EQ(values_after(power, std::ldexp(1e-3f, power)), values_after(0, 1e-3f)) << power;
+    EXPECT_NEAR(values_after(power, 1e-12f), values_after(0, 1e-12f), 1e-6f) << power;
   }
 }
 
