@@ -84,7 +84,7 @@ std::string simplification_section(const Json& report) {
   html << "<h2>Simplification</h2>\n<p>Largest distance allowed: "
        << unit.length(simplification["max_error"]) << " where there is evidence, "
        << unit.length(simplification["max_error_inferred"])
-       << " where inferred. Distances are measured by samples, both ways.</p>\n<table>\n"
+       << " where inferred. The largest distance is searched, both ways.</p>\n<table>\n"
           "<tr><th>mesh</th><th>faces before</th><th>after</th><th>max, evidence</th>"
           "<th>RMS, evidence</th><th>max, inferred</th><th>area observed before</th>"
           "<th>after</th></tr>\n";

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <memory>
 #include <numbers>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 
@@ -220,18 +221,23 @@ void refuse_for_files(const CLI::App& command, const std::filesystem::path& path
   }
 }
 
-void run_info(const InfoArgs& args) {
-  if (print_file_info(args.scene.path, args.json)) return;
+Json tell_scene(const InfoArgs& args) {
   Terminal terminal(args.json);
   OpenedScene opened = open_scene(args.scene, {}, terminal);
   const Json fit = checked_cameras(opened);
-  const Json info = scene_json(opened, fit);
+  Json info = scene_json(opened, fit);
   if (args.json) {
     std::cout << json_text(info) << "\n";
   } else {
     print_scene(info);
   }
-  if (args.strict && !info["warnings"].empty()) {
+  return info;
+}
+
+void run_info(const InfoArgs& args) {
+  const std::optional<Json> file = print_file_info(args.scene.path, args.json);
+  const Json info = file ? *file : tell_scene(args);
+  if (args.strict && info.contains("warnings") && !info["warnings"].empty()) {
     throw BadInput(Defect::Value, args.scene.path, "--strict: a warning counts as an error");
   }
 }
@@ -254,7 +260,7 @@ void add_info(CLI::App& app) {
   add_scene_options(*cmd, args->scene.options);
   add_camera_options(*cmd, args->scene);
   cmd->add_flag("--json", args->json, "Print JSON on standard output");
-  cmd->add_flag("--strict", args->strict, "A warning of a scene ends the command with exit code 3");
+  cmd->add_flag("--strict", args->strict, "A warning ends the command with exit code 3");
   cmd->footer(
       "Example: cgs info photos/portal --views 1,10,19\n"
       "         cgs info part.stl");

@@ -5,10 +5,8 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
-#include <optional>
 #include <string>
 
-#include <nlohmann/json.hpp>
 #include <openvdb/tools/Count.h>
 
 #include "convert/frame_json.h"
@@ -35,12 +33,13 @@ using Json = nlohmann::ordered_json;
 Json vec3d_to_json(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 
 template <typename Print>
-void print_info(const Json& info, bool as_json, Print print) {
+Json print_info(Json info, bool as_json, Print print) {
   if (as_json) {
     std::cout << json_text(info) << "\n";
   } else {
     print(info);
   }
+  return info;
 }
 
 // --- meshes and splats ----------------------------------------------------------------------
@@ -116,7 +115,7 @@ void print_splats(const Json& info) {
   print_warnings(info);
 }
 
-void tell_mesh(const fs::path& path, bool as_json) {
+Json tell_mesh(const fs::path& path, bool as_json) {
   MeasurableFile file = read_mesh_file(path);
   const TriangleMesh& mesh = file.content.mesh;
   Certificate certificate;
@@ -127,12 +126,12 @@ void tell_mesh(const fs::path& path, bool as_json) {
     const std::string seams = certificate.closed ? "" : seams_text(mesh);
     if (!seams.empty()) file.warnings.push_back(seams);
   }
-  print_info(
+  return print_info(
       mesh_json(file, proved), as_json, [&](const Json& info) { print_mesh(info, certificate); });
 }
 
-void tell_splats(const fs::path& path, bool as_json) {
-  print_info(splat_file_to_json(read_splats(path)), as_json, print_splats);
+Json tell_splats(const fs::path& path, bool as_json) {
+  return print_info(splat_file_to_json(read_splats(path)), as_json, print_splats);
 }
 
 // --- volumes --------------------------------------------------------------------------------
@@ -303,16 +302,14 @@ void print_run(const Json& info) {
 // Files that no mesh reader takes, and those of its kinds that hold splats.
 bool holds_splats(const fs::path& path) { return !is_mesh_name(path) || is_splat_file(path); }
 
-bool print_folder_info(const fs::path& folder, bool as_json) {
+std::optional<Json> tell_folder(const fs::path& folder, bool as_json) {
   const fs::path path = folder / "run.json";
   const Json record = is_present(path) ? read_run_record(path) : Json();
-  if (!record.is_null()) {
-    print_info(run_json(record, path), as_json, print_run);
-    return true;
+  if (!record.is_null()) return print_info(run_json(record, path), as_json, print_run);
+  if (is_present(folder / "gaussians.ply") && is_present(folder / "cameras.json")) {
+    return tell_splats(folder / "gaussians.ply", as_json);
   }
-  if (!is_present(folder / "gaussians.ply") || !is_present(folder / "cameras.json")) return false;
-  tell_splats(folder / "gaussians.ply", as_json);
-  return true;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -323,27 +320,21 @@ void print_warnings(const Json& info) {
   }
 }
 
-bool print_file_info(const fs::path& path, bool as_json) {
+std::optional<Json> print_file_info(const fs::path& path, bool as_json) {
   std::error_code none;
-  if (fs::is_directory(path, none)) return print_folder_info(path, as_json);
+  if (fs::is_directory(path, none)) return tell_folder(path, as_json);
   const std::string extension = lower_extension(path);
-  if (extension == ".vdb") {
-    print_info(volume_json(path), as_json, print_volume);
-  } else if (extension == ".exr") {
-    print_info(raster_json(read_exr(path)), as_json, print_raster);
-  } else if (fs::is_regular_file(path, none) && has_image_extension(path)) {
+  if (extension == ".vdb") return print_info(volume_json(path), as_json, print_volume);
+  if (extension == ".exr") return print_info(raster_json(read_exr(path)), as_json, print_raster);
+  if (fs::is_regular_file(path, none) && has_image_extension(path)) {
     throw BadInput(Defect::Unsupported,
                    path,
                    "is one picture; give the folder of the photographs, or a file of splats, a "
                    "mesh or a volume");
-  } else if (fs::is_regular_file(path, none) && holds_splats(path)) {
-    tell_splats(path, as_json);
-  } else if (is_mesh_name(path)) {
-    tell_mesh(path, as_json);
-  } else {
-    return false;
   }
-  return true;
+  if (fs::is_regular_file(path, none) && holds_splats(path)) return tell_splats(path, as_json);
+  if (is_mesh_name(path)) return tell_mesh(path, as_json);
+  return std::nullopt;
 }
 
 }  // namespace cgs

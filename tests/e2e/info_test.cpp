@@ -124,6 +124,24 @@ TEST(Info, AReportThatIsNotTakenWholeIsAnError) {
   }
 }
 
+TEST(Info, StrictTakesAWarningOfAFileForAnError) {
+  const TempDir dir;
+  const std::string triangle =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  test::write_bytes(dir / "a.ply", triangle);
+  test::write_bytes(dir / "b.ply", triangle + "3 0 1 2\n");
+  for (const std::string json : {"", " --json"}) {
+    const std::string strict = json + " --strict";
+    EXPECT_EQ(run_cgs("info " + (dir / "a.ply").string() + strict).exit_code, 0);
+    EXPECT_EQ(run_cgs("info " + (dir / "b.ply").string() + json).exit_code, 0);
+    const auto refused = run_cgs("info " + (dir / "b.ply").string() + strict);
+    EXPECT_EQ(refused.exit_code, 3);
+    EXPECT_NE(refused.err.find("--strict: a warning counts as an error"), std::string::npos);
+  }
+}
+
 TEST(Info, RefusesOptionsOfScenes) {
   const TempDir dir;
   test::write_bytes(dir / "a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
