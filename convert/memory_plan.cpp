@@ -81,6 +81,23 @@ double of_networks(const CoherenceOptions& coherence, size_t views, double pixel
   return of_one(widths.depth) + of_one(widths.opacity);
 }
 
+// Refuses if the stage that most_at(1) names needs more than the budget, and says how much smaller
+// pictures must be: most_at(n) is for pictures whose sides are an n-th.
+template <typename MostAt>
+void refuse_above(size_t budget, MostAt most_at) {
+  constexpr int kMostDownscale = 32;  // beyond, nothing can be made out in a photograph
+  const StageMemory most = most_at(1);
+  if (most.bytes <= budget) return;
+  int factor = 2;
+  while (factor <= kMostDownscale && most_at(factor).bytes > budget) ++factor;
+  const std::string fits = factor <= kMostDownscale
+                               ? "a --downscale " + std::to_string(factor) +
+                                     " times as large or fewer --views make it fit, a "
+                               : "no --downscale makes it fit, only a ";
+  throw LimitError("'" + most.stage + "' needs about " + mebibytes(most.bytes) + " and " +
+                   mebibytes(budget) + " may be used; " + fits + "larger --memory-limit allows it");
+}
+
 }  // namespace
 
 std::vector<StageMemory> memory_plan(const Scene& scene,
@@ -141,22 +158,16 @@ void check_memory_plan(const Scene& scene,
                        size_t budget,
                        const CoherenceOptions& coherence,
                        int downscale) {
-  constexpr int kMostDownscale = 32;  // beyond, nothing can be made out in a photograph
-  const auto largest = [&](int factor) {
+  refuse_above(budget, [&](int factor) {
     const auto plan = memory_plan(scene, chooses_voxels, measured, coherence, factor * downscale);
     return *std::max_element(
         plan.begin(), plan.end(), [](const auto& a, const auto& b) { return a.bytes < b.bytes; });
-  };
-  const StageMemory most = largest(1);
-  if (most.bytes <= budget) return;
-  int factor = 2;
-  while (factor <= kMostDownscale && largest(factor).bytes > budget) ++factor;
-  const std::string fits = factor <= kMostDownscale
-                               ? "a --downscale " + std::to_string(factor) +
-                                     " times as large or fewer --views make it fit, a "
-                               : "no --downscale makes it fit, only a ";
-  throw LimitError("'" + most.stage + "' needs about " + mebibytes(most.bytes) + " and " +
-                   mebibytes(budget) + " may be used; " + fits + "larger --memory-limit allows it");
+  });
+}
+
+void check_training_memory(const Scene& scene, size_t budget, const CoherenceOptions& coherence) {
+  refuse_above(
+      budget, [&](int factor) { return memory_plan(scene, false, {}, coherence, factor).front(); });
 }
 
 std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {

@@ -56,6 +56,9 @@ void check_memory_plan(const Scene& scene,
                        const CoherenceOptions& coherence = {},
                        int downscale = 1);
 
+/// The same for the training alone, the first stage. \throws LimitError
+void check_training_memory(const Scene& scene, size_t budget, const CoherenceOptions& coherence);
+
 /// What `convert` makes of splats that came without cameras.
 struct SplatWork {
   uint64_t splats = 0;

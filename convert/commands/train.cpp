@@ -7,6 +7,7 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/marker_bars.h"
+#include "convert/memory_plan.h"
 #include "convert/model.h"
 #include "convert/model_training.h"
 #include "convert/scene_request.h"
@@ -62,6 +63,8 @@ void run_train(const TrainArgs& args) {
                                 !args.overwrite};
   Terminal terminal(args.common.quiet, args.common.strict);
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
+  check_training_memory(
+      opened.scene, memory_budget(stated_memory_limit(args.common)), request.training.coherence);
   (void)check_stated_cameras(opened, terminal);
   const NewFolder folder(args.output);
   const FolderLock lock(args.output);
@@ -115,7 +118,7 @@ void add_train(CLI::App& app) {
   add_scale_options(*cmd, args->scene);
   add_training_options(*cmd, args->training);
   cmd->add_flag("-w,--overwrite", args->overwrite, "Replace a finished model");
-  add_output_options(*cmd, args->common);
+  add_common_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs train photos/portal --views 1,10,19 --preset draft -o out/model\n"
       "Interrupted, it goes on where it was when it is run again.");

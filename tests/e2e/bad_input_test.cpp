@@ -268,6 +268,10 @@ TEST(Output, AModelIsReplacedOnlyWhenAskedForAndFramesOfOthersNever) {
   write_scene(dir);
   const std::string model = (dir / "model").string();
   const std::string train = "train " + (dir / "scene").string() + " -q --set steps=0 -o ";
+  const ProgramResult too_small = run_cgs(train + model + " --memory-limit 50M");
+  EXPECT_EQ(too_small.exit_code, 4);
+  EXPECT_NE(too_small.err.find("'depth and Gaussians' needs about"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(model));
   EXPECT_EQ(run_cgs(train + model).exit_code, 0);
   const ProgramResult again = run_cgs(train + model);
   EXPECT_EQ(again.exit_code, 2);
