@@ -90,6 +90,11 @@ void catch_interrupts() {
   (void)std::signal(SIGPIPE, SIG_IGN);
 }
 
+void let_interrupts_end() {
+  (void)std::signal(SIGINT, SIG_DFL);
+  (void)std::signal(SIGTERM, SIG_DFL);
+}
+
 int interrupt_exit_code() { return interrupt_signal == SIGTERM ? 143 : 130; }
 
 size_t peak_memory() {

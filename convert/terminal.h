@@ -44,6 +44,8 @@ class Terminal {
 /// From now on SIGINT and SIGTERM make the next progress report throw Cancelled; a second signal
 /// ends the program at once. \return nothing; the exit code is 130 or 143.
 void catch_interrupts();
+/// Undoes it: for commands that write nothing before their end and report no progress.
+void let_interrupts_end();
 /// 130 after SIGINT, 143 after SIGTERM.
 int interrupt_exit_code();
 

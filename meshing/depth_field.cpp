@@ -72,7 +72,7 @@ float middle_value(std::vector<float>& values) {
 }
 
 // Standard deviation of the pixel noise relative to depth, from the median second difference
-// along rows, which is blind to slopes and to the few pixels at edges.
+// along rows, which is blind to slopes and to the few pixels at edges; background has none.
 // \param padded  with a margin of one pixel
 float relative_noise(const Raster<float>& padded, int width, int height) {
   std::vector<float> bends(size_t(width) * size_t(height));
@@ -82,7 +82,8 @@ float relative_noise(const Raster<float>& padded, int width, int height) {
       const auto at = [&](int k) { return load<Floats>(&padded(x + k, y)); };
       const Floats d = at(1);
       const Floats bend = magnitude(at(0) - 2 * d + at(2)) / d;
-      for (unsigned left = bits(bend - bend == 0.0f); left != 0; left &= left - 1) {
+      for (unsigned left = bits((bend - bend == 0.0f) & (d < kBackground)); left != 0;
+           left &= left - 1) {
         bends[count++] = bend[std::countr_zero(left)];
       }
     }

@@ -18,6 +18,17 @@ namespace cgs {
 
 namespace edge_collapse {
 
+namespace {
+
+// One more face at an edge.
+void join(EdgeNeighbor& at, const EdgeNeighbor& one) {
+  ++at.faces;
+  at.winding += one.winding;
+  if (at.faces == 2) at.border = at.label != one.label;
+}
+
+}  // namespace
+
 Collapser::Collapser(const TriangleMesh& mesh, const CollapseLimits& limits)
     : original_(mesh), limits_(limits), mesh_(mesh) {
   assert(limits.tolerance.size() == mesh.vertices.size());
@@ -72,6 +83,8 @@ void Collapser::index_faces() {
 
 void Collapser::neighbors_of(uint32_t v, std::vector<EdgeNeighbor>& out) const {
   out.clear();
+  constexpr uint32_t kMany = 64;  // faces: searching among them costs more than sorting
+  const bool many = first_[v + 1] - first_[v] > kMany;
   for (uint32_t i = first_[v]; i < first_[v + 1]; ++i) {
     const uint32_t f = around_[i];
     if (is_dead(f)) continue;
@@ -80,16 +93,27 @@ void Collapser::neighbors_of(uint32_t v, std::vector<EdgeNeighbor>& out) const {
     const int k = face[0] == v ? 0 : face[1] == v ? 1 : 2;
     for (const int turn : {1, 2}) {
       const uint32_t w = face[size_t((k + turn) % 3)];
-      auto at = std::find_if(out.begin(), out.end(), [w](const auto& n) { return n.vertex == w; });
+      const EdgeNeighbor one{w, 1, turn == 1 ? 1 : -1, true, label};
+      auto at = out.end();
+      if (!many) at = std::find_if(out.begin(), out.end(), [w](auto& n) { return n.vertex == w; });
       if (at == out.end()) {
-        out.push_back({w, 0, 0, true, label});
-        at = out.end() - 1;
+        out.push_back(one);
+      } else {
+        join(*at, one);
       }
-      ++at->faces;
-      at->winding += turn == 1 ? 1 : -1;
-      if (at->faces == 2) at->border = at->label != label;
     }
   }
+  if (!many) return;
+  std::stable_sort(out.begin(), out.end(), [](auto& a, auto& b) { return a.vertex < b.vertex; });
+  size_t kept = 0;
+  for (size_t i = 1; i < out.size(); ++i) {
+    if (out[i].vertex == out[kept].vertex) {
+      join(out[kept], out[i]);
+    } else {
+      out[++kept] = out[i];
+    }
+  }
+  if (!out.empty()) out.resize(kept + 1);
 }
 
 // Walks from face to face over shared edges; all faces around the vertex must be met.

@@ -9,16 +9,27 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"
+#include "meshing/measured_value.h"
 
 namespace cgs {
 
 namespace {
+
+constexpr size_t kFewest = 100;
+constexpr double kReach = 4.6851;  // widths of Tukey's weights: 95 % efficient for normal errors
+
+// What was invented of a surface says nothing of where it lies, unless all of it was.
+bool leaves_out_unseen(const MeasurableMesh& mesh) {
+  const auto& labels = mesh.mesh.provenance;
+  return mesh.states_provenance() && std::any_of(labels.begin(), labels.end(), was_seen);
+}
 
 // A point after the motion so far, and the plane it is drawn to.
 struct Pair {
   Eigen::Vector3d place;
   Eigen::Vector3d normal;
   double distance = 0;  // along the normal, from the plane to the place
+  bool counts = true;
 };
 
 std::vector<Pair> pairs(const std::vector<Eigen::Vector3d>& points,
@@ -26,16 +37,26 @@ std::vector<Pair> pairs(const std::vector<Eigen::Vector3d>& points,
                         const MeasurableMesh& mesh,
                         const NearestSurface& surface) {
   std::vector<Pair> out(points.size());
+  const bool only_seen = leaves_out_unseen(mesh);
   tbb::parallel_for(size_t(0), points.size(), [&](size_t i) {
     out[i].place = motion.apply(points[i]);
     const SurfacePoint nearest = surface.nearest(out[i].place);
-    out[i].normal = evidence_at(mesh, nearest).normal;
+    const SurfaceEvidence evidence = evidence_at(mesh, nearest);
+    out[i].normal = evidence.normal;
+    out[i].counts = !only_seen || was_seen(evidence.provenance);
     // Where an edge is nearest (a rim, a corner) the way to it is the better direction.
     const Eigen::Vector3d offset = out[i].place - nearest.position;
     if (nearest.weights.minCoeff() == 0 && offset.norm() > 1e-12)
       out[i].normal = offset.normalized();
     out[i].distance = offset.dot(out[i].normal);
   });
+  out.erase(std::remove_if(out.begin(), out.end(), [](const Pair& p) { return !p.counts; }),
+            out.end());
+  if (out.size() < kFewest) {
+    throw NumericalError(
+        "the surfaces hardly meet where both were seen; lay them onto each other "
+        "first, and compare without --icp");
+  }
   return out;
 }
 
@@ -49,7 +70,6 @@ double robust_width(const std::vector<Pair>& all) {
 }
 
 double tukey_weight(double distance, double width) {
-  constexpr double kReach = 4.6851;  // 95 % efficient for normal errors
   const double u = distance / (kReach * width);
   return std::abs(u) >= 1 ? 0 : (1 - u * u) * (1 - u * u);
 }
@@ -59,7 +79,7 @@ struct Used {
   double share = 0;
 };
 
-Used used(const std::vector<Pair>& all, double width) {
+Used used(const std::vector<Pair>& all, double width, size_t points) {
   Used out;
   double squares = 0;
   size_t count = 0;
@@ -69,7 +89,7 @@ Used used(const std::vector<Pair>& all, double width) {
     ++count;
   }
   out.rms = count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0;
-  out.share = static_cast<double>(count) / static_cast<double>(all.size());
+  out.share = static_cast<double>(count) / static_cast<double>(points);
   return out;
 }
 
@@ -132,7 +152,6 @@ Registration register_points(const std::vector<Eigen::Vector3d>& points,
                              const MeasurableMesh& mesh,
                              const NearestSurface& surface,
                              bool with_scale) {
-  constexpr size_t kFewest = 100;
   require(points.size() >= kFewest, "a registration needs points, their number", points.size());
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& p : points) box.extend(p);
@@ -143,7 +162,7 @@ Registration register_points(const std::vector<Eigen::Vector3d>& points,
   for (; out.iterations < kMostIterations; ++out.iterations) {
     const auto all = pairs(points, out, mesh, surface);
     const double width = robust_width(all);
-    const Used now = used(all, width);
+    const Used now = used(all, width, points.size());
     if (out.iterations == 0) out.rms_before = now.rms;
     const Eigen::Vector3d center = out.apply(box.center());
     const Vector7 by = step(all, width, center, radius, with_scale);
@@ -151,10 +170,11 @@ Registration register_points(const std::vector<Eigen::Vector3d>& points,
     move(out, by, center);
     const double largest =
         std::max({by.head<3>().norm(), by.segment<3>(3).norm() / radius, std::abs(by[6])});
-    if (largest < kStill) break;
+    out.converged = largest < kStill;
+    if (out.converged) break;
   }
   const auto all = pairs(points, out, mesh, surface);
-  const Used end = used(all, robust_width(all));
+  const Used end = used(all, robust_width(all), points.size());
   out.rms_after = end.rms;
   out.share = end.share;
   return out;

@@ -17,6 +17,7 @@ struct Registration {
   double rms_after = 0;
   double share = 0;  ///< Of the points that take part at the end.
   int iterations = 0;
+  bool converged = false;  ///< False if it still moved at the end.
 
   Eigen::Vector3d apply(const Eigen::Vector3d& p) const {
     return scale * (rotation * p) + translation;
@@ -26,8 +27,8 @@ struct Registration {
 /// Lays points onto a surface from where they are (iterative closest points, point to plane).
 ///
 /// Robust: distances count by Tukey's weights, whose width follows the median of the distances, so
-/// that what really changed pulls little. What has no counterpart within three times that width
-/// takes no part.
+/// that what really changed pulls little. What has no counterpart within 4.7 times that width takes
+/// no part, nor does surface that the mesh says nobody saw (unless that is all of it).
 /// \throws InvalidInput for fewer than 100 points; NumericalError if the surface does not hold them
 ///         (a plane lets them slide)
 /// Source: Chen and Medioni 1992, "Object modelling by registration of multiple range images".

@@ -213,24 +213,46 @@ struct Uncertainty {
   SigmaSum areas;
 };
 
-// Adds a line's share to sigma of length and area, and to the stated length.
-void add_uncertainty(const Cut& cut, const Chain& chain, int side, Uncertainty& sum) {
-  const auto& [mesh, plane, crossings] = cut;
-  const size_t count = chain.faces.size();
-  for (size_t i = 0; i < count; ++i) {
+// A cut through a face: from one of its edges to another.
+struct Piece {
+  uint32_t face = 0;
+  double sigma = 0;  // of its ends, across the surface
+  Eigen::Vector2d along;
+};
+
+// The pieces of a line but for those without length, which a plane through a vertex leaves: their
+// direction means nothing.
+std::vector<Piece> pieces_of(const Crossings& crossings, const Chain& chain) {
+  constexpr double kNoLength = 1e-12;  // of the line's extent
+  Eigen::AlignedBox2d box;
+  for (const auto node : chain.nodes) box.extend(crossings.nodes[node].place);
+  std::vector<Piece> out;
+  for (size_t i = 0; i < chain.faces.size(); ++i) {
     const auto& a = crossings.nodes[chain.nodes[i]];
     const auto& b = crossings.nodes[chain.nodes[(i + 1) % chain.nodes.size()]];
     const Eigen::Vector2d along = b.place - a.place;
-    const double sigma = (a.sigma + b.sigma) / 2 * shift_in_plane(mesh, plane, chain.faces[i]);
+    if (along.norm() <= kNoLength * box.diagonal().norm()) continue;
+    out.push_back({chain.faces[i], (a.sigma + b.sigma) / 2, along});
+  }
+  return out;
+}
+
+// Adds a line's share to sigma of length and area, and to the stated length. Where all surface
+// moves outwards, an outline grows and a hole in it shrinks: the area gains by both.
+void add_uncertainty(const Cut& cut, const Chain& chain, bool bounds_area, Uncertainty& sum) {
+  const auto& [mesh, plane, crossings] = cut;
+  const std::vector<Piece> pieces = pieces_of(crossings, chain);
+  for (size_t i = 0; i < pieces.size(); ++i) {
+    const auto& [face, sigma_across, along] = pieces[i];
+    const double sigma = sigma_across * shift_in_plane(mesh, plane, face);
     const bool invented =
-        mesh.states_provenance() && mesh.mesh.provenance[chain.faces[i]] == Provenance::Inferred;
+        mesh.states_provenance() && mesh.mesh.provenance[face] == Provenance::Inferred;
     if (!std::isfinite(sigma) || invented) continue;
     sum.stated_length += along.norm();
-    if (side != 0) sum.areas.add(side * sigma * along.norm());
-    if (i + 1 == count && !chain.closed) continue;
-    const auto& c = crossings.nodes[chain.nodes[(i + 2) % chain.nodes.size()]];
+    if (bounds_area) sum.areas.add(sigma * along.norm());
+    if (i + 1 == pieces.size() && !chain.closed) continue;
     const Eigen::Vector2d before = along.stableNormalized();
-    const Eigen::Vector2d after = (c.place - b.place).stableNormalized();
+    const Eigen::Vector2d after = pieces[(i + 1) % pieces.size()].along.stableNormalized();
     const Eigen::Vector2d middle = (before + after).stableNormalized();
     const Eigen::Vector2d outwards(middle.y(), -middle.x());
     sum.lengths.add(sigma * (before - after).dot(outwards));
@@ -282,7 +304,7 @@ Section section(const MeasurableMesh& mesh, const CutPlane& plane) {
     // Material lies to the left of lines, as it lies behind faces for the volume.
     const double area = out.lines[i].closed ? signed_area(out.lines[i]) : 0;
     out.area.value += area;
-    add_uncertainty({mesh, plane, crossings}, *kept[i], area < 0 ? -1 : area > 0 ? 1 : 0, sum);
+    add_uncertainty({mesh, plane, crossings}, *kept[i], area != 0, sum);
   }
   out.area.value = std::abs(out.area.value);  // faces may all look inward
   out.length.stated = sum.stated_length / (out.length.value > 0 ? out.length.value : 1);

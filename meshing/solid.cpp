@@ -83,26 +83,35 @@ class Parts {
     const uint8_t mark = flip ? 2 : 1;
     const std::array<size_t, 3> strides = {
         size_t(solid_.size[1]) * size_t(solid_.size[2]), size_t(solid_.size[2]), 1};
+    const size_t row = strides[1];
+    const auto is_new = [&](size_t at) { return seen_[at] != mark && solid_.inside[at] == sign; };
+    const auto push_runs = [&](size_t begin, size_t end) {
+      for (size_t at = begin; at < end; ++at) {
+        if (is_new(at) && (at == begin || !is_new(at - 1))) stack_.push_back(at);
+      }
+    };
     Part out{seed, 0, false};
     stack_.assign(1, seed);
-    seen_[seed] = mark;
-    while (!stack_.empty()) {
-      const size_t at = stack_.back();
+    while (!stack_.empty()) {  // a run of voxels along z at a time: the stack stays small
+      size_t begin = stack_.back();
       stack_.pop_back();
-      ++out.size;
-      out.is_observed = out.is_observed || solid_.evidence[at] != 0;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const size_t stride = strides.at(axis);
-        const size_t place = at / stride % size_t(solid_.size.at(axis));
-        const auto visit = [&](size_t next) {
-          if (seen_[next] == mark || solid_.inside[next] != sign) return;
-          seen_[next] = mark;
-          stack_.push_back(next);
-        };
-        if (place > 0) visit(at - stride);
-        if (place + 1 < size_t(solid_.size.at(axis))) visit(at + stride);
+      if (!is_new(begin)) continue;
+      const size_t row_begin = begin - begin % row;
+      size_t end = begin + 1;
+      while (begin > row_begin && is_new(begin - 1)) --begin;
+      while (end < row_begin + row && is_new(end)) ++end;
+      for (size_t at = begin; at < end; ++at) {
+        seen_[at] = mark;
+        out.is_observed = out.is_observed || solid_.evidence[at] != 0;
+        if (flip) solid_.inside[at] = sign == 0 ? 1 : 0;
       }
-      if (flip) solid_.inside[at] = sign == 0 ? 1 : 0;
+      out.size += end - begin;
+      for (size_t axis = 0; axis < 2; ++axis) {
+        const size_t stride = strides.at(axis);
+        const size_t place = begin / stride % size_t(solid_.size.at(axis));
+        if (place > 0) push_runs(begin - stride, end - stride);
+        if (place + 1 < size_t(solid_.size.at(axis))) push_runs(begin + stride, end + stride);
+      }
     }
     return out;
   }

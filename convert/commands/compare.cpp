@@ -65,12 +65,27 @@ std::string title_of(const CompareArgs& args) {
   return printable(args.a.filename()) + " against " + printable(args.b.filename());
 }
 
+// Places that somebody saw; all of a surface that nobody saw.
+std::vector<Eigen::Vector3d> seen_places(ComparedPoints points) {
+  std::vector<Eigen::Vector3d> out;
+  for (size_t i = 0; i < points.places.size(); ++i) {
+    if (points.observed[i] != 0) out.push_back(points.places[i]);
+  }
+  return out.empty() ? std::move(points.places) : out;
+}
+
 Registration lay_onto(MeasurableMesh& a,
                       const MeasurableMesh& b,
                       const NearestSurface& surface,
-                      bool with_scale) {
+                      bool with_scale,
+                      const Terminal& terminal) {
   constexpr size_t kPoints = 20'000;
-  Registration out = register_points(points_by_area(a, kPoints).places, b, surface, with_scale);
+  const Registration out =
+      register_points(seen_places(points_by_area(a, kPoints)), b, surface, with_scale);
+  if (!out.converged) {
+    terminal.warn({"--icp still moved A after " + std::to_string(out.iterations) +
+                   " iterations: the surfaces hold each other badly"});
+  }
   a = moved(a, out);
   return out;
 }
@@ -97,14 +112,15 @@ void print_text(const CompareArgs& args, const Comparison& comparison, const Fig
 void print_m3c2(const CompareArgs& args,
                 MeasurableMesh a,
                 const MeasurableMesh& b,
-                const FigureUnit& unit) {
+                const FigureUnit& unit,
+                const Terminal& terminal) {
   std::optional<Registration> registration;
   if (args.icp) {
     if (b.mesh.faces.empty()) {
       throw InvalidInput("--icp needs a surface to lay A onto, but " + printable(args.b) +
                          " is a point cloud");
     }
-    registration = lay_onto(a, b, NearestSurface(b), args.scale);
+    registration = lay_onto(a, b, NearestSurface(b), args.scale, terminal);
   }
   M3c2Comparison found = compare_m3c2(args.m3c2, a, b);
   found.comparison.registration = registration;
@@ -128,6 +144,7 @@ void check_units(const CompareArgs& args, const Frame& a, const Frame& b) {
 }
 
 void run_compare(const CompareArgs& args) {
+  let_interrupts_end();
   limit_threads(args.common.threads);
   for (const auto& output : {args.ply, args.svg}) {
     for (const auto& input : {args.a, args.b}) {
@@ -156,9 +173,9 @@ void run_compare(const CompareArgs& args) {
   const MeasurableMesh b = in_frame_of(second.content, a.frame);
   const FigureUnit unit = figure_unit(a.frame, args.unit);
   Comparison comparison;
-  if (args.m3c2.wanted) return print_m3c2(args, std::move(a), b, unit);
+  if (args.m3c2.wanted) return print_m3c2(args, std::move(a), b, unit, terminal);
   const NearestSurface surface(b);
-  if (args.icp) comparison.registration = lay_onto(a, b, surface, args.scale);
+  if (args.icp) comparison.registration = lay_onto(a, b, surface, args.scale, terminal);
   comparison.by_area = deviations(points_by_area(a, args.samples), b, surface);
   comparison.summary = summarize(comparison.by_area);
   comparison.half_range = range_of(comparison.by_area);

@@ -66,6 +66,7 @@ void check_outputs(const MeasureArgs& args) {
 }
 
 void run_measure(const MeasureArgs& args) {
+  let_interrupts_end();
   limit_threads(args.common.threads);
   check_outputs(args);
   const Terminal terminal(args.common.quiet, args.common.strict);

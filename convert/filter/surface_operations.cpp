@@ -82,6 +82,7 @@ FilterStep prepare_simplify_to(FilterArguments& arguments) {
     for (const auto& p : state.mesh.vertices) box.extend(p);
     const SimplifyOptions options{.max_error = std::max(1e-30, 2 * double(box.diagonal().norm())),
                                   .max_color_error = 1,
+                                  .max_area_change = 1,
                                   .target_faces = faces};
     if (state.mesh.faces.size() <= faces) return std::string("there are no more than that");
     std::string remark = take_simplified(state, simplify(state.mesh, options, progress));

@@ -148,7 +148,10 @@ class Fitter {
     }
     double squares = 0;
     for (const double log : logs) squares += log * log;
-    return std::hypot(kSensorSigma, std::sqrt(squares) / double(std::max(size_t{1}, logs.size())));
+    const auto n = double(logs.size());
+    // Of a single view nothing tells how far it errs as a whole: its pixels must do.
+    const double of_mean = n > 1 ? std::sqrt(squares / (n * (n - 1))) : scale_->scatter;
+    return std::hypot(kSensorSigma, of_mean);
   }
 
   void leave_out(const std::string& why) {

@@ -2,7 +2,9 @@
 //
 // cgs measure and cgs compare as a user calls them.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 
 #include <gtest/gtest.h>
@@ -42,6 +44,23 @@ TEST(Measure, VolumeAndAreaAreTheSameFarAway) {
     EXPECT_TRUE(far["figures"]["area"]["sigma"].is_null());
     EXPECT_EQ(far["mesh"]["provenance"], "not stated");
   }
+}
+
+// It writes nothing before its end, so that it can end at once.
+TEST(Measure, EndsWhenItIsInterrupted) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::torus_mesh(0.6, 0.2, 1200, 400)));
+  const std::string command = std::string("timeout --preserve-status -s INT 2 ") + CGS_BINARY +
+                              " measure " + (dir / "a.obj").string() +
+                              " --along 0.8,0,0 -0.8,0,0 >/dev/null 2>&1";
+  const auto start = std::chrono::steady_clock::now();
+  const int status = std::system(command.c_str());
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == 0) GTEST_SKIP() << "it had ended before";
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_LT(seconds, 6);
 }
 
 TEST(Measure, OrthophotoOfACubeSeenFromThreeSides) {

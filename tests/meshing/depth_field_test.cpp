@@ -33,6 +33,27 @@ TEST(ContinuousQuads, FollowASteepPlaneButStopAtAStep) {
   EXPECT_EQ(at_step(32, 20), 1);
 }
 
+TEST(ContinuousQuads, NoiseIsThatOfTheSurfaceHoweverMuchBackgroundThereIs) {
+  constexpr float kBackground = 1e6f;
+  const Camera c = camera();
+  DepthMap whole(c.width, c.height, 1.0f);
+  std::mt19937 random(1);
+  std::normal_distribution<float> noise(0, 0.02f);
+  for (float& d : whole.data) d += noise(random);
+  DepthMap cut_out = whole;
+  const int edge = c.width * 6 / 10;
+  for (int y = 0; y < c.height; ++y) {
+    for (int x = 0; x < edge; ++x) cut_out(x, y) = kBackground;
+  }
+  const auto expected = continuous_quads(whole, c);
+  const auto quads = continuous_quads(cut_out, c);
+  int different = 0;
+  for (int y = 0; y + 1 < c.height; ++y) {
+    for (int x = edge; x + 1 < c.width; ++x) different += quads(x, y) != expected(x, y);
+  }
+  EXPECT_LT(different, (c.width - edge) * c.height / 50);
+}
+
 TEST(WithGapsFilled, ContinuesAPlaneIntoSmallEnclosedGapsOnly) {
   const Camera c = camera();
   const DepthMap whole =

@@ -45,6 +45,26 @@ TEST(RegisterPoints, WhatChangedPullsLittle) {
   for (const Eigen::Vector3d& p : before.points) EXPECT_LT((r.apply(p) - p).norm(), 1e-3);
 }
 
+// Most of the surface was invented, and badly.
+TEST(RegisterPoints, WhatNobodySawPullsNothing) {
+  const MeasurableMesh invented =
+      test::with_labels(test::grid_mesh(80,
+                                        80,
+                                        [](double s, double t) {
+                                          double z = 0.05 * std::sin(9 * s) * std::cos(7 * t);
+                                          if (s > 0.45) z += 0.3 * (s - 0.45);
+                                          return Eigen::Vector3d(s, t, z + 0.1 * s * t);
+                                        }),
+                        [](const Eigen::Vector3d& p) {
+                          return p.x() > 0.45 ? Provenance::Inferred : Provenance::Observed;
+                        });
+  const MeasurableMesh truth = relief();
+  const Registration r = register_points(truth.points, invented, NearestSurface(invented), false);
+  EXPECT_TRUE(r.converged);
+  EXPECT_LT(r.share, 0.5);
+  for (const Eigen::Vector3d& p : truth.points) EXPECT_LT((r.apply(p) - p).norm(), 1e-3);
+}
+
 TEST(RegisterPoints, SaysWhatSlides) {
   const auto plane =
       test::grid_mesh(20, 20, [](double s, double t) { return Eigen::Vector3d(s, t, 0); });

@@ -110,6 +110,36 @@ TEST(Section, SigmaIsWhatALargerSphereShows) {
   EXPECT_NEAR(cut.length.sigma / (larger.length.value - cut.length.value), 1, 0.03);
 }
 
+// All surface moves outwards by sigma: the hollow of a shell becomes smaller.
+TEST(Section, SigmaOfAHollowIsThatOfBothItsSides) {
+  const double sigma = 1e-4;
+  const auto shell = [](double outer, double inner) {
+    MeasurableMesh out = test::sphere_mesh(outer, 128, 256);
+    const MeasurableMesh hollow = test::sphere_mesh(inner, 128, 256);
+    const auto first = static_cast<uint32_t>(out.points.size());
+    for (const Eigen::Vector3d& p : hollow.points) out.points.push_back(p);
+    for (const auto& f : hollow.mesh.faces) {
+      out.mesh.faces.push_back({f[0] + first, f[2] + first, f[1] + first});
+    }
+    return test::with_vertices(std::move(out));
+  };
+  const CutPlane plane = cut_plane({0, 0, 0.1}, {0, 0, 1});
+  const Section cut = section(test::with_sigma(shell(0.4, 0.38), float(sigma)), plane);
+  const Section larger = section(shell(0.4 + sigma, 0.38 - sigma), plane);
+  EXPECT_NEAR(cut.area.sigma / (larger.area.value - cut.area.value), 1, 0.03);
+}
+
+TEST(Section, SigmaIsTheSameThroughVerticesAsBesideThem) {
+  const auto mesh = test::with_sigma(test::sphere_mesh(0.4, 32, 64), 1e-3f);
+  const double equator = mesh.points[1 + 15 * 64].z();
+  const Section through = section(mesh, cut_plane({0, 0, equator}, {0, 0, 1}));
+  const Section beside = section(mesh, cut_plane({0, 0, equator + 0.001}, {0, 0, 1}));
+  ASSERT_EQ(through.lines.size(), 1U);
+  EXPECT_NEAR(through.length.sigma / (2 * kPi * 1e-3), 1, 0.05);
+  EXPECT_NEAR(through.length.sigma / beside.length.sigma, 1, 0.05);
+  EXPECT_NEAR(through.area.sigma / beside.area.sigma, 1, 0.05);
+}
+
 TEST(CutPlane, AxesAreThoseOfTheFile) {
   EXPECT_EQ(cut_plane({0, 0, 0}, {0, 3, 0}).right, Eigen::Vector3d::UnitX());
   EXPECT_EQ(cut_plane({0, 0, 0}, {0, 3, 0}).up, Eigen::Vector3d::UnitZ());

@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <random>
 
 #include <Eigen/Geometry>
@@ -218,6 +219,21 @@ TEST(Simplify, StopsAtTheTarget) {
   const SimplifyResult result = simplify(torus(30), {.max_error = 0.01, .target_faces = 2000});
   EXPECT_LE(result.faces_after, 2000U);
   EXPECT_GE(result.faces_after, 1990U);
+}
+
+// A disc whose faces all meet in its middle, as CAD programs write lids.
+TEST(Simplify, ManyFacesMayMeetInAVertex) {
+  constexpr uint32_t kRim = 5000;
+  TriangleMesh disc;
+  disc.vertices.emplace_back(0, 0, 0);
+  for (uint32_t i = 0; i < kRim; ++i) {
+    const double turn = 2 * std::numbers::pi * i / kRim;
+    disc.vertices.emplace_back(float(std::cos(turn)), float(std::sin(turn)), 0);
+    disc.faces.push_back({0, 1 + i, 1 + (i + 1) % kRim});
+  }
+  const SimplifyResult result = simplify(disc, {.max_error = 1e-3});
+  EXPECT_LT(result.faces_after, 200U);
+  EXPECT_LT(result.evidence.hausdorff(), 1e-3);
 }
 
 TEST(Simplify, KeepsTheBorderBetweenLabelsWhereItIs) {

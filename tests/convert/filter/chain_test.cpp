@@ -6,6 +6,7 @@
 #include <cstring>
 #include <map>
 #include <ostream>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "meshing/components.h"
 #include "meshing/simplify.h"
 #include "tests/support/sample_mesh.h"
+#include "tests/support/solid_meshes.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs::chain_test {
@@ -265,6 +267,16 @@ TEST_P(EveryOperation, ExampleOfTheHelpCanBeRead) {
   metres.metres_per_unit = 1;
   EXPECT_EQ(prepare_filters({std::string(GetParam().example)}, metres).size(), 1U);
   EXPECT_NE(filter_help().find(GetParam().example), std::string::npos);
+}
+
+// Their number is what was asked for, whatever the area loses when noise goes.
+TEST(SimplifyTo, ReachesTheNumberOnNoisySurface) {
+  FilterState noisy;
+  noisy.mesh = test::sphere_mesh(1, 60, 120).mesh;
+  std::mt19937 random(1);
+  std::normal_distribution<float> normal(0, 0.01f);
+  for (auto& p : noisy.mesh.vertices) p *= 1 + normal(random);
+  EXPECT_LE(filtered(noisy, "simplify-to=2000", 2).mesh.faces.size(), 2000U);
 }
 
 // However far off the result may be, sigma says so.

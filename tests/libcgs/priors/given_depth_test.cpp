@@ -135,6 +135,18 @@ TEST(FitGivenDepth, MetricCamerasStayMetric) {
   EXPECT_GT(given.metres_sigma, 0.004);
 }
 
+// Views err as a whole: of n of them the mean is known to their scatter over the root of n.
+TEST(FitGivenDepth, TheScaleIsAsSureAsTheMeanOfItsViews) {
+  Example e;
+  e.give([](double z, int k) { return (k == 0 ? 1.02 : 0.98) * 0.3 * z; });
+  e.state_metres();
+  const GivenDepth given = fit_given_depth(e.scene, e.priors);
+  EXPECT_EQ(given.kind, DepthKind::Metric);
+  const double of_views = given.views.size() == 2 ? 0.02 : 0;
+  ASSERT_GT(of_views, 0) << given.views.size();
+  EXPECT_NEAR(given.metres_sigma / 0.3, std::hypot(0.005, of_views), 0.002);
+}
+
 // As in the frame of control points: depth is still in the units that the cameras were stated in.
 TEST(FitGivenDepth, IsInUnitsOfTheCamerasAsTheyWereStated) {
   Example e;
