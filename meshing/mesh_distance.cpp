@@ -253,6 +253,13 @@ DistanceStatistics statistics(std::vector<float> distances) {
   return out;
 }
 
+void widen_sigma(TriangleMesh& mesh, const MeshDistance& moved) {
+  const double rms = std::max(moved.accuracy.rms, moved.completeness.rms);
+  for (float& sigma : mesh.sigma) {
+    if (!std::isnan(sigma)) sigma = static_cast<float>(std::hypot(double{sigma}, rms));
+  }
+}
+
 MeshDistance mesh_distance(const TriangleMesh& mesh,
                            const TriangleMesh& reference,
                            size_t samples) {

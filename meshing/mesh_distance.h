@@ -87,6 +87,10 @@ struct MeshDistance {
   double hausdorff() const { return std::max(accuracy.max, completeness.max); }
 };
 
+/// Adds to sigma, where it is stated, how far a surface was moved: the larger root mean square of
+/// both ways, in squares.
+void widen_sigma(TriangleMesh& mesh, const MeshDistance& moved);
+
 /// \throws InvalidInput if a mesh has no area.
 MeshDistance mesh_distance(const TriangleMesh& mesh, const TriangleMesh& reference, size_t samples);
 

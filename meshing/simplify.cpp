@@ -207,6 +207,7 @@ SimplifyResult simplify(const TriangleMesh& mesh,
       result.faces_after = out.mesh.faces.size();
       result.evidence = {forth.evidence, back.evidence};
       result.inferred = {forth.inferred, back.inferred};
+      widen_sigma(result.mesh, result.evidence);
       report(progress, 1);
       return result;
     }

@@ -41,11 +41,11 @@ struct SimplifyResult {
 
 /// A mesh with fewer faces that stays within a stated distance of the input.
 ///
-/// Faces keep their labels, borders between labels and open rims stay where they are within the
-/// error, topology is kept; see collapse_edges(). A mesh without provenance counts as evidence.
-/// What comes out is then measured: in both directions by points over the area and along all edges
-/// (see DistanceToMesh::of_edges()), by the area of every label with evidence, and for
-/// self-intersections. Where a check fails, the
+/// Sigma grows by the measured error, see widen_sigma(). Faces keep their labels, borders between
+/// labels and open rims stay where they are within the error, topology is kept; see
+/// collapse_edges(). A mesh without provenance counts as evidence. What comes out is then measured:
+/// in both directions by points over the area and along all edges (see DistanceToMesh::of_edges()),
+/// by the area of every label with evidence, and for self-intersections. Where a check fails, the
 /// tolerance of the input vertices nearby is quartered, finally to zero, and the collapses are run
 /// again. If that does not help within a few rounds, the result is the input.
 /// \throws InvalidInput if a vertex is not finite.

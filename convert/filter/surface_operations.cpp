@@ -41,20 +41,8 @@ FilterStep prepare_taubin(FilterArguments& arguments) {
                         {.iterations = arguments.count(1, kMostIterations), .outward = kBack});
 }
 
-double rms_of(const MeshDistance& moved) {
-  return std::max(moved.accuracy.rms, moved.completeness.rms);
-}
-
-// What is known of a surface is known of it to within how far it was moved.
-void widen_sigma(TriangleMesh& mesh, double rms) {
-  for (float& sigma : mesh.sigma) {
-    if (!std::isnan(sigma)) sigma = static_cast<float>(std::hypot(double{sigma}, rms));
-  }
-}
-
 std::string take_simplified(FilterState& state, SimplifyResult result) {
   state.mesh = std::move(result.mesh);
-  widen_sigma(state.mesh, rms_of(result.evidence));
   if (result.faces_after == result.faces_before) {
     return "nothing left out, as the result would be too far off or cut itself; where the input "
            "cuts "
@@ -100,7 +88,7 @@ FilterStep prepare_remesh(FilterArguments& arguments) {
     state.mesh = remeshed(before, edge / state.frame.scale);
     constexpr size_t kSamples = 100'000;
     const MeshDistance moved = mesh_distance(state.mesh, before, kSamples);
-    widen_sigma(state.mesh, rms_of(moved));
+    widen_sigma(state.mesh, moved);
     return "largest error measured " + format_length(moved.hausdorff(), state.frame);
   };
 }
