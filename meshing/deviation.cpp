@@ -74,6 +74,12 @@ ComparedPoints points_by_vertex(const MeasurableMesh& mesh) {
   return out;
 }
 
+void add_scale_sigma(ComparedPoints& points, double relative, const Eigen::Vector3d& center) {
+  for (size_t i = 0; i < points.places.size(); ++i) {
+    points.sigma[i] = std::hypot(points.sigma[i], relative * (points.places[i] - center).norm());
+  }
+}
+
 std::vector<Deviation> deviations(const ComparedPoints& points,
                                   const MeasurableMesh& mesh_b,
                                   const NearestSurface& surface_b) {

@@ -35,6 +35,10 @@ ComparedPoints points_by_area(const MeasurableMesh& mesh, size_t count);
 /// The vertices, in their order.
 ComparedPoints points_by_vertex(const MeasurableMesh& mesh);
 
+/// Adds to sigma how far an error of the scale moves places away from `center`, where it moves
+/// none. \param relative  standard deviation of the scale as a share of it
+void add_scale_sigma(ComparedPoints& points, double relative, const Eigen::Vector3d& center);
+
 /// Signed distances of points to a surface, and whether they are more than uncertainty.
 ///
 /// |d| > 2 sqrt(sigma_a^2 + sigma_b^2) counts as changed, where both sides were observed (by one

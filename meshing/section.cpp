@@ -214,19 +214,19 @@ struct Uncertainty {
 };
 
 // A cut through a face: from one of its edges to another.
-struct Piece {
+struct FaceCut {
   uint32_t face = 0;
   double sigma = 0;  // of its ends, across the surface
   Eigen::Vector2d along;
 };
 
-// The pieces of a line but for those without length, which a plane through a vertex leaves: their
+// Those of a line but for those without length, which a plane through a vertex leaves: their
 // direction means nothing.
-std::vector<Piece> pieces_of(const Crossings& crossings, const Chain& chain) {
+std::vector<FaceCut> face_cuts(const Crossings& crossings, const Chain& chain) {
   constexpr double kNoLength = 1e-12;  // of the line's extent
   Eigen::AlignedBox2d box;
   for (const auto node : chain.nodes) box.extend(crossings.nodes[node].place);
-  std::vector<Piece> out;
+  std::vector<FaceCut> out;
   for (size_t i = 0; i < chain.faces.size(); ++i) {
     const auto& a = crossings.nodes[chain.nodes[i]];
     const auto& b = crossings.nodes[chain.nodes[(i + 1) % chain.nodes.size()]];
@@ -241,18 +241,18 @@ std::vector<Piece> pieces_of(const Crossings& crossings, const Chain& chain) {
 // moves outwards, an outline grows and a hole in it shrinks: the area gains by both.
 void add_uncertainty(const Cut& cut, const Chain& chain, bool bounds_area, Uncertainty& sum) {
   const auto& [mesh, plane, crossings] = cut;
-  const std::vector<Piece> pieces = pieces_of(crossings, chain);
-  for (size_t i = 0; i < pieces.size(); ++i) {
-    const auto& [face, sigma_across, along] = pieces[i];
+  const std::vector<FaceCut> cuts = face_cuts(crossings, chain);
+  for (size_t i = 0; i < cuts.size(); ++i) {
+    const auto& [face, sigma_across, along] = cuts[i];
     const double sigma = sigma_across * shift_in_plane(mesh, plane, face);
     const bool invented =
         mesh.states_provenance() && mesh.mesh.provenance[face] == Provenance::Inferred;
     if (!std::isfinite(sigma) || invented) continue;
     sum.stated_length += along.norm();
     if (bounds_area) sum.areas.add(sigma * along.norm());
-    if (i + 1 == pieces.size() && !chain.closed) continue;
+    if (i + 1 == cuts.size() && !chain.closed) continue;
     const Eigen::Vector2d before = along.stableNormalized();
-    const Eigen::Vector2d after = pieces[(i + 1) % pieces.size()].along.stableNormalized();
+    const Eigen::Vector2d after = cuts[(i + 1) % cuts.size()].along.stableNormalized();
     const Eigen::Vector2d middle = (before + after).stableNormalized();
     const Eigen::Vector2d outwards(middle.y(), -middle.x());
     sum.lengths.add(sigma * (before - after).dot(outwards));

@@ -90,6 +90,12 @@ Registration lay_onto(MeasurableMesh& a,
   return out;
 }
 
+// Relative standard deviation of one scale against the other; none where A was made to fit.
+double scale_sigma(const Frame& a, const Frame& b, bool fits_scale) {
+  if (fits_scale || !a.has_metric_scale() || !b.has_metric_scale()) return 0;
+  return std::hypot(a.metres_sigma / a.metres_per_unit, b.metres_sigma / b.metres_per_unit);
+}
+
 void print_json(const CompareArgs& args,
                 const MeasurableMesh& a,
                 const MeasurableMesh& b,
@@ -170,20 +176,27 @@ void run_compare(const CompareArgs& args) {
   const std::string turned = turned_text(first.content.frame, second.content.frame);
   if (!turned.empty() && !args.icp) terminal.warn({turned});
   MeasurableMesh a = std::move(first.content);
+  const double of_scale = scale_sigma(a.frame, second.content.frame, args.scale);
   const MeasurableMesh b = in_frame_of(second.content, a.frame);
   const FigureUnit unit = figure_unit(a.frame, args.unit);
   Comparison comparison;
   if (args.m3c2.wanted) return print_m3c2(args, std::move(a), b, unit, terminal);
   const NearestSurface surface(b);
   if (args.icp) comparison.registration = lay_onto(a, b, surface, args.scale, terminal);
-  comparison.by_area = deviations(points_by_area(a, args.samples), b, surface);
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : a.points) box.extend(p);
+  const auto compared = [&](ComparedPoints points) {
+    add_scale_sigma(points, of_scale, box.center());
+    return deviations(points, b, surface);
+  };
+  comparison.by_area = compared(points_by_area(a, args.samples));
   comparison.summary = summarize(comparison.by_area);
   comparison.half_range = range_of(comparison.by_area);
   if (!args.threshold.empty()) {
     comparison.agreement = agreement(args, a, b, comparison.by_area);
   }
   if (!args.ply.empty()) {
-    write_colored(args.ply, a, deviations(points_by_vertex(a), b, surface), comparison.half_range);
+    write_colored(args.ply, a, compared(points_by_vertex(a)), comparison.half_range);
   }
   if (!args.svg.empty()) write_histogram_svg(args.svg, comparison, unit, title_of(args));
   if (args.common.json) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/deviation.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "tests/support/solid_meshes.h"
@@ -71,6 +73,21 @@ TEST(Deviations, OnlyWhatBothSawCanChange) {
   const auto silent = test::sphere_mesh(0.28);
   for (const Deviation& d : deviations(points_by_vertex(silent), before, NearestSurface(before))) {
     EXPECT_EQ(d.change, Change::Unknown);
+  }
+}
+
+TEST(Deviations, AnErrorOfTheScaleIsNoChange) {
+  const auto before = test::with_sigma(test::sphere_mesh(0.3), 1e-3f);
+  const auto after = test::with_sigma(test::sphere_mesh(0.306), 1e-3f);
+  const NearestSurface surface(before);
+  ComparedPoints points = points_by_area(after, 2000);
+  for (const Deviation& d : deviations(points, before, surface)) {
+    EXPECT_EQ(d.change, Change::Farther);
+  }
+  add_scale_sigma(points, 0.02, {0, 0, 0});
+  for (const Deviation& d : deviations(points, before, surface)) {
+    EXPECT_EQ(d.change, Change::None);
+    EXPECT_NEAR(d.sigma, std::hypot(1e-3, 1e-3, 0.02 * 0.306), 1e-5);
   }
 }
 
