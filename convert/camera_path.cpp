@@ -139,7 +139,8 @@ std::vector<Camera> camera_path(const Model& model, const std::string& name, int
 }
 
 std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Model& model) {
-  const Scene path = read_cameras_json(file);
+  Scene path = read_cameras_json(file);
+  use_metres_where_measured(path);  // as read_model() does
   const bool states_frame = path.kind != kForeignCameras;
   std::vector<Camera> out;
   for (const View& view : path.views) {

@@ -20,6 +20,7 @@
 #include "convert/splat_selection.h"
 #include "convert/stated_frame.h"
 #include "convert/volume_file.h"
+#include "io/atomic_file.h"
 #include "io/gltf.h"
 #include "io/json_file.h"
 #include "io/mesh_file.h"
@@ -283,6 +284,7 @@ void refuse_without_effect(const ConversionRequest& request, const Source& sourc
 /// Refuses at once what would be refused after minutes of work.
 void check_before_work(const ConversionRequest& request, const Source& source, Content wanted) {
   require_writable_as(request.output, source.frame);
+  { const AtomicFile can_be_written(request.output); }
   refuse_without_effect(request, source, wanted);
   if (wanted == Content::Splats) return;
   if (!request.volume.voxel_size.empty())

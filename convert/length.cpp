@@ -25,11 +25,14 @@ constexpr std::array<std::pair<std::string_view, double>, 7> kUnits = {{{"m", 1.
 // Splits "0.5mm" into 0.5 and "mm".
 std::pair<double, std::string> number_and_suffix(const std::string& text, const char* what) {
   double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const size_t first = std::min(text.find_first_not_of(' '), text.size());
+  const size_t last = text.find_last_not_of(' ') + 1;  // 0 if there is nothing else
+  const char* const begin = text.data() + std::min(first, last);
+  const auto [end, error] = std::from_chars(begin, text.data() + last, value);
   if (error != std::errc() || !(value > 0) || !std::isfinite(value)) {
     throw InvalidInput("'" + text + "' is not a positive " + what);
   }
-  std::string suffix(end, text.data() + text.size());
+  std::string suffix(end, text.data() + last);
   suffix.erase(0, suffix.find_first_not_of(' '));
   return {value, suffix};
 }

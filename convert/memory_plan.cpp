@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <numeric>
 
 #include "libcgs/core/error.h"
@@ -79,6 +80,19 @@ double of_networks(const CoherenceOptions& coherence, size_t views, double pixel
   };
   const ConvWidths widths = conv_widths(coherence, views);
   return of_one(widths.depth) + of_one(widths.opacity);
+}
+
+constexpr size_t kUnlimited = std::numeric_limits<size_t>::max();
+
+size_t free_of_machine() {
+  std::ifstream meminfo("/proc/meminfo");
+  std::string key;
+  size_t kibibytes = 0;
+  std::string unit;
+  while (meminfo >> key >> kibibytes >> unit) {
+    if (key == "MemAvailable:") return kibibytes * 1024;
+  }
+  return kUnlimited;
 }
 
 // Refuses if the stage that most_at(1) names needs more than the budget, and says how much smaller
@@ -170,6 +184,21 @@ void check_training_memory(const Scene& scene, size_t budget, const CoherenceOpt
       budget, [&](int factor) { return memory_plan(scene, false, {}, coherence, factor).front(); });
 }
 
+size_t free_of_group(const std::filesystem::path& folder, const char* most, const char* now) {
+  std::ifstream most_file(folder / most);
+  std::ifstream now_file(folder / now);
+  size_t limit = 0;
+  size_t used = 0;
+  if (!(most_file >> limit) || !(now_file >> used)) return kUnlimited;  // "max": no limit
+  std::ifstream stat(folder / "memory.stat");
+  std::string key;
+  size_t bytes = 0;
+  while (stat >> key >> bytes) {
+    if (key == "inactive_file" || key == "active_file") used -= std::min(used, bytes);
+  }
+  return limit - std::min(limit, used);
+}
+
 std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
   constexpr double kBase = 60 * kMebi;
   constexpr double kHarmonic = 12;              // bytes per coefficient
@@ -224,14 +253,12 @@ void check_splat_memory_plan(const SplatWork& work, size_t budget) {
 
 size_t memory_budget(size_t limit) {
   if (limit > 0) return limit;
-  std::ifstream meminfo("/proc/meminfo");
-  std::string key;
-  size_t kibibytes = 0;
-  std::string unit;
-  while (meminfo >> key >> kibibytes >> unit) {
-    if (key == "MemAvailable:") return kibibytes * 1024 / 10 * 8;
-  }
-  return size_t{4} << 30;
+  const std::filesystem::path groups = "/sys/fs/cgroup";
+  const size_t free = std::min(
+      {free_of_machine(),
+       free_of_group(groups, "memory.max", "memory.current"),
+       free_of_group(groups / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes")});
+  return free == kUnlimited ? size_t{4} << 30 : free / 10 * 8;
 }
 
 }  // namespace cgs

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -78,7 +79,13 @@ std::vector<StageMemory> splat_memory_plan(const SplatWork& work);
 ///         it needs more than `budget` [bytes].
 void check_splat_memory_plan(const SplatWork& work, size_t budget);
 
-/// Memory the program may plan for: the user's limit, or 80 % of what is free now [bytes].
+/// Memory the program may plan for: the user's limit, or 80 % of what is free now, on the machine
+/// or within the limit of the container it runs in [bytes].
 size_t memory_budget(size_t limit);
+
+/// What a control group may still take: the number in the file `most` less that in `now`, without
+/// files that are only cached [bytes]; the largest number if there is no such limit.
+/// Source: Linux kernel, admin-guide/cgroup-v2 (memory.max, memory.current) and cgroup-v1/memory.
+size_t free_of_group(const std::filesystem::path& folder, const char* most, const char* now);
 
 }  // namespace cgs

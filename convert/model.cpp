@@ -184,6 +184,8 @@ void relink_photographs(Scene& scene, const std::vector<PhotoFile>& photographs)
   }
 }
 
+}  // namespace
+
 void relink_views(Scene& scene, const Scene& found) {
   for (View& view : scene.views) {
     const auto match = std::find_if(found.views.begin(), found.views.end(), [&](const View& other) {
@@ -195,19 +197,19 @@ void relink_views(Scene& scene, const Scene& found) {
   }
 }
 
-}  // namespace
-
-void relink_images(Scene& scene, const std::filesystem::path& folder) {
+void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow_external) {
   scene.folder = folder;
   for (View& view : scene.views) {
     view.image_path.clear();
     view.mask_path.clear();
   }
   if (is_photographs(folder)) {
-    relink_photographs(scene, list_photographs({folder, false}));
-    find_masks({folder, false}, scene);
+    relink_photographs(scene, list_photographs({folder, allow_external}));
+    find_masks({folder, allow_external}, scene);
   } else {
-    relink_views(scene, read_scene(folder));
+    SceneOptions options;
+    options.allow_external = allow_external;
+    relink_views(scene, read_scene(folder, options));
   }
   for (const View& view : scene.views) {
     if (view.image_path.empty()) {

@@ -39,7 +39,10 @@ void use_metres_where_measured(Scene& scene);
 
 /// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model
 /// or photographs that were moved. \throws BadInput as read_scene()
-void relink_images(Scene& scene, const std::filesystem::path& folder);
+void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow_external);
+
+/// Takes photographs and masks from another reading of the same scene, by the names of the views.
+void relink_views(Scene& scene, const Scene& found);
 
 /// 1 where no other view confirms the depth of a view: a guess from that view alone, or filled in
 /// from neighbours; empty if it is nowhere.

@@ -70,7 +70,10 @@ void refuse_unreadable_images(const Scene& scene) {
 }
 
 Model& loaded_model(Run& run) {
-  if (!run.model) run.model = read_model(run.request.output / "model");
+  if (!run.model) {
+    run.model = read_model(run.request.output / "model");
+    relink_views(run.model->scene, run.scene);  // masks and paths may have changed since
+  }
   return *run.model;
 }
 
@@ -111,6 +114,7 @@ GivenDepthReport sensor_scale(const Json& model) {
 // The scale is told apart from the model: people learn a length after they saw a first result.
 Json run_scale(Run& run, const Progress& progress) {
   Model model = read_model_as_written(run.request.output / "model");
+  relink_views(model.scene, run.scene);
   report(progress, 0);
   Frame& frame = model.scene.frame;
   const Frame before = frame;
@@ -214,7 +218,7 @@ std::map<std::string, std::string> decided_stages(const RunRequest& request, con
                                             {"marker_size", "scale"},
                                             {"control_points", "scale"},
                                             {"stated_scale", "scale"},
-                                            {"held_out_images", "evaluation"},
+                                            {"held_out_images", "views"},
                                             {"voxel_size", "mesh"},
                                             {"simplify", "mesh"},
                                             {"max_error", "mesh"},
@@ -440,9 +444,13 @@ Json run_stages(Run& run, Terminal& terminal) {
 void check_lengths_of_photographs(const RunRequest& request) {
   if (!is_photographs(request.scene.path)) return;
   Frame frame;
+  const DepthOptions& depth = request.scene.options.depth;
+  const bool has_depth = !depth.folder.empty() || is_folder(request.scene.path / "depth");
+  const bool may_be_metric = depth.kind == DepthKind::Unknown || depth.kind == DepthKind::Metric;
+  const bool may_tell_scale = has_depth && may_be_metric && depth.network.empty();
   const bool states_unit =
       !request.scene.assume_unit.empty() || !request.scene.control.file.empty();
-  if (states_unit) frame.metres_per_unit = 1;
+  if (states_unit || may_tell_scale) frame.metres_per_unit = 1;
   check_lengths(request, frame);
 }
 

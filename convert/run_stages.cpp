@@ -264,6 +264,10 @@ Json write_assets(const Model& model,
               {"deviations", asset_deviations(model, mesh, request.output / "web/asset.glb")},
               {"asset.glb", written.asset}};
   if (request.lods > 0) out["levels"] = written.levels;
+  if (texture_report.contains("left_out")) {
+    out["warnings"] = {"no photographs on the meshes: " +
+                       texture_report["left_out"].get<std::string>()};
+  }
   return out;
 }
 

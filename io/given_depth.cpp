@@ -310,6 +310,7 @@ void DepthOptions::validate() const {
   require(scale >= 0 && std::isfinite(scale), "DepthOptions.scale must be >= 0", scale);
   if (network.empty()) return;
   require(folder.empty(), "give depth files or a network, not both; files", folder);
+  require(scale == 0, "a network measures nothing: it takes no scale of depth, which is", scale);
   require(kind != DepthKind::Metric,
           "a network measures nothing: its kind is depth or disparity, the network",
           network);
@@ -326,11 +327,26 @@ fs::path confidence_file(const Scene& scene, const View& view, bool allow_extern
   return depth_file_of({folder, allow_external}, view.depth_path);
 }
 
+namespace {
+
+// A network guesses where files, if there are some, have measured.
+void leave_out_files(Scene& scene) {
+  size_t count = 0;
+  for (View& view : scene.views) {
+    count += static_cast<size_t>(!view.depth_path.empty());
+    view.depth_path.clear();
+  }
+  if (count == 0 && !is_folder(scene.folder / "depth")) return;
+  scene.warnings.emplace_back("the depth files of this scene are not used, as --depth-model is");
+}
+
+}  // namespace
+
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external) {
   if (options.kind != DepthKind::Unknown) scene.depth_kind = options.kind;
   if (options.scale > 0) scene.depth_scale = options.scale;
   if (!options.network.empty()) {
-    for (View& view : scene.views) view.depth_path.clear();
+    leave_out_files(scene);
     if (scene.depth_kind != DepthKind::Relative) scene.depth_kind = DepthKind::Disparity;
     return;
   }
@@ -354,6 +370,12 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
                    options.folder,
                    "holds no depth named as an input photograph: .exr .pfm .npy .npz .tif .png, or "
                    ".geometric.bin of COLMAP");
+  }
+  if (count == 0 && (options.kind != DepthKind::Unknown || options.scale > 0)) {
+    throw BadInput(Defect::Missing,
+                   scene.folder,
+                   "has no depth for an input photograph, though its kind or scale was stated; a "
+                   "folder of depth is called 'depth', or is named by --depth");
   }
   if (count == 0) return;
   check_colmap_maps(scene);

@@ -160,11 +160,24 @@ Eigen::Isometry3d read_pose(const JsonValue& matrix) {
                       [&](Defect defect, const std::string& why) { matrix.fail(defect, why); });
 }
 
-// The file a frame names, whether or not it exists.
+// As programs on Windows write paths.
+std::string with_slashes(std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  return name;
+}
+
+fs::path file_named(const SceneRoot& root, const std::string& name, const fs::path& json) {
+  fs::path path = resolve_in_scene(root, name, json);
+  if (is_present(path) || name.find('\\') == std::string::npos) return path;
+  return resolve_in_scene(root, with_slashes(name), json);
+}
+
+// The photograph a frame names, whether or not it exists.
 fs::path photograph(const SceneRoot& root, const std::string& name, const fs::path& json) {
   fs::path path = resolve_in_scene(root, name, json);
   std::error_code ignored;
   if (fs::is_regular_file(path, ignored)) return path;
+  if (name.find('\\') != std::string::npos) return photograph(root, with_slashes(name), json);
   for (const char* extension : {".png", ".jpg", ".jpeg"}) {
     fs::path candidate = resolve_in_scene(root, name + extension, json);
     if (fs::is_regular_file(candidate, ignored)) return candidate;
@@ -239,7 +252,7 @@ Scene read_transforms_json(const SceneRoot& root) {
     }
     view.name = view.image_path.empty() ? name : image.lexically_relative(root.folder).string();
     if (const auto depth = frame.find("depth_file_path")) {
-      const fs::path file = resolve_in_scene(root, depth->text(), path);
+      const fs::path file = file_named(root, depth->text(), path);
       if (is_present(file) && has_depth_extension(file)) {
         view.depth_path = file;
       } else {
@@ -250,7 +263,7 @@ Scene read_transforms_json(const SceneRoot& root) {
       }
     }
     if (const auto mask = frame.find("mask_path")) {
-      view.mask_path = resolve_in_scene(root, mask->text(), path);
+      view.mask_path = file_named(root, mask->text(), path);
       if (!is_present(view.mask_path)) {
         scene.warnings.push_back(mask->pointer() + ": there is no mask \"" +
                                  printable(fs::path(mask->text())) + "\"; all of view " +

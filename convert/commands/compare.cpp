@@ -76,12 +76,11 @@ std::vector<Eigen::Vector3d> seen_places(ComparedPoints points) {
 
 Registration lay_onto(MeasurableMesh& a,
                       const MeasurableMesh& b,
-                      const NearestSurface& surface,
                       bool with_scale,
                       const Terminal& terminal) {
   constexpr size_t kPoints = 20'000;
   const Registration out =
-      register_points(seen_places(points_by_area(a, kPoints)), b, surface, with_scale);
+      register_points(seen_places(points_by_area(a, kPoints)), b, NearestSurface(b), with_scale);
   if (!out.converged) {
     terminal.warn({"--icp still moved A after " + std::to_string(out.iterations) +
                    " iterations: the surfaces hold each other badly"});
@@ -114,20 +113,31 @@ void print_text(const CompareArgs& args, const Comparison& comparison, const Fig
               comparison_text(comparison, unit).c_str());
 }
 
+// Where only one file says how long a unit is, and A was made to fit B, both are brought to that.
+void share_unit(MeasurableMesh& a,
+                MeasurableMesh& b,
+                const Frame& stated_by_b,
+                const Registration& registration) {
+  if (a.frame.has_metric_scale() == stated_by_b.has_metric_scale()) return;
+  if (a.frame.has_metric_scale()) {
+    Registration back;
+    back.scale = 1 / registration.scale;
+    a = moved(a, back);
+    b = moved(b, back);
+    return;
+  }
+  a.frame.metres_per_unit = stated_by_b.metres_per_unit;
+  a.frame.metres_sigma = stated_by_b.metres_sigma;
+  a.frame.scale_source = stated_by_b.scale_source;
+  b.frame = a.frame;
+}
+
 // Cloud against cloud, along normals: what --m3c2 asks for.
 void print_m3c2(const CompareArgs& args,
-                MeasurableMesh a,
+                const MeasurableMesh& a,
                 const MeasurableMesh& b,
                 const FigureUnit& unit,
-                const Terminal& terminal) {
-  std::optional<Registration> registration;
-  if (args.icp) {
-    if (b.mesh.faces.empty()) {
-      throw InvalidInput("--icp needs a surface to lay A onto, but " + printable(args.b) +
-                         " is a point cloud");
-    }
-    registration = lay_onto(a, b, NearestSurface(b), args.scale, terminal);
-  }
+                const std::optional<Registration>& registration) {
   M3c2Comparison found = compare_m3c2(args.m3c2, a, b);
   found.comparison.registration = registration;
   if (!args.ply.empty()) write_m3c2_ply(args.ply, a, found);
@@ -177,12 +187,20 @@ void run_compare(const CompareArgs& args) {
   if (!turned.empty() && !args.icp) terminal.warn({turned});
   MeasurableMesh a = std::move(first.content);
   const double of_scale = scale_sigma(a.frame, second.content.frame, args.scale);
-  const MeasurableMesh b = in_frame_of(second.content, a.frame);
-  const FigureUnit unit = figure_unit(a.frame, args.unit);
+  MeasurableMesh b = in_frame_of(second.content, a.frame);
+  if (!args.scale) (void)figure_unit(a.frame, args.unit);  // before all the work
   Comparison comparison;
-  if (args.m3c2.wanted) return print_m3c2(args, std::move(a), b, unit, terminal);
+  if (args.icp) {
+    if (b.mesh.faces.empty()) {
+      throw InvalidInput("--icp needs a surface to lay A onto, but " + printable(args.b) +
+                         " is a point cloud");
+    }
+    comparison.registration = lay_onto(a, b, args.scale, terminal);
+    share_unit(a, b, second.content.frame, *comparison.registration);
+  }
+  const FigureUnit unit = figure_unit(a.frame, args.unit);
+  if (args.m3c2.wanted) return print_m3c2(args, a, b, unit, comparison.registration);
   const NearestSurface surface(b);
-  if (args.icp) comparison.registration = lay_onto(a, b, surface, args.scale, terminal);
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& p : a.points) box.extend(p);
   const auto compared = [&](ComparedPoints points) {

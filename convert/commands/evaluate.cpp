@@ -23,6 +23,7 @@ struct EvaluateArgs {
   std::filesystem::path model;
   std::filesystem::path scene;
   std::string views;
+  bool allow_external = false;
   CommonOptions common;
 };
 
@@ -53,7 +54,7 @@ void run_evaluate(const EvaluateArgs& args) {
   limit_threads(args.common.threads);
   Terminal terminal(args.common.quiet, args.common.strict);
   Model model = read_model(args.model);
-  if (!args.scene.empty()) relink_images(model.scene, args.scene);
+  if (!args.scene.empty()) relink_images(model.scene, args.scene, args.allow_external);
   terminal.warn(model.scene.warnings);
   const std::vector<int> views =
       args.views.empty() ? model.scene.held_out : select_views(model.scene, args.views);
@@ -88,6 +89,10 @@ void add_evaluate(CLI::App& app) {
   cmd->add_option("--scene", args->scene, "Scene folder, where the photographs have moved");
   cmd->add_option(
       "--views", args->views, "Views: indices in name order or names; default held out");
+  cmd->add_flag("--allow-external",
+                args->allow_external,
+                "Let --scene follow links and absolute paths out of its folder")
+      ->needs("--scene");
   add_output_options(*cmd, args->common);
   cmd->footer("Example: cgs evaluate out/portal/model --scene photos/portal --json");
   cmd->callback([args] { run_evaluate(*args); });

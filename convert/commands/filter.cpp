@@ -11,6 +11,7 @@
 #include "convert/mesh_files.h"
 #include "convert/stated_frame.h"
 #include "convert/terminal.h"
+#include "io/atomic_file.h"
 #include "io/json_file.h"
 #include "libcgs/core/error.h"
 
@@ -39,6 +40,7 @@ void run_filter_command(const FilterArgs& args) {
   require(is_writable_mesh_name(args.output),
           "the output must end in .ply, .obj, .stl, .3mf or .glb",
           printable(args.output.filename()));
+  { const AtomicFile can_be_written(args.output); }  // before all the work
   Terminal terminal(args.common.quiet, args.common.strict);
   (void)prepare_filters(args.operations, Frame{.metres_per_unit = 1});  // before a long read
   MeasurableFile file = read_measured(args.input, args.assume_unit);

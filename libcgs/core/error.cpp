@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/core/error.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
+
+#include "libcgs/core/utf8.h"
 
 namespace cgs {
 
@@ -50,14 +53,17 @@ std::string one_line(std::string_view text) {
 }
 
 std::string printable(const std::filesystem::path& path) {
+  const std::string text = path.string();
+  std::string_view rest = text;
   std::string out;
-  for (const char c : path.string()) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte >= 0x20 && byte < 0x7f) {
-      out += c;
+  while (!rest.empty()) {
+    const size_t length = shown_sequence(rest);
+    if (length > 0) {
+      out += rest.substr(0, length);
     } else {
-      append_escaped(out, byte);
+      append_escaped(out, static_cast<unsigned char>(rest[0]));
     }
+    rest.remove_prefix(std::max(length, size_t{1}));
   }
   return out;
 }

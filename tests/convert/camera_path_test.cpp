@@ -117,6 +117,22 @@ TEST(CameraPath, OfAFileIsInTheCoordinatesOfTheModelsFiles) {
   EXPECT_LT((foreign[0].center() - Eigen::Vector3d(1, 0, 0)).norm(), 1e-9);
 }
 
+// Photographs that a tape gave their scale: the model is in metres, its file in the unit of the
+// cameras that were solved for.
+TEST(CameraPath, OfTheModelItselfIsWhereItsCamerasAre) {
+  Model model = row_of_cameras();
+  model.scene.kind = "photographs";
+  model.scene.frame.metres_per_unit = 3.5;
+  model.scene.frame.scale_source = ScaleSource::KnownDistance;
+  const test::TempDir dir;
+  write_cameras_json(dir / "cameras.json", model.scene);
+  use_metres_where_measured(model.scene);
+  const auto path = camera_path_from(dir / "cameras.json", model);
+  for (size_t i = 0; i < path.size(); ++i) {
+    EXPECT_LT((path[i].center() - model.scene.views[i].camera.center()).norm(), 1e-9);
+  }
+}
+
 TEST(CameraPath, RefusesWhatLeadsNowhere) {
   EXPECT_THROW(camera_path(row_of_cameras(), "loop", 8), InvalidInput);
   EXPECT_THROW(camera_path(row_of_cameras(), "orbit", 1), InvalidInput);

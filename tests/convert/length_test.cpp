@@ -35,6 +35,17 @@ TEST(ParseLength, RefusesWhatIsNoLength) {
   }
 }
 
+TEST(ParseMetresWithSigma, TakesBlanksWhereOneWritesThem) {
+  for (const auto* text : {"7.06m+-2cm", "7.06 m +- 2 cm", " 7.06m \u00b1 2 cm "}) {
+    const auto [metres, sigma] = parse_metres_with_sigma(text);
+    EXPECT_DOUBLE_EQ(metres, 7.06) << text;
+    EXPECT_DOUBLE_EQ(sigma, 0.02) << text;
+  }
+  for (const auto* bad : {"", " ", "7.06m +-", "7.06 m 2"}) {
+    EXPECT_THROW(parse_metres_with_sigma(bad), InvalidInput) << bad;
+  }
+}
+
 TEST(FormatLength, SpeaksTheUnitOfTheScene) {
   EXPECT_EQ(format_length(2, frame_in_millimetres()), "8 mm");
   EXPECT_EQ(format_length(500, frame_in_millimetres()), "2 m");

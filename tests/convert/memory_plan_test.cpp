@@ -3,12 +3,14 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 
 #include <gtest/gtest.h>
 
 #include "convert/terminal.h"
 #include "libcgs/core/error.h"
 #include "libcgs/render/rasterizer.h"
+#include "tests/support/temp_dir.h"
 
 namespace cgs::memory_plan_test {
 namespace {
@@ -85,6 +87,22 @@ TEST(MemoryPlan, LeavesOutWhatTheUsersVoxelsDecide) {
   const std::string text = memory_plan_text(memory_plan(scene_of(3, 400, 300), false));
   EXPECT_EQ(text.find("volume"), std::string::npos) << text;
   EXPECT_NE(text.find("depth and Gaussians"), std::string::npos) << text;
+}
+
+TEST(FreeOfGroup, IsWhatAContainerMayStillTake) {
+  const test::TempDir dir;
+  const auto free = [&] { return free_of_group(dir.path(), "memory.max", "memory.current"); };
+  const size_t unlimited = std::numeric_limits<size_t>::max();
+  EXPECT_EQ(free(), unlimited) << "there are no groups";
+  test::write_bytes(dir / "memory.max", "max\n");
+  test::write_bytes(dir / "memory.current", "700\n");
+  EXPECT_EQ(free(), unlimited);
+  test::write_bytes(dir / "memory.max", "1000\n");
+  EXPECT_EQ(free(), 300u);
+  test::write_bytes(dir / "memory.stat", "anon 500\ninactive_file 150\nactive_file 50\n");
+  EXPECT_EQ(free(), 500u);
+  test::write_bytes(dir / "memory.max", "400\n");
+  EXPECT_EQ(free(), 0u);
 }
 
 TEST(MemoryPlan, CountsNetworksWhileTheyAreTrained) {

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "io/png.h"
 #include "tests/support/run_cgs.h"
@@ -129,6 +130,21 @@ TEST(BadInput, CutJpeg) {
   cut(dir / "scene/images/1.jpg", 0.9);
   write_transforms(dir, {frame_json("images/0.png", 0), frame_json("images/1.jpg", 0.1)});
   expect_refused(dir, 3, {"TRUNCATED", "1.jpg"});
+}
+
+// Depth of a sensor may tell the scale, so lengths are no mistake; the photographs are.
+TEST(BadInput, LengthsOfPhotographsWithDepth) {
+  const TempDir dir;
+  std::filesystem::create_directories(dir / "scene/depth");
+  const ColorImage blank(64, 48, Eigen::Vector3f::Constant(0.5f));
+  for (const char* name : {"a.png", "b.png"}) write_png(dir / "scene" / name, blank);
+  const auto run = [&] {
+    return run_cgs("run " + (dir / "scene").string() + " -q --voxel-size 5mm -o " +
+                   (dir / "out").string());
+  };
+  EXPECT_EQ(run().exit_code, 3);
+  std::filesystem::remove(dir / "scene/depth");
+  EXPECT_EQ(run().exit_code, 2);
 }
 
 TEST(BadInput, PathThatLeavesTheScene) {
@@ -261,6 +277,37 @@ TEST(Output, FilesOfOthersAreNotReplaced) {
   for (const char* name : {"out/mesh/watertight.blend", "out/web/asset.usdz"}) {
     EXPECT_TRUE(std::filesystem::exists(dir / name)) << name;
   }
+}
+
+// A folder whose name is not UTF-8, a photograph that is held out, and a mask that comes and goes.
+TEST(Output, FilesAreFoundByTheSceneNotByWhatTheModelNoted) {
+  const TempDir dir;
+  write_scene(dir);
+  const std::string folder = (dir /
+                              "K\xfc"
+                              "che")
+                                 .string();
+  std::filesystem::rename(dir / "scene", folder);
+  const std::string run =
+      "run " + folder + " -q --views 0,1 --set steps=0 -o " + (dir / "out").string();
+  const auto evaluation = [&] {
+    const ProgramResult result = run_cgs(run + " -w --json");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out)["evaluation"]["views"];
+  };
+  const auto plain = evaluation();
+  ASSERT_EQ(plain.size(), 1u);
+  EXPECT_FALSE(std::filesystem::is_empty(dir / "out/web"));
+  const std::string holes = test::read_bytes(dir / "out/views/2.hole.png");
+  MaskMap mask(32, 24, 1);
+  std::fill(mask.data.begin(), mask.data.begin() + 32 * 12, uint8_t{0});
+  std::filesystem::create_directories(folder + "/masks");
+  write_png(folder + "/masks/2.png", mask);
+  EXPECT_NE(evaluation(), plain);
+  EXPECT_NE(test::read_bytes(dir / "out/views/2.hole.png"), holes);
+  std::filesystem::remove(folder + "/masks/2.png");
+  EXPECT_EQ(evaluation(), plain);
+  EXPECT_EQ(test::read_bytes(dir / "out/views/2.hole.png"), holes);
 }
 
 TEST(Output, AModelIsReplacedOnlyWhenAskedForAndFramesOfOthersNever) {

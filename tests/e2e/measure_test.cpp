@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/mesh_ply.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/solid_meshes.h"
 
@@ -212,6 +213,41 @@ TEST(Compare, MovedSphereAndBack) {
   EXPECT_NEAR(joined["registration"]["matrix"][1][3].get<double>(), 0.02, 1e-6);
   EXPECT_NE(test::read_bytes(dir / "c.ply").find("property float scalar_distance"),
             std::string::npos);
+}
+
+// One file is in metres, the other does not say; a unit of it is 0.8 m.
+TEST(Compare, AScaleThatFitsTellsTheUnitOfTheOther) {
+  const TempDir dir;
+  auto waves = test::torus_mesh(0.6, 0.2);
+  for (Eigen::Vector3d& p : waves.points) {
+    p *= 1 + 0.1 * std::sin(5 * p.x() + 1) * std::cos(4 * p.y());
+  }
+  waves = test::with_vertices(std::move(waves));
+  Frame metres;
+  metres.metres_per_unit = 1;
+  metres.scale_source = ScaleSource::Assumed;
+  MeasurableMesh raised = waves;  // by 2 cm where z > 0.15
+  for (Eigen::Vector3d& p : raised.points) {
+    if (p.z() > 0.15) p.z() += 0.02;
+  }
+  write_mesh_ply(dir / "new.ply", test::with_vertices(raised).mesh, metres);
+  for (Eigen::Vector3d& p : waves.points) p /= 0.8;
+  test::write_bytes(dir / "old.obj", obj_text(waves));
+  const std::string a = (dir / "new.ply").string();
+  const std::string b = (dir / "old.obj").string();
+  for (const std::string& both : {a + " " + b, b + " " + a}) {
+    const json found =
+        json_of("compare " + both + " --icp --scale --unit mm --threshold 5mm --ply " +
+                (dir / "c.ply").string());
+    EXPECT_NEAR(found["distance"]["max_absolute"].get<double>(), 20, 1) << both;
+    const json written = json_of("measure " + (dir / "c.ply").string() + " --area");
+    const json truth = json_of("measure " + a + " --area");
+    EXPECT_NEAR(written["figures"]["area"]["value"].get<double>() /
+                    truth["figures"]["area"]["value"].get<double>(),
+                1,
+                0.03)
+        << both;
+  }
 }
 
 // What `arguments` would write over `input` is refused, by another name of the file as well.

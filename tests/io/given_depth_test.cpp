@@ -351,7 +351,27 @@ TEST_F(FisheyeGivenDepth, LosesTheDistortionAsThePhotographDoes) {
   }
 }
 
+TEST_F(GivenDepthFiles, ThatWereDescribedMustBeThere) {
+  SceneOptions described;
+  described.depth.kind = DepthKind::Metric;
+  EXPECT_EQ(test::defect_of([&] { first(described); }), "MISSING");
+  described.depth.kind = DepthKind::Unknown;
+  described.depth.scale = 5000;
+  EXPECT_EQ(test::defect_of([&] { first(described); }), "MISSING");
+  write("depth/v1.npy", kWidth, kHeight, ramp);
+  EXPECT_FALSE(first(described).depth_path.empty());
+}
+
+TEST_F(GivenDepthFiles, ThatANetworkReplacesAreNamed) {
+  write("depth/v1.npy", kWidth, kHeight, ramp);
+  SceneOptions guessed;
+  guessed.depth.network = dir_ / "network.onnx";
+  EXPECT_TRUE(first(guessed).depth_path.empty());
+  EXPECT_NE(all_warnings_.find("are not used, as --depth-model is"), std::string::npos);
+}
+
 TEST(DepthOptions, RefusesAScaleOutOfRange) {
+  EXPECT_THROW((DepthOptions{.network = "n.onnx", .scale = 1000}.validate()), InvalidInput);
   EXPECT_NO_THROW(DepthOptions{}.validate());
   EXPECT_THROW((DepthOptions{.scale = -1}.validate()), InvalidInput);
   EXPECT_THROW((DepthOptions{.scale = NAN}.validate()), InvalidInput);

@@ -68,6 +68,20 @@ TEST_F(ReadTransforms, SaysWhichDepthIsNotThere) {
   EXPECT_TRUE(scene.views[0].depth_path.empty() && scene.views[1].depth_path.empty());
 }
 
+TEST_F(ReadTransforms, TakesPathsAsWindowsWritesThem) {
+  test::write_bytes(dir_ / "depth/a.png", "x");
+  document_["frames"][0]["file_path"] = ".\\images\\a.png";
+  document_["frames"][0]["depth_file_path"] = "depth\\a.png";
+  document_["frames"][1]["file_path"] = "images\\b";
+  const Scene scene = read();
+  EXPECT_TRUE(scene.missing.empty());
+  EXPECT_EQ(scene.views[0].image_path.filename(), "a.png");
+  EXPECT_EQ(scene.views[0].depth_path.filename(), "a.png");
+  EXPECT_EQ(scene.views[1].image_path.filename(), "b.jpg");
+  document_["frames"][0]["file_path"] = "..\\a.png";
+  EXPECT_EQ(refused(), "PATH");
+}
+
 TEST_F(ReadTransforms, TakesAllOfAFocalLengthFromTheFrameThatStatesOne) {
   document_["frames"][0]["camera_angle_x"] = 2 * std::atan(40 / 260.0);
   document_["frames"][1]["fl_x"] = 260;
