@@ -39,7 +39,7 @@ void use_metres_where_measured(Scene& scene);
 
 /// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model
 /// or photographs that were moved. \throws BadInput as read_scene()
-void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow_external);
+void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow_external = false);
 
 /// Takes photographs and masks from another reading of the same scene, by the names of the views.
 void relink_views(Scene& scene, const Scene& found);
