@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/mesh_ply.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/solid_meshes.h"
 
@@ -222,15 +221,15 @@ TEST(Compare, AScaleThatFitsTellsTheUnitOfTheOther) {
   for (Eigen::Vector3d& p : waves.points) {
     p *= 1 + 0.1 * std::sin(5 * p.x() + 1) * std::cos(4 * p.y());
   }
-  waves = test::with_vertices(std::move(waves));
-  Frame metres;
-  metres.metres_per_unit = 1;
-  metres.scale_source = ScaleSource::Assumed;
   MeasurableMesh raised = waves;  // by 2 cm where z > 0.15
   for (Eigen::Vector3d& p : raised.points) {
     if (p.z() > 0.15) p.z() += 0.02;
   }
-  write_mesh_ply(dir / "new.ply", test::with_vertices(raised).mesh, metres);
+  test::write_bytes(dir / "new.obj", obj_text(raised));
+  ASSERT_EQ(run_cgs("filter " + (dir / "new.obj").string() + " " + (dir / "new.ply").string() +
+                    " --assume-unit m --op scale=1")
+                .exit_code,
+            0);
   for (Eigen::Vector3d& p : waves.points) p /= 0.8;
   test::write_bytes(dir / "old.obj", obj_text(waves));
   const std::string a = (dir / "new.ply").string();
