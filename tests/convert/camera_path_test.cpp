@@ -122,6 +122,7 @@ TEST(CameraPath, OfAFileIsInTheCoordinatesOfTheModelsFiles) {
 TEST(CameraPath, OfTheModelItselfIsWhereItsCamerasAre) {
   Model model = row_of_cameras();
   model.scene.kind = "photographs";
+  model.scene.folder = "somewhere";
   model.scene.frame.metres_per_unit = 3.5;
   model.scene.frame.scale_source = ScaleSource::KnownDistance;
   const test::TempDir dir;
