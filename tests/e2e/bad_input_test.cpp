@@ -142,7 +142,7 @@ TEST(BadInput, LengthsOfPhotographsWithDepth) {
     return run_cgs("run " + (dir / "scene").string() + " -q --voxel-size 5mm -o " +
                    (dir / "out").string());
   };
-  EXPECT_EQ(run().exit_code, 3);
+  EXPECT_EQ(run().exit_code, 6);
   std::filesystem::remove(dir / "scene/depth");
   EXPECT_EQ(run().exit_code, 2);
 }
