@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/png.h"
 
+#include <cerrno>
 #include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <new>
 // The C libraries' headers must follow <cstdio>.
 #include <jpeglib.h>
 #include <png.h>
 
 #include "io/atomic_file.h"
+#include "io/lack_of_memory.h"
 #include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
 
@@ -43,7 +46,9 @@ std::string png_bytes(int width, int height, png_uint_32 format, const std::stri
   image.format = format;
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::string out(size, '\0');
+  errno = 0;
   if (png_image_write_to_memory(&image, out.data(), &size, 0, pixels.data(), 0, nullptr) == 0) {
+    throw_if_memory_ran_out();
     throw NumericalError(std::string("PNG encoder: ") + image.message);
   }
   out.resize(size);
@@ -139,7 +144,7 @@ std::string encode_jpeg(const ColorImage& image, int quality) {
   JpegJob job{rgb.data(), image.width, image.height, quality};
   const bool good = compress_jpeg(job);
   const std::unique_ptr<unsigned char, decltype(&std::free)> owner(job.bytes, &std::free);
-  if (!good) throw NumericalError("JPEG encoder: out of memory");
+  if (!good) throw std::bad_alloc();
   return {reinterpret_cast<const char*>(job.bytes), job.size};
 }
 
