@@ -25,16 +25,19 @@ constexpr std::array<std::pair<std::string_view, double>, 7> kUnits = {{{"m", 1.
 // Splits "0.5mm" into 0.5 and "mm".
 std::pair<double, std::string> number_and_suffix(const std::string& text, const char* what) {
   double value = 0;
-  const size_t first = std::min(text.find_first_not_of(' '), text.size());
-  const size_t last = text.find_last_not_of(' ') + 1;  // 0 if there is nothing else
-  const char* const begin = text.data() + std::min(first, last);
-  const auto [end, error] = std::from_chars(begin, text.data() + last, value);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || !(value > 0) || !std::isfinite(value)) {
     throw InvalidInput("'" + text + "' is not a positive " + what);
   }
-  std::string suffix(end, text.data() + last);
+  std::string suffix(end, text.data() + text.size());
   suffix.erase(0, suffix.find_first_not_of(' '));
   return {value, suffix};
+}
+
+std::string without_blanks(const std::string& text) {
+  const size_t first = text.find_first_not_of(' ');
+  if (first == std::string::npos) return "";
+  return text.substr(first, text.find_last_not_of(' ') + 1 - first);
 }
 
 }  // namespace
@@ -84,8 +87,9 @@ std::pair<double, double> parse_metres_with_sigma(std::string text) {
   const size_t sign = text.find(plus_minus);
   if (sign != std::string::npos) text.replace(sign, plus_minus.size(), "+-");
   const size_t split = text.find("+-");
-  const double metres = parse_metres(text.substr(0, split));
-  return {metres, split == std::string::npos ? 0 : parse_metres(text.substr(split + 2))};
+  const double metres = parse_metres(without_blanks(text.substr(0, split)));
+  if (split == std::string::npos) return {metres, 0};
+  return {metres, parse_metres(without_blanks(text.substr(split + 2)))};
 }
 
 std::string format_length(double internal_length, const Frame& frame) {
