@@ -91,9 +91,7 @@ fs::path photograph(const SceneRoot& root,
   };
   fs::path path = resolve(name);
   if (is_present(path) || name.find('\\') == std::string::npos) return path;
-  std::string with_slashes = name;  // written on Windows
-  std::replace(with_slashes.begin(), with_slashes.end(), '\\', '/');
-  return resolve(with_slashes);
+  return resolve(with_slashes(name));
 }
 
 View view_of(const SceneRoot& root,

@@ -297,6 +297,17 @@ void refuse_shared_files(const Scene& scene) {
   }
 }
 
+// A network guesses where files, if there are some, have measured.
+void leave_out_files(Scene& scene) {
+  size_t count = 0;
+  for (View& view : scene.views) {
+    count += static_cast<size_t>(!view.depth_path.empty());
+    view.depth_path.clear();
+  }
+  if (count == 0 && !is_folder(scene.folder / "depth")) return;
+  scene.warnings.emplace_back("the depth files of this scene are not used, as --depth-model is");
+}
+
 }  // namespace
 
 std::map<std::string, DepthKind> depth_kinds() {
@@ -326,21 +337,6 @@ fs::path confidence_file(const Scene& scene, const View& view, bool allow_extern
   const fs::path folder = resolve_in_scene(root, name.string(), scene.folder);
   return depth_file_of({folder, allow_external}, view.depth_path);
 }
-
-namespace {
-
-// A network guesses where files, if there are some, have measured.
-void leave_out_files(Scene& scene) {
-  size_t count = 0;
-  for (View& view : scene.views) {
-    count += static_cast<size_t>(!view.depth_path.empty());
-    view.depth_path.clear();
-  }
-  if (count == 0 && !is_folder(scene.folder / "depth")) return;
-  scene.warnings.emplace_back("the depth files of this scene are not used, as --depth-model is");
-}
-
-}  // namespace
 
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external) {
   if (options.kind != DepthKind::Unknown) scene.depth_kind = options.kind;

@@ -98,6 +98,11 @@ std::vector<fs::path> companion_folders(const SceneRoot& root,
   return out;
 }
 
+std::string with_slashes(std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  return name;
+}
+
 bool stays_below(const fs::path& path) {
   return path.is_relative() && std::find(path.begin(), path.end(), "..") == path.end();
 }

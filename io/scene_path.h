@@ -38,6 +38,9 @@ std::vector<std::filesystem::path> companion_folders(const SceneRoot& root,
                                                      const std::filesystem::path& photographs,
                                                      const std::string& name);
 
+/// A name as programs on Windows write paths, with '/' for every backslash.
+std::string with_slashes(std::string name);
+
 /// True for a relative path without ".." in it.
 bool stays_below(const std::filesystem::path& path);
 

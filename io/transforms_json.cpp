@@ -160,12 +160,6 @@ Eigen::Isometry3d read_pose(const JsonValue& matrix) {
                       [&](Defect defect, const std::string& why) { matrix.fail(defect, why); });
 }
 
-// As programs on Windows write paths.
-std::string with_slashes(std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');
-  return name;
-}
-
 fs::path file_named(const SceneRoot& root, const std::string& name, const fs::path& json) {
   fs::path path = resolve_in_scene(root, name, json);
   if (is_present(path) || name.find('\\') == std::string::npos) return path;

@@ -8,6 +8,7 @@
 
 #include "io/byte_reader.h"
 #include "io/compression.h"
+#include "io/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -108,8 +109,8 @@ void read_64_bit_fields(std::string_view extra,
 }
 
 // Nothing is extracted, but a name that would lead elsewhere is no accident.
-bool leaves_a_folder(std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');
+bool leaves_a_folder(const std::string& written) {
+  const std::string name = with_slashes(written);
   const bool has_drive = name.size() > 1 && name[1] == ':';
   if (name.empty() || name[0] == '/' || has_drive) return true;
   const std::string between = "/" + name + "/";

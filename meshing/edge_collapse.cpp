@@ -27,6 +27,20 @@ void join(EdgeNeighbor& at, const EdgeNeighbor& one) {
   if (at.faces == 2) at.border = at.label != one.label;
 }
 
+// Leaves one neighbour per vertex.
+void join_same(std::vector<EdgeNeighbor>& all) {
+  std::stable_sort(all.begin(), all.end(), [](auto& a, auto& b) { return a.vertex < b.vertex; });
+  std::vector<EdgeNeighbor> out;
+  for (const EdgeNeighbor& one : all) {
+    if (!out.empty() && out.back().vertex == one.vertex) {
+      join(out.back(), one);
+    } else {
+      out.push_back(one);
+    }
+  }
+  all = std::move(out);
+}
+
 }  // namespace
 
 Collapser::Collapser(const TriangleMesh& mesh, const CollapseLimits& limits)
@@ -103,17 +117,7 @@ void Collapser::neighbors_of(uint32_t v, std::vector<EdgeNeighbor>& out) const {
       }
     }
   }
-  if (!many) return;
-  std::stable_sort(out.begin(), out.end(), [](auto& a, auto& b) { return a.vertex < b.vertex; });
-  size_t kept = 0;
-  for (size_t i = 1; i < out.size(); ++i) {
-    if (out[i].vertex == out[kept].vertex) {
-      join(out[kept], out[i]);
-    } else {
-      out[++kept] = out[i];
-    }
-  }
-  if (!out.empty()) out.resize(kept + 1);
+  if (many) join_same(out);
 }
 
 // Walks from face to face over shared edges; all faces around the vertex must be met.

@@ -81,9 +81,8 @@ class Parts {
   Part flood(size_t seed, bool flip) {
     const uint8_t sign = solid_.inside[seed];
     const uint8_t mark = flip ? 2 : 1;
-    const std::array<size_t, 3> strides = {
-        size_t(solid_.size[1]) * size_t(solid_.size[2]), size_t(solid_.size[2]), 1};
-    const size_t row = strides[1];
+    const auto row = size_t(solid_.size[2]);
+    const std::array<size_t, 2> strides = {size_t(solid_.size[1]) * row, row};
     const auto is_new = [&](size_t at) { return seen_[at] != mark && solid_.inside[at] == sign; };
     const auto push_runs = [&](size_t begin, size_t end) {
       for (size_t at = begin; at < end; ++at) {
@@ -106,7 +105,7 @@ class Parts {
         if (flip) solid_.inside[at] = sign == 0 ? 1 : 0;
       }
       out.size += end - begin;
-      for (size_t axis = 0; axis < 2; ++axis) {
+      for (size_t axis = 0; axis < strides.size(); ++axis) {
         const size_t stride = strides.at(axis);
         const size_t place = begin / stride % size_t(solid_.size.at(axis));
         if (place > 0) push_runs(begin - stride, end - stride);

@@ -76,11 +76,12 @@ std::vector<Eigen::Vector3d> seen_places(ComparedPoints points) {
 
 Registration lay_onto(MeasurableMesh& a,
                       const MeasurableMesh& b,
+                      const NearestSurface& surface,
                       bool with_scale,
                       const Terminal& terminal) {
   constexpr size_t kPoints = 20'000;
   const Registration out =
-      register_points(seen_places(points_by_area(a, kPoints)), b, NearestSurface(b), with_scale);
+      register_points(seen_places(points_by_area(a, kPoints)), b, surface, with_scale);
   if (!out.converged) {
     terminal.warn({"--icp still moved A after " + std::to_string(out.iterations) +
                    " iterations: the surfaces hold each other badly"});
@@ -91,8 +92,8 @@ Registration lay_onto(MeasurableMesh& a,
 
 // Relative standard deviation of one scale against the other; none where A was made to fit.
 double scale_sigma(const Frame& a, const Frame& b, bool fits_scale) {
-  if (fits_scale || !a.has_metric_scale() || !b.has_metric_scale()) return 0;
-  return std::hypot(a.metres_sigma / a.metres_per_unit, b.metres_sigma / b.metres_per_unit);
+  if (fits_scale) return 0;
+  return std::hypot(figure_unit(a, "").relative_sigma, figure_unit(b, "").relative_sigma);
 }
 
 void print_json(const CompareArgs& args,
@@ -113,23 +114,15 @@ void print_text(const CompareArgs& args, const Comparison& comparison, const Fig
               comparison_text(comparison, unit).c_str());
 }
 
-// Where only one file says how long a unit is, and A was made to fit B, both are brought to that.
-void share_unit(MeasurableMesh& a,
-                MeasurableMesh& b,
-                const Frame& stated_by_b,
-                const Registration& registration) {
-  if (a.frame.has_metric_scale() == stated_by_b.has_metric_scale()) return;
-  if (a.frame.has_metric_scale()) {
-    Registration back;
-    back.scale = 1 / registration.scale;
-    a = moved(a, back);
-    b = moved(b, back);
-    return;
-  }
-  a.frame.metres_per_unit = stated_by_b.metres_per_unit;
-  a.frame.metres_sigma = stated_by_b.metres_sigma;
-  a.frame.scale_source = stated_by_b.scale_source;
-  b.frame = a.frame;
+// Where only one file says how long a unit is: A has grown into units of B, so that is known of
+// these now.
+void share_unit(Frame& a, const Frame& b, double growth) {
+  if (a.has_metric_scale() == b.has_metric_scale()) return;
+  const double units_of_b = a.has_metric_scale() ? growth : 1;
+  const Frame known = a.has_metric_scale() ? a : b;
+  a.metres_per_unit = known.metres_per_unit / units_of_b;
+  a.metres_sigma = known.metres_sigma / units_of_b;
+  a.scale_source = known.scale_source;
 }
 
 // Cloud against cloud, along normals: what --m3c2 asks for.
@@ -159,9 +152,7 @@ void check_units(const CompareArgs& args, const Frame& a, const Frame& b) {
                      printable(known) + " does; say it with --assume-unit");
 }
 
-void run_compare(const CompareArgs& args) {
-  let_interrupts_end();
-  limit_threads(args.common.threads);
+void check_options(const CompareArgs& args) {
   for (const auto& output : {args.ply, args.svg}) {
     for (const auto& input : {args.a, args.b}) {
       if (!output.empty()) keep_apart(output, input);
@@ -172,16 +163,31 @@ void run_compare(const CompareArgs& args) {
   require(args.samples >= 100 && args.samples <= 100'000'000,
           "--samples must be in 100 ... 100000000",
           args.samples);
+}
+
+void check_clouds(const CompareArgs& args, const MeasurableMesh& b) {
+  if (!b.mesh.faces.empty()) return;
+  if (!args.m3c2.wanted) {
+    throw InvalidInput(
+        printable(args.b) +
+        " is a point cloud; distances need a surface: name the cloud first, or say --m3c2");
+  }
+  if (args.icp) {
+    throw InvalidInput("--icp needs a surface to lay A onto, but " + printable(args.b) +
+                       " is a point cloud");
+  }
+}
+
+void run_compare(const CompareArgs& args) {
+  let_interrupts_end();
+  limit_threads(args.common.threads);
+  check_options(args);
   Terminal terminal(args.common.quiet, args.common.strict);
   MeasurableFile first = read_measured(args.a, args.assume_unit);
   MeasurableFile second = read_measured(args.b, args.assume_unit);
   terminal.warn(first.warnings);
   terminal.warn(second.warnings);
-  if (second.content.mesh.faces.empty() && !args.m3c2.wanted) {
-    throw InvalidInput(
-        printable(args.b) +
-        " is a point cloud; distances need a surface: name the cloud first, or say --m3c2");
-  }
+  check_clouds(args, second.content);
   check_units(args, first.content.frame, second.content.frame);
   const std::string turned = turned_text(first.content.frame, second.content.frame);
   if (!turned.empty() && !args.icp) terminal.warn({turned});
@@ -190,22 +196,20 @@ void run_compare(const CompareArgs& args) {
   MeasurableMesh b = in_frame_of(second.content, a.frame);
   if (!args.scale) (void)figure_unit(a.frame, args.unit);  // before all the work
   Comparison comparison;
+  std::optional<NearestSurface> surface;
+  if (args.icp || !args.m3c2.wanted) surface.emplace(b);
   if (args.icp) {
-    if (b.mesh.faces.empty()) {
-      throw InvalidInput("--icp needs a surface to lay A onto, but " + printable(args.b) +
-                         " is a point cloud");
-    }
-    comparison.registration = lay_onto(a, b, args.scale, terminal);
-    share_unit(a, b, second.content.frame, *comparison.registration);
+    comparison.registration = lay_onto(a, b, *surface, args.scale, terminal);
+    share_unit(a.frame, second.content.frame, comparison.registration->scale);
+    b.frame = a.frame;
   }
   const FigureUnit unit = figure_unit(a.frame, args.unit);
   if (args.m3c2.wanted) return print_m3c2(args, a, b, unit, comparison.registration);
-  const NearestSurface surface(b);
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& p : a.points) box.extend(p);
   const auto compared = [&](ComparedPoints points) {
     add_scale_sigma(points, of_scale, box.center());
-    return deviations(points, b, surface);
+    return deviations(points, b, *surface);
   };
   comparison.by_area = compared(points_by_area(a, args.samples));
   comparison.summary = summarize(comparison.by_area);

@@ -88,14 +88,6 @@ TEST_F(ResolveInScene, EscapesTheNameInItsMessage) {
   EXPECT_EQ(message.find('\n'), std::string::npos);
 }
 
-TEST(Printable, ShowsNamesAsTheyAreUnlessTheyCannotBeShown) {
-  EXPECT_EQ(printable("K\u00fcche \u6c34.ply"), "K\u00fcche \u6c34.ply");
-  EXPECT_EQ(printable("K\xfc"
-                      "che"),
-            "K\\xfcche");
-  EXPECT_EQ(printable("a\x1b[31m\xc2\x85z\n"), "a\\x1b[31m\\xc2\\x85z\\x0a");
-}
-
 TEST_F(ResolveInScene, ListsImagesByName) {
   test::write_bytes(dir_ / "scene/images/B.JPG", "x");
   test::write_bytes(dir_ / "scene/images/K.txt", "x");
