@@ -52,6 +52,7 @@ struct Source {
   std::vector<std::string> warnings;  ///< Of reading the mesh.
   bool has_textures = false;          ///< As MeasurableFile.
   Frame frame;
+  Eigen::Vector3d file_origin = Eigen::Vector3d::Zero();  ///< Of the mesh that was read.
 };
 
 /// Files of a mesh: PLY and .glb have to be looked into, they may hold splats.
@@ -99,6 +100,7 @@ Source read_source(const std::filesystem::path& path, size_t memory_limit) {
     out.frame = file.content.frame;
     out.warnings = std::move(file.warnings);
     out.has_textures = file.has_textures;
+    out.file_origin = file.content.file_origin;
   } else {
     check_size(path, memory_limit);
     out.splats = read_splats(path);
@@ -348,29 +350,37 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
     return report;
   }
   const bool from_splats_alone = source.splats.has_value();
-  if (from_splats_alone) check_pictures(request, source.splats->gaussians);
+  if (from_splats_alone) {
+    check_pictures(request, source.splats->gaussians);
+    report["evidence"] = "none: the surface was seen by virtual cameras only";
+    terminal.say(
+        "no photograph vouches for this surface: all of it is labelled virtual or inferred");
+  }
   if (source.content != Content::Mesh) {
     Volume volume = make_volume(request, source, terminal, report);
     if (wanted == Content::Volume) {
-      write_volume(request.output, volume, source.frame);
+      write_volume(request.output,
+                   volume,
+                   source.frame,
+                   from_splats_alone ? "virtual cameras" : "photographs");
       return report;
     }
     source.mesh = make_mesh(request, volume, source.frame, terminal, report);
   } else if (!request.simplify.empty()) {
     simplify_mesh(request, source, terminal);
   }
-  if (from_splats_alone) {
-    report["evidence"] = "none: the surface was seen by virtual cameras only";
-    terminal.say(
-        "no photograph vouches for this surface: all of it is labelled virtual or inferred");
-  }
   if (source.mesh.faces.empty() && lower_extension(request.output) != ".ply") {
     throw BadInput(
         Defect::Empty, request.input, "has no faces; a point cloud can only be written as .ply");
   }
-  for (const std::string& lost :
-       {textures_text(source.has_textures), lost_in_file(request.output, source.mesh)}) {
+  for (const std::string& lost : {textures_text(source.has_textures),
+                                  lost_in_file(request.output, source.mesh, source.frame)}) {
     if (!lost.empty()) terminal.say(lost);
+  }
+  if (source.content == Content::Mesh) {
+    const std::string moved =
+        moved_origin_text(request.output, source.file_origin, source.frame.file_origin);
+    if (!moved.empty()) terminal.warn(moved);
   }
   const std::string lost_by_encoding = write_mesh(request, source, source.mesh, report);
   if (!lost_by_encoding.empty()) terminal.say(lost_by_encoding);

@@ -237,7 +237,7 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   refuse_other_kinds(scene);
   if (!request.options.downscale) take_size_of_depth(scene);
   settle_scale(scene, request.assume_unit);
-  const Eigen::Vector3d up = request.up.empty() ? world_up(scene) : up_direction(request.up);
+  const Eigen::Vector3d up = up_of(scene, request.up);
   to_canonical(scene);
   scene.frame.up = up;
 

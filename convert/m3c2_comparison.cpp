@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 #include "convert/length.h"
@@ -46,6 +47,10 @@ M3c2Options options_of(const M3c2Request& request,
   if (!request.registration.empty() && !is_none(request.registration)) {
     out.registration = parse_length(request.registration, frame);
   }
+  out.scale_sigma = request.scale_sigma;
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : a.places) box.extend(p);
+  out.center = box.center();
   return out;
 }
 
@@ -208,6 +213,7 @@ Json m3c2_json(const M3c2Comparison& found, const MeasurableMesh& a, const Figur
                  {"cylinder", found.options.cylinder * unit.length},
                  {"cylinder_depth", found.options.depth * unit.length},
                  {"registration_error", found.options.registration * unit.length},
+                 {"scale_sigma", found.options.scale_sigma},
                  {"variance_a", found.variance_a},
                  {"variance_b", found.variance_b},
                  {"sign_known", found.is_sign_known()},
@@ -231,13 +237,14 @@ std::string m3c2_text(const M3c2Comparison& found, const FigureUnit& unit) {
     std::snprintf(text.data(),
                   text.size(),
                   "level of detection (95 %%): median %.4g %s, 95 %% below %.4g; by %s of A and %s "
-                  "of B, registration %.4g\n",
+                  "of B, registration %.4g, scale %.2g %%\n",
                   at_share(detections, 0.5) * unit.length,
                   unit.name.c_str(),
                   at_share(detections, 0.95) * unit.length,
                   words(found.variance_a).c_str(),
                   words(found.variance_b).c_str(),
-                  found.options.registration * unit.length);
+                  found.options.registration * unit.length,
+                  100 * found.options.scale_sigma);
     out = text.data();
   }
   std::snprintf(text.data(),

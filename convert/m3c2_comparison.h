@@ -19,6 +19,7 @@ struct M3c2Request {
   std::string cylinder;
   std::string depth;
   std::string registration;  ///< Empty = 0.
+  double scale_sigma = 0;    ///< Of one file's scale against the other's, as a share of it.
 };
 
 /// What was found at the vertices of A.
@@ -50,8 +51,9 @@ M3c2Comparison compare_m3c2(const M3c2Request& request,
                             const MeasurableMesh& b);
 
 /// comparison_json() and "m3c2": {"normal_scale", "cylinder", "cylinder_depth",
-/// "registration_error", "sign_known", "variance_a": "sigma", "roughness" or "mixed", "variance_b",
-/// "places", "with_distance": share, "with_detection": share, "detection": {"median", "p95"}}
+/// "registration_error", "scale_sigma", "sign_known", "variance_a": "sigma", "roughness" or
+/// "mixed", "variance_b", "places", "with_distance": share, "with_detection": share, "detection":
+/// {"median", "p95"}}
 nlohmann::ordered_json m3c2_json(const M3c2Comparison& found,
                                  const MeasurableMesh& a,
                                  const FigureUnit& unit);

@@ -124,7 +124,8 @@ double common_sigma(const Sightings& seen) {
   text.resize(text.size() - 2);
   throw InvalidInput(
       text +
-      "; known are AprilTag 36h11, ArUco 4x4 up to number 49, 5x5 to 99, 6x6 to 249, original");
+      "; known are AprilTag 36h11, ArUco 4x4 up to number 49, 5x5 to 99, 6x6 to 249, original; "
+      "one that a photograph shows twice is left out, so print different numbers");
 }
 
 }  // namespace

@@ -111,7 +111,17 @@ std::string seams_text(const TriangleMesh& mesh) {
          "--op repair joins them";
 }
 
-std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& mesh) {
+std::string moved_origin_text(const std::filesystem::path& path,
+                              const Eigen::Vector3d& read,
+                              const Eigen::Vector3d& written) {
+  if (read == written) return "";
+  return "coordinates in " + printable(path) +
+         " are from another origin, which the file states: floats would lose digits";
+}
+
+std::string lost_in_file(const std::filesystem::path& path,
+                         const TriangleMesh& mesh,
+                         const Frame& frame) {
   const std::string extension = lower_extension(path);
   if (extension == ".ply" || extension == ".glb") return "";
   std::string out;
@@ -122,6 +132,7 @@ std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& 
   add((extension == ".stl" || extension == ".3mf") && !mesh.colors.empty(), "colours");
   add(!mesh.sigma.empty(), "sigma");
   add(!mesh.support.empty(), "support");
+  add(extension == ".stl" && frame.metres_sigma > 0, "sigma of the scale");
   return out.empty() ? out : extension + " files hold no " + out + "; .ply and .glb do";
 }
 

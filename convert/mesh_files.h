@@ -49,8 +49,16 @@ std::string seams_text(const TriangleMesh& mesh);
 /// without.
 std::string textures_text(bool has_textures);
 
+/// Says that coordinates in a written file are from another origin than those that were read, for a
+/// warning; empty if not.
+std::string moved_origin_text(const std::filesystem::path& path,
+                              const Eigen::Vector3d& read,
+                              const Eigen::Vector3d& written);
+
 /// What the format of a path has no place for, of what a mesh says, for people; empty if nothing.
-std::string lost_in_file(const std::filesystem::path& path, const TriangleMesh& mesh);
+std::string lost_in_file(const std::filesystem::path& path,
+                         const TriangleMesh& mesh,
+                         const Frame& frame);
 
 /// Writes a mesh in the format that the ending of the path names.
 /// \param frame    whose `up` becomes +Z in STL and 3MF, +Y in GLB, and must be known for these

@@ -8,11 +8,14 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "convert/stated_frame.h"
 #include "io/atomic_file.h"
 #include "io/cameras_json.h"
+#include "io/exif.h"
 #include "io/exr.h"
 #include "io/gaussian_ply.h"
 #include "io/masks.h"
+#include "io/orientation.h"
 #include "io/photographs.h"
 #include "io/scene_path.h"
 #include "io/scene_reader.h"
@@ -259,13 +262,40 @@ ColorImage picture(const RenderBuffers& buffers) {
   return out;
 }
 
+namespace {
+
+// How a photograph is to be turned that its camera takes as it lies in the file; 1 = not at all.
+int ignored_orientation(const View& view) {
+  if (view.image_path.empty() || !is_present(view.image_path)) return 1;
+  const int orientation = exif_orientation(view.image_path);
+  return orientation == view.orientation ? 1 : orientation;
+}
+
+// Of a picture as one looks at it, in axes of the file's.
+struct PictureAxes {
+  Eigen::Vector3d right;
+  Eigen::Vector3d down;
+};
+
+PictureAxes picture_axes(int orientation) {
+  const auto at = [&](double x, double y) { return stored_pixel({x, y}, {1, 1}, orientation); };
+  PictureAxes out;
+  out.right << at(1, 0) - at(0, 0), 0;
+  out.down << at(0, 1) - at(0, 0), 0;
+  return out;
+}
+
+}  // namespace
+
 Eigen::Vector3d world_up(const Scene& scene) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   Eigen::Vector3d mean_up = Eigen::Vector3d::Zero();
   for (const View& view : scene.views) {
     const Eigen::Matrix3d R = view.camera.world_from_cam.rotation();
-    spread += R.col(0) * R.col(0).transpose();
-    mean_up -= R.col(1);
+    const PictureAxes axes = picture_axes(ignored_orientation(view));
+    const Eigen::Vector3d right = R * axes.right;
+    spread += right * right.transpose();
+    mean_up -= R * axes.down;
   }
   if (!(mean_up.norm() > 1e-6)) return Eigen::Vector3d::UnitZ();
   mean_up.normalize();
@@ -278,6 +308,18 @@ Eigen::Vector3d world_up(const Scene& scene) {
   if (values[1] < kMinTurn * values[2] || values[0] > kLevel * values[1]) return mean_up;
   const Eigen::Vector3d normal = eigen.eigenvectors().col(0);
   return normal.dot(mean_up) < 0 ? Eigen::Vector3d(-normal) : normal;
+}
+
+Eigen::Vector3d up_of(const Scene& scene, const std::vector<double>& stated) {
+  if (!stated.empty()) return up_direction(stated);
+  return scene.frame.knows_up() ? scene.frame.up : world_up(scene);
+}
+
+size_t turned_photographs(const Scene& scene) {
+  return static_cast<size_t>(
+      std::count_if(scene.views.begin(), scene.views.end(), [](const View& view) {
+        return ignored_orientation(view) != 1;
+      }));
 }
 
 }  // namespace cgs

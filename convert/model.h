@@ -61,7 +61,17 @@ RenderBuffers render_camera(const Model& model,
 ColorImage picture(const RenderBuffers& buffers);
 
 /// World direction that is up in the photographs, by the axis all cameras were turned around
-/// (people hold cameras level), or by the mean image up where the cameras do not turn.
+/// (people hold cameras level), or by the mean image up where the cameras do not turn. Photographs
+/// count as Exif says that they are to be looked at, also where their cameras do not heed it.
+/// \throws BadInput as exif_orientation()
 Eigen::Vector3d world_up(const Scene& scene);
+
+/// What is up in a scene: as `stated` (numbers as typed), else as its frame says, else world_up().
+/// \throws InvalidInput as up_direction(); BadInput as world_up()
+Eigen::Vector3d up_of(const Scene& scene, const std::vector<double>& stated);
+
+/// How many photographs lie turned in their files where their cameras are for the files as they
+/// lie. \throws BadInput as exif_orientation()
+size_t turned_photographs(const Scene& scene);
 
 }  // namespace cgs

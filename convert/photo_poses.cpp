@@ -32,16 +32,25 @@ namespace {
 // Every pair is compared.
 constexpr size_t kMostPhotographs = 16;
 
-std::vector<PhotoFile> checked_photographs(const SceneRoot& root) {
+std::vector<PhotoFile> checked_photographs(const SceneRoot& root,
+                                           const std::vector<std::string>& wanted) {
   std::vector<PhotoFile> photographs = list_photographs(root);
+  if (photographs.size() > kMostPhotographs && wanted.size() >= 2) {
+    std::erase_if(photographs, [&](const PhotoFile& photograph) {
+      const std::string name = photograph.path.filename().string();
+      return std::find(wanted.begin(), wanted.end(), name) == wanted.end();
+    });
+  }
   if (photographs.size() < 2) {
-    throw BadInput(Defect::Empty, root.folder, "need at least 2 photographs");
+    std::string hints;
+    for (const std::string& line : unread_files(root.folder)) hints += "; " + line;
+    throw BadInput(Defect::Empty, root.folder, "need at least 2 photographs" + hints);
   }
   if (photographs.size() > kMostPhotographs) {
     throw LimitError(printable(root.folder) + ": " + std::to_string(photographs.size()) +
                      " photographs without cameras; poses are solved for at most " +
                      std::to_string(kMostPhotographs) +
-                     ": put the best into a folder of their own, or solve with COLMAP");
+                     ": name those to use with --views, or solve with COLMAP");
   }
   return photographs;
 }
@@ -81,6 +90,7 @@ std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
     out.is_stored = true;
     const JsonValue warnings = record.at("warnings");
     for (size_t i = 0; i < warnings.size(); ++i) out.warnings.push_back(warnings.at(i).text());
+    out.focal_sigma = record.at("focal_sigma").number();
     const std::filesystem::path model = folder / "sparse/0";
     out.model.cameras = read_colmap_cameras_text(model / "cameras.txt");
     out.model.images = read_colmap_images_text(model / "images.txt");
@@ -237,21 +247,24 @@ void check_focal(double focal, const std::vector<PhotoFile>& photographs) {
   constexpr double kLongest = 50;
   const double larger = side(photographs.front());
   if (focal >= kShortest * larger && focal <= kLongest * larger) return;
-  throw InvalidInput("--focal is in pixels, not millimetres, and of photographs of " +
-                     std::to_string(side(photographs.front())) + " pixels allowed from " +
-                     std::to_string(std::lround(kShortest * larger)) + " to " +
-                     std::to_string(std::lround(kLongest * larger)) +
-                     " (a lens of f mm as on film: f / 36 of the larger side), got " +
-                     std::to_string(focal));
+  throw InvalidInput(
+      "--focal is in pixels, not millimetres, and of photographs of " +
+      std::to_string(side(photographs.front())) + " pixels allowed from " +
+      std::to_string(std::lround(kShortest * larger)) + " to " +
+      std::to_string(std::lround(kLongest * larger)) +
+      " (a lens of f mm as on film: f / 36 of the larger side of photographs of 3:2, f / 34.6 "
+      "of those of 4:3), got " +
+      std::to_string(focal));
 }
 
 }  // namespace
 
 PhotoPoses photo_poses(const SceneRoot& root,
+                       const std::vector<std::string>& wanted,
                        double focal,
                        const std::filesystem::path& stored,
                        Terminal& terminal) {
-  const std::vector<PhotoFile> photographs = checked_photographs(root);
+  const std::vector<PhotoFile> photographs = checked_photographs(root, wanted);
   if (focal > 0) check_focal(focal, photographs);
   MaskIndex masks(root);
   const std::string inputs = inputs_text(masks, photographs, focal);
@@ -268,6 +281,9 @@ PhotoPoses photo_poses(const SceneRoot& root,
   }
   const PoseSolution solution = solve_poses(photos, part_of(progress, kShare, 1));
   PhotoPoses out{colmap_model(photos, colors, solution), inputs, remarks(photos, solution)};
+  for (const SolvedPhoto& solved : solution.photos) {
+    if (solved.is_placed) out.focal_sigma = std::max(out.focal_sigma, solved.focal_sigma);
+  }
   char rms[32];
   std::snprintf(rms, sizeof rms, "%.2f", solution.rms);
   terminal.end(std::to_string(out.model.images.size()) + " of " +
@@ -278,8 +294,10 @@ PhotoPoses photo_poses(const SceneRoot& root,
 
 void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& poses) {
   write_colmap_text(folder / "sparse/0", poses.model);
-  const Json record = {
-      {"inputs", poses.inputs}, {"warnings", poses.warnings}, {"files", hashes_of_model(folder)}};
+  const Json record = {{"inputs", poses.inputs},
+                       {"warnings", poses.warnings},
+                       {"focal_sigma", poses.focal_sigma},
+                       {"files", hashes_of_model(folder)}};
   write_file(folder / "poses.json", json_text(record) + "\n");  // last: it says the model is whole
 }
 

@@ -16,17 +16,22 @@ struct PhotoPoses {
   ColmapModel model;
   std::string inputs;                 ///< Names and hashes of the photographs, options, program.
   std::vector<std::string> warnings;  ///< How the focal length was found; who is left out.
+  double focal_sigma = 0;             ///< Largest of SolvedPhoto::focal_sigma.
   bool is_stored = false;  ///< Read, not solved; the places of features are then not known.
 };
 
 /// Solves for the cameras of the photographs in a folder, or reads what write_photo_poses() stored
 /// in `stored` if that was solved from the same.
 ///
+/// \param wanted  file names; where there are more photographs than can be compared, these alone
+/// are
+///                used; may be empty
 /// \param focal   [pixels] of every photograph as stored; 0 = from Exif, else solved for
 /// \param stored  may be empty or not exist
 /// \throws BadInput Empty (fewer than two photographs), and as read_image(); LimitError for more
 ///         photographs than can be compared in reasonable time; NumericalError as solve_poses()
 PhotoPoses photo_poses(const SceneRoot& root,
+                       const std::vector<std::string>& wanted,
                        double focal,
                        const std::filesystem::path& stored,
                        Terminal& terminal);

@@ -24,6 +24,7 @@
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
 #include "convert/stage_cost.h"
+#include "convert/stated_frame.h"
 #include "convert/verification.h"
 #include "convert/views.h"
 #include "convert/web_splats.h"
@@ -48,8 +49,9 @@ struct Run {
   Scene scene;  ///< As opened: world coordinates.
   std::vector<KnownDistance> distances;
   std::vector<MarkerBar> markers;
-  Json control;  ///< Of OpenedScene.
-  Json refined;  ///< RefinedPoses::report; null where it was not asked for.
+  Json control;        ///< Of OpenedScene.
+  Json refined;        ///< RefinedPoses::report; null where it was not asked for.
+  double focal_sigma;  ///< Of OpenedScene.
   // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
   // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
   std::optional<Model> model;
@@ -125,6 +127,8 @@ Json run_scale(Run& run, const Progress& progress) {
   take_sensor_scale(sensor_scale(run.record.result("model")), frame);
   Json result = run.control;
   if (result.is_null()) result = scale_by(run.distances, run.markers, model);
+  widen_by_focal(frame, run.focal_sigma);
+  if (result.is_object()) result["metres_sigma"] = frame.metres_sigma;
   const bool is_new = frame.metres_per_unit != before.metres_per_unit ||
                       frame.metres_sigma != before.metres_sigma ||
                       frame.scale_source != before.scale_source || frame.up != before.up;
@@ -212,7 +216,10 @@ Json run_report(Run& run, const Progress& progress) {
 
 /// Which stage a part of the request first has a say in; what is not here decides all.
 std::map<std::string, std::string> decided_stages(const RunRequest& request, const Scene& scene) {
-  std::map<std::string, std::string> out = {{"assume_unit", "scale"},
+  // Which photographs are meant is decided by their names and hashes, wherever they lie.
+  std::map<std::string, std::string> out = {{"scene", "report"},
+                                            {"views", "report"},
+                                            {"assume_unit", "scale"},
                                             {"up", "scale"},
                                             {"known_distances", "scale"},
                                             {"marker_size", "scale"},
@@ -512,6 +519,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
           std::move(markers),
           std::move(opened.control),
           opened.refined ? std::move(opened.refined->report) : Json(),
+          opened.focal_sigma(),
           {},
           {},
           {}};

@@ -6,6 +6,7 @@
 
 #include "convert/baselines.h"
 #include "convert/camera_fit.h"
+#include "convert/model.h"
 #include "convert/stated_frame.h"
 #include "io/photographs.h"
 #include "io/view_names.h"
@@ -40,6 +41,15 @@ void refine(const std::filesystem::path& model, Terminal& terminal, OpenedScene&
   move_cameras(*out.refined, out.scene);
   auto& warnings = out.scene.warnings;
   warnings.insert(warnings.end(), out.refined->warnings.begin(), out.refined->warnings.end());
+}
+
+void warn_of_turned(Scene& scene) {
+  const size_t turned = turned_photographs(scene);
+  if (turned == 0) return;
+  scene.warnings.push_back(
+      std::to_string(turned) +
+      " photographs lie turned in their files (Exif); the cameras are for the files as they lie, "
+      "so views are shown lying; up is as Exif says");
 }
 
 // Which photographs there are is known before their cameras are, minutes earlier.
@@ -105,7 +115,7 @@ OpenedScene open_scene(const SceneRequest& request,
     const SceneRoot root{request.path, request.options.allow_external};
     const std::vector<std::string> names = names_of(root, request.options.views);
     const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
-    out.poses = photo_poses(root, request.focal, stored, terminal);
+    out.poses = photo_poses(root, names, request.focal, stored, terminal);
     SceneOptions options = request.options;
     options.views = placed_views(names, out.poses->model);
     out.scene = scene_of_photographs(request.path, out.poses->model, options);
@@ -117,6 +127,7 @@ OpenedScene open_scene(const SceneRequest& request,
       throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
                          " states them (" + out.scene.kind + ")");
     }
+    warn_of_turned(out.scene);
     if (request.refine_poses) refine(model, terminal, out);
   }
   for (std::string& warning : baseline_warnings(out.scene)) {
@@ -137,7 +148,7 @@ OpenedScene open_scene(const SceneRequest& request,
           "scale");
     }
   }
-  out.scene.frame.up = request.up.empty() ? world_up(out.scene) : up_direction(request.up);
+  out.scene.frame.up = up_of(out.scene, request.up);
   return out;
 }
 

@@ -53,6 +53,9 @@ struct OpenedScene {
   std::optional<RefinedPoses> refined;  ///< If that was asked for.
   nlohmann::ordered_json control;       ///< As move_to_control_frame() returns it; null without.
 
+  /// Relative standard deviation of focal lengths that were solved for; 0 = they were given.
+  double focal_sigma() const { return poses ? poses->focal_sigma : 0; }
+
   /// Stores solved and refined cameras below the folder of the model, for other programs and for
   /// the next time, and takes away those of an earlier scene.
   void keep(const std::filesystem::path& model) const;

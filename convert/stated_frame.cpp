@@ -8,6 +8,7 @@
 
 #include "convert/html.h"
 #include "convert/length.h"
+#include "io/camera_checks.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -28,10 +29,9 @@ std::string scale_contradiction(const Frame& stated,
                                 double metres,
                                 double sigma) {
   constexpr double kSigmas = 3;
-  constexpr double kUsual = 0.05 / kSigmas;  // of scales that phones and programs state
   if (!stated.has_metric_scale()) return "";
   const double own =
-      stated.metres_sigma > 0 ? stated.metres_sigma / stated.metres_per_unit : kUsual;
+      stated.metres_sigma > 0 ? stated.metres_sigma / stated.metres_per_unit : kTrackedScale;
   const double off = std::abs(std::log(metres / stated.metres_per_unit));
   if (off <= kSigmas * std::hypot(own, sigma / metres)) return "";
   const bool is_by_depth = stated.scale_source == ScaleSource::DepthSensor;
@@ -39,6 +39,11 @@ std::string scale_contradiction(const Frame& stated,
          " that its unit is " + number(stated.metres_per_unit, "%.4g") + " m, " + by +
          " that it is " + number(metres, "%.4g") +
          " m; the latter was taken, so check the unit and the picks";
+}
+
+void widen_by_focal(Frame& frame, double focal_sigma) {
+  if (!frame.has_metric_scale()) return;
+  frame.metres_sigma = std::hypot(frame.metres_sigma, focal_sigma * frame.metres_per_unit);
 }
 
 std::string turned_text(const Frame& a, const Frame& b) {

@@ -26,6 +26,11 @@ std::string scale_contradiction(const Frame& stated,
                                 double metres,
                                 double sigma);
 
+/// Widens the sigma of a known scale by that of the focal length for which cameras were solved: a
+/// wrong one stretches depth against width, so that a length along one tells the other no better.
+/// \param focal_sigma  relative; 0 = the focal length was given
+void widen_by_focal(Frame& frame, double focal_sigma);
+
 /// Says that two files have other directions up, so that what they show together may be turned, for
 /// a warning; empty if not, or if one does not say.
 std::string turned_text(const Frame& a, const Frame& b);

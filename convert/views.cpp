@@ -85,20 +85,19 @@ Json write_view(const Model& model,
                 const std::filesystem::path& folder) {
   const View& view = model.scene.views[static_cast<size_t>(index)];
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
-  const ViewRasters rasters = view_rasters(buffers, view.camera);
+  ViewRasters rasters = view_rasters(buffers, view.camera);
+  rasters.valid = valid_pixels(model.scene, index);  // what is masked was seen, and is not wanted
   write_view_exr(folder / (view.name + ".exr"), rasters, view.camera, model.scene.frame);
   const auto png = [&](const char* what) { return folder / (view.name + "." + what + ".png"); };
   write_png(png("color"), picture(buffers));
   write_png(png("depth"), depth_picture(rasters.depth));
   write_png(png("normal"), normal_picture(rasters.normal, view.camera.cam_from_world()));
-  // What is masked was seen, and is not wanted.
-  const MaskMap valid = valid_pixels(model.scene, index);
   const MaskMap holes = hole_mask(buffers);
-  write_png(png("hole"), intersection(holes, valid));
+  write_png(png("hole"), intersection(holes, rasters.valid));
   const auto& input = model.scene.input;
   const bool is_input = std::find(input.begin(), input.end(), index) != input.end();
   Json out = {{"name", view.name}, {"role", is_input ? "input" : "held out"}};
-  out.update(hole_fractions(buffers, valid));
+  out.update(hole_fractions(buffers, rasters.valid));
   return out;
 }
 

@@ -139,7 +139,10 @@ openvdb::GridBase::ConstPtr named(typename Grid::Ptr grid, const char* name) {
 
 }  // namespace
 
-void write_volume(const std::filesystem::path& path, const Volume& volume, const Frame& frame) {
+void write_volume(const std::filesystem::path& path,
+                  const Volume& volume,
+                  const Frame& frame,
+                  const std::string& evidence) {
   const double stretch = stretch_for(volume.voxel_size * frame.scale);
   const double scale = stretch * frame.scale;
   const Eigen::Vector3d offset = stretch * (frame.origin - frame.file_origin);
@@ -165,7 +168,10 @@ void write_volume(const std::filesystem::path& path, const Volume& volume, const
     surface->setGridClass(openvdb::GRID_LEVEL_SET);
     grids.push_back(named<openvdb::FloatGrid>(surface, "surface"));
   }
-  std::map<std::string, std::string> about = {{"creator", "cgs"}, {"cgs_units", frame.unit_name()}};
+  std::map<std::string, std::string> about = {{"creator", "cgs"},
+                                              {"cgs_units", frame.unit_name()},
+                                              {"cgs_evidence", evidence},
+                                              {"cgs_color_space", "sRGB"}};
   if (stretch != 1) about[kStretchKey] = stretch_text;
   write_vdb(path, grids, about);
 }

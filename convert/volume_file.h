@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "libcgs/core/frame.h"
@@ -17,7 +18,11 @@ namespace cgs {
 /// OpenVDB cannot hold voxels below some hundred-thousandth of a unit. Smaller ones, and with them
 /// all places and lengths of the file, are multiplied by the power of 1024 that the metadata call
 /// "cgs_stretch", of the file and of its grid tsdf.
-void write_volume(const std::filesystem::path& path, const Volume& volume, const Frame& frame);
+/// \param evidence  what vouches for it, for the metadata: "photographs" or "virtual cameras"
+void write_volume(const std::filesystem::path& path,
+                  const Volume& volume,
+                  const Frame& frame,
+                  const std::string& evidence = "photographs");
 
 struct VolumeFile {
   Volume volume;

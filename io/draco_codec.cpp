@@ -93,21 +93,41 @@ int texcoord_bits(const GlbPrimitive& primitive) {
   return bits;
 }
 
+/// What nine in ten of the known values are at least; 0 if none is.
+float small_value(const std::vector<float>& sigma) {
+  std::vector<float> known;
+  for (const float value : sigma) {
+    if (value > 0) known.push_back(value);
+  }
+  if (known.empty()) return 0;
+  const auto tenth = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 10);
+  std::nth_element(known.begin(), tenth, known.end());
+  return *tenth;
+}
+
 /// Sigma on its grid. What is known stays above zero, where it would count as unknown: values
 /// below a step become a step.
 struct StoredSigma {
   std::vector<float> values;
   float low = 0;
   float range = 1;
+  int bits = kSigmaBits;
 
   explicit StoredSigma(const std::vector<float>& sigma) : values(sigma) {
     if (values.empty()) return;
     const auto [least, most] = std::minmax_element(values.begin(), values.end());
     low = *least;
     if (*most > *least) range = *most - *least;
-    const float step = range / static_cast<float>((1 << kSigmaBits) - 1);
+    // One place that is known badly must not make the steps of all others coarse.
+    constexpr int kMostBits = 16;
+    constexpr float kFine = 0.05f;  // of what most are larger than
+    const auto step = [&] { return range / static_cast<float>((1 << bits) - 1); };
+    while (bits < kMostBits && step() > kFine * small_value(sigma)) ++bits;
+    const float largest = *most;  // never less than was known
     for (float& value : values) {
-      if (value >= 0) value = std::max(value, std::min(step, *most));
+      if (!(value >= 0)) continue;
+      const float steps = std::ceil((value - low) / step() - 1e-3f);
+      value = std::min(largest, std::max(low + steps * step(), step()));
     }
   }
 };
@@ -171,7 +191,7 @@ std::string encode(const GlbPrimitive& primitive,
     quantize_whole(encoder, ids["_FEATURE_ID_0"], primitive.features);
   }
   if (ids.count("_SIGMA") != 0) {
-    quantize(encoder, ids["_SIGMA"], kSigmaBits, sigma.low, sigma.range);
+    quantize(encoder, ids["_SIGMA"], sigma.bits, sigma.low, sigma.range);
   }
   draco::EncoderBuffer buffer;
   const draco::Status status = encoder.EncodeToBuffer(&buffer);

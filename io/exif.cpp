@@ -112,11 +112,15 @@ LensHint lens_hint(const std::filesystem::path& path, const ImageSize& size) {
   const double plane = pixels_per_millimetre(exif.get(), size);
   const double focal = number(exif.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH);
   const double film = number(exif.get(), EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
-  if (plane > 0 && focal > 0) {
+  if (film > 0) hint = from_film(film, size);
+  // Some programs that develop or shrink photographs leave a resolution of the focal plane that is
+  // wrong by half and more; the length as on film they leave as it was.
+  constexpr double kContradicts = 0.1;
+  const bool is_plane_right =
+      hint.focal == 0 || std::abs(std::log(plane * focal / hint.focal)) <= kContradicts;
+  if (plane > 0 && focal > 0 && is_plane_right) {
     constexpr double kMarked = 0.03;  // lenses focused near are longer than marked
     hint = {"", plane * focal, kMarked};
-  } else if (film > 0) {
-    hint = from_film(film, size);
   }
   constexpr double kShortest = 0.2;  // [larger sides]
   constexpr double kLongest = 50;

@@ -18,9 +18,9 @@ struct LensHint {
 };
 
 /// Reads the Exif part of an image, as exif_part() finds it: focal length from the resolution of
-/// the focal plane, else from the focal length as on 35 mm film. What is damaged or absurd counts
-/// as not said, and so does any where the camera enlarged the picture by itself: programs differ in
-/// whether they count that in.
+/// the focal plane, else, or where that contradicts it, from the focal length as on 35 mm film.
+/// What is damaged or absurd counts as not said, and so does any where the camera enlarged the
+/// picture by itself: programs differ in whether they count that in.
 ///
 /// The film equivalent compares diagonals and is rounded to whole millimetres. Where the picture
 /// has another shape than the usual sensors (3:2 and 4:3) it was cut, and sigma is larger.

@@ -7,6 +7,7 @@
 #include "io/byte_reader.h"
 #include "io/compression.h"
 #include "io/heif.h"
+#include "io/image_chunks.h"
 #include "io/tiff_directory.h"
 
 namespace cgs {
@@ -66,35 +67,22 @@ std::string of_text_chunk(std::string_view name,
 }
 
 std::string of_png(std::string_view bytes, const std::filesystem::path& path) {
-  ByteReader file(bytes, path);
-  file.take(8, "PNG magic");
-  while (true) {
-    uint32_t length = 0;
-    for (const char c : file.take(4, "PNG chunk length")) {
-      length = length << 8 | static_cast<uint8_t>(c);
-    }
-    const std::string_view name = file.take(4, "PNG chunk");
-    const std::string_view body = file.take(size_t{length}, "PNG chunk");
-    file.take(4, "PNG checksum");
-    if (name == "eXIf") return with_header(body);
-    if (name == "tEXt" || name == "zTXt") {
-      std::string found = of_text_chunk(name, body, path);
-      if (!found.empty()) return found;
-    }
-    if (name == "IEND") return "";
-  }
+  std::string out;
+  visit_png_chunks(bytes, path, [&](std::string_view name, std::string_view body) {
+    if (name == "eXIf") out = with_header(body);
+    if (name == "tEXt" || name == "zTXt") out = of_text_chunk(name, body, path);
+    return out.empty();
+  });
+  return out;
 }
 
 std::string of_webp(std::string_view bytes, const std::filesystem::path& path) {
-  ByteReader file(bytes, path);
-  file.take(12, "WebP header");
-  while (file.offset() < bytes.size()) {
-    const std::string_view name = file.take(4, "WebP chunk");
-    const auto length = file.get<uint32_t>("WebP chunk length");
-    const std::string_view body = file.take(size_t{length} + length % 2, "WebP chunk");
-    if (name == "EXIF") return with_header(body);
-  }
-  return "";
+  std::string out;
+  visit_webp_chunks(bytes, path, [&](std::string_view name, std::string_view body) {
+    if (name == "EXIF") out = with_header(body);
+    return out.empty();
+  });
+  return out;
 }
 
 // A TIFF file of one directory and that of its Exif part, in the byte order of another file.

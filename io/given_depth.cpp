@@ -49,13 +49,6 @@ void drop_low_confidence(const fs::path& file, Raster<float>& values) {
   }
 }
 
-// True if no shape of depth could tell whether it lies as the photograph is stored or upright.
-bool may_lie_turned(const View& view) {
-  if (view.orientation == 1) return false;
-  const ImageSize size = photograph_size(view);
-  return view.orientation < 5 || size.width == size.height;
-}
-
 // Values whose shape is that of the photograph: upright, as masks are, or else as it is stored.
 Raster<float> upright(const Raster<float>& values, const View& view, const ImageSize& photograph) {
   const auto fits = [&](const ImageSize& size) {

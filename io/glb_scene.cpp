@@ -115,6 +115,11 @@ class NodeVisitor {
     visited_[number] = true;
     if (depth > kDeepest) throw LimitError(printable(file_.path()) + ": nodes nest too deeply");
     const Eigen::Affine3d world = parent * node_matrix(node);
+    if (const auto skin = node.find("skin"); skin && node.find("mesh")) {
+      skin->fail(Defect::Unsupported,
+                 "joints of a skeleton place this mesh, which are not read: apply the armature "
+                 "before exporting");
+    }
     if (const auto mesh = node.find("mesh")) {
       for (const Eigen::Affine3d& place : places_of_mesh(file_, node)) {
         out_.push_back({file_.element("meshes", *mesh), world * place});

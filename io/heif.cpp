@@ -86,6 +86,32 @@ std::string exif_of(const PrimaryImage& file) {
   return std::string("Exif\0\0", 6) + block.substr(kOffset + static_cast<size_t>(skipped));
 }
 
+constexpr char kIsDisplayP3 = 'p';
+constexpr char kIsIcc = 'i';
+
+// The first letter says which of both it is; empty for neither.
+std::string profile_of(const PrimaryImage& file) {
+  const heif_image_handle* const handle = file.handle.get();
+  const heif_color_profile_type type = heif_image_handle_get_color_profile_type(handle);
+  if (type == heif_color_profile_type_nclx) {
+    heif_color_profile_nclx* found = nullptr;
+    require_ok(heif_image_handle_get_nclx_color_profile(handle, &found));
+    const std::unique_ptr<heif_color_profile_nclx, decltype(&heif_nclx_color_profile_free)> nclx(
+        found, &heif_nclx_color_profile_free);
+    const bool is_hdr =
+        nclx->transfer_characteristics == heif_transfer_characteristic_ITU_R_BT_2100_0_PQ ||
+        nclx->transfer_characteristics == heif_transfer_characteristic_ITU_R_BT_2100_0_HLG;
+    const bool is_p3 = nclx->color_primaries == heif_color_primaries_SMPTE_EG_432_1;
+    return is_p3 && !is_hdr ? std::string(1, kIsDisplayP3) : "";
+  }
+  constexpr size_t kMost = size_t{4} << 20;
+  const size_t size = heif_image_handle_get_raw_color_profile_size(handle);
+  if (type == heif_color_profile_type_not_present || size == 0 || size > kMost) return "";
+  std::string out(size, '\0');
+  require_ok(heif_image_handle_get_raw_color_profile(handle, out.data()));
+  return kIsIcc + out;
+}
+
 }  // namespace
 
 // Of the box that comes first: the major brand, a version, and brands that it is compatible with.
@@ -136,6 +162,14 @@ std::string decode_heif(std::string_view bytes,
 
 std::string heif_exif(std::string_view bytes, const std::filesystem::path& path) {
   return run_isolated([&] { return exif_of(PrimaryImage(bytes)); }, path);
+}
+
+HeifProfile heif_profile(std::string_view bytes, const std::filesystem::path& path) {
+  const std::string found = run_isolated([&] { return profile_of(PrimaryImage(bytes)); }, path);
+  HeifProfile out;
+  out.is_display_p3 = found.starts_with(kIsDisplayP3);
+  if (found.starts_with(kIsIcc)) out.icc = found.substr(1);
+  return out;
 }
 
 }  // namespace cgs

@@ -36,4 +36,12 @@ std::string decode_heif(std::string_view bytes,
 /// \throws BadInput Syntax; LimitError
 std::string heif_exif(std::string_view bytes, const std::filesystem::path& path);
 
+/// What such a file says of its colours.
+struct HeifProfile {
+  std::string icc;             ///< A profile of at most 4 MiB; empty if it holds none.
+  bool is_display_p3 = false;  ///< It states these primaries by number, and no curve of HDR.
+};
+/// \throws BadInput if the file cannot be read; see run_isolated()
+HeifProfile heif_profile(std::string_view bytes, const std::filesystem::path& path);
+
 }  // namespace cgs

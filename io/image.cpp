@@ -21,6 +21,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <unistd.h>
 
+#include "io/color_profile.h"
 #include "io/heif.h"
 #include "io/image_header.h"
 #include "io/lack_of_memory.h"
@@ -286,7 +287,10 @@ ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits
 ColorImage read_image(const std::filesystem::path& path,
                       MaskMap* alpha_mask,
                       const ReadLimits& limits) {
-  return decode_image(read_image_file(path, limits), path, alpha_mask, limits);
+  const std::string bytes = read_image_file(path, limits);
+  ColorImage image = decode_image(bytes, path, alpha_mask, limits);
+  to_srgb(color_profile(bytes, path), image);
+  return image;
 }
 
 ColorImage decode_image(std::string_view bytes,

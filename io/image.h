@@ -20,7 +20,8 @@ struct ImageSize {
 ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Decodes an image to sRGB-coded RGB in [0, 1]. Grey, palette and 16-bit images are converted;
-/// of several pages the first is read; float TIFF is clamped.
+/// of several pages the first is read; float TIFF is clamped. Colours of another profile than sRGB,
+/// as of phones, become sRGB: see color_profile.h.
 ///
 /// \param alpha_mask  where not null: emptied if every pixel is usable, else 1 where alpha is at
 ///                    least 0.5 and, for float images, the colour is finite
@@ -31,7 +32,8 @@ ColorImage read_image(const std::filesystem::path& path,
                       MaskMap* alpha_mask = nullptr,
                       const ReadLimits& limits = {});
 
-/// The same for the content of an image file. \param path  of the file that holds it, for messages
+/// The same for the content of an image file, as it is coded, as glTF wants its textures.
+/// \param path  of the file that holds it, for messages
 ColorImage decode_image(std::string_view bytes,
                         const std::filesystem::path& path,
                         MaskMap* alpha_mask = nullptr,

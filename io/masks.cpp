@@ -76,6 +76,14 @@ void find_masks(const SceneRoot& root, Scene& scene) {
   }
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
+    if (view.mask_path.empty() || !may_lie_turned(view)) continue;
+    if (exif_orientation(view.mask_path) != 1) continue;
+    scene.warnings.push_back("the photograph of view " + printable(view.name) +
+                             " lies turned in its file and is shown upright; its mask is taken to "
+                             "be upright already");
+  }
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
     if (!view.mask_path.empty() || !masks.lacks(view.image_path)) continue;
     scene.warnings.push_back("there are masks, but none for view " + printable(view.name) +
                              ", of which everything is used");

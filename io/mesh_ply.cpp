@@ -143,7 +143,9 @@ std::string unread_properties(const PlyHeader& header, bool has_colors) {
   };
   for (const PlyProperty& property : header.find("vertex")->properties) {
     const bool is_known = std::find(kKnown.begin(), kKnown.end(), property.name) != kKnown.end();
-    if (!is_known) add(property.name);
+    const bool is_other_quality =
+        property.name == "quality" && !quality_is_support(header, *header.find("vertex"));
+    if (!is_known || is_other_quality) add(property.name);
   }
   if (header.find("tristrips") != nullptr) add("triangle strips, which hold its faces");
   const auto names_texture = [](const std::string& comment) {

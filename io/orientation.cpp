@@ -76,6 +76,12 @@ ImageSize shown_size(const View& view) {
   return turned(image_size(view.image_path), exif_orientation(view.image_path));
 }
 
+bool may_lie_turned(const View& view) {
+  if (view.orientation == kUpright) return false;
+  const ImageSize size = photograph_size(view);
+  return view.orientation < kFirstTransposed || size.width == size.height;
+}
+
 std::optional<Eigen::Vector2d> picked_pixel(const View& view, const Eigen::Vector2d& shown) {
   const ImageSize size = shown_size(view);
   const bool is_inside = shown.x() >= 0 && shown.y() >= 0 && shown.x() <= size.width - 1 &&

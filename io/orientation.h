@@ -25,6 +25,10 @@ Eigen::Vector2d stored_pixel(const Eigen::Vector2d& upright,
 /// [pixels]. \throws BadInput as image_size()
 ImageSize shown_size(const View& view);
 
+/// True if the shape of a mask or of depth cannot tell whether it lies as the photograph is stored
+/// or upright. \throws BadInput as image_size()
+bool may_lie_turned(const View& view);
+
 /// Where a pixel that was picked in an image viewer lies in the photograph that the camera of the
 /// view is for; both numbered from 0.
 /// \return nothing outside of the photograph

@@ -21,6 +21,10 @@ struct PhotoFile {
 /// read_scene() knows.
 bool is_photographs(const std::filesystem::path& folder);
 
+/// What people should know of files in a folder that are not read: raw photographs and other kinds
+/// of pictures, and cameras of other programs, one line each; empty if there are none.
+std::vector<std::string> unread_files(const std::filesystem::path& folder);
+
 /// The image files directly in a folder, in the order of their names.
 /// \throws BadInput Path (names with control characters, links that leave the folder), and as
 ///         image_size(); LimitError

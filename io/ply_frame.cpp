@@ -31,6 +31,24 @@ std::optional<Eigen::Vector3d> numbers_after(const std::vector<std::string>& com
   return std::nullopt;
 }
 
+// "Vertical Axis: z" of nerfstudio, "Vertical axis: 0 -1 0" of Brush.
+std::optional<Eigen::Vector3d> vertical_axis(const std::vector<std::string>& comments) {
+  constexpr std::string_view kKey = "vertical axis:";
+  for (std::string comment : comments) {
+    std::transform(comment.begin(), comment.end(), comment.begin(), [](char c) {
+      return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    });
+    if (!comment.starts_with(kKey)) continue;
+    const std::string value = comment.substr(kKey.size());
+    const size_t letter = value.find_first_not_of(' ');
+    const bool is_letter = letter != std::string::npos && letter + 1 == value.size() &&
+                           value[letter] >= 'x' && value[letter] <= 'z';
+    if (is_letter) return Eigen::Vector3d::Unit(value[letter] - 'x');
+    return numbers_after({"up" + value}, "up", 3);
+  }
+  return std::nullopt;
+}
+
 std::vector<Eigen::Vector3d> moved(std::vector<Eigen::Vector3d> points, const Eigen::Vector3d& by) {
   for (Eigen::Vector3d& p : points) p += by;
   return points;
@@ -111,7 +129,8 @@ PlyPlacement ply_placement(const std::vector<std::string>& comments,
         "far away");
   }
   out.frame.file_origin = file_origin_near(out.frame, file_origin);
-  const auto up = numbers_after(comments, "up", 3);
+  auto up = numbers_after(comments, "up", 3);
+  if (!up) up = vertical_axis(comments);
   if (up && up->norm() > 0) out.frame.up = up->normalized();
   if (has_unit) {
     out.frame.metres_per_unit = metres->x();

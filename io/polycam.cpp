@@ -103,6 +103,8 @@ Scene read_polycam(const SceneRoot& root) {
   scene.depth_kind = DepthKind::Metric;
   scene.frame.metres_per_unit = 1;
   scene.frame.scale_source = ScaleSource::CameraPoses;
+  scene.frame.metres_sigma = kTrackedScale;
+  scene.frame.up = Eigen::Vector3d::UnitY();  // of ARKit, along gravity
   const fs::path cameras = prefix + "cameras";
   for (const std::string& name : json_files(inside(cameras))) {
     View view;

@@ -161,6 +161,7 @@ Scene read_realitycapture(const SceneRoot& root) {
   Scene scene;
   scene.kind = "RealityCapture";
   scene.folder = root.folder;
+  scene.frame.up = Eigen::Vector3d::UnitZ();  // heading, pitch and altitude are about it
   while (const auto line = lines.next_data()) {
     const Row row(columns, lines, *line);
     View view;

@@ -269,10 +269,11 @@ size_t read_open3d(const SceneRoot& root, Scene& scene) {
   const fs::path trajectory = inside(trajectory_name(root.folder));
   const auto poses = read_trajectory(trajectory);
   std::vector<fs::path> photographs = image_files(root, photograph_folder(root.folder));
-  std::vector<fs::path> depths = image_files(root, "depth");
+  const bool has_depth = is_folder(root.folder / "depth");
+  std::vector<fs::path> depths = has_depth ? image_files(root, "depth") : std::vector<fs::path>();
   std::sort(photographs.begin(), photographs.end(), comes_before);
   std::sort(depths.begin(), depths.end(), comes_before);
-  if (photographs.size() != poses.size() || depths.size() != poses.size()) {
+  if (photographs.size() != poses.size() || (has_depth && depths.size() != poses.size())) {
     throw BadInput(Defect::Mismatch,
                    trajectory,
                    std::to_string(poses.size()) + " poses for " +
@@ -284,7 +285,7 @@ size_t read_open3d(const SceneRoot& root, Scene& scene) {
     View view;
     view.name = photographs[i].stem().string();
     view.image_path = photographs[i];
-    view.depth_path = depths[i];
+    if (has_depth) view.depth_path = depths[i];
     view.camera = camera;
     add_view(poses[i], std::move(view), scene, lost);
   }
@@ -292,8 +293,7 @@ size_t read_open3d(const SceneRoot& root, Scene& scene) {
 }
 
 bool is_open3d(const fs::path& folder) {
-  return !trajectory_name(folder).empty() && !photograph_folder(folder).empty() &&
-         is_folder(folder / "depth");
+  return !trajectory_name(folder).empty() && !photograph_folder(folder).empty();
 }
 
 }  // namespace
@@ -308,6 +308,7 @@ Scene read_rgbd_frames(const SceneRoot& root) {
   scene.depth_kind = DepthKind::Metric;
   scene.frame.metres_per_unit = 1;
   scene.frame.scale_source = ScaleSource::CameraPoses;
+  scene.frame.metres_sigma = kTrackedScale;
   size_t lost = 0;
   if (sequences(root.folder).empty()) {
     scene.kind = "Open3D RGB-D";

@@ -126,8 +126,17 @@ std::string lower_extension(const fs::path& path) {
 }
 
 bool has_image_extension(const fs::path& path) {
-  static constexpr std::array<std::string_view, 9> kKnown = {
-      ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".heic", ".heif", ".avif"};
+  static constexpr std::array<std::string_view, 11> kKnown = {".png",
+                                                              ".jpg",
+                                                              ".jpeg",
+                                                              ".jpe",
+                                                              ".jfif",
+                                                              ".tif",
+                                                              ".tiff",
+                                                              ".webp",
+                                                              ".heic",
+                                                              ".heif",
+                                                              ".avif"};
   return std::find(kKnown.begin(), kKnown.end(), lower_extension(path)) != kKnown.end();
 }
 

@@ -32,6 +32,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// What may be meant by a folder in no layout.
+std::string hints(const fs::path& folder) {
+  std::string out;
+  for (const std::string& line : unread_files(folder)) out += line + "; ";
+  for (const std::string& name : sorted_entries(folder)) {
+    if (!is_photographs(folder / name)) continue;
+    out += "the photographs seem to lie in " + printable(folder / name) + ": give that; ";
+    break;
+  }
+  return out;
+}
+
 Scene read_layout(const SceneRoot& root) {
   std::error_code error;
   const fs::file_status status = fs::status(root.folder, error);
@@ -42,11 +54,12 @@ Scene read_layout(const SceneRoot& root) {
   if (const SceneLayout* const layout = layout_of(root.folder)) return layout->read(root);
   throw BadInput(Defect::Schema,
                  root.folder,
-                 "no known layout: understood are LLFF (poses_bounds.npy), transforms.json "
-                 "(nerfstudio, instant-ngp), COLMAP (sparse/0/cameras.bin or .txt), Strecha "
-                 "(<image>.camera), Polycam (keyframes/), frames of a depth camera (7-Scenes, "
-                 "Open3D), Metashape (.xml), RealityCapture (.csv), cameras.json (3DGS) and "
-                 "photographs with nothing else");
+                 hints(root.folder) +
+                     "no known layout: understood are LLFF (poses_bounds.npy), transforms.json "
+                     "(nerfstudio, instant-ngp), COLMAP (sparse/0/cameras.bin or .txt), Strecha "
+                     "(<image>.camera), Polycam (keyframes/), frames of a depth camera (7-Scenes, "
+                     "Open3D), Metashape (.xml), RealityCapture (.csv), cameras.json (3DGS) and "
+                     "photographs with nothing else");
 }
 
 void sort_views(Scene& scene) {
@@ -112,6 +125,7 @@ std::vector<int> some_views(const Scene& scene, const std::vector<int>& usable) 
 
 void choose_views(Scene& scene, const std::string& list, bool all_views) {
   constexpr size_t kTakeAll = 4;
+  constexpr size_t kMostHeldOut = 24;
   const std::vector<int> usable = views_with_files(scene);
   if (!list.empty()) {
     scene.input = select_views(scene, list);
@@ -128,11 +142,17 @@ void choose_views(Scene& scene, const std::string& list, bool all_views) {
     scene.input = takes_all ? usable : some_views(scene, usable);
   }
   if (scene.input.size() < 2) throw BadInput(Defect::Empty, scene.folder, "need at least 2 views");
+  std::vector<int> others;
   std::set_difference(usable.begin(),
                       usable.end(),
                       scene.input.begin(),
                       scene.input.end(),
-                      std::back_inserter(scene.held_out));
+                      std::back_inserter(others));
+  // Each is drawn, evaluated and shown: hundreds would take more than the reconstruction.
+  const size_t count = std::min(others.size(), kMostHeldOut);
+  for (size_t i = 0; i < count; ++i) {
+    scene.held_out.push_back(others[count == 1 ? 0 : i * (others.size() - 1) / (count - 1)]);
+  }
 }
 
 void check_baselines(const Scene& scene) {
@@ -262,6 +282,7 @@ Scene scene_of_photographs(const fs::path& folder,
   for (const PhotoFile& photograph : list_photographs({folder, options.allow_external})) {
     scene.photographs.push_back(photograph.path.filename().string());
   }
+  for (const std::string& line : unread_files(folder)) scene.warnings.push_back(line);
   for (View& view : scene.views) {
     if (!view.image_path.empty()) view.orientation = exif_orientation(view.image_path);
   }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/stl.h"
 
+#include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 
 #include <Eigen/Geometry>
@@ -13,6 +15,20 @@
 
 namespace cgs {
 
+namespace {
+
+constexpr size_t kHeader = 80;
+
+// "62 % seen by photographs", by area.
+std::string seen_share(const TriangleMesh& mesh) {
+  const auto area = area_by_provenance(mesh);
+  const double seen = area[size_t(Provenance::Observed)] + area[size_t(Provenance::SingleView)];
+  const double all = std::accumulate(area.begin(), area.end(), 0.0);
+  return std::to_string(std::lround(all > 0 ? 100 * seen / all : 0)) + " % seen by photographs";
+}
+
+}  // namespace
+
 void write_stl(const std::filesystem::path& path,
                const TriangleMesh& mesh,
                const Frame& frame,
@@ -22,7 +38,9 @@ void write_stl(const std::filesystem::path& path,
   std::string header = "cgs binary STL, unit mm";  // must not begin with "solid"
   const std::string origin = origin_in_millimetres(frame, up_rotation);
   if (!origin.empty()) header += ", add " + origin;
-  header.resize(80, ' ');
+  const std::string evidence = ", " + seen_share(mesh);
+  if (!mesh.provenance.empty() && header.size() + evidence.size() <= kHeader) header += evidence;
+  header.resize(kHeader, ' ');
   append_bytes(header, static_cast<uint32_t>(mesh.faces.size()));
   AtomicFile file(path);
   file.write(header);

@@ -14,6 +14,7 @@
 #include <Model/COM/NMR_DLLInterfaces.h>
 
 #include "io/atomic_file.h"
+#include "io/byte_writer.h"
 #include "io/content_uuid.h"
 #include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
@@ -63,9 +64,15 @@ std::string shares_by_origin(const TriangleMesh& mesh) {
   return out;
 }
 
-std::string description(const TriangleMesh& mesh, const std::string& origin) {
+std::string description(const TriangleMesh& mesh, const Frame& frame, const std::string& origin) {
   std::string out = mesh.provenance.empty() ? "What of the surface was observed is not stated."
                                             : shares_by_origin(mesh);
+  out += " Scale: " + scale_source_name(frame.scale_source);
+  if (frame.metres_sigma > 0) {
+    out += ", relative sigma ";
+    append_number(out, frame.metres_sigma / frame.metres_per_unit);
+  }
+  out += ';';
   if (!origin.empty()) out += " Coordinates of the scene: add " + origin + " mm.";
   return out;
 }
@@ -222,11 +229,22 @@ void set_materials(NMR::PLib3MFBase* model,
   check(NMR::lib3mf_propertyhandler_setbasematerialarray(
             properties.get(), groups.data(), materials.data()),
         "label faces");
-  Handle defaults;  // Readers that ignore faces' own properties need one on the object.
+  // Readers that ignore faces' own properties need one on the object: what holds of all of it.
+  constexpr std::array<Provenance, kProvenanceCount> kWeakestFirst = {Provenance::Inferred,
+                                                                      Provenance::Virtual,
+                                                                      Provenance::Interpolated,
+                                                                      Provenance::SingleView,
+                                                                      Provenance::Observed};
+  const auto weakest =
+      std::find_if(kWeakestFirst.begin(), kWeakestFirst.end(), [&](Provenance label) {
+        return std::find(materials.begin(), materials.end(), index.at(size_t(label))) !=
+               materials.end();
+      });
+  Handle defaults;
   check(NMR::lib3mf_object_createdefaultpropertyhandler(object, defaults.out()),
         "label the object");
   check(NMR::lib3mf_defaultpropertyhandler_setbasematerial(
-            defaults.get(), group_id, index.at(static_cast<size_t>(Provenance::Observed))),
+            defaults.get(), group_id, index.at(static_cast<size_t>(*weakest))),
         "label the object");
 }
 
@@ -280,7 +298,7 @@ void write_3mf(const std::filesystem::path& path,
   check(NMR::lib3mf_model_addmeshobject(model.get(), object.out()), "add a mesh");
   set_geometry(object.get(), content);
   if (!mesh.provenance.empty()) set_materials(model.get(), object.get(), mesh, faces);
-  const std::string text = description(mesh, origin_in_millimetres(frame, up_rotation));
+  const std::string text = description(mesh, frame, origin_in_millimetres(frame, up_rotation));
   check(NMR::lib3mf_model_addmetadatautf8(model.get(), "Description", text.c_str()),
         "add metadata");
   Handle item;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/byte_reader.h"
 #include "io/byte_writer.h"
 #include "io/mesh_arrays.h"
 #include "io/threemf_model.h"
@@ -85,7 +86,10 @@ class Assembly {
     }
     if (out_.mesh.provenance.size() != out_.mesh.faces.size()) out_.mesh.provenance.clear();
     out_.comments.push_back("metres_per_unit " + model.metres_per_unit);
-    if (is_ours_) add_origin(model);
+    if (is_ours_) {
+      add_scale(model);
+      add_origin(model);
+    }
     warn_of_types();
     return std::move(out_);
   }
@@ -214,6 +218,27 @@ class Assembly {
 
   // As write_3mf() says what to add to the coordinates: where the file was changed since, what it
   // says need not hold.
+  // "Scale: known distance, relative sigma 0.01;"
+  void add_scale(const ThreeMfModel& model) {
+    constexpr std::string_view kScale = " Scale: ";
+    constexpr std::string_view kSigma = ", relative sigma ";
+    const size_t at = model.description.find(kScale);
+    const size_t end = model.description.find(';', at);
+    if (at == std::string::npos || end == std::string::npos) return;
+    const size_t begin = at + kScale.size();
+    const std::string text = model.description.substr(begin, end - begin);
+    const size_t sigma_at = text.find(kSigma);
+    out_.comments.push_back("scale_source " + text.substr(0, sigma_at));
+    double relative = 0;
+    if (sigma_at == std::string::npos ||
+        !parse_number(text.substr(sigma_at + kSigma.size()), relative)) {
+      return;
+    }
+    std::string comment = "metres_sigma ";
+    append_number(comment, relative * std::stod(model.metres_per_unit));
+    out_.comments.push_back(comment);
+  }
+
   void add_origin(const ThreeMfModel& model) {
     const std::string& description = model.description;
     constexpr std::string_view kAdd = "Coordinates of the scene: add ";

@@ -75,8 +75,10 @@ std::array<float, kChannels.size()> pixel(const ViewRasters& view,
   out[10] = view.support.data[i];
   const Hole hole =
       !known && view.hole.data[i] == Hole::None ? Hole::Transparent : view.hole.data[i];
-  out[11] = hole == Hole::None ? 0 : 1;
-  out[12] = static_cast<float>(hole);
+  constexpr float kMasked = 4;
+  const bool is_masked = !view.valid.empty() && view.valid.data[i] == 0 && hole != Hole::None;
+  out[11] = hole == Hole::None || is_masked ? 0 : 1;
+  out[12] = is_masked ? kMasked : static_cast<float>(hole);
   return out;
 }
 

@@ -20,6 +20,7 @@ struct ViewRasters {
   Raster<float> depth_variance;  ///< [internal units squared]
   Raster<uint8_t> support;       ///< Number of input views that see the surface drawn here.
   Raster<Hole> hole;             ///< Why no input view can vouch for the pixel.
+  MaskMap valid;                 ///< 0 where a mask leaves the pixel out; empty = nowhere.
 };
 
 /// Writes a view as one OpenEXR file of 32-bit float channels.
@@ -30,9 +31,10 @@ struct ViewRasters {
 /// - variance.Y: variance of Z [world units squared]; support.Y: number of input views
 /// - hole.Y: 1 where no input view can vouch for the pixel or depth is unknown, else 0
 /// - holeKind.Y: 0 no hole, 1 nothing was reconstructed, 2 hidden from every input view, 3 outside
-///   of every input picture (Hole); where depth alone is unknown, 1
+///   of every input picture (Hole); where depth alone is unknown, 1; 4 left out by a mask, which
+///   is none of these and has hole.Y = 0
 ///
-/// Unknown Z, distance and variance are 0, with hole.Y = 1; no value is NaN.
+/// Unknown Z, distance and variance are 0, with holeKind.Y > 0; no value is NaN.
 /// Attributes: worldToCamera (left-handed, see ExrImage); as text, numbers row by row,
 /// cgs:worldToCamera (+x right, +y down, +z forward), cgs:K [pixels], cgs:units ("m", …,
 /// "unknown"), cgs:fileOrigin (world point of (0, 0, 0)). World points count from

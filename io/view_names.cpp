@@ -95,6 +95,13 @@ std::vector<int> views_called(const Scene& scene, const std::string& word) {
   return out;
 }
 
+int index_of(const Scene& scene, int view) {
+  const auto& all = scene.photographs;
+  const std::string file = scene.views.at(static_cast<size_t>(view)).image_path.filename().string();
+  const auto found = std::find(all.begin(), all.end(), file);
+  return found == all.end() ? view : static_cast<int>(found - all.begin());
+}
+
 int find_view(const Scene& scene, const std::string& word, const std::string& option) {
   const std::vector<int> found = views_called(scene, word);
   if (found.size() == 1) return found.front();

@@ -21,6 +21,10 @@ std::string first_few(const std::vector<std::string>& names);
 /// \return indices into scene.views; several only for files of one name
 std::vector<int> views_called(const Scene& scene, const std::string& word);
 
+/// The index by which views_called() finds a view: in name order, among all photographs.
+/// \pre view is an index into scene.views
+int index_of(const Scene& scene, int view);
+
 /// The one view that a word means. \param option  that the word was given to, for messages
 /// \return index into scene.views
 /// \throws InvalidInput if there is none, or more than one

@@ -77,8 +77,9 @@ class Comparing {
     out.distance = in_a.mean - in_b.mean;
     if (in_a.count < kFewest || in_b.count < kFewest) return out;
     constexpr double kOf95Percent = 1.96;
-    out.detection =
-        kOf95Percent * (std::sqrt(in_a.variance + in_b.variance) + options_.registration);
+    const double of_scale = options_.scale_sigma * normal->dot(place - options_.center);
+    out.detection = kOf95Percent * (std::sqrt(in_a.variance + in_b.variance + of_scale * of_scale) +
+                                    options_.registration);
     out.change = std::abs(out.distance) <= out.detection ? Change::None
                  : out.distance < 0                      ? Change::Nearer
                                                          : Change::Farther;
@@ -188,6 +189,9 @@ void M3c2Options::validate() const {
   require(registration >= 0 && std::isfinite(registration),
           "M3c2Options.registration must be 0 or more",
           registration);
+  require(scale_sigma >= 0 && std::isfinite(scale_sigma),
+          "M3c2Options.scale_sigma must be 0 or more",
+          scale_sigma);
 }
 
 double spacing_cylinder(const ComparedPoints& a, const ComparedPoints& b) {

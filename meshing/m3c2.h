@@ -17,6 +17,8 @@ struct M3c2Options {
                         ///< are averaged; > 0.
   double depth = 0;     ///< How far the cylinder reaches to either side; > 0.
   double registration = 0;  ///< Standard deviation of laying A onto B; >= 0.
+  double scale_sigma = 0;   ///< That of one scale against the other, as a share of it; >= 0.
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< Where an error of scale moves nothing.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
@@ -45,7 +47,8 @@ M3c2Options m3c2_scales(double cylinder);
 
 /// Distances of A from B at `places`, with what roughness and known errors allow to detect.
 ///
-/// Detection is 1.96 (sqrt(v_a + v_b) + registration). v is the variance of a mean: roughness^2 / n
+/// Detection is 1.96 (sqrt(v_a + v_b + s^2) + registration), s being how far an error of the scale
+/// moves the place along the normal. v is the variance of a mean: roughness^2 / n
 /// of the n points of that side, where these do not state what they are worth (Lague et al.); the
 /// mean of their sigma^2, where all do: errors of neighbours in one reconstruction are alike, and
 /// do not average out (James et al.); the larger of the two, where some do: what others do not

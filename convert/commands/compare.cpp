@@ -129,9 +129,12 @@ void share_unit(Frame& a, const Frame& b, double growth) {
 void print_m3c2(const CompareArgs& args,
                 const MeasurableMesh& a,
                 const MeasurableMesh& b,
+                double scale_sigma,
                 const FigureUnit& unit,
                 const std::optional<Registration>& registration) {
-  M3c2Comparison found = compare_m3c2(args.m3c2, a, b);
+  M3c2Request request = args.m3c2;
+  request.scale_sigma = scale_sigma;
+  M3c2Comparison found = compare_m3c2(request, a, b);
   found.comparison.registration = registration;
   if (!args.ply.empty()) write_m3c2_ply(args.ply, a, found);
   if (!args.svg.empty()) write_histogram_svg(args.svg, found.comparison, unit, title_of(args));
@@ -204,7 +207,9 @@ void run_compare(const CompareArgs& args) {
     b.frame = a.frame;
   }
   const FigureUnit unit = figure_unit(a.frame, args.unit);
-  if (args.m3c2.wanted) return print_m3c2(args, a, b, unit, comparison.registration);
+  if (args.m3c2.wanted) {
+    return print_m3c2(args, a, b, of_scale, unit, comparison.registration);
+  }
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& p : a.points) box.extend(p);
   const auto compared = [&](ComparedPoints points) {

@@ -55,7 +55,7 @@ void run_filter_command(const FilterArgs& args) {
   const nlohmann::ordered_json report = run_filters(state, filters, terminal);
   check_content(args.output, state);
   for (const std::string& lost :
-       {textures_text(file.has_textures), lost_in_file(args.output, state.mesh)}) {
+       {textures_text(file.has_textures), lost_in_file(args.output, state.mesh, state.frame)}) {
     if (!lost.empty()) terminal.say(lost);
   }
   Frame written = state.frame;
@@ -64,10 +64,9 @@ void run_filter_command(const FilterArgs& args) {
   GlbOptions exact;
   exact.encoding = GlbEncoding::Plain;
   (void)write_mesh_as(args.output, state.mesh, written, exact);
-  if (state.frame.file_origin != state.file_origin) {
-    terminal.warn("coordinates in " + printable(args.output) +
-                  " are from another origin, which the file states: floats would lose digits");
-  }
+  const std::string moved =
+      moved_origin_text(args.output, state.file_origin, state.frame.file_origin);
+  if (!moved.empty()) terminal.warn(moved);
   if (args.common.json) std::cout << json_text({{"operations", report}}) << "\n";
 }
 

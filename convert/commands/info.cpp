@@ -16,6 +16,7 @@
 #include "convert/html.h"
 #include "convert/scene_request.h"
 #include "io/json_file.h"
+#include "io/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -37,12 +38,13 @@ Json camera_json(const Scene& scene, int index) {
     return std::find(views.begin(), views.end(), index) != views.end();
   };
   const DepthRange range = listed(scene.input) ? depth_range(scene, index) : DepthRange{};
-  return {{"index", index},
+  return {{"index", index_of(scene, index)},
           {"name", view.name},
           {"role",
-           listed(scene.input)      ? "input"
-           : listed(scene.held_out) ? "held out"
-                                    : "no image"},
+           listed(scene.input)       ? "input"
+           : listed(scene.held_out)  ? "held out"
+           : view.image_path.empty() ? "no image"
+                                     : "not used"},
           {"width", camera.width},
           {"height", camera.height},
           {"fx", camera.fx},

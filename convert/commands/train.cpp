@@ -11,6 +11,7 @@
 #include "convert/model.h"
 #include "convert/model_training.h"
 #include "convert/scene_request.h"
+#include "convert/stated_frame.h"
 #include "io/atomic_file.h"
 #include "io/json_file.h"
 #include "io/scene_path.h"
@@ -75,26 +76,24 @@ void run_train(const TrainArgs& args) {
   const auto distances = known_distances(args.scene.known_distances, scene);
   const auto markers = marker_bars(scene, args.scene.marker_size);
   const size_t known = scene.warnings.size();
-  const bool states_up = !args.scene.up.empty() || !opened.control.is_null();
-  const Eigen::Vector3d up = states_up ? scene.frame.up : Eigen::Vector3d::Zero();
   terminal.warn(scene.warnings);
   TrainedModel trained =
       train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
   const std::vector<std::string> found(warnings.begin() + static_cast<std::ptrdiff_t>(known),
                                        warnings.end());
-  trained.model.scene.frame.up = up;  // else the model tells it by its cameras
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
   if (opened.refined) report["refined_poses"] = opened.refined->report;
-  report["scale"] = opened.control;
-  if (opened.control.is_null()) {
-    report["scale"] = scale_by(distances, markers, trained.model);
-    if (!report["scale"].is_null()) {
-      write_model(args.output, trained.model);
-      terminal.warn(report["scale"].at("warnings").get<std::vector<std::string>>());
-    }
-  }
+  nlohmann::ordered_json scale = opened.control;
+  const bool is_measured = !distances.empty() || !markers.empty();
+  if (scale.is_null()) scale = scale_by(distances, markers, trained.model);
+  Frame& frame = trained.model.scene.frame;
+  widen_by_focal(frame, opened.focal_sigma());
+  if (scale.is_object()) scale["metres_sigma"] = frame.metres_sigma;
+  if (frame.has_metric_scale()) write_model(args.output, trained.model);
+  if (is_measured) terminal.warn(scale.at("warnings").get<std::vector<std::string>>());
+  report["scale"] = scale;
   write_file(args.output / "training.json", json_text(report) + "\n");
   forget_checkpoints(args.output);
   const size_t count = trained.model.gaussians.size();

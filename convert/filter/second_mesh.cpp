@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/filter/second_mesh.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "convert/stated_frame.h"
@@ -26,9 +27,15 @@ void require_both_units(const std::filesystem::path& path,
                      " does not: cgs filter with --assume-unit writes it with one");
 }
 
+void keep_larger_scale_sigma(Frame& frame, const Frame& second) {
+  if (!second.has_metric_scale()) return;
+  const double relative = second.metres_sigma / second.metres_per_unit;
+  frame.metres_sigma = std::max(frame.metres_sigma, relative * frame.metres_per_unit);
+}
+
 }  // namespace
 
-SecondMesh read_second_mesh(const FilterState& state,
+SecondMesh read_second_mesh(FilterState& state,
                             const std::filesystem::path& path,
                             const char* operation) {
   const std::string prefix = std::string("--op ") + operation + ": ";
@@ -38,9 +45,15 @@ SecondMesh read_second_mesh(const FilterState& state,
     throw InvalidInput(prefix + printable(path) + " is a " +
                        (mesh.faces.empty() ? "point cloud" : "mesh") + ", the first file is not");
   }
-  require_both_units(path, second.content.frame, state.frame, prefix);
   SecondMesh out;
-  out.remark = std::to_string(mesh.vertices.size()) + " vertices, " +
+  const bool is_assumed = state.frame.scale_source == ScaleSource::Assumed;
+  if (is_assumed && !second.content.frame.has_metric_scale()) {
+    second.content.frame.metres_per_unit = state.frame.metres_per_unit;
+    second.content.frame.scale_source = ScaleSource::Assumed;
+    out.remark = "its unit taken as " + state.frame.unit_name() + ", too; ";
+  }
+  require_both_units(path, second.content.frame, state.frame, prefix);
+  out.remark += std::to_string(mesh.vertices.size()) + " vertices, " +
                std::to_string(mesh.faces.size()) + " faces";
   if (mesh.provenance.empty() != state.mesh.provenance.empty()) {
     out.remark += "; only one file says what was observed: all of the other counts as inferred";
@@ -49,6 +62,7 @@ SecondMesh read_second_mesh(const FilterState& state,
   const std::string turned = turned_text(state.frame, second.content.frame);
   if (!turned.empty()) out.remark += "; " + turned;
   move_to_frame(mesh, second.content.frame, state.frame);
+  keep_larger_scale_sigma(state.frame, second.content.frame);
   out.mesh = std::move(mesh);
   return out;
 }

@@ -66,12 +66,21 @@ double share_on_planes(const std::vector<PhotoPair>& pairs) {
 
 void refuse_unconnected(const std::vector<UnposedPhoto>& photos,
                         const std::vector<PhotoPair>& pairs) {
+  const UnposedPhoto* poor = nullptr;
+  size_t rich = 0;
   for (const UnposedPhoto& photo : photos) {
-    if (photo.features.points.size() >= kFewestMatches) continue;
+    if (photo.features.points.size() >= kFewestMatches) {
+      ++rich;
+    } else {
+      poor = &photo;
+    }
+  }
+  if (rich < 2) {
     throw NumericalError(
-        "photograph " + printable(photo.name) +
-        " shows too little to find again: " + std::to_string(photo.features.points.size()) +
-        " distinct points, need " + std::to_string(kFewestMatches));
+        "photograph " + printable(poor->name) +
+        " shows too little to find again: " + std::to_string(poor->features.points.size()) +
+        " distinct points, need " + std::to_string(kFewestMatches) +
+        "; sharp photographs of surface with texture have thousands");
   }
   const auto is_connected = [](const PhotoPair& pair) { return pair.is_connected; };
   if (std::any_of(pairs.begin(), pairs.end(), is_connected)) return;
@@ -122,11 +131,11 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
           pairs, "they ask for a lens of " + decimals(kFilm * focal, 0) + " mm as on film"));
     }
     if (focal_sigmas[lens] <= kMostSigma) continue;
-    throw NumericalError(
-        undetermined_focal(pairs,
-                           std::isfinite(focal_sigmas[lens])
-                               ? "uncertain by " + decimals(100 * focal_sigmas[lens], 0) + " %"
-                               : ""));
+    throw NumericalError(undetermined_focal(
+        pairs,
+        std::isfinite(focal_sigmas[lens])
+            ? "uncertain by " + decimals(100 * kFocalOptimism * focal_sigmas[lens], 0) + " %"
+            : ""));
   }
 }
 

@@ -24,9 +24,6 @@ namespace {
 // widest lenses (13 mm as on film) to short telephoto lenses (115 mm).
 constexpr std::array<double, 8> kFocals = {0.36, 0.5, 0.7, 0.9, 1.15, 1.5, 2.2, 3.2};
 
-// Errors of focal lengths on nine sets of photographs, RMS, beside what adjustment claims.
-constexpr double kOptimism = 3;
-
 double larger_side(const UnposedPhoto& photo) {
   return std::max(photo.width, photo.height) / photo.features.pixel;
 }
@@ -283,7 +280,7 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
     out.photos.push_back(scene.poses[i]
                              ? solved_photo(photos[i], scene.lenses[lens], *scene.poses[i])
                              : SolvedPhoto{});
-    out.photos.back().focal_sigma = kOptimism * sigmas[lens];
+    out.photos.back().focal_sigma = kFocalOptimism * sigmas[lens];
   }
   add_points(photos, scene, out);
   return out;
@@ -308,6 +305,19 @@ std::optional<std::vector<UnposedPhoto>> without_refuted(const std::vector<Unpos
   return out;
 }
 
+// The photographs without any focal length that may be wrong, if there is one.
+std::optional<std::vector<UnposedPhoto>> without_stated(const std::vector<UnposedPhoto>& photos) {
+  std::vector<UnposedPhoto> out = photos;
+  bool any = false;
+  for (UnposedPhoto& photo : out) {
+    if (!(photo.focal_sigma > 0)) continue;
+    photo.focal = photo.focal_sigma = 0;
+    any = true;
+  }
+  if (!any) return std::nullopt;
+  return out;
+}
+
 }  // namespace
 
 PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress) {
@@ -317,14 +327,25 @@ PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress
   refuse_unconnected(photos, matched.pairs);
   matched.tracks = chain_matches(photos, matched.pairs);
   report(progress, 0.5);
-  PoseSolution out = solve(photos, matched, part_of(progress, 0.5, 0.9));
-  if (const auto relaxed = without_refuted(photos, out)) {
+  PoseSolution out;
+  std::optional<std::vector<UnposedPhoto>> relaxed;
+  std::optional<NumericalError> failure;
+  try {
+    out = solve(photos, matched, part_of(progress, 0.5, 0.9));
+    relaxed = without_refuted(photos, out);
+  } catch (const NumericalError& error) {
+    failure = error;
+    relaxed = without_stated(photos);  // a lens far from what is stated may be why
+    if (!relaxed) throw;
+  }
+  if (relaxed) {
     try {
       out = solve(*relaxed, matched, part_of(progress, 0.9, 1));
       for (size_t i = 0; i < photos.size(); ++i) {
         out.photos[i].is_refuted = photos[i].focal > 0 && (*relaxed)[i].focal == 0;
       }
     } catch (const NumericalError&) {
+      if (failure) throw *failure;
       // the photographs tell less than what was known of the lens: that stays
     }
   }

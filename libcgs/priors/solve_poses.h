@@ -54,7 +54,8 @@ struct PoseSolution {
 /// Cameras of photographs from nothing but what they show: matched features, relative pose of a
 /// pair that shows much depth, resection of the others, bundle adjustment. Where a focal length is
 /// unknown, the one from which the matches are explained best. A focal length that is known but for
-/// its sigma and turns out to lie three of them away is taken as unknown, if one is found then.
+/// its sigma and turns out to lie three of them away, or with which no cameras are found, is taken
+/// as unknown, if one is found then.
 ///
 /// focal_sigma is wider than adjustment has it, which knows nothing of what lenses do that no model
 /// states: by what errors were on photographs with known focal lengths (tests/eval/pose_accuracy).

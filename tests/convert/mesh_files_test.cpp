@@ -33,18 +33,19 @@ Frame frame_of_scale_2() {
 }
 
 TEST(LostInFile, IsWhatTheFormatHasNoPlaceFor) {
-  EXPECT_EQ(lost_in_file("a.ply", corner()), "");
-  EXPECT_EQ(lost_in_file("a.GLB", corner()), "");
-  EXPECT_EQ(lost_in_file("a.obj", corner()), ".obj files hold no sigma, support; .ply and .glb do");
-  EXPECT_EQ(lost_in_file("a.STL", corner()),
+  EXPECT_EQ(lost_in_file("a.ply", corner(), {}), "");
+  EXPECT_EQ(lost_in_file("a.GLB", corner(), {}), "");
+  EXPECT_EQ(lost_in_file("a.obj", corner(), {}),
+            ".obj files hold no sigma, support; .ply and .glb do");
+  EXPECT_EQ(lost_in_file("a.STL", corner(), {}),
             ".stl files hold no labels, colours, sigma, support; .ply and .glb do");
   TriangleMesh bare = corner();
   bare.sigma.clear();
   bare.support.clear();
-  EXPECT_EQ(lost_in_file("a.3mf", bare), ".3mf files hold no colours; .ply and .glb do")
+  EXPECT_EQ(lost_in_file("a.3mf", bare, {}), ".3mf files hold no colours; .ply and .glb do")
       << "but those of labels";
   bare.colors.clear();
-  EXPECT_EQ(lost_in_file("a.3mf", bare), "");
+  EXPECT_EQ(lost_in_file("a.3mf", bare, {}), "");
 }
 
 TEST(CertificateToJson, GivesMeasuresInFileUnits) {

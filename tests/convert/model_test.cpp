@@ -2,10 +2,12 @@
 #include "convert/model.h"
 
 #include <cmath>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
 #include "io/scene_reader.h"
+#include "tests/support/exif_segment.h"
 #include "tests/support/sample_splats.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
@@ -31,6 +33,29 @@ Scene arc_scene(const Eigen::Vector3d& up, double arc, double pitch) {
 TEST(WorldUp, IsFreeOfThePitchOfCamerasOnAnArc) {
   const Eigen::Vector3d up = Eigen::Vector3d(0.2, -0.3, 1).normalized();
   EXPECT_GT(world_up(arc_scene(up, 0.3, 0.4)).dot(up), 1 - 1e-9);
+}
+
+// Phones held upright store pictures that lie on their side; programs calibrate on these.
+TEST(WorldUp, IsThatOfPhotographsAsTheyAreLookedAt) {
+  const test::TempDir dir;
+  const Eigen::Vector3d up = Eigen::Vector3d(0.2, -0.3, 1).normalized();
+  constexpr double kQuarter = std::numbers::pi / 2;
+  // How far, about the optical axis, the axes of the file are turned from those of the picture.
+  for (const auto& [orientation, angle] :
+       {std::pair(3, 2 * kQuarter), {6, kQuarter}, {8, -kQuarter}}) {
+    std::string jpeg = test::jpeg(16, 12);
+    jpeg.insert(2, test::orientation_segment(orientation));
+    test::write_bytes(dir / "turned.jpg", jpeg);
+    Scene scene = arc_scene(up, 0.3, 0.4);
+    for (View& view : scene.views) {
+      view.image_path = dir / "turned.jpg";
+      view.camera.world_from_cam.rotate(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()));
+    }
+    EXPECT_GT(world_up(scene).dot(up), 1 - 1e-9) << orientation;
+    EXPECT_EQ(turned_photographs(scene), 3u);
+    for (View& view : scene.views) view.orientation = orientation;  // heeded when they were solved
+    EXPECT_EQ(turned_photographs(scene), 0u);
+  }
 }
 
 TEST(WorldUp, IsTheMeanImageUpOfParallelCameras) {

@@ -35,9 +35,12 @@ void photograph(const fs::path& path, const Camera& camera, uint32_t seed) {
   write_png(path, render_view(portal().scene, portal().sky, camera, seed));
 }
 
-PhotoPoses solved(const fs::path& folder, double focal = 0, const fs::path& stored = {}) {
+PhotoPoses solved(const fs::path& folder,
+                  double focal = 0,
+                  const fs::path& stored = {},
+                  const std::vector<std::string>& wanted = {}) {
   Terminal terminal(true);
-  return photo_poses({folder, false}, focal, stored, terminal);
+  return photo_poses({folder, false}, wanted, focal, stored, terminal);
 }
 
 std::vector<Camera> cameras_of(const Scene& scene) {
@@ -65,11 +68,14 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   EXPECT_LT(errors.focal, 0.01);
   ASSERT_EQ(poses.warnings.size(), 1u);
   EXPECT_NE(poses.warnings[0].find("focal length"), std::string::npos);
+  EXPECT_GT(poses.focal_sigma, 0);
+  EXPECT_LT(poses.focal_sigma, 0.1);
 
   // Stored, they are taken from there, bit for bit, until something changes.
   write_photo_poses(dir / "model/colmap", poses);
   const PhotoPoses again = solved(dir / "photos", 0, dir / "model/colmap");
   EXPECT_EQ(again.warnings, poses.warnings);
+  EXPECT_EQ(again.focal_sigma, poses.focal_sigma);
   EXPECT_TRUE(again.model.images[0].points.empty());  // as readers leave them: not solved anew
   const Scene same = scene_of_photographs(dir / "photos", again.model);
   for (size_t i = 0; i < scene.views.size(); ++i) {
@@ -88,6 +94,7 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   EXPECT_FALSE(other.model.images[0].points.empty());
   EXPECT_EQ(other.model.cameras.begin()->second.camera.fx, truth[0].fx);
   EXPECT_TRUE(other.warnings.empty());
+  EXPECT_EQ(other.focal_sigma, 0);
 
   OpenedScene().keep(dir / "model");  // of cameras that were stated
   EXPECT_FALSE(fs::exists(dir / "model/colmap"));
@@ -155,6 +162,11 @@ TEST(PhotoPoses, NeedTwoPhotographsAndNotTooMany) {
     test::write_bytes(dir / ("photos/" + std::to_string(i) + ".png"), test::rgb_png(64, 64, i));
   }
   EXPECT_EQ(test::defect_of([&] { solved(dir / "photos"); }), "LIMIT");
+  // Those that are wanted are few enough, but show nothing.
+  EXPECT_NE(message_of([&] {
+              solved(dir / "photos", 0, {}, {"2.png", "3.png"});
+            }).find("shows too little"),
+            std::string::npos);
 }
 
 }  // namespace

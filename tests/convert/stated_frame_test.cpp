@@ -40,6 +40,16 @@ TEST(ScaleContradiction, IsSaidBeyondThreeSigma) {
             std::string::npos);
 }
 
+TEST(WidenByFocal, AddsToAScaleThatIsKnown) {
+  Frame frame;
+  widen_by_focal(frame, 0.04);
+  EXPECT_EQ(frame.metres_sigma, 0);
+  frame.metres_per_unit = 2;
+  frame.metres_sigma = 0.06;
+  widen_by_focal(frame, 0.04);
+  EXPECT_DOUBLE_EQ(frame.metres_sigma, 0.1);
+}
+
 TEST(TurnedText, SaysThatTwoFilesHaveOtherDirectionsUp) {
   Frame a;
   Frame b;

@@ -167,10 +167,22 @@ TEST_F(ExifFile, PrefersTheResolutionOfTheFocalPlane) {
                                           {kPixelY, 4, 1500},
                                           {kPlaneX, 5, 25400},
                                           {kPlaneUnit, 3, 2},
-                                          {kFilm, 3, 90}};
+                                          {kFilm, 3, 17}};
   EXPECT_NEAR(hint(entries, {2000, 1500}).focal, 1000, 1e-6);
   EXPECT_NEAR(hint(entries, {1000, 750}).focal, 500, 1e-6);
-  EXPECT_NEAR(hint(entries, {1500, 1500}).focal, 1500 * 90 / 25, 300);  // cut: says nothing
+  EXPECT_NEAR(hint(entries, {1500, 1500}).focal, 1500 * 17 / 25, 60);  // cut: says nothing
+}
+
+// Programs that shrink or develop photographs may leave a resolution of another picture.
+TEST_F(ExifFile, TakesTheFocalLengthOnFilmWhereTheFocalPlaneContradictsIt) {
+  const LensHint lens = hint({{kFocalLength, 5, 100},
+                              {kPixelX, 4, 2000},
+                              {kPixelY, 4, 1500},
+                              {kPlaneX, 5, 25400},
+                              {kPlaneUnit, 3, 2},
+                              {kFilm, 3, 38}},
+                             {2000, 1500});
+  EXPECT_NEAR(lens.focal, 2000 * 38 / 34.613, 1);
 }
 
 TEST_F(ExifFile, SaysNothingWhereNothingUsefulStands) {

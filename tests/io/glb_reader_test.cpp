@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/glb_reader.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -182,6 +183,7 @@ TEST(ReadGlb, NamesWhatIsWrong) {
   EXPECT_EQ(broken("/buffers/0/uri", "/etc/passwd"), "UNSUPPORTED");
   EXPECT_EQ(broken("/nodes/0/children", {0}), "REF");
   EXPECT_EQ(broken("/nodes/0/mesh", 1), "REF");
+  EXPECT_EQ(broken("/nodes/0/skin", 0), "UNSUPPORTED");
   EXPECT_EQ(broken("/scenes", Json::array()), "EMPTY");
   EXPECT_EQ(broken("/scenes", Json::object()), "SCHEMA");
   EXPECT_EQ(broken("/scene", 1), "REF");
@@ -244,6 +246,25 @@ TEST(ReadGlb, LeadsOurFilesBackToTheWorld) {
     expect_round_trip({.encoding = encoding, .y_up = y_up, .center = center}, 64 * 0.8 / steps);
   }
   expect_round_trip({.encoding = GlbEncoding::Draco, .y_up = y_up}, 64 * 0.8 / 8192);
+}
+
+// One place that is known badly costs the others little, and none becomes surer than it was.
+TEST(ReadGlb, SigmaIsNeverLessThanItWas) {
+  const test::TempDir dir;
+  TriangleMesh mesh = test::labelled_sphere();
+  std::fill(mesh.provenance.begin(), mesh.provenance.end(), Provenance::Observed);
+  std::fill(mesh.sigma.begin(), mesh.sigma.end(), 0.0004f);
+  mesh.sigma[5] = 5;
+  for (const auto& [name, encoding] : glb_encodings()) {
+    write_glb(dir / "a.glb", mesh, {}, {.encoding = encoding});
+    const MeasurableFile back = read_mesh_file(dir / "a.glb");
+    const double scale = back.content.frame.scale;
+    for (const float s : back.content.mesh.sigma) {
+      if (s * scale > 1) continue;
+      EXPECT_GT(s * scale, 0.0004 * (1 - 0.004)) << name;
+      EXPECT_LT(s * scale, 0.0004 * 1.2) << name;
+    }
+  }
 }
 
 // Programs that pack files for the web join materials that look alike: what one photograph saw

@@ -151,6 +151,22 @@ TEST_F(Masks, OfTurnedPhotographsAreUprightUnlessTheirSizeTellsOtherwise) {
   EXPECT_EQ(usable(0, 12), 1);
 }
 
+TEST_F(Masks, OfPhotographsTurnedByHalfAreTold) {
+  write_mask("masks/v1.png", 12);
+  Scene scene;
+  View& view = scene.views.emplace_back();
+  view.name = "v1";
+  view.image_path = dir_ / "images/v1.jpg";
+  scene.input = {0};
+  for (const int orientation : {1, 3, 6}) {
+    view.orientation = orientation;
+    view.mask_path.clear();
+    scene.warnings.clear();
+    find_masks({dir_.path(), false}, scene);
+    EXPECT_EQ(scene.warnings.size(), orientation == 3 ? 1u : 0u) << orientation;
+  }
+}
+
 TEST_F(Masks, OfAnotherSizeAreRefused) {
   write_mask("masks/v1.png", 4, kWidth / 2);
   EXPECT_EQ(test::defect_of([&] { usable_columns(); }), "MISMATCH");

@@ -233,11 +233,13 @@ TEST(MeshPly, NamesWhatItDoesNotRead) {
   test::write_bytes(dir / "a.ply",
                     "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
                     "property float y\nproperty float z\nproperty float scalar_Intensity\n"
-                    "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
-                    "0 0 0 7\n3 0 0 0\n");
+                    "property float quality\nelement tristrips 1\nproperty list int int "
+                    "vertex_indices\nend_header\n"
+                    "0 0 0 7 1\n3 0 0 0\n");
   const MeshFile out = read_mesh_ply(dir / "a.ply");
   ASSERT_EQ(out.warnings.size(), 1U);
-  EXPECT_EQ(out.warnings[0], "not read: scalar_Intensity, triangle strips, which hold its faces");
+  EXPECT_EQ(out.warnings[0],
+            "not read: scalar_Intensity, quality, triangle strips, which hold its faces");
 }
 
 }  // namespace

@@ -54,6 +54,17 @@ TEST(Photographs, MayHaveOtherFilesBesideThem) {
   expect_cameras("cameras/nikon.json", R"({"t_00": 1})");
 }
 
+TEST(UnreadFiles, AreNamed) {
+  const test::TempDir dir;
+  for (const char* name : {"a.jpg", "b.NEF", "c.dng", "notes.txt", "bundle.out"}) {
+    test::write_bytes(dir / name, "x");
+  }
+  const std::vector<std::string> lines = unread_files(dir.path());
+  ASSERT_EQ(lines.size(), 2u);
+  EXPECT_EQ(lines[0].substr(0, 22), "bundle.out is not read");
+  EXPECT_EQ(lines[1].substr(0, 25), "b.NEF, c.dng are not read");
+}
+
 TEST(Photographs, ThatCannotBeReadAreRefused) {
   const test::TempDir dir;
   test::write_bytes(dir / "a.png", test::rgb_png(20, 10));

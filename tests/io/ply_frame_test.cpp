@@ -42,6 +42,17 @@ TEST(PlyFrame, CommentsSayWhatIsUpWhereThatIsKnown) {
   EXPECT_FALSE(ply_placement({"up and away"}, kBounds, {}).frame.knows_up());
 }
 
+TEST(PlyFrame, CommentsOfNerfstudioAndBrushSayWhatIsUp) {
+  const auto up = [](const char* comment) {
+    return ply_placement({comment}, kBounds, {}).frame.up;
+  };
+  EXPECT_EQ(up("Vertical Axis: z"), Eigen::Vector3d::UnitZ());
+  EXPECT_EQ(up("Vertical axis: y"), Eigen::Vector3d::UnitY());
+  EXPECT_EQ(up("Vertical axis: 0 -2 0"), -Eigen::Vector3d::UnitY());
+  EXPECT_EQ(up("Vertical axis: w"), Eigen::Vector3d::Zero());
+  EXPECT_EQ(up("Vertical axis:"), Eigen::Vector3d::Zero());
+}
+
 TEST(PlyFrame, PlacesContentInTheWorld) {
   const PlyPlacement back = ply_placement(comments_of(test::centimetre_frame()), kBounds, {});
   const Eigen::Vector3d in_file(0.5, 1.5, -2.5);

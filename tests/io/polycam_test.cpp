@@ -79,6 +79,8 @@ TEST_F(ReadPolycam, ProjectsAsArKitDoes) {
     }
   }
   EXPECT_EQ(scene.frame.metres_per_unit, 1);
+  EXPECT_GT(scene.frame.metres_sigma, 0.01);
+  EXPECT_EQ(scene.frame.up, Eigen::Vector3d::UnitY());
   EXPECT_EQ(scene.depth_kind, DepthKind::Metric);
 }
 

@@ -77,6 +77,7 @@ TEST_F(ReadRealityCapture, ProjectsAsTheFormulaSays) {
     EXPECT_NEAR(image[0].x, expected.x(), 1e-6);
     EXPECT_NEAR(image[0].y, expected.y(), 1e-6);
   }
+  EXPECT_EQ(scene.frame.up, Eigen::Vector3d::UnitZ());
   EXPECT_EQ(scene.views[1].camera.width, 60);
   EXPECT_DOUBLE_EQ(scene.views[1].camera.fx, 28.5 / 36 * 80);
 }

@@ -67,6 +67,16 @@ TEST_F(ReadScene, OfManyViewsTakesThreeThatGoWellTogether) {
   EXPECT_EQ(scene.held_out.size(), 17u);
 }
 
+TEST_F(ReadScene, OfHundredsHoldsOutSomeFromFirstToLast) {
+  write(200);
+  const Scene scene = read();
+  EXPECT_EQ(scene.input.size(), 3u);
+  EXPECT_EQ(scene.held_out.size(), 24u);
+  EXPECT_LE(scene.held_out.front(), 3);
+  EXPECT_GE(scene.held_out.back(), 196);
+  EXPECT_TRUE(std::is_sorted(scene.held_out.begin(), scene.held_out.end()));
+}
+
 TEST_F(ReadScene, FollowsTheLlffProtocolAboveFourViewsOfLlff) {
   std::vector<std::vector<double>> rows;
   for (int i = 0; i < 20; ++i) {

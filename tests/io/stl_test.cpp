@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/stl.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -51,6 +52,17 @@ TEST(WriteStl, IsInMillimetresWithZUp) {
       EXPECT_LT((facets[i].corner.at(k) - turned).norm(), 1e-4f);
     }
   }
+}
+
+TEST(WriteStl, TheHeaderSaysHowMuchWasSeenWhereThereIsRoom) {
+  const test::TempDir dir;
+  Frame frame;
+  frame.metres_per_unit = 1;
+  TriangleMesh mesh = test::labelled_sphere();
+  std::fill(mesh.provenance.begin(), mesh.provenance.end(), Provenance::SingleView);
+  write_stl(dir / "a.stl", mesh, frame, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(test::read_bytes(dir / "a.stl").substr(0, 51),
+            "cgs binary STL, unit mm, 100 % seen by photographs ");
 }
 
 TEST(WriteStl, FarFromTheOriginTheHeaderLeadsBack) {

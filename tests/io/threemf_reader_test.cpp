@@ -50,6 +50,11 @@ TEST_F(Read3mf, ReadsWhatThisProgramWrites) {
   EXPECT_EQ(back.content.mesh.faces, mesh.faces);
   EXPECT_EQ(back.content.mesh.provenance, mesh.provenance);
   EXPECT_EQ(back.content.frame.unit_name(), "mm");
+  EXPECT_EQ(back.content.frame.scale_source, frame.scale_source);
+  EXPECT_GT(frame.metres_sigma, 0);
+  EXPECT_NEAR(back.content.frame.metres_sigma / back.content.frame.metres_per_unit,
+              frame.metres_sigma / frame.metres_per_unit,
+              1e-9);
   EXPECT_EQ(back.content.frame.up, Vector3d::UnitZ());
   ASSERT_EQ(back.content.points.size(), mesh.vertices.size());
   for (size_t i = 0; i < mesh.vertices.size(); ++i) {

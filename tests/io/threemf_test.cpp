@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/threemf.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include <gtest/gtest.h>
@@ -98,6 +99,21 @@ TEST(Write3mf, KeepsFacesTheirOrderAndTheirClass) {
   }
   EXPECT_NE(xml.find("<base name=\"inferred\" displaycolor=\"#F21AD9FF\""), std::string::npos);
   EXPECT_NE(xml.find("Surface by origin: observed "), std::string::npos);
+}
+
+// For readers that know but one material per object.
+TEST(Write3mf, ClaimsOfTheWholeObjectWhatHoldsOfAllOfIt) {
+  TriangleMesh mesh = test::labelled_sphere();
+  const auto material = [&] {
+    return attribute(model_of(mesh, Eigen::Matrix3d::Identity()), "object", "pindex").at(0);
+  };
+  EXPECT_EQ(material(), 3) << "inferred";
+  for (Provenance& label : mesh.provenance) {
+    if (label == Provenance::Inferred) label = Provenance::SingleView;
+  }
+  EXPECT_EQ(material(), 2) << "interpolated";
+  std::fill(mesh.provenance.begin(), mesh.provenance.end(), Provenance::Observed);
+  EXPECT_EQ(material(), 0) << "observed";
 }
 
 TEST(Write3mf, GivesEqualBytesForEqualMeshes) {

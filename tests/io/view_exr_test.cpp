@@ -87,6 +87,20 @@ TEST(WriteViewExr, MarksWhatIsUnknownAndWritesNoNan) {
   EXPECT_GT(at(image, "Z", 2, 1), 0.0f);
 }
 
+TEST(WriteViewExr, WhatAMaskLeavesOutIsNoHole) {
+  ViewRasters view = rasters();
+  view.hole(2, 1) = Hole::Outside;
+  view.hole(3, 1) = Hole::Outside;
+  view.valid = MaskMap(6, 4, 1);
+  view.valid(2, 1) = 0;
+  view.valid(4, 1) = 0;  // drawn nevertheless
+  const ExrImage image = written(view, {});
+  EXPECT_EQ(at(image, "hole.Y", 2, 1), 0.0f);
+  EXPECT_EQ(at(image, "holeKind.Y", 2, 1), 4.0f);
+  EXPECT_EQ(at(image, "hole.Y", 3, 1), 1.0f);
+  EXPECT_EQ(at(image, "holeKind.Y", 4, 1), 0.0f);
+}
+
 TEST(WriteViewExr, AttributesProjectAPointToItsPixel) {
   const Frame frame = test::centimetre_frame();
   const ExrImage image = written(rasters(), frame);

@@ -67,6 +67,9 @@ TEST(ViewNames, IndicesCountAllPhotographsOfAFolder) {
   name_views(scene);
   EXPECT_EQ(views_called(scene, "0"), Indices{});
   EXPECT_EQ(views_called(scene, "2"), Indices{1});
+  EXPECT_EQ(index_of(scene, 1), 2);
+  scene.photographs.clear();
+  EXPECT_EQ(index_of(scene, 1), 1);
 }
 
 TEST(ViewNames, ListsAreSortedAndNameNobodyTwice) {

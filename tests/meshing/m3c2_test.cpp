@@ -148,6 +148,24 @@ TEST(M3c2, KnownSigmaCountsInFullAndRegistrationOnTop) {
   EXPECT_EQ(swapped[0].change, Change::Nearer);
 }
 
+TEST(M3c2, AnErrorOfTheScaleWidensDetectionAwayFromTheCenterAlongTheNormal) {
+  const Plane plane;
+  const auto a = noisy_plane(plane, kShift, kNoiseA, 6000, 1);
+  const auto b = noisy_plane(plane, 0, kNoiseB, 4000, 2);
+  const std::vector<Vector3d> places = {Vector3d::Zero()};
+  M3c2Options options = scales();
+  const double before = m3c2(places, outward(places, plane.normal), a, b, options)[0].detection;
+  options.scale_sigma = 0.02;
+  options.center = 0.3 * plane.right;  // such an error slides the place within the plane
+  EXPECT_NEAR(m3c2(places, outward(places, plane.normal), a, b, options)[0].detection,
+              before,
+              1e-6 * before);
+  options.center = 0.3 * plane.right - 0.5 * plane.normal;
+  EXPECT_NEAR(m3c2(places, outward(places, plane.normal), a, b, options)[0].detection,
+              1.96 * std::hypot(before / 1.96, 0.02 * 0.5),
+              1e-3 * before);
+}
+
 TEST(M3c2, APointWithoutSigmaDoesNotMakeTheMeanBetter) {
   const Plane plane;
   auto a = noisy_plane(plane, kShift, 0.0005, 3000, 5);

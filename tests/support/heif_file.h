@@ -18,6 +18,7 @@ struct HeifKind {
   heif_compression_format codec = heif_compression_HEVC;
   heif_orientation orientation = heif_orientation_normal;  ///< How it is to be turned when shown.
   std::string exif;                                        ///< From the TIFF header on; or empty.
+  std::string profile;                                     ///< ICC; or empty.
   bool has_alpha = false;                                  ///< The left half is transparent.
 };
 
@@ -45,6 +46,9 @@ inline std::string heif(const ColorImage& picture, const HeifKind& kind = {}) {
       }
       if (kind.has_alpha) rows[y * stride + channels * x + 3] = 2 * x < picture.width ? 0 : 255;
     }
+  }
+  if (!kind.profile.empty()) {
+    ok(heif_image_set_raw_color_profile(image, "prof", kind.profile.data(), kind.profile.size()));
   }
   heif_context* const context = heif_context_alloc();
   heif_encoder* encoder = nullptr;

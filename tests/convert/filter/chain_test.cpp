@@ -320,6 +320,20 @@ INSTANTIATE_TEST_SUITE_P(Filter,
                          testing::ValuesIn(operations_on(&Case::cloud)),
                          test_name);
 
+TEST(Merge, LeavesTheScaleNoSurerThanEither) {
+  const test::TempDir dir;
+  FilterState sure = labelled_mesh();
+  FilterState unsure = labelled_mesh();
+  sure.frame.metres_sigma = 0.01 * sure.frame.metres_per_unit;
+  unsure.frame.metres_sigma = 0.03 * unsure.frame.metres_per_unit;
+  write_mesh_ply(dir / "sure.ply", sure.mesh, sure.frame);
+  write_mesh_ply(dir / "unsure.ply", unsure.mesh, unsure.frame);
+  for (const auto& [state, second] : {std::pair(sure, "unsure.ply"), {unsure, "sure.ply"}}) {
+    const Frame frame = filtered(state, "merge=" + (dir / second).string(), 2).frame;
+    EXPECT_NEAR(frame.metres_sigma / frame.metres_per_unit, 0.03, 1e-6) << second;
+  }
+}
+
 TEST(RunFilters, KeepsTheOrder) {
   const FilterState cloud = labelled_cloud();
   Terminal terminal(true);

@@ -173,8 +173,8 @@ void add_jpeg(Cases& cases) {
   cases.push_back(picture_case(
       "I06",
       "orientation tag",
-      "OK",
-      {},
+      "OK+W",
+      {"lie turned"},
       [] {
         const std::string tag =
             "Exif" + std::string(2, '\0') + "II" + packed(uint16_t{42}, uint32_t{8}) +

@@ -201,9 +201,30 @@ TEST(SolvePoses, RefusesTooLittleOverlapNamingTheBestPair) {
 
 TEST(SolvePoses, RefusesPhotographsThatShowNothing) {
   std::vector<UnposedPhoto> photos = unposed_photos(three_views());
+  photos[1].features = {};
   photos[2].features = {};
   EXPECT_NE(refusal(photos).find("photo_2"), std::string::npos);
   EXPECT_THROW(solve_poses({photos[0]}), InvalidInput);
+}
+
+TEST(SolvePoses, ADarkPhotographStopsNothing) {
+  std::vector<UnposedPhoto> photos = unposed_photos(three_views());
+  UnposedPhoto dark = photos[0];
+  dark.features = {};
+  photos.insert(photos.begin() + 1, dark);
+  const PoseSolution solution = solve_poses(photos);
+  for (size_t i = 0; i < photos.size(); ++i) EXPECT_EQ(solution.photos[i].is_placed, i != 1) << i;
+}
+
+// So far off that no cameras are found with it.
+TEST(SolvePoses, DropsAFocalLengthWithWhichNothingFits) {
+  const PointScene scene = three_views();
+  for (const double factor : {0.1, 12.0}) {
+    const PoseSolution solution =
+        solve_poses(with_focal(unposed_photos(scene), factor * kFocal, 0.02));
+    EXPECT_LT(pose_errors(cameras_of(solution), scene.cameras).focal, 0.02) << factor;
+    for (const SolvedPhoto& photo : solution.photos) EXPECT_TRUE(photo.is_refuted);
+  }
 }
 
 TEST(SolvePoses, LeavesOutWhatItCannotPlace) {
