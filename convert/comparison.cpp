@@ -32,6 +32,11 @@ std::array<size_t, 4> change_counts(const std::vector<Deviation>& deviations) {
   return out;
 }
 
+size_t beyond_rim(const std::vector<Deviation>& deviations) {
+  return static_cast<size_t>(std::count_if(
+      deviations.begin(), deviations.end(), [](const Deviation& d) { return d.is_beyond_rim; }));
+}
+
 double share(size_t count, const Comparison& comparison) {
   return static_cast<double>(count) /
          static_cast<double>(
@@ -133,7 +138,8 @@ Json comparison_json(const Comparison& comparison,
        {{"unchanged", share(changes[1], comparison)},
         {"nearer", share(changes[2], comparison)},
         {"farther", share(changes[3], comparison)},
-        {"not_comparable", share(changes[0] + comparison.without_distance, comparison)}}},
+        {"not_comparable", share(changes[0] + comparison.without_distance, comparison)},
+        {"beyond_rim", share(beyond_rim(comparison.by_area), comparison)}}},
       {"registration", nullptr},
       {"agreement", nullptr}};
   if (comparison.registration) {
@@ -179,6 +185,12 @@ std::string comparison_text(const Comparison& comparison, const FigureUnit& unit
            text_of("%.2f", 100 * share(changes[1], comparison)) + " %; not comparable " +
            text_of("%.2f", 100 * share(changes[0] + comparison.without_distance, comparison)) +
            " %\n";
+  }
+  const size_t beyond = beyond_rim(comparison.by_area);
+  if (beyond > 0) {
+    out += text_of("%.2f", 100 * share(beyond, comparison)) +
+           " % of the points lie beyond the rim of B, which says nothing of them: their distances "
+           "are to that rim\n";
   }
   const auto counts =
       histogram(comparison.by_area, -comparison.half_range, comparison.half_range, kBins / 2);

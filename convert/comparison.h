@@ -40,7 +40,7 @@ struct Comparison {
   size_t without_distance = 0;  ///< Points of A that are not in by_area, as B has nothing there.
   std::string change_rule = "beyond 2 sigma";  ///< What counts as change, for people.
   std::string no_change_rule =                 ///< Why no change can be told where it cannot.
-      "no place has a sigma in both and was observed in both";
+      "no place that B reaches has a sigma in both and was observed in both";
 };
 
 /// Half the width of a histogram that holds 98 % of the distances; > 0 [internal units].
@@ -50,7 +50,8 @@ double range_of(const std::vector<Deviation>& deviations);
 Eigen::Vector3f diverging_color(double t);
 
 /// {"unit", "distance": {…}, "histogram": {"low", "high", "counts"}, "change": shares of A's
-/// points, "registration", "agreement"}; see docs/measuring.md.
+/// points (of what is "not_comparable", "beyond_rim" is where an open B ends before it gets there;
+/// distances hold that to its rim), "registration", "agreement"}; see docs/measuring.md.
 nlohmann::ordered_json comparison_json(const Comparison& comparison,
                                        const MeasurableMesh& a,
                                        const FigureUnit& unit);

@@ -6,8 +6,8 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
-#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 #include "convert/length.h"
@@ -48,9 +48,7 @@ M3c2Options options_of(const M3c2Request& request,
     out.registration = parse_length(request.registration, frame);
   }
   out.scale_sigma = request.scale_sigma;
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& p : a.places) box.extend(p);
-  out.center = box.center();
+  out.center = request.scale_center;
   return out;
 }
 
@@ -58,6 +56,7 @@ M3c2Options options_of(const M3c2Request& request,
 struct Outward {
   std::vector<Eigen::Vector3f> directions;
   std::vector<uint8_t> is_known;  // 0 where it may as well be the other side
+  bool is_stated = true;          // by the file; else guessed from how the points lie
 };
 
 bool is_stated(const Eigen::Vector3f& direction) { return !direction.isZero(0); }
@@ -74,6 +73,7 @@ Outward estimated_outward(const MeasurableMesh& mesh) {
   upright.reserve(mesh.mesh.vertices.size());
   for (const Eigen::Vector3f& p : mesh.mesh.vertices) upright.emplace_back(z_up * p);
   Outward out;
+  out.is_stated = false;
   out.directions = estimated_normals(upright, kNeighbors);
   for (const uint32_t start : turn_consistently(out.directions, upright, kNeighbors)) {
     out.is_known.push_back(out.directions[start].z() >= kSteep ? 1 : 0);
@@ -102,16 +102,64 @@ void fill_from_nearest(std::vector<Eigen::Vector3f>& directions,
   }
 }
 
+// By faces, or by normals; empty if there are none.
+std::vector<Eigen::Vector3f> stated_outward(const MeasurableMesh& mesh) {
+  std::vector<Eigen::Vector3f> out =
+      mesh.mesh.faces.empty() ? mesh.mesh.normals : vertex_normals(mesh.mesh);
+  // Some programs write normals that are all 0.
+  if (std::none_of(out.begin(), out.end(), is_stated)) return {};
+  fill_from_nearest(out, mesh.mesh.vertices);
+  return out;
+}
+
 Outward outward_of(const MeasurableMesh& mesh) {
   Outward out;
-  out.directions = mesh.mesh.faces.empty() ? mesh.mesh.normals : vertex_normals(mesh.mesh);
-  out.is_known.assign(out.directions.size(), 1);
-  // Some programs write normals that are all 0.
-  if (std::none_of(out.directions.begin(), out.directions.end(), is_stated)) {
+  out.directions = stated_outward(mesh);
+  if (out.directions.empty()) {
     out = estimated_outward(mesh);
+    fill_from_nearest(out.directions, mesh.mesh.vertices);
+  } else {
+    out.is_known.assign(out.directions.size(), 1);
   }
-  fill_from_nearest(out.directions, mesh.mesh.vertices);
   return out;
+}
+
+// Whether nearly all of A looks against what of B is nearest: one of them is inside out. (Half of
+// it does where a thin thing moved by more than half its thickness.)
+bool look_against(const MeasurableMesh& a,
+                  const std::vector<Eigen::Vector3f>& outward_a,
+                  const MeasurableMesh& b,
+                  const std::vector<Eigen::Vector3f>& outward_b) {
+  constexpr size_t kAsked = 2000;
+  constexpr double kNearlyAll = 0.5;  // mean cosine: three quarters against one
+  const size_t step = std::max<size_t>(1, outward_a.size() / kAsked);
+  const KdTree tree(b.mesh.vertices);
+  std::vector<Neighbor> found;
+  double sum = 0;
+  double asked = 0;
+  for (size_t i = 0; i < outward_a.size(); i += step) {
+    tree.nearest(a.mesh.vertices[i], 1, found);
+    const Eigen::Vector3f& there = outward_b[found.front().point];
+    sum += double(outward_a[i].stableNormalized().dot(there.stableNormalized()));
+    ++asked;
+  }
+  return sum < -kNearlyAll * asked;
+}
+
+// Tells both clouds which sides of them are outside, if both say so.
+void add_sides(const MeasurableMesh& a,
+               const Outward& outward_a,
+               const MeasurableMesh& b,
+               ComparedPoints& points_a,
+               ComparedPoints& points_b) {
+  if (!outward_a.is_stated) return;
+  std::vector<Eigen::Vector3f> outward_b = stated_outward(b);
+  if (outward_b.empty()) return;
+  if (look_against(a, outward_a.directions, b, outward_b)) {
+    for (Eigen::Vector3f& n : outward_b) n = -n;
+  }
+  points_a.outward = outward_a.directions;
+  points_b.outward = std::move(outward_b);
 }
 
 // What the variance comes from of the means of one side, whose columns have so many points.
@@ -160,6 +208,30 @@ double at_share(const std::vector<double>& sorted, double share) {
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
+// What is doubtful about the distances, a line each.
+std::string doubts_text(const M3c2Comparison& found) {
+  std::array<char, 300> text{};
+  std::string out;
+  if (!found.is_sign_known()) {
+    std::snprintf(
+        text.data(),
+        text.size(),
+        "the SIGN of %.3g %% of the distances is not known: A, or parts of it, is a steep "
+        "cloud without faces and normals\n",
+        100 * found.unknown_signs);
+    out += text.data();
+  }
+  if (found.is_split()) {
+    std::snprintf(text.data(),
+                  text.size(),
+                  "%.3g %% of the distances are between MEANS OF TWO SURFACES or more, farther "
+                  "apart than a cylinder is wide: a smaller --cylinder-depth keeps them apart\n",
+                  100 * found.split);
+    out += text.data();
+  }
+  return out;
+}
+
 bool is_significant(const M3c2Place& place) {
   return place.change == Change::Nearer || place.change == Change::Farther;
 }
@@ -174,13 +246,15 @@ Eigen::Vector3f color_of(const M3c2Place& place, double half_range) {
 M3c2Comparison compare_m3c2(const M3c2Request& request,
                             const MeasurableMesh& a,
                             const MeasurableMesh& b) {
-  const ComparedPoints points_a = points_by_vertex(a);
-  const ComparedPoints points_b = points_by_vertex(b);
+  ComparedPoints points_a = points_by_vertex(a);
+  ComparedPoints points_b = points_by_vertex(b);
   M3c2Comparison out;
   out.options = options_of(request, points_a, points_b, a.frame);
   const Outward outward = outward_of(a);
+  add_sides(a, outward, b, points_a, points_b);
   out.places = m3c2(points_a.places, outward.directions, points_a, points_b, out.options);
   size_t unknown_signs = 0;
+  size_t split = 0;
   constexpr double kOf95Percent = 1.96;
   for (size_t i = 0; i < out.places.size(); ++i) {
     M3c2Place& place = out.places[i];
@@ -192,10 +266,12 @@ M3c2Comparison compare_m3c2(const M3c2Request& request,
     out.comparison.by_area.push_back(
         {place.distance, place.detection / kOf95Percent, place.change});
     if (outward.is_known[i] == 0) ++unknown_signs;
+    if (place.is_split) ++split;
   }
   if (out.comparison.by_area.empty()) refuse_without_distance(out, a.frame);
-  out.unknown_signs =
-      static_cast<double>(unknown_signs) / static_cast<double>(out.comparison.by_area.size());
+  const auto distances = static_cast<double>(out.comparison.by_area.size());
+  out.unknown_signs = static_cast<double>(unknown_signs) / distances;
+  out.split = static_cast<double>(split) / distances;
   out.variance_a = variance_source(out.places, &M3c2Place::count_a, &M3c2Place::stated_a);
   out.variance_b = variance_source(out.places, &M3c2Place::count_b, &M3c2Place::stated_b);
   out.comparison.summary = summarize(out.comparison.by_area);
@@ -220,6 +296,7 @@ Json m3c2_json(const M3c2Comparison& found, const MeasurableMesh& a, const Figur
                  {"places", found.places.size()},
                  {"with_distance", static_cast<double>(found.comparison.by_area.size()) / all},
                  {"with_detection", static_cast<double>(detections.size()) / all},
+                 {"split", found.split},
                  {"detection",
                   {{"median", number_or_null(at_share(detections, 0.5) * unit.length)},
                    {"p95", number_or_null(at_share(detections, 0.95) * unit.length)}}}};
@@ -259,16 +336,7 @@ std::string m3c2_text(const M3c2Comparison& found, const FigureUnit& unit) {
                     static_cast<double>(std::max<size_t>(1, found.places.size())),
                 found.places.size());
   out += text.data();
-  if (!found.is_sign_known()) {
-    std::snprintf(
-        text.data(),
-        text.size(),
-        "the SIGN of %.3g %% of the distances is not known: A, or parts of it, is a steep "
-        "cloud without faces and normals\n",
-        100 * found.unknown_signs);
-    out += text.data();
-  }
-  return out;
+  return out + doubts_text(found);
 }
 
 void write_m3c2_ply(const std::filesystem::path& path,

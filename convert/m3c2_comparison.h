@@ -20,6 +20,8 @@ struct M3c2Request {
   std::string depth;
   std::string registration;  ///< Empty = 0.
   double scale_sigma = 0;    ///< Of one file's scale against the other's, as a share of it.
+  /// What an error of that scale leaves in its place [internal units].
+  Eigen::Vector3d scale_center = Eigen::Vector3d::Zero();
 };
 
 /// What was found at the vertices of A.
@@ -32,11 +34,11 @@ struct M3c2Comparison {
   std::vector<M3c2Place> places;  ///< Of A's vertices, in their order.
   Comparison comparison;          ///< Of the places with a distance.
   double unknown_signs = 0;       ///< Share of the distances that may have the other sign.
+  double split = 0;               ///< Share of the distances that are split, see M3c2Place.
 
-  bool is_sign_known() const {
-    constexpr double kNegligible = 0.01;
-    return unknown_signs <= kNegligible;
-  }
+  static constexpr double kNegligible = 0.01;
+  bool is_sign_known() const { return unknown_signs <= kNegligible; }
+  bool is_split() const { return split > kNegligible; }
 };
 
 /// Compares the vertices of A with those of B, faces aside: every vertex of a reconstruction is a
@@ -44,6 +46,8 @@ struct M3c2Comparison {
 /// is outside (where these are 0: the nearest that are not); else neighbours agree with each other,
 /// and of every part that hangs together the topmost point, by the up of A's frame (+z where it is
 /// not known), looks up: where that is steep, the sign is not known.
+/// Where both A and B have faces or such normals, the other wall of what is thin is left out, as
+/// m3c2() does, also if one of the two is inside out.
 /// \throws InvalidInput for a length that cannot be, clouds without seen points, or where no point
 ///         of A has a normal, or points of B in its cylinder
 M3c2Comparison compare_m3c2(const M3c2Request& request,
@@ -52,8 +56,8 @@ M3c2Comparison compare_m3c2(const M3c2Request& request,
 
 /// comparison_json() and "m3c2": {"normal_scale", "cylinder", "cylinder_depth",
 /// "registration_error", "scale_sigma", "sign_known", "variance_a": "sigma", "roughness" or
-/// "mixed", "variance_b", "places", "with_distance": share, "with_detection": share, "detection":
-/// {"median", "p95"}}
+/// "mixed", "variance_b", "places", "with_distance": share, "with_detection": share, "split":
+/// share of the distances, "detection": {"median", "p95"}}
 nlohmann::ordered_json m3c2_json(const M3c2Comparison& found,
                                  const MeasurableMesh& a,
                                  const FigureUnit& unit);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/model_training.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -162,6 +164,71 @@ nlohmann::ordered_json given_depth_to_json(const PriorsReport& priors) {
   return out;
 }
 
+// "a", "a and b", "a, b and c".
+std::string listed(const std::vector<std::string>& words) {
+  std::string out;
+  for (size_t i = 0; i < words.size(); ++i) {
+    if (i > 0) out += i + 1 < words.size() ? ", " : " and ";
+    out += words[i];
+  }
+  return out;
+}
+
+// Where the depth of the input views is from: what most rests on first.
+std::string depth_words(const PriorsReport& priors) {
+  PriorsCoverage sum;
+  for (const PriorsCoverage& view : priors.coverage) {
+    if (!is_measured(view)) continue;  // its depth stays unknown
+    sum.measured += view.measured;
+    sum.guessed += view.guessed;
+    sum.completed += view.completed;
+  }
+  const bool has_sensor = priors.given.kind == DepthKind::Metric;
+  std::vector<std::pair<double, std::string>> sources = {
+      {sum.measured,
+       has_sensor ? "measured by a multi-view plane sweep and a depth sensor"
+                  : "measured by a multi-view plane sweep"},
+      {sum.guessed, "guessed from one photograph and fitted to what is measured"},
+      {sum.completed, "filled in from neighbours"}};
+  std::stable_sort(sources.begin(), sources.end(), [](const auto& a, const auto& b) {
+    return a.first > b.first;
+  });
+  const double all = sum.measured + sum.guessed + sum.completed;
+  std::vector<std::string> words;
+  for (const auto& [share, text] : sources) {
+    if (!(share > 0)) continue;
+    std::array<char, 32> percent{};
+    std::snprintf(percent.data(), percent.size(), "%.0f %% ", 100 * share / all);
+    words.push_back(share < all ? percent.data() + text : text);
+  }
+  return words.empty() ? "unknown" : listed(words);
+}
+
+// What a training of so many steps may have changed.
+std::vector<std::string> optimised(const TrainingOptions& options, size_t steps) {
+  const bool has_networks = options.coherence.decoder == ResidualDecoder::Conv;
+  // Shapes are free from the first step on that begins at or after this part of the schedule.
+  const bool frees_shapes = options.free_from * options.steps <= double(steps) - 1;
+  std::vector<std::string> out;
+  if ((has_networks ? options.conv_depth_rate : options.depth_rate) > 0) out.emplace_back("depth");
+  if ((has_networks ? options.conv_opacity_rate : options.opacity_rate) > 0) {
+    out.emplace_back("opacity");
+  }
+  if (options.shape_rate > 0 && frees_shapes) out.emplace_back("shape");
+  return out;
+}
+
+std::string description_of(const TrainedModel& trained, const TrainingOptions& options) {
+  const std::string start =
+      "one Gaussian per pixel at a depth that is " + depth_words(trained.priors) + "; ";
+  const std::vector<std::string> changed = optimised(options, trained.steps.size());
+  if (trained.steps.empty() || changed.empty()) {
+    return "aligned initialisation: " + start + "not optimised against the photographs";
+  }
+  return "coherent Gaussians: " + start + listed(changed) +
+         " optimised against the photographs in " + std::to_string(trained.steps.size()) + " steps";
+}
+
 // Of the pixels of every input view.
 nlohmann::ordered_json coverage_to_json(const TrainedModel& trained) {
   nlohmann::ordered_json out = nlohmann::ordered_json::array();
@@ -231,14 +298,7 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
     loss.push_back(step.total());
     skipped += step.skipped;
   }
-  const std::string start = "one Gaussian per pixel at the depth of a multi-view plane sweep; ";
-  return {{"description",
-           trained.steps.empty()
-               ? "aligned initialisation: " + start + "not optimised against the photographs"
-               : "coherent Gaussians: " + start +
-                     "depth, opacity and shape optimised against the "
-                     "photographs in " +
-                     std::to_string(trained.steps.size()) + " steps"},
+  return {{"description", description_of(trained, request.training)},
           {"gaussians", trained.model.gaussians.size()},
           {"settings", settings_to_json(request.training)},
           {"loss", loss},

@@ -25,8 +25,21 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+// What a view was to the model; null where no view is an input, as of splats of other programs.
+Json role_of(const Scene& scene, int index) {
+  if (scene.input.empty()) return nullptr;
+  const auto is_in = [&](const std::vector<int>& views) {
+    return std::find(views.begin(), views.end(), index) != views.end();
+  };
+  return is_in(scene.input) ? "input" : is_in(scene.held_out) ? "held out" : "not used";
+}
+
+// Without the depth that input views saw, every pixel would look like a hole.
+bool knows_holes(const Model& model) { return !model.priors.empty(); }
+
 // Of the pixels that may be looked at; all may if there is no mask.
-Json hole_fractions(const RenderBuffers& buffers, const MaskMap& valid) {
+Json hole_fractions(const Model& model, const RenderBuffers& buffers, const MaskMap& valid) {
+  if (!knows_holes(model)) return {{"hole_fraction", nullptr}};
   const std::vector<Hole>& holes = buffers.hole.data;
   std::array<size_t, 4> counts{};
   size_t looked_at = 0;
@@ -92,12 +105,13 @@ Json write_view(const Model& model,
   write_png(png("color"), picture(buffers));
   write_png(png("depth"), depth_picture(rasters.depth));
   write_png(png("normal"), normal_picture(rasters.normal, view.camera.cam_from_world()));
-  const MaskMap holes = hole_mask(buffers);
-  write_png(png("hole"), intersection(holes, rasters.valid));
-  const auto& input = model.scene.input;
-  const bool is_input = std::find(input.begin(), input.end(), index) != input.end();
-  Json out = {{"name", view.name}, {"role", is_input ? "input" : "held out"}};
-  out.update(hole_fractions(buffers, rasters.valid));
+  if (knows_holes(model)) {
+    write_png(png("hole"), intersection(hole_mask(buffers), rasters.valid));
+  } else {
+    std::filesystem::remove(png("hole"));  // of another model
+  }
+  Json out = {{"name", view.name}, {"role", role_of(model.scene, index)}};
+  out.update(hole_fractions(model, buffers, rasters.valid));
   return out;
 }
 
@@ -171,7 +185,8 @@ double share_of(const MaskMap& part, const MaskMap& whole) {
   return count(part) / count(whole);
 }
 
-Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, const View& view) {
+Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, int index) {
+  const View& view = model.scene.views[static_cast<size_t>(index)];
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
   const ColorImage shown = blackened(picture(buffers), view.valid);
   const ColorImage photograph = blackened(view.image, view.valid);
@@ -191,16 +206,70 @@ Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, c
   const auto figure = [&](const auto& metric, const MaskMap& pixels) {
     return has_any(pixels) ? Json(metric(shown, photograph, &pixels)) : Json();
   };
+  const bool tells_holes = knows_holes(model);
   return {{"name", view.name},
+          {"role", role_of(model.scene, index)},
           {"psnr", figure(psnr, all)},
           {"ssim", figure(ssim, all)},
-          {"psnr_seen", figure(psnr, use)},
-          {"ssim_seen", figure(ssim, use)},
-          {"hole_fraction", has_any(all) ? Json(1 - share_of(use, all)) : Json()},
+          {"psnr_seen", tells_holes ? figure(psnr, use) : Json()},
+          {"ssim_seen", tells_holes ? figure(ssim, use) : Json()},
+          {"hole_fraction", tells_holes && has_any(all) ? Json(1 - share_of(use, all)) : Json()},
           {"ms_ssim", is_nearly_whole ? Json(ms_ssim(shown, photograph)) : Json()}};
 }
 
+// Of those views that say how well the model predicts, if there are any: it was trained on inputs.
+Json mean_of(const Json& rows, std::vector<std::string>& warnings) {
+  const auto is_input = [](const Json& row) { return row["role"] == "input"; };
+  const bool are_all_inputs = std::all_of(rows.begin(), rows.end(), is_input);
+  if (are_all_inputs) {
+    warnings.emplace_back(
+        "only input views are evaluated: the model was trained on them, so that the figures say "
+        "how well it fits, not how well it predicts");
+  }
+  Json mean;
+  for (const char* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}) {
+    double sum = 0;
+    size_t count = 0;
+    for (const Json& row : rows) {
+      if (!row[key].is_number() || (is_input(row) && !are_all_inputs)) continue;
+      sum += row[key].get<double>();
+      ++count;
+    }
+    mean[key] = count > 0 ? Json(sum / static_cast<double>(count)) : Json();
+  }
+  return mean;
+}
+
+// Those that have a photograph. \throws BadInput if none has
+std::vector<int> with_photograph(Scene& scene, const std::vector<int>& views) {
+  std::vector<int> out;
+  for (const int i : views) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (view.image_path.empty()) {
+      scene.warnings.push_back("view " + printable(view.name) +
+                               " has no photograph and is not evaluated");
+    } else {
+      out.push_back(i);
+    }
+  }
+  if (out.empty() && !is_folder(scene.folder)) {
+    throw BadInput(Defect::Open,
+                   scene.folder,
+                   "the folder of the photographs is gone; --scene says where they are");
+  }
+  if (out.empty()) {
+    throw BadInput(Defect::Empty, scene.folder, "no view to evaluate has a photograph");
+  }
+  return out;
+}
+
 }  // namespace
+
+std::string unknown_holes_warning(const Model& model) {
+  if (knows_holes(model)) return {};
+  return "the model does not say what input views saw, so holes are not known: no mask of them is "
+         "written, and their figures are left out";
+}
 
 Json write_views(const Model& model,
                  const std::vector<int>& views,
@@ -233,15 +302,18 @@ Json write_path(const Model& model,
     report(progress, static_cast<double>(k) / static_cast<double>(path.size()));
     const RenderBuffers buffers = render_camera(model, inputs, path[k]);
     const ColorImage shown = picture(buffers);
-    const MaskMap holes = hole_mask(buffers);
+    MaskMap holes(shown.width, shown.height, 0);
     const std::vector<std::string> names = pictures_of_frame(k);
     write_png(folder / names[0], shown);
-    write_png(folder / names[1], holes);
+    if (knows_holes(model)) {
+      holes = hole_mask(buffers);
+      write_png(folder / names[1], holes);
+    }
     if (k == 0 || path.size() <= kOnSheet || place_on_sheet(k) != place_on_sheet(k - 1)) {
       sheet.push_back(thumbnail(tinted(shown, holes)));
     }
     out.push_back({{"name", frame_name(k)}});
-    out.back().update(hole_fractions(buffers, {}));
+    out.back().update(hole_fractions(model, buffers, {}));
   }
   constexpr int kColumns = 4;
   write_png(folder / "contact.png", contact_sheet(sheet, kColumns));
@@ -250,44 +322,20 @@ Json write_path(const Model& model,
 }
 
 Json evaluate_views(Model& model, const std::vector<int>& views, const Progress& progress) {
-  std::vector<int> with_photograph;
-  for (const int i : views) {
-    const View& view = model.scene.views[static_cast<size_t>(i)];
-    if (view.image_path.empty()) {
-      model.scene.warnings.push_back("view " + printable(view.name) +
-                                     " has no photograph and is not evaluated");
-    } else {
-      with_photograph.push_back(i);
-    }
+  std::vector<std::string>& warnings = model.scene.warnings;
+  if (const std::string text = unknown_holes_warning(model); !text.empty()) {
+    warnings.push_back(text);
   }
-  if (with_photograph.empty() && !is_folder(model.scene.folder)) {
-    throw BadInput(Defect::Open,
-                   model.scene.folder,
-                   "the folder of the photographs is gone; --scene says where they are");
-  }
-  if (with_photograph.empty()) {
-    throw BadInput(Defect::Empty, model.scene.folder, "no view to evaluate has a photograph");
-  }
+  const std::vector<int> shown = with_photograph(model.scene, views);
   const std::vector<SupportView> inputs = support_views(model);
   Json rows = Json::array();
-  for (size_t k = 0; k < with_photograph.size(); ++k) {
-    report(progress, static_cast<double>(k) / static_cast<double>(with_photograph.size()));
-    View& view = model.scene.views[static_cast<size_t>(with_photograph[k])];
-    load_images(model.scene, {with_photograph[k]});
-    rows.push_back(evaluate_view(model, inputs, view));
-    view.image = {};  // one photograph in memory at a time
+  for (size_t k = 0; k < shown.size(); ++k) {
+    report(progress, static_cast<double>(k) / static_cast<double>(shown.size()));
+    load_images(model.scene, {shown[k]});
+    rows.push_back(evaluate_view(model, inputs, shown[k]));
+    model.scene.views[static_cast<size_t>(shown[k])].image = {};  // one photograph at a time
   }
-  Json mean;
-  for (const char* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}) {
-    double sum = 0;
-    size_t count = 0;
-    for (const Json& row : rows) {
-      if (!row[key].is_number()) continue;
-      sum += row[key].get<double>();
-      ++count;
-    }
-    mean[key] = count > 0 ? Json(sum / static_cast<double>(count)) : Json();
-  }
+  const Json mean = mean_of(rows, warnings);
   report(progress, 1);
   return {{"mean", mean}, {"views", rows}};
 }

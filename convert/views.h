@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -11,9 +12,15 @@
 
 namespace cgs {
 
+/// What to tell where a model has no priors, as splats of other programs: nothing is known of what
+/// its input views saw, nor which views those were. Empty if it has.
+std::string unknown_holes_warning(const Model& model);
+
 /// Writes <name>.exr and <name>.{color,depth,normal,hole}.png for each of the given views of the
 /// model, and returns per view {"name", "role", "hole_fraction", …}, of pixels that
-/// are not masked.
+/// are not masked. The role is "input", "held out" or "not used"; null where no view is an input.
+/// Without priors no hole.png is written and the hole fraction is null; the EXR says, as it does of
+/// any pixel, that no input view can vouch for it.
 nlohmann::ordered_json write_views(const Model& model,
                                    const std::vector<int>& views,
                                    const std::filesystem::path& folder,
@@ -21,7 +28,8 @@ nlohmann::ordered_json write_views(const Model& model,
 
 /// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
 /// says where they are, and contact.png: twelve of them, holes in magenta. Returns per frame
-/// {"name", "hole_fraction", …}.
+/// {"name", "hole_fraction", …}. Without priors there are no masks and no magenta, and the fraction
+/// is null.
 nlohmann::ordered_json write_path(const Model& model,
                                   const std::vector<Camera>& path,
                                   const std::filesystem::path& folder,
@@ -29,7 +37,11 @@ nlohmann::ordered_json write_path(const Model& model,
 
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
 /// that are not holes, and MS-SSIM over all: {"mean": {"psnr", "ssim", "psnr_seen", "ssim_seen",
-/// "hole_fraction", "ms_ssim"}, "views": [{"name", …}]}. Loads the photographs.
+/// "hole_fraction", "ms_ssim"}, "views": [{"name", "role" as of write_views(), …}]}. Loads the
+/// photographs.
+///
+/// Input views stay out of the mean where there are others. Warnings of the scene tell where there
+/// are none, and where nothing is known of holes, whose figures are then null.
 /// \throws BadInput if none of the views has a photograph.
 nlohmann::ordered_json evaluate_views(Model& model,
                                       const std::vector<int>& views,

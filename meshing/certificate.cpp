@@ -159,7 +159,7 @@ double smallest_angle(const TriangleMesh& mesh) {
 
 }  // namespace
 
-Certificate certify(const TriangleMesh& mesh) {
+Certificate certify(const TriangleMesh& mesh, const Progress& progress) {
   Certificate out;
   const std::vector<HalfEdge> edges = sorted_half_edges(mesh);
   const EdgeFacts facts = edge_facts(edges);
@@ -179,7 +179,7 @@ Certificate certify(const TriangleMesh& mesh) {
       out.genus = static_cast<int>((2 * static_cast<long>(out.components) - out.euler_number) / 2);
     }
   }
-  out.self_intersections = self_intersections(mesh).size();
+  out.self_intersections = self_intersections(mesh, progress).size();
   const auto areas = area_by_provenance(mesh);
   out.observed_area = areas[size_t(Provenance::Observed)];
   out.single_view_area = areas[size_t(Provenance::SingleView)];

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {
@@ -36,7 +37,8 @@ struct Certificate {
 };
 
 /// Examines a mesh. Volume and area are double sums about the centre of the bounding box.
+/// \param progress  as self_intersections() tells it, which takes most of the time
 /// \pre every face index is below mesh.vertices.size().
-Certificate certify(const TriangleMesh& mesh);
+Certificate certify(const TriangleMesh& mesh, const Progress& progress = {});
 
 }  // namespace cgs

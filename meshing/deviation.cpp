@@ -89,8 +89,10 @@ std::vector<Deviation> deviations(const ComparedPoints& points,
     const SurfaceEvidence evidence = evidence_at(mesh_b, nearest);
     out[i].distance = surface_b.signed_distance(points.places[i], nearest);
     out[i].sigma = std::hypot(points.sigma[i], evidence.sigma);
+    out[i].is_beyond_rim = surface_b.is_beyond_rim(points.places[i], nearest);
     const bool seen = !mesh_b.states_provenance() || was_seen(evidence.provenance);
-    out[i].change = judge(out[i].distance, out[i].sigma, seen && points.observed[i] != 0);
+    const bool both_observed = seen && points.observed[i] != 0 && !out[i].is_beyond_rim;
+    out[i].change = judge(out[i].distance, out[i].sigma, both_observed);
   });
   return out;
 }

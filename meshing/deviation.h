@@ -10,7 +10,8 @@ namespace cgs {
 
 /// Whether a place of A differs from B by more than both state they are wrong.
 enum class Change : uint8_t {
-  Unknown = 0,  ///< One side was not observed or states no sigma there: nothing can be said.
+  Unknown = 0,  ///< One side was not observed or states no sigma there, or B ends before it gets
+                ///< there: nothing can be said.
   None = 1,     ///< Within 2 standard deviations.
   Nearer = 2,   ///< Beyond them, A lies on the inner side of B: material is missing in A.
   Farther = 3,  ///< Beyond them, A lies on the outer side of B: material was added in A.
@@ -21,6 +22,7 @@ struct Deviation {
   double distance = 0;  ///< To the nearest point of B, positive on the outer side [internal units].
   double sigma = 0;     ///< Of that distance, from both sides; NaN = no statement.
   Change change = Change::Unknown;
+  bool is_beyond_rim = false;  ///< B ends before it gets there: the distance is that to its rim.
 };
 
 /// The points to compare: places on A's faces by area, or the points of a cloud.
@@ -28,6 +30,9 @@ struct ComparedPoints {
   std::vector<Eigen::Vector3d> places;  ///< [internal units]
   std::vector<double> sigma;            ///< NaN = no statement.
   std::vector<uint8_t> observed;        ///< 0 where provenance says that nobody saw it.
+  /// Per place a direction to the outer side, 0 = not known there; empty = known nowhere. Only
+  /// m3c2() asks for them.
+  std::vector<Eigen::Vector3f> outward;
 };
 
 /// `count` places spread evenly over the area of the mesh; all points of a cloud.
@@ -42,7 +47,8 @@ void add_scale_sigma(ComparedPoints& points, double relative, const Eigen::Vecto
 /// Signed distances of points to a surface, and whether they are more than uncertainty.
 ///
 /// |d| > 2 sqrt(sigma_a^2 + sigma_b^2) counts as changed, where both sides were observed (by one
-/// view at least) and state a sigma: invented surface never counts.
+/// view at least) and state a sigma: invented surface never counts, nor do places beyond the rim of
+/// an open B, which says nothing of them.
 /// Both in the same frame.
 std::vector<Deviation> deviations(const ComparedPoints& points,
                                   const MeasurableMesh& mesh_b,

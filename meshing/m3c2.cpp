@@ -23,17 +23,16 @@ constexpr uint32_t kFewest = 4;
 
 /// The points that somebody saw, to be searched.
 struct Cloud {
-  explicit Cloud(const ComparedPoints& in) : tree(seen_points(in, points, sigma)) {}
+  explicit Cloud(const ComparedPoints& in) : tree(add_seen(in)) {}
 
-  // Fills both vectors, and gives what the tree is made of.
-  static std::vector<Eigen::Vector3f> seen_points(const ComparedPoints& in,
-                                                  std::vector<Eigen::Vector3d>& points,
-                                                  std::vector<double>& sigma) {
+  // Fills the vectors, and gives what the tree is made of.
+  std::vector<Eigen::Vector3f> add_seen(const ComparedPoints& in) {
     std::vector<Eigen::Vector3f> out;
     for (size_t i = 0; i < in.places.size(); ++i) {
       if (in.observed[i] == 0) continue;
       points.push_back(in.places[i]);
       sigma.push_back(in.sigma[i]);
+      if (!in.outward.empty()) outward.push_back(in.outward[i]);
       out.emplace_back(in.places[i].cast<float>());
     }
     return out;
@@ -41,7 +40,8 @@ struct Cloud {
 
   std::vector<Eigen::Vector3d> points;
   std::vector<double> sigma;
-  KdTree tree;
+  std::vector<Eigen::Vector3f> outward;  // empty = not known
+  KdTree tree;                           // made last, while it fills the others
 };
 
 /// Points of one side within the cylinder, along its axis from the place.
@@ -51,6 +51,7 @@ struct Column {
   double mean = 0;
   double roughness = 0;
   double variance = kNone;  ///< Of the mean.
+  bool is_split = false;
 };
 
 class Comparing {
@@ -65,14 +66,16 @@ class Comparing {
     if (!normal) return out;
     const double side = normal->dot(outward.cast<double>()) < 0 ? -1 : 1;
     out.normal = (side * *normal).cast<float>();
-    const Column in_a = column(a_, place, side * *normal);
-    const Column in_b = column(b_, place, side * *normal);
+    const bool has_sides = !a_.outward.empty() && !b_.outward.empty() && !outward.isZero(0);
+    const Column in_a = column(a_, place, side * *normal, has_sides);
+    const Column in_b = column(b_, place, side * *normal, has_sides);
     out.count_a = in_a.count;
     out.count_b = in_b.count;
     out.stated_a = in_a.stated;
     out.stated_b = in_b.stated;
     out.roughness_a = in_a.roughness;
     out.roughness_b = in_b.roughness;
+    out.is_split = in_a.is_split || in_b.is_split;
     if (in_a.count == 0 || in_b.count == 0) return out;
     out.distance = in_a.mean - in_b.mean;
     if (in_a.count < kFewest || in_b.count < kFewest) return out;
@@ -105,8 +108,12 @@ class Comparing {
     return solver.eigenvectors().col(0);
   }
 
-  // The tree knows balls: a chain of them covers the cylinder, each for its own slice.
-  Column column(const Cloud& cloud, const Eigen::Vector3d& place, const Eigen::Vector3d& axis) {
+  // The tree knows balls: a chain of them covers the cylinder, each for its own slice. Where the
+  // cloud `has_sides`, points that look against the axis are left out.
+  Column column(const Cloud& cloud,
+                const Eigen::Vector3d& place,
+                const Eigen::Vector3d& axis,
+                bool has_sides) {
     const double radius = 0.5 * options_.cylinder;
     const int slices = std::max(1, static_cast<int>(std::ceil(options_.depth / radius)));
     const double slice = 2 * options_.depth / slices;
@@ -128,6 +135,7 @@ class Comparing {
         const double along = axis.dot(way);
         if (along < low || along >= high) continue;
         if ((way - along * axis).squaredNorm() > radius * radius) continue;
+        if (has_sides && cloud.outward[n.point].cast<double>().dot(axis) < 0) continue;
         along_.push_back(along);
         const double sigma = cloud.sigma[n.point];
         if (!std::isfinite(sigma)) continue;
@@ -138,7 +146,7 @@ class Comparing {
     return summary(squares, stated);
   }
 
-  Column summary(double sigma_squares, uint32_t stated) const {
+  Column summary(double sigma_squares, uint32_t stated) {
     Column out;
     out.count = static_cast<uint32_t>(along_.size());
     out.stated = stated;
@@ -150,7 +158,16 @@ class Comparing {
     const double by_roughness = out.roughness * out.roughness / n;
     const double by_sigma = stated > 0 ? sigma_squares / stated : 0;
     out.variance = stated == out.count ? by_sigma : std::max(by_sigma, by_roughness);
+    out.is_split = has_gap();
     return out;
+  }
+
+  // Sorts what the column holds.
+  bool has_gap() {
+    std::sort(along_.begin(), along_.end());
+    return std::adjacent_find(along_.begin(), along_.end(), [&](double low, double high) {
+             return high - low > options_.cylinder;
+           }) != along_.end();
   }
 
   const Cloud& a_;
@@ -220,6 +237,11 @@ std::vector<M3c2Place> m3c2(const std::vector<Eigen::Vector3d>& places,
                             const M3c2Options& options) {
   options.validate();
   require(outward.size() == places.size(), "m3c2 needs a direction per place", outward.size());
+  for (const ComparedPoints* side : {&a, &b}) {
+    require(side->outward.empty() || side->outward.size() == side->places.size(),
+            "m3c2 needs a side per point, or none, their number",
+            side->outward.size());
+  }
   const Cloud cloud_a(a);
   const Cloud cloud_b(b);
   const size_t fewer = std::min(cloud_a.points.size(), cloud_b.points.size());

@@ -35,6 +35,8 @@ struct M3c2Place {
   uint32_t count_b = 0;
   uint32_t stated_a = 0;  ///< Those of them that state a sigma.
   uint32_t stated_b = 0;
+  bool is_split = false;  ///< Points of one side leave a gap along the normal that is wider than
+                          ///< the cylinder: means of two surfaces, likely.
   Change change = Change::Unknown;  ///< Unknown where detection is NaN.
 };
 
@@ -54,6 +56,10 @@ M3c2Options m3c2_scales(double cylinder);
 /// do not average out (James et al.); the larger of the two, where some do: what others do not
 /// state must not make the mean better. Points that nobody saw are left out. At least four points
 /// of either side are needed.
+///
+/// Where both clouds say what is outside, points that look against the normal are left out: those
+/// of the other wall of what is thinner than the cylinder is deep. Else its mean is one of both
+/// walls, and a wall that moved alone seems to have moved by less.
 /// \param outward  per place a direction on whose side the normal is to lie; 0 = as it comes
 /// Source: Lague, Brodu and Leroux 2013, "Accurate 3D comparison of complex topography with
 /// terrestrial laser scanner"; James, Robson and Smith 2017, "3-D uncertainty-based topographic

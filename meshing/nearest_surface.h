@@ -29,6 +29,10 @@ struct SurfaceEvidence {
 
 SurfaceEvidence evidence_at(const MeasurableMesh& mesh, const SurfacePoint& point);
 
+/// Whether the surface ends somewhere: it has an edge of one face alone, faces meeting where their
+/// corners are in the same places.
+bool has_rim(const MeasurableMesh& mesh);
+
 /// Answers where a mesh is nearest to points, and on which side of it they lie. Queries may run in
 /// parallel.
 class NearestSurface {
@@ -46,8 +50,17 @@ class NearestSurface {
   /// Distance to the nearest point, positive on the side that faces look to.
   ///
   /// Where an edge or a vertex is nearest, its pseudonormal decides (Baerentzen and Aanaes 2005,
-  /// "Signed distance computation using the angle weighted pseudonormal").
+  /// "Signed distance computation using the angle weighted pseudonormal"): that of all faces there,
+  /// whether they share vertices or have their own in the same place.
   double signed_distance(const Eigen::Vector3d& point, const SurfacePoint& nearest) const;
+
+  /// Whether the nearest place is on the rim of the surface: on an edge of one face alone, or at
+  /// an end of such an edge. Faces meet where their corners are in the same places.
+  bool is_on_rim(const SurfacePoint& nearest) const;
+  /// Whether the surface ends before it reaches the point: the nearest place is on the rim, and the
+  /// point lies farther out than the face there, not just above or below it, by more than a
+  /// millionth of its distance and than coordinates rounded to float can be off.
+  bool is_beyond_rim(const Eigen::Vector3d& point, const SurfacePoint& nearest) const;
 
  private:
   struct Parts;

@@ -43,8 +43,9 @@ std::vector<Pair> pairs(const std::vector<Eigen::Vector3d>& points,
     const SurfacePoint nearest = surface.nearest(out[i].place);
     const SurfaceEvidence evidence = evidence_at(mesh, nearest);
     out[i].normal = evidence.normal;
-    out[i].counts = !only_seen || was_seen(evidence.provenance);
-    // Where an edge is nearest (a rim, a corner) the way to it is the better direction.
+    // A rim would draw what lies beyond it, where the surface goes on and nobody recorded it.
+    out[i].counts = (!only_seen || was_seen(evidence.provenance)) && !surface.is_on_rim(nearest);
+    // Where an edge is nearest (a ridge, a corner) the way to it is the better direction.
     const Eigen::Vector3d offset = out[i].place - nearest.position;
     if (nearest.weights.minCoeff() == 0 && offset.norm() > 1e-12)
       out[i].normal = offset.normalized();

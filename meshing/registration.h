@@ -28,9 +28,10 @@ struct Registration {
 ///
 /// Robust: distances count by Tukey's weights, whose width follows the median of the distances, so
 /// that what really changed pulls little. What has no counterpart within 4.7 times that width takes
-/// no part, nor does surface that the mesh says nobody saw (unless that is all of it).
-/// \throws InvalidInput for fewer than 100 points; NumericalError if the surface does not hold them
-///         (a plane lets them slide)
+/// no part, nor does surface that the mesh says nobody saw (unless that is all of it), nor points
+/// to which the rim of an open mesh is nearest: the surface ends there, they lie where it goes on.
+/// \throws InvalidInput for fewer than 100 points; NumericalError if fewer than 100 of them have a
+///         counterpart, or if the surface does not hold them (a plane lets them slide)
 /// Source: Chen and Medioni 1992, "Object modelling by registration of multiple range images".
 Registration register_points(const std::vector<Eigen::Vector3d>& points,
                              const MeasurableMesh& mesh,

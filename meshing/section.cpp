@@ -313,6 +313,7 @@ Section section(const MeasurableMesh& mesh, const CutPlane& plane) {
     out.length.sigma = sum.lengths.sigma();
     out.area.sigma = sum.areas.sigma();
   }
+  if (out.open_lines > 0) out.area.value = out.area.sigma = std::nan("");
   return out;
 }
 

@@ -26,7 +26,8 @@ CutPlane cut_plane(const Eigen::Vector3d& point, const Eigen::Vector3d& normal);
 struct Section {
   std::vector<DrawnLine> lines;  ///< [internal units] in the axes of the plane.
   MeasuredValue length;          ///< Of all lines.
-  MeasuredValue area;  ///< Within closed lines, where an inner line is a hole; parts not stated.
+  MeasuredValue area;  ///< Within the lines, where an inner line is a hole; NaN where lines are
+                       ///< open, as nobody knows what these enclose. Parts not stated.
   size_t open_lines = 0;
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -54,18 +55,87 @@ bool folded(const TriangleMesh& mesh, const Face& f, const Face& g) {
   return CGAL::coplanar(a, b, c, d) && CGAL::coplanar_orientation(a, b, c, d) == CGAL::POSITIVE;
 }
 
+// A sign in double, or 0 where rounding might change it. The bounds used here are twice those of
+// Shewchuk 1997, "Adaptive precision floating-point arithmetic and fast robust geometric
+// predicates"; coordinates are floats, so that nothing underflows.
+constexpr double kRounding = 0x1p-53;
+
+int sign_of(double value, double bound) { return value > bound ? 1 : value < -bound ? -1 : 0; }
+
+// u x v: its coordinates, and the sum of what each is made of.
+struct Cross {
+  Eigen::Vector3d value = Eigen::Vector3d::Zero();
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();
+
+  Cross(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const Eigen::Index i = (k + 1) % 3;
+      const Eigen::Index j = (k + 2) % 3;
+      value[k] = u[i] * v[j] - u[j] * v[i];
+      size[k] = std::abs(u[i] * v[j]) + std::abs(u[j] * v[i]);
+    }
+  }
+  // Of the coordinate k: the side of u that v is on, seen along an axis.
+  int sign(Eigen::Index k) const { return sign_of(value[k], 8 * kRounding * size[k]); }
+  // Of the product with w: the side of the plane of u and v that w is on.
+  int side(const Eigen::Vector3d& w) const {
+    return sign_of(value.dot(w), 16 * kRounding * size.dot(w.cwiseAbs()));
+  }
+};
+
+// Whether a plane through the shared vertex has both faces on its two sides, one of them strictly;
+// true only if it is certain. Of the planes that might, it tries those of the faces and those
+// through an edge along an axis: fans, flat ones as well, have n^2/2 pairs for the first to spare
+// from the exact tests. \param tips  the other vertices, two of each face, from the shared one
+bool apart_at_vertex(const std::array<Eigen::Vector3d, 4>& tips) {
+  const auto& [a, b, c, d] = tips;
+  const Cross ab(a, b);
+  const Cross cd(c, d);
+  const int side = ab.side(c);
+  if (side != 0 && side == ab.side(d)) return true;
+  const int other_side = cd.side(a);
+  if (other_side != 0 && other_side == cd.side(b)) return true;
+  const Cross ac(a, c);
+  const Cross ad(a, d);
+  const Cross bc(b, c);
+  const Cross bd(b, d);
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const int f = ab.sign(k);
+    const int g = cd.sign(k);
+    if (f != 0 && ac.sign(k) == -f && ad.sign(k) == -f) return true;  // the edge to a
+    if (f != 0 && bc.sign(k) == f && bd.sign(k) == f) return true;    // to b
+    if (g != 0 && ac.sign(k) == g && bc.sign(k) == g) return true;    // to c
+    if (g != 0 && ad.sign(k) == -g && bd.sign(k) == -g) return true;  // to d
+  }
+  return false;
+}
+
 // Faces that share one vertex intersect iff the edge opposite to it in one meets the other face.
 bool crossed_at_vertex(const TriangleMesh& mesh, const Face& f, const Face& g) {
-  const auto opposite = [&](const Face& face, const Face& other) {
+  const auto opposite = [](const Face& face, const Face& other) {
     std::array<uint32_t, 2> edge{};
     size_t n = 0;
     for (const uint32_t v : face) {
       if (!has(other, v)) edge.at(n++) = v;
     }
+    return edge;
+  };
+  const auto at = [&](uint32_t v) { return Eigen::Vector3d(mesh.vertices[v].cast<double>()); };
+  const auto segment = [&](const std::array<uint32_t, 2>& edge) {
     return Kernel::Segment_3(point(mesh, edge[0]), point(mesh, edge[1]));
   };
-  return CGAL::do_intersect(triangle(mesh, f), opposite(g, f)) ||
-         CGAL::do_intersect(triangle(mesh, g), opposite(f, g));
+  const Eigen::Vector3d shared =
+      at(*std::find_if(f.begin(), f.end(), [&](uint32_t v) { return has(g, v); }));
+  const std::array<uint32_t, 2> of_f = opposite(f, g);
+  const std::array<uint32_t, 2> of_g = opposite(g, f);
+  if (apart_at_vertex({at(of_f[0]) - shared,
+                       at(of_f[1]) - shared,
+                       at(of_g[0]) - shared,
+                       at(of_g[1]) - shared})) {
+    return false;
+  }
+  return CGAL::do_intersect(triangle(mesh, f), segment(of_g)) ||
+         CGAL::do_intersect(triangle(mesh, g), segment(of_f));
 }
 
 bool intersect(const TriangleMesh& mesh, const Face& f, const Face& g) {
@@ -90,7 +160,8 @@ std::vector<uint8_t> degenerate_faces(const TriangleMesh& mesh) {
 /// must not be held.
 class PairTests {
  public:
-  explicit PairTests(const TriangleMesh& mesh) : mesh_(mesh) {}
+  PairTests(const TriangleMesh& mesh, const Progress& progress)
+      : mesh_(mesh), progress_(progress) {}
 
   void add(const FacePair& pair) {
     constexpr size_t kAtOnce = size_t{1} << 22;
@@ -112,6 +183,7 @@ class PairTests {
       if (hit_[i] != 0) found_.push_back(waiting_[i]);
     }
     waiting_.clear();
+    report(progress_, 0);
     constexpr size_t kMost = 20'000'000;
     if (found_.size() <= kMost) return;
     throw LimitError("more than " + std::to_string(kMost) +
@@ -119,6 +191,7 @@ class PairTests {
   }
 
   const TriangleMesh& mesh_;
+  const Progress& progress_;
   std::vector<FacePair> waiting_;
   std::vector<uint8_t> hit_;
   std::vector<FacePair> found_;
@@ -145,11 +218,11 @@ std::vector<Box> face_boxes(const TriangleMesh& mesh, const std::vector<uint8_t>
 
 }  // namespace
 
-std::vector<FacePair> self_intersections(const TriangleMesh& mesh) {
+std::vector<FacePair> self_intersections(const TriangleMesh& mesh, const Progress& progress) {
   CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
   const std::vector<uint8_t> degenerate = degenerate_faces(mesh);
   std::vector<Box> boxes = face_boxes(mesh, degenerate);
-  PairTests tests(mesh);
+  PairTests tests(mesh, progress);
   CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& a, const Box& b) {
     tests.add(std::minmax(a.info(), b.info()));
   });
@@ -158,6 +231,7 @@ std::vector<FacePair> self_intersections(const TriangleMesh& mesh) {
     if (degenerate[f] != 0) found.emplace_back(f, f);
   }
   std::sort(found.begin(), found.end());
+  report(progress, 1);
   return found;
 }
 

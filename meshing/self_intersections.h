@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
 
 namespace cgs {
@@ -12,7 +13,9 @@ namespace cgs {
 /// Pairs of faces (smaller index first, ascending) that touch beyond the vertices and edges they
 /// share by index. Decided with exact predicates, so there is no tolerance; works on any soup.
 /// A face of zero area counts as intersecting itself.
+/// \param progress  0 every few million pairs of boxes, as nobody knows how many there are; then 1
 /// \throws LimitError above 20 million pairs, as of a hundred thousand equal faces
-std::vector<std::pair<uint32_t, uint32_t>> self_intersections(const TriangleMesh& mesh);
+std::vector<std::pair<uint32_t, uint32_t>> self_intersections(const TriangleMesh& mesh,
+                                                              const Progress& progress = {});
 
 }  // namespace cgs

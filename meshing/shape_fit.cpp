@@ -2,7 +2,9 @@
 #include "meshing/shape_fit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -14,17 +16,18 @@ namespace cgs {
 
 namespace {
 
-// A small piece of the patch, in units of the ball around its centre.
+// A small piece of the patch, or a corner of it with its share, in units of the ball around its
+// centre.
 struct Sample {
   Eigen::Vector3d place;
-  Eigen::Vector3d normal;
+  Eigen::Vector3d normal;  // zero for a corner
   double area;
   double sigma;  // NaN = no statement
 };
 
 struct Patch {
   std::vector<Sample> samples;
-  size_t vertices = 0;
+  std::vector<Sample> corners;  // of the faces with samples, each place once
   double area = 0;
   std::array<double, kProvenanceCount> area_of_label = {};
   double stated_area = 0;
@@ -40,30 +43,39 @@ struct Piece {
     for (const Eigen::Vector3d& c : corner) box.extend(c);
     return box.squaredExteriorDistance(Eigen::Vector3d::Zero()) <= 1;
   }
-  double longest() const {
-    return std::sqrt(std::max({(corner[1] - corner[0]).squaredNorm(),
-                               (corner[2] - corner[1]).squaredNorm(),
-                               (corner[0] - corner[2]).squaredNorm()}));
+  double side(size_t k) const { return (corner.at((k + 1) % 3) - corner.at(k)).norm(); }
+  double longest() const { return std::max({side(0), side(1), side(2)}); }
+  // Across the longest side, so that the parts of a long thin face are no thinner than it.
+  std::array<Piece, 2> halves() const {
+    size_t k = 0;
+    while (side(k) < longest()) ++k;
+    const size_t next = (k + 1) % 3;
+    std::array<Piece, 2> out = {*this, *this};
+    out[0].corner.at(next) = out[1].corner.at(k) = (corner.at(k) + corner.at(next)) / 2;
+    out[0].weights.at(next) = out[1].weights.at(k) = (weights.at(k) + weights.at(next)) / 2;
+    return out;
   }
-  std::array<Piece, 4> quarters() const {
-    const auto half = [&](const auto& of, size_t i, size_t j) {
-      return Eigen::Vector3d((of.at(i) + of.at(j)) / 2);
-    };
-    const auto part = [&](size_t k) {
-      const size_t next = (k + 1) % 3;
-      const size_t last = (k + 2) % 3;
-      return Piece{{corner.at(k), half(corner, k, next), half(corner, k, last)},
-                   {weights.at(k), half(weights, k, next), half(weights, k, last)}};
-    };
-    const Piece middle{{half(corner, 0, 1), half(corner, 1, 2), half(corner, 2, 0)},
-                       {half(weights, 0, 1), half(weights, 1, 2), half(weights, 2, 0)}};
-    return {part(0), part(1), part(2), middle};
-  }
+};
+
+// What vertices have of the area within the ball.
+struct CornerShares {
+  std::vector<double> area;     // of faces around, by how near to the vertex it lies
+  std::vector<double> evident;  // without that of invented faces
+};
+
+// Where samples of a patch go.
+struct Collected {
+  const MeasurableMesh& mesh;
+  Patch& patch;
+  CornerShares& shares;
 };
 
 // Splits a piece of face f into n x n equal triangles and takes the middles of those within the
 // ball.
-void add_samples(Patch& patch, const MeasurableMesh& mesh, uint32_t f, const Piece& piece) {
+void add_samples(const Collected& to, uint32_t f, const Piece& piece) {
+  const MeasurableMesh& mesh = to.mesh;
+  Patch& patch = to.patch;
+  CornerShares& shares = to.shares;
   constexpr double kFinest = 24;  // pieces per radius
   const Eigen::Vector3d u = piece.corner[1] - piece.corner[0];
   const Eigen::Vector3d v = piece.corner[2] - piece.corner[0];
@@ -72,14 +84,20 @@ void add_samples(Patch& patch, const MeasurableMesh& mesh, uint32_t f, const Pie
   const int n = static_cast<int>(std::max(std::ceil(piece.longest() * kFinest), 1.0));
   const double area = twice.norm() / 2 / n / n;
   const bool invented = mesh.states_provenance() && mesh.mesh.provenance[f] == Provenance::Inferred;
+  const bool states_sigma = !mesh.mesh.sigma.empty();
   const auto& face = mesh.mesh.faces[f];
   const auto add = [&](double s, double t) {
     const Eigen::Vector3d p = piece.corner[0] + s * u + t * v;
     if (p.squaredNorm() > 1) return;
+    const Eigen::Vector3d weights =
+        (1 - s - t) * piece.weights[0] + s * piece.weights[1] + t * piece.weights[2];
+    for (size_t k = 0; k < 3; ++k) {
+      const double share = area * weights[static_cast<Eigen::Index>(k)];
+      shares.area[face.at(k)] += share;
+      if (!invented) shares.evident[face.at(k)] += share;
+    }
     double sigma = std::nan("");
-    if (mesh.states_sigma() && !invented) {
-      const Eigen::Vector3d weights =
-          (1 - s - t) * piece.weights[0] + s * piece.weights[1] + t * piece.weights[2];
+    if (states_sigma && !invented) {
       sigma = weights[0] * double(mesh.mesh.sigma[face[0]]) +
               weights[1] * double(mesh.mesh.sigma[face[1]]) +
               weights[2] * double(mesh.mesh.sigma[face[2]]);
@@ -99,34 +117,57 @@ void add_samples(Patch& patch, const MeasurableMesh& mesh, uint32_t f, const Pie
   }
 }
 
-// Of a large face only what is near the ball. \param depth  how often the face was quartered
-void add_piece(
-    Patch& patch, const MeasurableMesh& mesh, uint32_t f, const Piece& piece, int depth) {
+// Of a large face only what is near the ball. \param depth  how often the face was halved
+void add_piece(const Collected& to, uint32_t f, const Piece& piece, int depth) {
   constexpr double kLongest = 16;  // [radii]
-  constexpr int kDeepest = 64;     // for balls so small that nothing is within reach of double
+  constexpr int kDeepest = 128;    // for balls so small that nothing is within reach of double
   if (!piece.meets_ball() || depth > kDeepest) return;
   if (piece.longest() <= kLongest) {
-    add_samples(patch, mesh, f, piece);
+    add_samples(to, f, piece);
     return;
   }
-  for (const Piece& quarter : piece.quarters()) add_piece(patch, mesh, f, quarter, depth + 1);
+  for (const Piece& half : piece.halves()) add_piece(to, f, half, depth + 1);
+}
+
+// Vertices in one place, as in files without shared vertices, are one corner: they err together.
+std::vector<Sample> corners(const MeasurableMesh& mesh,
+                            const CornerShares& shares,
+                            const Eigen::Vector3d& center,
+                            double radius) {
+  std::vector<Sample> out;
+  std::map<std::array<double, 3>, size_t> corner_at;
+  for (size_t v = 0; v < mesh.points.size(); ++v) {
+    if (shares.area[v] == 0) continue;
+    const Eigen::Vector3d& p = mesh.points[v];
+    const auto [known, is_new] = corner_at.try_emplace({p.x(), p.y(), p.z()}, out.size());
+    if (is_new) {
+      out.push_back({(p - center) / radius, Eigen::Vector3d::Zero(), 0, std::nan("")});
+    }
+    Sample& corner = out[known->second];
+    corner.area += shares.area[v];
+    const double sigma = mesh.mesh.sigma.empty() ? std::nan("") : double(mesh.mesh.sigma[v]);
+    if (!std::isfinite(sigma) || shares.evident[v] == 0) continue;
+    if (std::isnan(corner.sigma)) corner.sigma = 0;
+    corner.sigma += sigma / radius * shares.evident[v];
+  }
+  for (Sample& corner : out) corner.sigma /= corner.area;
+  return out;
 }
 
 Patch patch_within(const MeasurableMesh& mesh, const Eigen::Vector3d& center, double radius) {
   Patch out;
-  std::vector<uint8_t> used(mesh.points.size(), 0);
+  CornerShares shares{std::vector<double>(mesh.points.size(), 0),
+                      std::vector<double>(mesh.points.size(), 0)};
   for (uint32_t f = 0; f < mesh.mesh.faces.size(); ++f) {
     Piece whole;
     for (size_t k = 0; k < 3; ++k) {
       whole.corner.at(k) = (mesh.points[mesh.mesh.faces[f].at(k)] - center) / radius;
       whole.weights.at(k) = Eigen::Vector3d::Unit(static_cast<Eigen::Index>(k));
     }
-    const size_t before = out.samples.size();
-    add_piece(out, mesh, f, whole, 0);
-    if (out.samples.size() == before) continue;
-    for (const uint32_t v : mesh.mesh.faces[f]) used[v] = 1;
+    add_piece({mesh, out, shares}, f, whole, 0);
   }
-  out.vertices = static_cast<size_t>(std::count(used.begin(), used.end(), uint8_t{1}));
+  for (Sample& s : out.samples) s.sigma /= radius;
+  out.corners = corners(mesh, shares, center, radius);
   return out;
 }
 
@@ -216,23 +257,30 @@ struct Normal {
   Eigen::MatrixXd hessian;   // sum of w J J^T
   Eigen::VectorXd gradient;  // sum of w J r
   Eigen::VectorXd shift;     // sum of w J sigma: every stated sigma at once
+  Eigen::MatrixXd scatter;   // sum of w^2 J J^T
+  double weight = 0;         // sum of w
   double squares = 0;        // sum of w r^2
   double largest = 0;
 };
 
 Normal normal_equations(Shape shape,
-                        const Patch& patch,
+                        const std::vector<Sample>& samples,
                         const Local& local,
                         const Eigen::VectorXd& parameters) {
   const Eigen::Index n = parameters.size();
-  Normal out{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)};
+  Normal out{Eigen::MatrixXd::Zero(n, n),
+             Eigen::VectorXd::Zero(n),
+             Eigen::VectorXd::Zero(n),
+             Eigen::MatrixXd::Zero(n, n)};
   Eigen::VectorXd row(n);
-  for (const Sample& s : patch.samples) {
+  for (const Sample& s : samples) {
     const Eigen::Vector3d q = local.axes.transpose() * (s.place - local.point);
     const double r = distance(shape, q, parameters, row);
     out.hessian += s.area * row * row.transpose();
     out.gradient += s.area * r * row;
     if (std::isfinite(s.sigma)) out.shift += s.area * s.sigma * row;
+    out.scatter += s.area * s.area * row * row.transpose();
+    out.weight += s.area;
     out.squares += s.area * r * r;
     out.largest = std::max(out.largest, std::abs(r));
   }
@@ -241,54 +289,96 @@ Normal normal_equations(Shape shape,
 
 struct Fitted {
   Eigen::VectorXd parameters;
-  Eigen::MatrixXd covariance;
-  double rms = 0;
-  double largest = 0;
+  Normal at;  // the parameters
 };
 
-// Levenberg and Marquardt from a first guess, and how well the patch determines the parameters.
-Fitted solve(Shape shape, const Patch& patch, const Local& local, const Eigen::VectorXd& guess) {
-  const int n = parameter_count(shape);
-  Fitted out{guess, {}};
-  Normal at = normal_equations(shape, patch, local, guess);
+// Tilts of an axis are taken at the reach of places along it: long facets end far from the ball.
+bool is_determined(Shape shape, const Normal& at) {
+  Eigen::VectorXd scale = Eigen::VectorXd::Ones(at.gradient.size());
+  if (shape == Shape::Cylinder) {
+    const double reach = std::sqrt(at.hessian.topLeftCorner(2, 2).trace() / at.weight);
+    scale.head(2) /= std::max(1.0, reach);
+  }
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * at.hessian * scale.asDiagonal();
+  if (!scaled.allFinite()) return false;
+  const Eigen::VectorXd values =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scaled, Eigen::EigenvaluesOnly).eigenvalues();
+  constexpr double kSingular = 1e-9;
+  return values[0] > kSingular * values[values.size() - 1];
+}
+
+// Levenberg and Marquardt from a first guess.
+Fitted solve(Shape shape,
+             const std::vector<Sample>& samples,
+             const Local& local,
+             const Eigen::VectorXd& guess) {
+  Fitted out{guess, normal_equations(shape, samples, local, guess)};
   double damping = 1e-3;
   constexpr int kMostSteps = 200;
   for (int i = 0; i < kMostSteps && damping < 1e12; ++i) {
-    Eigen::MatrixXd damped = at.hessian;
+    Eigen::MatrixXd damped = out.at.hessian;
     damped.diagonal() *= 1 + damping;
-    const Eigen::VectorXd step = damped.ldlt().solve(-at.gradient);
+    const Eigen::VectorXd step = damped.ldlt().solve(-out.at.gradient);
     const Eigen::VectorXd next = out.parameters + step;
-    const Normal there = normal_equations(shape, patch, local, next);
-    if (!(there.squares <= at.squares)) {
+    const Normal there = normal_equations(shape, samples, local, next);
+    if (!(there.squares <= out.at.squares)) {
       damping *= 10;
       continue;
     }
     out.parameters = next;
-    at = there;
+    out.at = there;
     damping /= 10;
     if (step.norm() <= 1e-13 * (1 + next.norm())) break;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(at.hessian);
-  constexpr double kSingular = 1e-9;
-  if (!out.parameters.allFinite() ||
-      !(eigen.eigenvalues()[0] > kSingular * eigen.eigenvalues()[n - 1])) {
+  if (samples.size() <= static_cast<size_t>(parameter_count(shape)) ||
+      !out.parameters.allFinite() || !is_determined(shape, out.at)) {
     throw NumericalError(
         "the surface within the ball does not determine this shape; take a larger --radius or "
         "another shape");
   }
-  out.rms = std::sqrt(at.squares / patch.area);
-  out.largest = at.largest;
-  const auto points = static_cast<double>(std::max(patch.vertices, static_cast<size_t>(n + 1)));
-  const Eigen::MatrixXd inverse = at.hessian.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-  const Eigen::VectorXd together = inverse * at.shift;
-  out.covariance = inverse * (at.squares / (points - n)) + together * together.transpose();
   return out;
+}
+
+// Covariances of the parameters.
+struct Errors {
+  Eigen::MatrixXd scatter;  // by residuals, as if every vertex erred on its own
+  Eigen::MatrixXd common;   // by the stated sigma, as if all erred the same way
+
+  double variance(Eigen::Index i) const { return scatter(i, i) + common(i, i); }
+};
+
+Eigen::MatrixXd inverse_hessian(const Normal& at) {
+  const Eigen::Index n = at.gradient.size();
+  return at.hessian.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+}
+
+Eigen::MatrixXd common_errors(const Normal& at, const Eigen::MatrixXd& inverse) {
+  const Eigen::VectorXd together = inverse * at.shift;
+  return together * together.transpose();
+}
+
+// Of a fit to samples, which err no more on their own than the vertices do.
+Errors errors_of_samples(const Normal& at, size_t vertices) {
+  const auto n = static_cast<double>(at.gradient.size());
+  const Eigen::MatrixXd inverse = inverse_hessian(at);
+  const double points = std::max(static_cast<double>(vertices), n + 1);
+  return {inverse * (at.squares / (points - n)), common_errors(at, inverse)};
+}
+
+// Of a fit to corners of any weights. Residuals are smaller than the errors by what the fit follows
+// of each, so that the sum of w r^2 is expected to be the variance times this freedom.
+Errors errors_of_corners(const Normal& at) {
+  const Eigen::MatrixXd inverse = inverse_hessian(at);
+  constexpr double kLeast = 1e-9;  // of all weight, which rounding may leave of none
+  const double freedom = std::max(at.weight - (inverse * at.scatter).trace(), kLeast * at.weight);
+  const double variance = at.squares / freedom;
+  return {inverse * at.scatter * inverse * variance, common_errors(at, inverse)};
 }
 
 ShapeFit common_part(const Patch& patch, Shape shape, double radius) {
   ShapeFit out;
   out.shape = shape;
-  out.vertices = patch.vertices;
+  out.vertices = patch.corners.size();
   out.area.dimension = 2;
   out.area.value = patch.area * radius * radius;
   for (size_t i = 0; i < kProvenanceCount; ++i) {
@@ -298,40 +388,51 @@ ShapeFit common_part(const Patch& patch, Shape shape, double radius) {
   return out;
 }
 
-void set_radius(ShapeFit& out, double value, double variance, const Patch& patch) {
+void set_radius(ShapeFit& out, double value, const Errors& errors, const Patch& patch) {
+  const Eigen::Index last = errors.scatter.rows() - 1;
   out.radius.value = value;
-  out.radius.sigma = std::sqrt(variance);
+  out.radius_scatter = std::sqrt(errors.scatter(last, last));
   out.radius.stated = patch.stated_area / patch.area;
+  if (out.radius.stated > 0) out.radius.sigma = std::sqrt(errors.variance(last));
   for (size_t i = 0; i < kProvenanceCount; ++i) {
     out.radius.by_provenance.at(i) = value * patch.area_of_label.at(i) / patch.area;
   }
 }
 
+// What the surface, between its vertices as well, leaves to a shape.
+void set_residuals(ShapeFit& out, const Patch& patch, const Local& local, const Fitted& fit) {
+  const Normal all = normal_equations(out.shape, patch.samples, local, fit.parameters);
+  out.rms = std::sqrt(all.squares / all.weight);
+  out.largest = all.largest;
+}
+
 ShapeFit fit_plane(const Patch& patch, ShapeFit out) {
   const Eigen::Vector3d mean = mean_place(patch);
   const Local local{scatter_axes(patch, mean, false), mean};
-  const Fitted fit = solve(Shape::Plane, patch, local, Eigen::VectorXd::Zero(3));
+  const Fitted fit = solve(Shape::Plane, patch.samples, local, Eigen::VectorXd::Zero(3));
+  const Errors errors = errors_of_samples(fit.at, patch.corners.size());
   const Eigen::Vector3d along =
       local.axes * Eigen::Vector3d(fit.parameters[0], fit.parameters[1], 1).normalized();
   double facing = 0;
   for (const Sample& s : patch.samples) facing += s.area * s.normal.dot(along);
   out.point = mean + fit.parameters[2] * along;
   out.direction = facing < 0 ? Eigen::Vector3d(-along) : along;
-  out.point_sigma = std::sqrt(fit.covariance(2, 2));
-  out.direction_sigma = std::sqrt(fit.covariance(0, 0) + fit.covariance(1, 1));
-  out.rms = fit.rms;
-  out.largest = fit.largest;
+  out.point_sigma = std::sqrt(errors.variance(2));
+  out.direction_sigma = std::sqrt(errors.variance(0) + errors.variance(1));
+  set_residuals(out, patch, local, fit);
   return out;
 }
 
+// Round shapes are fitted to the corners: facets cut off from them what lies between.
 ShapeFit fit_sphere(const Patch& patch, ShapeFit out) {
   const Local local;
-  const Fitted fit = solve(Shape::Sphere, patch, local, algebraic_center(patch.samples, local, 3));
+  const Fitted fit =
+      solve(Shape::Sphere, patch.corners, local, algebraic_center(patch.corners, local, 3));
+  const Errors errors = errors_of_corners(fit.at);
   out.point = fit.parameters.head(3);
-  out.point_sigma = std::sqrt(fit.covariance.topLeftCorner(3, 3).trace());
-  set_radius(out, fit.parameters[3], fit.covariance(3, 3), patch);
-  out.rms = fit.rms;
-  out.largest = fit.largest;
+  out.point_sigma = std::sqrt(errors.variance(0) + errors.variance(1) + errors.variance(2));
+  set_radius(out, fit.parameters[3], errors, patch);
+  set_residuals(out, patch, local, fit);
   return out;
 }
 
@@ -340,17 +441,17 @@ ShapeFit fit_cylinder(const Patch& patch, ShapeFit out) {
   const Eigen::Matrix3d axes = scatter_axes(patch, mean, true);  // normals avoid the axis
   const Local local{axes, mean};
   Eigen::VectorXd guess(5);
-  guess << 0, 0, algebraic_center(patch.samples, local, 2);
-  const Fitted fit = solve(Shape::Cylinder, patch, local, guess);
+  guess << 0, 0, algebraic_center(patch.corners, local, 2);
+  const Fitted fit = solve(Shape::Cylinder, patch.corners, local, guess);
+  const Errors errors = errors_of_corners(fit.at);
   out.direction = axes * Eigen::Vector3d(fit.parameters[0], fit.parameters[1], 1).normalized();
   const Eigen::Vector3d on_axis =
       mean + axes * Eigen::Vector3d(fit.parameters[2], fit.parameters[3], 0);
   out.point = on_axis + out.direction.dot(mean - on_axis) * out.direction;
-  out.point_sigma = std::sqrt(fit.covariance(2, 2) + fit.covariance(3, 3));
-  out.direction_sigma = std::sqrt(fit.covariance(0, 0) + fit.covariance(1, 1));
-  set_radius(out, fit.parameters[4], fit.covariance(4, 4), patch);
-  out.rms = fit.rms;
-  out.largest = fit.largest;
+  out.point_sigma = std::sqrt(errors.variance(2) + errors.variance(3));
+  out.direction_sigma = std::sqrt(errors.variance(0) + errors.variance(1));
+  set_radius(out, fit.parameters[4], errors, patch);
+  set_residuals(out, patch, local, fit);
   return out;
 }
 
@@ -361,8 +462,7 @@ ShapeFit fit_shape(const MeasurableMesh& mesh,
                    const Eigen::Vector3d& center,
                    double radius) {
   require(radius > 0 && std::isfinite(radius), "the radius of a fit must be > 0", radius);
-  Patch patch = patch_within(mesh, center, radius);
-  for (Sample& s : patch.samples) s.sigma /= radius;
+  const Patch patch = patch_within(mesh, center, radius);
   constexpr size_t kFewest = 12;
   require(patch.samples.size() >= kFewest,
           "a fit needs more surface within its ball; the pieces of it",
@@ -377,6 +477,7 @@ ShapeFit fit_shape(const MeasurableMesh& mesh,
   out.largest *= radius;
   out.radius.value *= radius;
   out.radius.sigma *= radius;
+  out.radius_scatter *= radius;
   for (double& part : out.radius.by_provenance) part *= radius;
   return out;
 }

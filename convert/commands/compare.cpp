@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 #include "convert/commands/commands.h"
@@ -18,6 +19,7 @@
 #include "convert/terminal.h"
 #include "io/json_file.h"
 #include "libcgs/core/error.h"
+#include "meshing/surface_measures.h"
 
 namespace cgs {
 
@@ -96,6 +98,39 @@ double scale_sigma(const Frame& a, const Frame& b, bool fits_scale) {
   return std::hypot(figure_unit(a, "").relative_sigma, figure_unit(b, "").relative_sigma);
 }
 
+// How wrong one scale may be against the other.
+struct ScaleError {
+  double relative = 0;                               // standard deviation
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  // what it leaves in its place
+};
+
+// Units were matched about the zero of the world. Where A was laid onto B afterwards, it is held in
+// the middle; and control points hold what lies among them, however far from that zero.
+Eigen::Vector3d unmoved_by_scale(const MeasurableMesh& a, const Frame& b, bool is_registered) {
+  const bool by_control_points = a.frame.scale_source == ScaleSource::ControlPoints &&
+                                 b.scale_source == ScaleSource::ControlPoints;
+  if (!is_registered && !by_control_points) {
+    return a.frame.internal_from_world(Eigen::Vector3d::Zero());
+  }
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : a.points) box.extend(p);
+  return box.center();
+}
+
+// Faces say the sign of all distances, and a closed mesh says whether they lie.
+void warn_of_inward(const std::filesystem::path& path,
+                    const MeasurableMesh& mesh,
+                    const Terminal& terminal) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : mesh.points) box.extend(p);
+  constexpr double kFlat = 1e-9;  // what rounding makes of the volume of two sides of a sheet
+  if (!(enclosed_volume(mesh).value < -kFlat * std::pow(box.diagonal().norm(), 3))) return;
+  if (has_rim(mesh)) return;
+  terminal.warn("the faces of " + printable(path) +
+                " look inward, so that nearer and farther are exchanged; cgs filter --op repair "
+                "turns them");
+}
+
 void print_json(const CompareArgs& args,
                 const MeasurableMesh& a,
                 const MeasurableMesh& b,
@@ -129,11 +164,12 @@ void share_unit(Frame& a, const Frame& b, double growth) {
 void print_m3c2(const CompareArgs& args,
                 const MeasurableMesh& a,
                 const MeasurableMesh& b,
-                double scale_sigma,
+                const ScaleError& of_scale,
                 const FigureUnit& unit,
                 const std::optional<Registration>& registration) {
   M3c2Request request = args.m3c2;
-  request.scale_sigma = scale_sigma;
+  request.scale_sigma = of_scale.relative;
+  request.scale_center = of_scale.center;
   M3c2Comparison found = compare_m3c2(request, a, b);
   found.comparison.registration = registration;
   if (!args.ply.empty()) write_m3c2_ply(args.ply, a, found);
@@ -195,8 +231,9 @@ void run_compare(const CompareArgs& args) {
   const std::string turned = turned_text(first.content.frame, second.content.frame);
   if (!turned.empty() && !args.icp) terminal.warn({turned});
   MeasurableMesh a = std::move(first.content);
-  const double of_scale = scale_sigma(a.frame, second.content.frame, args.scale);
+  ScaleError of_scale{scale_sigma(a.frame, second.content.frame, args.scale)};
   MeasurableMesh b = in_frame_of(second.content, a.frame);
+  warn_of_inward(args.m3c2.wanted ? args.a : args.b, args.m3c2.wanted ? a : b, terminal);
   if (!args.scale) (void)figure_unit(a.frame, args.unit);  // before all the work
   Comparison comparison;
   std::optional<NearestSurface> surface;
@@ -206,14 +243,13 @@ void run_compare(const CompareArgs& args) {
     share_unit(a.frame, second.content.frame, comparison.registration->scale);
     b.frame = a.frame;
   }
+  of_scale.center = unmoved_by_scale(a, second.content.frame, args.icp);
   const FigureUnit unit = figure_unit(a.frame, args.unit);
   if (args.m3c2.wanted) {
     return print_m3c2(args, a, b, of_scale, unit, comparison.registration);
   }
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& p : a.points) box.extend(p);
   const auto compared = [&](ComparedPoints points) {
-    add_scale_sigma(points, of_scale, box.center());
+    add_scale_sigma(points, of_scale.relative, of_scale.center);
     return deviations(points, b, *surface);
   };
   comparison.by_area = compared(points_by_area(a, args.samples));

@@ -28,26 +28,32 @@ struct EvaluateArgs {
 };
 
 void print_table(const nlohmann::ordered_json& report) {
-  std::printf("%-24s %8s %8s %10s %10s %8s %8s\n",
+  std::printf("%-24s %-8s %8s %8s %10s %10s %8s %8s\n",
               "view",
+              "role",
               "PSNR",
               "SSIM",
               "PSNR seen",
               "SSIM seen",
               "holes",
               "MS-SSIM");
-  const auto row = [](const std::string& name, const nlohmann::ordered_json& r) {
-    std::printf("%-24s %8s %8s %10s %10s %8s %8s\n",
-                name.c_str(),
-                number(r["psnr"], "%.2f").c_str(),
-                number(r["ssim"], "%.3f").c_str(),
-                number(r["psnr_seen"], "%.2f").c_str(),
-                number(r["ssim_seen"], "%.3f").c_str(),
-                percent(r["hole_fraction"]).c_str(),
-                number(r["ms_ssim"], "%.3f").c_str());
-  };
-  for (const auto& view : report["views"]) row(view["name"].get<std::string>(), view);
-  row("mean", report["mean"]);
+  const auto row =
+      [](const std::string& name, const std::string& role, const nlohmann::ordered_json& r) {
+        std::printf("%-24s %-8s %8s %8s %10s %10s %8s %8s\n",
+                    name.c_str(),
+                    role.c_str(),
+                    number(r["psnr"], "%.2f").c_str(),
+                    number(r["ssim"], "%.3f").c_str(),
+                    number(r["psnr_seen"], "%.2f").c_str(),
+                    number(r["ssim_seen"], "%.3f").c_str(),
+                    percent(r["hole_fraction"]).c_str(),
+                    number(r["ms_ssim"], "%.3f").c_str());
+      };
+  for (const auto& view : report["views"]) {
+    const auto& role = view["role"];
+    row(view["name"].get<std::string>(), role.is_null() ? "-" : role.get<std::string>(), view);
+  }
+  row("mean", "", report["mean"]);
 }
 
 void run_evaluate(const EvaluateArgs& args) {
@@ -94,7 +100,9 @@ void add_evaluate(CLI::App& app) {
                 "Let --scene follow links and absolute paths out of its folder")
       ->needs("--scene");
   add_output_options(*cmd, args->common);
-  cmd->footer("Example: cgs evaluate out/portal/model --scene photos/portal --json");
+  cmd->footer(
+      "The mean leaves input views out where there are others: the model was trained on them.\n"
+      "Example: cgs evaluate out/portal/model --scene photos/portal --json");
   cmd->callback([args] { run_evaluate(*args); });
 }
 

@@ -18,6 +18,7 @@
 #include "meshing/geodesic.h"
 #include "meshing/section.h"
 #include "meshing/shape_fit.h"
+#include "meshing/shells.h"
 #include "meshing/surface_measures.h"
 #include "meshing/thickness.h"
 
@@ -38,6 +39,55 @@ std::string shares_text(const MeasuredValue& area) {
   return out;
 }
 
+// \param point  of the fit, in coordinates of the file
+std::string fit_text(const ShapeFit& fit,
+                     const std::string& shape,
+                     const Eigen::Vector3d& point,
+                     const FigureUnit& unit) {
+  std::array<char, 300> text{};
+  std::snprintf(text.data(),
+                text.size(),
+                "%s through (%.9g, %.9g, %.9g) of the file, ± %.3g %s",
+                shape.c_str(),
+                point.x(),
+                point.y(),
+                point.z(),
+                fit.point_sigma * unit.length,
+                unit.name.c_str());
+  std::string out = text.data();
+  if (fit.shape != Shape::Sphere) {
+    std::snprintf(text.data(),
+                  text.size(),
+                  ", direction (%.6f, %.6f, %.6f) ± %.3g degrees",
+                  fit.direction.x(),
+                  fit.direction.y(),
+                  fit.direction.z(),
+                  fit.direction_sigma * 180 / M_PI);
+    out += text.data();
+  }
+  std::snprintf(text.data(),
+                text.size(),
+                "; residuals %.3g rms, %.3g max [%s], %zu vertices",
+                fit.rms * unit.length,
+                fit.largest * unit.length,
+                unit.name.c_str(),
+                fit.vertices);
+  return out + text.data();
+}
+
+std::string scatter_text(const ShapeFit& fit, const FigureUnit& unit) {
+  std::string out = "nothing states a sigma: ± tells what the scatter of vertices allows";
+  if (fit.shape == Shape::Plane) return out;
+  return out + ", for the radius " + number(fit.radius_scatter * unit.length, "%.3g") + " " +
+         unit.name;
+}
+
+// A reason why a surface is not closed, and that its file may be what keeps faces apart.
+std::string with_seams(const std::string& reason, const TriangleMesh& mesh) {
+  const std::string seams = seams_text(mesh);
+  return seams.empty() ? reason : reason + "; " + seams;
+}
+
 }  // namespace
 
 void Measuring::figure(const std::string& name, const MeasuredValue& value, const Json& more) {
@@ -53,6 +103,11 @@ void Measuring::figure_without_parts(const std::string& name,
   for (const Provenance label : kProvenanceOrder) out.erase(provenance_key(label));
   out.update(more);
   say(name, figure_text(value, unit_, false));
+}
+
+void Measuring::no_figure(const std::string& name, const std::string& reason) {
+  figures_[name] = {{"value", nullptr}, {"reason", reason}};
+  say(name, "none: " + reason);
 }
 
 void Measuring::say(const std::string& name, const std::string& text) const {
@@ -92,17 +147,20 @@ void Measuring::volume() {
         c.closed ? "its faces look inward, or disagree on which side is outside; cgs filter --op "
                    "repair turns them"
                  : "the surface is not closed";
-    const std::string seams = c.closed ? "" : seams_text(mesh_.mesh);
-    if (!seams.empty()) reason += "; " + seams;
-    figures_["volume"] = {{"value", nullptr}, {"reason", reason}};
-    say("volume", "none: " + reason);
+    if (!c.closed) reason = with_seams(reason, mesh_.mesh);
+    no_figure("volume", reason);
     return;
   }
   const MeasuredValue value = enclosed_volume(mesh_);
   const MeasuredValue around = surface_area(mesh_);
   const double sigma = figure_sigma(value, unit_);
   const double unstated = (1 - value.stated) * figure_value(around, unit_);
-  Json more = {{"area_without_sigma", unstated}};
+  // Of shells that cut each other, none lies within another.
+  const bool is_nested = c.passed() && c.components > 1;
+  const size_t doubled = is_nested ? settled_shells(mesh_.mesh).dropped : size_t{0};
+  Json more = {{"area_without_sigma", unstated},
+               {"self_intersections", c.self_intersections},
+               {"doubled_shells", doubled}};
   if (std::isfinite(sigma)) {
     more["interval"] = {figure_value(value, unit_) - 2 * sigma,
                         figure_value(value, unit_) + 2 * sigma};
@@ -111,6 +169,7 @@ void Measuring::volume() {
   more["surface_shares"] = surface_shares(around);
   figure_without_parts("volume", value, more);
   if (mesh_.states_provenance()) say("", "the surface around it: " + shares_text(around));
+  say_overlaps(c.self_intersections, doubled);
   if (value.stated > 0 && value.stated < 1) {
     char text[200];  // NOLINT(modernize-avoid-c-arrays)
     std::snprintf(text,
@@ -120,6 +179,20 @@ void Measuring::volume() {
                   unstated,
                   unit_.name.c_str());
     say("", text);
+  }
+}
+
+void Measuring::say_overlaps(size_t self_intersections, size_t doubled_shells) const {
+  const std::string helps = "; cgs filter --op watertight makes one solid of it";
+  if (self_intersections > 0) {
+    say("",
+        "pairs of faces that cut or touch each other: " + std::to_string(self_intersections) +
+            "; where the mesh overlaps itself, the volume counts twice" + helps);
+  }
+  if (doubled_shells > 0) {
+    say("",
+        "shells within others that look the same way: " + std::to_string(doubled_shells) +
+            "; the volume counts what they enclose twice" + helps);
   }
 }
 
@@ -196,13 +269,21 @@ void Measuring::section(const std::string& plane,
                        " does not cut the mesh; it misses it, or only touches it");
   }
   figure("section_length", cut.length, {{"lines", cut.lines.size()}, {"open", cut.open_lines}});
-  figure_without_parts("section_area", cut.area, Json::object());
+  std::string area_text = figure_text(cut.area, unit_, false);
+  if (cut.open_lines == 0) {
+    figure_without_parts("section_area", cut.area, Json::object());
+  } else {
+    const std::string reason = "open lines: " + std::to_string(cut.open_lines) + " of " +
+                               std::to_string(cut.lines.size()) + ", where the surface has gaps";
+    no_figure("section_area", with_seams(reason, mesh_.mesh));
+    area_text = "none: " + reason;
+  }
   if (svg.empty() && dxf.empty()) return;
   Drawing drawing = section_drawing(cut, cutter, mesh_, unit_);
   drawing.title = printable(file_.filename()) + ", section " + plane;
   drawing.notes.insert(drawing.notes.begin(),
                        {"length " + figure_text(cut.length, unit_, mesh_.states_provenance()),
-                        "enclosed area " + figure_text(cut.area, unit_, false)});
+                        "enclosed area " + area_text});
   if (!svg.empty()) write_svg(svg, drawing);
   if (!dxf.empty()) write_dxf(dxf, drawing);
 }
@@ -224,42 +305,17 @@ void Measuring::fit(const std::string& shape, const std::string& at, const std::
               {"unit", unit_.name},
               {"vertices", fit.vertices},
               {"area", figure_json(fit.area, unit_, mesh_.states_provenance())}};
-  const Eigen::Vector3d p = mesh_.file_from_internal(fit.point);
-  char text[300];  // NOLINT(modernize-avoid-c-arrays)
-  std::snprintf(text,
-                sizeof(text),
-                "%s through (%.9g, %.9g, %.9g) of the file, ± %.3g %s",
-                shape.c_str(),
-                p.x(),
-                p.y(),
-                p.z(),
-                length(fit.point_sigma),
-                unit_.name.c_str());
-  std::string line = text;
   if (wanted != Shape::Sphere) {
     out["direction"] = {fit.direction.x(), fit.direction.y(), fit.direction.z()};
     out["direction_sigma_degrees"] = fit.direction_sigma * 180 / M_PI;
-    std::snprintf(text,
-                  sizeof(text),
-                  ", direction (%.6f, %.6f, %.6f) ± %.3g degrees",
-                  fit.direction.x(),
-                  fit.direction.y(),
-                  fit.direction.z(),
-                  fit.direction_sigma * 180 / M_PI);
-    line += text;
   }
   if (wanted != Shape::Plane) {
     out["radius"] = figure_json(fit.radius, unit_, mesh_.states_provenance());
+    out["radius"]["scatter"] = length(fit.radius_scatter);
     say("radius", figure_text(fit.radius, unit_, mesh_.states_provenance()));
   }
-  std::snprintf(text,
-                sizeof(text),
-                "; residuals %.3g rms, %.3g max [%s], %zu vertices",
-                length(fit.rms),
-                length(fit.largest),
-                unit_.name.c_str(),
-                fit.vertices);
-  say("fit", line + text);
+  say("fit", fit_text(fit, shape, mesh_.file_from_internal(fit.point), unit_));
+  if (fit.area.stated == 0) say("", scatter_text(fit, unit_));
   say("",
       "--at lies " + number(picked["moved"].get<double>(), "%.3g") + " " + unit_.name +
           " off the surface");
@@ -292,9 +348,17 @@ void Measuring::orthophoto(const OrthophotoRequest& request) {
   figures_["orthophoto"] = out;
 }
 
-// Inside out, gaps between parts would be taken for their thickness.
+// Inside out, gaps between parts would be taken for their thickness; of an open mesh, whatever lies
+// behind a sheet.
 void Measuring::require_inside(const char* option) {
-  if (!certified().closed || certified().oriented_outward) return;
+  if (!certified().closed) {
+    throw InvalidInput(with_seams(
+        std::string(option) + " needs to know what is inside, but this mesh is not closed; take "
+                              "the watertight.ply of a "
+                              "run, or close it by cgs filter --op fill-holes or --op watertight",
+        mesh_.mesh));
+  }
+  if (certified().oriented_outward) return;
   throw InvalidInput(std::string(option) +
                      " needs to know what is inside, but faces of this closed mesh disagree on it "
                      "or all look inward; cgs filter --op repair turns them");

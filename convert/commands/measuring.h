@@ -55,7 +55,9 @@ class Measuring {
               const MeasuredValue& value,
               const Json& more = Json::object());
   void figure_without_parts(const std::string& name, const MeasuredValue& value, const Json& more);
+  void no_figure(const std::string& name, const std::string& reason);
   void say(const std::string& name, const std::string& text) const;
+  void say_overlaps(size_t self_intersections, size_t doubled_shells) const;
   void require_inside(const char* option);
   Json surface_shares(const MeasuredValue& area) const;
   SurfacePoint pick(const std::string& text);

@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 #include <numeric>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -37,6 +38,7 @@ void run_render(const RenderArgs& args) {
   Terminal terminal(args.common.quiet, args.common.strict);
   const Model model = read_model(args.model);
   terminal.warn(model.scene.warnings);
+  if (const std::string text = unknown_holes_warning(model); !text.empty()) terminal.warn({text});
   if (!args.path.empty()) {
     const bool is_file = lower_extension(args.path) == ".json";
     std::error_code ignored;

@@ -54,7 +54,7 @@ SecondMesh read_second_mesh(FilterState& state,
   }
   require_both_units(path, second.content.frame, state.frame, prefix);
   out.remark += std::to_string(mesh.vertices.size()) + " vertices, " +
-               std::to_string(mesh.faces.size()) + " faces";
+                std::to_string(mesh.faces.size()) + " faces";
   if (mesh.provenance.empty() != state.mesh.provenance.empty()) {
     out.remark += "; only one file says what was observed: all of the other counts as inferred";
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <tbb/parallel_for.h>
 
@@ -18,6 +19,14 @@ constexpr size_t kShapeSize = 3;  // log of the diagonal of a lower triangle, an
 float sigmoid(float x) {
   const float e = std::exp(-std::abs(x));
   return (x >= 0 ? 1.0f : e) / (1.0f + e);
+}
+
+// Of a Gaussian that is there but may be seen through: neither 0 nor 1, to which a float rounds
+// what is too close, and whose logit no file can hold.
+float opacity_of(float logit) {
+  constexpr float kLeast = std::numeric_limits<float>::min();
+  constexpr float kMost = 1 - std::numeric_limits<float>::epsilon() / 2;
+  return std::clamp(sigmoid(logit), kLeast, kMost);
 }
 
 float logit(float p) { return std::log(p) - std::log1p(-p); }
@@ -274,7 +283,7 @@ void CoherentGaussians::decode_view(size_t n) {
     const int x = pixel % view.depth.width;
     const int y = pixel / view.depth.width;
     gaussians_.position[g] = view.camera.unproject(x + 0.5, y + 0.5, double(z)).cast<float>();
-    gaussians_.opacity[g] = sigmoid(start_logit_ + max_logit * h);
+    gaussians_.opacity[g] = opacity_of(start_logit_ + max_logit * h);
     if (!shapes_are_free_) {
       gaussians_.scale[g].setConstant(options_.radius_factor * z * unit);
       return;

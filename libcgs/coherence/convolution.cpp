@@ -2,6 +2,7 @@
 #include "libcgs/coherence/convolution.h"
 
 #include <cassert>
+#include <new>
 #include <unordered_map>
 
 #include <dnnl.hpp>
@@ -32,6 +33,19 @@ class OneOpenMpThread {
  private:
   int before_;
 };
+
+// Does work that calls oneDNN. Lack of memory, which oneDNN tells in its own way, is told as
+// everywhere else.
+template <typename Work>
+void with_dnnl(const Work& work) {
+  const OneOpenMpThread one;
+  try {
+    work();
+  } catch (const dnnl::error& error) {
+    if (error.status == dnnl_out_of_memory) throw std::bad_alloc();
+    throw;
+  }
+}
 
 const dnnl::engine& cpu() {
   static const dnnl::engine engine(dnnl::engine::kind::cpu, 0);
@@ -122,31 +136,32 @@ int convolution_lanes() {
 
 Convolution::Convolution(int in_channels, int out_channels, int width, const std::vector<int>& rows)
     : primitives_(std::make_unique<Primitives>()) {
-  const OneOpenMpThread one;
-  Primitives& own = *primitives_;
-  own.weight_count = static_cast<size_t>(in_channels) * static_cast<size_t>(out_channels) * 9;
-  own.out_channels = static_cast<size_t>(out_channels);
-  const memory::dims weight_dims{out_channels, in_channels, 3, 3};
-  own.plain_weights = memory::desc(weight_dims, kFloat, FormatTag::oihw);
-  const memory::desc any_weights(weight_dims, kFloat, FormatTag::any);
-  const memory::desc bias({out_channels}, kFloat, FormatTag::a);
-  own.bias = memory(bias, cpu());
-  own.gradient = any_weights;
-  const bool wide = convolution_lanes() == 16;
-  const FormatTag blocked = wide ? FormatTag::nChw16c : FormatTag::nChw8c;
-  const bool winograd = wide && width * rows.front() >= kWinogradPixels;
-  for (const int height : rows) {
-    const BandShape shape{{{1, in_channels, height + 2, width + 2}, kFloat, blocked},
-                          {{1, out_channels, height, width}, kFloat, blocked},
-                          any_weights,
-                          own.gradient,
-                          bias};
-    BandPrimitives& band = own.bands[height];
-    if (!winograd || !create(algorithm::convolution_winograd, shape, band)) {
-      create(algorithm::convolution_direct, shape, band);
+  with_dnnl([&] {
+    Primitives& own = *primitives_;
+    own.weight_count = static_cast<size_t>(in_channels) * static_cast<size_t>(out_channels) * 9;
+    own.out_channels = static_cast<size_t>(out_channels);
+    const memory::dims weight_dims{out_channels, in_channels, 3, 3};
+    own.plain_weights = memory::desc(weight_dims, kFloat, FormatTag::oihw);
+    const memory::desc any_weights(weight_dims, kFloat, FormatTag::any);
+    const memory::desc bias({out_channels}, kFloat, FormatTag::a);
+    own.bias = memory(bias, cpu());
+    own.gradient = any_weights;
+    const bool wide = convolution_lanes() == 16;
+    const FormatTag blocked = wide ? FormatTag::nChw16c : FormatTag::nChw8c;
+    const bool winograd = wide && width * rows.front() >= kWinogradPixels;
+    for (const int height : rows) {
+      const BandShape shape{{{1, in_channels, height + 2, width + 2}, kFloat, blocked},
+                            {{1, out_channels, height, width}, kFloat, blocked},
+                            any_weights,
+                            own.gradient,
+                            bias};
+      BandPrimitives& band = own.bands[height];
+      const bool is_made = (winograd && create(algorithm::convolution_winograd, shape, band)) ||
+                           create(algorithm::convolution_direct, shape, band);
+      if (!is_made) throw std::bad_alloc();  // every processor has the direct one
+      own.gradient = band.weights_desc.diff_weights_desc();
     }
-    own.gradient = band.weights_desc.diff_weights_desc();
-  }
+  });
 }
 
 Convolution::~Convolution() = default;
@@ -159,47 +174,51 @@ size_t Convolution::parameter_count() const {
 
 void Convolution::set_parameters(std::span<const float> parameters) {
   assert(parameters.size() == parameter_count());
-  const OneOpenMpThread one;
-  Primitives& own = *primitives_;
-  dnnl::stream stream(cpu());
-  memory plain(own.plain_weights, cpu(), handle(parameters.data()));
-  for (auto& [rows, band] : own.bands) {
-    dnnl::reorder(plain, band.forward_weights).execute(stream, plain, band.forward_weights);
-    dnnl::reorder(plain, band.backward_weights_in).execute(stream, plain, band.backward_weights_in);
-  }
-  std::copy(parameters.begin() + static_cast<std::ptrdiff_t>(own.weight_count),
-            parameters.end(),
-            static_cast<float*>(own.bias.get_data_handle()));
+  with_dnnl([&] {
+    Primitives& own = *primitives_;
+    dnnl::stream stream(cpu());
+    memory plain(own.plain_weights, cpu(), handle(parameters.data()));
+    for (auto& [rows, band] : own.bands) {
+      dnnl::reorder(plain, band.forward_weights).execute(stream, plain, band.forward_weights);
+      dnnl::reorder(plain, band.backward_weights_in)
+          .execute(stream, plain, band.backward_weights_in);
+    }
+    std::copy(parameters.begin() + static_cast<std::ptrdiff_t>(own.weight_count),
+              parameters.end(),
+              static_cast<float*>(own.bias.get_data_handle()));
+  });
 }
 
 void Convolution::forward(int rows, const float* input, float* output, FloatBuffer& scratch) const {
-  const OneOpenMpThread one;
-  const BandPrimitives& band = primitives_->bands.at(rows);
-  dnnl::stream stream(cpu());
-  band.forward.execute(
-      stream,
-      {{DNNL_ARG_SRC, {band.forward_desc.src_desc(), cpu(), handle(input)}},
-       {DNNL_ARG_WEIGHTS, band.forward_weights},
-       {DNNL_ARG_BIAS, primitives_->bias},
-       {DNNL_ARG_DST, {band.forward_desc.dst_desc(), cpu(), output}},
-       {DNNL_ARG_SCRATCHPAD, scratch_memory(band.forward_desc.scratchpad_desc(), scratch)}});
-  stream.wait();
+  with_dnnl([&] {
+    const BandPrimitives& band = primitives_->bands.at(rows);
+    dnnl::stream stream(cpu());
+    band.forward.execute(
+        stream,
+        {{DNNL_ARG_SRC, {band.forward_desc.src_desc(), cpu(), handle(input)}},
+         {DNNL_ARG_WEIGHTS, band.forward_weights},
+         {DNNL_ARG_BIAS, primitives_->bias},
+         {DNNL_ARG_DST, {band.forward_desc.dst_desc(), cpu(), output}},
+         {DNNL_ARG_SCRATCHPAD, scratch_memory(band.forward_desc.scratchpad_desc(), scratch)}});
+    stream.wait();
+  });
 }
 
 void Convolution::backward_input(int rows,
                                  const float* output_gradient,
                                  float* input_gradient,
                                  FloatBuffer& scratch) const {
-  const OneOpenMpThread one;
-  const BandPrimitives& band = primitives_->bands.at(rows);
-  dnnl::stream stream(cpu());
-  band.backward_input.execute(
-      stream,
-      {{DNNL_ARG_DIFF_SRC, {band.input_desc.diff_src_desc(), cpu(), input_gradient}},
-       {DNNL_ARG_WEIGHTS, band.backward_weights_in},
-       {DNNL_ARG_DIFF_DST, {band.input_desc.diff_dst_desc(), cpu(), handle(output_gradient)}},
-       {DNNL_ARG_SCRATCHPAD, scratch_memory(band.input_desc.scratchpad_desc(), scratch)}});
-  stream.wait();
+  with_dnnl([&] {
+    const BandPrimitives& band = primitives_->bands.at(rows);
+    dnnl::stream stream(cpu());
+    band.backward_input.execute(
+        stream,
+        {{DNNL_ARG_DIFF_SRC, {band.input_desc.diff_src_desc(), cpu(), input_gradient}},
+         {DNNL_ARG_WEIGHTS, band.backward_weights_in},
+         {DNNL_ARG_DIFF_DST, {band.input_desc.diff_dst_desc(), cpu(), handle(output_gradient)}},
+         {DNNL_ARG_SCRATCHPAD, scratch_memory(band.input_desc.scratchpad_desc(), scratch)}});
+    stream.wait();
+  });
 }
 
 size_t Convolution::gradient_size() const {
@@ -211,20 +230,21 @@ void Convolution::backward_parameters(int rows,
                                       const Band& band,
                                       float* gradient,
                                       FloatBuffer& scratch) const {
-  const OneOpenMpThread one;
-  const BandPrimitives& with = primitives_->bands.at(rows);
-  const auto& desc = with.weights_desc;
-  float* bias = gradient + primitives_->gradient_floats();
-  std::fill(bias, gradient + gradient_size(), 0.0f);
-  dnnl::stream stream(cpu());
-  with.backward_weights.execute(
-      stream,
-      {{DNNL_ARG_SRC, {desc.src_desc(), cpu(), handle(band.input)}},
-       {DNNL_ARG_DIFF_DST, {desc.diff_dst_desc(), cpu(), handle(band.output_gradient)}},
-       {DNNL_ARG_DIFF_WEIGHTS, {primitives_->gradient, cpu(), gradient}},
-       {DNNL_ARG_DIFF_BIAS, {primitives_->bias.get_desc(), cpu(), bias}},
-       {DNNL_ARG_SCRATCHPAD, scratch_memory(desc.scratchpad_desc(), scratch)}});
-  stream.wait();
+  with_dnnl([&] {
+    const BandPrimitives& with = primitives_->bands.at(rows);
+    const auto& desc = with.weights_desc;
+    float* bias = gradient + primitives_->gradient_floats();
+    std::fill(bias, gradient + gradient_size(), 0.0f);
+    dnnl::stream stream(cpu());
+    with.backward_weights.execute(
+        stream,
+        {{DNNL_ARG_SRC, {desc.src_desc(), cpu(), handle(band.input)}},
+         {DNNL_ARG_DIFF_DST, {desc.diff_dst_desc(), cpu(), handle(band.output_gradient)}},
+         {DNNL_ARG_DIFF_WEIGHTS, {primitives_->gradient, cpu(), gradient}},
+         {DNNL_ARG_DIFF_BIAS, {primitives_->bias.get_desc(), cpu(), bias}},
+         {DNNL_ARG_SCRATCHPAD, scratch_memory(desc.scratchpad_desc(), scratch)}});
+    stream.wait();
+  });
 }
 
 void Convolution::add_gradients(float* gradients, size_t count, std::span<float> sum) const {
@@ -239,14 +259,15 @@ void Convolution::add_gradients(float* gradients, size_t count, std::span<float>
       for (size_t i = chunk * kChunk; i < end; ++i) gradients[i] += next[i];
     }
   });
-  const OneOpenMpThread one;
-  dnnl::stream stream(cpu());
-  memory blocked(own.gradient, cpu(), gradients);
-  memory plain(own.plain_weights, cpu());
-  dnnl::reorder(blocked, plain).execute(stream, blocked, plain);
-  stream.wait();
-  const auto* weights = static_cast<const float*>(plain.get_data_handle());
-  for (size_t i = 0; i < own.weight_count; ++i) sum[i] += weights[i];
+  with_dnnl([&] {
+    dnnl::stream stream(cpu());
+    memory blocked(own.gradient, cpu(), gradients);
+    memory plain(own.plain_weights, cpu());
+    dnnl::reorder(blocked, plain).execute(stream, blocked, plain);
+    stream.wait();
+    const auto* weights = static_cast<const float*>(plain.get_data_handle());
+    for (size_t i = 0; i < own.weight_count; ++i) sum[i] += weights[i];
+  });
   const float* bias = gradients + own.gradient_floats();
   for (size_t i = 0; i < own.out_channels; ++i) sum[own.weight_count + i] += bias[i];
 }

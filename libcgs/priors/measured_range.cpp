@@ -31,15 +31,38 @@ View reduced(const View& view) {
   return out;
 }
 
-// The range that holds the measured depths but for one in a hundred at each end, with a margin for
-// what the small images could not show.
-DepthRange range_of(std::vector<float> depths, const DepthRange& guess) {
-  constexpr double kNearMargin = 0.75;
-  constexpr double kFarMargin = 1.5;
-  const size_t trimmed = depths.size() / 100;
-  return {
-      std::max(guess.near, kNearMargin * double{nth_smallest(depths, trimmed)}),
-      std::min(guess.far, kFarMargin * double{nth_smallest(depths, depths.size() - 1 - trimmed)})};
+// Depths but for a share of them at each end.
+DepthRange trimmed(std::vector<float> depths, size_t one_in) {
+  const size_t left_out = depths.size() / one_in;
+  return {double{nth_smallest(depths, left_out)},
+          double{nth_smallest(depths, depths.size() - 1 - left_out)}};
+}
+
+// The range that holds what was measured, zero where that is little, with a margin for what the
+// small images could not show. What two views agree on may be chance, in patches of up to half a
+// per cent of a picture. What a third one confirms hardly is, and a thing in the foreground may
+// fill no more: outside the range it would come out at another depth. Planes lie evenly in inverse
+// depth: room behind costs few of them, room in front many.
+DepthRange range_of(const ViewPriors& measured, const DepthRange& guess) {
+  constexpr double kNearMargin = 0.5;
+  constexpr double kFarMargin = 2.5;
+  constexpr size_t kOneInOfAll = 100;
+  constexpr size_t kOneInOfSure = 1000;
+  std::vector<float> all;
+  std::vector<float> sure;
+  for (size_t i = 0; i < measured.depth.data.size(); ++i) {
+    if (measured.origin.data[i] != DepthOrigin::Measured) continue;
+    all.push_back(measured.depth.data[i]);
+    if (measured.matched_views.data[i] >= 2) sure.push_back(measured.depth.data[i]);
+  }
+  // A fifth of a picture of four pixels is none: there must be at least one depth.
+  if (all.empty() || 5 * all.size() < measured.depth.data.size()) return {};
+  DepthRange out = trimmed(std::move(all), kOneInOfAll);
+  if (!sure.empty()) {
+    const DepthRange of_sure = trimmed(std::move(sure), kOneInOfSure);
+    out = {std::min(out.near, of_sure.near), std::max(out.far, of_sure.far)};
+  }
+  return {std::max(guess.near, kNearMargin * out.near), std::min(guess.far, kFarMargin * out.far)};
 }
 
 }  // namespace
@@ -62,15 +85,8 @@ void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options) {
   const std::vector<ViewPriors> measured = plane_sweep(small, coarse);
   for (size_t k = 0; k < measured.size(); ++k) {
     if (states_range(scene.input[k])) continue;
-    std::vector<float> depths;
-    for (size_t i = 0; i < measured[k].depth.data.size(); ++i) {
-      if (measured[k].origin.data[i] == DepthOrigin::Measured) {
-        depths.push_back(measured[k].depth.data[i]);
-      }
-    }
-    // A fifth of a picture of four pixels is none: there must be at least one depth.
-    if (depths.empty() || 5 * depths.size() < measured[k].depth.data.size()) continue;
-    const DepthRange range = range_of(std::move(depths), depth_range(scene, scene.input[k]));
+    const DepthRange range = range_of(measured[k], depth_range(scene, scene.input[k]));
+    if (!(range.far > 0)) continue;
     View& view = scene.views[static_cast<size_t>(scene.input[k])];
     view.near = range.near;
     view.far = range.far;

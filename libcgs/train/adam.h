@@ -24,9 +24,12 @@ double bias_correction(double decay, int64_t steps);
 /// afterwards. Entries whose gradient and mean are both zero stay as they are, but for decay. The
 /// state is created on first use.
 ///
-/// A gradient that is not finite must not end a training: its entry keeps its value for this step
-/// and its means begin anew. One above 1e15 counts as 1e15, so that its square stays in range and
-/// does not hold the entry back for ever.
+/// A gradient that is not finite must not end a training: its entry keeps its value and its means
+/// for this step. After 100 steps, one above 1000 times the root of the entry's own mean square
+/// counts as 10 times that root: it moves the entry by ten rates in all, and later steps are at
+/// least 0.9 times as long as without it. Before, and where there is no mean square yet, all
+/// counts as it is up to 1e15, which keeps squares in range; the entry hardly moves until such
+/// a mean square has faded.
 /// \param rate   length of a step where gradients agree; 0 leaves values and state alone
 /// \param decay  values shrink by rate times this share of themselves (AdamW)
 /// \param epsilon  in the unit of the gradient: what is far below it makes no step. Gradients of a

@@ -93,7 +93,9 @@ uint64_t mixed(uint64_t a, uint64_t b, uint64_t c) {
                    (c + 1) * 0x165667B19E3779F9ULL);
 }
 
-// Pixels of `first` whose measured depth `second` confirms, with the place where it does.
+// Pixels of `first` whose measured depth `second` confirms, with the place where it does. An
+// optical flow, which the flow loss was published with, would also match what the sweep could not
+// measure.
 std::vector<PixelMatch> matches_between(const Camera& first,
                                         const ViewPriors& own,
                                         const Camera& second,

@@ -132,6 +132,7 @@ void TrainingOptions::validate() const {
   require_weight(prior_weight, "prior_weight");
   require_weight(depth_bending, "depth_bending");
   require_weight(opacity_bending, "opacity_bending");
+  require_weight(opacity_prior, "opacity_prior");
   const bool has_knots = coherence.decoder == ResidualDecoder::Lattice;
   require(has_knots || depth_bending == 0,
           "depth_bending must be 0 with decoder=conv, which has no knots",

@@ -11,7 +11,8 @@
 namespace cgs {
 
 /// How a model is trained. One step looks at all input views. Points in time are fractions of the
-/// whole schedule, so that a run of another length is the same run, slower or faster.
+/// whole schedule. Rates are per step: with lattices, a run of more steps goes further, and is not
+/// the same run more slowly.
 struct TrainingOptions {
   CoherenceOptions coherence;
 
@@ -37,7 +38,10 @@ struct TrainingOptions {
   double tv_weight = 0;         ///< Total variation of the rendered disparity.
   double masked_tv_weight = 0;  ///< The same within layers.
   double tv_to_layers = 0;      ///< Share of tv_weight that goes over to the layers until the end.
-  double flow_weight = 0;       ///< Distance of corresponding points [scene extents].
+  /// Distance of corresponding points [scene extents]. They correspond by the measured depth of the
+  /// views, not by an optical flow: the term holds together what the plane sweep found, and tells
+  /// nothing new.
+  double flow_weight = 0;
   double prior_weight = 0.002;  ///< Departure of measured depths from their prior, in sigmas. Less
                                 ///< lets rounding decide where photographs hardly tell depth.
   double depth_bending = 0;     ///< Of the depth lattice; 0 with decoder=conv, which has no knots.
@@ -60,6 +64,10 @@ struct TrainingOptions {
 ///   13 000 steps of one view each are 4333, with rates higher by the root of three. Where paper
 ///   and implementation differ, the paper: total variation goes over to layers from none to all
 ///   (as a mean over pairs within layers, not over all five), the flow term counts in full.
+///   What remains of this program: correspondences of the flow term from measured depth where
+///   theirs are from an optical flow, as a mean over the pixels of all pairs of views; a background
+///   of another colour in each step; drawing at twice the size along each axis; a change of depth
+///   that is bounded by max_depth_change; steps and rates for three views, however many there are.
 TrainingOptions training_preset(std::string_view name);
 
 /// Sets one field by its name, e.g. ("steps", "500") or ("depth_spacing", "64,16"); the names are

@@ -2,6 +2,7 @@
 #include "convert/m3c2_comparison.h"
 
 #include <cmath>
+#include <cstddef>
 #include <random>
 #include <utility>
 
@@ -144,6 +145,50 @@ MeasurableMesh roof_and_wall(double shift, int wall, uint32_t seed) {
     for (int j = 0; j < wall; ++j) out.points.emplace_back(noise(random), 0.02 * i, 0.02 * j);
   }
   return test::with_vertices(std::move(out));
+}
+
+// A sheet 2 cm thick, whose upper side has moved by `shift`; its first 51 x 51 points are those.
+MeasurableMesh sheet(double shift) {
+  const auto side = [](double z) {
+    return test::grid_mesh(50, 50, [=](double s, double t) { return Vector3d(s, t, z); });
+  };
+  MeasurableMesh out = side(shift);
+  const MeasurableMesh lower = side(-0.02);
+  const auto first = static_cast<uint32_t>(out.points.size());
+  out.points.insert(out.points.end(), lower.points.begin(), lower.points.end());
+  for (const auto& f : lower.mesh.faces) {
+    out.mesh.faces.push_back({first + f[0], first + f[2], first + f[1]});
+  }
+  out.frame.metres_per_unit = 1;
+  return test::with_vertices(std::move(out));
+}
+
+TEST(CompareM3c2, FindsWhatMovedOfAThinSheetEvenIfOneIsInsideOut) {
+  constexpr double kMoved = 0.004;
+  constexpr size_t kMiddle = 51 * 25 + 25;
+  const MeasurableMesh a = sheet(kMoved);
+  MeasurableMesh b = sheet(0);
+  MeasurableMesh inside_out = b;
+  for (auto& f : inside_out.mesh.faces) std::swap(f[1], f[2]);
+  const M3c2Request request{.wanted = true, .cylinder = "13cm"};
+  for (const MeasurableMesh& earlier : {b, inside_out}) {
+    const M3c2Comparison found = compare_m3c2(request, a, earlier);
+    EXPECT_NEAR(found.places[kMiddle].distance, kMoved, 1e-5);
+    EXPECT_NEAR(found.places[51 * 51 + kMiddle].distance, 0, 1e-5);
+  }
+  // Two clouds that state no normals have both sides in every mean.
+  const M3c2Comparison clouds = compare_m3c2(request, cloud_of(a), cloud_of(b));
+  EXPECT_NEAR(std::abs(clouds.places[kMiddle].distance), kMoved / 2, 1e-4);
+}
+
+TEST(CompareM3c2, AnErrorOfTheScaleGrowsFromWhereTheRequestSays) {
+  const MeasurableMesh a = rough_square(0.01, 1);
+  const Vector3d zero(3, -2, 100);
+  const M3c2Comparison found = compare_m3c2(
+      {.wanted = true, .scale_sigma = 0.01, .scale_center = zero}, a, rough_square(0, 2));
+  EXPECT_EQ(found.options.center, zero);
+  EXPECT_NEAR(found.places[51 * 20 + 20].detection, 1.96 * 0.01 * 100, 0.1);
+  EXPECT_EQ(found.places[51 * 20 + 20].change, Change::None);
 }
 
 TEST(CompareM3c2, EveryPartNeedsATopThatLooksUp) {

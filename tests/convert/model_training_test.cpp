@@ -38,5 +38,50 @@ TEST(TrainingToJson, SaysInWordsWhetherAnythingWasOptimised) {
   EXPECT_EQ(training_to_json(trained, request)["gradients_not_finite"], 6);
 }
 
+// Of a model with a view per entry of the coverage.
+std::string described(TrainedModel trained, const ModelRequest& request) {
+  Scene& scene = trained.model.scene;
+  scene.views.resize(trained.priors.coverage.size());
+  for (size_t k = 0; k < scene.views.size(); ++k) scene.input.push_back(static_cast<int>(k));
+  return training_to_json(trained, request)["description"].get<std::string>();
+}
+
+TEST(TrainingToJson, SaysInWordsWhereTheDepthIsFrom) {
+  TrainedModel trained;
+  trained.priors.coverage = {{.measured = 1, .completed = 0, .guessed = 0}};
+  EXPECT_NE(described(trained, {}).find("is measured by a multi-view plane sweep;"),
+            std::string::npos);
+  trained.priors.given.kind = DepthKind::Metric;
+  EXPECT_NE(described(trained, {}).find("plane sweep and a depth sensor;"), std::string::npos);
+  trained.priors.given.kind = DepthKind::Relative;
+  trained.priors.coverage = {{.measured = 0.2, .completed = 0, .guessed = 0.8},
+                             {.measured = 0.2, .completed = 0.2, .guessed = 0.6},
+                             {.measured = 0, .completed = 1, .guessed = 0}};
+  EXPECT_NE(described(trained, {})
+                .find("70 % guessed from one photograph and fitted to what is measured, 20 % "
+                      "measured by a multi-view plane sweep and 10 % filled in from neighbours;"),
+            std::string::npos)
+      << described(trained, {});
+}
+
+TEST(TrainingToJson, SaysInWordsWhatWasOptimised) {
+  ModelRequest request;
+  TrainedModel trained;
+  trained.steps.resize(static_cast<size_t>(request.training.steps));
+  const auto expect = [&](const char* words) {
+    EXPECT_NE(described(trained, request).find(words), std::string::npos)
+        << words << " is not in: " << described(trained, request);
+  };
+  expect("; depth, opacity and shape optimised against the photographs in 60 steps");
+  request.training.depth_rate = 0;
+  expect("; opacity and shape optimised against");
+  request.training.free_from = 1;
+  expect("; opacity optimised against");
+  request.training.coherence.decoder = ResidualDecoder::Conv;
+  expect("; depth and opacity optimised against");
+  request.training.conv_depth_rate = request.training.conv_opacity_rate = 0;
+  expect("; not optimised against the photographs");
+}
+
 }  // namespace
 }  // namespace cgs::model_training_test

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/views.h"
 
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -11,6 +16,34 @@ namespace cgs::views_test {
 namespace {
 
 constexpr int kSide = 40;
+
+// A view becomes an input that saw nothing anywhere: then everything is a hole, and known to be.
+void say_that_it_saw_nothing(Model& model, int view) {
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  model.scene.input.push_back(view);
+  ViewPriors& priors = model.priors.emplace_back();
+  priors.depth = DepthMap(kSide, kSide, kNaN);
+  priors.sigma = DepthMap(kSide, kSide, kNaN);
+  priors.origin = Raster<DepthOrigin>(kSide, kSide, DepthOrigin::Unknown);
+}
+
+// A model of nothing, whose photographs are ramps of different grey.
+Model model_of_greys(const test::TempDir& dir, int count) {
+  Model model;
+  model.scene.folder = dir.path();
+  for (int k = 0; k < count; ++k) {
+    View& view = model.scene.views.emplace_back();
+    view.name = std::to_string(k);
+    view.image_path = dir / (view.name + ".png");
+    view.camera = {kSide, kSide, 50, 50, 20, 20, Eigen::Isometry3d::Identity()};
+    ColorImage ramp(kSide, kSide, Eigen::Vector3f::Zero());
+    for (size_t i = 0; i < ramp.data.size(); ++i) {
+      ramp.data[i].setConstant(0.2f * float(k + 1) * float(i) / float(ramp.data.size()));
+    }
+    write_png(view.image_path, ramp);
+  }
+  return model;
+}
 
 // Photographs that differ only where their masks are black, from a model of nothing.
 TEST(EvaluateViews, LooksAtNoMaskedPixel) {
@@ -35,6 +68,8 @@ TEST(EvaluateViews, LooksAtNoMaskedPixel) {
     view.mask_path = dir / (view.name + ".mask.png");
     write_png(view.mask_path, mask);
   }
+  model.scene.views.push_back(model.scene.views[0]);
+  say_that_it_saw_nothing(model, 2);
   const auto rows = evaluate_views(model, {0, 1}, {})["views"];
   ASSERT_TRUE(rows[0]["ssim"].is_number());
   EXPECT_EQ(rows[0]["ssim"], rows[1]["ssim"]);
@@ -50,6 +85,66 @@ TEST(EvaluateViews, LooksAtNoMaskedPixel) {
   const auto masked = evaluate_views(model, {0, 1}, {});
   EXPECT_TRUE(masked["views"][0]["hole_fraction"].is_null()) << "nothing may be looked at";
   EXPECT_EQ(masked["mean"]["hole_fraction"], masked["views"][1]["hole_fraction"]);
+}
+
+TEST(EvaluateViews, KeepsInputsOutOfTheMeanAndSaysWhatAViewIs) {
+  const test::TempDir dir;
+  Model model = model_of_greys(dir, 4);
+  say_that_it_saw_nothing(model, 0);
+  say_that_it_saw_nothing(model, 1);
+  model.scene.held_out = {2};
+  const auto all = evaluate_views(model, {0, 1, 2, 3}, {});
+  const std::vector<std::string> roles = {"input", "input", "held out", "not used"};
+  for (size_t k = 0; k < roles.size(); ++k) EXPECT_EQ(all["views"][k]["role"], roles[k]);
+  EXPECT_NE(all["views"][0]["psnr"], all["views"][2]["psnr"]);
+  const auto others = evaluate_views(model, {2, 3}, {});
+  EXPECT_EQ(all["mean"], others["mean"]);
+  EXPECT_TRUE(model.scene.warnings.empty()) << model.scene.warnings.front();
+}
+
+TEST(EvaluateViews, SaysOnceThatOnlyInputsAreEvaluated) {
+  const test::TempDir dir;
+  Model model = model_of_greys(dir, 3);
+  say_that_it_saw_nothing(model, 0);
+  say_that_it_saw_nothing(model, 1);
+  const auto report = evaluate_views(model, {0, 1}, {});
+  EXPECT_TRUE(report["mean"]["psnr"].is_number());
+  ASSERT_EQ(model.scene.warnings.size(), 1u);
+  EXPECT_NE(model.scene.warnings[0].find("only input views"), std::string::npos);
+}
+
+// As of splats of other programs: not 100 % holes, but nobody knows.
+TEST(EvaluateViews, LeavesHolesOutWhereNothingIsKnownOfThem) {
+  const test::TempDir dir;
+  Model model = model_of_greys(dir, 2);
+  const auto report = evaluate_views(model, {0, 1}, {});
+  for (const auto& row : {report["views"][0], report["views"][1], report["mean"]}) {
+    EXPECT_TRUE(row["psnr"].is_number());
+    for (const char* key : {"hole_fraction", "psnr_seen", "ssim_seen"}) {
+      EXPECT_TRUE(row[key].is_null()) << key;
+    }
+  }
+  EXPECT_TRUE(report["views"][0]["role"].is_null());
+  ASSERT_EQ(model.scene.warnings.size(), 1u);
+  EXPECT_EQ(model.scene.warnings[0], unknown_holes_warning(model));
+}
+
+TEST(WriteViews, WritesHolesWhereTheyAreKnownAlone) {
+  for (const bool is_known : {true, false}) {
+    const test::TempDir dir;
+    Model model = model_of_greys(dir, 2);
+    if (is_known) say_that_it_saw_nothing(model, 0);
+    const auto rows = write_views(model, {0, 1}, dir / "views", {});
+    const auto frames = write_path(model, {model.scene.views[0].camera}, dir / "path", {});
+    for (const auto& row : {rows[0], rows[1], frames[0]}) {
+      EXPECT_EQ(row["hole_fraction"].is_number(), is_known) << row;
+    }
+    EXPECT_EQ(rows[1]["role"].is_string() && rows[1]["role"] == "not used", is_known);
+    EXPECT_EQ(std::filesystem::exists(dir / "views" / "0.hole.png"), is_known);
+    EXPECT_EQ(std::filesystem::exists(dir / "path" / "frame_0000.hole.png"), is_known);
+    EXPECT_TRUE(std::filesystem::exists(dir / "views" / "0.color.png"));
+    EXPECT_TRUE(std::filesystem::exists(dir / "path" / "frame_0000.png"));
+  }
 }
 
 }  // namespace

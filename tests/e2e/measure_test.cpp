@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
+#include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -120,6 +123,95 @@ TEST(Measure, EveryThicknessSaysItselfThatItNeedsAnInside) {
     EXPECT_NE(result.err.find(name + " needs to know what is inside"), std::string::npos)
         << result.err;
   }
+}
+
+TEST(Measure, AnOpenMeshHasNoThickness) {
+  const TempDir dir;
+  MeasurableMesh cube = test::cube_mesh(2);
+  cube.mesh.faces.pop_back();
+  test::write_bytes(dir / "a.obj", obj_text(cube));
+  const std::vector<std::string> options = {
+      "--thickness", "--thickness-at 1,1,2", "--thickness-ply " + (dir / "t.ply").string()};
+  for (const std::string& option : options) {
+    const auto result = run_cgs("measure " + (dir / "a.obj").string() + " " + option);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_NE(result.err.find("this mesh is not closed; take the watertight.ply"),
+              std::string::npos)
+        << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+  EXPECT_FALSE(std::filesystem::exists(dir / "t.ply"));
+}
+
+TEST(Measure, ASectionWithOpenLinesHasALengthAndNoArea) {
+  const TempDir dir;
+  MeasurableMesh cube = test::cube_mesh(2);
+  cube.mesh.faces.pop_back();
+  test::write_bytes(dir / "a.obj", obj_text(cube));
+  const std::string arguments =
+      "measure " + (dir / "a.obj").string() + " --section z=1.5 --svg " + (dir / "s.svg").string();
+  const json figures = json_of(arguments)["figures"];
+  EXPECT_EQ(figures["section_length"]["open"], 1);
+  EXPECT_NEAR(figures["section_length"]["value"].get<double>(), 6.5, 1e-9);
+  EXPECT_TRUE(figures["section_area"]["value"].is_null());
+  EXPECT_NE(figures["section_area"].at("reason").get<std::string>().find("open lines: 1 of 1"),
+            std::string::npos);
+  const auto said = run_cgs(arguments);
+  EXPECT_NE(said.out.find("section_area none: open lines: 1 of 1"), std::string::npos) << said.out;
+  EXPECT_NE(test::read_bytes(dir / "s.svg").find("enclosed area none: open lines"),
+            std::string::npos);
+}
+
+// Two cubes of volume 8 and 1 in one file, moved from each other along the diagonal.
+std::string two_cubes(double shift) {
+  MeasurableMesh both = test::cube_mesh(2);
+  const MeasurableMesh small = test::cube_mesh(1);
+  const auto first = static_cast<uint32_t>(both.points.size());
+  for (const Eigen::Vector3d& p : small.points) both.points.emplace_back(p.array() + shift);
+  for (const auto& f : small.mesh.faces) {
+    both.mesh.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
+  }
+  return obj_text(both);
+}
+
+TEST(Measure, AVolumeSaysWhatCountsTwice) {
+  const TempDir dir;
+  const auto volume_of = [&](double shift) {
+    test::write_bytes(dir / "a.obj", two_cubes(shift));
+    return json_of("measure " + (dir / "a.obj").string() + " --volume")["figures"]["volume"];
+  };
+  const auto said = [&] {
+    return run_cgs("measure " + (dir / "a.obj").string() + " --volume").out;
+  };
+  const json apart = volume_of(3);
+  EXPECT_EQ(apart.at("self_intersections"), 0);
+  EXPECT_EQ(apart.at("doubled_shells"), 0);
+  EXPECT_EQ(said().find("volume counts"), std::string::npos) << said();
+  const json nested = volume_of(0.4);
+  EXPECT_EQ(nested.at("doubled_shells"), 1);
+  EXPECT_NEAR(nested["value"].get<double>(), 9, 1e-6);
+  EXPECT_NE(said().find("shells within others that look the same way: 1;"), std::string::npos)
+      << said();
+  const json cut = volume_of(1.4);
+  EXPECT_GT(cut.at("self_intersections"), 0);
+  EXPECT_NE(said().find("where the mesh overlaps itself, the volume counts twice"),
+            std::string::npos)
+      << said();
+}
+
+TEST(Measure, AFitWithoutSigmaClaimsNone) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.obj", obj_text(test::tube_mesh(10, 20, 24, 1)));
+  const std::string arguments =
+      "measure " + (dir / "a.obj").string() + " --fit cylinder --at 10,0,10 --radius 8";
+  const json radius = json_of(arguments)["figures"]["fit"]["radius"];
+  EXPECT_NEAR(radius["value"].get<double>(), 10, 1e-6);
+  EXPECT_TRUE(radius["sigma"].is_null());
+  EXPECT_LT(radius.at("scatter").get<double>(), 1e-6);
+  const auto result = run_cgs(arguments);
+  EXPECT_EQ(result.out.find("covers"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("10 units (no sigma stated)"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("nothing states a sigma"), std::string::npos) << result.out;
 }
 
 TEST(Measure, ThicknessOfACubeAndAtAPoint) {
@@ -298,6 +390,73 @@ TEST(Compare, MatchesUnits) {
   const json out = json_of("compare " + (dir / "m.ply").string() + " " + (dir / "mm.ply").string() +
                            " --unit mm");
   EXPECT_NEAR(out["distance"]["mean"].get<double>(), 1, 1e-9);
+}
+
+// A square of four faces, every one with its own vertices, that states everything.
+std::string stated_square(double from_x, double z, const std::string& scale_comments) {
+  std::ostringstream out;
+  out << "ply\nformat ascii 1.0\ncomment metres_per_unit 1\n"
+      << scale_comments
+      << "element vertex 12\nproperty double x\nproperty double y\nproperty double z\n"
+         "property float scalar_sigma\nelement face 4\nproperty list uchar int vertex_indices\n"
+         "end_header\n";
+  const double corners[5][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}};
+  for (int k = 0; k < 4; ++k) {
+    for (const auto& [x, y] : {std::pair(corners[k][0], corners[k][1]),
+                               std::pair(corners[k + 1][0], corners[k + 1][1]),
+                               std::pair(0.5, 0.5)}) {
+      out << from_x + x << ' ' << y << ' ' << z << " 0.001\n";
+    }
+  }
+  for (int k = 0; k < 4; ++k) out << "3 " << 3 * k << ' ' << 3 * k + 1 << ' ' << 3 * k + 2 << '\n';
+  return out.str();
+}
+
+json change_of(const TempDir& dir, const std::string& a, const std::string& b) {
+  test::write_bytes(dir / "a.ply", a);
+  test::write_bytes(dir / "b.ply", b);
+  return json_of("compare " + (dir / "a.ply").string() + " " + (dir / "b.ply").string())["change"];
+}
+
+// Units are matched about the zero of the files, 1000 m away: 1 % of it is 10 m.
+TEST(Compare, AnErrorOfTheScaleGrowsFromTheZeroOfTheWorld) {
+  const TempDir dir;
+  const std::string off = "comment metres_sigma 0.01\n";
+  EXPECT_EQ(change_of(dir, stated_square(1000, 1, off), stated_square(1000, 0, off))["unchanged"],
+            1.0);
+  EXPECT_EQ(change_of(dir, stated_square(0, 1, off), stated_square(0, 0, off))["farther"], 1.0);
+  const std::string held = off + "comment scale_source control points\n";
+  EXPECT_EQ(change_of(dir, stated_square(1000, 1, held), stated_square(1000, 0, held))["farther"],
+            1.0);
+}
+
+TEST(Compare, WhatLiesBeyondTheRimCannotBeCompared) {
+  const TempDir dir;
+  const json change = change_of(dir, stated_square(0.4, 0.1, ""), stated_square(0, 0, ""));
+  EXPECT_NEAR(change["beyond_rim"].get<double>(), 0.4, 0.01);
+  EXPECT_NEAR(change["not_comparable"].get<double>(), 0.4, 0.01);
+  EXPECT_NEAR(change["farther"].get<double>(), 0.6, 0.01);
+  const auto text = run_cgs("compare " + (dir / "a.ply").string() + " " + (dir / "b.ply").string());
+  EXPECT_NE(text.out.find("lie beyond the rim of B"), std::string::npos) << text.out;
+}
+
+TEST(Compare, WarnsOfFacesThatLookInward) {
+  const TempDir dir;
+  MeasurableMesh ball = test::sphere_mesh(0.3);
+  test::write_bytes(dir / "good.obj", obj_text(ball));
+  for (auto& f : ball.mesh.faces) std::swap(f[1], f[2]);
+  test::write_bytes(dir / "inside_out.obj", obj_text(ball));
+  const std::string good = (dir / "good.obj").string();
+  const std::string bad = (dir / "inside_out.obj").string();
+  const auto warns = [&](const std::string& arguments) {
+    const auto result = run_cgs("compare " + arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.err.find("inside_out.obj look inward") != std::string::npos;
+  };
+  EXPECT_TRUE(warns(good + " " + bad));
+  EXPECT_FALSE(warns(bad + " " + good));
+  EXPECT_TRUE(warns(bad + " " + good + " --m3c2"));
+  EXPECT_FALSE(warns(good + " " + bad + " --m3c2"));
 }
 
 // A unit that only one file states is not that of the other.

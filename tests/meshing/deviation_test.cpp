@@ -76,6 +76,39 @@ TEST(Deviations, OnlyWhatBothSawCanChange) {
   }
 }
 
+// A square [0, 1]^2 at z = 0, and places above, below and beside it.
+TEST(Deviations, NothingIsKnownBeyondTheRim) {
+  const auto square = test::with_sigma(
+      test::grid_mesh(8, 8, [](double s, double t) { return Eigen::Vector3d(s, t, 0); }), 1e-3f);
+  const auto at = [&](const Eigen::Vector3d& place) {
+    ComparedPoints points;
+    points.places = {place};
+    points.sigma = {1e-3};
+    points.observed = {1};
+    return deviations(points, square, NearestSurface(square)).at(0);
+  };
+  for (const Eigen::Vector3d& place : {Eigen::Vector3d(1.3, 0.5, 0),
+                                       Eigen::Vector3d(1.3, 0.5, 0.1),
+                                       Eigen::Vector3d(1.0001, 0.55, -0.1),
+                                       Eigen::Vector3d(-0.2, -0.2, 0.1),
+                                       Eigen::Vector3d(-0.2, 1.2, 0)}) {
+    const Deviation beyond = at(place);
+    EXPECT_EQ(beyond.change, Change::Unknown) << place.transpose();
+    EXPECT_TRUE(beyond.is_beyond_rim) << place.transpose();
+  }
+  EXPECT_NEAR(at({1.3, 0.5, 0}).distance, 0.3, 1e-12);
+  for (const Eigen::Vector3d& place : {Eigen::Vector3d(0.55, 0.5, 0.1),
+                                       Eigen::Vector3d(1, 0.5, 0.1),
+                                       Eigen::Vector3d(1, 1, 0.1),
+                                       Eigen::Vector3d(1 + 1e-8, 0.55, 0.1)}) {
+    const Deviation above = at(place);
+    EXPECT_EQ(above.change, Change::Farther) << place.transpose();
+    EXPECT_FALSE(above.is_beyond_rim) << place.transpose();
+  }
+  EXPECT_EQ(at({1, 0.55, -0.1}).change, Change::Nearer);
+  EXPECT_EQ(at({1, 0.55, 0}).change, Change::None);
+}
+
 TEST(Deviations, AnErrorOfTheScaleIsNoChange) {
   const auto before = test::with_sigma(test::sphere_mesh(0.3), 1e-3f);
   const auto after = test::with_sigma(test::sphere_mesh(0.306), 1e-3f);

@@ -2,6 +2,7 @@
 #include "meshing/nearest_surface.h"
 
 #include <random>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -15,6 +16,24 @@ namespace {
 double cube_distance(const Eigen::Vector3d& p) {
   const Eigen::Vector3d q = (p.array() - 0.5).abs() - 0.5;
   return q.cwiseMax(0).norm() + std::min(0.0, q.maxCoeff());
+}
+
+// The same with vertices of its own for every face.
+MeasurableMesh apart(const MeasurableMesh& mesh) {
+  MeasurableMesh out;
+  for (const auto& f : mesh.mesh.faces) {
+    const auto first = static_cast<uint32_t>(out.points.size());
+    for (const uint32_t v : f) out.points.push_back(mesh.points[v]);
+    out.mesh.faces.push_back({first, first + 1, first + 2});
+  }
+  return test::with_vertices(std::move(out));
+}
+
+MeasurableMesh sharp_tip() {
+  MeasurableMesh mesh;
+  mesh.points = {{0, 0, 0}, {1, 0.05, 0}, {1, -0.05, 0.05}, {1, -0.05, -0.05}};
+  mesh.mesh.faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  return test::with_vertices(std::move(mesh));
 }
 
 TEST(NearestSurface, SignedDistanceToACube) {
@@ -47,15 +66,78 @@ TEST(NearestSurface, WithinADistanceFindsTheSameOrNothing) {
 
 // At a sharp tip the nearest faces look away from points that lie outside of them.
 TEST(NearestSurface, SignNearASharpTip) {
-  MeasurableMesh mesh;
-  mesh.points = {{0, 0, 0}, {1, 0.05, 0}, {1, -0.05, 0.05}, {1, -0.05, -0.05}};
-  mesh.mesh.faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  const MeasurableMesh mesh = sharp_tip();
   const NearestSurface surface(mesh);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> place(-0.3, 0.3);
   for (int i = 0; i < 2000; ++i) {
     const Eigen::Vector3d p(-0.01 - std::abs(place(random)), place(random), place(random));
     EXPECT_GT(surface.signed_distance(p, surface.nearest(p)), 0);
+  }
+}
+
+TEST(NearestSurface, FacesWithTheirOwnVerticesGiveTheSameSigns) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> place(-1, 2);
+  for (const MeasurableMesh& mesh : {sharp_tip(), test::cube_mesh()}) {
+    const MeasurableMesh loose = apart(mesh);
+    const NearestSurface joined(mesh);
+    const NearestSurface unjoined(loose);
+    for (int i = 0; i < 3000; ++i) {
+      const Eigen::Vector3d p(place(random), place(random), place(random));
+      EXPECT_EQ(unjoined.signed_distance(p, unjoined.nearest(p)),
+                joined.signed_distance(p, joined.nearest(p)))
+          << p.transpose();
+    }
+  }
+}
+
+TEST(NearestSurface, KnowsItsRimWhetherFacesShareVerticesOrNot) {
+  const auto square =
+      test::grid_mesh(4, 4, [](double s, double t) { return Eigen::Vector3d(s, t, 0); });
+  for (const MeasurableMesh& mesh : {square, apart(square)}) {
+    const NearestSurface surface(mesh);
+    const auto is_on_rim = [&](const Eigen::Vector3d& p) {
+      return surface.is_on_rim(surface.nearest(p));
+    };
+    const auto is_beyond = [&](const Eigen::Vector3d& p) {
+      return surface.is_beyond_rim(p, surface.nearest(p));
+    };
+    EXPECT_TRUE(has_rim(mesh));
+    for (const double z : {-0.3, 0.0, 0.3}) {
+      EXPECT_FALSE(is_on_rim({0.25, 0.4, z}));  // an edge within
+      EXPECT_FALSE(is_on_rim({0.5, 0.5, z}));   // a vertex within
+      EXPECT_TRUE(is_on_rim({1, 0.4, z}));
+      EXPECT_TRUE(is_on_rim({0, 1, z}));
+      EXPECT_FALSE(is_beyond({1, 0.4, z}));
+      EXPECT_FALSE(is_beyond({0, 1, z}));
+      EXPECT_TRUE(is_beyond({1.1, 0.4, z}));
+      EXPECT_TRUE(is_beyond({1.1, 0.5, z}));  // beside a vertex of a straight rim
+      EXPECT_TRUE(is_beyond({-0.1, 1.1, z}));
+      EXPECT_FALSE(is_beyond({0.9, 0.4, z}));
+    }
+  }
+}
+
+// A slit along the edge from 0 to 1 is closed by a face without area.
+TEST(NearestSurface, ClosedMeshesHaveNoRim) {
+  MeasurableMesh slit = test::cube_mesh();
+  slit.points.emplace_back(0.5, 0, 0);
+  slit.mesh.faces[0] = {0, 2, 8};
+  slit.mesh.faces.push_back({8, 2, 1});
+  EXPECT_TRUE(has_rim(slit));
+  slit.mesh.faces.push_back({0, 8, 1});
+  for (const MeasurableMesh& mesh :
+       {test::cube_mesh(), apart(test::cube_mesh()), slit, apart(slit)}) {
+    EXPECT_FALSE(has_rim(mesh));
+    const NearestSurface surface(mesh);
+    for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.3, -1, -1),
+                                     Eigen::Vector3d(-1, -1, -1),
+                                     Eigen::Vector3d(0.5, -0.1, -0.2),
+                                     Eigen::Vector3d(0.5, 2, 0.5)}) {
+      EXPECT_FALSE(surface.is_on_rim(surface.nearest(p))) << p.transpose();
+      EXPECT_FALSE(surface.is_beyond_rim(p, surface.nearest(p))) << p.transpose();
+    }
   }
 }
 

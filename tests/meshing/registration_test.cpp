@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/registration.h"
 
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
@@ -63,6 +65,46 @@ TEST(RegisterPoints, WhatNobodySawPullsNothing) {
   EXPECT_TRUE(r.converged);
   EXPECT_LT(r.share, 0.5);
   for (const Eigen::Vector3d& p : truth.points) EXPECT_LT((r.apply(p) - p).norm(), 1e-3);
+}
+
+// A square of an endless relief, from column `first` of its grid on, 80 of which are one unit.
+MeasurableMesh part_from(int first) {
+  constexpr int kColumns = 80;
+  return test::grid_mesh(kColumns, 40, [=](double s, double t) {
+    const double x = (first + kColumns * s) / kColumns;
+    return Eigen::Vector3d(x, t, 0.05 * std::sin(9 * x) * std::cos(7 * t) + 0.1 * x * t);
+  });
+}
+
+TEST(RegisterPoints, WhatLiesBeyondTheRimPullsNothing) {
+  const MeasurableMesh a = part_from(0);
+  const MeasurableMesh b = part_from(48);  // 40 % of it is in A
+  const NearestSurface surface(b);
+  const std::vector<Eigen::Vector3d> places = points_by_area(a, 8000).places;
+  const Registration in_place = register_points(places, b, surface, false);
+  EXPECT_TRUE(in_place.converged);
+  EXPECT_NEAR(in_place.share, 0.4, 0.05);
+  const Eigen::AngleAxisd turn(0.01, Eigen::Vector3d(1, -2, 1).normalized());
+  std::vector<Eigen::Vector3d> moved;
+  for (const Eigen::Vector3d& p : places) {
+    moved.emplace_back(turn * p + Eigen::Vector3d(0.002, 0.003, -0.002));
+  }
+  const Registration back = register_points(moved, b, surface, false);
+  for (size_t i = 0; i < places.size(); ++i) {
+    EXPECT_LT((in_place.apply(places[i]) - places[i]).norm(), 1e-6);
+    EXPECT_LT((back.apply(moved[i]) - places[i]).norm(), 1e-5);
+  }
+}
+
+TEST(RegisterPoints, RefusesSurfacesThatOverlapByFewPoints) {
+  const MeasurableMesh b = part_from(79);
+  try {
+    register_points(points_by_area(part_from(0), 4000).places, b, NearestSurface(b), false);
+    FAIL() << "50 of its points lie within the rim of the other";
+  } catch (const NumericalError& error) {
+    EXPECT_NE(std::string(error.what()).find("hardly meet where both were seen"), std::string::npos)
+        << error.what();
+  }
 }
 
 TEST(RegisterPoints, SaysWhatSlides) {

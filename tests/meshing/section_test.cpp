@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/section.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
@@ -80,7 +82,28 @@ TEST(Section, OfAnOpenTubeAcrossAndAlong) {
   EXPECT_EQ(along.lines.size(), 2U);
   EXPECT_EQ(along.open_lines, 2U);
   EXPECT_NEAR(along.length.value, 1.2, 1e-12);
-  EXPECT_EQ(along.area.value, 0);
+  EXPECT_TRUE(std::isnan(along.area.value));
+}
+
+// A hole in the outer wall of a shell, which the plane meets, must not leave its bore as the area.
+TEST(Section, HasNoAreaWhereAWallIsOpen) {
+  MeasurableMesh mesh = test::with_sigma(test::torus_mesh(0.3, 0.1, 64, 32), 1e-3f);
+  const CutPlane plane = cut_plane({0, 0, 0}, {0, 0, 1});
+  const Section closed = section(mesh, plane);
+  ASSERT_EQ(closed.lines.size(), 2U);
+  EXPECT_TRUE(std::isfinite(closed.area.value));
+  std::erase_if(mesh.mesh.faces, [&](const auto& f) {
+    const Eigen::Vector3d p = mesh.points[f[0]];
+    return p.x() > 0.35 && std::abs(p.y()) < 0.05 && std::abs(p.z()) < 0.05;
+  });
+  const Section cut = section(mesh, plane);
+  EXPECT_EQ(cut.lines.size(), 2U);
+  EXPECT_EQ(cut.open_lines, 1U);
+  EXPECT_TRUE(std::isnan(cut.area.value));
+  EXPECT_TRUE(std::isnan(cut.area.sigma));
+  EXPECT_LT(cut.length.value, closed.length.value);
+  EXPECT_GT(cut.length.value, 0.9 * closed.length.value);
+  EXPECT_TRUE(std::isfinite(cut.length.sigma));
 }
 
 TEST(Section, LabelsEverySegment) {

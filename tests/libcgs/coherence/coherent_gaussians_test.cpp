@@ -250,7 +250,25 @@ TEST(CoherentGaussians, MoveByNoMoreThanTheBound) {
   EXPECT_NEAR(model.depth(0)(0, 0), 0.5 * std::exp(0.2), 1e-5);
   EXPECT_NEAR(model.depth(1)(0, 0), 0.5 * std::exp(-0.2), 1e-5);
   for (const float o : model.gaussians().opacity) {
-    EXPECT_TRUE(o >= 0 && o <= 1 && std::isfinite(o));
+    EXPECT_TRUE(o > 0 && o < 1) << o;
+  }
+}
+
+// As no file holds the logit of 0 or 1.
+TEST(CoherentGaussians, OpacitiesStayBetweenZeroAndOneHoweverFarTheyMayGo) {
+  for (const float most : {12.0f, 18.0f, 120.0f, 1e30f}) {
+    CoherenceOptions options = small_lattices();
+    options.max_logit_change = most;
+    options.opacity = 0.995f;
+    CoherentGaussians model(scene_of(2), priors_of(2), options);
+    for (const float sign : {-1.0f, 1.0f}) {
+      for (ParameterBlock& block : model.parameters) {
+        if (block.role == ParameterRole::Opacity)
+          block.value.assign(block.value.size(), sign * 1e33f);
+      }
+      model.decode();
+      for (const float o : model.gaussians().opacity) ASSERT_TRUE(o > 0 && o < 1) << sign * most;
+    }
   }
 }
 

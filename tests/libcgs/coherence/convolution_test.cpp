@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/coherence/convolution.h"
 
+#include <cstdlib>
+#include <fstream>
+#include <new>
 #include <ostream>
 #include <random>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 namespace cgs::convolution_test {
 namespace {
@@ -156,6 +161,37 @@ INSTANTIATE_TEST_SUITE_P(Sizes,
                                          Size{18, 17, 9, 6},
                                          Size{5, 4, 31, 20},
                                          Size{18, 33, 40, 12}));
+
+// Addresses that this process has now [bytes].
+rlim_t addresses() {
+  std::ifstream file("/proc/self/statm");
+  rlim_t pages = 0;
+  file >> pages;
+  return pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE));
+}
+
+// Ends with 4 if lack of memory is told as such; runs in a process of its own.
+[[noreturn]] void convolve_without_memory() {
+  const Convolution first(8, 8, 8, {4});  // what oneDNN makes once
+  const rlim_t most = addresses() + (rlim_t{16} << 20);
+  const struct rlimit limit = {most, most};
+  setrlimit(RLIMIT_AS, &limit);
+  try {
+    const Convolution large(1024, 1024, 8, {4});  // 38 MB of weights
+  } catch (const std::bad_alloc&) {
+    std::_Exit(4);
+  } catch (...) {
+    std::_Exit(1);
+  }
+  std::_Exit(0);
+}
+
+TEST(Convolution, LackOfMemoryIsTheUsualError) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers need addresses without limit";
+#endif
+  EXPECT_EXIT(convolve_without_memory(), testing::ExitedWithCode(4), "");
+}
 
 }  // namespace
 }  // namespace cgs::convolution_test

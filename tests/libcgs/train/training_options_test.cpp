@@ -44,6 +44,7 @@ TEST(TrainingOptions, ValidateNamesTheFieldOutOfRange) {
                               "conv_depth_gain",
                               "conv_opacity_rate",
                               "conv_rise",
+                              "opacity_prior",
                               "tv_to_layers"}) {
     TrainingOptions options;
     set_training_field(options, setting, "-1");
@@ -52,6 +53,24 @@ TEST(TrainingOptions, ValidateNamesTheFieldOutOfRange) {
       ADD_FAILURE() << setting << " = -1 was accepted";
     } catch (const InvalidInput& error) {
       EXPECT_NE(std::string(error.what()).find(setting), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(TrainingOptions, WeightsAreFinite) {
+  for (const char* weight : {"l1_weight",
+                             "ssim_weight",
+                             "tv_weight",
+                             "masked_tv_weight",
+                             "flow_weight",
+                             "prior_weight",
+                             "depth_bending",
+                             "opacity_bending",
+                             "opacity_prior"}) {
+    for (const char* value : {"nan", "inf"}) {
+      TrainingOptions options;
+      set_training_field(options, weight, value);
+      EXPECT_THROW(options.validate(), InvalidInput) << weight << " = " << value;
     }
   }
 }
