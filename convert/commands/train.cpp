@@ -76,12 +76,14 @@ void run_train(const TrainArgs& args) {
   const auto distances = known_distances(args.scene.known_distances, scene);
   const auto markers = marker_bars(scene, args.scene.marker_size);
   const size_t known = scene.warnings.size();
+  const Eigen::Vector3d up = scene.frame.up;
   terminal.warn(scene.warnings);
   TrainedModel trained =
       train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
   const std::vector<std::string> found(warnings.begin() + static_cast<std::ptrdiff_t>(known),
                                        warnings.end());
+  trained.model.scene.frame.up = up;
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
   if (opened.refined) report["refined_poses"] = opened.refined->report;
