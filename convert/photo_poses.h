@@ -23,9 +23,9 @@ struct PhotoPoses {
 /// Solves for the cameras of the photographs in a folder, or reads what write_photo_poses() stored
 /// in `stored` if that was solved from the same.
 ///
-/// \param wanted  file names; where there are more photographs than can be compared, these alone
-/// are
-///                used; may be empty
+/// \param wanted  file names; if there are too many photographs to compare, only these are used;
+/// may
+///                be empty
 /// \param focal   [pixels] of every photograph as stored; 0 = from Exif, else solved for
 /// \param stored  may be empty or not exist
 /// \throws BadInput Empty (fewer than two photographs), and as read_image(); LimitError for more

@@ -98,6 +98,12 @@ double scale_sigma(const Frame& a, const Frame& b, bool fits_scale) {
   return std::hypot(figure_unit(a, "").relative_sigma, figure_unit(b, "").relative_sigma);
 }
 
+Eigen::AlignedBox3d box_around(const MeasurableMesh& mesh) {
+  Eigen::AlignedBox3d out;
+  for (const Eigen::Vector3d& p : mesh.points) out.extend(p);
+  return out;
+}
+
 // How wrong one scale may be against the other.
 struct ScaleError {
   double relative = 0;                               // standard deviation
@@ -112,19 +118,16 @@ Eigen::Vector3d unmoved_by_scale(const MeasurableMesh& a, const Frame& b, bool i
   if (!is_registered && !by_control_points) {
     return a.frame.internal_from_world(Eigen::Vector3d::Zero());
   }
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& p : a.points) box.extend(p);
-  return box.center();
+  return box_around(a).center();
 }
 
 // Faces say the sign of all distances, and a closed mesh says whether they lie.
 void warn_of_inward(const std::filesystem::path& path,
                     const MeasurableMesh& mesh,
                     const Terminal& terminal) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& p : mesh.points) box.extend(p);
   constexpr double kFlat = 1e-9;  // what rounding makes of the volume of two sides of a sheet
-  if (!(enclosed_volume(mesh).value < -kFlat * std::pow(box.diagonal().norm(), 3))) return;
+  if (!(enclosed_volume(mesh).value < -kFlat * std::pow(box_around(mesh).diagonal().norm(), 3)))
+    return;
   if (has_rim(mesh)) return;
   terminal.warn("the faces of " + printable(path) +
                 " look inward, so that nearer and farther are exchanged; cgs filter --op repair "

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -109,19 +110,27 @@ TEST(Measure, SharesOfLabelsAreOfWhatAnOrthophotoShows) {
       << result.out;
 }
 
+// The options that ask for thickness, and with what each is refused for a mesh.
+std::vector<std::pair<std::string, std::string>> thickness_refusals(const TempDir& dir,
+                                                                    const MeasurableMesh& mesh) {
+  test::write_bytes(dir / "a.obj", obj_text(mesh));
+  const std::vector<std::string> options = {
+      "--thickness", "--thickness-at 1,1,2", "--thickness-ply " + (dir / "t.ply").string()};
+  std::vector<std::pair<std::string, std::string>> out;
+  for (const std::string& option : options) {
+    const auto result = run_cgs("measure " + (dir / "a.obj").string() + " " + option);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    out.emplace_back(option.substr(0, option.find(' ')), result.err);
+  }
+  return out;
+}
+
 TEST(Measure, EveryThicknessSaysItselfThatItNeedsAnInside) {
   const TempDir dir;
   MeasurableMesh cube = test::cube_mesh(2);
   for (auto& f : cube.mesh.faces) std::swap(f[0], f[1]);
-  test::write_bytes(dir / "a.obj", obj_text(cube));
-  const std::vector<std::string> options = {
-      "--thickness", "--thickness-at 1,1,2", "--thickness-ply " + (dir / "t.ply").string()};
-  for (const std::string& option : options) {
-    const auto result = run_cgs("measure " + (dir / "a.obj").string() + " " + option);
-    EXPECT_EQ(result.exit_code, 2) << result.err;
-    const std::string name = option.substr(0, option.find(' '));
-    EXPECT_NE(result.err.find(name + " needs to know what is inside"), std::string::npos)
-        << result.err;
+  for (const auto& [name, text] : thickness_refusals(dir, cube)) {
+    EXPECT_NE(text.find(name + " needs to know what is inside"), std::string::npos) << text;
   }
 }
 
@@ -129,16 +138,10 @@ TEST(Measure, AnOpenMeshHasNoThickness) {
   const TempDir dir;
   MeasurableMesh cube = test::cube_mesh(2);
   cube.mesh.faces.pop_back();
-  test::write_bytes(dir / "a.obj", obj_text(cube));
-  const std::vector<std::string> options = {
-      "--thickness", "--thickness-at 1,1,2", "--thickness-ply " + (dir / "t.ply").string()};
-  for (const std::string& option : options) {
-    const auto result = run_cgs("measure " + (dir / "a.obj").string() + " " + option);
-    EXPECT_EQ(result.exit_code, 2) << result.err;
-    EXPECT_NE(result.err.find("this mesh is not closed; take the watertight.ply"),
-              std::string::npos)
-        << result.err;
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  for (const auto& [name, text] : thickness_refusals(dir, cube)) {
+    EXPECT_NE(text.find("this mesh is not closed; take the watertight.ply"), std::string::npos)
+        << name << ": " << text;
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
   }
   EXPECT_FALSE(std::filesystem::exists(dir / "t.ply"));
 }

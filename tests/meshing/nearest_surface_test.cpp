@@ -8,6 +8,7 @@
 
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
+#include "tests/support/unshared_corners.h"
 
 namespace cgs::nearest_surface_test {
 namespace {
@@ -16,17 +17,6 @@ namespace {
 double cube_distance(const Eigen::Vector3d& p) {
   const Eigen::Vector3d q = (p.array() - 0.5).abs() - 0.5;
   return q.cwiseMax(0).norm() + std::min(0.0, q.maxCoeff());
-}
-
-// The same with vertices of its own for every face.
-MeasurableMesh apart(const MeasurableMesh& mesh) {
-  MeasurableMesh out;
-  for (const auto& f : mesh.mesh.faces) {
-    const auto first = static_cast<uint32_t>(out.points.size());
-    for (const uint32_t v : f) out.points.push_back(mesh.points[v]);
-    out.mesh.faces.push_back({first, first + 1, first + 2});
-  }
-  return test::with_vertices(std::move(out));
 }
 
 MeasurableMesh sharp_tip() {
@@ -80,7 +70,7 @@ TEST(NearestSurface, FacesWithTheirOwnVerticesGiveTheSameSigns) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(-1, 2);
   for (const MeasurableMesh& mesh : {sharp_tip(), test::cube_mesh()}) {
-    const MeasurableMesh loose = apart(mesh);
+    const MeasurableMesh loose = test::unshared_corners(mesh);
     const NearestSurface joined(mesh);
     const NearestSurface unjoined(loose);
     for (int i = 0; i < 3000; ++i) {
@@ -95,7 +85,7 @@ TEST(NearestSurface, FacesWithTheirOwnVerticesGiveTheSameSigns) {
 TEST(NearestSurface, KnowsItsRimWhetherFacesShareVerticesOrNot) {
   const auto square =
       test::grid_mesh(4, 4, [](double s, double t) { return Eigen::Vector3d(s, t, 0); });
-  for (const MeasurableMesh& mesh : {square, apart(square)}) {
+  for (const MeasurableMesh& mesh : {square, test::unshared_corners(square)}) {
     const NearestSurface surface(mesh);
     const auto is_on_rim = [&](const Eigen::Vector3d& p) {
       return surface.is_on_rim(surface.nearest(p));
@@ -127,8 +117,10 @@ TEST(NearestSurface, ClosedMeshesHaveNoRim) {
   slit.mesh.faces.push_back({8, 2, 1});
   EXPECT_TRUE(has_rim(slit));
   slit.mesh.faces.push_back({0, 8, 1});
-  for (const MeasurableMesh& mesh :
-       {test::cube_mesh(), apart(test::cube_mesh()), slit, apart(slit)}) {
+  for (const MeasurableMesh& mesh : {test::cube_mesh(),
+                                     test::unshared_corners(test::cube_mesh()),
+                                     slit,
+                                     test::unshared_corners(slit)}) {
     EXPECT_FALSE(has_rim(mesh));
     const NearestSurface surface(mesh);
     for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.3, -1, -1),

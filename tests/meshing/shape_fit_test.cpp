@@ -7,6 +7,7 @@
 
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
+#include "tests/support/unshared_corners.h"
 
 namespace cgs::shape_fit_test {
 namespace {
@@ -68,20 +69,9 @@ TEST(FitShape, SphereAndCylinderOfFineMeshes) {
             1e-4);
 }
 
-// Every face with corners of its own, as STL files have them.
-MeasurableMesh unshared(const MeasurableMesh& mesh) {
-  MeasurableMesh out;
-  for (const auto& f : mesh.mesh.faces) {
-    const auto first = static_cast<uint32_t>(out.points.size());
-    for (const uint32_t v : f) out.points.push_back(mesh.points[v]);
-    out.mesh.faces.push_back({first, first + 1, first + 2});
-  }
-  return test::with_vertices(std::move(out));
-}
-
 // Facets cut off from a round shape: its corners have the radius that a caliper would find.
 TEST(FitShape, CoarseFacetsAreNoSmallerShape) {
-  const MeasurableMesh pin = turned(unshared(test::tube_mesh(10, 20, 24, 1)));
+  const MeasurableMesh pin = turned(test::unshared_corners(test::tube_mesh(10, 20, 24, 1)));
   const ShapeFit cylinder = fit_shape(pin, Shape::Cylinder, turned(Eigen::Vector3d(10, 0, 10)), 8);
   EXPECT_NEAR(cylinder.radius.value, 10, 1e-9);
   EXPECT_NEAR(std::abs(cylinder.direction.dot(kTurn * Eigen::Vector3d::UnitZ())), 1, 1e-12);
@@ -107,7 +97,7 @@ TEST(FitShape, RepeatedVerticesCountOnce) {
   const auto radial = [](const Eigen::Vector3d& p) { return Eigen::Vector3d(p.normalized()); };
   const MeasurableMesh shared = noisy(test::sphere_mesh(0.4, 48, 96), 2e-3, 5, radial);
   const ShapeFit a = fit_shape(shared, Shape::Sphere, {0.4, 0, 0}, 0.2);
-  const ShapeFit b = fit_shape(unshared(shared), Shape::Sphere, {0.4, 0, 0}, 0.2);
+  const ShapeFit b = fit_shape(test::unshared_corners(shared), Shape::Sphere, {0.4, 0, 0}, 0.2);
   EXPECT_EQ(a.vertices, b.vertices);
   EXPECT_NEAR(a.radius.value, b.radius.value, 1e-9);
   EXPECT_NEAR(a.radius_scatter / b.radius_scatter, 1, 1e-6);
