@@ -237,9 +237,8 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   refuse_other_kinds(scene);
   if (!request.options.downscale) take_size_of_depth(scene);
   settle_scale(scene, request.assume_unit);
-  const Eigen::Vector3d up = up_of(scene, request.up);
+  scene.frame.up = up_of(scene, request.up);
   to_canonical(scene);
-  scene.frame.up = up;
 
   Frames frames(scene);
   std::vector<Camera> cameras;

@@ -133,6 +133,11 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
   for (const std::filesystem::path& file : earlier) std::filesystem::remove(file);
 }
 
+void restate_frame(const std::filesystem::path& folder, const Model& model) {
+  restate_gaussian_ply(folder / "gaussians.ply", model.scene.frame);
+  write_cameras_json(folder / "cameras.json", model.scene);
+}
+
 Model read_model(const std::filesystem::path& folder) {
   Model model = read_model_as_written(folder);
   use_metres_where_measured(model.scene);

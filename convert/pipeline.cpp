@@ -132,7 +132,7 @@ Json run_scale(Run& run, const Progress& progress) {
   const bool is_new = frame.metres_per_unit != before.metres_per_unit ||
                       frame.metres_sigma != before.metres_sigma ||
                       frame.scale_source != before.scale_source || frame.up != before.up;
-  if (is_new) write_model(run.request.output / "model", model);
+  if (is_new) restate_frame(run.request.output / "model", model);
   use_metres_where_measured(model.scene);
   run.model = std::move(model);
   return result;

@@ -16,11 +16,14 @@ namespace cgs {
 
 namespace {
 
-std::string header_text(const Gaussians& g, const Frame& frame) {
+std::string header_start(const Frame& frame) {
   std::string out = "ply\nformat binary_little_endian 1.0\ncomment ";
   out += kPlyGenerator;
-  out += '\n';
-  out += ply_frame_comments(frame);
+  return out + '\n' + ply_frame_comments(frame);
+}
+
+std::string header_text(const Gaussians& g, const Frame& frame) {
+  std::string out = header_start(frame);
   out += "element vertex " + std::to_string(g.size()) + "\n";
   const auto add = [&](const std::string& name) { out += "property float " + name + "\n"; };
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
@@ -246,6 +249,17 @@ void write_gaussian_ply(const std::filesystem::path& path,
     append_gaussian(record, gaussians, frame, i);
     file.write(record);
   }
+  file.commit();
+}
+
+void restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame) {
+  const std::string bytes = read_file(path);
+  if (!is_our_ply(parse_ply_header(bytes, path).comments)) {
+    throw BadInput(Defect::Schema, path, "its header was not written here");
+  }
+  AtomicFile file(path);
+  file.write(header_start(frame));
+  file.write(std::string_view(bytes).substr(bytes.find("element vertex ")));
   file.commit();
 }
 

@@ -23,6 +23,10 @@ void write_gaussian_ply(const std::filesystem::path& path,
                         const Gaussians& gaussians,
                         const Frame& frame);
 
+/// Writes anew what the header of a file of write_gaussian_ply() tells of its frame; the splats
+/// keep their bytes. \throws BadInput (Schema: the file is of another program); IoError
+void restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame);
+
 /// Reads the 3DGS layout, ASCII or binary, properties in any order and of any type, others ignored.
 ///
 /// Normals and f_rest_* may be absent; degree 4 is read as degree 3. Without scale_2 (2DGS) splats

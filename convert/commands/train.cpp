@@ -76,14 +76,12 @@ void run_train(const TrainArgs& args) {
   const auto distances = known_distances(args.scene.known_distances, scene);
   const auto markers = marker_bars(scene, args.scene.marker_size);
   const size_t known = scene.warnings.size();
-  const Eigen::Vector3d up = scene.frame.up;
   terminal.warn(scene.warnings);
   TrainedModel trained =
       train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
   const std::vector<std::string> found(warnings.begin() + static_cast<std::ptrdiff_t>(known),
                                        warnings.end());
-  trained.model.scene.frame.up = up;
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
   if (opened.refined) report["refined_poses"] = opened.refined->report;
@@ -93,7 +91,7 @@ void run_train(const TrainArgs& args) {
   Frame& frame = trained.model.scene.frame;
   widen_by_focal(frame, opened.focal_sigma());
   if (scale.is_object()) scale["metres_sigma"] = frame.metres_sigma;
-  if (frame.has_metric_scale()) write_model(args.output, trained.model);
+  if (frame.has_metric_scale()) restate_frame(args.output, trained.model);
   if (is_measured) terminal.warn(scale.at("warnings").get<std::vector<std::string>>());
   report["scale"] = scale;
   write_file(args.output / "training.json", json_text(report) + "\n");

@@ -122,13 +122,10 @@ std::vector<Eigen::Vector3d> subject_points(const Scene& scene) {
 }
 
 void to_canonical(Scene& scene) {
-  const double metres_per_unit = scene.frame.metres_per_unit;
-  const double metres_sigma = scene.frame.metres_sigma;
-  const ScaleSource source = scene.frame.scale_source;
-  scene.frame = canonical_frame(subject_points(scene));
-  scene.frame.metres_per_unit = metres_per_unit;
-  scene.frame.metres_sigma = metres_sigma;
-  scene.frame.scale_source = source;
+  const Frame canonical = canonical_frame(subject_points(scene));
+  scene.frame.origin = canonical.origin;
+  scene.frame.scale = canonical.scale;
+  scene.frame.file_origin = canonical.file_origin;
   for (View& view : scene.views) {
     view.camera.world_from_cam = internal_from_world(scene.frame, view.camera.world_from_cam);
     view.near /= scene.frame.scale;

@@ -359,6 +359,20 @@ TEST(GaussianPly, NoticesAFullDisk) {
       [](const auto& path) { write_gaussian_ply(path, sample(3), exact_frame()); });
 }
 
+TEST(GaussianPly, KeepsTheBytesOfSplatsWhenItsFrameIsToldAnew) {
+  const test::TempDir dir;
+  Frame frame = exact_frame();
+  const Gaussians g = sample(1, 5000);
+  write_gaussian_ply(dir / "told.ply", g, frame);
+  frame.up = Eigen::Vector3d(0.1, 0.2, 0.3).normalized();
+  frame.metres_per_unit = 0.025;
+  write_gaussian_ply(dir / "wanted.ply", g, frame);
+  restate_gaussian_ply(dir / "told.ply", frame);
+  EXPECT_TRUE(test::read_bytes(dir / "told.ply") == test::read_bytes(dir / "wanted.ply"));
+  test::write_bytes(dir / "other.ply", raw_file(std::vector<RawSplat>(3)));
+  EXPECT_THROW(restate_gaussian_ply(dir / "other.ply", frame), BadInput);
+}
+
 TEST(GaussianPly, RefusesToWriteWhatItCouldNotRead) {
   const test::TempDir dir;
   const auto refused = [&](const auto& damage) {

@@ -57,11 +57,15 @@ TEST(DepthRange, RefusesOneCommonCentre) {
   EXPECT_THROW(depth_range(scene, 0), BadInput);
 }
 
-TEST(ToCanonical, KeepsProjections) {
+TEST(ToCanonical, KeepsProjectionsUnitAndUp) {
   Scene scene = converging_scene();
   const Eigen::Vector3d point(0.3, -0.2, 3.7);
   const Eigen::Vector3d before = scene.views[0].camera.project(point);
+  scene.frame.up = Eigen::Vector3d(0.6, 0, 0.8);
+  scene.frame.metres_per_unit = 0.5;
   to_canonical(scene);
+  EXPECT_EQ(scene.frame.up, Eigen::Vector3d(0.6, 0, 0.8));
+  EXPECT_EQ(scene.frame.metres_per_unit, 0.5);
   const Eigen::Vector3d after =
       scene.views[0].camera.project(scene.frame.internal_from_world(point));
   EXPECT_NEAR(before.x(), after.x(), 1e-9);
