@@ -13,6 +13,7 @@
 #include "io/glb_container.h"
 #include "io/glb_faces.h"
 #include "io/glb_scene.h"
+#include "io/material_labels.h"
 #include "io/mesh_arrays.h"
 #include "io/significance.h"
 #include "io/splat_glb.h"
@@ -43,7 +44,7 @@ class SceneReader {
     if (!has_colors_) mesh.colors.clear();
     if (!all_have_support_) mesh.support.clear();
     if (!all_have_sigma_) mesh.sigma.clear();
-    if (!origin_.is_ours || !all_have_labels_) mesh.provenance.clear();
+    settle_labels();
     if (has_splats_) {
       out_.parsed.warnings.emplace_back("left out the splats that lie beside the triangles");
     }
@@ -63,6 +64,18 @@ class SceneReader {
   }
 
  private:
+  void settle_labels() {
+    ParsedMesh& out = out_.parsed;
+    const bool are_told = all_have_labels_ && (origin_.is_ours || materials_.are_told());
+    if (!are_told) out.mesh.provenance.clear();
+    const std::string of_names = materials_.warning(are_told);
+    if (origin_.had_labels && !are_told) {
+      out.warnings.emplace_back(kLostLabels);
+    } else if (!origin_.is_ours && !of_names.empty()) {
+      out.warnings.push_back(of_names);
+    }
+  }
+
   void add_mesh(const JsonValue& mesh, const Eigen::Affine3d& world) {
     const JsonValue primitives = mesh.at("primitives");
     for (size_t i = 0; i < primitives.size(); ++i) {
@@ -70,7 +83,8 @@ class SceneReader {
       const auto extensions = primitive.find("extensions");
       has_splats_ = has_splats_ || (extensions && extensions->find(kGaussianSplatting));
       GlbFaces faces = read_glb_primitive(file_, primitive, colors_.texcoord_set(primitive));
-      if (!faces.faces.empty()) faces.colors = colors_.of_vertices(primitive, faces);
+      if (faces.faces.empty()) continue;  // points and lines neither add vertices nor lack colours
+      faces.colors = colors_.of_vertices(primitive, faces);
       add(faces, world, labels_of(primitive, faces));
       if (out_.parsed.mesh.faces.size() > kMostCorners / 3) {
         throw LimitError(printable(file_.path()) + ": more than " +
@@ -80,15 +94,17 @@ class SceneReader {
   }
 
   // Of faces; empty where nothing is said. Programs that pack files for the web join materials that
-  // look alike under the name of one, but keep feature numbers: these come first.
+  // look alike under the name of one, but keep feature numbers: these come first. In files that do
+  // not say that they are ours, numbers may be of anything; there they only weaken what names say.
   std::vector<Provenance> labels_of(const JsonValue& primitive, const GlbFaces& in) {
     const std::optional<Provenance> label = label_of(primitive);
-    if (in.features.empty()) {
+    materials_.add(label);
+    if (in.features.empty() || (!origin_.is_ours && !label)) {
       return label ? std::vector<Provenance>(in.faces.size(), *label) : std::vector<Provenance>();
     }
     std::vector<Provenance> out;
     for (const auto& face : in.faces) {
-      size_t weakest = 0;  // in kProvenanceOrder, which goes from most to least evidence
+      size_t weakest = origin_.is_ours ? 0 : rank(*label);
       for (const uint32_t corner : face) {
         const auto* const found = std::find_if(
             kProvenanceOrder.begin(), kProvenanceOrder.end(), [&](Provenance candidate) {
@@ -102,25 +118,22 @@ class SceneReader {
     return out;
   }
 
-  // Materials of ours are named "<class>" or "<class> <photograph>"; of a mesh that does not say
-  // what was observed, otherwise.
-  std::optional<Provenance> label_of(const JsonValue& primitive) {
+  // In kProvenanceOrder, which goes from most to least evidence.
+  static size_t rank(Provenance label) {
+    const auto* const at = std::find(kProvenanceOrder.begin(), kProvenanceOrder.end(), label);
+    return static_cast<size_t>(at - kProvenanceOrder.begin());
+  }
+
+  std::optional<Provenance> label_of(const JsonValue& primitive) const {
     const auto index = primitive.find("material");
     if (!index) return std::nullopt;
-    const JsonValue material = file_.element("materials", *index);
-    const auto name = material.find("name");
-    for (const Provenance label : kProvenanceOrder) {
-      if (name && (name->text() + " ").starts_with(std::string(provenance_name(label)) + " ")) {
-        return label;
-      }
-    }
-    return std::nullopt;
+    const auto name = file_.element("materials", *index).find("name");
+    return name ? provenance_of_material(name->text()) : std::nullopt;
   }
 
   void add(const GlbFaces& in,
            const Eigen::Affine3d& world,
            const std::vector<Provenance>& labels) {
-    if (in.faces.empty()) return;  // points and lines neither add vertices nor lack colours
     TriangleMesh& mesh = out_.parsed.mesh;
     const bool is_mirrored = world.linear().determinant() < 0;
     std::vector<uint32_t> numbers(in.positions.size() / 3);
@@ -191,6 +204,7 @@ class SceneReader {
   size_t recolored_ = 0;     // corners where surfaces of other colours meet
   bool has_colors_ = false;  // any of it; the rest is white
   bool all_have_labels_ = true;
+  MaterialLabels materials_;
   bool all_have_support_ = true;
   bool all_have_sigma_ = true;
   bool has_splats_ = false;

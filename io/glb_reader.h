@@ -21,9 +21,10 @@ struct GlbMesh {
 /// nodes placed as the file says. Vertices at one place become one: the format repeats them
 /// wherever normals, textures or materials change.
 ///
-/// Files of ours lead back to world coordinates, with unit, labels and sigma. Others are in metres
-/// with +Y up, as the format demands. Colours are taken where every primitive has COLOR_0; textures
-/// are not read.
+/// Files of ours lead back to world coordinates, with unit, labels and sigma; a warning says where
+/// labels were lost. Others are in metres with +Y up, as the format demands, and have labels where
+/// MaterialLabels finds them in names of materials. Colours are taken where every primitive has
+/// COLOR_0; textures are not read.
 ///
 /// \throws BadInput as GlbContainer; Empty without triangles; Unsupported for an extension that
 ///         changes the geometry; Ref for a node with two parents; Value for positions that are

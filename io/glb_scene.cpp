@@ -167,6 +167,7 @@ GlbOrigin glb_origin(const GlbContainer& file) {
     return out;
   }
   out.is_ours = true;
+  out.had_labels = extras->find("area").has_value();
   const JsonValue rotation = extras->at("gltf_from_world");
   const JsonValue origin = extras->at("origin_in_world");
   if (rotation.size() != 9) rotation.fail(Defect::Count, "needs 9 numbers");

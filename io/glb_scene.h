@@ -25,6 +25,7 @@ std::vector<GlbInstance> glb_instances(const GlbContainer& file);
 /// Scale and place of a file in the world; that of other programs' files is the identity.
 struct GlbOrigin {
   bool is_ours = false;
+  bool had_labels = false;  ///< As it was written.
   Eigen::Matrix3d world_from_gltf = Eigen::Matrix3d::Identity();
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double units_per_metre = 1;  ///< World units per unit of the file.

@@ -9,6 +9,7 @@
 
 #include "io/atomic_file.h"
 #include "io/byte_writer.h"
+#include "io/material_labels.h"
 #include "io/mesh_arrays.h"
 #include "io/ply_frame.h"
 #include "io/ply_rows.h"
@@ -17,6 +18,10 @@ namespace cgs {
 
 namespace {
 
+/// The header line of files with labels, without "comment ".
+constexpr const char* kPlyLabels =
+    "provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual";
+
 std::string header_text(const TriangleMesh& mesh,
                         const Frame& frame,
                         const std::vector<VertexScalar>& scalars) {
@@ -24,9 +29,7 @@ std::string header_text(const TriangleMesh& mesh,
   out += kPlyGenerator;
   out += '\n';
   out += ply_frame_comments(frame);
-  if (!mesh.provenance.empty()) {
-    out += "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual\n";
-  }
+  if (!mesh.provenance.empty()) out += std::string("comment ") + kPlyLabels + "\n";
   out += "element vertex " + std::to_string(mesh.vertices.size()) + "\n";
   out += "property float x\nproperty float y\nproperty float z\n";
   if (!mesh.normals.empty()) out += "property float nx\nproperty float ny\nproperty float nz\n";
@@ -110,6 +113,20 @@ VertexColumns vertex_columns(const PlyHeader& header, const std::filesystem::pat
     out.color_scale = coded || whole ? 1.0f / 255.0f : wide ? 1.0f / 65535.0f : 1.0f;
   }
   return out;
+}
+
+/// Whether a file of ours had labels that another program left out: those that know scalars of
+/// vertices only keep scalar_sigma of them.
+bool has_lost_labels(const PlyHeader& header) {
+  const PlyElement* face = header.find("face");
+  if (face == nullptr || face->count == 0 || find_scalar(*face, "scalar_provenance") >= 0) {
+    return false;
+  }
+  const auto& comments = header.comments;
+  if (is_our_ply(comments)) {
+    return std::find(comments.begin(), comments.end(), kPlyLabels) != comments.end();
+  }
+  return find_scalar(*header.find("vertex"), "scalar_sigma") >= 0;
 }
 
 /// Whether a file has colours elsewhere than at its vertices, as MeshLab and VCG write them.
@@ -318,6 +335,7 @@ ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
         "textures and colours of faces are not read, only colours of vertices, which it has none "
         "of");
   }
+  if (has_lost_labels(header)) out.warnings.emplace_back(kLostLabels);
   const std::string unread = unread_properties(header, !out.mesh.colors.empty());
   if (!unread.empty()) out.warnings.push_back("not read: " + unread);
   if (trailing > 0) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "io/material_labels.h"
 #include "io/mesh_arrays.h"
 
 namespace cgs {
@@ -60,11 +61,19 @@ class ObjRows {
     if (words.empty()) return;
     if (words[0] == "v") add_vertex(words);
     if (words[0] == "f") add_face(words);
-    if (words[0] == "usemtl") has_materials_ = true;
+    if (words[0] == "usemtl") set_material(words);
     if (words[0] == "vt") has_texture_ = true;
     if (words[0] == "g") {
       group_ = words.size() == 2 ? provenance_of_group(words[1]) : std::nullopt;
     }
+  }
+
+  // Programs leave blanks in names as they are.
+  void set_material(const std::vector<std::string_view>& words) {
+    has_materials_ = true;
+    const char* const end = words.back().data() + words.back().size();
+    const char* const begin = words.size() > 1 ? words[1].data() : end;
+    material_ = provenance_of_material({begin, static_cast<size_t>(end - begin)});
   }
 
   double number(std::string_view word) const {
@@ -115,6 +124,17 @@ class ObjRows {
     append_polygon(corners, out_.positions, out_.mesh.faces);
     all_grouped_ = all_grouped_ && group_.has_value();
     if (all_grouped_) out_.mesh.provenance.resize(out_.mesh.faces.size(), *group_);
+    materials_.add(material_);
+    by_material_.resize(out_.mesh.faces.size(), material_.value_or(Provenance::Inferred));
+  }
+
+  // Groups come first: materials of photographs have other names in files of earlier versions.
+  void settle_labels() {
+    if (all_grouped_) return;
+    const bool are_told = materials_.are_told();
+    out_.mesh.provenance = are_told ? std::move(by_material_) : std::vector<Provenance>();
+    const std::string warning = materials_.warning(are_told);
+    if (!warning.empty()) out_.warnings.push_back(warning);
   }
 
   void finish() {
@@ -125,7 +145,7 @@ class ObjRows {
     }
     settle_colors(out_);
     fill_in_colors(out_, colored_);
-    if (!all_grouped_) out_.mesh.provenance.clear();
+    settle_labels();
     if (has_materials_ && out_.mesh.colors.empty() && out_.mesh.provenance.empty()) {
       out_.warnings.emplace_back(
           "materials and textures are not read, only colours of vertices, which it has none of");
@@ -143,6 +163,9 @@ class ObjRows {
   std::vector<size_t> colored_;  // vertices that state a colour
   std::optional<Provenance> group_;
   bool all_grouped_ = true;
+  std::optional<Provenance> material_;
+  MaterialLabels materials_;
+  std::vector<Provenance> by_material_;  // of faces
   bool has_materials_ = false;
   bool has_texture_ = false;
   uint64_t small_faces_ = 0;

@@ -13,7 +13,7 @@
 
 #include "io/byte_reader.h"
 #include "io/byte_writer.h"
-#include "io/mesh_arrays.h"
+#include "io/material_labels.h"
 #include "io/threemf_model.h"
 #include "io/xml_events.h"
 #include "io/zip.h"
@@ -56,14 +56,6 @@ std::string root_part(const ZipArchive& archive, const fs::path& path) {
   return out;
 }
 
-// \return the label of that name
-std::optional<Provenance> provenance_named(std::string_view name) {
-  for (const Provenance label : kProvenanceOrder) {
-    if (provenance_name(label) == name) return label;
-  }
-  return std::nullopt;
-}
-
 /// Puts together what the build of a file places.
 class Assembly {
  public:
@@ -84,7 +76,7 @@ class Assembly {
                      path_,
                      accessories_.empty() ? "builds nothing" : "builds nothing but supports");
     }
-    if (out_.mesh.provenance.size() != out_.mesh.faces.size()) out_.mesh.provenance.clear();
+    settle_labels(model);
     out_.comments.push_back("metres_per_unit " + model.metres_per_unit);
     if (is_ours_) {
       add_scale(model);
@@ -196,7 +188,7 @@ class Assembly {
       out_.mesh.faces.push_back({first + corners[0], first + corners[1], first + corners[2]});
     }
     if (is_last) give_back(object.triangles);
-    if (is_ours_) append_provenance(object, part(at.part));
+    append_provenance(object, part(at.part));
     if (is_last) give_back(object.materials);
   }
 
@@ -209,10 +201,25 @@ class Assembly {
   void append_provenance(const ThreeMfObject& object, const ThreeMfModel& model) {
     for (const ThreeMfMaterial& material : object.materials) {
       const auto group = model.material_names.find(material.group);
-      if (group == model.material_names.end() || material.index >= group->second.size()) return;
-      const auto label = provenance_named(group->second[material.index]);
+      std::optional<Provenance> label;
+      if (group != model.material_names.end() && material.index < group->second.size()) {
+        label = provenance_of_material(group->second[material.index]);
+      }
+      materials_.add(label);
       if (!label) return;
       out_.mesh.provenance.push_back(*label);
+    }
+  }
+
+  void settle_labels(const ThreeMfModel& model) {
+    const bool are_told = out_.mesh.provenance.size() == out_.mesh.faces.size() &&
+                          (is_ours_ || materials_.are_told());
+    if (!are_told) out_.mesh.provenance.clear();
+    const std::string of_names = materials_.warning(are_told);
+    if (!are_told && model.description.starts_with("Surface by origin:")) {
+      out_.warnings.emplace_back(kLostLabels);
+    } else if (!is_ours_ && !of_names.empty()) {
+      out_.warnings.push_back(of_names);
     }
   }
 
@@ -284,6 +291,7 @@ class Assembly {
   std::set<Key> open_;  // objects between the build and the one that is looked at
   double stored_ = 0;   // cost of all objects once
   bool is_ours_ = false;
+  MaterialLabels materials_;
   bool is_moved_ = false;  // an object, or built more than once
   ParsedMesh out_;
 };

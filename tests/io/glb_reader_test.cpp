@@ -293,6 +293,99 @@ TEST(ReadGlb, FeatureNumbersCorrectWhatMaterialsClaim) {
   }
 }
 
+/// The JSON of a file, changed.
+template <typename Change>
+void change_json(const std::filesystem::path& path, const Change& change) {
+  const std::string bytes = test::read_bytes(path);
+  const size_t binary = bytes.find(std::string("BIN\0", 4)) + 4;
+  Json json = Json::parse(bytes.substr(20, binary - 8 - 20));
+  change(json);
+  test::write_bytes(path, test::glb(json.dump(), bytes.substr(binary)));
+}
+
+std::vector<std::string> warnings_of_labels(const MeasurableFile& file) {
+  std::vector<std::string> out;
+  for (const std::string& line : file.warnings) {
+    if (line.find("labels") != std::string::npos) out.push_back(line);
+  }
+  return out;
+}
+
+void expect_same_areas(const TriangleMesh& mesh, const MeasurableMesh& back) {
+  const auto before = area_by_provenance(mesh);
+  const auto after = area_by_provenance(back.mesh);
+  const double square = back.frame.scale * back.frame.scale;
+  for (size_t label = 0; label < before.size(); ++label) {
+    EXPECT_NEAR(after.at(label) * square, before.at(label), 1e-3 * before.at(label)) << label;
+  }
+}
+
+// Blender keeps names of materials, but neither extras nor attributes of ours.
+TEST(ReadGlb, TakesLabelsOfMaterialsWhereExtrasWereLeftOut) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::labelled_sphere();
+  write_glb(dir / "a.glb", mesh, {}, {.encoding = GlbEncoding::Plain});
+  change_json(dir / "a.glb", [](Json& json) {
+    json["asset"] = {{"version", "2.0"}, {"generator", "Khronos glTF Blender I/O v4.2.57"}};
+    json.erase("extensionsUsed");
+    for (Json& primitive : json["meshes"][0]["primitives"]) {
+      primitive.erase("extensions");
+      for (const char* name : {"_SUPPORT", "_SIGMA", "_FEATURE_ID_0"}) {
+        primitive["attributes"].erase(name);
+      }
+    }
+    json["materials"][1]["name"] = "single view.001";
+  });
+  const MeasurableFile back = read_mesh_file(dir / "a.glb");
+  expect_same_areas(mesh, back.content);
+  ASSERT_EQ(warnings_of_labels(back).size(), 1U);
+  EXPECT_TRUE(warnings_of_labels(back)[0].starts_with("labels are taken from the names"));
+  change_json(dir / "a.glb", [](Json& json) { json["materials"][2]["name"] = "roof"; });
+  const MeasurableFile some = read_mesh_file(dir / "a.glb");
+  EXPECT_TRUE(some.content.mesh.provenance.empty());
+  ASSERT_EQ(warnings_of_labels(some).size(), 1U);
+  EXPECT_TRUE(warnings_of_labels(some)[0].starts_with("where its faces come from is not known"));
+}
+
+// Numbers of features are anybody's; where materials were joined, they tell what had less evidence.
+TEST(ReadGlb, FeatureNumbersOfOthersOnlyWeakenNames) {
+  const test::TempDir dir;
+  TriangleMesh mesh = test::labelled_sphere();
+  write_glb(dir / "a.glb", mesh, {}, {.encoding = GlbEncoding::Plain});
+  change_json(dir / "a.glb", [](Json& json) {
+    json["asset"].erase("extras");
+    json["materials"][1]["name"] = "observed";
+    json["materials"][2]["name"] = "inferred";
+  });
+  for (Provenance& label : mesh.provenance) {
+    if (label == Provenance::Interpolated) label = Provenance::Inferred;
+  }
+  expect_same_areas(mesh, read_mesh_file(dir / "a.glb").content);
+  change_json(dir / "a.glb", [](Json& json) {
+    for (Json& material : json["materials"]) material["name"] = "stone";
+  });
+  const MeasurableFile other = read_mesh_file(dir / "a.glb");
+  EXPECT_TRUE(other.content.mesh.provenance.empty());
+  EXPECT_TRUE(warnings_of_labels(other).empty());
+}
+
+TEST(ReadGlb, SaysThatLabelsOfOursAreLost) {
+  const test::TempDir dir;
+  write_glb(dir / "a.glb", test::labelled_sphere(), {}, {.encoding = GlbEncoding::Plain});
+  EXPECT_TRUE(warnings_of_labels(read_mesh_file(dir / "a.glb")).empty());
+  change_json(dir / "a.glb", [](Json& json) {
+    json["materials"][0]["name"] = "stone";
+    for (Json& primitive : json["meshes"][0]["primitives"]) {
+      primitive["attributes"].erase("_FEATURE_ID_0");
+    }
+  });
+  const MeasurableFile back = read_mesh_file(dir / "a.glb");
+  EXPECT_TRUE(back.content.mesh.provenance.empty());
+  ASSERT_EQ(warnings_of_labels(back).size(), 1U);
+  EXPECT_TRUE(
+      warnings_of_labels(back)[0].starts_with("where its faces come from is no longer known"));
+}
+
 TEST(ReadGlb, AMeshOfOursWithoutLabelsHasNone) {
   const test::TempDir dir;
   TriangleMesh mesh = test::labelled_sphere();
@@ -301,6 +394,7 @@ TEST(ReadGlb, AMeshOfOursWithoutLabelsHasNone) {
   const MeasurableFile back = read_mesh_file(dir / "a.glb");
   EXPECT_EQ(back.content.mesh.faces.size(), mesh.faces.size());
   EXPECT_TRUE(back.content.mesh.provenance.empty());
+  EXPECT_TRUE(warnings_of_labels(back).empty());
 }
 
 TEST(ReadGlb, SurvivesDamagedCompression) {

@@ -139,6 +139,32 @@ TEST(MeshPly, QualityIsSupportOnlyInFilesOfOurs) {
       << "edited in MeshLab";
 }
 
+// CloudCompare keeps scalars of vertices, but none of faces.
+TEST(MeshPly, SaysThatLabelsOfOursAreLost) {
+  const test::TempDir dir;
+  const auto warnings_of = [&](const std::string& comment, const std::string& more) {
+    test::write_bytes(dir / "a.ply",
+                      "ply\nformat ascii 1.0\n" + comment +
+                          "element vertex 3\nproperty float x\nproperty float y\n"
+                          "property float z\nproperty float scalar_sigma\nelement face 1\n"
+                          "property list uchar int vertex_indices\n" +
+                          more + "end_header\n0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2 2\n");
+    return read_mesh_ply(dir / "a.ply").warnings;
+  };
+  const std::string ours = "comment generator cgs\n";
+  const std::string labelled =
+      "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual\n";
+  const std::string labels = "property uchar scalar_provenance\n";
+  const std::string other = "property uchar other\n";
+  for (const std::string& comment : {ours + labelled, std::string()}) {
+    EXPECT_TRUE(warnings_of(comment, labels).empty());
+    ASSERT_EQ(warnings_of(comment, other).size(), 1U);
+    EXPECT_TRUE(
+        warnings_of(comment, other)[0].starts_with("where its faces come from is no longer known"));
+  }
+  EXPECT_TRUE(warnings_of(ours, other).empty()) << "it never had any";
+}
+
 TEST(MeshPly, SaysThatItLeavesOutTextures) {
   const test::TempDir dir;
   test::write_bytes(dir / "a.ply",

@@ -86,6 +86,23 @@ TEST(ReadObj, AGroupOfAnotherNameLeavesProvenanceUnstated) {
   EXPECT_TRUE(parsed(vertices + "g observed\nf 1 2 3\ng door\nf 1 2 3\n").mesh.provenance.empty());
 }
 
+// Blender writes objects and materials, but no groups; of two materials of one name it numbers one.
+TEST(ReadObj, TakesLabelsOfMaterialsWhereGroupsWereLeftOut) {
+  const std::string start = "# Blender\nmtllib a.mtl\no mesh\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
+  const std::string observed = "usemtl observed\nf 1 2 3 4\n";
+  const ParsedMesh both = parsed(start + observed + "usemtl single view.001\r\nf 1 2 4\n");
+  EXPECT_EQ(both.mesh.provenance,
+            (std::vector<Provenance>{
+                Provenance::Observed, Provenance::Observed, Provenance::SingleView}));
+  ASSERT_EQ(both.warnings.size(), 1U);
+  EXPECT_TRUE(both.warnings[0].starts_with("labels are taken from the names of materials"));
+  for (const char* more : {"", "usemtl view_front\nf 1 2 4\n", "usemtl\nf 1 2 4\n"}) {
+    const ParsedMesh some = parsed(start + observed + more);
+    EXPECT_TRUE(some.mesh.provenance.empty()) << more;
+    EXPECT_TRUE(some.warnings.at(0).starts_with("where its faces come from is not known")) << more;
+  }
+}
+
 TEST(ReadObj, CommentsAndFileNamesEndWithTheirLine) {
   const ParsedMesh mesh =
       parsed("# from C:\\models\\\nv 0 0 0\nmtllib C:\\a\\\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");

@@ -190,6 +190,38 @@ TEST_F(Read3mf, LabelsOfOthersAreNoProvenance) {
   EXPECT_TRUE(read(file).mesh.provenance.empty()) << "half of it says nothing";
 }
 
+// As slicers and Blender write them again: metadata of their own, materials by the same names.
+TEST_F(Read3mf, TakesLabelsOfMaterialsWhereMetadataWereReplaced) {
+  const auto with_materials = [](const std::string& second, const std::string& description) {
+    ThreeMfFile file;
+    file.metadata = "<metadata name=\"Application\">Blender</metadata>" + description;
+    file.resources =
+        "<basematerials id=\"5\"><base name=\"observed\" displaycolor=\"#FFFFFF\"/>"
+        "<base name=\"" +
+        second + "\" displaycolor=\"#FF00FF\"/></basematerials><object id=\"1\" pid=\"5\" " +
+        "pindex=\"1\">" + ThreeMfFile::tetrahedron() + "</object>";
+    const std::string first = "<triangle v1=\"0\"";
+    file.resources.insert(file.resources.find(first) + first.size(), " pid=\"5\" p1=\"0\"");
+    return file;
+  };
+  const ParsedMesh both = read(with_materials("inferred.001", ""));
+  EXPECT_EQ(
+      both.mesh.provenance,
+      (std::vector<Provenance>{
+          Provenance::Observed, Provenance::Inferred, Provenance::Inferred, Provenance::Inferred}));
+  ASSERT_EQ(both.warnings.size(), 1U);
+  EXPECT_TRUE(both.warnings[0].starts_with("labels are taken from the names of materials"));
+  const ParsedMesh some = read(with_materials("PLA", ""));
+  EXPECT_TRUE(some.mesh.provenance.empty());
+  ASSERT_EQ(some.warnings.size(), 1U);
+  EXPECT_TRUE(some.warnings[0].starts_with("where its faces come from is not known"));
+  const ParsedMesh lost = read(with_materials(
+      "PLA", "<metadata name=\"Description\">Surface by origin: observed 61.2 %.</metadata>"));
+  EXPECT_TRUE(lost.mesh.provenance.empty());
+  ASSERT_EQ(lost.warnings.size(), 1U);
+  EXPECT_TRUE(lost.warnings[0].starts_with("where its faces come from is no longer known"));
+}
+
 TEST_F(Read3mf, RefusesWhatDoesNotLeadAnywhere) {
   const auto with = [&](const auto& change) {
     ThreeMfFile file;
