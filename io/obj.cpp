@@ -30,6 +30,12 @@ std::string group_name(Provenance provenance) {
   return name;
 }
 
+/// What names of textured materials begin with: the class, as programs that leave groups out keep
+/// names of materials.
+std::string material_prefix(const TriangleMesh& mesh, Provenance label) {
+  return (mesh.provenance.empty() ? "view" : group_name(label)) + "_";
+}
+
 /// A name that files and materials may have; each but once.
 std::vector<std::string> safe_names(const PhotoTexture& texture) {
   std::vector<std::string> out;
@@ -94,16 +100,34 @@ std::string diffuse_text(Provenance label) {
   return out;
 }
 
+/// Classes of the faces that show a photograph, one if the mesh has no labels.
+std::array<bool, kProvenanceCount> classes_in(const TriangleMesh& mesh,
+                                              const ObjTexture& texture,
+                                              size_t photograph) {
+  std::array<bool, kProvenanceCount> out = {};
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (texture.photograph(f) != static_cast<int>(photograph)) continue;
+    out.at(mesh.provenance.empty() ? 0 : static_cast<size_t>(mesh.provenance[f])) = true;
+  }
+  return out;
+}
+
 /// Always all classes, so that writing it again never changes what an older OBJ refers to.
-std::string materials_text(const std::filesystem::path& path, const ObjTexture& texture) {
+std::string materials_text(const std::filesystem::path& path,
+                           const TriangleMesh& mesh,
+                           const ObjTexture& texture) {
   std::string out = std::string(kOurMaterials) + " materials tell where a surface comes from\n";
   for (const Provenance label : kProvenanceOrder) {
     out += "newmtl " + group_name(label) + "\nKd " + diffuse_text(label) + "\nillum 1\n";
   }
   for (size_t i = 0; i < texture.images.size(); ++i) {
     if (texture.images[i].jpeg.empty()) continue;
-    out += "newmtl view_" + texture.names[i] + "\nKd 1 1 1\nillum 1\nmap_Kd " +
-           image_name(path, texture.names[i]) + "\n";
+    const auto has_class = classes_in(mesh, texture, i);
+    for (const Provenance label : kProvenanceOrder) {
+      if (!has_class.at(static_cast<size_t>(label))) continue;
+      out += "newmtl " + material_prefix(mesh, label) + texture.names[i] +
+             "\nKd 1 1 1\nillum 1\nmap_Kd " + image_name(path, texture.names[i]) + "\n";
+    }
   }
   return out;
 }
@@ -211,7 +235,8 @@ void write_faces(AtomicFile& file, const TriangleMesh& mesh, const ObjTexture& t
       if (!open) file.write("g " + group_name(group) + "\n");
       open = true;
       if (i >= 0) {
-        file.write("usemtl view_" + texture.names[static_cast<size_t>(i)] + "\n");
+        file.write("usemtl " + material_prefix(mesh, group) +
+                   texture.names[static_cast<size_t>(i)] + "\n");
       } else if (!mesh.provenance.empty()) {
         file.write("usemtl " + group_name(group) + "\n");
       }
@@ -265,7 +290,7 @@ void write_obj(const std::filesystem::path& path,
     if (used.images[i].jpeg.empty()) continue;
     companions.write(path.parent_path() / image_name(path, used.names[i]), used.images[i].jpeg);
   }
-  companions.write(materials, materials_text(path, used));
+  companions.write(materials, materials_text(path, mesh, used));
   file.commit();
   companions.keep();
 }

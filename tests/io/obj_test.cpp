@@ -9,6 +9,7 @@
 
 #include "io/image.h"
 #include "io/mesh_arrays.h"
+#include "io/obj_reader.h"
 #include "io/texture_images.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
@@ -143,19 +144,20 @@ TEST(WriteTexturedObj, TextureCoordinatesAreTheProjections) {
   write_obj(dir / "a.obj", box.mesh, box.texture, {});
   const TexturedObj obj = parse_textured(test::read_bytes(dir / "a.obj"));
   EXPECT_EQ(obj.vertices.size(), box.mesh.vertices.size());
-  EXPECT_EQ(obj.groups.at("observed"),
-            (std::set<std::string>{"view_left_side", "view_top", "view_front", "observed"}));
+  EXPECT_EQ(
+      obj.groups.at("observed"),
+      (std::set<std::string>{"observed_left_side", "observed_top", "observed_front", "observed"}));
   EXPECT_EQ(obj.groups.at("single_view"), std::set<std::string>{"single_view"});
   EXPECT_EQ(obj.groups.at("inferred"), std::set<std::string>{"inferred"});
   const std::string materials = test::read_bytes(dir / "a.mtl");
   const auto images = texture_images(box.mesh, box.texture, 90);
   size_t i = 0;
   for (const std::string name : {"left_side", "top", "front"}) {
-    EXPECT_NE(materials.find("newmtl view_" + name + "\n"), std::string::npos);
+    EXPECT_NE(materials.find("newmtl observed_" + name + "\n"), std::string::npos);
     EXPECT_NE(materials.find("map_Kd a." + name + ".jpg\n"), std::string::npos);
     const ColorImage image = read_image(dir / ("a." + name + ".jpg"));
     EXPECT_EQ(image.width, images[i].size.x());
-    const auto& corners = obj.corners.at("view_" + name);
+    const auto& corners = obj.corners.at("observed_" + name);
     EXPECT_EQ(corners.size(), 600u);
     const Camera& camera = box.texture.photographs[i].camera;
     for (const auto& corner : corners) {
@@ -169,6 +171,28 @@ TEST(WriteTexturedObj, TextureCoordinatesAreTheProjections) {
     ++i;
   }
   EXPECT_EQ(test::entries(dir.path()), 5);
+}
+
+TEST(WriteTexturedObj, MaterialsTellLabelsWithoutGroups) {
+  const test::TempDir dir;
+  test::TexturedBox box = test::textured_box();
+  write_obj(dir / "a.obj", box.mesh, box.texture, {});
+  std::istringstream lines(test::read_bytes(dir / "a.obj"));
+  std::string ungrouped;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("g ")) ungrouped += line + "\n";
+  }
+  test::write_bytes(dir / "b.obj", ungrouped);
+  const std::vector<Provenance> labels = read_obj(dir / "a.obj").mesh.provenance;
+  EXPECT_EQ(labels.size(), box.mesh.faces.size());
+  EXPECT_EQ(read_obj(dir / "b.obj").mesh.provenance, labels);
+  const std::string materials = test::read_bytes(dir / "a.mtl");
+  EXPECT_EQ(materials.find("newmtl inferred_"), std::string::npos) << "no face has it";
+  box.mesh.provenance.clear();
+  write_obj(dir / "c.obj", box.mesh, box.texture, {});
+  EXPECT_TRUE(parse_textured(test::read_bytes(dir / "c.obj")).corners.contains("view_front"));
+  EXPECT_NE(test::read_bytes(dir / "c.mtl").find("newmtl view_front\n"), std::string::npos);
+  EXPECT_TRUE(read_obj(dir / "c.obj").mesh.provenance.empty());
 }
 
 TEST(WriteTexturedObj, KeepsNamesOfPhotographsApart) {
