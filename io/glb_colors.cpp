@@ -51,10 +51,18 @@ Eigen::Vector3f sampled(const ColorImage& image,
 
 }  // namespace
 
-std::optional<JsonValue> GlbColors::base(const JsonValue& primitive) const {
+GlbColors::Base GlbColors::base(const JsonValue& primitive) const {
   const auto index = primitive.find("material");
-  if (!index) return std::nullopt;
-  return file_.element("materials", *index).find("pbrMetallicRoughness");
+  if (!index) return {};
+  const JsonValue material = file_.element("materials", *index);
+  const auto extensions = material.find("extensions");
+  // Comes first: what stands beside it is for programs that do not know it.
+  const auto diffuse = extensions ? extensions->find("KHR_materials_pbrSpecularGlossiness")
+                                  : std::optional<JsonValue>();
+  const auto stated = diffuse ? diffuse : material.find("pbrMetallicRoughness");
+  if (!stated) return {};
+  return {numbers_or(*stated, diffuse ? "diffuseFactor" : "baseColorFactor", {1, 1, 1, 1}),
+          stated->find(diffuse ? "diffuseTexture" : "baseColorTexture")};
 }
 
 GlbColors::Texture GlbColors::texture(const JsonValue& info) const {
@@ -86,8 +94,7 @@ GlbColors::Texture GlbColors::texture(const JsonValue& info) const {
 }
 
 int GlbColors::texcoord_set(const JsonValue& primitive) const {
-  const auto material = base(primitive);
-  const auto info = material ? material->find("baseColorTexture") : std::nullopt;
+  const auto info = base(primitive).texture;
   return info ? texture(*info).texcoord_set : -1;
 }
 
@@ -123,13 +130,10 @@ const ColorImage* GlbColors::image(int index) {
 
 std::vector<float> GlbColors::of_vertices(const JsonValue& primitive, const GlbFaces& faces) {
   std::vector<float> out = faces.colors;
-  const auto material = base(primitive);
-  if (!material) return out;
+  const auto [factor, info] = base(primitive);
   const size_t vertices = faces.positions.size() / 3;
-  const auto factor = numbers_or(*material, "baseColorFactor", {1, 1, 1, 1});
   const bool is_white = factor[0] == 1 && factor[1] == 1 && factor[2] == 1;
   const bool is_colored = !has_tints_ && !is_white;
-  const auto info = material->find("baseColorTexture");
   const Texture looked_up = info ? texture(*info) : Texture();
   const ColorImage* picture = info && !faces.texcoords.empty() ? image(looked_up.image) : nullptr;
   if (!is_colored && picture == nullptr) return out;

@@ -14,8 +14,9 @@
 namespace cgs {
 
 /// What glTF says of the colour of surface: that of its vertices, times the base colour of its
-/// material, times its texture.
-/// Source: glTF 2.0, section 3.9.2, and KHR_texture_transform without rotation, Khronos Group.
+/// material (diffuse colour of KHR_materials_pbrSpecularGlossiness), times its texture.
+/// Source: glTF 2.0, section 3.9.2, KHR_materials_pbrSpecularGlossiness, and KHR_texture_transform
+///         without rotation, Khronos Group.
 class GlbColors {
  public:
   /// \param has_tints  base colours are tints that tell classes apart, and no colour of the surface
@@ -42,7 +43,13 @@ class GlbColors {
     std::array<int, 2> wrap = {};  ///< As samplers state it.
   };
 
-  std::optional<JsonValue> base(const JsonValue& primitive) const;
+  /// Of a material: white without one.
+  struct Base {
+    std::vector<double> factor = {1, 1, 1, 1};
+    std::optional<JsonValue> texture;
+  };
+
+  Base base(const JsonValue& primitive) const;
   Texture texture(const JsonValue& info) const;
   const ColorImage* image(int index);
   void warn(const std::string& line);

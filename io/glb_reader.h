@@ -23,8 +23,8 @@ struct GlbMesh {
 ///
 /// Files of ours lead back to world coordinates, with unit, labels and sigma; a warning says where
 /// labels were lost. Others are in metres with +Y up, as the format demands, and have labels where
-/// MaterialLabels finds them in names of materials. Colours are taken where every primitive has
-/// COLOR_0; textures are not read.
+/// MaterialLabels finds them in names of materials. Colours of vertices are what GlbColors
+/// makes of theirs, materials and textures.
 ///
 /// \throws BadInput as GlbContainer; Empty without triangles; Unsupported for an extension that
 ///         changes the geometry; Ref for a node with two parents; Value for positions that are

@@ -77,6 +77,24 @@ TEST(GlbColors, VerticesTakeTheColoursOfTexturesAndMaterials) {
   EXPECT_NEAR(t.linear_colors()[1].y(), 1, 1e-5f) << "not repeated";
 }
 
+// As many older models are; what stands beside it is for readers that do not know the extension.
+TEST(GlbColors, DiffuseColoursStandForBaseColours) {
+  TexturedTriangle t;
+  Json& material = t.json["materials"][0];
+  Json diffuse = {{"diffuseFactor", {0.5, 1, 1, 1}}, {"diffuseTexture", {{"index", 0}}}};
+  material = {{"extensions", {{"KHR_materials_pbrSpecularGlossiness", diffuse}}},
+              {"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 1, 1}}}}};
+  t.json["extensionsRequired"] = {"KHR_materials_pbrSpecularGlossiness"};
+  const auto colors = t.linear_colors();
+  ASSERT_EQ(colors.size(), 3U);
+  EXPECT_TRUE(t.read().parsed.has_textures);
+  EXPECT_LT((colors[0] - Eigen::Vector3f(0.5f, 0, 0)).norm(), 1e-5f);
+  EXPECT_LT((colors[1] - Eigen::Vector3f(0, 1, 0)).norm(), 1e-5f);
+  material["extensions"]["KHR_materials_pbrSpecularGlossiness"] = {
+      {"diffuseFactor", {0.25, 0.5, 1, 1}}};
+  EXPECT_LT((t.linear_colors()[2] - Eigen::Vector3f(0.25f, 0.5f, 1)).norm(), 1e-5f);
+}
+
 TEST(GlbColors, TexturesThatCannotBeReadAreTold) {
   TexturedTriangle t;
   t.json["images"][0] = {{"uri", "a.png"}};
