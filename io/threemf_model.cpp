@@ -2,6 +2,8 @@
 #include "io/threemf_model.h"
 
 #include <algorithm>
+#include <charconv>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -14,6 +16,8 @@ namespace cgs {
 namespace {
 
 constexpr std::string_view kCore = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02|";
+constexpr std::string_view kMaterial =
+    "http://schemas.microsoft.com/3dmanufacturing/material/2015/02|";
 constexpr std::string_view kPath =
     "http://schemas.microsoft.com/3dmanufacturing/production/2015/06|path";
 
@@ -49,6 +53,26 @@ Eigen::Affine3d transform_of(const XmlElement& element) {
     out(static_cast<int>(i % 3), static_cast<int>(i / 3)) = values[i];
   }
   return out;
+}
+
+// "#RRGGBB" or "#RRGGBBAA", whose opacity counts for nothing. \return NaN for others
+Eigen::Vector3f color_of(std::string_view text) {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  const Eigen::Vector3f none = Eigen::Vector3f::Constant(kNone);
+  if (!text.starts_with('#') || (text.size() != 7 && text.size() != 9)) return none;
+  Eigen::Vector3f out;
+  for (int c = 0; c < 3; ++c) {
+    const char* const begin = text.data() + 1 + 2 * c;
+    uint8_t value = 0;
+    if (std::from_chars(begin, begin + 2, value, 16).ptr != begin + 2) return none;
+    out[c] = static_cast<float>(value) / 255.0f;
+  }
+  return out;
+}
+
+// What is too large for any resource stays so.
+uint32_t number_of(uint64_t id) {
+  return static_cast<uint32_t>(std::min<uint64_t>(id, std::numeric_limits<uint32_t>::max()));
 }
 
 ThreeMfType type_of(const XmlElement& object) {
@@ -99,6 +123,20 @@ class ModelReader {
       refuse_unknown_extensions(element);
     } else if (is_core) {
       start_core(name, element);
+    } else if (name.starts_with(kMaterial)) {
+      start_material(name.substr(kMaterial.size()), element);
+    }
+  }
+
+  // Of the materials extension.
+  void start_material(std::string_view name, const XmlElement& element) {
+    if (name == "colorgroup") {
+      count_entry();
+      colors_ = &(model_.colors[element.count("id")] = {});
+    } else if (name == "color" && colors_ != nullptr) {
+      colors_->push_back(color_of(element.find("color").value_or("")));
+    } else if (name == "texture2dgroup") {
+      model_.has_textures = true;
     }
   }
 
@@ -117,9 +155,11 @@ class ModelReader {
       const uint64_t id = element.count("id");
       refuse_second(element, id);
       names_ = &model_.material_names[id];
+      colors_ = &(model_.colors[id] = {});
     } else if (name == "base" && names_ != nullptr) {
       count_entry();
       names_->emplace_back(element.at("name"));
+      colors_->push_back(color_of(element.find("displaycolor").value_or("")));
     } else if (name == "item") {
       count_entry();
       model_.build.push_back(placement_of(element));
@@ -133,10 +173,14 @@ class ModelReader {
 
   void end(std::string_view name) {
     --depth_;
+    if (name.starts_with(kMaterial) && name.ends_with("|colorgroup")) colors_ = nullptr;
     if (!name.starts_with(kCore)) return;
     name.remove_prefix(kCore.size());
     if (name == "object") object_ = nullptr;
-    if (name == "basematerials") names_ = nullptr;
+    if (name == "basematerials") {
+      names_ = nullptr;
+      colors_ = nullptr;
+    }
     if (name == "metadata") text_ = nullptr;
   }
 
@@ -175,10 +219,10 @@ class ModelReader {
     refuse_second(element, id);
     object_ = &model_.objects[id];
     object_->type = type_of(element);
-    material_ = {};
+    property_ = {};
     if (!element.find("pid")) return;
-    material_.group = element.count("pid");
-    material_.index = element.find("pindex") ? element.count("pindex") : 0;
+    property_.group = number_of(element.count("pid"));
+    if (element.find("pindex")) property_.index.fill(number_of(element.count("pindex")));
   }
 
   ThreeMfObject& inside(const XmlElement& element) const {
@@ -204,11 +248,13 @@ class ModelReader {
       }
       corners.at(k) = static_cast<uint32_t>(corner);
     }
-    ThreeMfMaterial material = material_;
-    if (element.find("pid")) material.group = element.count("pid");
-    if (element.find("p1")) material.index = element.count("p1");
+    ThreeMfProperty property = property_;
+    if (element.find("pid")) property.group = number_of(element.count("pid"));
+    if (element.find("p1")) property.index.fill(number_of(element.count("p1")));
+    if (element.find("p2")) property.index[1] = number_of(element.count("p2"));
+    if (element.find("p3")) property.index[2] = number_of(element.count("p3"));
     object.triangles.push_back(corners);
-    object.materials.push_back(material);
+    object.properties.push_back(property);
   }
 
   const std::filesystem::path& path_;
@@ -216,11 +262,12 @@ class ModelReader {
   std::map<std::string, std::string> uris_;  // by prefix
   std::set<uint64_t> ids_;
   bool has_root_ = false;
-  int depth_ = 0;                              // of the element that comes; 1 = the root
-  ThreeMfObject* object_ = nullptr;            // the one whose elements come
-  ThreeMfMaterial material_;                   // of its triangles that name none
-  std::vector<std::string>* names_ = nullptr;  // of the group whose elements come
-  std::string* text_ = nullptr;                // the metadata whose text comes
+  int depth_ = 0;                                   // of the element that comes; 1 = the root
+  ThreeMfObject* object_ = nullptr;                 // the one whose elements come
+  ThreeMfProperty property_;                        // of its triangles that name none
+  std::vector<std::string>* names_ = nullptr;       // of the group whose elements come
+  std::vector<Eigen::Vector3f>* colors_ = nullptr;  // as names_, or of colours
+  std::string* text_ = nullptr;                     // the metadata whose text comes
 };
 
 }  // namespace

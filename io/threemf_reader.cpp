@@ -77,6 +77,7 @@ class Assembly {
                      accessories_.empty() ? "builds nothing" : "builds nothing but supports");
     }
     settle_labels(model);
+    settle_colors();
     out_.comments.push_back("metres_per_unit " + model.metres_per_unit);
     if (is_ours_) {
       add_scale(model);
@@ -187,9 +188,10 @@ class Assembly {
       if (is_mirrored) std::swap(corners[1], corners[2]);
       out_.mesh.faces.push_back({first + corners[0], first + corners[1], first + corners[2]});
     }
+    if (!is_ours_) append_colors(object, first, part(at.part));
     if (is_last) give_back(object.triangles);
     append_provenance(object, part(at.part));
-    if (is_last) give_back(object.materials);
+    if (is_last) give_back(object.properties);
   }
 
   template <typename T>
@@ -199,16 +201,54 @@ class Assembly {
 
   // Stops where a triangle has no label; then the mesh has none.
   void append_provenance(const ThreeMfObject& object, const ThreeMfModel& model) {
-    for (const ThreeMfMaterial& material : object.materials) {
+    for (const ThreeMfProperty& material : object.properties) {
       const auto group = model.material_names.find(material.group);
       std::optional<Provenance> label;
-      if (group != model.material_names.end() && material.index < group->second.size()) {
-        label = provenance_of_material(group->second[material.index]);
+      if (group != model.material_names.end() && material.index[0] < group->second.size()) {
+        label = provenance_of_material(group->second[material.index[0]]);
       }
       materials_.add(label);
       if (!label) return;
       out_.mesh.provenance.push_back(*label);
     }
+  }
+
+  // Of vertices the first triangle's that has one.
+  void append_colors(const ThreeMfObject& object, uint32_t first, const ThreeMfModel& model) {
+    constexpr float kOtherColor = 0.1f;
+    has_textures_ = has_textures_ || model.has_textures;
+    if (model.colors.empty()) return;
+    const Eigen::Vector3f none = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+    std::vector<Eigen::Vector3f> colors(out_.positions.size() - first, none);
+    for (size_t f = 0; f < object.triangles.size(); ++f) {
+      const auto group = model.colors.find(object.properties[f].group);
+      if (group == model.colors.end()) continue;
+      for (size_t k = 0; k < 3; ++k) {
+        const uint32_t index = object.properties[f].index.at(k);
+        if (index >= group->second.size() || group->second[index].hasNaN()) continue;
+        Eigen::Vector3f& color = colors[object.triangles[f].at(k)];
+        if (color.hasNaN()) color = group->second[index];
+        if ((color - group->second[index]).cwiseAbs().maxCoeff() > kOtherColor) ++recolored_;
+      }
+    }
+    for (size_t v = 0; v < colors.size(); ++v) {
+      if (colors[v].hasNaN()) continue;
+      colored_.push_back(first + v);
+      out_.mesh.colors.push_back(colors[v]);
+    }
+  }
+
+  // Where materials tell labels, their colours tell these apart, and are not of the surface.
+  void settle_colors() {
+    if (has_textures_) out_.warnings.emplace_back("textures are not read");
+    if (!out_.mesh.provenance.empty()) {
+      out_.mesh.colors.clear();
+      return;
+    }
+    fill_in_colors(out_, colored_);
+    if (recolored_ == 0) return;
+    out_.warnings.push_back("surfaces of different colours meet at " + std::to_string(recolored_) +
+                            " corners; vertices have one, that of the first");
   }
 
   void settle_labels(const ThreeMfModel& model) {
@@ -292,6 +332,9 @@ class Assembly {
   double stored_ = 0;   // cost of all objects once
   bool is_ours_ = false;
   MaterialLabels materials_;
+  std::vector<size_t> colored_;  // vertices that state a colour
+  size_t recolored_ = 0;         // corners where surfaces of other colours meet
+  bool has_textures_ = false;
   bool is_moved_ = false;  // an object, or built more than once
   ParsedMesh out_;
 };

@@ -198,7 +198,7 @@ TEST_F(Read3mf, TakesLabelsOfMaterialsWhereMetadataWereReplaced) {
     file.resources =
         "<basematerials id=\"5\"><base name=\"observed\" displaycolor=\"#FFFFFF\"/>"
         "<base name=\"" +
-        second + "\" displaycolor=\"#FF00FF\"/></basematerials><object id=\"1\" pid=\"5\" " +
+        second + "\" displaycolor=\"#FFFFFF\"/></basematerials><object id=\"1\" pid=\"5\" " +
         "pindex=\"1\">" + ThreeMfFile::tetrahedron() + "</object>";
     const std::string first = "<triangle v1=\"0\"";
     file.resources.insert(file.resources.find(first) + first.size(), " pid=\"5\" p1=\"0\"");
@@ -211,6 +211,7 @@ TEST_F(Read3mf, TakesLabelsOfMaterialsWhereMetadataWereReplaced) {
           Provenance::Observed, Provenance::Inferred, Provenance::Inferred, Provenance::Inferred}));
   ASSERT_EQ(both.warnings.size(), 1U);
   EXPECT_TRUE(both.warnings[0].starts_with("labels are taken from the names of materials"));
+  EXPECT_TRUE(both.mesh.colors.empty()) << "they tell labels apart";
   const ParsedMesh some = read(with_materials("PLA", ""));
   EXPECT_TRUE(some.mesh.provenance.empty());
   ASSERT_EQ(some.warnings.size(), 1U);
@@ -220,6 +221,48 @@ TEST_F(Read3mf, TakesLabelsOfMaterialsWhereMetadataWereReplaced) {
   EXPECT_TRUE(lost.mesh.provenance.empty());
   ASSERT_EQ(lost.warnings.size(), 1U);
   EXPECT_TRUE(lost.warnings[0].starts_with("where its faces come from is no longer known"));
+}
+
+// By the materials extension: the colour of an object, one face that overrides it with one of each
+// corner; a second object in a base material, and a third without any.
+TEST_F(Read3mf, VerticesTakeTheColoursOfFaces) {
+  ThreeMfFile file;
+  file.attributes =
+      "unit=\"millimeter\" requiredextensions=\"m\" "
+      "xmlns:m=\"http://schemas.microsoft.com/3dmanufacturing/material/2015/02\"";
+  const std::string first = "<triangle v1=\"0\" v2=\"2\" v3=\"1\"";
+  std::string mesh = ThreeMfFile::tetrahedron();
+  mesh.insert(mesh.find(first) + first.size(), " pid=\"6\" p1=\"0\" p2=\"1\" p3=\"2\"");
+  file.resources =
+      "<m:colorgroup id=\"5\"><m:color color=\"#336699\"/></m:colorgroup><m:colorgroup id=\"6\">"
+      "<m:color color=\"#FF0000\"/><m:color color=\"#00ff0080\"/><m:color color=\"blue\"/>"
+      "</m:colorgroup><basematerials id=\"7\"><base name=\"PLA\" displaycolor=\"#000000\"/>"
+      "</basematerials><object id=\"1\" pid=\"5\" pindex=\"0\">" +
+      mesh + "</object><object id=\"2\" pid=\"7\" pindex=\"0\">" + ThreeMfFile::tetrahedron() +
+      "</object>";
+  file.build = "<item objectid=\"1\"/><item objectid=\"2\"/>";
+  const ParsedMesh all = read(file);
+  const Eigen::Vector3f of_object(0.2f, 0.4f, 0.6f);
+  ASSERT_EQ(all.mesh.colors.size(), 8u);
+  EXPECT_EQ(all.mesh.colors[0], Eigen::Vector3f::UnitX());
+  EXPECT_LT((all.mesh.colors[1] - of_object).norm(), 1e-6f) << "\"blue\" is no colour here";
+  EXPECT_EQ(all.mesh.colors[2], Eigen::Vector3f::UnitY());
+  EXPECT_LT((all.mesh.colors[3] - of_object).norm(), 1e-6f);
+  EXPECT_EQ(all.mesh.colors[4], Eigen::Vector3f::Zero());
+  EXPECT_EQ(all.warnings,
+            std::vector<std::string>{"surfaces of different colours meet at 4 corners; vertices "
+                                     "have one, that of the first"});
+  file.resources += ThreeMfFile::object(3, ThreeMfFile::tetrahedron());
+  file.build = "<item objectid=\"3\"/><item objectid=\"2\"/>";
+  const ParsedMesh some = read(file);
+  ASSERT_EQ(some.mesh.colors.size(), 8u);
+  EXPECT_EQ(some.mesh.colors[0], Eigen::Vector3f::Ones());
+  EXPECT_EQ(some.mesh.colors[4], Eigen::Vector3f::Zero());
+  EXPECT_EQ(some.warnings, std::vector<std::string>{"4 of 8 vertices state no colour: white"});
+  file.build = "<item objectid=\"3\"/>";
+  EXPECT_TRUE(read(file).mesh.colors.empty());
+  file.resources += "<m:texture2dgroup id=\"9\" texid=\"8\"/>";
+  EXPECT_EQ(read(file).warnings, std::vector<std::string>{"textures are not read"});
 }
 
 TEST_F(Read3mf, RefusesWhatDoesNotLeadAnywhere) {
