@@ -115,18 +115,18 @@ VertexColumns vertex_columns(const PlyHeader& header, const std::filesystem::pat
   return out;
 }
 
-/// Whether a file of ours had labels that another program left out: those that know scalars of
-/// vertices only keep scalar_sigma of them.
-bool has_lost_labels(const PlyHeader& header) {
+/// Warning of a file that had labels, or may have had them; empty for others. Programs that know
+/// scalars of vertices only keep scalar_sigma.
+std::string lost_labels(const PlyHeader& header) {
   const PlyElement* face = header.find("face");
-  if (face == nullptr || face->count == 0 || find_scalar(*face, "scalar_provenance") >= 0) {
-    return false;
-  }
+  if (face == nullptr || face->count == 0) return "";
+  if (find_scalar(*face, "scalar_provenance") >= 0) return "";
   const auto& comments = header.comments;
-  if (is_our_ply(comments)) {
-    return std::find(comments.begin(), comments.end(), kPlyLabels) != comments.end();
-  }
-  return find_scalar(*header.find("vertex"), "scalar_sigma") >= 0;
+  if (std::find(comments.begin(), comments.end(), kPlyLabels) != comments.end()) return kLostLabels;
+  if (is_our_ply(comments) || find_scalar(*header.find("vertex"), "scalar_sigma") < 0) return "";
+  return "it states sigma, but not where its faces come from: another program may have left out "
+         "the "
+         "labels of a file of ours";
 }
 
 /// Whether a file has colours elsewhere than at its vertices, as MeshLab and VCG write them.
@@ -335,7 +335,8 @@ ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
         "textures and colours of faces are not read, only colours of vertices, which it has none "
         "of");
   }
-  if (has_lost_labels(header)) out.warnings.emplace_back(kLostLabels);
+  const std::string lost = lost_labels(header);
+  if (!lost.empty()) out.warnings.push_back(lost);
   const std::string unread = unread_properties(header, !out.mesh.colors.empty());
   if (!unread.empty()) out.warnings.push_back("not read: " + unread);
   if (trailing > 0) {

@@ -49,7 +49,8 @@ struct MeshFile {
 ///
 /// Polygons become fans of triangles. Colours may be uchar or float in [0, 1]. Our own names are
 /// understood as written; a negative or non-finite scalar_sigma is NaN. Arrays the file does not
-/// have stay empty; a warning says where another program left out the labels of a file of ours.
+/// have stay empty; a warning says where another program left out, or may have, the labels of a
+/// file of ours.
 /// \param frame  read into exactly this frame; without it a canonical frame is made from the
 ///               vertices, with unit and origin from the comments
 /// \throws BadInput as parse_ply_header() and read_ply_rows(); Schema (no vertices with x y z),

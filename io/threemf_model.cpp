@@ -55,17 +55,17 @@ Eigen::Affine3d transform_of(const XmlElement& element) {
   return out;
 }
 
-// "#RRGGBB" or "#RRGGBBAA", whose opacity counts for nothing. \return NaN for others
+// "#RRGGBB" or "#RRGGBBAA", whose opacity counts for nothing. \return NaN in it for others
 Eigen::Vector3f color_of(std::string_view text) {
-  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-  const Eigen::Vector3f none = Eigen::Vector3f::Constant(kNone);
-  if (!text.starts_with('#') || (text.size() != 7 && text.size() != 9)) return none;
-  Eigen::Vector3f out;
-  for (int c = 0; c < 3; ++c) {
-    const char* const begin = text.data() + 1 + 2 * c;
+  Eigen::Vector3f out = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  if (!text.starts_with('#') || (text.size() != 7 && text.size() != 9)) return out;
+  for (Eigen::Index c = 0; c < 3; ++c) {
+    const std::string_view digits = text.substr(static_cast<size_t>(1 + 2 * c), 2);
+    const char* const end = digits.data() + digits.size();
     uint8_t value = 0;
-    if (std::from_chars(begin, begin + 2, value, 16).ptr != begin + 2) return none;
-    out[c] = static_cast<float>(value) / 255.0f;
+    if (std::from_chars(digits.data(), end, value, 16).ptr == end) {
+      out[c] = static_cast<float>(value) / 255.0f;
+    }
   }
   return out;
 }

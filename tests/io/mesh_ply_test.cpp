@@ -156,12 +156,13 @@ TEST(MeshPly, SaysThatLabelsOfOursAreLost) {
       "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual\n";
   const std::string labels = "property uchar scalar_provenance\n";
   const std::string other = "property uchar other\n";
-  for (const std::string& comment : {ours + labelled, std::string()}) {
+  for (const std::string& comment : {ours + labelled, labelled, std::string()}) {
     EXPECT_TRUE(warnings_of(comment, labels).empty());
     ASSERT_EQ(warnings_of(comment, other).size(), 1U);
-    EXPECT_TRUE(
-        warnings_of(comment, other)[0].starts_with("where its faces come from is no longer known"));
   }
+  EXPECT_TRUE(
+      warnings_of(labelled, other)[0].starts_with("where its faces come from is no longer known"));
+  EXPECT_TRUE(warnings_of("", other)[0].starts_with("it states sigma, but not where"));
   EXPECT_TRUE(warnings_of(ours, other).empty()) << "it never had any";
 }
 
