@@ -16,6 +16,7 @@
 #include "io/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/depth_network.h"
+#include "libcgs/priors/exposure.h"
 #include "libcgs/priors/measured_range.h"
 
 namespace cgs {
@@ -99,6 +100,17 @@ class TrainingCheckpoint {
   std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
   bool has_failed_ = false;
 };
+
+// Splats keep the colours of the photographs they stem from: where exposures differ, the same
+// surface would come in two colours, and every step of the training would fight over them.
+void match_exposures(Scene& scene, const std::vector<ViewPriors>& priors) {
+  const ExposureGains exposure = exposure_gains(scene, priors);
+  for (size_t k = 0; k < scene.input.size(); ++k) {
+    View& view = scene.views[static_cast<size_t>(scene.input[k])];
+    view.exposure = exposure.gain[k];
+    apply_gain(view.image, view.exposure);
+  }
+}
 
 void optimise(TrainedModel& trained, const ModelRequest& request, const Progress& progress) {
   Model& model = trained.model;
@@ -270,6 +282,7 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   TrainedModel trained;
   trained.priors = estimated.report;
   trained.model.priors = std::move(estimated.views);
+  match_exposures(scene, trained.model.priors);
   trained.model.scene = std::move(scene);
   if (request.inspect) request.inspect(trained.model);
   optimise(trained, request, part_of(progress, kPriorsShare, 1));
@@ -291,6 +304,41 @@ nlohmann::ordered_json settings_to_json(const TrainingOptions& options) {
   return settings;
 }
 
+namespace {
+
+// How far the photographs of any two input views lie apart in the linear light of a channel, at
+// most: 0.25 = one is brighter by a quarter.
+float largest_difference(const Scene& scene) {
+  Eigen::Array3f least = Eigen::Array3f::Constant(1);
+  Eigen::Array3f most = least;
+  for (const int i : scene.input) {
+    const Eigen::Vector3f& gain = scene.views[static_cast<size_t>(i)].exposure;
+    least = least.min(gain.array());
+    most = most.max(gain.array());
+  }
+  return (most / least).maxCoeff() - 1;
+}
+
+// Null where the photographs were exposed alike.
+nlohmann::ordered_json exposure_to_json(const Scene& scene) {
+  const float difference = largest_difference(scene);
+  if (difference == 0) return nullptr;
+  nlohmann::ordered_json views = nlohmann::ordered_json::array();
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    const Eigen::Vector3f& gain = view.exposure;
+    views.push_back({{"view", view.name}, {"gain", {gain.x(), gain.y(), gain.z()}}});
+  }
+  std::array<char, 100> words{};
+  std::snprintf(words.data(),
+                words.size(),
+                "exposures of the photographs differ by up to %.0f %% and were matched",
+                100 * double{difference});
+  return {{"words", words.data()}, {"views", views}};
+}
+
+}  // namespace
+
 nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request) {
   nlohmann::ordered_json loss = nlohmann::ordered_json::array();
   size_t skipped = 0;
@@ -308,6 +356,7 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
             {"offset", trained.priors.alignment.offset},
             {"correspondences", trained.priors.alignment.correspondences}}},
           {"depth_of_views", coverage_to_json(trained)},
+          {"exposure", exposure_to_json(trained.model.scene)},
           {"given_depth", given_depth_to_json(trained.priors)}};
 }
 

@@ -401,8 +401,13 @@ void warn_of(const Json& result, const Terminal& terminal) {
 
 // What a user would not expect of a stage: "kept 33165 of 142884".
 std::string remark_on(const std::string& stage, const Json& result) {
-  if (stage == "model" && result["given_depth"].is_object()) {
-    return "depth files: " + result["given_depth"].value("words", "");
+  if (stage == "model") {
+    const std::string depth = result["given_depth"].is_object()
+                                  ? "depth files: " + result["given_depth"].value("words", "")
+                                  : "";
+    const std::string exposure =
+        result["exposure"].is_object() ? result["exposure"].value("words", "") : "";
+    return depth + (depth.empty() || exposure.empty() ? "" : "; ") + exposure;
   }
   if (stage != "splats") return "";
   const Json& thinning = result["thinning"];

@@ -48,7 +48,8 @@ double largest_stretch(const TriangleMesh& mesh, const PhotoTexture& texture) {
 
 Json report_of(const TriangleMesh& mesh,
                const PhotoTexture& texture,
-               const ExposureGains& exposure,
+               const std::vector<Eigen::Vector3f>& gains,
+               const std::vector<size_t>& samples,
                const Frame& frame) {
   const double area_unit = frame.scale * frame.scale;
   std::vector<size_t> faces(texture.photographs.size(), 0);
@@ -68,12 +69,12 @@ Json report_of(const TriangleMesh& mesh,
   }
   Json views = Json::array();
   for (size_t i = 0; i < faces.size(); ++i) {
-    const Eigen::Vector3f& gain = exposure.gain[i];
+    const Eigen::Vector3f& gain = gains[i];
     views.push_back({{"name", texture.photographs[i].name},
                      {"faces", faces[i]},
                      {"area", area[i]},
                      {"gain", {gain.x(), gain.y(), gain.z()}},
-                     {"samples", exposure.samples[i]}});
+                     {"samples", samples[i]}});
   }
   return {{"views", views},
           {"faces_without_view", faces_without},
@@ -146,13 +147,15 @@ PhotoTexture texture_from_photographs(const Scene& scene,
   const FaceScores scores = face_scores(mesh, views);
   const FaceViews chosen = choose_face_views(mesh, scores);
   const ExposureGains exposure = exposure_gains(mesh, scores, views);
+  std::vector<Eigen::Vector3f> gains;  // with those that load_images() applied
   PhotoTexture texture;
   texture.of_face = chosen.of_face;
   for (size_t i = 0; i < views.size(); ++i) {
     apply_gain(views[i].image, exposure.gain[i]);
+    gains.emplace_back(exposure.gain[i].cwiseProduct(views[i].exposure));
     texture.photographs.push_back({views[i].name, views[i].camera, std::move(views[i].image)});
   }
-  report = report_of(mesh, texture, exposure, scene.frame);
+  report = report_of(mesh, texture, gains, exposure.samples, scene.frame);
   report["seam_length"] = chosen.seam_length * scene.frame.scale;
   report["seam_length_unsmoothed"] = chosen.best_seam_length * scene.frame.scale;
   return texture;

@@ -81,6 +81,9 @@ json camera_json(const Scene& scene, size_t index) {
   entry["role"] = contains(scene.input) ? "input" : contains(scene.held_out) ? "held_out" : "";
   if (view.fisheye) entry["fisheye"] = fisheye_json(*view.fisheye);
   if (view.orientation != 1) entry["orientation"] = view.orientation;
+  if (view.exposure != Eigen::Vector3f::Ones()) {
+    entry["exposure"] = vector_json(view.exposure.cast<double>());
+  }
   if (!view.image_path.empty()) {
     entry["image_path"] = std::filesystem::absolute(view.image_path).lexically_normal().string();
   }
@@ -189,6 +192,8 @@ std::string read_name(const JsonValue& value, bool is_foreign, std::set<std::str
   return name;
 }
 
+constexpr float kLargestGain = 1000;  // ten stops
+
 View read_view(const JsonValue& entry, const Frame& frame) {
   const Refuse refuse = [&](Defect defect, const std::string& why) { entry.fail(defect, why); };
   View view;
@@ -222,6 +227,12 @@ View read_view(const JsonValue& entry, const Frame& frame) {
     view.orientation = orientation->count();
     if (view.orientation < 1 || view.orientation > 8) {
       orientation->fail(Defect::Value, "must be 1 ... 8, as Exif counts");
+    }
+  }
+  if (const auto exposure = entry.find("exposure")) {
+    view.exposure = read_vector(*exposure).cast<float>();
+    if (!(view.exposure.minCoeff() > 0 && view.exposure.maxCoeff() <= kLargestGain)) {
+      exposure->fail(Defect::Value, "factors of exposure must be > 0 and <= 1000");
     }
   }
   return view;

@@ -39,6 +39,9 @@ struct View {
   /// Of a photograph through a fisheye lens, which load_images() turns into what a pinhole camera
   /// would have recorded; `distortion` is then zero. Empty = none.
   std::optional<Fisheye> fisheye;
+  /// Factors on the linear light of the photograph, by which load_images() makes it agree with the
+  /// other input views.
+  Eigen::Vector3f exposure = Eigen::Vector3f::Ones();
   ColorImage image;                  ///< Empty until loaded; same size as camera.
   MaskMap valid;                     ///< Empty = every pixel; else 1 where the image may be used.
   std::filesystem::path depth_path;  ///< File with depth from elsewhere; empty = none.

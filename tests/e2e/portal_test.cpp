@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/image.h"
+#include "io/png.h"
+#include "libcgs/core/exposure.h"
 #include "samples/capture/files.h"
 #include "tests/support/portal_measurement.h"
 #include "tests/support/run_cgs.h"
@@ -170,6 +173,33 @@ TEST(Portal, StagesByHandGiveTheFilesOfARun) {
        {"model/gaussians.ply", "views/view_05.exr", "mesh/surface.ply", "mesh/watertight.ply"}) {
     EXPECT_TRUE(test::read_bytes(dir / file) == test::read_bytes(dir / "run" / file)) << file;
   }
+}
+
+// Of the views held out, whose exposure the middle one of the input views has.
+double held_out_psnr(const std::filesystem::path& capture, const std::filesystem::path& model) {
+  const auto trained =
+      run_cgs("train " + capture.string() +
+              " --views view_01,view_02,view_03 --preset draft -q -o " + model.string());
+  EXPECT_EQ(trained.exit_code, 0) << trained.err;
+  const auto evaluation = run_cgs("evaluate " + model.string() + " -q --json");
+  EXPECT_EQ(evaluation.exit_code, 0) << evaluation.err;
+  return ordered_json::parse(evaluation.out)["mean"]["psnr_seen"].get<double>();
+}
+
+TEST(Portal, LosesNothingToAnAutomaticExposure) {
+  make_capture(kSmallCapture, 3);
+  const test::TempDir dir;
+  std::filesystem::copy(kSmallCapture, dir / "capture", std::filesystem::copy_options::recursive);
+  const std::filesystem::path photograph = dir / "capture/images/view_02.png";
+  ColorImage image = read_image(photograph, nullptr, {});
+  apply_gain(image, {0.7f, 0.65f, 0.6f});
+  write_png(photograph, image);
+  const double alike = held_out_psnr(kSmallCapture, dir / "alike");
+  EXPECT_GT(held_out_psnr(dir / "capture", dir / "model"), alike - 0.5);
+  const auto report = ordered_json::parse(test::read_bytes(dir / "model/training.json"));
+  EXPECT_NEAR(report["exposure"]["views"][1]["gain"][0].get<double>(), 1 / 0.7, 0.05);
+  EXPECT_TRUE(
+      ordered_json::parse(test::read_bytes(dir / "alike/training.json"))["exposure"].is_null());
 }
 
 }  // namespace

@@ -44,6 +44,7 @@ Scene far_away_scene() {
   fisheye.camera = resized(picture, picture.width / 2, picture.height / 2);
   fisheye.camera.world_from_cam = pose;
   scene.input = {0, 2};
+  scene.views[2].exposure = {1.1f, 0.7f, 1 / 3.0f};
   scene.held_out = {1};
   scene.frame.metres_per_unit = 0.3;
   scene.frame.metres_sigma = 0.001;
@@ -84,6 +85,7 @@ TEST_F(CamerasJson, RestoresTheSceneBitForBit) {
     EXPECT_EQ(scene.views[i].near, out.views[i].near);
     EXPECT_EQ(scene.views[i].far, out.views[i].far);
     EXPECT_EQ(scene.views[i].distortion, out.views[i].distortion);
+    EXPECT_EQ(scene.views[i].exposure, out.views[i].exposure);
     EXPECT_EQ(lens_numbers(scene.views[i]), lens_numbers(out.views[i]));
   }
   EXPECT_EQ(out.input, scene.input);
@@ -167,6 +169,8 @@ TEST_F(CamerasJson, RefusesBadFiles) {
   EXPECT_EQ(refused("/1/rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}}), "VALUE");
   EXPECT_EQ(refused("/1/rotation", {{1, 0, 0}, {0, 1, 0}}), "SCHEMA");
   EXPECT_EQ(refused("/1/distortion", {1, 2}), "SCHEMA");
+  EXPECT_EQ(refused("/2/exposure", {1, 0, 1}), "VALUE");
+  EXPECT_EQ(refused("/2/exposure", {1, 1e9, 1}), "VALUE");
   EXPECT_EQ(refused("/2/fisheye/k", {1, 2}), "SCHEMA");
   EXPECT_EQ(refused("/2/fisheye/p", {1, 2, 3}), "SCHEMA");
   EXPECT_EQ(refused("/2/fisheye/fx", 0), "VALUE");

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/core/exposure.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/QR>
+#include <tbb/parallel_for.h>
+
+#include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
+#include "libcgs/core/srgb.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr size_t kFewestSamples = 100;  // below, a pair of views says nothing
+constexpr float kDarkest = 0.04f;       // sRGB-coded
+constexpr float kBrightest = 0.98f;
+
+/// Colour where a view shows a point, bilinear; NaN where it is clipped or nearly black.
+Eigen::Vector3f color_at(const View& view, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d uvz = view.camera.project(point);
+  const float u =
+      std::clamp(static_cast<float>(uvz.x() - 0.5), 0.0f, static_cast<float>(view.image.width - 1));
+  const float v = std::clamp(
+      static_cast<float>(uvz.y() - 0.5), 0.0f, static_cast<float>(view.image.height - 1));
+  const int x = std::min(static_cast<int>(u), std::max(0, view.image.width - 2));
+  const int y = std::min(static_cast<int>(v), std::max(0, view.image.height - 2));
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (int k = 0; k < 4; ++k) {
+    const int i = std::min(x + (k & 1), view.image.width - 1);
+    const int j = std::min(y + (k >> 1), view.image.height - 1);
+    const Eigen::Vector3f& color = view.image(i, j);
+    if (!(color.minCoeff() > kDarkest && color.maxCoeff() < kBrightest)) {
+      return Eigen::Vector3f::Constant(std::nanf(""));
+    }
+    const float weight =
+        (1 - std::abs(u - static_cast<float>(i))) * (1 - std::abs(v - static_cast<float>(j)));
+    sum += weight * color.unaryExpr([](float c) { return linear_from_srgb(c); });
+  }
+  return sum;
+}
+
+/// What two views say about each other.
+struct Pair {
+  size_t a = 0;
+  size_t b = 0;
+  std::array<std::vector<float>, 3> log_ratio;  ///< ln(colour in a / colour in b), per channel.
+};
+
+Pair compare(std::span<const View* const> views,
+             const SharedSurface& shared,
+             std::pair<size_t, size_t> which) {
+  Pair out{which.first, which.second, {}};
+  for (const Eigen::Vector3d& point : shared(out.a, out.b)) {
+    const Eigen::Vector3f ratio =
+        color_at(*views[out.a], point).cwiseQuotient(color_at(*views[out.b], point));
+    if (!(ratio.minCoeff() > 0)) continue;
+    for (int c = 0; c < 3; ++c)
+      out.log_ratio.at(static_cast<size_t>(c)).push_back(std::log(ratio[c]));
+  }
+  return out;
+}
+
+/// Least squares with the smallest norm, which makes the sum in each connected group 0.
+Eigen::VectorXd log_gains(const std::vector<Pair>& pairs, size_t views, size_t channel) {
+  const auto n = static_cast<Eigen::Index>(views);
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
+  for (const Pair& pair : pairs) {
+    const auto a = static_cast<Eigen::Index>(pair.a);
+    const auto b = static_cast<Eigen::Index>(pair.b);
+    std::vector<float> ratios = pair.log_ratio.at(channel);
+    const auto weight = static_cast<double>(ratios.size());
+    const double difference = -weight * double{median(ratios)};  // gain a - gain b
+    normal(a, a) += weight;
+    normal(b, b) += weight;
+    normal(a, b) -= weight;
+    normal(b, a) -= weight;
+    right[a] += difference;
+    right[b] -= difference;
+  }
+  return normal.completeOrthogonalDecomposition().solve(right);
+}
+
+}  // namespace
+
+ExposureGains exposure_gains(std::span<const View* const> views, const SharedSurface& shared) {
+  for (const View* view : views) {
+    require(!view->image.empty(), "exposure_gains: every view must have its image", view->name);
+  }
+  ExposureGains out;
+  out.gain.assign(views.size(), Eigen::Vector3f::Ones());
+  out.samples.assign(views.size(), 0);
+  std::vector<std::pair<size_t, size_t>> which;
+  for (size_t a = 0; a < views.size(); ++a) {
+    for (size_t b = a + 1; b < views.size(); ++b) which.emplace_back(a, b);
+  }
+  std::vector<Pair> pairs(which.size());
+  tbb::parallel_for(
+      size_t(0), which.size(), [&](size_t i) { pairs[i] = compare(views, shared, which[i]); });
+  std::erase_if(pairs, [](const Pair& p) { return p.log_ratio[0].size() < kFewestSamples; });
+  if (pairs.empty()) return out;
+  for (const Pair& pair : pairs) {
+    out.samples[pair.a] += pair.log_ratio[0].size();
+    out.samples[pair.b] += pair.log_ratio[0].size();
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    const Eigen::VectorXd logs = log_gains(pairs, views.size(), c);
+    for (size_t v = 0; v < views.size(); ++v) {
+      out.gain[v][static_cast<Eigen::Index>(c)] =
+          static_cast<float>(std::exp(logs[static_cast<Eigen::Index>(v)]));
+    }
+  }
+  return out;
+}
+
+void apply_gain(ColorImage& image, const Eigen::Vector3f& gain) {
+  for (int c = 0; c < 3; ++c) {
+    if (gain[c] == 1) continue;
+    tbb::parallel_for(size_t(0), image.data.size(), [&](size_t i) {
+      image.data[i][c] = srgb_from_linear(gain[c] * linear_from_srgb(image.data[i][c]));
+    });
+  }
+}
+
+}  // namespace cgs

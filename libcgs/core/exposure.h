@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "libcgs/core/scene.h"
+
+namespace cgs {
+
+/// Factors on linear light that make photographs agree where they show the same surface.
+struct ExposureGains {
+  std::vector<Eigen::Vector3f> gain;  ///< Per view, one factor per channel.
+  std::vector<size_t> samples;        ///< Per view, surface points it shares with another view.
+};
+
+/// Points of the surface that views `a` and `b` both show, in the frame of their cameras. Any
+/// number of threads may ask at once.
+using SharedSurface = std::function<std::vector<Eigen::Vector3d>(size_t a, size_t b)>;
+
+/// Estimates the gains of views from what several of them show: for each pair the median of the log
+/// ratio of their colours, then least squares over the pairs, weighted by their samples. The
+/// product of the gains is 1 in every connected group of views; one that shares nothing with
+/// another keeps 1. Clipped and nearly black colours take no part.
+/// \throws InvalidInput if the image of a view is not loaded
+ExposureGains exposure_gains(std::span<const View* const> views, const SharedSurface& shared);
+
+/// Multiplies the linear light of an sRGB-coded picture; a factor of exactly 1 changes no bit.
+/// Values beyond 1 stay so; writers clip them.
+void apply_gain(ColorImage& image, const Eigen::Vector3f& gain);
+
+}  // namespace cgs

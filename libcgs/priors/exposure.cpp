@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/exposure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+/// Whether a view measured depth where it shows a point, and that of the point.
+bool confirms(const Camera& camera, const ViewPriors& priors, const Eigen::Vector3d& point) {
+  constexpr double kSame = 0.01;  // of the depth
+  const Eigen::Vector3d uvz = camera.project(point);
+  if (!(uvz.z() > 0 && uvz.x() >= 0 && uvz.y() >= 0 && uvz.x() < camera.width &&
+        uvz.y() < camera.height)) {
+    return false;
+  }
+  const int x = static_cast<int>(uvz.x());
+  const int y = static_cast<int>(uvz.y());
+  return priors.origin(x, y) == DepthOrigin::Measured &&
+         std::abs(priors.depth(x, y) - uvz.z()) <= kSame * uvz.z();
+}
+
+std::vector<Eigen::Vector3d> shared_surface(const View& a,
+                                            const ViewPriors& priors_of_a,
+                                            const View& b,
+                                            const ViewPriors& priors_of_b) {
+  constexpr double kMostSamples = 100000;  // of the pixels of a view, on a grid
+  const double pixels = static_cast<double>(a.camera.width) * a.camera.height;
+  const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kMostSamples))));
+  std::vector<Eigen::Vector3d> out;
+  for (int y = 0; y < a.camera.height; y += step) {
+    for (int x = 0; x < a.camera.width; x += step) {
+      if (priors_of_a.origin(x, y) != DepthOrigin::Measured) continue;
+      const Eigen::Vector3d point = a.camera.unproject(x + 0.5, y + 0.5, priors_of_a.depth(x, y));
+      if (confirms(b.camera, priors_of_b, point)) out.push_back(point);
+    }
+  }
+  return out;
+}
+
+/// The middle value; of an even number of them the mean of the two in the middle.
+float middle(std::vector<float> values) {
+  std::sort(values.begin(), values.end());
+  const size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+}
+
+/// Makes the exposure that most views have the common one.
+void keep_most_as_they_are(ExposureGains& exposure) {
+  for (int c = 0; c < 3; ++c) {
+    std::vector<float> logs;
+    for (size_t v = 0; v < exposure.gain.size(); ++v) {
+      if (exposure.samples[v] > 0) logs.push_back(std::log(exposure.gain[v][c]));
+    }
+    if (logs.empty()) return;
+    const float common = std::exp(middle(logs));
+    for (size_t v = 0; v < exposure.gain.size(); ++v) {
+      if (exposure.samples[v] > 0) exposure.gain[v][c] /= common;
+    }
+  }
+}
+
+}  // namespace
+
+ExposureGains exposure_gains(const Scene& scene, const std::vector<ViewPriors>& priors) {
+  std::vector<const View*> views;
+  for (const int i : scene.input) views.push_back(&scene.views[static_cast<size_t>(i)]);
+  require(priors.size() == views.size(),
+          "exposure_gains: number of priors must be that of the input views",
+          priors.size());
+  ExposureGains out = exposure_gains(views, [&](size_t a, size_t b) {
+    return shared_surface(*views[a], priors[a], *views[b], priors[b]);
+  });
+  keep_most_as_they_are(out);
+  const auto is_small = [](const Eigen::Vector3f& gain) {
+    return (gain.array() - 1).abs().maxCoeff() < kLeastGain;
+  };
+  if (std::all_of(out.gain.begin(), out.gain.end(), is_small)) {
+    std::fill(out.gain.begin(), out.gain.end(), Eigen::Vector3f::Ones());
+  }
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/exposure.h"
+
+#include <gtest/gtest.h>
+
+#include "libcgs/core/error.h"
+#include "tests/support/stereo_scene.h"
+
+namespace cgs::exposure_of_priors_test {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+// A wall and a square before it, which hides another part of the wall from each of three cameras.
+const std::vector<test::TexturedPatch> kPatches = {
+    {Vector3d(0, 0, 6), Vector3d::UnitX(), Vector3d::UnitY()},
+    {Vector3d(0, 0, 3), Vector3d::UnitX(), Vector3d::UnitY(), 0.5, 0.5}};
+
+Scene photographs() {
+  std::vector<Camera> cameras;
+  for (const double x : {-0.4, 0.0, 0.4}) {
+    cameras.push_back(test::looking_at({x, 0, 0}, {0, 0, 4}, 160, 120, 150));
+  }
+  return test::photographed_scene(kPatches, cameras, 0.06);
+}
+
+std::vector<ViewPriors> true_priors(const Scene& scene) {
+  std::vector<ViewPriors> out;
+  for (const View& view : scene.views) {
+    ViewPriors priors;
+    priors.depth = test::true_depth(kPatches, view.camera);
+    priors.origin = Raster<DepthOrigin>(160, 120, DepthOrigin::Measured);
+    out.push_back(std::move(priors));
+  }
+  return out;
+}
+
+void expect_gain(const Vector3f& found, const Vector3f& expected) {
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c] / expected[c], 1, 0.01) << c;
+}
+
+TEST(ExposureOfPriors, BringsTheOneThatStandsOutToTheOthers) {
+  Scene scene = photographs();
+  apply_gain(scene.views[1].image, {0.7f, 0.8f, 0.5f});
+  const ExposureGains found = exposure_gains(scene, true_priors(scene));
+  expect_gain(found.gain[0], Vector3f::Ones());
+  expect_gain(found.gain[1], {1 / 0.7f, 1 / 0.8f, 1 / 0.5f});
+  expect_gain(found.gain[2], Vector3f::Ones());
+}
+
+TEST(ExposureOfPriors, OfTwoViewsMeetInTheMiddle) {
+  Scene scene = photographs();
+  apply_gain(scene.views[2].image, Vector3f::Constant(0.64f));
+  scene.input = {0, 2};
+  std::vector<ViewPriors> priors = true_priors(scene);
+  priors.erase(priors.begin() + 1);
+  const ExposureGains found = exposure_gains(scene, priors);
+  expect_gain(found.gain[0], Vector3f::Constant(0.8f));
+  expect_gain(found.gain[1], Vector3f::Constant(1.25f));
+}
+
+TEST(ExposureOfPriors, LeavesPhotographsExposedAlikeAsTheyAre) {
+  Scene scene = photographs();
+  apply_gain(scene.views[1].image, Vector3f::Constant(1.015f));
+  for (const Vector3f& gain : exposure_gains(scene, true_priors(scene)).gain) {
+    EXPECT_EQ(gain, Vector3f::Ones());
+  }
+}
+
+// What was filled in lies where no other view confirms it, and may show anything there.
+TEST(ExposureOfPriors, HeedsMeasuredDepthAlone) {
+  Scene scene = photographs();
+  apply_gain(scene.views[1].image, Vector3f::Constant(0.5f));
+  std::vector<ViewPriors> priors = true_priors(scene);
+  for (DepthOrigin& origin : priors[1].origin.data) origin = DepthOrigin::Completed;
+  const ExposureGains found = exposure_gains(scene, priors);
+  EXPECT_EQ(found.gain[1], Vector3f::Ones());
+  EXPECT_EQ(found.samples[1], 0u);
+  priors.pop_back();
+  EXPECT_THROW(exposure_gains(scene, priors), InvalidInput);
+}
+
+}  // namespace
+}  // namespace cgs::exposure_of_priors_test
