@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/length.h"
+#include "io/json_file.h"
 #include "io/mesh_ply.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
@@ -59,8 +60,6 @@ struct Outward {
   bool is_stated = true;          // by the file; else guessed from how the points lie
 };
 
-bool is_stated(const Eigen::Vector3f& direction) { return !direction.isZero(0); }
-
 // Neighbours agree, and the topmost vertex of every part looks up; nobody knows where that is
 // hardly more up than down.
 Outward estimated_outward(const MeasurableMesh& mesh) {
@@ -88,7 +87,7 @@ void fill_from_nearest(std::vector<Eigen::Vector3f>& directions,
   std::vector<Eigen::Vector3f> known;
   std::vector<Eigen::Vector3f> known_places;
   for (size_t i = 0; i < directions.size(); ++i) {
-    if (!is_stated(directions[i])) continue;
+    if (!is_known_normal(directions[i])) continue;
     known.push_back(directions[i]);
     known_places.push_back(places[i]);
   }
@@ -96,7 +95,7 @@ void fill_from_nearest(std::vector<Eigen::Vector3f>& directions,
   const KdTree tree(known_places);
   std::vector<Neighbor> found;
   for (size_t i = 0; i < directions.size(); ++i) {
-    if (is_stated(directions[i])) continue;
+    if (is_known_normal(directions[i])) continue;
     tree.nearest(places[i], 1, found);
     directions[i] = known[found.front().point];
   }
@@ -107,7 +106,7 @@ std::vector<Eigen::Vector3f> stated_outward(const MeasurableMesh& mesh) {
   std::vector<Eigen::Vector3f> out =
       mesh.mesh.faces.empty() ? mesh.mesh.normals : vertex_normals(mesh.mesh);
   // Some programs write normals that are all 0.
-  if (std::none_of(out.begin(), out.end(), is_stated)) return {};
+  if (std::none_of(out.begin(), out.end(), is_known_normal)) return {};
   fill_from_nearest(out, mesh.mesh.vertices);
   return out;
 }
@@ -177,9 +176,10 @@ std::string variance_source(const std::vector<M3c2Place>& places,
 }
 
 [[noreturn]] void refuse_without_distance(const M3c2Comparison& found, const Frame& frame) {
-  const bool has_normals = std::any_of(found.places.begin(),
-                                       found.places.end(),
-                                       [](const M3c2Place& p) { return is_stated(p.normal); });
+  const bool has_normals =
+      std::any_of(found.places.begin(), found.places.end(), [](const M3c2Place& p) {
+        return is_known_normal(p.normal);
+      });
   if (!has_normals) {
     throw InvalidInput("no point of A has four seen points within " +
                        format_length(0.5 * found.options.normal_scale, frame) +
@@ -205,8 +205,6 @@ double at_share(const std::vector<double>& sorted, double share) {
   if (sorted.empty()) return std::nan("");
   return sorted[static_cast<size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
-
-Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 // What is doubtful about the distances, a line each.
 std::string doubts_text(const M3c2Comparison& found) {

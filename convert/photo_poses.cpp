@@ -11,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/html.h"
 #include "convert/run_record.h"
 #include "io/atomic_file.h"
 #include "io/colmap_writer.h"
@@ -144,12 +145,6 @@ UnposedPhoto unposed_photo(MaskIndex& masks,
                       static_cast<int>(std::lround(color.z()))});
   }
   return out;
-}
-
-std::string percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f %%", 100 * share);
-  return text;
 }
 
 // Pairs of placed photographs that are next to no way apart: a burst, or two copies of one.

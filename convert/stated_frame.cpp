@@ -8,7 +8,6 @@
 
 #include "convert/html.h"
 #include "convert/length.h"
-#include "io/camera_checks.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

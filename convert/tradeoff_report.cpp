@@ -287,8 +287,6 @@ std::string plots_svg(const Tradeoff& tradeoff) {
                            error + ", and packing" + unit)});
 }
 
-Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-
 Json error_json(const std::optional<SurfaceError>& error) {
   if (!error) return nullptr;
   return {{"rms", error->rms}, {"p95", error->p95}, {"max", error->max}};

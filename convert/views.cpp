@@ -27,11 +27,7 @@ using Json = nlohmann::ordered_json;
 
 // What a view was to the model; null where no view is an input, as of splats of other programs.
 Json role_of(const Scene& scene, int index) {
-  if (scene.input.empty()) return nullptr;
-  const auto is_in = [&](const std::vector<int>& views) {
-    return std::find(views.begin(), views.end(), index) != views.end();
-  };
-  return is_in(scene.input) ? "input" : is_in(scene.held_out) ? "held out" : "not used";
+  return scene.input.empty() ? Json() : Json(view_role(scene, index));
 }
 
 // Without the depth that input views saw, every pixel would look like a hole.
@@ -264,6 +260,13 @@ std::vector<int> with_photograph(Scene& scene, const std::vector<int>& views) {
 }
 
 }  // namespace
+
+std::string view_role(const Scene& scene, int view) {
+  const auto is_in = [&](const std::vector<int>& views) {
+    return std::find(views.begin(), views.end(), view) != views.end();
+  };
+  return is_in(scene.input) ? "input" : is_in(scene.held_out) ? "held out" : "not used";
+}
 
 std::string unknown_holes_warning(const Model& model) {
   if (knows_holes(model)) return {};

@@ -16,9 +16,12 @@ namespace cgs {
 /// its input views saw, nor which views those were. Empty if it has.
 std::string unknown_holes_warning(const Model& model);
 
+/// What a view, an index into scene.views, is to its scene: "input", "held out" or "not used".
+std::string view_role(const Scene& scene, int view);
+
 /// Writes <name>.exr and <name>.{color,depth,normal,hole}.png for each of the given views of the
 /// model, and returns per view {"name", "role", "hole_fraction", …}, of pixels that
-/// are not masked. The role is "input", "held out" or "not used"; null where no view is an input.
+/// are not masked. The role is view_role(), or null where no view is an input.
 /// Without priors no hole.png is written and the hole fraction is null; the EXR says, as it does of
 /// any pixel, that no input view can vouch for it.
 nlohmann::ordered_json write_views(const Model& model,

@@ -16,15 +16,12 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
 #include "meshing/mesh_distance.h"
+#include "meshing/provenance.h"
 #include "meshing/watertight.h"
 
 namespace cgs {
 
 namespace {
-
-bool is_inferred(const TriangleMesh& mesh, size_t f) {
-  return !mesh.provenance.empty() && mesh.provenance[f] == Provenance::Inferred;
-}
 
 // Corners, each with the better label of its faces, then places by area.
 struct Places {

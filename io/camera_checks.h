@@ -12,10 +12,6 @@
 
 namespace cgs {
 
-/// Relative standard deviation of scales that come of tracked poses, as phones and programs state
-/// them without one.
-inline constexpr double kTrackedScale = 0.05 / 3;
-
 /// Throws the BadInput of a reader, which knows the file and the place in it.
 using Refuse = std::function<void(Defect defect, const std::string& reason)>;
 

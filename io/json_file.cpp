@@ -106,6 +106,10 @@ std::string json_text(const nlohmann::ordered_json& value, int indent) {
   return value.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
+nlohmann::ordered_json number_or_null(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
+}
+
 JsonValue::JsonValue(const json& value, std::filesystem::path path, std::string pointer)
     : value_(&value), path_(std::move(path)), pointer_(std::move(pointer)) {}
 

@@ -29,6 +29,9 @@ nlohmann::json parse_json(std::string_view bytes,
 /// not be UTF-8 but JSON has to be: other bytes are replaced.
 std::string json_text(const nlohmann::ordered_json& value, int indent = 2);
 
+/// A number, or null for one that is not finite, which JSON cannot state.
+nlohmann::ordered_json number_or_null(double value);
+
 /// A value inside a JSON file that knows its file and JSON pointer (RFC 6901), so that every
 /// complaint about it names both. Refers to the document: keep that alive.
 class JsonValue {

@@ -9,6 +9,10 @@
 
 namespace cgs {
 
+/// Whether a normal is one: 0 0 0 stands for one that is not known, in files of other programs,
+/// too.
+inline bool is_known_normal(const Eigen::Vector3f& normal) { return !normal.isZero(0); }
+
 /// Unit normals of a point cloud: per point the direction in which it and its nearest neighbours
 /// spread least; which of the two is open. 0 where the neighbours are one point or on a line.
 /// \param neighbors  the point included, >= 3

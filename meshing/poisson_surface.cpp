@@ -16,6 +16,7 @@
 #include "meshing/certificate.h"
 #include "meshing/down_sampling.h"
 #include "meshing/isosurface.h"
+#include "meshing/point_normals.h"
 #include "meshing/poisson_function.h"
 
 namespace cgs {
@@ -28,9 +29,7 @@ void check_cloud(const TriangleMesh& cloud) {
   require(cloud.faces.empty(),
           "Poisson's surface is made from points; the number of faces",
           cloud.faces.size());
-  const auto known = std::count_if(cloud.normals.begin(),
-                                   cloud.normals.end(),
-                                   [](const Eigen::Vector3f& n) { return !n.isZero(0); });
+  const auto known = std::count_if(cloud.normals.begin(), cloud.normals.end(), is_known_normal);
   require(known >= kLeast,
           "Poisson's surface needs 10 points or more that state a normal, the number",
           known);
@@ -45,7 +44,7 @@ double default_spacing(size_t points, double point_spacing) {
 TriangleMesh thinned(const TriangleMesh& cloud, double side) {
   TriangleMesh bare;
   for (size_t v = 0; v < cloud.vertices.size(); ++v) {
-    if (cloud.normals[v].isZero(0)) continue;
+    if (!is_known_normal(cloud.normals[v])) continue;
     bare.vertices.push_back(cloud.vertices[v]);
     bare.normals.emplace_back(cloud.normals[v].stableNormalized());
     if (!cloud.sigma.empty()) bare.sigma.push_back(cloud.sigma[v]);

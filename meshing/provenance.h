@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -9,6 +10,11 @@
 namespace cgs {
 
 struct Volume;
+
+/// Whether a face is labelled Inferred; no face of a mesh without labels is.
+inline bool is_inferred(const TriangleMesh& mesh, size_t face) {
+  return !mesh.provenance.empty() && mesh.provenance[face] == Provenance::Inferred;
+}
 
 /// What the volume says about a vertex of a surface made from it.
 enum class Evidence : uint8_t {

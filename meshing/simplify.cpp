@@ -8,15 +8,12 @@
 
 #include "libcgs/core/error.h"
 #include "meshing/edge_collapse.h"
+#include "meshing/provenance.h"
 #include "meshing/self_intersections.h"
 
 namespace cgs {
 
 namespace {
-
-bool is_inferred(const TriangleMesh& mesh, size_t f) {
-  return !mesh.provenance.empty() && mesh.provenance[f] == Provenance::Inferred;
-}
 
 // Of the largest error on edges, as a share of the error allowed.
 constexpr double kAccuracy = 1.0 / 256;

@@ -32,9 +32,7 @@ Provenance label_by_support(float support) {
 // \return none if all are zero
 std::vector<Eigen::Vector3f> unit_normals(std::vector<Eigen::Vector3f> normals) {
   for (Eigen::Vector3f& n : normals) n.stableNormalize();
-  const bool any = std::any_of(
-      normals.begin(), normals.end(), [](const Eigen::Vector3f& n) { return !n.isZero(0); });
-  if (!any) normals.clear();
+  if (std::none_of(normals.begin(), normals.end(), is_known_normal)) normals.clear();
   return normals;
 }
 

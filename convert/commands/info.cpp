@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -15,6 +15,7 @@
 #include "convert/frame_json.h"
 #include "convert/html.h"
 #include "convert/scene_request.h"
+#include "convert/views.h"
 #include "io/json_file.h"
 #include "io/view_names.h"
 #include "libcgs/core/error.h"
@@ -34,17 +35,11 @@ struct InfoArgs {
 Json camera_json(const Scene& scene, int index) {
   const View& view = scene.views[static_cast<size_t>(index)];
   const Camera& camera = view.camera;
-  const auto listed = [&](const std::vector<int>& views) {
-    return std::find(views.begin(), views.end(), index) != views.end();
-  };
-  const DepthRange range = listed(scene.input) ? depth_range(scene, index) : DepthRange{};
+  const std::string role = view_role(scene, index);
+  const DepthRange range = role == "input" ? depth_range(scene, index) : DepthRange{};
   return {{"index", index_of(scene, index)},
           {"name", view.name},
-          {"role",
-           listed(scene.input)       ? "input"
-           : listed(scene.held_out)  ? "held out"
-           : view.image_path.empty() ? "no image"
-                                     : "not used"},
+          {"role", role == "not used" && view.image_path.empty() ? "no image" : role},
           {"width", camera.width},
           {"height", camera.height},
           {"fx", camera.fx},

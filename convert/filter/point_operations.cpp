@@ -47,9 +47,6 @@ FilterStep prepare_voxel(FilterArguments& arguments) {
   };
 }
 
-// Other programs write 0 0 0 where they know of none.
-bool is_stated(const Eigen::Vector3f& normal) { return !normal.isZero(0); }
-
 FilterStep prepare_normals(FilterArguments& arguments) {
   const bool given = arguments.more();
   constexpr size_t kDefault = 30;
@@ -64,7 +61,8 @@ FilterStep prepare_normals(FilterArguments& arguments) {
     }
     const std::vector<Eigen::Vector3f> before = std::move(mesh.normals);
     mesh.normals = estimated_normals(mesh.vertices, neighbors);
-    const auto stated = static_cast<size_t>(std::count_if(before.begin(), before.end(), is_stated));
+    const auto stated =
+        static_cast<size_t>(std::count_if(before.begin(), before.end(), is_known_normal));
     if (stated > 0 && stated == before.size()) {
       turn_like(mesh.normals, before);
       return "on the side of those before";

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -8,6 +9,7 @@
 #include "convert/length.h"
 #include "libcgs/core/error.h"
 #include "meshing/advancing_front.h"
+#include "meshing/point_normals.h"
 #include "meshing/poisson_surface.h"
 
 namespace cgs {
@@ -17,9 +19,7 @@ namespace {
 // \return what is to be said of points that state none
 std::string require_normals(const TriangleMesh& cloud) {
   const auto none = static_cast<size_t>(
-      std::count_if(cloud.normals.begin(), cloud.normals.end(), [](const Eigen::Vector3f& n) {
-        return n.isZero(0);
-      }));
+      std::count_if(cloud.normals.begin(), cloud.normals.end(), std::not_fn(is_known_normal)));
   if (none == cloud.normals.size()) {
     throw InvalidInput("--op poisson: the points have no normals; put --op normals before it");
   }

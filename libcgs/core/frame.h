@@ -14,6 +14,10 @@ enum class ScaleSource { Unknown, Assumed, CameraPoses, KnownDistance, ControlPo
 
 std::string scale_source_name(ScaleSource source);
 
+/// Relative standard deviation of scales that come of tracked poses, as phones and programs state
+/// them without one.
+inline constexpr double kTrackedScale = 0.05 / 3;
+
 /// The canonical frame all float data live in, and how to leave it.
 ///
 /// world = origin + scale * internal. The origin is snapped to a power-of-two grid and the scale is
