@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/pipeline.h"
 
-#include <algorithm>
 #include <map>
 #include <optional>
 #include <set>
@@ -11,7 +10,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/asset.h"
 #include "convert/disk_plan.h"
 #include "convert/frame_json.h"
 #include "convert/marker_bars.h"
@@ -21,11 +19,11 @@
 #include "convert/recorded_request.h"
 #include "convert/report.h"
 #include "convert/report_viewer.h"
+#include "convert/run_files.h"
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
 #include "convert/stage_cost.h"
 #include "convert/stated_frame.h"
-#include "convert/verification.h"
 #include "convert/views.h"
 #include "convert/web_splats.h"
 #include "io/atomic_file.h"
@@ -45,6 +43,7 @@ namespace {
 /// One run: the request, what is in memory so far, and the record on disk.
 struct Run {
   const RunRequest& request;
+  std::vector<StageFiles> stages;
   RunRecord record;
   Scene scene;  ///< As opened: world coordinates.
   std::vector<KnownDistance> distances;
@@ -243,123 +242,32 @@ std::map<std::string, std::string> decided_stages(const RunRequest& request, con
   return out;
 }
 
-/// A stage: its files (whose absence means it must run) and what it does.
-struct Stage {
-  std::string name;
-  std::string title;
-  std::vector<std::string> files;
-  Json (*work)(Run&, const Progress&);
-  std::vector<std::string> further = {};  ///< What it may write besides, as output_hashes() says.
+/// What a stage is called and does.
+struct StageWork {
+  const char* title;
+  Json (*run)(Run&, const Progress&);
 };
 
-std::vector<Stage> stages_of(const Scene& scene, size_t lods) {
-  std::vector<std::string> view_files;
-  for (const int i : views_with_photograph(scene)) {
-    const std::string stem = "views/" + scene.views[static_cast<size_t>(i)].name;
-    for (const char* suffix : {".exr", ".color.png", ".depth.png", ".normal.png", ".hole.png"}) {
-      view_files.push_back(stem + suffix);
-    }
-  }
-  std::vector<std::string> model_files = {"model/gaussians.ply", "model/cameras.json"};
-  for (const int i : scene.input) {
-    model_files.push_back("model/priors/" + scene.views[static_cast<size_t>(i)].name + ".exr");
-  }
-  std::vector<std::string> web_files = {
-      "web/asset.glb", "mesh/watertight.obj", "mesh/watertight.mtl"};
-  for (const std::string& name : level_files(lods)) web_files.push_back("web/" + name);
-  return {{"model", "depth and Gaussians", model_files, run_model, {"model/training.json"}},
-          {"scale", "scale", {}, run_scale, {"model/gaussians.ply", "model/cameras.json"}},
-          {"views", "views", view_files, run_views},
-          {"evaluation", "held-out views", {}, run_evaluation},
-          {"splats", "splats for browsers", {"web/splats.glb"}, run_splats, {"web/splats.spz"}},
-          {"mesh",
-           "volume and mesh",
-           {"volume.vdb",
-            "mesh/surface.ply",
-            "mesh/watertight.ply",
-            "mesh/front.png",
-            "mesh/side.png",
-            "mesh/front.provenance.png",
-            "mesh/side.provenance.png"},
-           run_mesh,
-           {"mesh/watertight.stl", "mesh/watertight.3mf"}},
-          {"web",
-           "textured assets",
-           web_files,
-           run_web,
-           // Pictures of the texture, levels of a run that wanted more of them.
-           {"mesh/watertight.*.jpg", "web/asset.lod*.glb", "web/tileset.json"}},
-          {"report", "report", {"report.html", "report.json"}, run_report}};
-}
-
-}  // namespace
-
-std::vector<int> views_with_photograph(const Scene& scene) {
-  std::vector<int> views = scene.input;
-  views.insert(views.end(), scene.held_out.begin(), scene.held_out.end());
-  std::sort(views.begin(), views.end());
-  return views;
-}
-
-namespace {
-
-std::set<std::string> files_of(const Stage& stage) {
-  std::set<std::string> out(stage.files.begin(), stage.files.end());
-  out.insert(stage.further.begin(), stage.further.end());
-  return out;
-}
-
-std::set<std::string> files_of_stages(const Scene& scene, size_t lods) {
-  std::set<std::string> out;
-  for (const Stage& stage : stages_of(scene, lods)) out.merge(files_of(stage));
-  return out;
-}
-
-// A folder without the record of a run may hold work of somebody else under the names that a run
-// writes to.
-void refuse_foreign_files(const RunRequest& request, const Scene& scene) {
-  if (request.overwrite || is_present(request.output / "run.json")) return;
-  const auto found = named_outputs(request.output, files_of_stages(scene, request.lods));
-  if (found.empty()) return;
-  throw InvalidInput(printable(request.output) + " holds " + printable(found.front()) +
-                     (found.size() > 1 ? " and more" : "") +
-                     " but no run.json: this would replace files that no run here wrote; choose "
-                     "another folder, or say --overwrite");
-}
-
-// What OpenedScene::keep() writes, before the first stage.
-std::set<std::string> camera_files() {
-  return {"model/refined_poses.json",
-          "model/colmap/poses.json",
-          "model/colmap/sparse/0/cameras.txt",
-          "model/colmap/sparse/0/images.txt",
-          "model/colmap/sparse/0/points3D.txt"};
-}
-
-std::set<std::string> outputs_of(const Stage& stage, const Run& run) {
-  const std::vector<std::string> outputs = named_outputs(run.request.output, files_of(stage));
-  return {outputs.begin(), outputs.end()};
-}
-
-// Hashes of what stages before wrote and this one may write anew.
-Json earlier_outputs(const Stage& stage, const Run& run) {
-  std::set<std::string> names;
-  for (const Stage& other : stages_of(run.scene, run.request.lods)) {
-    if (other.name == stage.name) break;
-    for (const std::string& file : run.record.files(other.name)) {
-      if (files_of(stage).contains(file)) names.insert(file);
-    }
-  }
-  return output_hashes(run.request.output, names);
+const StageWork& work_of(const StageFiles& stage) {
+  static const std::map<std::string, StageWork> kWork = {
+      {"model", {"depth and Gaussians", run_model}},
+      {"scale", {"scale", run_scale}},
+      {"views", {"views", run_views}},
+      {"evaluation", {"held-out views", run_evaluation}},
+      {"splats", {"splats for browsers", run_splats}},
+      {"mesh", {"volume and mesh", run_mesh}},
+      {"web", {"textured assets", run_web}},
+      {"report", {"report", run_report}}};
+  return kWork.at(stage.stage);
 }
 
 // What somebody changed of the files of a finished stage may be wanted, and stays.
-void warn_of_changed_files(const Stage& stage, const Run& run, const Terminal& terminal) {
+void warn_of_changed_files(const StageFiles& stage, const Run& run, const Terminal& terminal) {
   std::set<std::string> unsettled;  // a later stage may have been stopped after it wrote them
-  for (const Stage& other : stages_of(run.scene, run.request.lods)) {
-    if (!run.record.is_done(other.name, other.files)) unsettled.merge(files_of(other));
+  for (const StageFiles& other : run.stages) {
+    if (!run.record.is_done(other.stage, other.files)) unsettled.merge(other.all());
   }
-  for (const std::string& file : run.record.changed_files(stage.name)) {
+  for (const std::string& file : run.record.changed_files(stage.stage)) {
     if (unsettled.contains(file)) continue;
     terminal.warn({printable(run.request.output / file) +
                    " is not what the run wrote and stays as it is; remove it to have it made "
@@ -373,25 +281,6 @@ void note_outputs(Run& run, bool is_fresh) {
   Json outputs = output_hashes(run.request.output, camera_files());
   outputs.update(run.record.file_hashes());
   run.record.note("outputs", outputs);
-}
-
-// What later stages made of other settings must not stand beside what comes now, as if it belonged
-// to it, should this run end before them. Files of like names that no stage is known to have
-// written are the user's.
-void remove_outputs_after(const Stage& first, const Run& run) {
-  bool is_later = false;
-  std::set<std::string> kept;
-  std::set<std::string> names;
-  for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
-    (is_later ? names : kept).insert(stage.files.begin(), stage.files.end());
-    for (const std::string& file : run.record.files(stage.name)) {
-      (is_later ? names : kept).insert(file);
-    }
-    is_later = is_later || stage.name == first.name;
-  }
-  for (const std::string& name : named_outputs(run.request.output, names)) {
-    if (!kept.contains(name)) std::filesystem::remove(run.request.output / name);
-  }
 }
 
 void warn_of(const Json& result, const Terminal& terminal) {
@@ -417,29 +306,32 @@ std::string remark_on(const std::string& stage, const Json& result) {
 
 Json run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
-  for (const Stage& stage : stages_of(run.scene, run.request.lods)) {
-    if (!stale && run.record.is_done(stage.name, stage.files)) {
-      terminal.say(stage.title + ": done before");
-      warn_of(run.record.result(stage.name), terminal);
+  const std::filesystem::path& output = run.request.output;
+  for (const StageFiles& stage : run.stages) {
+    const StageWork& work = work_of(stage);
+    if (!stale && run.record.is_done(stage.stage, stage.files)) {
+      terminal.say(std::string(work.title) + ": done before");
+      warn_of(run.record.result(stage.stage), terminal);
       warn_of_changed_files(stage, run, terminal);
       continue;
     }
-    if (!stale) remove_outputs_after(stage, run);
+    if (!stale) remove_outputs_after(stage.stage, run.stages, run.record, output);
     stale = true;
-    const Json before = earlier_outputs(stage, run);
+    const Json before = earlier_outputs(stage, run.stages, run.record, output);
     const CostMeter meter;  // from here on the peak of memory is that of the stage
-    const Json result = stage.work(run, terminal.begin(stage.title));
-    const double seconds = terminal.end(remark_on(stage.name, result));
-    std::set<std::string> outputs = outputs_of(stage, run);
-    const Json after = earlier_outputs(stage, run);
+    const Json result = work.run(run, terminal.begin(work.title));
+    const double seconds = terminal.end(remark_on(stage.stage, result));
+    const std::vector<std::string> written = named_outputs(output, stage.all());
+    std::set<std::string> outputs(written.begin(), written.end());
+    const Json after = earlier_outputs(stage, run.stages, run.record, output);
     for (const auto& [name, hash] : after.items()) {
       if (before.value(name, Json()) == hash) outputs.erase(name);
     }
-    run.record.finish(stage.name, seconds, result, outputs);
+    run.record.finish(stage.stage, seconds, result, outputs);
     warn_of(result, terminal);
     terminal.warn(std::exchange(run.hitches, {}));
   }
-  forget_checkpoints(run.request.output / "model");
+  forget_checkpoints(output / "model");
   run.record.note("focal", run.request.scene.focal);
   const std::filesystem::path& control = run.request.scene.control.file;
   if (!control.empty()) {
@@ -503,7 +395,8 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   check_lengths(request, scene);
   make_output_folder(request.output);
   const FolderLock lock(request.output);
-  refuse_foreign_files(request, scene);
+  std::vector<StageFiles> stages = stage_files(scene, request.lods);
+  if (!request.overwrite) refuse_foreign_files(request.output, stages);
   const std::string little_room = little_room_warning(scene, request.output);
   if (!little_room.empty()) terminal.warn(little_room);
   RunRecord record(request.output,
@@ -518,6 +411,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   record.note("camera_fit", fit);
   record.note("refined_poses", opened.refined ? opened.refined->report : Json());
   Run run{request,
+          std::move(stages),
           std::move(record),
           std::move(scene),
           std::move(distances),

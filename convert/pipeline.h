@@ -1,21 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <vector>
-
 #include <nlohmann/json.hpp>
 
 #include "convert/run_request.h"
 #include "convert/terminal.h"
-#include "libcgs/core/scene.h"
 
 namespace cgs {
 
 /// Photographs to every asset, in stages that are skipped when their output is there already.
 /// \return the content of OUT/report.json.
 nlohmann::ordered_json run_pipeline(const RunRequest& request, Terminal& terminal);
-
-/// The input views and those held out, ascending.
-std::vector<int> views_with_photograph(const Scene& scene);
 
 }  // namespace cgs

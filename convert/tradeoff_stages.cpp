@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/model_training.h"
-#include "convert/pipeline.h"
 #include "convert/run_stages.h"
 #include "convert/scene_request.h"
 #include "convert/stage_cost.h"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/verification.h"
 
-#include <algorithm>
 #include <set>
 
 #include <nlohmann/json.hpp>
@@ -107,36 +106,6 @@ void remove_finished(const fs::path& fresh) {
 }
 
 }  // namespace
-
-std::vector<std::string> named_outputs(const fs::path& output, const std::set<std::string>& names) {
-  std::set<std::string> out;
-  const auto add = [&](const fs::path& name) {
-    std::error_code ignored;  // what cannot be looked at is not there
-    const bool is_file = fs::is_regular_file(fs::symlink_status(output / name, ignored));
-    if (is_file) out.insert(name.generic_string());
-  };
-  for (const std::string& name : names) {
-    const size_t any = name.find('*');
-    if (any == std::string::npos) {
-      add(name);
-      continue;
-    }
-    const fs::path folder = fs::path(name).parent_path();
-    for (const std::string& entry : sorted_entries(output / folder)) {
-      const std::string file = (folder / entry).generic_string();
-      const bool is_named = file.size() >= name.size() && file.starts_with(name.substr(0, any)) &&
-                            file.ends_with(name.substr(any + 1));
-      if (is_named) add(file);
-    }
-  }
-  return {out.begin(), out.end()};
-}
-
-Json output_hashes(const fs::path& output, const std::set<std::string>& names) {
-  Json out = Json::object();
-  for (const std::string& name : named_outputs(output, names)) out[name] = file_hash(output / name);
-  return out;
-}
 
 Verification verify_run(const fs::path& output, Terminal& terminal) {
   const Json record = finished_record(output);

@@ -2,26 +2,12 @@
 #pragma once
 
 #include <filesystem>
-#include <set>
 #include <string>
 #include <vector>
-
-#include <nlohmann/json_fwd.hpp>
 
 #include "convert/terminal.h"
 
 namespace cgs {
-
-/// Files that a run wrote, by their paths below its folder, in order.
-///
-/// \param names  paths of what a run writes; "*" in one stands for any characters. Other files are
-///               the user's, who may change them.
-std::vector<std::string> named_outputs(const std::filesystem::path& output,
-                                       const std::set<std::string>& names);
-
-/// Hashes of named_outputs(). \throws IoError
-nlohmann::ordered_json output_hashes(const std::filesystem::path& output,
-                                     const std::set<std::string>& names);
 
 /// What became of the files of a run.
 struct Verification {

@@ -268,6 +268,13 @@ std::string view_role(const Scene& scene, int view) {
   return is_in(scene.input) ? "input" : is_in(scene.held_out) ? "held out" : "not used";
 }
 
+std::vector<int> views_with_photograph(const Scene& scene) {
+  std::vector<int> views = scene.input;
+  views.insert(views.end(), scene.held_out.begin(), scene.held_out.end());
+  std::sort(views.begin(), views.end());
+  return views;
+}
+
 std::string unknown_holes_warning(const Model& model) {
   if (knows_holes(model)) return {};
   return "the model does not say what input views saw, so holes are not known: no mask of them is "

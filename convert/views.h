@@ -19,6 +19,9 @@ std::string unknown_holes_warning(const Model& model);
 /// What a view, an index into scene.views, is to its scene: "input", "held out" or "not used".
 std::string view_role(const Scene& scene, int view);
 
+/// The input views and those held out, ascending.
+std::vector<int> views_with_photograph(const Scene& scene);
+
 /// Writes <name>.exr and <name>.{color,depth,normal,hole}.png for each of the given views of the
 /// model, and returns per view {"name", "role", "hole_fraction", …}, of pixels that
 /// are not masked. The role is view_role(), or null where no view is an input.
