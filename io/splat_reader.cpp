@@ -12,7 +12,7 @@
 #include "io/ksplat.h"
 #include "io/sog.h"
 #include "io/splat_glb_reader.h"
-#include "io/spz.h"
+#include "io/spz_reader.h"
 
 namespace cgs {
 
