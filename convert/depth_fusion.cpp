@@ -250,6 +250,7 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   out.disagreement = agreement.off;
   out.frame = scene.frame;
   out.warnings = scene.warnings;
+  out.notes = scene.notes;
   const DepthOptions& depth = request.options.depth;
   const bool is_said = depth.kind == DepthKind::Metric || depth.scale != 0;
   if (tells_metres(scene)) {

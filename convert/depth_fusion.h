@@ -27,6 +27,7 @@ struct DepthFusion {
   size_t frames = 0;                  ///< Fused.
   double disagreement = 0;            ///< Median, relative, of depth between frames; NaN = unknown.
   std::vector<std::string> warnings;  ///< One line each.
+  std::vector<std::string> notes;     ///< Scene::notes
 };
 
 /// Fuses the depth files of a scene, which measure metres, without any reconstruction.

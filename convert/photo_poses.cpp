@@ -91,6 +91,8 @@ std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
     out.is_stored = true;
     const JsonValue warnings = record.at("warnings");
     for (size_t i = 0; i < warnings.size(); ++i) out.warnings.push_back(warnings.at(i).text());
+    const JsonValue notes = record.at("notes");
+    for (size_t i = 0; i < notes.size(); ++i) out.notes.push_back(notes.at(i).text());
     out.focal_sigma = record.at("focal_sigma").number();
     const std::filesystem::path model = folder / "sparse/0";
     out.model.cameras = read_colmap_cameras_text(model / "cameras.txt");
@@ -162,34 +164,37 @@ std::vector<std::pair<size_t, size_t>> photos_from_one_place(const PoseSolution&
   return out;
 }
 
-std::vector<std::string> remarks(const std::vector<UnposedPhoto>& photos,
-                                 const PoseSolution& solution) {
-  std::vector<std::string> out;
+std::string focal_text(const UnposedPhoto& photo, const SolvedPhoto& solved) {
+  return "focal length of " + printable(photo.name) +
+         " solved for: " + std::to_string(std::lround(solved.camera.fx)) +
+         " pixels, uncertain by " + percent(solved.focal_sigma) +
+         (photo.focal > 0 ? " (Exif says " + std::to_string(std::lround(photo.focal)) +
+                                (solved.is_refuted ? ", which the photographs contradict: they may "
+                                                     "have been cut or zoomed)"
+                                                   : ")")
+                          : " (its Exif does not say)");
+}
+
+void add_remarks(const std::vector<UnposedPhoto>& photos,
+                 const PoseSolution& solution,
+                 PhotoPoses& out) {
   int told = -1;  // lens
   for (size_t i = 0; i < photos.size(); ++i) {
     const SolvedPhoto& solved = solution.photos[i];
     const UnposedPhoto& photo = photos[i];
     if (!solved.is_placed) {
-      out.push_back("photograph " + printable(photo.name) +
-                    " was left out: too little of what it shows is in the others");
+      out.warnings.push_back("photograph " + printable(photo.name) +
+                             " was left out: too little of what it shows is in the others");
     } else if (solved.focal_sigma > 0 && photo.lens > told) {
       told = photo.lens;
-      out.push_back("focal length of " + printable(photo.name) +
-                    " solved for: " + std::to_string(std::lround(solved.camera.fx)) +
-                    " pixels, uncertain by " + percent(solved.focal_sigma) +
-                    (photo.focal > 0
-                         ? " (Exif says " + std::to_string(std::lround(photo.focal)) +
-                               (solved.is_refuted ? ", which the photographs contradict: they may "
-                                                    "have been cut or zoomed)"
-                                                  : ")")
-                         : " (its Exif does not say)"));
+      (solved.is_refuted ? out.warnings : out.notes).push_back(focal_text(photo, solved));
     }
   }
   for (const auto& [a, b] : photos_from_one_place(solution)) {
-    out.push_back("photographs " + printable(photos[a].name) + " and " + printable(photos[b].name) +
-                  " were taken from one place: together they tell nothing of depth");
+    out.warnings.push_back("photographs " + printable(photos[a].name) + " and " +
+                           printable(photos[b].name) +
+                           " were taken from one place: together they tell nothing of depth");
   }
-  return out;
 }
 
 ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
@@ -275,7 +280,10 @@ PhotoPoses photo_poses(const SceneRoot& root,
     photos.back().lens = lens_of(photographs[i], lenses);
   }
   const PoseSolution solution = solve_poses(photos, part_of(progress, kShare, 1));
-  PhotoPoses out{colmap_model(photos, colors, solution), inputs, remarks(photos, solution)};
+  PhotoPoses out;
+  out.model = colmap_model(photos, colors, solution);
+  out.inputs = inputs;
+  add_remarks(photos, solution, out);
   for (const SolvedPhoto& solved : solution.photos) {
     if (solved.is_placed) out.focal_sigma = std::max(out.focal_sigma, solved.focal_sigma);
   }
@@ -291,6 +299,7 @@ void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& po
   write_colmap_text(folder / "sparse/0", poses.model);
   const Json record = {{"inputs", poses.inputs},
                        {"warnings", poses.warnings},
+                       {"notes", poses.notes},
                        {"focal_sigma", poses.focal_sigma},
                        {"files", hashes_of_model(folder)}};
   write_file(folder / "poses.json", json_text(record) + "\n");  // last: it says the model is whole

@@ -15,7 +15,8 @@ namespace cgs {
 struct PhotoPoses {
   ColmapModel model;
   std::string inputs;                 ///< Names and hashes of the photographs, options, program.
-  std::vector<std::string> warnings;  ///< How the focal length was found; who is left out.
+  std::vector<std::string> warnings;  ///< Who is left out; whose Exif is refuted.
+  std::vector<std::string> notes;     ///< How the focal length was found.
   double focal_sigma = 0;             ///< Largest of SolvedPhoto::focal_sigma.
   bool is_stored = false;  ///< Read, not solved; the places of features are then not known.
 };

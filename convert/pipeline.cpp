@@ -197,7 +197,8 @@ Json report_json(const Run& run) {
               {"splats", run.record.result("splats")},
               {"photographs", photographs},
               {"stages", stages},
-              {"warnings", warnings}};
+              {"warnings", warnings},
+              {"notes", run.scene.notes}};
   if (!run.refined.is_null()) out["refined_poses"] = run.refined;
   if (!run.request.settings_reason.empty()) out["settings_reason"] = run.request.settings_reason;
   return out;
@@ -378,6 +379,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   check_lengths_of_photographs(request);
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   Scene& scene = opened.scene;
+  terminal.note(scene.notes);
   terminal.warn(scene.warnings);
   const bool chooses_voxels = request.voxel_size.empty();
   const MeasuredFiles measured = measured_files(request);

@@ -250,8 +250,10 @@ void write_html_report(const std::filesystem::path& folder,
   if (report.contains("settings_reason")) {
     html << "<p class=note>" << escaped(report["settings_reason"].get<std::string>()) << ".</p>\n";
   }
-  for (const Json& warning : report["warnings"]) {
-    html << "<p class=note>" << escaped(warning.get<std::string>()) << "</p>\n";
+  for (const char* list : {"warnings", "notes"}) {
+    for (const Json& line : report[list]) {
+      html << "<p class=note>" << escaped(line.get<std::string>()) << "</p>\n";
+    }
   }
   html << viewer << refinement_section(report) << scale_section(report) << promises_section(report)
        << levels_section(report) << certificate_section(report) << simplification_section(report)

@@ -121,6 +121,8 @@ OpenedScene open_scene(const SceneRequest& request,
     out.scene = scene_of_photographs(request.path, out.poses->model, options);
     auto& warnings = out.scene.warnings;
     warnings.insert(warnings.end(), out.poses->warnings.begin(), out.poses->warnings.end());
+    auto& notes = out.scene.notes;
+    notes.insert(notes.end(), out.poses->notes.begin(), out.poses->notes.end());
   } else {
     out.scene = read_scene(request.path, request.options);
     if (request.focal > 0) {

@@ -73,6 +73,10 @@ void Terminal::say(const std::string& line) const {
   if (!quiet_) std::fprintf(stderr, "%s\n", one_line(line).c_str());
 }
 
+void Terminal::note(const std::vector<std::string>& lines) const {
+  for (const std::string& line : lines) say("cgs: note: " + line);
+}
+
 void Terminal::warn(const std::string& line) const { warn(std::vector{line}); }
 
 void Terminal::warn(const std::vector<std::string>& lines) const {

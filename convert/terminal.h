@@ -28,6 +28,8 @@ class Terminal {
   double end(const std::string& remark);
   /// One line for the user, unless quiet.
   void say(const std::string& line) const;
+  /// What was done that raises no doubt, a line each, unless quiet; strictness lets it pass.
+  void note(const std::vector<std::string>& lines) const;
   /// One line the user must see even when quiet.
   void warn(const std::string& line) const;
   void warn(const std::vector<std::string>& lines) const;

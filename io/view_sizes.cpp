@@ -105,11 +105,11 @@ std::vector<int> chosen_divisors(Scene& scene) {
     has_smaller = true;
   }
   if (common > 1) {
-    scene.warnings.push_back((largest.fisheye ? "undistorted pictures of " : "photographs of ") +
-                             size_text(largest.camera.width, largest.camera.height) +
-                             " pixels are worked on at 1/" + std::to_string(common) +
-                             " of their size" + (has_smaller ? ", smaller ones at more" : "") +
-                             "; --downscale 1 takes all of it, and longer");
+    scene.notes.push_back((largest.fisheye ? "undistorted pictures of " : "photographs of ") +
+                          size_text(largest.camera.width, largest.camera.height) +
+                          " pixels are worked on at 1/" + std::to_string(common) +
+                          " of their size" + (has_smaller ? ", smaller ones at more" : "") +
+                          "; --downscale 1 takes all of it, and longer");
   }
   return out;
 }

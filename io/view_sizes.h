@@ -25,8 +25,7 @@ void make_pinholes(Scene& scene);
 /// The divisors that options leave open, one per view: that of the largest photograph or, as that
 /// is what is worked on, undistorted picture of a fisheye, so that no side is above
 /// SceneOptions::kLongestSide. Where it would leave half or less of what a photograph has to give,
-/// that one has its own: cameras whose sizes differ little agree. What was chosen becomes a
-/// warning.
+/// that one has its own: cameras whose sizes differ little agree. What was chosen becomes a note.
 std::vector<int> chosen_divisors(Scene& scene);
 
 /// Makes cameras smaller, rounded down to whole pixels. \param divisors  one per view

@@ -77,6 +77,7 @@ void run_fuse(const FuseArgs& args) {
     return;
   }
   const DepthFusion fusion = fuse_depth(request, terminal.begin("fuse"));
+  terminal.note(fusion.notes);
   terminal.warn(fusion.warnings);
   write(args,
         fusion.fused,

@@ -108,7 +108,8 @@ Json scene_json(const OpenedScene& opened, const Json& fit) {
           {"camera_fit", fit},
           {"refined_poses", opened.refined ? opened.refined->report : Json()},
           {"missing", scene.missing},
-          {"warnings", scene.warnings}};
+          {"warnings", scene.warnings},
+          {"notes", scene.notes}};
 }
 
 void print_fit(const Json& info) {
@@ -187,6 +188,9 @@ void print_scene(const Json& info) {
   print_fit(info);
   for (const Json& name : info["missing"]) {
     std::printf("missing: %s\n", one_line(name.get<std::string>()).c_str());
+  }
+  for (const Json& text : info["notes"]) {
+    std::printf("note: %s\n", one_line(text.get<std::string>()).c_str());
   }
   print_warnings(info);
 }

@@ -50,6 +50,7 @@ void run_tradeoff(const TradeoffArgs& args) {
   const CostMeter meter;
   const OpenedScene opened = open_scene(request.scene, request.output, terminal);
   const StageCost opening = meter.read();
+  terminal.note(opened.scene.notes);
   terminal.warn(opened.scene.warnings);
   TradeoffReport report;
   for (const std::string& want : args.wants) {

@@ -76,6 +76,7 @@ void run_train(const TrainArgs& args) {
   const auto distances = known_distances(args.scene.known_distances, scene);
   const auto markers = marker_bars(scene, args.scene.marker_size);
   const size_t known = scene.warnings.size();
+  terminal.note(scene.notes);
   terminal.warn(scene.warnings);
   TrainedModel trained =
       train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));

@@ -80,6 +80,7 @@ struct Scene {
   double world_per_stated_unit = 1;
   std::vector<std::string> missing;   ///< Image files that cameras name but the disk lacks.
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
+  std::vector<std::string> notes;     ///< One line each: what was done that raises no doubt.
   Frame frame;
 };
 

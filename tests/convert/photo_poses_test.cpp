@@ -66,8 +66,9 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   EXPECT_LT(errors.rotation, 0.1);
   EXPECT_LT(errors.direction, 0.5);
   EXPECT_LT(errors.focal, 0.01);
-  ASSERT_EQ(poses.warnings.size(), 1u);
-  EXPECT_NE(poses.warnings[0].find("focal length"), std::string::npos);
+  EXPECT_TRUE(poses.warnings.empty());
+  ASSERT_EQ(poses.notes.size(), 1u);
+  EXPECT_NE(poses.notes[0].find("focal length"), std::string::npos);
   EXPECT_GT(poses.focal_sigma, 0);
   EXPECT_LT(poses.focal_sigma, 0.1);
 
@@ -75,6 +76,7 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   write_photo_poses(dir / "model/colmap", poses);
   const PhotoPoses again = solved(dir / "photos", 0, dir / "model/colmap");
   EXPECT_EQ(again.warnings, poses.warnings);
+  EXPECT_EQ(again.notes, poses.notes);
   EXPECT_EQ(again.focal_sigma, poses.focal_sigma);
   EXPECT_TRUE(again.model.images[0].points.empty());  // as readers leave them: not solved anew
   const Scene same = scene_of_photographs(dir / "photos", again.model);
@@ -94,6 +96,7 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   EXPECT_FALSE(other.model.images[0].points.empty());
   EXPECT_EQ(other.model.cameras.begin()->second.camera.fx, truth[0].fx);
   EXPECT_TRUE(other.warnings.empty());
+  EXPECT_TRUE(other.notes.empty());
   EXPECT_EQ(other.focal_sigma, 0);
 
   OpenedScene().keep(dir / "model");  // of cameras that were stated

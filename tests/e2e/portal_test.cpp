@@ -139,6 +139,23 @@ TEST(Portal, StrictEndsAtAWarningBeforeAnythingIsWritten) {
   EXPECT_FALSE(std::filesystem::exists(dir / "out"));
 }
 
+TEST(Portal, StrictLetsPassThatAFocalLengthWasSolvedFor) {
+  const test::TempDir dir;
+  make_capture(dir / "capture", 1);
+  std::filesystem::create_directory(dir / "photos");
+  for (const char* name : {"view_01.png", "view_02.png", "view_03.png"}) {
+    std::filesystem::rename(dir / "capture/images" / name, dir / "photos" / name);
+  }
+  const auto result = run_cgs("info " + (dir / "photos").string() + " --strict --json");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const auto info = ordered_json::parse(result.out);
+  EXPECT_TRUE(info["warnings"].empty()) << info["warnings"];
+  ASSERT_EQ(info["notes"].size(), 1u);
+  EXPECT_NE(info["notes"][0].get<std::string>().find("focal length of view_01.png solved for"),
+            std::string::npos)
+      << info["notes"];
+}
+
 TEST(Portal, StagesByHandGiveTheFilesOfARun) {
   make_capture(kSmallCapture, 3);
   const test::TempDir dir;

@@ -178,11 +178,12 @@ TEST_F(ReadScene, ChoosesASizeThatEndsInMinutesAndSaysSo) {
   EXPECT_EQ(chosen.views[0].camera.width, 683);
   EXPECT_EQ(chosen.views[0].camera.height, 10);
   EXPECT_EQ(chosen.views[0].camera.fx, 3000. * 683 / 2049);
-  ASSERT_EQ(chosen.warnings.size(), 1u);
-  EXPECT_NE(chosen.warnings[0].find("2049 x 32 pixels are worked on at 1/3"), std::string::npos);
+  EXPECT_TRUE(chosen.warnings.empty());
+  ASSERT_EQ(chosen.notes.size(), 1u);
+  EXPECT_NE(chosen.notes[0].find("2049 x 32 pixels are worked on at 1/3"), std::string::npos);
   const Scene whole = read({.downscale = 1});
   EXPECT_EQ(whole.views[0].camera.width, 2049);
-  EXPECT_TRUE(whole.warnings.empty());
+  EXPECT_TRUE(whole.notes.empty());
 }
 
 TEST_F(ReadScene, PhotographsOfHalfTheSizeAndLessKeepMoreOfIt) {
@@ -198,10 +199,10 @@ TEST_F(ReadScene, PhotographsOfHalfTheSizeAndLessKeepMoreOfIt) {
   EXPECT_EQ(chosen.views[2].camera.width, 1024);  // a half instead of a quarter
   EXPECT_EQ(chosen.views[3].camera.width, 512);
   EXPECT_EQ(chosen.views[3].camera.fx, 750);
-  const std::string& warning = chosen.warnings.back();
-  EXPECT_NE(warning.find("4096 x 64 pixels are worked on at 1/4 of their size, smaller ones"),
+  const std::string& note = chosen.notes.back();
+  EXPECT_NE(note.find("4096 x 64 pixels are worked on at 1/4 of their size, smaller ones"),
             std::string::npos)
-      << warning;
+      << note;
 }
 
 TEST_F(ReadScene, ScalesIntrinsicsToTheImageAndRefusesOtherShapes) {
@@ -337,12 +338,12 @@ TEST_F(ReadScene, SaysThatItIsTheUndistortedPictureOfAFisheyeThatIsLarge) {
     test::write_bytes(dir_ / name, test::rgb_png(800, 800, name[9]));
   }
   const Scene scene = read();
-  ASSERT_EQ(scene.warnings.size(), 1u);
+  ASSERT_EQ(scene.notes.size(), 1u);
   const int side = int(std::lround(2 * 390 * std::tan(399.5 / 390)));
   const std::string size = std::to_string(side) + " x " + std::to_string(side);
-  EXPECT_NE(scene.warnings[0].find("undistorted pictures of " + size + " pixels are worked on at "),
+  EXPECT_NE(scene.notes[0].find("undistorted pictures of " + size + " pixels are worked on at "),
             std::string::npos)
-      << scene.warnings[0];
+      << scene.notes[0];
 }
 
 TEST_F(ReadScene, WarnsOfOddPictures) {

@@ -35,12 +35,13 @@ TEST(ViewSizes, HaveTheSameShapeWhereOneIsTheOtherRounded) {
 TEST(ViewSizes, AreDividedSoThatTheLargestSideEndsInMinutes) {
   Scene small = scene_of({{1024, 768}, {800, 600}});
   EXPECT_EQ(chosen_divisors(small), (Divisors{1, 1}));
-  EXPECT_TRUE(small.warnings.empty());
+  EXPECT_TRUE(small.notes.empty());
   Scene large = scene_of({{768, 1025}, {4032, 3024}, {4000, 3000}});
   EXPECT_EQ(chosen_divisors(large), (Divisors{2, 4, 4}));
-  ASSERT_EQ(large.warnings.size(), 1u);
-  EXPECT_NE(large.warnings[0].find("4032 x 3024 pixels are worked on at 1/4"), std::string::npos);
-  EXPECT_NE(large.warnings[0].find("smaller ones at more"), std::string::npos);
+  EXPECT_TRUE(large.warnings.empty());
+  ASSERT_EQ(large.notes.size(), 1u);
+  EXPECT_NE(large.notes[0].find("4032 x 3024 pixels are worked on at 1/4"), std::string::npos);
+  EXPECT_NE(large.notes[0].find("smaller ones at more"), std::string::npos);
 }
 
 TEST(ViewSizes, LeavePhotographsOfAlmostTheSameSizeAlike) {
