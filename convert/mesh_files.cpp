@@ -14,6 +14,7 @@
 #include "io/scene_path.h"
 #include "io/stl.h"
 #include "io/threemf.h"
+#include "io/threemf_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
 #include "meshing/repair.h"
@@ -51,6 +52,17 @@ Json certificate_to_json(const Certificate& certificate,
           {"faces", mesh.faces.size()}};
 }
 
+namespace {
+
+// What was written when the scale was known must not stand beside what comes now; a file of
+// another program stays.
+void remove_own(const std::filesystem::path& path) {
+  const bool is_own = lower_extension(path) == ".stl" ? is_own_stl(path) : is_own_3mf(path);
+  if (is_own) std::filesystem::remove(path);
+}
+
+}  // namespace
+
 Json write_mesh_files(const std::filesystem::path& folder,
                       const TriangleMesh& open_surface,
                       const TriangleMesh& watertight,
@@ -69,7 +81,7 @@ Json write_mesh_files(const std::filesystem::path& folder,
       left_out[name] =
           "the scale of this scene is unknown and CAD files are in millimetres; --known-distance "
           "tells it, --assume-unit m says that one scene unit is a metre";
-      std::filesystem::remove(folder / name);  // of a time when the scale was known
+      remove_own(folder / name);
       continue;
     }
     const Eigen::Matrix3d z_up = z_up_from(frame.up);

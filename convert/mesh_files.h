@@ -23,7 +23,8 @@ nlohmann::ordered_json certificate_to_json(const Certificate& certificate,
 
 /// Writes surface.ply, watertight.ply and, where the scale is known, watertight.{stl,3mf}. (The OBJ
 /// may carry photographs, which not every caller has.)
-/// In STL and 3MF frame.up, which must be known, becomes +Z.
+/// In STL and 3MF frame.up, which must be known, becomes +Z. Where the scale is unknown, those that
+/// this program wrote before are removed.
 /// \return {"files": […], "left_out": {"watertight.stl": "why", …}}
 nlohmann::ordered_json write_mesh_files(const std::filesystem::path& folder,
                                         const TriangleMesh& open_surface,

@@ -162,10 +162,12 @@ WrittenSurfaces write_surfaces_within(const Surfaces& fused,
                                       const std::filesystem::path& folder,
                                       const Progress& progress) {
   const Frame& frame = scene.frame;
+  Json files;
   for (const double share : {0.7, 0.35, 0.0}) {
     std::optional<SimplifyOptions> options;
     if (share > 0) options = SimplifyOptions{.max_error = share * promise};
     WrittenSurfaces out = write_surfaces(fused, options, scene, folder, progress);
+    files = out.files["files"];
     const FileDeviations deviations = deviations_of_files(fused, out, scene, folder);
     double worst = 0;
     for (const auto& [file, deviation] : deviations.largest) worst = std::max(worst, deviation);
@@ -185,8 +187,8 @@ WrittenSurfaces write_surfaces_within(const Surfaces& fused,
     }
     return out;
   }
-  for (const char* name : {"surface.ply", "watertight.ply", "watertight.stl", "watertight.3mf"}) {
-    std::filesystem::remove(folder / name);  // they are none of what was asked for
+  for (const Json& file : files) {
+    std::filesystem::remove(folder / file.get<std::string>());  // none of what was asked for
   }
   throw NumericalError("--max-error: the files hold no coordinates as fine as " +
                        format_length(promise, frame));

@@ -5,10 +5,12 @@
 #include <limits>
 #include <numeric>
 #include <string>
+#include <string_view>
 
 #include <Eigen/Geometry>
 
 #include "io/atomic_file.h"
+#include "io/byte_reader.h"
 #include "io/byte_writer.h"
 #include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
@@ -18,6 +20,7 @@ namespace cgs {
 namespace {
 
 constexpr size_t kHeader = 80;
+constexpr std::string_view kOwn = "cgs binary STL, unit mm";  // must not begin with "solid"
 
 // "62 % seen by photographs", by area.
 std::string seen_share(const TriangleMesh& mesh) {
@@ -35,7 +38,7 @@ void write_stl(const std::filesystem::path& path,
                const Eigen::Matrix3d& up_rotation) {
   require_writable(mesh, "write_stl");
   require_printable_solid(mesh, frame, "write_stl");
-  std::string header = "cgs binary STL, unit mm";  // must not begin with "solid"
+  std::string header(kOwn);
   const std::string origin = origin_in_millimetres(frame, up_rotation);
   if (!origin.empty()) header += ", add " + origin;
   const std::string evidence = ", " + seen_share(mesh);
@@ -62,6 +65,14 @@ void write_stl(const std::filesystem::path& path,
     file.write(record);
   }
   file.commit();
+}
+
+bool is_own_stl(const std::filesystem::path& path) {
+  try {
+    return read_file_start(path, kOwn.size()) == kOwn;
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 }  // namespace cgs

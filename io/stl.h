@@ -23,4 +23,7 @@ void write_stl(const std::filesystem::path& path,
                const Frame& frame,
                const Eigen::Matrix3d& up_rotation);
 
+/// Whether the header of a file says that write_stl() made it; false if it cannot be read.
+bool is_own_stl(const std::filesystem::path& path);
+
 }  // namespace cgs

@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -25,6 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::string_view kOwnApplication = "cgs";     // of write_3mf()
 constexpr uint64_t kMostRelations = uint64_t{1} << 20;  // [bytes]
 constexpr uint64_t kMostModel = uint64_t{2} << 30;      // [bytes]
 
@@ -64,7 +66,7 @@ class Assembly {
   ParsedMesh build() {
     const std::string root = root_part(archive_, path_);
     const ThreeMfModel& model = part(root);
-    is_ours_ = model.application == "cgs";
+    is_ours_ = model.application == kOwnApplication;
     double cost = 0;
     for (const ThreeMfPlacement& item : model.build) cost += cost_of(placed(item, root));
     refuse_multiplication(cost);
@@ -349,6 +351,18 @@ ParsedMesh read_3mf(const fs::path& path) {
   }
   const ZipArchive archive(bytes, path);
   return Assembly(archive, path).build();
+}
+
+bool is_own_3mf(const fs::path& path) {
+  try {
+    const std::string bytes = read_file(path);
+    const ZipArchive archive(bytes, path);
+    const std::string root = root_part(archive, path);
+    const std::string xml = archive.read(root, kMostModel);
+    return parse_threemf_model(xml, path / root).application == kOwnApplication;
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 }  // namespace cgs

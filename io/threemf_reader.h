@@ -26,4 +26,7 @@ namespace cgs {
 ///         Extension 1.2, 3MF Consortium.
 ParsedMesh read_3mf(const std::filesystem::path& path);
 
+/// Whether a file says that write_3mf() made it; false if it cannot be read.
+bool is_own_3mf(const std::filesystem::path& path);
+
 }  // namespace cgs

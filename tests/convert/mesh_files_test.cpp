@@ -90,6 +90,23 @@ TEST(WriteMeshFiles, WritesCadFilesOfAKnownScale) {
   }
 }
 
+TEST(WriteMeshFiles, RemovesCadFilesOfAnotherScaleThatItWroteAndNoOthers) {
+  const test::TempDir dir;
+  Frame frame = frame_of_scale_2();
+  frame.metres_per_unit = 1;
+  frame.up = Eigen::Vector3d::UnitZ();
+  write_mesh_files(dir / "own", corner(), corner(), frame);
+  write_mesh_files(dir / "own", corner(), corner(), frame_of_scale_2());
+  for (const auto* name : {"watertight.stl", "watertight.3mf"}) {
+    EXPECT_FALSE(std::filesystem::exists(dir / "own" / name)) << name;
+    test::write_bytes(dir / "others" / name, "made by hand");
+  }
+  write_mesh_files(dir / "others", corner(), corner(), frame_of_scale_2());
+  for (const auto* name : {"watertight.stl", "watertight.3mf"}) {
+    EXPECT_EQ(test::read_bytes(dir / "others" / name), "made by hand") << name;
+  }
+}
+
 TEST(WriteMeshFiles, RefusesAMeshWithoutSurfaceAndWritesNothing) {
   const test::TempDir dir;
   EXPECT_THROW(write_mesh_files(dir / "mesh", {}, {}, {}), NumericalError);

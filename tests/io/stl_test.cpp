@@ -106,6 +106,21 @@ TEST(WriteStl, KeepsAFaceWithoutAreaAndGivesItNoNormal) {
   EXPECT_EQ(parse(test::read_bytes(dir / "a.stl"))[0].normal, Eigen::Vector3f::Zero());
 }
 
+TEST(IsOwnStl, TellsFilesOfThisProgramFromOthers) {
+  const test::TempDir dir;
+  write_stl(dir / "a.stl",
+            test::labelled_sphere(),
+            test::centimetre_frame(),
+            Eigen::Matrix3d::Identity());
+  EXPECT_TRUE(is_own_stl(dir / "a.stl"));
+  test::write_bytes(dir / "b.stl", "solid cgs\nendsolid cgs\n");
+  EXPECT_FALSE(is_own_stl(dir / "b.stl"));
+  test::write_bytes(dir / "c.stl", "cgs");
+  EXPECT_FALSE(is_own_stl(dir / "c.stl"));
+  EXPECT_FALSE(is_own_stl(dir / "none.stl"));
+  EXPECT_FALSE(is_own_stl(dir.path()));
+}
+
 TEST(WriteStl, RefusesAnUnknownScaleAndAnEmptyMesh) {
   const test::TempDir dir;
   const Eigen::Matrix3d same = Eigen::Matrix3d::Identity();

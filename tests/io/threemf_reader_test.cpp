@@ -265,6 +265,19 @@ TEST_F(Read3mf, VerticesTakeTheColoursOfFaces) {
   EXPECT_EQ(read(file).warnings, std::vector<std::string>{"textures are not read"});
 }
 
+TEST_F(Read3mf, TellsFilesOfThisProgramFromOthers) {
+  write_3mf(dir_ / "own.3mf",
+            test::labelled_sphere(),
+            test::centimetre_frame(),
+            Eigen::Matrix3d::Identity());
+  EXPECT_TRUE(is_own_3mf(dir_ / "own.3mf"));
+  test::write_bytes(dir_ / "other.3mf", ThreeMfFile().bytes());
+  EXPECT_FALSE(is_own_3mf(dir_ / "other.3mf"));
+  test::write_bytes(dir_ / "none.3mf", "<metadata name=\"Application\">cgs</metadata>");
+  EXPECT_FALSE(is_own_3mf(dir_ / "none.3mf"));
+  EXPECT_FALSE(is_own_3mf(dir_ / "missing.3mf"));
+}
+
 TEST_F(Read3mf, RefusesWhatDoesNotLeadAnywhere) {
   const auto with = [&](const auto& change) {
     ThreeMfFile file;
