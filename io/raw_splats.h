@@ -27,6 +27,7 @@ struct RawSplats {
   int digits = kFloatDigits;               ///< Binary digits of a position as stored.
   bool may_be_linear = false;              ///< Programs differ: scales may really be lengths, and
                                            ///< opacities probabilities.
+  bool is_antialiased = false;             ///< For viewers that compensate opacity for blur.
   std::vector<std::string> comments;       ///< Of a PLY header.
   std::vector<std::string> notes;          ///< One line each: what was left out, or looks odd.
 

@@ -69,6 +69,12 @@ class SogReader {
     count_ = static_cast<size_t>(meta.at("count").count());
     if (count_ == 0) throw BadInput(Defect::Empty, path_, "0 splats");
     splats_.format = "SOG 2";
+    const auto states = [&](const char* key, const nlohmann::json& value) {
+      const auto found = json.find(key);
+      return found != json.end() && *found == value;
+    };
+    // The specification has the first, splat-transform writes the second.
+    splats_.is_antialiased = states("antialias", true) || states("model", "antialiased");
     const auto harmonics = meta.find("shN");
     if (harmonics) {
       splats_.sh_degree = harmonics->at("bands").count();

@@ -2,9 +2,12 @@
 #include "io/splat_doctor.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string_view>
+#include <utility>
 
 #include "io/ply_frame.h"
 #include "libcgs/core/error.h"
@@ -53,6 +56,25 @@ double fill_ratio(const std::vector<Eigen::Vector3f>& scales, double extent, ToL
 
 std::string counted(uint64_t count, const std::string& what) {
   return std::to_string(count) + (count == 1 ? " splat" : " splats") + what;
+}
+
+/// Whether comments of a PLY say so: those of Brush, or of Postshot in two versions. The last one
+/// counts.
+bool states_antialiasing(const std::vector<std::string>& comments) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kKnown = {
+      {{"splatrendermode:", "mip"}, {"antialiased", "1"}, {"postshot.anti_aliasing=", "1"}}};
+  bool out = false;
+  for (const std::string& comment : comments) {
+    std::string text;  // in lower case, without blanks
+    for (const char c : comment) {
+      if (c == ' ' || c == '\t') continue;
+      text += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    }
+    for (const auto& [key, value] : kKnown) {
+      if (text.starts_with(key)) out = text.substr(key.size()) == value;
+    }
+  }
+  return out;
 }
 
 class Examination {
@@ -266,6 +288,11 @@ class Examination {
   void add_warnings(std::vector<std::string>& out) const {
     const SplatFindings& f = findings_;
     out.insert(out.end(), raw_.notes.begin(), raw_.notes.end());
+    if (raw_.is_antialiased || states_antialiasing(raw_.comments)) {
+      out.emplace_back(
+          "trained for viewers that smooth edges (antialiased); what is written from it does not "
+          "say so");
+    }
     if (f.dropped() > 0) out.push_back("dropped " + counted(f.dropped(), dropped_reasons()));
     if (f.clamped > 0) out.push_back("clamped opacity or scale of " + counted(f.clamped, ""));
     if (all_scales_positive_) {

@@ -267,10 +267,7 @@ RawSplats splats_of(const Parts& parts, const Header& header) {
   out.sh_degree = std::min(header.degree, 3);
   out.reserve(header.count);
   if (header.degree > 3) out.notes.emplace_back("spherical harmonics of degree 4 left out");
-  if ((header.flags & 1U) != 0)
-    out.notes.emplace_back(
-        "trained for viewers that smooth edges (antialiased); what is written from it does not say "
-        "so");
+  out.is_antialiased = (header.flags & 1U) != 0;
   const double step = std::ldexp(1.0, -header.fractional_bits);
   const size_t kept = out.sh_count() - 1;
   for (size_t i = 0; i < header.count; ++i) {

@@ -40,6 +40,20 @@ TEST(Sog, ReadsEveryAttribute) {
   EXPECT_NEAR(out.logit[0], std::log(0.2 / 0.8), 1e-6);
 }
 
+TEST(Sog, StatesWhetherItWasTrainedForSmoothEdges) {
+  const auto with = [](const char* key, const nlohmann::json& value) {
+    SogFile file;
+    file.meta[key] = value;
+    return parse_sog(file.bytes(), "a.sog").is_antialiased;
+  };
+  EXPECT_TRUE(with("antialias", true));
+  EXPECT_FALSE(with("antialias", false));
+  EXPECT_TRUE(with("model", "antialiased"));
+  EXPECT_FALSE(with("model", "2dgs"));
+  EXPECT_FALSE(with("model", 1));
+  EXPECT_FALSE(parse_sog(SogFile().bytes(), "a.sog").is_antialiased);
+}
+
 TEST(Sog, LooksHarmonicsUpInThePalette) {
   SogFile file;
   file.add_harmonics();

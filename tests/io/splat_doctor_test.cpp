@@ -51,6 +51,21 @@ TEST(SplatDoctor, FindsNothingInAHealthyFile) {
   EXPECT_EQ(out.gaussians.sh, test::varied_splats(400, 1).sh);
 }
 
+TEST(SplatDoctor, TellsSplatsThatWereTrainedForSmoothEdges) {
+  const auto told = [](const std::vector<std::string>& comments) {
+    return warns(examined([&](RawSplats& raw) { raw.comments = comments; }), "antialiased");
+  };
+  EXPECT_TRUE(told({"Exported from Brush", "SplatRenderMode: mip"}));
+  EXPECT_FALSE(told({"Exported from Brush", "SplatRenderMode: default"}));
+  EXPECT_TRUE(told({"antialiased 1"}));
+  EXPECT_FALSE(told({"antialiased 0"}));
+  EXPECT_TRUE(told({"postshot.anti_aliasing=1"}));
+  EXPECT_TRUE(told({"  SPLATRENDERMODE:\tMIP "}));
+  EXPECT_FALSE(told({"antialiased 1", "SplatRenderMode: default"})) << "the last one counts";
+  EXPECT_FALSE(told({"not antialiased 1", "antialiased", "antialiased 10"}));
+  EXPECT_TRUE(warns(examined([](RawSplats& raw) { raw.is_antialiased = true; }), "antialiased"));
+}
+
 TEST(SplatDoctor, DropsPlacesThatFloatsCannotHoldAgain) {
   const GaussianFile out = examined([](RawSplats& raw) {
     raw.position[0].y() = 3e38;

@@ -131,6 +131,14 @@ TEST(ParseSpz, ReadsExtensionsAfterTheSplats) {
   EXPECT_EQ(defect(gzip(without.header() + splats.substr(16) + orbit)), "COUNT");
 }
 
+TEST(ParseSpz, StatesWhetherItWasTrainedForSmoothEdges) {
+  const std::string splats = kPositions + kOpacities + kColors + kScales + kRotations2;
+  SpzBytes header;
+  EXPECT_FALSE(parsed(header.header() + splats).is_antialiased);
+  header.flags = 1;
+  EXPECT_TRUE(parsed(header.header() + splats).is_antialiased);
+}
+
 TEST(ParseSpz, TurnsSplatsFromTheAxesThatItStates) {
   SpzBytes header;
   header.flags = 2;
