@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <atomic>
+#include <cstddef>
 #include <functional>
+#include <mutex>
 #include <string_view>
 
 namespace cgs {
@@ -19,5 +22,28 @@ inline Progress part_of(const Progress& progress, double begin, double end) {
   if (!progress) return {};
   return [=](double fraction) { progress(begin + (end - begin) * fraction); };
 }
+
+/// Tells of items that several threads work on at once, so that even one long loop over the rows of
+/// an image can be cancelled.
+class SharedProgress {
+ public:
+  /// \param progress  not owned; must outlive this
+  /// \param items     > 0
+  SharedProgress(const Progress& progress, size_t items) : progress_(progress), items_(items) {}
+
+  /// Called for every finished item, from any thread; what is told never falls. A thread that finds
+  /// another one telling goes on with its work.
+  void advance() {
+    ++done_;
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (lock) report(progress_, double(done_) / double(items_));
+  }
+
+ private:
+  const Progress& progress_;
+  const size_t items_;
+  std::atomic<size_t> done_ = 0;
+  std::mutex mutex_;
+};
 
 }  // namespace cgs
