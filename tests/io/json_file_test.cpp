@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/json_file.h"
 
+#include <cmath>
+#include <limits>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -83,6 +86,13 @@ TEST(JsonValue, CountsAreWholeAndFitAnInt) {
   }
   const nlohmann::json whole = nlohmann::json::parse("1080.0");
   EXPECT_EQ(JsonValue(whole, "t").count(), 1080);
+}
+
+TEST(NumberOrNull, IsNullWhereJsonHasNoNumber) {
+  EXPECT_EQ(number_or_null(-1.5).dump(), "-1.5");
+  for (const double none : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_TRUE(number_or_null(none).is_null()) << none;
+  }
 }
 
 }  // namespace
