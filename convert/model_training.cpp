@@ -108,7 +108,7 @@ void match_exposures(Scene& scene, const std::vector<ViewPriors>& priors) {
   for (size_t k = 0; k < scene.input.size(); ++k) {
     View& view = scene.views[static_cast<size_t>(scene.input[k])];
     view.exposure = exposure.gain[k];
-    apply_gain(view.image, view.exposure);
+    apply_exposure(view);
   }
 }
 

@@ -91,8 +91,9 @@ std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
     out.is_stored = true;
     const JsonValue warnings = record.at("warnings");
     for (size_t i = 0; i < warnings.size(); ++i) out.warnings.push_back(warnings.at(i).text());
-    const JsonValue notes = record.at("notes");
-    for (size_t i = 0; i < notes.size(); ++i) out.notes.push_back(notes.at(i).text());
+    if (const auto notes = record.find("notes")) {  // earlier versions had none
+      for (size_t i = 0; i < notes->size(); ++i) out.notes.push_back(notes->at(i).text());
+    }
     out.focal_sigma = record.at("focal_sigma").number();
     const std::filesystem::path model = folder / "sparse/0";
     out.model.cameras = read_colmap_cameras_text(model / "cameras.txt");
@@ -187,7 +188,9 @@ void add_remarks(const std::vector<UnposedPhoto>& photos,
                              " was left out: too little of what it shows is in the others");
     } else if (solved.focal_sigma > 0 && photo.lens > told) {
       told = photo.lens;
-      (solved.is_refuted ? out.warnings : out.notes).push_back(focal_text(photo, solved));
+      constexpr double kSure = 0.05;  // lengths along the view err by about as much
+      const bool is_doubtful = solved.is_refuted || solved.focal_sigma > kSure;
+      (is_doubtful ? out.warnings : out.notes).push_back(focal_text(photo, solved));
     }
   }
   for (const auto& [a, b] : photos_from_one_place(solution)) {

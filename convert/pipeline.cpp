@@ -181,6 +181,10 @@ Json report_json(const Run& run) {
     const Json found = result.value("warnings", Json::array());
     warnings.insert(warnings.end(), found.begin(), found.end());
   }
+  std::vector<std::string> notes = run.scene.notes;
+  const Json model = run.record.result("model");
+  const Json exposure = model.value("exposure", Json());
+  if (exposure.is_object()) notes.push_back(exposure.value("words", ""));
   Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
               {"folder", run.request.scene.path.string()},
@@ -188,7 +192,7 @@ Json report_json(const Run& run) {
               {"scale_source", scale_source_name(scene.frame.scale_source)},
               {"frame", frame_to_json(scene.frame)},
               {"scale", run.record.result("scale")},
-              {"model", run.record.result("model")},
+              {"model", model},
               {"views", run.record.result("views")},
               {"evaluation", run.record.result("evaluation")},
               {"mesh", mesh},
@@ -198,7 +202,7 @@ Json report_json(const Run& run) {
               {"photographs", photographs},
               {"stages", stages},
               {"warnings", warnings},
-              {"notes", run.scene.notes}};
+              {"notes", notes}};
   if (!run.refined.is_null()) out["refined_poses"] = run.refined;
   if (!run.request.settings_reason.empty()) out["settings_reason"] = run.request.settings_reason;
   return out;
@@ -305,6 +309,14 @@ std::string remark_on(const std::string& stage, const Json& result) {
          std::to_string(thinning["of"].get<size_t>());
 }
 
+// Where files for CAD were left out, those of another program may stand by their names.
+void erase_left_out(const Json& result, std::set<std::string>& outputs) {
+  const Json output = result.is_object() ? result.value("output", Json()) : Json();
+  if (!output.is_object()) return;
+  const Json left_out = output.value("left_out", Json::object());
+  for (const auto& [name, why] : left_out.items()) outputs.erase("mesh/" + name);
+}
+
 Json run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
   const std::filesystem::path& output = run.request.output;
@@ -324,6 +336,7 @@ Json run_stages(Run& run, Terminal& terminal) {
     const double seconds = terminal.end(remark_on(stage.stage, result));
     const std::vector<std::string> written = named_outputs(output, stage.all());
     std::set<std::string> outputs(written.begin(), written.end());
+    erase_left_out(result, outputs);
     const Json after = earlier_outputs(stage, run.stages, run.record, output);
     for (const auto& [name, hash] : after.items()) {
       if (before.value(name, Json()) == hash) outputs.erase(name);

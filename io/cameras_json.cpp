@@ -229,13 +229,17 @@ View read_view(const JsonValue& entry, const Frame& frame) {
       orientation->fail(Defect::Value, "must be 1 ... 8, as Exif counts");
     }
   }
+  return view;
+}
+
+// Of files that this program wrote.
+void read_exposure(const JsonValue& entry, View& view) {
   if (const auto exposure = entry.find("exposure")) {
     view.exposure = read_vector(*exposure).cast<float>();
     if (!(view.exposure.minCoeff() > 0 && view.exposure.maxCoeff() <= kLargestGain)) {
       exposure->fail(Defect::Value, "factors of exposure must be > 0 and <= 1000");
     }
   }
-  return view;
 }
 
 void read_paths(const JsonValue& entry, View& view, Scene& scene) {
@@ -279,6 +283,7 @@ Scene read_cameras_json(const std::filesystem::path& path, std::vector<std::stri
   for (size_t i = 0; i < entries.size(); ++i) {
     const JsonValue entry = entries.at(i);
     View view = read_view(entry, scene.frame);
+    if (frame) read_exposure(entry, view);
     view.name = read_name(entry.at("img_name"), !frame, taken);
     if (names != nullptr) names->push_back(entry.at("img_name").text());
     read_paths(entry, view, scene);

@@ -53,6 +53,7 @@ Scene read_cameras_json_scene(const SceneRoot& root) {
     view.image_path = photograph_in_folder(root, names[i]);
     if (view.image_path.empty()) view.image_path = photographs.take(names[i]);
     if (view.image_path.empty()) scene.missing.push_back(names[i]);
+    view.exposure.setOnes();  // of another choice of input views
     // What this program wrote is in its internal frame.
     Camera& camera = view.camera;
     const Eigen::Isometry3d pose = world_from_internal(scene.frame, camera.world_from_cam);
@@ -65,6 +66,7 @@ Scene read_cameras_json_scene(const SceneRoot& root) {
   world.metres_per_unit = scene.frame.metres_per_unit;
   world.metres_sigma = scene.frame.metres_sigma;
   world.scale_source = scene.frame.scale_source;
+  world.up = scene.frame.up;
   scene.frame = world;
   return scene;
 }

@@ -16,8 +16,10 @@ namespace cgs {
 
 namespace {
 
+constexpr const char* kHeaderStart = "ply\nformat binary_little_endian 1.0\ncomment ";
+
 std::string header_start(const Frame& frame) {
-  std::string out = "ply\nformat binary_little_endian 1.0\ncomment ";
+  std::string out = kHeaderStart;
   out += kPlyGenerator;
   return out + '\n' + ply_frame_comments(frame);
 }
@@ -252,15 +254,17 @@ void write_gaussian_ply(const std::filesystem::path& path,
   file.commit();
 }
 
-void restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame) {
+bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame) {
   const std::string bytes = read_file(path);
-  if (!is_our_ply(parse_ply_header(bytes, path).comments)) {
-    throw BadInput(Defect::Schema, path, "its header was not written here");
-  }
+  // Other programs may keep our comments, but not the order of the lines around them.
+  const std::string_view start(kHeaderStart);
+  if (!bytes.starts_with(start) || !is_our_ply(parse_ply_header(bytes, path).comments))
+    return false;
   AtomicFile file(path);
   file.write(header_start(frame));
   file.write(std::string_view(bytes).substr(bytes.find("element vertex ")));
   file.commit();
+  return true;
 }
 
 RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path& path) {

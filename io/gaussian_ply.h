@@ -24,8 +24,9 @@ void write_gaussian_ply(const std::filesystem::path& path,
                         const Frame& frame);
 
 /// Writes anew what the header of a file of write_gaussian_ply() tells of its frame; the splats
-/// keep their bytes. \throws BadInput (Schema: the file is of another program); IoError
-void restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame);
+/// keep their bytes. \return false if another program wrote the file, which is left alone \throws
+/// BadInput; IoError
+bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame);
 
 /// Reads the 3DGS layout, ASCII or binary, properties in any order and of any type, others ignored.
 ///

@@ -110,7 +110,9 @@ class SceneReader {
             kProvenanceOrder.begin(), kProvenanceOrder.end(), [&](Provenance candidate) {
               return static_cast<float>(candidate) == in.features[corner];
             });
-        if (found == kProvenanceOrder.end()) return {};
+        const bool is_label = found != kProvenanceOrder.end();
+        if (!is_label && origin_.is_ours) return {};
+        if (!is_label) continue;
         weakest = std::max(weakest, static_cast<size_t>(found - kProvenanceOrder.begin()));
       }
       out.push_back(kProvenanceOrder.at(weakest));

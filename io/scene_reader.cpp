@@ -221,7 +221,7 @@ void load_image(const Scene& scene, View& view, std::vector<std::string>& warnin
   }
   if (view.image.width < camera.width || view.image.height < camera.height) refuse_size();
   area_downscale(view.image, view.valid, camera.width, camera.height);
-  apply_gain(view.image, view.exposure);
+  apply_exposure(view);
   load_given_depth(scene, view, {width, height});
   const auto is_set = [](uint8_t set) { return set != 0; };
   const bool is_masked =

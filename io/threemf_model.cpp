@@ -132,7 +132,9 @@ class ModelReader {
   void start_material(std::string_view name, const XmlElement& element) {
     if (name == "colorgroup") {
       count_entry();
-      colors_ = &(model_.colors[element.count("id")] = {});
+      const uint64_t id = element.count("id");
+      refuse_second(element, id);
+      colors_ = &model_.colors[id];
     } else if (name == "color" && colors_ != nullptr) {
       colors_->push_back(color_of(element.find("color").value_or("")));
     } else if (name == "texture2dgroup") {
@@ -155,11 +157,11 @@ class ModelReader {
       const uint64_t id = element.count("id");
       refuse_second(element, id);
       names_ = &model_.material_names[id];
-      colors_ = &(model_.colors[id] = {});
+      base_colors_ = &model_.colors[id];
     } else if (name == "base" && names_ != nullptr) {
       count_entry();
       names_->emplace_back(element.at("name"));
-      colors_->push_back(color_of(element.find("displaycolor").value_or("")));
+      base_colors_->push_back(color_of(element.find("displaycolor").value_or("")));
     } else if (name == "item") {
       count_entry();
       model_.build.push_back(placement_of(element));
@@ -177,10 +179,7 @@ class ModelReader {
     if (!name.starts_with(kCore)) return;
     name.remove_prefix(kCore.size());
     if (name == "object") object_ = nullptr;
-    if (name == "basematerials") {
-      names_ = nullptr;
-      colors_ = nullptr;
-    }
+    if (name == "basematerials") names_ = nullptr;
     if (name == "metadata") text_ = nullptr;
   }
 
@@ -262,12 +261,13 @@ class ModelReader {
   std::map<std::string, std::string> uris_;  // by prefix
   std::set<uint64_t> ids_;
   bool has_root_ = false;
-  int depth_ = 0;                                   // of the element that comes; 1 = the root
-  ThreeMfObject* object_ = nullptr;                 // the one whose elements come
-  ThreeMfProperty property_;                        // of its triangles that name none
-  std::vector<std::string>* names_ = nullptr;       // of the group whose elements come
-  std::vector<Eigen::Vector3f>* colors_ = nullptr;  // as names_, or of colours
-  std::string* text_ = nullptr;                     // the metadata whose text comes
+  int depth_ = 0;                                        // of the element that comes; 1 = the root
+  ThreeMfObject* object_ = nullptr;                      // the one whose elements come
+  ThreeMfProperty property_;                             // of its triangles that name none
+  std::vector<std::string>* names_ = nullptr;            // of the base materials that come
+  std::vector<Eigen::Vector3f>* base_colors_ = nullptr;  // of the same, where names_ are
+  std::vector<Eigen::Vector3f>* colors_ = nullptr;       // of the group of colours that come
+  std::string* text_ = nullptr;                          // the metadata whose text comes
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <Eigen/QR>
 #include <tbb/parallel_for.h>
 
+#include "libcgs/core/disjoint_sets.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/core/srgb.h"
@@ -49,20 +50,25 @@ Eigen::Vector3f color_at(const View& view, const Eigen::Vector3d& point) {
 struct Pair {
   size_t a = 0;
   size_t b = 0;
-  std::array<std::vector<float>, 3> log_ratio;  ///< ln(colour in a / colour in b), per channel.
+  std::array<float, 3> log_ratio = {};  ///< Median of ln(colour in a / colour in b), per channel.
+  size_t samples = 0;
 };
 
 Pair compare(std::span<const View* const> views,
              const SharedSurface& shared,
              std::pair<size_t, size_t> which) {
-  Pair out{which.first, which.second, {}};
+  Pair out{which.first, which.second};
+  std::array<std::vector<float>, 3> log_ratios;
   for (const Eigen::Vector3d& point : shared(out.a, out.b)) {
     const Eigen::Vector3f ratio =
         color_at(*views[out.a], point).cwiseQuotient(color_at(*views[out.b], point));
     if (!(ratio.minCoeff() > 0)) continue;
-    for (int c = 0; c < 3; ++c)
-      out.log_ratio.at(static_cast<size_t>(c)).push_back(std::log(ratio[c]));
+    for (size_t c = 0; c < 3; ++c) {
+      log_ratios.at(c).push_back(std::log(ratio[static_cast<Eigen::Index>(c)]));
+    }
   }
+  out.samples = log_ratios[0].size();
+  for (size_t c = 0; c < 3 && out.samples > 0; ++c) out.log_ratio.at(c) = median(log_ratios.at(c));
   return out;
 }
 
@@ -74,9 +80,8 @@ Eigen::VectorXd log_gains(const std::vector<Pair>& pairs, size_t views, size_t c
   for (const Pair& pair : pairs) {
     const auto a = static_cast<Eigen::Index>(pair.a);
     const auto b = static_cast<Eigen::Index>(pair.b);
-    std::vector<float> ratios = pair.log_ratio.at(channel);
-    const auto weight = static_cast<double>(ratios.size());
-    const double difference = -weight * double{median(ratios)};  // gain a - gain b
+    const auto weight = static_cast<double>(pair.samples);
+    const double difference = -weight * double{pair.log_ratio.at(channel)};  // gain a - gain b
     normal(a, a) += weight;
     normal(b, b) += weight;
     normal(a, b) -= weight;
@@ -103,12 +108,17 @@ ExposureGains exposure_gains(std::span<const View* const> views, const SharedSur
   std::vector<Pair> pairs(which.size());
   tbb::parallel_for(
       size_t(0), which.size(), [&](size_t i) { pairs[i] = compare(views, shared, which[i]); });
-  std::erase_if(pairs, [](const Pair& p) { return p.log_ratio[0].size() < kFewestSamples; });
-  if (pairs.empty()) return out;
+  std::erase_if(pairs, [](const Pair& p) { return p.samples < kFewestSamples; });
+  DisjointSets groups(views.size());
   for (const Pair& pair : pairs) {
-    out.samples[pair.a] += pair.log_ratio[0].size();
-    out.samples[pair.b] += pair.log_ratio[0].size();
+    out.samples[pair.a] += pair.samples;
+    out.samples[pair.b] += pair.samples;
+    groups.join(static_cast<uint32_t>(pair.a), static_cast<uint32_t>(pair.b));
   }
+  for (size_t v = 0; v < views.size(); ++v) {
+    out.group.push_back(groups.root(static_cast<uint32_t>(v)));
+  }
+  if (pairs.empty()) return out;
   for (size_t c = 0; c < 3; ++c) {
     const Eigen::VectorXd logs = log_gains(pairs, views.size(), c);
     for (size_t v = 0; v < views.size(); ++v) {
@@ -117,6 +127,12 @@ ExposureGains exposure_gains(std::span<const View* const> views, const SharedSur
     }
   }
   return out;
+}
+
+void apply_exposure(View& view) {
+  if (view.exposure == Eigen::Vector3f::Ones()) return;
+  apply_gain(view.image, view.exposure);
+  for (Eigen::Vector3f& color : view.image.data) color = color.cwiseMin(1.0f);
 }
 
 void apply_gain(ColorImage& image, const Eigen::Vector3f& gain) {

@@ -14,6 +14,7 @@ namespace cgs {
 struct ExposureGains {
   std::vector<Eigen::Vector3f> gain;  ///< Per view, one factor per channel.
   std::vector<size_t> samples;        ///< Per view, surface points it shares with another view.
+  std::vector<size_t> group;          ///< Per view, the first of those that it is compared with.
 };
 
 /// Points of the surface that views `a` and `b` both show, in the frame of their cameras. Any
@@ -26,6 +27,10 @@ using SharedSurface = std::function<std::vector<Eigen::Vector3d>(size_t a, size_
 /// another keeps 1. Clipped and nearly black colours take no part.
 /// \throws InvalidInput if the image of a view is not loaded
 ExposureGains exposure_gains(std::span<const View* const> views, const SharedSurface& shared);
+
+/// Multiplies the photograph of a view by its exposure. What that makes brighter than white is
+/// white: no picture of the surface could show more.
+void apply_exposure(View& view);
 
 /// Multiplies the linear light of an sRGB-coded picture; a factor of exactly 1 changes no bit.
 /// Values beyond 1 stay so; writers clip them.

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "libcgs/core/error.h"
 
@@ -49,19 +51,29 @@ float middle(std::vector<float> values) {
   return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
-/// Makes the exposure that most views have the common one.
+/// Makes the exposure that most views of a group have the common one.
 void keep_most_as_they_are(ExposureGains& exposure) {
-  for (int c = 0; c < 3; ++c) {
-    std::vector<float> logs;
-    for (size_t v = 0; v < exposure.gain.size(); ++v) {
-      if (exposure.samples[v] > 0) logs.push_back(std::log(exposure.gain[v][c]));
-    }
-    if (logs.empty()) return;
-    const float common = std::exp(middle(logs));
-    for (size_t v = 0; v < exposure.gain.size(); ++v) {
-      if (exposure.samples[v] > 0) exposure.gain[v][c] /= common;
+  const std::vector<Eigen::Vector3f> gains = exposure.gain;
+  for (size_t v = 0; v < gains.size(); ++v) {
+    for (int c = 0; c < 3; ++c) {
+      std::vector<float> logs;
+      for (size_t other = 0; other < gains.size(); ++other) {
+        if (exposure.group[other] == exposure.group[v]) logs.push_back(std::log(gains[other][c]));
+      }
+      if (logs.size() > 1) exposure.gain[v][c] /= std::exp(middle(std::move(logs)));
     }
   }
+}
+
+/// How far two views lie apart in a channel at most: 0.25 = one is brighter by a quarter.
+float largest_difference(const std::vector<Eigen::Vector3f>& gains) {
+  Eigen::Array3f least = Eigen::Array3f::Constant(std::numeric_limits<float>::infinity());
+  Eigen::Array3f most = Eigen::Array3f::Zero();
+  for (const Eigen::Vector3f& gain : gains) {
+    least = least.min(gain.array());
+    most = most.max(gain.array());
+  }
+  return gains.empty() ? 0 : (most / least).maxCoeff() - 1;
 }
 
 }  // namespace
@@ -76,10 +88,7 @@ ExposureGains exposure_gains(const Scene& scene, const std::vector<ViewPriors>& 
     return shared_surface(*views[a], priors[a], *views[b], priors[b]);
   });
   keep_most_as_they_are(out);
-  const auto is_small = [](const Eigen::Vector3f& gain) {
-    return (gain.array() - 1).abs().maxCoeff() < kLeastGain;
-  };
-  if (std::all_of(out.gain.begin(), out.gain.end(), is_small)) {
+  if (largest_difference(out.gain) < kLeastDifference) {
     std::fill(out.gain.begin(), out.gain.end(), Eigen::Vector3f::Ones());
   }
   return out;

@@ -8,16 +8,17 @@
 
 namespace cgs {
 
-/// Gains of the input views of a scene below which photographs count as exposed alike: an automatic
-/// exposure goes in larger steps, and what is matched wrongly or shines makes smaller ones.
-inline constexpr float kLeastGain = 0.03f;  ///< |gain - 1|
+/// Difference in a channel of two photographs, 0.25 = one is brighter by a quarter, below which
+/// they count as exposed alike: automatic exposures go in larger steps, and what shines or is
+/// matched wrongly makes smaller ones.
+inline constexpr float kLeastDifference = 0.03f;
 
-/// The gains of the input views from pixels whose measured depth another view confirms. What they
-/// agree on is the exposure in the middle, so that one photograph that stands out is brought to
-/// that of the others, and views that are held out are likely to have it, too.
+/// The gains of the input views from pixels whose measured depth another view confirms. In each
+/// channel of each group of views that share surface, the gain in the middle is 1: one photograph
+/// that stands out is brought to the others, and views that are held out are likely to agree.
 ///
 /// \param priors  of the input views, in their order
-/// \return in the order of Scene::input; all exactly 1 unless one differs by kLeastGain or more
+/// \return in the order of Scene::input; all exactly 1 unless two differ by kLeastDifference
 /// \throws InvalidInput if the image of an input view is not loaded
 ExposureGains exposure_gains(const Scene& scene, const std::vector<ViewPriors>& priors);
 

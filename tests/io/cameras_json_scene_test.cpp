@@ -64,9 +64,13 @@ TEST_F(CamerasJsonScene, BringsOurOwnBackToTheWorld) {
   Scene scene = read_scene(dir_.path());
   const Scene world = scene;
   to_canonical(scene);
+  scene.frame.up = Eigen::Vector3d(0, -0.6, 0.8);
+  scene.views[1].exposure.setConstant(1.5f);
   write_cameras_json(dir_ / "cameras.json", scene);
   const Scene again = read_scene(dir_.path());
+  EXPECT_EQ(again.frame.up, scene.frame.up);
   for (size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(again.views[i].exposure, Eigen::Vector3f::Ones()) << "as they were taken";
     EXPECT_TRUE(
         again.views[i].camera.world_from_cam.isApprox(world.views[i].camera.world_from_cam, 1e-12));
   }

@@ -130,8 +130,10 @@ TEST_F(CamerasJson, ReadsFilesOfOtherPrograms) {
                       {"position", {1, 2, 3}},
                       {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
                       {"fy", 100},
-                      {"fx", 100}};
+                      {"fx", 100},
+                      {"exposure", "1/250 s"}};
   const Scene scene = read(json::array({entry}));
+  EXPECT_EQ(scene.views.at(0).exposure, Eigen::Vector3f::Ones());
   EXPECT_EQ(scene.views.at(0).camera.center(), Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(scene.views.at(0).camera.cx, 40);
   EXPECT_TRUE(scene.input.empty());

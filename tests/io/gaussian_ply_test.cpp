@@ -367,10 +367,16 @@ TEST(GaussianPly, KeepsTheBytesOfSplatsWhenItsFrameIsToldAnew) {
   frame.up = Eigen::Vector3d(0.1, 0.2, 0.3).normalized();
   frame.metres_per_unit = 0.025;
   write_gaussian_ply(dir / "wanted.ply", g, frame);
-  restate_gaussian_ply(dir / "told.ply", frame);
+  EXPECT_TRUE(restate_gaussian_ply(dir / "told.ply", frame));
   EXPECT_TRUE(test::read_bytes(dir / "told.ply") == test::read_bytes(dir / "wanted.ply"));
-  test::write_bytes(dir / "other.ply", raw_file(std::vector<RawSplat>(3)));
-  EXPECT_THROW(restate_gaussian_ply(dir / "other.ply", frame), BadInput);
+  std::string other = raw_file(std::vector<RawSplat>(3));
+  test::write_bytes(dir / "other.ply", other);
+  EXPECT_FALSE(restate_gaussian_ply(dir / "other.ply", frame));
+  other = test::read_bytes(dir / "told.ply");
+  other.replace(other.find("little"), 6, "big");
+  test::write_bytes(dir / "other.ply", other);
+  EXPECT_FALSE(restate_gaussian_ply(dir / "other.ply", frame));
+  EXPECT_EQ(test::read_bytes(dir / "other.ply"), other);
 }
 
 TEST(GaussianPly, RefusesToWriteWhatItCouldNotRead) {

@@ -361,6 +361,15 @@ TEST(ReadGlb, FeatureNumbersOfOthersOnlyWeakenNames) {
     if (label == Provenance::Interpolated) label = Provenance::Inferred;
   }
   expect_same_areas(mesh, read_mesh_file(dir / "a.glb").content);
+  change_json(dir / "a.glb", [](Json& json) {  // numbers that are no labels say nothing of them
+    for (Json& primitive : json["meshes"][0]["primitives"]) {
+      primitive["attributes"]["_FEATURE_ID_0"] = primitive["attributes"]["_SIGMA"];
+    }
+  });
+  for (Provenance& label : mesh.provenance) {
+    if (label == Provenance::SingleView) label = Provenance::Observed;
+  }
+  expect_same_areas(mesh, read_mesh_file(dir / "a.glb").content);
   change_json(dir / "a.glb", [](Json& json) {
     for (Json& material : json["materials"]) material["name"] = "stone";
   });

@@ -265,6 +265,25 @@ TEST_F(Read3mf, VerticesTakeTheColoursOfFaces) {
   EXPECT_EQ(read(file).warnings, std::vector<std::string>{"textures are not read"});
 }
 
+// A group of colours inside one of materials ends before it, as no file should have it.
+TEST_F(Read3mf, KeepsGroupsOfColoursAndMaterialsApart) {
+  ThreeMfFile file;
+  file.attributes =
+      "unit=\"millimeter\" requiredextensions=\"m\" "
+      "xmlns:m=\"http://schemas.microsoft.com/3dmanufacturing/material/2015/02\"";
+  file.resources =
+      "<basematerials id=\"5\"><m:colorgroup id=\"6\"><m:color color=\"#0000FF\"/></m:colorgroup>"
+      "<base name=\"PLA\" displaycolor=\"#FF0000\"/></basematerials>"
+      "<object id=\"1\" pid=\"5\" pindex=\"0\">" +
+      ThreeMfFile::tetrahedron() + "</object>";
+  const ParsedMesh parsed = read(file);
+  ASSERT_EQ(parsed.mesh.colors.size(), 4u);
+  EXPECT_EQ(parsed.mesh.colors[0], Eigen::Vector3f::UnitX());
+  const std::string second = "<m:colorgroup id=\"5\"/>";
+  file.resources.insert(file.resources.find("<object"), second);
+  EXPECT_EQ(refused(file), "SCHEMA");
+}
+
 TEST_F(Read3mf, TellsFilesOfThisProgramFromOthers) {
   write_3mf(dir_ / "own.3mf",
             test::labelled_sphere(),

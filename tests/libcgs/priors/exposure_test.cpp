@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/exposure.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
@@ -58,6 +60,41 @@ TEST(ExposureOfPriors, OfTwoViewsMeetInTheMiddle) {
   const ExposureGains found = exposure_gains(scene, priors);
   expect_gain(found.gain[0], Vector3f::Constant(0.8f));
   expect_gain(found.gain[1], Vector3f::Constant(1.25f));
+}
+
+// Two that share nothing with three others tell nothing of what these have in common.
+TEST(ExposureOfPriors, IsSettledForEachGroupOfViewsByItself) {
+  Scene scene = photographs();
+  Scene beside = photographs();
+  for (size_t i = 0; i < 2; ++i) {
+    View& view = beside.views[i];
+    view.camera.world_from_cam.pretranslate(Vector3d(0, 0, 100));
+    apply_gain(view.image, Vector3f::Constant(i == 0 ? 0.5f : 0.125f));
+    scene.views.push_back(view);
+    scene.input.push_back(static_cast<int>(3 + i));
+  }
+  apply_gain(scene.views[0].image, Vector3f::Constant(0.8f));
+  std::vector<ViewPriors> priors = true_priors(photographs());
+  priors.push_back(priors[0]);
+  priors.push_back(priors[1]);
+  const ExposureGains found = exposure_gains(scene, priors);
+  expect_gain(found.gain[0], Vector3f::Constant(1.25f));
+  expect_gain(found.gain[1], Vector3f::Ones());
+  expect_gain(found.gain[2], Vector3f::Ones());
+  expect_gain(found.gain[3], Vector3f::Constant(0.5f));
+  expect_gain(found.gain[4], Vector3f::Constant(2));
+  EXPECT_EQ(found.group, (std::vector<size_t>{0, 0, 0, 3, 3}));
+}
+
+TEST(ExposureOfPriors, CountsTheDifferenceOfTwoPhotographs) {
+  Scene scene = photographs();
+  scene.input = {0, 1};
+  apply_gain(scene.views[1].image, Vector3f::Constant(1.045f));
+  std::vector<ViewPriors> priors = true_priors(scene);
+  priors.pop_back();
+  const ExposureGains found = exposure_gains(scene, priors);
+  expect_gain(found.gain[0], Vector3f::Constant(std::sqrt(1.045f)));
+  EXPECT_NEAR(found.gain[0].x() / found.gain[1].x(), 1.045, 0.01);
 }
 
 TEST(ExposureOfPriors, LeavesPhotographsExposedAlikeAsTheyAre) {
