@@ -272,9 +272,9 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   load_images(scene, scene.input, part_of(progress, 0, 0.01));
   if (!request.depth_network.empty()) guess_by_network(request.depth_network, scene);
   to_canonical(scene);
-  narrow_depth_ranges(scene, request.priors.sweep);
+  narrow_depth_ranges(scene, request.priors.sweep, part_of(progress, 0.01, 0.02));
   EstimatedPriors estimated =
-      estimate_priors(scene, request.priors, part_of(progress, 0.01, kPriorsShare));
+      estimate_priors(scene, request.priors, part_of(progress, 0.02, kPriorsShare));
   const GivenDepthReport& given = estimated.report.given;
   scene.warnings.insert(scene.warnings.end(), given.remarks.begin(), given.remarks.end());
   take_sensor_scale(given, scene.frame);

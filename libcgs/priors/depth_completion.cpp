@@ -94,19 +94,22 @@ class Completion {
   bool measured(int x, int y) const { return priors_.origin(x, y) == DepthOrigin::Measured; }
   const Raster<Filled>& filled() const { return filled_; }
 
-  void collect(float fallback) {
+  void collect(float fallback, const Progress& progress) {
+    SharedProgress shared(progress, static_cast<size_t>(filled_.height));
     tbb::parallel_for(0, filled_.height, [&](int y) {
       for (int x = 0; x < filled_.width; ++x) {
         if (!usable(x, y)) continue;
         filled_(x, y) =
             measured(x, y) ? Filled{1 / priors_.depth(x, y), 0, 0} : estimate(x, y, fallback);
       }
+      shared.advance();
     });
   }
 
   // Weighted averages over neighbours of like colour and depth, as on a chessboard.
-  void smooth() {
+  void smooth(const Progress& progress) {
     for (int k = 0; k < 2 * options_.smoothing_rounds; ++k) {
+      report(progress, double(k) / (2 * options_.smoothing_rounds));
       tbb::parallel_for(0, filled_.height, [&](int y) {
         for (int x = (y + k) % 2; x < filled_.width; x += 2) {
           if (usable(x, y) && !measured(x, y)) relax(x, y);
@@ -261,11 +264,12 @@ void DepthCompletionOptions::validate() const {
 void complete_depth(ViewPriors& priors,
                     const View& view,
                     const DepthCompletionOptions& options,
-                    const std::vector<CompletionWitness>& witnesses) {
+                    const std::vector<CompletionWitness>& witnesses,
+                    const Progress& progress) {
   options.validate();
   Completion completion(priors, view, options, witnesses);
-  completion.collect(fallback_inverse_depth(priors, options));
-  completion.smooth();
+  completion.collect(fallback_inverse_depth(priors, options), part_of(progress, 0, 0.5));
+  completion.smooth(part_of(progress, 0.5, 1));
   constexpr float kFloor = 0.02f;  // relative sigma next to the evidence
   constexpr float kCap = 0.5f;
   for (int y = 0; y < priors.depth.height; ++y) {

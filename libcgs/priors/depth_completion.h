@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "libcgs/core/progress.h"
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/view_priors.h"
 
@@ -43,6 +44,7 @@ struct CompletionWitness {
 void complete_depth(ViewPriors& priors,
                     const View& view,
                     const DepthCompletionOptions& options,
-                    const std::vector<CompletionWitness>& witnesses = {});
+                    const std::vector<CompletionWitness>& witnesses = {},
+                    const Progress& progress = {});
 
 }  // namespace cgs

@@ -56,8 +56,10 @@ class Estimator {
       }
     }
     const std::vector<DepthGuess> guesses = guesses_of(given);
+    const auto count = static_cast<double>(out_.views.size());
     for (size_t i = 0; i < out_.views.size(); ++i) {
-      complete(i, out_.views[i]);
+      const Progress completing = part_of(progress, kSweepShare, 1);
+      complete(i, out_.views[i], part_of(completing, double(i) / count, double(i + 1) / count));
       enter_guess(guesses[i], out_.views[i]);
       out_.views[i].layer = depth_layers(out_.views[i].depth, options_.layers);
       out_.report.coverage.push_back(coverage(out_.views[i]));
@@ -94,7 +96,7 @@ class Estimator {
   const View& view(size_t i) const { return scene_.views[static_cast<size_t>(scene_.input[i])]; }
 
   // Of a view, which may be a copy of it that knows less; others are as they are now.
-  void complete(size_t i, ViewPriors& priors) const {
+  void complete(size_t i, ViewPriors& priors, const Progress& progress) const {
     DepthCompletionOptions completion = options_.completion;
     if (!(completion.fallback_depth > 0)) {
       const DepthRange range = depth_range(scene_, scene_.input[i]);
@@ -104,7 +106,7 @@ class Estimator {
     for (size_t j = 0; j < out_.views.size(); ++j) {
       if (j != i) witnesses.push_back({&view(j).camera, &out_.views[j]});
     }
-    complete_depth(priors, view(i), completion, witnesses);
+    complete_depth(priors, view(i), completion, witnesses, progress);
   }
 
   std::vector<DepthGuess> guesses_of(const GivenDepth& given) const {

@@ -222,12 +222,15 @@ class BandCost {
 
 }  // namespace
 
-CostVolume matching_cost(const std::vector<SweepImage>& images, const SweepGeometry& geometry) {
+CostVolume matching_cost(const std::vector<SweepImage>& images,
+                         const SweepGeometry& geometry,
+                         const Progress& progress) {
   const Raster<float>& gray = images[static_cast<size_t>(geometry.image)].gray;
   CostVolume volume{gray.width, gray.height, geometry.planes, {}};
   const auto planes = static_cast<size_t>(geometry.planes);
   volume.cost.resize(gray.data.size() * planes);
   const int bands = (gray.height + kBandRows - 1) / kBandRows;
+  SharedProgress shared(progress, static_cast<size_t>(bands) * planes);
   tbb::parallel_for(0, bands, [&](int band) {
     const int first = band * kBandRows;
     const int last = std::min(gray.height, first + kBandRows);
@@ -244,6 +247,7 @@ CostVolume matching_cost(const std::vector<SweepImage>& images, const SweepGeome
         out[p * planes + static_cast<size_t>(t)] =
             static_cast<uint8_t>(std::lround(kLargestCost * std::clamp(c, 0.0f, 1.0f)));
       }
+      shared.advance();
     }
   });
   return volume;

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "libcgs/core/progress.h"
 #include "libcgs/priors/sweep_geometry.h"
 
 namespace cgs {
@@ -43,6 +44,8 @@ inline float combined_cost(std::span<const float> sorted) {
 /// Per source a census transform (7 x 7, robust to lighting, outliers and foreground fattening;
 /// Zabih and Woodfill 1994) plus normalised cross-correlation (5 x 5, sharper where there is
 /// texture). Sources that see a pixel are combined so that one of them may be occluded.
-CostVolume matching_cost(const std::vector<SweepImage>& images, const SweepGeometry& geometry);
+CostVolume matching_cost(const std::vector<SweepImage>& images,
+                         const SweepGeometry& geometry,
+                         const Progress& progress = {});
 
 }  // namespace cgs

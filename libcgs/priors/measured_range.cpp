@@ -67,7 +67,7 @@ DepthRange range_of(const ViewPriors& measured, const DepthRange& guess) {
 
 }  // namespace
 
-void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options) {
+void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options, const Progress& progress) {
   const auto states_range = [&](int i) {
     const View& view = scene.views[static_cast<size_t>(i)];
     return view.near > 0 && view.far > view.near;
@@ -82,7 +82,7 @@ void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options) {
   }
   PlaneSweepOptions coarse = options;
   coarse.least_disparity /= kReduction;  // what the full sweep can tell must lie in the range
-  const std::vector<ViewPriors> measured = plane_sweep(small, coarse);
+  const std::vector<ViewPriors> measured = plane_sweep(small, coarse, progress);
   for (size_t k = 0; k < measured.size(); ++k) {
     if (states_range(scene.input[k])) continue;
     const DepthRange range = range_of(measured[k], depth_range(scene, scene.input[k]));

@@ -13,6 +13,8 @@ namespace cgs {
 /// a chance match far from the scene; the full sweep also spends its planes where nothing is.
 /// Views with little to measure keep the guess.
 /// Preconditions and errors as plane_sweep().
-void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options);
+void narrow_depth_ranges(Scene& scene,
+                         const PlaneSweepOptions& options,
+                         const Progress& progress = {});
 
 }  // namespace cgs

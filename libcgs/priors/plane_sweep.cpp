@@ -129,9 +129,11 @@ void remove_outvoted(Raster<Agreement>& agreement) {
 }
 
 std::vector<Raster<Agreement>> check_all(const std::vector<SweptView>& views,
-                                         const PlaneSweepOptions& options) {
+                                         const PlaneSweepOptions& options,
+                                         const Progress& progress) {
   std::vector<Raster<Agreement>> out;
   for (size_t i = 0; i < views.size(); ++i) {
+    report(progress, double(i) / double(views.size()));
     out.push_back(cross_check(views, i, {options.max_disagreement, options.least_disparity}));
     remove_outvoted(out.back());
     remove_bare(views[i], out.back());
@@ -280,24 +282,40 @@ std::vector<ViewPriors> plane_sweep(const Scene& scene,
     views[i].geometry = sweep_geometry(scene, static_cast<int>(i), options.sampling);
     matched[i] = with_parallax(views[i].geometry);
   }
+  const auto of_view = [count](const Progress& of_all, size_t i) {
+    return part_of(of_all, double(i) / double(count), double(i + 1) / double(count));
+  };
   for (size_t i = 0; i < count; ++i) {
-    const CostVolume volume = matching_cost(images, matched[i]);
-    const Raster<float> start = semi_global_planes(volume, images[i].gray, options.smoothness);
+    const Progress sweeping = of_view(part_of(progress, 0, 0.5), i);
+    const CostVolume volume = matching_cost(images, matched[i], part_of(sweeping, 0, 0.8));
+    const Raster<float> start =
+        semi_global_planes(volume, images[i].gray, options.smoothness, part_of(sweeping, 0.8, 1));
     refinements.emplace_back(images, matched[i], start);
-    report(progress, 0.5 * static_cast<double>(i + 1) / static_cast<double>(count));
+    report(sweeping, 1);
   }
   std::vector<Raster<SlantedPlane>> extra(count);
+  const auto take_results = [&](const Progress& taking) {
+    for (size_t i = 0; i < count; ++i) views[i].pixels = refinements[i].result(of_view(taking, i));
+  };
   for (int round = 0; round < options.refinement_rounds; ++round) {
-    for (size_t i = 0; i < count; ++i) refinements[i].round(extra[i]);
-    for (size_t i = 0; i < count; ++i) views[i].pixels = refinements[i].result();
-    const auto agreements = check_all(views, options);
-    for (size_t i = 0; i < count; ++i) extra[i] = planes_of_others(views, i, agreements);
-    report(progress, 0.5 + 0.5 * (round + 1) / options.refinement_rounds);
+    const double share = 0.45 / options.refinement_rounds;
+    const Progress refining = part_of(progress, 0.5 + share * round, 0.5 + share * (round + 1));
+    const Progress rounding = part_of(refining, 0, 0.8);
+    for (size_t i = 0; i < count; ++i) refinements[i].round(extra[i], of_view(rounding, i));
+    take_results(part_of(refining, 0.8, 0.9));
+    const auto agreements = check_all(views, options, part_of(refining, 0.9, 0.95));
+    for (size_t i = 0; i < count; ++i) {
+      report(of_view(part_of(refining, 0.95, 1), i), 0);
+      extra[i] = planes_of_others(views, i, agreements);
+    }
   }
-  for (size_t i = 0; i < count; ++i) views[i].pixels = refinements[i].result();
-  const auto agreements = check_all(views, options);
+  take_results(part_of(progress, 0.95, 0.97));
+  const auto agreements = check_all(views, options, part_of(progress, 0.97, 0.98));
   std::vector<ViewPriors> priors;
-  for (size_t i = 0; i < count; ++i) priors.push_back(view_priors(views[i], agreements[i]));
+  for (size_t i = 0; i < count; ++i) {
+    report(of_view(part_of(progress, 0.98, 1), i), 0);
+    priors.push_back(view_priors(views[i], agreements[i]));
+  }
   return priors;
 }
 

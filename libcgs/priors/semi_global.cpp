@@ -36,7 +36,8 @@ class Aggregation {
   Aggregation(const CostVolume& volume, const Raster<float>& guide, const SmoothnessPenalties& p)
       : volume_(volume), guide_(guide), penalties_(p), total_(volume.cost.size(), 0) {}
 
-  void along_rows() {
+  void along_rows(const Progress& progress) {
+    SharedProgress shared(progress, static_cast<size_t>(volume_.height));
     tbb::parallel_for(0, volume_.height, [&](int y) {
       PathCosts pair(2, volume_.planes);
       for (const int dx : {1, -1}) {
@@ -46,15 +47,17 @@ class Aggregation {
           step({x, y}, {x - dx, y}, {pair, (k + 1) % 2}, {pair, k % 2});
         }
       }
+      shared.advance();
     });
   }
 
   // Paths that come from the row above (dy = 1) or below (dy = -1): straight and both diagonals.
-  void across_rows(int dy) {
+  void across_rows(int dy, const Progress& progress) {
     std::vector<PathCosts> before(3, PathCosts(volume_.width, volume_.planes));
     std::vector<PathCosts> here = before;
     const int begin = dy > 0 ? 0 : volume_.height - 1;
     for (int k = 0; k < volume_.height; ++k) {
+      report(progress, double(k) / volume_.height);
       const int y = begin + dy * k;
       const tbb::blocked_range<int> columns(0, volume_.width, kColumnGrain);
       tbb::parallel_for(columns, [&](const tbb::blocked_range<int>& range) {
@@ -142,11 +145,12 @@ class Aggregation {
 
 Raster<float> semi_global_planes(const CostVolume& volume,
                                  const Raster<float>& guide,
-                                 const SmoothnessPenalties& penalties) {
+                                 const SmoothnessPenalties& penalties,
+                                 const Progress& progress) {
   Aggregation aggregation(volume, guide, penalties);
-  aggregation.along_rows();
-  aggregation.across_rows(1);
-  aggregation.across_rows(-1);
+  aggregation.along_rows(part_of(progress, 0, 0.25));  // two of eight paths
+  aggregation.across_rows(1, part_of(progress, 0.25, 0.625));
+  aggregation.across_rows(-1, part_of(progress, 0.625, 1));
   return aggregation.winners();
 }
 

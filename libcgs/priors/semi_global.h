@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "libcgs/core/progress.h"
 #include "libcgs/core/raster.h"
 #include "libcgs/priors/matching_cost.h"
 
@@ -19,6 +20,7 @@ struct SmoothnessPenalties {
 /// \param guide gray levels of the view the volume belongs to
 Raster<float> semi_global_planes(const CostVolume& volume,
                                  const Raster<float>& guide,
-                                 const SmoothnessPenalties& penalties);
+                                 const SmoothnessPenalties& penalties,
+                                 const Progress& progress = {});
 
 }  // namespace cgs

@@ -407,18 +407,21 @@ void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
   planes_(x, y) = best;
 }
 
-void SlantedRefinement::round(const Raster<SlantedPlane>& extra) {
+void SlantedRefinement::round(const Raster<SlantedPlane>& extra, const Progress& progress) {
+  SharedProgress shared(progress, 2 * static_cast<size_t>(planes_.height));
   for (const int color : {0, 1}) {
     tbb::parallel_for(0, planes_.height, [&](int y) {
       for (int x = (y + color) % 2; x < planes_.width; x += 2) {
         if (reference_.valid(x, y) != 0) visit(x, y, extra);
       }
+      shared.advance();
     });
   }
 }
 
-Raster<RefinedPixel> SlantedRefinement::result() const {
+Raster<RefinedPixel> SlantedRefinement::result(const Progress& progress) const {
   Raster<RefinedPixel> out(planes_.width, planes_.height, RefinedPixel{{kNaN, 0, 0}, 0, 0});
+  SharedProgress shared(progress, static_cast<size_t>(planes_.height));
   tbb::parallel_for(0, planes_.height, [&](int y) {
     for (int x = 0; x < planes_.width; ++x) {
       if (reference_.valid(x, y) == 0) continue;
@@ -437,6 +440,7 @@ Raster<RefinedPixel> SlantedRefinement::result() const {
       const auto sigma = static_cast<float>(std::sqrt(variance * per_variance));
       out(x, y) = {planes_(x, y), 1 - data_cost(w, planes_(x, y)), sigma};
     }
+    shared.advance();
   });
   return out;
 }

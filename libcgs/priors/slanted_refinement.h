@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "libcgs/core/progress.h"
 #include "libcgs/priors/sweep_geometry.h"
 
 namespace cgs {
@@ -41,10 +42,10 @@ class SlantedRefinement {
 
   /// One round over all pixels. `extra` (may be empty) holds one more hypothesis per pixel, from
   /// other views; t NaN = none.
-  void round(const Raster<SlantedPlane>& extra);
+  void round(const Raster<SlantedPlane>& extra, const Progress& progress = {});
 
   /// \return NaN t at invalid pixels
-  Raster<RefinedPixel> result() const;
+  Raster<RefinedPixel> result(const Progress& progress = {}) const;
 
  private:
   struct Window;

@@ -215,6 +215,30 @@ TEST(PlaneSweep, IsTheSameForAnyNumberOfThreads) {
   }
 }
 
+// An image that takes minutes must not keep who waits for its end from stopping it.
+TEST(PlaneSweep, CanBeCancelledAmidAView) {
+  const Scene scene = test::photographed_scene(wall_and_square(), three_cameras(), kFinest);
+  std::vector<double> told;
+  const auto priors =
+      plane_sweep(scene, one_round(), [&](double fraction) { told.push_back(fraction); });
+  ASSERT_FALSE(told.empty());
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_LE(told.back(), 1);
+  double before = 0;
+  double largest_step = 0;
+  for (const double fraction : told) {
+    largest_step = std::max(largest_step, fraction - before);
+    before = fraction;
+  }
+  EXPECT_LT(largest_step, 0.08);  // a view is a sixth, half of the whole being for the sweep
+  const auto expected = plane_sweep(scene, one_round());
+  for (size_t v = 0; v < 3; ++v) EXPECT_TRUE(same_bits(priors[v].depth, expected[v].depth));
+  const Progress cancel = [](double fraction) {
+    if (fraction > 0.01) throw Cancelled();
+  };
+  EXPECT_THROW(plane_sweep(scene, one_round(), cancel), Cancelled);
+}
+
 TEST(PlaneSweep, StaysTheSameWhenTheSceneIsScaledByAPowerOfTwo) {
   Scene scene = test::photographed_scene(wall_and_square(), three_cameras(), kFinest);
   const std::vector<ViewPriors> expected = plane_sweep(scene, one_round());
