@@ -224,6 +224,7 @@ Json leave_out_floaters(GaussianFile& file, size_t memory_limit, const Terminal&
   } else {
     terminal.say(floaters_text(found));
     keep_only(file.gaussians, found.keep);
+    if (!file.evidence.empty()) file.evidence += "; " + floaters_text(found);
   }
   return floaters_to_json(found, file.frame);
 }
@@ -345,7 +346,9 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
         write_splat_file(request.output,
                          source.model ? source.model->gaussians : source.splats->gaussians,
                          source.frame,
-                         {request.spz_version, request.volume.memory_limit},
+                         {request.spz_version,
+                          request.volume.memory_limit,
+                          source.model ? source.model->evidence : source.splats->evidence},
                          terminal);
     return report;
   }

@@ -128,7 +128,7 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
     write_priors(priors_path(folder, view), model.priors[k]);
     earlier.erase(priors_path(folder, view));
   }
-  write_gaussian_ply(folder / "gaussians.ply", model.gaussians, model.scene.frame);
+  write_gaussian_ply(folder / "gaussians.ply", model.gaussians, model.scene.frame, model.evidence);
   write_cameras_json(folder / "cameras.json", model.scene);  // last: by it the scale is told
   for (const std::filesystem::path& file : earlier) std::filesystem::remove(file);
 }
@@ -168,6 +168,7 @@ Model read_model_as_written(const std::filesystem::path& folder) {
   if (!has_frame) move_foreign_cameras(model.scene, file);
   if (!model.scene.frame.knows_up()) model.scene.frame.up = world_up(model.scene);
   model.gaussians = std::move(file.gaussians);
+  model.evidence = std::move(file.evidence);
   model.scene.warnings = std::move(file.warnings);
   for (const int i : model.scene.input) {
     const View& view = model.scene.views[static_cast<size_t>(i)];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "libcgs/core/gaussians.h"
@@ -18,6 +19,7 @@ struct Model {
   Scene scene;  ///< In its canonical frame; pixels only where loaded.
   Gaussians gaussians;
   std::vector<ViewPriors> priors;  ///< In the order of scene.input; empty for foreign splats.
+  std::string evidence;  ///< What the Gaussians rest on, in words; empty where nobody says.
 };
 
 /// Writes gaussians.ply, cameras.json and priors/<view>.exr. \throws IoError

@@ -286,6 +286,7 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   trained.model.scene = std::move(scene);
   if (request.inspect) request.inspect(trained.model);
   optimise(trained, request, part_of(progress, kPriorsShare, 1));
+  trained.model.evidence = description_of(trained, request.training);
   report(progress, 1);
   return trained;
 }

@@ -45,7 +45,7 @@ struct WrittenSplats {
 WrittenSplats write_splats(const std::filesystem::path& path,
                            const Gaussians& g,
                            const Frame& frame,
-                           int spz_version) {
+                           const SplatFileOptions& options) {
   const std::string extension = lower_extension(path);
   if (extension == ".splat") {
     const DotSplatReport made = write_dot_splat(path, g, frame);
@@ -57,8 +57,8 @@ WrittenSplats write_splats(const std::filesystem::path& path,
             {}};
   }
   if (extension == ".spz") {
-    const SpzReport made = write_spz(path, g, frame, {.version = spz_version});
-    return {{{"format", "SPZ " + std::to_string(spz_version)},
+    const SpzReport made = write_spz(path, g, frame, {.version = options.spz_version});
+    return {{{"format", "SPZ " + std::to_string(options.spz_version)},
              {"splats", g.size()},
              {"bytes", made.bytes},
              {"fractional_bits", made.fractional_bits},
@@ -66,23 +66,25 @@ WrittenSplats write_splats(const std::filesystem::path& path,
             {}};
   }
   if (extension == ".glb") {
-    const size_t bytes = write_splat_glb(path, g, frame, {.y_up = y_up_from(frame.up)});
+    const size_t bytes = write_splat_glb(path, g, frame, {y_up_from(frame.up), options.evidence});
     return {{{"format", "KHR_gaussian_splatting"}, {"splats", g.size()}, {"bytes", bytes}}, {}};
   }
   if (is_compressed_ply_name(path)) {
-    CompressedPlyReport made = write_compressed_ply(path, g, frame);
+    CompressedPlyReport made = write_compressed_ply(path, g, frame, options.evidence);
     return {{{"format", "compressed PLY"},
              {"splats", g.size()},
              {"bytes", made.bytes},
              {"clamped_splats", made.clamped}},
             std::move(made.order)};
   }
-  write_gaussian_ply(path, g, frame);
+  write_gaussian_ply(path, g, frame, options.evidence);
   return {{{"format", "3DGS PLY"}, {"splats", g.size()}}, {}};
 }
 
 /// What a format has no place for, of what is known of a scene: "" if nothing.
-std::string lost_of_frame(const std::filesystem::path& path, const Frame& frame) {
+std::string lost_of_scene(const std::filesystem::path& path,
+                          const Frame& frame,
+                          const std::string& evidence) {
   if (!is_bare_splat_name(path)) return "";
   std::string out;
   const auto add = [&](bool is_lost, const std::string& what) {
@@ -91,6 +93,7 @@ std::string lost_of_frame(const std::filesystem::path& path, const Frame& frame)
   add(frame.has_metric_scale(), "unit");
   add(!frame.file_origin.isZero(0), "origin");
   add(!frame.up.isApprox(-Eigen::Vector3d::UnitY()), "direction that is up");
+  add(!evidence.empty(), "evidence");
   return out.empty() ? out : lower_extension(path) + " files hold no " + out + " of the scene";
 }
 
@@ -144,9 +147,9 @@ Json write_splat_file(const std::filesystem::path& path,
                       const Frame& frame,
                       const SplatFileOptions& options,
                       Terminal& terminal) {
-  const WrittenSplats written = write_splats(path, g, frame, options.spz_version);
+  const WrittenSplats written = write_splats(path, g, frame, options);
   Json report = written.report;
-  const std::string lost = lost_of_frame(path, frame);
+  const std::string lost = lost_of_scene(path, frame, options.evidence);
   if (!lost.empty()) terminal.say(lost);
   std::vector<std::string> missing;  // why splats are, or parts of them
   if (const std::string clamped = clamped_text(report); !clamped.empty()) {
@@ -176,6 +179,7 @@ Json write_splat_file(const std::filesystem::path& path,
 
 Json splat_file_to_json(const GaussianFile& file) {
   const SplatFindings& f = file.findings;
+  const Json evidence = file.evidence.empty() ? Json() : Json(file.evidence);
   return {{"kind", "splats"},
           {"format", file.format},
           {"counts",
@@ -184,6 +188,7 @@ Json splat_file_to_json(const GaussianFile& file) {
             {"sh_degree", file.gaussians.sh_degree}}},
           {"bounds", bounds_json(file.gaussians, file.frame)},
           {"units", file.frame.unit_name()},
+          {"evidence", evidence},
           {"findings",
            {{"not_finite", f.not_finite},
             {"without_rotation", f.without_rotation},

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -26,7 +27,8 @@ bool is_compressed_ply_name(const std::filesystem::path& path);
 
 struct SplatFileOptions {
   int spz_version = 3;
-  size_t memory_limit = 0;  ///< In bytes, for reading back; 0 = as memory_budget().
+  size_t memory_limit = 0;    ///< In bytes, for reading back; 0 = as memory_budget().
+  std::string evidence = {};  ///< What the splats rest on, in words; empty = nobody says.
 };
 
 /// Writes splats in the format that the name of the file says, reads them back and says on the
@@ -42,7 +44,7 @@ nlohmann::ordered_json write_splat_file(const std::filesystem::path& path,
                                         Terminal& terminal);
 
 /// What a file of splats holds and what is wrong with it: {"kind", "format", "counts", "bounds",
-/// "units", "findings", "warnings"}.
+/// "units", "evidence": words or null, "findings", "warnings"}.
 nlohmann::ordered_json splat_file_to_json(const GaussianFile& file);
 
 }  // namespace cgs

@@ -2,6 +2,7 @@
 #include "convert/web_splats.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -62,6 +63,14 @@ class Exchange {
   Gaussians& b_;
 };
 
+// What the model rests on, of which these splats are no longer one per pixel; "" where nobody says.
+std::string evidence_of_thinned(const Model& model, size_t kept) {
+  const size_t all = model.gaussians.size();
+  if (model.evidence.empty() || kept == all) return model.evidence;
+  return model.evidence + "; thinned to " + std::to_string(kept) + " of " + std::to_string(all) +
+         " Gaussians";
+}
+
 // How they show what was held out, as the evaluation of the model says of all of them; null
 // without.
 Json held_out_figures(Model& model, Gaussians& splats, const Progress& progress) {
@@ -78,7 +87,10 @@ Json write_web_splats(const std::filesystem::path& folder, Model& model, const P
   make_output_folder(folder);
   ThinnedSplats thinned = thinned_splats(model, part_of(progress, 0, 0.9));
   const size_t glb_bytes =
-      write_splat_glb(folder / "splats.glb", thinned.splats, frame, {.y_up = y_up});
+      write_splat_glb(folder / "splats.glb",
+                      thinned.splats,
+                      frame,
+                      {y_up, evidence_of_thinned(model, thinned.splats.size())});
   Json thinning = thinning_to_json(thinned, model.gaussians.size());
   thinning["held_out"] = held_out_figures(model, thinned.splats, part_of(progress, 0.9, 1));
   Json out = {{"thinning", thinning}, {"splats.glb", {{"bytes", glb_bytes}}}};

@@ -193,11 +193,11 @@ class SplatPacker {
   std::vector<Chunk> chunks_;
 };
 
-std::string packed_header(const Gaussians& g, const Frame& frame) {
+std::string packed_header(const Gaussians& g, const Frame& frame, const std::string& evidence) {
   std::string out = "ply\nformat binary_little_endian 1.0\ncomment ";
   out += kPlyGenerator;
   out += '\n';
-  out += ply_frame_comments(frame);
+  out += ply_frame_comments(frame) + ply_evidence_comment(evidence);
   out += "element chunk " + std::to_string((g.size() + kChunk - 1) / kChunk) + "\n";
   for (const auto& [prefix, names] : {std::pair(std::string(), "xyz"),
                                       std::pair(std::string("scale_"), "xyz"),
@@ -348,6 +348,7 @@ RawSplats parse_compressed_ply(std::string_view bytes, const std::filesystem::pa
       });
   RawSplats out = rows.take();
   out.comments = header.comments;
+  out.evidence = ply_evidence(out.comments);
   if (trailing > 0) {
     out.notes.push_back("trailing " + std::to_string(trailing) + " bytes ignored");
   }
@@ -356,7 +357,8 @@ RawSplats parse_compressed_ply(std::string_view bytes, const std::filesystem::pa
 
 CompressedPlyReport write_compressed_ply(const std::filesystem::path& path,
                                          const Gaussians& gaussians,
-                                         const Frame& frame) {
+                                         const Frame& frame,
+                                         const std::string& evidence) {
   require_writable(gaussians);
   require(gaussians.size() < std::numeric_limits<uint32_t>::max(),
           "write_compressed_ply: number of splats must be below 2^32",
@@ -369,7 +371,7 @@ CompressedPlyReport write_compressed_ply(const std::filesystem::path& path,
     file.write(bytes);
     report.bytes += bytes.size();
   };
-  write(packed_header(gaussians, frame));
+  write(packed_header(gaussians, frame, evidence));
   write(packer.chunk_bytes());
   std::string record;
   for (size_t place = 0; place < gaussians.size(); ++place) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -37,9 +38,12 @@ struct CompressedPlyReport {
 ///
 /// A coordinate or log scale is off by up to half of 1/2047 (y: 1/1023) of the range of its chunk,
 /// a colour by half of 1/255 of it, opacity by 1/510, a harmonic by 1/64 (1/32 at the ends), a
-/// rotation by three parts in a thousand. \throws InvalidInput as write_gaussian_ply(); IoError
+/// rotation by three parts in a thousand.
+/// \param evidence  as write_gaussian_ply()
+/// \throws InvalidInput as write_gaussian_ply(); IoError
 CompressedPlyReport write_compressed_ply(const std::filesystem::path& path,
                                          const Gaussians& gaussians,
-                                         const Frame& frame);
+                                         const Frame& frame,
+                                         const std::string& evidence = {});
 
 }  // namespace cgs

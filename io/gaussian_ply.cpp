@@ -18,14 +18,14 @@ namespace {
 
 constexpr const char* kHeaderStart = "ply\nformat binary_little_endian 1.0\ncomment ";
 
-std::string header_start(const Frame& frame) {
+std::string header_start(const Frame& frame, const std::string& evidence) {
   std::string out = kHeaderStart;
   out += kPlyGenerator;
-  return out + '\n' + ply_frame_comments(frame);
+  return out + '\n' + ply_frame_comments(frame) + ply_evidence_comment(evidence);
 }
 
-std::string header_text(const Gaussians& g, const Frame& frame) {
-  std::string out = header_start(frame);
+std::string header_text(const Gaussians& g, const Frame& frame, const std::string& evidence) {
+  std::string out = header_start(frame, evidence);
   out += "element vertex " + std::to_string(g.size()) + "\n";
   const auto add = [&](const std::string& name) { out += "property float " + name + "\n"; };
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
@@ -241,10 +241,11 @@ class SplatRows {
 
 void write_gaussian_ply(const std::filesystem::path& path,
                         const Gaussians& gaussians,
-                        const Frame& frame) {
+                        const Frame& frame,
+                        const std::string& evidence) {
   require_writable(gaussians);
   AtomicFile file(path);
-  file.write(header_text(gaussians, frame));
+  file.write(header_text(gaussians, frame, evidence));
   std::string record;
   for (size_t i = 0; i < gaussians.size(); ++i) {
     record.clear();
@@ -256,13 +257,12 @@ void write_gaussian_ply(const std::filesystem::path& path,
 
 bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame) {
   const std::string bytes = read_file(path);
+  const std::vector<std::string> comments = parse_ply_header(bytes, path).comments;
   // Other programs may keep our comments, but not the order of the lines around them.
-  const std::string_view start(kHeaderStart);
-  if (!bytes.starts_with(start) || !is_our_ply(parse_ply_header(bytes, path).comments))
-    return false;
+  if (!bytes.starts_with(kHeaderStart) || !is_our_ply(comments)) return false;
   AtomicFile file(path);
-  file.write(header_start(frame));
-  file.write(std::string_view(bytes).substr(bytes.find("element vertex ")));
+  file.write(header_start(frame, ply_evidence(comments)));
+  file.write(std::string_view(bytes).substr(bytes.find("\nelement vertex ") + 1));
   file.commit();
   return true;
 }
@@ -280,6 +280,7 @@ RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path
       });
   RawSplats out = rows.take();
   out.comments = header.comments;
+  out.evidence = ply_evidence(out.comments);
   out.may_be_linear =  // no program that states filters writes lengths
       vertex.find("filter_3D") < 0 && !is_our_ply(out.comments);
   const PlyProperty& x = vertex.properties[static_cast<size_t>(vertex.find("x"))];

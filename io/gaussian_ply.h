@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "io/splat_doctor.h"
@@ -16,16 +17,18 @@ namespace cgs {
 /// (logit), scale_0..2 (natural log of world units), rot_0..3 (w, x, y, z).
 ///
 /// Positions are file coordinates; comments carry unit, scale source and origin.
+/// \param evidence  what the Gaussians rest on, in words, for a comment; empty = nobody says
 /// \throws InvalidInput if an array does not fit, or a value is not finite or out of its range;
 ///         IoError
 /// Source: Kerbl et al. 2023, "3D Gaussian Splatting", files of the reference implementation.
 void write_gaussian_ply(const std::filesystem::path& path,
                         const Gaussians& gaussians,
-                        const Frame& frame);
+                        const Frame& frame,
+                        const std::string& evidence = {});
 
 /// Writes anew what the header of a file of write_gaussian_ply() tells of its frame; the splats
-/// keep their bytes. \return false if another program wrote the file, which is left alone \throws
-/// BadInput; IoError
+/// keep their bytes, and the evidence its words. \return false if another program wrote the file,
+/// which is left alone \throws BadInput; IoError
 bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame);
 
 /// Reads the 3DGS layout, ASCII or binary, properties in any order and of any type, others ignored.

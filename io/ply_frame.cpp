@@ -8,10 +8,13 @@
 #include "io/byte_reader.h"
 #include "io/byte_writer.h"
 #include "io/significance.h"
+#include "libcgs/core/error.h"
 
 namespace cgs {
 
 namespace {
+
+constexpr std::string_view kEvidence = "evidence ";
 
 /// The values after `key` in the comment that starts with it, if they are `count` finite numbers.
 std::optional<Eigen::Vector3d> numbers_after(const std::vector<std::string>& comments,
@@ -82,6 +85,20 @@ ScaleSource scale_source_in(const std::vector<std::string>& comments) {
 
 bool is_our_ply(const std::vector<std::string>& comments) {
   return std::find(comments.begin(), comments.end(), kPlyGenerator) != comments.end();
+}
+
+std::string ply_evidence_comment(const std::string& evidence) {
+  if (evidence.empty()) return "";
+  constexpr size_t kLongest = 1000;  // readers that go by lines often have room for 1024 bytes
+  return "comment " + std::string(kEvidence) + one_line(evidence).substr(0, kLongest) + "\n";
+}
+
+std::string ply_evidence(const std::vector<std::string>& comments) {
+  if (!is_our_ply(comments)) return "";
+  for (const std::string& comment : comments) {
+    if (comment.starts_with(kEvidence)) return comment.substr(kEvidence.size());
+  }
+  return "";
 }
 
 std::string ply_frame_comments(const Frame& frame) { return frame_comments(frame, "comment "); }

@@ -26,6 +26,13 @@ inline constexpr const char* kPlyGenerator = "generator cgs";
 /// Whether its comments hold that line.
 bool is_our_ply(const std::vector<std::string>& comments);
 
+/// The header line "comment evidence …" that says in words what splats rest on: which part of their
+/// depth was measured, and which was made up. Cut after 1000 bytes; "" if nobody says.
+std::string ply_evidence_comment(const std::string& evidence);
+
+/// What that line says in the comments of a file of ours; "" in those of others, or without it.
+std::string ply_evidence(const std::vector<std::string>& comments);
+
 /// Where the coordinates of a PLY file belong.
 struct PlyPlacement {
   Frame frame;                  ///< The frame the content is read into.

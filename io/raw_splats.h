@@ -29,6 +29,7 @@ struct RawSplats {
                                            ///< opacities probabilities.
   bool is_antialiased = false;             ///< For viewers that compensate opacity for blur.
   std::vector<std::string> comments;       ///< Of a PLY header.
+  std::string evidence;                    ///< As GaussianFile.
   std::vector<std::string> notes;          ///< One line each: what was left out, or looks odd.
 
   size_t size() const { return position.size(); }

@@ -109,6 +109,7 @@ class Examination {
     out.frame = placement.frame;
     out.file_origin = placement.file_origin;
     out.format = std::move(raw_.format);
+    out.evidence = std::move(raw_.evidence);
     out.warnings = std::move(placement.warnings);
     if (!odd.empty()) out.warnings.push_back(odd);
     add_warnings(out.warnings);

@@ -36,6 +36,7 @@ struct GaussianFile {
   Eigen::Vector3d file_origin = Eigen::Vector3d::Zero();  ///< World point of (0, 0, 0) of the file.
   std::vector<std::string> warnings;  ///< One line each: what was dropped, clamped, or looks odd.
   std::string format;                 ///< For people.
+  std::string evidence;  ///< What the splats rest on, in the words of a file of ours; else empty.
   SplatFindings findings;
 };
 

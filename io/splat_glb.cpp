@@ -190,7 +190,9 @@ size_t write_splat_glb(const std::filesystem::path& path,
   Json document = buffer.document();
   const Eigen::Quaterniond turn(options.y_up);
   document["nodes"][0]["rotation"] = {turn.x(), turn.y(), turn.z(), turn.w()};
-  document["asset"]["extras"] = place_in_world(frame, center, options.y_up);
+  Json& extras = document["asset"]["extras"];
+  extras = place_in_world(frame, center, options.y_up);
+  if (!options.evidence.empty()) extras["evidence"] = options.evidence;
   const std::string out = glb_bytes(json_text(document, -1), buffer.take_bytes());
   write_file(path, out);
   return out.size();

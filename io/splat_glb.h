@@ -20,6 +20,7 @@ std::string splat_harmonic_name(int degree, int order);
 
 struct SplatGlbOptions {
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
+  std::string evidence = {};  ///< As write_gaussian_ply(); for asset.extras.
 
   /// \throws InvalidInput if y_up is no rotation.
   void validate() const;

@@ -224,6 +224,7 @@ class SplatScene {
       if (stated->size() != 3) stated->fail(Defect::Count, "needs 3 numbers");
       for (int i = 0; i < 3; ++i) file_origin[i] = stated->at(static_cast<size_t>(i)).number();
     }
+    if (const auto stated = extras.find("evidence")) splats_.evidence = stated->text();
     file_from_gltf_.linear() = origin_.units_per_metre * origin_.world_from_gltf;
     file_from_gltf_.translation() = origin_.origin - file_origin;
     add_comment("file_origin", file_origin);

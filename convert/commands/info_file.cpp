@@ -112,6 +112,9 @@ void print_splats(const Json& info) {
                 p[2].get<double>());
   }
   std::printf("fill ratio %.3g\n", info["findings"]["fill_ratio"].get<double>());
+  if (!info["evidence"].is_null()) {
+    std::printf("evidence: %s\n", one_line(info["evidence"].get<std::string>()).c_str());
+  }
   print_warnings(info);
 }
 

@@ -234,6 +234,19 @@ TEST_F(Conversion, LeavesOutFloatersWhereAsked) {
   EXPECT_THROW(convert("mesh.ply", "mesh.obj", filtered), InvalidInput);
 }
 
+TEST_F(Conversion, CarriesTheEvidenceOfSplatsAndWhatWasLeftOutOfThem) {
+  Gaussians g;
+  test::add_sphere(g, {0, 0, 2}, 0.5, 4000);
+  test::add_disc(g, {0.7, 0, 2}, Eigen::Vector3d::UnitX(), 0.01);
+  write_gaussian_ply(dir_ / "ours.ply", g, Frame{}, "82 % measured");
+  convert("ours.ply", "a.compressed.ply", [](ConversionRequest& r) { r.as = "splats"; });
+  convert("a.compressed.ply", "b.glb", [](ConversionRequest& r) { r.as = "splats"; });
+  EXPECT_EQ(read_splats(dir_ / "b.glb").evidence, "82 % measured");
+  convert("ours.ply", "c.ply", [](ConversionRequest& r) { r.filter_floaters = true; });
+  const std::string words = read_splats(dir_ / "c.ply").evidence;
+  EXPECT_TRUE(words.starts_with("82 % measured; removed 1 of 4001 splats as floaters")) << words;
+}
+
 TEST_F(Conversion, RefusesWhatWouldNotFitBeforeAndAfterReading) {
   const auto refusal = [&](size_t limit) -> std::string {
     try {

@@ -109,6 +109,22 @@ TEST(WriteModel, LeavesNothingOfViewsThatAnEarlierModelHad) {
   }
 }
 
+TEST(WriteModel, SaysWhatItsGaussiansRestOn) {
+  const test::TempDir dir;
+  Model model;
+  model.gaussians = test::varied_splats(5, 0);
+  model.scene.folder = dir.path();
+  View& view = model.scene.views.emplace_back();
+  view.name = "a";
+  view.image_path = dir / "a.png";
+  view.camera = {2, 2, 2, 2, 1, 1, Eigen::Isometry3d::Identity()};
+  model.scene.frame.up = Eigen::Vector3d::UnitY();
+  model.evidence = "82 % measured, 18 % filled in from neighbours";
+  write_model(dir.path(), model);
+  restate_frame(dir.path(), model);
+  EXPECT_EQ(read_model(dir.path()).evidence, model.evidence);
+}
+
 TEST(ReadModel, OfPhotographsAloneIsInMetresOnceSomethingMeasuredTellsTheirScale) {
   const test::TempDir dir;
   Model model;

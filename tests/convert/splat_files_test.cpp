@@ -64,6 +64,28 @@ TEST(WriteSplatFile, SaysWhatEveryFileLost) {
   }
 }
 
+TEST(WriteSplatFile, SaysWhatTheSplatsRestOnWhereItCan) {
+  const test::TempDir dir;
+  Frame frame;
+  frame.up = -Eigen::Vector3d::UnitY();
+  const SplatFileOptions options{.evidence = "82 % measured"};
+  Terminal terminal(false);
+  testing::internal::CaptureStderr();
+  for (const char* name : {"a.compressed.ply", "a.glb", "a.ply"}) {
+    write_splat_file(dir / name, ball(400), frame, options, terminal);
+    EXPECT_EQ(splat_file_to_json(read_splats(dir / name))["evidence"], "82 % measured") << name;
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr().find("evidence"), std::string::npos);
+  for (const std::string name : {"a.splat", "a.spz"}) {
+    testing::internal::CaptureStderr();
+    write_splat_file(dir / name, ball(400), frame, options, terminal);
+    EXPECT_NE(testing::internal::GetCapturedStderr().find("hold no evidence of the scene"),
+              std::string::npos)
+        << name;
+    EXPECT_TRUE(splat_file_to_json(read_splats(dir / name))["evidence"].is_null()) << name;
+  }
+}
+
 TEST(WriteSplatFile, LeavesTheFileAndSaysWhyWhereItCannotBeReadBack) {
   const test::TempDir dir;
   Terminal quiet(true);

@@ -61,6 +61,16 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
   EXPECT_NE(report["model"]["description"].get<std::string>().find("optimised against"),
             std::string::npos);
 
+  // Splats say so themselves, and how many are left of those that were one per pixel.
+  const auto evidence_of = [](const std::string& file) {
+    return ordered_json::parse(run_cgs("info " + (kRun / file).string() + " --json").out)
+        .at("evidence")
+        .get<std::string>();
+  };
+  const auto words = report["model"]["description"].get<std::string>();
+  EXPECT_EQ(evidence_of("model/gaussians.ply"), words);
+  EXPECT_TRUE(evidence_of("web/splats.glb").starts_with(words + "; thinned to "));
+
   // Far fewer splats show what was held out as well as all do.
   const auto& thinning = report["splats"]["thinning"];
   EXPECT_LE(thinning["kept"].get<double>(), 0.35 * thinning["of"].get<double>());

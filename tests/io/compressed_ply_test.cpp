@@ -144,6 +144,12 @@ class WrittenPackedPly : public testing::Test {
   RawSplats raw_;
 };
 
+TEST_F(WrittenPackedPly, SaysWhatItsSplatsRestOn) {
+  write_compressed_ply(dir_ / "a.ply", test::varied_splats(20, 1), Frame{}, "82 % measured");
+  EXPECT_EQ(parse_compressed_ply(test::read_bytes(dir_ / "a.ply"), "a.ply").evidence,
+            "82 % measured");
+}
+
 TEST_F(WrittenPackedPly, ReadsBackWithinHalfAStep) {
   const Frame frame = test::centimetre_frame();
   for (int degree = 0; degree <= 3; ++degree) {

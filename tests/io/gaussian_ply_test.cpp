@@ -379,6 +379,22 @@ TEST(GaussianPly, KeepsTheBytesOfSplatsWhenItsFrameIsToldAnew) {
   EXPECT_EQ(test::read_bytes(dir / "other.ply"), other);
 }
 
+TEST(GaussianPly, SaysWhatItsSplatsRestOnAlsoAfterItsFrameIsToldAnew) {
+  const test::TempDir dir;
+  const std::string words = "82 % measured, 18 % made up; element vertex 5";
+  Frame frame = exact_frame();
+  write_gaussian_ply(dir / "a.ply", sample(1), frame, words);
+  EXPECT_EQ(read_gaussian_ply(dir / "a.ply").evidence, words);
+  frame.metres_per_unit = 0.025;
+  restate_gaussian_ply(dir / "a.ply", frame);
+  const GaussianFile back = read_gaussian_ply(dir / "a.ply");
+  EXPECT_EQ(back.evidence, words);
+  EXPECT_EQ(back.frame.metres_per_unit, 0.025);
+  EXPECT_EQ(back.gaussians.size(), sample(1).size());
+  write_gaussian_ply(dir / "silent.ply", sample(1), frame);
+  EXPECT_EQ(read_gaussian_ply(dir / "silent.ply").evidence, "");
+}
+
 TEST(GaussianPly, RefusesToWriteWhatItCouldNotRead) {
   const test::TempDir dir;
   const auto refused = [&](const auto& damage) {

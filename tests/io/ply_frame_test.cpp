@@ -42,6 +42,19 @@ TEST(PlyFrame, CommentsSayWhatIsUpWhereThatIsKnown) {
   EXPECT_FALSE(ply_placement({"up and away"}, kBounds, {}).frame.knows_up());
 }
 
+TEST(PlyEvidence, IsOneLineOfBoundedLength) {
+  EXPECT_EQ(ply_evidence_comment(""), "");
+  EXPECT_EQ(ply_evidence_comment("82 % measured"), "comment evidence 82 % measured\n");
+  EXPECT_EQ(ply_evidence_comment("a\nend_header\n"), "comment evidence a\\x0aend_header\\x0a\n");
+  EXPECT_LT(ply_evidence_comment(std::string(5000, 'a')).size(), 1024u);
+}
+
+TEST(PlyEvidence, IsReadFromFilesOfOursAlone) {
+  EXPECT_EQ(ply_evidence({"generator cgs", "unit m", "evidence 82 % measured"}), "82 % measured");
+  EXPECT_EQ(ply_evidence({"generator cgs", "unit m"}), "");
+  EXPECT_EQ(ply_evidence({"evidence of another kind"}), "");
+}
+
 TEST(PlyFrame, CommentsOfNerfstudioAndBrushSayWhatIsUp) {
   const auto up = [](const char* comment) {
     return ply_placement({comment}, kBounds, {}).frame.up;

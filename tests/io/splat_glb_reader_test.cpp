@@ -180,6 +180,16 @@ TEST(SplatGlbReader, BringsFilesOfOursBackToTheirPlace) {
   }
 }
 
+TEST(SplatGlbReader, TellsWhatFilesOfOursSayTheyRestOn) {
+  const test::TempDir dir;
+  const Gaussians g = test::varied_splats(20, 0);
+  write_splat_glb(dir / "a.glb", g, Frame{}, {.evidence = "82 % \"measured\""});
+  EXPECT_EQ(read_splats(dir / "a.glb").evidence, "82 % \"measured\"");
+  write_splat_glb(dir / "silent.glb", g, Frame{});
+  EXPECT_EQ(read_splats(dir / "silent.glb").evidence, "");
+  EXPECT_EQ(test::read_bytes(dir / "silent.glb").find("evidence"), std::string::npos);
+}
+
 TEST(SplatGlbReader, KeepsAnUnknownScaleUnknown) {
   const test::TempDir dir;
   const Gaussians g = test::varied_splats(20, 0);
