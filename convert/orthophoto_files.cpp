@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <map>
 
@@ -16,6 +17,7 @@
 #include "convert/memory_plan.h"
 #include "convert/stated_frame.h"
 #include "io/atomic_file.h"
+#include "io/json_file.h"
 #include "io/mesh_arrays.h"
 #include "io/png.h"
 #include "io/tiff.h"
@@ -41,6 +43,7 @@ struct Placed {
   PictureGrid grid;
   double pixel_size = 0;                             ///< [unit]
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();  ///< Of the top left pixel [unit].
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< World point of (0, 0) at height 0 [unit].
   double height_base = 0;                            ///< Height of internal (0, 0, 0) [unit].
 };
 
@@ -127,14 +130,16 @@ Placed place(const OrthophotoRequest& request,
   // World coordinates of internal (0, 0, 0) along the axes, or those from the plane's first point.
   const double per_world = unit.length / mesh.frame.scale;
   Eigen::Vector3d origin = mesh.frame.world_from_internal(Eigen::Vector3d::Zero()) * per_world;
+  Placed out;
   if (!request.plane.empty()) {
-    origin = -unit.length * mesh.internal_from_file(parse_point(request.plane[0]));
+    const Eigen::Vector3d first = mesh.internal_from_file(parse_point(request.plane[0]));
+    origin = -unit.length * first;
+    out.origin = mesh.frame.world_from_internal(first) * per_world;
   }
   const Range across = range_along(mesh, axes.right);
   const Range along = range_along(mesh, axes.up);
   const double longest = std::max(across.length(), along.length());
   require(longest > 0, "an orthophoto needs a surface with extent, its size", longest);
-  Placed out;
   out.pixel_size = request.pixel_size.empty()
                        ? round_part(longest * unit.length)
                        : parse_length(request.pixel_size, mesh.frame) * unit.length;
@@ -180,6 +185,16 @@ ColorImage label_picture(const Orthophoto& photo) {
   return out;
 }
 
+// 1 where the mesh is shown.
+MaskMap shown_pixels(const Orthophoto& photo) {
+  const Raster<double>& height = photo.height;
+  MaskMap out(height.width, height.height, 0);
+  std::transform(height.data.begin(), height.data.end(), out.data.begin(), [](double h) {
+    return uint8_t(std::isnan(h) ? 0 : 1);
+  });
+  return out;
+}
+
 struct Heights {
   Raster<float> values;  // [unit], from zero
   double zero = 0;
@@ -211,8 +226,8 @@ Heights heights_of(const Orthophoto& photo, const Placed& placed, const FigureUn
 }
 
 // Pictures first, then their world files in the same order.
-constexpr std::array<const char*, 6> kEndings = {
-    ".png", ".provenance.png", ".tif", ".pgw", ".provenance.pgw", ".tfw"};
+constexpr std::array<const char*, 7> kEndings = {
+    ".png", ".provenance.png", ".tif", ".pgw", ".provenance.pgw", ".tfw", ".orthophoto.json"};
 
 Json shares_json(const Orthophoto& photo, size_t covered, bool states_provenance) {
   std::array<size_t, kProvenanceCount> counts = {};
@@ -229,26 +244,45 @@ Json shares_json(const Orthophoto& photo, size_t covered, bool states_provenance
   return out;
 }
 
-// Colour and label pictures, heights, and their world files; names as they lie in the folder. What
-// may run out of memory comes before the first file is there, so that none is left alone: heights
-// go first, as they are encoded while they are written. The photo's colours are gone afterwards.
-Json write_files(const std::filesystem::path& prefix,
+Json provenance_colors_json() {
+  Json out = Json::object();
+  for (const Provenance label : kProvenanceOrder) {
+    out[provenance_key(label)] = kProvenanceColors.at(static_cast<size_t>(label));
+  }
+  return out;
+}
+
+// For whoever opens the pictures later and has nothing else; they may lie elsewhere then.
+std::string description_of(Json report, const std::vector<std::filesystem::path>& files) {
+  report["files"] = Json::array();
+  for (const auto& file : files) report["files"].push_back(file.filename().string());
+  report["provenance_colors"] = provenance_colors_json();
+  return json_text(report) + "\n";
+}
+
+// All files appear together, once all could be written, so that no picture is left alone or beside
+// the numbers of an earlier one: first heights, which are encoded while they are written, then the
+// numbers, then the other pictures. The photo's colours are gone afterwards.
+void write_files(const std::vector<std::filesystem::path>& files,
                  Orthophoto& photo,
                  const MaskMap& shown,
                  const Raster<float>& heights,
-                 const std::string& world) {
-  if (prefix.has_parent_path()) make_output_folder(prefix.parent_path());
+                 const std::string& world,
+                 const std::string& description) {
+  if (files[0].has_parent_path()) make_output_folder(files[0].parent_path());
   const std::string colors = encode_png(photo.color, shown);
   photo.color = ColorImage();  // the largest part of a photo
   const std::string labels = encode_png(label_picture(photo), shown);
-  const std::vector<std::filesystem::path> files = orthophoto_files(prefix);
+  std::deque<AtomicFile> written;  // not moved while it grows
+  const auto write = [&](const std::filesystem::path& file, const std::string& bytes) {
+    written.emplace_back(file).write(bytes);
+  };
+  write(files.back(), description);
+  for (size_t k = 3; k + 1 < files.size(); ++k) write(files[k], world);
+  write(files[0], colors);
+  write(files[1], labels);
   write_tiff(files[2], heights);
-  write_file(files[0], colors);
-  write_file(files[1], labels);
-  for (size_t k = 3; k < files.size(); ++k) write_file(files[k], world);
-  Json out = Json::array();
-  for (const auto& file : files) out.push_back(file.string());
-  return out;
+  for (AtomicFile& file : written) file.commit();
 }
 
 }  // namespace
@@ -271,32 +305,34 @@ Json write_orthophoto(const OrthophotoRequest& request,
   const Placed placed = place(request, mesh, axes, unit);
   check_memory(placed.grid, memory_budget(memory_limit));
   Orthophoto photo = orthophoto(mesh, placed.grid);
-  MaskMap shown(placed.grid.width, placed.grid.height, 0);
-  std::transform(
-      photo.height.data.begin(), photo.height.data.end(), shown.data.begin(), [](double h) {
-        return uint8_t(std::isnan(h) ? 0 : 1);
-      });
+  const MaskMap shown = shown_pixels(photo);
   const auto covered =
       static_cast<size_t>(std::count(shown.data.begin(), shown.data.end(), uint8_t{1}));
   require(
       covered > 0, "--pixel-size is so large that no pixel's middle shows the mesh, covered", 0);
   const Heights heights = heights_of(photo, placed, unit);
-  Json out = {
-      {"files", write_files(request.prefix, photo, shown, heights.values, world_file(placed))},
-      {"unit", unit.name},
-      {"pixel_size", placed.pixel_size},
-      {"width", placed.grid.width},
-      {"height", placed.grid.height},
-      {"axes",
-       {{"right", vector_to_json(axes.right)},
-        {"up", vector_to_json(axes.up)},
-        {"toward", vector_to_json(axes.toward)}}},
-      {"corner", {placed.corner.x(), placed.corner.y()}},
-      {"height_zero", heights.zero},
-      {"lowest", heights.lowest},
-      {"highest", heights.highest},
-      {"covered", static_cast<double>(covered) / static_cast<double>(shown.data.size())}};
+  const std::vector<std::filesystem::path> files = orthophoto_files(request.prefix);
+  Json out = {{"files", Json::array()},
+              {"unit", unit.name},
+              {"scale",
+               {{"source", scale_source_name(mesh.frame.scale_source)},
+                {"relative_sigma", unit.relative_sigma > 0 ? Json(unit.relative_sigma) : Json()}}},
+              {"pixel_size", placed.pixel_size},
+              {"width", placed.grid.width},
+              {"height", placed.grid.height},
+              {"axes",
+               {{"right", vector_to_json(axes.right)},
+                {"up", vector_to_json(axes.up)},
+                {"toward", vector_to_json(axes.toward)}}},
+              {"origin", vector_to_json(placed.origin)},
+              {"corner", {placed.corner.x(), placed.corner.y()}},
+              {"height_zero", heights.zero},
+              {"lowest", heights.lowest},
+              {"highest", heights.highest},
+              {"covered", static_cast<double>(covered) / static_cast<double>(shown.data.size())}};
   out.update(shares_json(photo, covered, mesh.states_provenance()));
+  for (const auto& file : files) out["files"].push_back(file.string());
+  write_files(files, photo, shown, heights.values, world_file(placed), description_of(out, files));
   return out;
 }
 

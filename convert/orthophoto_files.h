@@ -24,21 +24,25 @@ struct OrthophotoRequest {
 };
 
 /// The files that write_orthophoto() writes: pictures of colours, labels and heights, then a world
-/// file for each.
+/// file for each, last what tells of them all.
 std::vector<std::filesystem::path> orthophoto_files(const std::filesystem::path& prefix);
 
 /// Writes PREFIX.png (colour, transparent outside), PREFIX.tif (height of the surface toward the
 /// viewer, 32-bit float, NaN outside), PREFIX.provenance.png (which surface was seen) and a world
-/// file for each (.pgw, .tfw): the world coordinates of the middle of the top left pixel.
+/// file for each (.pgw, .tfw): the world coordinates of the middle of the top left pixel. World
+/// files name no unit and no axes, so PREFIX.orthophoto.json holds what is returned, with files by
+/// their names alone, and "provenance_colors": {label: [red, green, blue] of 255}.
 ///
 /// Coordinates are world coordinates (those of the file and the origin it states) along the axes of
 /// the picture, in `unit`; with a plane they count from its first point, heights from the plane.
 /// Corners of pixels lie on whole multiples of the pixel size, so that pictures of one place at
 /// several dates fit on each other.
-/// \return {"files", "unit", "pixel_size", "width", "height", "axes": {"right", "up", "toward"},
-///         "corner": of the top left pixel, "height_zero": what is to be added to the heights in
-///         the file (0 unless floats would lose digits), "lowest", "highest", "covered": share of
-///         the pixels, and per label the share of the covered ones; null where not stated}
+/// \return {"files", "unit", "scale": {"source", "relative_sigma": null where nothing is known},
+///         "pixel_size", "width", "height", "axes": {"right", "up", "toward"}, "origin": world
+///         point of (0, 0) at height 0, "corner": of the top left pixel, "height_zero": what is to
+///         be added to the heights in the file (0 unless floats would lose digits), "lowest",
+///         "highest", "covered": share of the pixels, and per label the share of the covered ones;
+///         null where not stated}
 /// \param memory_limit  that the picture may use [bytes]; 0 = 80 % of what is free
 /// \throws InvalidInput for a side or plane that cannot be; LimitError for too many pixels, or more
 ///         than the memory holds; IoError

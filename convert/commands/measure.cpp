@@ -127,8 +127,8 @@ void add_figures(CLI::App& cmd, MeasureArgs& args) {
 void add_orthophoto(CLI::App& cmd, OrthophotoRequest& request) {
   auto* prefix = cmd.add_option("--orthophoto",
                                 request.prefix,
-                                "Write PREFIX.png, PREFIX.tif (heights), PREFIX.provenance.png and "
-                                "a world file for each");
+                                "Write PREFIX.png, PREFIX.tif (heights), PREFIX.provenance.png, a "
+                                "world file for each, and PREFIX.orthophoto.json (unit, axes)");
   auto* side = cmd.add_option("--side", request.side, "Where it is seen from")
                    ->check(CLI::IsMember({"top", "front", "back", "left", "right"}))
                    ->capture_default_str()

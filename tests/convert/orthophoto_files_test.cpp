@@ -178,7 +178,47 @@ TEST(WriteOrthophoto, RefusesAPictureThatMemoryDoesNotHold) {
   }
   EXPECT_EQ(test::entries(dir.path()), 0);
   write_orthophoto(request, mesh, {"m", 1, 0}, 2 * kBytes);
-  EXPECT_EQ(test::entries(dir.path()), 6);
+  EXPECT_EQ(test::entries(dir.path()), 7);
+}
+
+TEST(WriteOrthophoto, LeavesBesideThePicturesWhatTheyMean) {
+  const TempDir dir;
+  MeasurableMesh mesh = test::with_labels(placed(tilted_plane(), {100, 200, 300}, 0.001),
+                                          [](const auto&) { return Provenance::Inferred; });
+  mesh.frame.scale_source = ScaleSource::KnownDistance;
+  const OrthophotoRequest request{.prefix = dir / "p",
+                                  .plane = {"0.2,0.2,0.1", "0.2,0.9,0.1", "0.1,0.5,0.1"},
+                                  .pixel_size = "0.02mm"};
+  Json returned = write_orthophoto(request, mesh, {"mm", 1, 0.01});
+  Json told = Json::parse(test::read_bytes(dir / "p.orthophoto.json"));
+  EXPECT_EQ(told["files"][0], "p.png");
+  EXPECT_EQ(told["files"].size(), returned["files"].size());
+  EXPECT_EQ(told["unit"], "mm");
+  EXPECT_EQ(told["scale"]["source"], "known distance");
+  EXPECT_EQ(told["scale"]["relative_sigma"], 0.01);
+  EXPECT_EQ(told["inferred"], 1);
+  EXPECT_EQ(told["provenance_colors"]["inferred"], Json({242, 26, 217}));
+  // The highest place, by this file alone: the first point of the plane is its zero.
+  const std::vector<double> origin = told["origin"];
+  EXPECT_NEAR(origin[2] + told["highest"].get<double>(), 300 + 0.25 + 0.3, 0.01);
+  told.erase("files");
+  told.erase("provenance_colors");
+  returned.erase("files");
+  EXPECT_EQ(told, returned);
+  const Json top = write_orthophoto({.prefix = dir / "q"}, mesh, {"mm", 1, 0});
+  EXPECT_EQ(top["origin"], Json({0, 0, 0}));
+  EXPECT_TRUE(top["scale"]["relative_sigma"].is_null());
+}
+
+TEST(WriteOrthophoto, WritesNoPictureWithoutItsScale) {
+  const TempDir dir;
+  std::filesystem::create_directory(dir / "map.orthophoto.json");
+  EXPECT_THROW(write_orthophoto({.prefix = dir / "map", .pixel_size = "1cm"},
+                                placed(tilted_plane(), {0, 0, 0}),
+                                {"m", 1, 0}),
+               IoError);
+  EXPECT_FALSE(std::filesystem::exists(dir / "map.png"));
+  EXPECT_FALSE(std::filesystem::exists(dir / "map.provenance.png"));
 }
 
 // Heights are encoded while they are written: what fails there must not leave pictures behind.
