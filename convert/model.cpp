@@ -136,7 +136,8 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
 void restate_frame(const std::filesystem::path& folder, const Model& model) {
   // Somebody may have edited the splats in another program since.
   if (!restate_gaussian_ply(folder / "gaussians.ply", model.scene.frame)) {
-    write_gaussian_ply(folder / "gaussians.ply", model.gaussians, model.scene.frame);
+    write_gaussian_ply(
+        folder / "gaussians.ply", model.gaussians, model.scene.frame, model.evidence);
   }
   write_cameras_json(folder / "cameras.json", model.scene);
 }

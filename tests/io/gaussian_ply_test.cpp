@@ -386,7 +386,7 @@ TEST(GaussianPly, SaysWhatItsSplatsRestOnAlsoAfterItsFrameIsToldAnew) {
   write_gaussian_ply(dir / "a.ply", sample(1), frame, words);
   EXPECT_EQ(read_gaussian_ply(dir / "a.ply").evidence, words);
   frame.metres_per_unit = 0.025;
-  restate_gaussian_ply(dir / "a.ply", frame);
+  EXPECT_TRUE(restate_gaussian_ply(dir / "a.ply", frame));
   const GaussianFile back = read_gaussian_ply(dir / "a.ply");
   EXPECT_EQ(back.evidence, words);
   EXPECT_EQ(back.frame.metres_per_unit, 0.025);
