@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 
+#include "io/image.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -67,6 +68,23 @@ PictureSizes picture_sizes(const Scene& scene, const std::vector<int>& views, in
   return out;
 }
 
+// What reading the largest of these photographs holds where it is larger than its camera: the
+// file's bytes, linear pixels, and a copy of them without distortion. Measured at 6 million pixels.
+double of_reading(const Scene& scene, const std::vector<int>& views) {
+  constexpr double kOfPixel = 3 + 12 + 12;
+  double largest = 0;
+  for (const int i : views) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (view.image_path.empty()) continue;
+    const ImageSize size = image_size(view.image_path);
+    const double pixels = double(size.width) * size.height;
+    if (pixels > double(view.camera.width) * view.camera.height) {
+      largest = std::max(largest, pixels);
+    }
+  }
+  return kOfPixel * largest;
+}
+
 // What the networks of decoder=conv hold: feature maps of all views, and parameters with their
 // gradients (one of each band of rows that is worked on) and means. Measured at 24,000 to 140,000
 // pixels and widths of 10 to 30.
@@ -121,6 +139,9 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
                                      int downscale) {
   const PictureSizes input = picture_sizes(scene, scene.input, downscale);
   const PictureSizes held_out = picture_sizes(scene, scene.held_out, downscale);
+  const double reading_input = of_reading(scene, scene.input);
+  const double reading_held_out = of_reading(scene, scene.held_out);
+  constexpr double kOfModel = 136;  // bytes per pixel of all input views
   std::vector<StageMemory> plan;
   plan.reserve(kFactors.size());
   for (const StageFactors& f : kFactors) {
@@ -132,12 +153,17 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
     // Voxels that must keep an error are not made coarser to save memory.
     const double voxel_pixels =
         measured.meshes ? input.as_voxels : std::min(input.as_voxels, kMostPixels);
-    const double largest = stage == "held-out views" ? held_out.largest : input.largest;
+    const bool draws_held_out = stage == "held-out views";
+    const double largest = draws_held_out ? held_out.largest : input.largest;
+    const double reading = draws_held_out ? reading_held_out : reading_input;
     double bytes =
         f.base + f.of_pixel * input.all + f.of_largest * largest + of_voxel * voxel_pixels;
     if (stage == "depth and Gaussians") {
       bytes += of_networks(coherence, scene.input.size(), input.all);
     }
+    // The report shows photographs beside all that it holds; other stages read them before.
+    bytes = stage == "report" ? bytes + reading
+                              : std::max(bytes, f.base + kOfModel * input.all + reading);
     plan.push_back({stage, static_cast<size_t>(bytes)});
   }
   return plan;

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "convert/terminal.h"
+#include "io/png.h"
 #include "libcgs/core/error.h"
 #include "libcgs/render/rasterizer.h"
 #include "tests/support/temp_dir.h"
@@ -81,6 +82,24 @@ TEST(MemoryPlan, TheLargestPictureIsDrawnAsAWhole) {
   held_out.views.push_back(mixed.views[0]);
   held_out.held_out.push_back(3);
   EXPECT_GT(of_stage(held_out, "held-out views"), of_stage(held_out, "views"));
+}
+
+// A photograph is read at its own size, whatever it is worked on at; the report holds all else,
+// too.
+TEST(MemoryPlan, CountsTheReadingOfLargePhotographs) {
+  const test::TempDir dir;
+  write_png(dir / "large.png", ColorImage(3000, 2000, Eigen::Vector3f::Zero()));
+  const Scene small = scene_of(2, 300, 200);
+  Scene large = small;
+  large.views[1].image_path = dir / "large.png";
+  constexpr double kPhotograph = 3000.0 * 2000 * (3 + 2 * 12);
+  EXPECT_NEAR(of_stage(large, "report") - of_stage(small, "report"), kPhotograph, 2);
+  EXPECT_GT(of_stage(large, "views"), kPhotograph);
+  large.views[1].camera.width = 3000;
+  large.views[1].camera.height = 2000;
+  Scene whole = large;
+  whole.views[1].image_path.clear();
+  EXPECT_EQ(of_stage(large, "report"), of_stage(whole, "report"));
 }
 
 TEST(MemoryPlan, LeavesOutWhatTheUsersVoxelsDecide) {
