@@ -37,7 +37,9 @@ std::optional<TiffDirectory> TiffDirectory::directory(uint64_t tag) const {
   const auto entry = find(tag);
   if (!entry) return std::nullopt;
   TiffDirectory out = *this;
-  out.begin_at(number(*entry + 4 + field_size(), field_size()));
+  // A narrow number stands at the beginning of its field.
+  const uint64_t width = width_of(number(*entry + 2, 2)) == 4 ? 4 : field_size();
+  out.begin_at(number(*entry + 4 + field_size(), width));
   return out;
 }
 

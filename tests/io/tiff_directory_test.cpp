@@ -61,9 +61,6 @@ struct TiffBytes {
     }
     return out + number(0, wide());
   }
-  Entry to_directory(uint16_t tag, uint64_t place) const {
-    return {tag, is_big_tiff ? kLong8 : kLong, 1, place};
-  }
   std::string file(const std::vector<Entry>& entries) const { return head() + directory(entries); }
 };
 
@@ -99,12 +96,15 @@ TEST(TiffDirectory, ReadsValuesInAndBesideTheEntryInAnyByteOrderAndWidth) {
 
 TEST(TiffDirectory, FollowsATagToAnotherDirectory) {
   for (const TiffBytes& kind : kKinds) {
-    const size_t other = kind.start() + kind.size_of(1);
-    const std::string bytes =
-        kind.file({kind.to_directory(0x8769, other)}) + kind.directory({{0xa405, kShort, 1, 28}});
+    const size_t other = kind.start() + kind.size_of(2);
+    const std::string bytes = kind.file({{0x8769, kLong, 1, other},
+                                         {0x014a, kind.is_big_tiff ? kLong8 : kLong, 1, other}}) +
+                              kind.directory({{0xa405, kShort, 1, 28}});
     const TiffDirectory first(bytes, kPath);
-    ASSERT_TRUE(first.directory(0x8769));
-    EXPECT_EQ(first.directory(0x8769)->value(0xa405), 28u);
+    for (const uint64_t tag : {0x8769, 0x014a}) {
+      ASSERT_TRUE(first.directory(tag));
+      EXPECT_EQ(first.directory(tag)->value(0xa405), 28u);
+    }
     EXPECT_FALSE(first.value(0xa405));
     EXPECT_FALSE(first.directory(0x8825));
   }
@@ -152,7 +152,8 @@ TEST(TiffDirectory, ReadsNothingBeyondTheFile) {
     EXPECT_EQ(defect(head + kind.number(1, width), read), "TRUNCATED");
     EXPECT_EQ(defect(head.substr(0, 6), read), "TRUNCATED");
     const auto follow = [](const TiffDirectory& d) { (void)d.directory(273); };
-    EXPECT_EQ(defect(kind.file({kind.to_directory(273, farthest)}), follow), "TRUNCATED");
+    EXPECT_EQ(defect(kind.file({{273, kind.is_big_tiff ? kLong8 : kLong, 1, farthest}}), follow),
+              "TRUNCATED");
   }
 }
 
