@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 #include <openvdb/tools/ChangeBackground.h>
+#include <openvdb/tools/LevelSetUtil.h>
 #include <openvdb/tools/ValueTransformer.h>
 
 #include "convert/frame_json.h"
@@ -40,6 +41,16 @@ openvdb::FloatGrid::Ptr scaled_lengths(const openvdb::FloatGrid::Ptr& grid,
   openvdb::tools::foreach (
       out->beginValueAll(), [factor](const auto& it) { it.setValue(*it * factor); }, true, false);
   openvdb::tools::changeBackground(out->tree(), grid->background() * factor);
+  return out;
+}
+
+// For programs that show volumes as clouds: 0 outside, rising to 1 over the depth of the band.
+openvdb::FloatGrid::Ptr fog_of(const openvdb::FloatGrid::Ptr& distance,
+                               double scale,
+                               const Eigen::Vector3d& offset) {
+  auto out = placed<openvdb::FloatGrid>(distance, scale, offset, true);
+  openvdb::tools::sdfToFogVolume(*out);
+  out->setGridClass(openvdb::GRID_FOG_VOLUME);
   return out;
 }
 
@@ -168,6 +179,8 @@ void write_volume(const std::filesystem::path& path,
     surface->setGridClass(openvdb::GRID_LEVEL_SET);
     grids.push_back(named<openvdb::FloatGrid>(surface, "surface"));
   }
+  const auto& distance = volume.surface ? volume.surface : volume.tsdf;
+  grids.push_back(named<openvdb::FloatGrid>(fog_of(distance, scale, offset), "density"));
   std::map<std::string, std::string> about = {{"creator", "cgs"},
                                               {"cgs_units", frame.unit_name()},
                                               {"cgs_evidence", evidence},

@@ -2,6 +2,7 @@
 #include "convert/volume_file.h"
 
 #include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetSphere.h>
 
 #include "io/vdb.h"
 #include "libcgs/core/error.h"
@@ -75,6 +76,34 @@ TEST(VolumeFile, HoldsFileCoordinatesAndLengths) {
     return;
   }
   FAIL() << "no grid tsdf";
+}
+
+// Blender, Houdini and renderers of clouds show a grid of this name without being told to.
+TEST(VolumeFile, HoldsADensityOfTheClosedSurfaceOrElseOfTheBand) {
+  const test::TempDir dir;
+  Volume volume = small_volume();
+  volume.tsdf->tree().setValue(openvdb::Coord(4, -2, 7), -0.15f);
+  const auto density = [&] {
+    write_volume(dir / "v.vdb", volume, large_frame());
+    for (const auto& grid : read_vdb(dir / "v.vdb")) {
+      if (grid->getName() == "density") return openvdb::gridPtrCast<openvdb::FloatGrid>(grid);
+    }
+    return openvdb::FloatGrid::Ptr();
+  };
+  const auto of_band = density();
+  ASSERT_TRUE(of_band);
+  EXPECT_EQ(of_band->getGridClass(), openvdb::GRID_FOG_VOLUME);
+  EXPECT_EQ(of_band->tree().getValue(openvdb::Coord(3, -2, 7)), 0);
+  EXPECT_NEAR(of_band->tree().getValue(openvdb::Coord(4, -2, 7)), 0.5, 1e-6);
+  EXPECT_EQ(of_band->background(), 0);
+  EXPECT_NEAR(of_band->voxelSize().x(), 1.6, 1e-12);
+  EXPECT_EQ(volume.tsdf->tree().getValue(openvdb::Coord(4, -2, 7)), -0.15f) << "is left alone";
+  volume.surface = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+      1.0f, openvdb::Vec3f(0, 0, 0), 0.1f, 3.0f);
+  const auto of_surface = density();
+  EXPECT_EQ(of_surface->tree().getValue(openvdb::Coord(0, 0, 0)), 1) << "deep inside";
+  EXPECT_EQ(of_surface->tree().getValue(openvdb::Coord(12, 0, 0)), 0);
+  EXPECT_NEAR(of_surface->tree().getValue(openvdb::Coord(9, 0, 0)), 1.0 / 3, 1e-3);
 }
 
 TEST(VolumeFile, RefusesAVolumeOfAnotherProgram) {
