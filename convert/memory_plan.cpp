@@ -70,7 +70,7 @@ PictureSizes picture_sizes(const Scene& scene, const std::vector<int>& views, in
 
 // What reading the largest of these photographs holds where it is larger than its camera: the
 // file's bytes, linear pixels, and a copy of them without distortion. Measured at 6 million pixels.
-double of_reading(const Scene& scene, const std::vector<int>& views) {
+double of_reading(const Scene& scene, const std::vector<int>& views, int downscale) {
   constexpr double kOfPixel = 3 + 12 + 12;
   double largest = 0;
   for (const int i : views) {
@@ -78,9 +78,9 @@ double of_reading(const Scene& scene, const std::vector<int>& views) {
     if (view.image_path.empty()) continue;
     const ImageSize size = image_size(view.image_path);
     const double pixels = double(size.width) * size.height;
-    if (pixels > double(view.camera.width) * view.camera.height) {
-      largest = std::max(largest, pixels);
-    }
+    const double worked_on =
+        double(view.camera.width) * view.camera.height / (double(downscale) * downscale);
+    if (pixels > worked_on) largest = std::max(largest, pixels);
   }
   return kOfPixel * largest;
 }
@@ -139,8 +139,8 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
                                      int downscale) {
   const PictureSizes input = picture_sizes(scene, scene.input, downscale);
   const PictureSizes held_out = picture_sizes(scene, scene.held_out, downscale);
-  const double reading_input = of_reading(scene, scene.input);
-  const double reading_held_out = of_reading(scene, scene.held_out);
+  const double reading_input = of_reading(scene, scene.input, downscale);
+  const double reading_held_out = of_reading(scene, scene.held_out, downscale);
   constexpr double kOfModel = 136;  // bytes per pixel of all input views
   std::vector<StageMemory> plan;
   plan.reserve(kFactors.size());
@@ -162,7 +162,7 @@ std::vector<StageMemory> memory_plan(const Scene& scene,
       bytes += of_networks(coherence, scene.input.size(), input.all);
     }
     // The report shows photographs beside all that it holds; other stages read them before.
-    bytes = stage == "report" ? bytes + reading
+    bytes = stage == "report" ? bytes + std::max(reading_input, reading_held_out)
                               : std::max(bytes, f.base + kOfModel * input.all + reading);
     plan.push_back({stage, static_cast<size_t>(bytes)});
   }

@@ -133,13 +133,14 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
   for (const std::filesystem::path& file : earlier) std::filesystem::remove(file);
 }
 
-void restate_frame(const std::filesystem::path& folder, const Model& model) {
-  // Somebody may have edited the splats in another program since.
-  if (!restate_gaussian_ply(folder / "gaussians.ply", model.scene.frame)) {
+bool restate_frame(const std::filesystem::path& folder, const Model& model) {
+  const bool is_own = restate_gaussian_ply(folder / "gaussians.ply", model.scene.frame);
+  if (!is_own) {
     write_gaussian_ply(
         folder / "gaussians.ply", model.gaussians, model.scene.frame, model.evidence);
   }
   write_cameras_json(folder / "cameras.json", model.scene);
+  return is_own;
 }
 
 Model read_model(const std::filesystem::path& folder) {

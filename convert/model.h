@@ -28,7 +28,9 @@ void write_model(const std::filesystem::path& folder, const Model& model);
 /// Writes anew what `model.scene.frame` tells of unit and up, in the files that write_model() wrote
 /// of this model. The splats keep their bytes: written again from what was read, logarithms could
 /// end in another bit, and whether they do depends on the processor. \throws BadInput; IoError
-void restate_frame(const std::filesystem::path& folder, const Model& model);
+/// \return false if another program changed the splats since, which are then written anew as they
+///         were read
+bool restate_frame(const std::filesystem::path& folder, const Model& model);
 
 /// Reads what write_model() wrote, or gaussians.ply and cameras.json of 3DGS, which state no frame:
 /// it is then the canonical one of the splats. Of the folder of a run, the model in it.

@@ -103,13 +103,15 @@ class TrainingCheckpoint {
 
 // Splats keep the colours of the photographs they stem from: where exposures differ, the same
 // surface would come in two colours, and every step of the training would fight over them.
-void match_exposures(Scene& scene, const std::vector<ViewPriors>& priors) {
+// Returns ExposureGains::difference().
+float match_exposures(Scene& scene, const std::vector<ViewPriors>& priors) {
   const ExposureGains exposure = exposure_gains(scene, priors);
   for (size_t k = 0; k < scene.input.size(); ++k) {
     View& view = scene.views[static_cast<size_t>(scene.input[k])];
     view.exposure = exposure.gain[k];
     apply_exposure(view);
   }
+  return exposure.difference();
 }
 
 void optimise(TrainedModel& trained, const ModelRequest& request, const Progress& progress) {
@@ -282,7 +284,7 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   TrainedModel trained;
   trained.priors = estimated.report;
   trained.model.priors = std::move(estimated.views);
-  match_exposures(scene, trained.model.priors);
+  trained.exposure_difference = match_exposures(scene, trained.model.priors);
   trained.model.scene = std::move(scene);
   if (request.inspect) request.inspect(trained.model);
   optimise(trained, request, part_of(progress, kPriorsShare, 1));
@@ -307,23 +309,10 @@ nlohmann::ordered_json settings_to_json(const TrainingOptions& options) {
 
 namespace {
 
-// How far the photographs of any two input views lie apart in the linear light of a channel, at
-// most: 0.25 = one is brighter by a quarter.
-float largest_difference(const Scene& scene) {
-  Eigen::Array3f least = Eigen::Array3f::Constant(1);
-  Eigen::Array3f most = least;
-  for (const int i : scene.input) {
-    const Eigen::Vector3f& gain = scene.views[static_cast<size_t>(i)].exposure;
-    least = least.min(gain.array());
-    most = most.max(gain.array());
-  }
-  return (most / least).maxCoeff() - 1;
-}
-
 // Null where the photographs were exposed alike.
-nlohmann::ordered_json exposure_to_json(const Scene& scene) {
-  const float difference = largest_difference(scene);
-  if (difference == 0) return nullptr;
+nlohmann::ordered_json exposure_to_json(const TrainedModel& trained) {
+  if (trained.exposure_difference == 0) return nullptr;
+  const Scene& scene = trained.model.scene;
   nlohmann::ordered_json views = nlohmann::ordered_json::array();
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
@@ -334,7 +323,7 @@ nlohmann::ordered_json exposure_to_json(const Scene& scene) {
   std::snprintf(words.data(),
                 words.size(),
                 "exposures of the photographs differ by up to %.0f %% and were matched",
-                100 * double{difference});
+                100 * double{trained.exposure_difference});
   return {{"words", words.data()}, {"views", views}};
 }
 
@@ -357,7 +346,7 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
             {"offset", trained.priors.alignment.offset},
             {"correspondences", trained.priors.alignment.correspondences}}},
           {"depth_of_views", coverage_to_json(trained)},
-          {"exposure", exposure_to_json(trained.model.scene)},
+          {"exposure", exposure_to_json(trained)},
           {"given_depth", given_depth_to_json(trained.priors)}};
 }
 

@@ -34,6 +34,7 @@ struct ModelRequest {
 struct TrainedModel {
   Model model;
   PriorsReport priors;
+  float exposure_difference = 0;  ///< ExposureGains::difference() of the input views
   std::vector<StepReport> steps;  ///< Of the training; empty = aligned initialisation.
   /// Checkpoints that could not be read or written, for the terminal: they change no result.
   std::vector<std::string> hitches;

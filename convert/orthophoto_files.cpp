@@ -260,29 +260,25 @@ std::string description_of(Json report, const std::vector<std::filesystem::path>
   return json_text(report) + "\n";
 }
 
-// All files appear together, once all could be written, so that no picture is left alone or beside
-// the numbers of an earlier one: first heights, which are encoded while they are written, then the
-// numbers, then the other pictures. The photo's colours are gone afterwards.
+// All files appear together, once all could be encoded and written, so that no picture is left
+// alone or beside the numbers of an earlier one. What takes long, or may run out of memory, comes
+// before the first file is there. The photo's colours are gone afterwards.
 void write_files(const std::vector<std::filesystem::path>& files,
                  Orthophoto& photo,
                  const MaskMap& shown,
                  const Raster<float>& heights,
                  const std::string& world,
                  const std::string& description) {
-  if (files[0].has_parent_path()) make_output_folder(files[0].parent_path());
-  const std::string colors = encode_png(photo.color, shown);
+  std::vector<std::string> contents = {encode_png(photo.color, shown)};
   photo.color = ColorImage();  // the largest part of a photo
-  const std::string labels = encode_png(label_picture(photo), shown);
+  contents.push_back(encode_png(label_picture(photo), shown));
+  contents.push_back(encode_tiff(heights));
+  contents.resize(files.size() - 1, world);
+  contents.push_back(description);
+  if (files[0].has_parent_path()) make_output_folder(files[0].parent_path());
   std::deque<AtomicFile> written;  // not moved while it grows
-  const auto write = [&](const std::filesystem::path& file, const std::string& bytes) {
-    written.emplace_back(file).write(bytes);
-  };
-  write(files.back(), description);
-  for (size_t k = 3; k + 1 < files.size(); ++k) write(files[k], world);
-  write(files[0], colors);
-  write(files[1], labels);
-  write_tiff(files[2], heights);
-  for (AtomicFile& file : written) file.commit();
+  for (size_t k = files.size(); k-- > 0;) written.emplace_back(files[k]).write(contents[k]);
+  for (AtomicFile& file : written) file.commit();  // the numbers first, by which pictures are read
 }
 
 }  // namespace

@@ -131,7 +131,11 @@ Json run_scale(Run& run, const Progress& progress) {
   const bool is_new = frame.metres_per_unit != before.metres_per_unit ||
                       frame.metres_sigma != before.metres_sigma ||
                       frame.scale_source != before.scale_source || frame.up != before.up;
-  if (is_new) restate_frame(run.request.output / "model", model);
+  if (is_new && !restate_frame(run.request.output / "model", model)) {
+    run.hitches.push_back(printable(run.request.output / "model/gaussians.ply") +
+                          " was changed by another program; with the scale it was written anew, as "
+                          "it was read");
+  }
   use_metres_where_measured(model.scene);
   run.model = std::move(model);
   return result;

@@ -18,6 +18,8 @@ namespace {
 
 constexpr const char* kHeaderStart = "ply\nformat binary_little_endian 1.0\ncomment ";
 
+constexpr size_t kLongestHeader = 4096;  // of those that write_gaussian_ply() writes
+
 std::string header_start(const Frame& frame, const std::string& evidence) {
   std::string out = kHeaderStart;
   out += kPlyGenerator;
@@ -259,10 +261,13 @@ bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame)
   const std::string bytes = read_file(path);
   const std::vector<std::string> comments = parse_ply_header(bytes, path).comments;
   // Other programs may keep our comments, but not the order of the lines around them.
-  if (!bytes.starts_with(kHeaderStart) || !is_our_ply(comments)) return false;
+  const size_t splats = bytes.find("\nelement vertex ");
+  if (!bytes.starts_with(kHeaderStart) || !is_our_ply(comments) || splats > kLongestHeader) {
+    return false;
+  }
   AtomicFile file(path);
   file.write(header_start(frame, ply_evidence(comments)));
-  file.write(std::string_view(bytes).substr(bytes.find("\nelement vertex ") + 1));
+  file.write(std::string_view(bytes).substr(splats + 1));
   file.commit();
   return true;
 }

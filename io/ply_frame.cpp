@@ -90,7 +90,13 @@ bool is_our_ply(const std::vector<std::string>& comments) {
 std::string ply_evidence_comment(const std::string& evidence) {
   if (evidence.empty()) return "";
   constexpr size_t kLongest = 1000;  // readers that go by lines often have room for 1024 bytes
-  return "comment " + std::string(kEvidence) + one_line(evidence).substr(0, kLongest) + "\n";
+  std::string words = one_line(evidence);
+  if (words.size() > kLongest) {
+    size_t end = kLongest;
+    while (end > 0 && (words[end] & '\xc0') == '\x80') --end;  // not amid a character
+    words = words.substr(0, end) + "…";
+  }
+  return "comment " + std::string(kEvidence) + words + "\n";
 }
 
 std::string ply_evidence(const std::vector<std::string>& comments) {

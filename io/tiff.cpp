@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/tiff.h"
 
-#include <string_view>
 #include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "io/atomic_file.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/opencv_memory.h"
 
 namespace cgs {
 
-void write_tiff(const std::filesystem::path& path, const Raster<float>& values) {
+std::string encode_tiff(const Raster<float>& values) {
   require(!values.empty(), "a TIFF file needs pixels, width", values.width);
   constexpr int kDeflate = 8;  // "Adobe Deflate", which every reader knows
   // OpenCV takes no const data, and does not change it.
@@ -26,7 +24,7 @@ void write_tiff(const std::filesystem::path& path, const Raster<float>& values) 
     throw_if_out_of_memory(error);
     throw NumericalError(std::string("TIFF encoder: ") + error.what());
   }
-  write_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace cgs

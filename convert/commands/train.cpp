@@ -92,7 +92,7 @@ void run_train(const TrainArgs& args) {
   Frame& frame = trained.model.scene.frame;
   widen_by_focal(frame, opened.focal_sigma());
   if (scale.is_object()) scale["metres_sigma"] = frame.metres_sigma;
-  if (frame.has_metric_scale()) restate_frame(args.output, trained.model);
+  if (frame.has_metric_scale()) (void)restate_frame(args.output, trained.model);
   if (is_measured) terminal.warn(scale.at("warnings").get<std::vector<std::string>>());
   report["scale"] = scale;
   write_file(args.output / "training.json", json_text(report) + "\n");

@@ -129,6 +129,16 @@ ExposureGains exposure_gains(std::span<const View* const> views, const SharedSur
   return out;
 }
 
+float ExposureGains::difference() const {
+  float most = 1;
+  for (size_t a = 0; a < gain.size(); ++a) {
+    for (size_t b = 0; b < gain.size(); ++b) {
+      if (group[a] == group[b]) most = std::max(most, gain[a].cwiseQuotient(gain[b]).maxCoeff());
+    }
+  }
+  return most - 1;
+}
+
 void apply_exposure(View& view) {
   if (view.exposure == Eigen::Vector3f::Ones()) return;
   apply_gain(view.image, view.exposure);

@@ -15,6 +15,10 @@ struct ExposureGains {
   std::vector<Eigen::Vector3f> gain;  ///< Per view, one factor per channel.
   std::vector<size_t> samples;        ///< Per view, surface points it shares with another view.
   std::vector<size_t> group;          ///< Per view, the first of those that it is compared with.
+
+  /// How far two views of a group lie apart in a channel at most: 0.25 = one is brighter by a
+  /// quarter.
+  float difference() const;
 };
 
 /// Points of the surface that views `a` and `b` both show, in the frame of their cameras. Any

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "libcgs/core/error.h"
@@ -65,17 +64,6 @@ void keep_most_as_they_are(ExposureGains& exposure) {
   }
 }
 
-/// How far two views lie apart in a channel at most: 0.25 = one is brighter by a quarter.
-float largest_difference(const std::vector<Eigen::Vector3f>& gains) {
-  Eigen::Array3f least = Eigen::Array3f::Constant(std::numeric_limits<float>::infinity());
-  Eigen::Array3f most = Eigen::Array3f::Zero();
-  for (const Eigen::Vector3f& gain : gains) {
-    least = least.min(gain.array());
-    most = most.max(gain.array());
-  }
-  return gains.empty() ? 0 : (most / least).maxCoeff() - 1;
-}
-
 }  // namespace
 
 ExposureGains exposure_gains(const Scene& scene, const std::vector<ViewPriors>& priors) {
@@ -88,7 +76,7 @@ ExposureGains exposure_gains(const Scene& scene, const std::vector<ViewPriors>& 
     return shared_surface(*views[a], priors[a], *views[b], priors[b]);
   });
   keep_most_as_they_are(out);
-  if (largest_difference(out.gain) < kLeastDifference) {
+  if (out.difference() < kLeastDifference) {
     std::fill(out.gain.begin(), out.gain.end(), Eigen::Vector3f::Ones());
   }
   return out;

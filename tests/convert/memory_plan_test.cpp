@@ -100,6 +100,11 @@ TEST(MemoryPlan, CountsTheReadingOfLargePhotographs) {
   Scene whole = large;
   whole.views[1].image_path.clear();
   EXPECT_EQ(of_stage(large, "report"), of_stage(whole, "report"));
+  EXPECT_GT(double(memory_plan(large, true, {}, {}, 8).back().bytes), kPhotograph);
+  large.input = {0};
+  large.held_out = {1};
+  large.views[1].camera = small.views[1].camera;
+  EXPECT_GT(of_stage(large, "report"), kPhotograph) << "which shows views held out, too";
 }
 
 TEST(MemoryPlan, LeavesOutWhatTheUsersVoxelsDecide) {

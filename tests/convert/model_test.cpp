@@ -121,8 +121,31 @@ TEST(WriteModel, SaysWhatItsGaussiansRestOn) {
   model.scene.frame.up = Eigen::Vector3d::UnitY();
   model.evidence = "82 % measured, 18 % filled in from neighbours";
   write_model(dir.path(), model);
-  restate_frame(dir.path(), model);
+  EXPECT_TRUE(restate_frame(dir.path(), model));
   EXPECT_EQ(read_model(dir.path()).evidence, model.evidence);
+}
+
+// As programs that edit splats leave it.
+TEST(RestateFrame, WritesSplatsAnewThatAnotherProgramChanged) {
+  const test::TempDir dir;
+  Model model;
+  model.gaussians = test::varied_splats(5, 0);
+  model.scene.folder = dir.path();
+  View& view = model.scene.views.emplace_back();
+  view.name = "a";
+  view.image_path = dir / "a.png";
+  view.camera = {2, 2, 2, 2, 1, 1, Eigen::Isometry3d::Identity()};
+  write_model(dir.path(), model);
+  std::string bytes = test::read_bytes(dir / "gaussians.ply");
+  const size_t comments = bytes.find("comment ");
+  bytes.erase(comments, bytes.find("element vertex ") - comments);
+  test::write_bytes(dir / "gaussians.ply", bytes);
+  model.scene.frame.up = Eigen::Vector3d::UnitX();
+  EXPECT_FALSE(restate_frame(dir.path(), model));
+  const Model back = read_model(dir.path());
+  EXPECT_EQ(back.scene.frame.up, Eigen::Vector3d::UnitX());
+  EXPECT_EQ(back.gaussians.size(), 5u);
+  EXPECT_NE(test::read_bytes(dir / "gaussians.ply").find("comment up 1 0 0"), std::string::npos);
 }
 
 TEST(ReadModel, OfPhotographsAloneIsInMetresOnceSomethingMeasuredTellsTheirScale) {

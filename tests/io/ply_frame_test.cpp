@@ -47,6 +47,9 @@ TEST(PlyEvidence, IsOneLineOfBoundedLength) {
   EXPECT_EQ(ply_evidence_comment("82 % measured"), "comment evidence 82 % measured\n");
   EXPECT_EQ(ply_evidence_comment("a\nend_header\n"), "comment evidence a\\x0aend_header\\x0a\n");
   EXPECT_LT(ply_evidence_comment(std::string(5000, 'a')).size(), 1024u);
+  std::string accents = "a";
+  for (int i = 0; i < 1000; ++i) accents += "é";
+  EXPECT_TRUE(ply_evidence_comment(accents).ends_with("é…\n"));
 }
 
 TEST(PlyEvidence, IsReadFromFilesOfOursAlone) {

@@ -30,7 +30,7 @@ TEST(WriteTiff, IsReadByOthersWithEveryBit) {
   const test::TempDir dir;
   Raster<float> values(3, 2, 0);
   values.data = {1.5f, -0.1f, 123456.789f, std::nanf(""), 1e-30f, 0};
-  write_tiff(dir / "a.tif", values);
+  test::write_bytes(dir / "a.tif", encode_tiff(values));
   const auto words = as_pillow_reads(dir / "a.tif");
   ASSERT_EQ(words.size(), 9U);
   EXPECT_EQ(words[0], "F");  // 32-bit floats
@@ -48,8 +48,7 @@ TEST(WriteTiff, IsReadByOthersWithEveryBit) {
 
 TEST(WriteTiff, RefusesAnEmptyRasterAndAFolderThatIsNotThere) {
   const test::TempDir dir;
-  EXPECT_THROW(write_tiff(dir / "a.tif", Raster<float>()), InvalidInput);
-  EXPECT_THROW(write_tiff(dir / "no/a.tif", Raster<float>(2, 2, 1)), IoError);
+  EXPECT_THROW(encode_tiff(Raster<float>()), InvalidInput);
 }
 
 }  // namespace

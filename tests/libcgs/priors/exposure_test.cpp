@@ -84,6 +84,12 @@ TEST(ExposureOfPriors, IsSettledForEachGroupOfViewsByItself) {
   expect_gain(found.gain[3], Vector3f::Constant(0.5f));
   expect_gain(found.gain[4], Vector3f::Constant(2));
   EXPECT_EQ(found.group, (std::vector<size_t>{0, 0, 0, 3, 3}));
+  EXPECT_NEAR(found.difference(), 3, 0.05);
+  const ExposureGains apart{
+      {Vector3f::Ones(), Vector3f::Constant(1.02f), Vector3f::Constant(0.98f)},
+      {9, 9, 9},
+      {0, 0, 2}};
+  EXPECT_NEAR(apart.difference(), 0.02, 1e-6) << "nothing compares the third with the others";
 }
 
 TEST(ExposureOfPriors, CountsTheDifferenceOfTwoPhotographs) {
