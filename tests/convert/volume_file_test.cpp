@@ -83,6 +83,7 @@ TEST(VolumeFile, HoldsADensityOfTheClosedSurfaceOrElseOfTheBand) {
   const test::TempDir dir;
   Volume volume = small_volume();
   volume.tsdf->tree().setValue(openvdb::Coord(4, -2, 7), -0.15f);
+  volume.tsdf->tree().setValue(openvdb::Coord(5, -2, 7), -0.3f);  // deepest: 1
   const auto density = [&] {
     write_volume(dir / "v.vdb", volume, large_frame());
     for (const auto& grid : read_vdb(dir / "v.vdb")) {
@@ -95,6 +96,7 @@ TEST(VolumeFile, HoldsADensityOfTheClosedSurfaceOrElseOfTheBand) {
   EXPECT_EQ(of_band->getGridClass(), openvdb::GRID_FOG_VOLUME);
   EXPECT_EQ(of_band->tree().getValue(openvdb::Coord(3, -2, 7)), 0);
   EXPECT_NEAR(of_band->tree().getValue(openvdb::Coord(4, -2, 7)), 0.5, 1e-6);
+  EXPECT_EQ(of_band->tree().getValue(openvdb::Coord(5, -2, 7)), 1);
   EXPECT_EQ(of_band->background(), 0);
   EXPECT_NEAR(of_band->voxelSize().x(), 1.6, 1e-12);
   EXPECT_EQ(volume.tsdf->tree().getValue(openvdb::Coord(4, -2, 7)), -0.15f) << "is left alone";
