@@ -31,7 +31,7 @@ uint64_t disk_plan(const Scene& scene) {
   // do not depend on it.
   constexpr double kBase = 12e6;
   constexpr double kOfDrawn = 36;
-  constexpr double kOfInput = 300;
+  constexpr double kOfInput = 330;
   const double input = pixels_of(scene, scene.input);
   const double drawn = input + pixels_of(scene, scene.held_out);
   return static_cast<uint64_t>(kBase + kOfDrawn * drawn + kOfInput * input);
