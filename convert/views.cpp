@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/frame_json.h"
 #include "convert/pictures.h"
 #include "io/atomic_file.h"
 #include "io/cameras_json.h"
@@ -17,6 +18,7 @@
 #include "io/scene_reader.h"
 #include "io/view_exr.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/exposure.h"
 #include "libcgs/train/image_metrics.h"
 
 namespace cgs {
@@ -181,16 +183,31 @@ double share_of(const MaskMap& part, const MaskMap& whole) {
   return count(part) / count(whole);
 }
 
+// The exposure of the model is that of its input views. Where these had to be matched, the other
+// photographs of the scene were exposed by whatever they show.
+bool is_exposed_otherwise(const Model& model, int index) {
+  const Scene& scene = model.scene;
+  const std::string role = view_role(scene, index);
+  return role != "input" && std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
+           return scene.views[static_cast<size_t>(i)].exposure != Eigen::Vector3f::Ones();
+         });
+}
+
 Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, int index) {
-  const View& view = model.scene.views[static_cast<size_t>(index)];
+  View view = model.scene.views[static_cast<size_t>(index)];
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
   const ColorImage shown = blackened(picture(buffers), view.valid);
-  const ColorImage photograph = blackened(view.image, view.valid);
   MaskMap seen = hole_mask(buffers);
   for (uint8_t& value : seen.data) value = 1 - value;
   const MaskMap everywhere(seen.width, seen.height, 1);
   const MaskMap all = intersection(everywhere, view.valid);
   const MaskMap use = intersection(seen, view.valid);
+  const bool is_matched = is_exposed_otherwise(model, index);
+  if (is_matched) {
+    view.exposure = matching_gain(view.image, shown, use);
+    apply_exposure(view);
+  }
+  const ColorImage photograph = blackened(view.image, view.valid);
   // The coarse scales of MS-SSIM mix what is masked with the rest, and count it as equal; the rim
   // that a lens leaves does not matter.
   constexpr double kNearlyWhole = 0.95;
@@ -210,7 +227,8 @@ Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, i
           {"psnr_seen", tells_holes ? figure(psnr, use) : Json()},
           {"ssim_seen", tells_holes ? figure(ssim, use) : Json()},
           {"hole_fraction", tells_holes && has_any(all) ? Json(1 - share_of(use, all)) : Json()},
-          {"ms_ssim", is_nearly_whole ? Json(ms_ssim(shown, photograph)) : Json()}};
+          {"ms_ssim", is_nearly_whole ? Json(ms_ssim(shown, photograph)) : Json()},
+          {"exposure", is_matched ? vector_to_json(view.exposure.cast<double>()) : Json()}};
 }
 
 // Of those views that say how well the model predicts, if there are any: it was trained on inputs.

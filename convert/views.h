@@ -46,6 +46,9 @@ nlohmann::ordered_json write_path(const Model& model,
 /// "hole_fraction", "ms_ssim"}, "views": [{"name", "role" as of write_views(), …}]}. Loads the
 /// photographs.
 ///
+/// Where the exposures of input views were matched, the photographs of others are matched to what
+/// is rendered, by the factors "exposure" of red, green and blue light, else null.
+///
 /// Input views stay out of the mean where there are others. Warnings of the scene tell where there
 /// are none, and where nothing is known of holes, whose figures are then null.
 /// \throws BadInput if none of the views has a photograph.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -54,6 +55,11 @@ void print_table(const nlohmann::ordered_json& report) {
     row(view["name"].get<std::string>(), role.is_null() ? "-" : role.get<std::string>(), view);
   }
   row("mean", "", report["mean"]);
+  const auto& views = report["views"];
+  if (std::any_of(
+          views.begin(), views.end(), [](const auto& v) { return !v["exposure"].is_null(); })) {
+    std::printf("photographs are matched in exposure to the model, as its input views are\n");
+  }
 }
 
 void run_evaluate(const EvaluateArgs& args) {

@@ -22,6 +22,10 @@ constexpr size_t kFewestSamples = 100;  // below, a pair of views says nothing
 constexpr float kDarkest = 0.04f;       // sRGB-coded
 constexpr float kBrightest = 0.98f;
 
+bool tells_exposure(const Eigen::Vector3f& color) {
+  return color.minCoeff() > kDarkest && color.maxCoeff() < kBrightest;
+}
+
 /// Colour where a view shows a point, bilinear; NaN where it is clipped or nearly black.
 Eigen::Vector3f color_at(const View& view, const Eigen::Vector3d& point) {
   const Eigen::Vector3d uvz = view.camera.project(point);
@@ -36,9 +40,7 @@ Eigen::Vector3f color_at(const View& view, const Eigen::Vector3d& point) {
     const int i = std::min(x + (k & 1), view.image.width - 1);
     const int j = std::min(y + (k >> 1), view.image.height - 1);
     const Eigen::Vector3f& color = view.image(i, j);
-    if (!(color.minCoeff() > kDarkest && color.maxCoeff() < kBrightest)) {
-      return Eigen::Vector3f::Constant(std::nanf(""));
-    }
+    if (!tells_exposure(color)) return Eigen::Vector3f::Constant(std::nanf(""));
     const float weight =
         (1 - std::abs(u - static_cast<float>(i))) * (1 - std::abs(v - static_cast<float>(j)));
     sum += weight * color.unaryExpr([](float c) { return linear_from_srgb(c); });
@@ -137,6 +139,25 @@ float ExposureGains::difference() const {
     }
   }
   return most - 1;
+}
+
+Eigen::Vector3f matching_gain(const ColorImage& picture,
+                              const ColorImage& wanted,
+                              const MaskMap& use) {
+  std::array<std::vector<float>, 3> log_ratios;
+  for (size_t i = 0; i < picture.data.size(); ++i) {
+    const Eigen::Vector3f& from = picture.data[i];
+    const Eigen::Vector3f& to = wanted.data[i];
+    if (use.data[i] != 1 || !tells_exposure(from) || !tells_exposure(to)) continue;
+    for (int c = 0; c < 3; ++c) {
+      log_ratios.at(static_cast<size_t>(c))
+          .push_back(std::log(linear_from_srgb(to[c]) / linear_from_srgb(from[c])));
+    }
+  }
+  if (log_ratios[0].size() < kFewestSamples) return Eigen::Vector3f::Ones();
+  return {std::exp(median(log_ratios[0])),
+          std::exp(median(log_ratios[1])),
+          std::exp(median(log_ratios[2]))};
 }
 
 void apply_exposure(View& view) {

@@ -32,6 +32,13 @@ using SharedSurface = std::function<std::vector<Eigen::Vector3d>(size_t a, size_
 /// \throws InvalidInput if the image of a view is not loaded
 ExposureGains exposure_gains(std::span<const View* const> views, const SharedSurface& shared);
 
+/// Factors on the linear light of a picture that make it agree with another one of the same pixels:
+/// per channel the median ratio of those that `use` marks with 1. Clipped and nearly black ones
+/// take no part; all factors are 1 where fewer than 100 are left.
+Eigen::Vector3f matching_gain(const ColorImage& picture,
+                              const ColorImage& wanted,
+                              const MaskMap& use);
+
 /// Multiplies the photograph of a view by its exposure. What that makes brighter than white is
 /// white: no picture of the surface could show more.
 void apply_exposure(View& view);

@@ -102,6 +102,7 @@ void run(const std::filesystem::path& folder,
          const std::filesystem::path& output,
          const std::string& names) {
   cgs::Model model = cgs::read_model(folder);
+  model.scene.frame.up = -Eigen::Vector3d::UnitY();  // the axes by which SPZ is read back
   const std::vector<int> views =
       names.empty() ? model.scene.held_out : cgs::select_views(model.scene, names);
   cgs::make_output_folder(output / "all");
