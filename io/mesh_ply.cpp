@@ -125,8 +125,7 @@ std::string lost_labels(const PlyHeader& header) {
   if (std::find(comments.begin(), comments.end(), kPlyLabels) != comments.end()) return kLostLabels;
   if (is_our_ply(comments) || find_scalar(*header.find("vertex"), "scalar_sigma") < 0) return "";
   return "it states sigma, but not where its faces come from: another program may have left out "
-         "the "
-         "labels of a file of ours";
+         "the labels of a file of ours";
 }
 
 /// Whether a file has colours elsewhere than at its vertices, as MeshLab and VCG write them.

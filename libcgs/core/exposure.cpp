@@ -48,6 +48,23 @@ Eigen::Vector3f color_at(const View& view, const Eigen::Vector3d& point) {
   return sum;
 }
 
+/// How the linear light of two pictures of the same places compares.
+class LightRatios {
+ public:
+  void add(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+    for (size_t c = 0; c < 3; ++c) {
+      const auto channel = static_cast<Eigen::Index>(c);
+      logs_.at(c).push_back(std::log(a[channel] / b[channel]));
+    }
+  }
+  size_t size() const { return logs_[0].size(); }
+  /// Of ln(a / b), per channel; the order is another one afterwards. \pre size() > 0
+  std::array<float, 3> medians() { return {median(logs_[0]), median(logs_[1]), median(logs_[2])}; }
+
+ private:
+  std::array<std::vector<float>, 3> logs_;
+};
+
 /// What two views say about each other.
 struct Pair {
   size_t a = 0;
@@ -60,17 +77,14 @@ Pair compare(std::span<const View* const> views,
              const SharedSurface& shared,
              std::pair<size_t, size_t> which) {
   Pair out{which.first, which.second};
-  std::array<std::vector<float>, 3> log_ratios;
+  LightRatios ratios;
   for (const Eigen::Vector3d& point : shared(out.a, out.b)) {
-    const Eigen::Vector3f ratio =
-        color_at(*views[out.a], point).cwiseQuotient(color_at(*views[out.b], point));
-    if (!(ratio.minCoeff() > 0)) continue;
-    for (size_t c = 0; c < 3; ++c) {
-      log_ratios.at(c).push_back(std::log(ratio[static_cast<Eigen::Index>(c)]));
-    }
+    const Eigen::Vector3f of_a = color_at(*views[out.a], point);
+    const Eigen::Vector3f of_b = color_at(*views[out.b], point);
+    if (of_a.cwiseQuotient(of_b).minCoeff() > 0) ratios.add(of_a, of_b);
   }
-  out.samples = log_ratios[0].size();
-  for (size_t c = 0; c < 3 && out.samples > 0; ++c) out.log_ratio.at(c) = median(log_ratios.at(c));
+  out.samples = ratios.size();
+  if (out.samples > 0) out.log_ratio = ratios.medians();
   return out;
 }
 
@@ -144,20 +158,16 @@ float ExposureGains::difference() const {
 Eigen::Vector3f matching_gain(const ColorImage& picture,
                               const ColorImage& wanted,
                               const MaskMap& use) {
-  std::array<std::vector<float>, 3> log_ratios;
+  LightRatios ratios;
   for (size_t i = 0; i < picture.data.size(); ++i) {
     const Eigen::Vector3f& from = picture.data[i];
     const Eigen::Vector3f& to = wanted.data[i];
     if (use.data[i] != 1 || !tells_exposure(from) || !tells_exposure(to)) continue;
-    for (int c = 0; c < 3; ++c) {
-      log_ratios.at(static_cast<size_t>(c))
-          .push_back(std::log(linear_from_srgb(to[c]) / linear_from_srgb(from[c])));
-    }
+    ratios.add(to.unaryExpr(&linear_from_srgb), from.unaryExpr(&linear_from_srgb));
   }
-  if (log_ratios[0].size() < kFewestSamples) return Eigen::Vector3f::Ones();
-  return {std::exp(median(log_ratios[0])),
-          std::exp(median(log_ratios[1])),
-          std::exp(median(log_ratios[2]))};
+  if (ratios.size() < kFewestSamples) return Eigen::Vector3f::Ones();
+  const std::array<float, 3> logs = ratios.medians();
+  return {std::exp(logs[0]), std::exp(logs[1]), std::exp(logs[2])};
 }
 
 void apply_exposure(View& view) {

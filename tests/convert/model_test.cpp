@@ -109,15 +109,20 @@ TEST(WriteModel, LeavesNothingOfViewsThatAnEarlierModelHad) {
   }
 }
 
-TEST(WriteModel, SaysWhatItsGaussiansRestOn) {
-  const test::TempDir dir;
+Model model_of_one_view(const std::filesystem::path& folder) {
   Model model;
   model.gaussians = test::varied_splats(5, 0);
-  model.scene.folder = dir.path();
+  model.scene.folder = folder;
   View& view = model.scene.views.emplace_back();
   view.name = "a";
-  view.image_path = dir / "a.png";
+  view.image_path = folder / "a.png";
   view.camera = {2, 2, 2, 2, 1, 1, Eigen::Isometry3d::Identity()};
+  return model;
+}
+
+TEST(WriteModel, SaysWhatItsGaussiansRestOn) {
+  const test::TempDir dir;
+  Model model = model_of_one_view(dir.path());
   model.scene.frame.up = Eigen::Vector3d::UnitY();
   model.evidence = "82 % measured, 18 % filled in from neighbours";
   write_model(dir.path(), model);
@@ -128,13 +133,7 @@ TEST(WriteModel, SaysWhatItsGaussiansRestOn) {
 // As programs that edit splats leave it.
 TEST(RestateFrame, WritesSplatsAnewThatAnotherProgramChanged) {
   const test::TempDir dir;
-  Model model;
-  model.gaussians = test::varied_splats(5, 0);
-  model.scene.folder = dir.path();
-  View& view = model.scene.views.emplace_back();
-  view.name = "a";
-  view.image_path = dir / "a.png";
-  view.camera = {2, 2, 2, 2, 1, 1, Eigen::Isometry3d::Identity()};
+  Model model = model_of_one_view(dir.path());
   write_model(dir.path(), model);
   std::string bytes = test::read_bytes(dir / "gaussians.ply");
   const size_t comments = bytes.find("comment ");
