@@ -35,6 +35,10 @@ class SharedProgress {
   /// another one telling goes on with its work.
   void advance() {
     ++done_;
+    tell();
+  }
+  /// Amid a long item: tells again what is done, from any thread.
+  void tell() {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (lock) report(progress_, double(done_) / double(items_));
   }
