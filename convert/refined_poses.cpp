@@ -283,10 +283,13 @@ RefinedPoses solved_poses(const Scene& scene, const Progress& progress) {
     add_view(view_of(scene, parts[k]), parts[k].second, refined.photos[k], out);
   }
   out.fit["refined"] = !out.poses.empty();
+  const double step = 0.3 / double(std::max<size_t>(1, parts.size() - inputs));
   for (size_t k = inputs; k < parts.size(); ++k) {
-    report(progress, 0.7 + 0.3 * double(k - inputs) / double(parts.size() - inputs));
+    const double done = 0.7 + step * double(k - inputs);
+    report(progress, done);
     const View& view = view_of(scene, parts[k]);
-    add_view(view, parts[k].second, refine_pose(posed_photo(view), refined.points), out);
+    const Progress of_view = part_of(progress, done, done + step);
+    add_view(view, parts[k].second, refine_pose(posed_photo(view), refined.points, of_view), out);
   }
   return out;
 }

@@ -2,6 +2,7 @@
 #include "libcgs/priors/bundle_adjustment.h"
 
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -258,6 +259,29 @@ ceres::Solver::Options solver_options(const BundleOptions& options,
   return out;
 }
 
+// Ends the solver where the progress function throws: no exception may pass through it.
+class IterationReport : public ceres::IterationCallback {
+ public:
+  explicit IterationReport(const BundleOptions& options) : options_(options) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    try {
+      report(options_.progress, double(summary.iteration) / options_.most_iterations);
+    } catch (...) {
+      thrown_ = std::current_exception();
+      return ceres::SOLVER_ABORT;
+    }
+    return ceres::SOLVER_CONTINUE;
+  }
+  void rethrow() const {
+    if (thrown_) std::rethrow_exception(thrown_);
+  }
+
+ private:
+  const BundleOptions& options_;
+  std::exception_ptr thrown_;
+};
+
 // The free parameter blocks of cameras and lenses; the column at which each begins, and their end.
 struct CameraColumns {
   std::vector<double*> blocks;
@@ -365,7 +389,11 @@ std::vector<double> adjust_bundle(Reconstruction& scene,
   if (options.hold_points) hold_points(scene, unknowns, problem);
   const std::vector<bool> held_focal = hold_lenses(priors, options, unknowns, problem);
   ceres::Solver::Summary summary;
-  ceres::Solve(solver_options(options, scene, unknowns, problem), &problem, &summary);
+  ceres::Solver::Options solver = solver_options(options, scene, unknowns, problem);
+  IterationReport iterations(options);
+  solver.callbacks.push_back(&iterations);
+  ceres::Solve(solver, &problem, &summary);
+  iterations.rethrow();
   if (summary.IsSolutionUsable()) unknowns.write_to(scene);
   if (!with_sigma) return std::vector<double>(scene.lenses.size(), 0.0);
   return focal_sigmas(scene, held_focal, unknowns, problem);

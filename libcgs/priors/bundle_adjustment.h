@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "libcgs/core/progress.h"
 #include "libcgs/priors/reconstruction.h"
 
 namespace cgs {
@@ -31,6 +32,7 @@ struct BundleOptions {
   std::vector<PosePrior> pose_priors = {};  ///< Per photograph; empty = nothing is known.
   double loss_scale = 1;                    ///< Of the Cauchy loss [working pixels].
   int most_iterations = 50;
+  Progress progress = {};  ///< Told of every iteration; the scene stays as it is if it throws.
 };
 
 /// Moves placed photographs, known points and, as asked, lenses to where the points appear where

@@ -72,10 +72,11 @@ struct Nearest {
       second = std::max(second, dot);
     }
   }
-  bool is_distinct(double ratio) const {
+  bool is_distinct() const {
+    constexpr double kRatio = 0.8;
     const double near = std::max(0.0, 2 - 2 * double(best));  // squared distances
     const double next = std::max(0.0, 2 - 2 * double(second));
-    return index >= 0 && near < ratio * ratio * next;
+    return index >= 0 && near < kRatio * kRatio * next;
   }
 };
 
@@ -125,12 +126,13 @@ PhotoFeatures detect_features(const ColorImage& image,
 
 std::vector<FeatureMatch> match_features(const PhotoFeatures& a,
                                          const PhotoFeatures& b,
-                                         double ratio) {
+                                         const Progress& progress) {
   std::vector<Nearest> of_a(a.points.size());
   std::vector<Nearest> of_b(b.points.size());
   constexpr Eigen::Index kBlock = 512;  // products of two blocks stay in the cache
   Descriptors dots;
   for (Eigen::Index i = 0; i < a.descriptors.rows(); i += kBlock) {
+    report(progress, double(i) / double(a.descriptors.rows()));
     const Eigen::Index rows = std::min(kBlock, a.descriptors.rows() - i);
     for (Eigen::Index j = 0; j < b.descriptors.rows(); j += kBlock) {
       const Eigen::Index cols = std::min(kBlock, b.descriptors.rows() - j);
@@ -146,9 +148,9 @@ std::vector<FeatureMatch> match_features(const PhotoFeatures& a,
   }
   std::vector<FeatureMatch> out;
   for (size_t i = 0; i < of_a.size(); ++i) {
-    if (!of_a[i].is_distinct(ratio)) continue;
+    if (!of_a[i].is_distinct()) continue;
     const Nearest& back = of_b[static_cast<size_t>(of_a[i].index)];
-    if (back.index == static_cast<int>(i) && back.is_distinct(ratio)) {
+    if (back.index == static_cast<int>(i) && back.is_distinct()) {
       out.push_back({static_cast<int>(i), of_a[i].index});
     }
   }

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "libcgs/core/progress.h"
 #include "libcgs/core/raster.h"
 
 namespace cgs {
@@ -42,10 +43,10 @@ struct FeatureMatch {
   int b = 0;
 };
 
-/// Features that are each other's nearest, and nearer than `ratio` times the second nearest, seen
-/// from both sides; in the order of a.
+/// Features that are each other's nearest, and nearer than 0.8 times the second nearest, seen from
+/// both sides; in the order of a.
 std::vector<FeatureMatch> match_features(const PhotoFeatures& a,
                                          const PhotoFeatures& b,
-                                         double ratio = 0.8);
+                                         const Progress& progress = {});
 
 }  // namespace cgs

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/photo_pairs.h"
 
-#include <algorithm>
 #include <cstdint>
 
 #include <tbb/parallel_for.h>
@@ -28,8 +27,8 @@ bool shows_no_photo_twice(const Track& track) {
 
 }  // namespace
 
-PhotoPair match_pair(const UnposedPhoto& a, const UnposedPhoto& b) {
-  const std::vector<FeatureMatch> matches = match_features(a.features, b.features);
+PhotoPair match_pair(const UnposedPhoto& a, const UnposedPhoto& b, const Progress& progress) {
+  const std::vector<FeatureMatch> matches = match_features(a.features, b.features, progress);
   MatchedPoints points;
   for (const FeatureMatch& m : matches) {
     points.a.push_back(from_centre(a, m.a));
@@ -57,17 +56,17 @@ std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,
   for (int a = 0; a < count; ++a) {
     for (int b = a + 1; b < count; ++b) pairs.push_back({a, b, {}, {}, false});
   }
-  constexpr size_t kAtOnce = 8;
-  for (size_t begin = 0; begin < pairs.size(); begin += kAtOnce) {
-    report(progress, double(begin) / double(pairs.size()));
-    tbb::parallel_for(begin, std::min(begin + kAtOnce, pairs.size()), [&](size_t i) {
-      const int a = pairs[i].a;
-      const int b = pairs[i].b;
-      pairs[i] = match_pair(photos[static_cast<size_t>(a)], photos[static_cast<size_t>(b)]);
-      pairs[i].a = a;
-      pairs[i].b = b;
-    });
-  }
+  SharedProgress matched(progress, pairs.size());
+  tbb::parallel_for(size_t{0}, pairs.size(), [&](size_t i) {
+    const int a = pairs[i].a;
+    const int b = pairs[i].b;
+    pairs[i] = match_pair(photos[static_cast<size_t>(a)],
+                          photos[static_cast<size_t>(b)],
+                          [&](double) { matched.tell(); });
+    pairs[i].a = a;
+    pairs[i].b = b;
+    matched.advance();
+  });
   return pairs;
 }
 

@@ -23,7 +23,7 @@ struct PhotoPair {
 inline constexpr size_t kFewestMatches = 24;
 
 /// Matches one pair, which is then (0, 1).
-PhotoPair match_pair(const UnposedPhoto& a, const UnposedPhoto& b);
+PhotoPair match_pair(const UnposedPhoto& a, const UnposedPhoto& b, const Progress& progress = {});
 
 /// Matches every pair a < b.
 std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,

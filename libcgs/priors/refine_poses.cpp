@@ -109,7 +109,8 @@ void adjust(const std::vector<LensPrior>& lenses,
             const Progress& progress) {
   double done = 0;
   for (const double most_error : kRounds) {
-    report(progress, done++ / kRounds.size());
+    options.progress = part_of(progress, done / kRounds.size(), (done + 1) / kRounds.size());
+    ++done;
     triangulate_anew(scene, most_error);
     options.loss_scale = kLossShare * most_error;
     adjust_bundle(scene, lenses, options);
@@ -133,11 +134,13 @@ std::vector<double> errors_in(const Reconstruction& scene, int photo) {
 // The same points, put where the poses given have them.
 Reconstruction as_given(const Reconstruction& refined,
                         const std::vector<std::optional<PhotoPose>>& given,
-                        const std::vector<LensPrior>& lenses) {
+                        const std::vector<LensPrior>& lenses,
+                        const Progress& progress) {
   Reconstruction out = refined;
   out.poses = given;
   // Every sighting counts: a loss that forgives would find points that two of three agree on.
-  const BundleOptions options{.hold_poses = true, .loss_scale = kRounds.front()};
+  const BundleOptions options{
+      .hold_poses = true, .loss_scale = kRounds.front(), .progress = progress};
   adjust_bundle(out, lenses, options);
   return out;
 }
@@ -194,10 +197,13 @@ std::vector<std::ptrdiff_t> tracks_of(const KnownPoints& points, int photo) {
 }
 
 // By its matches with all others. Points found in two places are left out.
-Shown shown_points(const UnposedPhoto& photo, const KnownPoints& points) {
+Shown shown_points(const UnposedPhoto& photo, const KnownPoints& points, const Progress& progress) {
   std::vector<PhotoPair> pairs(points.photos.size());
-  tbb::parallel_for(
-      size_t{0}, pairs.size(), [&](size_t i) { pairs[i] = match_pair(points.photos[i], photo); });
+  SharedProgress matched(progress, pairs.size());
+  tbb::parallel_for(size_t{0}, pairs.size(), [&](size_t i) {
+    pairs[i] = match_pair(points.photos[i], photo, [&](double) { matched.tell(); });
+    matched.advance();
+  });
   Shown out;
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (!pairs[i].is_connected) continue;
@@ -262,8 +268,8 @@ PoseRefinement refine_poses(const std::vector<PosedPhoto>& photos, const Progres
     lenses.push_back(exact_lens(photos[i]));
     options.pose_priors.push_back(prior_of(*given[i], gauge.baseline / frame.scale));
   }
-  adjust(lenses, options, scene, part_of(progress, 0.7, 1));
-  const Reconstruction before = as_given(scene, given, lenses);
+  adjust(lenses, options, scene, part_of(progress, 0.7, 0.95));
+  const Reconstruction before = as_given(scene, given, lenses, part_of(progress, 0.95, 1));
   report(progress, 1);
   for (size_t i = 0; i < photos.size(); ++i) {
     const int photo = static_cast<int>(i);
@@ -286,9 +292,11 @@ PoseRefinement refine_poses(const std::vector<PosedPhoto>& photos, const Progres
   return out;
 }
 
-RefinedPose refine_pose(const PosedPhoto& photo, const KnownPoints& points) {
+RefinedPose refine_pose(const PosedPhoto& photo,
+                        const KnownPoints& points,
+                        const Progress& progress) {
   const UnposedPhoto unposed = as_unposed(photo);
-  const Shown shown = shown_points(unposed, points);
+  const Shown shown = shown_points(unposed, points, progress);
   if (shown.feature_of.empty()) return fit_of(photo, shown.matches, {}, {});
   Reconstruction scene = resection_of(photo, unposed, shown, points);
   const PhotoPose given = *scene.poses[0];

@@ -47,6 +47,8 @@ PoseRefinement refine_poses(const std::vector<PosedPhoto>& photos, const Progres
 
 /// The pose of one more photograph, held against points that stay where they are. It changes where
 /// that more than halves its error; against points that were moved, where that lowers it.
-RefinedPose refine_pose(const PosedPhoto& photo, const KnownPoints& points);
+RefinedPose refine_pose(const PosedPhoto& photo,
+                        const KnownPoints& points,
+                        const Progress& progress = {});
 
 }  // namespace cgs

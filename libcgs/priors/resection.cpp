@@ -64,6 +64,7 @@ void settle(Reconstruction& scene,
 // Of the poses that the pair may mean, the one from which adjusting explains most.
 bool begin_with(const PhotoPair& pair,
                 const std::vector<LensPrior>& priors,
+                const Progress& progress,
                 Reconstruction& scene) {
   forget(scene);
   std::optional<Reconstruction> best;
@@ -73,7 +74,7 @@ bool begin_with(const PhotoPair& pair,
     Reconstruction candidate = scene;
     candidate.poses[static_cast<size_t>(pair.a)] = PhotoPose{};
     candidate.poses[static_cast<size_t>(pair.b)] = pose;
-    settle(candidate, priors, {.first = pair.a, .second = pair.b});
+    settle(candidate, priors, {.first = pair.a, .second = pair.b, .progress = progress});
     const double error = capped_error(candidate);
     if (known_points(candidate) < kFewestPoints || !(error < least)) continue;
     least = error;
@@ -174,7 +175,8 @@ double capped_error(const Reconstruction& scene) {
 
 std::optional<FirstPair> place_photos(Reconstruction& scene,
                                       const std::vector<LensPrior>& priors,
-                                      const std::vector<PhotoPair>& pairs) {
+                                      const std::vector<PhotoPair>& pairs,
+                                      const Progress& progress) {
   std::optional<FirstPair> begun;
   double least = std::numeric_limits<double>::infinity();
   Reconstruction best = scene;
@@ -182,8 +184,8 @@ std::optional<FirstPair> place_photos(Reconstruction& scene,
   constexpr int kMostTries = 3;
   int tries = 0;
   for (const PhotoPair* pair : ranked_pairs(scene, pairs)) {
-    if (!begin_with(*pair, priors, scene)) continue;
-    place_more(scene, priors, {pair->a, pair->b});
+    if (!begin_with(*pair, priors, progress, scene)) continue;
+    place_more(scene, priors, {pair->a, pair->b}, progress);
     const double error = capped_error(scene);
     if (error < least) {
       least = error;
@@ -198,13 +200,14 @@ std::optional<FirstPair> place_photos(Reconstruction& scene,
 
 void place_more(Reconstruction& scene,
                 const std::vector<LensPrior>& priors,
-                const FirstPair& begun) {
+                const FirstPair& begun,
+                const Progress& progress) {
   triangulate(scene, kMostError, kLeastAngle);
   std::vector<char> has_failed(scene.poses.size(), 0);
   for (int photo = 0; (photo = next_photo(scene, has_failed)) >= 0;) {
     has_failed[static_cast<size_t>(photo)] = 1;
     if (!resect(scene, photo)) continue;
-    settle(scene, priors, {.first = begun.first, .second = begun.second});
+    settle(scene, priors, {.first = begun.first, .second = begun.second, .progress = progress});
     if (points_in(scene, photo) < kFewestPoints) scene.poses[static_cast<size_t>(photo)].reset();
   }
 }

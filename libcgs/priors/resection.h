@@ -24,16 +24,19 @@ struct FirstPair {
 /// matches and much parallax first, then the photograph that shows the most known points, again
 /// and again. Of the most promising pairs to begin with, the one that explains most is kept.
 ///
-/// \param scene  with tracks and lenses; poses and positions are overwritten
+/// \param scene     with tracks and lenses; poses and positions are overwritten
+/// \param progress  told again and again, never how much is done
 /// \return nothing, and no pose, if no pair could be placed
 std::optional<FirstPair> place_photos(Reconstruction& scene,
                                       const std::vector<LensPrior>& priors,
-                                      const std::vector<PhotoPair>& pairs);
+                                      const std::vector<PhotoPair>& pairs,
+                                      const Progress& progress = {});
 
 /// Goes on from there: triangulates what the placed photographs show and places further ones.
 void place_more(Reconstruction& scene,
                 const std::vector<LensPrior>& priors,
-                const FirstPair& begun);
+                const FirstPair& begun,
+                const Progress& progress = {});
 
 /// Sum of squared errors of all sightings, none counting more than kMostError² (which those without
 /// a point or pose count), per sighting: for comparing solutions of the same tracks.

@@ -66,7 +66,8 @@ Attempt attempt_at(double focal_of_side,
                    const std::vector<int>& lens_of,
                    const std::vector<LensPrior>& priors,
                    const std::vector<PhotoPair>& pairs,
-                   const std::vector<Track>& tracks) {
+                   const std::vector<Track>& tracks,
+                   const Progress& progress) {
   Attempt out;
   out.scene.tracks = tracks;
   out.scene.lens_of = lens_of;
@@ -74,10 +75,12 @@ Attempt attempt_at(double focal_of_side,
   for (const LensPrior& prior : priors) {
     out.scene.lenses.push_back({prior.focal > 0 ? prior.focal : focal_of_side * prior.side, 0});
   }
-  out.begun = place_photos(out.scene, priors, pairs);
+  out.begun = place_photos(out.scene, priors, pairs, progress);
   if (!out.begun) return out;
-  const BundleOptions options{
-      .first = out.begun->first, .second = out.begun->second, .solve_focal = true};
+  const BundleOptions options{.first = out.begun->first,
+                              .second = out.begun->second,
+                              .solve_focal = true,
+                              .progress = progress};
   adjust_bundle(out.scene, priors, options);
   drop_outliers(out.scene, kMostError, kLeastAngle);
   out.error = capped_error(out.scene);
@@ -130,14 +133,18 @@ bool has_rival(const Attempt& best,
 Attempt best_attempt(const std::vector<int>& lens_of,
                      const std::vector<LensPrior>& priors,
                      const std::vector<PhotoPair>& pairs,
-                     const std::vector<Track>& tracks) {
+                     const std::vector<Track>& tracks,
+                     const Progress& progress) {
   constexpr size_t kTracks = 600;
   const std::vector<Track> some = sample(tracks, kTracks);
   const bool is_known = std::all_of(
       priors.begin(), priors.end(), [](const LensPrior& prior) { return prior.focal > 0; });
   std::vector<Attempt> attempts(is_known ? 1 : kFocals.size());
+  SharedProgress tried(progress, attempts.size());
   tbb::parallel_for(size_t{0}, attempts.size(), [&](size_t i) {
-    attempts[i] = attempt_at(kFocals[i], lens_of, priors, pairs, some);
+    attempts[i] =
+        attempt_at(kFocals[i], lens_of, priors, pairs, some, [&](double) { tried.tell(); });
+    tried.advance();
   });
   const Attempt& best =
       *std::min_element(attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
@@ -156,7 +163,11 @@ std::vector<double> polish(const std::vector<LensPrior>& priors,
                            Reconstruction& scene) {
   BundleOptions options = wanted;
   options.solve_shape = false;
+  constexpr double kRoundShare = 0.2;  // of the time, of each round but the last
+  double done = 0;
   for (const double most_error : {kMostError, 3.0, 2.5}) {
+    options.progress = part_of(wanted.progress, done, done + kRoundShare);
+    done += kRoundShare;
     adjust_bundle(scene, priors, options);
     drop_outliers(scene, most_error, kLeastAngle);
     triangulate(scene, most_error, kLeastAngle);
@@ -164,6 +175,7 @@ std::vector<double> polish(const std::vector<LensPrior>& priors,
   }
   constexpr int kUntilSettled = 200;
   options.most_iterations = kUntilSettled;
+  options.progress = part_of(wanted.progress, done, 1);
   return adjust_bundle(scene, priors, options, true);
 }
 
@@ -171,12 +183,17 @@ std::vector<double> polish(const std::vector<LensPrior>& priors,
 // lenses have it: then the photographs cannot tell one from the other, and plain lenses stay.
 std::vector<double> polish_with_shape(const std::vector<LensPrior>& priors,
                                       const FirstPair& begun,
+                                      const Progress& progress,
                                       Reconstruction& scene) {
   constexpr double kMostPull = 0.1;  // of log(focal); distortion of real lenses does less
-  BundleOptions options{.first = begun.first, .second = begun.second, .solve_focal = true};
+  BundleOptions options{.first = begun.first,
+                        .second = begun.second,
+                        .solve_focal = true,
+                        .progress = part_of(progress, 0, 0.5)};
   Reconstruction plain = scene;
   std::vector<double> plain_sigmas = polish(priors, options, plain);
   options.solve_shape = true;
+  options.progress = part_of(progress, 0.5, 1);
   std::vector<double> sigmas = polish(priors, options, scene);
   for (size_t i = 0; i < scene.lenses.size(); ++i) {
     const double pull = std::abs(std::log(scene.lenses[i].focal / plain.lenses[i].focal));
@@ -264,13 +281,15 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
   lens_of.reserve(photos.size());
   for (const UnposedPhoto& photo : photos) lens_of.push_back(photo.lens);
   refuse_turned_only(photos, priors, matched.pairs);
-  Attempt attempt = best_attempt(lens_of, priors, matched.pairs, matched.tracks);
-  report(progress, 0.6);
+  constexpr double kPlaced = 0.6;  // of the time
+  Attempt attempt =
+      best_attempt(lens_of, priors, matched.pairs, matched.tracks, part_of(progress, 0, kPlaced));
   if (!attempt.begun) throw NumericalError(unexplained_matches(photos, matched.pairs));
   Reconstruction scene = std::move(attempt.scene);
   scene.tracks = matched.tracks;
-  place_more(scene, priors, *attempt.begun);
-  const std::vector<double> sigmas = polish_with_shape(priors, *attempt.begun, scene);
+  place_more(scene, priors, *attempt.begun, [&](double) { report(progress, kPlaced); });
+  const std::vector<double> sigmas =
+      polish_with_shape(priors, *attempt.begun, part_of(progress, kPlaced, 1), scene);
   refuse_unsure(photos, priors, matched.pairs, scene, sigmas);
   move_to_first(scene);
 

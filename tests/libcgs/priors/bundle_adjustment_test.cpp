@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "libcgs/core/error.h"
 #include "tests/support/unposed_photos.h"
 
 namespace cgs::bundle_adjustment_test {
@@ -51,6 +52,22 @@ TEST(AdjustBundle, ReturnsToTheTruthFromNearby) {
   for (size_t i = 0; i < scene.tracks.size(); ++i) {
     EXPECT_LT((scene.tracks[i].position - truth.tracks[i].position).norm(), 1e-3);
   }
+}
+
+TEST(AdjustBundle, CanBeCancelledBetweenIterations) {
+  Reconstruction scene = around_points(0.3, 1);
+  scene.lenses[0].focal = 930;
+  scene.poses[2]->translation += Eigen::Vector3d(0.05, -0.04, 0.1);
+  const Reconstruction before = scene;
+  int told = 0;
+  BundleOptions options{.solve_focal = true};
+  options.progress = [&](double) {
+    if (++told == 3) throw Cancelled();
+  };
+  EXPECT_THROW(adjust_bundle(scene, {{0, 0, 1200}}, options), Cancelled);
+  EXPECT_EQ(told, 3);
+  EXPECT_EQ(scene.lenses[0].focal, 930);
+  EXPECT_EQ(scene.poses[2]->translation, before.poses[2]->translation);
 }
 
 TEST(AdjustBundle, HoldsWhatItIsToldTo) {

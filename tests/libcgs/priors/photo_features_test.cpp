@@ -124,7 +124,7 @@ TEST(MatchFeatures, FindsWhatASlowSearchFinds) {
   }
   ASSERT_GT(expected.size(), 50u);
   std::vector<std::pair<int, int>> found;
-  for (const FeatureMatch& m : match_features(a, b, 0.8)) found.emplace_back(m.a, m.b);
+  for (const FeatureMatch& m : match_features(a, b)) found.emplace_back(m.a, m.b);
   EXPECT_EQ(found, expected);
 }
 

@@ -68,6 +68,25 @@ TEST(SolvePoses, FindsCamerasOfKnownFocalLength) {
   EXPECT_GT(solution.points.size(), 400u);
 }
 
+// Placing and polishing take seconds on real photographs: they must not go on unheard.
+TEST(SolvePoses, TellsOfEveryIterationAndCanBeCancelledAtEach) {
+  const std::vector<UnposedPhoto> photos = unposed_photos(three_views());
+  std::vector<double> told;
+  solve_poses(photos, [&](double fraction) { told.push_back(fraction); });
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_EQ(told.back(), 1);
+  ASSERT_GT(told.size(), 100u);
+  // The attempts run at the same time and tell more or less often.
+  for (const size_t last : {size_t{1}, told.size() / 4, told.size() / 2}) {
+    size_t count = 0;
+    EXPECT_THROW(solve_poses(photos,
+                             [&](double) {
+                               if (++count >= last) throw Cancelled();
+                             }),
+                 Cancelled);
+  }
+}
+
 TEST(SolvePoses, FindsTheFocalLengthToo) {
   for (const double focal : {500.0, 900.0, 2000.0}) {
     PointScene scene = three_views();
