@@ -99,7 +99,7 @@ constexpr std::string_view kOutOfMemory =
 std::atomic<bool> memory_ran_out = false;
 
 // Calls nothing that may not be called in a signal handler. Libraries in C may use what they were
-// not given (Blosc 1.21 does): errno still tells why.
+// not given (Blosc 1.21 does), or abort: errno still tells why.
 void end_at_crash(int signal) {
   if (memory_ran_out || errno == ENOMEM) {
     [[maybe_unused]] const ssize_t ignored =
@@ -149,6 +149,7 @@ int main(int argc, char** argv) {
   std::set_terminate(end_in_thread);
   std::set_new_handler(note_lack_of_memory);
   std::signal(SIGSEGV, end_at_crash);
+  std::signal(SIGABRT, end_at_crash);
   cv::redirectError(note_error_of_opencv);
   cgs::catch_interrupts();
   try {

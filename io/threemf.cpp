@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <numeric>
@@ -16,6 +17,7 @@
 #include "io/atomic_file.h"
 #include "io/byte_writer.h"
 #include "io/content_uuid.h"
+#include "io/lack_of_memory.h"
 #include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/provenance_colors.h"
@@ -43,6 +45,7 @@ class Handle {
 /// Calls into the library cannot fail on a checked mesh, short of memory.
 void check(HRESULT result, const char* step) {
   if (result == 0) return;
+  throw_if_memory_ran_out();
   throw NumericalError(std::string("write_3mf: lib3mf refused to ") + step + ", code " +
                        std::to_string(static_cast<uint32_t>(result)));
 }
@@ -290,6 +293,7 @@ void write_3mf(const std::filesystem::path& path,
   require_printable_solid(mesh, frame, "write_3mf");
   const std::vector<size_t> faces = faces_of_surface(mesh);
   Geometry content = geometry(mesh, faces, frame, up_rotation);
+  errno = 0;
   Handle model;
   check(NMR::lib3mf_createmodel(model.out()), "create a model");
   check(NMR::lib3mf_model_setunit(model.get(), content.unit), "set the unit");
