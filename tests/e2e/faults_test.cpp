@@ -342,5 +342,35 @@ TEST_F(Faults, AnyAllocationMayFail) {
   EXPECT_GE(2 * said, tried);
 }
 
+// Its library says no more than that it failed.
+TEST_F(Faults, AnyAllocationOfWriting3mfMayFail) {
+  const std::string preload = std::string("LD_PRELOAD=") + CGS_FAILING_ALLOCATION + " ";
+  const std::string count_file = (*dir_ / "allocations").string();
+  const fs::path written = *dir_ / "written.3mf";
+  const std::string solid = (*dir_ / "solid.stl").string();
+  std::ofstream(solid) << "solid t\n"
+                          "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 1 0\n"
+                          "vertex 1 0 0\nendloop\nendfacet\n"
+                          "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                          "vertex 0 0 1\nendloop\nendfacet\n"
+                          "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\n"
+                          "vertex 0 1 0\nendloop\nendfacet\n"
+                          "facet normal 0 0 0\nouter loop\nvertex 1 0 0\nvertex 0 1 0\n"
+                          "vertex 0 0 1\nendloop\nendfacet\nendsolid t\n";
+  const std::string convert =
+      std::string(CGS_BINARY) + " convert --assume-unit m " + solid + " " + written.string();
+  ASSERT_EQ(exit_code(preload + "COUNT_ALLOCATIONS=" + count_file + " " + convert), 0) << message();
+  const size_t count = std::stoul(test::read_bytes(count_file));
+  for (size_t i = 1; i <= 30; ++i) {
+    const size_t nth = count - 10 * i;
+    fs::remove(written);
+    SCOPED_TRACE("allocation " + std::to_string(nth) + " of " + std::to_string(count));
+    const int code =
+        exit_code(preload + "FAILING_ALLOCATION=" + std::to_string(nth) + " " + convert);
+    EXPECT_TRUE(code == 0 || code == 4) << code << ": " << message();
+    EXPECT_EQ(fs::exists(written), code == 0);
+  }
+}
+
 }  // namespace
 }  // namespace cgs
