@@ -38,6 +38,7 @@ struct Fault {
 
 // With --seccomp-bpf it would be quicker, but strace 6.1 then injects nothing.
 const std::string kStrace = "strace -f ";
+const std::string kPreload = std::string("LD_PRELOAD=") + CGS_FAILING_ALLOCATION + " ";
 
 constexpr const char* kCalls = "openat,read,write,writev,pwrite64,lseek,fsync,rename,mkdir,unlink";
 
@@ -117,6 +118,16 @@ class Faults : public testing::Test {
                                   "--set steps=3 --threads 1 -q -o " +
                                   (*dir_ / out).string();
     return exit_code(before + CGS_BINARY + " run " + arguments);
+  }
+  // Before a command: counts its allocations, or fails one of them.
+  static std::string counting_allocations() {
+    return kPreload + "COUNT_ALLOCATIONS=" + (*dir_ / "allocations").string() + " ";
+  }
+  static size_t counted_allocations() {
+    return std::stoul(test::read_bytes(*dir_ / "allocations"));
+  }
+  static std::string failing_allocation(size_t nth) {
+    return kPreload + "FAILING_ALLOCATION=" + std::to_string(nth) + " ";
   }
   // What the command says on standard error is message().
   static int exit_code(const std::string& command) {
@@ -317,11 +328,9 @@ TEST_F(Faults, MemoryThatRunsOutAnywhereIsSaidAndNothingIsLost) {
 }
 
 TEST_F(Faults, AnyAllocationMayFail) {
-  const std::string preload = std::string("LD_PRELOAD=") + CGS_FAILING_ALLOCATION + " ";
-  const std::string count_file = (*dir_ / "allocations").string();
-  ASSERT_EQ(run_after(preload + "COUNT_ALLOCATIONS=" + count_file + " ", "out"), 0) << message();
+  ASSERT_EQ(run_after(counting_allocations(), "out"), 0) << message();
   fs::remove_all(*dir_ / "out");
-  const size_t count = std::stoul(test::read_bytes(count_file));
+  const size_t count = counted_allocations();
   ASSERT_GT(count, 100'000u);
   const size_t tried = share_of(200, 6);
   size_t said = 0;
@@ -329,7 +338,7 @@ TEST_F(Faults, AnyAllocationMayFail) {
     const size_t nth = 1 + i * count / tried;
     SCOPED_TRACE("allocation " + std::to_string(nth) + " of " + std::to_string(count));
     const Counted counted;
-    const int code = run_after(preload + "FAILING_ALLOCATION=" + std::to_string(nth) + " ", "out");
+    const int code = run_after(failing_allocation(nth), "out");
     EXPECT_TRUE(code == 0 || code == 4) << code << ": " << message();
     if (code == 0) {  // a library did without
       EXPECT_TRUE(test::files_of_run(*dir_ / "out") == expected_);
@@ -344,8 +353,6 @@ TEST_F(Faults, AnyAllocationMayFail) {
 
 // Its library says no more than that it failed.
 TEST_F(Faults, AnyAllocationOfWriting3mfMayFail) {
-  const std::string preload = std::string("LD_PRELOAD=") + CGS_FAILING_ALLOCATION + " ";
-  const std::string count_file = (*dir_ / "allocations").string();
   const fs::path written = *dir_ / "written.3mf";
   const std::string solid = (*dir_ / "solid.stl").string();
   std::ofstream(solid) << "solid t\n"
@@ -359,14 +366,13 @@ TEST_F(Faults, AnyAllocationOfWriting3mfMayFail) {
                           "vertex 0 0 1\nendloop\nendfacet\nendsolid t\n";
   const std::string convert =
       std::string(CGS_BINARY) + " convert --assume-unit m " + solid + " " + written.string();
-  ASSERT_EQ(exit_code(preload + "COUNT_ALLOCATIONS=" + count_file + " " + convert), 0) << message();
-  const size_t count = std::stoul(test::read_bytes(count_file));
+  ASSERT_EQ(exit_code(counting_allocations() + convert), 0) << message();
+  const size_t count = counted_allocations();
   for (size_t i = 1; i <= 30; ++i) {
     const size_t nth = count - 10 * i;
     fs::remove(written);
     SCOPED_TRACE("allocation " + std::to_string(nth) + " of " + std::to_string(count));
-    const int code =
-        exit_code(preload + "FAILING_ALLOCATION=" + std::to_string(nth) + " " + convert);
+    const int code = exit_code(failing_allocation(nth) + convert);
     EXPECT_TRUE(code == 0 || code == 4) << code << ": " << message();
     EXPECT_EQ(fs::exists(written), code == 0);
   }

@@ -216,8 +216,11 @@ TEST(Killed, RunGoesOnToTheFilesOfOneThatWasNotKilled) {
       continue;
     }
     EXPECT_EQ(code, signal == SIGKILL ? -1 : 128 + signal);
-    if (signal == SIGKILL) ++kills;
-    if (signal != SIGKILL) latency.push_back(after.count());
+    if (signal == SIGKILL) {
+      ++kills;
+    } else {
+      latency.push_back(after.count());
+    }
   }
   expect_soon(latency);
   std::printf("kills: %d, and %zu interrupts, of %d runs\n", kills, latency.size(), runs);
