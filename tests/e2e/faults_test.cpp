@@ -85,7 +85,8 @@ class Faults : public testing::Test {
       return;
     }
     dir_ = new test::TempDir;
-    const auto views = capture_views(3);
+    auto views = capture_views(3);
+    views.erase(views.begin() + 4, views.end());  // more that are held out only repeat its calls
     write_capture(*dir_ / "capture", portal_scene(), views, input_cameras(views));
     const std::string trace =
         "-y -e trace=" + std::string(kCalls) + " -o " + (*dir_ / "calls").string();
