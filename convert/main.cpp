@@ -16,6 +16,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <fcntl.h>
 #include <glog/logging.h>
 #include <opencv2/core.hpp>
 #include <unistd.h>
@@ -87,10 +88,25 @@ int run_program(int argc, char** argv) {
 constexpr std::string_view kOutOfMemory =
     "cgs: LIMIT: out of memory; smaller pictures, larger voxels or a smaller file need less\n";
 
+// Where to say why the program ends: not into what takes the place of standard error while images
+// are decoded, as their libraries write there.
+int standard_error = STDERR_FILENO;
+
+void keep_standard_error() {
+  const int copy = ::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
+  if (copy >= 0) standard_error = copy;
+}
+
+// Calls nothing that may not be called in a signal handler.
+void say_out_of_memory() {
+  [[maybe_unused]] const ssize_t ignored =
+      ::write(standard_error, kOutOfMemory.data(), kOutOfMemory.size());
+}
+
 // Ends at once: what libraries do at a regular end may need memory, too, and abort without.
 [[noreturn]] void end_without_memory() {
-  std::fwrite(kOutOfMemory.data(), 1, kOutOfMemory.size(), stderr);
   std::fflush(nullptr);
+  say_out_of_memory();
   std::_Exit(4);
 }
 
@@ -102,8 +118,7 @@ std::atomic<bool> memory_ran_out = false;
 // not given (Blosc 1.21 does), or abort: errno still tells why.
 void end_at_crash(int signal) {
   if (memory_ran_out || errno == ENOMEM) {
-    [[maybe_unused]] const ssize_t ignored =
-        ::write(STDERR_FILENO, kOutOfMemory.data(), kOutOfMemory.size());
+    say_out_of_memory();
     std::_Exit(4);
   }
   std::signal(signal, SIG_DFL);
@@ -146,6 +161,7 @@ int end_unexpectedly(const std::exception& error) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  keep_standard_error();
   std::set_terminate(end_in_thread);
   std::set_new_handler(note_lack_of_memory);
   std::signal(SIGSEGV, end_at_crash);
@@ -161,6 +177,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "cgs: %s\n", error.what());
     return error.exit_code();
   } catch (const std::filesystem::filesystem_error& error) {
+    if (error.code() == std::errc::not_enough_memory) end_without_memory();
     const cgs::IoError io(error.path1(), error.code().message());
     std::fprintf(stderr, "cgs: %s\n", io.what());
     return io.exit_code();

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <new>
+#include <system_error>
 
 #include "io/byte_reader.h"
 
@@ -57,6 +59,7 @@ fs::path resolve_in_scene(const SceneRoot& root, std::string_view name, const fs
   std::error_code error;
   const fs::path folder = fs::weakly_canonical(root.folder, error);
   const fs::path target = error ? fs::path() : fs::weakly_canonical(joined, error);
+  if (error == std::errc::not_enough_memory) throw std::bad_alloc();
   if (error) refuse("cannot be followed: " + error.message());
   if (!is_beneath(target, folder)) {
     refuse("escapes the folder of the scene through a symbolic link" + advice);

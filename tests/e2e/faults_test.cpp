@@ -352,6 +352,24 @@ TEST_F(Faults, AnyAllocationMayFail) {
   EXPECT_GE(2 * said, tried);
 }
 
+// Libraries that decode images have standard error taken from them, and some abort.
+TEST_F(Faults, AnyAllocationOfReadingPhotographsMayFail) {
+  const std::string info = std::string(CGS_BINARY) + " info " + (*dir_ / "capture").string();
+  ASSERT_EQ(exit_code(counting_allocations() + info), 0) << message();
+  // The first photograph has them announce all their formats; the others only repeat its calls.
+  const size_t count = counted_allocations() / 4;
+  const size_t tried = share_of(600, 60);
+  for (size_t i = 0; i < tried; ++i) {
+    const size_t nth = 1 + i * count / tried;
+    SCOPED_TRACE("allocation " + std::to_string(nth) + " of " + std::to_string(count));
+    const Counted counted;
+    const int code = exit_code(failing_allocation(nth) + info);
+    EXPECT_TRUE(code == 0 || code == 4) << code << ": " << message();
+    EXPECT_EQ(complaints(), code == 0 ? 0 : 1) << message();
+    EXPECT_EQ(message().find("LIMIT") != std::string::npos, code == 4) << message();
+  }
+}
+
 // Its library says no more than that it failed.
 TEST_F(Faults, AnyAllocationOfWriting3mfMayFail) {
   const fs::path written = *dir_ / "written.3mf";
