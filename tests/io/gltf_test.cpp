@@ -254,7 +254,7 @@ TEST(WriteGlb, RefusesToWriteNothingButTrianglesWithoutArea) {
     const GlbReport report = write_glb(dir / "joined", joined, {}, options);
     EXPECT_EQ(report.triangles, 3u) << name;
     EXPECT_EQ(report.collapsed_triangles, keeps ? 0u : 2u) << name;
-    const auto write = [&] { write_glb(dir / name, far_apart, {}, options); };
+    const auto write = [&, file = dir / name] { write_glb(file, far_apart, {}, options); };
     if (keeps) {
       write();
     } else {
