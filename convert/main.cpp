@@ -142,7 +142,7 @@ bool is_for_want_of_a_thread(const std::exception& error) {
 
 int end_unexpectedly(const std::exception& error) {
   if (memory_ran_out || is_for_want_of_a_thread(error)) end_without_memory();
-  std::fprintf(stderr, "cgs: unexpected: %s\n", cgs::one_line(error.what()).c_str());
+  dprintf(standard_error, "cgs: unexpected: %s\n", cgs::one_line(error.what()).c_str());
   return 1;
 }
 

@@ -241,6 +241,10 @@ void remove_flat_faces(RepairedMesh& out) {
   out.flat_faces += flat - std::min(flat, out.flat_left);
 }
 
+void drop_unused_vertices(TriangleMesh& mesh) {
+  mesh = with_faces(mesh, std::vector<uint8_t>(mesh.faces.size(), 1));
+}
+
 // Only a closed surface that does not cut itself has an outside.
 void orient_outward(RepairedMesh& out) {
   const Certificate found = certify(out.mesh);
@@ -269,9 +273,10 @@ RepairedMesh repaired(const TriangleMesh& mesh) {
   out.merged_vertices = merge_vertices(out.mesh);
   drop_improper_faces(out);
   orient_faces(out);
-  remove_flat_faces(out);
   const size_t vertices = out.mesh.vertices.size();
-  out.mesh = with_faces(out.mesh, std::vector<uint8_t>(out.mesh.faces.size(), 1));
+  drop_unused_vertices(out.mesh);  // with one, no mesh is valid for CGAL
+  remove_flat_faces(out);
+  drop_unused_vertices(out.mesh);
   out.unused_vertices = vertices - out.mesh.vertices.size() - out.merged_vertices;
   orient_outward(out);
   if (!mesh.normals.empty()) out.mesh.normals = vertex_normals(out.mesh);

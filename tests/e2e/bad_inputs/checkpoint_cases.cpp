@@ -20,15 +20,23 @@ Call long_training(const fs::path& folder) {
   return call;
 }
 
-/// A training that was interrupted twice (made once per process), so that it left two states.
+/// A training that was interrupted twice (made once per process), so that it left two states. How
+/// long it takes is the machine's: the time until it is interrupted adapts itself.
 const std::map<std::string, std::string>& interrupted() {
   static const std::map<std::string, std::string> files = [] {
     const TempDir dir;
     write_transforms_scene(dir.path());
-    std::string command = std::string("timeout -s INT 2 ") + CGS_BINARY;
-    for (const std::string& word : long_training(dir.path()).arguments) command += " " + word;
-    for (int tries = 0; tries < 20 && !fs::exists(dir / kBefore); ++tries) {
-      (void)std::system((command + " 2>/dev/null").c_str());
+    std::string training = CGS_BINARY;
+    for (const std::string& word : long_training(dir.path()).arguments) training += " " + word;
+    double seconds = 2;
+    for (int tries = 0; tries < 40 && !fs::exists(dir / kBefore); ++tries) {
+      const std::string interrupt = "timeout -s INT " + std::to_string(seconds) + " ";
+      if (std::system((interrupt + training + " 2>/dev/null").c_str()) == 0) {
+        fs::remove_all(dir / "out");  // it came to its end
+        seconds /= 2;
+      } else if (!fs::exists(dir / kNewest)) {
+        seconds *= 1.3;  // it had not begun
+      }
     }
     std::map<std::string, std::string> made;
     for (const char* name : {kNewest, kBefore}) made[name] = read_bytes(dir / name);
