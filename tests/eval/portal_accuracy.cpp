@@ -35,6 +35,9 @@ int main(int argc, char** argv) {
         m.hole_iou,
         m.hole_iou_of_exact_depth,
         m.hole_iou_inside);
+    std::printf("of the masks %.1f %% are true holes; of the true holes %.1f %% are in the masks\n",
+                100 * m.hole_precision,
+                100 * m.hole_recall);
     std::printf("hole IoU without true holes narrower than 3 px: %.3f (they are %.1f %% of all)\n",
                 m.hole_iou_wide,
                 100 * m.narrow_hole_share);

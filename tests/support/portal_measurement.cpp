@@ -78,8 +78,10 @@ MaskMap narrow_parts(const MaskMap& mask) {
   return narrow;
 }
 
-/// Intersection and union of masks, summed over views.
+/// Masks found (a) and expected (b), their intersection and union, in pixels summed over views.
 struct Overlap {
+  size_t found = 0;
+  size_t expected = 0;
   size_t both = 0;
   size_t either = 0;
   double iou() const { return either == 0 ? 1 : double(both) / double(either); }
@@ -88,6 +90,8 @@ struct Overlap {
 void add_overlap(Overlap& sum, const MaskMap& a, const MaskMap& b, const MaskMap* ignored) {
   for (size_t i = 0; i < a.data.size(); ++i) {
     if (ignored != nullptr && ignored->data[i] != 0) continue;
+    sum.found += a.data[i];
+    sum.expected += b.data[i];
     sum.both += a.data[i] & b.data[i];
     sum.either += a.data[i] | b.data[i];
   }
@@ -138,6 +142,8 @@ PortalMeasurement measure_portal(const std::filesystem::path& run_folder) {
     hole_area += fraction(expected);
   }
   out.hole_iou = all.iou();
+  out.hole_precision = double(all.both) / double(all.found);
+  out.hole_recall = double(all.both) / double(all.expected);
   out.hole_iou_of_exact_depth = best.iou();
   out.hole_iou_inside = inside.iou();
   out.hole_iou_wide = wide.iou();

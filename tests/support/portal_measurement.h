@@ -25,6 +25,8 @@ struct PortalMeasurement {
   std::vector<HeldOutView> held_out;
   double depth_within_1_percent = 0;   ///< Mean over the input views.
   double hole_iou = 0;                 ///< Over the pixels of all held-out views together.
+  double hole_precision = 0;           ///< The part of the masks that no input view saw.
+  double hole_recall = 0;              ///< The part of what no input view saw that is in the masks.
   double hole_iou_of_exact_depth = 0;  ///< What masks from the exact depth of all views reach.
   /// The same without pixels within 2 px of a border of a true hole: the holes that people notice.
   double hole_iou_inside = 0;
