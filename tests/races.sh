@@ -47,12 +47,16 @@ cmake --preset race >/dev/null
 cmake --build --preset race --target "${programs[@]}"
 
 status=0
+report=$PWD/build/race/report # standard error is closed while images are decoded
 for source in "${sources[@]}"; do
   name=${source#tests/}
   log=build/race/${name//\//_}.log
   verdict=clean
-  LD_LIBRARY_PATH="$tbb/build/lib_relwithdebinfo" TSAN_OPTIONS="halt_on_error=1 suppressions=tests/races.supp" \
+  rm -f "$report".*
+  LD_LIBRARY_PATH="$tbb/build/lib_relwithdebinfo" \
+    TSAN_OPTIONS="halt_on_error=1 suppressions=tests/races.supp log_path=$report" \
     tests/one.sh "build/race/bin/${name%%/*}_tests" "$source" >"$log" 2>&1 || verdict="FAILED, see $log"
+  cat "$report".* >>"$log" 2>/dev/null || true
   if grep -q "Running 0 tests" "$log"; then verdict="NOT IN ${name%%/*}_tests"; fi
   printf '%-55s %s\n' "$source" "$verdict"
   [ "$verdict" = clean ] || status=1
