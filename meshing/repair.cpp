@@ -206,10 +206,15 @@ void weaken_flat_faces(TriangleMesh& mesh, const PolygonMesh& halfedges) {
   }
 }
 
+void drop_unused_vertices(TriangleMesh& mesh) {
+  mesh = with_faces(mesh, std::vector<uint8_t>(mesh.faces.size(), 1));
+}
+
 void remove_flat_faces(RepairedMesh& out) {
   TriangleMesh& mesh = out.mesh;
   const size_t flat = count_flat(mesh);
   if (flat == 0) return;
+  drop_unused_vertices(mesh);  // with one, no mesh is valid for CGAL
   PolygonMesh halfedges = polygon_mesh::from_triangles(mesh, "repair");
   weaken_flat_faces(mesh, halfedges);
   // New faces, if CGAL makes any, get the default: Inferred.
@@ -241,10 +246,6 @@ void remove_flat_faces(RepairedMesh& out) {
   out.flat_faces += flat - std::min(flat, out.flat_left);
 }
 
-void drop_unused_vertices(TriangleMesh& mesh) {
-  mesh = with_faces(mesh, std::vector<uint8_t>(mesh.faces.size(), 1));
-}
-
 // Only a closed surface that does not cut itself has an outside.
 void orient_outward(RepairedMesh& out) {
   const Certificate found = certify(out.mesh);
@@ -274,7 +275,6 @@ RepairedMesh repaired(const TriangleMesh& mesh) {
   drop_improper_faces(out);
   orient_faces(out);
   const size_t vertices = out.mesh.vertices.size();
-  drop_unused_vertices(out.mesh);  // with one, no mesh is valid for CGAL
   remove_flat_faces(out);
   drop_unused_vertices(out.mesh);
   out.unused_vertices = vertices - out.mesh.vertices.size() - out.merged_vertices;

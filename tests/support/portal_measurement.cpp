@@ -78,22 +78,28 @@ MaskMap narrow_parts(const MaskMap& mask) {
   return narrow;
 }
 
-/// Masks found (a) and expected (b), their intersection and union, in pixels summed over views.
+/// Masks found and expected, and what they share, in pixels summed over views.
 struct Overlap {
   size_t found = 0;
   size_t expected = 0;
   size_t both = 0;
-  size_t either = 0;
-  double iou() const { return either == 0 ? 1 : double(both) / double(either); }
+  double iou() const { return share_of(found + expected - both); }
+  double precision() const { return share_of(found); }
+  double recall() const { return share_of(expected); }
+
+ private:
+  double share_of(size_t pixels) const { return pixels == 0 ? 1 : double(both) / double(pixels); }
 };
 
-void add_overlap(Overlap& sum, const MaskMap& a, const MaskMap& b, const MaskMap* ignored) {
-  for (size_t i = 0; i < a.data.size(); ++i) {
+void add_overlap(Overlap& sum,
+                 const MaskMap& found,
+                 const MaskMap& expected,
+                 const MaskMap* ignored) {
+  for (size_t i = 0; i < found.data.size(); ++i) {
     if (ignored != nullptr && ignored->data[i] != 0) continue;
-    sum.found += a.data[i];
-    sum.expected += b.data[i];
-    sum.both += a.data[i] & b.data[i];
-    sum.either += a.data[i] | b.data[i];
+    sum.found += found.data[i];
+    sum.expected += expected.data[i];
+    sum.both += found.data[i] & expected.data[i];
   }
 }
 
@@ -142,8 +148,8 @@ PortalMeasurement measure_portal(const std::filesystem::path& run_folder) {
     hole_area += fraction(expected);
   }
   out.hole_iou = all.iou();
-  out.hole_precision = double(all.both) / double(all.found);
-  out.hole_recall = double(all.both) / double(all.expected);
+  out.hole_precision = all.precision();
+  out.hole_recall = all.recall();
   out.hole_iou_of_exact_depth = best.iou();
   out.hole_iou_inside = inside.iou();
   out.hole_iou_wide = wide.iou();
