@@ -28,8 +28,8 @@ figures() {
   local word=$1 output result=0 start=$SECONDS
   shift
   output=$("$@" 2>&1) || { result=1; echo "FAILED: $*"; grep -m5 -A4 Failure <<<"$output" || true; }
-  grep "^$word" <<<"$output" || { result=1; echo "NO FIGURE '$word': $*"; }
-  echo "  ($(((SECONDS - start + 30) / 60)) min)"
+  output=$(grep "^$word" <<<"$output") || { result=1; output="NO FIGURE '$word': $*"; }
+  echo "$output ($(((SECONDS - start + 30) / 60)) min)"
   return $result
 }
 # Runs on captures of three sizes, and how much memory they needed of what was foreseen.
@@ -55,8 +55,10 @@ power_cuts() {
 }
 # The faults in two halves of about the same length.
 injected_faults() {
-  CGS_FAULTS=$faults figures 'faults:' "$bin/e2e_faults_test" --gtest_filter="$1" >"$folder/faults$1" ||
-    { cat "$folder/faults$1"; return 1; }
+  local result=0
+  CGS_FAULTS=$faults figures 'faults:' "$bin/e2e_faults_test" --gtest_filter="$1" >"$folder/faults$1" || result=1
+  sed 's/^faults:/of these/' "$folder/faults$1"
+  return $result
 }
 faults_of_the_system() { injected_faults '*AnError*'; }
 other_faults() { injected_faults '-*AnError*'; }
@@ -76,6 +78,6 @@ CGS_KILLS=$kills figures '\(cancel\|kills\|lost\)' "$bin/e2e_kill_test" || statu
 figures 'memory:' foreseen_memory || status=1
 in_pairs sweep bad_inputs power_cuts other_faults faults_of_the_system extremes hashes || status=1
 awk '/^faults:/ { survived += $2; tried += $5 }
-  END { printf "faults: %d survived of %d tried\n", survived, tried }' "$folder"/faults*
+  END { printf "faults: %d survived of %d tried\n", survived, tried; exit tried == 0 }' "$folder"/faults* || status=1
 CGS_FUZZ_RUNS=$runs tests/fuzz/run.sh "$seconds" || status=1
 exit $status
