@@ -137,6 +137,7 @@ UnposedPhoto unposed_photo(MaskIndex& masks,
   out.width = image.width;
   out.height = image.height;
   out.features = detect_features(image, usable);
+  out.picture = searched_picture(image);
   out.focal = focal > 0 ? focal : photograph.hint.focal;
   out.focal_sigma = focal > 0 ? 0 : photograph.hint.sigma;
   for (const Eigen::Vector2d& p : out.features.points) {
@@ -220,12 +221,15 @@ ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
     image.keypoints = image.points.size();
     model.images.push_back(std::move(image));
   }
+  std::vector<ColmapImage*> image_of(photos.size(), nullptr);
+  for (ColmapImage& image : model.images) image_of[image.id - 1] = &image;
   for (const SolvedPoint& point : solution.points) {
     ColmapPoint out{point.position, {}, {}, point.error};
-    const auto& [photo, feature] = point.track.front();
-    out.color = colors[static_cast<size_t>(photo)][static_cast<size_t>(feature)];
-    for (const auto& [seen_by, place] : point.track) {
-      out.track.emplace_back(static_cast<uint32_t>(seen_by + 1), static_cast<uint32_t>(place));
+    const SolvedSighting& first = point.track.front();
+    out.color = colors[static_cast<size_t>(first.photo)][static_cast<size_t>(first.feature)];
+    for (const SolvedSighting& s : point.track) {
+      out.track.emplace_back(static_cast<uint32_t>(s.photo + 1), static_cast<uint32_t>(s.feature));
+      image_of[static_cast<size_t>(s.photo)]->points[static_cast<size_t>(s.feature)] = s.at;
     }
     model.points.push_back(std::move(out));
   }

@@ -191,7 +191,7 @@ InterpolatedSurface advancing_front(const TriangleMesh& cloud, double max_edge) 
   const double spacing = point_spacing(out.mesh.vertices);
   out.mesh.faces = joined_points(out.mesh.vertices, spacing, max_edge);
   if (out.mesh.faces.empty()) throw NumericalError("no three of the points could be joined");
-  out.mesh = with_faces(out.mesh, std::vector<uint8_t>(out.mesh.faces.size(), 1));
+  out.mesh = without_unused_vertices(out.mesh);
   out.unused = cloud.vertices.size() - out.mesh.vertices.size();
   turn_parts(out.mesh);
   sort_faces(out.mesh);

@@ -155,7 +155,7 @@ TriangleMesh with_claims(const Cut& cut, const TriangleMesh& both, size_t first_
 bool shells_alternate(const TriangleMesh& mesh) {
   CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
   // Without loose vertices: CGAL takes each for a part of a face.
-  const TriangleMesh used = with_faces(mesh, std::vector<uint8_t>(mesh.faces.size(), 1));
+  const TriangleMesh used = without_unused_vertices(mesh);
   return pmp::does_bound_a_volume(polygon_mesh::from_triangles(used, "the mesh"));
 }
 

@@ -92,6 +92,10 @@ TriangleMesh with_faces(const TriangleMesh& mesh, const std::vector<uint8_t>& ke
   return out;
 }
 
+TriangleMesh without_unused_vertices(const TriangleMesh& mesh) {
+  return with_faces(mesh, std::vector<uint8_t>(mesh.faces.size(), 1));
+}
+
 TriangleMesh without_small_components(const TriangleMesh& mesh, double relative_area) {
   const MeshComponents parts = components(mesh);
   if (parts.area.empty()) return mesh;

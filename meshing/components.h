@@ -22,6 +22,9 @@ MeshComponents components(const TriangleMesh& mesh);
 /// \pre keep is as long as mesh.faces.
 TriangleMesh with_faces(const TriangleMesh& mesh, const std::vector<uint8_t>& keep);
 
+/// The mesh without the vertices that no face has; all attributes stay.
+TriangleMesh without_unused_vertices(const TriangleMesh& mesh);
+
 /// The mesh without the components whose area is below `relative_area` of the largest one's.
 TriangleMesh without_small_components(const TriangleMesh& mesh, double relative_area);
 

@@ -72,7 +72,7 @@ class PlaneCut {
 
 // Of a mesh, vertices that no face uses are of no use.
 TriangleMesh without_unused(const TriangleMesh& cut, bool was_cloud) {
-  return was_cloud ? cut : with_faces(cut, std::vector<uint8_t>(cut.faces.size(), 1));
+  return was_cloud ? cut : without_unused_vertices(cut);
 }
 
 }  // namespace

@@ -348,7 +348,7 @@ CollapsedMesh Collapser::run(const Progress& progress) {
     for (uint32_t w = witness_[f]; w != kNone; w = next_witness_[w]) out.witness_of[w] = f;
   }
   if (original_.provenance.empty()) mesh_.provenance.clear();
-  out.mesh = with_faces(mesh_, std::vector<uint8_t>(mesh_.faces.size(), 1));
+  out.mesh = without_unused_vertices(mesh_);
   if (!original_.normals.empty()) out.mesh.normals = vertex_normals(out.mesh);
   return out;
 }

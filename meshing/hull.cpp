@@ -129,7 +129,7 @@ TriangleMesh convex_hull(const TriangleMesh& mesh) {
     out.faces.push_back(face);
     out.provenance.push_back(known == labels.end() ? Provenance::Inferred : known->second);
   }
-  out = with_faces(out, std::vector<uint8_t>(out.faces.size(), 1));
+  out = without_unused_vertices(out);
   if (!mesh.normals.empty()) out.normals = vertex_normals(out);
   return out;
 }

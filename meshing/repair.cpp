@@ -206,15 +206,11 @@ void weaken_flat_faces(TriangleMesh& mesh, const PolygonMesh& halfedges) {
   }
 }
 
-void drop_unused_vertices(TriangleMesh& mesh) {
-  mesh = with_faces(mesh, std::vector<uint8_t>(mesh.faces.size(), 1));
-}
-
 void remove_flat_faces(RepairedMesh& out) {
   TriangleMesh& mesh = out.mesh;
   const size_t flat = count_flat(mesh);
   if (flat == 0) return;
-  drop_unused_vertices(mesh);  // with one, no mesh is valid for CGAL
+  mesh = without_unused_vertices(mesh);  // with one, no mesh is valid for CGAL
   PolygonMesh halfedges = polygon_mesh::from_triangles(mesh, "repair");
   weaken_flat_faces(mesh, halfedges);
   // New faces, if CGAL makes any, get the default: Inferred.
@@ -276,7 +272,7 @@ RepairedMesh repaired(const TriangleMesh& mesh) {
   orient_faces(out);
   const size_t vertices = out.mesh.vertices.size();
   remove_flat_faces(out);
-  drop_unused_vertices(out.mesh);
+  out.mesh = without_unused_vertices(out.mesh);
   out.unused_vertices = vertices - out.mesh.vertices.size() - out.merged_vertices;
   orient_outward(out);
   if (!mesh.normals.empty()) out.mesh.normals = vertex_normals(out.mesh);

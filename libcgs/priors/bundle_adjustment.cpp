@@ -21,10 +21,9 @@ constexpr size_t kTranslation = 4;
 constexpr size_t kPerPhoto = 7;
 constexpr size_t kPerLens = 4;
 
-constexpr double kPixelSigma = 0.3;  // of features [working pixels]
-
 struct Reprojection {
   Eigen::Vector2d at;
+  double sigma;
 
   template <typename T>
   bool operator()(
@@ -38,8 +37,8 @@ struct Reprojection {
     using std::exp;
     const Eigen::Matrix<T, 2, 1> centre(lens[2], lens[3]);
     const Eigen::Matrix<T, 2, 1> seen = through_lens<T>(exp(lens[0]), lens[1], centre, direction);
-    out[0] = (seen.x() - T(at.x())) / T(kPixelSigma);
-    out[1] = (seen.y() - T(at.y())) / T(kPixelSigma);
+    out[0] = (seen.x() - T(at.x())) / T(sigma);
+    out[1] = (seen.y() - T(at.y())) / T(sigma);
     return true;
   }
 };
@@ -152,7 +151,7 @@ void add_sightings(const Reconstruction& scene,
       const auto photo = static_cast<size_t>(s.photo);
       if (!s.is_used || !scene.poses[photo]) continue;
       problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Reprojection, 2, 4, 3, kPerLens, 3>(
-                                   new Reprojection{s.at}),
+                                   new Reprojection{s.at, s.sigma}),
                                loss,
                                unknowns.rotation(photo),
                                unknowns.translation(photo),
@@ -378,7 +377,7 @@ std::vector<double> adjust_bundle(Reconstruction& scene,
                                   const BundleOptions& options,
                                   bool with_sigma) {
   Unknowns unknowns(scene);
-  ceres::CauchyLoss loss(options.loss_scale / kPixelSigma);
+  ceres::CauchyLoss loss(options.loss_scale / kFeatureSigma);
   ceres::Problem::Options problem_options;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem problem(problem_options);

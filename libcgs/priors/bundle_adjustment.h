@@ -30,7 +30,7 @@ struct BundleOptions {
   bool hold_poses = false;   ///< All of them.
   bool hold_points = false;
   std::vector<PosePrior> pose_priors = {};  ///< Per photograph; empty = nothing is known.
-  double loss_scale = 1;                    ///< Of the Cauchy loss [working pixels].
+  double loss_scale = 1;  ///< Of the Cauchy loss, for a feature as found [working pixels].
   int most_iterations = 50;
   Progress progress = {};  ///< Told of every iteration; the scene stays as it is if it throws.
 };

@@ -87,6 +87,15 @@ void FeatureOptions::validate() const {
   require(most >= 1, "FeatureOptions.most must be >= 1", most);
 }
 
+Raster<uint8_t> searched_picture(const ColorImage& image, const FeatureOptions& options) {
+  const cv::Mat picture = grey_picture(image, options.largest_side);
+  Raster<uint8_t> out(picture.cols, picture.rows, 0);
+  for (int y = 0; y < out.height; ++y) {
+    std::copy_n(picture.ptr<uint8_t>(y), out.width, &out(0, y));
+  }
+  return out;
+}
+
 PhotoFeatures detect_features(const ColorImage& image,
                               const MaskMap& usable,
                               const FeatureOptions& options) {

@@ -26,6 +26,10 @@ struct FeatureOptions {
   void validate() const;
 };
 
+/// The picture that is searched for features: grey, levels 0 ... 255 as in the photograph, no
+/// larger than `largest_side`.
+Raster<uint8_t> searched_picture(const ColorImage& image, const FeatureOptions& options = {});
+
 /// Finds SIFT features. The same for any number of threads.
 ///
 /// \param image   at least 8 pixels wide and high

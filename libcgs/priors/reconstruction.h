@@ -27,12 +27,16 @@ struct PhotoPose {
   Eigen::Vector3d center() const { return -(rotation.conjugate() * translation); }
 };
 
+inline constexpr double kFeatureSigma = 0.3;   ///< Of the place of a feature [working pixels].
+inline constexpr double kRefinedSigma = 0.07;  ///< At best, refined by refine_sightings().
+
 /// A feature that shows the point of its track.
 struct Sighting {
   int photo = 0;
   int feature = 0;
   Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< From the image centre [working pixels].
   bool is_used = true;                           ///< False once found to be a wrong match.
+  double sigma = kFeatureSigma;                  ///< Of `at` in each coordinate [working pixels].
 };
 
 /// One point of the scene, in at most one place of each photograph.

@@ -15,6 +15,7 @@
 #include "libcgs/priors/photo_pairs.h"
 #include "libcgs/priors/pose_checks.h"
 #include "libcgs/priors/resection.h"
+#include "libcgs/priors/sighting_refinement.h"
 
 namespace cgs {
 
@@ -254,9 +255,11 @@ void add_points(const std::vector<UnposedPhoto>& photos,
     SolvedPoint point{track.position, {}, 0};
     for (const Sighting& s : track.seen) {
       if (!s.is_used || !scene.pose(s.photo)) continue;
-      const double error = reprojection_error(scene, track.position, s) *
-                           photos[static_cast<size_t>(s.photo)].features.pixel;
-      point.track.emplace_back(s.photo, s.feature);
+      const UnposedPhoto& photo = photos[static_cast<size_t>(s.photo)];
+      const double pixel = photo.features.pixel;
+      const double error = reprojection_error(scene, track.position, s) * pixel;
+      const Eigen::Vector2d centre(0.5 * photo.width, 0.5 * photo.height);
+      point.track.push_back({s.photo, s.feature, centre + pixel * s.at});
       point.error += error;
       sum += error * error;
       ++count;
@@ -288,6 +291,7 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
   Reconstruction scene = std::move(attempt.scene);
   scene.tracks = matched.tracks;
   place_more(scene, priors, *attempt.begun, [&](double) { report(progress, kPlaced); });
+  refine_sightings(photos, scene, [&](double) { report(progress, kPlaced); });
   const std::vector<double> sigmas =
       polish_with_shape(priors, *attempt.begun, part_of(progress, kPlaced, 1), scene);
   refuse_unsure(photos, priors, matched.pairs, scene, sigmas);

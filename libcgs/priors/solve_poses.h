@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "libcgs/core/camera.h"
@@ -20,6 +19,9 @@ struct UnposedPhoto {
   int lens = 0;            ///< Photographs of one lens share focal length and distortion.
   double focal = 0;        ///< What is known of it beforehand [pixels]; 0 = nothing.
   double focal_sigma = 0;  ///< Relative standard deviation of `focal`; 0 = exact.
+  /// As searched_picture() gives it, to measure places of features more finely; empty = they count
+  /// as found.
+  Raster<uint8_t> picture = {};
 };
 
 /// A photograph's camera as solved.
@@ -36,11 +38,19 @@ struct SolvedPhoto {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 };
 
+/// A feature that shows a solved point.
+struct SolvedSighting {
+  int photo = 0;
+  int feature = 0;
+  /// Where it was seen, more finely than the feature says where the photographs agree [pixels].
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();
+};
+
 /// A point that at least two photographs agree on.
 struct SolvedPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  std::vector<std::pair<int, int>> track;  ///< (photograph, feature), by photograph.
-  double error = 0;                        ///< Mean distance from the features [pixels].
+  std::vector<SolvedSighting> track;  ///< By photograph.
+  double error = 0;                   ///< Mean distance from where it was seen [pixels].
 };
 
 /// World axes and origin are those of the first photograph that was placed; the unit is the
@@ -48,7 +58,7 @@ struct SolvedPoint {
 struct PoseSolution {
   std::vector<SolvedPhoto> photos;  ///< As given.
   std::vector<SolvedPoint> points;
-  double rms = 0;  ///< Of the distances between points and features [pixels].
+  double rms = 0;  ///< Of the distances between points and where they were seen [pixels].
 };
 
 /// Cameras of photographs from nothing but what they show: matched features, relative pose of a

@@ -6,8 +6,10 @@
 //                                  it (Strecha, Middlebury, MVImgNet, LLFF); SET = part of a name
 //
 // Prints per set and source of the focal length (given = of the data set, Exif, solved = unknown):
-// photographs placed, largest error of rotation and of the direction between any two cameras
-// [degrees] after the rotation that brings all cameras together best, of the focal length [%], the
+// photographs placed, largest error of the cameras' axes, of where their pixels look (a principal
+// point off the centre, which few photographs do not tell, turns the axes but hardly the rays) and
+// of the direction between any two cameras [degrees], each after the rotation that brings all
+// cameras together best; of the focal length [%], the
 // standard deviation claimed for it [%], and seconds.
 #include <array>
 #include <chrono>
@@ -101,6 +103,7 @@ Photos photos_of(const Scene& scene) {
     photo.width = image.width;
     photo.height = image.height;
     photo.features = detect_features(image);
+    photo.picture = searched_picture(image);
     out.photos.push_back(std::move(photo));
     out.given.push_back(resized(view.camera, image.width, image.height));
     const LensHint hint = lens_hint(view.image_path, {image.width, image.height});
@@ -133,9 +136,10 @@ void measure(const Set& set,
       truth.push_back(given[i]);
     }
     const test::PoseErrors errors = test::pose_errors(solved, truth);
-    std::printf(" %2zu of %zu %9.3f %9.3f %8.2f %8.2f %7.1f\n",
+    std::printf(" %2zu of %zu %9.3f %9.3f %9.3f %8.2f %8.2f %7.1f\n",
                 solved.size(),
                 photos.size(),
+                errors.axes,
                 errors.rotation,
                 errors.direction,
                 100 * errors.focal,
@@ -148,12 +152,13 @@ void measure(const Set& set,
 }
 
 int run(const std::filesystem::path& data, const std::string& wanted) {
-  std::printf("%-24s %-10s %-7s %7s %9s %9s %8s %8s %7s\n",
+  std::printf("%-24s %-10s %-7s %7s %9s %9s %9s %8s %8s %7s\n",
               "set",
               "views",
               "focal",
               "placed",
-              "rotation",
+              "axes",
+              "rays",
               "direction",
               "focal %",
               "sigma %",

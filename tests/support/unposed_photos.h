@@ -84,34 +84,71 @@ inline std::vector<UnposedPhoto> unposed_photos(const PointScene& scene) {
   return out;
 }
 
-/// Largest differences between solved and given cameras, after the rotation that brings their axes
+/// Largest differences between solved and given cameras, after the rotation that brings them
 /// together best.
 struct PoseErrors {
-  double rotation = 0;   ///< [degrees]
+  double axes = 0;  ///< Of the cameras' axes [degrees].
+  /// Of what the pixels look at [degrees]: a principal point off the centre, which few photographs
+  /// do not tell, turns the axes but hardly the rays.
+  double rotation = 0;
   double direction = 0;  ///< Between any two cameras [degrees].
   double focal = 0;      ///< Relative.
 };
 
-inline PoseErrors pose_errors(const std::vector<Camera>& solved, const std::vector<Camera>& given) {
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  for (size_t i = 0; i < solved.size(); ++i) {
-    H += given[i].world_from_cam.rotation() * solved[i].world_from_cam.rotation().transpose();
-  }
+/// The rotation nearest to a matrix.
+inline Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& H) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant());
-  const Eigen::Matrix3d align = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
-  const auto degrees = [](double radians) { return radians * 180 / M_PI; };
+  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+}
+
+/// What turns a camera's axes such that its pixels look where those of another lens do.
+inline Eigen::Matrix3d between_rays(const Camera& from, const Camera& to) {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  for (const double u : {0.1, 0.5, 0.9}) {
+    for (const double v : {0.1, 0.5, 0.9}) {
+      H += to.ray_in_cam(u * to.width, v * to.height).normalized() *
+           from.ray_in_cam(u * from.width, v * from.height).normalized().transpose();
+    }
+  }
+  return nearest_rotation(H);
+}
+
+/// Largest angle [degrees] between rotations, after the one that brings all together best, which it
+/// returns.
+inline Eigen::Matrix3d largest_turn(const std::vector<Eigen::Matrix3d>& solved,
+                                    const std::vector<Eigen::Matrix3d>& given,
+                                    double& degrees) {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  for (size_t i = 0; i < solved.size(); ++i) H += given[i] * solved[i].transpose();
+  const Eigen::Matrix3d align = nearest_rotation(H);
+  degrees = 0;
+  for (size_t i = 0; i < solved.size(); ++i) {
+    const Eigen::AngleAxisd off(Eigen::Matrix3d(given[i].transpose() * align * solved[i]));
+    degrees = std::max(degrees, off.angle() * 180 / M_PI);
+  }
+  return align;
+}
+
+inline PoseErrors pose_errors(const std::vector<Camera>& solved, const std::vector<Camera>& given) {
+  std::vector<Eigen::Matrix3d> axes;
+  std::vector<Eigen::Matrix3d> rays;
+  std::vector<Eigen::Matrix3d> truth;
   PoseErrors errors;
   for (size_t i = 0; i < solved.size(); ++i) {
-    const Eigen::Matrix3d off = given[i].world_from_cam.rotation().transpose() * align *
-                                solved[i].world_from_cam.rotation();
-    errors.rotation = std::max(errors.rotation, degrees(Eigen::AngleAxisd(off).angle()));
+    axes.push_back(solved[i].world_from_cam.rotation());
+    rays.push_back(axes.back() * between_rays(solved[i], given[i]).transpose());
+    truth.push_back(given[i].world_from_cam.rotation());
     errors.focal = std::max(errors.focal, std::abs(solved[i].fx / given[i].fx - 1));
+  }
+  (void)largest_turn(axes, truth, errors.axes);
+  const Eigen::Matrix3d align = largest_turn(rays, truth, errors.rotation);
+  for (size_t i = 0; i < solved.size(); ++i) {
     for (size_t j = i + 1; j < solved.size(); ++j) {
       const Eigen::Vector3d u = given[j].center() - given[i].center();
       const Eigen::Vector3d v = align * (solved[j].center() - solved[i].center());
-      errors.direction =
-          std::max(errors.direction, degrees(std::atan2(u.cross(v).norm(), u.dot(v))));
+      const double off = std::atan2(u.cross(v).norm(), u.dot(v));
+      errors.direction = std::max(errors.direction, off * 180 / M_PI);
     }
   }
   return errors;
