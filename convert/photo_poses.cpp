@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -121,10 +122,12 @@ int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) 
 }
 
 using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255
+using Search = std::function<PhotoFeatures(const ColorImage&, const MaskMap&)>;
 
 UnposedPhoto unposed_photo(MaskIndex& masks,
                            const PhotoFile& photograph,
                            double focal,
+                           const Search& search,
                            Colors& colors) {
   View view;
   view.image_path = photograph.path;
@@ -136,7 +139,7 @@ UnposedPhoto unposed_photo(MaskIndex& masks,
   out.name = photograph.path.filename().string();
   out.width = image.width;
   out.height = image.height;
-  out.features = detect_features(image, usable);
+  out.features = search(image, usable);
   out.picture = searched_picture(image);
   out.focal = focal > 0 ? focal : photograph.hint.focal;
   out.focal_sigma = focal > 0 ? 0 : photograph.hint.sigma;
@@ -236,6 +239,79 @@ ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
   return model;
 }
 
+/// Photographs and what was found of their cameras.
+struct Attempt {
+  std::vector<UnposedPhoto> photos;
+  std::vector<Colors> colors;
+  PoseSolution solution;
+
+  size_t placed() const {
+    return static_cast<size_t>(std::count_if(solution.photos.begin(),
+                                             solution.photos.end(),
+                                             [](const SolvedPhoto& p) { return p.is_placed; }));
+  }
+};
+
+std::string attempt_text(const Attempt& attempt) {
+  char rms[32];
+  std::snprintf(rms, sizeof rms, "%.2f", attempt.solution.rms);
+  return std::to_string(attempt.placed()) + " of " + std::to_string(attempt.photos.size()) +
+         " placed, " + std::to_string(attempt.solution.points.size()) + " points, " + rms +
+         " pixels rms";
+}
+
+Attempt attempted(MaskIndex& masks,
+                  const std::vector<PhotoFile>& photographs,
+                  double focal,
+                  bool from_aside,
+                  const Progress& progress) {
+  Attempt out;
+  out.colors.resize(photographs.size());
+  std::vector<const PhotoFile*> lenses;
+  constexpr double kShare = 0.4;  // of the time, for finding features
+  for (size_t i = 0; i < photographs.size(); ++i) {
+    const double count = double(photographs.size());
+    const Progress part =
+        part_of(progress, kShare * double(i) / count, kShare * double(i + 1) / count);
+    report(part, 0);
+    const Search search = [&](const ColorImage& image, const MaskMap& usable) {
+      return from_aside ? detect_tilted_features(image, usable, {}, part)
+                        : detect_features(image, usable);
+    };
+    out.photos.push_back(unposed_photo(masks, photographs[i], focal, search, out.colors[i]));
+    out.photos.back().lens = lens_of(photographs[i], lenses);
+  }
+  out.solution = solve_poses(out.photos, part_of(progress, kShare, 1));
+  return out;
+}
+
+// Where not every photograph finds its place, once more with features as seen from aside.
+Attempt solved_photos(MaskIndex& masks,
+                      const std::vector<PhotoFile>& photographs,
+                      double focal,
+                      Terminal& terminal) {
+  std::optional<Attempt> first;
+  std::optional<NumericalError> failure;
+  const Progress progress = terminal.begin("cameras of photographs");
+  try {
+    first = attempted(masks, photographs, focal, false, progress);
+  } catch (const NumericalError& error) {
+    failure = error;
+  }
+  terminal.end(first ? attempt_text(*first) : "not found");
+  if (first && first->placed() == photographs.size()) return std::move(*first);
+  const Progress again = terminal.begin("cameras again, as if seen from aside");
+  try {
+    Attempt second = attempted(masks, photographs, focal, true, again);
+    terminal.end(attempt_text(second));
+    if (!first || second.placed() > first->placed()) return second;
+  } catch (const NumericalError&) {
+    terminal.end("not found");
+  }
+  if (failure) throw *failure;
+  return std::move(*first);
+}
+
 // A focal length in pixels is that of one size of photographs, and no lens is 28 pixels long.
 void check_focal(double focal, const std::vector<PhotoFile>& photographs) {
   const auto side = [](const PhotoFile& file) {
@@ -276,29 +352,14 @@ PhotoPoses photo_poses(const SceneRoot& root,
   MaskIndex masks(root);
   const std::string inputs = inputs_text(masks, photographs, focal);
   if (auto poses = stored_poses(stored, inputs)) return *poses;
-  const Progress progress = terminal.begin("cameras of photographs");
-  std::vector<const PhotoFile*> lenses;
-  std::vector<UnposedPhoto> photos;
-  std::vector<Colors> colors(photographs.size());
-  constexpr double kShare = 0.4;  // of the time, for finding features
-  for (size_t i = 0; i < photographs.size(); ++i) {
-    report(progress, kShare * double(i) / double(photographs.size()));
-    photos.push_back(unposed_photo(masks, photographs[i], focal, colors[i]));
-    photos.back().lens = lens_of(photographs[i], lenses);
-  }
-  const PoseSolution solution = solve_poses(photos, part_of(progress, kShare, 1));
+  const Attempt attempt = solved_photos(masks, photographs, focal, terminal);
   PhotoPoses out;
-  out.model = colmap_model(photos, colors, solution);
+  out.model = colmap_model(attempt.photos, attempt.colors, attempt.solution);
   out.inputs = inputs;
-  add_remarks(photos, solution, out);
-  for (const SolvedPhoto& solved : solution.photos) {
+  add_remarks(attempt.photos, attempt.solution, out);
+  for (const SolvedPhoto& solved : attempt.solution.photos) {
     if (solved.is_placed) out.focal_sigma = std::max(out.focal_sigma, solved.focal_sigma);
   }
-  char rms[32];
-  std::snprintf(rms, sizeof rms, "%.2f", solution.rms);
-  terminal.end(std::to_string(out.model.images.size()) + " of " +
-               std::to_string(photographs.size()) + " placed, " +
-               std::to_string(solution.points.size()) + " points, " + rms + " pixels rms");
   return out;
 }
 

@@ -2,9 +2,10 @@
 #include "libcgs/priors/photo_features.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
 #include <tuple>
+#include <utility>
 
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -43,32 +44,115 @@ cv::Mat mask_of(const MaskMap& usable, const cv::Size& size) {
   return small;
 }
 
-// Strongest first. Every field takes part: the order, and with it what is kept, must not depend on
-// the order in which threads found them.
+/// What was found, and what each looks like.
+struct Found {
+  cv::KeyPoint point;
+  cv::Mat descriptor;
+};
+
+// Every field takes part: the order, and with it what is kept, must not depend on the order in
+// which threads found them.
+auto strength_key(const cv::KeyPoint& p) {
+  return std::tuple(-p.response, p.pt.y, p.pt.x, p.size, p.angle, p.octave);
+}
+
+// Strongest first.
 void sort_and_cut(std::vector<cv::KeyPoint>& points, int most) {
-  const auto key = [](const cv::KeyPoint& p) {
-    return std::tuple(-p.response, p.pt.y, p.pt.x, p.size, p.angle, p.octave);
-  };
-  std::sort(points.begin(), points.end(), [&](const cv::KeyPoint& a, const cv::KeyPoint& b) {
-    return key(a) < key(b);
+  std::sort(points.begin(), points.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+    return strength_key(a) < strength_key(b);
   });
   if (points.size() > static_cast<size_t>(most)) points.resize(static_cast<size_t>(most));
 }
 
+// Likewise.
+void sort_and_cut(std::vector<Found>& found, size_t most) {
+  std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
+    return strength_key(a.point) < strength_key(b.point);
+  });
+  if (found.size() > most) found.resize(most);
+}
+
+cv::Ptr<cv::SIFT> sift() {
+  // Half of the usual contrast: photographs of stone and plaster have few strong corners, and
+  // matching throws out what is not distinct.
+  constexpr int kOctaveLayers = 3;
+  constexpr double kContrast = 0.02;
+  return cv::SIFT::create(0, kOctaveLayers, kContrast);
+}
+
+// From places in the picture searched to those in the photograph.
+struct ToPhotograph {
+  double x, y;
+
+  ToPhotograph(const ColorImage& image, const cv::Mat& picture)
+      : x(double(image.width) / picture.cols), y(double(image.height) / picture.rows) {}
+  double pixel() const { return std::max(x, y); }
+  Eigen::Vector2d operator()(const cv::Point2f& at) const {
+    // OpenCV counts from the centre of the first pixel, and its doubling of the picture before
+    // the search moves everything by a quarter of a pixel.
+    constexpr double kDoubling = -0.25;
+    return {(double(at.x) + 0.5 + kDoubling) * x, (double(at.y) + 0.5 + kDoubling) * y};
+  }
+};
+
+Eigen::RowVectorXf rooted(const cv::Mat& descriptor) {
+  const Eigen::Map<const Eigen::RowVectorXf> row(descriptor.ptr<float>(), descriptor.cols);
+  const float sum = row.sum();
+  return sum > 0 ? Eigen::RowVectorXf((row / sum).cwiseSqrt()) : row;
+}
+
+// Points by place: those found within a distance of an earlier one are the same.
+class Places {
+ public:
+  explicit Places(const cv::Size& size)
+      : columns_(static_cast<int>(size.width / kSame) + 3),
+        cells_(static_cast<size_t>(columns_) *
+               static_cast<size_t>(static_cast<int>(size.height / kSame) + 3)) {}
+
+  // \return number of the place, counted in the order in which they were new
+  int add(const cv::Point2f& at) {
+    const int x = std::max(0, static_cast<int>(double(at.x) / kSame)) + 1;
+    const int y = std::max(0, static_cast<int>(double(at.y) / kSame)) + 1;
+    for (int j = y - 1; j <= y + 1; ++j) {
+      for (int i = x - 1; i <= x + 1; ++i) {
+        for (const int place : cell(i, j)) {
+          if (cv::norm(points_[static_cast<size_t>(place)] - at) < kSame) return place;
+        }
+      }
+    }
+    cell(x, y).push_back(static_cast<int>(points_.size()));
+    points_.push_back(at);
+    return static_cast<int>(points_.size()) - 1;
+  }
+  const std::vector<cv::Point2f>& points() const { return points_; }
+
+ private:
+  static constexpr double kSame = 1.5;  // [pixels]
+  std::vector<int>& cell(int x, int y) {
+    return cells_[static_cast<size_t>(y) * static_cast<size_t>(columns_) + static_cast<size_t>(x)];
+  }
+
+  int columns_;
+  std::vector<std::vector<int>> cells_;
+  std::vector<cv::Point2f> points_;
+};
+
 using Descriptors = decltype(PhotoFeatures::descriptors);
 
-// Nearest and second nearest by the largest dot products of unit vectors.
+// Nearest row, and nearest row of another point, by the largest dot products of unit vectors.
 struct Nearest {
   float best = -1;
   float second = -1;
-  int index = -1;
+  int row = -1;
+  int point = -1;
 
-  void add(float dot, int i) {
+  void add(float dot, int i, int of) {
     if (dot > best) {
-      second = best;
+      if (of != point) second = best;
       best = dot;
-      index = i;
-    } else {
+      row = i;
+      point = of;
+    } else if (of != point) {
       second = std::max(second, dot);
     }
   }
@@ -76,9 +160,43 @@ struct Nearest {
     constexpr double kRatio = 0.8;
     const double near = std::max(0.0, 2 - 2 * double(best));  // squared distances
     const double next = std::max(0.0, 2 - 2 * double(second));
-    return index >= 0 && near < kRatio * kRatio * next;
+    return row >= 0 && near < kRatio * kRatio * next;
   }
 };
+
+int point_of_row(const PhotoFeatures& features, Eigen::Index row) {
+  return features.point_of.empty() ? static_cast<int>(row)
+                                   : features.point_of[static_cast<size_t>(row)];
+}
+
+/// A match, and how alike its sides look.
+struct Likeness {
+  FeatureMatch match;
+  float dot = 0;
+};
+
+// Each point at most once, where it looks most alike.
+std::vector<FeatureMatch> unique_matches(std::vector<Likeness> found,
+                                         const PhotoFeatures& a,
+                                         const PhotoFeatures& b) {
+  std::stable_sort(found.begin(), found.end(), [](const Likeness& l, const Likeness& r) {
+    return l.dot > r.dot;
+  });
+  std::vector<char> in_a(a.points.size(), 0);
+  std::vector<char> in_b(b.points.size(), 0);
+  std::vector<FeatureMatch> out;
+  for (const Likeness& l : found) {
+    char& of_a = in_a[static_cast<size_t>(l.match.a)];
+    char& of_b = in_b[static_cast<size_t>(l.match.b)];
+    if (of_a != 0 || of_b != 0) continue;
+    of_a = of_b = 1;
+    out.push_back(l.match);
+  }
+  std::sort(out.begin(), out.end(), [](const FeatureMatch& l, const FeatureMatch& r) {
+    return l.a < r.a;
+  });
+  return out;
+}
 
 }  // namespace
 
@@ -101,43 +219,66 @@ PhotoFeatures detect_features(const ColorImage& image,
                               const FeatureOptions& options) {
   options.validate();
   const cv::Mat picture = grey_picture(image, options.largest_side);
-  // Half of the usual contrast: photographs of stone and plaster have few strong corners, and
-  // matching throws out what is not distinct.
-  constexpr int kOctaveLayers = 3;
-  constexpr double kContrast = 0.02;
-  const auto sift = cv::SIFT::create(0, kOctaveLayers, kContrast);
+  const auto detector = sift();
   std::vector<cv::KeyPoint> found;
-  sift->detect(picture, found, mask_of(usable, picture.size()));
+  detector->detect(picture, found, mask_of(usable, picture.size()));
   sort_and_cut(found, options.most);
   cv::Mat descriptors;
-  sift->compute(picture, found, descriptors);
+  detector->compute(picture, found, descriptors);
 
   PhotoFeatures out;
-  const double to_image_x = double(image.width) / picture.cols;
-  const double to_image_y = double(image.height) / picture.rows;
-  out.pixel = std::max(to_image_x, to_image_y);
+  const ToPhotograph to_photograph(image, picture);
+  out.pixel = to_photograph.pixel();
   out.points.reserve(found.size());
-  for (const cv::KeyPoint& p : found) {
-    // OpenCV counts from the centre of the first pixel, and its doubling of the picture before
-    // the search moves everything by a quarter of a pixel.
-    constexpr double kDoubling = -0.25;
-    out.points.emplace_back((double(p.pt.x) + 0.5 + kDoubling) * to_image_x,
-                            (double(p.pt.y) + 0.5 + kDoubling) * to_image_y);
-  }
+  for (const cv::KeyPoint& p : found) out.points.push_back(to_photograph(p.pt));
   out.descriptors.resize(descriptors.rows, descriptors.cols);
-  for (int i = 0; i < descriptors.rows; ++i) {
-    const Eigen::Map<const Eigen::RowVectorXf> row(descriptors.ptr<float>(i), descriptors.cols);
-    const float sum = row.sum();
-    out.descriptors.row(i) = sum > 0 ? Eigen::RowVectorXf((row / sum).cwiseSqrt()) : row;
+  for (int i = 0; i < descriptors.rows; ++i) out.descriptors.row(i) = rooted(descriptors.row(i));
+  return out;
+}
+
+PhotoFeatures detect_tilted_features(const ColorImage& image,
+                                     const MaskMap& usable,
+                                     const FeatureOptions& options,
+                                     const Progress& progress) {
+  options.validate();
+  const cv::Mat picture = grey_picture(image, options.largest_side);
+  const cv::Mat mask = mask_of(usable, picture.size());
+  // Factor of compression, and its direction [degrees].
+  constexpr float kTilt = 1.4142136f;
+  constexpr std::array<std::pair<float, float>, 5> kViews = {
+      {{1, 0}, {kTilt, 0}, {kTilt, 45}, {kTilt, 90}, {kTilt, 135}}};
+  std::vector<Found> found;
+  for (size_t view = 0; view < kViews.size(); ++view) {
+    report(progress, double(view) / kViews.size());
+    const auto detector = cv::AffineFeature::create(sift());
+    detector->setViewParams({kViews[view].first}, {kViews[view].second});
+    std::vector<cv::KeyPoint> points;
+    cv::Mat descriptors;
+    detector->detectAndCompute(picture, mask, points, descriptors);
+    for (size_t i = 0; i < points.size(); ++i) {
+      found.push_back({points[i], descriptors.row(static_cast<int>(i))});
+    }
   }
+  sort_and_cut(found, 2 * static_cast<size_t>(options.most));
+
+  PhotoFeatures out;
+  const ToPhotograph to_photograph(image, picture);
+  out.pixel = to_photograph.pixel();
+  Places places(picture.size());
+  out.descriptors.resize(static_cast<Eigen::Index>(found.size()), sift()->descriptorSize());
+  for (size_t i = 0; i < found.size(); ++i) {
+    out.point_of.push_back(places.add(found[i].point.pt));
+    out.descriptors.row(static_cast<Eigen::Index>(i)) = rooted(found[i].descriptor);
+  }
+  for (const cv::Point2f& at : places.points()) out.points.push_back(to_photograph(at));
   return out;
 }
 
 std::vector<FeatureMatch> match_features(const PhotoFeatures& a,
                                          const PhotoFeatures& b,
                                          const Progress& progress) {
-  std::vector<Nearest> of_a(a.points.size());
-  std::vector<Nearest> of_b(b.points.size());
+  std::vector<Nearest> of_a(static_cast<size_t>(a.descriptors.rows()));
+  std::vector<Nearest> of_b(static_cast<size_t>(b.descriptors.rows()));
   constexpr Eigen::Index kBlock = 512;  // products of two blocks stay in the cache
   Descriptors dots;
   for (Eigen::Index i = 0; i < a.descriptors.rows(); i += kBlock) {
@@ -148,22 +289,25 @@ std::vector<FeatureMatch> match_features(const PhotoFeatures& a,
       dots.noalias() =
           a.descriptors.middleRows(i, rows) * b.descriptors.middleRows(j, cols).transpose();
       for (Eigen::Index r = 0; r < rows; ++r) {
+        const int in_a = point_of_row(a, i + r);
         for (Eigen::Index c = 0; c < cols; ++c) {
-          of_a[static_cast<size_t>(i + r)].add(dots(r, c), static_cast<int>(j + c));
-          of_b[static_cast<size_t>(j + c)].add(dots(r, c), static_cast<int>(i + r));
+          of_a[static_cast<size_t>(i + r)].add(
+              dots(r, c), static_cast<int>(j + c), point_of_row(b, j + c));
+          of_b[static_cast<size_t>(j + c)].add(dots(r, c), static_cast<int>(i + r), in_a);
         }
       }
     }
   }
-  std::vector<FeatureMatch> out;
+  std::vector<Likeness> found;
   for (size_t i = 0; i < of_a.size(); ++i) {
     if (!of_a[i].is_distinct()) continue;
-    const Nearest& back = of_b[static_cast<size_t>(of_a[i].index)];
-    if (back.index == static_cast<int>(i) && back.is_distinct()) {
-      out.push_back({static_cast<int>(i), of_a[i].index});
+    const int in_a = point_of_row(a, static_cast<Eigen::Index>(i));
+    const Nearest& back = of_b[static_cast<size_t>(of_a[i].row)];
+    if (back.point == in_a && back.is_distinct()) {
+      found.push_back({{in_a, of_a[i].point}, of_a[i].best});
     }
   }
-  return out;
+  return unique_matches(std::move(found), a, b);
 }
 
 }  // namespace cgs

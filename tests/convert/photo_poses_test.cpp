@@ -114,6 +114,41 @@ TEST(PhotoPoses, AreRefusedForACameraThatWasOnlyTurned) {
   EXPECT_NE(message_of([&] { solved(dir / "photos"); }).find("turned"), std::string::npos);
 }
 
+// The camera of a photograph, moved around what it looks at [degrees].
+Camera from_aside(const Camera& camera, double degrees) {
+  const Eigen::Vector3d subject = camera.unproject(camera.cx, camera.cy, 6);
+  const Eigen::AngleAxisd turn(degrees * M_PI / 180, Eigen::Vector3d::UnitZ());
+  Camera out = camera;
+  out.world_from_cam.linear() = turn * camera.world_from_cam.linear();
+  out.world_from_cam.translation() = subject + turn * (camera.center() - subject);
+  return out;
+}
+
+TEST(PhotoPoses, PlaceAPhotographFromFarAside) {
+  const test::TempDir dir;
+  const Camera middle = capture_views()[1].camera;
+  const std::vector<Camera> truth = {capture_views()[0].camera, middle, from_aside(middle, 71)};
+  std::vector<UnposedPhoto> photos;
+  for (size_t i = 0; i < truth.size(); ++i) {
+    const fs::path path = dir / ("photos/" + std::to_string(i) + ".png");
+    photograph(path, truth[i], uint32_t(i));
+    photos.push_back({.name = path.filename(),
+                      .width = middle.width,
+                      .height = middle.height,
+                      .features = detect_features(read_image(path)),
+                      .focal = middle.fx});
+  }
+  EXPECT_FALSE(solve_poses(photos).photos[2].is_placed);  // what it looks like says too little
+
+  const PhotoPoses poses = solved(dir / "photos", middle.fx);
+  EXPECT_TRUE(poses.warnings.empty());
+  const std::vector<Camera> found = cameras_of(scene_of_photographs(dir / "photos", poses.model));
+  ASSERT_EQ(found.size(), 3u);
+  const test::PoseErrors errors = test::pose_errors(found, truth);
+  EXPECT_LT(errors.rotation, 0.3);
+  EXPECT_LT(errors.direction, 0.5);
+}
+
 TEST(PhotoPoses, TellWhichPhotographsAreFromOnePlace) {
   const test::TempDir dir;
   const auto views = capture_views();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/photo_features.h"
 
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -126,6 +127,84 @@ TEST(MatchFeatures, FindsWhatASlowSearchFinds) {
   std::vector<std::pair<int, int>> found;
   for (const FeatureMatch& m : match_features(a, b)) found.emplace_back(m.a, m.b);
   EXPECT_EQ(found, expected);
+}
+
+TEST(MatchFeatures, APointOfSeveralLooksIsMatchedOnceAndIsNoRivalOfItself) {
+  constexpr int kPoints = 100;
+  PhotoFeatures a;
+  PhotoFeatures b;
+  a.points.resize(kPoints);
+  b.points.resize(kPoints);
+  a.descriptors.resize(2 * kPoints, 32);
+  b.descriptors.resize(kPoints, 32);
+  for (int i = 0; i < kPoints; ++i) {
+    for (int k = 0; k < 32; ++k) {
+      const auto noise = [&](double seed) {
+        return float(test::solid_noise({i * 1.0, k * 1.0, seed}, 1)) - 0.5f;
+      };
+      a.descriptors(2 * i, k) = noise(1) + 0.1f * noise(2);
+      a.descriptors(2 * i + 1, k) = noise(1) + 0.1f * noise(3);
+      b.descriptors(kPoints - 1 - i, k) = noise(1);
+    }
+    a.point_of.insert(a.point_of.end(), 2, i);
+  }
+  a.descriptors.rowwise().normalize();
+  b.descriptors.rowwise().normalize();
+  const std::vector<FeatureMatch> matches = match_features(a, b);
+  ASSERT_EQ(matches.size(), size_t(kPoints));
+  for (int i = 0; i < kPoints; ++i) {
+    EXPECT_EQ(matches[size_t(i)].a, i);
+    EXPECT_EQ(matches[size_t(i)].b, kPoints - 1 - i);
+  }
+  const std::vector<FeatureMatch> turned = match_features(b, a);
+  ASSERT_EQ(turned.size(), size_t(kPoints));
+  for (int i = 0; i < kPoints; ++i) EXPECT_EQ(turned[size_t(i)].b, kPoints - 1 - i);
+}
+
+// Matches of two pictures of a wall, and those of them that are right to 3 pixels.
+std::pair<int, int> matches_on_wall(const std::array<Camera, 2>& cameras,
+                                    const std::vector<test::TexturedPatch>& wall,
+                                    const std::array<PhotoFeatures, 2>& features) {
+  std::pair<int, int> out;
+  for (const FeatureMatch& m : match_features(features[0], features[1])) {
+    const Eigen::Vector2d& at = features[0].points[size_t(m.a)];
+    const double depth = test::cast(wall, cameras[0], at.x(), at.y()).depth;
+    const Eigen::Vector3d there = cameras[1].project(cameras[0].unproject(at.x(), at.y(), depth));
+    ++out.first;
+    out.second += (there.head<2>() - features[1].points[size_t(m.b)]).norm() < 3;
+  }
+  return out;
+}
+
+TEST(TiltedFeatures, FindAgainWhatIsSeenFromAside) {
+  const std::vector<test::TexturedPatch> wall = {
+      {{0, 0, 4}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), 1.5, 1.5}};
+  const std::array<Camera, 2> cameras = {test::looking_at({0, 0, 0}, {0, 0, 4}, 400, 300, 350),
+                                         test::looking_at({3.4, 0, 2}, {0, 0, 4}, 400, 300, 350)};
+  std::array<PhotoFeatures, 2> plain;
+  std::array<PhotoFeatures, 2> tilted;
+  for (const size_t i : {0u, 1u}) {
+    const ColorImage image = test::photograph(wall, cameras[i], 0.02);
+    plain[i] = detect_features(image);
+    tilted[i] = detect_tilted_features(image);
+    EXPECT_EQ(tilted[i].point_of.size(), size_t(tilted[i].descriptors.rows()));
+    EXPECT_GT(tilted[i].point_of.size(), tilted[i].points.size());
+  }
+  const auto [all_plain, right_plain] = matches_on_wall(cameras, wall, plain);
+  const auto [all, right] = matches_on_wall(cameras, wall, tilted);
+  EXPECT_GT(right, 3 * right_plain);
+  EXPECT_GT(right, all * 9 / 10);
+}
+
+TEST(TiltedFeatures, AreTheSameForAnyNumberOfThreads) {
+  const ColorImage image = spots(scattered_centres(23, 300), 3, 300);
+  const PhotoFeatures several = detect_tilted_features(image);
+  cv::setNumThreads(1);
+  const PhotoFeatures single = detect_tilted_features(image);
+  cv::setNumThreads(-1);
+  EXPECT_EQ(several.points, single.points);
+  EXPECT_EQ(several.point_of, single.point_of);
+  EXPECT_EQ(several.descriptors, single.descriptors);
 }
 
 TEST(FeatureOptions, NameTheFieldOutOfRange) {
