@@ -4,7 +4,7 @@
 #
 # usage: tests/reliability.sh [--long]
 #   a share of the faults and 20 s of fuzzing per kind of file: half an hour on 2 cores;
-#   --long tries all of them and ten million files or more of the fuzzer: two hours
+#   --long tries all of them and ten million files or more of the fuzzer: an hour and a half
 set -euo pipefail
 cd "$(dirname "$0")/.."
 if [ $# -gt 1 ] || { [ $# -eq 1 ] && [ "$1" != "--long" ]; }; then

@@ -152,6 +152,7 @@ bool is_before_both_of_most(const Rays& rays,
 // from before it. `limit` is a distance at z = 1.
 std::vector<PhotoPose> poses_of_plane(const Rays& rays, double limit) {
   constexpr double kPlanar = 0.6;
+  constexpr int kTrials = 200;  // an eighth of them hits the plane where there is one
   std::vector<cv::Point2d> a;
   std::vector<cv::Point2d> b;
   for (size_t i = 0; i < rays.a.size(); ++i) {
@@ -159,8 +160,7 @@ std::vector<PhotoPose> poses_of_plane(const Rays& rays, double limit) {
     b.emplace_back(rays.b[i].x(), rays.b[i].y());
   }
   cv::Mat mask;
-  const cv::Mat plane =
-      cv::findHomography(a, b, cv::RANSAC, 2 * limit, mask, kMostTrials, kConfidence);
+  const cv::Mat plane = cv::findHomography(a, b, cv::RANSAC, 2 * limit, mask, kTrials, kConfidence);
   const std::vector<char> used = mask_of(mask, a.size());
   const auto on_plane = std::count(used.begin(), used.end(), char{1});
   if (plane.empty() || double(on_plane) < kPlanar * double(a.size())) return {};
