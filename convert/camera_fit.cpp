@@ -37,6 +37,7 @@ void take_out_distortion(const LensMap& lens, const Camera& picture, PhotoFeatur
   }
   features.points.resize(kept);
   features.descriptors.conservativeResize(Eigen::Index(kept), Eigen::NoChange);
+  features.picture = {};  // it shows them elsewhere
 }
 
 /// How far a view is off, in the pixels it was searched in, as its pairs have it.

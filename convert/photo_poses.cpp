@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -122,12 +121,12 @@ int lens_of(const PhotoFile& photograph, std::vector<const PhotoFile*>& lenses) 
 }
 
 using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255
-using Search = std::function<PhotoFeatures(const ColorImage&, const MaskMap&)>;
 
 UnposedPhoto unposed_photo(MaskIndex& masks,
                            const PhotoFile& photograph,
                            double focal,
-                           const Search& search,
+                           bool from_aside,
+                           const Progress& progress,
                            Colors& colors) {
   View view;
   view.image_path = photograph.path;
@@ -139,8 +138,8 @@ UnposedPhoto unposed_photo(MaskIndex& masks,
   out.name = photograph.path.filename().string();
   out.width = image.width;
   out.height = image.height;
-  out.features = search(image, usable);
-  out.picture = searched_picture(image);
+  out.features = from_aside ? detect_tilted_features(image, usable, {}, progress)
+                            : detect_features(image, usable);
   out.focal = focal > 0 ? focal : photograph.hint.focal;
   out.focal_sigma = focal > 0 ? 0 : photograph.hint.sigma;
   for (const Eigen::Vector2d& p : out.features.points) {
@@ -274,11 +273,8 @@ Attempt attempted(MaskIndex& masks,
     const Progress part =
         part_of(progress, kShare * double(i) / count, kShare * double(i + 1) / count);
     report(part, 0);
-    const Search search = [&](const ColorImage& image, const MaskMap& usable) {
-      return from_aside ? detect_tilted_features(image, usable, {}, part)
-                        : detect_features(image, usable);
-    };
-    out.photos.push_back(unposed_photo(masks, photographs[i], focal, search, out.colors[i]));
+    out.photos.push_back(
+        unposed_photo(masks, photographs[i], focal, from_aside, part, out.colors[i]));
     out.photos.back().lens = lens_of(photographs[i], lenses);
   }
   out.solution = solve_poses(out.photos, part_of(progress, kShare, 1));

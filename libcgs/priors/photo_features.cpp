@@ -56,20 +56,23 @@ auto strength_key(const cv::KeyPoint& p) {
   return std::tuple(-p.response, p.pt.y, p.pt.x, p.size, p.angle, p.octave);
 }
 
+auto strength_key(const Found& found) { return strength_key(found.point); }
+
 // Strongest first.
-void sort_and_cut(std::vector<cv::KeyPoint>& points, int most) {
-  std::sort(points.begin(), points.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+template <typename T>
+void sort_and_cut(std::vector<T>& found, size_t most) {
+  std::stable_sort(found.begin(), found.end(), [](const T& a, const T& b) {
     return strength_key(a) < strength_key(b);
   });
-  if (points.size() > static_cast<size_t>(most)) points.resize(static_cast<size_t>(most));
+  if (found.size() > most) found.resize(most);
 }
 
-// Likewise.
-void sort_and_cut(std::vector<Found>& found, size_t most) {
-  std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
-    return strength_key(a.point) < strength_key(b.point);
-  });
-  if (found.size() > most) found.resize(most);
+Raster<uint8_t> raster_of(const cv::Mat& picture) {
+  Raster<uint8_t> out(picture.cols, picture.rows, 0);
+  for (int y = 0; y < out.height; ++y) {
+    std::copy_n(picture.ptr<uint8_t>(y), out.width, &out(0, y));
+  }
+  return out;
 }
 
 cv::Ptr<cv::SIFT> sift() {
@@ -205,15 +208,6 @@ void FeatureOptions::validate() const {
   require(most >= 1, "FeatureOptions.most must be >= 1", most);
 }
 
-Raster<uint8_t> searched_picture(const ColorImage& image, const FeatureOptions& options) {
-  const cv::Mat picture = grey_picture(image, options.largest_side);
-  Raster<uint8_t> out(picture.cols, picture.rows, 0);
-  for (int y = 0; y < out.height; ++y) {
-    std::copy_n(picture.ptr<uint8_t>(y), out.width, &out(0, y));
-  }
-  return out;
-}
-
 PhotoFeatures detect_features(const ColorImage& image,
                               const MaskMap& usable,
                               const FeatureOptions& options) {
@@ -222,13 +216,14 @@ PhotoFeatures detect_features(const ColorImage& image,
   const auto detector = sift();
   std::vector<cv::KeyPoint> found;
   detector->detect(picture, found, mask_of(usable, picture.size()));
-  sort_and_cut(found, options.most);
+  sort_and_cut(found, static_cast<size_t>(options.most));
   cv::Mat descriptors;
   detector->compute(picture, found, descriptors);
 
   PhotoFeatures out;
   const ToPhotograph to_photograph(image, picture);
   out.pixel = to_photograph.pixel();
+  out.picture = raster_of(picture);
   out.points.reserve(found.size());
   for (const cv::KeyPoint& p : found) out.points.push_back(to_photograph(p.pt));
   out.descriptors.resize(descriptors.rows, descriptors.cols);
@@ -264,6 +259,7 @@ PhotoFeatures detect_tilted_features(const ColorImage& image,
   PhotoFeatures out;
   const ToPhotograph to_photograph(image, picture);
   out.pixel = to_photograph.pixel();
+  out.picture = raster_of(picture);
   Places places(picture.size());
   out.descriptors.resize(static_cast<Eigen::Index>(found.size()), sift()->descriptorSize());
   for (size_t i = 0; i < found.size(); ++i) {

@@ -17,6 +17,9 @@ struct PhotoFeatures {
   Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> descriptors;
   std::vector<int> point_of;  ///< Of each row; empty = row i is of point i.
   double pixel = 1;  ///< Side of a pixel of the picture searched, in pixels of the photograph.
+  /// The picture searched, grey, levels 0 ... 255: places are measured more finely in it. Empty =
+  /// the points are not where they were found; they count as they are.
+  Raster<uint8_t> picture;
 };
 
 struct FeatureOptions {
@@ -26,10 +29,6 @@ struct FeatureOptions {
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
 };
-
-/// The picture that is searched for features: grey, levels 0 ... 255 as in the photograph, no
-/// larger than `largest_side`.
-Raster<uint8_t> searched_picture(const ColorImage& image, const FeatureOptions& options = {});
 
 /// Finds SIFT features. The same for any number of threads.
 ///

@@ -76,9 +76,9 @@ struct PicturePlane {
   Vector2d centre;  // [pixels of the picture]
 
   explicit PicturePlane(const UnposedPhoto& photo)
-      : scale(photo.features.pixel * photo.picture.width / photo.width,
-              photo.features.pixel * photo.picture.height / photo.height),
-        centre(0.5 * photo.picture.width, 0.5 * photo.picture.height) {}
+      : scale(photo.features.pixel * photo.features.picture.width / photo.width,
+              photo.features.pixel * photo.features.picture.height / photo.height),
+        centre(0.5 * photo.features.picture.width, 0.5 * photo.features.picture.height) {}
   Vector2d in_picture(const Vector2d& at) const { return centre + scale.cwiseProduct(at); }
 };
 
@@ -104,7 +104,7 @@ std::optional<Patch> patch_at(const UnposedPhoto& photo, const Vector2d& at) {
   double sum = 0;
   for_each_offset([&](size_t k, const Vector2d& d) {
     Sample s;
-    is_inside = is_inside && sample(photo.picture, plane.in_picture(at + d), s);
+    is_inside = is_inside && sample(photo.features.picture, plane.in_picture(at + d), s);
     out.level[k] = s.level;
     out.weight[k] = std::exp(-0.5 * d.squaredNorm() / (kWindow * kWindow));
     sum += out.weight[k];
@@ -147,7 +147,8 @@ std::optional<Equations> equations(const Patch& patch,
   bool is_inside = true;
   for_each_offset([&](size_t k, const Vector2d& d) {
     Sample s;
-    is_inside = is_inside && sample(photo.picture, plane.in_picture(fit.at + fit.warp * d), s);
+    is_inside =
+        is_inside && sample(photo.features.picture, plane.in_picture(fit.at + fit.warp * d), s);
     if (!is_inside) return;
     const double residual = fit.gain * s.level + fit.offset - patch.level[k];
     const Vector2d g = fit.gain * s.slope.cwiseProduct(plane.scale);
@@ -177,10 +178,10 @@ bool match_levels(const Patch& patch,
 }
 
 bool is_like(const Matrix2d& warp, const Matrix2d& expected) {
-  const Eigen::JacobiSVD<Matrix2d> svd(warp * expected.inverse());
-  const Vector2d stretch = svd.singularValues();
+  const Matrix2d change = warp * expected.inverse();
+  const Vector2d stretch = Eigen::JacobiSVD<Matrix2d>(change).singularValues();
   return stretch.allFinite() && stretch[0] < kLargestStretch && stretch[1] > 1 / kLargestStretch &&
-         (warp * expected.inverse()).determinant() > 0;
+         change.determinant() > 0;
 }
 
 // Standard deviation of the place, along the direction in which it is known worst.
@@ -260,7 +261,8 @@ std::optional<Matrix2d> expected_warp(const Reconstruction& scene,
 bool can_take_part(const std::vector<UnposedPhoto>& photos,
                    const Reconstruction& scene,
                    const Sighting& s) {
-  return s.is_used && scene.pose(s.photo) && !photos[static_cast<size_t>(s.photo)].picture.empty();
+  return s.is_used && scene.pose(s.photo) &&
+         !photos[static_cast<size_t>(s.photo)].features.picture.empty();
 }
 
 // The sighting from the middle of the others: the largest sum of cosines to their rays.

@@ -19,9 +19,6 @@ struct UnposedPhoto {
   int lens = 0;            ///< Photographs of one lens share focal length and distortion.
   double focal = 0;        ///< What is known of it beforehand [pixels]; 0 = nothing.
   double focal_sigma = 0;  ///< Relative standard deviation of `focal`; 0 = exact.
-  /// As searched_picture() gives it, to measure places of features more finely; empty = they count
-  /// as found.
-  Raster<uint8_t> picture = {};
 };
 
 /// A photograph's camera as solved.

@@ -104,7 +104,6 @@ Photos photos_of(const Scene& scene, bool from_aside) {
     photo.width = image.width;
     photo.height = image.height;
     photo.features = from_aside ? detect_tilted_features(image) : detect_features(image);
-    photo.picture = searched_picture(image);
     out.photos.push_back(std::move(photo));
     out.given.push_back(resized(view.camera, image.width, image.height));
     const LensHint hint = lens_hint(view.image_path, {image.width, image.height});

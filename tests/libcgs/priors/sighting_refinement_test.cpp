@@ -52,7 +52,7 @@ Photographed photographed(double noise) {
     UnposedPhoto photo;
     photo.width = kWidth;
     photo.height = kHeight;
-    photo.picture = searched_picture(view.image);
+    photo.features.picture = detect_features(view.image).picture;
     out.photos.push_back(std::move(photo));
     out.scene.lens_of.push_back(0);
     const Eigen::Isometry3d pose = view.camera.cam_from_world();
@@ -123,7 +123,8 @@ TEST(SightingRefinement, FindsWhatTheMiddlePhotographShowsToATwentiethOfAPixel) 
 TEST(SightingRefinement, BrightnessAndContrastDoNotMatter) {
   Photographed photos = photographed(0.4);
   Photographed darker = photos;
-  for (uint8_t& level : darker.photos[0].picture.data) level = uint8_t(20 + level * 6 / 10);
+  for (uint8_t& level : darker.photos[0].features.picture.data)
+    level = uint8_t(20 + level * 6 / 10);
   refine_sightings(photos.photos, photos.scene);
   refine_sightings(darker.photos, darker.scene);
   std::vector<double> differences;
@@ -137,8 +138,10 @@ TEST(SightingRefinement, BrightnessAndContrastDoNotMatter) {
 TEST(SightingRefinement, WhatCannotBeToldStaysAsItWas) {
   Photographed photos = photographed(0.4);
   Photographed blank = photos;
-  std::fill(blank.photos[0].picture.data.begin(), blank.photos[0].picture.data.end(), uint8_t(90));
-  blank.photos[2].picture = {};
+  std::fill(blank.photos[0].features.picture.data.begin(),
+            blank.photos[0].features.picture.data.end(),
+            uint8_t(90));
+  blank.photos[2].features.picture = {};
   const std::vector<Track> before = blank.scene.tracks;
   refine_sightings(blank.photos, blank.scene);
   for (size_t k = 0; k < before.size(); ++k) {
