@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "io/mesh_arrays.h"
+#include "libcgs/core/crease_normals.h"
 #include "libcgs/core/srgb.h"
 
 namespace cgs {
@@ -42,6 +44,12 @@ bool is_unlit(std::optional<Provenance> label, bool textured) {
   return textured || label == Provenance::Virtual;
 }
 
+ShadingVertices with_normals_of(const TriangleMesh& mesh) {
+  std::vector<uint32_t> vertices(mesh.vertices.size());
+  std::iota(vertices.begin(), vertices.end(), 0U);
+  return {vertices, mesh.normals, mesh.faces};
+}
+
 class Splitter {
  public:
   Splitter(const TriangleMesh& mesh,
@@ -55,7 +63,7 @@ class Splitter {
         unknown_sigma_(unknown_sigma(mesh, placement.scale)) {
     positions_.reserve(mesh.vertices.size());
     for (const Eigen::Vector3f& v : mesh.vertices) positions_.push_back(placement(v));
-    normals_ = mesh.normals.empty() ? vertex_normals(mesh) : mesh.normals;
+    shading_ = mesh.normals.empty() ? split_at_creases(mesh) : with_normals_of(mesh);
   }
 
   /// Faces of a class (all without labels) and a photograph.
@@ -71,17 +79,17 @@ class Splitter {
       return (!label || mesh_.provenance[f] == *label) &&
              (texture_.empty() || texture_.of_face[f] == photograph);
     };
-    std::vector<uint32_t> renumbered(mesh_.vertices.size(), kUnused);
+    std::vector<uint32_t> renumbered(shading_.vertex.size(), kUnused);
     for (size_t i = 0; i < mesh_.faces.size(); ++i) {
-      if (wanted(i) && has_three_places(mesh_.faces[i])) out.faces.push_back(mesh_.faces[i]);
+      if (wanted(i) && has_three_places(mesh_.faces[i])) out.faces.push_back(shading_.faces[i]);
     }
     for (const auto& face : out.faces) {
       for (const uint32_t corner : face) renumbered[corner] = 0;
     }
-    for (size_t v = 0; v < renumbered.size(); ++v) {
-      if (renumbered[v] == kUnused) continue;
-      renumbered[v] = static_cast<uint32_t>(out.positions.size());
-      append_vertex(out, v);
+    for (size_t i = 0; i < renumbered.size(); ++i) {
+      if (renumbered[i] == kUnused) continue;
+      renumbered[i] = static_cast<uint32_t>(out.positions.size());
+      append_vertex(out, shading_.vertex[i], shading_.normal[i]);
     }
     if (label) out.features.assign(out.positions.size(), static_cast<float>(*label));
     for (auto& face : out.faces) {
@@ -98,9 +106,9 @@ class Splitter {
     return a != b && b != c && c != a;
   }
 
-  void append_vertex(GlbPrimitive& out, size_t v) const {
+  void append_vertex(GlbPrimitive& out, uint32_t v, const Eigen::Vector3f& shading_normal) const {
     out.positions.push_back(positions_[v]);
-    const Eigen::Vector3d normal = placement_.rotation * normals_[v].cast<double>();
+    const Eigen::Vector3d normal = placement_.rotation * shading_normal.cast<double>();
     const bool known = normal.allFinite() && normal.norm() > 0;
     out.normals.push_back(known ? Eigen::Vector3f(normal.stableNormalized().cast<float>())
                                 : Eigen::Vector3f::UnitY());
@@ -132,7 +140,7 @@ class Splitter {
   std::span<const TextureImage> images_;
   float unknown_sigma_;
   std::vector<Eigen::Vector3f> positions_;
-  std::vector<Eigen::Vector3f> normals_;
+  ShadingVertices shading_;
 };
 
 }  // namespace

@@ -47,7 +47,7 @@ struct GlbPlacement {
 
 /// Splits a mesh into its provenance classes, from most to least evidence, and these by photograph,
 /// faces without one last; what has no faces is left out. Vertices keep their order; those without
-/// a face are left out.
+/// a face are left out. Without normals, a vertex on a crease is there once for each of its sides.
 /// \param images  one for each photograph of the texture
 /// \pre the arrays of the mesh and of the texture fit
 std::vector<GlbPrimitive> glb_primitives(const TriangleMesh& mesh,

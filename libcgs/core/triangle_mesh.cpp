@@ -5,17 +5,12 @@
 
 namespace cgs {
 
-namespace {
-
-// Twice the area times the unit normal; double, because thin faces far out cancel in float.
 Eigen::Vector3d area_vector(const TriangleMesh& mesh, const std::array<uint32_t, 3>& face) {
   const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
   const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>();
   const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>();
   return (b - a).cross(c - a);
 }
-
-}  // namespace
 
 std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3d> sums(mesh.vertices.size(), Eigen::Vector3d::Zero());

@@ -33,6 +33,9 @@ struct TriangleMesh {
   std::vector<Provenance> provenance;  ///< Optional; one per face.
 };
 
+/// Twice the area of a face times its unit normal; in double, because thin faces far out cancel.
+Eigen::Vector3d area_vector(const TriangleMesh& mesh, const std::array<uint32_t, 3>& face);
+
 /// Area-weighted vertex normals from the faces; 0 where a vertex has no face of positive area.
 std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh);
 

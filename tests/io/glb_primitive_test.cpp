@@ -7,6 +7,7 @@
 
 #include "libcgs/core/up_axis.h"
 #include "tests/support/sample_mesh.h"
+#include "tests/support/solid_meshes.h"
 
 namespace cgs::glb_primitive_test {
 namespace {
@@ -48,6 +49,21 @@ TEST(GlbPrimitives, PlacementTurnsScalesAndCentres) {
   const auto parts = glb_primitives(mesh, placement);
   EXPECT_LT((parts[0].normals[0] - Eigen::Vector3f::UnitY()).norm(), 1e-6f);  // north pole
   EXPECT_FLOAT_EQ(parts[0].sigma[0], 2 * mesh.sigma[0]);
+}
+
+// A viewer interpolates between the normals of a face: they must not lean towards its neighbours.
+TEST(GlbPrimitives, HaveSharpCreasesWhereTheMeshHasNoNormals) {
+  const TriangleMesh mesh = test::cube_mesh().mesh;
+  const auto parts = glb_primitives(mesh, {});
+  ASSERT_EQ(parts.size(), 1u);
+  EXPECT_EQ(parts[0].positions.size(), 6u * 4);
+  ASSERT_EQ(parts[0].faces.size(), mesh.faces.size());
+  for (const auto& face : parts[0].faces) {
+    const Eigen::Vector3f a = parts[0].positions[face[0]];
+    const Eigen::Vector3f across =
+        (parts[0].positions[face[1]] - a).cross(parts[0].positions[face[2]] - a).normalized();
+    for (const uint32_t v : face) EXPECT_LT((parts[0].normals[v] - across).norm(), 1e-6f);
+  }
 }
 
 TEST(GlbPrimitives, HoldNoNanWhateverTheMeshHolds) {
