@@ -14,8 +14,6 @@
 #include <vector>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <fcntl.h>
 #include <glog/logging.h>
 #include <opencv2/core.hpp>

@@ -11,7 +11,7 @@ namespace cgs {
 
 namespace {
 
-std::string number(double value) {
+std::string four_digits(double value) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.4g", value);
   return text.data();
@@ -25,7 +25,7 @@ std::string exact(double value) {
 }
 
 std::string optional_number(const std::optional<double>& value) {
-  return value ? number(*value) : "default";
+  return value ? four_digits(*value) : "default";
 }
 
 // A word of a command line as a shell takes it.
@@ -49,12 +49,12 @@ std::string label(const Setting& setting) {
   } else if (setting.steps != TrainingOptions().steps) {
     add(std::to_string(setting.steps) + " steps");
   }
-  if (setting.voxel != 1) add("voxel x" + number(setting.voxel));
+  if (setting.voxel != 1) add("voxel x" + four_digits(setting.voxel));
   if (setting.simplify) {
     add(*setting.simplify == 0 ? "not simplified"
-                               : "simplified " + number(*setting.simplify) + " voxel");
+                               : "simplified " + four_digits(*setting.simplify) + " voxel");
   }
-  if (setting.max_error) add("packed " + number(*setting.max_error) + " voxel");
+  if (setting.max_error) add("packed " + four_digits(*setting.max_error) + " voxel");
   if (setting.repeat != 0) add("repeat " + std::to_string(setting.repeat));
   return out.empty() ? "standard" : out;
 }
@@ -65,7 +65,7 @@ std::string model_key(const Setting& setting) {
 }
 
 std::string mesh_key(const Setting& setting) {
-  return model_key(setting) + "_v" + number(setting.voxel) + "_e" +
+  return model_key(setting) + "_v" + four_digits(setting.voxel) + "_e" +
          optional_number(setting.simplify);
 }
 
@@ -112,7 +112,7 @@ RunRequest request_of(const Setting& setting,
   out.training.steps = setting.steps;
   const auto length = [&](double voxels) {
     require(standard_voxel > 0, "the standard voxel must be known", standard_voxel);
-    return number(voxels * standard_voxel);
+    return four_digits(voxels * standard_voxel);
   };
   if (setting.voxel != 1) out.voxel_size = length(setting.voxel * setting.coarser);
   if (setting.simplify) out.simplify = *setting.simplify == 0 ? "0" : length(*setting.simplify);

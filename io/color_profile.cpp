@@ -29,7 +29,7 @@ constexpr size_t kLargest = size_t{4} << 20;  // [bytes] printers' have 1 to 2 M
 
 // In parts of at most 64 KiB, each with its number and how many there are.
 std::string of_jpeg(std::string_view bytes, const std::filesystem::path& path) {
-  constexpr std::string_view kName = "ICC_PROFILE\0"sv;
+  constexpr std::string_view kPartName = "ICC_PROFILE\0"sv;
   constexpr unsigned char kStartOfScan = 0xda;
   constexpr unsigned char kApp2 = 0xe2;
   ByteReader file(bytes, path);
@@ -46,11 +46,12 @@ std::string of_jpeg(std::string_view bytes, const std::filesystem::path& path) {
     const size_t length = size_t{high} << 8 | file.get<uint8_t>("JPEG length");
     if (length < 2) return "";
     const std::string_view body = file.take(length - 2, "JPEG segment");
-    if (marker != kApp2 || !body.starts_with(kName) || body.size() < kName.size() + 2) continue;
-    const std::string_view part = body.substr(kName.size() + 2);
+    if (marker != kApp2 || !body.starts_with(kPartName) || body.size() < kPartName.size() + 2)
+      continue;
+    const std::string_view part = body.substr(kPartName.size() + 2);
     total += part.size();
     if (total > kLargest) return "";
-    parts.emplace(static_cast<unsigned char>(body[kName.size()]), part);
+    parts.emplace(static_cast<unsigned char>(body[kPartName.size()]), part);
   }
   std::string out;
   for (const auto& [number, part] : parts) out += part;

@@ -11,7 +11,7 @@ namespace cgs {
 
 namespace {
 
-constexpr const char* kDraco = "KHR_draco_mesh_compression";
+constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
 
 std::vector<float> without_alpha(const std::vector<float>& rgba) {
   std::vector<float> out;
@@ -32,7 +32,7 @@ class PrimitiveReader {
 
   GlbFaces read(const JsonValue& primitive) const {
     const auto extensions = primitive.find("extensions");
-    const auto draco = extensions ? extensions->find(kDraco) : std::nullopt;
+    const auto draco = extensions ? extensions->find(kDracoExtension) : std::nullopt;
     GlbFaces out = draco ? compressed(primitive, *draco) : plain(primitive);
     const size_t vertices = out.positions.size() / 3;
     const auto fits = [&](const std::vector<float>& values, size_t components) {
@@ -148,12 +148,12 @@ class PrimitiveReader {
   void scale_whole_numbers(const JsonValue& index,
                            const DracoMesh::Attribute& attribute,
                            std::vector<float>& values) const {
-    constexpr int kUnsignedByte = 5121;
-    constexpr int kUnsignedShort = 5123;
+    constexpr int kByteType = 5121;
+    constexpr int kShortType = 5123;
     const JsonValue accessor = file_.element("accessors", index);
     const int type = accessor.at("componentType").count();
-    if (attribute.is_normalized || (type != kUnsignedByte && type != kUnsignedShort)) return;
-    const float largest = type == kUnsignedByte ? 255.0f : 65535.0f;
+    if (attribute.is_normalized || (type != kByteType && type != kShortType)) return;
+    const float largest = type == kByteType ? 255.0f : 65535.0f;
     for (float& v : values) v /= largest;
   }
 

@@ -76,9 +76,9 @@ std::string exif_of(const PrimaryImage& file) {
   heif_image_handle* const handle = file.handle.get();
   if (heif_image_handle_get_list_of_metadata_block_IDs(handle, "Exif", &id, 1) != 1) return "";
   constexpr size_t kOffset = 4;
-  constexpr size_t kMost = size_t{1} << 20;
+  constexpr size_t kMostBytes = size_t{1} << 20;
   std::string block(heif_image_handle_get_metadata_size(handle, id), '\0');
-  if (block.size() < kOffset || block.size() > kMost) return "";
+  if (block.size() < kOffset || block.size() > kMostBytes) return "";
   if (heif_image_handle_get_metadata(handle, id, block.data()).code != heif_error_Ok) return "";
   uint64_t skipped = 0;
   for (size_t i = 0; i < kOffset; ++i) skipped = skipped << 8 | static_cast<uint8_t>(block[i]);
@@ -104,9 +104,9 @@ std::string profile_of(const PrimaryImage& file) {
     const bool is_p3 = nclx->color_primaries == heif_color_primaries_SMPTE_EG_432_1;
     return is_p3 && !is_hdr ? std::string(1, kIsDisplayP3) : "";
   }
-  constexpr size_t kMost = size_t{4} << 20;
+  constexpr size_t kMostBytes = size_t{4} << 20;
   const size_t size = heif_image_handle_get_raw_color_profile_size(handle);
-  if (type == heif_color_profile_type_not_present || size == 0 || size > kMost) return "";
+  if (type == heif_color_profile_type_not_present || size == 0 || size > kMostBytes) return "";
   std::string out(size, '\0');
   require_ok(heif_image_handle_get_raw_color_profile(handle, out.data()));
   return kIsIcc + out;

@@ -11,7 +11,7 @@ namespace cgs {
 
 namespace {
 
-constexpr size_t kHeaderBytes = 84;
+constexpr size_t kBytesBeforeFaces = 84;
 constexpr size_t kFacetBytes = 50;
 
 /// Numbers corners by place, in the order they first appear.
@@ -125,10 +125,10 @@ bool starts_with_solid(std::string_view bytes) {
 }
 
 bool is_binary(const std::string& bytes) {
-  if (bytes.size() < kHeaderBytes) return false;
+  if (bytes.size() < kBytesBeforeFaces) return false;
   uint32_t count = 0;
   std::memcpy(&count, bytes.data() + 80, sizeof(count));
-  if (kHeaderBytes + uint64_t{kFacetBytes} * count == bytes.size()) return true;
+  if (kBytesBeforeFaces + uint64_t{kFacetBytes} * count == bytes.size()) return true;
   return !starts_with_solid(bytes);
 }
 

@@ -83,11 +83,11 @@ class CornerFans {
     }
   }
   bool one_per_vertex() {
-    constexpr auto kNone = static_cast<size_t>(-1);
-    std::vector<size_t> fan(mesh_.vertices.size(), kNone);
+    constexpr auto kUnset = static_cast<size_t>(-1);
+    std::vector<size_t> fan(mesh_.vertices.size(), kUnset);
     for (size_t c = 0; c < parent_.size(); ++c) {
       size_t& known = fan[mesh_.faces[c / 3][c % 3]];
-      if (known == kNone) known = root(c);
+      if (known == kUnset) known = root(c);
       if (known != root(c)) return false;
     }
     return true;

@@ -15,12 +15,12 @@ namespace cgs {
 
 namespace {
 
-constexpr float kHalfWidth = 3;  // [voxels]
+constexpr float kBandHalfWidth = 3;  // [voxels]
 
 void check_size(const TriangleMesh& mesh, double voxel) {
   double area = 0;
   for (const double a : area_by_provenance(mesh)) area += a;
-  const double voxels = 2 * double(kHalfWidth) * area / (voxel * voxel);
+  const double voxels = 2 * double(kBandHalfWidth) * area / (voxel * voxel);
   constexpr double kMost = 1 << 27;
   if (voxels <= kMost) return;
   throw LimitError("a level set of this surface would have " +
@@ -40,7 +40,7 @@ openvdb::FloatGrid::Ptr enclosing_level_set(const TriangleMesh& mesh, double vox
   for (const auto& [a, b, c] : mesh.faces) triangles.emplace_back(a, b, c);
   const auto transform = openvdb::math::Transform::createLinearTransform(voxel);
   return openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(
-      *transform, points, triangles, kHalfWidth);
+      *transform, points, triangles, kBandHalfWidth);
 }
 
 double enclosed_by_level_set(const openvdb::FloatGrid& surface) {

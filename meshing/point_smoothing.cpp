@@ -69,8 +69,8 @@ std::vector<std::optional<Fit>> fits(const TriangleMesh& cloud, size_t neighbors
   const KdTree tree_of_all(cloud.vertices);
   const KdTree tree_of_sure(sure);
   std::vector<std::optional<Fit>> out(cloud.vertices.size());
-  constexpr size_t kGrain = 256;
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), kGrain), [&](const auto& range) {
+  constexpr size_t kBatch = 256;
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), kBatch), [&](const auto& range) {
     std::vector<Neighbor> found;
     for (size_t i = range.begin(); i != range.end(); ++i) {
       const uint32_t v = tree_of_all.order()[i];

@@ -148,7 +148,7 @@ Eigen::Vector3d area_vector(const TriangleMesh& mesh, uint32_t f) {
 }
 
 // Faces without evidence that hang together over edges.
-struct Patch {
+struct FacePatch {
   std::vector<uint32_t> faces;
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // sum of area vectors
   Eigen::Vector3d rim_direction = Eigen::Vector3d::Zero();
@@ -165,7 +165,7 @@ class PatchLabeller {
   void label(double gap) {
     for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
       if (seen_[f] != 0 || has_evidence(f)) continue;
-      const Patch patch = patch_from(f);
+      const FacePatch patch = patch_from(f);
       const bool alike = patch.direction.dot(patch.rim_direction) >
                          0.5 * patch.direction.norm() * patch.rim_direction.norm();
       if (patch.at_border || patch.rim_is_virtual || !(patch.area <= gap * gap) || !alike ||
@@ -179,8 +179,8 @@ class PatchLabeller {
  private:
   bool has_evidence(uint32_t f) const { return mesh_.provenance[f] != Provenance::Inferred; }
 
-  Patch patch_from(uint32_t start) {
-    Patch patch;
+  FacePatch patch_from(uint32_t start) {
+    FacePatch patch;
     patch.faces = {start};
     seen_[start] = 1;
     for (size_t i = 0; i < patch.faces.size(); ++i) {
@@ -201,7 +201,7 @@ class PatchLabeller {
   }
 
   // Euler characteristic 1.
-  bool is_disc(const Patch& patch) const {
+  bool is_disc(const FacePatch& patch) const {
     std::vector<uint32_t> vertices;
     std::vector<Edge> edges;
     for (const uint32_t f : patch.faces) {

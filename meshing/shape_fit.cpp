@@ -34,7 +34,7 @@ struct Patch {
 };
 
 // A part of a face: its corners [radii from the middle of the ball], and their weights in the face.
-struct Piece {
+struct FacePart {
   std::array<Eigen::Vector3d, 3> corner;
   std::array<Eigen::Vector3d, 3> weights;
 
@@ -46,11 +46,11 @@ struct Piece {
   double side(size_t k) const { return (corner.at((k + 1) % 3) - corner.at(k)).norm(); }
   double longest() const { return std::max({side(0), side(1), side(2)}); }
   // Across the longest side, so that the parts of a long thin face are no thinner than it.
-  std::array<Piece, 2> halves() const {
+  std::array<FacePart, 2> halves() const {
     size_t k = 0;
     while (side(k) < longest()) ++k;
     const size_t next = (k + 1) % 3;
-    std::array<Piece, 2> out = {*this, *this};
+    std::array<FacePart, 2> out = {*this, *this};
     out[0].corner.at(next) = out[1].corner.at(k) = (corner.at(k) + corner.at(next)) / 2;
     out[0].weights.at(next) = out[1].weights.at(k) = (weights.at(k) + weights.at(next)) / 2;
     return out;
@@ -72,7 +72,7 @@ struct Collected {
 
 // Splits a piece of face f into n x n equal triangles and takes the middles of those within the
 // ball.
-void add_samples(const Collected& to, uint32_t f, const Piece& piece) {
+void add_samples(const Collected& to, uint32_t f, const FacePart& piece) {
   const MeasurableMesh& mesh = to.mesh;
   Patch& patch = to.patch;
   CornerShares& shares = to.shares;
@@ -118,7 +118,7 @@ void add_samples(const Collected& to, uint32_t f, const Piece& piece) {
 }
 
 // Of a large face only what is near the ball. \param depth  how often the face was halved
-void add_piece(const Collected& to, uint32_t f, const Piece& piece, int depth) {
+void add_piece(const Collected& to, uint32_t f, const FacePart& piece, int depth) {
   constexpr double kLongest = 16;  // [radii]
   constexpr int kDeepest = 128;    // for balls so small that nothing is within reach of double
   if (!piece.meets_ball() || depth > kDeepest) return;
@@ -126,7 +126,7 @@ void add_piece(const Collected& to, uint32_t f, const Piece& piece, int depth) {
     add_samples(to, f, piece);
     return;
   }
-  for (const Piece& half : piece.halves()) add_piece(to, f, half, depth + 1);
+  for (const FacePart& half : piece.halves()) add_piece(to, f, half, depth + 1);
 }
 
 // Vertices in one place, as in files without shared vertices, are one corner: they err together.
@@ -159,7 +159,7 @@ Patch patch_within(const MeasurableMesh& mesh, const Eigen::Vector3d& center, do
   CornerShares shares{std::vector<double>(mesh.points.size(), 0),
                       std::vector<double>(mesh.points.size(), 0)};
   for (uint32_t f = 0; f < mesh.mesh.faces.size(); ++f) {
-    Piece whole;
+    FacePart whole;
     for (size_t k = 0; k < 3; ++k) {
       whole.corner.at(k) = (mesh.points[mesh.mesh.faces[f].at(k)] - center) / radius;
       whole.weights.at(k) = Eigen::Vector3d::Unit(static_cast<Eigen::Index>(k));

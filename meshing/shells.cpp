@@ -18,13 +18,13 @@ constexpr double kTouches = 1e-6;  // [diagonals of the shell]
 
 // Whether faces have an area beyond what rounding makes of a line.
 bool has_area(const MeasurableMesh& mesh, double diagonal) {
-  constexpr double kRounding = 1e-12;
+  constexpr double kThinnest = 1e-12;
   double twice = 0;
   for (const auto& f : mesh.mesh.faces) {
     const Eigen::Vector3d& a = mesh.points[f[0]];
     twice += (mesh.points[f[1]] - a).cross(mesh.points[f[2]] - a).norm();
   }
-  return twice > kRounding * diagonal * diagonal;
+  return twice > kThinnest * diagonal * diagonal;
 }
 
 // Per shell those that surround it.

@@ -70,7 +70,7 @@ struct Observation {
   }
 };
 
-struct Reprojection {
+struct Projection {
   const Observation* point;
 
   template <typename T>
@@ -126,10 +126,9 @@ void solve(const std::vector<Observation>& points,
   for (const Observation& p : points) {
     if (count[p.view] < kFewestPoints) continue;
     // The loss is per block, so every point needs its own.
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<Reprojection, 2, 2>(new Reprojection{&p}),
-        new ceres::CauchyLoss(loss_scale),
-        solution[p.view].data());
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Projection, 2, 2>(new Projection{&p}),
+                             new ceres::CauchyLoss(loss_scale),
+                             solution[p.view].data());
   }
   if (problem.NumResidualBlocks() == 0) return;
   ceres::Solver::Options options;

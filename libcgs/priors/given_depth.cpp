@@ -16,7 +16,7 @@ namespace cgs {
 
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNotMeasured = std::numeric_limits<float>::quiet_NaN();
 constexpr double kWorstSensor = 0.2;  // relative scatter beyond which depth is not metric
 constexpr double kNoFit = 1;          // scatter that stands for none
 
@@ -220,7 +220,7 @@ class Fitter {
       out_.views[k] = {view(k).given_depth, lines[k]->scatter};
       for (float& z : out_.views[k].depth.data) {
         const double value = lines[k]->at(double(z));
-        z = value > 0 ? static_cast<float>(is_disparity ? 1 / value : value) : kNaN;
+        z = value > 0 ? static_cast<float>(is_disparity ? 1 / value : value) : kNotMeasured;
       }
     }
     const bool is_used = worst > 0;

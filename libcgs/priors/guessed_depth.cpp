@@ -18,7 +18,7 @@ namespace cgs {
 
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoGuess = std::numeric_limits<float>::quiet_NaN();
 constexpr double kFloor = 0.005;   // relative sigma that no guess goes below
 constexpr double kDeviations = 3;  // of the fit: beyond, given or measured depth is wrong
 
@@ -28,8 +28,8 @@ bool is_usable(const View& view, int x, int y) {
 
 // A guess and how far the next measured pixel is.
 struct Bent {
-  float depth = kNaN;  // [internal units]
-  float distance = 0;  // [pixels]
+  float depth = kNoGuess;  // [internal units]
+  float distance = 0;      // [pixels]
 };
 
 // Fitted depth at one pixel, corrected by what is measured around it.
@@ -193,8 +193,8 @@ GuessErrors try_out(const FittedDepth& fitted, const View& view, const ViewPrior
 
 // What a view shows at a pixel, measured or guessed.
 struct Shown {
-  float depth = kNaN;
-  float sigma = kNaN;
+  float depth = kNoGuess;
+  float sigma = kNoGuess;
   bool is_guess = false;
 };
 
@@ -226,8 +226,8 @@ bool floats(double z, double sigma, const Shown& shown) {
 }  // namespace
 
 DepthGuess guess_depth(const FittedDepth& fitted, const View& view, const ViewPriors& priors) {
-  DepthGuess out{DepthMap(fitted.depth.width, fitted.depth.height, kNaN),
-                 DepthMap(fitted.depth.width, fitted.depth.height, kNaN)};
+  DepthGuess out{DepthMap(fitted.depth.width, fitted.depth.height, kNoGuess),
+                 DepthMap(fitted.depth.width, fitted.depth.height, kNoGuess)};
   const GuessErrors errors = try_out(fitted, view, priors);
   const Raster<Bent> bent = bend(fitted, view, priors);
   // What measured pixels around correct is theirs to correct; soon after, the fit is all there is.
@@ -275,7 +275,7 @@ void remove_contradictions(const std::vector<Camera>& cameras,
     }
   }
   for (const auto& [view, pixel] : contradicted) {
-    guesses[view].depth.data[pixel] = guesses[view].sigma.data[pixel] = kNaN;
+    guesses[view].depth.data[pixel] = guesses[view].sigma.data[pixel] = kNoGuess;
   }
 }
 

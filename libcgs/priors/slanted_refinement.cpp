@@ -18,10 +18,10 @@ namespace cgs {
 
 namespace {
 
-constexpr int kRadius = 4;
-constexpr int kSide = 2 * kRadius + 1;
-constexpr size_t kTaps = (kSide * kSide + 1) / 2;  // every other pixel, like a chessboard
-constexpr size_t kSamples = (kTaps + 7) / 8 * 8;   // padded with weight 0
+constexpr int kPatchRadius = 4;
+constexpr int kPatchSide = 2 * kPatchRadius + 1;
+constexpr size_t kTaps = (kPatchSide * kPatchSide + 1) / 2;  // every other pixel, like a chessboard
+constexpr size_t kSamples = (kTaps + 7) / 8 * 8;             // padded with weight 0
 constexpr size_t kCenter = kTaps / 2;
 constexpr float kLevelScale = 12;       // bilateral weight halves at this difference [gray levels]
 constexpr float kDistanceScale = 1.6f;  // … and at this distance [pixels]
@@ -61,10 +61,10 @@ struct OffsetTable {
   Samples dx{}, dy{};
   OffsetTable() {
     for (size_t i = 0; i < kTaps; ++i) {
-      const int column = static_cast<int>(2 * i) % kSide;
-      const int row = static_cast<int>(2 * i) / kSide;
-      dx[i] = static_cast<float>(column - kRadius);
-      dy[i] = static_cast<float>(row - kRadius);
+      const int column = static_cast<int>(2 * i) % kPatchSide;
+      const int row = static_cast<int>(2 * i) / kPatchSide;
+      dx[i] = static_cast<float>(column - kPatchRadius);
+      dy[i] = static_cast<float>(row - kPatchRadius);
     }
   }
 };

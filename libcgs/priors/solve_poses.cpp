@@ -312,13 +312,13 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
 // The photographs without the focal lengths that a solution lies three sigma away from, if any.
 std::optional<std::vector<UnposedPhoto>> without_refuted(const std::vector<UnposedPhoto>& photos,
                                                          const PoseSolution& solution) {
-  constexpr double kSigmas = 3;
+  constexpr double kRefutingSigmas = 3;
   std::vector<UnposedPhoto> out = photos;
   bool any = false;
   for (size_t i = 0; i < photos.size(); ++i) {
     if (!solution.photos[i].is_placed || !(photos[i].focal_sigma > 0)) continue;
     const double off = std::abs(std::log(solution.photos[i].camera.fx / photos[i].focal));
-    if (off <= kSigmas * photos[i].focal_sigma) continue;
+    if (off <= kRefutingSigmas * photos[i].focal_sigma) continue;
     any = true;
     for (UnposedPhoto& photo : out) {
       if (photo.lens == photos[i].lens) photo.focal = photo.focal_sigma = 0;

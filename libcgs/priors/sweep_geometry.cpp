@@ -65,19 +65,19 @@ SweepSource source_of(const Camera& reference, const Camera& other, double inver
 // of its ray that the source sees.
 double largest_speed(const Camera& reference, const Camera& other, double near_t, SweepSource s) {
   constexpr int kGrid = 8;
-  constexpr int kSteps = 32;
+  constexpr int kDepths = 32;
   double speed = 0;
   for (int i = 0; i <= kGrid; ++i) {
     for (int j = 0; j <= kGrid; ++j) {
       const double u = reference.width * double(i) / kGrid;
       const double v = reference.height * double(j) / kGrid;
-      for (int k = 0; k <= kSteps; ++k) {
-        const Eigen::Vector3d h = s.project(u, v, near_t * k / kSteps);
+      for (int k = 0; k <= kDepths; ++k) {
+        const Eigen::Vector3d h = s.project(u, v, near_t * k / kDepths);
         const Eigen::Vector2d q = h.head<2>() / h.z();
         const bool seen =
             h.z() > 0 && q.x() >= 0 && q.y() >= 0 && q.x() <= other.width && q.y() <= other.height;
         if (!seen) continue;
-        speed = std::max(speed, s.parallax(u, v, near_t * k / kSteps));
+        speed = std::max(speed, s.parallax(u, v, near_t * k / kDepths));
       }
     }
   }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-struct Step {
+struct PixelStep {
   int dx, dy;
 };
 
@@ -32,7 +32,7 @@ class Surface {
     return inverse_depth_.contains(x, y) ? inverse_depth_(x, y) : kNan;
   }
 
-  bool continues(int x, int y, Step s) const {
+  bool continues(int x, int y, PixelStep s) const {
     constexpr float kSteepest = 0.1f;   // step of a slanted surface, part of the inverse depth
     constexpr float kCurvature = 0.5f;  // change from step to step, part of the step
     const float here = at(x, y);
@@ -49,7 +49,7 @@ class Surface {
   }
 
   // Change over one pixel along an axis, of the neighbours on the same surface.
-  float slope(int x, int y, Step s) const {
+  float slope(int x, int y, PixelStep s) const {
     const bool after = continues(x, y, s);
     const bool before = continues(x, y, {-s.dx, -s.dy});
     if (!after && !before) return 0;
@@ -156,7 +156,7 @@ class Canvas {
 }  // namespace
 
 SeenSurface seen_surface(const DepthCells& cells, const Camera& camera) {
-  constexpr std::array<Step, 4> kCorners = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};
+  constexpr std::array<PixelStep, 4> kCorners = {{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};
   const Surface surface(cells);
   const Eigen::Isometry3d cam_from_world = camera.cam_from_world();
   Canvas canvas(camera);

@@ -20,8 +20,8 @@ constexpr size_t kMatchesPerTask = 4096;
 bool known(float depth) { return depth > 0 && std::isfinite(depth); }
 
 // One of the views: world points are centre + depth * direction * (u, v, 1).
-struct View {
-  View(const Camera& camera, const DepthMap& map)
+struct Projected {
+  Projected(const Camera& camera, const DepthMap& map)
       : depth(map),
         centre(camera.center()),
         direction(camera.world_from_cam.linear() * camera.intrinsics().inverse()) {
@@ -44,7 +44,7 @@ struct Sample {
   std::array<double, 4> by_pixel;
 };
 
-Sample sample(const View& view, double u, double v) {
+Sample sample(const Projected& view, double u, double v) {
   const DepthMap& depth = view.depth;
   const double x = u - 0.5;
   const double y = v - 0.5;
@@ -74,8 +74,11 @@ struct Slopes {
 };
 
 // L1 distance between the points of one correspondence; `scale` times its derivatives to `slopes`.
-double distance(
-    const View& first, const View& second, const PixelMatch& match, Slopes& slopes, double scale) {
+double distance(const Projected& first,
+                const Projected& second,
+                const PixelMatch& match,
+                Slopes& slopes,
+                double scale) {
   const float depth = first.depth.data[match.pixel];
   const Sample sampled = sample(second, double(match.u), double(match.v));
   if (!known(depth) || sampled.depth == 0) return 0;
@@ -107,8 +110,8 @@ double flow_consistency(const Camera& first,
                         double weight,
                         Raster<float>& gradient_first,
                         Raster<float>& gradient_second) {
-  const View from(first, depth_first);
-  const View to(second, depth_second);
+  const Projected from(first, depth_first);
+  const Projected to(second, depth_second);
   if (weight == 0) return 0;
   const double scale = weight / static_cast<double>(depth_first.data.size());
   std::vector<Slopes> slopes(matches.size());

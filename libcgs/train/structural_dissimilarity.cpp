@@ -22,34 +22,34 @@ namespace {
 
 constexpr float kC1 = 0.01f * 0.01f;
 constexpr float kC2 = 0.03f * 0.03f;
-constexpr int kRadius = 5;
+constexpr int kReach = 5;
 
-using Window = std::array<float, kRadius + 1>;  // symmetric: the centre, then one side
+using HalfWindow = std::array<float, kReach + 1>;  // symmetric: the centre, then one side
 
-Window window() {
+HalfWindow half_window() {
   constexpr double kSigma = 1.5;
-  std::array<double, kRadius + 1> half{};
+  std::array<double, kReach + 1> half{};
   double sum = 0;
-  for (int k = 0; k <= kRadius; ++k) {
+  for (int k = 0; k <= kReach; ++k) {
     half[k] = std::exp(-k * k / (2 * kSigma * kSigma));
     sum += k == 0 ? half[k] : 2 * half[k];
   }
-  Window out{};
-  for (int k = 0; k <= kRadius; ++k) out[k] = static_cast<float>(half[k] / sum);
+  HalfWindow out{};
+  for (int k = 0; k <= kReach; ++k) out[k] = static_cast<float>(half[k] / sum);
   return out;
 }
 
-// A row with kRadius zeros on both sides.
+// A row with kReach zeros on both sides.
 class PaddedRow {
  public:
-  explicit PaddedRow(int width) : data_(width + size_t(2) * kRadius, 0) {}
-  float* data() { return data_.data() + kRadius; }
+  explicit PaddedRow(int width) : data_(width + size_t(2) * kReach, 0) {}
+  float* data() { return data_.data() + kReach; }
 
  private:
   std::vector<float> data_;
 };
 
-void blur_row(const Window& w, const float* from, int width, float* __restrict to) {
+void blur_row(const HalfWindow& w, const float* from, int width, float* __restrict to) {
   for (int x = 0; x < width; ++x) {
     const float* at = from + x;
     to[x] = w[0] * at[0] + w[1] * (at[-1] + at[1]) + w[2] * (at[-2] + at[2]) +
@@ -57,14 +57,14 @@ void blur_row(const Window& w, const float* from, int width, float* __restrict t
   }
 }
 
-// A raster with kRadius rows of zeros above and below.
+// A raster with kReach rows of zeros above and below.
 class PaddedPlane {
  public:
   PaddedPlane(int width, int height)
-      : width_(width), data_(static_cast<size_t>(width) * (height + 2 * kRadius), 0) {}
-  float* row(int y) { return data_.data() + static_cast<size_t>(y + kRadius) * width_; }
+      : width_(width), data_(static_cast<size_t>(width) * (height + 2 * kReach), 0) {}
+  float* row(int y) { return data_.data() + static_cast<size_t>(y + kReach) * width_; }
 
-  void blur_column(const Window& w, int y, float* __restrict to) {
+  void blur_column(const HalfWindow& w, int y, float* __restrict to) {
     const float* at = row(y);
     const std::ptrdiff_t n = width_;
     for (int x = 0; x < width_; ++x, ++at) {
@@ -187,7 +187,7 @@ class Channel {
   const Raster<float>& rendered_;
   const Raster<float>& photograph_;
   const MaskMap* use_;
-  Window window_ = window();
+  HalfWindow window_ = half_window();
   std::vector<PaddedPlane> means_;        // along rows only: of d, b, d^2, a^2 + b^2
   std::vector<PaddedPlane> derivatives_;  // along rows only: by_d, by_dd, by_aa
 };

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,9 @@ struct Case {
 };
 
 using Cases = std::vector<Case>;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInf = std::numeric_limits<double>::infinity();
 
 Cases general_cases();     ///< G: any file
 Cases gaussian_cases();    ///< P: PLY of Gaussians and of meshes

@@ -5,9 +5,6 @@ namespace cgs::test {
 
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInf = std::numeric_limits<double>::infinity();
-
 Case model_case(const std::string& row,
                 const std::string& damage,
                 const std::string& expected,
@@ -42,7 +39,7 @@ std::string images(const std::function<void(ColmapImageFields&)>& change) {
   return out;
 }
 
-void add_cameras(Cases& cases) {
+void add_colmap_cameras(Cases& cases) {
   cases.push_back(model_case("C01", "2^63 cameras", "COUNT", {"cameras.bin"}, [](ColmapFiles& f) {
     f.cameras.replace(0, 8, packed(uint64_t{1} << 63));
   }));
@@ -243,7 +240,7 @@ Case text_case(const std::string& row,
 
 Cases colmap_cases() {
   Cases cases;
-  add_cameras(cases);
+  add_colmap_cameras(cases);
   add_images(cases);
   add_points(cases);
   cases.push_back({"C18", "binary and text", "OK+W", {".bin"}, [](const fs::path& folder) {

@@ -7,9 +7,6 @@ namespace cgs::test {
 
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInf = std::numeric_limits<double>::infinity();
-
 // A model folder whose Gaussians are these bytes.
 Call render_with(const fs::path& folder, const std::string& ply) {
   write_model_folder(folder);

@@ -126,7 +126,7 @@ void add_paths(Cases& cases) {
   }
 }
 
-void add_cameras(Cases& cases) {
+void add_frame_cameras(Cases& cases) {
   cases.push_back(
       json_case("T16", "no focal length", "SCHEMA", {"fl_x", "camera_angle_x"}, [](Json& d) {
         d.erase("fl_x");
@@ -173,7 +173,7 @@ Cases transforms_cases() {
   add_documents(cases);
   add_matrices(cases);
   add_paths(cases);
-  add_cameras(cases);
+  add_frame_cameras(cases);
   return cases;
 }
 
