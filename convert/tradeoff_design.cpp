@@ -38,14 +38,22 @@ std::string shell_word(const std::string& text) {
   return out + "'";
 }
 
+// Of the presets, which differ in their steps; empty for standard and for other numbers.
+std::string preset_of(int steps) {
+  for (const char* name : {"draft", "fine"}) {
+    if (steps == training_preset(name).steps) return name;
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string label(const Setting& setting) {
   std::string out;
   const auto add = [&](const std::string& text) { out += (out.empty() ? "" : ", ") + text; };
   if (setting.coarser != 1) add("1/" + std::to_string(setting.coarser) + " size");
-  if (setting.steps == training_preset("draft").steps) {
-    add("draft");
+  if (const std::string preset = preset_of(setting.steps); !preset.empty()) {
+    add(preset);
   } else if (setting.steps != TrainingOptions().steps) {
     add(std::to_string(setting.steps) + " steps");
   }
@@ -91,6 +99,7 @@ std::vector<Setting> tradeoff_design() {
       {.voxel = 2},
       {.coarser = 2, .steps = draft},
       {.steps = more},
+      {.steps = training_preset("fine").steps},
       {.simplify = 1},
       {.voxel = 1.5, .simplify = 1, .max_error = 0.4},  // for the smallest file
       {.coarser = 2, .steps = 0, .simplify = 0},        // for the shortest time
@@ -142,8 +151,8 @@ std::string command_line(const RunRequest& request, int threads) {
   add("--marker-size", scene.marker_size);
   if (!scene.up.empty()) out += " --up";
   for (const double number : scene.up) out += " " + exact(number);
-  if (request.training.steps == training_preset("draft").steps) {
-    add("--preset", "draft");
+  if (const std::string preset = preset_of(request.training.steps); !preset.empty()) {
+    add("--preset", preset);
   } else if (request.training.steps != TrainingOptions().steps) {
     add("--set", "steps=" + std::to_string(request.training.steps));
   }

@@ -38,7 +38,7 @@ TEST(TradeoffDesign, TurnsEachThingByItselfAndDoesTheWorkOnce) {
     return std::find(design.begin(), design.end(), s) != design.end();
   };
   for (const int coarser : {2, 4}) EXPECT_TRUE(has({.coarser = coarser}));
-  for (const int steps : {0, 20, 120}) EXPECT_TRUE(has({.steps = steps}));
+  for (const int steps : {0, 20, 120, 240}) EXPECT_TRUE(has({.steps = steps}));
   for (const double voxel : {0.7, 1.5, 2.0}) EXPECT_TRUE(has({.voxel = voxel}));
   for (const double error : {0.0, 0.5, 1.0}) EXPECT_TRUE(has({.simplify = error}));
   for (const double error : {0.1, 0.4}) EXPECT_TRUE(has({.max_error = error}));
@@ -93,6 +93,8 @@ TEST(CommandLine, SurvivesAShell) {
   EXPECT_EQ(words(command_line(r)),
             "cgs\nrun\nmy photos/it's $HOME; #1\n--views\n1,10,19\n--downscale\n2\n--assume-unit\n"
             "m\n--up\n0\n-1\n0.5\n--preset\ndraft\n--voxel-size\n1\n-o\nout/a b\n");
+  r.training.steps = 240;
+  EXPECT_NE(command_line(r).find(" --preset fine"), std::string::npos);
   r.training.steps = 120;
   EXPECT_NE(command_line(r).find("--set steps=120"), std::string::npos);
   EXPECT_EQ(command_line(r).find("--refine-poses"), std::string::npos);
