@@ -128,6 +128,7 @@ void end_at_crash(int signal) {
   throw std::bad_alloc();
 }
 
+// NOLINTNEXTLINE(readability-function-size): as cv::ErrorCallback
 int note_error_of_opencv(int status, const char*, const char*, const char*, int, void*) {
   if (status == cv::Error::StsNoMem) memory_ran_out = true;
   return 0;
