@@ -124,9 +124,8 @@ bool is_identity(const Transform& transform) {
   constexpr int kSteps = 5;
   constexpr float kSame = 1.0f / 255;
   for (int i = 0; i < kSteps * kSteps * kSteps; ++i) {
-    const Eigen::Vector3f in =
-        Eigen::Vector3f(float(i % kSteps), float(i / kSteps % kSteps), float(i / kSteps / kSteps)) /
-        float(kSteps - 1);
+    const Eigen::Vector3i step(i % kSteps, i / kSteps % kSteps, i / kSteps / kSteps);
+    const Eigen::Vector3f in = step.cast<float>() / float(kSteps - 1);
     Eigen::Vector3f out;
     cmsDoTransform(transform.get(), in.data(), out.data(), 1);
     if (!((out - in).cwiseAbs().maxCoeff() <= kSame)) return false;

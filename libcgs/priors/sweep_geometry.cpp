@@ -63,7 +63,10 @@ SweepSource source_of(const Camera& reference, const Camera& other, double inver
 
 // Longest way a pixel of the reference goes in the source, per unit of inverse depth, on the part
 // of its ray that the source sees.
-double largest_speed(const Camera& reference, const Camera& other, double near_t, SweepSource s) {
+double largest_speed(const Camera& reference,
+                     const Camera& other,
+                     double near_t,
+                     const SweepSource& s) {
   constexpr int kGrid = 8;
   constexpr int kDepths = 32;
   double speed = 0;
