@@ -299,7 +299,8 @@ void warn_of_points(const std::vector<Sighted>& points,
         (s.point.is_check ? "check point " : "control point ") + printable(s.point.name);
     const auto remark = told["remark"].get<std::string>();
     if (!remark.empty()) {
-      std::string text = name + (is_compared ? " " : " left out: ") + remark;
+      std::string text = name;
+      text.append(is_compared ? " " : " left out: ").append(remark);
       if (s.meeting) {
         const Json& off = told["residual"];
         const Eigen::Vector3d v(off[0], off[1], off[2]);

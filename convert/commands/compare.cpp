@@ -82,7 +82,7 @@ Registration lay_onto(MeasurableMesh& a,
                       bool with_scale,
                       const Terminal& terminal) {
   constexpr size_t kPoints = 20'000;
-  const Registration out =
+  Registration out =
       register_points(seen_places(points_by_area(a, kPoints)), b, surface, with_scale);
   if (!out.converged) {
     terminal.warn({"--icp still moved A after " + std::to_string(out.iterations) +
