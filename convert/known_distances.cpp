@@ -72,14 +72,14 @@ struct Picked {
 
 // The pixel with a measured depth that is next to a point of the image, within reach; -1 if none.
 int next_measured(const ViewPriors& priors, const Eigen::Vector2d& at) {
-  constexpr int kSearch = 2;  // [pixels]; corners, which people pick, are often not matched
+  constexpr int kReach = 2;  // [pixels]; corners, which people pick, are often not matched
   const int x0 = static_cast<int>(std::floor(at.x()));
   const int y0 = static_cast<int>(std::floor(at.y()));
   int best = -1;
   double least = std::numeric_limits<double>::infinity();
-  for (int y = std::max(0, y0 - kSearch); y <= std::min(priors.origin.height - 1, y0 + kSearch);
+  for (int y = std::max(0, y0 - kReach); y <= std::min(priors.origin.height - 1, y0 + kReach);
        ++y) {
-    for (int x = std::max(0, x0 - kSearch); x <= std::min(priors.origin.width - 1, x0 + kSearch);
+    for (int x = std::max(0, x0 - kReach); x <= std::min(priors.origin.width - 1, x0 + kReach);
          ++x) {
       const double distance = (Eigen::Vector2d(x + 0.5, y + 0.5) - at).squaredNorm();
       if (priors.origin(x, y) != DepthOrigin::Measured || distance >= least) continue;

@@ -124,7 +124,6 @@ using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255
 
 UnposedPhoto unposed_photo(MaskIndex& masks,
                            const PhotoFile& photograph,
-                           double focal,
                            bool from_aside,
                            const Progress& progress,
                            Colors& colors) {
@@ -140,8 +139,8 @@ UnposedPhoto unposed_photo(MaskIndex& masks,
   out.height = image.height;
   out.features = from_aside ? detect_tilted_features(image, usable, {}, progress)
                             : detect_features(image, usable);
-  out.focal = focal > 0 ? focal : photograph.hint.focal;
-  out.focal_sigma = focal > 0 ? 0 : photograph.hint.sigma;
+  out.focal = photograph.hint.focal;
+  out.focal_sigma = photograph.hint.sigma;
   for (const Eigen::Vector2d& p : out.features.points) {
     const int x = std::clamp(static_cast<int>(p.x()), 0, image.width - 1);
     const int y = std::clamp(static_cast<int>(p.y()), 0, image.height - 1);
@@ -273,9 +272,13 @@ Attempt attempted(MaskIndex& masks,
     const Progress part =
         part_of(progress, kShare * double(i) / count, kShare * double(i + 1) / count);
     report(part, 0);
-    out.photos.push_back(
-        unposed_photo(masks, photographs[i], focal, from_aside, part, out.colors[i]));
-    out.photos.back().lens = lens_of(photographs[i], lenses);
+    UnposedPhoto photo = unposed_photo(masks, photographs[i], from_aside, part, out.colors[i]);
+    photo.lens = lens_of(photographs[i], lenses);
+    if (focal > 0) {
+      photo.focal = focal;
+      photo.focal_sigma = 0;
+    }
+    out.photos.push_back(std::move(photo));
   }
   out.solution = solve_poses(out.photos, part_of(progress, kShare, 1));
   return out;

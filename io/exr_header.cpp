@@ -8,7 +8,7 @@ namespace cgs {
 
 namespace {
 
-constexpr uint32_t kExrMagic = 0x01312f76;
+constexpr uint32_t kMagic = 0x01312f76;
 constexpr uint32_t kTiled = 0x200;
 constexpr uint32_t kDeep = 0x800;
 constexpr uint32_t kMultiPart = 0x1000;
@@ -42,7 +42,7 @@ class ExrScreen {
 
  private:
   void check_version() {
-    if (reader_.get<uint32_t>("magic number") != kExrMagic) {
+    if (reader_.get<uint32_t>("magic number") != kMagic) {
       reader_.fail(Defect::Magic, "expected OpenEXR");
     }
     const auto version = reader_.get<uint32_t>("version");

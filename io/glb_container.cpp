@@ -14,7 +14,7 @@ namespace cgs {
 
 namespace {
 
-constexpr uint32_t kGlbMagic = 0x46546C67;   // "glTF"
+constexpr uint32_t kMagic = 0x46546C67;      // "glTF"
 constexpr uint32_t kJsonChunk = 0x4E4F534A;  // "JSON"
 constexpr uint32_t kBinaryChunk = 0x004E4942;
 
@@ -101,7 +101,7 @@ GlbContainer::GlbContainer(std::string content, const std::filesystem::path& pat
     : path_(path), content_(std::move(content)) {
   refuse_foreign_content(path, content_, "GLB");
   ByteReader in(content_, path);
-  if (in.get<uint32_t>("magic") != kGlbMagic) {
+  if (in.get<uint32_t>("magic") != kMagic) {
     throw BadInput(Defect::Magic, path, "not a binary glTF file: does not start with 'glTF'");
   }
   if (const auto version = in.get<uint32_t>("version"); version != 2) {

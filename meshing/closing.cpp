@@ -14,10 +14,10 @@
 #include <Eigen/Geometry>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/face_adjacency.h"
 #include "meshing/boolean.h"
 #include "meshing/closed_isosurface.h"
 #include "meshing/components.h"
-#include "meshing/face_adjacency.h"
 #include "meshing/hole_filling.h"
 #include "meshing/lidded_volume.h"
 #include "meshing/mesh_level_set.h"

@@ -10,8 +10,8 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/face_adjacency.h"
 #include "libcgs/core/order_statistics.h"
-#include "meshing/face_adjacency.h"
 #include "meshing/projected_faces.h"
 
 namespace cgs {
@@ -20,15 +20,6 @@ namespace {
 
 constexpr double kMinCosine = 0.1;
 constexpr float kDepthTolerance = 1.5f;  // [pixel footprints]
-
-/// Twice the area, as a vector along the normal.
-Eigen::Vector3d area_vector(const TriangleMesh& mesh, size_t f) {
-  const auto& face = mesh.faces[f];
-  const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
-  const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>();
-  const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>();
-  return (b - a).cross(c - a);
-}
 
 /// What one view shows of a mesh.
 class ViewScorer {
@@ -44,7 +35,7 @@ class ViewScorer {
 
   float score(size_t f) const {
     if (!faces_[f].in_front) return 0;
-    const Eigen::Vector3d normal = area_vector(mesh_, f);
+    const Eigen::Vector3d normal = area_vector(mesh_, mesh_.faces[f]);
     const Eigen::Vector3d to_eye = eye_ - mesh_.vertices[mesh_.faces[f][0]].cast<double>();
     const double cosine = normal.dot(to_eye) / (normal.norm() * to_eye.norm());
     if (!(cosine >= kMinCosine)) return 0;
@@ -136,7 +127,7 @@ class Labelling {
     best_.resize(n);
     std::vector<float> densities;
     for (size_t f = 0; f < n; ++f) {
-      area_[f] = static_cast<float>(0.5 * area_vector(mesh, f).norm());
+      area_[f] = static_cast<float>(0.5 * area_vector(mesh, mesh.faces[f]).norm());
       for (size_t k = 0; k < 3; ++k) {
         const Eigen::Vector3f& p = mesh.vertices[mesh.faces[f].at(k)];
         length_[f].at(k) = (mesh.vertices[mesh.faces[f].at((k + 1) % 3)] - p).norm();

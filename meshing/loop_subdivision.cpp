@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "meshing/face_adjacency.h"
+#include "libcgs/core/face_adjacency.h"
 #include "meshing/face_split.h"
 #include "meshing/remeshing.h"
 #include "meshing/vertex_attributes.h"
@@ -23,16 +23,16 @@ bool has_evidence(const TriangleMesh& mesh, size_t face) {
 }
 
 /// An edge with the corners opposite to it.
-struct EdgeWithTips {
+struct Edge {
   uint32_t low, high;
   uint32_t tip, other_tip;
   bool sharp;
 };
 
-std::vector<EdgeWithTips> edges_of(const TriangleMesh& mesh) {
+std::vector<Edge> edges_of(const TriangleMesh& mesh) {
   const std::vector<FaceSide> sides = sides_by_edge(mesh);
   const auto tip = [&](const FaceSide& s) { return mesh.faces[s.face].at((s.side + 2) % 3); };
-  std::vector<EdgeWithTips> out;
+  std::vector<Edge> out;
   for (size_t i = 0; i < sides.size();) {
     size_t end = i + 1;
     while (end < sides.size() && sides[end].same_edge(sides[i])) ++end;
@@ -70,18 +70,17 @@ struct Around {
 };
 
 // Where the vertices of the mesh, and then those in the middle of its edges, come to lie.
-std::vector<Eigen::Vector3d> places(const TriangleMesh& mesh,
-                                    const std::vector<EdgeWithTips>& edges) {
+std::vector<Eigen::Vector3d> places(const TriangleMesh& mesh, const std::vector<Edge>& edges) {
   const auto at = [&](uint32_t v) -> Eigen::Vector3d { return mesh.vertices[v].cast<double>(); };
   std::vector<Around> around(mesh.vertices.size());
-  for (const EdgeWithTips& e : edges) {
+  for (const Edge& e : edges) {
     around[e.low].add(at(e.high), e.sharp);
     around[e.high].add(at(e.low), e.sharp);
   }
   std::vector<Eigen::Vector3d> out;
   out.reserve(mesh.vertices.size() + edges.size());
   for (uint32_t v = 0; v < around.size(); ++v) out.push_back(around[v].moved(at(v)));
-  for (const EdgeWithTips& e : edges) {
+  for (const Edge& e : edges) {
     const Eigen::Vector3d ends = at(e.low) + at(e.high);
     out.emplace_back(e.sharp
                          ? Eigen::Vector3d(ends / 2)
@@ -91,12 +90,12 @@ std::vector<Eigen::Vector3d> places(const TriangleMesh& mesh,
 }
 
 TriangleMesh loop_subdivided_once(const TriangleMesh& mesh) {
-  const std::vector<EdgeWithTips> edges = edges_of(mesh);
+  const std::vector<Edge> edges = edges_of(mesh);
   const std::vector<Eigen::Vector3d> to = places(mesh, edges);
   TriangleMesh out = mesh;
   out.faces.clear();
   out.provenance.clear();
-  for (const EdgeWithTips& e : edges) {
+  for (const Edge& e : edges) {
     append_blend(out, mesh, std::array<VertexShare, 2>{{{e.low, 0.5f}, {e.high, 0.5f}}});
   }
   for (size_t v = 0; v < to.size(); ++v) {
@@ -107,13 +106,10 @@ TriangleMesh loop_subdivided_once(const TriangleMesh& mesh) {
   }
   const auto middle = [&](uint32_t a, uint32_t b) {
     const auto [low, high] = std::minmax(a, b);
-    const auto found =
-        std::lower_bound(edges.begin(),
-                         edges.end(),
-                         std::pair(low, high),
-                         [](const EdgeWithTips& e, const auto& ends) {
-                           return std::tie(e.low, e.high) < std::tie(ends.first, ends.second);
-                         });
+    const auto found = std::lower_bound(
+        edges.begin(), edges.end(), std::pair(low, high), [](const Edge& e, const auto& ends) {
+          return std::tie(e.low, e.high) < std::tie(ends.first, ends.second);
+        });
     return static_cast<uint32_t>(mesh.vertices.size() + size_t(found - edges.begin()));
   };
   split_faces(mesh, middle, out);

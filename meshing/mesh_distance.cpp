@@ -15,7 +15,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "meshing/face_adjacency.h"
+#include "libcgs/core/face_adjacency.h"
 #include "meshing/triangle_tree.h"
 
 namespace cgs {

@@ -23,7 +23,7 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-Kernel::Point_3 exact_point(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
+Kernel::Point_3 to_cgal(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
 
 // A side of a face, without direction, between places.
 struct Edge {
@@ -108,9 +108,9 @@ std::vector<uint32_t> proper_faces(const MeasurableMesh& mesh) {
   std::vector<uint32_t> out;
   for (uint32_t f = 0; f < mesh.mesh.faces.size(); ++f) {
     const auto& face = mesh.mesh.faces[f];
-    const bool is_line = CGAL::collinear(exact_point(mesh.points[face[0]]),
-                                         exact_point(mesh.points[face[1]]),
-                                         exact_point(mesh.points[face[2]]));
+    const bool is_line = CGAL::collinear(to_cgal(mesh.points[face[0]]),
+                                         to_cgal(mesh.points[face[1]]),
+                                         to_cgal(mesh.points[face[2]]));
     if (!is_line) out.push_back(f);
   }
   return out;

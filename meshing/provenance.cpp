@@ -11,7 +11,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "meshing/face_adjacency.h"
+#include "libcgs/core/face_adjacency.h"
 #include "meshing/volume.h"
 
 namespace cgs {
@@ -139,16 +139,8 @@ void spread_colors(TriangleMesh& mesh) {
 
 using Edge = std::array<uint32_t, 2>;
 
-Eigen::Vector3d area_vector(const TriangleMesh& mesh, uint32_t f) {
-  const auto& face = mesh.faces[f];
-  const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
-  const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>();
-  const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>();
-  return 0.5 * (b - a).cross(c - a);
-}
-
 // Faces without evidence that hang together over edges.
-struct FacePatch {
+struct Patch {
   std::vector<uint32_t> faces;
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // sum of area vectors
   Eigen::Vector3d rim_direction = Eigen::Vector3d::Zero();
@@ -165,7 +157,7 @@ class PatchLabeller {
   void label(double gap) {
     for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
       if (seen_[f] != 0 || has_evidence(f)) continue;
-      const FacePatch patch = patch_from(f);
+      const Patch patch = patch_from(f);
       const bool alike = patch.direction.dot(patch.rim_direction) >
                          0.5 * patch.direction.norm() * patch.rim_direction.norm();
       if (patch.at_border || patch.rim_is_virtual || !(patch.area <= gap * gap) || !alike ||
@@ -179,18 +171,18 @@ class PatchLabeller {
  private:
   bool has_evidence(uint32_t f) const { return mesh_.provenance[f] != Provenance::Inferred; }
 
-  FacePatch patch_from(uint32_t start) {
-    FacePatch patch;
+  Patch patch_from(uint32_t start) {
+    Patch patch;
     patch.faces = {start};
     seen_[start] = 1;
     for (size_t i = 0; i < patch.faces.size(); ++i) {
       const uint32_t f = patch.faces[i];
-      const Eigen::Vector3d area = area_vector(mesh_, f);
+      const Eigen::Vector3d area = 0.5 * area_vector(mesh_, mesh_.faces[f]);
       patch.direction += area;
       patch.area += area.norm();
       for (const uint32_t g : adjacent_[f]) {
         if (g == f) patch.at_border = true;
-        if (has_evidence(g)) patch.rim_direction += area_vector(mesh_, g);
+        if (has_evidence(g)) patch.rim_direction += 0.5 * area_vector(mesh_, mesh_.faces[g]);
         if (mesh_.provenance[g] == Provenance::Virtual) patch.rim_is_virtual = true;
         if (seen_[g] != 0 || has_evidence(g)) continue;
         seen_[g] = 1;
@@ -201,7 +193,7 @@ class PatchLabeller {
   }
 
   // Euler characteristic 1.
-  bool is_disc(const FacePatch& patch) const {
+  bool is_disc(const Patch& patch) const {
     std::vector<uint32_t> vertices;
     std::vector<Edge> edges;
     for (const uint32_t f : patch.faces) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "meshing/face_adjacency.h"
+#include "libcgs/core/face_adjacency.h"
 
 #include <algorithm>
 #include <tuple>
