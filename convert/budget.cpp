@@ -203,15 +203,16 @@ Sizes usable_sizes(const RunRequest& request, const Scene& scene) {
   for (const View& view : scene.views) {
     side = std::min({side, view.camera.width, view.camera.height});
   }
-  const MeasuredFiles measured = measured_files(request);
-  const CoherenceOptions& coherence = request.training.coherence;
+  PictureWork work = {.chooses_voxels = request.voxel_size.empty(),
+                      .measured = measured_files(request),
+                      .coherence = request.training.coherence};
   const size_t budget = memory_budget(request.memory_limit);
   Sizes out;
   for (const int size : kSizes) {
     if (size > 1 && side / size < kLeastSide) break;
+    work.downscale = size;
     size_t most = 0;
-    for (const StageMemory& stage :
-         memory_plan(scene, request.voxel_size.empty(), measured, coherence, size)) {
+    for (const StageMemory& stage : memory_plan(scene, work)) {
       most = std::max(most, stage.bytes);
     }
     if (most <= budget) {

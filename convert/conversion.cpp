@@ -298,6 +298,53 @@ void check_before_work(const ConversionRequest& request, const Source& source, C
   (void)simplify_options(request.simplify, 1, source.frame);
 }
 
+// The axes and the unit that the output has.
+void settle_frame(const ConversionRequest& request, Source& source) {
+  const bool keeps_axes = source.content == Content::Mesh && !is_turned_upright(request.output);
+  if (!keeps_axes || !request.up.empty()) {
+    settle_up(source.frame, request.up, source.content == Content::Splats);
+  }
+  if (request.assume_unit.empty()) return;
+  const std::string refused = assume_unit(source.frame, request.assume_unit);
+  if (!refused.empty()) source.warnings.push_back(refused);
+}
+
+void write_as_splats(const ConversionRequest& request,
+                     const Source& source,
+                     Terminal& terminal,
+                     Json& report) {
+  report["output"] =
+      write_splat_file(request.output,
+                       source.model ? source.model->gaussians : source.splats->gaussians,
+                       source.frame,
+                       {request.spz_version,
+                        request.volume.memory_limit,
+                        source.model ? source.model->evidence : source.splats->evidence},
+                       terminal);
+}
+
+// Says what of it the file cannot hold.
+void write_as_mesh(const ConversionRequest& request,
+                   const Source& source,
+                   Terminal& terminal,
+                   Json& report) {
+  if (source.mesh.faces.empty() && lower_extension(request.output) != ".ply") {
+    throw BadInput(
+        Defect::Empty, request.input, "has no faces; a point cloud can only be written as .ply");
+  }
+  for (const std::string& lost : {textures_text(source.has_textures),
+                                  lost_in_file(request.output, source.mesh, source.frame)}) {
+    if (!lost.empty()) terminal.say(lost);
+  }
+  if (source.content == Content::Mesh) {
+    const std::string moved =
+        moved_origin_text(request.output, source.file_origin, source.frame.file_origin);
+    if (!moved.empty()) terminal.warn(moved);
+  }
+  const std::string lost_by_encoding = write_mesh(request, source, source.mesh, report);
+  if (!lost_by_encoding.empty()) terminal.say(lost_by_encoding);
+}
+
 }  // namespace
 
 std::string conversion_table() {
@@ -319,14 +366,7 @@ std::string conversion_table() {
 Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   ConversionRequest request = given;
   Source source = read_source(request.input, request.volume.memory_limit);
-  const bool keeps_axes = source.content == Content::Mesh && !is_turned_upright(request.output);
-  if (!keeps_axes || !request.up.empty()) {
-    settle_up(source.frame, request.up, source.content == Content::Splats);
-  }
-  if (!request.assume_unit.empty()) {
-    const std::string refused = assume_unit(source.frame, request.assume_unit);
-    if (!refused.empty()) source.warnings.push_back(refused);
-  }
+  settle_frame(request, source);
   const Content wanted = wanted_content(request, source.content);
   check_before_work(request, source, wanted);
   // Splats of others are rough at the size of a voxel: hardly a face could go within a part of one.
@@ -342,14 +382,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
     report["floaters"] = leave_out_floaters(*source.splats, request.volume.memory_limit, terminal);
   }
   if (wanted == Content::Splats) {
-    report["output"] =
-        write_splat_file(request.output,
-                         source.model ? source.model->gaussians : source.splats->gaussians,
-                         source.frame,
-                         {request.spz_version,
-                          request.volume.memory_limit,
-                          source.model ? source.model->evidence : source.splats->evidence},
-                         terminal);
+    write_as_splats(request, source, terminal, report);
     return report;
   }
   const bool from_splats_alone = source.splats.has_value();
@@ -372,21 +405,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   } else if (!request.simplify.empty()) {
     simplify_mesh(request, source, terminal);
   }
-  if (source.mesh.faces.empty() && lower_extension(request.output) != ".ply") {
-    throw BadInput(
-        Defect::Empty, request.input, "has no faces; a point cloud can only be written as .ply");
-  }
-  for (const std::string& lost : {textures_text(source.has_textures),
-                                  lost_in_file(request.output, source.mesh, source.frame)}) {
-    if (!lost.empty()) terminal.say(lost);
-  }
-  if (source.content == Content::Mesh) {
-    const std::string moved =
-        moved_origin_text(request.output, source.file_origin, source.frame.file_origin);
-    if (!moved.empty()) terminal.warn(moved);
-  }
-  const std::string lost_by_encoding = write_mesh(request, source, source.mesh, report);
-  if (!lost_by_encoding.empty()) terminal.say(lost_by_encoding);
+  write_as_mesh(request, source, terminal, report);
   return report;
 }
 

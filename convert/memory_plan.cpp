@@ -132,34 +132,30 @@ void refuse_above(size_t budget, MostAt most_at) {
 
 }  // namespace
 
-std::vector<StageMemory> memory_plan(const Scene& scene,
-                                     bool chooses_voxels,
-                                     const MeasuredFiles& measured,
-                                     const CoherenceOptions& coherence,
-                                     int downscale) {
-  const PictureSizes input = picture_sizes(scene, scene.input, downscale);
-  const PictureSizes held_out = picture_sizes(scene, scene.held_out, downscale);
-  const double reading_input = of_reading(scene, scene.input, downscale);
-  const double reading_held_out = of_reading(scene, scene.held_out, downscale);
+std::vector<StageMemory> memory_plan(const Scene& scene, const PictureWork& work) {
+  const PictureSizes input = picture_sizes(scene, scene.input, work.downscale);
+  const PictureSizes held_out = picture_sizes(scene, scene.held_out, work.downscale);
+  const double reading_input = of_reading(scene, scene.input, work.downscale);
+  const double reading_held_out = of_reading(scene, scene.held_out, work.downscale);
   constexpr double kOfModel = 136;  // bytes per pixel of all input views
   std::vector<StageMemory> plan;
   plan.reserve(kFactors.size());
   for (const StageFactors& f : kFactors) {
     const std::string stage = f.stage;
     if (stage == "held-out views" && scene.held_out.empty()) continue;
-    if (f.of_voxel > 0 && !chooses_voxels) continue;
-    const bool measures = stage == "volume and mesh" ? measured.meshes : measured.asset;
+    if (f.of_voxel > 0 && !work.chooses_voxels) continue;
+    const bool measures = stage == "volume and mesh" ? work.measured.meshes : work.measured.asset;
     const double of_voxel = f.of_voxel + (measures ? f.of_fused : 0);
     // Voxels that must keep an error are not made coarser to save memory.
     const double voxel_pixels =
-        measured.meshes ? input.as_voxels : std::min(input.as_voxels, kMostPixels);
+        work.measured.meshes ? input.as_voxels : std::min(input.as_voxels, kMostPixels);
     const bool draws_held_out = stage == "held-out views";
     const double largest = draws_held_out ? held_out.largest : input.largest;
     const double reading = draws_held_out ? reading_held_out : reading_input;
     double bytes =
         f.base + f.of_pixel * input.all + f.of_largest * largest + of_voxel * voxel_pixels;
     if (stage == "depth and Gaussians") {
-      bytes += of_networks(coherence, scene.input.size(), input.all);
+      bytes += of_networks(work.coherence, scene.input.size(), input.all);
     }
     // The report shows photographs beside all that it holds; other stages read them before.
     bytes = stage == "report" ? bytes + std::max(reading_input, reading_held_out)
@@ -192,22 +188,22 @@ std::string memory_plan_text(const std::vector<StageMemory>& plan) {
   return out;
 }
 
-void check_memory_plan(const Scene& scene,
-                       bool chooses_voxels,
-                       const MeasuredFiles& measured,
-                       size_t budget,
-                       const CoherenceOptions& coherence,
-                       int downscale) {
+void check_memory_plan(const Scene& scene, const PictureWork& work, size_t budget) {
   refuse_above(budget, [&](int factor) {
-    const auto plan = memory_plan(scene, chooses_voxels, measured, coherence, factor * downscale);
+    PictureWork smaller = work;
+    smaller.downscale *= factor;
+    const auto plan = memory_plan(scene, smaller);
     return *std::max_element(
         plan.begin(), plan.end(), [](const auto& a, const auto& b) { return a.bytes < b.bytes; });
   });
 }
 
 void check_training_memory(const Scene& scene, size_t budget, const CoherenceOptions& coherence) {
-  refuse_above(
-      budget, [&](int factor) { return memory_plan(scene, false, {}, coherence, factor).front(); });
+  refuse_above(budget, [&](int factor) {
+    return memory_plan(scene,
+                       {.chooses_voxels = false, .coherence = coherence, .downscale = factor})
+        .front();
+  });
 }
 
 size_t free_of_group(const std::filesystem::path& folder, const char* most, const char* now) {

@@ -24,20 +24,21 @@ struct MeasuredFiles {
   bool asset = false;   ///< RunRequest::max_error or max_size
 };
 
+/// What a run is asked for that changes how much memory its stages take.
+struct PictureWork {
+  /// False where the user says how large voxels are: stages that depend on them are then left out
+  /// of the plan, and the volume itself refuses what does not fit.
+  bool chooses_voxels = true;
+  MeasuredFiles measured = {};
+  CoherenceOptions coherence = {};  ///< Of the training: networks hold much more than lattices.
+  int downscale = 1;                ///< Divides the sides of the pictures once more.
+};
+
 /// Predicts what the stages of a run will need, from the sizes of its pictures alone.
 ///
 /// What a stage holds grows with the pixels of the input views: a Gaussian, a few voxels and a few
 /// faces come of each. The factors are measured; see docs/reliability.md for how well they hold.
-/// \param chooses_voxels  false where the user says how large voxels are: stages that depend on
-/// them
-///                        are then left out, and the volume itself refuses what does not fit
-/// \param coherence       of the training: networks hold much more than lattices
-/// \param downscale       divides the sides of the pictures once more
-std::vector<StageMemory> memory_plan(const Scene& scene,
-                                     bool chooses_voxels,
-                                     const MeasuredFiles& measured = {},
-                                     const CoherenceOptions& coherence = {},
-                                     int downscale = 1);
+std::vector<StageMemory> memory_plan(const Scene& scene, const PictureWork& work = {});
 
 /// How many pixels these views have together.
 double pixels_of(const Scene& scene, const std::vector<int>& views);
@@ -50,12 +51,7 @@ std::string memory_plan_text(const std::vector<StageMemory>& plan);
 
 /// \throws LimitError naming the stage of memory_plan() that needs most and by how much to scale
 ///         the pictures down, if it needs more than `budget` [bytes].
-void check_memory_plan(const Scene& scene,
-                       bool chooses_voxels,
-                       const MeasuredFiles& measured,
-                       size_t budget,
-                       const CoherenceOptions& coherence = {},
-                       int downscale = 1);
+void check_memory_plan(const Scene& scene, const PictureWork& work, size_t budget);
 
 /// The same for the training alone, the first stage. \throws LimitError
 void check_training_memory(const Scene& scene, size_t budget, const CoherenceOptions& coherence);

@@ -267,14 +267,12 @@ void write_files(const std::vector<std::filesystem::path>& files,
                  Orthophoto& photo,
                  const MaskMap& shown,
                  const Raster<float>& heights,
-                 const std::string& world,
-                 const std::string& description) {
+                 const std::vector<std::string>& texts) {
   std::vector<std::string> contents = {encode_png(photo.color, shown)};
   photo.color = ColorImage();  // the largest part of a photo
   contents.push_back(encode_png(label_picture(photo), shown));
   contents.push_back(encode_tiff(heights));
-  contents.resize(files.size() - 1, world);
-  contents.push_back(description);
+  contents.insert(contents.end(), texts.begin(), texts.end());
   if (files[0].has_parent_path()) make_output_folder(files[0].parent_path());
   std::deque<AtomicFile> written;  // not moved while it grows
   for (size_t k = files.size(); k-- > 0;) written.emplace_back(files[k]).write(contents[k]);
@@ -328,7 +326,9 @@ Json write_orthophoto(const OrthophotoRequest& request,
               {"covered", static_cast<double>(covered) / static_cast<double>(shown.data.size())}};
   out.update(shares_json(photo, covered, mesh.states_provenance()));
   for (const auto& file : files) out["files"].push_back(file.string());
-  write_files(files, photo, shown, heights.values, world_file(placed), description_of(out, files));
+  const std::string world = world_file(placed);
+  write_files(
+      files, photo, shown, heights.values, {world, world, world, description_of(out, files)});
   return out;
 }
 

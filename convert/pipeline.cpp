@@ -398,13 +398,12 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   Scene& scene = opened.scene;
   terminal.note(scene.notes);
   terminal.warn(scene.warnings);
-  const bool chooses_voxels = request.voxel_size.empty();
-  const MeasuredFiles measured = measured_files(request);
-  const CoherenceOptions& coherence = request.training.coherence;
-  const std::vector<StageMemory> plan = memory_plan(scene, chooses_voxels, measured, coherence);
+  const PictureWork work = {.chooses_voxels = request.voxel_size.empty(),
+                            .measured = measured_files(request),
+                            .coherence = request.training.coherence};
+  const std::vector<StageMemory> plan = memory_plan(scene, work);
   terminal.say("memory: " + memory_plan_text(plan));
-  check_memory_plan(
-      scene, chooses_voxels, measured, memory_budget(request.memory_limit), coherence);
+  check_memory_plan(scene, work, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
   const size_t known = scene.warnings.size();
   const Json fit = check_stated_cameras(opened, terminal);

@@ -112,11 +112,10 @@ StageResults run_setting(Bench& bench, const Setting& setting) {
   const fs::path mesh = bench.folder(mesh_key(setting));
   out[kModel] = stage(bench, model_key(setting), name + ": model", [&](const Progress& progress) {
     check_memory_plan(bench.scene,
-                      setting.voxel == 1,
-                      {},
-                      memory_budget(bench.request.memory_limit),
-                      bench.standard.training.coherence,
-                      setting.coarser);
+                      {.chooses_voxels = setting.voxel == 1,
+                       .coherence = bench.standard.training.coherence,
+                       .downscale = setting.coarser},
+                      memory_budget(bench.request.memory_limit));
     return make_model(request(model_key(setting)), bench.request.output, bench.scene, progress);
   });
   if (out[kModel].contains("failed")) return out;

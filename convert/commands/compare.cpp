@@ -167,14 +167,8 @@ void share_unit(Frame& a, const Frame& b, double growth) {
 void print_m3c2(const CompareArgs& args,
                 const MeasurableMesh& a,
                 const MeasurableMesh& b,
-                const ScaleError& of_scale,
-                const FigureUnit& unit,
-                const std::optional<Registration>& registration) {
-  M3c2Request request = args.m3c2;
-  request.scale_sigma = of_scale.relative;
-  request.scale_center = of_scale.center;
-  M3c2Comparison found = compare_m3c2(request, a, b);
-  found.comparison.registration = registration;
+                const M3c2Comparison& found,
+                const FigureUnit& unit) {
   if (!args.ply.empty()) write_m3c2_ply(args.ply, a, found);
   if (!args.svg.empty()) write_histogram_svg(args.svg, found.comparison, unit, title_of(args));
   if (args.common.json) {
@@ -249,7 +243,12 @@ void run_compare(const CompareArgs& args) {
   of_scale.center = unmoved_by_scale(a, second.content.frame, args.icp);
   const FigureUnit unit = figure_unit(a.frame, args.unit);
   if (args.m3c2.wanted) {
-    return print_m3c2(args, a, b, of_scale, unit, comparison.registration);
+    M3c2Request request = args.m3c2;
+    request.scale_sigma = of_scale.relative;
+    request.scale_center = of_scale.center;
+    M3c2Comparison found = compare_m3c2(request, a, b);
+    found.comparison.registration = comparison.registration;
+    return print_m3c2(args, a, b, found, unit);
   }
   const auto compared = [&](ComparedPoints points) {
     add_scale_sigma(points, of_scale.relative, of_scale.center);

@@ -50,11 +50,8 @@ void refuse_depth_options(const DepthFusionRequest& request) {
 void write(const FuseArgs& args,
            const FusedVolume& fused,
            const Frame& frame,
-           const std::string& of,
-           nlohmann::ordered_json report,
-           Terminal& terminal) {
+           nlohmann::ordered_json report) {
   write_volume(args.output, fused.volume, frame);
-  terminal.end(of + "voxel " + format_length(fused.report.voxel_size, frame));
   report.update(fusion_to_json(fused.report, frame));
   if (args.common.json) std::cout << json_text(report) << "\n";
 }
@@ -73,18 +70,19 @@ void run_fuse(const FuseArgs& args) {
     terminal.warn(model.scene.warnings);
     const FusedVolume fused =
         fuse_model(model, request.voxel_size, request.memory_limit, terminal.begin("fuse"));
-    write(args, fused, model.scene.frame, "", {}, terminal);
+    terminal.end("voxel " + format_length(fused.report.voxel_size, model.scene.frame));
+    write(args, fused, model.scene.frame, {});
     return;
   }
   const DepthFusion fusion = fuse_depth(request, terminal.begin("fuse"));
   terminal.note(fusion.notes);
   terminal.warn(fusion.warnings);
+  terminal.end(std::to_string(fusion.frames) + " frames, voxel " +
+               format_length(fusion.fused.report.voxel_size, fusion.frame));
   write(args,
         fusion.fused,
         fusion.frame,
-        std::to_string(fusion.frames) + " frames, ",
-        {{"frames", fusion.frames}, {"disagreement", fusion.disagreement}},
-        terminal);
+        {{"frames", fusion.frames}, {"disagreement", fusion.disagreement}});
 }
 
 }  // namespace

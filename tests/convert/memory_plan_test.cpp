@@ -39,7 +39,7 @@ size_t most(const std::vector<StageMemory>& plan) {
 
 std::string refusal(const Scene& scene, size_t budget) {
   try {
-    check_memory_plan(scene, true, {}, budget);
+    check_memory_plan(scene, {}, budget);
   } catch (const LimitError& error) {
     return error.what();
   }
@@ -51,13 +51,13 @@ TEST(MemoryPlan, GrowsWithThePixelsOfTheInputViewsAlone) {
   Scene more = scene;
   more.views.resize(20);
   more.views.back().camera.width = 100000;
-  EXPECT_EQ(memory_plan_text(memory_plan(more, true)), memory_plan_text(memory_plan(scene, true)));
-  EXPECT_GT(most(memory_plan(scene_of(4, 400, 300), true)), most(memory_plan(scene, true)));
-  EXPECT_GT(most(memory_plan(scene_of(3, 800, 600), true)), most(memory_plan(scene, true)));
+  EXPECT_EQ(memory_plan_text(memory_plan(more)), memory_plan_text(memory_plan(scene)));
+  EXPECT_GT(most(memory_plan(scene_of(4, 400, 300))), most(memory_plan(scene)));
+  EXPECT_GT(most(memory_plan(scene_of(3, 800, 600))), most(memory_plan(scene)));
 }
 
 double of_stage(const Scene& scene, const std::string& stage) {
-  for (const StageMemory& s : memory_plan(scene, true)) {
+  for (const StageMemory& s : memory_plan(scene)) {
     if (s.stage == stage) return double(s.bytes);
   }
   ADD_FAILURE() << "no stage " << stage;
@@ -100,7 +100,7 @@ TEST(MemoryPlan, CountsTheReadingOfLargePhotographs) {
   Scene whole = large;
   whole.views[1].image_path.clear();
   EXPECT_EQ(of_stage(large, "report"), of_stage(whole, "report"));
-  EXPECT_GT(double(memory_plan(large, true, {}, {}, 8).back().bytes), kPhotograph);
+  EXPECT_GT(double(memory_plan(large, {.downscale = 8}).back().bytes), kPhotograph);
   large.input = {0};
   large.held_out = {1};
   large.views[1].camera = small.views[1].camera;
@@ -108,7 +108,8 @@ TEST(MemoryPlan, CountsTheReadingOfLargePhotographs) {
 }
 
 TEST(MemoryPlan, LeavesOutWhatTheUsersVoxelsDecide) {
-  const std::string text = memory_plan_text(memory_plan(scene_of(3, 400, 300), false));
+  const std::string text =
+      memory_plan_text(memory_plan(scene_of(3, 400, 300), {.chooses_voxels = false}));
   EXPECT_EQ(text.find("volume"), std::string::npos) << text;
   EXPECT_NE(text.find("depth and Gaussians"), std::string::npos) << text;
 }
@@ -135,24 +136,24 @@ TEST(MemoryPlan, CountsNetworksWhileTheyAreTrained) {
   networks.decoder = ResidualDecoder::Conv;
   CoherenceOptions wider = networks;
   wider.conv_depth_width = 30;
-  const auto lattices = memory_plan(scene, true);
-  const auto published = memory_plan(scene, true, {}, networks);
-  const auto wide = memory_plan(scene, true, {}, wider);
+  const auto lattices = memory_plan(scene);
+  const auto published = memory_plan(scene, {.coherence = networks});
+  const auto wide = memory_plan(scene, {.coherence = wider});
   for (size_t i = 0; i < lattices.size(); ++i) {
     const bool trains = lattices[i].stage == "depth and Gaussians";
     EXPECT_EQ(published[i].bytes > lattices[i].bytes, trains) << lattices[i].stage;
     EXPECT_EQ(wide[i].bytes > published[i].bytes, trains) << lattices[i].stage;
   }
   const size_t needed = most(published);
-  EXPECT_THROW(check_memory_plan(scene, true, {}, needed - 1, networks), LimitError);
-  EXPECT_NO_THROW(check_memory_plan(scene, true, {}, needed - 1));
+  EXPECT_THROW(check_memory_plan(scene, {.coherence = networks}, needed - 1), LimitError);
+  EXPECT_NO_THROW(check_memory_plan(scene, {}, needed - 1));
 }
 
 TEST(MemoryPlan, CountsTheFusedSurfaceWhereFilesAreHeldAgainstIt) {
   const Scene scene = scene_of(3, 400, 300);
-  const auto plain = memory_plan(scene, true);
-  const auto sized = memory_plan(scene, true, {.asset = true});
-  const auto near = memory_plan(scene, true, {.meshes = true, .asset = true});
+  const auto plain = memory_plan(scene);
+  const auto sized = memory_plan(scene, {.measured = {.asset = true}});
+  const auto near = memory_plan(scene, {.measured = {.meshes = true, .asset = true}});
   for (size_t i = 0; i < plain.size(); ++i) {
     const bool assets = plain[i].stage == "textured assets";
     const bool meshes = plain[i].stage == "volume and mesh";
@@ -162,16 +163,16 @@ TEST(MemoryPlan, CountsTheFusedSurfaceWhereFilesAreHeldAgainstIt) {
 }
 
 TEST(MemoryPlan, VoxelsThatMustKeepAnErrorGrowWithThePixelsWithoutEnd) {
-  const MeasuredFiles exact = {.meshes = true, .asset = true};
-  const size_t some = most(memory_plan(scene_of(4, 1000, 500), true, exact));
-  const size_t many = most(memory_plan(scene_of(8, 1000, 500), true, exact));
+  const PictureWork exact = {.measured = {.meshes = true, .asset = true}};
+  const size_t some = most(memory_plan(scene_of(4, 1000, 500), exact));
+  const size_t many = most(memory_plan(scene_of(8, 1000, 500), exact));
   EXPECT_GT(double(many), 1.8 * double(some));
 }
 
 TEST(MemoryPlan, RefusesInOneLineThatSaysWhatToLower) {
   const Scene scene = scene_of(3, 504, 378);
-  const size_t needed = most(memory_plan(scene, true));
-  EXPECT_NO_THROW(check_memory_plan(scene, true, {}, needed));
+  const size_t needed = most(memory_plan(scene));
+  EXPECT_NO_THROW(check_memory_plan(scene, {}, needed));
   const std::string message = refusal(scene, needed / 5);
   for (const char* word : {"volume and mesh", "--downscale 4", "--memory-limit"}) {
     EXPECT_NE(message.find(word), std::string::npos) << message;
@@ -185,15 +186,15 @@ TEST(MemoryPlan, TheAdviceIsEnough) {
   for (const int side : sides) {
     const Scene scene = scene_of(3, side, side);
     for (const double share : {0.9, 0.5, 0.3}) {
-      const auto budget = static_cast<size_t>(share * double(most(memory_plan(scene, true))));
+      const auto budget = static_cast<size_t>(share * double(most(memory_plan(scene))));
       const std::string message = refusal(scene, budget);
       const size_t at = message.find("--downscale ");
       ASSERT_NE(at, std::string::npos) << message;
       const int factor = std::stoi(message.substr(at + 12));
       const Scene smaller = scene_of(3, side / factor, side / factor);
-      EXPECT_LE(most(memory_plan(smaller, true)), budget) << message;
+      EXPECT_LE(most(memory_plan(smaller)), budget) << message;
       const Scene larger = scene_of(3, side / (factor - 1), side / (factor - 1));
-      EXPECT_GT(most(memory_plan(larger, true)), budget) << message;
+      EXPECT_GT(most(memory_plan(larger)), budget) << message;
     }
   }
 }
