@@ -2,6 +2,7 @@
 #include "convert/photo_poses.h"
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "convert/scene_request.h"
 #include "io/image.h"
@@ -92,6 +93,16 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   Terminal terminal(true);
   open_scene({.path = dir / "photos"}, dir / "model", terminal).keep(dir / "model");
   EXPECT_EQ(test::read_bytes(dir / "model/colmap/sparse/0/images.txt"), stored);
+
+  // Earlier versions kept no notes.
+  const fs::path record = dir / "model/colmap/poses.json";
+  nlohmann::json without_notes = nlohmann::json::parse(test::read_bytes(record));
+  ASSERT_EQ(without_notes.erase("notes"), 1u);
+  test::write_bytes(record, without_notes.dump());
+  const PhotoPoses earlier = solved(dir / "photos", 0, dir / "model/colmap");
+  EXPECT_TRUE(earlier.is_stored);
+  EXPECT_TRUE(earlier.notes.empty());
+
   const PhotoPoses other = solved(dir / "photos", truth[0].fx, dir / "model/colmap");
   EXPECT_FALSE(other.model.images[0].points.empty());
   EXPECT_EQ(other.model.cameras.begin()->second.camera.fx, truth[0].fx);
