@@ -14,6 +14,7 @@
 #include "io/byte_reader.h"
 #include "io/vdb.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/srgb.h"
 
 namespace cgs {
 
@@ -56,7 +57,8 @@ openvdb::FloatGrid::Ptr fog_of(const openvdb::FloatGrid::Ptr& distance,
 
 constexpr const char* kFrameKey = "cgs_frame";
 constexpr const char* kStretchKey = "cgs_stretch";
-constexpr const char* kBoundsKey = "cgs_bounds";  // min and max corner [internal units]
+constexpr const char* kBoundsKey = "cgs_bounds";           // min and max corner [internal units]
+constexpr const char* kColorSpaceKey = "cgs_color_space";  // of the grid of colours
 
 template <typename Grid>
 typename Grid::Ptr find_grid(const openvdb::GridPtrVec& grids,
@@ -148,6 +150,14 @@ openvdb::GridBase::ConstPtr named(typename Grid::Ptr grid, const char* name) {
   return grid;
 }
 
+// Earlier versions wrote colours as sRGB codes them, and did not say so on the grid.
+void decode(openvdb::Vec3SGrid& color) {
+  for (auto value = color.beginValueOn(); value; ++value) {
+    const openvdb::Vec3f c = *value;
+    value.setValue({linear_from_srgb(c.x()), linear_from_srgb(c.y()), linear_from_srgb(c.z())});
+  }
+}
+
 }  // namespace
 
 void write_volume(const std::filesystem::path& path,
@@ -167,10 +177,12 @@ void write_volume(const std::filesystem::path& path,
   if (stretch != 1) tsdf->insertMeta(kStretchKey, openvdb::StringMetadata(stretch_text));
   tsdf->insertMeta(kBoundsKey, openvdb::StringMetadata(bounds_text(volume.bounds)));
   tsdf->setGridClass(openvdb::GRID_UNKNOWN);  // one-sided and open: no valid level set
+  const auto color = values(volume.color);
+  color->insertMeta(kColorSpaceKey, openvdb::StringMetadata("linear"));
   std::vector<openvdb::GridBase::ConstPtr> grids = {
       named<openvdb::FloatGrid>(tsdf, "tsdf"),
       named<openvdb::FloatGrid>(values(volume.weight), "weight"),
-      named<openvdb::Vec3SGrid>(values(volume.color), "color"),
+      named<openvdb::Vec3SGrid>(color, "color"),
       named<openvdb::FloatGrid>(values(volume.support), "support"),
       named<openvdb::FloatGrid>(scaled_lengths(volume.sigma, scale, offset), "sigma"),
       named<openvdb::Int32Grid>(values(volume.state), "state")};
@@ -181,10 +193,8 @@ void write_volume(const std::filesystem::path& path,
   }
   const auto& distance = volume.surface ? volume.surface : volume.tsdf;
   grids.push_back(named<openvdb::FloatGrid>(fog_of(distance, scale, offset), "density"));
-  std::map<std::string, std::string> about = {{"creator", "cgs"},
-                                              {"cgs_units", frame.unit_name()},
-                                              {"cgs_evidence", evidence},
-                                              {"cgs_color_space", "sRGB"}};
+  std::map<std::string, std::string> about = {
+      {"creator", "cgs"}, {"cgs_units", frame.unit_name()}, {"cgs_evidence", evidence}};
   if (stretch != 1) about[kStretchKey] = stretch_text;
   write_vdb(path, grids, about);
 }
@@ -216,6 +226,7 @@ VolumeFile read_volume(const std::filesystem::path& path) {
   };
   plain.operator()<openvdb::FloatGrid>(volume.weight, "weight");
   plain.operator()<openvdb::Vec3SGrid>(volume.color, "color");
+  if (!volume.color->getMetadata<openvdb::StringMetadata>(kColorSpaceKey)) decode(*volume.color);
   plain.operator()<openvdb::FloatGrid>(volume.support, "support");
   plain.operator()<openvdb::Int32Grid>(volume.state, "state");
   volume.bounds = bounds_of(*tsdf, path);

@@ -6,6 +6,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "libcgs/core/srgb.h"
+
 namespace cgs {
 
 namespace {
@@ -29,7 +31,10 @@ void store_band(FusedBlock& block,
   if (e.has_sigma) leaf(block.sigma).setValueOn(n, static_cast<float>(e.sigma(common_sigma)));
   if (e.color_weight <= 0) return;
   const Eigen::Vector3f c = (e.color / e.color_weight).cast<float>();
-  leaf(block.color).setValueOn(n, openvdb::Vec3f(c.x(), c.y(), c.z()));
+  leaf(block.color)
+      .setValueOn(n,
+                  openvdb::Vec3f(
+                      linear_from_srgb(c.x()), linear_from_srgb(c.y()), linear_from_srgb(c.z())));
 }
 
 void store(FusedBlock& block,

@@ -12,6 +12,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/face_adjacency.h"
+#include "libcgs/core/srgb.h"
 #include "meshing/volume.h"
 
 namespace cgs {
@@ -77,7 +78,9 @@ class VolumeProbe {
     mesh.support[v] = crossing ? support : 0;
     mesh.sigma[v] = crossing && sigma.weight > 0 ? sigma.sum / sigma.weight : kNaN;
     mesh.colors[v].setConstant(kNaN);
-    if (crossing && color.weight > 0) mesh.colors[v] = color.sum / color.weight;
+    if (crossing && color.weight > 0) {
+      mesh.colors[v] = (color.sum / color.weight).unaryExpr(&srgb_from_linear);
+    }
     if (!crossing) return Evidence::None;
     return inside + outside == 8 ? Evidence::Full : Evidence::Partial;
   }

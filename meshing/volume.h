@@ -22,7 +22,8 @@ struct Volume {
   openvdb::FloatGrid::Ptr tsdf;     ///< Signed distance [internal units], + in front of the
                                     ///< surface; active on observed voxels of the band only.
   openvdb::FloatGrid::Ptr weight;   ///< Sum of the weights of the views in the band.
-  openvdb::Vec3SGrid::Ptr color;    ///< sRGB-coded RGB in [0, 1]; active where a view gave colour.
+  openvdb::Vec3SGrid::Ptr color;    ///< Linear light, RGB in [0, 1], as programs that draw volumes
+                                    ///< take it; active where a view gave colour.
   openvdb::FloatGrid::Ptr support;  ///< Photographs in the band that look at it from one side, the
                                     ///< side with more of them; guesses count as one at most.
   openvdb::FloatGrid::Ptr sigma;    ///< Standard deviation of tsdf [internal units]; active where

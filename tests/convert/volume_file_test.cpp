@@ -6,6 +6,7 @@
 
 #include "io/vdb.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/srgb.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs::volume_file_test {
@@ -60,6 +61,24 @@ TEST(VolumeFile, ReadsBackTheSameBits) {
   EXPECT_EQ(file.volume.bounds.min(), volume.bounds.min());
   EXPECT_EQ(file.volume.bounds.max(), volume.bounds.max());
   EXPECT_EQ(file.frame.origin, large_frame().origin);
+}
+
+// As those of earlier versions are, which coded them.
+TEST(VolumeFile, ColorsThatAreNotSaidToBeLinearAreDecoded) {
+  const test::TempDir dir;
+  write_volume(dir / "v.vdb", small_volume(), large_frame());
+  const openvdb::Coord at(3, -2, 7);
+  EXPECT_EQ(read_volume(dir / "v.vdb").volume.color->tree().getValue(at),
+            openvdb::Vec3s(0.1f, 0.2f, 0.3f));
+  std::vector<openvdb::GridBase::ConstPtr> grids;
+  for (const auto& grid : read_vdb(dir / "v.vdb")) {
+    if (grid->getName() == "color") grid->removeMeta("cgs_color_space");
+    grids.push_back(grid);
+  }
+  write_vdb(dir / "earlier.vdb", grids, {});
+  const openvdb::Vec3s color = read_volume(dir / "earlier.vdb").volume.color->tree().getValue(at);
+  EXPECT_EQ(color[0], linear_from_srgb(0.1f));
+  EXPECT_EQ(color[2], linear_from_srgb(0.3f));
 }
 
 TEST(VolumeFile, HoldsFileCoordinatesAndLengths) {

@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "libcgs/core/srgb.h"
 #include "meshing/depth_field.h"
 #include "tests/support/depth_scenes.h"
 #include "tests/support/fused_volumes.h"
@@ -91,7 +92,9 @@ void expect_voxel(const Volume& volume, const openvdb::Coord& at, const SlowVoxe
   ASSERT_EQ(volume.color->tree().isValueOn(at), slow.color_weight > 0);
   if (slow.color_weight <= 0) return;
   const Eigen::Vector3f c = (slow.color / slow.color_weight).cast<float>();
-  ASSERT_EQ(volume.color->tree().getValue(at), openvdb::Vec3f(c.x(), c.y(), c.z()));
+  ASSERT_EQ(
+      volume.color->tree().getValue(at),
+      openvdb::Vec3f(linear_from_srgb(c.x()), linear_from_srgb(c.y()), linear_from_srgb(c.z())));
 }
 
 // A thin sheet, a ball and a wall, from random places, with noise, holes, masks, guesses and a
