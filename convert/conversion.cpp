@@ -199,17 +199,14 @@ void simplify_mesh(const ConversionRequest& request, Source& source, Terminal& t
 }
 
 /// \return what the file lost by its encoding, for people; empty if nothing
-std::string write_mesh(const ConversionRequest& request,
-                       const Source& source,
-                       const TriangleMesh& mesh,
-                       const Json& report) {
+std::string write_mesh(const ConversionRequest& request, const Source& source, const Json& report) {
   GlbOptions options;
   options.encoding = request.encoding;
   if (!request.compression_error.empty()) {
     options.max_error = parse_length(request.compression_error, source.frame) * source.frame.scale;
   }
   options.summary_json = json_text(report, -1);
-  return write_mesh_as(request.output, mesh, source.frame, options);
+  return write_mesh_as(request.output, source.mesh, source.frame, options);
 }
 
 /// \return what was left out, for the report
@@ -327,7 +324,7 @@ void write_as_splats(const ConversionRequest& request,
 void write_as_mesh(const ConversionRequest& request,
                    const Source& source,
                    Terminal& terminal,
-                   Json& report) {
+                   const Json& report) {
   if (source.mesh.faces.empty() && lower_extension(request.output) != ".ply") {
     throw BadInput(
         Defect::Empty, request.input, "has no faces; a point cloud can only be written as .ply");
@@ -341,7 +338,7 @@ void write_as_mesh(const ConversionRequest& request,
         moved_origin_text(request.output, source.file_origin, source.frame.file_origin);
     if (!moved.empty()) terminal.warn(moved);
   }
-  const std::string lost_by_encoding = write_mesh(request, source, source.mesh, report);
+  const std::string lost_by_encoding = write_mesh(request, source, report);
   if (!lost_by_encoding.empty()) terminal.say(lost_by_encoding);
 }
 

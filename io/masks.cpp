@@ -21,7 +21,10 @@ std::vector<fs::path> mask_folders(const SceneRoot& root, const fs::path& photog
 }
 
 // The mask of a photograph that lies turned in its file, as the upright photograph.
-ColorImage upright(ColorImage mask, const fs::path& file, int orientation, const ImageSize& size) {
+ColorImage upright(const ColorImage& mask,
+                   const fs::path& file,
+                   int orientation,
+                   const ImageSize& size) {
   const int own = exif_orientation(file);
   if (own != 1) return turned(mask, own);
   const bool lies_as_stored = mask.width == size.height && mask.height == size.width &&
@@ -94,7 +97,7 @@ void apply_mask(const View& view, const ImageSize& size, MaskMap& usable) {
   const fs::path& file = view.mask_path;
   if (file.empty()) return;
   ColorImage mask = read_image(file);
-  if (view.orientation != 1) mask = upright(std::move(mask), file, view.orientation, size);
+  if (view.orientation != 1) mask = upright(mask, file, view.orientation, size);
   if (mask.width != size.width || mask.height != size.height) {
     throw BadInput(Defect::Mismatch,
                    file,

@@ -83,7 +83,7 @@ constexpr std::string_view kOurMaterials = "# cgs:";
 
 /// Where the materials go. \throws InvalidInput if those of another program lie there
 std::filesystem::path materials_path(const std::filesystem::path& path) {
-  const std::filesystem::path out = path.parent_path() / (companion_stem(path) + ".mtl");
+  std::filesystem::path out = path.parent_path() / (companion_stem(path) + ".mtl");
   if (is_present(out) && read_file_start(out, kOurMaterials.size()) != kOurMaterials) {
     throw InvalidInput("the materials of " + printable(path) + " would replace " + printable(out) +
                        ", which another program wrote; choose another name");
