@@ -15,7 +15,7 @@ namespace cgs {
 /// them.
 struct BlockGrid {
   static constexpr int kCube = 4;
-  static constexpr size_t kBlocksPerCube = kCube * kCube * kCube;
+  static constexpr size_t kBlocksPerCube = size_t{kCube} * kCube * kCube;
 
   openvdb::Coord first;  // in blocks
   openvdb::Coord count;

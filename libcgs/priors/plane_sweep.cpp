@@ -11,6 +11,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/priors/cross_check.h"
+#include "libcgs/priors/directions.h"
 
 namespace cgs {
 
@@ -44,15 +45,15 @@ constexpr float kPlaces = 0.5f;  // largest error of a match that places a surfa
 constexpr float kSameSurface = 2.0f;
 
 using Patch = std::vector<std::pair<int, int>>;
-constexpr std::array<std::pair<int, int>, 4> kNeighbors = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+constexpr std::array<Direction, 4> kNeighbors = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
 
-// Whether the surface at (x, y) goes on at its neighbour (x + dx, y + dy).
-bool goes_on(const SweptView& view, int x, int y, int dx, int dy, float same_surface) {
+// Whether the surface at (x, y) goes on at its neighbour.
+bool goes_on(const SweptView& view, int x, int y, Direction to, float same_surface) {
   const SlantedPlane& here = view.pixels(x, y).plane;
-  const SlantedPlane& there = view.pixels(x + dx, y + dy).plane;
+  const SlantedPlane& there = view.pixels(x + to.dx, y + to.dy).plane;
   // Either plane may be the one that continues.
-  const float step =
-      std::min(std::abs(there.at(-dx, -dy) - here.t), std::abs(here.at(dx, dy) - there.t));
+  const float step = std::min(std::abs(there.at(-to.dx, -to.dy) - here.t),
+                              std::abs(here.at(to.dx, to.dy) - there.t));
   return step < same_surface;
 }
 
@@ -80,9 +81,9 @@ void for_each_patch(const SweptView& view,
       grow(x0, y0);
       for (size_t i = 0; i < patch.size(); ++i) {
         const auto [x, y] = patch[i];
-        for (const auto& [dx, dy] : kNeighbors) {
-          if (!visited.contains(x + dx, y + dy)) continue;
-          if (goes_on(view, x, y, dx, dy, same_surface)) grow(x + dx, y + dy);
+        for (const Direction to : kNeighbors) {
+          if (!visited.contains(x + to.dx, y + to.dy)) continue;
+          if (goes_on(view, x, y, to, same_surface)) grow(x + to.dx, y + to.dy);
         }
       }
       if (!patch.empty()) visit(patch);
@@ -158,11 +159,13 @@ Raster<int> distance_to_texture(const SweptView& view) {
   }
   for (size_t i = 0; i < reached.size(); ++i) {
     const auto [x, y] = reached[i];
-    for (const auto& [dx, dy] : kNeighbors) {
-      if (!out.contains(x + dx, y + dy) || out(x + dx, y + dy) < farthest) continue;
-      if (!goes_on(view, x, y, dx, dy, kSameSurface)) continue;
-      out(x + dx, y + dy) = out(x, y) + 1;
-      reached.emplace_back(x + dx, y + dy);
+    for (const Direction to : kNeighbors) {
+      const int u = x + to.dx;
+      const int v = y + to.dy;
+      if (!out.contains(u, v) || out(u, v) < farthest) continue;
+      if (!goes_on(view, x, y, to, kSameSurface)) continue;
+      out(u, v) = out(x, y) + 1;
+      reached.emplace_back(u, v);
     }
   }
   return out;

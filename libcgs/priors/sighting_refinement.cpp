@@ -84,8 +84,9 @@ struct PicturePlane {
 
 /// Levels around the sighting that stays.
 struct Patch {
-  std::array<double, (2 * kRadius + 1) * (2 * kRadius + 1)> level;
-  std::array<double, (2 * kRadius + 1) * (2 * kRadius + 1)> weight;  // sum 1
+  static constexpr size_t kSide = 2 * kRadius + 1;
+  std::array<double, kSide * kSide> level;
+  std::array<double, kSide * kSide> weight;  // sum 1
   double variance = 0;
 };
 

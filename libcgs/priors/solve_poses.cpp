@@ -63,16 +63,14 @@ std::vector<Track> sample(const std::vector<Track>& tracks, size_t most) {
   return out;
 }
 
+// \param start  without lenses and places
 Attempt attempt_at(double focal_of_side,
-                   const std::vector<int>& lens_of,
+                   const Reconstruction& start,
                    const std::vector<LensPrior>& priors,
                    const std::vector<PhotoPair>& pairs,
-                   const std::vector<Track>& tracks,
                    const Progress& progress) {
   Attempt out;
-  out.scene.tracks = tracks;
-  out.scene.lens_of = lens_of;
-  out.scene.poses.resize(lens_of.size());
+  out.scene = start;
   for (const LensPrior& prior : priors) {
     out.scene.lenses.push_back({prior.focal > 0 ? prior.focal : focal_of_side * prior.side, 0});
   }
@@ -137,14 +135,16 @@ Attempt best_attempt(const std::vector<int>& lens_of,
                      const std::vector<Track>& tracks,
                      const Progress& progress) {
   constexpr size_t kTracks = 600;
-  const std::vector<Track> some = sample(tracks, kTracks);
+  Reconstruction start;
+  start.tracks = sample(tracks, kTracks);
+  start.lens_of = lens_of;
+  start.poses.resize(lens_of.size());
   const bool is_known = std::all_of(
       priors.begin(), priors.end(), [](const LensPrior& prior) { return prior.focal > 0; });
   std::vector<Attempt> attempts(is_known ? 1 : kFocals.size());
   SharedProgress tried(progress, attempts.size());
   tbb::parallel_for(size_t{0}, attempts.size(), [&](size_t i) {
-    attempts[i] =
-        attempt_at(kFocals[i], lens_of, priors, pairs, some, [&](double) { tried.tell(); });
+    attempts[i] = attempt_at(kFocals[i], start, priors, pairs, [&](double) { tried.tell(); });
     tried.advance();
   });
   const Attempt& best =
