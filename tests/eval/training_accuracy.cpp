@@ -6,6 +6,7 @@
 //
 // MODEL is a folder that `cgs train --set steps=0` wrote. Fields are those of TrainingOptions; a
 // preset sets all, so that fields come after it.
+// Photographs are matched in exposure to the model where its input views were, as by cgs evaluate.
 // Prints one line per evaluation: PSNR and SSIM over all pixels, over the pixels that were seen
 // before training (a fixed set, so that lines can be compared), and over those seen now. Times are
 // core-seconds of the steps: what is left to compare on a busy machine.
@@ -20,7 +21,9 @@
 #include "convert/model.h"
 #include "io/exr.h"
 #include "io/scene_reader.h"
+#include "io/view_names.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/exposure.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/train/image_metrics.h"
 #include "libcgs/train/trainer.h"
@@ -31,6 +34,7 @@ using cgs::MaskMap;
 
 struct HeldOut {
   cgs::View view;
+  bool is_exposed_otherwise = false;
   MaskMap seen_at_start;
 };
 
@@ -88,6 +92,17 @@ struct Means {
   double psnr = 0, ssim = 0, psnr_fixed = 0, ssim_fixed = 0, psnr_seen = 0, holes = 0;
 };
 
+cgs::ColorImage exposed_alike(const HeldOut& held_out,
+                              const cgs::ColorImage& shown,
+                              const MaskMap& seen) {
+  cgs::View view = held_out.view;
+  if (held_out.is_exposed_otherwise) {
+    view.exposure = cgs::matching_gain(view.image, shown, seen);
+    cgs::apply_exposure(view);
+  }
+  return view.image;
+}
+
 Means evaluate(const cgs::Gaussians& gaussians,
                const std::vector<cgs::SupportView>& inputs,
                std::vector<HeldOut>& held_out) {
@@ -99,11 +114,12 @@ Means evaluate(const cgs::Gaussians& gaussians,
     const MaskMap seen = seen_pixels(buffers, valid);
     if (h.seen_at_start.empty()) h.seen_at_start = seen;
     const cgs::ColorImage shown = cgs::picture(buffers);
-    m.psnr += cgs::psnr(shown, h.view.image, &valid);
-    m.ssim += cgs::ssim(shown, h.view.image, &valid);
-    m.psnr_fixed += cgs::psnr(shown, h.view.image, &h.seen_at_start);
-    m.ssim_fixed += cgs::ssim(shown, h.view.image, &h.seen_at_start);
-    m.psnr_seen += cgs::psnr(shown, h.view.image, &seen);
+    const cgs::ColorImage photograph = exposed_alike(h, shown, seen);
+    m.psnr += cgs::psnr(shown, photograph, &valid);
+    m.ssim += cgs::ssim(shown, photograph, &valid);
+    m.psnr_fixed += cgs::psnr(shown, photograph, &h.seen_at_start);
+    m.ssim_fixed += cgs::ssim(shown, photograph, &h.seen_at_start);
+    m.psnr_seen += cgs::psnr(shown, photograph, &seen);
     const auto count = [](const MaskMap& mask) {
       return double(std::count(mask.data.begin(), mask.data.end(), 1));
     };
@@ -131,22 +147,23 @@ void run(int argc, char** argv) {
     } else if (name == "preset") {
       options = cgs::training_preset(value);
     } else if (name == "views") {
-      views = "," + value + ",";
+      views = value;
     } else {
       cgs::set_training_field(options, name, value);
     }
   }
   cgs::load_images(model.scene, model.scene.input);
   std::vector<HeldOut> held_out;
-  std::vector<int> indices;
-  for (const int i : model.scene.held_out) {
-    const std::string& name = model.scene.views[static_cast<size_t>(i)].name;
-    if (views.empty() || views.find("," + name + ",") != std::string::npos) indices.push_back(i);
-  }
+  const std::vector<int> indices =
+      views.empty() ? model.scene.held_out : cgs::select_views(model.scene, views);
+  const bool are_matched =
+      std::any_of(model.scene.input.begin(), model.scene.input.end(), [&](int i) {
+        return model.scene.views[static_cast<size_t>(i)].exposure != Eigen::Vector3f::Ones();
+      });
   const size_t stride = std::max<size_t>(1, indices.size() / std::max<size_t>(limit, 1));
   for (size_t k = stride / 2; k < indices.size(); k += stride) {
     cgs::load_images(model.scene, {indices[k]});
-    held_out.push_back({model.scene.views[static_cast<size_t>(indices[k])], {}});
+    held_out.push_back({model.scene.views[static_cast<size_t>(indices[k])], are_matched, {}});
   }
   const std::vector<cgs::SupportView> inputs = cgs::support_views(model);
   cgs::Trainer trainer(model.scene, model.priors, options);
