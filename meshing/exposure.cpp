@@ -23,6 +23,7 @@ ExposureGains exposure_gains(const TriangleMesh& mesh,
     return middles;
   };
   std::vector<const View*> pointers;
+  pointers.reserve(views.size());
   for (const View& view : views) pointers.push_back(&view);
   return exposure_gains(pointers, shared);
 }

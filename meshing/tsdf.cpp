@@ -52,15 +52,20 @@ struct Witness {
 
 using Fields = std::vector<std::optional<DepthField>>;
 
+// From the first of them to before the last.
+struct ViewRange {
+  size_t first, last;
+};
+
 // \param made  fields of the first views, which are taken
 std::vector<std::optional<Witness>> witnesses(const FusionViews& views,
-                                              size_t first,
-                                              size_t last,
+                                              ViewRange range,
                                               const TsdfOptions& options,
                                               double voxel,
                                               Fields& made) {
-  std::vector<std::optional<Witness>> out(last - first);
-  views.each(first, last, true, [&](size_t i, auto&& view) {
+  const size_t first = range.first;
+  std::vector<std::optional<Witness>> out(range.last - first);
+  views.each(first, range.last, true, [&](size_t i, auto&& view) {
     DepthField field = i < made.size() ? std::move(*made[i]) : DepthField(view, options, voxel);
     if (views.are_in_memory()) {
       out[i - first] = Witness{{}, &view, std::move(field)};
@@ -167,7 +172,7 @@ class Fuser {
 
   void fuse_at_once() {
     Fields none;
-    const auto held = witnesses(views_, 0, views_.size(), options_, rules_.voxel, none);
+    const auto held = witnesses(views_, {0, views_.size()}, options_, rules_.voxel, none);
     const std::vector<const DepthField*> fields = fields_of(held);
     std::vector<Sight> sights(grid_.size());
     tbb::parallel_for(size_t(0), grid_.cube_count(), [&](size_t c) {
@@ -175,9 +180,8 @@ class Fuser {
       grid_.each_in_cube(c, [&](size_t i, size_t n) { sights[i] = look.together(n); });
     });
     const auto mixed = size_t(std::count(sights.begin(), sights.end(), Sight::Mixed));
-    constexpr size_t kPixelBytes = 80;  // A prepared depth map, with its bounds and normals.
-    constexpr size_t kMostThreads =
-        16;  // Whose cubes hold evidence; no more, as it is foreseen alike.
+    constexpr size_t kPixelBytes = 80;   // A prepared depth map, with its bounds and normals.
+    constexpr size_t kMostThreads = 16;  // whose cubes hold evidence: foreseen alike everywhere
     const size_t held_blocks =
         std::min(mixed, std::min(kMostThreads, grid_.cube_count()) * BlockGrid::kBlocksPerCube);
     check_memory(out_.report,
@@ -208,7 +212,7 @@ class Fuser {
     std::vector<Sight> whole(grid_.size(), Sight::Nothing);  // Where there is no evidence.
     for (size_t first = 0; first < views_.size(); first += portion_) {
       const size_t last = std::min(first + portion_, views_.size());
-      const auto held = witnesses(views_, first, last, options_, rules_.voxel, made);
+      const auto held = witnesses(views_, {first, last}, options_, rules_.voxel, made);
       made.clear();
       const std::vector<const DepthField*> fields = fields_of(held);
       tbb::parallel_for(size_t(0), grid_.cube_count(), [&](size_t c) {
