@@ -213,9 +213,9 @@ class Completion {
     const float step = std::min(kSameSurface + kSlope * here.distance, kLargest);
     float sum = 0;
     float weight = 0;
-    for (size_t k = 0; k < 4; ++k) {
-      const int u = x + kDirections[k].dx;
-      const int v = y + kDirections[k].dy;
+    for (const Direction d : kNeighbors) {
+      const int u = x + d.dx;
+      const int v = y + d.dy;
       if (!filled_.contains(u, v) || !usable(u, v)) continue;
       const float there = filled_(u, v).inverse_depth;
       if (std::abs(there - here.inverse_depth) > step * here.inverse_depth) continue;

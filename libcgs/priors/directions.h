@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 
 namespace cgs {
 
@@ -27,5 +28,7 @@ inline constexpr std::array<Direction, 16> kDirections = {{{1, 0},
                                                            {-1, 2},
                                                            {1, -2},
                                                            {-1, -2}}};
+
+inline constexpr std::span<const Direction, 4> kNeighbors = std::span(kDirections).first<4>();
 
 }  // namespace cgs

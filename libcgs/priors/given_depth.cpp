@@ -11,6 +11,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/priors/depth_fit.h"
+#include "libcgs/priors/directions.h"
 
 namespace cgs {
 
@@ -244,7 +245,7 @@ class Fitter {
 bool is_at_depth_edge(const DepthMap& depth, int x, int y) {
   constexpr float kJump = 0.05f;  // relative
   const float z = depth(x, y);
-  for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+  for (const auto& [dx, dy] : kNeighbors) {
     if (!depth.contains(x + dx, y + dy)) continue;
     if (std::abs(depth(x + dx, y + dy) - z) > kJump * z) return true;
   }

@@ -135,8 +135,7 @@ bool is_in_patch(int x, int y, int width, int height) {
 // How steep given depth is: the largest relative step to a neighbour [1 / pixel].
 double steepness(const DepthMap& depth, int x, int y) {
   double out = 0;
-  for (size_t k = 0; k < 4; ++k) {
-    const auto [dx, dy] = kDirections[k];
+  for (const auto& [dx, dy] : kNeighbors) {
     if (!depth.contains(x + dx, y + dy)) continue;
     const float there = depth(x + dx, y + dy);
     if (there > 0) out = std::max(out, std::abs(std::log(double(there / depth(x, y)))));

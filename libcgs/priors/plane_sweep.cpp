@@ -2,7 +2,6 @@
 #include "libcgs/priors/plane_sweep.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -45,7 +44,6 @@ constexpr float kPlaces = 0.5f;  // largest error of a match that places a surfa
 constexpr float kSameSurface = 2.0f;
 
 using Patch = std::vector<std::pair<int, int>>;
-constexpr std::array<Direction, 4> kNeighbors = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
 
 // Whether the surface at (x, y) goes on at its neighbour.
 bool goes_on(const SweptView& view, int x, int y, Direction to, float same_surface) {
