@@ -203,9 +203,7 @@ Sizes usable_sizes(const RunRequest& request, const Scene& scene) {
   for (const View& view : scene.views) {
     side = std::min({side, view.camera.width, view.camera.height});
   }
-  PictureWork work = {.chooses_voxels = request.voxel_size.empty(),
-                      .measured = measured_files(request),
-                      .coherence = request.training.coherence};
+  PictureWork work = picture_work(request);
   const size_t budget = memory_budget(request.memory_limit);
   Sizes out;
   for (const int size : kSizes) {

@@ -398,9 +398,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   Scene& scene = opened.scene;
   terminal.note(scene.notes);
   terminal.warn(scene.warnings);
-  const PictureWork work = {.chooses_voxels = request.voxel_size.empty(),
-                            .measured = measured_files(request),
-                            .coherence = request.training.coherence};
+  const PictureWork work = picture_work(request);
   const std::vector<StageMemory> plan = memory_plan(scene, work);
   terminal.say("memory: " + memory_plan_text(plan));
   check_memory_plan(scene, work, memory_budget(request.memory_limit));

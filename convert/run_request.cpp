@@ -74,9 +74,11 @@ uint64_t cameras_hash(const Scene& scene) {
 
 }  // namespace
 
-MeasuredFiles measured_files(const RunRequest& request) {
-  return {.meshes = !request.max_error.empty(),
-          .asset = !request.max_error.empty() || request.max_size > 0};
+PictureWork picture_work(const RunRequest& request) {
+  return {.chooses_voxels = request.voxel_size.empty(),
+          .measured = {.meshes = !request.max_error.empty(),
+                       .asset = !request.max_error.empty() || request.max_size > 0},
+          .coherence = request.training.coherence};
 }
 
 void check_lengths(const RunRequest& request, Frame frame) {

@@ -35,8 +35,8 @@ struct RunRequest {
 /// Further levels would differ by less than a factor of 2 in scenes of the usual photographs.
 inline constexpr size_t kMostLods = 5;
 
-/// What the promises of a request make a run hold against the fused surface.
-MeasuredFiles measured_files(const RunRequest& request);
+/// What of a request decides how much memory its run takes.
+PictureWork picture_work(const RunRequest& request);
 
 /// Refuses promises that contradict other settings.
 /// \throws InvalidInput naming both options
