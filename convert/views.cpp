@@ -183,16 +183,6 @@ double share_of(const MaskMap& part, const MaskMap& whole) {
   return count(part) / count(whole);
 }
 
-// The exposure of the model is that of its input views. Where these had to be matched, the other
-// photographs of the scene were exposed by whatever they show.
-bool is_exposed_otherwise(const Model& model, int index) {
-  const Scene& scene = model.scene;
-  const std::string role = view_role(scene, index);
-  return role != "input" && std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
-           return scene.views[static_cast<size_t>(i)].exposure != Eigen::Vector3f::Ones();
-         });
-}
-
 Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, int index) {
   View view = model.scene.views[static_cast<size_t>(index)];
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
@@ -278,6 +268,16 @@ std::vector<int> with_photograph(Scene& scene, const std::vector<int>& views) {
 }
 
 }  // namespace
+
+// The exposure of the model is that of its input views. Where these had to be matched, the other
+// photographs of the scene were exposed by whatever they show.
+bool is_exposed_otherwise(const Model& model, int view) {
+  const Scene& scene = model.scene;
+  const std::string role = view_role(scene, view);
+  return role != "input" && std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
+           return scene.views[static_cast<size_t>(i)].exposure != Eigen::Vector3f::Ones();
+         });
+}
 
 std::string view_role(const Scene& scene, int view) {
   const auto is_in = [&](const std::vector<int>& views) {

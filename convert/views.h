@@ -41,6 +41,10 @@ nlohmann::ordered_json write_path(const Model& model,
                                   const std::filesystem::path& folder,
                                   const Progress& progress);
 
+/// Whether the photograph of a view, an index into model.scene.views, is to be matched in exposure
+/// to what is rendered: those of the input views were matched, and it is none of them.
+bool is_exposed_otherwise(const Model& model, int view);
+
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
 /// that are not holes, and MS-SSIM over all: {"mean": {"psnr", "ssim", "psnr_seen", "ssim_seen",
 /// "hole_fraction", "ms_ssim"}, "views": [{"name", "role" as of write_views(), …}]}. Loads the

@@ -19,6 +19,7 @@
 #include <string>
 
 #include "convert/model.h"
+#include "convert/views.h"
 #include "io/exr.h"
 #include "io/scene_reader.h"
 #include "io/view_names.h"
@@ -156,14 +157,12 @@ void run(int argc, char** argv) {
   std::vector<HeldOut> held_out;
   const std::vector<int> indices =
       views.empty() ? model.scene.held_out : cgs::select_views(model.scene, views);
-  const bool are_matched =
-      std::any_of(model.scene.input.begin(), model.scene.input.end(), [&](int i) {
-        return model.scene.views[static_cast<size_t>(i)].exposure != Eigen::Vector3f::Ones();
-      });
   const size_t stride = std::max<size_t>(1, indices.size() / std::max<size_t>(limit, 1));
   for (size_t k = stride / 2; k < indices.size(); k += stride) {
     cgs::load_images(model.scene, {indices[k]});
-    held_out.push_back({model.scene.views[static_cast<size_t>(indices[k])], are_matched, {}});
+    held_out.push_back({model.scene.views[static_cast<size_t>(indices[k])],
+                        cgs::is_exposed_otherwise(model, indices[k]),
+                        {}});
   }
   const std::vector<cgs::SupportView> inputs = cgs::support_views(model);
   cgs::Trainer trainer(model.scene, model.priors, options);
