@@ -30,11 +30,9 @@ void store_band(FusedBlock& block,
   leaf(block.support).setValueOn(n, e.support());
   if (e.has_sigma) leaf(block.sigma).setValueOn(n, static_cast<float>(e.sigma(common_sigma)));
   if (e.color_weight <= 0) return;
-  const Eigen::Vector3f c = (e.color / e.color_weight).cast<float>();
-  leaf(block.color)
-      .setValueOn(n,
-                  openvdb::Vec3f(
-                      linear_from_srgb(c.x()), linear_from_srgb(c.y()), linear_from_srgb(c.z())));
+  const Eigen::Vector3f coded = (e.color / e.color_weight).cast<float>();
+  const Eigen::Vector3f c = coded.unaryExpr(&linear_from_srgb);
+  leaf(block.color).setValueOn(n, openvdb::Vec3f(c.x(), c.y(), c.z()));
 }
 
 void store(FusedBlock& block,

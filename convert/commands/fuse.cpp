@@ -47,12 +47,11 @@ void refuse_depth_options(const DepthFusionRequest& request) {
   }
 }
 
-void write(const FuseArgs& args,
-           const FusedVolume& fused,
-           const Frame& frame,
-           nlohmann::ordered_json report) {
-  write_volume(args.output, fused.volume, frame);
-  report.update(fusion_to_json(fused.report, frame));
+void print_json(const FuseArgs& args,
+                const TsdfReport& fusion,
+                const Frame& frame,
+                nlohmann::ordered_json report) {
+  report.update(fusion_to_json(fusion, frame));
   if (args.common.json) std::cout << json_text(report) << "\n";
 }
 
@@ -70,19 +69,21 @@ void run_fuse(const FuseArgs& args) {
     terminal.warn(model.scene.warnings);
     const FusedVolume fused =
         fuse_model(model, request.voxel_size, request.memory_limit, terminal.begin("fuse"));
+    write_volume(args.output, fused.volume, model.scene.frame);
     terminal.end("voxel " + format_length(fused.report.voxel_size, model.scene.frame));
-    write(args, fused, model.scene.frame, {});
+    print_json(args, fused.report, model.scene.frame, {});
     return;
   }
   const DepthFusion fusion = fuse_depth(request, terminal.begin("fuse"));
   terminal.note(fusion.notes);
   terminal.warn(fusion.warnings);
+  write_volume(args.output, fusion.fused.volume, fusion.frame);
   terminal.end(std::to_string(fusion.frames) + " frames, voxel " +
                format_length(fusion.fused.report.voxel_size, fusion.frame));
-  write(args,
-        fusion.fused,
-        fusion.frame,
-        {{"frames", fusion.frames}, {"disagreement", fusion.disagreement}});
+  print_json(args,
+             fusion.fused.report,
+             fusion.frame,
+             {{"frames", fusion.frames}, {"disagreement", fusion.disagreement}});
 }
 
 }  // namespace
