@@ -132,6 +132,7 @@ void optimise(TrainedModel& trained, const ModelRequest& request, const Progress
   }
   checkpoint.try_to_save(trainer);
   model.gaussians = trainer.model().gaussians();
+  trained.view_dependence = trainer.model().view_dependence();
   // The depth of the priors stays that of the sweep: meshes and support rest on what was measured,
   // pictures on what was optimised to look right.
   trained.steps = trainer.history();
@@ -327,7 +328,34 @@ nlohmann::ordered_json exposure_to_json(const TrainedModel& trained) {
   return {{"words", words.data()}, {"views", views}};
 }
 
+// Words only where colours depend on the direction.
+nlohmann::ordered_json view_dependence_to_json(const ViewDependence& found) {
+  nlohmann::ordered_json out = {{"words", nullptr},
+                                {"difference", found.difference},
+                                {"explained", found.explained},
+                                {"share", found.share}};
+  if (!(found.share > 0)) return out;
+  std::array<char, 100> words{};
+  std::snprintf(words.data(),
+                words.size(),
+                "colours of %.0f %% of the Gaussians change with the direction of view",
+                100 * found.share);
+  out["words"] = words.data();
+  return out;
+}
+
 }  // namespace
+
+std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training) {
+  std::vector<std::string> out;
+  for (const char* key : {"exposure", "view_dependence"}) {
+    const auto found = training.find(key);
+    if (found == training.end() || !found->is_object()) continue;
+    const auto words = found->find("words");
+    if (words != found->end() && words->is_string()) out.push_back(words->get<std::string>());
+  }
+  return out;
+}
 
 nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request) {
   nlohmann::ordered_json loss = nlohmann::ordered_json::array();
@@ -347,6 +375,7 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
             {"correspondences", trained.priors.alignment.correspondences}}},
           {"depth_of_views", coverage_to_json(trained)},
           {"exposure", exposure_to_json(trained)},
+          {"view_dependence", view_dependence_to_json(trained.view_dependence)},
           {"given_depth", given_depth_to_json(trained.priors)}};
 }
 

@@ -35,6 +35,7 @@ struct TrainedModel {
   Model model;
   PriorsReport priors;
   float exposure_difference = 0;  ///< ExposureGains::difference() of the input views
+  ViewDependence view_dependence;
   std::vector<StepReport> steps;  ///< Of the training; empty = aligned initialisation.
   /// Checkpoints that could not be read or written, for the terminal: they change no result.
   std::vector<std::string> hitches;
@@ -61,5 +62,8 @@ nlohmann::ordered_json settings_to_json(const TrainingOptions& options);
 /// What was done, for run.json, the report and OUT/model/training.json: a description in plain
 /// words, the effective settings, and the loss over the steps.
 nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request);
+
+/// What training_to_json() tells of the photographs that their owner may not know.
+std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training);
 
 }  // namespace cgs

@@ -187,8 +187,7 @@ Json report_json(const Run& run) {
   }
   std::vector<std::string> notes = run.scene.notes;
   const Json model = run.record.result("model");
-  const Json exposure = model.value("exposure", Json());
-  if (exposure.is_object()) notes.push_back(exposure.value("words", ""));
+  for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
   Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
               {"folder", run.request.scene.path.string()},
@@ -300,12 +299,13 @@ void warn_of(const Json& result, const Terminal& terminal) {
 // What a user would not expect of a stage: "kept 33165 of 142884".
 std::string remark_on(const std::string& stage, const Json& result) {
   if (stage == "model") {
-    const std::string depth = result["given_depth"].is_object()
-                                  ? "depth files: " + result["given_depth"].value("words", "")
-                                  : "";
-    const std::string exposure =
-        result["exposure"].is_object() ? result["exposure"].value("words", "") : "";
-    return depth + (depth.empty() || exposure.empty() ? "" : "; ") + exposure;
+    std::string out = result["given_depth"].is_object()
+                          ? "depth files: " + result["given_depth"].value("words", "")
+                          : "";
+    for (const std::string& remark : remarks_on_photographs(result)) {
+      out += (out.empty() ? "" : "; ") + remark;
+    }
+    return out;
   }
   if (stage != "splats") return "";
   const Json& thinning = result["thinning"];

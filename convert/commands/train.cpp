@@ -101,7 +101,7 @@ void run_train(const TrainArgs& args) {
   report["seconds"] = terminal.end(std::to_string(count) + " Gaussians");
   const std::string& depth = trained.priors.given.found;
   if (!depth.empty()) terminal.say("depth files: " + depth);
-  if (report["exposure"].is_object()) terminal.say(report["exposure"].value("words", ""));
+  for (const std::string& remark : remarks_on_photographs(report)) terminal.say(remark);
   if (args.common.json) std::cout << json_text(report) << "\n";
   terminal.warn(found);
   terminal.warn(trained.hitches);

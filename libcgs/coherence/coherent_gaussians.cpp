@@ -168,6 +168,7 @@ void CoherenceOptions::validate() const {
   require(conv_opacity_gain > 0 && std::isfinite(conv_opacity_gain),
           "CoherenceOptions.conv_opacity_gain must be > 0",
           conv_opacity_gain);
+  require(sh_degree == 0 || sh_degree == 1, "CoherenceOptions.sh_degree must be 0 or 1", sh_degree);
   require_width(conv_depth_width, "CoherenceOptions.conv_depth_width must be in [0, 64]");
   require_width(conv_opacity_width, "CoherenceOptions.conv_opacity_width must be in [0, 64]");
   LayeredLatticeOptions{depth_spacing}.validate();
@@ -207,6 +208,9 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
       depth_maps_(depth_maps(priors, options)),
       opacity_maps_(opacity_maps(priors, options)) {
   gaussians_ = initial_gaussians(scene, priors, {options.radius_factor, options.opacity});
+  if (options.sh_degree > 0) {
+    view_dependence_ = add_view_dependence(scene, priors, gaussians_);
+  }
   if (gaussians_.size() > 0) start_logit_ = logit(gaussians_.opacity[0]);
   size_t first = 0;
   for (size_t n = 0; n < priors.size(); ++n) {

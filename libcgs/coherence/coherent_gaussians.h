@@ -6,6 +6,7 @@
 
 #include "libcgs/coherence/parameter_block.h"
 #include "libcgs/coherence/residual_maps.h"
+#include "libcgs/coherence/view_dependence.h"
 #include "libcgs/core/gaussian_gradients.h"
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/scene.h"
@@ -35,6 +36,8 @@ struct CoherenceOptions {
                              ///< not in the photographs.
   float max_radius = 3.0f;   ///< Of free shapes; >= radius_factor.
   float opacity = 0;         ///< As in InitialisationOptions.
+  int sh_degree = 1;         ///< Most that colours may have: 0, or 1 = where it pays, as
+                             ///< add_view_dependence() judges.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
@@ -61,7 +64,8 @@ void require_decodable(const Scene& scene, const CoherenceOptions& options);
 /// (3x2) from its point to the next pixels' points and a lower triangle L with e^a, e^b on its
 /// diagonal, the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a
 /// photograph cannot show, how far a Gaussian reaches along the ray, thus follows the surface
-/// instead of drifting. Colours are those of the pixels.
+/// instead of drifting. Colours are those of the pixels,
+/// seen from the own view; where surfaces demand it, they change with the direction.
 ///
 /// Source: Paliwal et al. 2024, "CoherentGS", section 3; the residual here is relative to depth
 ///         and bounded, and lattices may stand in for the convolutional decoders.
@@ -87,6 +91,7 @@ class CoherentGaussians {
   /// Brings gaussians() and depth() up to date with the parameters.
   void decode();
   const Gaussians& gaussians() const { return gaussians_; }
+  const ViewDependence& view_dependence() const { return view_dependence_; }
   size_t view_count() const { return views_.size(); }
   const DepthMap& depth(size_t view) const { return views_[view].depth; }
   /// Indices [first, last) in gaussians() of those of one view, in row-major order of its pixels.
@@ -140,6 +145,7 @@ class CoherentGaussians {
   std::vector<Raster<float>> depth_change_;  // f, then tanh(f / D), per view
   std::vector<Raster<float>> logit_change_;  // the same of g
   Gaussians gaussians_;
+  ViewDependence view_dependence_;
 };
 
 }  // namespace cgs

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cstdint>
 #include <span>
 
 #include "libcgs/core/camera.h"
 #include "libcgs/core/raster.h"
+#include "libcgs/priors/pixel_matches.h"
 #include "libcgs/render/training_rasterizer.h"
 
 namespace cgs {
@@ -53,13 +53,6 @@ double total_variation(const TrainingBuffers& rendered,
                        const Raster<uint8_t>* layer,
                        double weight,
                        TrainingBuffers& gradient);
-
-/// What one view's pixel and a point of another view's depth map show in common.
-struct PixelMatch {
-  int32_t pixel = 0;  ///< Index of the pixel in the first view, row-major.
-  float u = 0;        ///< Place in the second view [pixels, centres at +0.5].
-  float v = 0;
-};
 
 /// Mean over all pixels of the first view of the L1 distance (the sum of three coordinates)
 /// between the 3D points that two depth maps give at corresponding places; the second depth is

@@ -93,34 +93,6 @@ uint64_t mixed(uint64_t a, uint64_t b, uint64_t c) {
                    (c + 1) * 0x165667B19E3779F9ULL);
 }
 
-// Pixels of `first` whose measured depth `second` confirms, with the place where it does. An
-// optical flow, which the flow loss was published with, would also match what the sweep could not
-// measure.
-std::vector<PixelMatch> matches_between(const Camera& first,
-                                        const ViewPriors& own,
-                                        const Camera& second,
-                                        const ViewPriors& other) {
-  std::vector<PixelMatch> out;
-  for (int y = 0; y < own.depth.height; ++y) {
-    for (int x = 0; x < own.depth.width; ++x) {
-      if (own.origin(x, y) != DepthOrigin::Measured) continue;
-      const Eigen::Vector3d uvz =
-          second.project(first.unproject(x + 0.5, y + 0.5, double(own.depth(x, y))));
-      if (!second.sees(uvz)) continue;
-      const auto u = static_cast<int>(uvz.x());
-      const auto v = static_cast<int>(uvz.y());
-      if (other.origin(u, v) != DepthOrigin::Measured) continue;
-      const double tolerance =
-          3 * std::hypot(double(own.sigma(x, y)), double(other.sigma(u, v))) + 0.005 * uvz.z();
-      if (std::abs(double(other.depth(u, v)) - uvz.z()) > tolerance) continue;
-      out.push_back({static_cast<int32_t>(own.depth.index(x, y)),
-                     static_cast<float>(uvz.x()),
-                     static_cast<float>(uvz.y())});
-    }
-  }
-  return out;
-}
-
 void append(std::string& out, int64_t value) {
   out.append(reinterpret_cast<const char*>(&value), sizeof(value));
 }
@@ -209,8 +181,10 @@ Trainer::Trainer(const Scene& scene,
   for (size_t i = 0; i < priors.size() && options.flow_weight > 0; ++i) {
     for (size_t j = 0; j < priors.size(); ++j) {
       if (i == j) continue;
+      // An optical flow, which the flow loss was published with, would also match what the sweep
+      // could not measure.
       pairs_.push_back(
-          {i, j, matches_between(full_[i].camera, priors[i], full_[j].camera, priors[j])});
+          {i, j, pixel_matches(full_[i].camera, priors[i], full_[j].camera, priors[j])});
     }
   }
   states_.resize(model_.parameters.size());

@@ -53,7 +53,8 @@ std::vector<Field> fields_of(TrainingOptions& o) {
           {"radius_factor", &o.coherence.radius_factor},
           {"min_radius", &o.coherence.min_radius},
           {"max_radius", &o.coherence.max_radius},
-          {"opacity", &o.coherence.opacity}};
+          {"opacity", &o.coherence.opacity},
+          {"sh_degree", &o.coherence.sh_degree}};
 }
 
 template <typename T>

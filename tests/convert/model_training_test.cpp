@@ -38,6 +38,18 @@ TEST(TrainingToJson, SaysInWordsWhetherAnythingWasOptimised) {
   EXPECT_EQ(training_to_json(trained, request)["gradients_not_finite"], 6);
 }
 
+TEST(TrainingToJson, RemarksWhereColoursDependOnTheDirection) {
+  TrainedModel trained;
+  trained.view_dependence = {.difference = 0.02, .explained = 0.05, .share = 0};
+  const auto remarks = [&] { return remarks_on_photographs(training_to_json(trained, {})); };
+  EXPECT_TRUE(remarks().empty());
+  trained.view_dependence = {.difference = 0.05, .explained = 0.67, .share = 0.245};
+  EXPECT_EQ(training_to_json(trained, {})["view_dependence"]["explained"], 0.67);
+  ASSERT_EQ(remarks().size(), 1u);
+  EXPECT_EQ(remarks()[0], "colours of 24 % of the Gaussians change with the direction of view");
+  EXPECT_TRUE(remarks_on_photographs({{"exposure", nullptr}}).empty());
+}
+
 // Of a model with a view per entry of the coverage.
 std::string described(TrainedModel trained, const ModelRequest& request) {
   Scene& scene = trained.model.scene;

@@ -45,7 +45,8 @@ TEST(TrainingOptions, ValidateNamesTheFieldOutOfRange) {
                               "conv_opacity_rate",
                               "conv_rise",
                               "opacity_prior",
-                              "tv_to_layers"}) {
+                              "tv_to_layers",
+                              "sh_degree"}) {
     TrainingOptions options;
     set_training_field(options, setting, "-1");
     try {
