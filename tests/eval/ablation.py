@@ -26,6 +26,7 @@ ROWS = {
     "depth stays": ["depth_rate=1e-12"],
     "opacity stays": ["opacity_rate=1e-12"],
     "shapes stay balls": ["free_from=1"],
+    "colours the same from everywhere": ["sh_degree=0"],
     "no prior of depth": ["prior_weight=0"],
     "no prior of opacity": ["opacity_prior=0"],
     "no D-SSIM": ["ssim_weight=0", "l1_weight=1"],
