@@ -31,7 +31,7 @@ struct StageFactors {
   double of_fused;    ///< The same on top, where files are held against the fused surface.
 };
 constexpr std::array<StageFactors, 7> kFactors = {
-    {{"depth and Gaussians", 115 * kMebi, 730, 0, 0, 0},
+    {{"depth and Gaussians", 115 * kMebi, 930, 0, 0, 0},
      {"views", 105 * kMebi, 160, 231, 0, 0},
      {"held-out views", 105 * kMebi, 160, 231, 0, 0},
      {"splats for browsers", 124 * kMebi, 745, 0, 0, 0},

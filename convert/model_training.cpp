@@ -230,6 +230,7 @@ std::vector<std::string> optimised(const TrainingOptions& options, size_t steps)
     out.emplace_back("opacity");
   }
   if (options.shape_rate > 0 && frees_shapes) out.emplace_back("shape");
+  if (options.color_rate > 0) out.emplace_back("colour");
   return out;
 }
 

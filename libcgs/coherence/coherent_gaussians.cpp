@@ -14,6 +14,7 @@ namespace cgs {
 
 namespace {
 
+constexpr size_t kChannels = 3;
 constexpr size_t kShapeSize = 3;  // log of the diagonal of a lower triangle, and its corner
 
 float sigmoid(float x) {
@@ -216,11 +217,12 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
   for (size_t n = 0; n < priors.size(); ++n) {
     const Camera& camera = scene.views[static_cast<size_t>(scene.input[n])].camera;
     const DepthMap& depth = priors[n].depth;
-    ViewState view{camera, depth, depth, {}, {}, {}};
+    const auto& origin = priors[n].origin.data;
+    ViewState view{camera, depth, depth, {}, {}, {}, {}, {}};
     for (size_t i = 0; i < depth.data.size(); ++i) {
-      if (has_gaussian(depth.data[i])) {
-        view.pixels.push_back(static_cast<int>(i));
-      }
+      if (!has_gaussian(depth.data[i])) continue;
+      view.pixels.push_back(static_cast<int>(i));
+      view.is_measured.push_back(!origin.empty() && origin[i] == DepthOrigin::Measured ? 1 : 0);
     }
     view.range = {first, first + view.pixels.size()};
     first = view.range.last;
@@ -230,7 +232,9 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
   for (ParameterBlock& block : opacity_maps_.initial_blocks(ParameterRole::Opacity)) {
     parameters.push_back(std::move(block));
   }
-  parameters.resize(parameters.size() + views_.size(), {ParameterRole::Shape, {}, {}});
+  for (const ParameterRole role : {ParameterRole::Color, ParameterRole::Shape}) {
+    parameters.resize(parameters.size() + views_.size(), {role, {}, {}});
+  }
 }
 
 std::span<ParameterBlock> CoherentGaussians::blocks(ParameterRole role) {
@@ -249,6 +253,20 @@ std::vector<Raster<float>> CoherentGaussians::zeros() const {
     out.emplace_back(view.depth.width, view.depth.height, 0.0f);
   }
   return out;
+}
+
+void CoherentGaussians::free_colors() {
+  if (colors_are_free_) return;
+  colors_are_free_ = true;
+  const auto count = static_cast<size_t>(gaussians_.sh_count());
+  for (size_t n = 0; n < views_.size(); ++n) {
+    ViewState& view = views_[n];
+    color(n).resize(view.pixels.size() * kChannels);
+    view.start_color.reserve(view.pixels.size());
+    for (size_t g = view.range.first; g < view.range.last; ++g) {
+      view.start_color.push_back(gaussians_.sh[g * count]);
+    }
+  }
 }
 
 void CoherentGaussians::free_shapes() {
@@ -273,6 +291,8 @@ void CoherentGaussians::free_shapes() {
 void CoherentGaussians::decode_view(size_t n) {
   ViewState& view = views_[n];
   std::vector<float>& shapes = shape(n).value;
+  const std::vector<float>& colors = color(n).value;
+  const auto harmonics = static_cast<size_t>(gaussians_.sh_count());
   const auto unit = static_cast<float>(pixel_size(view.camera));
   const float max_depth = options_.max_depth_change;
   const float max_logit = options_.max_logit_change;
@@ -288,6 +308,10 @@ void CoherentGaussians::decode_view(size_t n) {
     const int y = pixel / view.depth.width;
     gaussians_.position[g] = view.camera.unproject(x + 0.5, y + 0.5, double(z)).cast<float>();
     gaussians_.opacity[g] = opacity_of(start_logit_ + max_logit * h);
+    if (colors_are_free_) {
+      gaussians_.sh[g * harmonics] =
+          view.start_color[k] + Eigen::Vector3f(&colors[k * kChannels]) / kShC0;
+    }
     if (!shapes_are_free_) {
       gaussians_.scale[g].setConstant(options_.radius_factor * z * unit);
       return;
@@ -335,6 +359,8 @@ void CoherentGaussians::add_view_gradients(size_t n,
                                            Raster<float>& by_f,
                                            Raster<float>& by_h) {
   const ViewState& view = views_[n];
+  std::vector<float>& by_color = color(n).gradient;
+  const auto harmonics = static_cast<size_t>(gaussians_.sh_count());
   const auto unit = static_cast<float>(pixel_size(view.camera));
   const Eigen::Matrix3d R = view.camera.world_from_cam.linear();
   for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
@@ -349,6 +375,9 @@ void CoherentGaussians::add_view_gradients(size_t n,
       by_z += gradients.radius[g] * options_.radius_factor * unit;
     } else {
       by_z += add_shape_gradient(n, k, gradients.covariance[g]) / z;
+    }
+    if (colors_are_free_ && view.is_measured[k] != 0) {
+      Eigen::Map<Eigen::Vector3f>(&by_color[k * kChannels]) += gradients.sh[g * harmonics] / kShC0;
     }
     const float f = depth_change_[n].data[pixel];
     const float h = logit_change_[n].data[pixel];
@@ -384,6 +413,20 @@ double CoherentGaussians::add_opacity_prior(double weight) {
     }
   }
   opacity_maps_.add_gradient(std::move(by_h), blocks(ParameterRole::Opacity));
+  return share * sum;
+}
+
+double CoherentGaussians::add_color_prior(double weight) {
+  if (!(weight > 0)) return 0;
+  const double share = weight / double(std::max<size_t>(gaussians_.size(), 1));
+  double sum = 0;
+  for (size_t n = 0; n < views_.size(); ++n) {
+    ParameterBlock& own = color(n);
+    for (size_t i = 0; i < own.value.size(); ++i) {
+      sum += double(own.value[i]) * double(own.value[i]);
+      own.gradient[i] += static_cast<float>(2 * share) * own.value[i];
+    }
+  }
   return share * sum;
 }
 

@@ -65,7 +65,8 @@ void require_decodable(const Scene& scene, const CoherenceOptions& options);
 /// diagonal, the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a
 /// photograph cannot show, how far a Gaussian reaches along the ray, thus follows the surface
 /// instead of drifting. Colours are those of the pixels,
-/// seen from the own view; where surfaces demand it, they change with the direction.
+/// seen from the own view; where surfaces demand it, they change with the direction. Free colours
+/// move where depth is measured: elsewhere, they would learn by heart what another view shows.
 ///
 /// Source: Paliwal et al. 2024, "CoherentGS", section 3; the residual here is relative to depth
 ///         and bounded, and lattices may stand in for the convolutional decoders.
@@ -79,14 +80,18 @@ class CoherentGaussians {
                     const CoherenceOptions& options);
 
   /// What the optimiser may change: blocks of depth (one per view of lattices, one of a network),
-  /// blocks of opacity alike, and one block of shape per view: (a, b, corner of L) per Gaussian,
-  /// empty until free_shapes().
+  /// blocks of opacity alike, one block of colour per view: change of red, green and blue per
+  /// Gaussian, empty until free_colors(), and one of shape: (a, b, corner of L) per Gaussian, empty
+  /// until free_shapes().
   std::vector<ParameterBlock> parameters;
 
   /// From now on every Gaussian has a shape of its own, at first L = radius_factor: it covers its
   /// pixel's piece of the surface and is longer than the ball it was along the slope.
   void free_shapes();
   bool shapes_are_free() const { return shapes_are_free_; }
+
+  /// From now on every Gaussian on measured surface has a colour of its own, at first its pixel's.
+  void free_colors();
 
   /// Brings gaussians() and depth() up to date with the parameters.
   void decode();
@@ -112,6 +117,9 @@ class CoherentGaussians {
   /// and its gradient. \return weight times the mean
   double add_opacity_prior(double weight);
 
+  /// The same for the squared change of colour, summed over its channels.
+  double add_color_prior(double weight);
+
   /// Adds the bending energies of the lattices of depth and opacity, times weights; networks have
   /// none. \return the weighted sum
   double add_bending(double depth_weight, double opacity_weight);
@@ -122,10 +130,13 @@ class CoherentGaussians {
     DepthMap start;
     DepthMap depth;
     std::vector<int> pixels;
+    std::vector<uint8_t> is_measured;               // per Gaussian
+    std::vector<Eigen::Vector3f> start_color;       // constant coefficient of SH; if free
     std::vector<Eigen::Matrix<float, 3, 2>> steps;  // to the next pixels, for depth 1; if free
     Range range;
   };
   std::span<ParameterBlock> blocks(ParameterRole role);
+  ParameterBlock& color(size_t n) { return parameters[parameters.size() - 2 * views_.size() + n]; }
   ParameterBlock& shape(size_t n) { return parameters[parameters.size() - views_.size() + n]; }
   void decode_view(size_t n);
   float add_shape_gradient(size_t n, size_t k, const CovarianceGradient& gradient);
@@ -138,6 +149,7 @@ class CoherentGaussians {
 
   CoherenceOptions options_;
   float start_logit_ = 0;
+  bool colors_are_free_ = false;
   bool shapes_are_free_ = false;
   std::vector<ViewState> views_;
   ResidualMaps depth_maps_;

@@ -7,7 +7,7 @@
 namespace cgs {
 
 /// What a block of parameters moves; an optimiser treats blocks of one role alike.
-enum class ParameterRole { Depth, Opacity, Shape };
+enum class ParameterRole { Depth, Opacity, Color, Shape };
 
 /// Numbers that an optimiser changes, and the derivative of the loss with respect to each.
 struct ParameterBlock {

@@ -187,6 +187,7 @@ Trainer::Trainer(const Scene& scene,
           {i, j, pixel_matches(full_[i].camera, priors[i], full_[j].camera, priors[j])});
     }
   }
+  if (options.color_rate > 0) model_.free_colors();
   states_.resize(model_.parameters.size());
   disparity_unit_ = median_depth(priors);
   model_.decode();
@@ -218,6 +219,7 @@ void Trainer::add_view(size_t n, GaussianGradients& sum, StepReport& report) {
   const TrainingView& view = coarse ? coarse_[n] : full_[n];
   TrainingRasterizerOptions how;
   how.background = background(static_cast<uint64_t>(step_), n);
+  how.sh_gradients = options_.color_rate > 0;
   how.shape = model_.shapes_are_free() ? GaussianShape::Ellipsoids : GaussianShape::Balls;
   rasterizer_.set_options(how);
   const Camera camera = sharp ? doubled(view.camera) : view.camera;
@@ -295,7 +297,8 @@ void Trainer::add_depth_terms(std::vector<Raster<float>>& sum, StepReport& repor
 }
 
 float Trainer::rate(ParameterRole role) const {
-  if (role != ParameterRole::Shape && options_.coherence.decoder == ResidualDecoder::Conv) {
+  const bool is_decoded = role == ParameterRole::Depth || role == ParameterRole::Opacity;
+  if (is_decoded && options_.coherence.decoder == ResidualDecoder::Conv) {
     const bool is_depth = role == ParameterRole::Depth;
     const double peak = is_depth ? options_.conv_depth_rate : options_.conv_opacity_rate;
     const double rise = options_.conv_rise * (is_depth ? 1 : 2) * options_.steps;
@@ -306,6 +309,7 @@ float Trainer::rate(ParameterRole role) const {
   const double left = options_.final_rate + (1 - options_.final_rate) * fall;
   const double start = role == ParameterRole::Depth     ? options_.depth_rate
                        : role == ParameterRole::Opacity ? options_.opacity_rate
+                       : role == ParameterRole::Color   ? options_.color_rate
                                                         : options_.shape_rate;
   return static_cast<float>(left * start);
 }
@@ -316,8 +320,10 @@ size_t Trainer::update() {
   size_t skipped = 0;
   for (size_t i = 0; i < model_.parameters.size(); ++i) {
     ParameterBlock& block = model_.parameters[i];
-    if (block.value.empty()) continue;  // shapes that are not free
-    const float decay = has_networks && block.role != ParameterRole::Shape ? kNetworkDecay : 0;
+    if (block.value.empty()) continue;  // colours or shapes that are not free
+    const bool is_decoded =
+        block.role == ParameterRole::Depth || block.role == ParameterRole::Opacity;
+    const float decay = has_networks && is_decoded ? kNetworkDecay : 0;
     skipped += adam_step(block, states_[i], rate(block.role), decay);
   }
   return skipped;
@@ -335,7 +341,8 @@ StepReport Trainer::step() {
   add_depth_terms(depth, report);
   model_.add_gradients(gaussians, depth);
   report.bending = model_.add_bending(options_.depth_bending, options_.opacity_bending) +
-                   model_.add_opacity_prior(options_.opacity_prior);
+                   model_.add_opacity_prior(options_.opacity_prior) +
+                   model_.add_color_prior(options_.color_prior);
   // The state is still that of the last good step; a NaN in every parameter would look like a
   // result.
   if (!std::isfinite(report.total())) {

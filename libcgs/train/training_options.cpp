@@ -23,6 +23,7 @@ std::vector<Field> fields_of(TrainingOptions& o) {
           {"sharp_from", &o.sharp_from},
           {"depth_rate", &o.depth_rate},
           {"opacity_rate", &o.opacity_rate},
+          {"color_rate", &o.color_rate},
           {"shape_rate", &o.shape_rate},
           {"final_rate", &o.final_rate},
           {"conv_depth_rate", &o.conv_depth_rate},
@@ -38,6 +39,7 @@ std::vector<Field> fields_of(TrainingOptions& o) {
           {"depth_bending", &o.depth_bending},
           {"opacity_bending", &o.opacity_bending},
           {"opacity_prior", &o.opacity_prior},
+          {"color_prior", &o.color_prior},
           {"l1_levels", &o.l1_levels},
           {"dropout", &o.dropout},
           {"dropout_block", &o.dropout_block},
@@ -120,6 +122,7 @@ void TrainingOptions::validate() const {
   require_fraction(final_rate, "final_rate");
   require_weight(depth_rate, "depth_rate");
   require_weight(opacity_rate, "opacity_rate");
+  require_weight(color_rate, "color_rate");
   require_weight(shape_rate, "shape_rate");
   require_weight(conv_depth_rate, "conv_depth_rate");
   require_weight(conv_opacity_rate, "conv_opacity_rate");
@@ -134,6 +137,7 @@ void TrainingOptions::validate() const {
   require_weight(depth_bending, "depth_bending");
   require_weight(opacity_bending, "opacity_bending");
   require_weight(opacity_prior, "opacity_prior");
+  require_weight(color_prior, "color_prior");
   const bool has_knots = coherence.decoder == ResidualDecoder::Lattice;
   require(has_knots || depth_bending == 0,
           "depth_bending must be 0 with decoder=conv, which has no knots",
@@ -162,6 +166,8 @@ TrainingOptions reference_options() {
   options.conv_rise = 1000 / kSteps;
   options.free_from = 8000 / kSteps;
   options.sharp_from = 5000 / kSteps;
+  options.color_rate = 0;
+  options.coherence.sh_degree = 0;
   options.shape_rate = 1e-4 * faster;
   options.final_rate = 1;
   options.tv_weight = 5;
@@ -170,6 +176,7 @@ TrainingOptions reference_options() {
   options.flow_weight = 0.5 / 3;
   options.prior_weight = 0;
   options.opacity_prior = 0;
+  options.color_prior = 0;
   return options;
 }
 

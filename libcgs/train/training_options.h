@@ -23,6 +23,7 @@ struct TrainingOptions {
 
   double depth_rate = 1e-3;   ///< Of log depth, per step, at the start.
   double opacity_rate = 0.1;  ///< Of the logit.
+  double color_rate = 6e-3;   ///< Of sRGB-coded colours in [0, 1]; 0 = colours stay.
   double shape_rate = 0.2;    ///< Of the entries of a shape (CoherentGaussians).
   double final_rate = 0.05;   ///< These rates fall to this part of themselves, along a cosine.
 
@@ -47,6 +48,7 @@ struct TrainingOptions {
   double depth_bending = 0;     ///< Of the depth lattice; 0 with decoder=conv, which has no knots.
   double opacity_bending = 0;
   double opacity_prior = 0.001;  ///< Squared change of the logit, mean over Gaussians.
+  double color_prior = 0.6;      ///< The same of the colour, summed over its channels.
 
   int l1_levels = 5;
   double dropout = 0;      ///< Share of a view's own blocks left out of its picture; in [0, 1).

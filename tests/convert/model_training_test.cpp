@@ -84,7 +84,8 @@ TEST(TrainingToJson, SaysInWordsWhatWasOptimised) {
     EXPECT_NE(described(trained, request).find(words), std::string::npos)
         << words << " is not in: " << described(trained, request);
   };
-  expect("; depth, opacity and shape optimised against the photographs in 60 steps");
+  expect("; depth, opacity, shape and colour optimised against the photographs in 60 steps");
+  request.training.color_rate = 0;
   request.training.depth_rate = 0;
   expect("; opacity and shape optimised against");
   request.training.free_from = 1;

@@ -398,6 +398,91 @@ TEST(CoherentGaussians, GradientsOfBallsMatchFiniteDifferences) { expect_gradien
 
 TEST(CoherentGaussians, GradientsOfFreeShapesMatchFiniteDifferences) { expect_gradients(true); }
 
+// All of the right half is measured.
+CoherentGaussians with_free_colors() {
+  std::vector<ViewPriors> priors = priors_of(2);
+  for (ViewPriors& p : priors) {
+    p.sigma = DepthMap(kWidth, kHeight, 0.01f);
+    p.origin = Raster<DepthOrigin>(kWidth, kHeight, DepthOrigin::Completed);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 8; x < kWidth; ++x) p.origin(x, y) = DepthOrigin::Measured;
+    }
+  }
+  CoherentGaussians model(scene_of(2), priors, small_lattices());
+  model.free_colors();
+  return model;
+}
+
+std::vector<ParameterBlock*> color_blocks(CoherentGaussians& model) {
+  std::vector<ParameterBlock*> out;
+  for (ParameterBlock& block : model.parameters) {
+    if (block.role == ParameterRole::Color) out.push_back(&block);
+  }
+  return out;
+}
+
+TEST(CoherentGaussians, FreeColoursAreThoseOfThePixelsAndTheirChange) {
+  CoherentGaussians model = with_free_colors();
+  const std::vector<ParameterBlock*> blocks = color_blocks(model);
+  ASSERT_EQ(blocks.size(), 2u);
+  std::mt19937 random(6);
+  for (ParameterBlock* block : blocks) randomise(*block, 0.2f, random);
+  model.decode();
+  for (size_t n = 0; n < 2; ++n) {
+    const auto [first, last] = model.range(n);
+    ASSERT_EQ(blocks[n]->value.size(), 3 * (last - first));
+    for (size_t i = first; i < last; ++i) {
+      const Eigen::Vector3f change(&blocks[n]->value[3 * (i - first)]);
+      const Eigen::Vector3f color =
+          kShC0 * model.gaussians().sh[i] + Eigen::Vector3f::Constant(0.5f);
+      EXPECT_NEAR((color - Eigen::Vector3f(0.1f, 0.5f, 0.9f) - change).norm(), 0, 1e-6);
+    }
+  }
+}
+
+TEST(CoherentGaussians, GradientsOfFreeColoursAreThoseOfMeasuredPixels) {
+  CoherentGaussians model = with_free_colors();
+  model.decode();
+  LinearLoss loss(model, false);
+  std::mt19937 random(7);
+  std::normal_distribution<float> normal(0, 1);
+  for (size_t i = 0; i < model.gaussians().size(); ++i) {
+    loss.weights.sh.emplace_back(normal(random), normal(random), normal(random));
+  }
+  model.add_gradients(loss.weights, loss.depth);
+  const std::vector<ParameterBlock*> blocks = color_blocks(model);
+  for (size_t n = 0; n < 2; ++n) {
+    const auto [first, last] = model.range(n);
+    for (size_t i = first; i < last; ++i) {
+      const Eigen::Vector3f gradient(&blocks[n]->gradient[3 * (i - first)]);
+      const bool is_measured = model.pixel(n, i - first) % kWidth >= 8;
+      // colour = 0.5 + Y_00 coefficient
+      const Eigen::Vector3f expected = is_measured ? Eigen::Vector3f(loss.weights.sh[i] / kShC0)
+                                                   : Eigen::Vector3f(Eigen::Vector3f::Zero());
+      EXPECT_NEAR((gradient - expected).norm(), 0, 1e-5) << i;
+    }
+  }
+}
+
+TEST(CoherentGaussians, ThePriorOfColoursIsTheirMeanSquaredChange) {
+  CoherentGaussians model = with_free_colors();
+  const std::vector<ParameterBlock*> blocks = color_blocks(model);
+  std::mt19937 random(8);
+  double sum = 0;
+  for (ParameterBlock* block : blocks) {
+    randomise(*block, 0.2f, random);
+    for (const float v : block->value) sum += double(v) * double(v);
+  }
+  const auto count = double(model.gaussians().size());
+  EXPECT_NEAR(model.add_color_prior(3), 3 * sum / count, 1e-9);
+  for (const ParameterBlock* block : blocks) {
+    for (size_t i = 0; i < block->value.size(); ++i) {
+      EXPECT_NEAR(block->gradient[i], 2 * 3 / count * double(block->value[i]), 1e-8);
+    }
+  }
+  EXPECT_EQ(model.add_color_prior(0), 0);
+}
+
 TEST(CoherenceOptions, NameTheFieldOutOfRange) {
   CoherenceOptions options;
   options.max_depth_change = std::numeric_limits<float>::quiet_NaN();

@@ -130,7 +130,7 @@ TEST(Trainer, LosesLessAndLess) {
 TEST(Trainer, FreesShapesBeforeItsStepNotAfter) {
   const PlantedScene planted = planted_scene(0.03);
   TrainingOptions options = short_training(4);
-  options.depth_rate = options.opacity_rate = options.shape_rate = 0;
+  options.depth_rate = options.opacity_rate = options.shape_rate = options.color_rate = 0;
   options.free_from = 0;
   Trainer from_the_start(planted.scene, planted.priors, options);
   options.free_from = 0.25;
@@ -278,12 +278,48 @@ TEST(Trainer, LearnsNothingFromMaskedPixelsWhileImagesAreCoarse) {
   EXPECT_EQ(losses[0], losses[1]);
 }
 
-TEST(Trainer, ChangesNoColour) {
+TEST(Trainer, ChangesNoColourWithoutARate) {
   const PlantedScene planted = planted_scene(0.02);
-  Trainer trainer(planted.scene, planted.priors, short_training(5));
+  TrainingOptions options = short_training(5);
+  options.color_rate = 0;
+  Trainer trainer(planted.scene, planted.priors, options);
   const auto before = trainer.model().gaussians().sh;
   run(trainer);
   EXPECT_EQ(trainer.model().gaussians().sh, before);
+}
+
+TEST(Trainer, ColoursThatMoveMakeHeldOutViewsBetter) {
+  const PlantedScene planted = planted_scene(0.01);
+  TrainingOptions options = short_training(40);
+  std::vector<double> psnr;
+  for (const double rate : {0.0, options.color_rate}) {
+    options.color_rate = rate;
+    Trainer trainer(planted.scene, planted.priors, options);
+    run(trainer);
+    psnr.push_back(held_out_psnr(trainer.model().gaussians()));
+  }
+  EXPECT_GT(psnr[1], psnr[0] + 0.3) << "from " << psnr[0] << " dB";
+}
+
+// Completed depth tells of no surface, and colours there would fit one photograph alone.
+TEST(Trainer, ColoursStayWhereDepthIsNotMeasured) {
+  PlantedScene planted = planted_scene(0.02);
+  for (ViewPriors& priors : planted.priors) {
+    for (size_t i = 0; i < priors.origin.data.size(); i += 2) {
+      priors.origin.data[i] = DepthOrigin::Completed;
+    }
+  }
+  Trainer trainer(planted.scene, planted.priors, short_training(5));
+  const CoherentGaussians& model = trainer.model();
+  const auto before = model.gaussians().sh;
+  run(trainer);
+  for (size_t n = 0; n < model.view_count(); ++n) {
+    const auto [first, last] = model.range(n);
+    for (size_t i = first; i < last; ++i) {
+      const bool is_measured = model.pixel(n, i - first) % 2 == 1;
+      EXPECT_EQ(model.gaussians().sh[i] != before[i], is_measured) << i;
+    }
+  }
 }
 
 }  // namespace

@@ -46,7 +46,9 @@ TEST(TrainingOptions, ValidateNamesTheFieldOutOfRange) {
                               "conv_rise",
                               "opacity_prior",
                               "tv_to_layers",
-                              "sh_degree"}) {
+                              "sh_degree",
+                              "color_rate",
+                              "color_prior"}) {
     TrainingOptions options;
     set_training_field(options, setting, "-1");
     try {
