@@ -35,8 +35,9 @@ struct ThinnedSplats {
 };
 
 /// What may be lost as thin_splats() foresees it [dB]. It foresees more than photographs that were
-/// held out show: where these are, less was reconstructed well than where input photographs meet.
-inline constexpr double kMostThinningLoss = 0.1;
+/// held out show, by four times or more: where these are, less was reconstructed well than where
+/// input photographs meet, and all splats were trained on each of these.
+inline constexpr double kMostThinningLoss = 0.2;
 
 /// The splats of input views without those that its pictures do not need: merge_splats() and
 /// refit_splats() on the input views and on cameras between and beside them, by the strongest

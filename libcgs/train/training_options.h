@@ -23,7 +23,7 @@ struct TrainingOptions {
 
   double depth_rate = 1e-3;   ///< Of log depth, per step, at the start.
   double opacity_rate = 0.1;  ///< Of the logit.
-  double color_rate = 6e-3;   ///< Of sRGB-coded colours in [0, 1]; 0 = colours stay.
+  double color_rate = 3e-3;   ///< Of sRGB-coded colours in [0, 1]; 0 = colours stay.
   double shape_rate = 0.2;    ///< Of the entries of a shape (CoherentGaussians).
   double final_rate = 0.05;   ///< These rates fall to this part of themselves, along a cosine.
 
