@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <tbb/parallel_for.h>
@@ -98,7 +99,8 @@ class ViewDependenceFit {
     for (size_t j = 0; j < views_.size(); ++j) {
       if (j == n) continue;
       const View& other = *views_[j];
-      const auto none = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+      const Eigen::Vector3f none =
+          Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
       ViewColors shown{{own.image.width, own.image.height, none}, other.camera.center()};
       for (const PixelMatch& match :
            pixel_matches(own.camera, priors_[n], other.camera, priors_[j])) {
@@ -214,6 +216,7 @@ ViewDependence add_view_dependence(const Scene& scene,
   size_t changed = 0;
   for (size_t n = 0; n < priors.size(); ++n) {
     const View& view = scene.views[static_cast<size_t>(scene.input[n])];
+    // Once more: kept from above, those of all views would take much memory at once.
     const std::vector<ViewColors> others = fit.seen_by_others(n);
     for (int y = 0; y < priors[n].depth.height; ++y) {
       for (int x = 0; x < priors[n].depth.width; ++x) {

@@ -159,6 +159,11 @@ float median_depth(const std::vector<ViewPriors>& priors) {
   return median(all);
 }
 
+// Whether a decoder, lattices or networks, gives what the parameters move.
+bool is_decoded(ParameterRole role) {
+  return role == ParameterRole::Depth || role == ParameterRole::Opacity;
+}
+
 }  // namespace
 
 Trainer::Trainer(const Scene& scene,
@@ -297,8 +302,7 @@ void Trainer::add_depth_terms(std::vector<Raster<float>>& sum, StepReport& repor
 }
 
 float Trainer::rate(ParameterRole role) const {
-  const bool is_decoded = role == ParameterRole::Depth || role == ParameterRole::Opacity;
-  if (is_decoded && options_.coherence.decoder == ResidualDecoder::Conv) {
+  if (is_decoded(role) && options_.coherence.decoder == ResidualDecoder::Conv) {
     const bool is_depth = role == ParameterRole::Depth;
     const double peak = is_depth ? options_.conv_depth_rate : options_.conv_opacity_rate;
     const double rise = options_.conv_rise * (is_depth ? 1 : 2) * options_.steps;
@@ -321,9 +325,7 @@ size_t Trainer::update() {
   for (size_t i = 0; i < model_.parameters.size(); ++i) {
     ParameterBlock& block = model_.parameters[i];
     if (block.value.empty()) continue;  // colours or shapes that are not free
-    const bool is_decoded =
-        block.role == ParameterRole::Depth || block.role == ParameterRole::Opacity;
-    const float decay = has_networks && is_decoded ? kNetworkDecay : 0;
+    const float decay = has_networks && is_decoded(block.role) ? kNetworkDecay : 0;
     skipped += adam_step(block, states_[i], rate(block.role), decay);
   }
   return skipped;
