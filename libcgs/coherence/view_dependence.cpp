@@ -17,10 +17,9 @@ namespace cgs {
 
 namespace {
 
-constexpr float kShC1 = 0.4886025119029199f;  // of the linear harmonics -y, z, -x
-constexpr int kMeanRadius = 2;                // of the neighbourhood that G is fitted to [pixels]
-constexpr int kNearest = 1;                   // of what is left out of it to judge
-constexpr int kPiece = 16;                    // side of the pieces that are judged [pixels]
+constexpr int kMeanRadius = 2;  // of the neighbourhood that G is fitted to [pixels]
+constexpr int kNearest = 1;     // of what is left out of it to judge
+constexpr int kPiece = 16;      // side of the pieces that are judged [pixels]
 constexpr double kSlopeRidge = 0.3;
 constexpr double kMostChange = 2;  // over a turn of 1, of what was seen
 constexpr double kLeastDifference = 0.03;
@@ -187,42 +186,47 @@ void set_color(const Eigen::Vector3f& color,
   sh[3] = -linear.col(0);
 }
 
-}  // namespace
-
-ViewDependence add_view_dependence(const Scene& scene,
-                                   const std::vector<ViewPriors>& priors,
-                                   Gaussians& gaussians) {
-  require(
-      gaussians.sh_degree == 0, "colours must not depend on directions yet", gaussians.sh_degree);
-  const ViewDependenceFit fit(scene, priors);
-  std::vector<Raster<PieceDifference>> evidence;
+// Pieces of the views, and what all of them and those that ask for directions differ by.
+struct Evidence {
+  std::vector<Raster<PieceDifference>> views;
   PieceDifference all;
   PieceDifference asking;
-  for (size_t n = 0; n < priors.size(); ++n) {
-    evidence.push_back(fit.evidence(n));
-    for (const PieceDifference& piece : evidence.back().data) {
-      all.add(piece);
-      if (piece.asks_for_directions()) asking.add(piece);
+
+  double explained() const { return all.all > 0 ? (asking.all - asking.left) / all.all : 0; }
+};
+
+Evidence gather_evidence(const ViewDependenceFit& fit, size_t views) {
+  Evidence out;
+  for (size_t n = 0; n < views; ++n) {
+    out.views.push_back(fit.evidence(n));
+    for (const PieceDifference& piece : out.views.back().data) {
+      out.all.add(piece);
+      if (piece.asks_for_directions()) out.asking.add(piece);
     }
   }
-  ViewDependence out;
-  out.difference = all.rms(all.all);
-  if (all.all > 0) out.explained = (asking.all - asking.left) / all.all;
-  if (out.explained < kWorth) return out;
+  return out;
+}
 
+// Gives all Gaussians four coefficients, and those of pieces that ask for it a slope. \return their
+// share.
+double add_slopes(const Scene& scene,
+                  const std::vector<ViewPriors>& priors,
+                  const ViewDependenceFit& fit,
+                  const Evidence& evidence,
+                  Gaussians& gaussians) {
   constexpr size_t kCount = 4;  // coefficients of degree 1
   std::vector<Eigen::Vector3f> sh(gaussians.size() * kCount, Eigen::Vector3f::Zero());
   size_t i = 0;
   size_t changed = 0;
   for (size_t n = 0; n < priors.size(); ++n) {
     const View& view = scene.views[static_cast<size_t>(scene.input[n])];
-    // Once more: kept from above, those of all views would take much memory at once.
+    // Once more: kept from the evidence, those of all views would take much memory at once.
     const std::vector<ViewColors> others = fit.seen_by_others(n);
     for (int y = 0; y < priors[n].depth.height; ++y) {
       for (int x = 0; x < priors[n].depth.width; ++x) {
         if (!has_gaussian(priors[n].depth(x, y))) continue;
         sh[i * kCount] = gaussians.sh[i];
-        if (evidence[n](x / kPiece, y / kPiece).asks_for_directions()) {
+        if (evidence.views[n](x / kPiece, y / kPiece).asks_for_directions()) {
           const Eigen::Vector3d point = gaussians.position[i].cast<double>();
           const Eigen::Vector3d direction = (point - view.camera.center()).normalized();
           const Eigen::Matrix3d slope = fit.slope(others, point, direction, x, y);
@@ -235,7 +239,23 @@ ViewDependence add_view_dependence(const Scene& scene,
   }
   gaussians.sh_degree = 1;
   gaussians.sh = std::move(sh);
-  out.share = static_cast<double>(changed) / static_cast<double>(gaussians.size());
+  return static_cast<double>(changed) / static_cast<double>(gaussians.size());
+}
+
+}  // namespace
+
+ViewDependence add_view_dependence(const Scene& scene,
+                                   const std::vector<ViewPriors>& priors,
+                                   Gaussians& gaussians) {
+  require(
+      gaussians.sh_degree == 0, "colours must not depend on directions yet", gaussians.sh_degree);
+  const ViewDependenceFit fit(scene, priors);
+  const Evidence evidence = gather_evidence(fit, priors.size());
+  ViewDependence out;
+  out.difference = evidence.all.rms(evidence.all.all);
+  out.explained = evidence.explained();
+  if (out.explained < kWorth) return out;
+  out.share = add_slopes(scene, priors, fit, evidence, gaussians);
   return out;
 }
 

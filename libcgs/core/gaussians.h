@@ -12,6 +12,8 @@ namespace cgs {
 
 /// Value of the constant spherical harmonic Y_00; colour = kShC0 * coefficient + 0.5.
 inline constexpr float kShC0 = 0.28209479177387814f;
+/// That of the linear ones: Y_1 = kShC1 * (-y, z, -x).
+inline constexpr float kShC1 = 0.4886025119029199f;
 
 /// A set of 3D Gaussians, one entry per Gaussian in every array, as values (no log, no logit).
 /// Positions and scales are in internal units of the canonical frame that comes with it.

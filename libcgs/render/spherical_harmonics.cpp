@@ -11,7 +11,6 @@ namespace cgs {
 namespace {
 
 // Normalisation of the real basis, sqrt of rational multiples of 1/pi.
-constexpr float kY1 = 0.4886025119029199f;      // sqrt(3 / 4pi)
 constexpr float kXY = 1.0925484305920792f;      // sqrt(15 / 4pi)
 constexpr float kZZ = 0.31539156525252005f;     // sqrt(5 / 16pi)
 constexpr float kXXYY = 0.5462742152960396f;    // sqrt(15 / 16pi)
@@ -27,7 +26,7 @@ Eigen::Vector3f bands_above_0(std::span<const Eigen::Vector3f> c,
   const float x = direction.x();
   const float y = direction.y();
   const float z = direction.z();
-  Eigen::Vector3f sum = kY1 * (z * c[2] - y * c[1] - x * c[3]);
+  Eigen::Vector3f sum = kShC1 * (z * c[2] - y * c[1] - x * c[3]);
   if (degree == 1) return sum;
   const float xx = x * x;
   const float yy = y * y;
@@ -71,9 +70,9 @@ ShBasis sh_basis(int degree, const Eigen::Vector3f& direction) {
     out.value[k] = value;
     out.slope[k] = {of_x, of_y, of_z};
   };
-  set(1, -kY1 * y, 0, -kY1, 0);
-  set(2, kY1 * z, 0, 0, kY1);
-  set(3, -kY1 * x, -kY1, 0, 0);
+  set(1, -kShC1 * y, 0, -kShC1, 0);
+  set(2, kShC1 * z, 0, 0, kShC1);
+  set(3, -kShC1 * x, -kShC1, 0, 0);
   if (degree == 1) return out;
   const float xx = x * x;
   const float yy = y * y;

@@ -116,7 +116,7 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
 
 TEST(PhotoPoses, AreRefusedForACameraThatWasOnlyTurned) {
   const test::TempDir dir;
-  Camera camera = capture_views()[1].camera;
+  Camera camera = capture_views(2)[1].camera;
   for (const int i : {0, 1, 2}) {
     photograph(dir / ("photos/" + std::to_string(i) + ".png"), camera, uint32_t(i));
     camera.world_from_cam.linear() =
@@ -162,7 +162,7 @@ TEST(PhotoPoses, PlaceAPhotographFromFarAside) {
 
 TEST(PhotoPoses, TellWhichPhotographsAreFromOnePlace) {
   const test::TempDir dir;
-  const auto views = capture_views();
+  const auto views = capture_views(2);
   for (const auto& [name, view] :
        {std::pair("a.png", 0), {"b.png", 1}, {"c.png", 2}, {"d.png", 2}}) {
     photograph(dir / "photos" / name, views[size_t(view)].camera, uint32_t(name[0]));
