@@ -71,6 +71,7 @@ class AssetWriter {
       : scene_(model.scene),
         mesh_(content.mesh),
         texture_(content.texture),
+        simplify_(content.texture.empty() ? 0 : content.simplify),
         frame_(model.scene.frame),
         path_(request.output / "web/asset.glb"),
         y_up_(y_up_from(model.scene.frame.up)),
@@ -86,6 +87,13 @@ class AssetWriter {
   }
 
   Form whole() const { return {0, mesh_, texture_, 1, glb_options(rounding_, summary_)}; }
+
+  /// Without the faces that hold nothing but colours which photographs show.
+  Form finest() const {
+    Form out = whole();
+    if (simplify_ > 0) simplify_to(simplify_, kLooserWhereInferred * simplify_, 1, out);
+    return out;
+  }
 
   /// \param already  how far mesh_ is from the fused surface where there is evidence
   Form coarser(double detail, double already) const {
@@ -200,6 +208,7 @@ class AssetWriter {
   const Scene& scene_;
   const TriangleMesh& mesh_;
   const PhotoTexture& texture_;
+  double simplify_;
   const Frame& frame_;
   std::filesystem::path path_;
   Eigen::Matrix3d y_up_;
@@ -223,7 +232,7 @@ Written form_within(const AssetWriter& writer,
                     double already,
                     const Frame& frame,
                     const Progress& progress) {
-  Written out{writer.whole(), {}, {}};
+  Written out{writer.finest(), {}, {}};
   out.glb = writer.certified(out.form);
   if (limit == 0 || out.glb.bytes.size() <= limit) return out;
   const size_t whole = out.glb.bytes.size();
@@ -322,17 +331,19 @@ std::pair<Form, Json> write_promised(const AssetWriter& writer,
   return {std::move(written.form), std::move(out)};
 }
 
-/// The form without a promise is the whole.
+/// Without a promise, the form is the finest.
 std::pair<Form, Json> write_finest(const AssetWriter& writer,
                                    const RunRequest& request,
                                    const TriangleMesh& mesh,
                                    const Frame& frame,
                                    const Progress& progress) {
   if (request.max_error.empty() && request.max_size == 0) {
-    Form form = writer.whole();
+    Form form = writer.finest();
     const GlbFile glb = writer.certified(form);
     write_file(writer.path(), glb.bytes);
-    return {std::move(form), glb_to_json(glb.report, frame)};
+    Json out = glb_to_json(glb.report, frame);
+    out["faces"] = form.mesh.faces.size();
+    return {std::move(form), std::move(out)};
   }
   try {
     return write_promised(writer, request, mesh, frame, progress);

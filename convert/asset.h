@@ -25,6 +25,8 @@ std::vector<std::string> level_files(size_t levels);
 struct AssetContent {
   const TriangleMesh& mesh;               ///< Watertight, as the run wrote it.
   const PhotoTexture& texture;            ///< Of this mesh.
+  double simplify = 0;                    ///< How far faces that only hold colours may go from it
+                                          ///< where there is a texture [internal units].
   const nlohmann::ordered_json& summary;  ///< Goes into the file; its certificate becomes that of
                                           ///< the mesh as the file holds it.
 };
@@ -38,6 +40,9 @@ struct WrittenAsset {
 /// Writes web/asset.glb below request.output, as small as request.max_size and as near to the fused
 /// surface as request.max_error demand.
 ///
+/// The mesh has faces that are there to hold colours: a flat wall with a pattern needs as many as a
+/// carved one. Where photographs show the pattern they are left out.
+///
 /// Where it has to become smaller, one length decides what goes, the detail d: the mesh stays
 /// within d of the fused surface (four times that where inferred), pixels of textures grow to 2 d,
 /// and positions are rounded by a fifth of d. The smallest d that fits wins. With a promise, what
@@ -49,7 +54,8 @@ struct WrittenAsset {
 /// object; inferred surface stays as near as the rest. None of them keeps a promise; how far it is
 /// off asset.glb is measured.
 ///
-/// \return of asset.glb bytes and measured errors; with a promise "deviation", "form" and, for
+/// \return of asset.glb bytes, faces and measured errors; with a promise "deviation", "form" and,
+/// for
 ///         people, "words"; of each level "file", "bytes", "faces", "texture_share", "detail",
 ///         "deviation" from asset.glb, "words"
 /// \throws LimitError with the smallest size that can be reached, and no asset.glb is left;

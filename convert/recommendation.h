@@ -19,8 +19,8 @@ struct TradeoffFigures {
   double error = kNotMeasured;  ///< Of the surface [scene units].
   double psnr = kNotMeasured;   ///< On held-out views [dB].
   double bytes = kNotMeasured;  ///< Of the web asset.
-  /// Errors are measured from its surface: its own, that of packing alone, is the least, but meets
-  /// no want.
+  /// Errors are measured from its surface: its own, that of asset.glb alone, is the least, but
+  /// meets no want.
   bool is_ruler = false;
 };
 

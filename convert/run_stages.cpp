@@ -49,7 +49,7 @@ DeviationLedger fusion_ledger(const Model& model,
   return ledger;
 }
 
-// What compression of asset.glb moves, told by the file itself.
+// What simplification for asset.glb and its compression move, told by the file itself.
 Json asset_deviations(const Model& model,
                       const TriangleMesh& mesh,
                       const std::filesystem::path& asset) {
@@ -202,6 +202,13 @@ void require_obj_in_place(const RunRequest& request, const TriangleMesh& mesh, c
   throw NumericalError("--max-error: watertight.obj was rounded by " + format_length(moved, frame));
 }
 
+// What asset.glb may go off the watertight mesh [internal units]: as much as that may go off the
+// fused surface, where nothing was promised of both.
+double as_much_again(const Json& simplification, const RunRequest& request, const Frame& frame) {
+  if (simplification.is_null() || !request.max_error.empty()) return 0;
+  return simplification.at("max_error").get<double>() / frame.scale;
+}
+
 }  // namespace
 
 Json write_meshes(const Model& model, const RunRequest& request, const Progress& progress) {
@@ -252,6 +259,7 @@ Json write_assets(const Model& model,
                   const TriangleMesh& mesh,
                   const RunRequest& request,
                   const Json& summary,
+                  const Json& simplification,
                   const Progress& progress) {
   report(progress, 0);
   make_output_folder(request.output / "web");
@@ -260,8 +268,11 @@ Json write_assets(const Model& model,
   report(progress, 0.3);
   write_obj(request.output / "mesh/watertight.obj", mesh, texture, model.scene.frame);
   if (!request.max_error.empty()) require_obj_in_place(request, mesh, model.scene.frame);
-  const WrittenAsset written =
-      write_asset(model, {mesh, texture, summary}, request, part_of(progress, 0.4, 0.9));
+  const WrittenAsset written = write_asset(
+      model,
+      {mesh, texture, as_much_again(simplification, request, model.scene.frame), summary},
+      request,
+      part_of(progress, 0.4, 0.9));
   Json out = {{"texture", texture_report},
               {"deviations", asset_deviations(model, mesh, request.output / "web/asset.glb")},
               {"asset.glb", written.asset}};

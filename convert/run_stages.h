@@ -23,12 +23,14 @@ TriangleMesh read_watertight(const std::filesystem::path& output, const Frame& f
 
 /// The stage from model and watertight mesh to what photographs texture: writes web/ and
 /// mesh/watertight.obj below request.output.
-/// \param summary  goes into asset.glb
+/// \param summary         goes into asset.glb
+/// \param simplification  of "mesh" of the report
 /// \return "web" of the report.
 nlohmann::ordered_json write_assets(const Model& model,
                                     const TriangleMesh& mesh,
                                     const RunRequest& request,
                                     const nlohmann::ordered_json& summary,
+                                    const nlohmann::ordered_json& simplification,
                                     const Progress& progress);
 
 }  // namespace cgs

@@ -126,7 +126,12 @@ StageResults run_setting(Bench& bench, const Setting& setting) {
   out[kAssets] = stage(bench, asset_key(setting), name + ": assets", [&](const Progress& progress) {
     const Json summary = {{"model", out[kModel].at("description")},
                           {"certificate", out[kMesh].at("certificate")}};
-    return make_assets(model, mesh, request(asset_key(setting)), summary, progress);
+    return make_assets(model,
+                       mesh,
+                       request(asset_key(setting)),
+                       summary,
+                       out[kMesh].at("simplification"),
+                       progress);
   });
   return out;
 }

@@ -45,7 +45,7 @@ struct MeasuredSetting {
   bool is_ruler = false;                   ///< Its own surface is what errors are measured from.
   std::optional<SurfaceError> truth;       ///< From the reference.
   double voxel = 0;
-  double asset_error = 0;  ///< Largest move of a vertex by compression.
+  double asset_error = 0;  ///< What 95 % of asset.glb are off the watertight mesh at most.
   size_t faces = 0;        ///< Of the watertight mesh.
   size_t model_bytes = 0;  ///< gaussians.ply
   size_t mesh_bytes = 0;   ///< watertight.ply
@@ -56,7 +56,7 @@ struct MeasuredSetting {
   /// Of the surface: 95 % of it are within, against the truth where there is one; NaN = unknown, as
   /// that of the ruler is.
   double error() const;
-  /// With that of compression: what asset.glb is off.
+  /// With that of asset.glb: what that is off.
   double asset_and_surface_error() const { return error() + asset_error; }
 };
 

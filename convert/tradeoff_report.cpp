@@ -180,10 +180,10 @@ std::string geometry_text(const Tradeoff& tradeoff) {
 
 std::string files_text(const Tradeoff& tradeoff) {
   const std::string unit = " [" + unit_of(tradeoff) + "]";
-  return "Files: asset.glb; its error is that of the surface (95 %) and of its compression "
-         "(max)\n" +
+  return "Files: asset.glb; its error is that of the surface and what it is off the PLY (95 % "
+         "each)\n" +
          table(files(tradeoff),
-               {"setting", "glb [MiB]", "error" + unit, "packing" + unit, "PLY [MiB]", "CPU [s]"},
+               {"setting", "glb [MiB]", "error" + unit, "off PLY" + unit, "PLY [MiB]", "CPU [s]"},
                [](const MeasuredSetting& m) -> std::vector<std::string> {
                  return {mebibytes(double(m.asset_bytes)),
                          text_of("%.3g", m.asset_and_surface_error()),
@@ -284,7 +284,7 @@ std::string plots_svg(const Tradeoff& tradeoff) {
                       plot(files(tradeoff),
                            "Files: down and left is better",
                            "size of asset.glb [MiB]",
-                           error + ", and packing" + unit)});
+                           error + ", and off the PLY" + unit)});
 }
 
 Json error_json(const std::optional<SurfaceError>& error) {
@@ -313,7 +313,7 @@ Json setting_json(const MeasuredSetting& m) {
   out["from_reference"] = error_json(m.truth);
   out["voxel"] = m.voxel;
   out["faces"] = m.faces;
-  out["packing_error"] = m.asset_error;
+  out["off_mesh"] = m.asset_error;
   out["error"] = number_or_null(m.asset_and_surface_error());
   out["bytes"] = {{"gaussians.ply", m.model_bytes},
                   {"watertight.ply", m.mesh_bytes},

@@ -76,6 +76,7 @@ Json make_meshes(const fs::path& model_folder,
   Json out = {{"cost", cost_json(meter)},
               {"voxel", report.at("fusion").at("voxel_size")},
               {"certificate", report.at("certificate")},
+              {"simplification", report.at("simplification")},
               {"bytes", fs::file_size(request.output / "mesh/watertight.ply")}};
   fs::remove(request.output / "volume.vdb");
   for (const auto& entry : fs::directory_iterator(request.output / "mesh")) {
@@ -88,16 +89,18 @@ Json make_assets(const fs::path& model_folder,
                  const fs::path& mesh_folder,
                  const RunRequest& request,
                  const Json& summary,
+                 const Json& simplification,
                  const Progress& progress) {
   fs::remove_all(request.output);
   const Model model = read_model(model_folder);
   const TriangleMesh mesh = read_watertight(mesh_folder, model.scene.frame);
   make_output_folder(request.output / "mesh");
   const CostMeter meter;
-  const Json report = write_assets(model, mesh, request, summary, progress);
+  const Json report = write_assets(model, mesh, request, summary, simplification, progress);
+  const Json& off_mesh = report.at("deviations").at(0).at("with_evidence");
   Json out = {{"cost", cost_json(meter)},
               {"bytes", report.at("asset.glb").at("bytes")},
-              {"error", report.at("asset.glb").at("measured_max_error")}};
+              {"error", off_mesh.is_null() ? 0.0 : off_mesh.at("p95").get<double>()}};
   fs::remove_all(request.output);
   return out;
 }

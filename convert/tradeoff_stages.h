@@ -26,18 +26,19 @@ nlohmann::ordered_json make_model(const RunRequest& request,
                                   const Progress& progress);
 
 /// Model to volume and meshes, of which the watertight one is kept. {…, "voxel" [scene units],
-/// "certificate"}
+/// "certificate", "simplification"}
 nlohmann::ordered_json make_meshes(const std::filesystem::path& model_folder,
                                    const RunRequest& request,
                                    const Progress& progress);
 
-/// Model and watertight mesh to what a web page shows. {…, "error": largest move of a vertex by
-/// compression [scene units]}
-/// \param summary  as write_assets() takes it
+/// Model and watertight mesh to what a web page shows. {…, "error": how far 95 % of the surface
+/// with evidence is off the watertight mesh at most [scene units]} \param summary, simplification
+/// as write_assets() takes them
 nlohmann::ordered_json make_assets(const std::filesystem::path& model_folder,
                                    const std::filesystem::path& mesh_folder,
                                    const RunRequest& request,
                                    const nlohmann::ordered_json& summary,
+                                   const nlohmann::ordered_json& simplification,
                                    const Progress& progress);
 
 }  // namespace cgs
