@@ -83,7 +83,7 @@ std::string asset_key(const Setting& setting) {
 
 std::vector<Setting> tradeoff_design() {
   const int draft = training_preset("draft").steps;
-  const int more = 2 * TrainingOptions().steps;
+  const int fine = training_preset("fine").steps;
   return {
       {},
       {.steps = draft},
@@ -98,8 +98,8 @@ std::vector<Setting> tradeoff_design() {
       {.max_error = 0.4},
       {.voxel = 2},
       {.coarser = 2, .steps = draft},
-      {.steps = more},
-      {.steps = training_preset("fine").steps},
+      {.steps = fine},
+      {.steps = 2 * fine},
       {.simplify = 1},
       {.voxel = 1.5, .simplify = 1, .max_error = 0.4},  // for the smallest file
       {.coarser = 2, .steps = 0, .simplify = 0},        // for the shortest time

@@ -162,7 +162,7 @@ void add_training_options(CLI::App& command, TrainingArguments& arguments) {
   command
       .add_option("--preset",
                   arguments.preset,
-                  "draft, standard, fine (a third, all, four times of the training steps), or "
+                  "draft, standard, fine (a third, all, twice the training steps), or "
                   "reference: the published CoherentGS schedule with convolutional decoders, hours "
                   "instead of a minute")
       ->capture_default_str();

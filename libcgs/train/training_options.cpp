@@ -190,7 +190,7 @@ TrainingOptions training_preset(std::string_view name) {
     return options;
   }
   if (name == "fine") {
-    options.steps = 240;
+    options.steps = 120;
     return options;
   }
   if (name == "reference") return reference_options();

@@ -59,7 +59,7 @@ struct TrainingOptions {
 };
 
 /// The settings of a name. \throws InvalidInput if it is none of:
-/// - "draft", "standard" and "fine": lattices, a third, all and four times of the steps;
+/// - "draft", "standard" and "fine": lattices, a third, all and twice the steps;
 /// - "reference": the schedule that CoherentGS was published with, as far as it has a meaning here.
 ///   Networks; balls for 8/13 of the time, drawn at twice the size from 5/13 on; its losses but the
 ///   perceptual one; no prior that holds depth or opacity. A step here looks at all views, so the

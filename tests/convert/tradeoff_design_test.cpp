@@ -93,10 +93,10 @@ TEST(CommandLine, SurvivesAShell) {
   EXPECT_EQ(words(command_line(r)),
             "cgs\nrun\nmy photos/it's $HOME; #1\n--views\n1,10,19\n--downscale\n2\n--assume-unit\n"
             "m\n--up\n0\n-1\n0.5\n--preset\ndraft\n--voxel-size\n1\n-o\nout/a b\n");
-  r.training.steps = 240;
-  EXPECT_NE(command_line(r).find(" --preset fine"), std::string::npos);
   r.training.steps = 120;
-  EXPECT_NE(command_line(r).find("--set steps=120"), std::string::npos);
+  EXPECT_NE(command_line(r).find(" --preset fine"), std::string::npos);
+  r.training.steps = 240;
+  EXPECT_NE(command_line(r).find("--set steps=240"), std::string::npos);
   EXPECT_EQ(command_line(r).find("--refine-poses"), std::string::npos);
   r.scene.refine_poses = true;
   EXPECT_NE(command_line(r).find(" --refine-poses"), std::string::npos);

@@ -93,6 +93,26 @@ TEST(PlaneSweep, KeepsBothSidesOfAnOcclusionEdge) {
   EXPECT_GT(share_within(priors[1], truth, 0.03, seen), 0.93);
 }
 
+// A pane reflects less than it shows: no depth between it and the wall is made up.
+TEST(PlaneSweep, MeasuresWhatLiesBehindAPane) {
+  constexpr float kReflected = 0.4f;
+  const auto pane_and_wall = wall_and_square();
+  const std::vector<TexturedPatch> wall = {pane_and_wall[0]};
+  const Scene reflected = test::photographed_scene(pane_and_wall, three_cameras(), kFinest);
+  Scene scene = test::photographed_scene(wall, three_cameras(), kFinest);
+  for (size_t n = 0; n < scene.views.size(); ++n) {
+    for (size_t i = 0; i < scene.views[n].image.data.size(); ++i) {
+      Eigen::Vector3f& shown = scene.views[n].image.data[i];
+      shown += kReflected * (reflected.views[n].image.data[i] - shown);
+    }
+  }
+  const std::vector<ViewPriors> priors = plane_sweep(scene, {});
+  const DepthMap truth = test::true_depth(wall, scene.views[1].camera);
+  const DepthMap pane = test::true_depth(pane_and_wall, scene.views[1].camera);
+  const auto behind = [&](int x, int y) { return pane(x, y) < truth(x, y) - 1; };
+  EXPECT_GT(share_within(priors[1], truth, 0.03, behind), 0.9);
+}
+
 TEST(PlaneSweep, SigmaAndConfidenceTellTextureFromNone) {
   auto patches = slanted_plane();
   const Scene textured = test::photographed_scene(patches, three_cameras(), kFinest);
