@@ -118,7 +118,7 @@ class ControlPoints : public testing::Test {
   }
   static ProgramResult run(const std::string& more = "") {
     return run_cgs("run " + (*dir_ / "capture").string() +
-                   " --views view_01,view_02,view_03 --set steps=0 --voxel-size 2cm -q -o " +
+                   " --views view_01,view_02,view_03 --set steps=0 --voxel-size 3cm -q -o " +
                    out().string() + " --control-points " + (*dir_ / "survey.csv").string() + more);
   }
   static fs::path out() { return *dir_ / "out"; }

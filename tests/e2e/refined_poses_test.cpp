@@ -48,7 +48,7 @@ class RefinedPoses : public testing::Test {
   static fs::path out() { return *dir_ / "out"; }
   static ProgramResult run(const fs::path& output, const std::string& more) {
     return run_cgs("run " + scene().string() +
-                   " --views view_01,view_02,view_03 --set steps=0 --voxel-size 0.05 -q -o " +
+                   " --views view_01,view_02,view_03 --set steps=0 --voxel-size 0.1 -q -o " +
                    output.string() + more);
   }
   static json read(const fs::path& file) { return json::parse(test::read_bytes(file)); }

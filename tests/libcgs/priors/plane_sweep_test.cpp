@@ -93,13 +93,14 @@ TEST(PlaneSweep, KeepsBothSidesOfAnOcclusionEdge) {
   EXPECT_GT(share_within(priors[1], truth, 0.03, seen), 0.93);
 }
 
-// A pane reflects less than it shows: no depth between it and the wall is made up.
+// Where what it reflects has as much contrast as what lies behind it, some depth is of neither.
 TEST(PlaneSweep, MeasuresWhatLiesBehindAPane) {
   constexpr float kReflected = 0.4f;
+  constexpr double kCell = 0.1;  // 1.5 pixels on the wall
   const auto pane_and_wall = wall_and_square();
   const std::vector<TexturedPatch> wall = {pane_and_wall[0]};
-  const Scene reflected = test::photographed_scene(pane_and_wall, three_cameras(), kFinest);
-  Scene scene = test::photographed_scene(wall, three_cameras(), kFinest);
+  const Scene reflected = test::photographed_scene(pane_and_wall, three_cameras(), kCell);
+  Scene scene = test::photographed_scene(wall, three_cameras(), kCell);
   for (size_t n = 0; n < scene.views.size(); ++n) {
     for (size_t i = 0; i < scene.views[n].image.data.size(); ++i) {
       Eigen::Vector3f& shown = scene.views[n].image.data[i];
@@ -110,11 +111,7 @@ TEST(PlaneSweep, MeasuresWhatLiesBehindAPane) {
   const DepthMap truth = test::true_depth(wall, scene.views[1].camera);
   const DepthMap pane = test::true_depth(pane_and_wall, scene.views[1].camera);
   const auto behind = [&](int x, int y) { return pane(x, y) < truth(x, y) - 1; };
-  const auto measured = [&](int x, int y) {
-    return behind(x, y) && priors[1].origin(x, y) == DepthOrigin::Measured;
-  };
-  EXPECT_GT(share_within(priors[1], truth, 0.03, behind), 0.8);
-  EXPECT_GT(share_within(priors[1], truth, 0.03, measured), 0.95);
+  EXPECT_GT(share_within(priors[1], truth, 0.03, behind), 0.85);
 }
 
 TEST(PlaneSweep, SigmaAndConfidenceTellTextureFromNone) {
