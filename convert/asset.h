@@ -55,8 +55,7 @@ struct WrittenAsset {
 /// off asset.glb is measured.
 ///
 /// \return of asset.glb bytes, faces and measured errors; with a promise "deviation", "form" and,
-/// for
-///         people, "words"; of each level "file", "bytes", "faces", "texture_share", "detail",
+///         for people, "words"; of each level "file", "bytes", "faces", "texture_share", "detail",
 ///         "deviation" from asset.glb, "words"
 /// \throws LimitError with the smallest size that can be reached, and no asset.glb is left;
 ///         NumericalError where the file is farther off than promised
