@@ -341,9 +341,7 @@ std::pair<Form, Json> write_finest(const AssetWriter& writer,
     Form form = writer.finest();
     const GlbFile glb = writer.certified(form);
     write_file(writer.path(), glb.bytes);
-    Json out = glb_to_json(glb.report, frame);
-    out["faces"] = form.mesh.faces.size();
-    return {std::move(form), std::move(out)};
+    return {std::move(form), glb_to_json(glb.report, frame)};
   }
   try {
     return write_promised(writer, request, mesh, frame, progress);
@@ -469,6 +467,7 @@ WrittenAsset write_asset(const Model& model,
   const double of_finest = request.lods > 0 ? 0.5 : 1;
   auto [form, asset] =
       write_finest(writer, request, content.mesh, frame, part_of(progress, 0, of_finest));
+  asset["faces"] = form.mesh.faces.size();
   WrittenAsset out{std::move(asset), Json::array()};
   if (request.lods == 0) return out;
   out.levels =

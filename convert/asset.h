@@ -25,7 +25,7 @@ std::vector<std::string> level_files(size_t levels);
 struct AssetContent {
   const TriangleMesh& mesh;               ///< Watertight, as the run wrote it.
   const PhotoTexture& texture;            ///< Of this mesh.
-  double simplify = 0;                    ///< How far faces that only hold colours may go from it
+  double simplify;                        ///< How far faces that only hold colours may go from it
                                           ///< where there is a texture [internal units].
   const nlohmann::ordered_json& summary;  ///< Goes into the file; its certificate becomes that of
                                           ///< the mesh as the file holds it.

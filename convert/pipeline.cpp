@@ -163,11 +163,12 @@ Json run_mesh(Run& run, const Progress& progress) {
 
 Json run_web(Run& run, const Progress& progress) {
   const Model& model = loaded_model(run);
-  const Json mesh = run.record.result("mesh");
-  const Json summary = {{"model", run.record.result("model").at("description")},
-                        {"certificate", mesh.at("certificate")}};
-  return write_assets(
-      model, loaded_mesh(run), run.request, summary, mesh.at("simplification"), progress);
+  return write_assets(model,
+                      loaded_mesh(run),
+                      run.request,
+                      run.record.result("model").at("description"),
+                      run.record.result("mesh"),
+                      progress);
 }
 
 Json report_json(const Run& run) {

@@ -258,8 +258,8 @@ TriangleMesh read_watertight(const std::filesystem::path& output, const Frame& f
 Json write_assets(const Model& model,
                   const TriangleMesh& mesh,
                   const RunRequest& request,
-                  const Json& summary,
-                  const Json& simplification,
+                  const Json& description,
+                  const Json& mesh_report,
                   const Progress& progress) {
   report(progress, 0);
   make_output_folder(request.output / "web");
@@ -268,11 +268,11 @@ Json write_assets(const Model& model,
   report(progress, 0.3);
   write_obj(request.output / "mesh/watertight.obj", mesh, texture, model.scene.frame);
   if (!request.max_error.empty()) require_obj_in_place(request, mesh, model.scene.frame);
-  const WrittenAsset written = write_asset(
-      model,
-      {mesh, texture, as_much_again(simplification, request, model.scene.frame), summary},
-      request,
-      part_of(progress, 0.4, 0.9));
+  const double simplify =
+      as_much_again(mesh_report.at("simplification"), request, model.scene.frame);
+  const Json summary = {{"model", description}, {"certificate", mesh_report.at("certificate")}};
+  const WrittenAsset written =
+      write_asset(model, {mesh, texture, simplify, summary}, request, part_of(progress, 0.4, 0.9));
   Json out = {{"texture", texture_report},
               {"deviations", asset_deviations(model, mesh, request.output / "web/asset.glb")},
               {"asset.glb", written.asset}};

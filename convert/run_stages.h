@@ -23,14 +23,14 @@ TriangleMesh read_watertight(const std::filesystem::path& output, const Frame& f
 
 /// The stage from model and watertight mesh to what photographs texture: writes web/ and
 /// mesh/watertight.obj below request.output.
-/// \param summary         goes into asset.glb
-/// \param simplification  of "mesh" of the report
+/// \param description  of the model, for asset.glb
+/// \param mesh_report  "certificate" and "simplification" as write_meshes() returned them
 /// \return "web" of the report.
 nlohmann::ordered_json write_assets(const Model& model,
                                     const TriangleMesh& mesh,
                                     const RunRequest& request,
-                                    const nlohmann::ordered_json& summary,
-                                    const nlohmann::ordered_json& simplification,
+                                    const nlohmann::ordered_json& description,
+                                    const nlohmann::ordered_json& mesh_report,
                                     const Progress& progress);
 
 }  // namespace cgs

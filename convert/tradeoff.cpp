@@ -124,13 +124,11 @@ StageResults run_setting(Bench& bench, const Setting& setting) {
   });
   if (out[kMesh].contains("failed")) return out;
   out[kAssets] = stage(bench, asset_key(setting), name + ": assets", [&](const Progress& progress) {
-    const Json summary = {{"model", out[kModel].at("description")},
-                          {"certificate", out[kMesh].at("certificate")}};
     return make_assets(model,
                        mesh,
                        request(asset_key(setting)),
-                       summary,
-                       out[kMesh].at("simplification"),
+                       out[kModel].at("description"),
+                       out[kMesh],
                        progress);
   });
   return out;

@@ -88,15 +88,15 @@ Json make_meshes(const fs::path& model_folder,
 Json make_assets(const fs::path& model_folder,
                  const fs::path& mesh_folder,
                  const RunRequest& request,
-                 const Json& summary,
-                 const Json& simplification,
+                 const Json& description,
+                 const Json& mesh_report,
                  const Progress& progress) {
   fs::remove_all(request.output);
   const Model model = read_model(model_folder);
   const TriangleMesh mesh = read_watertight(mesh_folder, model.scene.frame);
   make_output_folder(request.output / "mesh");
   const CostMeter meter;
-  const Json report = write_assets(model, mesh, request, summary, simplification, progress);
+  const Json report = write_assets(model, mesh, request, description, mesh_report, progress);
   const Json& off_mesh = report.at("deviations").at(0).at("with_evidence");
   Json out = {{"cost", cost_json(meter)},
               {"bytes", report.at("asset.glb").at("bytes")},

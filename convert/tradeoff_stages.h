@@ -31,14 +31,15 @@ nlohmann::ordered_json make_meshes(const std::filesystem::path& model_folder,
                                    const RunRequest& request,
                                    const Progress& progress);
 
-/// Model and watertight mesh to what a web page shows. {…, "error": how far 95 % of the surface
-/// with evidence is off the watertight mesh at most [scene units]} \param summary, simplification
-/// as write_assets() takes them
+/// Model and watertight mesh to what a web page shows. {…, "error": 95 % of the surface with
+/// evidence are off the watertight mesh by less [scene units]}
+/// \param description  as write_assets() takes it
+/// \param mesh_report  likewise; what make_meshes() returned will do
 nlohmann::ordered_json make_assets(const std::filesystem::path& model_folder,
                                    const std::filesystem::path& mesh_folder,
                                    const RunRequest& request,
-                                   const nlohmann::ordered_json& summary,
-                                   const nlohmann::ordered_json& simplification,
+                                   const nlohmann::ordered_json& description,
+                                   const nlohmann::ordered_json& mesh_report,
                                    const Progress& progress);
 
 }  // namespace cgs
