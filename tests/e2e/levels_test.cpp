@@ -132,6 +132,21 @@ size_t pixels_of(const test::Glb& glb) {
   return out;
 }
 
+TEST(Asset, LeavesOutFacesThatHoldColoursAndStaysNear) {
+  const TempDir dir;
+  make_capture(dir, 3);
+  const auto run = run_cgs(run_arguments(dir, "--json --voxel-size 0.08"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json report = json::parse(run.out);
+  const json& mesh = report["mesh"];
+  const json& asset = report["web"]["asset.glb"];
+  EXPECT_LT(asset["faces"], 0.8 * mesh["certificate"]["faces"].get<double>());
+  const json& off = report["web"]["deviations"][0]["with_evidence"];
+  const double allowed = mesh["simplification"]["max_error"];
+  EXPECT_GT(off["max"], 0.2 * allowed);
+  EXPECT_LT(off["max"], allowed + asset["measured_max_error"].get<double>());
+}
+
 TEST(Levels, AreSmallerAndAsFarOffAsTheySay) {
   const TempDir dir;
   make_capture(dir, 3);
