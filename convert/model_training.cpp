@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <optional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -14,10 +15,12 @@
 #include "io/checkpoint.h"
 #include "io/content_hash.h"
 #include "io/scene_reader.h"
+#include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/depth_network.h"
 #include "libcgs/priors/exposure.h"
 #include "libcgs/priors/measured_range.h"
+#include "libcgs/priors/pane.h"
 
 namespace cgs {
 
@@ -26,7 +29,7 @@ namespace {
 constexpr const char* kCheckpointName = "training";
 
 // Everything the training depends on.
-uint64_t training_key(const Model& model, const TrainingOptions& options) {
+uint64_t training_key(const Model& model, const TrainingOptions& options, const Pane* pane) {
   uint64_t key = content_hash(kProgramVersion);
   for (const auto& [name, value] : training_fields(options)) {
     key = content_hash(value, content_hash(name, key));
@@ -47,6 +50,11 @@ uint64_t training_key(const Model& model, const TrainingOptions& options) {
     const std::array<double, 4> intrinsics = {camera.fx, camera.fy, camera.cx, camera.cy};
     add(intrinsics.data(), sizeof intrinsics);
     add(camera.world_from_cam.data(), 16 * sizeof(double));
+  }
+  if (pane != nullptr) {
+    add(pane->depth.data.data(), pane->depth.data.size() * sizeof(float));
+    add(pane->color.data.data(), pane->color.data.size() * sizeof(Eigen::Vector3f));
+    add(&pane->opacity, sizeof(float));
   }
   return key;
 }
@@ -114,11 +122,14 @@ float match_exposures(Scene& scene, const std::vector<ViewPriors>& priors) {
   return exposure.difference();
 }
 
-void optimise(TrainedModel& trained, const ModelRequest& request, const Progress& progress) {
+void optimise(TrainedModel& trained,
+              const Pane* pane,
+              const ModelRequest& request,
+              const Progress& progress) {
   Model& model = trained.model;
-  Trainer trainer(model.scene, model.priors, request.training);
+  Trainer trainer(model.scene, model.priors, request.training, pane);
   TrainingCheckpoint checkpoint(
-      request.checkpoints, training_key(model, request.training), trained.hitches);
+      request.checkpoints, training_key(model, request.training, pane), trained.hitches);
   checkpoint.restore(trainer, request.keeps_others);
   while (!trainer.done()) {
     trainer.step();
@@ -144,6 +155,28 @@ void guess_by_network(const std::filesystem::path& file, Scene& scene) {
     View& view = scene.views[static_cast<size_t>(i)];
     view.given_depth = network(view);
   }
+}
+
+PaneReport report_of(const Pane& pane, const Scene& scene) {
+  const auto pixels = static_cast<double>(pane.depth.data.size());
+  const auto covered = std::count_if(pane.depth.data.begin(), pane.depth.data.end(), has_gaussian);
+  return {scene.views[static_cast<size_t>(scene.input[pane.drawn_from])].name,
+          static_cast<double>(covered) / pixels,
+          double{pane.opacity},
+          pane.gain};
+}
+
+// A pane in the photographs, and then the priors of what lies behind it: what it shows disturbs
+// their matching, and the better they are, the better the two are told apart.
+std::optional<Pane> look_behind_pane(const Scene& scene,
+                                     const PriorsOptions& options,
+                                     EstimatedPriors& priors,
+                                     const Progress& progress) {
+  std::optional<Pane> pane = find_pane(scene, priors.views, part_of(progress, 0, 0.1));
+  if (!pane) return pane;
+  priors = estimate_priors(behind_pane(scene, *pane), options, part_of(progress, 0.1, 0.9));
+  std::optional<Pane> better = find_pane(scene, priors.views, part_of(progress, 0.9, 1));
+  return better ? better : pane;
 }
 
 // Views whose depth rests on little.
@@ -237,11 +270,12 @@ std::vector<std::string> optimised(const TrainingOptions& options, size_t steps)
 std::string description_of(const TrainedModel& trained, const TrainingOptions& options) {
   const std::string start =
       "one Gaussian per pixel at a depth that is " + depth_words(trained.priors) + "; ";
+  const std::string pane = trained.pane.view.empty() ? "" : "before them a pane; ";
   const std::vector<std::string> changed = optimised(options, trained.steps.size());
   if (trained.steps.empty() || changed.empty()) {
-    return "aligned initialisation: " + start + "not optimised against the photographs";
+    return "aligned initialisation: " + start + pane + "not optimised against the photographs";
   }
-  return "coherent Gaussians: " + start + listed(changed) +
+  return "coherent Gaussians: " + start + pane + listed(changed) +
          " optimised against the photographs in " + std::to_string(trained.steps.size()) + " steps";
 }
 
@@ -272,24 +306,31 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   request.priors.validate();
   request.training.validate();
   require_decodable(scene, request.training.coherence);
-  constexpr double kPriorsShare = 0.2;
+  constexpr double kPriorsShare = 0.18;
+  constexpr double kPaneShare = 0.2;  // without a pane, and there hardly ever is one
   load_images(scene, scene.input, part_of(progress, 0, 0.01));
   if (!request.depth_network.empty()) guess_by_network(request.depth_network, scene);
   to_canonical(scene);
   narrow_depth_ranges(scene, request.priors.sweep, part_of(progress, 0.01, 0.02));
   EstimatedPriors estimated =
       estimate_priors(scene, request.priors, part_of(progress, 0.02, kPriorsShare));
+  TrainedModel trained;
+  trained.exposure_difference = match_exposures(scene, estimated.views);
+  std::optional<Pane> pane;
+  if (request.training.coherence.layers_per_ray > 1) {
+    const Progress looking = part_of(progress, kPriorsShare, kPaneShare);
+    pane = look_behind_pane(scene, request.priors, estimated, looking);
+  }
+  if (pane) trained.pane = report_of(*pane, scene);
   const GivenDepthReport& given = estimated.report.given;
   scene.warnings.insert(scene.warnings.end(), given.remarks.begin(), given.remarks.end());
   take_sensor_scale(given, scene.frame);
   warn_of_coverage(estimated.report.coverage, scene);
-  TrainedModel trained;
   trained.priors = estimated.report;
   trained.model.priors = std::move(estimated.views);
-  trained.exposure_difference = match_exposures(scene, trained.model.priors);
   trained.model.scene = std::move(scene);
   if (request.inspect) request.inspect(trained.model);
-  optimise(trained, request, part_of(progress, kPriorsShare, 1));
+  optimise(trained, pane ? &*pane : nullptr, request, part_of(progress, kPaneShare, 1));
   trained.model.evidence = description_of(trained, request.training);
   report(progress, 1);
   return trained;
@@ -329,6 +370,22 @@ nlohmann::ordered_json exposure_to_json(const TrainedModel& trained) {
   return {{"words", words.data()}, {"views", views}};
 }
 
+// Null where there is none.
+nlohmann::ordered_json pane_to_json(const PaneReport& pane) {
+  if (pane.view.empty()) return nullptr;
+  std::array<char, 100> words{};
+  std::snprintf(words.data(),
+                words.size(),
+                "a pane that hides %.0f %% of what lies behind is before %.0f %% of view ",
+                100 * pane.opacity,
+                100 * pane.share);
+  return {{"words", words.data() + pane.view + "; it is in no mesh"},
+          {"view", pane.view},
+          {"share", pane.share},
+          {"opacity", pane.opacity},
+          {"gain_db", pane.gain}};
+}
+
 // Words only where colours depend on the direction.
 nlohmann::ordered_json view_dependence_to_json(const ViewDependence& found) {
   nlohmann::ordered_json out = {{"words", nullptr},
@@ -349,7 +406,7 @@ nlohmann::ordered_json view_dependence_to_json(const ViewDependence& found) {
 
 std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training) {
   std::vector<std::string> out;
-  for (const char* key : {"exposure", "view_dependence"}) {
+  for (const char* key : {"exposure", "view_dependence", "pane"}) {
     const auto found = training.find(key);
     if (found == training.end() || !found->is_object()) continue;
     const auto words = found->find("words");
@@ -377,6 +434,7 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
           {"depth_of_views", coverage_to_json(trained)},
           {"exposure", exposure_to_json(trained)},
           {"view_dependence", view_dependence_to_json(trained.view_dependence)},
+          {"pane", pane_to_json(trained.pane)},
           {"given_depth", given_depth_to_json(trained.priors)}};
 }
 

@@ -30,19 +30,29 @@ struct ModelRequest {
   std::function<void(const Model&)> inspect = {};
 };
 
+/// What became of a pane in the photographs.
+struct PaneReport {
+  std::string view;    ///< The one it is drawn from; empty = there is none.
+  double share = 0;    ///< Of the pixels of that view.
+  double opacity = 0;  ///< Before the training.
+  double gain = 0;     ///< Pane::gain [dB]
+};
+
 /// A model, and how it was come by.
 struct TrainedModel {
   Model model;
   PriorsReport priors;
   float exposure_difference = 0;  ///< ExposureGains::difference() of the input views
   ViewDependence view_dependence;
+  PaneReport pane;
   std::vector<StepReport> steps;  ///< Of the training; empty = aligned initialisation.
   /// Checkpoints that could not be read or written, for the terminal: they change no result.
   std::vector<std::string> hitches;
 };
 
 /// Scene -> model. Loads the images of the input views, moves the scene to its canonical frame,
-/// estimates depth and optimises the Gaussians; goes on from a checkpoint of the same work.
+/// estimates depth and optimises the Gaussians; goes on from a checkpoint of the same work. Where
+/// the photographs show a pane, depth is estimated once more from what lies behind it.
 /// If the progress function throws Cancelled, the training so far is saved first.
 /// \throws BadInput Mismatch for a checkpoint of other work that is to be kept
 TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress);

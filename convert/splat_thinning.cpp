@@ -204,8 +204,10 @@ ThinnedSplats thin_splats(const Gaussians& gaussians,
                           const Progress& progress) {
   ThinnedSplats out;
   report(progress, 0);
-  const size_t known = std::accumulate(counts.begin(), counts.end(), size_t{0});
-  if (known == gaussians.size() && counts.size() == scene.input.size()) {
+  const size_t of_views = std::accumulate(counts.begin(), counts.end(), size_t{0});
+  const size_t most = counts.empty() ? 0 : *std::max_element(counts.begin(), counts.end());
+  const bool is_own = of_views <= gaussians.size() && gaussians.size() - of_views <= most;
+  if (is_own && counts.size() == scene.input.size()) {
     out.unseen_psnr = psnr_of_unseen(gaussians, scene, counts);
   }
   if (out.unseen_psnr) {

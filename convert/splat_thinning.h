@@ -54,8 +54,10 @@ inline constexpr double kMostThinningLoss = 0.2;
 /// The same choice and the same bits every time, for any number of threads.
 ///
 /// \param scene   with the pixels of its input views
-/// \param counts  how many of the splats are of each input view, in their order; if that is not all
-///                of them, nobody knows whose they are, and all are kept
+/// \param counts  how many of the splats are of each input view, in their order; those of a pane
+/// may
+///                follow, fewer than of a view. If there are fewer or more splats than that, nobody
+///                knows whose they are, and all are kept
 /// \throws as weigh_splats() and refit_splats()
 ThinnedSplats thin_splats(const Gaussians& gaussians,
                           const Scene& scene,

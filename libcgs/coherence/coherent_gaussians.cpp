@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <tbb/parallel_for.h>
 
@@ -113,10 +114,12 @@ const CoherenceOptions& checked(const Scene& scene, const CoherenceOptions& opti
   return options;
 }
 
-std::vector<Raster<uint8_t>> layers_of(const std::vector<ViewPriors>& priors) {
+// A pane is one more picture, all of one layer.
+std::vector<Raster<uint8_t>> layers_of(const std::vector<ViewPriors>& priors, const Pane* pane) {
   std::vector<Raster<uint8_t>> out;
-  out.reserve(priors.size());
+  out.reserve(priors.size() + 1);
   for (const ViewPriors& p : priors) out.push_back(p.layer);
+  if (pane != nullptr) out.emplace_back(pane->depth.width, pane->depth.height, uint8_t{0});
   return out;
 }
 
@@ -128,22 +131,26 @@ int layer_count(const std::vector<ViewPriors>& priors) {
   return highest + 1;
 }
 
-ResidualMaps depth_maps(const std::vector<ViewPriors>& priors, const CoherenceOptions& options) {
+ResidualMaps depth_maps(const std::vector<ViewPriors>& priors,
+                        const CoherenceOptions& options,
+                        const Pane* pane) {
   if (options.decoder == ResidualDecoder::Lattice) {
-    return {layers_of(priors), LayeredLatticeOptions{options.depth_spacing}};
+    return {layers_of(priors, pane), LayeredLatticeOptions{options.depth_spacing}};
   }
   const int width = conv_widths(options, priors.size()).depth;
-  return {layers_of(priors),
+  return {layers_of(priors, pane),
           ConvDecoderOptions{.width = width, .layers = layer_count(priors)},
           options.conv_depth_gain};
 }
 
-ResidualMaps opacity_maps(const std::vector<ViewPriors>& priors, const CoherenceOptions& options) {
+ResidualMaps opacity_maps(const std::vector<ViewPriors>& priors,
+                          const CoherenceOptions& options,
+                          const Pane* pane) {
   if (options.decoder == ResidualDecoder::Lattice) {
-    return {layers_of(priors), LayeredLatticeOptions{options.opacity_spacing}};
+    return {layers_of(priors, pane), LayeredLatticeOptions{options.opacity_spacing}};
   }
   const int width = conv_widths(options, priors.size()).opacity;
-  return {layers_of(priors),
+  return {layers_of(priors, pane),
           ConvDecoderOptions{.width = width, .layers = layer_count(priors), .seed = 1},
           options.conv_opacity_gain};
 }
@@ -170,6 +177,9 @@ void CoherenceOptions::validate() const {
           "CoherenceOptions.conv_opacity_gain must be > 0",
           conv_opacity_gain);
   require(sh_degree == 0 || sh_degree == 1, "CoherenceOptions.sh_degree must be 0 or 1", sh_degree);
+  require(layers_per_ray == 1 || layers_per_ray == 2,
+          "CoherenceOptions.layers_per_ray must be 1 or 2",
+          layers_per_ray);
   require_width(conv_depth_width, "CoherenceOptions.conv_depth_width must be in [0, 64]");
   require_width(conv_opacity_width, "CoherenceOptions.conv_opacity_width must be in [0, 64]");
   LayeredLatticeOptions{depth_spacing}.validate();
@@ -204,21 +214,23 @@ void require_decodable(const Scene& scene, const CoherenceOptions& options) {
 
 CoherentGaussians::CoherentGaussians(const Scene& scene,
                                      const std::vector<ViewPriors>& priors,
-                                     const CoherenceOptions& options)
+                                     const CoherenceOptions& options,
+                                     const Pane* pane)
     : options_(checked(scene, options)),
-      depth_maps_(depth_maps(priors, options)),
-      opacity_maps_(opacity_maps(priors, options)) {
+      depth_maps_(depth_maps(priors, options, pane)),
+      opacity_maps_(opacity_maps(priors, options, pane)) {
   gaussians_ = initial_gaussians(scene, priors, {options.radius_factor, options.opacity});
   if (options.sh_degree > 0) {
     view_dependence_ = add_view_dependence(scene, priors, gaussians_);
   }
-  if (gaussians_.size() > 0) start_logit_ = logit(gaussians_.opacity[0]);
+  const float start_logit = gaussians_.size() > 0 ? logit(gaussians_.opacity[0]) : 0;
   size_t first = 0;
   for (size_t n = 0; n < priors.size(); ++n) {
     const Camera& camera = scene.views[static_cast<size_t>(scene.input[n])].camera;
     const DepthMap& depth = priors[n].depth;
     const auto& origin = priors[n].origin.data;
-    ViewState view{camera, depth, depth, {}, {}, {}, {}, {}};
+    ViewState view{
+        camera, depth, depth, {}, {}, {}, {}, {}, start_logit, options.radius_factor, false};
     for (size_t i = 0; i < depth.data.size(); ++i) {
       if (!has_gaussian(depth.data[i])) continue;
       view.pixels.push_back(static_cast<int>(i));
@@ -228,6 +240,9 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
     first = view.range.last;
     views_.push_back(std::move(view));
   }
+  if (pane != nullptr) {
+    add_pane(*pane, views_[pane->drawn_from].camera);
+  }
   parameters = depth_maps_.initial_blocks(ParameterRole::Depth);
   for (ParameterBlock& block : opacity_maps_.initial_blocks(ParameterRole::Opacity)) {
     parameters.push_back(std::move(block));
@@ -235,6 +250,32 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
   for (const ParameterRole role : {ParameterRole::Color, ParameterRole::Shape}) {
     parameters.resize(parameters.size() + views_.size(), {role, {}, {}});
   }
+}
+
+void CoherentGaussians::add_pane(const Pane& pane, const Camera& camera) {
+  // Wider than a pixel is small: what pictures of other sizes add to a splat, a fixed part of
+  // their pixel, then changes little.
+  constexpr float kRadius = 1;
+  constexpr float kAdded = 0.3f;  // TrainingRasterizerOptions::dilation [pixels^2]
+  // So many of equal height lie over each other at a pixel.
+  constexpr float kOverlap = 2 * std::numbers::pi_v<float> * (kRadius * kRadius + kAdded);
+  const float opacity = -std::log1p(-pane.opacity) / kOverlap;
+  const size_t first = gaussians_.size();
+  const auto harmonics = static_cast<size_t>(gaussians_.sh_count());
+  ViewState view{camera, pane.depth, pane.depth, {}, {}, {}, {}, {}, logit(opacity), kRadius, true};
+  for (size_t i = 0; i < pane.depth.data.size(); ++i) {
+    if (!has_gaussian(pane.depth.data[i])) continue;
+    view.pixels.push_back(static_cast<int>(i));
+    view.is_measured.push_back(1);
+    gaussians_.position.emplace_back();  // decode() gives these
+    gaussians_.scale.emplace_back();
+    gaussians_.rotation.emplace_back(1.0f, 0.0f, 0.0f, 0.0f);
+    gaussians_.opacity.push_back(opacity);
+    gaussians_.sh.push_back((pane.color.data[i] - Eigen::Vector3f::Constant(0.5f)) / kShC0);
+    gaussians_.sh.resize(gaussians_.size() * harmonics, Eigen::Vector3f::Zero());
+  }
+  view.range = {first, gaussians_.size()};
+  views_.push_back(std::move(view));
 }
 
 std::span<ParameterBlock> CoherentGaussians::blocks(ParameterRole role) {
@@ -283,7 +324,7 @@ void CoherentGaussians::free_shapes() {
       // On the surface at the start, not at this step: a restored training knows no other.
       view.steps[k].col(0) = surface_step(view.camera, view.start, x, y, {1, 0}).cast<float>();
       view.steps[k].col(1) = surface_step(view.camera, view.start, x, y, {0, 1}).cast<float>();
-      std::fill_n(&own.value[k * kShapeSize], 2, std::log(options_.radius_factor));
+      std::fill_n(&own.value[k * kShapeSize], 2, std::log(view.radius_factor));
     });
   }
 }
@@ -300,20 +341,20 @@ void CoherentGaussians::decode_view(size_t n) {
     const size_t g = view.range.first + k;
     float& f = depth_change_[n].data[pixel];
     float& h = logit_change_[n].data[pixel];
-    f = std::tanh(f / max_depth);
+    f = view.is_pane ? 0 : std::tanh(f / max_depth);
     h = std::tanh(h / max_logit);
     const float z = view.start.data[pixel] * std::exp(max_depth * f);
     view.depth.data[pixel] = z;
     const int x = pixel % view.depth.width;
     const int y = pixel / view.depth.width;
     gaussians_.position[g] = view.camera.unproject(x + 0.5, y + 0.5, double(z)).cast<float>();
-    gaussians_.opacity[g] = opacity_of(start_logit_ + max_logit * h);
+    gaussians_.opacity[g] = opacity_of(view.start_logit + max_logit * h);
     if (colors_are_free_) {
       gaussians_.sh[g * harmonics] =
           view.start_color[k] + Eigen::Vector3f(&colors[k * kChannels]) / kShC0;
     }
     if (!shapes_are_free_) {
-      gaussians_.scale[g].setConstant(options_.radius_factor * z * unit);
+      gaussians_.scale[g].setConstant(view.radius_factor * z * unit);
       return;
     }
     float* own = &shapes[k * kShapeSize];
@@ -372,7 +413,7 @@ void CoherentGaussians::add_view_gradients(size_t n,
     float by_z = gradients.position[g].dot(ray);
     if (!depth.empty()) by_z += depth.data[pixel];
     if (!shapes_are_free_) {
-      by_z += gradients.radius[g] * options_.radius_factor * unit;
+      by_z += gradients.radius[g] * view.radius_factor * unit;
     } else {
       by_z += add_shape_gradient(n, k, gradients.covariance[g]) / z;
     }
@@ -382,7 +423,7 @@ void CoherentGaussians::add_view_gradients(size_t n,
     const float f = depth_change_[n].data[pixel];
     const float h = logit_change_[n].data[pixel];
     const float o = gaussians_.opacity[g];
-    by_f.data[pixel] = by_z * z * (1 - f) * (1 + f);
+    by_f.data[pixel] = view.is_pane ? 0 : by_z * z * (1 - f) * (1 + f);
     by_h.data[pixel] = gradients.opacity[g] * o * (1 - o) * (1 - h) * (1 + h);
   });
 }

@@ -10,6 +10,7 @@
 #include "libcgs/core/gaussian_gradients.h"
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/scene.h"
+#include "libcgs/priors/pane.h"
 #include "libcgs/priors/view_priors.h"
 
 namespace cgs {
@@ -38,6 +39,8 @@ struct CoherenceOptions {
   float opacity = 0;         ///< As in InitialisationOptions.
   int sh_degree = 1;         ///< Most that colours may have: 0, or 1 = where it pays, as
                              ///< add_view_dependence() judges.
+  int layers_per_ray = 2;    ///< Most that there may be: 1, or 2 = one more where photographs show
+                             ///< a pane, as find_pane() judges.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
@@ -68,21 +71,28 @@ void require_decodable(const Scene& scene, const CoherenceOptions& options);
 /// seen from the own view; where surfaces demand it, they change with the direction. Free colours
 /// move where depth is measured: elsewhere, they would learn by heart what another view shows.
 ///
+/// A pane in front of the scene is a second layer: one more Gaussian per pixel of the view it is
+/// drawn from, after those of all views. They stay on its plane, and are wide enough that together
+/// they are about as opaque in pictures of other sizes.
+///
 /// Source: Paliwal et al. 2024, "CoherentGS", section 3; the residual here is relative to depth
 ///         and bounded, and lattices may stand in for the convolutional decoders.
 class CoherentGaussians {
  public:
   /// \param priors  in the order of scene.input; pixels of NaN depth have no Gaussian
+  /// \param pane    if given, one in front of what the images of the scene show: these are
+  ///                then Pane::behind
   /// \throws InvalidInput if priors, images and cameras are not of one size, or as
   ///         require_decodable()
   CoherentGaussians(const Scene& scene,
                     const std::vector<ViewPriors>& priors,
-                    const CoherenceOptions& options);
+                    const CoherenceOptions& options,
+                    const Pane* pane = nullptr);
 
   /// What the optimiser may change: blocks of depth (one per view of lattices, one of a network),
-  /// blocks of opacity alike, one block of colour per view: change of red, green and blue per
-  /// Gaussian, empty until free_colors(), and one of shape: (a, b, corner of L) per Gaussian, empty
-  /// until free_shapes().
+  /// blocks of opacity alike, one block of colour per view (a pane counts as one): change of red,
+  /// green and blue per Gaussian, empty until free_colors(), and one of shape: (a, b, corner of L)
+  /// per Gaussian, empty until free_shapes().
   std::vector<ParameterBlock> parameters;
 
   /// From now on every Gaussian has a shape of its own, at first L = radius_factor: it covers its
@@ -97,7 +107,7 @@ class CoherentGaussians {
   void decode();
   const Gaussians& gaussians() const { return gaussians_; }
   const ViewDependence& view_dependence() const { return view_dependence_; }
-  size_t view_count() const { return views_.size(); }
+  size_t view_count() const { return views_.size(); }  ///< A pane counts as one.
   const DepthMap& depth(size_t view) const { return views_[view].depth; }
   /// Indices [first, last) in gaussians() of those of one view, in row-major order of its pixels.
   struct Range {
@@ -134,7 +144,11 @@ class CoherentGaussians {
     std::vector<Eigen::Vector3f> start_color;       // constant coefficient of SH; if free
     std::vector<Eigen::Matrix<float, 3, 2>> steps;  // to the next pixels, for depth 1; if free
     Range range;
+    float start_logit;
+    float radius_factor;  // of balls [pixels]
+    bool is_pane = false;
   };
+  void add_pane(const Pane& pane, const Camera& camera);
   std::span<ParameterBlock> blocks(ParameterRole role);
   ParameterBlock& color(size_t n) { return parameters[parameters.size() - 2 * views_.size() + n]; }
   ParameterBlock& shape(size_t n) { return parameters[parameters.size() - views_.size() + n]; }
@@ -148,7 +162,6 @@ class CoherentGaussians {
   std::vector<Raster<float>> zeros() const;  // of the size of the views
 
   CoherenceOptions options_;
-  float start_logit_ = 0;
   bool colors_are_free_ = false;
   bool shapes_are_free_ = false;
   std::vector<ViewState> views_;

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/coherence/initialisation.h"
+#include "libcgs/core/bilinear.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/pixel_matches.h"
 
@@ -32,19 +33,6 @@ struct ViewColors {
 };
 
 bool is_seen(const Eigen::Vector3f& difference) { return !std::isnan(difference.x()); }
-
-// Bilinear; (u, v) lies within the image.
-Eigen::Vector3f color_at(const ColorImage& image, float u, float v) {
-  const auto x = static_cast<int>(std::floor(u - 0.5f));
-  const auto y = static_cast<int>(std::floor(v - 0.5f));
-  const float a = u - 0.5f - static_cast<float>(x);
-  const float b = v - 0.5f - static_cast<float>(y);
-  const auto at = [&](int i, int j) -> const Eigen::Vector3f& {
-    return image(std::clamp(i, 0, image.width - 1), std::clamp(j, 0, image.height - 1));
-  };
-  return (1 - b) * ((1 - a) * at(x, y) + a * at(x + 1, y)) +
-         b * ((1 - a) * at(x, y + 1) + a * at(x + 1, y + 1));
-}
 
 // Of the mean difference over the neighbourhood of a pixel, without those up to `left_out` away.
 struct MeanDifference {

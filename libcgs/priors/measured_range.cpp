@@ -5,31 +5,13 @@
 #include <vector>
 
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/priors/reduced_view.h"
 
 namespace cgs {
 
 namespace {
 
 constexpr int kReduction = 4;
-
-// Means of 4 x 4 pixels; what remains at the right and lower border is left out.
-View reduced(const View& view) {
-  View out = view;
-  out.camera.width = view.camera.width / kReduction;
-  out.camera.height = view.camera.height / kReduction;
-  for (double* value : {&out.camera.fx, &out.camera.fy, &out.camera.cx, &out.camera.cy}) {
-    *value /= kReduction;
-  }
-  out.image = ColorImage(out.camera.width, out.camera.height, Eigen::Vector3f::Zero());
-  if (!view.valid.empty()) out.valid = MaskMap(out.camera.width, out.camera.height, 1);
-  for (int y = 0; y < out.camera.height * kReduction; ++y) {
-    for (int x = 0; x < out.camera.width * kReduction; ++x) {
-      out.image(x / kReduction, y / kReduction) += view.image(x, y) / (kReduction * kReduction);
-      if (!view.valid.empty()) out.valid(x / kReduction, y / kReduction) &= view.valid(x, y);
-    }
-  }
-  return out;
-}
 
 // Depths but for a share of them at each end.
 DepthRange trimmed(std::vector<float> depths, size_t one_in) {
@@ -77,7 +59,8 @@ void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options, const P
   small.folder = scene.folder;
   small.points = scene.points;
   for (size_t k = 0; k < scene.input.size(); ++k) {
-    small.views.push_back(reduced(scene.views[static_cast<size_t>(scene.input[k])]));
+    small.views.push_back(
+        reduced_view(scene.views[static_cast<size_t>(scene.input[k])], kReduction));
     small.input.push_back(static_cast<int>(k));
   }
   PlaneSweepOptions coarse = options;

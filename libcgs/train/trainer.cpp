@@ -164,14 +164,23 @@ bool is_decoded(ParameterRole role) {
   return role == ParameterRole::Depth || role == ParameterRole::Opacity;
 }
 
+CoherentGaussians model_of(const Scene& scene,
+                           const std::vector<ViewPriors>& priors,
+                           const CoherenceOptions& options,
+                           const Pane* pane) {
+  if (pane == nullptr) return {scene, priors, options};
+  return {behind_pane(scene, *pane), priors, options, pane};
+}
+
 }  // namespace
 
 Trainer::Trainer(const Scene& scene,
                  const std::vector<ViewPriors>& priors,
-                 const TrainingOptions& options)
+                 const TrainingOptions& options,
+                 const Pane* pane)
     : priors_(priors),
       options_(options),
-      model_(scene, priors, options.coherence),
+      model_(model_of(scene, priors, options.coherence, pane)),
       rasterizer_(TrainingRasterizerOptions{}) {
   options.validate();
   for (size_t n = 0; n < priors.size(); ++n) {

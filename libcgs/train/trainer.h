@@ -36,9 +36,11 @@ class Trainer {
  public:
   /// \param scene   canonical, input images loaded
   /// \param priors  in the order of scene.input; must outlive the trainer
+  /// \param pane    if given, the one in the photographs
   Trainer(const Scene& scene,
           const std::vector<ViewPriors>& priors,
-          const TrainingOptions& options);
+          const TrainingOptions& options,
+          const Pane* pane = nullptr);
 
   bool done() const { return step_ >= options_.steps; }
   int steps_done() const { return step_; }

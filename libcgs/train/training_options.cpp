@@ -56,7 +56,8 @@ std::vector<Field> fields_of(TrainingOptions& o) {
           {"min_radius", &o.coherence.min_radius},
           {"max_radius", &o.coherence.max_radius},
           {"opacity", &o.coherence.opacity},
-          {"sh_degree", &o.coherence.sh_degree}};
+          {"sh_degree", &o.coherence.sh_degree},
+          {"layers_per_ray", &o.coherence.layers_per_ray}};
 }
 
 template <typename T>
@@ -168,6 +169,7 @@ TrainingOptions reference_options() {
   options.sharp_from = 5000 / kSteps;
   options.color_rate = 0;
   options.coherence.sh_degree = 0;
+  options.coherence.layers_per_ray = 1;
   options.shape_rate = 1e-4 * faster;
   options.final_rate = 1;
   options.tv_weight = 5;

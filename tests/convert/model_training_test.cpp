@@ -50,6 +50,23 @@ TEST(TrainingToJson, RemarksWhereColoursDependOnTheDirection) {
   EXPECT_TRUE(remarks_on_photographs({{"exposure", nullptr}}).empty());
 }
 
+TEST(TrainingToJson, RemarksOnAPane) {
+  TrainedModel trained;
+  const auto json = [&] { return training_to_json(trained, {}); };
+  EXPECT_TRUE(json()["pane"].is_null());
+  EXPECT_EQ(json()["description"].get<std::string>().find("pane"), std::string::npos);
+  trained.pane = {.view = "left", .share = 0.121, .opacity = 0.39, .gain = 4.1};
+  EXPECT_EQ(json()["pane"]["view"], "left");
+  EXPECT_EQ(json()["pane"]["gain_db"], 4.1);
+  EXPECT_NE(json()["description"].get<std::string>().find("before them a pane; "),
+            std::string::npos);
+  const std::vector<std::string> remarks = remarks_on_photographs(json());
+  ASSERT_EQ(remarks.size(), 1u);
+  EXPECT_EQ(remarks[0],
+            "a pane that hides 39 % of what lies behind is before 12 % of view left; it is in no "
+            "mesh");
+}
+
 // Of a model with a view per entry of the coverage.
 std::string described(TrainedModel trained, const ModelRequest& request) {
   Scene& scene = trained.model.scene;

@@ -280,11 +280,20 @@ TEST(ThinSplatsOfASliver, KeepsAll) {
 }
 
 TEST_F(ThinSplatsTest, LeavesSplatsAloneThatAreNotOfTheViews) {
-  w_.counts[2] -= 1;
-  const ThinnedSplats out = thinned(w_);
-  EXPECT_EQ(out.splats.position, w_.splats.position);
-  EXPECT_TRUE(out.tried.empty());
-  EXPECT_TRUE(thinning_to_json(out, w_.splats.size())["chosen"].is_null());
+  const std::vector<size_t> more = {w_.counts[0], w_.counts[1], w_.counts[2] + 1};
+  const std::vector<size_t> far_fewer = {w_.counts[0], 0, 0};
+  for (const auto& counts : {more, far_fewer}) {
+    w_.counts = counts;
+    const ThinnedSplats out = thinned(w_);
+    EXPECT_EQ(out.splats.position, w_.splats.position);
+    EXPECT_TRUE(out.tried.empty());
+    EXPECT_TRUE(thinning_to_json(out, w_.splats.size())["chosen"].is_null());
+  }
+}
+
+TEST_F(ThinSplatsTest, LetsAPaneFollowThoseOfTheViews) {
+  w_.counts[2] -= 100;
+  EXPECT_FALSE(thinned(w_).tried.empty());
 }
 
 TEST_F(ThinSplatsTest, NamesWhatItTried) {

@@ -483,6 +483,62 @@ TEST(CoherentGaussians, ThePriorOfColoursIsTheirMeanSquaredChange) {
   EXPECT_EQ(model.add_color_prior(0), 0);
 }
 
+// One before the left half of the second view.
+Pane pane_before_left_half() {
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  Pane pane{.drawn_from = 1,
+            .depth = DepthMap(kWidth, kHeight, none),
+            .color = ColorImage(kWidth, kHeight, Eigen::Vector3f(0.8f, 0.6f, 0.4f)),
+            .opacity = 0.4f,
+            .behind = {},
+            .gain = 0};
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < 7; ++x) pane.depth(x, y) = 0.2f + 0.002f * static_cast<float>(x);
+  }
+  return pane;
+}
+
+TEST(CoherentGaussians, PutAPaneAfterThoseOfTheViews) {
+  const Pane pane = pane_before_left_half();
+  const Scene scene = scene_of(2);
+  CoherentGaussians model(scene, priors_of(2), small_lattices(), &pane);
+  ASSERT_EQ(model.view_count(), 3u);
+  const auto [first, last] = model.range(2);
+  EXPECT_EQ(first, model.range(1).last);
+  ASSERT_EQ(last - first, size_t{7 * kHeight});
+  EXPECT_EQ(last, model.gaussians().size());
+  randomise(model, 4);
+  model.decode();
+  const Gaussians& g = model.gaussians();
+  for (size_t i = first; i < last; ++i) {
+    const int pixel = model.pixel(2, i - first);
+    const double z = double(pane.depth.data[static_cast<size_t>(pixel)]);
+    const Eigen::Vector3d on_plane =
+        scene.views[1].camera.unproject(pixel % kWidth + 0.5, pixel / kWidth + 0.5, z);
+    EXPECT_LT((g.position[i].cast<double>() - on_plane).norm(), 1e-6);
+    EXPECT_LT((kShC0 * g.sh[i] - Eigen::Vector3f(0.3f, 0.1f, -0.1f)).norm(), 1e-6f);
+  }
+}
+
+TEST(CoherentGaussians, GradientsOfAPaneMatchFiniteDifferences) {
+  const Pane pane = pane_before_left_half();
+  CoherentGaussians model(scene_of(2), priors_of(2), small_lattices(), &pane);
+  model.free_shapes();
+  randomise(model, 3);
+  model.decode();
+  const LinearLoss loss(model, true);
+  model.add_gradients(loss.weights, loss.depth);
+  size_t of_depth = 0;
+  for (ParameterBlock& block : model.parameters) {
+    if (block.role == ParameterRole::Depth && of_depth++ == 2) {
+      for (const float slope : block.gradient) EXPECT_EQ(slope, 0) << "it stays on its plane";
+    } else if (!block.value.empty()) {
+      expect_finite_differences(model, block, loss);
+    }
+  }
+  EXPECT_EQ(of_depth, 3u);
+}
+
 TEST(CoherenceOptions, NameTheFieldOutOfRange) {
   CoherenceOptions options;
   options.max_depth_change = std::numeric_limits<float>::quiet_NaN();

@@ -11,6 +11,7 @@
 #include "libcgs/priors/depth_layers.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/train/image_metrics.h"
+#include "tests/support/pane_scene.h"
 #include "tests/support/stereo_scene.h"
 
 namespace cgs::trainer_test {
@@ -112,6 +113,31 @@ TEST(Trainer, MovesDepthTowardsTheTruth) {
   RecordProperty("before", std::to_string(before));
   RecordProperty("after", std::to_string(after));
   EXPECT_LT(after, 0.8 * before) << "from " << before;
+}
+
+// What a camera between those of the photographs sees through a pane and beside it.
+TEST(Trainer, ShowsWhatLiesBehindAPaneFromElsewhere) {
+  std::vector<Camera> cameras;
+  for (const double x : {-0.6, 0.0, 0.6, 0.3}) {
+    cameras.push_back(test::looking_at({x, 0.15 * x * x, 0}, {0.5 * x, 0, 6}, 160, 120, 160));
+  }
+  test::PaneScene planted = test::pane_scene(cameras, 0.1, 0.4f);
+  const View held_out = planted.scene.views.back();
+  planted.scene.input.pop_back();
+  cameras.pop_back();
+  const std::vector<ViewPriors> priors = test::true_priors(planted.wall, cameras);
+  const std::optional<Pane> pane = find_pane(planted.scene, priors);
+  ASSERT_TRUE(pane.has_value());
+  const auto quality = [&](const Pane* second_layer) {
+    Trainer trainer(planted.scene, priors, short_training(40), second_layer);
+    run(trainer);
+    return psnr(rasterize(trainer.model().gaussians(), held_out.camera).color, held_out.image);
+  };
+  const double one = quality(nullptr);
+  const double two = quality(&*pane);
+  RecordProperty("one", std::to_string(one));
+  RecordProperty("two", std::to_string(two));
+  EXPECT_GT(two, one + 2);
 }
 
 TEST(Trainer, LosesLessAndLess) {

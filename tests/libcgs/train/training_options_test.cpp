@@ -47,6 +47,7 @@ TEST(TrainingOptions, ValidateNamesTheFieldOutOfRange) {
                               "opacity_prior",
                               "tv_to_layers",
                               "sh_degree",
+                              "layers_per_ray",
                               "color_rate",
                               "color_prior"}) {
     TrainingOptions options;

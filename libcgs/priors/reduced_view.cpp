@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/reduced_view.h"
+
+namespace cgs {
+
+View reduced_view(const View& view, int factor) {
+  View out = view;
+  out.camera.width = view.camera.width / factor;
+  out.camera.height = view.camera.height / factor;
+  for (double* value : {&out.camera.fx, &out.camera.fy, &out.camera.cx, &out.camera.cy}) {
+    *value /= factor;
+  }
+  const float share = 1.0f / static_cast<float>(factor * factor);
+  out.image = ColorImage(out.camera.width, out.camera.height, Eigen::Vector3f::Zero());
+  if (!view.valid.empty()) out.valid = MaskMap(out.camera.width, out.camera.height, 1);
+  for (int y = 0; y < out.camera.height * factor; ++y) {
+    for (int x = 0; x < out.camera.width * factor; ++x) {
+      out.image(x / factor, y / factor) += share * view.image(x, y);
+      if (!view.valid.empty()) out.valid(x / factor, y / factor) &= view.valid(x, y);
+    }
+  }
+  return out;
+}
+
+}  // namespace cgs
