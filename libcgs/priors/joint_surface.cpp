@@ -24,18 +24,25 @@ PlaceMap places_in(const View& from,
     for (int x = 0; x < out.width; ++x) {
       const float z = own.depth(x, y);
       if (std::isnan(z)) continue;
-      const Eigen::Vector3d uvz =
-          to.camera.project(from.camera.unproject(x + 0.5, y + 0.5, double(z)));
-      if (!to.camera.sees(uvz)) continue;
-      const float there = other.depth(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
-      if (!(std::abs(double(there) / uvz.z() - 1) < kTolerance)) continue;
-      out(x, y) = uvz.head<2>().cast<float>();
+      const Eigen::Vector3d point = from.camera.unproject(x + 0.5, y + 0.5, double(z));
+      const Eigen::Vector2f at = place_of(to.camera, point);
+      if (!is_known(at)) continue;
+      const float there = other.depth(static_cast<int>(at.x()), static_cast<int>(at.y()));
+      const double expected = to.camera.project(point).z();
+      if (std::abs(double(there) / expected - 1) < kTolerance) out(x, y) = at;
     }
   });
   return out;
 }
 
 }  // namespace
+
+Eigen::Vector2f place_of(const Camera& camera, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d uvz = camera.project(point);
+  const Eigen::Vector2f at = uvz.head<2>().cast<float>();
+  const bool is_inside = camera.sees({double(at.x()), double(at.y()), uvz.z()});
+  return is_inside ? at : Eigen::Vector2f::Constant(kNaN);
+}
 
 JointSurface joint_surface(const Scene& scene, const std::vector<ViewPriors>& priors) {
   JointSurface out;

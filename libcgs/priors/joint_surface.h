@@ -13,6 +13,10 @@ using PlaceMap = Raster<Eigen::Vector2f>;  ///< In another image [pixels, centre
 inline bool is_known(const Eigen::Vector2f& place) { return !std::isnan(place.x()); }
 inline bool is_known(const Eigen::Vector3f& color) { return !std::isnan(color.x()); }
 
+/// Where a camera sees a world point; NaN where it does not. As a float it still lies within the
+/// picture, which a place next to its far border may not by rounding.
+Eigen::Vector2f place_of(const Camera& camera, const Eigen::Vector3d& point);
+
 /// The input views, and where each sees the surface that another one sees.
 struct JointSurface {
   std::vector<const View*> views;               ///< In the order of Scene::input.

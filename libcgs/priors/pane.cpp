@@ -60,8 +60,7 @@ PlaceMap places_on(const FrontPlane& front, const Camera& from, const Camera& to
     for (int x = 0; x < out.width; ++x) {
       const double z = depth_on(front.plane, from, x + 0.5, y + 0.5);
       if (std::isnan(z)) continue;
-      const Eigen::Vector3d uvz = to.project(from.unproject(x + 0.5, y + 0.5, z));
-      if (to.sees(uvz)) out(x, y) = uvz.head<2>().cast<float>();
+      out(x, y) = place_of(to, from.unproject(x + 0.5, y + 0.5, z));
     }
   });
   return out;

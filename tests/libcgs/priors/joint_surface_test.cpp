@@ -29,6 +29,16 @@ TEST_F(JointSurfaceTest, KnowsWhereOthersSeeAPixel) {
   EXPECT_FALSE(is_known(surface.place_in[0][1](5, 7))) << "beside the other picture";
 }
 
+TEST(PlaceOf, LiesWithinThePictureAlsoAsAFloat) {
+  const Camera camera = test::looking_at({0, 0, 0}, {0, 0, 1}, 40, 30, 60);
+  const double beyond_floats = 40 - 1e-9;
+  EXPECT_TRUE(camera.sees(camera.project(camera.unproject(beyond_floats, 15, 2))));
+  EXPECT_FALSE(is_known(place_of(camera, camera.unproject(beyond_floats, 15, 2))));
+  EXPECT_LT((place_of(camera, camera.unproject(39.5, 15, 2)) - Eigen::Vector2f(39.5f, 15)).norm(),
+            1e-4f);
+  EXPECT_FALSE(is_known(place_of(camera, camera.unproject(20, 15, -2))));
+}
+
 TEST_F(JointSurfaceTest, LeavesOutWhatAnotherViewSeesAtAnotherDepth) {
   priors_[1].depth(15, 7) *= 0.9f;
   EXPECT_FALSE(is_known(joint_surface(scene_, priors_).place_in[0][1](25, 7)));

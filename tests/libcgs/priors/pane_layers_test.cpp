@@ -45,8 +45,7 @@ class PaneLayersTest : public testing::Test {
     for (int y = 0; y < a.height; ++y) {
       for (int x = 0; x < a.width; ++x) {
         const double z = depth_on(plane, a, x + 0.5, y + 0.5);
-        const Eigen::Vector3d uvz = b.project(a.unproject(x + 0.5, y + 0.5, z));
-        if (b.sees(uvz)) out(x, y) = uvz.head<2>().cast<float>();
+        out(x, y) = place_of(b, a.unproject(x + 0.5, y + 0.5, z));
       }
     }
     return out;
