@@ -7,9 +7,9 @@
 #include <cstdint>
 
 #include <Eigen/Eigenvalues>
+#include <tbb/parallel_for.h>
 
 #include "libcgs/core/split_mix.h"
-#include "libcgs/priors/joint_surface.h"
 #include "libcgs/priors/plane_sweep.h"
 #include "libcgs/priors/reduced_view.h"
 
@@ -141,6 +141,18 @@ double depth_on(const Plane& plane, const Camera& camera, double u, double v) {
   const Vector3d ray = camera.world_from_cam.linear() * camera.ray_in_cam(u, v);
   const double z = -plane.signedDistance(camera.center()) / plane.normal().dot(ray);
   return z > 0 && std::isfinite(z) ? z : std::nan("");
+}
+
+PlaceMap places_on(const Plane& plane, const Camera& from, const Camera& to) {
+  PlaceMap out(from.width, from.height, Eigen::Vector2f::Constant(std::nanf("")));
+  tbb::parallel_for(0, out.height, [&](int y) {
+    for (int x = 0; x < out.width; ++x) {
+      const double z = depth_on(plane, from, x + 0.5, y + 0.5);
+      if (std::isnan(z)) continue;
+      out(x, y) = place_of(to, from.unproject(x + 0.5, y + 0.5, z));
+    }
+  });
+  return out;
 }
 
 std::optional<FrontPlane> find_front_plane(const Scene& scene,

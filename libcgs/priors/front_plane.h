@@ -8,6 +8,7 @@
 
 #include "libcgs/core/progress.h"
 #include "libcgs/core/scene.h"
+#include "libcgs/priors/joint_surface.h"
 #include "libcgs/priors/view_priors.h"
 
 namespace cgs {
@@ -24,6 +25,9 @@ double depth_on(const Eigen::Hyperplane<double, 3>& plane,
                 const Camera& camera,
                 double u,
                 double v);
+
+/// Where the pixels of one camera lie in another one, on a plane; NaN where it does not see that.
+PlaceMap places_on(const Eigen::Hyperplane<double, 3>& plane, const Camera& from, const Camera& to);
 
 /// Matches what is left of each photograph without the surface, and looks for the plane that most
 /// of what lies in front of that is on; none if those are fewer than one in 200 of the pixels.

@@ -53,19 +53,6 @@ Raster<float> strength(const ColorImage& difference) {
   return out;
 }
 
-// Where the pixels of one camera lie in another one, on a plane.
-PlaceMap places_on(const FrontPlane& front, const Camera& from, const Camera& to) {
-  PlaceMap out(from.width, from.height, Eigen::Vector2f::Constant(std::nanf("")));
-  tbb::parallel_for(0, out.height, [&](int y) {
-    for (int x = 0; x < out.width; ++x) {
-      const double z = depth_on(front.plane, from, x + 0.5, y + 0.5);
-      if (std::isnan(z)) continue;
-      out(x, y) = place_of(to, from.unproject(x + 0.5, y + 0.5, z));
-    }
-  });
-  return out;
-}
-
 // The largest part of a mask, without what is thinner than the kernel and with what is narrower
 // filled.
 MaskMap largest_part(cv::Mat1b mask) {
@@ -135,8 +122,8 @@ PanePlaces places_of(const JointSurface& surface,
   std::vector<Raster<float>> strengths;
   for (size_t v = 0; v < surface.count(); ++v) {
     const Camera& camera = surface.views[v]->camera;
-    out.in_view.push_back(places_on(front, own, camera));
-    out.of_view.push_back(places_on(front, camera, own));
+    out.in_view.push_back(places_on(front.plane, own, camera));
+    out.of_view.push_back(places_on(front.plane, camera, own));
     strengths.push_back(strength(left[v]));
   }
   out.extent = extent(out, strengths, least_strength(front, strengths));

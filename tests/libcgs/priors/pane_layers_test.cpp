@@ -29,25 +29,14 @@ class PaneLayersTest : public testing::Test {
     const Camera& own = planted_.scene.views[1].camera;
     PanePlaces out{.drawn_from = 1, .extent = {}, .in_view = {}, .of_view = {}, .through = {}};
     for (const View& view : planted_.scene.views) {
-      out.in_view.push_back(on(plane, own, view.camera));
-      out.of_view.push_back(on(plane, view.camera, own));
+      out.in_view.push_back(places_on(plane, own, view.camera));
+      out.of_view.push_back(places_on(plane, view.camera, own));
       const DepthMap depth = test::true_depth(planted_.both, view.camera);
       MaskMap through(depth.width, depth.height, 0);
       for (size_t i = 0; i < through.data.size(); ++i) through.data[i] = depth.data[i] < 4 ? 1 : 0;
       out.through.push_back(through);
     }
     out.extent = out.through[1];
-    return out;
-  }
-
-  static PlaceMap on(const Eigen::Hyperplane<double, 3>& plane, const Camera& a, const Camera& b) {
-    PlaceMap out(a.width, a.height, Eigen::Vector2f::Constant(std::nanf("")));
-    for (int y = 0; y < a.height; ++y) {
-      for (int x = 0; x < a.width; ++x) {
-        const double z = depth_on(plane, a, x + 0.5, y + 0.5);
-        out(x, y) = place_of(b, a.unproject(x + 0.5, y + 0.5, z));
-      }
-    }
     return out;
   }
 
