@@ -15,10 +15,7 @@ namespace {
 bool confirms(const Camera& camera, const ViewPriors& priors, const Eigen::Vector3d& point) {
   constexpr double kSame = 0.01;  // of the depth
   const Eigen::Vector3d uvz = camera.project(point);
-  if (!(uvz.z() > 0 && uvz.x() >= 0 && uvz.y() >= 0 && uvz.x() < camera.width &&
-        uvz.y() < camera.height)) {
-    return false;
-  }
+  if (!camera.sees(uvz)) return false;
   const int x = static_cast<int>(uvz.x());
   const int y = static_cast<int>(uvz.y());
   return priors.origin(x, y) == DepthOrigin::Measured &&

@@ -40,24 +40,18 @@ PlantedScene planted_scene(double error) {
   }
   PlantedScene out;
   out.scene = test::photographed_scene(patches, cameras, 0.02);
+  out.priors = test::true_priors(patches, cameras);
   for (size_t n = 0; n < cameras.size(); ++n) {
-    const DepthMap truth = test::true_depth(patches, cameras[n]);
-    ViewPriors p;
-    p.depth = truth;
-    p.sigma = truth;
-    for (float& s : p.sigma.data) s *= 0.02f;
-    for (int y = 0; y < truth.height; ++y) {
-      for (int x = 0; x < truth.width; ++x) {
+    ViewPriors& p = out.priors[n];
+    out.truth.push_back(p.depth);
+    for (float& s : p.sigma.data) s *= 2;
+    for (int y = 0; y < p.depth.height; ++y) {
+      for (int x = 0; x < p.depth.width; ++x) {
         const double bump = std::sin(0.09 * x + 2.0 * double(n)) * std::cos(0.11 * y + double(n));
         p.depth(x, y) *= static_cast<float>(1 + error * bump);
       }
     }
-    p.confidence = Raster<float>(truth.width, truth.height, 1);
-    p.origin = Raster<DepthOrigin>(truth.width, truth.height, DepthOrigin::Measured);
-    p.matched_views = Raster<uint8_t>(truth.width, truth.height, 2);
     p.layer = depth_layers(p.depth, {.count = 2, .sample_step = 2});
-    out.truth.push_back(truth);
-    out.priors.push_back(std::move(p));
   }
   return out;
 }
