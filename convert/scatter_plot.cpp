@@ -27,7 +27,8 @@ constexpr double kTop = 46;
 constexpr double kRight = 24;
 constexpr double kBottom = 58;
 constexpr double kFont = 13;
-constexpr double kLetter = 7;  // mean width of one
+constexpr double kLetter = 7.2;  // mean width of one, of a wide font
+constexpr double kBoldLetter = 8.2;
 constexpr double kDot = 5;
 
 constexpr const char* kStyle = R"(<style>
@@ -173,6 +174,20 @@ std::string line_through(const std::vector<Vector2d>& corners) {
   return out + "\"/>\n";
 }
 
+// As near to its point as the box lets it, whatever the width of the font.
+std::string label_in(const Box& box,
+                     const Vector2d& point,
+                     const std::string& label,
+                     bool on_front) {
+  const bool is_right = box.min().x() > point.x();
+  const bool is_left = box.max().x() < point.x();
+  const double x = is_right ? box.min().x() : is_left ? box.max().x() : box.center().x();
+  const std::string anchor = is_right ? "start" : is_left ? "end" : "middle";
+  return text_at({x, box.max().y() - 2},
+                 label,
+                 "text-anchor=\"" + anchor + "\" class=\"" + (on_front ? "front" : "off") + "\"");
+}
+
 std::string labels(const std::vector<ScatterPlot::Point>& points,
                    const std::vector<Vector2d>& places,
                    const std::vector<Vector2d>& corners,
@@ -188,7 +203,7 @@ std::string labels(const std::vector<ScatterPlot::Point>& points,
   for (const bool front : {true, false}) {  // the front has the first choice
     for (size_t i = 0; i < points.size(); ++i) {
       if (points[i].on_front != front) continue;
-      const double width = kLetter * double(points[i].label.size());
+      const double width = (front ? kBoldLetter : kLetter) * double(points[i].label.size());
       const Box box = place_label(places[i], width, taken, inside);
       taken.push_back(box);
       const Vector2d near = places[i].cwiseMax(box.min()).cwiseMin(box.max());
@@ -197,10 +212,7 @@ std::string labels(const std::vector<ScatterPlot::Point>& points,
                pixel(places[i].y()) + "\" x2=\"" + pixel(near.x()) + "\" y2=\"" + pixel(near.y()) +
                "\"/>\n";
       }
-      out += text_at(
-          {box.center().x(), box.max().y() - 2},
-          points[i].label,
-          std::string("text-anchor=\"middle\" class=\"") + (front ? "front" : "off") + "\"");
+      out += label_in(box, places[i], points[i].label, front);
     }
   }
   return out;

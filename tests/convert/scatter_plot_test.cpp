@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/scatter_plot.h"
 
+#include <map>
 #include <regex>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -14,12 +16,18 @@ struct Text {
   std::string words;
 };
 
-std::vector<Text> texts(const std::string& svg, const std::string& attribute) {
-  const std::regex pattern("<text x=\"([-0-9.]+)\" y=\"([-0-9.]+)\"[^>]*" + attribute +
-                           "[^>]*>([^<]*)<");
+// Labels of points, where the font is as wide as a plain one: 7 pixels a letter.
+std::vector<Text> labels_of(const std::string& svg, const std::string& kind) {
+  const std::regex pattern(
+      "<text x=\"([-0-9.]+)\" y=\"([-0-9.]+)\" text-anchor=\"([a-z]+)\" class=\"(?:" + kind +
+      ")\">([^<]*)<");
   std::vector<Text> out;
   for (std::sregex_iterator it(svg.begin(), svg.end(), pattern), end; it != end; ++it) {
-    out.push_back({std::stod((*it)[1]), std::stod((*it)[2]), (*it)[3]});
+    const std::string anchor = (*it)[3];
+    Text text{std::stod((*it)[1]), std::stod((*it)[2]), (*it)[4]};
+    const double half = 3.5 * double(text.words.size());
+    text.x += anchor == "start" ? half : anchor == "end" ? -half : 0;
+    out.push_back(text);
   }
   return out;
 }
@@ -42,8 +50,8 @@ TEST(ScatterSvg, DrawsEveryPointAndJoinsTheFront) {
   const std::string svg = scatter_svg({plot()});
   EXPECT_EQ(count(svg, "<circle"), 3u);
   EXPECT_EQ(count(svg, "<circle") - count(svg, "class=\"front\"/>"), 1u);
-  EXPECT_EQ(texts(svg, "class=\"off\"").size(), 1u);
-  EXPECT_EQ(texts(svg, "class=\"front\"").size(), 2u);
+  EXPECT_EQ(labels_of(svg, "off").size(), 1u);
+  EXPECT_EQ(labels_of(svg, "front").size(), 2u);
   EXPECT_NE(svg.find("draft &amp; fast"), std::string::npos);
   EXPECT_NE(svg.find(">time [s]<"), std::string::npos);
   EXPECT_NE(svg.find("prefers-color-scheme: dark"), std::string::npos);
@@ -69,7 +77,7 @@ TEST(ScatterSvg, LabelsOfACrowdDoNotLieOnEachOther) {
         {10 + 0.01 * i, 1 + 0.001 * (i % 5), "setting " + std::to_string(i), false});
   }
   crowd.points.push_back({1, 10, "far", true});
-  const std::vector<Text> labels = texts(scatter_svg({crowd}), "class=\"(?:off|front)\"");
+  const std::vector<Text> labels = labels_of(scatter_svg({crowd}), "off|front");
   ASSERT_EQ(labels.size(), 21u);
   for (const Text& a : labels) {
     for (const Text& b : labels) {
@@ -79,6 +87,20 @@ TEST(ScatterSvg, LabelsOfACrowdDoNotLieOnEachOther) {
           << a.words << " / " << b.words;
     }
   }
+}
+
+// However wide the reader's font is.
+TEST(ScatterSvg, LabelsToTheRightBeginAndThoseToTheLeftEndBesideTheirPoints) {
+  const std::string svg = scatter_svg({plot()});
+  const std::regex pattern(
+      "<text x=\"([-0-9.]+)\"[^>]*text-anchor=\"(start|end)\" class=\"[a-z]+\">([^<]*)<");
+  const std::map<std::string, double> dots = {{"standard", 456}, {"slow", 762.5}};
+  size_t found = 0;
+  for (std::sregex_iterator it(svg.begin(), svg.end(), pattern), end; it != end; ++it, ++found) {
+    const double gap = (*it)[2] == "start" ? 9 : -9;
+    EXPECT_NEAR(std::stod((*it)[1]), dots.at((*it)[3]) + gap, 0.11) << (*it)[3];
+  }
+  EXPECT_EQ(found, 2u);
 }
 
 TEST(ScatterSvg, StandsPointsThatAreOneAndPlotsWithoutAny) {
