@@ -28,10 +28,9 @@ struct FrontPoint {
   double tolerance;  // of depth
 };
 
-// By how much images shrink: a plane needs no more than so many pixels. (With 256 instead of 160 it
-// took three times as long, on every scene, and two planted panes came out 0.1 to 0.2 dB better.)
+// By how much images shrink: a plane needs no more than so many pixels.
 int reduction(const std::vector<ColorImage>& images) {
-  constexpr int kLongestSide = 160;
+  constexpr int kLongestSide = 256;
   int longest = 0;
   for (const ColorImage& image : images) longest = std::max({longest, image.width, image.height});
   return std::max(1, (longest + kLongestSide / 2) / kLongestSide);
