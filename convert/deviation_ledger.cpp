@@ -91,8 +91,8 @@ void DeviationLedger::take(const std::vector<Provenance>& labels,
   std::vector<float> inferred;
   for (size_t i = 0; i < distances.size(); ++i) {
     if (!std::isfinite(distances[i])) continue;
-    const bool is_inferred = !labels.empty() && labels[i] == Provenance::Inferred;
-    (is_inferred ? inferred : evidence).push_back(distances[i]);
+    const bool is_measured = labels.empty() || has_evidence(labels[i]);
+    (is_measured ? evidence : inferred).push_back(distances[i]);
   }
   out.has_evidence |= !evidence.empty();
   out.has_inferred |= !inferred.empty();

@@ -25,7 +25,7 @@ FusedVolume fuse_model(const Model& model,
     view.camera = camera;
     view.depth = model.priors[k].depth;
     view.sigma = model.priors[k].sigma;
-    view.guessed = inputs[k].guessed;
+    view.evidence = inputs[k].evidence;
     view.color = picture(buffers);
     views.push_back(std::move(view));
   }
@@ -47,6 +47,7 @@ Json fusion_to_json(const TsdfReport& report, const Frame& frame) {
           {"voxels",
            {{"free", report.free},
             {"occupied", report.occupied},
+            {"estimated", report.estimated},
             {"never_seen_hidden", report.hidden},
             {"never_seen_outside", report.unseen},
             {"conflicts", report.conflicts},

@@ -86,7 +86,8 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
   const Raster<uint8_t> origin = as_raster<uint8_t>(image, "origin.Y", file);
   priors.origin = Raster<DepthOrigin>(image.width, image.height, DepthOrigin::Unknown);
   std::transform(origin.data.begin(), origin.data.end(), priors.origin.data.begin(), [](uint8_t v) {
-    return v > 3 ? DepthOrigin::Unknown : static_cast<DepthOrigin>(v);
+    return v > static_cast<uint8_t>(DepthOrigin::Estimated) ? DepthOrigin::Unknown
+                                                             : static_cast<DepthOrigin>(v);
   });
   return priors;
 }
@@ -233,14 +234,10 @@ void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow
   }
 }
 
-MaskMap guessed_pixels(const ViewPriors& priors) {
-  const auto is_guess = [](DepthOrigin origin) {
-    return origin == DepthOrigin::Guessed || origin == DepthOrigin::Completed;
-  };
-  const std::vector<DepthOrigin>& origins = priors.origin.data;
-  if (std::none_of(origins.begin(), origins.end(), is_guess)) return {};
-  MaskMap out(priors.origin.width, priors.origin.height, 0);
-  std::transform(origins.begin(), origins.end(), out.data.begin(), is_guess);
+EvidenceMap evidence_of(const ViewPriors& priors) {
+  EvidenceMap out(priors.origin.width, priors.origin.height, DepthEvidence::Measured);
+  std::transform(
+      priors.origin.data.begin(), priors.origin.data.end(), out.data.begin(), depth_evidence);
   return out;
 }
 
@@ -249,7 +246,7 @@ std::vector<SupportView> support_views(const Model& model) {
   for (size_t k = 0; k < model.priors.size(); ++k) {
     const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
     const ViewPriors& priors = model.priors[k];
-    views.push_back({view.camera, priors.depth, priors.sigma, guessed_pixels(priors)});
+    views.push_back({view.camera, priors.depth, priors.sigma, evidence_of(priors)});
   }
   return views;
 }

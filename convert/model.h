@@ -53,9 +53,8 @@ void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow
 /// Takes photographs and masks from another reading of the same scene, by the names of the views.
 void relink_views(Scene& scene, const Scene& found);
 
-/// 1 where no other view confirms the depth of a view: a guess from that view alone, or filled in
-/// from neighbours; empty if it is nowhere.
-MaskMap guessed_pixels(const ViewPriors& priors);
+/// What vouches for the depth of every pixel of a view.
+EvidenceMap evidence_of(const ViewPriors& priors);
 
 /// The input views with their depth and its uncertainty: who can vouch for a rendered pixel.
 std::vector<SupportView> support_views(const Model& model);

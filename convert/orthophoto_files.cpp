@@ -22,7 +22,7 @@
 #include "io/png.h"
 #include "io/tiff.h"
 #include "libcgs/core/error.h"
-#include "libcgs/core/provenance_colors.h"
+#include "libcgs/core/provenance.h"
 #include "meshing/orthophoto.h"
 
 namespace cgs {
@@ -247,7 +247,7 @@ Json shares_json(const Orthophoto& photo, size_t covered, bool states_provenance
 Json provenance_colors_json() {
   Json out = Json::object();
   for (const Provenance label : kProvenanceOrder) {
-    out[provenance_key(label)] = kProvenanceColors.at(static_cast<size_t>(label));
+    out[provenance_key(label)] = traits(label).color;
   }
   return out;
 }

@@ -71,6 +71,8 @@ std::string certificate_section(const Json& report) {
        << table_row("area seen by two or more views", area("area_observed"))
        << table_row("area seen by one view", area("area_single_view"))
        << table_row("area interpolated", area("area_interpolated"))
+       << table_row("area estimated (shown by a photograph, measured by nothing)",
+                    area("area_estimated"))
        << table_row("area inferred (never seen, invented)", area("area_inferred"))
        << table_row("faces", number(c["faces"], "%.0f")) << "</table>\n";
   return html.str();

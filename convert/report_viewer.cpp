@@ -20,7 +20,7 @@
 #include "io/mesh_arrays.h"
 #include "io/resample.h"
 #include "io/texture_images.h"
-#include "libcgs/core/provenance_colors.h"
+#include "libcgs/core/provenance.h"
 #include "meshing/simplify.h"
 
 namespace cgs {
@@ -207,8 +207,10 @@ Json viewer_scene(const Model& model, const TriangleMesh& mesh) {
   for (const Provenance label : kProvenanceOrder) {
     const auto number = static_cast<size_t>(label);
     labels.push_back({{"number", number},
-                      {"name", provenance_name(label)},
-                      {"color", kProvenanceColors.at(number)}});
+                      {"name", traits(label).name},
+                      {"meaning", traits(label).meaning},
+                      {"has_evidence", traits(label).has_evidence},
+                      {"color", traits(label).color}});
   }
   return {{"unit", {{"name", unit.name}, {"length", unit.length}, {"sigma", unit.relative_sigma}}},
           {"file",

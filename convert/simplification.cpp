@@ -25,7 +25,8 @@ Json distances_to_json(const MeshDistance& distance, double scale) {
 
 Json result_to_json(const SimplifyResult& result, const Frame& frame) {
   const auto observed = size_t(Provenance::Observed);
-  const bool has_inferred = result.area_before.at(size_t(Provenance::Inferred)) > 0;
+  const bool has_inferred = result.area_before.at(size_t(Provenance::Inferred)) > 0 ||
+                            result.area_before.at(size_t(Provenance::Estimated)) > 0;
   const double area_unit = frame.scale * frame.scale;
   return {
       {"faces_before", result.faces_before},

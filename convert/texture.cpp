@@ -61,8 +61,7 @@ Json report_of(const TriangleMesh& mesh,
     if (i >= 0) {
       ++faces[static_cast<size_t>(i)];
       area[static_cast<size_t>(i)] += face_area(mesh, f) * area_unit;
-    } else if (mesh.provenance.empty() || mesh.provenance[f] == Provenance::Observed ||
-               mesh.provenance[f] == Provenance::SingleView) {
+    } else if (mesh.provenance.empty() || is_shown(mesh.provenance[f])) {
       ++faces_without;
       area_without += face_area(mesh, f) * area_unit;
     }

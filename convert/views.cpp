@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -39,7 +40,7 @@ bool knows_holes(const Model& model) { return !model.priors.empty(); }
 Json hole_fractions(const Model& model, const RenderBuffers& buffers, const MaskMap& valid) {
   if (!knows_holes(model)) return {{"hole_fraction", nullptr}};
   const std::vector<Hole>& holes = buffers.hole.data;
-  std::array<size_t, 4> counts{};
+  std::array<size_t, kHoleKinds> counts{};
   size_t looked_at = 0;
   for (size_t i = 0; i < holes.size(); ++i) {
     if (!valid.empty() && valid.data[i] == 0) continue;
@@ -50,10 +51,15 @@ Json hole_fractions(const Model& model, const RenderBuffers& buffers, const Mask
     const size_t count = counts.at(static_cast<size_t>(kind));
     return looked_at > 0 ? static_cast<double>(count) / static_cast<double>(looked_at) : 0;
   };
-  Json out = {{"hole_fraction", looked_at > 0 ? 1 - fraction(Hole::None) : 0},
-              {"transparent_fraction", fraction(Hole::Transparent)},
-              {"occluded_fraction", fraction(Hole::Occluded)},
-              {"outside_fraction", fraction(Hole::Outside)}};
+  const double transparent = fraction(Hole::Transparent);
+  const double occluded = fraction(Hole::Occluded);
+  const double outside = fraction(Hole::Outside);
+  Json out = {{"hole_fraction", transparent + occluded + outside},
+              {"transparent_fraction", transparent},
+              {"occluded_fraction", occluded},
+              {"outside_fraction", outside},
+              {"estimated_fraction", fraction(Hole::Estimated)},
+              {"sky_fraction", fraction(Hole::Sky)}};
   if (looked_at < holes.size()) {
     out["masked_fraction"] = 1 - static_cast<double>(looked_at) / static_cast<double>(holes.size());
   }
@@ -83,7 +89,10 @@ ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
   rasters.color = buffers.color;
   rasters.alpha = buffers.alpha;
   rasters.depth = buffers.median_depth;
-  rasters.normal = normals_from_depth(buffers.median_depth, camera);
+  for (size_t i = 0; i < rasters.depth.data.size(); ++i) {
+    if (buffers.hole.data[i] == Hole::Sky) rasters.depth.data[i] = std::nanf("");
+  }
+  rasters.normal = normals_from_depth(rasters.depth, camera);
   rasters.depth_variance = buffers.depth_variance;
   rasters.support = buffers.support;
   rasters.hole = buffers.hole;

@@ -35,7 +35,7 @@ Places places_on(const TriangleMesh& mesh) {
   enum class Label : uint8_t { Unused, Inferred, Evidence };
   std::vector<Label> label(n, Label::Unused);
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    const Label of_face = is_inferred(mesh, f) ? Label::Inferred : Label::Evidence;
+    const Label of_face = is_unmeasured(mesh, f) ? Label::Inferred : Label::Evidence;
     for (const uint32_t v : mesh.faces[f]) label[v] = std::max(label[v], of_face);
   }
   Places out;
@@ -47,7 +47,7 @@ Places places_on(const TriangleMesh& mesh) {
   const SurfaceSamples samples = sample_faces(mesh, std::max(kLeast, mesh.faces.size()));
   for (size_t i = 0; i < samples.points.size(); ++i) {
     out.points.push_back(samples.points[i]);
-    out.inferred.push_back(is_inferred(mesh, samples.faces[i]) ? 1 : 0);
+    out.inferred.push_back(is_unmeasured(mesh, samples.faces[i]) ? 1 : 0);
   }
   return out;
 }
@@ -64,7 +64,7 @@ void add_distances(const TriangleMesh& from, const TriangleMesh& to, SurfaceDevi
     worst = std::max(worst, distances[i]);
   }
   std::vector<float> known(from.faces.size());
-  for (size_t f = 0; f < known.size(); ++f) known[f] = is_inferred(from, f) ? inferred : evidence;
+  for (size_t f = 0; f < known.size(); ++f) known[f] = is_unmeasured(from, f) ? inferred : evidence;
   constexpr double kOfFarthest = 1.0 / 1024;
   constexpr double kOfSize = 1e-6;  // coordinates are not known better
   Eigen::AlignedBox3f box;
@@ -75,7 +75,7 @@ void add_distances(const TriangleMesh& from, const TriangleMesh& to, SurfaceDevi
                         std::max(kOfFarthest * double(std::max(evidence, inferred)),
                                  kOfSize * double(box.diagonal().norm())));
   for (size_t f = 0; f < on_edges.size(); ++f) {
-    float& worst = is_inferred(from, f) ? inferred : evidence;
+    float& worst = is_unmeasured(from, f) ? inferred : evidence;
     worst = std::max(worst, on_edges[f]);
   }
   out.evidence = std::max(out.evidence, double(evidence));
@@ -147,8 +147,7 @@ double vertex_moves(const std::filesystem::path& file,
 KnownArea known_within(const TriangleMesh& mesh, double length) {
   KnownArea out;
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    const bool seen = !mesh.provenance.empty() && (mesh.provenance[f] == Provenance::Observed ||
-                                                   mesh.provenance[f] == Provenance::SingleView);
+    const bool seen = !mesh.provenance.empty() && was_seen(mesh.provenance[f]);
     if (!seen) continue;
     const auto& face = mesh.faces[f];
     const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();

@@ -264,7 +264,10 @@ tinygltf::Material GlbBuilder::material_for(const GlbPrimitive& in) {
   if (in.name == provenance_name(Provenance::Inferred)) {
     out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.25, 0.8, 1.0};
   } else if (in.name == provenance_name(Provenance::Interpolated)) {
-    out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.65, 0.3, 1.0};
+    out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.5, 0.2, 1.0};
+  } else if (in.name == provenance_name(Provenance::Estimated) &&
+             in.photograph == PhotoTexture::kNone) {
+    out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.8, 0.15, 1.0};
   }
   if (in.is_unlit) {
     out.extensions[kUnlit] = tinygltf::Value(tinygltf::Value::Object());

@@ -38,9 +38,10 @@ float stored_support(float support) {
 }
 
 /// Splats hold the light of the scene, as photographs do. Also where no photograph fits: beside
-/// photographs, lit surface would look like another. What was not seen is tinted and lit.
-bool is_unlit(std::optional<Provenance> label, bool textured) {
+/// photographs, lit surface would look like another. What no photograph shows is tinted and lit.
+bool is_unlit(std::optional<Provenance> label, int photograph, bool textured) {
   if (label == Provenance::Inferred || label == Provenance::Interpolated) return false;
+  if (label == Provenance::Estimated && photograph == PhotoTexture::kNone) return false;
   return textured || label == Provenance::Virtual;
 }
 
@@ -71,7 +72,7 @@ class Splitter {
     GlbPrimitive out;
     out.name = label ? provenance_name(*label) : "surface";
     out.photograph = photograph;
-    out.is_unlit = is_unlit(label, !texture_.empty());
+    out.is_unlit = is_unlit(label, photograph, !texture_.empty());
     if (photograph != PhotoTexture::kNone) {
       out.texture_size = images_[static_cast<size_t>(photograph)].size;
     }

@@ -38,7 +38,7 @@ void require_writable(const TriangleMesh& mesh, std::string_view writer) {
     require(largest < n, prefix + "faces must name vertices below " + std::to_string(n), largest);
   }
   for (const Provenance label : mesh.provenance) {
-    require(label <= Provenance::Virtual,
+    require(static_cast<size_t>(label) < kProvenanceCount,
             prefix + "provenance must be a Provenance",
             static_cast<int>(label));
   }
@@ -73,12 +73,6 @@ std::string origin_in_millimetres(const Frame& frame, const Eigen::Matrix3d& up_
   const char* const format = p.cwiseAbs().maxCoeff() < 1e11 ? "%.3f %.3f %.3f" : "%.9g %.9g %.9g";
   std::snprintf(text.data(), text.size(), format, p.x(), p.y(), p.z());
   return text.data();
-}
-
-std::string_view provenance_name(Provenance provenance) {
-  static constexpr std::array<std::string_view, kProvenanceCount> kNames = {
-      "inferred", "single view", "observed", "interpolated", "virtual"};
-  return kNames.at(static_cast<size_t>(provenance));
 }
 
 uint8_t color_byte(float value) {

@@ -33,18 +33,6 @@ Eigen::Vector3d millimetres(const Eigen::Vector3f& point,
                             const Frame& frame,
                             const Eigen::Matrix3d& up_rotation);
 
-/// From best to no evidence: the order in which files list the classes.
-inline constexpr std::array<Provenance, kProvenanceCount> kProvenanceOrder = {
-    Provenance::Observed,
-    Provenance::SingleView,
-    Provenance::Interpolated,
-    Provenance::Inferred,
-    Provenance::Virtual};
-
-/// "observed", "single view", "interpolated", "inferred", "virtual": the words in files and
-/// reports.
-std::string_view provenance_name(Provenance provenance);
-
 /// sRGB-coded value in [0, 1] as a byte; NaN becomes 0.
 uint8_t color_byte(float value);
 

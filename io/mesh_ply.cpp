@@ -252,17 +252,14 @@ class MeshRows {
 
   Provenance label(uint64_t row_number, const PlyRow& row) const {
     const double value = row.values[static_cast<size_t>(provenance_)];
-    for (const Provenance known : {Provenance::Inferred,
-                                   Provenance::SingleView,
-                                   Provenance::Observed,
-                                   Provenance::Interpolated,
-                                   Provenance::Virtual}) {
+    for (const Provenance known : kProvenanceOrder) {
       if (value == static_cast<double>(known)) return known;
     }
     throw BadInput(Defect::Value,
                    path_,
                    "face " + std::to_string(row_number) + " has scalar_provenance " +
-                       std::to_string(value) + ", allowed are 0 to 4");
+                       std::to_string(value) + ", allowed are 0 to " +
+                       std::to_string(kProvenanceCount - 1));
   }
 
   const std::filesystem::path& path_;

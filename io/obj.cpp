@@ -17,7 +17,7 @@
 #include "io/scene_path.h"
 #include "io/texture_images.h"
 #include "libcgs/core/error.h"
-#include "libcgs/core/provenance_colors.h"
+#include "libcgs/core/provenance.h"
 
 namespace cgs {
 
@@ -93,7 +93,7 @@ std::filesystem::path materials_path(const std::filesystem::path& path) {
 
 std::string diffuse_text(Provenance label) {
   std::string out;
-  for (const uint8_t value : kProvenanceColors.at(static_cast<size_t>(label))) {
+  for (const uint8_t value : traits(label).color) {
     if (!out.empty()) out += ' ';
     append_number(out, std::round(100 * value / 255.0) / 100);
   }

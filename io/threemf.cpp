@@ -20,7 +20,7 @@
 #include "io/lack_of_memory.h"
 #include "io/mesh_arrays.h"
 #include "libcgs/core/error.h"
-#include "libcgs/core/provenance_colors.h"
+#include "libcgs/core/provenance.h"
 
 namespace cgs {
 
@@ -211,7 +211,7 @@ void set_materials(NMR::PLib3MFBase* model,
   std::array<DWORD, kProvenanceCount> index{};
   for (const Provenance label : kProvenanceOrder) {
     const auto i = static_cast<size_t>(label);
-    const auto& [red, green, blue] = kProvenanceColors.at(i);
+    const auto& [red, green, blue] = traits(label).color;
     const std::string name(provenance_name(label));
     check(NMR::lib3mf_basematerial_addmaterialutf8(
               group.get(), name.c_str(), red, green, blue, &index.at(i)),
@@ -233,21 +233,15 @@ void set_materials(NMR::PLib3MFBase* model,
             properties.get(), groups.data(), materials.data()),
         "label faces");
   // Readers that ignore faces' own properties need one on the object: what holds of all of it.
-  constexpr std::array<Provenance, kProvenanceCount> kWeakestFirst = {Provenance::Inferred,
-                                                                      Provenance::Virtual,
-                                                                      Provenance::Interpolated,
-                                                                      Provenance::SingleView,
-                                                                      Provenance::Observed};
-  const auto weakest =
-      std::find_if(kWeakestFirst.begin(), kWeakestFirst.end(), [&](Provenance label) {
-        return std::find(materials.begin(), materials.end(), index.at(size_t(label))) !=
-               materials.end();
-      });
+  const auto is_weaker = [&](size_t a, size_t b) {
+    return evidence_rank(mesh.provenance[a]) < evidence_rank(mesh.provenance[b]);
+  };
+  const size_t weakest = *std::min_element(faces.begin(), faces.end(), is_weaker);
   Handle defaults;
   check(NMR::lib3mf_object_createdefaultpropertyhandler(object, defaults.out()),
         "label the object");
   check(NMR::lib3mf_defaultpropertyhandler_setbasematerial(
-            defaults.get(), group_id, index.at(static_cast<size_t>(*weakest))),
+            defaults.get(), group_id, index.at(static_cast<size_t>(mesh.provenance[weakest]))),
         "label the object");
 }
 

@@ -73,11 +73,12 @@ std::array<float, kChannels.size()> pixel(const ViewRasters& view,
     out[9] = finite_or_zero(view.depth_variance.data[i] * scale * scale);
   }
   out[10] = view.support.data[i];
-  const Hole hole =
-      !known && view.hole.data[i] == Hole::None ? Hole::Transparent : view.hole.data[i];
+  const Hole stated = view.hole.data[i];
+  const bool has_surface = stated == Hole::None || stated == Hole::Estimated;
+  const Hole hole = !known && has_surface ? Hole::Transparent : stated;
   constexpr float kMasked = 4;
   const bool is_masked = !view.valid.empty() && view.valid.data[i] == 0 && hole != Hole::None;
-  out[11] = hole == Hole::None || is_masked ? 0 : 1;
+  out[11] = is_hole(hole) && !is_masked ? 1 : 0;
   out[12] = is_masked ? kMasked : static_cast<float>(hole);
   return out;
 }

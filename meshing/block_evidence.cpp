@@ -32,10 +32,10 @@ void count_up(uint16_t* counts, unsigned bits_set) {
 }
 
 // A bit per point.
-unsigned guesses(const Sightings& seen, const MaskMap& guessed) {
+unsigned points_of(DepthEvidence kind, const Sightings& seen, const EvidenceMap& evidence) {
   unsigned out = 0;
   for (size_t lane = 0; lane < kLanes; ++lane) {
-    if (guessed.data[size_t(seen.pixel[lane])] != 0) out |= 1U << lane;
+    if (evidence.data[size_t(seen.pixel[lane])] == kind) out |= 1U << lane;
   }
   return out;
 }
@@ -176,16 +176,21 @@ void BlockEvidence::add_band(size_t group, const Sightings& seen, const TsdfView
     increase(&sigma_->spread[n], w * d * d);
     increase(&sigma_->variance[n], w * w * sigma * sigma);
   }
-  const unsigned guessed = view.guessed.empty() ? 0 : taken & guesses(seen, view.guessed);
+  const auto taken_of = [&](DepthEvidence kind) {
+    return view.evidence.empty() ? 0 : taken & points_of(kind, seen, view.evidence);
+  };
+  const unsigned adjoining = taken_of(DepthEvidence::Adjoining);
+  const unsigned estimated = taken_of(DepthEvidence::Estimated);
   count_up(&s.count[first], taken);
   if (!view.is_virtual) {
     // The two sides of a thin plate lie in one band, and are no place that two photographs show.
     constexpr float kOpposite = -0.5f;
     if (first_looks_.isZero(0)) first_looks_ = looks_;
     const bool is_behind = looks_.dot(first_looks_) < kOpposite;
-    count_up(&(is_behind ? s.known_behind : s.known)[first], taken & ~guessed);
+    count_up(&(is_behind ? s.known_behind : s.known)[first], taken & ~adjoining & ~estimated);
   }
-  s.is_guessed[group] = static_cast<uint8_t>(s.is_guessed[group] | guessed);
+  s.is_adjoining[group] = static_cast<uint8_t>(s.is_adjoining[group] | adjoining);
+  s.is_estimated[group] = static_cast<uint8_t>(s.is_estimated[group] | estimated);
   s.lacks_sigma[group] = static_cast<uint8_t>(s.lacks_sigma[group] | (taken & ~has_sigma));
   if (!view.color.empty()) add_color(first, taken, seen, view.color);
 }
@@ -210,7 +215,8 @@ void BlockEvidence::forget_band(size_t n) {
   s.weight[n] = s.distance[n] = 0;
   s.count[n] = s.known[n] = s.known_behind[n] = 0;
   const auto others = static_cast<uint8_t>(~(1U << n % kLanes));
-  s.is_guessed[n / kLanes] &= others;
+  s.is_adjoining[n / kLanes] &= others;
+  s.is_estimated[n / kLanes] &= others;
   s.lacks_sigma[n / kLanes] &= others;
   if (sigma_) sigma_->spread[n] = sigma_->variance[n] = 0;
   if (!color_) return;
@@ -242,7 +248,8 @@ BlockEvidence::Voxel BlockEvidence::operator[](size_t in_leaf) const {
   out.distance = sums_->distance[n];
   out.count = sums_->count[n];
   out.known = std::max(sums_->known[n], sums_->known_behind[n]);
-  out.is_guessed = is_set(sums_->is_guessed);
+  out.is_adjoining = is_set(sums_->is_adjoining);
+  out.is_estimated = is_set(sums_->is_estimated);
   out.has_sigma = !is_set(sums_->lacks_sigma);
   if (sigma_) {
     out.spread = sigma_->spread[n];
@@ -256,7 +263,7 @@ BlockEvidence::Voxel BlockEvidence::operator[](size_t in_leaf) const {
 }
 
 float BlockEvidence::Voxel::support() const {
-  return static_cast<float>(std::max(known, is_guessed ? 1 : 0));
+  return static_cast<float>(std::max(known, is_adjoining ? 1 : 0));
 }
 
 double BlockEvidence::Voxel::sigma(double common) const {

@@ -55,15 +55,17 @@ class BlockEvidence {
     double weight = 0, distance = 0, spread = 0, variance = 0;  // weighted sums
     float free_weight = 0;
     int count = 0;  // of views in the band
-    int known = 0;  // of those that are photographs and no guess, and look from one side
-    bool is_guessed = false, has_sigma = true;
+    int known = 0;  // of those that are photographs, measured it, and look from one side
+    bool is_adjoining = false, is_estimated = false, has_sigma = true;
     bool free = false, hidden = false;
     double color_weight = 0;
     Eigen::Vector3d color = Eigen::Vector3d::Zero();
 
     double mean() const { return distance / weight; }
-    /// Guesses that agree still rest on one view each.
+    /// Depth of one view alone still rests on one view where such views agree.
     float support() const;
+    /// Whether nothing but estimates say that there is surface.
+    bool is_estimate() const { return is_estimated && support() == 0; }
     /// The larger of what the views promise and how far they disagree.
     /// \param common  share of the sigma of each by which all are off alike
     double sigma(double common) const;
@@ -77,7 +79,7 @@ class BlockEvidence {
   struct Sums {
     Doubles weight = {}, distance = {};
     std::array<uint16_t, kBlockVoxels> count = {}, known = {}, known_behind = {};
-    std::array<uint8_t, kGroups> is_guessed = {}, lacks_sigma = {};
+    std::array<uint8_t, kGroups> is_adjoining = {}, is_estimated = {}, lacks_sigma = {};
   };
   struct SigmaSums {
     Doubles spread = {}, variance = {};

@@ -184,6 +184,7 @@ Certificate certify(const TriangleMesh& mesh, const Progress& progress) {
   out.observed_area = areas[size_t(Provenance::Observed)];
   out.single_view_area = areas[size_t(Provenance::SingleView)];
   out.interpolated_area = areas[size_t(Provenance::Interpolated)];
+  out.estimated_area = areas[size_t(Provenance::Estimated)];
   out.inferred_area = areas[size_t(Provenance::Inferred)];
   out.virtual_area = areas[size_t(Provenance::Virtual)];
   return out;

@@ -74,8 +74,7 @@ Collapser::Collapser(const TriangleMesh& mesh, const CollapseLimits& limits)
     // Where labels meet, the surface with evidence is the one to stay near to.
     const uint32_t f = *std::max_element(
         around_.begin() + first_[v], around_.begin() + first_[v + 1], [&](uint32_t a, uint32_t b) {
-          return (mesh_.provenance[a] != Provenance::Inferred) <
-                 (mesh_.provenance[b] != Provenance::Inferred);
+          return has_evidence(mesh_.provenance[a]) < has_evidence(mesh_.provenance[b]);
         });
     next_witness_[v] = witness_[f];
     witness_[f] = v;

@@ -13,11 +13,6 @@ namespace cgs {
 
 namespace {
 
-bool is_seen(const TriangleMesh& mesh, size_t face) {
-  const Provenance label = mesh.provenance[face];
-  return label == Provenance::Observed || label == Provenance::SingleView;
-}
-
 double hindmost(const TriangleMesh& mesh, const Eigen::Vector3d& front) {
   double seen = std::numeric_limits<double>::infinity();
   double any = seen;
@@ -25,7 +20,7 @@ double hindmost(const TriangleMesh& mesh, const Eigen::Vector3d& front) {
     for (const uint32_t v : mesh.faces[f]) {
       const double depth = front.dot(mesh.vertices[v].cast<double>());
       any = std::min(any, depth);
-      if (!mesh.provenance.empty() && is_seen(mesh, f)) seen = std::min(seen, depth);
+      if (!mesh.provenance.empty() && was_seen(mesh.provenance[f])) seen = std::min(seen, depth);
     }
   }
   return std::isfinite(seen) ? seen : any;
@@ -73,7 +68,7 @@ Eigen::Vector3d seen_side(const TriangleMesh& mesh) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double area = 0;
   for (size_t f = 0; f < mesh.provenance.size(); ++f) {
-    if (!is_seen(mesh, f)) continue;
+    if (!was_seen(mesh.provenance[f])) continue;
     const auto& face = mesh.faces[f];
     const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
     const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>() - a;

@@ -28,7 +28,7 @@ void store_band(FusedBlock& block,
   leaf(block.tsdf).setValueOn(n, static_cast<float>(e.mean()));
   leaf(block.weight).setValueOn(n, static_cast<float>(e.weight));
   leaf(block.support).setValueOn(n, e.support());
-  if (e.has_sigma) leaf(block.sigma).setValueOn(n, static_cast<float>(e.sigma(common_sigma)));
+  if (e.has_sigma && !e.is_estimate()) leaf(block.sigma).setValueOn(n, static_cast<float>(e.sigma(common_sigma)));
   if (e.color_weight <= 0) return;
   const Eigen::Vector3f coded = (e.color / e.color_weight).cast<float>();
   const Eigen::Vector3f c = coded.unaryExpr(&linear_from_srgb);
@@ -48,8 +48,9 @@ void store(FusedBlock& block,
   counts.conflicts += conflict;
   counts.carved += conflict && carved;
   if (seen && !carved) {
-    ++counts.occupied;
-    block.state->setValueOn(n, int(VoxelState::Occupied));
+    ++(e.is_estimate() ? counts.estimated : counts.occupied);
+    const VoxelState state = e.is_estimate() ? VoxelState::Estimated : VoxelState::Occupied;
+    block.state->setValueOn(n, int(state));
     store_band(block, n, origin, e, rules.common_sigma);
   } else if (e.free) {
     ++counts.free;
@@ -130,6 +131,7 @@ void count(TsdfReport& report, const FusedBlock& block) {
       block.counts.hidden +
       (block.counts.hidden == 0 && block.whole == Sight::Hidden ? size_t(kBlockVoxels) : 0);
   report.occupied += block.counts.occupied;
+  report.estimated += block.counts.estimated;
   report.conflicts += block.counts.conflicts;
   report.carved += block.counts.carved;
 }

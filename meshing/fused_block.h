@@ -12,7 +12,7 @@ namespace cgs {
 
 /// Voxels of a block by what they are.
 struct BlockCounts {
-  size_t free = 0, occupied = 0, hidden = 0, unseen = 0, conflicts = 0, carved = 0;
+  size_t free = 0, occupied = 0, estimated = 0, hidden = 0, unseen = 0, conflicts = 0, carved = 0;
 };
 
 /// One evaluated block: leaves where it is mixed, else only what it is.

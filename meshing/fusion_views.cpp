@@ -81,7 +81,8 @@ std::vector<Pixel> trustworthy_pixels(const TsdfView& view, double depth_trunc) 
   const float high = nth_smallest(depths, (depths.size() - 1) * 99 / 100);
   MaskMap beyond(view.depth.width, view.depth.height, 0);
   for (const Pixel& p : pixels) {
-    const bool is_measured = view.guessed.empty() || view.guessed(p.x, p.y) == 0;
+    const bool is_measured =
+        view.evidence.empty() || view.evidence(p.x, p.y) == DepthEvidence::Measured;
     beyond(p.x, p.y) = is_measured && (p.depth < low || p.depth > high) ? 1 : 0;
   }
   const size_t least = std::max<size_t>(16, pixels.size() / 500);
@@ -126,7 +127,7 @@ void validate_view(const TsdfView& v, size_t i) {
   };
   const bool ok = fits(v.depth) && (v.sigma.empty() || fits(v.sigma)) &&
                   (v.color.empty() || fits(v.color)) && (v.usable.empty() || fits(v.usable)) &&
-                  (v.guessed.empty() || fits(v.guessed));
+                  (v.evidence.empty() || fits(v.evidence));
   require(ok && v.camera.width > 1 && v.camera.height > 1,
           "every raster must have the size of its camera, the view where one has not",
           i);

@@ -70,13 +70,13 @@ void OpenSurfaceOptions::validate() const {
 TriangleMesh open_surface(const Volume& volume, const OpenSurfaceOptions& options) {
   options.validate();
   TriangleMesh mesh = zero_surface(*volume.tsdf);
-  const std::vector<Evidence> evidence = annotate_vertices(mesh, volume);
+  const VertexEvidence evidence = annotate_vertices(mesh, volume);
   label_faces(mesh, evidence, 0);
   std::vector<uint8_t> keep(mesh.faces.size());
   for (size_t f = 0; f < keep.size(); ++f) {
     const auto& face = mesh.faces[f];
     keep[f] = std::all_of(
-        face.begin(), face.end(), [&](uint32_t v) { return evidence[v] == Evidence::Full; });
+        face.begin(), face.end(), [&](uint32_t v) { return evidence.of_vertex[v] == Evidence::Full; });
   }
   mesh = without_small_components(with_faces(mesh, keep), options.min_component);
   mesh.normals = vertex_normals(mesh);

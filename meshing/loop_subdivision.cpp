@@ -17,9 +17,8 @@ namespace cgs {
 
 namespace {
 
-bool has_evidence(const TriangleMesh& mesh, size_t face) {
-  return !mesh.provenance.empty() && (mesh.provenance[face] == Provenance::Observed ||
-                                      mesh.provenance[face] == Provenance::SingleView);
+bool was_seen(const TriangleMesh& mesh, size_t face) {
+  return !mesh.provenance.empty() && cgs::was_seen(mesh.provenance[face]);
 }
 
 /// An edge with the corners opposite to it.
@@ -38,7 +37,7 @@ std::vector<Edge> edges_of(const TriangleMesh& mesh) {
     while (end < sides.size() && sides[end].same_edge(sides[i])) ++end;
     const FaceSide& last = sides[end - 1];
     const bool inside =
-        end - i == 2 && has_evidence(mesh, sides[i].face) == has_evidence(mesh, last.face);
+        end - i == 2 && was_seen(mesh, sides[i].face) == was_seen(mesh, last.face);
     out.push_back({last.low, last.high, tip(sides[i]), tip(last), !inside});
     i = end;
   }

@@ -8,22 +8,6 @@
 
 namespace cgs {
 
-/// How much evidence a label stands for: the more, the higher. Inferred surface has none, virtual
-/// surface at least splats.
-inline int evidence_rank(Provenance label) {
-  constexpr std::array<int, kProvenanceCount> kRank = {0, 3, 4, 2, 1};  // index = label
-  return kRank.at(static_cast<size_t>(label));
-}
-
-inline Provenance weaker_evidence(Provenance a, Provenance b) {
-  return evidence_rank(a) < evidence_rank(b) ? a : b;
-}
-
-/// Whether a photograph vouches for surface of this label.
-inline bool was_seen(Provenance label) {
-  return label == Provenance::Observed || label == Provenance::SingleView;
-}
-
 /// A figure taken from a mesh, with what it rests on.
 struct MeasuredValue {
   double value = 0;   ///< [internal units to the power of `dimension`], as sigma and the parts.

@@ -9,7 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "libcgs/core/provenance_colors.h"
+#include "libcgs/core/provenance.h"
 #include "meshing/projected_faces.h"
 
 namespace cgs {
@@ -22,7 +22,7 @@ Eigen::Vector3f base_color(const TriangleMesh& mesh,
                            bool by_provenance) {
   if (by_provenance && !mesh.provenance.empty()) {
     const Provenance label = mesh.provenance[f];
-    if (label == Provenance::Inferred || label == Provenance::Interpolated) {
+    if (label == Provenance::Interpolated || !has_evidence(label)) {
       return provenance_color(label);
     }
   }

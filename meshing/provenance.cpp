@@ -39,10 +39,15 @@ class VolumeProbe {
         tsdf_(volume.tsdf->getConstAccessor()),
         support_(volume.support->getConstAccessor()),
         sigma_(volume.sigma->getConstAccessor()),
-        color_(volume.color->getConstAccessor()) {}
+        color_(volume.color->getConstAccessor()),
+        state_(volume.state->getConstAccessor()) {}
 
+  struct Found {
+    Evidence evidence = Evidence::None;
+    bool is_estimated = false;
+  };
   // Writes the attributes of vertex v; a missing colour becomes NaN.
-  Evidence annotate(TriangleMesh& mesh, size_t v) {
+  Found annotate(TriangleMesh& mesh, size_t v) {
     const Eigen::Vector3f index = mesh.vertices[v] / voxel_;
     const Eigen::Vector3f floor = index.array().floor();
     const Eigen::Vector3f t = index - floor;
@@ -51,6 +56,7 @@ class VolumeProbe {
     CellMean<Eigen::Vector3f> color{Eigen::Vector3f::Zero()};
     float nearest = std::numeric_limits<float>::max();
     float support = 0;
+    bool is_estimated = false;
     int inside = 0;
     int outside = 0;
     for (int k = 0; k < 8; ++k) {
@@ -67,6 +73,7 @@ class VolumeProbe {
       if (std::abs(value) < nearest) {
         nearest = std::abs(value);
         support = support_.getValue(at);
+        is_estimated = state_.getValue(at) == int(VoxelState::Estimated);
       }
       float s = 0;
       if (sigma_.probeValue(at, s)) sigma.add(s, w);
@@ -76,19 +83,21 @@ class VolumeProbe {
     const bool crossing =
         inside > 0 && outside > 0 && std::abs(distance.sum) <= voxel_ * distance.weight;
     mesh.support[v] = crossing ? support : 0;
-    mesh.sigma[v] = crossing && sigma.weight > 0 ? sigma.sum / sigma.weight : kNaN;
+    const bool is_known = crossing && !is_estimated && sigma.weight > 0;
+    mesh.sigma[v] = is_known ? sigma.sum / sigma.weight : kNaN;
     mesh.colors[v].setConstant(kNaN);
     if (crossing && color.weight > 0) {
       mesh.colors[v] = (color.sum / color.weight).unaryExpr(&srgb_from_linear);
     }
-    if (!crossing) return Evidence::None;
-    return inside + outside == 8 ? Evidence::Full : Evidence::Partial;
+    if (!crossing) return {};
+    return {inside + outside == 8 ? Evidence::Full : Evidence::Partial, is_estimated};
   }
 
  private:
   float voxel_;
   openvdb::FloatGrid::ConstAccessor tsdf_, support_, sigma_;
   openvdb::Vec3SGrid::ConstAccessor color_;
+  openvdb::Int32Grid::ConstAccessor state_;
 };
 
 // The vertices on the other end of every edge, vertex by vertex.
@@ -149,7 +158,7 @@ struct Patch {
   Eigen::Vector3d rim_direction = Eigen::Vector3d::Zero();
   double area = 0;
   bool at_border = false;
-  bool rim_is_virtual = false;  // nobody observed it, so nobody can vouch for what bridges it
+  bool rim_is_unseen = false;  // nobody can vouch for what bridges it
 };
 
 class PatchLabeller {
@@ -159,11 +168,11 @@ class PatchLabeller {
 
   void label(double gap) {
     for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
-      if (seen_[f] != 0 || has_evidence(f)) continue;
+      if (seen_[f] != 0 || is_labelled(f)) continue;
       const Patch patch = patch_from(f);
       const bool alike = patch.direction.dot(patch.rim_direction) >
                          0.5 * patch.direction.norm() * patch.rim_direction.norm();
-      if (patch.at_border || patch.rim_is_virtual || !(patch.area <= gap * gap) || !alike ||
+      if (patch.at_border || patch.rim_is_unseen || !(patch.area <= gap * gap) || !alike ||
           !is_disc(patch))
         continue;
       for (const uint32_t g : patch.faces) interpolated_.push_back(g);
@@ -172,7 +181,7 @@ class PatchLabeller {
   }
 
  private:
-  bool has_evidence(uint32_t f) const { return mesh_.provenance[f] != Provenance::Inferred; }
+  bool is_labelled(uint32_t f) const { return mesh_.provenance[f] != Provenance::Inferred; }
 
   Patch patch_from(uint32_t start) {
     Patch patch;
@@ -185,9 +194,9 @@ class PatchLabeller {
       patch.area += area.norm();
       for (const uint32_t g : adjacent_[f]) {
         if (g == f) patch.at_border = true;
-        if (has_evidence(g)) patch.rim_direction += 0.5 * area_vector(mesh_, mesh_.faces[g]);
-        if (mesh_.provenance[g] == Provenance::Virtual) patch.rim_is_virtual = true;
-        if (seen_[g] != 0 || has_evidence(g)) continue;
+        if (is_labelled(g)) patch.rim_direction += 0.5 * area_vector(mesh_, mesh_.faces[g]);
+        if (is_labelled(g) && !was_seen(mesh_.provenance[g])) patch.rim_is_unseen = true;
+        if (seen_[g] != 0 || is_labelled(g)) continue;
         seen_[g] = 1;
         patch.faces.push_back(g);
       }
@@ -222,31 +231,38 @@ class PatchLabeller {
 
 }  // namespace
 
-std::vector<Evidence> annotate_vertices(TriangleMesh& mesh, const Volume& volume) {
+VertexEvidence annotate_vertices(TriangleMesh& mesh, const Volume& volume) {
   const size_t n = mesh.vertices.size();
   mesh.support.assign(n, 0);
   mesh.sigma.assign(n, kNaN);
   mesh.colors.assign(n, Eigen::Vector3f::Zero());
-  std::vector<Evidence> evidence(n, Evidence::None);
+  VertexEvidence out{std::vector<Evidence>(n, Evidence::None), std::vector<uint8_t>(n, 0)};
   tbb::parallel_for(tbb::blocked_range<size_t>(0, n, 1024), [&](const auto& range) {
     VolumeProbe probe(volume);  // Accessors keep a cache, so every task has its own.
-    for (size_t v = range.begin(); v != range.end(); ++v) evidence[v] = probe.annotate(mesh, v);
+    for (size_t v = range.begin(); v != range.end(); ++v) {
+      const VolumeProbe::Found found = probe.annotate(mesh, v);
+      out.of_vertex[v] = found.evidence;
+      out.is_estimated[v] = found.is_estimated ? 1 : 0;
+    }
   });
   spread_colors(mesh);
-  return evidence;
+  return out;
 }
 
-void label_faces(TriangleMesh& mesh, const std::vector<Evidence>& evidence, double gap) {
+void label_faces(TriangleMesh& mesh, const VertexEvidence& evidence, double gap) {
   mesh.provenance.assign(mesh.faces.size(), Provenance::Inferred);
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     float support = std::numeric_limits<float>::max();
     bool seen = true;
+    bool is_estimated = false;
     for (const uint32_t v : mesh.faces[f]) {
-      seen = seen && evidence[v] != Evidence::None;
+      seen = seen && evidence.of_vertex[v] != Evidence::None;
+      is_estimated = is_estimated || evidence.is_estimated[v] != 0;
       support = std::min(support, mesh.support[v]);
     }
     if (!seen) continue;
-    mesh.provenance[f] = support >= 2   ? Provenance::Observed
+    mesh.provenance[f] = is_estimated   ? Provenance::Estimated
+                         : support >= 2 ? Provenance::Observed
                          : support >= 1 ? Provenance::SingleView
                                         : Provenance::Virtual;
   }

@@ -66,23 +66,6 @@ size_t merge_vertices(TriangleMesh& mesh) {
   return merged;
 }
 
-// How much a label vouches for, most first.
-int rank(Provenance label) {
-  switch (label) {
-    case Provenance::Observed:
-      return 0;
-    case Provenance::SingleView:
-      return 1;
-    case Provenance::Interpolated:
-      return 2;
-    case Provenance::Virtual:
-      return 3;
-    case Provenance::Inferred:
-      break;
-  }
-  return 4;
-}
-
 void drop_faces(TriangleMesh& mesh, const std::vector<uint8_t>& keep) {
   size_t kept = 0;
   for (size_t f = 0; f < keep.size(); ++f) {
@@ -105,7 +88,7 @@ void drop_improper_faces(RepairedMesh& out) {
     std::sort(corners.begin(), corners.end());
     keep[f] = corners[0] != corners[1] && corners[1] != corners[2] ? 1 : 0;
     if (keep[f] == 0) ++out.flat_faces;
-    const int worth = mesh.provenance.empty() ? 0 : rank(mesh.provenance[f]);
+    const int worth = mesh.provenance.empty() ? 0 : -evidence_rank(mesh.provenance[f]);
     if (keep[f] != 0) sorted.emplace_back(corners, worth, f);
   }
   std::sort(sorted.begin(), sorted.end());
@@ -200,8 +183,7 @@ void weaken_flat_faces(TriangleMesh& mesh, const PolygonMesh& halfedges) {
     for (const auto h : CGAL::halfedges_around_face(start, halfedges)) {
       const auto g = halfedges.face(halfedges.opposite(h));
       if (g == PolygonMesh::null_face()) continue;
-      if (rank(before[size_t(g)]) > rank(mesh.provenance[f]))
-        mesh.provenance[f] = before[size_t(g)];
+      mesh.provenance[f] = weaker_evidence(mesh.provenance[f], before[size_t(g)]);
     }
   }
 }

@@ -246,7 +246,7 @@ void add_uncertainty(const Cut& cut, const Chain& chain, bool bounds_area, Uncer
     const auto& [face, sigma_across, along] = cuts[i];
     const double sigma = sigma_across * shift_in_plane(mesh, plane, face);
     const bool invented =
-        mesh.states_provenance() && mesh.mesh.provenance[face] == Provenance::Inferred;
+        mesh.states_provenance() && !has_evidence(mesh.mesh.provenance[face]);
     if (!std::isfinite(sigma) || invented) continue;
     sum.stated_length += along.norm();
     if (bounds_area) sum.areas.add(sigma * along.norm());

@@ -83,7 +83,7 @@ void add_samples(const Collected& to, uint32_t f, const FacePart& piece) {
   if (twice.squaredNorm() == 0) return;
   const int n = static_cast<int>(std::max(std::ceil(piece.longest() * kFinest), 1.0));
   const double area = twice.norm() / 2 / n / n;
-  const bool invented = mesh.states_provenance() && mesh.mesh.provenance[f] == Provenance::Inferred;
+  const bool invented = mesh.states_provenance() && !has_evidence(mesh.mesh.provenance[f]);
   const bool states_sigma = !mesh.mesh.sigma.empty();
   const auto& face = mesh.mesh.faces[f];
   const auto add = [&](double s, double t) {

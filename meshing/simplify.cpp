@@ -40,7 +40,7 @@ Measured measure(const TriangleMesh& from,
   std::vector<float> of_face(from.faces.size(), 0);
   for (size_t i = 0; i < distances.size(); ++i) {
     const uint32_t f = samples.faces[i];
-    by_label[is_inferred(from, f) ? 1 : 0].push_back(distances[i]);
+    by_label[is_unmeasured(from, f) ? 1 : 0].push_back(distances[i]);
     of_face[f] = std::max(of_face[f], distances[i]);
   }
   std::array<DistanceStatistics, 2> statistics_of = {statistics(by_label[0]),
@@ -48,13 +48,13 @@ Measured measure(const TriangleMesh& from,
   // Points over the area miss the farthest places, which lie on edges.
   std::vector<float> known(from.faces.size());
   for (size_t f = 0; f < known.size(); ++f) {
-    known[f] = float(statistics_of.at(is_inferred(from, f) ? 1 : 0).max);
+    known[f] = float(statistics_of.at(is_unmeasured(from, f) ? 1 : 0).max);
   }
   const std::vector<float> on_edges =
       distance.of_edges(from, known, kAccuracy * options.max_error, progress);
   Measured out;
   for (uint32_t f = 0; f < on_edges.size(); ++f) {
-    const bool inferred = is_inferred(from, f);
+    const bool inferred = is_unmeasured(from, f);
     double& most = statistics_of.at(inferred ? 1 : 0).max;
     most = std::max(most, double(on_edges[f]));
     const double limit = inferred ? options.max_error_inferred : options.max_error;
@@ -72,7 +72,7 @@ constexpr double kMargin = 0.8;
 std::vector<float> tolerances(const TriangleMesh& mesh, const SimplifyOptions& options) {
   std::vector<float> out(mesh.vertices.size(), float(kMargin * options.max_error_inferred));
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    if (is_inferred(mesh, f)) continue;
+    if (is_unmeasured(mesh, f)) continue;
     for (const uint32_t v : mesh.faces[f]) out[v] = float(kMargin * options.max_error);
   }
   return out;
@@ -128,7 +128,7 @@ bool tighten_for_area(const TriangleMesh& mesh,
                       std::vector<float>& tolerance) {
   std::array<bool, kProvenanceCount> changed{};
   for (size_t label = 0; label < changed.size(); ++label) {
-    const bool counts = mesh.provenance.empty() || Provenance(label) != Provenance::Inferred;
+    const bool counts = mesh.provenance.empty() || has_evidence(Provenance(label));
     const double change = std::abs(result.area_after[label] - result.area_before[label]);
     changed[label] = counts && change > most_change * result.area_before[label];
   }

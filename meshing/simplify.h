@@ -14,7 +14,7 @@ struct SimplifyOptions {
   double max_error = 0;  ///< Largest distance between the two surfaces where there is
                          ///< evidence, both ways [internal units]; > 0.
   double max_error_inferred =
-      0;  ///< The same for Inferred faces; 0 = max_error, else >= max_error.
+      0;  ///< The same for Inferred and Estimated faces; 0 = max_error, else >= max_error.
   double max_color_error = 0.03;  ///< Largest change of a colour channel at an input vertex that is
                                   ///< not on Inferred faces only; in (0, 1]; 1 = any.
   double max_area_change =
@@ -29,10 +29,10 @@ struct SimplifyResult {
   TriangleMesh mesh;
   size_t faces_before = 0;
   size_t faces_after = 0;
-  MeshDistance evidence;  ///< Measured from all faces but the Inferred ones to the other mesh:
+  MeshDistance evidence;  ///< Measured from all faces with evidence to the other mesh:
                           ///< accuracy from the result, completeness from the input. The largest
                           ///< one is of points over the area and of all places on edges.
-  MeshDistance inferred;  ///< The same from Inferred faces.
+  MeshDistance inferred;  ///< The same from Inferred and Estimated faces.
   std::array<double, kProvenanceCount> area_before =
       {};  ///< By provenance [internal units squared].
   std::array<double, kProvenanceCount> area_after = {};

@@ -16,10 +16,6 @@ namespace {
 
 constexpr size_t kGrain = 4096;
 
-bool has_evidence(Provenance label) {
-  return label == Provenance::Observed || label == Provenance::SingleView;
-}
-
 /// Neighbours of every vertex: those of v are to[first[v] ... first[v + 1]); none if it is locked.
 struct Neighborhood {
   std::vector<uint32_t> first;
@@ -39,7 +35,7 @@ Neighborhood sides_of(const TriangleMesh& mesh) {
   out.to.resize(out.first.back());
   std::vector<uint32_t> next(out.first.begin(), out.first.end() - 1);
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    const uint32_t seen = !mesh.provenance.empty() && has_evidence(mesh.provenance[f]) ? 1 : 0;
+    const uint32_t seen = !mesh.provenance.empty() && was_seen(mesh.provenance[f]) ? 1 : 0;
     for (size_t k = 0; k < 3; ++k) {
       const uint32_t v = mesh.faces[f][k];
       out.to[next[v]++] = 2 * mesh.faces[f][(k + 1) % 3] + seen;

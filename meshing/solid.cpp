@@ -143,7 +143,7 @@ Solid solid(const Volume& volume) {
         const size_t i = out.index(x, y, z);
         int value = 0;
         const bool known = state.probeValue(at, value);
-        if (value == int(VoxelState::Occupied)) {
+        if (value == int(VoxelState::Occupied) || value == int(VoxelState::Estimated)) {
           out.evidence[i] = 1;
           out.inside[i] = tsdf.getValue(at) < 0;
         } else {

@@ -171,11 +171,11 @@ EvidenceTransfer write_labels(TriangleMesh& surface,
   return out;
 }
 
-// Vertices of invented faces alone.
+// Vertices of faces alone that nothing measured.
 void drop_claims(TriangleMesh& surface, const std::vector<FaceFinding>& findings) {
   std::vector<uint8_t> vouched(surface.vertices.size(), 0);
   for (size_t f = 0; f < surface.faces.size(); ++f) {
-    if (findings[f].label == Provenance::Inferred) continue;
+    if (!has_evidence(findings[f].label)) continue;
     for (const uint32_t v : surface.faces[f]) vouched[v] = 1;
   }
   for (size_t v = 0; v < vouched.size(); ++v) {

@@ -75,7 +75,7 @@ std::vector<std::optional<Witness>> witnesses(const FusionViews& views,
     TsdfView& own = out[i - first]->own;
     own.camera = view.camera;
     own.color = std::move(view.color);
-    own.guessed = std::move(view.guessed);
+    own.evidence = std::move(view.evidence);
     own.is_virtual = view.is_virtual;
   });
   return out;
@@ -141,7 +141,7 @@ class Fuser {
       fuse_at_once();
     }
     TsdfReport& r = out_.report;
-    r.unseen = r.voxels - r.free - r.occupied - r.hidden;
+    r.unseen = r.voxels - r.free - r.occupied - r.estimated - r.hidden;
     const Volume& v = out_.volume;
     r.actual_bytes = v.tsdf->memUsage() + v.weight->memUsage() + v.color->memUsage() +
                      v.support->memUsage() + v.sigma->memUsage() + v.state->memUsage();

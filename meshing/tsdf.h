@@ -7,6 +7,7 @@
 #include <span>
 
 #include "libcgs/core/camera.h"
+#include "libcgs/core/depth_evidence.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/core/raster.h"
 #include "meshing/volume.h"
@@ -22,8 +23,8 @@ struct TsdfView {
                      ///< known, the pixel then counts as exact.
   ColorImage color;  ///< Empty = no colour.
   Raster<uint8_t> usable;   ///< 0 where depth must be ignored; empty = use all.
-  MaskMap guessed;          ///< 1 where no other view confirms the depth: guesses of several
-                            ///< views add no more than one to the support. Empty = nowhere.
+  EvidenceMap evidence;     ///< What vouches for the depth. Adjoining depth of several views adds no
+                            ///< more than one to the support, estimated depth nothing.
   bool is_virtual = false;  ///< Rendered from splats, not measured: adds to the surface but not to
                             ///< its support.
 };
@@ -57,6 +58,7 @@ struct TsdfReport {
   size_t voxels = 0;           ///< In the bounds, rounded up to blocks of 8 x 8 x 8.
   size_t free = 0;             ///< Voxels per state.
   size_t occupied = 0;
+  size_t estimated = 0;
   size_t hidden = 0;           ///< Never seen, behind a surface.
   size_t unseen = 0;           ///< Never seen, nothing known.
   size_t conflicts = 0;        ///< Voxels near the surface of one view and free in another.

@@ -14,6 +14,7 @@ enum class VoxelState : int {
   NeverSeen = 0,  ///< Hidden behind a surface in every view that could see it, or in no frustum.
   Free = 1,       ///< In front of the surface: known to be empty.
   Occupied = 2,   ///< In the band around an observed surface.
+  Estimated = 3,  ///< In the band around a surface that photographs show, but nothing measured.
 };
 
 /// A fused volume. All grids share one transform, world = voxel_size * index, in internal units;
@@ -25,9 +26,10 @@ struct Volume {
   openvdb::Vec3SGrid::Ptr color;    ///< Linear light, RGB in [0, 1], as programs that draw volumes
                                     ///< take it; active where a view gave colour.
   openvdb::FloatGrid::Ptr support;  ///< Photographs in the band that look at it from one side, the
-                                    ///< side with more of them; guesses count as one at most.
+                                    ///< side with more of them; depth that rests on one alone counts
+                                    ///< as one at most, estimated depth not at all.
   openvdb::FloatGrid::Ptr sigma;    ///< Standard deviation of tsdf [internal units]; active where
-                                    ///< the views came with one.
+                                    ///< the views came with one, but not on estimated voxels.
   openvdb::Int32Grid::Ptr state;    ///< VoxelState, tiles where constant.
   openvdb::FloatGrid::Ptr surface;  ///< Closed level set [internal units], - inside; null until
                                     ///< watertight_surface() has made it.

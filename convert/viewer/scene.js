@@ -21,10 +21,11 @@ function viewerScene(scene, changed) {
   const sigmas = floats(scene.mesh.sigma);        // empty: not stated
   const provenance = bytes(scene.mesh.provenance);  // empty: not stated
   const corners = faces.length;
-  const INFERRED = 0;  // as Provenance numbers it
   const vector = (i) => new THREE.Vector3(vertices[3 * i], vertices[3 * i + 1], vertices[3 * i + 2]);
   const statesLabels = provenance.length > 0;
-  const isInvented = (face) => statesLabels && provenance[face] === INFERRED;
+  // Inferred or estimated: nothing measured where it is.
+  const withoutEvidence = new Set(scene.labels.filter((l) => !l.has_evidence).map((l) => l.number));
+  const isInvented = (face) => statesLabels && withoutEvidence.has(provenance[face]);
   // What is not stated at every corner is not stated between them.
   function statesSigma(face) {
     if (!sigmas.length || isInvented(face)) return false;

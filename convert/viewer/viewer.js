@@ -198,12 +198,9 @@
       area[provenance[f]] = (area[provenance[f]] || 0) + areaOf(f);
       all += areaOf(f);
     }
-    const means = { observed: 'two or more photographs saw it', 'single view': 'one photograph saw it',
-      interpolated: 'between observed rims', inferred: 'never seen, invented',
-      virtual: 'seen in splats only' };
-    for (const { number, name } of scene.labels) {
+    for (const { number, name, meaning } of scene.labels) {
       const part = area[number] ? share(area[number] / all) + ' of the area' : 'none';
-      explain(looksOfLabel[number], `${name} (${means[name]}): ${part}`);
+      explain(looksOfLabel[number], `${name} (${meaning}): ${part}`);
     }
   }
   function explainSigma() {
@@ -214,7 +211,7 @@
     const text = (s) => `${rounded(s * scene.unit.length)} ${scene.unit.name}`;
     line.append(`standard deviation ${text(leastSigma)} or less`, bar, `${text(mostSigma)} or more (logarithmic)`);
     legend.append(line);
-    explain(unknownColor, 'unknown: inferred, no photograph saw it');
+    explain(unknownColor, 'unknown: inferred or estimated, nothing measured it');
   }
 
   const looks = [
@@ -279,7 +276,7 @@
     const sigma = sigmaAt(end);
     const label = statesLabels ? nameOf[provenance[end.face]] : 'provenance not stated';
     let text = `${name} (${toFile(end.place).join(', ')}): ${label}`;
-    if (isInvented(end.face)) text += '. No photograph saw this place: it was invented and has no sigma';
+    if (isInvented(end.face)) text += '. Nothing measured this place: it has no sigma';
     else if (Number.isFinite(sigma)) text += `, ± ${rounded(sigma * scene.unit.length)} ${scene.unit.name}`;
     else text += ', no sigma stated';
     line('span', text + '.');

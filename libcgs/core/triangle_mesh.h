@@ -8,18 +8,9 @@
 
 #include <Eigen/Core>
 
-namespace cgs {
+#include "libcgs/core/provenance.h"
 
-/// Where a face comes from. The numbers are those in files.
-enum class Provenance : uint8_t {
-  Inferred = 0,      ///< No input view saw it: closes the surface, invented.
-  SingleView = 1,    ///< One input view saw it: its depth rests on the prior.
-  Observed = 2,      ///< Two or more input views saw it.
-  Interpolated = 3,  ///< Bridges a hole whose whole rim was observed.
-  Virtual = 4,       ///< Seen by virtual cameras alone, in splats that came without photographs:
-                     ///< nobody can vouch for it.
-};
-inline constexpr size_t kProvenanceCount = 5;
+namespace cgs {
 
 /// An indexed triangle mesh with its evidence. Optional arrays are empty or as long as vertices.
 struct TriangleMesh {
@@ -29,7 +20,7 @@ struct TriangleMesh {
   std::vector<Eigen::Vector3f> colors;         ///< Optional; sRGB-coded RGB in [0, 1].
   std::vector<float> support;                  ///< Optional; number of input views that see it.
   std::vector<float> sigma;  ///< Optional; standard deviation along the normal [internal units],
-                             ///< NaN = no statement (inferred).
+                             ///< NaN = no statement (inferred, estimated).
   std::vector<Provenance> provenance;  ///< Optional; one per face.
 };
 

@@ -4,19 +4,38 @@
 #include <cstdint>
 #include <vector>
 
+#include "libcgs/core/depth_evidence.h"
 #include "libcgs/core/raster.h"
 
 namespace cgs {
 
 /// How the depth of a pixel became known.
 enum class DepthOrigin : uint8_t {
-  Unknown = 0,    ///< No depth at all (masked out).
+  Unknown = 0,    ///< No depth at all: masked out, or nothing to fill it in from.
   Measured = 1,   ///< Matched in at least one other view and confirmed from there, or measured by
                   ///< a depth sensor (then possibly with no matched view).
   Completed = 2,  ///< Filled in from measured neighbours; no evidence of its own.
   Guessed = 3,    ///< By a given depth that rests on this photograph alone, such as a network's,
                   ///< fitted to the measured pixels.
+  Sky = 4,        ///< No surface; depth is that of a backdrop for pictures.
+  Estimated = 5,  ///< Completed or Guessed, but not a small way from a measured pixel of the same
+                  ///< surface (mark_estimated()): nothing tells whether it is right.
 };
+
+/// What vouches for a pixel. \pre it has a depth
+inline DepthEvidence depth_evidence(DepthOrigin origin) {
+  switch (origin) {
+    case DepthOrigin::Completed:
+    case DepthOrigin::Guessed:
+      return DepthEvidence::Adjoining;
+    case DepthOrigin::Sky:
+      return DepthEvidence::Sky;
+    case DepthOrigin::Estimated:
+      return DepthEvidence::Estimated;
+    default:
+      return DepthEvidence::Measured;
+  }
+}
 
 /// What is known about one input view before training; every raster has the size of its image.
 struct ViewPriors {

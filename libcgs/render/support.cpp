@@ -38,7 +38,7 @@ float change_over_pixel(const DepthMap& depth, int x, int y, const SupportOption
 struct Witness {
   DepthMap depth;
   DepthMap tolerance;
-  MaskMap guessed;  // empty = nowhere
+  EvidenceMap evidence;
 };
 
 // Uncertain depth is not torn by its own noise.
@@ -57,12 +57,14 @@ DepthMap gaps(const SupportView& view, const SupportOptions& options) {
 Witness make_witness(const SupportView& view, const Camera& camera, const SupportOptions& options) {
   const SeenSurface surface = seen_surface({view.camera, view.depth, gaps(view, options)}, camera);
   Witness out{surface.depth, surface.depth, {}};
-  if (!view.guessed.empty()) out.guessed = MaskMap(camera.width, camera.height, 0);
+  if (!view.evidence.empty()) {
+    out.evidence = EvidenceMap(camera.width, camera.height, DepthEvidence::Measured);
+  }
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       if (surface.pixel(x, y) < 0) continue;
       const auto pixel = static_cast<size_t>(surface.pixel(x, y));
-      if (!view.guessed.empty()) out.guessed(x, y) = view.guessed.data[pixel];
+      if (!view.evidence.empty()) out.evidence(x, y) = view.evidence.data[pixel];
       float tolerance = options.relative_tolerance * surface.depth(x, y);
       if (!view.sigma.empty() && std::isfinite(view.sigma.data[pixel])) {
         tolerance = std::max(tolerance, options.sigma_factor * view.sigma.data[pixel]);
@@ -73,6 +75,17 @@ Witness make_witness(const SupportView& view, const Camera& camera, const Suppor
   }
   return out;
 }
+
+// What views say together about a surface at a pixel.
+struct Verdict {
+  int support = 0;          // views that vouch for it
+  Hole kind = Hole::None;  // Estimated or Sky where some show it and none vouches
+
+  bool is_shown() const { return support > 0 || kind != Hole::None; }
+  bool is_better_than(const Verdict& other) const {
+    return support > other.support || (support == 0 && is_shown() && !other.is_shown());
+  }
+};
 
 // One rendered view and everything its pixels are judged by.
 struct Judge {
@@ -89,39 +102,42 @@ struct Judge {
     return std::isnan(median) ? buffers.depth(x, y) : median;
   }
 
-  // Number of views that show a surface of depth z at pixel (x, y).
-  int count(int x, int y, float z) const {
-    int known = 0;
-    bool is_guessed = false;
+  // Of a surface of depth z at pixel (x, y).
+  Verdict of(int x, int y, float z) const {
+    std::array<int, 4> views{};  // by DepthEvidence
     for (const Witness& witness : witnesses) {
       if (!witness.depth.contains(x, y)) continue;
       const float off = std::abs(witness.depth(x, y) - z);
       if (!(off <= witness.tolerance(x, y))) continue;  // also if unknown
-      if (!witness.guessed.empty() && witness.guessed(x, y) != 0) {
-        is_guessed = true;
-      } else {
-        ++known;
-      }
+      const DepthEvidence evidence =
+          witness.evidence.empty() ? DepthEvidence::Measured : witness.evidence(x, y);
+      ++views.at(static_cast<size_t>(evidence));
     }
-    return std::max(known, is_guessed ? 1 : 0);
+    const auto [measured, adjoining, estimated, sky] = views;
+    Verdict out{std::max(measured, std::min(adjoining, 1))};
+    if (out.support == 0 && sky > 0) out.kind = Hole::Sky;
+    if (out.support == 0 && estimated > 0) out.kind = Hole::Estimated;
+    return out;
   }
 
-  int support(int x, int y) const {
+  Verdict of(int x, int y) const {
     const float z = surface(x, y);
-    const int at_own_depth = count(x, y, z);
-    if (at_own_depth > 0) return at_own_depth;
+    const Verdict at_own_depth = of(x, y, z);
+    if (at_own_depth.is_shown()) return at_own_depth;
     bool shown_beside = false;
-    int best = 0;
+    Verdict best;
     for (int v = y - kRim; v <= y + kRim; ++v) {
       for (int u = x - kRim; u <= x + kRim; ++u) {
-        shown_beside = shown_beside || count(u, v, z) > 0;
+        shown_beside = shown_beside || of(u, v, z).is_shown();
         const float beside = surface(u, v);
-        if (!std::isnan(beside)) best = std::max(best, count(x, y, beside));
+        if (std::isnan(beside)) continue;
+        const Verdict there = of(x, y, beside);
+        if (there.is_better_than(best)) best = there;
       }
     }
     // What is drawn here is real a few pixels away: it is the soft rim of a silhouette, and the
     // pixel belongs to what lies beside it.
-    return shown_beside ? best : 0;
+    return shown_beside ? best : Verdict();
   }
 
  private:
@@ -192,8 +208,8 @@ void check_arguments(const RenderBuffers& buffers,
   for (const SupportView& view : views) {
     require(fits(view.depth, view.camera) &&
                 (view.sigma.empty() || fits(view.sigma, view.camera)) &&
-                (view.guessed.empty() || fits(view.guessed, view.camera)),
-            "annotate_support: depth, sigma and guessed must have the size of their camera",
+                (view.evidence.empty() || fits(view.evidence, view.camera)),
+            "annotate_support: depth, sigma and evidence must have the size of their camera",
             view.depth.width);
   }
 }
@@ -226,9 +242,10 @@ void annotate_support(RenderBuffers& buffers,
   tbb::parallel_for(0, camera.height, [&](int y) {
     for (int x = 0; x < camera.width; ++x) {
       const float z = judge.surface(x, y);
-      const int support = std::isnan(z) ? 0 : judge.support(x, y);
-      buffers.support(x, y) = static_cast<uint8_t>(support);
-      if (support == 0) buffers.hole(x, y) = kind_of_hole(camera, x, y, z, views);
+      const Verdict verdict = std::isnan(z) ? Verdict() : judge.of(x, y);
+      buffers.support(x, y) = static_cast<uint8_t>(verdict.support);
+      buffers.hole(x, y) =
+          verdict.is_shown() ? verdict.kind : kind_of_hole(camera, x, y, z, views);
     }
   });
 }

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "libcgs/core/camera.h"
+#include "libcgs/core/depth_evidence.h"
 #include "libcgs/render/render_buffers.h"
 
 namespace cgs {
@@ -13,9 +14,7 @@ struct SupportView {
   Camera camera;
   DepthMap depth;  ///< Of the size of the camera [internal units]; NaN = saw nothing here.
   DepthMap sigma;  ///< Standard deviation of depth [internal units]; NaN, or empty, = no statement.
-  /// 1 where no other view confirms the depth: guesses of several views count as one view.
-  /// Empty = nowhere.
-  MaskMap guessed;
+  EvidenceMap evidence;  ///< What vouches for the depth.
 };
 
 /// When an input view counts as having seen a rendered pixel.
@@ -41,7 +40,9 @@ struct SupportOptions {
 /// there. Where no view agrees at the very pixel but one does within three pixels, the pixel is
 /// therefore judged by the best of the depths drawn within three pixels.
 ///
-/// A pixel without support is a hole; `hole` says of which kind.
+/// Views of which the depth is Measured count one each, those of which it is Adjoining one together.
+/// A pixel that views show with no more than an estimate, or as sky, has support 0 and is no hole;
+/// every other pixel without support is one. `hole` says which.
 ///
 /// \param buffers  as rasterize() gives them for `camera`
 /// \param views    the input views only: a virtual camera is no witness

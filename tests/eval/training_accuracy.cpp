@@ -46,7 +46,7 @@ MaskMap valid_pixels(const cgs::View& view) {
 
 MaskMap seen_pixels(const cgs::RenderBuffers& buffers, MaskMap valid) {
   for (size_t i = 0; i < valid.data.size(); ++i) {
-    if (buffers.hole.data[i] != cgs::Hole::None) valid.data[i] = 0;
+    if (cgs::is_hole(buffers.hole.data[i])) valid.data[i] = 0;
   }
   return valid;
 }

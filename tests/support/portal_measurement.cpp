@@ -39,7 +39,7 @@ MaskMap holes_with_exact_depth(const ViewTruth& truth,
   buffers.median_depth = truth.depth;
   annotate_support(buffers, camera, inputs);
   MaskMap holes(camera.width, camera.height, 0);
-  for (size_t i = 0; i < holes.data.size(); ++i) holes.data[i] = buffers.hole.data[i] != Hole::None;
+  for (size_t i = 0; i < holes.data.size(); ++i) holes.data[i] = is_hole(buffers.hole.data[i]);
   return holes;
 }
 
