@@ -148,7 +148,9 @@ Volume make_volume(const ConversionRequest& request,
   const Progress progress = terminal.begin("fuse");
   FusedVolume fused;
   if (source.model) {
-    fused = fuse_model(*source.model, wanted.voxel_size, wanted.memory_limit, progress);
+    const ModelFusion fusion = {.voxel_size = wanted.voxel_size,
+                                .memory_limit = wanted.memory_limit};
+    fused = fuse_model(*source.model, fusion, progress);
     report["fusion"] = fusion_to_json(fused.report, source.frame);
   } else {
     Gaussians gaussians = std::move(source.splats->gaussians);

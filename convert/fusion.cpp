@@ -1,21 +1,47 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/fusion.h"
 
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "convert/length.h"
 #include "convert/memory_plan.h"
 #include "convert/views.h"
+#include "libcgs/priors/estimated_depth.h"
 
 namespace cgs {
 
 using Json = nlohmann::ordered_json;
 
-FusedVolume fuse_model(const Model& model,
-                       const std::string& voxel_size,
-                       size_t memory_limit,
-                       const Progress& progress,
-                       double coarsest_voxel) {
+namespace {
+
+// Depth as fusion takes it: none where estimated surface is not wanted, infinite at sky.
+void settle_depth(const ViewPriors& priors, EstimatedSurface wanted, TsdfView& view) {
+  const MaskMap framed =
+      wanted == EstimatedSurface::FillOnly ? framed_estimates(priors) : MaskMap();
+  for (size_t i = 0; i < view.depth.data.size(); ++i) {
+    const DepthEvidence evidence = view.evidence.data[i];
+    const bool is_wanted = wanted == EstimatedSurface::Keep ||
+                           (wanted == EstimatedSurface::FillOnly && framed.data[i] != 0);
+    if (evidence == DepthEvidence::Sky) {
+      view.depth.data[i] = std::numeric_limits<float>::infinity();
+      view.sigma.data[i] = std::nanf("");
+    } else if (evidence == DepthEvidence::Estimated && !is_wanted) {
+      view.depth.data[i] = view.sigma.data[i] = std::nanf("");
+    }
+  }
+}
+
+}  // namespace
+
+std::map<std::string, EstimatedSurface> estimated_surfaces() {
+  return {{"keep", EstimatedSurface::Keep},
+          {"fill-only", EstimatedSurface::FillOnly},
+          {"drop", EstimatedSurface::Drop}};
+}
+
+FusedVolume fuse_model(const Model& model, const ModelFusion& request, const Progress& progress) {
   std::vector<TsdfView> views;
   const std::vector<SupportView> inputs = support_views(model);
   for (size_t k = 0; k < model.scene.input.size(); ++k) {
@@ -27,12 +53,15 @@ FusedVolume fuse_model(const Model& model,
     view.sigma = model.priors[k].sigma;
     view.evidence = inputs[k].evidence;
     view.color = picture(buffers);
+    settle_depth(model.priors[k], request.estimated, view);
     views.push_back(std::move(view));
   }
   TsdfOptions options;
-  options.coarsest_voxel = coarsest_voxel;
-  if (!voxel_size.empty()) options.voxel_size = parse_length(voxel_size, model.scene.frame);
-  options.memory_limit = memory_budget(memory_limit);
+  options.coarsest_voxel = request.coarsest_voxel;
+  if (!request.voxel_size.empty()) {
+    options.voxel_size = parse_length(request.voxel_size, model.scene.frame);
+  }
+  options.memory_limit = memory_budget(request.memory_limit);
   return fuse(views, options, progress);
 }
 

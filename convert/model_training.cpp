@@ -283,17 +283,53 @@ std::string description_of(const TrainedModel& trained, const TrainingOptions& o
 nlohmann::ordered_json coverage_to_json(const TrainedModel& trained) {
   nlohmann::ordered_json out = nlohmann::ordered_json::array();
   const Scene& scene = trained.model.scene;
+  const std::vector<std::string> words = coverage_words(trained.priors, scene);
   for (size_t i = 0; i < trained.priors.coverage.size(); ++i) {
     const PriorsCoverage& coverage = trained.priors.coverage[i];
     out.push_back({{"view", scene.views[static_cast<size_t>(scene.input[i])].name},
                    {"measured", coverage.measured},
                    {"guessed", coverage.guessed},
-                   {"completed", coverage.completed}});
+                   {"completed", coverage.completed},
+                   {"sky", coverage.sky},
+                   {"left_open", coverage.left_open},
+                   {"estimated", coverage.estimated},
+                   {"words", words[i]}});
   }
   return out;
 }
 
+// "43 % "; tenths where it is little.
+std::string percent_text(double share) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), share < 0.095 ? "%.1f %% " : "%.0f %% ", 100 * share);
+  return text.data();
+}
+
+std::string words_on(const PriorsCoverage& share) {
+  constexpr double kMentioned = 0.0005;
+  const std::array<std::pair<double, const char*>, 3> parts = {
+      {{share.sky, "is sky"},
+       {share.estimated,
+        "shows surface that nothing measured and is estimated from its surroundings"},
+       {share.left_open, "shows surface of which nothing is known and stays open"}}};
+  std::vector<std::string> words = {
+      percent_text(1 - share.sky - share.estimated - share.left_open) + "is measured"};
+  for (const auto& [part, text] : parts) {
+    if (part >= kMentioned) words.push_back(percent_text(part) + text);
+  }
+  return listed(words);
+}
+
 }  // namespace
+
+std::vector<std::string> coverage_words(const PriorsReport& priors, const Scene& scene) {
+  std::vector<std::string> out;
+  for (size_t i = 0; i < priors.coverage.size(); ++i) {
+    const std::string& name = scene.views[static_cast<size_t>(scene.input[i])].name;
+    out.push_back("of photograph " + name + ", " + words_on(priors.coverage[i]));
+  }
+  return out;
+}
 
 void take_sensor_scale(const GivenDepthReport& given, Frame& frame) {
   if (frame.has_metric_scale() || !(given.metres_per_unit > 0)) return;
@@ -329,7 +365,7 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   trained.priors = estimated.report;
   trained.model.priors = std::move(estimated.views);
   trained.model.scene = std::move(scene);
-  if (request.inspect) request.inspect(trained.model);
+  if (request.inspect) request.inspect(trained.model, trained.priors);
   optimise(trained, pane ? &*pane : nullptr, request, part_of(progress, kPaneShare, 1));
   trained.model.evidence = description_of(trained, request.training);
   report(progress, 1);

@@ -27,7 +27,7 @@ struct ModelRequest {
   bool keeps_others = false;  ///< Checkpoints of other work are not replaced.
   /// Sees the cameras and what was measured, before the training, which takes much longer: what it
   /// throws ends the work.
-  std::function<void(const Model&)> inspect = {};
+  std::function<void(const Model&, const PriorsReport&)> inspect = {};
 };
 
 /// What became of a pane in the photographs.
@@ -56,6 +56,10 @@ struct TrainedModel {
 /// If the progress function throws Cancelled, the training so far is saved first.
 /// \throws BadInput Mismatch for a checkpoint of other work that is to be kept
 TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress);
+
+/// How much of each input view was measured, is sky, is estimated or stays open; a line each, for
+/// people.
+std::vector<std::string> coverage_words(const PriorsReport& priors, const Scene& scene);
 
 /// Gives a frame without scale the one that metric depth of the photographs tells, if it does.
 void take_sensor_scale(const GivenDepthReport& given, Frame& frame);

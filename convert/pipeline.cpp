@@ -56,6 +56,7 @@ struct Run {
   std::optional<Model> model;
   std::optional<TriangleMesh> mesh;  ///< Watertight.
   std::vector<std::string> hitches;  ///< Of the stage that runs, for the terminal alone.
+  const Terminal& terminal;          ///< For what must be said before a stage ends.
 };
 
 // Decodes every photograph once before anything is written: a run must not stop halfway, or leave
@@ -89,7 +90,10 @@ Json run_model(Run& run, const Progress& progress) {
   const std::filesystem::path folder = run.request.output / "model";
   ModelRequest request = {
       {}, run.request.training, folder, run.request.scene.options.depth.network};
-  request.inspect = [&](const Model& model) { check_picks(run.distances, model); };
+  request.inspect = [&](const Model& model, const PriorsReport& priors) {
+    check_picks(run.distances, model);
+    run.terminal.note(coverage_words(priors, model.scene));
+  };
   const TrainedModel trained = train_model(run.scene, request, progress);
   // Pixels were read for the first time: more may be odd than the cameras told.
   const std::vector<std::string>& found = trained.model.scene.warnings;
@@ -191,6 +195,9 @@ Json report_json(const Run& run) {
   std::vector<std::string> notes = run.scene.notes;
   const Json model = run.record.result("model");
   for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
+  for (const Json& view : model.value("coverage", Json::array())) {
+    if (view.contains("words")) notes.push_back(view["words"].get<std::string>());
+  }
   Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
               {"folder", run.request.scene.path.string()},
@@ -237,6 +244,7 @@ std::map<std::string, std::string> decided_stages(const RunRequest& request, con
                                             {"stated_scale", "scale"},
                                             {"held_out_images", "views"},
                                             {"voxel_size", "mesh"},
+                                            {"estimated", "mesh"},
                                             {"simplify", "mesh"},
                                             {"max_error", "mesh"},
                                             {"compression_error", "web"},
@@ -440,7 +448,8 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
           opened.focal_sigma(),
           {},
           {},
-          {}};
+          {},
+          terminal};
   try {
     return run_stages(run, terminal);
   } catch (const Json::exception&) {

@@ -110,11 +110,14 @@ RunRequest recorded_request(const Json& record, const fs::path& path) {
     out.lods = std::min(asked.value("lods", size_t{0}), kMostLods);
     const std::string encoding = text_at(asked, "glb_encoding");
     if (!encoding.empty()) out.glb_encoding = glb_encodings().at(encoding);
+    const std::string estimated = text_at(asked, "estimated");
+    if (!estimated.empty()) out.estimated = estimated_surfaces().at(estimated);
     return out;
   } catch (const Json::exception&) {
     throw BadInput(Defect::Schema, path, "\"request\" is not as a run writes it");
   } catch (const std::out_of_range&) {
-    throw BadInput(Defect::Schema, path, "\"glb_encoding\" is not one of this version");
+    throw BadInput(
+        Defect::Schema, path, "\"glb_encoding\" or \"estimated\" is not one of this version");
   }
 }
 

@@ -149,6 +149,10 @@ Json request_json(const RunRequest& request, const Scene& scene) {
     const bool is_default = encoding == GlbEncoding::Draco;
     if (encoding == request.glb_encoding && !is_default) out["glb_encoding"] = name;
   }
+  for (const auto& [name, estimated] : estimated_surfaces()) {
+    const bool is_default = estimated == EstimatedSurface::FillOnly;
+    if (estimated == request.estimated && !is_default) out["estimated"] = name;
+  }
   const Frame& frame = scene.frame;
   const bool is_stated = request.scene.assume_unit.empty() && control.file.empty();
   if (is_stated && frame.has_metric_scale()) {

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/fusion.h"
 #include "convert/memory_plan.h"
 #include "convert/scene_request.h"
 #include "io/gltf.h"
@@ -23,6 +24,7 @@ struct RunRequest {
   std::string simplify;           ///< Largest error of simplification; empty = default, "0" = none.
   std::string compression_error;  ///< Of the compressed mesh; empty = 1/16384 of its size.
   GlbEncoding glb_encoding = GlbEncoding::Draco;  ///< Of asset.glb.
+  EstimatedSurface estimated = EstimatedSurface::FillOnly;
   std::string max_error;    ///< Promise: how far the written meshes lie from the fused
                             ///< surface at most; empty = none.
   size_t lods = 0;          ///< Coarser levels of asset.glb, 0 to kMostLods.

@@ -215,8 +215,10 @@ Json write_meshes(const Model& model, const RunRequest& request, const Progress&
   const Scene& scene = model.scene;
   const Frame& frame = scene.frame;
   const double promise = request.max_error.empty() ? 0 : parse_length(request.max_error, frame);
-  FusedVolume fused = fuse_model(
-      model, request.voxel_size, request.memory_limit, part_of(progress, 0, 0.3), promise);
+  FusedVolume fused =
+      fuse_model(model,
+                 {request.voxel_size, request.estimated, request.memory_limit, promise},
+                 part_of(progress, 0, 0.3));
   Surfaces surfaces;
   surfaces.open = open_surface(fused.volume, {});
   WatertightOptions closing;

@@ -70,7 +70,7 @@ double Terminal::end(const std::string& remark) {
 }
 
 void Terminal::say(const std::string& line) const {
-  if (!quiet_) std::fprintf(stderr, "%s\n", one_line(line).c_str());
+  if (!quiet_) std::fprintf(stderr, "%s%s\n", rewrites_ ? "\r\033[K" : "", one_line(line).c_str());
 }
 
 void Terminal::note(const std::vector<std::string>& lines) const {

@@ -142,6 +142,18 @@ void add_glb_option(CLI::App& command, GlbEncoding& encoding) {
           CLI::CheckedTransformer(glb_encodings()).description("draco, meshopt, quantized, plain"));
 }
 
+void add_estimated_option(CLI::App& command, std::optional<EstimatedSurface>& estimated) {
+  command
+      .add_option(
+          "--estimated",
+          estimated,
+          "Surface that photographs show but nothing measured: keep, fill-only (where it is "
+          "small and framed by what was measured), drop; default fill-only. It is never "
+          "counted as evidence")
+      ->transform(
+          CLI::CheckedTransformer(estimated_surfaces()).description("keep, fill-only, drop"));
+}
+
 void add_camera_options(CLI::App& command, SceneRequest& request) {
   const OptionGroup group(command, "Photographs");
   command.add_option(

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <CLI/App.hpp>
 
+#include "convert/fusion.h"
 #include "convert/scene_request.h"
 #include "io/gltf.h"
 #include "io/scene_reader.h"
@@ -56,6 +58,9 @@ void add_depth_options(CLI::App& command, SceneOptions& options);
 
 /// --glb-encoding.
 void add_glb_option(CLI::App& command, GlbEncoding& encoding);
+
+/// --estimated.
+void add_estimated_option(CLI::App& command, std::optional<EstimatedSurface>& estimated);
 
 /// --focal and --refine-poses.
 void add_camera_options(CLI::App& command, SceneRequest& request);

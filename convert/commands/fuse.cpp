@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -22,6 +23,7 @@ namespace {
 struct FuseArgs {
   DepthFusionRequest request;  // its scene may be a model
   std::filesystem::path output;
+  std::optional<EstimatedSurface> estimated;
   CommonOptions common;
 };
 
@@ -67,12 +69,19 @@ void run_fuse(const FuseArgs& args) {
     refuse_depth_options(request);
     const Model model = read_model(request.scene);
     terminal.warn(model.scene.warnings);
-    const FusedVolume fused =
-        fuse_model(model, request.voxel_size, request.memory_limit, terminal.begin("fuse"));
+    const FusedVolume fused = fuse_model(model,
+                                         {request.voxel_size,
+                                          args.estimated.value_or(EstimatedSurface::FillOnly),
+                                          request.memory_limit},
+                                         terminal.begin("fuse"));
     write_volume(args.output, fused.volume, model.scene.frame);
     terminal.end("voxel " + format_length(fused.report.voxel_size, model.scene.frame));
     print_json(args, fused.report, model.scene.frame, {});
     return;
+  }
+  if (args.estimated) {
+    throw InvalidInput("--estimated is for models; " + printable(request.scene) +
+                       " holds depth frames, of which nothing is estimated");
   }
   const DepthFusion fusion = fuse_depth(request, terminal.begin("fuse"));
   terminal.note(fusion.notes);
@@ -103,6 +112,7 @@ void add_fuse(CLI::App& app) {
   cmd->add_option("--voxel-size",
                   request.voxel_size,
                   "Edge of a voxel, e.g. 5mm, or in scene units; default: from the pixel size");
+  add_estimated_option(*cmd, args->estimated);
   add_common_options(*cmd, args->common);
   cmd->add_option("--views", request.options.views, "Frames: names or indices; default: all");
   cmd->add_option("--downscale",

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -25,6 +26,7 @@ struct RunArgs {
   RunRequest request;
   TrainingArguments training;
   CommonOptions common;
+  std::optional<EstimatedSurface> estimated;
   std::string max_size;
   std::string budget;
 };
@@ -67,6 +69,7 @@ void run_run(const RunArgs& args) {
   RunRequest request = args.request;
   request.training = training_options(args.training);
   request.memory_limit = stated_memory_limit(args.common);
+  request.estimated = args.estimated.value_or(request.estimated);
   if (!args.max_size.empty()) request.max_size = asked_size(args.max_size);
   if (!request.scene.assume_unit.empty()) (void)metres_in(request.scene.assume_unit);
   Terminal terminal(args.common.quiet, args.common.strict);
@@ -103,6 +106,7 @@ void add_surface_options(CLI::App& command, RunArgs& args) {
                      args.request.compression_error,
                      "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
   add_glb_option(command, args.request.glb_encoding);
+  add_estimated_option(command, args.estimated);
   command
       .add_option(
           "--lods",

@@ -57,12 +57,15 @@ void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
   keep_scene_apart(args.output, args.scene.path, {"priors", "colmap"});
   refuse_to_replace(args);
+  Terminal terminal(args.common.quiet, args.common.strict);
   const ModelRequest request = {{},
                                 training_options(args.training),
                                 args.output,
                                 args.scene.options.depth.network,
-                                !args.overwrite};
-  Terminal terminal(args.common.quiet, args.common.strict);
+                                !args.overwrite,
+                                [&](const Model& model, const PriorsReport& priors) {
+                                  terminal.note(coverage_words(priors, model.scene));
+                                }};
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   check_training_memory(
       opened.scene, memory_budget(stated_memory_limit(args.common)), request.training.coherence);

@@ -59,6 +59,7 @@ class EmptySpace {
     const int y0 = static_cast<int>(v);
     for (int j = y0; j <= std::min(y0 + 1, priors.depth.height - 1); ++j) {
       for (int i = x0; i <= std::min(x0 + 1, priors.depth.width - 1); ++i) {
+        if (priors.origin(i, j) == DepthOrigin::Sky) continue;
         if (priors.origin(i, j) != DepthOrigin::Measured) return false;
         const float margin = std::max(kMargin * priors.depth(i, j), kSigmas * priors.sigma(i, j));
         if (!(priors.depth(i, j) > depth + margin)) return false;
@@ -90,7 +91,10 @@ class Completion {
     for (const CompletionWitness& witness : witnesses) empty_.emplace_back(view.camera, witness);
   }
 
-  bool usable(int x, int y) const { return view_.valid.empty() || view_.valid(x, y) != 0; }
+  bool usable(int x, int y) const {
+    return (view_.valid.empty() || view_.valid(x, y) != 0) && !is_sky(x, y);
+  }
+  bool is_sky(int x, int y) const { return priors_.origin(x, y) == DepthOrigin::Sky; }
   bool measured(int x, int y) const { return priors_.origin(x, y) == DepthOrigin::Measured; }
   const Raster<Filled>& filled() const { return filled_; }
 
@@ -103,6 +107,20 @@ class Completion {
             measured(x, y) ? Filled{1 / priors_.depth(x, y), 0, 0} : estimate(x, y, fallback);
       }
       shared.advance();
+    });
+  }
+
+  // What smoothing brought before what a witness sees moves back again; what is before it
+  // everywhere, as before the sky, is given up.
+  void clear_empty_space() {
+    tbb::parallel_for(0, filled_.height, [&](int y) {
+      for (int x = 0; x < filled_.width; ++x) {
+        if (!usable(x, y) || measured(x, y)) continue;
+        float& rho = filled_(x, y).inverse_depth;
+        if (!empty(x, y, rho)) continue;
+        rho = behind_empty(x, y, rho);
+        if (empty(x, y, rho)) rho = kNaN;
+      }
     });
   }
 
@@ -130,7 +148,7 @@ class Completion {
     for (int u = x, v = y;;) {
       const int next_u = u + d.dx;
       const int next_v = v + d.dy;
-      if (!filled_.contains(next_u, next_v)) return std::nullopt;
+      if (!filled_.contains(next_u, next_v) || is_sky(next_u, next_v)) return std::nullopt;
       ++steps;
       // Masked pixels have no colour to compare; the way through them counts.
       way += stride;
@@ -270,12 +288,14 @@ void complete_depth(ViewPriors& priors,
   Completion completion(priors, view, options, witnesses);
   completion.collect(fallback_inverse_depth(priors, options), part_of(progress, 0, 0.5));
   completion.smooth(part_of(progress, 0.5, 1));
+  completion.clear_empty_space();
   constexpr float kFloor = 0.02f;  // relative sigma next to the evidence
   constexpr float kCap = 0.5f;
   for (int y = 0; y < priors.depth.height; ++y) {
     for (int x = 0; x < priors.depth.width; ++x) {
       if (!completion.usable(x, y) || completion.measured(x, y)) continue;
       const Filled& filled = completion.filled()(x, y);
+      if (std::isnan(filled.inverse_depth)) continue;
       const float relative =
           kFloor + filled.spread / filled.inverse_depth + options.sigma_per_pixel * filled.distance;
       priors.depth(x, y) = 1 / filled.inverse_depth;

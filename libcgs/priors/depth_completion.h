@@ -26,11 +26,12 @@ struct DepthCompletionOptions {
 /// Another view as a witness of empty space: nothing stands before what it measured.
 struct CompletionWitness {
   const Camera* camera = nullptr;      ///< Not owned; must outlive the call.
-  const ViewPriors* priors = nullptr;  ///< Likewise. Only measured pixels speak.
+  const ViewPriors* priors = nullptr;  ///< Likewise. Only measured pixels and sky speak.
 };
 
-/// Gives every valid pixel a finite depth. Measured pixels are left as they are; the others get
-/// origin Completed, a large sigma and keep their confidence.
+/// Gives every valid pixel a finite depth but sky and what would stand before what a witness sees
+/// at any depth. Measured pixels are left as they are; the others get origin Completed, a large
+/// sigma and keep their confidence.
 ///
 /// Works in inverse depth. From a pixel without depth, rays in 16 directions collect the first
 /// measured pixel each, weighted down by the way and by the colour changes along it. Of those the
@@ -38,7 +39,8 @@ struct CompletionWitness {
 /// hide from the others, so it belongs to the farther one. Evidence that would put the pixel where
 /// a witness looks through does not count; if none is left, the pixel moves back until no witness
 /// objects. Then the values are smoothed towards
-/// neighbours on the same surface, which turns steps on slanted surfaces into slopes.
+/// neighbours on the same surface, which turns steps on slanted surfaces into slopes, and asked
+/// once more whether a witness looks through.
 ///
 /// \throws NumericalError if nothing is measured and there is no fallback
 void complete_depth(ViewPriors& priors,

@@ -7,21 +7,31 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/priors/guessed_depth.h"
+#include "libcgs/priors/sky.h"
 
 namespace cgs {
 
 namespace {
 
-PriorsCoverage coverage(const ViewPriors& priors) {
-  const auto& origin = priors.origin.data;
-  const auto share = [&](DepthOrigin which) {
-    return static_cast<double>(std::count(origin.begin(), origin.end(), which));
+// Before and after some of it was marked as estimated.
+PriorsCoverage coverage(const Raster<DepthOrigin>& before,
+                        const Raster<DepthOrigin>& after,
+                        const View& view) {
+  const auto count = [](const auto& values, auto which) {
+    return static_cast<double>(std::count(values.begin(), values.end(), which));
   };
-  const double valid = static_cast<double>(origin.size()) - share(DepthOrigin::Unknown);
+  const auto& origin = before.data;
+  const auto all = static_cast<double>(origin.size());
+  const double valid = view.valid.empty() ? all : all - count(view.valid.data, uint8_t{0});
   if (!(valid > 0)) return {};
-  return {share(DepthOrigin::Measured) / valid,
-          share(DepthOrigin::Completed) / valid,
-          share(DepthOrigin::Guessed) / valid};
+  PriorsCoverage out;
+  out.measured = count(origin, DepthOrigin::Measured) / valid;
+  out.completed = count(origin, DepthOrigin::Completed) / valid;
+  out.guessed = count(origin, DepthOrigin::Guessed) / valid;
+  out.sky = count(origin, DepthOrigin::Sky) / valid;
+  out.estimated = count(after.data, DepthOrigin::Estimated) / valid;
+  out.left_open = std::max(0.0, 1 - out.measured - out.completed - out.guessed - out.sky);
+  return out;
 }
 
 }  // namespace
@@ -34,6 +44,7 @@ void PriorsOptions::validate() const {
   sweep.validate();
   alignment.validate();
   completion.validate();
+  adjoining.validate();
   layers.validate();
 }
 
@@ -55,27 +66,41 @@ class Estimator {
         merge_sensor_depth(given.views[i], view(i), out_.views[i]);
       }
     }
+    for (size_t i = 0; i < out_.views.size(); ++i) {
+      enter_sky(find_sky(view(i), out_.views[i], scene_.frame.up), out_.views[i]);
+    }
     const std::vector<DepthGuess> guesses = guesses_of(given);
     const auto count = static_cast<double>(out_.views.size());
     for (size_t i = 0; i < out_.views.size(); ++i) {
       const Progress completing = part_of(progress, kSweepShare, 1);
       complete(i, out_.views[i], part_of(completing, double(i) / count, double(i + 1) / count));
       enter_guess(guesses[i], out_.views[i]);
-      out_.views[i].layer = depth_layers(out_.views[i].depth, options_.layers);
-      out_.report.coverage.push_back(coverage(out_.views[i]));
     }
+    set_backdrop(out_.views);
+    for (size_t i = 0; i < out_.views.size(); ++i) tell_evidence(i);
     forget_unmeasured();
     report(progress, 1);
     return std::move(out_);
   }
 
  private:
+  // Only when all views are completed: those before another are its witnesses as they were
+  // measured.
+  void tell_evidence(size_t i) {
+    ViewPriors& priors = out_.views[i];
+    limit_completion(priors);
+    const Raster<DepthOrigin> filled = priors.origin;
+    mark_estimated(priors, view(i), options_.adjoining);
+    out_.report.coverage.push_back(coverage(filled, priors.origin, view(i)));
+    priors.layer = depth_layers(priors.depth, options_.layers);
+  }
+
   // A view of which nothing was measured says nothing of the scene: filled in, it would be a
   // surface that nobody saw.
   void forget_unmeasured() {
     const auto& shares = out_.report.coverage;
     const bool has_pixels = std::any_of(shares.begin(), shares.end(), [](const auto& share) {
-      return share.measured + share.completed + share.guessed > 0;
+      return share.measured + share.completed + share.guessed + share.sky + share.left_open > 0;
     });
     if (!has_pixels) throw InvalidInput("the masks leave nothing of any input view");
     if (std::none_of(shares.begin(), shares.end(), is_measured)) {

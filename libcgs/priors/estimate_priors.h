@@ -8,6 +8,7 @@
 #include "libcgs/priors/alignment.h"
 #include "libcgs/priors/depth_completion.h"
 #include "libcgs/priors/depth_layers.h"
+#include "libcgs/priors/estimated_depth.h"
 #include "libcgs/priors/given_depth.h"
 #include "libcgs/priors/plane_sweep.h"
 #include "libcgs/priors/view_priors.h"
@@ -18,17 +19,21 @@ struct PriorsOptions {
   PlaneSweepOptions sweep;
   AlignmentOptions alignment;
   DepthCompletionOptions completion;
+  AdjoiningOptions adjoining;
   DepthLayersOptions layers;
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
 };
 
-/// Shares of the valid pixels of a view.
+/// Shares of the valid pixels of a view. The first five add up to 1.
 struct PriorsCoverage {
   double measured = 0;
   double completed = 0;
   double guessed = 0;
+  double sky = 0;
+  double left_open = 0;  ///< Not measured, and not filled in either.
+  double estimated = 0;  ///< Of those completed and guessed: what is no evidence.
 };
 
 /// Share of a view below which false matches may be all that was measured.
@@ -58,8 +63,8 @@ struct EstimatedPriors {
 };
 
 /// Everything known about the input views before training: sweep, align, enter the depth of
-/// sensors, complete, put guesses of given depth where they are better, layers. The depth of views
-/// of which nothing was measured stays unknown.
+/// sensors, find the sky, complete, put guesses of given depth where they are better, tell what of
+/// all that is estimated, layers. The depth of views of which nothing was measured stays unknown.
 /// Preconditions and errors as plane_sweep(); \throws InvalidInput if masks leave nothing of all
 /// views; NumericalError if nothing of any was measured
 EstimatedPriors estimate_priors(const Scene& scene,

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/sky.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "libcgs/core/order_statistics.h"
+#include "libcgs/priors/directions.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+// Levels of sRGB, in [0, 1].
+constexpr float kEven = 0.035f;      // largest change from pixel to pixel
+constexpr float kRimChange = 0.12f;  // of a pixel that is half sky
+constexpr float kBlueness = 0.2f;    // blue over red of a sky that need not be bright
+constexpr double kBrightest = 0.98;  // share of the rest that a sky of another colour outshines
+constexpr double kLeastArea = 0.01;  // of the picture
+constexpr double kLeastRim = 0.08;   // of the border that is up
+
+using Component = std::vector<std::pair<int, int>>;
+
+// Calls visit(component) for every set of pixels with is_member(x, y) that hang together.
+template <typename IsMember, typename Visit>
+void for_each_component(int width, int height, const IsMember& is_member, const Visit& visit) {
+  MaskMap visited(width, height, 0);
+  Component component;
+  const auto take = [&](int x, int y) {
+    if (!visited.contains(x, y) || visited(x, y) != 0 || !is_member(x, y)) return;
+    visited(x, y) = 1;
+    component.emplace_back(x, y);
+  };
+  for (int y0 = 0; y0 < height; ++y0) {
+    for (int x0 = 0; x0 < width; ++x0) {
+      component.clear();
+      take(x0, y0);
+      for (size_t i = 0; i < component.size(); ++i) {
+        const auto [x, y] = component[i];
+        for (const Direction d : kNeighbors) take(x + d.dx, y + d.dy);
+      }
+      if (!component.empty()) visit(component);
+    }
+  }
+}
+
+float luminance(const Eigen::Vector3f& c) { return c.dot(Eigen::Vector3f(0.21f, 0.72f, 0.07f)); }
+
+bool is_blue(const Eigen::Vector3f& c) {
+  return c[2] - c[0] > 0.08f && c[2] >= c[1] - 0.01f && c[1] >= c[0] - 0.03f && c[2] > 0.35f;
+}
+
+bool is_white(const Eigen::Vector3f& c, float least) {
+  return c.minCoeff() > least && c.maxCoeff() - c.minCoeff() < 0.2f;
+}
+
+// Means over 3 x 3 pixels: noise of sensors and of compression must not tear the sky.
+ColorImage smoothed(const ColorImage& image) {
+  ColorImage out = image;
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      float count = 0;
+      for (int v = std::max(0, y - 1); v <= std::min(image.height - 1, y + 1); ++v) {
+        for (int u = std::max(0, x - 1); u <= std::min(image.width - 1, x + 1); ++u) {
+          sum += image(u, v);
+          ++count;
+        }
+      }
+      out(x, y) = sum / count;
+    }
+  }
+  return out;
+}
+
+class SkyFinder {
+ public:
+  SkyFinder(const View& view, const ViewPriors& priors)
+      : view_(view),
+        priors_(priors),
+        colors_(smoothed(view.image)),
+        sky_(view.image.width, view.image.height, 0) {}
+
+  // \param up  step in the picture
+  MaskMap find(Direction up) {
+    const int width = sky_.width;
+    const int height = sky_.height;
+    const double rim_length = up.dx == 0 ? width : height;
+    bool any = false;
+    for_each_component(
+        width,
+        height,
+        [&](int x, int y) { return looks_like_sky(x, y); },
+        [&](const Component& part) {
+          const auto at_border = std::count_if(part.begin(), part.end(), [&](const auto& p) {
+            return !sky_.contains(p.first + up.dx, p.second + up.dy);
+          });
+          const bool is_large = double(part.size()) >= kLeastArea * double(sky_.data.size()) &&
+                                double(at_border) >= kLeastRim * rim_length;
+          if (!is_large || !is_sky(part)) return;
+          for (const auto& [x, y] : part) sky_(x, y) = 1;
+          any = true;
+        });
+    if (!any) return {};
+    add_clouds(up);
+    add_between_bars();
+    for (int round = 0; round < kRimPixels; ++round) add_rim();
+    return sky_;
+  }
+
+ private:
+  static constexpr int kRimPixels = 3;
+
+  bool usable(int x, int y) const { return view_.valid.empty() || view_.valid(x, y) != 0; }
+
+  float change_at(int x, int y) const {
+    float out = 0;
+    for (const Direction d : {Direction{1, 0}, Direction{0, 1}}) {
+      if (!colors_.contains(x + d.dx, y + d.dy)) continue;
+      const Eigen::Vector3f step = colors_(x + d.dx, y + d.dy) - colors_(x, y);
+      out = std::max(out, step.cwiseAbs().maxCoeff());
+    }
+    return out;
+  }
+
+  bool looks_like_sky(int x, int y) const {
+    const Eigen::Vector3f& c = colors_(x, y);
+    constexpr float kBright = 0.72f;
+    return usable(x, y) && (is_blue(c) || is_white(c, kBright)) && change_at(x, y) < kEven;
+  }
+
+  // By its colour beside all others, and by what was measured in it.
+  bool is_sky(const Component& part) const {
+    std::vector<float> blueness;
+    std::vector<float> levels;
+    size_t near = 0;
+    const float farther = kFarther * median_depth();
+    for (const auto& [x, y] : part) {
+      const Eigen::Vector3f& c = colors_(x, y);
+      blueness.push_back(c[2] - c[0]);
+      levels.push_back(luminance(c));
+      near += is_well_measured(x, y) && priors_.depth(x, y) < farther ? 1 : 0;
+    }
+    constexpr double kMostMeasured = 0.3;
+    if (double(near) > kMostMeasured * double(part.size())) return false;
+    return median(blueness) >= kBlueness || outshines(median(levels), part.size());
+  }
+
+  // Whether all but few of the pixels that are not of a part of so many are darker.
+  bool outshines(float level, size_t count) const {
+    const auto darker = std::count_if(colors_.data.begin(), colors_.data.end(), [&](const auto& c) {
+      return luminance(c) < level;
+    });
+    const double others = double(colors_.data.size()) - double(count);
+    return double(darker) - 0.5 * double(count) >= kBrightest * others;
+  }
+
+  bool is_well_measured(int x, int y) const {
+    constexpr float kConfident = 0.5f;
+    return !priors_.origin.empty() && priors_.origin(x, y) == DepthOrigin::Measured &&
+           priors_.confidence(x, y) > kConfident;
+  }
+
+  float median_depth() const {
+    std::vector<float> depths;
+    for (size_t i = 0; i < priors_.depth.data.size(); ++i) {
+      if (priors_.origin.data[i] == DepthOrigin::Measured) depths.push_back(priors_.depth.data[i]);
+    }
+    return depths.empty() ? 0 : median(depths);
+  }
+
+  // White parts that nothing but sky and the borders beside it enclose.
+  void add_clouds(Direction up) {
+    Component clouds;
+    for_each_component(
+        sky_.width,
+        sky_.height,
+        [&](int x, int y) { return sky_(x, y) == 0; },
+        [&](const Component& part) {
+          constexpr float kCloud = 0.5f;
+          Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+          for (const auto& [x, y] : part) {
+            // Whatever reaches the lower border stands on the ground.
+            if (!sky_.contains(x - up.dx, y - up.dy)) return;
+            mean += colors_(x, y);
+          }
+          if (!is_white(mean / float(part.size()), kCloud)) return;
+          clouds.insert(clouds.end(), part.begin(), part.end());
+        });
+    for (const auto& [x, y] : clouds) sky_(x, y) = 1;
+  }
+
+  // Parts that look like sky a small way from it, as between bars. Farther away they may be
+  // windows in which it is mirrored.
+  void add_between_bars() {
+    const int reach = std::max(3, (sky_.width + sky_.height) / 50);
+    Component found;
+    for_each_component(
+        sky_.width,
+        sky_.height,
+        [&](int x, int y) { return sky_(x, y) == 0 && looks_like_sky(x, y); },
+        [&](const Component& part) {
+          const bool is_near = std::any_of(part.begin(), part.end(), [&](const auto& p) {
+            return is_like_sky_nearby(p.first, p.second, reach);
+          });
+          if (is_near) found.insert(found.end(), part.begin(), part.end());
+        });
+    for (const auto& [x, y] : found) sky_(x, y) = 1;
+  }
+
+  bool is_like_sky_nearby(int x, int y, int reach) const {
+    constexpr float kAlike = 0.06f;
+    for (const Direction d : kDirections) {
+      const int stride = std::max(std::abs(d.dx), std::abs(d.dy));
+      for (int k = 1; k * stride <= reach; ++k) {
+        const int u = x + k * d.dx;
+        const int v = y + k * d.dy;
+        if (!sky_.contains(u, v)) break;
+        if (sky_(u, v) == 0) continue;
+        return (colors_(u, v) - colors_(x, y)).cwiseAbs().maxCoeff() < kAlike;
+      }
+    }
+    return false;
+  }
+
+  // Pixels beside sky that are more sky than not: the rim of a silhouette is blurred.
+  void add_rim() {
+    Component found;
+    for (int y = 0; y < sky_.height; ++y) {
+      for (int x = 0; x < sky_.width; ++x) {
+        if (sky_(x, y) != 0 || !usable(x, y)) continue;
+        const bool is_rim = std::any_of(kNeighbors.begin(), kNeighbors.end(), [&](Direction d) {
+          const int u = x + d.dx;
+          const int v = y + d.dy;
+          return sky_.contains(u, v) && sky_(u, v) != 0 &&
+                 (view_.image(u, v) - view_.image(x, y)).cwiseAbs().maxCoeff() < kRimChange;
+        });
+        if (is_rim) found.emplace_back(x, y);
+      }
+    }
+    for (const auto& [x, y] : found) sky_(x, y) = 1;
+  }
+
+  static constexpr float kFarther = 3;  // than what is measured mostly: clouds may be matched
+
+  const View& view_;
+  const ViewPriors& priors_;
+  ColorImage colors_;
+  MaskMap sky_;
+};
+
+// The border of the picture that a world direction points to most.
+Direction step_towards(const Eigen::Vector3d& up, const Camera& camera) {
+  const Eigen::Vector3d in_cam = camera.world_from_cam.linear().transpose() * up;
+  constexpr double kClear = 0.3;  // looking up or down, no border is
+  if (!(in_cam.head<2>().norm() > kClear)) return {0, -1};
+  if (std::abs(in_cam.x()) > std::abs(in_cam.y())) return {in_cam.x() > 0 ? 1 : -1, 0};
+  return {0, in_cam.y() > 0 ? 1 : -1};
+}
+
+}  // namespace
+
+MaskMap find_sky(const View& view, const ViewPriors& priors, const Eigen::Vector3d& up) {
+  return SkyFinder(view, priors).find(step_towards(up, view.camera));
+}
+
+void enter_sky(const MaskMap& sky, ViewPriors& priors) {
+  for (size_t i = 0; i < sky.data.size(); ++i) {
+    if (sky.data[i] == 0) continue;
+    priors.depth.data[i] = kNaN;
+    priors.sigma.data[i] = kNaN;
+    priors.origin.data[i] = DepthOrigin::Sky;
+    priors.matched_views.data[i] = 0;
+  }
+}
+
+void set_backdrop(std::vector<ViewPriors>& views) {
+  constexpr float kBehind = 4;        // times the farthest that is measured
+  constexpr float kUncertain = 0.5f;  // of the depth
+  std::vector<float> depths;
+  for (const ViewPriors& view : views) {
+    for (size_t i = 0; i < view.depth.data.size(); ++i) {
+      if (view.origin.data[i] == DepthOrigin::Measured) depths.push_back(view.depth.data[i]);
+    }
+  }
+  if (depths.empty()) return;
+  const float depth = kBehind * nth_smallest(depths, (depths.size() - 1) * 99 / 100);
+  for (ViewPriors& view : views) {
+    for (size_t i = 0; i < view.depth.data.size(); ++i) {
+      if (view.origin.data[i] != DepthOrigin::Sky) continue;
+      view.depth.data[i] = depth;
+      view.sigma.data[i] = kUncertain * depth;
+    }
+  }
+}
+
+}  // namespace cgs

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "libcgs/core/scene.h"
+#include "libcgs/priors/view_priors.h"
+
+namespace cgs {
+
+/// The sky of a photograph: 1 where there is some, empty where there is none.
+///
+/// Sky is even from pixel to pixel, blue or brighter than nearly everything else, and reaches the
+/// border of the picture that is up. From there it is followed as far as it stays so; what it
+/// encloses is sky, too, if it is white (clouds), and so is what shows the same colours a small way
+/// behind its rim (between bars and branches). Its rim reaches up to where the colours change: what
+/// was measured there is the silhouette before it, which matching makes too wide. A surface of like
+/// looks that was measured nearby, all over, such as a white wall, is none.
+///
+/// \param up  world direction that is up; zero = the top of the picture
+/// \param priors  of plane_sweep(), or empty rasters where nothing was measured
+MaskMap find_sky(const View& view, const ViewPriors& priors, const Eigen::Vector3d& up);
+
+/// Marks sky and what was measured there by mistake: origin Sky, without depth.
+void enter_sky(const MaskMap& sky, ViewPriors& priors);
+
+/// Gives sky the depth of a backdrop, far behind everything that was measured in any view.
+void set_backdrop(std::vector<ViewPriors>& views);
+
+}  // namespace cgs
