@@ -18,8 +18,6 @@ namespace cgs {
 
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kFar = std::numeric_limits<float>::max();
 
 bool is_filled(DepthOrigin origin) {
   return origin == DepthOrigin::Completed || origin == DepthOrigin::Guessed;
@@ -137,7 +135,7 @@ void limit_completion(ViewPriors& priors) {
   for (size_t i = 0; i < steps.data.size(); ++i) {
     if (priors.origin.data[i] != DepthOrigin::Completed || steps.data[i] < first_beyond) continue;
     priors.origin.data[i] = DepthOrigin::Unknown;
-    priors.depth.data[i] = priors.sigma.data[i] = kNaN;
+    priors.depth.data[i] = priors.sigma.data[i] = std::nanf("");
   }
 }
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "libcgs/core/order_statistics.h"
@@ -12,8 +11,6 @@
 namespace cgs {
 
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 // Levels of sRGB, in [0, 1].
 constexpr float kEven = 0.035f;      // largest change from pixel to pixel
@@ -271,8 +268,8 @@ MaskMap find_sky(const View& view, const ViewPriors& priors, const Eigen::Vector
 void enter_sky(const MaskMap& sky, ViewPriors& priors) {
   for (size_t i = 0; i < sky.data.size(); ++i) {
     if (sky.data[i] == 0) continue;
-    priors.depth.data[i] = kNaN;
-    priors.sigma.data[i] = kNaN;
+    priors.depth.data[i] = std::nanf("");
+    priors.sigma.data[i] = std::nanf("");
     priors.origin.data[i] = DepthOrigin::Sky;
     priors.matched_views.data[i] = 0;
   }
