@@ -225,10 +225,11 @@ size_t free_of_group(const std::filesystem::path& folder, const char* most, cons
 
 std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
   constexpr double kBase = 60 * kMebi;
-  constexpr double kHarmonic = 12;              // bytes per coefficient
-  constexpr double kAsRead = 24 + 12 + 16 + 4;  // place in double, scale, rotation, opacity
-  constexpr double kMoved = 12 + 4;             // place and opacity, made anew for the frame
-  constexpr double kInFrame = 12 + 12 + 16 + 4;
+  constexpr double kHarmonic = 12;                  // bytes per coefficient
+  constexpr double kAsRead = 24 + 12 + 16 + 4 + 4;  // place in double, scale, rotation, opacity,
+                                                    // and label, which splats of others lack
+  constexpr double kMoved = 12 + 4 + 1;  // place, opacity and label, made anew for the frame
+  constexpr double kInFrame = 12 + 12 + 16 + 4 + 1;
   constexpr double kProjected = 64 + 8 + 1;      // Splat, RowRange, SplatFate
   constexpr double kSorted = 2 * 8 + 4 + 4 * 4;  // keys, order, rows of tiles
   constexpr double kPicturePixel = 4 + 12 + 12;  // depth, colour, normal; kept for each picture

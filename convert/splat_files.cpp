@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/splat_files.h"
 
+#include <array>
+#include <cstdio>
 #include <optional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "convert/figures.h"
 #include "convert/memory_plan.h"
 #include "convert/splat_loss.h"
 #include "io/compressed_ply.h"
@@ -81,20 +84,51 @@ WrittenSplats write_splats(const std::filesystem::path& path,
   return {{{"format", "3DGS PLY"}, {"splats", g.size()}}, {}};
 }
 
+bool holds_provenance(const std::filesystem::path& path) {
+  return !is_bare_splat_name(path) && !is_compressed_ply_name(path);
+}
+
 /// What a format has no place for, of what is known of a scene: "" if nothing.
 std::string lost_of_scene(const std::filesystem::path& path,
+                          const Gaussians& g,
                           const Frame& frame,
                           const std::string& evidence) {
-  if (!is_bare_splat_name(path)) return "";
+  const bool is_bare = is_bare_splat_name(path);
   std::string out;
   const auto add = [&](bool is_lost, const std::string& what) {
     if (is_lost) out += (out.empty() ? "" : ", ") + what;
   };
-  add(frame.has_metric_scale(), "unit");
-  add(!frame.file_origin.isZero(0), "origin");
-  add(!frame.up.isApprox(-Eigen::Vector3d::UnitY()), "direction that is up");
-  add(!evidence.empty(), "evidence");
-  return out.empty() ? out : lower_extension(path) + " files hold no " + out + " of the scene";
+  add(is_bare && frame.has_metric_scale(), "unit");
+  add(is_bare && !frame.file_origin.isZero(0), "origin");
+  add(is_bare && !frame.up.isApprox(-Eigen::Vector3d::UnitY()), "direction that is up");
+  add(is_bare && !evidence.empty(), "evidence");
+  add(!g.provenance.empty() && !holds_provenance(path), "provenance");
+  const std::string ending = is_bare ? lower_extension(path) : ".compressed.ply";
+  return out.empty() ? out : ending + " files hold no " + out + " of the scene";
+}
+
+/// "12 %", and no more of all or nothing than there is.
+std::string share_text(size_t part, size_t all) {
+  const double percent = 100 * double(part) / double(all);
+  if (part == 0) return "none";
+  if (percent < 1) return "under 1 %";
+  if (part < all && percent > 99) return "over 99 %";
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.0f %%", percent);
+  return text.data();
+}
+
+/// As splat_file_to_json() says.
+Json provenance_json(const Gaussians& g) {
+  if (g.provenance.empty()) return nullptr;
+  std::array<size_t, kProvenanceCount> counts{};
+  for (const Provenance label : g.provenance) ++counts.at(static_cast<size_t>(label));
+  const auto count = [&](Provenance label) { return counts.at(static_cast<size_t>(label)); };
+  Json out = {
+      {"words",
+       "estimated: " + share_text(count(Provenance::Estimated), g.size()) + " of the splats"}};
+  for (const Provenance label : kProvenanceOrder) out[provenance_key(label)] = count(label);
+  return out;
 }
 
 /// Where a hundredth of the splats cannot be held as it is; "" elsewhere.
@@ -149,7 +183,10 @@ Json write_splat_file(const std::filesystem::path& path,
                       Terminal& terminal) {
   const WrittenSplats written = write_splats(path, g, frame, options);
   Json report = written.report;
-  const std::string lost = lost_of_scene(path, frame, options.evidence);
+  const Json provenance = provenance_json(g);
+  report["provenance"] = holds_provenance(path) ? provenance : Json();
+  if (!provenance.is_null()) terminal.say(provenance["words"].get<std::string>());
+  const std::string lost = lost_of_scene(path, g, frame, options.evidence);
   if (!lost.empty()) terminal.say(lost);
   std::vector<std::string> missing;  // why splats are, or parts of them
   if (const std::string clamped = clamped_text(report); !clamped.empty()) {
@@ -189,6 +226,7 @@ Json splat_file_to_json(const GaussianFile& file) {
           {"bounds", bounds_json(file.gaussians, file.frame)},
           {"units", file.frame.unit_name()},
           {"evidence", evidence},
+          {"provenance", provenance_json(file.gaussians)},
           {"findings",
            {{"not_finite", f.not_finite},
             {"without_rotation", f.without_rotation},

@@ -88,6 +88,8 @@ SplatLoss splat_loss(const Gaussians& source,
   out.psnr = psnr_of_pictures(source, written, cameras.cameras, progress);
   out.sh_degree_before = source.sh_degree;
   out.sh_degree_after = written.sh_degree;
+  out.provenance_before = !source.provenance.empty();
+  out.provenance_after = !written.provenance.empty();
   return out;
 }
 
@@ -109,6 +111,7 @@ std::string splat_loss_line(const SplatLoss& loss, const Frame& frame) {
     out << ", colours that " << (loss.sh_degree_after == 0 ? "no longer" : "less finely")
         << " change with direction";
   }
+  if (loss.provenance_before && !loss.provenance_after) out << ", without provenance";
   out << "; " << loss.views << " pictures ";
   if (!loss.psnr) {
     out << "show too little to compare";
@@ -133,6 +136,7 @@ Json splat_loss_to_json(const SplatLoss& loss, const Frame& frame) {
   if (loss.psnr) psnr = std::isinf(*loss.psnr) ? Json("same") : Json(*loss.psnr);
   out["pictures"] = {{"psnr", psnr}, {"views", loss.views}};
   out["sh_degree"] = {{"before", loss.sh_degree_before}, {"after", loss.sh_degree_after}};
+  out["provenance"] = {{"before", loss.provenance_before}, {"after", loss.provenance_after}};
   return out;
 }
 

@@ -26,6 +26,8 @@ struct SplatLoss {
   size_t views = 0;            ///< Pictures of each.
   int sh_degree_before = 0;
   int sh_degree_after = 0;
+  bool provenance_before = false;  ///< Whether every splat has a label.
+  bool provenance_after = false;
 };
 
 /// Compares splats with what a file of them gave, both in one frame: centre by centre, and in
@@ -42,9 +44,9 @@ SplatLoss splat_loss(const Gaussians& source,
 std::string splat_loss_line(const SplatLoss& loss, const Frame& frame);
 
 /// {"dropped", "centres": {"largest_move", "rms_move", "unit", "largest_of_extent",
-/// "rms_of_extent"}, "pictures": {"psnr", "views"}, "sh_degree": {"before", "after"}}; lengths in
-/// file units, centres null if splats were dropped; psnr is "same" for pictures that are, and null
-/// for those that show too little.
+/// "rms_of_extent"}, "pictures": {"psnr", "views"}, "sh_degree": {"before", "after"}, "provenance":
+/// {"before", "after": whether it is stated}}; lengths in file units, centres null if splats were
+/// dropped; psnr is "same" for pictures that are, and null for those that show too little.
 nlohmann::ordered_json splat_loss_to_json(const SplatLoss& loss, const Frame& frame);
 
 }  // namespace cgs

@@ -248,6 +248,9 @@ void merge_into(WeighedSplats& s, uint32_t i, uint32_t j) {
     Eigen::Vector3f& c = g.sh[i * count + k];
     c += static_cast<float>(b) * (g.sh[j * count + k] - c);
   }
+  if (!g.provenance.empty()) {
+    g.provenance[i] = weaker_evidence(g.provenance[i], g.provenance[j]);
+  }
   if (s.pixel[j] < s.pixel[i]) s.ray[i] = s.ray[j];
   s.weight[i] += s.weight[j];
   s.pixel[i] = pixel;

@@ -17,6 +17,7 @@ size_t keep_only(Gaussians& g, const std::vector<uint8_t>& keep) {
     std::copy_n(g.sh.begin() + static_cast<std::ptrdiff_t>(i * sh_count),
                 sh_count,
                 g.sh.begin() + static_cast<std::ptrdiff_t>(kept * sh_count));
+    if (!g.provenance.empty()) g.provenance[kept] = g.provenance[i];
     ++kept;
   }
   const size_t dropped = g.size() - kept;
@@ -25,6 +26,7 @@ size_t keep_only(Gaussians& g, const std::vector<uint8_t>& keep) {
   g.rotation.resize(kept);
   g.opacity.resize(kept);
   g.sh.resize(kept * sh_count);
+  if (!g.provenance.empty()) g.provenance.resize(kept);
   return dropped;
 }
 

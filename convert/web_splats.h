@@ -13,7 +13,8 @@ namespace cgs {
 /// Writes the splats of a model for viewers in browsers: splats.glb and splats.spz, thinned by
 /// thin_splats(); SPZ tells places apart to a sixteenth of a pixel. Splats that reach too far for
 /// SPZ are no reason to end a run: it is left out then.
-/// The .glb says what the model rests on; SPZ has no place for it.
+/// The .glb says what the model rests on, and what vouches for each splat where that is stated; SPZ
+/// has no place for these.
 /// \return {"thinning": {…, "held_out": mean of evaluate_views() or null}, "splats.glb": {…},
 ///          "splats.spz": {…}, "left_out": {"splats.spz": "why"}}
 /// \param model  as before when this returns or throws

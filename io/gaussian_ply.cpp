@@ -18,6 +18,8 @@ namespace {
 
 constexpr const char* kHeaderStart = "ply\nformat binary_little_endian 1.0\ncomment ";
 
+constexpr const char* kProvenanceProperty = "provenance";
+
 constexpr size_t kLongestHeader = 4096;  // of those that write_gaussian_ply() writes
 
 std::string header_start(const Frame& frame, const std::string& evidence) {
@@ -35,6 +37,7 @@ std::string header_text(const Gaussians& g, const Frame& frame, const std::strin
   for (int i = 0; i < 3 * (g.sh_count() - 1); ++i) add("f_rest_" + std::to_string(i));
   for (const char* name : {"opacity", "scale_0", "scale_1", "scale_2"}) add(name);
   for (const char* name : {"rot_0", "rot_1", "rot_2", "rot_3"}) add(name);
+  if (!g.provenance.empty()) add(kProvenanceProperty);
   return out + "end_header\n";
 }
 
@@ -52,6 +55,7 @@ void append_gaussian(std::string& out, const Gaussians& g, const Frame& frame, s
   append_bytes(out, static_cast<float>(std::log(opacity) - std::log1p(-opacity)));
   for (const float s : g.scale[i]) append_bytes(out, static_cast<float>(std::log(s * frame.scale)));
   for (const float q : g.rotation[i]) append_bytes(out, q);
+  if (!g.provenance.empty()) append_bytes(out, static_cast<float>(g.provenance[i]));
 }
 
 /// Columns of the properties of a splat within the vertex element.
@@ -63,6 +67,7 @@ struct SplatColumns {
   std::vector<int> scale;  ///< Three, or two of 2D splats.
   std::array<int, 4> rotation{};
   int filter = -1;         ///< filter_3D, -1 if there is none.
+  int provenance = -1;     ///< -1 if there is none.
   double color_range = 0;  ///< Largest value of red, green and blue; 0 = f_dc_*.
 };
 
@@ -72,6 +77,12 @@ class ColumnFinder {
       : vertex_(vertex), path_(path) {}
 
   bool has(const std::string& name) const { return vertex_.find(name) >= 0; }
+
+  /// -1 where there is no such number: what others call so is ignored, as all else.
+  int optional_column(const std::string& name) const {
+    const int i = vertex_.find(name);
+    return i >= 0 && vertex_.properties[static_cast<size_t>(i)].is_list ? -1 : i;
+  }
 
   int column(const std::string& name) const {
     const int i = vertex_.find(name);
@@ -135,6 +146,7 @@ SplatColumns splat_columns(const PlyHeader& header, const std::filesystem::path&
   out.rotation = find.columns<4>("rot_");
   out.opacity = find.column("opacity");
   if (find.has("filter_3D")) out.filter = find.column("filter_3D");
+  out.provenance = find.optional_column(kProvenanceProperty);
   if (!find.has("f_dc_0") && find.has("red") && find.has("green") && find.has("blue")) {
     out.color = {find.column("red"), find.column("green"), find.column("blue")};
     out.color_range = find.color_range(out.color[0]);
@@ -194,6 +206,7 @@ class SplatRows {
       splats_.notes.emplace_back("smoothing filter of every splat (filter_3D) applied");
     }
     splats_.reserve(count);
+    if (columns_.provenance >= 0) splats_.provenance.reserve(count);
   }
 
   void add(const PlyRow& row) {
@@ -212,6 +225,10 @@ class SplatRows {
     }
     splats_.log_scale.emplace_back(scale.cast<float>());
     splats_.logit.push_back(static_cast<float>(logit));
+    if (columns_.provenance >= 0) {
+      const double label = row.values[static_cast<size_t>(columns_.provenance)];
+      splats_.provenance.push_back(static_cast<float>(label));
+    }
     add_color(row);
   }
 

@@ -14,7 +14,8 @@ namespace cgs {
 
 /// Writes Gaussians in the 3DGS layout: binary little-endian PLY, all float32 properties x y z,
 /// nx ny nz (0), f_dc_0..2, f_rest_* (channel-major; 0, 9, 24 or 45 of them by degree), opacity
-/// (logit), scale_0..2 (natural log of world units), rot_0..3 (w, x, y, z).
+/// (logit), scale_0..2 (natural log of world units), rot_0..3 (w, x, y, z); and after these, where
+/// the Gaussians state it, provenance (the number of the label).
 ///
 /// Positions are file coordinates; comments carry unit, scale source and origin.
 /// \param evidence  what the Gaussians rest on, in words, for a comment; empty = nobody says
@@ -35,7 +36,7 @@ bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame)
 ///
 /// Normals and f_rest_* may be absent; degree 4 is read as degree 3. Without scale_2 (2DGS) splats
 /// become a thousandth of their smaller width thick. Colour may be red, green, blue instead of
-/// f_dc_*.
+/// f_dc_*. Labels of provenance are read where there are any, from whole numbers of any type.
 /// \throws BadInput as parse_ply_header() and read_ply_rows(); Schema (a property is missing, or
 /// the
 ///         number of f_rest_* is none of the five), Empty (0 vertices); LimitError

@@ -24,6 +24,7 @@ struct RawSplats {
   std::vector<Eigen::Vector4f> rotation;   ///< (w, x, y, z)
   std::vector<float> logit;                ///< Of the opacity.
   std::vector<Eigen::Vector3f> sh;         ///< Gaussian-major, (sh_degree + 1)^2 for each.
+  std::vector<float> provenance;           ///< Numbers of Provenance; empty = not stated.
   int digits = kFloatDigits;               ///< Binary digits of a position as stored.
   bool may_be_linear = false;              ///< Programs differ: scales may really be lengths, and
                                            ///< opacities probabilities.

@@ -14,6 +14,9 @@ void require_writable(const Gaussians& g) {
       g.rotation.size() == n, "Gaussians.rotation must be as long as position", g.rotation.size());
   require(g.opacity.size() == n, "Gaussians.opacity must be as long as position", g.opacity.size());
   require(g.sh.size() == sh, "Gaussians.sh must have sh_count() entries per Gaussian", g.sh.size());
+  require(g.provenance.empty() || g.provenance.size() == n,
+          "Gaussians.provenance must be empty or as long as position",
+          g.provenance.size());
   for (size_t i = 0; i < n; ++i) {
     require(g.position[i].allFinite() && g.rotation[i].allFinite(),
             "Gaussians: positions and rotations must be finite; index",
@@ -26,6 +29,10 @@ void require_writable(const Gaussians& g) {
   }
   for (const Eigen::Vector3f& c : g.sh) {
     require(c.allFinite(), "Gaussians.sh must be finite", c.transpose());
+  }
+  for (const Provenance label : g.provenance) {
+    const auto number = static_cast<size_t>(label);
+    require(number < kProvenanceCount, "Gaussians.provenance must be 0 to 5", number);
   }
 }
 

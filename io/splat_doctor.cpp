@@ -92,6 +92,7 @@ class Examination {
     judge_coding(extent);
     if (findings_.linear_opacity) drop_unusable();  // opacity 0 is only known now
     if (raw_.size() == 0) throw BadInput(Defect::Value, path_, "no splat can be seen");
+    judge_labels();
     const Eigen::AlignedBox3d box = widened({corners[0], corners[1]}, largest_radius(raw_));
     const std::string odd = check_significance(path_, box, raw_.digits);
     count_flyaways(corners, extent);
@@ -175,6 +176,7 @@ class Examination {
     std::copy_n(raw_.sh.begin() + static_cast<ptrdiff_t>(from * sh_count),
                 sh_count,
                 raw_.sh.begin() + static_cast<ptrdiff_t>(to * sh_count));
+    if (!raw_.provenance.empty()) raw_.provenance[to] = raw_.provenance[from];
   }
 
   void shrink_to(size_t count) {
@@ -183,6 +185,7 @@ class Examination {
     raw_.rotation.resize(count);
     raw_.logit.resize(count);
     raw_.sh.resize(count * raw_.sh_count());
+    if (!raw_.provenance.empty()) raw_.provenance.resize(count);
   }
 
   void drop_unusable() {
@@ -225,6 +228,16 @@ class Examination {
     if (!all_probabilities_ || *high - *low < kSpread) return;
     findings_.linear_opacity = true;
     for (float& value : raw_.logit) value = std::log(value) - std::log1p(-value);
+  }
+
+  /// Labels of some splats, or of none that there are, would be taken for those of all.
+  void judge_labels() {
+    const auto is_label = [](float number) {
+      return number >= 0 && number < float{kProvenanceCount} && number == std::floor(number);
+    };
+    const auto labelled = std::count_if(raw_.provenance.begin(), raw_.provenance.end(), is_label);
+    unlabelled_ = raw_.provenance.size() - static_cast<size_t>(labelled);
+    if (unlabelled_ > 0) raw_.provenance.clear();
   }
 
   void count_flyaways(const std::vector<Eigen::Vector3d>& corners, double extent) {
@@ -283,6 +296,10 @@ class Examination {
     out.scale = std::move(raw_.log_scale);
     out.rotation = std::move(raw_.rotation);
     out.sh = std::move(raw_.sh);
+    out.provenance.reserve(raw_.provenance.size());
+    for (const float number : raw_.provenance) {
+      out.provenance.push_back(static_cast<Provenance>(number));
+    }
     return out;
   }
 
@@ -303,6 +320,10 @@ class Examination {
     if (all_probabilities_) {
       out.push_back("opacity looks like a probability, not a logit; read as a " +
                     std::string(f.linear_opacity ? "probability" : "logit"));
+    }
+    if (unlabelled_ > 0) {
+      out.push_back("provenance of the splats left out: " +
+                    counted(unlabelled_, " without a label from 0 to 5"));
     }
     if (f.flyaways > 0) {
       out.push_back(counted(f.flyaways, " more than ten times the scene's size away from it"));
@@ -331,6 +352,7 @@ class Examination {
   SplatFindings findings_;
   bool all_scales_positive_ = false;
   bool all_probabilities_ = false;
+  uint64_t unlabelled_ = 0;  // splats, where others have a label
 };
 
 }  // namespace

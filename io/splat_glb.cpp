@@ -2,6 +2,7 @@
 #include "io/splat_glb.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -107,6 +108,14 @@ void add_harmonics(SplatBuffer& buffer, const Gaussians& g) {
   }
 }
 
+/// As floats, like all else: whole numbers of one or two bytes would be padded to four.
+void add_provenance(SplatBuffer& buffer, const Gaussians& g) {
+  if (g.provenance.empty()) return;
+  buffer.add(kSplatProvenance, "SCALAR", [&](size_t i) {
+    return std::array{static_cast<float>(g.provenance[i])};
+  });
+}
+
 std::string named(const char* what) { return std::string(kGaussianSplatting) + ":" + what; }
 
 /// Colours for readers that only know points, rotations and opacities.
@@ -177,7 +186,8 @@ size_t write_splat_glb(const std::filesystem::path& path,
             i);
   }
   constexpr size_t kRoomForJson = size_t{1} << 20;
-  const size_t floats = 15 + 3 * static_cast<size_t>(g.sh_count());
+  const size_t labels = g.provenance.empty() ? 0 : 1;
+  const size_t floats = 15 + 3 * static_cast<size_t>(g.sh_count()) + labels;
   if (g.size() > (std::numeric_limits<uint32_t>::max() - kRoomForJson) / (4 * floats)) {
     throw LimitError("write_splat_glb: glTF binary files end at 4 GiB");
   }
@@ -187,6 +197,7 @@ size_t write_splat_glb(const std::filesystem::path& path,
   add_looks(buffer, g);
   buffer.add(named("SCALE"), "VEC3", length);
   add_harmonics(buffer, g);
+  add_provenance(buffer, g);
   Json document = buffer.document();
   const Eigen::Quaterniond turn(options.y_up);
   document["nodes"][0]["rotation"] = {turn.x(), turn.y(), turn.z(), turn.w()};

@@ -15,6 +15,9 @@ namespace cgs {
 /// The extension, and the prefix of its attributes.
 inline constexpr const char* kGaussianSplatting = "KHR_gaussian_splatting";
 
+/// The attribute of the label of a splat, a number of Provenance: our own, so it begins with _.
+inline constexpr const char* kSplatProvenance = "_PROVENANCE";
+
 /// The attribute of a spherical harmonic: degree 0 to 3, order 0 to 2 degree.
 std::string splat_harmonic_name(int degree, int order);
 
@@ -28,7 +31,7 @@ struct SplatGlbOptions {
 
 /// Writes splats as .glb with KHR_gaussian_splatting: points with rotation (x, y, z, w), scale,
 /// opacity and spherical harmonics as float attributes, and COLOR_0 (linear, with opacity) for
-/// readers that only know points.
+/// readers that only know points; also _PROVENANCE, the number of the label, where splats state it.
 ///
 /// In metres where the scale is known, else in world units; positions are relative to their median,
 /// and the node turns them +Y up. Its place in the world stands in asset.extras, in double, and

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <set>
 #include <utility>
@@ -157,7 +158,8 @@ struct Attributes {
   int degree = 0;
   std::vector<float> position, rotation, scale, opacity;
   std::vector<std::vector<float>> harmonics;
-  double opacity_step = 0;  ///< Of whole numbers; 0 for floats.
+  std::vector<float> provenance;  ///< Empty = not stated.
+  double opacity_step = 0;        ///< Of whole numbers; 0 for floats.
 
   Eigen::Vector3d three(const std::vector<float>& values, size_t i) const {
     return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
@@ -178,6 +180,7 @@ class SplatScene {
     examine(instances);
     place();
     for (const GlbInstance& instance : instances) add_mesh(instance);
+    if (!splats_.provenance.empty()) leave_unlabelled(splats_.size());
     if (splats_.size() == 0) throw BadInput(Defect::Empty, file_.path(), "holds no splats");
     const std::string odd = check_significance(file_.path(), stored_, kFloatDigits);
     if (!odd.empty()) splats_.notes.push_back(odd);
@@ -288,6 +291,9 @@ class SplatScene {
         out.harmonics.push_back(values(splat_harmonic_name(degree, order), 3));
       }
     }
+    if (in.find(kSplatProvenance) && accessor(kSplatProvenance).at("type").text() == "SCALAR") {
+      out.provenance = values(kSplatProvenance, 1);
+    }
     return out;
   }
 
@@ -315,6 +321,11 @@ class SplatScene {
       for (float& s : in.scale) s = std::exp(s);
       has_logarithms_ = true;
     }
+    if (!in.provenance.empty()) {
+      leave_unlabelled(splats_.size());
+      splats_.provenance.insert(
+          splats_.provenance.end(), in.provenance.begin(), in.provenance.end());
+    }
     const SplatTurn turn(linear);
     for (size_t i = 0; i < in.count; ++i) {
       const Eigen::Vector3d p = in.three(in.position, i);
@@ -323,6 +334,11 @@ class SplatScene {
       append_shape(in, i, turn);
       append_harmonics(in, i, turn, is_linear);
     }
+  }
+
+  /// Splats up to there that no primitive gave a label.
+  void leave_unlabelled(size_t end) {
+    splats_.provenance.resize(end, std::numeric_limits<float>::quiet_NaN());
   }
 
   void append_shape(const Attributes& in, size_t i, const SplatTurn& turn) {

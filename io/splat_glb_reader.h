@@ -25,7 +25,9 @@ bool is_splat_glb(const std::filesystem::path& path);
 
 /// Reads every splat of the default scene of a binary glTF file, nodes placed as the file says:
 /// they turn, scale and mirror splats and their spherical harmonics too (harmonics are only turned
-/// where a node scales its axes differently). Attributes may be floats or whole numbers.
+/// where a node scales its axes differently). Attributes may be floats or whole numbers;
+/// _PROVENANCE is read where it is one number per splat, and NaN for splats of primitives without
+/// it.
 ///
 /// Files of ours lead back to world coordinates, with unit and origin. Others are in metres with +Y
 /// up, as the format demands, and are turned half way around z, into the axes of the 3DGS PLY.

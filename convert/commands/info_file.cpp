@@ -115,6 +115,9 @@ void print_splats(const Json& info) {
   if (!info["evidence"].is_null()) {
     std::printf("evidence: %s\n", one_line(info["evidence"].get<std::string>()).c_str());
   }
+  if (!info["provenance"].is_null()) {
+    std::printf("%s\n", info["provenance"]["words"].get<std::string>().c_str());
+  }
   print_warnings(info);
 }
 

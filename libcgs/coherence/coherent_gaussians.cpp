@@ -262,6 +262,7 @@ void CoherentGaussians::add_pane(const Pane& pane, const Camera& camera) {
   const float opacity = -std::log1p(-pane.opacity) / kOverlap;
   const size_t first = gaussians_.size();
   const auto harmonics = static_cast<size_t>(gaussians_.sh_count());
+  const bool states_provenance = !gaussians_.provenance.empty();
   ViewState view{camera, pane.depth, pane.depth, {}, {}, {}, {}, {}, logit(opacity), kRadius, true};
   for (size_t i = 0; i < pane.depth.data.size(); ++i) {
     if (!has_gaussian(pane.depth.data[i])) continue;
@@ -273,6 +274,7 @@ void CoherentGaussians::add_pane(const Pane& pane, const Camera& camera) {
     gaussians_.opacity.push_back(opacity);
     gaussians_.sh.push_back((pane.color.data[i] - Eigen::Vector3f::Constant(0.5f)) / kShC0);
     gaussians_.sh.resize(gaussians_.size() * harmonics, Eigen::Vector3f::Zero());
+    if (states_provenance) gaussians_.provenance.push_back(Provenance::Estimated);
   }
   view.range = {first, gaussians_.size()};
   views_.push_back(std::move(view));

@@ -75,6 +75,9 @@ void require_decodable(const Scene& scene, const CoherenceOptions& options);
 /// drawn from, after those of all views. They stay on its plane, and are wide enough that together
 /// they are about as opaque in pictures of other sizes.
 ///
+/// Labels are those of initial_gaussians(), wherever a Gaussian moves; a pane is estimated: its
+/// place is what explains the pictures best, and no pixel measured it.
+///
 /// Source: Paliwal et al. 2024, "CoherentGS", section 3; the residual here is relative to depth
 ///         and bounded, and lattices may stand in for the convolutional decoders.
 class CoherentGaussians {

@@ -23,6 +23,30 @@ void require_same_sizes(const View& view, const ViewPriors& priors) {
           view.name);
 }
 
+// \pre the pixel has a depth
+Provenance label_of(const ViewPriors& priors, size_t pixel) {
+  const DepthEvidence evidence = depth_evidence(priors.origin.data[pixel]);
+  if (evidence == DepthEvidence::Adjoining) return Provenance::SingleView;
+  if (evidence != DepthEvidence::Measured) return Provenance::Estimated;
+  const bool is_matched = priors.matched_views.data[pixel] > 0;
+  return is_matched ? Provenance::Observed : Provenance::SingleView;
+}
+
+// In the order of the Gaussians; empty where the priors of a view do not say how they know.
+std::vector<Provenance> labels_of(const std::vector<ViewPriors>& priors) {
+  std::vector<Provenance> out;
+  for (const ViewPriors& p : priors) {
+    const std::vector<float>& depth = p.depth.data;
+    if (p.origin.data.size() != depth.size() || p.matched_views.data.size() != depth.size()) {
+      return {};
+    }
+    for (size_t i = 0; i < depth.size(); ++i) {
+      if (has_gaussian(depth[i])) out.push_back(label_of(p, i));
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 void InitialisationOptions::validate() const {
@@ -56,6 +80,7 @@ Gaussians initial_gaussians(const Scene& scene,
       }
     }
   }
+  out.provenance = labels_of(priors);
   return out;
 }
 

@@ -28,6 +28,10 @@ inline double pixel_size(const Camera& camera) { return 2 / (camera.fx + camera.
 /// One isotropic Gaussian per pixel with depth, on the ray through the pixel's centre, of the
 /// pixel's colour (SH degree 0).
 ///
+/// Each is labelled by what vouches for its depth: observed where another view confirms it; single
+/// view where a sensor measured it, or a place right beside it is measured; estimated elsewhere, in
+/// the sky too. None has a label where the priors of a view state no origin or matched views.
+///
 /// \param priors in the order of scene.input; pixels of NaN depth are skipped
 /// \return view-major, row-major [internal units]
 /// \throws InvalidInput if priors, images and cameras are not of one size

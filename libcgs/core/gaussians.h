@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "libcgs/core/frame.h"
+#include "libcgs/core/provenance.h"
 
 namespace cgs {
 
@@ -15,7 +16,8 @@ inline constexpr float kShC0 = 0.28209479177387814f;
 /// That of the linear ones: Y_1 = kShC1 * (-y, z, -x).
 inline constexpr float kShC1 = 0.4886025119029199f;
 
-/// A set of 3D Gaussians, one entry per Gaussian in every array, as values (no log, no logit).
+/// A set of 3D Gaussians, one entry per Gaussian in every array, as values (no log, no logit); only
+/// provenance may be empty.
 /// Positions and scales are in internal units of the canonical frame that comes with it.
 struct Gaussians {
   std::vector<Eigen::Vector3f> position;  ///< [internal units]
@@ -24,6 +26,7 @@ struct Gaussians {
   std::vector<float> opacity;             ///< In (0, 1).
   int sh_degree = 0;                      ///< 0 … 3
   std::vector<Eigen::Vector3f> sh;        ///< size() * sh_count() RGB coefficients, Gaussian-major.
+  std::vector<Provenance> provenance;     ///< What vouches for each; empty = nobody states it.
 
   size_t size() const { return position.size(); }
   int sh_count() const { return (sh_degree + 1) * (sh_degree + 1); }

@@ -247,6 +247,27 @@ TEST_F(Conversion, CarriesTheEvidenceOfSplatsAndWhatWasLeftOutOfThem) {
   EXPECT_TRUE(words.starts_with("82 % measured; removed 1 of 4001 splats as floaters")) << words;
 }
 
+TEST_F(Conversion, CarriesTheLabelsOfTheSplatsThatStay) {
+  Gaussians g;
+  test::add_sphere(g, {0, 0, 2}, 0.5, 4000);
+  test::add_disc(g, {0.7, 0, 2}, Eigen::Vector3d::UnitX(), 0.01);
+  g.provenance.assign(4000, Provenance::Observed);
+  g.provenance[7] = Provenance::SingleView;
+  g.provenance.push_back(Provenance::Estimated);  // the disc floats
+  write_gaussian_ply(dir_ / "labelled.ply", g, Frame{});
+  const auto report = convert("labelled.ply", "a.glb", [](ConversionRequest& r) {
+    r.as = "splats";
+    r.filter_floaters = true;
+  });
+  EXPECT_EQ(report["splats"]["provenance"]["estimated"], 1);
+  EXPECT_EQ(report["output"]["provenance"]["words"], "estimated: none of the splats");
+  convert("a.glb", "b.ply", [](ConversionRequest& r) { r.as = "splats"; });
+  g.provenance.pop_back();
+  EXPECT_EQ(read_splats(dir_ / "b.ply").gaussians.provenance, g.provenance);
+  convert("b.ply", "c.spz");
+  EXPECT_TRUE(read_splats(dir_ / "c.spz").gaussians.provenance.empty());
+}
+
 TEST_F(Conversion, RefusesWhatWouldNotFitBeforeAndAfterReading) {
   const auto refusal = [&](size_t limit) -> std::string {
     try {

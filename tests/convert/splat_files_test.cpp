@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/splat_files.h"
 
+#include <algorithm>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -84,6 +85,54 @@ TEST(WriteSplatFile, SaysWhatTheSplatsRestOnWhereItCan) {
         << name;
     EXPECT_TRUE(splat_file_to_json(read_splats(dir / name))["evidence"].is_null()) << name;
   }
+}
+
+TEST(WriteSplatFile, SaysHowManyAreEstimatedAndWhichFormatsForgetIt) {
+  const test::TempDir dir;
+  Frame frame;
+  frame.up = -Eigen::Vector3d::UnitY();
+  Gaussians g = ball(400);
+  g.provenance.assign(400, Provenance::Observed);
+  std::fill_n(g.provenance.begin(), 48, Provenance::Estimated);
+  Terminal terminal(false);
+  const auto told = [&](const std::string& name) {
+    testing::internal::CaptureStderr();
+    const auto report = write_splat_file(dir / name, g, frame, {}, terminal);
+    const std::string text = testing::internal::GetCapturedStderr();
+    EXPECT_NE(text.find("estimated: 12 % of the splats\n"), std::string::npos) << text;
+    const bool is_kept = !report["provenance"].is_null();
+    EXPECT_EQ(report["loss"]["provenance"]["after"], is_kept) << name;
+    const auto info = splat_file_to_json(read_splats(dir / name));
+    EXPECT_EQ(info["provenance"], report["provenance"]) << name;
+    return text;
+  };
+  for (const std::string name : {"a.glb", "a.ply"}) {
+    EXPECT_EQ(told(name).find("hold no"), std::string::npos) << name;
+    const auto stated = splat_file_to_json(read_splats(dir / name))["provenance"];
+    EXPECT_EQ(stated["observed"], 352) << name;
+    EXPECT_EQ(stated["estimated"], 48) << name;
+    EXPECT_EQ(stated["single_view"], 0) << name;
+  }
+  for (const std::string ending : {".splat", ".spz", ".compressed.ply"}) {
+    EXPECT_NE(told("a" + ending).find(ending + " files hold no provenance of the scene"),
+              std::string::npos);
+  }
+}
+
+TEST(SplatFileToJson, RoundsNothingUpToAllOrDownToNone) {
+  GaussianFile file;
+  file.gaussians = ball(400);
+  const auto words = [&](size_t estimated) {
+    file.gaussians.provenance.assign(400, Provenance::SingleView);
+    std::fill_n(file.gaussians.provenance.begin(), estimated, Provenance::Estimated);
+    return splat_file_to_json(file)["provenance"]["words"].get<std::string>();
+  };
+  EXPECT_TRUE(splat_file_to_json(file)["provenance"].is_null());
+  EXPECT_EQ(words(0), "estimated: none of the splats");
+  EXPECT_EQ(words(1), "estimated: under 1 % of the splats");
+  EXPECT_EQ(words(200), "estimated: 50 % of the splats");
+  EXPECT_EQ(words(399), "estimated: over 99 % of the splats");
+  EXPECT_EQ(words(400), "estimated: 100 % of the splats");
 }
 
 TEST(WriteSplatFile, LeavesTheFileAndSaysWhyWhereItCannotBeReadBack) {

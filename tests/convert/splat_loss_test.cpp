@@ -69,6 +69,19 @@ TEST(SplatLoss, DoesNotJudgePicturesThatShowNothing) {
   EXPECT_NE(splat_loss_line(loss, Frame{}).find("show too little"), std::string::npos);
 }
 
+TEST(SplatLoss, SaysThatLabelsAreGone) {
+  Gaussians source = ball();
+  source.provenance.assign(source.size(), Provenance::Estimated);
+  const auto line = [&](const Gaussians& written) {
+    return splat_loss_line(splat_loss(source, written, {}), Frame{});
+  };
+  EXPECT_EQ(line(source).find("provenance"), std::string::npos);
+  EXPECT_NE(line(ball()).find("centres as they were, without provenance; "), std::string::npos);
+  const auto json = splat_loss_to_json(splat_loss(source, ball(), {}), Frame{});
+  EXPECT_EQ(json["provenance"]["before"], true);
+  EXPECT_EQ(json["provenance"]["after"], false);
+}
+
 TEST(SplatLoss, SaysWhatIsMissing) {
   const Gaussians source = ball();
   Gaussians written = source;

@@ -58,6 +58,7 @@ void append(Gaussians& to, const Gaussians& g) {
   to.rotation.insert(to.rotation.end(), g.rotation.begin(), g.rotation.end());
   to.opacity.insert(to.opacity.end(), g.opacity.begin(), g.opacity.end());
   to.sh.insert(to.sh.end(), g.sh.begin(), g.sh.end());
+  to.provenance.insert(to.provenance.end(), g.provenance.begin(), g.provenance.end());
 }
 
 WeighedSplats merged(const Gaussians& g, float most_cost) {
@@ -205,6 +206,30 @@ TEST(MergeSplats, MakesOneOfTwoLayers) {
     EXPECT_LT((out.splats.sh[i] - one.sh[i]).norm(), 1e-5f);
     EXPECT_GT(out.splats.opacity[i], 0.9f);
   }
+}
+
+// One layer knows more here, the other one there: of each pair the weaker label is left.
+TEST(MergeSplats, TakesTheWeakestEvidenceOfItsParts) {
+  Gaussians one = wall(noisy);
+  Gaussians other = one;
+  one.provenance.assign(one.size(), Provenance::Observed);
+  other.provenance.assign(other.size(), Provenance::Observed);
+  for (size_t i = 0; i < one.size(); ++i) {
+    if (i % 3 == 1) one.provenance[i] = Provenance::Estimated;
+    if (i % 3 == 2) other.provenance[i] = Provenance::SingleView;
+  }
+  Gaussians two = one;
+  append(two, other);
+  const WeighedSplats out = merged(two, 0.0005f);
+  ASSERT_EQ(out.splats.size(), one.size());
+  ASSERT_EQ(out.splats.provenance.size(), one.size());
+  for (size_t i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(out.splats.provenance[i],
+              i % 3 == 0   ? Provenance::Observed
+              : i % 3 == 1 ? Provenance::Estimated
+                           : Provenance::SingleView);
+  }
+  EXPECT_TRUE(merged(wall(noisy), 0.0005f).splats.provenance.empty());
 }
 
 TEST(MergeSplats, KeepsSurfacesApartThatLieBehindEachOther) {

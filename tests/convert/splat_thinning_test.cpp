@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/splat_thinning.h"
 
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -294,6 +295,33 @@ TEST_F(ThinSplatsTest, LeavesSplatsAloneThatAreNotOfTheViews) {
 TEST_F(ThinSplatsTest, LetsAPaneFollowThoseOfTheViews) {
   w_.counts[2] -= 100;
   EXPECT_FALSE(thinned(w_).tried.empty());
+}
+
+// What is merged over the border, or fitted to pictures, lies beside it by no more than its size.
+TEST_F(ThinSplatsTest, KeepsTheLabelsOfBothSidesOfABorder) {
+  for (const Eigen::Vector3f& p : w_.splats.position) {
+    w_.splats.provenance.push_back(p.x() < 0 ? Provenance::Observed : Provenance::Estimated);
+  }
+  const ThinnedSplats out = thinned(w_);
+  ASSERT_TRUE(out.most_cost.has_value());
+  ASSERT_LT(out.splats.size(), w_.splats.size() / 2);
+  ASSERT_EQ(out.splats.provenance.size(), out.splats.size());
+  std::array<size_t, kProvenanceCount> counts{};
+  for (size_t i = 0; i < out.splats.size(); ++i) {
+    const Provenance label = out.splats.provenance[i];
+    ++counts.at(static_cast<size_t>(label));
+    const double pixels = double(out.splats.position[i].x()) / kPixel;
+    if (label == Provenance::Observed) {
+      EXPECT_LT(pixels, 3);
+    } else {
+      EXPECT_GT(pixels, -kMargin);
+    }
+  }
+  const size_t observed = counts.at(static_cast<size_t>(Provenance::Observed));
+  const size_t estimated = counts.at(static_cast<size_t>(Provenance::Estimated));
+  EXPECT_EQ(observed + estimated, out.splats.size());
+  EXPECT_GT(4 * observed, out.splats.size());
+  EXPECT_GT(4 * estimated, out.splats.size());
 }
 
 TEST_F(ThinSplatsTest, NamesWhatItTried) {

@@ -26,5 +26,18 @@ TEST(WriteWebSplats, SaysWhatTheModelRestsOn) {
   EXPECT_EQ(read_splats(dir / "splats.glb").evidence, "82 % measured");
 }
 
+TEST(WriteWebSplats, KeepsTheLabelsOfTheModel) {
+  const test::TempDir dir;
+  Model model;
+  model.gaussians = test::varied_splats(20, 0);
+  model.gaussians.provenance.assign(20, Provenance::Observed);
+  model.gaussians.provenance[3] = Provenance::Estimated;
+  model.scene.views.emplace_back();
+  model.scene.input = {0};
+  model.scene.frame.up = -Eigen::Vector3d::UnitY();
+  write_web_splats(dir.path(), model);
+  EXPECT_EQ(read_splats(dir / "splats.glb").gaussians.provenance, model.gaussians.provenance);
+}
+
 }  // namespace
 }  // namespace cgs::web_splats_test

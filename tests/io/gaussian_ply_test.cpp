@@ -98,6 +98,31 @@ TEST(GaussianPly, ComesBackAtEveryDegree) {
   }
 }
 
+Gaussians labelled(Gaussians g) {
+  for (size_t i = 0; i < g.size(); ++i) {
+    g.provenance.push_back(static_cast<Provenance>(i % kProvenanceCount));
+  }
+  return g;
+}
+
+TEST(GaussianPly, BringsLabelsBackAndIsTheSameWithoutThem) {
+  const test::TempDir dir;
+  const Gaussians g = labelled(sample(1));
+  write_gaussian_ply(dir / "a.ply", g, exact_frame());
+  const GaussianFile back = read_gaussian_ply(dir / "a.ply", exact_frame());
+  EXPECT_TRUE(back.warnings.empty());
+  EXPECT_EQ(back.gaussians.provenance, g.provenance);
+  EXPECT_EQ(back.gaussians.sh, g.sh);
+  write_gaussian_ply(dir / "again.ply", back.gaussians, exact_frame());
+  EXPECT_EQ(read_gaussian_ply(dir / "again.ply", exact_frame()).gaussians.provenance, g.provenance);
+  const std::string head = test::read_bytes(dir / "a.ply");
+  EXPECT_NE(head.find("property float rot_3\nproperty float provenance\nend_header\n"),
+            std::string::npos);
+  write_gaussian_ply(dir / "bare.ply", sample(1), exact_frame());
+  EXPECT_EQ(test::read_bytes(dir / "bare.ply").find("provenance"), std::string::npos);
+  EXPECT_TRUE(read_gaussian_ply(dir / "bare.ply").gaussians.provenance.empty());
+}
+
 // Their logits lie between 0 and 1, as probabilities would.
 TEST(GaussianPly, OurOwnHalfOpaqueSplatsAreNotTakenForProbabilities) {
   const test::TempDir dir;
@@ -286,6 +311,29 @@ TEST(GaussianPly, ReadsPropertiesInAnyOrderAndType) {
   EXPECT_FLOAT_EQ(g.opacity[0], 1 / (1 + std::exp(1.0f)));
 }
 
+TEST(GaussianPly, ReadsLabelsOfAnyTypeAndLeavesOutWhatIsNone) {
+  const auto read = [](const std::string& property, const std::string& value) {
+    return read_dialect(
+        property + "\n" + lines_of({"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"}) +
+            lines_of({"scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"}),
+        value + " 0 0 0 0 0 0 2 -3 -4 -5 1 0 0 0");
+  };
+  const std::vector<Provenance> estimated(2, Provenance::Estimated);
+  for (const std::string type : {"uchar", "int", "float", "double"}) {
+    EXPECT_EQ(read("property " + type + " provenance", "5").gaussians.provenance, estimated)
+        << type;
+  }
+  for (const std::string value : {"6", "-1", "0.5", "nan", "1e300"}) {
+    const GaussianFile out = read("property double provenance", value);
+    EXPECT_TRUE(out.gaussians.provenance.empty()) << value;
+    EXPECT_TRUE(warns(out, "provenance of the splats left out")) << value;
+    EXPECT_EQ(out.gaussians.size(), 2u) << value;
+  }
+  const GaussianFile others = read("property list uchar float provenance", "1 7");
+  EXPECT_TRUE(others.gaussians.provenance.empty());
+  EXPECT_FALSE(warns(others, "provenance"));
+}
+
 TEST(GaussianPly, Reads2DSplatsAsThinOnes) {
   const GaussianFile out =
       read_dialect(lines_of({"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"}) +
@@ -362,7 +410,7 @@ TEST(GaussianPly, NoticesAFullDisk) {
 TEST(GaussianPly, KeepsTheBytesOfSplatsWhenItsFrameIsToldAnew) {
   const test::TempDir dir;
   Frame frame = exact_frame();
-  const Gaussians g = sample(1, 5000);
+  const Gaussians g = labelled(sample(1, 5000));
   write_gaussian_ply(dir / "told.ply", g, frame);
   frame.up = Eigen::Vector3d(0.1, 0.2, 0.3).normalized();
   frame.metres_per_unit = 0.025;
@@ -409,6 +457,7 @@ TEST(GaussianPly, RefusesToWriteWhatItCouldNotRead) {
   refused([](Gaussians& g) { g.sh.pop_back(); });
   refused([](Gaussians& g) { g.rotation.pop_back(); });
   refused([](Gaussians& g) { g.sh_degree = 4; });
+  refused([](Gaussians& g) { g.provenance.assign(3, Provenance::Observed); });
   EXPECT_EQ(test::entries(dir.path()), 0);
 }
 

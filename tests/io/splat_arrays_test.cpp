@@ -40,6 +40,7 @@ TEST(RequireWritable, NamesTheArrayOfAnotherLength) {
   names("opacity", [](Gaussians& g) { g.opacity.clear(); });
   names("sh ", [](Gaussians& g) { g.sh.pop_back(); });
   names("sh ", [](Gaussians& g) { g.sh_degree = 0; });
+  names("provenance", [](Gaussians& g) { g.provenance.assign(2, Provenance::Observed); });
   names("sh_degree", [](Gaussians& g) { g.sh_degree = 4; });
   names("sh_degree", [](Gaussians& g) { g.sh_degree = -1; });
 }
@@ -60,6 +61,14 @@ TEST(RequireWritable, RefusesValuesThatNoFileCanHold) {
     EXPECT_NE(refusal([&](Gaussians& g) { g.opacity[0] = opacity; }), "") << opacity;
   }
   EXPECT_EQ(refusal([](Gaussians& g) { g.rotation[0] *= 100; }), "") << "of any length";
+  const auto labelled = [](int last) {
+    return refusal([=](Gaussians& g) {
+      g.provenance.assign(3, Provenance::Observed);
+      g.provenance[2] = static_cast<Provenance>(last);
+    });
+  };
+  EXPECT_EQ(labelled(5), "");
+  EXPECT_NE(labelled(6), "");
 }
 
 TEST(RequireRotation, TakesRoundingAndNeitherScaleNorReflection) {

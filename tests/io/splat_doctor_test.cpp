@@ -100,6 +100,46 @@ TEST(SplatDoctor, CountsEveryDefectApart) {
   EXPECT_EQ(out.gaussians.sh[4 * 2 + 3], g.sh[4 * 9 + 3]);
 }
 
+// Of a healthy file: 0, 1, … 5, 0, 1, …
+std::vector<float> all_labels(size_t count = 400) {
+  std::vector<float> out;
+  for (size_t i = 0; i < count; ++i) out.push_back(static_cast<float>(i % kProvenanceCount));
+  return out;
+}
+
+TEST(SplatDoctor, KeepsTheLabelsOfSplatsThatStay) {
+  const GaussianFile out = examined([](RawSplats& raw) {
+    raw.provenance = all_labels();
+    raw.provenance[1] = 17;  // dropped, so that nobody asks
+    raw.rotation[1].setZero();
+    raw.log_scale[3].x() = 50;  // only too large once it is moved
+  });
+  EXPECT_EQ(out.findings.dropped(), 2u);
+  ASSERT_EQ(out.gaussians.provenance.size(), 398u);
+  EXPECT_EQ(out.gaussians.provenance[0], Provenance::Inferred);
+  EXPECT_EQ(out.gaussians.provenance[1], Provenance::Observed);
+  EXPECT_EQ(out.gaussians.provenance[2], Provenance::Virtual);
+  EXPECT_EQ(out.gaussians.provenance[3], Provenance::Estimated);
+  EXPECT_FALSE(warns(out, "provenance"));
+  EXPECT_TRUE(examined([](RawSplats&) {}).gaussians.provenance.empty());
+}
+
+TEST(SplatDoctor, LeavesAllLabelsOutWhereASplatHasNone) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinite = std::numeric_limits<float>::infinity();
+  for (const float bad : {nan, infinite, -infinite, -1.0f, 6.0f, 2.5f, 1e30f}) {
+    const GaussianFile out = examined([&](RawSplats& raw) {
+      raw.provenance = all_labels();
+      raw.provenance[7] = raw.provenance[9] = bad;
+    });
+    EXPECT_TRUE(out.gaussians.provenance.empty()) << bad;
+    EXPECT_TRUE(
+        warns(out, "provenance of the splats left out: 2 splats without a label from 0 to 5"))
+        << bad;
+    EXPECT_EQ(out.gaussians.size(), 400u);
+  }
+}
+
 TEST(SplatDoctor, OpacitiesAreThoseOfDoubleAndNeverOne) {
   const std::vector<float> logits = {
       -1e30f, -88, -17, -16.6f, -12, -8, 0, 3, 4.5f, 8, 12, 16.6f, 17, 88, 1e30f};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/splat_glb_reader.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -188,6 +189,55 @@ TEST(SplatGlbReader, TellsWhatFilesOfOursSayTheyRestOn) {
   write_splat_glb(dir / "silent.glb", g, Frame{});
   EXPECT_EQ(read_splats(dir / "silent.glb").evidence, "");
   EXPECT_EQ(test::read_bytes(dir / "silent.glb").find("evidence"), std::string::npos);
+}
+
+TEST(SplatGlbReader, BringsLabelsBack) {
+  const test::TempDir dir;
+  Gaussians g = test::varied_splats(20, 1);
+  write_splat_glb(dir / "a.glb", g, Frame{});
+  EXPECT_TRUE(read_splats(dir / "a.glb").gaussians.provenance.empty());
+  for (size_t i = 0; i < 20; ++i) g.provenance.push_back(static_cast<Provenance>(i % 6));
+  write_splat_glb(dir / "a.glb", g, Frame{});
+  const GaussianFile back = read_splats(dir / "a.glb");
+  EXPECT_TRUE(back.warnings.empty());
+  EXPECT_EQ(back.gaussians.provenance, g.provenance);
+}
+
+TEST(SplatGlbReader, ReadsLabelsOfEveryPrimitiveInWholeNumbersToo) {
+  OthersGlb file = others(3, 0);
+  file.add(test::varied_splats(2, 0));
+  const auto state = [&](size_t primitive, size_t index) {
+    file.json["accessors"][index]["normalized"] = false;
+    file.primitive(primitive)["attributes"]["_PROVENANCE"] = index;
+  };
+  state(1, file.accessor(std::vector<float>{5, 2}, "SCALAR", kFloat));
+  const RawSplats some = file.read();
+  ASSERT_EQ(some.provenance.size(), 5u);
+  EXPECT_TRUE(std::isnan(some.provenance[0]) && std::isnan(some.provenance[2]));
+  EXPECT_EQ(some.provenance[3], 5);
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.glb", file.bytes());
+  const GaussianFile judged = read_splats(dir / "a.glb");
+  EXPECT_TRUE(judged.gaussians.provenance.empty());
+  EXPECT_TRUE(
+      std::any_of(judged.warnings.begin(), judged.warnings.end(), [](const std::string& warning) {
+        return warning.find("3 splats without a label") != std::string::npos;
+      }));
+  state(0, file.accessor(std::vector<uint8_t>{1, 0, 4}, "SCALAR", kUnsignedByte));
+  EXPECT_EQ(file.read().provenance, (std::vector<float>{1, 0, 4, 5, 2}));
+  file.primitive(1)["attributes"].erase("_PROVENANCE");
+  EXPECT_TRUE(std::isnan(file.read().provenance[4]));
+}
+
+TEST(SplatGlbReader, DoesNotTakeWhatOthersNameAlikeForLabels) {
+  OthersGlb file = others(2, 0);
+  file.primitive()["attributes"]["_PROVENANCE"] =
+      file.accessor(std::vector<float>{1, 2, 3, 4}, "VEC2", kFloat);
+  EXPECT_TRUE(file.read().provenance.empty());
+  EXPECT_TRUE(file.read().notes.empty());
+  file.primitive()["attributes"]["_PROVENANCE"] =
+      file.accessor(std::vector<float>{1}, "SCALAR", kFloat);
+  EXPECT_EQ(file.defect(), "COUNT");
 }
 
 TEST(SplatGlbReader, KeepsAnUnknownScaleUnknown) {

@@ -91,6 +91,14 @@ TEST(SplatGlb, HoldsEveryAttributeAsTheExtensionNamesIt) {
   }
 }
 
+TEST(SplatGlb, HoldsLabelsInAnAttributeOfItsOwn) {
+  Gaussians g = test::varied_splats(3, 0);
+  g.provenance = {Provenance::Observed, Provenance::Estimated, Provenance::Inferred};
+  const GlbFile file = written(g, Frame{}, -Eigen::Vector3d::UnitY());
+  EXPECT_EQ(file.json["meshes"][0]["primitives"][0]["attributes"].size(), 5u + 1u + 1u);
+  EXPECT_EQ(file.attribute("_PROVENANCE"), (std::vector<float>{2, 5, 0}));
+}
+
 TEST(SplatGlb, StandsUprightInMetresAndKnowsItsPlace) {
   const Gaussians g = test::varied_splats(50, 0);
   const Frame frame = test::centimetre_frame();

@@ -520,6 +520,32 @@ TEST(CoherentGaussians, PutAPaneAfterThoseOfTheViews) {
   }
 }
 
+TEST(CoherentGaussians, KeepTheLabelsOfTheirPixelsAndEstimateAPane) {
+  std::vector<ViewPriors> priors = priors_of(2);
+  for (ViewPriors& p : priors) {
+    p.origin = Raster<DepthOrigin>(kWidth, kHeight, DepthOrigin::Measured);
+    p.origin(3, 3) = DepthOrigin::Unknown;
+    p.sigma = DepthMap(kWidth, kHeight, 0.01f);
+    p.matched_views = Raster<uint8_t>(kWidth, kHeight, 1);
+  }
+  priors[1].origin(2, 0) = DepthOrigin::Completed;
+  priors[1].origin(5, 0) = DepthOrigin::Sky;
+  const Pane pane = pane_before_left_half();
+  CoherentGaussians model(scene_of(2), priors, small_lattices(), &pane);
+  std::vector<Provenance> expected(model.gaussians().size(), Provenance::Observed);
+  expected[model.range(1).first + 2] = Provenance::SingleView;
+  expected[model.range(1).first + 5] = Provenance::Estimated;
+  for (size_t i = model.range(2).first; i < model.range(2).last; ++i) {
+    expected[i] = Provenance::Estimated;
+  }
+  EXPECT_EQ(model.gaussians().provenance, expected);
+  randomise(model, 4);
+  model.decode();
+  EXPECT_EQ(model.gaussians().provenance, expected);
+  const CoherentGaussians silent(scene_of(2), priors_of(2), small_lattices(), &pane);
+  EXPECT_TRUE(silent.gaussians().provenance.empty());
+}
+
 TEST(CoherentGaussians, GradientsOfAPaneMatchFiniteDifferences) {
   const Pane pane = pane_before_left_half();
   CoherentGaussians model(scene_of(2), priors_of(2), small_lattices(), &pane);

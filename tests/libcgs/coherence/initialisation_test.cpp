@@ -73,6 +73,36 @@ TEST(InitialGaussians, SkipPixelsWithoutDepth) {
   EXPECT_EQ(initial_gaussians(scene_of(2), priors).size(), 46u);
 }
 
+TEST(InitialGaussians, AreLabelledByWhatVouchesForTheirDepth) {
+  std::vector<ViewPriors> priors = priors_of(2);
+  for (ViewPriors& p : priors) {
+    p.origin = Raster<DepthOrigin>(6, 4, DepthOrigin::Measured);
+    p.matched_views = Raster<uint8_t>(6, 4, 1);
+  }
+  ViewPriors& second = priors[1];
+  second.depth.data[0] = std::numeric_limits<float>::quiet_NaN();
+  second.origin.data[0] = DepthOrigin::Unknown;
+  second.matched_views.data[1] = 0;  // a depth sensor
+  second.origin.data[2] = DepthOrigin::Completed;
+  second.origin.data[3] = DepthOrigin::Guessed;
+  second.origin.data[4] = DepthOrigin::Estimated;
+  second.origin.data[5] = DepthOrigin::Sky;
+  const Gaussians gaussians = initial_gaussians(scene_of(2), priors);
+  std::vector<Provenance> expected(47, Provenance::Observed);
+  for (const size_t i : {24, 25, 26}) expected[i] = Provenance::SingleView;
+  for (const size_t i : {27, 28}) expected[i] = Provenance::Estimated;
+  EXPECT_EQ(gaussians.size(), 47u);
+  EXPECT_EQ(gaussians.provenance, expected);
+}
+
+TEST(InitialGaussians, HaveNoLabelsWhereAViewDoesNotSayHowItKnows) {
+  std::vector<ViewPriors> priors = priors_of(2);
+  EXPECT_TRUE(initial_gaussians(scene_of(2), priors).provenance.empty());
+  priors[0].origin = Raster<DepthOrigin>(6, 4, DepthOrigin::Measured);
+  priors[0].matched_views = Raster<uint8_t>(6, 4, 1);
+  EXPECT_TRUE(initial_gaussians(scene_of(2), priors).provenance.empty());
+}
+
 TEST(InitialGaussians, RefusesPriorsThatDoNotFit) {
   EXPECT_THROW(initial_gaussians(scene_of(2), priors_of(3)), InvalidInput);
   std::vector<ViewPriors> priors = priors_of(2);
