@@ -18,6 +18,7 @@ namespace cgs {
 
 namespace {
 
+constexpr float kFar = std::numeric_limits<float>::max();
 
 bool is_filled(DepthOrigin origin) {
   return origin == DepthOrigin::Completed || origin == DepthOrigin::Guessed;
