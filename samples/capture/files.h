@@ -15,7 +15,7 @@ namespace cgs {
 /// (channel Z [m]), <view>_normal.exr (N.X N.Y N.Z, world) and <view>_seen.png (number of input
 /// views that see the point).
 ///
-/// \param views   all or some of capture_views()
+/// \param views   all or some of capture_views(), or of those of another scene
 /// \param inputs  the cameras that count as having seen something
 /// \throws IoError
 void write_capture(const std::filesystem::path& folder,

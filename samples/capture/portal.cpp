@@ -11,6 +11,7 @@
 
 #include "samples/capture/arch.h"
 #include "samples/capture/carving.h"
+#include "samples/capture/mason.h"
 #include "samples/capture/noise.h"
 #include "samples/capture/solids.h"
 
@@ -23,36 +24,6 @@ using Eigen::Vector3d;
 using std::numbers::pi;
 
 constexpr double kHalfWidth = 6.5;  // of wall and ground [m]
-
-// Uneven stone: moves vertices by a few millimetres in all directions.
-void weather(TriangleMesh& mesh, float amplitude, uint32_t seed) {
-  const NoiseBand band{.longest = 0.5F, .shortest = 0.06F, .gain = 0.6F};
-  for (auto& v : mesh.vertices) {
-    const Eigen::Vector3f p = v;
-    for (uint32_t k = 0; k < 3; ++k) {
-      v[k] += amplitude * band_noise(p, band, 0.01F, seed + 101 * k);
-    }
-  }
-}
-
-class Mason {
- public:
-  explicit Mason(PortalScene& scene) : scene_(scene) {}
-
-  void add(const std::string& name, Material material, const TriangleMesh& mesh) {
-    add_part(scene_, name, material, mesh);
-  }
-
-  // Stone: edges no longer than max_edge [m], then made uneven.
-  void add_stone(const std::string& name, Material material, TriangleMesh mesh, double max_edge) {
-    refine(mesh, max_edge);
-    weather(mesh, 0.004F, static_cast<uint32_t>(scene_.parts.size()) * 977U);
-    add(name, material, mesh);
-  }
-
- private:
-  PortalScene& scene_;
-};
 
 // The front is a net of its own; what lies behind it is hidden and stays coarse.
 void add_wall(Mason& mason) {
@@ -156,18 +127,6 @@ void add_columns(Mason& mason) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.translation() << 0, 1.20, 0;
   mason.add_stone("middle pillar", Material::Carved, moved(lathed(pillar), pose), 0.1);
-}
-
-struct Panel {
-  Relief relief;
-  Vector3d place = Vector3d::Zero();  // of its lower middle
-};
-
-void add_panel(Mason& mason, const std::string& name, Panel panel, Material material) {
-  panel.relief.depth = 0.15;
-  panel.place.y() -= 0.01;
-  const Eigen::Isometry3d pose(Eigen::Translation3d(panel.place));
-  mason.add(name, material, moved(carved(panel.relief), pose));
 }
 
 void add_reliefs(Mason& mason) {

@@ -3,11 +3,13 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
+#include "libcgs/core/srgb.h"
 #include "samples/capture/noise.h"
 #include "samples/capture/surface_colour.h"
 
@@ -23,6 +25,7 @@ constexpr int kSkyRays = 24;
 constexpr double kSkyReach = 1.2;    // [m]
 constexpr int kSamples = 2;          // per pixel and axis
 constexpr double kOffGround = 1e-5;  // start of secondary rays above the surface [m]
+constexpr float kMirrored = 0.3F;    // share of the light that comes from before a pane
 
 const Vector3d kToSun = Vector3d(-0.50, -0.72, 0.60).normalized();
 const Vector3f kSun(1.65F, 1.53F, 1.30F);
@@ -56,6 +59,17 @@ float gaussian(uint32_t counter, uint32_t seed) {
   return std::sqrt(-2 * std::log(u)) * std::cos(2 * static_cast<float>(pi) * v);
 }
 
+// Whether a ray meets a pane before it has come as far as `t_max`.
+bool passes(const GlassPane& pane, const Ray& ray, double t_max) {
+  const Vector3d normal = pane.across.cross(pane.up);
+  const double t = (pane.corner - ray.origin).dot(normal) / ray.direction.dot(normal);
+  if (!(t > ray.t_min && t < t_max)) return false;
+  const Vector3d from_corner = ray.origin + t * ray.direction - pane.corner;
+  const double u = from_corner.dot(pane.across) / pane.across.squaredNorm();
+  const double v = from_corner.dot(pane.up) / pane.up.squaredNorm();
+  return u >= 0 && u <= 1 && v >= 0 && v <= 1;
+}
+
 struct Shader {
   const PortalScene& scene;
   const std::vector<float>& sky;
@@ -63,29 +77,50 @@ struct Shader {
   // Linear light that comes along the ray; `spread` is the angle between samples [rad].
   Vector3f operator()(const Ray& ray, double spread) const {
     const auto hit = first_hit(scene.bvh, ray);
-    if (!hit) return Vector3f::Zero();
-    const auto& face = scene.mesh.faces[hit->face];
-    const Vector3d normal = face_normal(scene.mesh, hit->face);
-    const Vector3d point = ray.origin + hit->t * ray.direction;
-    const double distance = hit->t * ray.direction.norm();
+    Vector3f light = hit ? from_surface(ray, *hit, spread) : from_beyond(ray.direction);
+    const double reach = hit ? hit->t : std::numeric_limits<double>::infinity();
+    for (const GlassPane& pane : scene.panes) {
+      if (passes(pane, ray, reach)) light = (1 - kMirrored) * light + kMirrored * pane.mirrored;
+    }
+    return light;
+  }
+
+ private:
+  Vector3f from_beyond(const Vector3d& direction) const {
+    if (!scene.sky) return Vector3f::Zero();
+    return scene.sky(direction).unaryExpr([](float level) { return linear_from_srgb(level); });
+  }
+
+  Vector3f from_surface(const Ray& ray, const RayHit& hit, double spread) const {
+    const Vector3d normal = face_normal(scene.mesh, hit.face);
+    const Vector3d point = ray.origin + hit.t * ray.direction;
+    const double distance = hit.t * ray.direction.norm();
     const double facing = std::abs(normal.dot(ray.direction)) / ray.direction.norm();
-    const auto part = static_cast<uint32_t>(scene.part_of_face[hit->face]);
+    const auto part = static_cast<uint32_t>(scene.part_of_face[hit.face]);
     const Vector3f color = albedo(
         {.position = point.cast<float>(),
          .normal = normal.cast<float>(),
          .material = scene.parts[part].material,
          .part = part,
          .footprint = static_cast<float>(distance * spread / std::sqrt(std::max(facing, 0.04)))});
-    const auto b1 = static_cast<float>(hit->b1);
-    const auto b2 = static_cast<float>(hit->b2);
-    const float open = (1 - b1 - b2) * sky[face[0]] + b1 * sky[face[1]] + b2 * sky[face[2]];
+    const float open = openness(hit, scene.parts[part].material);
     const auto up = static_cast<float>(normal.z());
     Vector3f light = (0.18F + 0.82F * open) * (kSky * (0.62F + 0.38F * up)) +
                      open * kBounce * (0.5F - 0.5F * up);
     const double sun = normal.dot(kToSun);
     const Ray to_sun{.origin = point + kOffGround * normal, .direction = kToSun};
     if (sun > 0 && !any_hit(scene.bvh, to_sun)) light += static_cast<float>(sun) * kSun;
-    return color.cwiseProduct(light);
+    return scene.exposure * color.cwiseProduct(light);
+  }
+
+  // Share of the sky that the surface sees. Of plaster all of it: the few rays per vertex would
+  // leave a pattern on a wall that is to have none.
+  float openness(const RayHit& hit, Material material) const {
+    if (material == Material::Plaster) return 1;
+    const auto& face = scene.mesh.faces[hit.face];
+    const auto b1 = static_cast<float>(hit.b1);
+    const auto b2 = static_cast<float>(hit.b2);
+    return (1 - b1 - b2) * sky[face[0]] + b1 * sky[face[1]] + b2 * sky[face[2]];
   }
 };
 

@@ -13,7 +13,8 @@ namespace cgs {
 /// what lies within 1.2 m hides it.
 std::vector<float> sky_visibility(const PortalScene& scene);
 
-/// A photograph: sun with shadows and sky on matt surfaces, averaged over 2 x 2 samples per pixel,
+/// A photograph: sun with shadows and sky on matt surfaces, what the panes of the scene mirror
+/// added to seven tenths of what lies behind them, averaged over 2 x 2 samples per pixel,
 /// sRGB-coded, with sensor noise of half a grey level that depends on `seed`, rounded to 8 bits.
 ///
 /// \param sky  from sky_visibility(scene)

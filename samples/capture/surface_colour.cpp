@@ -202,6 +202,8 @@ Vector3f albedo(const PatternPoint& point) {
         return iron(point);
       case Material::Painted:
         return painted(point);
+      case Material::Plaster:
+        return Vector3f::Constant(0.85F);
       default:
         return stone(point);
     }

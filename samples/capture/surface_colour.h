@@ -17,8 +17,8 @@ struct PatternPoint {
 };
 
 /// Linear RGB reflectance in [0, 1]: weathered stone with joints, stains, lichen and pits, wood,
-/// rusty iron, chipped paint. A function of the place alone but for what the footprint cannot
-/// resolve, so that it looks the same from everywhere.
+/// rusty iron, chipped paint, and plaster, which alone has no pattern. A function of the place
+/// alone but for what the footprint cannot resolve, so that it looks the same from everywhere.
 Eigen::Vector3f albedo(const PatternPoint& point);
 
 }  // namespace cgs

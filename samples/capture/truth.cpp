@@ -14,7 +14,16 @@ namespace {
 
 using Eigen::Vector3d;
 
-Camera looking_at(const Vector3d& eye, const Vector3d& target, int downscale) {
+// The direction has camera z = 1, so that the ray parameter is the z-depth.
+Ray pixel_ray(const Camera& camera, int x, int y) {
+  return {.origin = camera.center(),
+          .direction = camera.world_from_cam.linear() * camera.ray_in_cam(x + 0.5, y + 0.5)};
+}
+
+}  // namespace
+
+Camera capture_camera(const Vector3d& eye, const Vector3d& target, int downscale) {
+  require(downscale >= 1 && 126 % downscale == 0, "downscale must divide 126", downscale);
   Camera camera;
   camera.width = 504;
   camera.height = 378;
@@ -29,20 +38,11 @@ Camera looking_at(const Vector3d& eye, const Vector3d& target, int downscale) {
   return resized(camera, camera.width / downscale, camera.height / downscale);
 }
 
-// The direction has camera z = 1, so that the ray parameter is the z-depth.
-Ray pixel_ray(const Camera& camera, int x, int y) {
-  return {.origin = camera.center(),
-          .direction = camera.world_from_cam.linear() * camera.ray_in_cam(x + 0.5, y + 0.5)};
-}
-
-}  // namespace
-
 std::vector<CaptureView> capture_views(int downscale) {
-  require(downscale >= 1 && 126 % downscale == 0, "downscale must divide 126", downscale);
   const Vector3d portal(0, 0.2, 2.25);
   uint32_t count = 0;
   const auto view = [&](const char* name, bool input, const Vector3d& eye, const Vector3d& at) {
-    return CaptureView{name, input, looking_at(eye, at, downscale), ++count};
+    return CaptureView{name, input, capture_camera(eye, at, downscale), ++count};
   };
   return {
       view("view_01", true, {-1.05, -7.15, 1.75}, portal),

@@ -18,6 +18,12 @@ struct CaptureView {
   uint32_t seed = 0;  ///< Of the sensor noise of its picture.
 };
 
+/// A camera that stands at `eye` and looks at `target`, both in the world [m], without roll.
+///
+/// \param downscale  pictures are 504 / downscale pixels wide; a divisor of 126
+/// \throws InvalidInput for another downscale
+Camera capture_camera(const Eigen::Vector3d& eye, const Eigen::Vector3d& target, int downscale);
+
 /// The views of the capture in the order of their names: three inputs, then five held out (two
 /// between the inputs, two beyond them, one nearer and higher).
 ///
