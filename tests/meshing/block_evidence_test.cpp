@@ -27,7 +27,7 @@ struct SlowVoxel {
   Vector3d color = Vector3d::Zero();
   float free_weight = 0;
   int count = 0, known = 0, known_behind = 0;
-  bool is_free = false, is_hidden = false, is_measured = false, is_guessed = false;
+  bool is_free = false, is_hidden = false, is_measured = false, is_adjoining = false;
   bool has_sigma = true;
 
   // Whether it adds to what is measured.
@@ -46,14 +46,16 @@ struct SlowVoxel {
     const auto w = double(s.weight);
     const auto d = double(s.distance);
     const auto sigma = double(s.sigma);
-    const bool is_guess = !view.guessed.empty() && view.guessed(s.x, s.y) != 0;
+    const DepthEvidence evidence =
+        view.evidence.empty() ? DepthEvidence::Measured : view.evidence(s.x, s.y);
     weight += w;
     distance += w * d;
     spread += w * d * d;
     variance += w * w * sigma * sigma;
     ++count;
-    (is_behind ? known_behind : known) += !view.is_virtual && !is_guess ? 1 : 0;
-    is_guessed |= is_guess;
+    (is_behind ? known_behind : known) +=
+        !view.is_virtual && evidence == DepthEvidence::Measured ? 1 : 0;
+    is_adjoining |= evidence == DepthEvidence::Adjoining;
     has_sigma &= sigma > 0;
     if (view.color.empty()) return;
     color_weight += w;
@@ -84,7 +86,7 @@ void expect_voxel(const Volume& volume, const openvdb::Coord& at, const SlowVoxe
   ASSERT_EQ(volume.tsdf->tree().getValue(at), static_cast<float>(slow.distance / slow.weight));
   ASSERT_EQ(volume.weight->tree().getValue(at), static_cast<float>(slow.weight));
   ASSERT_EQ(volume.support->tree().getValue(at),
-            std::max({slow.known, slow.known_behind, slow.is_guessed ? 1 : 0}));
+            std::max({slow.known, slow.known_behind, slow.is_adjoining ? 1 : 0}));
   ASSERT_EQ(volume.sigma->tree().isValueOn(at), slow.has_sigma);
   if (slow.has_sigma) {
     ASSERT_EQ(volume.sigma->tree().getValue(at), static_cast<float>(slow.sigma()));
@@ -97,8 +99,8 @@ void expect_voxel(const Volume& volume, const openvdb::Coord& at, const SlowVoxe
       openvdb::Vec3f(linear_from_srgb(c.x()), linear_from_srgb(c.y()), linear_from_srgb(c.z())));
 }
 
-// A thin sheet, a ball and a wall, from random places, with noise, holes, masks, guesses and a
-// patch in front that the other views see through.
+// A thin sheet, a ball and a wall, from random places, with noise, holes, masks, depth of one view
+// alone and a patch in front that the other views see through.
 std::vector<TsdfView> random_views(uint32_t seed) {
   std::mt19937 random(seed);
   const auto uniform = [&](double low, double high) {
@@ -119,12 +121,12 @@ std::vector<TsdfView> random_views(uint32_t seed) {
     if (i % 2 == 0) view.sigma = raster(0.006f);
     if (i == 1) view.color = {};
     if (i == 2) view.is_virtual = true;
-    if (i == 3) view.guessed = raster(uint8_t{0});
+    if (i == 3) view.evidence = raster(DepthEvidence::Measured);
     if (i == 4) view.usable = raster(uint8_t{1});
     for (int y = 10; y < 20; ++y) {
       for (int x = 15; x < 30; ++x) {
         if (i == 0) view.depth(x, y) *= 0.8f;
-        if (i == 3) view.guessed(x, y) = 1;
+        if (i == 3) view.evidence(x, y) = DepthEvidence::Adjoining;
         if (i == 4) view.usable(x, y) = 0;
         if (i == 5) view.depth(x, y) = INFINITY;
         if (i == 1 && x < 19) view.depth(x, y) = std::nanf("");

@@ -32,6 +32,10 @@ std::vector<TsdfView> three_views(const test::Shape& shape, int width = kWidth) 
   return views;
 }
 
+EvidenceMap everywhere(const TsdfView& view, DepthEvidence evidence) {
+  return {view.camera.width, view.camera.height, evidence};
+}
+
 test::Shape sphere_before_wall() {
   return test::nearest({test::sphere(kCenter, kRadius), test::plane({0, 0, 1}, 0.35)});
 }
@@ -180,7 +184,7 @@ TEST(Fuse, LabelsTheOverlapOfTwoViewsObserved) {
   EXPECT_LT((mesh.colors[0] - Eigen::Vector3f(0.2f, 0.5f, 0.8f)).norm(), 1e-4f);
 }
 
-TEST(Fuse, GuessesOfSeveralViewsAreLabelledAsSeenByOne) {
+TEST(Fuse, AdjoiningDepthOfSeveralViewsIsLabelledAsSeenByOne) {
   std::vector<TsdfView> views = three_views(test::plane({0, 0, 1}, 0.1));
   const auto largest_support = [&] {
     const TriangleMesh mesh = open_surface(fuse(views, {}).volume, {});
@@ -188,9 +192,9 @@ TEST(Fuse, GuessesOfSeveralViewsAreLabelledAsSeenByOne) {
     return *std::max_element(mesh.support.begin(), mesh.support.end());
   };
   EXPECT_EQ(largest_support(), 3);
-  views[0].guessed = MaskMap(views[0].camera.width, views[0].camera.height, 1);
+  views[0].evidence = everywhere(views[0], DepthEvidence::Adjoining);
   EXPECT_EQ(largest_support(), 2);
-  for (TsdfView& view : views) view.guessed = MaskMap(view.camera.width, view.camera.height, 1);
+  for (TsdfView& view : views) view.evidence = everywhere(view, DepthEvidence::Adjoining);
   EXPECT_EQ(largest_support(), 1);
 }
 
@@ -296,7 +300,7 @@ std::vector<TsdfView> varied_views() {
     return MaskMap(view.camera.width, view.camera.height, value);
   };
   views[1].color = {};
-  views[2].guessed = mask(views[2], 1);
+  views[2].evidence = everywhere(views[2], DepthEvidence::Adjoining);
   views[4].is_virtual = true;
   views[5].usable = mask(views[5], 1);
   for (size_t i = 0; i < 4000; ++i) views[5].usable.data[i] = 0;
@@ -403,7 +407,7 @@ TEST(Fuse, KeepsSmallThingsFarBeforeTheRest) {
   }
   EXPECT_LT(fuse(views, {}).report.bounds.min().z(), 0);
   for (TsdfView& view : views) {  // as where false matches are what stands out
-    view.guessed = MaskMap(view.camera.width, view.camera.height, 1);
+    view.evidence = everywhere(view, DepthEvidence::Adjoining);
   }
   EXPECT_GT(fuse(views, {}).report.bounds.min().z(), 0.2);
 }

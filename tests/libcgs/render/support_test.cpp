@@ -246,7 +246,7 @@ TEST(AnnotateSupport, DoesNotTakeAFloaterForASurface) {
   EXPECT_EQ(facing.buffers.hole(12, 7), Hole::None);
 }
 
-TEST(AnnotateSupport, CountsGuessesOfSeveralViewsAsOneView) {
+TEST(AnnotateSupport, CountsAdjoiningDepthOfSeveralViewsAsOneView) {
   Facing facing(1, 1);
   std::vector<SupportView> views(3, facing.view);
   const auto support = [&] {
@@ -254,13 +254,13 @@ TEST(AnnotateSupport, CountsGuessesOfSeveralViewsAsOneView) {
     return int(facing.buffers.support(9, 7));
   };
   EXPECT_EQ(support(), 3);
-  const MaskMap guessed(facing.camera.width, facing.camera.height, 1);
-  views[0].guessed = guessed;
-  EXPECT_EQ(support(), 2) << "a guess adds nothing to what views know";
-  views[1].guessed = views[2].guessed = guessed;
+  const EvidenceMap adjoining(facing.camera.width, facing.camera.height, DepthEvidence::Adjoining);
+  views[0].evidence = adjoining;
+  EXPECT_EQ(support(), 2) << "it adds nothing to what views know";
+  views[1].evidence = views[2].evidence = adjoining;
   EXPECT_EQ(support(), 1);
   EXPECT_EQ(facing.buffers.hole(9, 7), Hole::None);
-  views[2].guessed = MaskMap(3, 3, 1);
+  views[2].evidence = EvidenceMap(3, 3, DepthEvidence::Adjoining);
   EXPECT_THROW(support(), InvalidInput);
 }
 
