@@ -198,6 +198,47 @@ TEST(Fuse, AdjoiningDepthOfSeveralViewsIsLabelledAsSeenByOne) {
   EXPECT_EQ(largest_support(), 1);
 }
 
+TEST(Fuse, WhatNothingButEstimatesMakeIsEstimated) {
+  std::vector<TsdfView> views = three_views(test::plane({0, 0, 1}, 0.1));
+  for (TsdfView& view : views) {
+    view.sigma = DepthMap(view.depth.width, view.depth.height, 0.002f);
+    view.evidence = everywhere(view, DepthEvidence::Estimated);
+  }
+  const FusedVolume fused = fuse(views, {});
+  EXPECT_EQ(fused.report.occupied, 0U);
+  EXPECT_EQ(fused.report.estimated, fused.volume.tsdf->activeVoxelCount());
+  EXPECT_EQ(fused.volume.sigma->activeVoxelCount(), 0U);
+  EXPECT_EQ(state_at(fused.volume, {0, 0, 0.1}), VoxelState::Estimated);
+  const TriangleMesh mesh = open_surface(fused.volume, {});
+  ASSERT_GT(mesh.vertices.size(), 1000U);
+  for (const Provenance label : mesh.provenance) ASSERT_EQ(label, Provenance::Estimated);
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+    ASSERT_EQ(mesh.support[v], 0);
+    ASSERT_TRUE(std::isnan(mesh.sigma[v]));
+  }
+  ASSERT_EQ(mesh.colors.size(), mesh.vertices.size()) << "the photographs show it";
+}
+
+TEST(Fuse, EstimatesAddNothingToTheSupportOfWhatIsKnown) {
+  std::vector<TsdfView> views = three_views(test::plane({0, 0, 1}, 0.1));
+  const Vector3d seen_by_all(0, 0, 0.1);
+  for (const DepthEvidence known : {DepthEvidence::Measured, DepthEvidence::Adjoining}) {
+    for (TsdfView& view : views) view.evidence = everywhere(view, DepthEvidence::Estimated);
+    views[1].evidence = everywhere(views[1], known);
+    const FusedVolume fused = fuse(views, {});
+    EXPECT_EQ(state_at(fused.volume, seen_by_all), VoxelState::Occupied);
+    const auto at = fused.volume.support->transform().worldToIndexNodeCentered(
+        openvdb::Vec3d(seen_by_all.x(), seen_by_all.y(), seen_by_all.z()));
+    EXPECT_EQ(fused.volume.support->tree().getValue(at), 1);
+    EXPECT_GT(fused.report.estimated, 0U) << "where views[1] does not look";
+    const auto area = area_by_provenance(open_surface(fused.volume, {}));
+    EXPECT_GT(area[size_t(Provenance::SingleView)], 0.05);
+    EXPECT_GT(area[size_t(Provenance::Estimated)], 0.01);
+    EXPECT_EQ(area[size_t(Provenance::Observed)], 0);
+    EXPECT_EQ(area[size_t(Provenance::Virtual)], 0);
+  }
+}
+
 TEST(Fuse, CarriesTheUncertaintyOfTheViews) {
   auto views = three_views(test::plane({0, 0, 1}, 0.1));
   for (TsdfView& view : views) view.sigma = DepthMap(view.depth.width, view.depth.height, 0.002f);
