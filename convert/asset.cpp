@@ -308,8 +308,9 @@ std::string words_for(const Written& written,
   }
   return out + "; it is at most " + format_length(deviation.evidence, frame) +
          " off the fused surface where there is evidence, " +
-         format_length(deviation.inferred, frame) + " where that is inferred (measured at " +
-         std::to_string(deviation.places) + " places, both ways)";
+         format_length(deviation.inferred, frame) +
+         " where that is inferred or estimated (measured at " + std::to_string(deviation.places) +
+         " places, both ways)";
 }
 
 // The form on disk, and what the report says of it.
@@ -382,7 +383,7 @@ Json level_to_json(const Level& level, const Frame& frame) {
       " faces, textures " + number(100 * level.texture_share, "%.0f") +
       " % of the photographs' width; at most " + format_length(level.deviation.evidence, frame) +
       " off asset.glb where there is evidence, " + format_length(level.deviation.inferred, frame) +
-      " where that is inferred (measured)";
+      " where that is inferred or estimated (measured)";
   return {{"file", level.file},
           {"bytes", level.bytes},
           {"faces", level.faces},

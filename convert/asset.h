@@ -44,14 +44,14 @@ struct WrittenAsset {
 /// carved one. Where photographs show the pattern they are left out.
 ///
 /// Where it has to become smaller, one length decides what goes, the detail d: the mesh stays
-/// within d of the fused surface (four times that where inferred), pixels of textures grow to 2 d,
-/// and positions are rounded by a fifth of d. The smallest d that fits wins. With a promise, what
-/// was written is read again and held against the surface that volume.vdb holds.
+/// within d of the fused surface (four times that where inferred or estimated), pixels of textures
+/// grow to 2 d, and positions are rounded by a fifth of d. The smallest d that fits wins. With a
+/// promise, what was written is read again and held against the surface that volume.vdb holds.
 ///
 /// Coarser levels of it, request.lods of them, follow as web/asset.lod1.glb and so on, with
 /// web/tileset.json. Their details, which are also the size of a pixel of their textures, go on
 /// from the pixels of asset.glb and grow threefold, less where they would pass a fiftieth of the
-/// object; inferred surface stays as near as the rest. None of them keeps a promise; how far it is
+/// object; such surface stays as near as the rest. None of them keeps a promise; how far it is
 /// off asset.glb is measured.
 ///
 /// \return of asset.glb bytes, faces and measured errors; with a promise "deviation", "form" and,

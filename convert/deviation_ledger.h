@@ -36,9 +36,10 @@ class DeviationLedger {
   void go_on_from(const std::string& step, const TriangleMesh& mesh);
 
   /// [{"step", "against": the step before, "with_evidence": {"max", "rms", "p95"}, "inferred": the
-  /// same, "from_measured": {"max", "rms", "p95", "outside": share of the points that cannot be
-  /// told}, "samples"}] in file units; null for what has no samples. Of a pair of meshes samples of
-  /// both are taken, and of each figure the larger of the two ways.
+  /// same of inferred and estimated surface, "from_measured": {"max", "rms", "p95", "outside":
+  /// share of the points that cannot be told}, "samples"}] in file units; null for what has no
+  /// samples. Of a pair of meshes samples of both are taken, and of each figure the larger of the
+  /// two ways.
   nlohmann::ordered_json json(const Frame& frame) const;
 
  private:

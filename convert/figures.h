@@ -30,8 +30,8 @@ double figure_value(const MeasuredValue& value, const FigureUnit& unit);
 std::string provenance_key(Provenance label);
 
 /// {"value", "sigma" (null = no statement), "unit" ("m", "m^2", …), "observed", "single_view",
-/// "interpolated", "inferred", "virtual" (null where nothing is stated), "sigma_share" (share of
-/// what the figure rests on that states a sigma)}
+/// "interpolated", "estimated", "inferred", "virtual" (null where nothing is stated), "sigma_share"
+/// (share of what the figure rests on that states a sigma)}
 nlohmann::ordered_json figure_json(const MeasuredValue& value,
                                    const FigureUnit& unit,
                                    bool states_provenance);

@@ -87,7 +87,7 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
   priors.origin = Raster<DepthOrigin>(image.width, image.height, DepthOrigin::Unknown);
   std::transform(origin.data.begin(), origin.data.end(), priors.origin.data.begin(), [](uint8_t v) {
     return v > static_cast<uint8_t>(DepthOrigin::Estimated) ? DepthOrigin::Unknown
-                                                             : static_cast<DepthOrigin>(v);
+                                                            : static_cast<DepthOrigin>(v);
   });
   return priors;
 }

@@ -63,7 +63,8 @@ ColorImage normal_picture(const NormalMap& normals, const Eigen::Isometry3d& cam
 
 MaskMap hole_mask(const RenderBuffers& buffers) {
   MaskMap mask(buffers.hole.width, buffers.hole.height, 0);
-  for (size_t i = 0; i < mask.data.size(); ++i) mask.data[i] = is_hole(buffers.hole.data[i]) ? 1 : 0;
+  for (size_t i = 0; i < mask.data.size(); ++i)
+    mask.data[i] = is_hole(buffers.hole.data[i]) ? 1 : 0;
   return mask;
 }
 

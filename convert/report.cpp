@@ -69,8 +69,9 @@ std::string mesh_section(const std::filesystem::path& folder) {
          figure(folder / "mesh/front.png", "watertight mesh, from the middle input view") +
          figure(folder / "mesh/side.png", "from the side") +
          figure(folder / "mesh/front.provenance.png",
-                "magenta = inferred, never seen by any input view; orange = interpolated; what was "
-                "seen keeps its colour") +
+                "magenta = inferred, never seen by any input view; amber = estimated, a photograph "
+                "shows it and nothing measured its depth; orange = interpolated; what was seen "
+                "keeps its colour") +
          figure(folder / "mesh/side.provenance.png", "the same from the side") + "</div>\n";
 }
 
@@ -96,7 +97,12 @@ std::string hole_words(const Json& view) {
     out += before + number(100 * share, "%.1f") + " % " + words;
     before = ", ";
   }
-  if (view.contains("masked_fraction")) out += "; " + percent(view["masked_fraction"]) + " masked";
+  for (const auto& [key, words] : {std::pair("estimated_fraction", " of estimated depth"),
+                                   std::pair("sky_fraction", " sky"),
+                                   std::pair("masked_fraction", " masked")}) {
+    const bool is_told = view.value(key, 0.0) > 0;
+    if (is_told) out += "; " + percent(view[key]) + words;
+  }
   return out;
 }
 

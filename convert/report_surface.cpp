@@ -83,13 +83,14 @@ std::string simplification_section(const Json& report) {
   if (simplification.is_null()) return "";
   const ShownUnit unit(report);
   std::ostringstream html;
-  html << "<h2>Simplification</h2>\n<p>Largest distance allowed: "
-       << unit.length(simplification["max_error"]) << " where there is evidence, "
-       << unit.length(simplification["max_error_inferred"])
-       << " where inferred. The largest distance is searched, both ways.</p>\n<table>\n"
-          "<tr><th>mesh</th><th>faces before</th><th>after</th><th>max, evidence</th>"
-          "<th>RMS, evidence</th><th>max, inferred</th><th>area observed before</th>"
-          "<th>after</th></tr>\n";
+  html
+      << "<h2>Simplification</h2>\n<p>Largest distance allowed: "
+      << unit.length(simplification["max_error"]) << " where there is evidence, "
+      << unit.length(simplification["max_error_inferred"])
+      << " where inferred or estimated. The largest distance is searched, both ways.</p>\n<table>\n"
+         "<tr><th>mesh</th><th>faces before</th><th>after</th><th>max, evidence</th>"
+         "<th>RMS, evidence</th><th>max, inferred or estimated</th><th>area observed before</th>"
+         "<th>after</th></tr>\n";
   for (const auto& [key, name] :
        {std::pair("watertight", "watertight"), std::pair("open_surface", "open surface")}) {
     const Json& s = simplification[key];
@@ -151,7 +152,8 @@ std::string deviation_section(const Json& report) {
       << " samples of each surface. Bars: 95 % lie within, from the step before (upper) and from "
          "measured depth (lower).</p>\n<div class=scrolling><table>\n"
          "<tr><th rowspan=2>step</th><th rowspan=2>against</th><th colspan=3>seen surface</th>"
-         "<th colspan=3>inferred surface</th><th colspan=3>measured depth to this step</th>"
+         "<th colspan=3>inferred or estimated surface</th><th colspan=3>measured depth to this "
+         "step</th>"
          "<th rowspan=2></th></tr>\n<tr>"
          "<th>max</th><th>RMS</th><th>95 %</th><th>max</th><th>RMS</th><th>95 %</th>"
          "<th>max</th><th>RMS</th><th>95 %</th></tr>\n";

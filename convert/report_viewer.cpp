@@ -156,7 +156,7 @@ std::string shown_text(const ShownMesh& shown, const Frame& frame) {
       << " faces of <code>mesh/watertight.ply</code>. Measured both ways, what is shown is at most "
       << length(shown.evidence.hausdorff()) << " (RMS " << length(rms)
       << ") off where there is evidence, at most " << length(shown.inferred.hausdorff())
-      << " where the surface is inferred. Points are picked on what is shown.</p>\n";
+      << " where the surface is inferred or estimated. Points are picked on what is shown.</p>\n";
   return html.str();
 }
 

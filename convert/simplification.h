@@ -14,7 +14,7 @@
 namespace cgs {
 
 /// What --simplify asks for: the largest error where there is evidence; four times that where the
-/// surface is inferred.
+/// surface is inferred or estimated.
 ///
 /// \param length   as typed; empty = a quarter of a voxel, "0" = leave the meshes as they are
 /// \param voxel    [internal units]

@@ -43,8 +43,7 @@ ShownSurface shown_surface(TriangleMesh mesh, const std::vector<Camera>& inputs)
       labelled ? std::vector<int>() : times_seen(mesh, samples.points, inputs);
   ShownSurface out;
   for (size_t i = 0; i < samples.points.size(); ++i) {
-    const bool shown =
-        labelled ? has_evidence(mesh.provenance[samples.faces[i]]) : seen[i] >= 2;
+    const bool shown = labelled ? has_evidence(mesh.provenance[samples.faces[i]]) : seen[i] >= 2;
     if (shown) out.points.push_back(samples.points[i]);
   }
   if (out.points.empty()) {

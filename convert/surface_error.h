@@ -22,7 +22,7 @@ struct ShownSurface {
   std::vector<Eigen::Vector3f> points;
 };
 
-/// Invented surface has no error to speak of: only samples on faces that are not Inferred are taken
+/// What nothing measured has no error to speak of: only samples on faces with evidence are taken
 /// or, of a mesh without provenance, those that two cameras or more see.
 /// \param inputs  the cameras of the input views, in the frame of the mesh
 /// \throws InvalidInput if nothing is shown

@@ -12,8 +12,8 @@ namespace cgs {
 /// Largest distances between a mesh as a file holds it and the surface it was made from, both ways
 /// [internal units].
 struct SurfaceDeviation {
-  double evidence = 0;  ///< From places on faces that are not Inferred; all without provenance.
-  double inferred = 0;  ///< From places on Inferred faces.
+  double evidence = 0;  ///< From places on faces with evidence; all without provenance.
+  double inferred = 0;  ///< From places on Inferred and Estimated faces.
   size_t places = 0;    ///< Where it was measured: all corners, and as many places spread over the
                         ///< area as there are faces, 100,000 at least. Along the edges the
                         ///< farthest place is searched besides.

@@ -28,6 +28,7 @@ constexpr std::array<Layer, kProvenanceCount + 1> kLayers = {{{"INFERRED", 6, "D
                                                               {"OBSERVED", 7, "CONTINUOUS"},
                                                               {"INTERPOLATED", 3, "DOT"},
                                                               {"VIRTUAL", 5, "DASHED"},
+                                                              {"ESTIMATED", 2, "DASHED"},
                                                               {"SECTION", 7, "CONTINUOUS"}}};
 
 const Layer& layer_of(int label) {

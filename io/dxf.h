@@ -9,9 +9,9 @@ namespace cgs {
 
 /// Writes a drawing as DXF (release 12, ASCII), which every CAD program reads.
 ///
-/// Lines become polylines on the layers OBSERVED, SINGLE_VIEW, INTERPOLATED (dotted) and INFERRED
-/// (dashed), or SECTION if nothing is stated, cut where the layer changes. Coordinates are those of
-/// the drawing with all digits; $INSUNITS and comments name the unit.
+/// Lines become polylines on the layers OBSERVED, SINGLE_VIEW, INTERPOLATED (dotted), VIRTUAL,
+/// ESTIMATED and INFERRED (dashed), or SECTION if nothing is stated, cut where the layer changes.
+/// Coordinates are those of the drawing with all digits; $INSUNITS and comments name the unit.
 /// \throws InvalidInput if there is no line; IoError
 /// Source: Autodesk, "DXF Reference", release 12 group codes.
 void write_dxf(const std::filesystem::path& path, const Drawing& drawing);

@@ -104,7 +104,7 @@ class SceneReader {
     }
     std::vector<Provenance> out;
     for (const auto& face : in.faces) {
-      size_t weakest = origin_.is_ours ? 0 : rank(*label);
+      Provenance weakest = origin_.is_ours ? Provenance::Observed : *label;
       for (const uint32_t corner : face) {
         const auto* const found = std::find_if(
             kProvenanceOrder.begin(), kProvenanceOrder.end(), [&](Provenance candidate) {
@@ -113,17 +113,11 @@ class SceneReader {
         const bool is_label = found != kProvenanceOrder.end();
         if (!is_label && origin_.is_ours) return {};
         if (!is_label) continue;
-        weakest = std::max(weakest, static_cast<size_t>(found - kProvenanceOrder.begin()));
+        weakest = weaker_evidence(weakest, *found);
       }
-      out.push_back(kProvenanceOrder.at(weakest));
+      out.push_back(weakest);
     }
     return out;
-  }
-
-  // In kProvenanceOrder, which goes from most to least evidence.
-  static size_t rank(Provenance label) {
-    const auto* const at = std::find(kProvenanceOrder.begin(), kProvenanceOrder.end(), label);
-    return static_cast<size_t>(at - kProvenanceOrder.begin());
   }
 
   std::optional<Provenance> label_of(const JsonValue& primitive) const {

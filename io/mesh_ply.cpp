@@ -18,9 +18,19 @@ namespace cgs {
 
 namespace {
 
-/// The header line of files with labels, without "comment ".
-constexpr const char* kPlyLabels =
-    "provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual";
+/// How the header line of files with labels begins, without "comment "; the numbers and names
+/// follow, in earlier versions fewer.
+constexpr std::string_view kPlyLabels = "provenance 0 inferred 1 single view 2 observed";
+
+/// "provenance 0 inferred 1 single view …"
+std::string labels_text() {
+  std::string out = "provenance";
+  for (size_t i = 0; i < kProvenanceCount; ++i) {
+    out += ' ' + std::to_string(i) + ' ';
+    out += kProvenanceTraits.at(i).name;
+  }
+  return out;
+}
 
 std::string header_text(const TriangleMesh& mesh,
                         const Frame& frame,
@@ -29,7 +39,7 @@ std::string header_text(const TriangleMesh& mesh,
   out += kPlyGenerator;
   out += '\n';
   out += ply_frame_comments(frame);
-  if (!mesh.provenance.empty()) out += std::string("comment ") + kPlyLabels + "\n";
+  if (!mesh.provenance.empty()) out += "comment " + labels_text() + "\n";
   out += "element vertex " + std::to_string(mesh.vertices.size()) + "\n";
   out += "property float x\nproperty float y\nproperty float z\n";
   if (!mesh.normals.empty()) out += "property float nx\nproperty float ny\nproperty float nz\n";
@@ -122,7 +132,8 @@ std::string lost_labels(const PlyHeader& header) {
   if (face == nullptr || face->count == 0) return "";
   if (find_scalar(*face, "scalar_provenance") >= 0) return "";
   const auto& comments = header.comments;
-  if (std::find(comments.begin(), comments.end(), kPlyLabels) != comments.end()) return kLostLabels;
+  const auto lists_labels = [](const std::string& line) { return line.starts_with(kPlyLabels); };
+  if (std::any_of(comments.begin(), comments.end(), lists_labels)) return kLostLabels;
   if (is_our_ply(comments) || find_scalar(*header.find("vertex"), "scalar_sigma") < 0) return "";
   return "it states sigma, but not where its faces come from: another program may have left out "
          "the labels of a file of ours";

@@ -17,9 +17,10 @@ namespace cgs {
 /// Vertices: x y z [world units, minus frame.file_origin], then, as far as the mesh has them,
 /// nx ny nz, red green blue (uchar, sRGB), quality (number of views that see it) and
 /// scalar_sigma ([world units]; -1 = no statement). Faces: vertex_indices and scalar_provenance
-/// (uchar, the numbers of Provenance) with the same as `quality` (float). MeshLab reads `quality`,
-/// CloudCompare what starts with `scalar_`. Comments carry unit, scale source and origin.
-/// \throws InvalidInput if an array does not fit, an index is out of range, or a vertex is not
+/// (uchar, the numbers of Provenance, which a comment names) with the same as `quality` (float).
+/// MeshLab reads `quality`, CloudCompare what starts with `scalar_`. Comments carry unit, scale
+/// source and origin. \throws InvalidInput if an array does not fit, an index is out of range, or a
+/// vertex is not
 ///         finite; IoError
 void write_mesh_ply(const std::filesystem::path& path,
                     const TriangleMesh& mesh,

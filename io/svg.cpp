@@ -20,6 +20,7 @@ constexpr const char* kStyle = R"(<style>
 path { fill: none; stroke: #1d2733; stroke-width: 1.6px; vector-effect: non-scaling-stroke; stroke-linejoin: round; }
 .single_view { stroke: #4a7fb5; stroke-width: 1px; }
 .interpolated { stroke: #2a7d46; stroke-dasharray: 1.5 3; }
+.estimated { stroke: #b08a00; stroke-dasharray: 4 3; }
 .inferred { stroke: #c02a8a; stroke-dasharray: 7 4; }
 .virtual { stroke: #7a5fb5; stroke-dasharray: 7 2; }
 text { font-family: system-ui, sans-serif; fill: #1d2733; }
@@ -28,7 +29,7 @@ text { font-family: system-ui, sans-serif; fill: #1d2733; }
 
 // By label, the one for drawings without labels last.
 constexpr std::array<const char*, kProvenanceCount + 1> kClasses = {
-    "inferred", "single_view", "observed", "interpolated", "virtual", "section"};
+    "inferred", "single_view", "observed", "interpolated", "virtual", "estimated", "section"};
 
 // Coordinates of the picture: to the lower left corner of the lines, y downwards.
 struct Picture {

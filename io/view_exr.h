@@ -31,8 +31,8 @@ struct ViewRasters {
 /// - variance.Y: variance of Z [world units squared]; support.Y: number of input views
 /// - hole.Y: 1 where no input view can vouch for the pixel or depth is unknown, else 0
 /// - holeKind.Y: 0 no hole, 1 nothing was reconstructed, 2 hidden from every input view, 3 outside
-///   of every input picture (Hole); where depth alone is unknown, 1; with hole.Y = 0: 4 left out by a
-///   mask, 5 shown by an input view whose depth nothing measured, 6 sky
+///   of every input picture (Hole); where depth alone is unknown, 1; with hole.Y = 0: 4 left out by
+///   a mask, 5 shown by an input view whose depth nothing measured, 6 sky
 ///
 /// Unknown Z, distance and variance are 0, with holeKind.Y > 0; no value is NaN.
 /// Attributes: worldToCamera (left-handed, see ExrImage); as text, numbers row by row,

@@ -26,8 +26,8 @@ struct Certificate {
   double observed_area = 0;       ///< Seen by two or more views.
   double single_view_area = 0;
   double interpolated_area = 0;
-  double estimated_area = 0;      ///< Shown by a photograph, measured by nothing.
-  double inferred_area = 0;  ///< Everything, if the mesh has no provenance.
+  double estimated_area = 0;  ///< Shown by a photograph, measured by nothing.
+  double inferred_area = 0;   ///< Everything, if the mesh has no provenance.
   double virtual_area = 0;
 
   /// Closed, manifold, oriented and free of self-intersection: bounds a volume.

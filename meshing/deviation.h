@@ -47,9 +47,8 @@ void add_scale_sigma(ComparedPoints& points, double relative, const Eigen::Vecto
 /// Signed distances of points to a surface, and whether they are more than uncertainty.
 ///
 /// |d| > 2 sqrt(sigma_a^2 + sigma_b^2) counts as changed, where both sides were observed (by one
-/// view at least) and state a sigma: invented surface never counts, nor do places beyond the rim of
-/// an open B, which says nothing of them.
-/// Both in the same frame.
+/// view at least) and state a sigma: invented or estimated surface never counts, nor do places
+/// beyond the rim of an open B, which says nothing of them. Both in the same frame.
 std::vector<Deviation> deviations(const ComparedPoints& points,
                                   const MeasurableMesh& mesh_b,
                                   const NearestSurface& surface_b);

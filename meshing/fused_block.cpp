@@ -28,7 +28,8 @@ void store_band(FusedBlock& block,
   leaf(block.tsdf).setValueOn(n, static_cast<float>(e.mean()));
   leaf(block.weight).setValueOn(n, static_cast<float>(e.weight));
   leaf(block.support).setValueOn(n, e.support());
-  if (e.has_sigma && !e.is_estimate()) leaf(block.sigma).setValueOn(n, static_cast<float>(e.sigma(common_sigma)));
+  if (e.has_sigma && !e.is_estimate())
+    leaf(block.sigma).setValueOn(n, static_cast<float>(e.sigma(common_sigma)));
   if (e.color_weight <= 0) return;
   const Eigen::Vector3f coded = (e.color / e.color_weight).cast<float>();
   const Eigen::Vector3f c = coded.unaryExpr(&linear_from_srgb);

@@ -75,8 +75,9 @@ TriangleMesh open_surface(const Volume& volume, const OpenSurfaceOptions& option
   std::vector<uint8_t> keep(mesh.faces.size());
   for (size_t f = 0; f < keep.size(); ++f) {
     const auto& face = mesh.faces[f];
-    keep[f] = std::all_of(
-        face.begin(), face.end(), [&](uint32_t v) { return evidence.of_vertex[v] == Evidence::Full; });
+    keep[f] = std::all_of(face.begin(), face.end(), [&](uint32_t v) {
+      return evidence.of_vertex[v] == Evidence::Full;
+    });
   }
   mesh = without_small_components(with_faces(mesh, keep), options.min_component);
   mesh.normals = vertex_normals(mesh);

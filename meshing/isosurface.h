@@ -31,7 +31,8 @@ struct OpenSurfaceOptions {
 /// The observed surface of a fused volume, open where observation ends: every face lies in cells
 /// whose eight voxels were observed.
 ///
-/// \return a mesh with all attributes; provenance is Observed or SingleView. Empty if there is no
+/// \return a mesh with all attributes; provenance is Observed, SingleView, Estimated or Virtual.
+/// Empty if there is no
 ///         surface.
 TriangleMesh open_surface(const Volume& volume, const OpenSurfaceOptions& options);
 

@@ -36,8 +36,7 @@ std::vector<Edge> edges_of(const TriangleMesh& mesh) {
     size_t end = i + 1;
     while (end < sides.size() && sides[end].same_edge(sides[i])) ++end;
     const FaceSide& last = sides[end - 1];
-    const bool inside =
-        end - i == 2 && was_seen(mesh, sides[i].face) == was_seen(mesh, last.face);
+    const bool inside = end - i == 2 && was_seen(mesh, sides[i].face) == was_seen(mesh, last.face);
     out.push_back({last.low, last.high, tip(sides[i]), tip(last), !inside});
     i = end;
   }

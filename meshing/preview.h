@@ -8,9 +8,11 @@
 namespace cgs {
 
 struct PreviewOptions {
-  int width = 960;             ///< [pixels], in [1, 16384]
-  int height = 720;            ///< [pixels], in [1, 16384]
-  bool by_provenance = false;  ///< Draw inferred faces in magenta, interpolated ones in orange.
+  int width = 960;   ///< [pixels], in [1, 16384]
+  int height = 720;  ///< [pixels], in [1, 16384]
+  bool by_provenance =
+      false;  ///< Draw faces that were not seen in the colour of their label: inferred
+              ///< ones magenta, interpolated ones orange, estimated ones amber.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

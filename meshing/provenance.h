@@ -11,7 +11,8 @@ namespace cgs {
 
 struct Volume;
 
-/// Whether nothing measured a face, inferred or estimated; a mesh without labels counts as measured.
+/// Whether nothing measured a face, inferred or estimated; a mesh without labels counts as
+/// measured.
 inline bool is_unmeasured(const TriangleMesh& mesh, size_t face) {
   return !mesh.provenance.empty() && !has_evidence(mesh.provenance[face]);
 }
@@ -34,15 +35,16 @@ struct VertexEvidence {
 /// A vertex counts as observed if the observed ones of its eight voxels have both signs, and the
 /// distance interpolated from them is below one voxel. Support is that of the voxel nearest to the
 /// surface; colour and sigma are interpolated over the voxels that have one. Where that voxel is
-/// estimated, so is the vertex: its support is 0, its sigma NaN. Vertices without evidence take the colour of the nearest vertex that has one, counted in edges.
+/// estimated, so is the vertex: its support is 0, its sigma NaN. Vertices without evidence take the
+/// colour of the nearest vertex that has one, counted in edges.
 VertexEvidence annotate_vertices(TriangleMesh& mesh, const Volume& volume);
 
 /// Fills the provenance of every face from its vertices.
 ///
-/// Where all three vertices have evidence: Estimated if one of them is, else Observed, SingleView or
-/// Virtual (no support at all), by the smallest support. Other faces are Interpolated if they form
-/// a disc of at most gap x gap area, rimmed by observed faces only and facing as these do; else
-/// Inferred. \param gap [internal units]
+/// Where all three vertices have evidence: Estimated if one of them is, else Observed, SingleView
+/// or Virtual (no support at all), by the smallest support. Other faces are Interpolated if they
+/// form a disc of at most gap x gap area, rimmed by observed faces only and facing as these do;
+/// else Inferred. \param gap [internal units]
 void label_faces(TriangleMesh& mesh, const VertexEvidence& evidence, double gap);
 
 }  // namespace cgs

@@ -245,8 +245,7 @@ void add_uncertainty(const Cut& cut, const Chain& chain, bool bounds_area, Uncer
   for (size_t i = 0; i < cuts.size(); ++i) {
     const auto& [face, sigma_across, along] = cuts[i];
     const double sigma = sigma_across * shift_in_plane(mesh, plane, face);
-    const bool invented =
-        mesh.states_provenance() && !has_evidence(mesh.mesh.provenance[face]);
+    const bool invented = mesh.states_provenance() && !has_evidence(mesh.mesh.provenance[face]);
     if (!std::isfinite(sigma) || invented) continue;
     sum.stated_length += along.norm();
     if (bounds_area) sum.areas.add(sigma * along.norm());

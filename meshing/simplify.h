@@ -16,7 +16,8 @@ struct SimplifyOptions {
   double max_error_inferred =
       0;  ///< The same for Inferred and Estimated faces; 0 = max_error, else >= max_error.
   double max_color_error = 0.03;  ///< Largest change of a colour channel at an input vertex that is
-                                  ///< not on Inferred faces only; in (0, 1]; 1 = any.
+                                  ///< not on Inferred faces only (photographs show the colour of
+                                  ///< Estimated ones); in (0, 1]; 1 = any.
   double max_area_change =
       0.01;                 ///< Of any label with evidence, as a share of its area; in (0, 1].
   size_t target_faces = 0;  ///< Stop when so few are left; 0 = as few as the errors allow.

@@ -72,7 +72,7 @@ struct ThicknessSummary {
   size_t samples = 0;
   double without_far_side = 0;  ///< Share of the samples.
   ThicknessPart seen;           ///< A photograph vouches for both ends, or the mesh has no labels.
-  ThicknessPart unseen;         ///< One end at least is interpolated, virtual or invented.
+  ThicknessPart unseen;         ///< One end at least is neither observed nor of a single view.
 };
 
 /// \throws InvalidInput if the mesh has no area

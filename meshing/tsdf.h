@@ -22,9 +22,9 @@ struct TsdfView {
   DepthMap sigma;    ///< Standard deviation of depth [internal units]; empty or NaN = none
                      ///< known, the pixel then counts as exact.
   ColorImage color;  ///< Empty = no colour.
-  Raster<uint8_t> usable;   ///< 0 where depth must be ignored; empty = use all.
-  EvidenceMap evidence;     ///< What vouches for the depth. Adjoining depth of several views adds no
-                            ///< more than one to the support, estimated depth nothing.
+  Raster<uint8_t> usable;  ///< 0 where depth must be ignored; empty = use all.
+  EvidenceMap evidence;    ///< What vouches for the depth. Adjoining depth of several views adds no
+                           ///< more than one to the support, estimated depth nothing.
   bool is_virtual = false;  ///< Rendered from splats, not measured: adds to the surface but not to
                             ///< its support.
 };

@@ -26,8 +26,8 @@ struct Volume {
   openvdb::Vec3SGrid::Ptr color;    ///< Linear light, RGB in [0, 1], as programs that draw volumes
                                     ///< take it; active where a view gave colour.
   openvdb::FloatGrid::Ptr support;  ///< Photographs in the band that look at it from one side, the
-                                    ///< side with more of them; depth that rests on one alone counts
-                                    ///< as one at most, estimated depth not at all.
+                                    ///< side with more of them; depth that rests on one alone
+                                    ///< counts as one at most, estimated depth not at all.
   openvdb::FloatGrid::Ptr sigma;    ///< Standard deviation of tsdf [internal units]; active where
                                     ///< the views came with one, but not on estimated voxels.
   openvdb::Int32Grid::Ptr state;    ///< VoxelState, tiles where constant.

@@ -12,8 +12,8 @@ enum class Hole : uint8_t {
   Transparent = 1,  ///< Alpha below the threshold: nothing was reconstructed along the ray.
   Occluded = 2,     ///< What is drawn lies within input pictures, but none shows it: it is hidden.
   Outside = 3,      ///< Outside of every input picture: what is drawn, or else all of the ray.
-  Estimated = 5,    ///< An input view shows it, but nothing measured its depth. No hole in a picture.
-  Sky = 6,          ///< An input view shows sky, which has no surface. No hole in a picture.
+  Estimated = 5,  ///< An input view shows it, but nothing measured its depth. No hole in a picture.
+  Sky = 6,        ///< An input view shows sky, which has no surface. No hole in a picture.
 };
 inline constexpr int kHoleKinds = 7;
 

@@ -78,7 +78,7 @@ Witness make_witness(const SupportView& view, const Camera& camera, const Suppor
 
 // What views say together about a surface at a pixel.
 struct Verdict {
-  int support = 0;          // views that vouch for it
+  int support = 0;         // views that vouch for it
   Hole kind = Hole::None;  // Estimated or Sky where some show it and none vouches
 
   bool is_shown() const { return support > 0 || kind != Hole::None; }
@@ -244,8 +244,7 @@ void annotate_support(RenderBuffers& buffers,
       const float z = judge.surface(x, y);
       const Verdict verdict = std::isnan(z) ? Verdict() : judge.of(x, y);
       buffers.support(x, y) = static_cast<uint8_t>(verdict.support);
-      buffers.hole(x, y) =
-          verdict.is_shown() ? verdict.kind : kind_of_hole(camera, x, y, z, views);
+      buffers.hole(x, y) = verdict.is_shown() ? verdict.kind : kind_of_hole(camera, x, y, z, views);
     }
   });
 }

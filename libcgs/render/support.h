@@ -40,9 +40,9 @@ struct SupportOptions {
 /// there. Where no view agrees at the very pixel but one does within three pixels, the pixel is
 /// therefore judged by the best of the depths drawn within three pixels.
 ///
-/// Views of which the depth is Measured count one each, those of which it is Adjoining one together.
-/// A pixel that views show with no more than an estimate, or as sky, has support 0 and is no hole;
-/// every other pixel without support is one. `hole` says which.
+/// Views of which the depth is Measured count one each, those of which it is Adjoining one
+/// together. A pixel that views show with no more than an estimate, or as sky, has support 0 and is
+/// no hole; every other pixel without support is one. `hole` says which.
 ///
 /// \param buffers  as rasterize() gives them for `camera`
 /// \param views    the input views only: a virtual camera is no witness

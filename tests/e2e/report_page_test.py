@@ -260,7 +260,7 @@ class ReportPage(unittest.TestCase):
         self.assertGreater(share_of_magenta(self.page.picture()), 0.2)
         text = self.page.measured()
         self.assertNotIn('±', re.search(r'Distance .*', text).group())
-        self.assertRegex(text, r'B \([^)]*\): inferred\. No photograph saw this place')
+        self.assertRegex(text, r'B \([^)]*\): inferred\. Nothing measured this place')
         figure = measure(re.search(r'cgs measure .*', text).group())
         self.assertIsNone(figure['sigma'])
         self.assertEqual(figure['to']['provenance'], 'inferred')

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/dxf.h"
 
+#include <algorithm>
 #include <map>
 #include <sstream>
 
@@ -82,6 +83,22 @@ TEST(WriteDxf, HasWhatReadersLookFor) {
   EXPECT_EQ(line_type["OBSERVED"], "CONTINUOUS");
   EXPECT_EQ(largest_x, 5000002);
   EXPECT_EQ(all.back().second, "EOF");
+}
+
+TEST(WriteDxf, HasALayerForEveryLabel) {
+  const test::TempDir dir;
+  const auto layer_of = [&](std::vector<Provenance> labels) {
+    write_dxf(dir / "a.dxf", square(std::move(labels)));
+    const auto all = groups(test::read_bytes(dir / "a.dxf"));
+    const auto line = std::find(all.begin(), all.end(), std::pair(0, std::string("POLYLINE")));
+    const std::string name = std::next(line)->second;
+    const std::pair<int, std::string> defined(2, name);
+    EXPECT_NE(std::find(all.begin(), line, defined), line) << name;
+    return name;
+  };
+  EXPECT_EQ(layer_of(std::vector<Provenance>(4, Provenance::Virtual)), "VIRTUAL");
+  EXPECT_EQ(layer_of(std::vector<Provenance>(4, Provenance::Estimated)), "ESTIMATED");
+  EXPECT_EQ(layer_of({}), "SECTION");
 }
 
 TEST(WriteDxf, NeedsALineAndADisk) {

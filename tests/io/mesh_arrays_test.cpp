@@ -26,7 +26,7 @@ TEST(Millimetres, ConvertsFileCoordinates) {
 TEST(ProvenanceName, NamesEveryClassOnce) {
   std::string all;
   for (const Provenance label : kProvenanceOrder) all += std::string(provenance_name(label)) + ";";
-  EXPECT_EQ(all, "observed;single view;interpolated;inferred;virtual;");
+  EXPECT_EQ(all, "observed;single view;interpolated;estimated;inferred;virtual;");
 }
 
 }  // namespace

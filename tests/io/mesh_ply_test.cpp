@@ -153,10 +153,13 @@ TEST(MeshPly, SaysThatLabelsOfOursAreLost) {
   };
   const std::string ours = "comment generator cgs\n";
   const std::string labelled =
-      "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual\n";
+      "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual "
+      "5 estimated\n";
   const std::string labels = "property uchar scalar_provenance\n";
   const std::string other = "property uchar other\n";
-  for (const std::string& comment : {ours + labelled, labelled, std::string()}) {
+  const std::string earlier =
+      "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual\n";
+  for (const std::string& comment : {ours + labelled, labelled, earlier, std::string()}) {
     EXPECT_TRUE(warnings_of(comment, labels).empty());
     ASSERT_EQ(warnings_of(comment, other).size(), 1U);
   }
@@ -164,6 +167,15 @@ TEST(MeshPly, SaysThatLabelsOfOursAreLost) {
       warnings_of(labelled, other)[0].starts_with("where its faces come from is no longer known"));
   EXPECT_TRUE(warnings_of("", other)[0].starts_with("it states sigma, but not where"));
   EXPECT_TRUE(warnings_of(ours, other).empty()) << "it never had any";
+}
+
+TEST(MeshPly, NamesTheNumbersOfAllLabels) {
+  const test::TempDir dir;
+  write_mesh_ply(dir / "a.ply", test::labelled_sphere(3, 3), exact_frame());
+  const std::string bytes = test::read_bytes(dir / "a.ply");
+  EXPECT_NE(bytes.find("\ncomment provenance 0 inferred 1 single view 2 observed 3 interpolated "
+                       "4 virtual 5 estimated\n"),
+            std::string::npos);
 }
 
 TEST(MeshPly, SaysThatItLeavesOutTextures) {

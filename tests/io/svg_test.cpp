@@ -42,9 +42,14 @@ TEST(WriteSvg, DrawsLabelsApartWithYDownwards) {
 TEST(WriteSvg, HasAClassForEveryLabel) {
   const test::TempDir dir;
   Drawing drawing = triangle();
-  drawing.lines[0].of_segment.assign(3, Provenance::Virtual);
-  write_svg(dir / "a.svg", drawing);
-  EXPECT_NE(test::read_bytes(dir / "a.svg").find("class=\"virtual\""), std::string::npos);
+  for (const auto& [label, name] :
+       {std::pair(Provenance::Virtual, "virtual"), {Provenance::Estimated, "estimated"}}) {
+    drawing.lines[0].of_segment.assign(3, label);
+    write_svg(dir / "a.svg", drawing);
+    const std::string text = test::read_bytes(dir / "a.svg");
+    EXPECT_NE(text.find(std::string("class=\"") + name + '"'), std::string::npos);
+    EXPECT_NE(text.find(std::string("\n.") + name + " { stroke: "), std::string::npos);
+  }
   drawing.lines[0].of_segment.clear();
   write_svg(dir / "a.svg", drawing);
   EXPECT_NE(test::read_bytes(dir / "a.svg").find("class=\"section\""), std::string::npos);

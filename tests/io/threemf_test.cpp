@@ -90,7 +90,7 @@ TEST(Write3mf, KeepsFacesTheirOrderAndTheirClass) {
   const auto p1 = attribute(xml, "triangle", "p1");
   ASSERT_EQ(v1.size(), mesh.faces.size());
   ASSERT_EQ(p1.size(), mesh.faces.size());
-  constexpr std::array<double, 4> kMaterial = {3, 1, 0, 2};  // by label
+  constexpr std::array<double, 4> kMaterial = {4, 1, 0, 2};  // by label
   for (size_t i = 0; i < v1.size(); ++i) {
     EXPECT_EQ(v1[i], mesh.faces[i][0]);
     EXPECT_EQ(v2[i], mesh.faces[i][1]);
@@ -107,7 +107,7 @@ TEST(Write3mf, ClaimsOfTheWholeObjectWhatHoldsOfAllOfIt) {
   const auto material = [&] {
     return attribute(model_of(mesh, Eigen::Matrix3d::Identity()), "object", "pindex").at(0);
   };
-  EXPECT_EQ(material(), 3) << "inferred";
+  EXPECT_EQ(material(), 4) << "inferred";
   for (Provenance& label : mesh.provenance) {
     if (label == Provenance::Inferred) label = Provenance::SingleView;
   }

@@ -101,6 +101,24 @@ TEST(WriteViewExr, WhatAMaskLeavesOutIsNoHole) {
   EXPECT_EQ(at(image, "holeKind.Y", 4, 1), 0.0f);
 }
 
+TEST(WriteViewExr, WhatAPhotographShowsIsNoHole) {
+  ViewRasters view = rasters();
+  view.hole(1, 1) = Hole::Estimated;
+  view.hole(2, 1) = Hole::Sky;
+  view.depth(2, 1) = std::nanf("");
+  view.hole(3, 1) = Hole::Estimated;
+  view.depth(3, 1) = std::nanf("");
+  const ExrImage image = written(view, {});
+  EXPECT_EQ(at(image, "holeKind.Y", 1, 1), 5.0f);
+  EXPECT_EQ(at(image, "hole.Y", 1, 1), 0.0f);
+  EXPECT_EQ(at(image, "Z", 1, 1), 0.75f);
+  EXPECT_EQ(at(image, "holeKind.Y", 2, 1), 6.0f);
+  EXPECT_EQ(at(image, "hole.Y", 2, 1), 0.0f);
+  EXPECT_EQ(at(image, "Z", 2, 1), 0.0f);
+  EXPECT_EQ(at(image, "holeKind.Y", 3, 1), 1.0f) << "without a depth there is no estimate";
+  EXPECT_EQ(at(image, "hole.Y", 3, 1), 1.0f);
+}
+
 TEST(WriteViewExr, AttributesProjectAPointToItsPixel) {
   const Frame frame = test::centimetre_frame();
   const ExrImage image = written(rasters(), frame);

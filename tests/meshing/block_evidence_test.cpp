@@ -27,8 +27,8 @@ struct SlowVoxel {
   Vector3d color = Vector3d::Zero();
   float free_weight = 0;
   int count = 0, known = 0, known_behind = 0;
-  bool is_free = false, is_hidden = false, is_measured = false, is_guessed = false;
-  bool has_sigma = true;
+  bool is_free = false, is_hidden = false, is_measured = false;
+  bool is_adjoining = false, is_estimated = false, has_sigma = true;
 
   // Whether it adds to what is measured.
   bool takes(const PointSighting& s) const {
@@ -46,20 +46,25 @@ struct SlowVoxel {
     const auto w = double(s.weight);
     const auto d = double(s.distance);
     const auto sigma = double(s.sigma);
-    const bool is_guess = !view.guessed.empty() && view.guessed(s.x, s.y) != 0;
+    const DepthEvidence evidence =
+        view.evidence.empty() ? DepthEvidence::Measured : view.evidence(s.x, s.y);
     weight += w;
     distance += w * d;
     spread += w * d * d;
     variance += w * w * sigma * sigma;
     ++count;
-    (is_behind ? known_behind : known) += !view.is_virtual && !is_guess ? 1 : 0;
-    is_guessed |= is_guess;
+    (is_behind ? known_behind : known) +=
+        !view.is_virtual && evidence == DepthEvidence::Measured ? 1 : 0;
+    is_adjoining |= evidence == DepthEvidence::Adjoining;
+    is_estimated |= evidence == DepthEvidence::Estimated;
     has_sigma &= sigma > 0;
     if (view.color.empty()) return;
     color_weight += w;
     color += w * view.color(s.x, s.y).cast<double>();
   }
   bool is_seen() const { return weight > 0; }
+  int support() const { return std::max({known, known_behind, is_adjoining ? 1 : 0}); }
+  bool is_estimate() const { return is_estimated && support() == 0; }
   bool is_carved() const { return is_seen() && distance < 0 && double(free_weight) > weight; }
   double sigma() const {
     const double promised = variance / (weight * weight);
@@ -80,13 +85,13 @@ void expect_voxel(const Volume& volume, const openvdb::Coord& at, const SlowVoxe
     ASSERT_EQ(volume.state->tree().isValueOn(at), slow.is_free || is_hidden);
     return;
   }
-  ASSERT_EQ(state, VoxelState::Occupied);
+  ASSERT_EQ(state, slow.is_estimate() ? VoxelState::Estimated : VoxelState::Occupied);
   ASSERT_EQ(volume.tsdf->tree().getValue(at), static_cast<float>(slow.distance / slow.weight));
   ASSERT_EQ(volume.weight->tree().getValue(at), static_cast<float>(slow.weight));
-  ASSERT_EQ(volume.support->tree().getValue(at),
-            std::max({slow.known, slow.known_behind, slow.is_guessed ? 1 : 0}));
-  ASSERT_EQ(volume.sigma->tree().isValueOn(at), slow.has_sigma);
-  if (slow.has_sigma) {
+  ASSERT_EQ(volume.support->tree().getValue(at), slow.support());
+  const bool has_sigma = slow.has_sigma && !slow.is_estimate();
+  ASSERT_EQ(volume.sigma->tree().isValueOn(at), has_sigma);
+  if (has_sigma) {
     ASSERT_EQ(volume.sigma->tree().getValue(at), static_cast<float>(slow.sigma()));
   }
   ASSERT_EQ(volume.color->tree().isValueOn(at), slow.color_weight > 0);
@@ -97,8 +102,8 @@ void expect_voxel(const Volume& volume, const openvdb::Coord& at, const SlowVoxe
       openvdb::Vec3f(linear_from_srgb(c.x()), linear_from_srgb(c.y()), linear_from_srgb(c.z())));
 }
 
-// A thin sheet, a ball and a wall, from random places, with noise, holes, masks, guesses and a
-// patch in front that the other views see through.
+// A thin sheet, a ball and a wall, from random places, with noise, holes, masks, depth of one view
+// alone and a patch in front that the other views see through.
 std::vector<TsdfView> random_views(uint32_t seed) {
   std::mt19937 random(seed);
   const auto uniform = [&](double low, double high) {
@@ -119,12 +124,19 @@ std::vector<TsdfView> random_views(uint32_t seed) {
     if (i % 2 == 0) view.sigma = raster(0.006f);
     if (i == 1) view.color = {};
     if (i == 2) view.is_virtual = true;
-    if (i == 3) view.guessed = raster(uint8_t{0});
+    if (i == 3 || i == 5) {
+      view.evidence = raster(DepthEvidence::Measured);
+      for (int y = 0; y < view.camera.height; ++y) {
+        for (int x = 32; x < view.camera.width; ++x) {
+          view.evidence(x, y) = DepthEvidence::Estimated;
+        }
+      }
+    }
     if (i == 4) view.usable = raster(uint8_t{1});
     for (int y = 10; y < 20; ++y) {
       for (int x = 15; x < 30; ++x) {
         if (i == 0) view.depth(x, y) *= 0.8f;
-        if (i == 3) view.guessed(x, y) = 1;
+        if (i == 3) view.evidence(x, y) = DepthEvidence::Adjoining;
         if (i == 4) view.usable(x, y) = 0;
         if (i == 5) view.depth(x, y) = INFINITY;
         if (i == 1 && x < 19) view.depth(x, y) = std::nanf("");
@@ -163,6 +175,7 @@ std::vector<bool> views_from_behind(const openvdb::Coord& origin,
 }
 
 TEST(BlockEvidence, IsWhatEveryViewSaysOfEveryVoxelToTheBit) {
+  size_t estimated = 0;
   for (const uint32_t seed : {1U, 2U, 3U}) {
     const std::vector<TsdfView> views = random_views(seed);
     const TsdfOptions options = {.voxel_size = 0.011 + 0.002 * seed, .depth_trunc = 1.4};
@@ -189,7 +202,9 @@ TEST(BlockEvidence, IsWhatEveryViewSaysOfEveryVoxelToTheBit) {
           ++slow_report.voxels;
           slow_report.conflicts += is_conflict;
           slow_report.carved += is_conflict && slow.is_carved();
-          slow_report.occupied += slow.is_seen() && !slow.is_carved();
+          const bool is_occupied = slow.is_seen() && !slow.is_carved();
+          slow_report.occupied += is_occupied && !slow.is_estimate();
+          slow_report.estimated += is_occupied && slow.is_estimate();
         }
       }
     }
@@ -197,10 +212,13 @@ TEST(BlockEvidence, IsWhatEveryViewSaysOfEveryVoxelToTheBit) {
     EXPECT_EQ(fused.report.conflicts, slow_report.conflicts);
     EXPECT_EQ(fused.report.carved, slow_report.carved);
     EXPECT_EQ(fused.report.occupied, slow_report.occupied);
+    EXPECT_EQ(fused.report.estimated, slow_report.estimated);
+    estimated += fused.report.estimated;
     EXPECT_GT(fused.report.carved, 10U);
     EXPECT_GT(fused.report.hidden, 1000U);
     expect_same(fused, fuse_streamed(source_of(views), options, {}, 1));
   }
+  EXPECT_GT(estimated, 10U);
 }
 
 // Lengths that are twice as long are not rounded otherwise.

@@ -71,6 +71,18 @@ TEST(Certify, PassesACubeAndMeasuresIt) {
   EXPECT_EQ(c.genus, 0);
 }
 
+TEST(Certify, SplitsTheAreaByLabel) {
+  TriangleMesh mesh = cube({0, 0, 0}, {1, 1, 1});
+  mesh.provenance.assign(12, Provenance::Observed);
+  mesh.provenance[0] = mesh.provenance[1] = mesh.provenance[2] = Provenance::Estimated;
+  mesh.provenance[3] = Provenance::Inferred;
+  const Certificate c = certify(mesh);
+  EXPECT_DOUBLE_EQ(c.observed_area, 4);
+  EXPECT_DOUBLE_EQ(c.estimated_area, 1.5);
+  EXPECT_DOUBLE_EQ(c.inferred_area, 0.5);
+  EXPECT_DOUBLE_EQ(c.single_view_area + c.interpolated_area + c.virtual_area, 0);
+}
+
 TEST(Certify, MeasuresFarFromTheOriginAsNearIt) {
   const Vector3f far(4096, -8192, 2048);
   const Certificate c = certify(cube(far, far + Vector3f(1, 2, 3)));

@@ -153,8 +153,10 @@ TEST(EvidenceAt, InterpolatesSigma) {
   EXPECT_EQ(at.sigma, 0.375);
   EXPECT_EQ(at.provenance, Provenance::SingleView);
   EXPECT_EQ(at.normal, Eigen::Vector3d(0, 0, 1));
-  mesh.mesh.provenance = {Provenance::Inferred};
-  EXPECT_TRUE(std::isnan(evidence_at(mesh, {0, {0.5, 0, 0}, {0.5, 0.5, 0}}).sigma));
+  for (const Provenance label : {Provenance::Inferred, Provenance::Estimated}) {
+    mesh.mesh.provenance = {label};
+    EXPECT_TRUE(std::isnan(evidence_at(mesh, {0, {0.5, 0, 0}, {0.5, 0.5, 0}}).sigma));
+  }
 }
 
 }  // namespace

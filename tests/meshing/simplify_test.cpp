@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/simplify.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -269,11 +270,32 @@ TEST(Simplify, MovesAStraightBorderNotAtAllAndNoFaceAcrossIt) {
   }
 }
 
-TEST(Simplify, IsLooserOnlyWhereInferred) {
+// Half observed, half not, and rough.
+TriangleMesh rough_square() {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> noise(-2e-3f, 2e-3f);
   TriangleMesh mesh = labelled_square(48, [](float) { return 0.5f; });
   for (Vector3f& p : mesh.vertices) p.z() += noise(random);
+  return mesh;
+}
+
+TEST(Simplify, TakesEstimatedFacesAsItTakesInferredOnes) {
+  TriangleMesh mesh = rough_square();
+  const SimplifyOptions options = {.max_error = 3e-4, .max_error_inferred = 6e-3};
+  const SimplifyResult inferred = simplify(mesh, options);
+  std::replace(
+      mesh.provenance.begin(), mesh.provenance.end(), Provenance::Inferred, Provenance::Estimated);
+  const SimplifyResult estimated = simplify(mesh, options);
+  EXPECT_EQ(estimated.mesh.vertices, inferred.mesh.vertices);
+  EXPECT_EQ(estimated.mesh.faces, inferred.mesh.faces);
+  EXPECT_EQ(estimated.inferred.hausdorff(), inferred.inferred.hausdorff());
+  EXPECT_EQ(estimated.area_after[size_t(Provenance::Estimated)],
+            inferred.area_after[size_t(Provenance::Inferred)]);
+  EXPECT_EQ(estimated.area_after[size_t(Provenance::Inferred)], 0);
+}
+
+TEST(Simplify, IsLooserOnlyWhereInferred) {
+  const TriangleMesh mesh = rough_square();
   const SimplifyResult result = simplify(mesh, {.max_error = 3e-4, .max_error_inferred = 6e-3});
   std::array<size_t, 4> before{};
   std::array<size_t, 4> after{};

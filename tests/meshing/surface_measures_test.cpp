@@ -102,13 +102,17 @@ TEST(SurfaceMeasures, SigmaOfFlatAreaIsThatOfItsSides) {
 }
 
 TEST(SurfaceMeasures, InventedSurfaceStatesNoSigma) {
-  auto mesh = test::with_labels(test::with_sigma(test::sphere_mesh(0.4), 1e-4f),
-                                [](const Eigen::Vector3d& p) {
-                                  return p.z() > 0 ? Provenance::Observed : Provenance::Inferred;
-                                });
-  const double whole = enclosed_volume(test::with_sigma(test::sphere_mesh(0.4), 1e-4f)).sigma;
-  EXPECT_NEAR(enclosed_volume(mesh).stated, 0.5, 1e-12);
-  EXPECT_NEAR(enclosed_volume(mesh).sigma / whole, 0.5, 0.02);
+  const MeasurableMesh sphere = test::with_sigma(test::sphere_mesh(0.4), 1e-4f);
+  const double whole = enclosed_volume(sphere).sigma;
+  for (const Provenance below : {Provenance::Inferred, Provenance::Estimated}) {
+    const auto mesh = test::with_labels(
+        sphere, [&](const Eigen::Vector3d& p) { return p.z() > 0 ? Provenance::Observed : below; });
+    EXPECT_NEAR(enclosed_volume(mesh).stated, 0.5, 1e-12);
+    EXPECT_NEAR(enclosed_volume(mesh).sigma / whole, 0.5, 0.02);
+    EXPECT_NEAR(surface_area(mesh).stated, 0.5, 1e-12);
+    EXPECT_NEAR(
+        surface_area(mesh).by_provenance.at(size_t(below)) / surface_area(mesh).value, 0.5, 1e-12);
+  }
 }
 
 TEST(StraightDistance, AddsTheVariancesOfItsEnds) {

@@ -32,6 +32,10 @@ std::vector<TsdfView> three_views(const test::Shape& shape, int width = kWidth) 
   return views;
 }
 
+EvidenceMap everywhere(const TsdfView& view, DepthEvidence evidence) {
+  return {view.camera.width, view.camera.height, evidence};
+}
+
 test::Shape sphere_before_wall() {
   return test::nearest({test::sphere(kCenter, kRadius), test::plane({0, 0, 1}, 0.35)});
 }
@@ -180,7 +184,7 @@ TEST(Fuse, LabelsTheOverlapOfTwoViewsObserved) {
   EXPECT_LT((mesh.colors[0] - Eigen::Vector3f(0.2f, 0.5f, 0.8f)).norm(), 1e-4f);
 }
 
-TEST(Fuse, GuessesOfSeveralViewsAreLabelledAsSeenByOne) {
+TEST(Fuse, AdjoiningDepthOfSeveralViewsIsLabelledAsSeenByOne) {
   std::vector<TsdfView> views = three_views(test::plane({0, 0, 1}, 0.1));
   const auto largest_support = [&] {
     const TriangleMesh mesh = open_surface(fuse(views, {}).volume, {});
@@ -188,10 +192,51 @@ TEST(Fuse, GuessesOfSeveralViewsAreLabelledAsSeenByOne) {
     return *std::max_element(mesh.support.begin(), mesh.support.end());
   };
   EXPECT_EQ(largest_support(), 3);
-  views[0].guessed = MaskMap(views[0].camera.width, views[0].camera.height, 1);
+  views[0].evidence = everywhere(views[0], DepthEvidence::Adjoining);
   EXPECT_EQ(largest_support(), 2);
-  for (TsdfView& view : views) view.guessed = MaskMap(view.camera.width, view.camera.height, 1);
+  for (TsdfView& view : views) view.evidence = everywhere(view, DepthEvidence::Adjoining);
   EXPECT_EQ(largest_support(), 1);
+}
+
+TEST(Fuse, WhatNothingButEstimatesMakeIsEstimated) {
+  std::vector<TsdfView> views = three_views(test::plane({0, 0, 1}, 0.1));
+  for (TsdfView& view : views) {
+    view.sigma = DepthMap(view.depth.width, view.depth.height, 0.002f);
+    view.evidence = everywhere(view, DepthEvidence::Estimated);
+  }
+  const FusedVolume fused = fuse(views, {});
+  EXPECT_EQ(fused.report.occupied, 0U);
+  EXPECT_EQ(fused.report.estimated, fused.volume.tsdf->activeVoxelCount());
+  EXPECT_EQ(fused.volume.sigma->activeVoxelCount(), 0U);
+  EXPECT_EQ(state_at(fused.volume, {0, 0, 0.1}), VoxelState::Estimated);
+  const TriangleMesh mesh = open_surface(fused.volume, {});
+  ASSERT_GT(mesh.vertices.size(), 1000U);
+  for (const Provenance label : mesh.provenance) ASSERT_EQ(label, Provenance::Estimated);
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+    ASSERT_EQ(mesh.support[v], 0);
+    ASSERT_TRUE(std::isnan(mesh.sigma[v]));
+  }
+  ASSERT_EQ(mesh.colors.size(), mesh.vertices.size()) << "the photographs show it";
+}
+
+TEST(Fuse, EstimatesAddNothingToTheSupportOfWhatIsKnown) {
+  std::vector<TsdfView> views = three_views(test::plane({0, 0, 1}, 0.1));
+  const Vector3d seen_by_all(0, 0, 0.1);
+  for (const DepthEvidence known : {DepthEvidence::Measured, DepthEvidence::Adjoining}) {
+    for (TsdfView& view : views) view.evidence = everywhere(view, DepthEvidence::Estimated);
+    views[1].evidence = everywhere(views[1], known);
+    const FusedVolume fused = fuse(views, {});
+    EXPECT_EQ(state_at(fused.volume, seen_by_all), VoxelState::Occupied);
+    const auto at = fused.volume.support->transform().worldToIndexNodeCentered(
+        openvdb::Vec3d(seen_by_all.x(), seen_by_all.y(), seen_by_all.z()));
+    EXPECT_EQ(fused.volume.support->tree().getValue(at), 1);
+    EXPECT_GT(fused.report.estimated, 0U) << "where views[1] does not look";
+    const auto area = area_by_provenance(open_surface(fused.volume, {}));
+    EXPECT_GT(area[size_t(Provenance::SingleView)], 0.05);
+    EXPECT_GT(area[size_t(Provenance::Estimated)], 0.01);
+    EXPECT_EQ(area[size_t(Provenance::Observed)], 0);
+    EXPECT_EQ(area[size_t(Provenance::Virtual)], 0);
+  }
 }
 
 TEST(Fuse, CarriesTheUncertaintyOfTheViews) {
@@ -296,7 +341,7 @@ std::vector<TsdfView> varied_views() {
     return MaskMap(view.camera.width, view.camera.height, value);
   };
   views[1].color = {};
-  views[2].guessed = mask(views[2], 1);
+  views[2].evidence = everywhere(views[2], DepthEvidence::Adjoining);
   views[4].is_virtual = true;
   views[5].usable = mask(views[5], 1);
   for (size_t i = 0; i < 4000; ++i) views[5].usable.data[i] = 0;
@@ -403,7 +448,7 @@ TEST(Fuse, KeepsSmallThingsFarBeforeTheRest) {
   }
   EXPECT_LT(fuse(views, {}).report.bounds.min().z(), 0);
   for (TsdfView& view : views) {  // as where false matches are what stands out
-    view.guessed = MaskMap(view.camera.width, view.camera.height, 1);
+    view.evidence = everywhere(view, DepthEvidence::Adjoining);
   }
   EXPECT_GT(fuse(views, {}).report.bounds.min().z(), 0.2);
 }

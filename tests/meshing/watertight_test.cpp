@@ -113,6 +113,24 @@ TEST(WatertightSurface, LabelsFrontObservedAndBackInferred) {
   }
 }
 
+TEST(WatertightSurface, EstimatesMakeSurfaceButNoEvidence) {
+  auto views = views_of(test::sphere(kCenter, kRadius), kThreeEyes);
+  auto measured = fuse(views, {});
+  for (TsdfView& view : views) {
+    view.evidence = EvidenceMap(view.camera.width, view.camera.height, DepthEvidence::Estimated);
+  }
+  auto estimated = fuse(views, {});
+  const WatertightResult known = watertight_surface(measured.volume, {});
+  const WatertightResult guess = watertight_surface(estimated.volume, {});
+  EXPECT_TRUE(guess.certificate.passed());
+  const Certificate& c = guess.certificate;
+  EXPECT_EQ(c.observed_area + c.single_view_area + c.interpolated_area + c.virtual_area, 0);
+  EXPECT_GT(c.estimated_area,
+            0.8 * (known.certificate.observed_area + known.certificate.single_view_area));
+  EXPECT_NEAR((c.estimated_area + c.inferred_area) / c.area, 1, 1e-9);
+  for (const float sigma : guess.mesh.sigma) ASSERT_TRUE(std::isnan(sigma));
+}
+
 TEST(WatertightSurface, KeepsTheObservedSurfaceWhereItWas) {
   auto fused = fuse(views_of(sphere_before_wall(), kThreeEyes), {});
   const TriangleMesh open = open_surface(fused.volume, {});

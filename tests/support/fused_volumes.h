@@ -38,6 +38,7 @@ inline void expect_same(const FusedVolume& a, const FusedVolume& b) {
   expect_same(*a.volume.state, *b.volume.state);
   EXPECT_EQ(a.report.free, b.report.free);
   EXPECT_EQ(a.report.occupied, b.report.occupied);
+  EXPECT_EQ(a.report.estimated, b.report.estimated);
   EXPECT_EQ(a.report.hidden, b.report.hidden);
   EXPECT_EQ(a.report.unseen, b.report.unseen);
   EXPECT_EQ(a.report.conflicts, b.report.conflicts);

@@ -246,7 +246,7 @@ TEST(AnnotateSupport, DoesNotTakeAFloaterForASurface) {
   EXPECT_EQ(facing.buffers.hole(12, 7), Hole::None);
 }
 
-TEST(AnnotateSupport, CountsGuessesOfSeveralViewsAsOneView) {
+TEST(AnnotateSupport, CountsAdjoiningDepthOfSeveralViewsAsOneView) {
   Facing facing(1, 1);
   std::vector<SupportView> views(3, facing.view);
   const auto support = [&] {
@@ -254,14 +254,49 @@ TEST(AnnotateSupport, CountsGuessesOfSeveralViewsAsOneView) {
     return int(facing.buffers.support(9, 7));
   };
   EXPECT_EQ(support(), 3);
-  const MaskMap guessed(facing.camera.width, facing.camera.height, 1);
-  views[0].guessed = guessed;
-  EXPECT_EQ(support(), 2) << "a guess adds nothing to what views know";
-  views[1].guessed = views[2].guessed = guessed;
+  const EvidenceMap adjoining(facing.camera.width, facing.camera.height, DepthEvidence::Adjoining);
+  views[0].evidence = adjoining;
+  EXPECT_EQ(support(), 2) << "it adds nothing to what views know";
+  views[1].evidence = views[2].evidence = adjoining;
   EXPECT_EQ(support(), 1);
   EXPECT_EQ(facing.buffers.hole(9, 7), Hole::None);
-  views[2].guessed = MaskMap(3, 3, 1);
+  views[2].evidence = EvidenceMap(3, 3, DepthEvidence::Adjoining);
   EXPECT_THROW(support(), InvalidInput);
+}
+
+EvidenceMap everywhere(const Camera& camera, DepthEvidence evidence) {
+  return {camera.width, camera.height, evidence};
+}
+
+TEST(AnnotateSupport, WhatAnEstimateOrSkyShowsHasNoSupportAndIsNoHole) {
+  for (const auto& [evidence, kind] :
+       {std::pair(DepthEvidence::Estimated, Hole::Estimated), {DepthEvidence::Sky, Hole::Sky}}) {
+    Facing facing(1, 1);
+    facing.view.evidence = everywhere(facing.camera, evidence);
+    EXPECT_EQ(facing.judged(), kind);
+    EXPECT_EQ(facing.buffers.support(9, 7), 0);
+    EXPECT_FALSE(is_hole(kind));
+    facing.buffers.median_depth(9, 7) = 0.8f;  // before all that it shows
+    EXPECT_EQ(facing.judged(), Hole::Occluded);
+  }
+}
+
+TEST(AnnotateSupport, AnEstimateAddsNothingToWhatOthersMeasured) {
+  Facing facing(1, 1);
+  std::vector<SupportView> views(3, facing.view);
+  const auto judged = [&](DepthEvidence first, DepthEvidence second, DepthEvidence third) {
+    views[0].evidence = everywhere(facing.camera, first);
+    views[1].evidence = everywhere(facing.camera, second);
+    views[2].evidence = everywhere(facing.camera, third);
+    annotate_support(facing.buffers, facing.camera, views);
+    return std::pair(int(facing.buffers.support(9, 7)), facing.buffers.hole(9, 7));
+  };
+  using enum DepthEvidence;
+  EXPECT_EQ(judged(Estimated, Measured, Estimated), std::pair(1, Hole::None));
+  EXPECT_EQ(judged(Sky, Measured, Measured), std::pair(2, Hole::None));
+  EXPECT_EQ(judged(Estimated, Adjoining, Sky), std::pair(1, Hole::None));
+  EXPECT_EQ(judged(Sky, Sky, Estimated), std::pair(0, Hole::Estimated));
+  EXPECT_EQ(judged(Sky, Sky, Sky), std::pair(0, Hole::Sky));
 }
 
 TEST(AnnotateSupport, FindsNoWitnessBehindOrBesideItsImage) {
