@@ -66,9 +66,8 @@ class Estimator {
         merge_sensor_depth(given.views[i], view(i), out_.views[i]);
       }
     }
-    for (size_t i = 0; i < out_.views.size(); ++i) {
-      enter_sky(find_sky(view(i), out_.views[i], scene_.frame.up), out_.views[i]);
-    }
+    const std::vector<MaskMap> sky = find_sky(scene_, out_.views);
+    for (size_t i = 0; i < sky.size(); ++i) enter_sky(sky[i], out_.views[i]);
     const std::vector<DepthGuess> guesses = guesses_of(given);
     const auto count = static_cast<double>(out_.views.size());
     for (size_t i = 0; i < out_.views.size(); ++i) {

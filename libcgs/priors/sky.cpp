@@ -16,9 +16,12 @@ namespace {
 constexpr float kEven = 0.035f;      // largest change from pixel to pixel
 constexpr float kRimChange = 0.12f;  // of a pixel that is half sky
 constexpr float kBlueness = 0.2f;    // blue over red of a sky that need not be bright
-constexpr double kBrightest = 0.98;  // share of the rest that a sky of another colour outshines
+constexpr double kBrightest = 0.98;  // share of the rest that a sky of another colour outshines,
+constexpr double kBright = 0.6;      // and one along most of the border
 constexpr double kLeastArea = 0.01;  // of the picture
 constexpr double kLeastRim = 0.08;   // of the border that is up
+constexpr double kMostRim = 0.8;
+constexpr float kAlike = 0.12f;  // colours of one sky in two pictures
 
 using Component = std::vector<std::pair<int, int>>;
 
@@ -82,27 +85,41 @@ class SkyFinder {
         colors_(smoothed(view.image)),
         sky_(view.image.width, view.image.height, 0) {}
 
+  // What may be sky, if its colour says so.
+  struct Candidate {
+    Component pixels;
+    Eigen::Vector3f color = Eigen::Vector3f::Zero();  // median
+    bool stands_out = false;                          // from the rest of its picture, as sky does
+  };
+
   // \param up  step in the picture
-  MaskMap find(Direction up) {
-    const int width = sky_.width;
-    const int height = sky_.height;
-    const double rim_length = up.dx == 0 ? width : height;
-    bool any = false;
-    for_each_component(
-        width,
-        height,
-        [&](int x, int y) { return looks_like_sky(x, y); },
-        [&](const Component& part) {
-          const auto at_border = std::count_if(part.begin(), part.end(), [&](const auto& p) {
-            return !sky_.contains(p.first + up.dx, p.second + up.dy);
-          });
-          const bool is_large = double(part.size()) >= kLeastArea * double(sky_.data.size()) &&
-                                double(at_border) >= kLeastRim * rim_length;
-          if (!is_large || !is_sky(part)) return;
-          for (const auto& [x, y] : part) sky_(x, y) = 1;
-          any = true;
-        });
-    if (!any) return {};
+  std::vector<Candidate> candidates(Direction up) const {
+    const double border = up.dx == 0 ? sky_.width : sky_.height;
+    std::vector<Candidate> out;
+    const auto may_be_sky = [&](int x, int y) { return looks_like_sky(x, y); };
+    for_each_component(sky_.width, sky_.height, may_be_sky, [&](const Component& part) {
+      const auto at_border = std::count_if(part.begin(), part.end(), [&](const auto& p) {
+        return !sky_.contains(p.first + up.dx, p.second + up.dy);
+      });
+      const bool is_large = double(part.size()) >= kLeastArea * double(sky_.data.size());
+      const double along = double(at_border) / border;
+      if (!is_large || along < kLeastRim || is_measured_nearby(part)) return;
+      const Eigen::Vector3f color = median_color(part);
+      const bool is_clear =
+          color[2] - color[0] >= kBlueness ||
+          outshines(luminance(color), part.size(), kBrightest) ||
+          (along >= kMostRim && outshines(luminance(color), part.size(), kBright));
+      out.push_back({part, color, is_clear});
+    });
+    return out;
+  }
+
+  // \param parts  those that are sky
+  MaskMap grown_from(const std::vector<Candidate>& parts, Direction up) {
+    if (parts.empty()) return {};
+    for (const Candidate& part : parts) {
+      for (const auto& [x, y] : part.pixels) sky_(x, y) = 1;
+    }
     add_clouds(up);
     add_between_bars();
     for (int round = 0; round < kRimPixels; ++round) add_rim();
@@ -126,34 +143,38 @@ class SkyFinder {
 
   bool looks_like_sky(int x, int y) const {
     const Eigen::Vector3f& c = colors_(x, y);
-    constexpr float kBright = 0.72f;
-    return usable(x, y) && (is_blue(c) || is_white(c, kBright)) && change_at(x, y) < kEven;
+    constexpr float kLeast = 0.72f;
+    return usable(x, y) && (is_blue(c) || is_white(c, kLeast)) && change_at(x, y) < kEven;
   }
 
-  // By its colour beside all others, and by what was measured in it.
-  bool is_sky(const Component& part) const {
-    std::vector<float> blueness;
-    std::vector<float> levels;
-    size_t near = 0;
-    const float farther = kFarther * median_depth();
-    for (const auto& [x, y] : part) {
-      const Eigen::Vector3f& c = colors_(x, y);
-      blueness.push_back(c[2] - c[0]);
-      levels.push_back(luminance(c));
-      near += is_well_measured(x, y) && priors_.depth(x, y) < farther ? 1 : 0;
+  Eigen::Vector3f median_color(const Component& part) const {
+    Eigen::Vector3f out;
+    std::vector<float> levels(part.size());
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      std::transform(part.begin(), part.end(), levels.begin(), [&](const auto& p) {
+        return colors_(p.first, p.second)[c];
+      });
+      out[c] = median(levels);
     }
-    constexpr double kMostMeasured = 0.3;
-    if (double(near) > kMostMeasured * double(part.size())) return false;
-    return median(blueness) >= kBlueness || outshines(median(levels), part.size());
+    return out;
   }
 
-  // Whether all but few of the pixels that are not of a part of so many are darker.
-  bool outshines(float level, size_t count) const {
+  bool is_measured_nearby(const Component& part) const {
+    constexpr double kMost = 0.3;
+    const float farther = kFarther * median_depth();
+    const auto near = std::count_if(part.begin(), part.end(), [&](const auto& p) {
+      return is_well_measured(p.first, p.second) && priors_.depth(p.first, p.second) < farther;
+    });
+    return double(near) > kMost * double(part.size());
+  }
+
+  // Whether such a share of the pixels that are not of a part of so many are darker.
+  bool outshines(float level, size_t count, double share) const {
     const auto darker = std::count_if(colors_.data.begin(), colors_.data.end(), [&](const auto& c) {
       return luminance(c) < level;
     });
     const double others = double(colors_.data.size()) - double(count);
-    return double(darker) - 0.5 * double(count) >= kBrightest * others;
+    return double(darker) - 0.5 * double(count) >= share * others;
   }
 
   bool is_well_measured(int x, int y) const {
@@ -210,7 +231,7 @@ class SkyFinder {
   }
 
   bool is_like_sky_nearby(int x, int y, int reach) const {
-    constexpr float kAlike = 0.06f;
+    constexpr float kSame = 0.06f;
     for (const Direction d : kDirections) {
       const int stride = std::max(std::abs(d.dx), std::abs(d.dy));
       for (int k = 1; k * stride <= reach; ++k) {
@@ -218,7 +239,7 @@ class SkyFinder {
         const int v = y + k * d.dy;
         if (!sky_.contains(u, v)) break;
         if (sky_(u, v) == 0) continue;
-        return (colors_(u, v) - colors_(x, y)).cwiseAbs().maxCoeff() < kAlike;
+        return (colors_(u, v) - colors_(x, y)).cwiseAbs().maxCoeff() < kSame;
       }
     }
     return false;
@@ -262,7 +283,36 @@ Direction step_towards(const Eigen::Vector3d& up, const Camera& camera) {
 }  // namespace
 
 MaskMap find_sky(const View& view, const ViewPriors& priors, const Eigen::Vector3d& up) {
-  return SkyFinder(view, priors).find(step_towards(up, view.camera));
+  const Direction step = step_towards(up, view.camera);
+  SkyFinder finder(view, priors);
+  std::vector<SkyFinder::Candidate> found = finder.candidates(step);
+  std::erase_if(found, [](const auto& part) { return !part.stands_out; });
+  return finder.grown_from(found, step);
+}
+
+std::vector<MaskMap> find_sky(const Scene& scene, const std::vector<ViewPriors>& priors) {
+  std::vector<std::vector<SkyFinder::Candidate>> found;
+  std::vector<Eigen::Vector3f> skies;
+  const auto view = [&](size_t i) -> const View& {
+    return scene.views[static_cast<size_t>(scene.input[i])];
+  };
+  const auto up = [&](size_t i) { return step_towards(scene.frame.up, view(i).camera); };
+  for (size_t i = 0; i < priors.size(); ++i) {
+    found.push_back(SkyFinder(view(i), priors[i]).candidates(up(i)));
+    for (const auto& part : found.back()) {
+      if (part.stands_out) skies.push_back(part.color);
+    }
+  }
+  std::vector<MaskMap> out;
+  for (size_t i = 0; i < priors.size(); ++i) {
+    std::erase_if(found[i], [&](const auto& part) {
+      return !part.stands_out && std::none_of(skies.begin(), skies.end(), [&](const auto& sky) {
+        return (part.color - sky).cwiseAbs().maxCoeff() < kAlike;
+      });
+    });
+    out.push_back(SkyFinder(view(i), priors[i]).grown_from(found[i], up(i)));
+  }
+  return out;
 }
 
 void enter_sky(const MaskMap& sky, ViewPriors& priors) {
