@@ -102,7 +102,7 @@ void add_fuse(CLI::App& app) {
   auto* cmd = app.add_subcommand(
       "fuse",
       "Model or measured depth frames to OpenVDB volume: signed distance, weight, colour, free / "
-      "occupied / never seen");
+      "occupied / estimated / never seen");
   DepthFusionRequest& request = args->request;
   cmd->add_option("input",
                   request.scene,

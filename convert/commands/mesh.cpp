@@ -77,7 +77,7 @@ void add_mesh(CLI::App& app) {
       "--simplify",
       args->simplify,
       "Largest error of simplified meshes where there is evidence, e.g. 2mm; four times "
-      "that where inferred; default: a quarter of a voxel; 0 = do not simplify");
+      "that where inferred or estimated; default: a quarter of a voxel; 0 = do not simplify");
   add_common_options(*cmd, args->common);
   cmd->footer("Example: cgs mesh portal.vdb --up 0 -1 0 -o out/mesh");
   cmd->callback([args] { run_mesh_command(*args); });

@@ -100,8 +100,8 @@ void add_surface_options(CLI::App& command, RunArgs& args) {
       "--simplify",
       args.request.simplify,
       "Largest error of simplified meshes where there is evidence, e.g. 2mm; four times "
-      "that where inferred, as much again for asset.glb, whose photographs hold the colours; "
-      "default: a quarter of a voxel; 0 = do not simplify");
+      "that where inferred or estimated, as much again for asset.glb, whose photographs hold "
+      "the colours; default: a quarter of a voxel; 0 = do not simplify");
   command.add_option("--compression-error",
                      args.request.compression_error,
                      "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
