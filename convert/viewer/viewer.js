@@ -216,7 +216,7 @@
 
   const looks = [
     { name: 'Photographs', there: scene.photographs.length > 0, lit: 0, textured: 1, paint: colorOfVertex,
-      explain: () => legend.append('Every face shows the photograph that sees it best; what none shows has estimated colours.') },
+      explain: () => legend.append('Every face shows the photograph that sees it best; what none shows has the colours around it.') },
     { name: 'Colour', there: true, lit: 0.6, paint: colorOfVertex,
       explain: () => legend.append('Colours of the vertices, under a light at the camera.') },
     { name: 'Provenance', there: statesLabels, lit: 0.7, explain: explainLabels,
