@@ -87,7 +87,7 @@ class SkyFinder {
     const int width = sky_.width;
     const int height = sky_.height;
     const double rim_length = up.dx == 0 ? width : height;
-    bool any = false;
+    std::vector<Part> parts;
     for_each_component(
         width,
         height,
@@ -98,10 +98,14 @@ class SkyFinder {
           });
           const bool is_large = double(part.size()) >= kLeastArea * double(sky_.data.size()) &&
                                 double(at_border) >= kLeastRim * rim_length;
-          if (!is_large || !is_sky(part)) return;
-          for (const auto& [x, y] : part) sky_(x, y) = 1;
-          any = true;
+          if (is_large) parts.push_back({part, median_level(part)});
         });
+    bool any = false;
+    for (const Part& part : parts) {
+      if (!is_sky(part, parts)) continue;
+      for (const auto& [x, y] : part.pixels) sky_(x, y) = 1;
+      any = true;
+    }
     if (!any) return {};
     add_clouds(up);
     add_between_bars();
@@ -111,6 +115,12 @@ class SkyFinder {
 
  private:
   static constexpr int kRimPixels = 3;
+
+  // What may be sky: even, and large enough at the border that is up.
+  struct Part {
+    Component pixels;
+    float level;  // median luminance
+  };
 
   bool usable(int x, int y) const { return view_.valid.empty() || view_.valid(x, y) != 0; }
 
@@ -131,29 +141,50 @@ class SkyFinder {
   }
 
   // By its colour beside all others, and by what was measured in it.
-  bool is_sky(const Component& part) const {
+  bool is_sky(const Part& part, const std::vector<Part>& parts) const {
     std::vector<float> blueness;
-    std::vector<float> levels;
     size_t near = 0;
     const float farther = kFarther * median_depth();
-    for (const auto& [x, y] : part) {
+    for (const auto& [x, y] : part.pixels) {
       const Eigen::Vector3f& c = colors_(x, y);
       blueness.push_back(c[2] - c[0]);
-      levels.push_back(luminance(c));
       near += is_well_measured(x, y) && priors_.depth(x, y) < farther ? 1 : 0;
     }
     constexpr double kMostMeasured = 0.3;
-    if (double(near) > kMostMeasured * double(part.size())) return false;
-    return median(blueness) >= kBlueness || outshines(median(levels), part.size());
+    if (double(near) > kMostMeasured * double(part.pixels.size())) return false;
+    return median(blueness) >= kBlueness || outshines(part.level, parts);
   }
 
-  // Whether all but few of the pixels that are not of a part of so many are darker.
-  bool outshines(float level, size_t count) const {
-    const auto darker = std::count_if(colors_.data.begin(), colors_.data.end(), [&](const auto& c) {
-      return luminance(c) < level;
-    });
-    const double others = double(colors_.data.size()) - double(count);
-    return double(darker) - 0.5 * double(count) >= kBrightest * others;
+  float median_level(const Component& pixels) const {
+    std::vector<float> levels;
+    for (const auto& [x, y] : pixels) levels.push_back(luminance(colors_(x, y)));
+    return median(levels);
+  }
+
+  // Whether all but few of the pixels are darker than a part of that level. Parts of the same level
+  // do not count, since a tower may divide the sky, nor do their rims, which are sky but not even.
+  bool outshines(float level, const std::vector<Part>& parts) const {
+    constexpr float kSameLevel = 0.04f;
+    constexpr int kRim = 2;  // as wide as smoothing and the next pixel reach
+    MaskMap others = view_.valid.empty() ? MaskMap(sky_.width, sky_.height, 1) : view_.valid;
+    for (const Part& part : parts) {
+      if (std::abs(part.level - level) > kSameLevel) continue;
+      for (const auto& [x, y] : part.pixels) {
+        for (int v = std::max(0, y - kRim); v <= std::min(others.height - 1, y + kRim); ++v) {
+          for (int u = std::max(0, x - kRim); u <= std::min(others.width - 1, x + kRim); ++u) {
+            others(u, v) = 0;
+          }
+        }
+      }
+    }
+    size_t count = 0;
+    size_t darker = 0;
+    for (size_t i = 0; i < others.data.size(); ++i) {
+      if (others.data[i] == 0) continue;
+      ++count;
+      darker += luminance(colors_.data[i]) < level ? 1 : 0;
+    }
+    return count > 0 && double(darker) >= kBrightest * double(count);
   }
 
   bool is_well_measured(int x, int y) const {
@@ -179,14 +210,17 @@ class SkyFinder {
         [&](int x, int y) { return sky_(x, y) == 0; },
         [&](const Component& part) {
           constexpr float kCloud = 0.5f;
-          Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+          Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+          Component seen;
           for (const auto& [x, y] : part) {
             // Whatever reaches the lower border stands on the ground.
             if (!sky_.contains(x - up.dx, y - up.dy)) return;
-            mean += colors_(x, y);
+            if (!usable(x, y)) continue;
+            sum += colors_(x, y);
+            seen.emplace_back(x, y);
           }
-          if (!is_white(mean / float(part.size()), kCloud)) return;
-          clouds.insert(clouds.end(), part.begin(), part.end());
+          if (seen.empty() || !is_white(sum / float(seen.size()), kCloud)) return;
+          clouds.insert(clouds.end(), seen.begin(), seen.end());
         });
     for (const auto& [x, y] : clouds) sky_(x, y) = 1;
   }
