@@ -80,6 +80,7 @@ class SkyFinder {
       : view_(view),
         priors_(priors),
         colors_(smoothed(view.image)),
+        median_depth_(median_depth(priors)),
         sky_(view.image.width, view.image.height, 0) {}
 
   // \param up  step in the picture
@@ -142,17 +143,21 @@ class SkyFinder {
 
   // By its colour beside all others, and by what was measured in it.
   bool is_sky(const Part& part, const std::vector<Part>& parts) const {
+    if (was_measured(part.pixels)) return false;
     std::vector<float> blueness;
-    size_t near = 0;
-    const float farther = kFarther * median_depth();
-    for (const auto& [x, y] : part.pixels) {
-      const Eigen::Vector3f& c = colors_(x, y);
-      blueness.push_back(c[2] - c[0]);
-      near += is_well_measured(x, y) && priors_.depth(x, y) < farther ? 1 : 0;
-    }
-    constexpr double kMostMeasured = 0.3;
-    if (double(near) > kMostMeasured * double(part.pixels.size())) return false;
+    for (const auto& [x, y] : part.pixels) blueness.push_back(colors_(x, y)[2] - colors_(x, y)[0]);
     return median(blueness) >= kBlueness || outshines(part.level, parts);
+  }
+
+  // Nearby, and in more places than by mistake.
+  bool was_measured(const Component& pixels) const {
+    constexpr double kMostMeasured = 0.3;
+    const float farther = kFarther * median_depth_;
+    const auto near = std::count_if(pixels.begin(), pixels.end(), [&](const auto& p) {
+      const auto [x, y] = p;
+      return is_well_measured(x, y) && priors_.depth(x, y) < farther;
+    });
+    return double(near) > kMostMeasured * double(pixels.size());
   }
 
   float median_level(const Component& pixels) const {
@@ -193,10 +198,10 @@ class SkyFinder {
            priors_.confidence(x, y) > kConfident;
   }
 
-  float median_depth() const {
+  static float median_depth(const ViewPriors& priors) {
     std::vector<float> depths;
-    for (size_t i = 0; i < priors_.depth.data.size(); ++i) {
-      if (priors_.origin.data[i] == DepthOrigin::Measured) depths.push_back(priors_.depth.data[i]);
+    for (size_t i = 0; i < priors.depth.data.size(); ++i) {
+      if (priors.origin.data[i] == DepthOrigin::Measured) depths.push_back(priors.depth.data[i]);
     }
     return depths.empty() ? 0 : median(depths);
   }
@@ -238,7 +243,7 @@ class SkyFinder {
           const bool is_near = std::any_of(part.begin(), part.end(), [&](const auto& p) {
             return is_like_sky_nearby(p.first, p.second, reach);
           });
-          if (is_near) found.insert(found.end(), part.begin(), part.end());
+          if (is_near && !was_measured(part)) found.insert(found.end(), part.begin(), part.end());
         });
     for (const auto& [x, y] : found) sky_(x, y) = 1;
   }
@@ -281,6 +286,7 @@ class SkyFinder {
   const View& view_;
   const ViewPriors& priors_;
   ColorImage colors_;
+  float median_depth_;  // of what was measured; 0 = nothing
   MaskMap sky_;
 };
 
