@@ -83,6 +83,7 @@ class SkyFinder {
       : view_(view),
         priors_(priors),
         colors_(smoothed(view.image)),
+        median_depth_(median_depth(priors)),
         sky_(view.image.width, view.image.height, 0) {}
 
   // What may be sky, if its colour says so.
@@ -128,6 +129,12 @@ class SkyFinder {
 
  private:
   static constexpr int kRimPixels = 3;
+
+  // What may be sky: even, and large enough at the border that is up.
+  struct Part {
+    Component pixels;
+    float level;  // median luminance
+  };
 
   bool usable(int x, int y) const { return view_.valid.empty() || view_.valid(x, y) != 0; }
 
@@ -183,10 +190,10 @@ class SkyFinder {
            priors_.confidence(x, y) > kConfident;
   }
 
-  float median_depth() const {
+  static float median_depth(const ViewPriors& priors) {
     std::vector<float> depths;
-    for (size_t i = 0; i < priors_.depth.data.size(); ++i) {
-      if (priors_.origin.data[i] == DepthOrigin::Measured) depths.push_back(priors_.depth.data[i]);
+    for (size_t i = 0; i < priors.depth.data.size(); ++i) {
+      if (priors.origin.data[i] == DepthOrigin::Measured) depths.push_back(priors.depth.data[i]);
     }
     return depths.empty() ? 0 : median(depths);
   }
@@ -200,14 +207,17 @@ class SkyFinder {
         [&](int x, int y) { return sky_(x, y) == 0; },
         [&](const Component& part) {
           constexpr float kCloud = 0.5f;
-          Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+          Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+          Component seen;
           for (const auto& [x, y] : part) {
             // Whatever reaches the lower border stands on the ground.
             if (!sky_.contains(x - up.dx, y - up.dy)) return;
-            mean += colors_(x, y);
+            if (!usable(x, y)) continue;
+            sum += colors_(x, y);
+            seen.emplace_back(x, y);
           }
-          if (!is_white(mean / float(part.size()), kCloud)) return;
-          clouds.insert(clouds.end(), part.begin(), part.end());
+          if (seen.empty() || !is_white(sum / float(seen.size()), kCloud)) return;
+          clouds.insert(clouds.end(), seen.begin(), seen.end());
         });
     for (const auto& [x, y] : clouds) sky_(x, y) = 1;
   }
@@ -225,7 +235,7 @@ class SkyFinder {
           const bool is_near = std::any_of(part.begin(), part.end(), [&](const auto& p) {
             return is_like_sky_nearby(p.first, p.second, reach);
           });
-          if (is_near) found.insert(found.end(), part.begin(), part.end());
+          if (is_near && !was_measured(part)) found.insert(found.end(), part.begin(), part.end());
         });
     for (const auto& [x, y] : found) sky_(x, y) = 1;
   }
@@ -268,6 +278,7 @@ class SkyFinder {
   const View& view_;
   const ViewPriors& priors_;
   ColorImage colors_;
+  float median_depth_;  // of what was measured; 0 = nothing
   MaskMap sky_;
 };
 

@@ -93,6 +93,56 @@ TEST(TrainingToJson, SaysInWordsWhereTheDepthIsFrom) {
       << described(trained, {});
 }
 
+// Of one photograph.
+std::string covered(const PriorsCoverage& coverage) {
+  PriorsReport priors;
+  priors.coverage = {coverage};
+  Scene scene;
+  scene.views.resize(2);
+  scene.views[1].name = "left";
+  scene.input = {1};
+  const std::vector<std::string> words = coverage_words(priors, scene);
+  EXPECT_EQ(words.size(), 1u);
+  return words[0];
+}
+
+TEST(CoverageWords, TellOfSkyAndOfWhatIsEstimatedOrOpen) {
+  EXPECT_EQ(covered({.measured = 0.43,
+                     .completed = 0.2,
+                     .guessed = 0.05,
+                     .sky = 0.2,
+                     .left_open = 0.12,
+                     .estimated = 0.05}),
+            "of photograph left, 63 % is measured, 20 % is sky, 5.0 % shows surface that nothing "
+            "measured and is estimated from its surroundings and 12 % shows surface of which "
+            "nothing is known and stays open");
+}
+
+TEST(CoverageWords, LeaveOutWhatThereIsNoneOf) {
+  EXPECT_EQ(covered({.measured = 0.9, .completed = 0.1}), "of photograph left, 100 % is measured");
+  EXPECT_EQ(covered({.measured = 0.7, .sky = 0.3}),
+            "of photograph left, 70 % is measured and 30 % is sky");
+  EXPECT_EQ(covered({.measured = 0.5, .left_open = 0.5}),
+            "of photograph left, 50 % is measured and 50 % shows surface of which nothing is known "
+            "and stays open");
+  EXPECT_EQ(covered({.measured = 0.9999, .sky = 0.0001}), "of photograph left, 100 % is measured")
+      << "as good as none";
+}
+
+TEST(CoverageWords, AreBesideTheFigures) {
+  TrainedModel trained;
+  trained.model.scene.views.resize(1);
+  trained.model.scene.views[0].name = "left";
+  trained.model.scene.input = {0};
+  trained.priors.coverage = {{.measured = 0.5, .completed = 0.25, .sky = 0.25, .estimated = 0.125}};
+  const auto row = training_to_json(trained, {})["depth_of_views"][0];
+  EXPECT_EQ(row["view"], "left");
+  EXPECT_EQ(row["sky"], 0.25);
+  EXPECT_EQ(row["left_open"], 0);
+  EXPECT_EQ(row["estimated"], 0.125);
+  EXPECT_EQ(row["words"], coverage_words(trained.priors, trained.model.scene)[0]);
+}
+
 TEST(TrainingToJson, SaysInWordsWhatWasOptimised) {
   ModelRequest request;
   TrainedModel trained;

@@ -46,6 +46,7 @@ RunRequest unusual_request(const test::TempDir& dir) {
   out.max_size = 123456;
   out.lods = 2;
   out.glb_encoding = GlbEncoding::Quantized;
+  out.estimated = EstimatedSurface::Drop;
   return out;
 }
 
@@ -67,13 +68,15 @@ TEST(RecordedRequest, IsTheOneThatWasMade) {
     EXPECT_EQ(record_of(found).dump(), record.dump());
     EXPECT_EQ(training_fields(found.training), training_fields(request.training));
     EXPECT_EQ(found.scene.options.depth.kind, request.scene.options.depth.kind);
+    EXPECT_EQ(found.estimated, request.estimated);
   }
 }
 
 TEST(RecordedRequest, OfAnotherShapeIsRefused) {
   const test::TempDir dir;
   const Json record = record_of(unusual_request(dir));
-  for (const char* key : {"up", "known_distances", "max_size", "glb_encoding", "lods"}) {
+  for (const char* key :
+       {"up", "known_distances", "max_size", "glb_encoding", "lods", "estimated"}) {
     Json damaged = record;
     damaged["request"][key] = "nothing of the kind";
     EXPECT_THROW(recorded_request(damaged, "run.json"), BadInput) << key;

@@ -86,6 +86,17 @@ TEST_F(RequestJson, TellsMasksOfHeldOutPhotographs) {
   EXPECT_TRUE(masked["input_images"].contains("a, mask"));
 }
 
+// So that runs of versions that did not have the choice are still the same.
+TEST_F(RequestJson, TellsWhatBecomesOfEstimatedSurfaceWhereSomebodyChose) {
+  EXPECT_FALSE(json().contains("estimated"));
+  request_.estimated = EstimatedSurface::Keep;
+  EXPECT_EQ(json()["estimated"], "keep");
+  request_.estimated = EstimatedSurface::Drop;
+  EXPECT_EQ(json()["estimated"], "drop");
+  request_.estimated = EstimatedSurface::FillOnly;
+  EXPECT_FALSE(json().contains("estimated"));
+}
+
 TEST_F(RequestJson, KnowsOfDepthFromFilesAndNetworks) {
   EXPECT_FALSE(has_given_depth(request_.scene, scene_));
   scene_.views[1].depth_path = dir_ / "b.png";  // held out: goes in nowhere

@@ -9,7 +9,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/exr.h"
 #include "io/png.h"
+#include "tests/support/exr_channel.h"
+#include "tests/support/splat_shapes.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs::views_test {
@@ -145,6 +148,53 @@ TEST(WriteViews, WritesHolesWhereTheyAreKnownAlone) {
     EXPECT_TRUE(std::filesystem::exists(dir / "views" / "0.color.png"));
     EXPECT_TRUE(std::filesystem::exists(dir / "path" / "frame_0000.png"));
   }
+}
+
+// A splat per pixel: sky in the upper quarter, a wall below, of which the lower half is estimated.
+Model wall_below_sky(const test::TempDir& dir) {
+  constexpr float kBackdrop = 20;
+  Model model = model_of_greys(dir, 1);
+  say_that_it_saw_nothing(model, 0);
+  ViewPriors& priors = model.priors[0];
+  const Camera& camera = model.scene.views[0].camera;
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const bool is_sky = y < kSide / 4;
+      const double z = is_sky ? kBackdrop : 2;
+      priors.depth(x, y) = static_cast<float>(z);
+      priors.sigma(x, y) = is_sky ? kBackdrop / 2 : 0.002f;
+      priors.origin(x, y) = is_sky               ? DepthOrigin::Sky
+                            : y >= 5 * kSide / 8 ? DepthOrigin::Estimated
+                                                 : DepthOrigin::Measured;
+      const Eigen::Vector3d place = camera.unproject(x + 0.5, y + 0.5, z);
+      test::add_disc(model.gaussians, place, Eigen::Vector3d::UnitZ(), 0.5 * z / camera.fx);
+    }
+  }
+  return model;
+}
+
+TEST(WriteViews, TellsSkyAndWhatIsEstimatedFromHoles) {
+  const test::TempDir dir;
+  const Model model = wall_below_sky(dir);
+  const auto row = write_views(model, {0}, dir / "views", {})[0];
+  constexpr double kSoftRim = 0.05;  // two rows
+  EXPECT_NEAR(row["sky_fraction"].get<double>(), 0.25, kSoftRim);
+  EXPECT_NEAR(row["estimated_fraction"].get<double>(), 0.375, kSoftRim);
+  EXPECT_NEAR(row["hole_fraction"].get<double>(), 0, kSoftRim);
+  const std::filesystem::path file = dir / "views" / "0.exr";
+  const ExrImage image = read_exr(file);
+  const auto at = [&](const char* channel, int x, int y) {
+    return test::channel(image, channel, file)[static_cast<size_t>(y * kSide + x)];
+  };
+  EXPECT_EQ(at("holeKind.Y", 20, 4), 6);
+  EXPECT_EQ(at("Z", 20, 4), 0) << "the depth of a backdrop is none";
+  EXPECT_EQ(at("hole.Y", 20, 4), 0);
+  EXPECT_EQ(at("holeKind.Y", 20, 18), 0);
+  EXPECT_NEAR(at("Z", 20, 18), 2, 1e-4);
+  EXPECT_EQ(at("support.Y", 20, 18), 1);
+  EXPECT_EQ(at("holeKind.Y", 20, 33), 5);
+  EXPECT_NEAR(at("Z", 20, 33), 2, 1e-4);
+  EXPECT_EQ(at("support.Y", 20, 33), 0);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/priors/estimate_priors.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -46,6 +47,33 @@ TEST(EstimatePriors, GivesEveryPixelDepthSigmaAndLayer) {
     const PriorsCoverage& coverage = priors.report.coverage[v];
     EXPECT_GT(coverage.measured, 0.7);
     EXPECT_NEAR(coverage.measured + coverage.completed, 1, 1e-12);
+  }
+}
+
+// The upper third of both photographs shows a blue sky.
+TEST(EstimatePriors, TellsSharesThatAddUpToAllOfAView) {
+  Scene scene = wall_and_square();
+  for (View& view : scene.views) {
+    for (int y = 0; y < 20; ++y) {
+      for (int x = 0; x < 80; ++x) view.image(x, y) = Eigen::Vector3f(0.35f, 0.55f, 0.92f);
+    }
+    // What masks leave out is of no view.
+    view.valid = MaskMap(80, 60, 1);
+    for (int y = 0; y < 60; ++y) view.valid(0, y) = 0;
+  }
+  const EstimatedPriors priors = estimate_priors(scene, {});
+  for (size_t v = 0; v < 2; ++v) {
+    const PriorsCoverage& share = priors.report.coverage[v];
+    EXPECT_NEAR(
+        share.measured + share.completed + share.guessed + share.sky + share.left_open, 1, 1e-9);
+    EXPECT_NEAR(share.sky, 1.0 / 3, 0.05);
+    EXPECT_GT(share.measured, 0.3);
+    EXPECT_LE(share.estimated, share.completed + share.guessed + 1e-9);
+    const auto& origin = priors.views[v].origin.data;
+    const auto estimated = std::count(origin.begin(), origin.end(), DepthOrigin::Estimated);
+    EXPECT_NEAR(share.estimated, double(estimated) / (79 * 60), 1e-9);
+    EXPECT_EQ(priors.views[v].origin(40, 4), DepthOrigin::Sky);
+    EXPECT_GT(priors.views[v].depth(40, 4), priors.views[v].depth(40, 30));
   }
 }
 
