@@ -27,7 +27,8 @@ void limit_completion(ViewPriors& priors);
 
 /// Estimated pixels that stand for little and are framed by evidence, 1 where they are: patches of
 /// one surface with at most a quarter as many pixels as have evidence, three quarters of whose rim
-/// goes on in such pixels. What reaches the border of the picture, sky or another depth is not.
+/// goes on in such pixels. Of the rim, what is at the border of the picture, at sky or at another
+/// depth does not.
 MaskMap framed_estimates(const ViewPriors& priors);
 
 }  // namespace cgs

@@ -90,6 +90,7 @@ class SkyFinder {
   struct Candidate {
     Component pixels;
     Eigen::Vector3f color = Eigen::Vector3f::Zero();  // median
+    double along_border = 0;                          // share of the one that is up
     bool stands_out = false;                          // from the rest of its picture, as sky does
   };
 
@@ -105,13 +106,13 @@ class SkyFinder {
       const bool is_large = double(part.size()) >= kLeastArea * double(sky_.data.size());
       const double along = double(at_border) / border;
       if (!is_large || along < kLeastRim || is_measured_nearby(part)) return;
-      const Eigen::Vector3f color = median_color(part);
-      const bool is_clear =
-          color[2] - color[0] >= kBlueness ||
-          outshines(luminance(color), part.size(), kBrightest) ||
-          (along >= kMostRim && outshines(luminance(color), part.size(), kBright));
-      out.push_back({part, color, is_clear});
+      out.push_back({part, median_color(part), along});
     });
+    for (Candidate& one : out) {
+      const double darker = share_darker(one, out);
+      one.stands_out = one.color[2] - one.color[0] >= kBlueness || darker >= kBrightest ||
+                       (one.along_border >= kMostRim && darker >= kBright);
+    }
     return out;
   }
 
@@ -129,12 +130,6 @@ class SkyFinder {
 
  private:
   static constexpr int kRimPixels = 3;
-
-  // What may be sky: even, and large enough at the border that is up.
-  struct Part {
-    Component pixels;
-    float level;  // median luminance
-  };
 
   bool usable(int x, int y) const { return view_.valid.empty() || view_.valid(x, y) != 0; }
 
@@ -168,20 +163,38 @@ class SkyFinder {
 
   bool is_measured_nearby(const Component& part) const {
     constexpr double kMost = 0.3;
-    const float farther = kFarther * median_depth();
+    const float farther = kFarther * median_depth_;
     const auto near = std::count_if(part.begin(), part.end(), [&](const auto& p) {
       return is_well_measured(p.first, p.second) && priors_.depth(p.first, p.second) < farther;
     });
     return double(near) > kMost * double(part.size());
   }
 
-  // Whether such a share of the pixels that are not of a part of so many are darker.
-  bool outshines(float level, size_t count, double share) const {
-    const auto darker = std::count_if(colors_.data.begin(), colors_.data.end(), [&](const auto& c) {
-      return luminance(c) < level;
-    });
-    const double others = double(colors_.data.size()) - double(count);
-    return double(darker) - 0.5 * double(count) >= share * others;
+  // Of the pixels that are not of candidates as bright, how many are darker. Those do not count, as
+  // a tower may divide the sky, nor do their rims, which are sky but not even.
+  double share_darker(const Candidate& one, const std::vector<Candidate>& all) const {
+    constexpr float kSameLevel = 0.04f;
+    constexpr int kRim = 2;  // as wide as smoothing and the next pixel reach
+    const float level = luminance(one.color);
+    MaskMap others = view_.valid.empty() ? MaskMap(sky_.width, sky_.height, 1) : view_.valid;
+    for (const Candidate& part : all) {
+      if (std::abs(luminance(part.color) - level) > kSameLevel) continue;
+      for (const auto& [x, y] : part.pixels) {
+        for (int v = std::max(0, y - kRim); v <= std::min(others.height - 1, y + kRim); ++v) {
+          for (int u = std::max(0, x - kRim); u <= std::min(others.width - 1, x + kRim); ++u) {
+            others(u, v) = 0;
+          }
+        }
+      }
+    }
+    size_t count = 0;
+    size_t darker = 0;
+    for (size_t i = 0; i < others.data.size(); ++i) {
+      if (others.data[i] == 0) continue;
+      ++count;
+      darker += luminance(colors_.data[i]) < level ? 1 : 0;
+    }
+    return count > 0 ? double(darker) / double(count) : 0;
   }
 
   bool is_well_measured(int x, int y) const {
@@ -235,7 +248,9 @@ class SkyFinder {
           const bool is_near = std::any_of(part.begin(), part.end(), [&](const auto& p) {
             return is_like_sky_nearby(p.first, p.second, reach);
           });
-          if (is_near && !was_measured(part)) found.insert(found.end(), part.begin(), part.end());
+          if (is_near && !is_measured_nearby(part)) {
+            found.insert(found.end(), part.begin(), part.end());
+          }
         });
     for (const auto& [x, y] : found) sky_(x, y) = 1;
   }
