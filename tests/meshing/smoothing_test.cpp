@@ -18,10 +18,6 @@ namespace {
 
 using test::labelled_sphere;
 
-bool has_evidence(Provenance label) {
-  return label == Provenance::Observed || label == Provenance::SingleView;
-}
-
 // Edge by edge, in double: which vertices are held, and where the others go.
 std::vector<Eigen::Vector3d> reference(const TriangleMesh& mesh,
                                        const std::vector<double>& steps,
@@ -30,7 +26,7 @@ std::vector<Eigen::Vector3d> reference(const TriangleMesh& mesh,
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     for (size_t k = 0; k < 3; ++k) {
       const auto edge = std::minmax(mesh.faces[f][k], mesh.faces[f][(k + 1) % 3]);
-      edges[edge].push_back(has_evidence(mesh.provenance[f]));
+      edges[edge].push_back(was_seen(mesh.provenance[f]));
     }
   }
   std::vector<std::set<uint32_t>> around(mesh.vertices.size());
