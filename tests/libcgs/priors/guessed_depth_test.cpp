@@ -98,14 +98,22 @@ Errors errors_of(const Scene& scene, const EstimatedPriors& alone, const Estimat
   return out;
 }
 
+// As estimate_priors(), but that what was guessed can still be told from what was completed.
+EstimatedPriors priors_with_origins(const Scene& scene) {
+  constexpr float kAnyWay = 1e9f;
+  PriorsOptions options;
+  options.adjoining = {.way = kAnyWay, .largest_step = kAnyWay};
+  return estimate_priors(scene, options);
+}
+
 class GuessedDepth : public testing::TestWithParam<int> {
  protected:
-  GuessedDepth() : scene_(board_scene(GetParam())), alone_(estimate_priors(scene_, {})) {
+  GuessedDepth() : scene_(board_scene(GetParam())), alone_(priors_with_origins(scene_)) {
     before_ = errors_of(scene_, alone_, alone_);
     EXPECT_GT(before_.other_mean, 0.01) << "the scene must be hard enough to tell anything";
   }
   Errors with_given() {
-    given_ = estimate_priors(scene_, {});
+    given_ = priors_with_origins(scene_);
     const Errors after = errors_of(scene_, alone_, given_);
     for (size_t k = 0; k < given_.views.size(); ++k) {
       const ViewPriors& a = alone_.views[k];
