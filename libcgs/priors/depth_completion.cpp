@@ -110,15 +110,15 @@ class Completion {
     });
   }
 
-  // What smoothing brought before what a witness sees moves back again; what is before it
-  // everywhere, as before the sky, is given up.
+  // What smoothing brought before what a witness sees gets back what it had, or moves back; what is
+  // before it everywhere, as before the sky, is given up.
   void clear_empty_space() {
     tbb::parallel_for(0, filled_.height, [&](int y) {
       for (int x = 0; x < filled_.width; ++x) {
         if (!usable(x, y) || measured(x, y)) continue;
         float& rho = filled_(x, y).inverse_depth;
         if (!empty(x, y, rho)) continue;
-        rho = behind_empty(x, y, rho);
+        rho = behind_empty(x, y, collected_(x, y));
         if (empty(x, y, rho)) rho = kNaN;
       }
     });
@@ -126,6 +126,11 @@ class Completion {
 
   // Weighted averages over neighbours of like colour and depth, as on a chessboard.
   void smooth(const Progress& progress) {
+    collected_ = DepthMap(filled_.width, filled_.height, kNaN);
+    std::transform(filled_.data.begin(),
+                   filled_.data.end(),
+                   collected_.data.begin(),
+                   [](const Filled& filled) { return filled.inverse_depth; });
     for (int k = 0; k < 2 * options_.smoothing_rounds; ++k) {
       report(progress, double(k) / (2 * options_.smoothing_rounds));
       tbb::parallel_for(0, filled_.height, [&](int y) {
@@ -250,6 +255,7 @@ class Completion {
   const DepthCompletionOptions& options_;
   std::vector<EmptySpace> empty_;
   Raster<Filled> filled_;
+  DepthMap collected_;  // inverse depths before smoothing
 };
 
 // For pixels that no ray leads from to a measured one.
