@@ -109,10 +109,13 @@ TEST(Evidence, IsRightInASceneThatStereoCannotMeasureEverywhere) {
   const Right both{observed.count + single.count, observed.right + single.right};
   EXPECT_GE(both.share(), 0.98);
   EXPECT_GT(by_label.at(size_t(Provenance::Estimated)).count, 0U) << "of the white wall";
-  for (size_t f = 0; f < closed.mesh.faces.size(); ++f) {
-    if (closed.mesh.provenance[f] != Provenance::Estimated) continue;
-    ASSERT_TRUE(std::isnan(closed.sigma(static_cast<uint32_t>(f)))) << f;
-  }
+  const auto measured =
+      run_cgs("measure " + (folder / "mesh/watertight.ply").string() + " --area --json");
+  ASSERT_EQ(measured.exit_code, 0) << measured.err;
+  const ordered_json area = ordered_json::parse(measured.out).at("figures").at("area");
+  const double value = area.at("value").get<double>();
+  const double unmeasured = area.at("estimated").get<double>() + area.at("inferred").get<double>();
+  EXPECT_LE(area.at("sigma_share").get<double>() * value, value - unmeasured + 1e-6 * value);
 
   const Surface open(folder / "mesh/surface.ply");
   for (const CaptureView& view : views) {
