@@ -42,7 +42,8 @@ class EmptySpace {
     shift_ = (witness.camera->intrinsics() * to.translation()).cast<float>();
   }
 
-  bool holds(int x, int y, float inverse_depth) const {
+  /// \param clearly  how many times the margin of doubt what it sees must lie behind
+  bool holds(int x, int y, float inverse_depth, float clearly) const {
     const Eigen::Vector3f ray = camera_.ray_in_cam(x + 0.5, y + 0.5).cast<float>();
     const Eigen::Vector3f h = turn_ * ray + inverse_depth * shift_;  // z = ratio of the depths
     if (!(h.z() > 0)) return false;
@@ -61,7 +62,8 @@ class EmptySpace {
       for (int i = x0; i <= std::min(x0 + 1, priors.depth.width - 1); ++i) {
         if (priors.origin(i, j) == DepthOrigin::Sky) continue;
         if (priors.origin(i, j) != DepthOrigin::Measured) return false;
-        const float margin = std::max(kMargin * priors.depth(i, j), kSigmas * priors.sigma(i, j));
+        const float margin =
+            clearly * std::max(kMargin * priors.depth(i, j), kSigmas * priors.sigma(i, j));
         if (!(priors.depth(i, j) > depth + margin)) return false;
       }
     }
@@ -110,14 +112,15 @@ class Completion {
     });
   }
 
-  // What smoothing brought before what a witness sees gets back what it had, or moves back; what is
-  // before it everywhere, as before the sky, is given up.
+  // What smoothing brought clearly before what a witness sees gets back what it had, or moves back;
+  // what is before it everywhere, as before the sky, is given up.
   void clear_empty_space() {
+    constexpr float kClearly = 2;  // what smoothing moves by less looks better smooth
     tbb::parallel_for(0, filled_.height, [&](int y) {
       for (int x = 0; x < filled_.width; ++x) {
         if (!usable(x, y) || measured(x, y)) continue;
         float& rho = filled_(x, y).inverse_depth;
-        if (!empty(x, y, rho)) continue;
+        if (!empty(x, y, rho, kClearly)) continue;
         rho = behind_empty(x, y, collected_(x, y));
         if (empty(x, y, rho)) rho = kNaN;
       }
@@ -169,9 +172,9 @@ class Completion {
     }
   }
 
-  bool empty(int x, int y, float inverse_depth) const {
+  bool empty(int x, int y, float inverse_depth, float clearly = 1) const {
     return std::any_of(empty_.begin(), empty_.end(), [&](const EmptySpace& space) {
-      return space.holds(x, y, inverse_depth);
+      return space.holds(x, y, inverse_depth, clearly);
     });
   }
 

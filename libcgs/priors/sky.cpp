@@ -316,15 +316,19 @@ MaskMap find_sky(const View& view, const ViewPriors& priors, const Eigen::Vector
   return finder.grown_from(found, step);
 }
 
-std::vector<MaskMap> find_sky(const Scene& scene, const std::vector<ViewPriors>& priors) {
+namespace {
+
+std::vector<MaskMap> skies_towards(const Scene& scene,
+                                   const std::vector<ViewPriors>& priors,
+                                   const Eigen::Vector3d& up) {
   std::vector<std::vector<SkyFinder::Candidate>> found;
   std::vector<Eigen::Vector3f> skies;
   const auto view = [&](size_t i) -> const View& {
     return scene.views[static_cast<size_t>(scene.input[i])];
   };
-  const auto up = [&](size_t i) { return step_towards(scene.frame.up, view(i).camera); };
+  const auto step = [&](size_t i) { return step_towards(up, view(i).camera); };
   for (size_t i = 0; i < priors.size(); ++i) {
-    found.push_back(SkyFinder(view(i), priors[i]).candidates(up(i)));
+    found.push_back(SkyFinder(view(i), priors[i]).candidates(step(i)));
     for (const auto& part : found.back()) {
       if (part.stands_out) skies.push_back(part.color);
     }
@@ -336,9 +340,20 @@ std::vector<MaskMap> find_sky(const Scene& scene, const std::vector<ViewPriors>&
         return (part.color - sky).cwiseAbs().maxCoeff() < kAlike;
       });
     });
-    out.push_back(SkyFinder(view(i), priors[i]).grown_from(found[i], up(i)));
+    out.push_back(SkyFinder(view(i), priors[i]).grown_from(found[i], step(i)));
   }
   return out;
+}
+
+}  // namespace
+
+std::vector<MaskMap> find_sky(const Scene& scene, const std::vector<ViewPriors>& priors) {
+  // People hold cameras upright, and what is up in the world is a guess where cameras only moved
+  // on.
+  std::vector<MaskMap> out = skies_towards(scene, priors, Eigen::Vector3d::Zero());
+  const bool is_any =
+      std::any_of(out.begin(), out.end(), [](const MaskMap& sky) { return !sky.empty(); });
+  return is_any || !scene.frame.knows_up() ? out : skies_towards(scene, priors, scene.frame.up);
 }
 
 void enter_sky(const MaskMap& sky, ViewPriors& priors) {
