@@ -208,8 +208,8 @@ float before_witness(const Example& e, const Example& witness, int x, int y) {
 
 // In the gap the farther depth is taken, and smoothing draws its rim towards the nearer one, which
 // the witness does not see there.
-TEST(CompleteDepth, PutsNothingBeforeWhatAnotherViewSeesBySmoothingEither) {
-  constexpr float kFar = 2.14f;
+TEST(CompleteDepth, PutsNothingClearlyBeforeWhatAnotherViewSeesBySmoothingEither) {
+  constexpr float kFar = 2.22f;
   Example e(60, 20);
   for (int y = 0; y < 20; ++y) {
     for (int x = 0; x < 60; ++x) {
@@ -225,7 +225,7 @@ TEST(CompleteDepth, PutsNothingBeforeWhatAnotherViewSeesBySmoothingEither) {
     for (int x = 0; x < 60; ++x) witness.measure(x, y, kFar);
   }
   complete_depth(e.priors, e.view, {}, {{&witness.view.camera, &witness.priors}});
-  constexpr float kMargin = 0.03f;  // what a witness tells apart
+  constexpr float kMargin = 0.06f;  // what a witness tells apart clearly
   float most = -1;
   for (int y = 0; y < 20; ++y) {
     for (int x = 20; x < 40; ++x) {
