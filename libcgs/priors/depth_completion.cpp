@@ -42,8 +42,30 @@ class EmptySpace {
     shift_ = (witness.camera->intrinsics() * to.translation()).cast<float>();
   }
 
-  /// \param clearly  how many times the margin of doubt what it sees must lie behind
-  bool holds(int x, int y, float inverse_depth, float clearly) const {
+  bool holds(int x, int y, float inverse_depth) const {
+    return is_all_around(x, y, inverse_depth, [&](int i, int j, float depth) {
+      const ViewPriors& priors = *witness_.priors;
+      if (priors.origin(i, j) == DepthOrigin::Sky) return true;
+      if (priors.origin(i, j) != DepthOrigin::Measured) return false;
+      const float margin = std::max(kMargin * priors.depth(i, j), kSigmas * priors.sigma(i, j));
+      return priors.depth(i, j) > depth + margin;
+    });
+  }
+
+  bool is_before_sky(int x, int y, float inverse_depth) const {
+    return is_all_around(x, y, inverse_depth, [&](int i, int j, float) {
+      return witness_.priors->origin(i, j) == DepthOrigin::Sky;
+    });
+  }
+
+ private:
+  static constexpr float kMargin = 0.03f;  // of the depth
+  static constexpr float kSigmas = 3;
+
+  // Whether is_past(i, j, depth) holds of the four pixels of the witness around a point; one alone
+  // may differ next to a depth edge.
+  template <typename IsPast>
+  bool is_all_around(int x, int y, float inverse_depth, const IsPast& is_past) const {
     const Eigen::Vector3f ray = camera_.ray_in_cam(x + 0.5, y + 0.5).cast<float>();
     const Eigen::Vector3f h = turn_ * ray + inverse_depth * shift_;  // z = ratio of the depths
     if (!(h.z() > 0)) return false;
@@ -54,25 +76,16 @@ class EmptySpace {
           v <= static_cast<float>(priors.depth.height - 1))) {
       return false;
     }
-    // All four pixels around must lie behind: next to a depth edge one of them alone may not.
     const float depth = h.z() / inverse_depth;
     const int x0 = static_cast<int>(u);
     const int y0 = static_cast<int>(v);
     for (int j = y0; j <= std::min(y0 + 1, priors.depth.height - 1); ++j) {
       for (int i = x0; i <= std::min(x0 + 1, priors.depth.width - 1); ++i) {
-        if (priors.origin(i, j) == DepthOrigin::Sky) continue;
-        if (priors.origin(i, j) != DepthOrigin::Measured) return false;
-        const float margin =
-            clearly * std::max(kMargin * priors.depth(i, j), kSigmas * priors.sigma(i, j));
-        if (!(priors.depth(i, j) > depth + margin)) return false;
+        if (!is_past(i, j, depth)) return false;
       }
     }
     return true;
   }
-
- private:
-  static constexpr float kMargin = 0.03f;  // of the depth
-  static constexpr float kSigmas = 3;
 
   const Camera& camera_;
   const CompletionWitness& witness_;
@@ -112,28 +125,21 @@ class Completion {
     });
   }
 
-  // What smoothing brought clearly before what a witness sees gets back what it had, or moves back;
-  // what is before it everywhere, as before the sky, is given up.
-  void clear_empty_space() {
-    constexpr float kClearly = 2;  // what smoothing moves by less looks better smooth
+  // Gives up what is before the sky of a witness at any depth, wherever smoothing brought it.
+  void clear_sky() {
     tbb::parallel_for(0, filled_.height, [&](int y) {
       for (int x = 0; x < filled_.width; ++x) {
         if (!usable(x, y) || measured(x, y)) continue;
         float& rho = filled_(x, y).inverse_depth;
-        if (!empty(x, y, rho, kClearly)) continue;
-        rho = behind_empty(x, y, collected_(x, y));
-        if (empty(x, y, rho)) rho = kNaN;
+        if (!before_sky(x, y, rho)) continue;
+        rho = behind_empty(x, y, rho);
+        if (before_sky(x, y, rho)) rho = kNaN;
       }
     });
   }
 
   // Weighted averages over neighbours of like colour and depth, as on a chessboard.
   void smooth(const Progress& progress) {
-    collected_ = DepthMap(filled_.width, filled_.height, kNaN);
-    std::transform(filled_.data.begin(),
-                   filled_.data.end(),
-                   collected_.data.begin(),
-                   [](const Filled& filled) { return filled.inverse_depth; });
     for (int k = 0; k < 2 * options_.smoothing_rounds; ++k) {
       report(progress, double(k) / (2 * options_.smoothing_rounds));
       tbb::parallel_for(0, filled_.height, [&](int y) {
@@ -172,9 +178,15 @@ class Completion {
     }
   }
 
-  bool empty(int x, int y, float inverse_depth, float clearly = 1) const {
+  bool empty(int x, int y, float inverse_depth) const {
     return std::any_of(empty_.begin(), empty_.end(), [&](const EmptySpace& space) {
-      return space.holds(x, y, inverse_depth, clearly);
+      return space.holds(x, y, inverse_depth);
+    });
+  }
+
+  bool before_sky(int x, int y, float inverse_depth) const {
+    return std::any_of(empty_.begin(), empty_.end(), [&](const EmptySpace& space) {
+      return space.is_before_sky(x, y, inverse_depth);
     });
   }
 
@@ -258,7 +270,6 @@ class Completion {
   const DepthCompletionOptions& options_;
   std::vector<EmptySpace> empty_;
   Raster<Filled> filled_;
-  DepthMap collected_;  // inverse depths before smoothing
 };
 
 // For pixels that no ray leads from to a measured one.
@@ -297,7 +308,7 @@ void complete_depth(ViewPriors& priors,
   Completion completion(priors, view, options, witnesses);
   completion.collect(fallback_inverse_depth(priors, options), part_of(progress, 0, 0.5));
   completion.smooth(part_of(progress, 0.5, 1));
-  completion.clear_empty_space();
+  completion.clear_sky();
   constexpr float kFloor = 0.02f;  // relative sigma next to the evidence
   constexpr float kCap = 0.5f;
   for (int y = 0; y < priors.depth.height; ++y) {

@@ -186,57 +186,6 @@ TEST(CompleteDepth, LooksForEvidenceOnThisSideOfTheSky) {
   }
 }
 
-// As complete_depth() promises, but by other means: how far before what the witness measured all
-// around there a pixel stands, relative to that; negative = behind, or the witness cannot tell.
-float before_witness(const Example& e, const Example& witness, int x, int y) {
-  const Eigen::Vector3d uvz = witness.view.camera.project(
-      e.view.camera.unproject(x + 0.5, y + 0.5, double(e.priors.depth(x, y))));
-  if (!witness.view.camera.sees(uvz)) return -1;
-  float least = 1;
-  for (const double dy : {-0.5, 0.5}) {
-    for (const double dx : {-0.5, 0.5}) {
-      const int u = static_cast<int>(std::floor(uvz.x() + dx));
-      const int v = static_cast<int>(std::floor(uvz.y() + dy));
-      if (!witness.priors.depth.contains(u, v)) return -1;
-      if (witness.priors.origin(u, v) != DepthOrigin::Measured) return -1;
-      const float seen = witness.priors.depth(u, v);
-      least = std::min(least, (seen - static_cast<float>(uvz.z())) / seen);
-    }
-  }
-  return least;
-}
-
-// In the gap the farther depth is taken, and smoothing draws its rim towards the nearer one, which
-// the witness does not see there.
-TEST(CompleteDepth, PutsNothingClearlyBeforeWhatAnotherViewSeesBySmoothingEither) {
-  constexpr float kFar = 2.22f;
-  Example e(60, 20);
-  for (int y = 0; y < 20; ++y) {
-    for (int x = 0; x < 60; ++x) {
-      if (x < 20) e.measure(x, y, 2);
-      if (x >= 40) e.measure(x, y, kFar);
-    }
-  }
-  Example smoothed = e;
-  complete_depth(smoothed.priors, smoothed.view, {});
-  Example witness(60, 20);
-  witness.view.camera.world_from_cam.translation().x() = -0.2;
-  for (int y = 0; y < 20; ++y) {
-    for (int x = 0; x < 60; ++x) witness.measure(x, y, kFar);
-  }
-  complete_depth(e.priors, e.view, {}, {{&witness.view.camera, &witness.priors}});
-  constexpr float kMargin = 0.06f;  // what a witness tells apart clearly
-  float most = -1;
-  for (int y = 0; y < 20; ++y) {
-    for (int x = 20; x < 40; ++x) {
-      ASSERT_EQ(e.priors.origin(x, y), DepthOrigin::Completed);
-      ASSERT_LT(before_witness(e, witness, x, y), kMargin + 1e-4f) << x << ' ' << y;
-      most = std::max(most, before_witness(smoothed, witness, x, y));
-    }
-  }
-  EXPECT_GT(most, kMargin) << "smoothing draws nothing before it, so this shows nothing";
-}
-
 TEST(CompleteDepth, LeavesOpenWhatWouldStandBeforeTheSkyOfAnotherView) {
   Example e(60, 20);
   for (int y = 0; y < 20; ++y) {
