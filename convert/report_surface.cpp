@@ -57,7 +57,8 @@ std::string certificate_section(const Json& report) {
   const Json& c = report["certificate"];
   const ShownUnit unit(report);
   const auto yes = [&](const char* key) { return verdict(c[key].get<bool>(), "yes", "no"); };
-  const auto area = [&](const char* key) { return unit.area(c[key]); };
+  // Runs of earlier versions state fewer.
+  const auto area = [&](const char* key) { return unit.area(c.value(key, Json())); };
   std::ostringstream html;
   html << "<h2>Certificate of the watertight mesh</h2>\n<p>Made by: "
        << escaped(report["mesh"]["method"].get<std::string>()) << "</p>\n<table>\n"
