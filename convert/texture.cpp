@@ -61,7 +61,7 @@ Json report_of(const TriangleMesh& mesh,
     if (i >= 0) {
       ++faces[static_cast<size_t>(i)];
       area[static_cast<size_t>(i)] += face_area(mesh, f) * area_unit;
-    } else if (mesh.provenance.empty() || is_shown(mesh.provenance[f])) {
+    } else if (mesh.provenance.empty() || was_seen(mesh.provenance[f])) {
       ++faces_without;
       area_without += face_area(mesh, f) * area_unit;
     }

@@ -265,8 +265,7 @@ tinygltf::Material GlbBuilder::material_for(const GlbPrimitive& in) {
     out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.25, 0.8, 1.0};
   } else if (in.name == provenance_name(Provenance::Interpolated)) {
     out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.5, 0.2, 1.0};
-  } else if (in.name == provenance_name(Provenance::Estimated) &&
-             in.photograph == PhotoTexture::kNone) {
+  } else if (in.name == provenance_name(Provenance::Estimated)) {
     out.pbrMetallicRoughness.baseColorFactor = {1.0, 0.8, 0.15, 1.0};
   }
   if (in.is_unlit) {

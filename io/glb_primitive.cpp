@@ -38,10 +38,9 @@ float stored_support(float support) {
 }
 
 /// Splats hold the light of the scene, as photographs do. Also where no photograph fits: beside
-/// photographs, lit surface would look like another. What no photograph shows is tinted and lit.
-bool is_unlit(std::optional<Provenance> label, int photograph, bool textured) {
-  if (label == Provenance::Inferred || label == Provenance::Interpolated) return false;
-  if (label == Provenance::Estimated && photograph == PhotoTexture::kNone) return false;
+/// photographs, lit surface would look like another. What they do not vouch for is tinted and lit.
+bool is_unlit(std::optional<Provenance> label, bool textured) {
+  if (label && !was_seen(*label) && label != Provenance::Virtual) return false;
   return textured || label == Provenance::Virtual;
 }
 
@@ -72,7 +71,7 @@ class Splitter {
     GlbPrimitive out;
     out.name = label ? provenance_name(*label) : "surface";
     out.photograph = photograph;
-    out.is_unlit = is_unlit(label, photograph, !texture_.empty());
+    out.is_unlit = is_unlit(label, !texture_.empty());
     if (photograph != PhotoTexture::kNone) {
       out.texture_size = images_[static_cast<size_t>(photograph)].size;
     }

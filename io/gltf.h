@@ -66,7 +66,7 @@ struct GlbReport {
 /// - One primitive and material per provenance class that is present ("observed", "single view",
 ///   "interpolated", "estimated", "inferred", or "surface" if the mesh has no labels), double-sided
 ///   and opaque; inferred surface is tinted magenta, interpolated surface orange, estimated surface
-///   amber where it shows no photograph.
+///   amber.
 /// - POSITION is relative to options.center. asset.extras tells where that lies
 ///   (origin_in_world), the axes (gltf_from_world, row by row), units ("m" or "unknown"),
 ///   metres_per_unit, metres_sigma, scale_source, the area of each class, and the summary.
@@ -94,8 +94,9 @@ GlbReport write_glb(const std::filesystem::path& path,
 /// - A primitive and material per provenance class and photograph, named "observed <photograph>",
 ///   with TEXCOORD_0 and a JPEG of the used part of the photograph; the classes' own primitives
 ///   hold the faces without photograph.
-/// - Photographs hold the light of the scene already, so materials of surface that photographs show
-///   are KHR_materials_unlit; readers that do not know it find a rough non-metal.
+/// - Photographs hold the light of the scene already, so materials of surface that photographs
+/// vouch
+///   for are KHR_materials_unlit; readers that do not know it find a rough non-metal.
 /// - With Draco, texture coordinates move by at most 0.1 pixels, measured.
 ///
 /// \throws as above; InvalidInput if the texture does not fit the mesh: see require_texture().

@@ -112,7 +112,7 @@ class ViewScorer {
 };
 
 bool may_have_photograph(const TriangleMesh& mesh, size_t f) {
-  return mesh.provenance.empty() || is_shown(mesh.provenance[f]);
+  return mesh.provenance.empty() || was_seen(mesh.provenance[f]);
 }
 
 /// The labelling problem, lengths and areas in internal units.
