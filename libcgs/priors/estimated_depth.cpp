@@ -141,9 +141,9 @@ void limit_completion(ViewPriors& priors) {
 }
 
 MaskMap framed_estimates(const ViewPriors& priors) {
-  constexpr float kOneSurface = 0.03f;   // step of depth
-  constexpr double kLargest = 0.25;      // of the pixels with evidence
-  constexpr double kLeastFramed = 0.75;  // of the rim
+  constexpr float kOneSurface = 0.03f;  // step of depth
+  constexpr double kLargest = 0.25;     // of the pixels with evidence
+  constexpr double kLeastFramed = 0.5;  // of the rim
   const auto& origin = priors.origin;
   const auto has_evidence = [](DepthOrigin o) {
     return o == DepthOrigin::Measured || is_filled(o);

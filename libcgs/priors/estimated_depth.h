@@ -26,7 +26,7 @@ void mark_estimated(ViewPriors& priors, const View& view, const AdjoiningOptions
 void limit_completion(ViewPriors& priors);
 
 /// Estimated pixels that stand for little and are framed by evidence, 1 where they are: patches of
-/// one surface with at most a quarter as many pixels as have evidence, three quarters of whose rim
+/// one surface with at most a quarter as many pixels as have evidence, half or more of whose rim
 /// goes on in such pixels. Of the rim, what is at the border of the picture, at sky or at another
 /// depth does not.
 MaskMap framed_estimates(const ViewPriors& priors);
