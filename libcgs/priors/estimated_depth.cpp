@@ -140,44 +140,72 @@ void limit_completion(ViewPriors& priors) {
   }
 }
 
-MaskMap framed_estimates(const ViewPriors& priors) {
+namespace {
+
+bool has_evidence(DepthOrigin origin) {
+  return origin == DepthOrigin::Measured || is_filled(origin);
+}
+
+// Estimated pixels of one surface, and what their rim is, in sides of pixels.
+struct EstimatedPatch {
+  std::vector<std::pair<int, int>> pixels;
+  size_t rim = 0;
+  size_t framed = 0;  // goes on in pixels with evidence
+  size_t open = 0;    // at the border of the picture, at sky, or at what nothing is known of
+};
+
+// The patch around a pixel; takes its pixels out of `left`.
+EstimatedPatch estimated_patch(const ViewPriors& priors, int x0, int y0, MaskMap& left) {
   constexpr float kOneSurface = 0.03f;  // step of depth
+  EstimatedPatch out;
+  out.pixels = {{x0, y0}};
+  left(x0, y0) = 0;
+  for (size_t i = 0; i < out.pixels.size(); ++i) {
+    const auto [x, y] = out.pixels[i];
+    for (const Direction d : kNeighbors) {
+      const int u = x + d.dx;
+      const int v = y + d.dy;
+      const DepthOrigin there =
+          priors.origin.contains(u, v) ? priors.origin(u, v) : DepthOrigin::Unknown;
+      const bool is_open = there == DepthOrigin::Unknown || there == DepthOrigin::Sky;
+      const bool goes_on =
+          !is_open && depth_step(priors.depth(x, y), priors.depth(u, v)) <= kOneSurface;
+      if (goes_on && there == DepthOrigin::Estimated) {
+        if (left(u, v) != 0) out.pixels.emplace_back(u, v);
+        left(u, v) = 0;
+        continue;
+      }
+      ++out.rim;
+      out.framed += goes_on ? 1 : 0;
+      out.open += is_open ? 1 : 0;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+MaskMap framed_estimates(const ViewPriors& priors) {
   constexpr double kLargest = 0.25;     // of the pixels with evidence
   constexpr double kLeastFramed = 0.5;  // of the rim
-  const auto& origin = priors.origin;
-  const auto has_evidence = [](DepthOrigin o) {
-    return o == DepthOrigin::Measured || is_filled(o);
-  };
-  const auto evident = std::count_if(origin.data.begin(), origin.data.end(), has_evidence);
-  MaskMap out(origin.width, origin.height, 0);
-  MaskMap visited = out;
-  std::vector<std::pair<int, int>> patch;
-  for (int y0 = 0; y0 < origin.height; ++y0) {
-    for (int x0 = 0; x0 < origin.width; ++x0) {
-      if (visited(x0, y0) != 0 || origin(x0, y0) != DepthOrigin::Estimated) continue;
-      size_t rim = 0;
-      size_t framed = 0;
-      visited(x0, y0) = 1;
-      patch.assign(1, {x0, y0});
-      for (size_t i = 0; i < patch.size(); ++i) {
-        const auto [x, y] = patch[i];
-        for (const Direction d : kNeighbors) {
-          const int u = x + d.dx;
-          const int v = y + d.dy;
-          const bool goes_on = origin.contains(u, v) &&
-                               depth_step(priors.depth(x, y), priors.depth(u, v)) <= kOneSurface;
-          if (goes_on && origin(u, v) == DepthOrigin::Estimated) {
-            if (visited(u, v) == 0) patch.emplace_back(u, v);
-            visited(u, v) = 1;
-            continue;
-          }
-          ++rim;
-          framed += goes_on && has_evidence(origin(u, v)) ? 1 : 0;
-        }
-      }
-      const bool is_small = double(patch.size()) <= kLargest * double(evident);
-      if (!is_small || double(framed) < kLeastFramed * double(rim)) continue;
-      for (const auto& [x, y] : patch) out(x, y) = 1;
+  constexpr double kMostOpen = 0.25;    // of the rim
+  const auto& origins = priors.origin.data;
+  const auto evident = double(std::count_if(origins.begin(), origins.end(), has_evidence));
+  MaskMap out(priors.origin.width, priors.origin.height, 0);
+  MaskMap left = out;
+  std::transform(origins.begin(), origins.end(), left.data.begin(), [](DepthOrigin origin) {
+    return origin == DepthOrigin::Estimated ? 1 : 0;
+  });
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      if (left(x, y) == 0) continue;
+      const EstimatedPatch patch = estimated_patch(priors, x, y, left);
+      const auto rim = double(patch.rim);
+      const bool is_framed = double(patch.pixels.size()) <= kLargest * evident &&
+                             double(patch.framed) >= kLeastFramed * rim &&
+                             double(patch.open) <= kMostOpen * rim;
+      if (!is_framed) continue;
+      for (const auto& [u, v] : patch.pixels) out(u, v) = 1;
     }
   }
   return out;

@@ -27,8 +27,8 @@ void limit_completion(ViewPriors& priors);
 
 /// Estimated pixels that stand for little and are framed by evidence, 1 where they are: patches of
 /// one surface with at most a quarter as many pixels as have evidence, half or more of whose rim
-/// goes on in such pixels. Of the rim, what is at the border of the picture, at sky or at another
-/// depth does not.
+/// goes on in such pixels, and at most a quarter of whose rim is at the border of the picture, at
+/// sky or at what nothing is known of.
 MaskMap framed_estimates(const ViewPriors& priors);
 
 }  // namespace cgs
