@@ -142,9 +142,7 @@ void limit_completion(ViewPriors& priors) {
 
 namespace {
 
-bool has_evidence(DepthOrigin origin) {
-  return origin == DepthOrigin::Measured || is_filled(origin);
-}
+bool is_evident(DepthOrigin origin) { return origin == DepthOrigin::Measured || is_filled(origin); }
 
 // Estimated pixels of one surface, and what their rim is, in sides of pixels.
 struct EstimatedPatch {
@@ -190,7 +188,7 @@ MaskMap framed_estimates(const ViewPriors& priors) {
   constexpr double kLeastFramed = 0.5;  // of the rim
   constexpr double kMostOpen = 0.25;    // of the rim
   const auto& origins = priors.origin.data;
-  const auto evident = double(std::count_if(origins.begin(), origins.end(), has_evidence));
+  const auto evident = double(std::count_if(origins.begin(), origins.end(), is_evident));
   MaskMap out(priors.origin.width, priors.origin.height, 0);
   MaskMap left = out;
   std::transform(origins.begin(), origins.end(), left.data.begin(), [](DepthOrigin origin) {
