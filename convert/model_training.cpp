@@ -191,7 +191,8 @@ void warn_of_coverage(const std::vector<PriorsCoverage>& coverage, Scene& scene)
     scene.warnings.push_back(
         text.data() + view.name +
         (is_measured(coverage[i])
-             ? "; what is filled in from there is an estimate: see that views overlap and show texture"
+             ? "; what is filled in from there is an estimate: see that views overlap and show "
+               "texture"
              : ", so it adds nothing: hardly a point of it is seen in another input view"));
   }
 }
