@@ -58,8 +58,10 @@ bool is_white(const Eigen::Vector3f& c, float least) {
   return c.minCoeff() > least && c.maxCoeff() - c.minCoeff() < 0.2f;
 }
 
-// Means over 3 x 3 pixels: noise of sensors and of compression must not tear the sky.
-ColorImage smoothed(const ColorImage& image) {
+// Means over the pixels of use among 3 x 3: noise of sensors and of compression must not tear the
+// sky.
+ColorImage smoothed(const View& view) {
+  const ColorImage& image = view.image;
   ColorImage out = image;
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
@@ -67,11 +69,12 @@ ColorImage smoothed(const ColorImage& image) {
       float count = 0;
       for (int v = std::max(0, y - 1); v <= std::min(image.height - 1, y + 1); ++v) {
         for (int u = std::max(0, x - 1); u <= std::min(image.width - 1, x + 1); ++u) {
+          if (!view.valid.empty() && view.valid(u, v) == 0) continue;
           sum += image(u, v);
           ++count;
         }
       }
-      out(x, y) = sum / count;
+      if (count > 0) out(x, y) = sum / count;
     }
   }
   return out;
@@ -82,7 +85,7 @@ class SkyFinder {
   SkyFinder(const View& view, const ViewPriors& priors)
       : view_(view),
         priors_(priors),
-        colors_(smoothed(view.image)),
+        colors_(smoothed(view)),
         median_depth_(median_depth(priors)),
         sky_(view.image.width, view.image.height, 0) {}
 
@@ -101,7 +104,7 @@ class SkyFinder {
     const auto may_be_sky = [&](int x, int y) { return looks_like_sky(x, y); };
     for_each_component(sky_.width, sky_.height, may_be_sky, [&](const Component& part) {
       const auto at_border = std::count_if(part.begin(), part.end(), [&](const auto& p) {
-        return !sky_.contains(p.first + up.dx, p.second + up.dy);
+        return is_at_border(p.first, p.second, up);
       });
       const bool is_large = double(part.size()) >= kLeastArea * double(sky_.data.size());
       const double along = double(at_border) / border;
@@ -133,10 +136,18 @@ class SkyFinder {
 
   bool usable(int x, int y) const { return view_.valid.empty() || view_.valid(x, y) != 0; }
 
+  // Nothing but pixels of no use, as undistorting leaves them, lies between it and the border.
+  bool is_at_border(int x, int y, Direction up) const {
+    for (x += up.dx, y += up.dy; sky_.contains(x, y); x += up.dx, y += up.dy) {
+      if (usable(x, y)) return false;
+    }
+    return true;
+  }
+
   float change_at(int x, int y) const {
     float out = 0;
     for (const Direction d : {Direction{1, 0}, Direction{0, 1}}) {
-      if (!colors_.contains(x + d.dx, y + d.dy)) continue;
+      if (!colors_.contains(x + d.dx, y + d.dy) || !usable(x + d.dx, y + d.dy)) continue;
       const Eigen::Vector3f step = colors_(x + d.dx, y + d.dy) - colors_(x, y);
       out = std::max(out, step.cwiseAbs().maxCoeff());
     }

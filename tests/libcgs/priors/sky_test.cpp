@@ -258,6 +258,17 @@ TEST(FindSky, LeavesOutWhatIsMasked) {
   expect_all_of_it(photo, photo.sky());
 }
 
+// As undistorting leaves it.
+TEST(FindSky, BeginsAtTheFirstRowOfUse) {
+  Photo photo = sky_above_ground(blue);
+  photo.view.valid = MaskMap(kWidth, kHeight, 1);
+  photo.paint(0, 0, kWidth, 3, [](int, int) { return Vector3f(Vector3f::Zero()); });
+  for (int y = 0; y < 3; ++y) {
+    for (int x = 0; x < kWidth; ++x) photo.view.valid(x, y) = 0;
+  }
+  expect_all_of_it(photo, photo.sky());
+}
+
 TEST(FindSky, LooksForItWhereUpIs) {
   Photo rolled(kHeight, kWidth, [](int x, int y) {
     const int from_top = kHeight - 1 - x;
