@@ -94,9 +94,8 @@ GlbReport write_glb(const std::filesystem::path& path,
 /// - A primitive and material per provenance class and photograph, named "observed <photograph>",
 ///   with TEXCOORD_0 and a JPEG of the used part of the photograph; the classes' own primitives
 ///   hold the faces without photograph.
-/// - Photographs hold the light of the scene already, so materials of surface that photographs
-/// vouch
-///   for are KHR_materials_unlit; readers that do not know it find a rough non-metal.
+/// - Photographs hold the light of the scene already, so materials of surface that they vouch for
+///   are KHR_materials_unlit; readers that do not know it find a rough non-metal.
 /// - With Draco, texture coordinates move by at most 0.1 pixels, measured.
 ///
 /// \throws as above; InvalidInput if the texture does not fit the mesh: see require_texture().

@@ -19,8 +19,9 @@ namespace cgs {
 /// scalar_sigma ([world units]; -1 = no statement). Faces: vertex_indices and scalar_provenance
 /// (uchar, the numbers of Provenance, which a comment names) with the same as `quality` (float).
 /// MeshLab reads `quality`, CloudCompare what starts with `scalar_`. Comments carry unit, scale
-/// source and origin. \throws InvalidInput if an array does not fit, an index is out of range, or a
-/// vertex is not
+/// source and origin.
+///
+/// \throws InvalidInput if an array does not fit, an index is out of range, or a vertex is not
 ///         finite; IoError
 void write_mesh_ply(const std::filesystem::path& path,
                     const TriangleMesh& mesh,

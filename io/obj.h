@@ -15,8 +15,9 @@ namespace cgs {
 /// Vertex colours follow the coordinates ("v x y z r g b", in [0, 1], as most readers of colour
 /// expect). Faces are grouped by provenance: "g observed" with material "observed", and so on in
 /// the order observed, single_view, interpolated, estimated, inferred, virtual. Comments carry unit
-/// and origin. Either both files are written or none. \throws InvalidInput if the mesh is not
-/// writable (an array does not fit, a vertex is not
+/// and origin. Either both files are written or none.
+///
+/// \throws InvalidInput if the mesh is not writable (an array does not fit, a vertex is not
 ///         finite); IoError
 void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh, const Frame& frame);
 

@@ -53,8 +53,10 @@ struct GaussianFile {
 ///   lengths do not.
 /// - Quaternions are normalised.
 /// - Labels of provenance are kept where every splat has one; else they are left out, with a
-/// warning. \param raw    taken apart, so that no second copy is in memory \param frame  read into
-/// exactly this frame; without it a canonical frame is made from the 1st
+///   warning.
+///
+/// \param raw    taken apart, so that no second copy is in memory
+/// \param frame  read into exactly this frame; without it a canonical frame is made from the 1st
 ///               to 99th percentile of the positions, so that stray splats do not shrink the scene,
 ///               with unit and origin from the comments
 /// \throws BadInput Value (no splat is left; as check_significance())

@@ -29,7 +29,7 @@ struct CompletionWitness {
   const ViewPriors* priors = nullptr;  ///< Likewise. Only measured pixels and sky speak.
 };
 
-/// Gives every valid pixel a finite depth but sky and what would stand before what a witness sees
+/// Gives every valid pixel a finite depth but sky and what would stand before the sky of a witness
 /// at any depth. Measured pixels are left as they are; the others get origin Completed, a large
 /// sigma and keep their confidence.
 ///

@@ -332,6 +332,7 @@ namespace {
 std::vector<MaskMap> skies_towards(const Scene& scene,
                                    const std::vector<ViewPriors>& priors,
                                    const Eigen::Vector3d& up) {
+  std::vector<SkyFinder> finders;
   std::vector<std::vector<SkyFinder::Candidate>> found;
   std::vector<Eigen::Vector3f> skies;
   const auto view = [&](size_t i) -> const View& {
@@ -339,7 +340,8 @@ std::vector<MaskMap> skies_towards(const Scene& scene,
   };
   const auto step = [&](size_t i) { return step_towards(up, view(i).camera); };
   for (size_t i = 0; i < priors.size(); ++i) {
-    found.push_back(SkyFinder(view(i), priors[i]).candidates(step(i)));
+    finders.emplace_back(view(i), priors[i]);
+    found.push_back(finders.back().candidates(step(i)));
     for (const auto& part : found.back()) {
       if (part.stands_out) skies.push_back(part.color);
     }
@@ -351,7 +353,7 @@ std::vector<MaskMap> skies_towards(const Scene& scene,
         return (part.color - sky).cwiseAbs().maxCoeff() < kAlike;
       });
     });
-    out.push_back(SkyFinder(view(i), priors[i]).grown_from(found[i], step(i)));
+    out.push_back(finders[i].grown_from(found[i], step(i)));
   }
   return out;
 }

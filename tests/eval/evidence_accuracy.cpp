@@ -12,8 +12,10 @@
 // sky and even walls, cannot be tested: the shares tell of the rest.
 //
 //   build/release/bin/cgs_make_capture out/capture --scene courtyard
-//   build/release/bin/cgs run out/capture --views view_01,view_02,view_03 --assume-unit m -o
-//   out/run build/release/bin/evidence_accuracy out/run --scene courtyard
+//   V=view_01,view_02,view_03
+//   build/release/bin/cgs run out/capture --views $V --assume-unit m -o out/run
+//
+//   build/release/bin/evidence_accuracy out/run --scene courtyard
 //
 // With a scene, against its truth: the share of the area of both meshes that lies within three
 // sigma, at least two voxels, of the true surface.

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
+#include "tests/support/unmeasured_priors.h"
 
 namespace cgs::depth_completion_test {
 namespace {
@@ -22,12 +23,7 @@ struct Example {
   Example(int w, int h) {
     view.camera = {.width = w, .height = h, .fx = 50, .fy = 50, .cx = 0.5 * w, .cy = 0.5 * h};
     view.image = ColorImage(w, h, Eigen::Vector3f::Constant(0.2f));
-    priors = {DepthMap(w, h, kNaN),
-              DepthMap(w, h, kNaN),
-              Raster<float>(w, h, 0.0f),
-              Raster<DepthOrigin>(w, h, DepthOrigin::Unknown),
-              Raster<uint8_t>(w, h, 0),
-              Raster<uint8_t>(w, h, 0)};
+    priors = test::unmeasured_priors(w, h);
   }
   void measure(int x, int y, float depth) {
     priors.depth(x, y) = depth;

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
+#include "tests/support/unmeasured_priors.h"
 
 namespace cgs::estimated_depth_test {
 namespace {
@@ -30,12 +31,7 @@ struct Example {
 
   Example() {
     view.image = ColorImage(kSide, kSide, Eigen::Vector3f::Constant(0.3f));
-    priors = {DepthMap(kSide, kSide, kNaN),
-              DepthMap(kSide, kSide, kNaN),
-              Raster<float>(kSide, kSide, 0.0f),
-              Raster<DepthOrigin>(kSide, kSide, DepthOrigin::Unknown),
-              Raster<uint8_t>(kSide, kSide, 0),
-              Raster<uint8_t>(kSide, kSide, 0)};
+    priors = test::unmeasured_priors(kSide, kSide);
   }
   void put(const Box& box, DepthOrigin origin, float depth = 2) {
     for (int y = box.y0; y < box.y1; ++y) {

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "libcgs/core/split_mix.h"
+#include "tests/support/unmeasured_priors.h"
 
 namespace cgs::sky_test {
 namespace {
@@ -58,12 +59,7 @@ struct Photo {
     for (int y = 0; y < h; ++y) {
       for (int x = 0; x < w; ++x) view.image(x, y) = color(x, y);
     }
-    priors = {DepthMap(w, h, kNaN),
-              DepthMap(w, h, kNaN),
-              Raster<float>(w, h, 0.0f),
-              Raster<DepthOrigin>(w, h, DepthOrigin::Unknown),
-              Raster<uint8_t>(w, h, 0),
-              Raster<uint8_t>(w, h, 0)};
+    priors = test::unmeasured_priors(w, h);
     truth = MaskMap(w, h, 0);
   }
 
