@@ -25,7 +25,7 @@ struct Solid {
   }
 };
 
-/// Matter according to the three states, inside the bounds of the volume: behind the observed
+/// Matter according to the states, inside the bounds of the volume: behind the observed
 /// surface, and where hidden. Free and unknown voxels are empty.
 Solid solid(const Volume& volume);
 

@@ -81,7 +81,7 @@ struct TsdfSource {
   std::function<TsdfView(size_t i, bool with_color)> view;
 };
 
-/// Fuses depth maps into a volume of three states.
+/// Fuses depth maps into a volume of four states (VoxelState).
 ///
 /// - Bounds: the box of all surface points whose depth lies within the 1st and 99th percentile of
 ///   their view, plus truncation and two voxels.
