@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "meshing/volume/tsdf.h"
+#include "meshing/volume/tsdf_view.h"
 
 namespace cgs {
 

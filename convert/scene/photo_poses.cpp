@@ -11,7 +11,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/run/run_record.h"
 #include "convert/text/html.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/content_hash.h"

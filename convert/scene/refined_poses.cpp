@@ -7,7 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include "convert/run/run_record.h"
 #include "convert/scene/camera_fit.h"
 #include "convert/text/html.h"
 #include "io/bytes/atomic_file.h"

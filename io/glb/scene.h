@@ -10,6 +10,9 @@
 
 namespace cgs {
 
+/// The extension of splats, and the prefix of their attributes.
+inline constexpr const char* kGaussianSplatting = "KHR_gaussian_splatting";
+
 /// A mesh of the scene, and where its node puts it.
 struct GlbInstance {
   JsonValue mesh;  ///< Refers to the container.

@@ -16,7 +16,6 @@
 #include "io/meshes/glb_colors.h"
 #include "io/meshes/glb_faces.h"
 #include "io/meshes/material_labels.h"
-#include "io/splats/splat_glb.h"
 #include "libcgs/core/srgb.h"
 
 namespace cgs {

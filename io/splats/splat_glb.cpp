@@ -15,6 +15,7 @@
 #include "io/bytes/byte_writer.h"
 #include "io/bytes/json_file.h"
 #include "io/glb/bytes.h"
+#include "io/glb/scene.h"
 #include "io/splats/splat_arrays.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"

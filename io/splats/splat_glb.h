@@ -12,9 +12,6 @@
 
 namespace cgs {
 
-/// The extension, and the prefix of its attributes.
-inline constexpr const char* kGaussianSplatting = "KHR_gaussian_splatting";
-
 /// The attribute of the label of a splat, a number of Provenance: our own, so it begins with _.
 inline constexpr const char* kSplatProvenance = "_PROVENANCE";
 

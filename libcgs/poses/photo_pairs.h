@@ -5,8 +5,8 @@
 
 #include "libcgs/core/progress.h"
 #include "libcgs/poses/reconstruction.h"
-#include "libcgs/poses/solve_poses.h"
 #include "libcgs/poses/two_view.h"
+#include "libcgs/poses/unposed_photo.h"
 
 namespace cgs {
 

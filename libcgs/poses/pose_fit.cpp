@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "libcgs/core/angle_between.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/poses/photo_pairs.h"
-#include "libcgs/priors/depth_fit.h"
 
 namespace cgs {
 

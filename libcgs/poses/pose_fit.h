@@ -8,7 +8,7 @@
 #include "libcgs/core/camera.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/poses/photo_features.h"
-#include "libcgs/poses/solve_poses.h"
+#include "libcgs/poses/unposed_photo.h"
 
 namespace cgs {
 

@@ -9,9 +9,9 @@
 
 #include <tbb/parallel_for.h>
 
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/poses/photo_pairs.h"
 #include "libcgs/poses/resection.h"
-#include "libcgs/priors/depth_fit.h"
 
 namespace cgs {
 

@@ -8,7 +8,8 @@
 #include <span>
 
 #include "meshing/volume/depth_bounds.h"
-#include "meshing/volume/tsdf.h"
+#include "meshing/volume/tsdf_options.h"
+#include "meshing/volume/tsdf_view.h"
 
 namespace cgs {
 

@@ -6,7 +6,8 @@
 #include <openvdb/openvdb.h>
 
 #include "meshing/volume/block_evidence.h"
-#include "meshing/volume/tsdf.h"
+#include "meshing/volume/tsdf_report.h"
+#include "meshing/volume/volume.h"
 
 namespace cgs {
 

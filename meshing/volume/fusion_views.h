@@ -13,7 +13,8 @@
 #include <tbb/task_arena.h>
 
 #include "libcgs/core/progress.h"
-#include "meshing/volume/tsdf.h"
+#include "meshing/volume/tsdf_options.h"
+#include "meshing/volume/tsdf_view.h"
 
 namespace cgs {
 
