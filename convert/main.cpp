@@ -21,7 +21,7 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/usage.h"
-#include "convert/terminal.h"
+#include "convert/text/terminal.h"
 #include "libcgs/core/error.h"
 
 namespace {

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Runs the tests of one source out of a program of many. Takes the options of the program, too.
 #
-# usage: tests/one.sh build/release/bin/io_tests tests/io/npy_test.cpp [--gtest_...]
+# usage: tests/one.sh build/release/bin/io_tests tests/io/images/npy_test.cpp [--gtest_...]
 set -euo pipefail
 program=$1
 source=$2

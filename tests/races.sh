@@ -4,7 +4,7 @@
 # Debian's source, for how the packaged one hands work from thread to thread would not be seen and
 # all of it be reported. The source is fetched once and kept in build/race.
 #
-# usage: tests/races.sh [SOURCE...]   such as tests/meshing/tsdf_test.cpp, of those that share a
+# usage: tests/races.sh [SOURCE...]   such as tests/meshing/volume/tsdf_test.cpp, of those that share a
 #                                     program; if nothing is said, those that set a number of threads
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -41,7 +41,7 @@ if [ $# -gt 0 ]; then
 else
   mapfile -t sources < <(grep -rl max_allowed_parallelism tests --include='*_test.cpp' | sort)
 fi
-# tests/meshing/tsdf_test.cpp is in meshing_tests
+# tests/meshing/volume/tsdf_test.cpp is in meshing_tests
 mapfile -t programs < <(printf '%s\n' "${sources[@]}" | sed -E 's|^tests/([^/]+)/.*|\1_tests|' | sort -u)
 cmake --preset race >/dev/null
 cmake --build --preset race --target "${programs[@]}"

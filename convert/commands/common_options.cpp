@@ -9,8 +9,8 @@
 #include <opencv2/core/utility.hpp>
 #include <tbb/global_control.h>
 
-#include "convert/length.h"
-#include "io/scene_path.h"
+#include "convert/text/length.h"
+#include "io/bytes/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

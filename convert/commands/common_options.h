@@ -7,10 +7,10 @@
 
 #include <CLI/App.hpp>
 
-#include "convert/fusion.h"
-#include "convert/scene_request.h"
-#include "io/gltf.h"
-#include "io/scene_reader.h"
+#include "convert/model/fusion.h"
+#include "convert/scene/scene_request.h"
+#include "io/meshes/gltf.h"
+#include "io/scenes/scene_reader.h"
 #include "libcgs/train/training_options.h"
 
 namespace cgs {

@@ -11,15 +11,15 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/comparison.h"
-#include "convert/length.h"
-#include "convert/m3c2_comparison.h"
-#include "convert/measured_file.h"
-#include "convert/stated_frame.h"
-#include "convert/terminal.h"
-#include "io/json_file.h"
+#include "convert/measure/comparison.h"
+#include "convert/measure/m3c2_comparison.h"
+#include "convert/measure/measured_file.h"
+#include "convert/text/length.h"
+#include "convert/text/stated_frame.h"
+#include "convert/text/terminal.h"
+#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
-#include "meshing/surface_measures.h"
+#include "meshing/measure/surface_measures.h"
 
 namespace cgs {
 

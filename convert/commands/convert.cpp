@@ -6,8 +6,8 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/conversion.h"
-#include "io/json_file.h"
+#include "convert/splats/conversion.h"
+#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

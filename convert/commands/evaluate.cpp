@@ -8,12 +8,12 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/html.h"
-#include "convert/model.h"
-#include "convert/terminal.h"
-#include "convert/views.h"
-#include "io/json_file.h"
-#include "io/view_names.h"
+#include "convert/model/model.h"
+#include "convert/model/views.h"
+#include "convert/text/html.h"
+#include "convert/text/terminal.h"
+#include "io/bytes/json_file.h"
+#include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

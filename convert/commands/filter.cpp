@@ -6,13 +6,13 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/files/mesh_files.h"
 #include "convert/filter/chain.h"
-#include "convert/measured_file.h"
-#include "convert/mesh_files.h"
-#include "convert/stated_frame.h"
-#include "convert/terminal.h"
-#include "io/atomic_file.h"
-#include "io/json_file.h"
+#include "convert/measure/measured_file.h"
+#include "convert/text/stated_frame.h"
+#include "convert/text/terminal.h"
+#include "io/bytes/atomic_file.h"
+#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -8,12 +8,12 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/depth_fusion.h"
-#include "convert/fusion.h"
-#include "convert/length.h"
-#include "convert/volume_file.h"
-#include "io/json_file.h"
-#include "io/scene_path.h"
+#include "convert/files/volume_file.h"
+#include "convert/model/depth_fusion.h"
+#include "convert/model/fusion.h"
+#include "convert/text/length.h"
+#include "io/bytes/json_file.h"
+#include "io/bytes/scene_path.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -8,16 +8,16 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/baselines.h"
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/commands/info_file.h"
-#include "convert/frame_json.h"
-#include "convert/html.h"
-#include "convert/scene_request.h"
-#include "convert/views.h"
-#include "io/json_file.h"
-#include "io/view_names.h"
+#include "convert/model/views.h"
+#include "convert/scene/baselines.h"
+#include "convert/scene/scene_request.h"
+#include "convert/text/frame_json.h"
+#include "convert/text/html.h"
+#include "io/bytes/json_file.h"
+#include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -9,18 +9,18 @@
 
 #include <openvdb/tools/Count.h>
 
-#include "convert/frame_json.h"
-#include "convert/html.h"
-#include "convert/measured_file.h"
-#include "convert/mesh_files.h"
-#include "convert/run_record.h"
-#include "convert/splat_files.h"
-#include "convert/volume_file.h"
-#include "io/exr.h"
-#include "io/json_file.h"
-#include "io/scene_path.h"
-#include "io/splat_reader.h"
-#include "io/vdb.h"
+#include "convert/files/mesh_files.h"
+#include "convert/files/volume_file.h"
+#include "convert/measure/measured_file.h"
+#include "convert/run/run_record.h"
+#include "convert/splats/splat_files.h"
+#include "convert/text/frame_json.h"
+#include "convert/text/html.h"
+#include "io/bytes/json_file.h"
+#include "io/bytes/scene_path.h"
+#include "io/images/exr.h"
+#include "io/splats/splat_reader.h"
+#include "io/volumes/vdb.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -8,9 +8,9 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/commands/measuring.h"
-#include "convert/measured_file.h"
-#include "convert/terminal.h"
-#include "io/json_file.h"
+#include "convert/measure/measured_file.h"
+#include "convert/text/terminal.h"
+#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

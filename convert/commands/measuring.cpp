@@ -5,22 +5,22 @@
 #include <cmath>
 #include <cstdio>
 
-#include "convert/frame_json.h"
-#include "convert/html.h"
-#include "convert/length.h"
-#include "convert/measured_file.h"
-#include "convert/mesh_files.h"
-#include "convert/thickness_figures.h"
-#include "io/dxf.h"
-#include "io/mesh_arrays.h"
-#include "io/svg.h"
+#include "convert/files/mesh_files.h"
+#include "convert/measure/measured_file.h"
+#include "convert/measure/thickness_figures.h"
+#include "convert/text/frame_json.h"
+#include "convert/text/html.h"
+#include "convert/text/length.h"
+#include "io/bytes/mesh_arrays.h"
+#include "io/drawings/dxf.h"
+#include "io/drawings/svg.h"
 #include "libcgs/core/error.h"
-#include "meshing/geodesic.h"
-#include "meshing/section.h"
-#include "meshing/shape_fit.h"
-#include "meshing/shells.h"
-#include "meshing/surface_measures.h"
-#include "meshing/thickness.h"
+#include "meshing/measure/geodesic.h"
+#include "meshing/measure/section.h"
+#include "meshing/measure/shape_fit.h"
+#include "meshing/measure/surface_measures.h"
+#include "meshing/measure/thickness.h"
+#include "meshing/mesh/shells.h"
 
 namespace cgs {
 

@@ -10,11 +10,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/figures.h"
-#include "convert/orthophoto_files.h"
+#include "convert/measure/orthophoto_files.h"
+#include "convert/text/figures.h"
 #include "libcgs/core/measurable_mesh.h"
-#include "meshing/certificate.h"
-#include "meshing/nearest_surface.h"
+#include "meshing/mesh/certificate.h"
+#include "meshing/mesh/nearest_surface.h"
 
 namespace cgs {
 

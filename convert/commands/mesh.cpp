@@ -6,15 +6,15 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/memory_plan.h"
-#include "convert/mesh_files.h"
-#include "convert/simplification.h"
-#include "convert/stated_frame.h"
-#include "convert/terminal.h"
-#include "convert/volume_file.h"
-#include "io/json_file.h"
-#include "io/obj.h"
-#include "meshing/isosurface.h"
+#include "convert/files/mesh_files.h"
+#include "convert/files/volume_file.h"
+#include "convert/model/memory_plan.h"
+#include "convert/model/simplification.h"
+#include "convert/text/stated_frame.h"
+#include "convert/text/terminal.h"
+#include "io/bytes/json_file.h"
+#include "io/meshes/obj.h"
+#include "meshing/surface/isosurface.h"
 
 namespace cgs {
 

@@ -6,15 +6,15 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/camera_path.h"
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/model.h"
-#include "convert/terminal.h"
-#include "convert/views.h"
-#include "io/json_file.h"
-#include "io/scene_path.h"
-#include "io/view_names.h"
+#include "convert/model/camera_path.h"
+#include "convert/model/model.h"
+#include "convert/model/views.h"
+#include "convert/text/terminal.h"
+#include "io/bytes/json_file.h"
+#include "io/bytes/scene_path.h"
+#include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -7,15 +7,15 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/budget.h"
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/length.h"
-#include "convert/pipeline.h"
-#include "convert/report_frame.h"
-#include "convert/report_surface.h"
-#include "convert/verification.h"
-#include "io/json_file.h"
+#include "convert/report/report_frame.h"
+#include "convert/report/report_surface.h"
+#include "convert/run/budget.h"
+#include "convert/run/pipeline.h"
+#include "convert/run/verification.h"
+#include "convert/text/length.h"
+#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -8,10 +8,10 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/length.h"
-#include "convert/measured_file.h"
-#include "convert/tradeoff_report.h"
-#include "io/json_file.h"
+#include "convert/measure/measured_file.h"
+#include "convert/text/length.h"
+#include "convert/tradeoff/tradeoff_report.h"
+#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -6,15 +6,15 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/marker_bars.h"
-#include "convert/memory_plan.h"
-#include "convert/model.h"
-#include "convert/model_training.h"
-#include "convert/scene_request.h"
-#include "convert/stated_frame.h"
-#include "io/atomic_file.h"
-#include "io/json_file.h"
-#include "io/scene_path.h"
+#include "convert/model/memory_plan.h"
+#include "convert/model/model.h"
+#include "convert/model/model_training.h"
+#include "convert/scene/marker_bars.h"
+#include "convert/scene/scene_request.h"
+#include "convert/text/stated_frame.h"
+#include "io/bytes/atomic_file.h"
+#include "io/bytes/json_file.h"
+#include "io/bytes/scene_path.h"
 
 namespace cgs {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "convert/closest_name.h"
+#include "convert/text/closest_name.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -6,9 +6,9 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/terminal.h"
-#include "convert/verification.h"
-#include "io/json_file.h"
+#include "convert/run/verification.h"
+#include "convert/text/terminal.h"
+#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -5,8 +5,8 @@
 #include <sstream>
 #include <utility>
 
-#include "convert/length.h"
-#include "io/byte_reader.h"
+#include "convert/text/length.h"
+#include "io/bytes/byte_reader.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

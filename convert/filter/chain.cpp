@@ -10,9 +10,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/closest_name.h"
 #include "convert/filter/operations.h"
-#include "io/mesh_arrays.h"
+#include "convert/text/closest_name.h"
+#include "io/bytes/mesh_arrays.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {

@@ -8,7 +8,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "convert/filter/state.h"
-#include "convert/terminal.h"
+#include "convert/text/terminal.h"
 
 namespace cgs {
 

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/html.h"
+#include "convert/text/html.h"
 
 namespace cgs {
 

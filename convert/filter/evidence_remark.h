@@ -4,7 +4,7 @@
 #include <string>
 
 #include "libcgs/core/triangle_mesh.h"
-#include "meshing/stated_surface.h"
+#include "meshing/mesh/stated_surface.h"
 
 namespace cgs {
 

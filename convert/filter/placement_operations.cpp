@@ -5,10 +5,10 @@
 
 #include "convert/filter/operations.h"
 #include "convert/filter/second_mesh.h"
-#include "io/byte_reader.h"
+#include "io/bytes/byte_reader.h"
 #include "libcgs/core/error.h"
-#include "meshing/placement.h"
-#include "meshing/vertex_attributes.h"
+#include "meshing/edit/placement.h"
+#include "meshing/mesh/vertex_attributes.h"
 
 namespace cgs {
 

@@ -3,14 +3,14 @@
 #include <utility>
 
 #include "convert/filter/operations.h"
-#include "convert/length.h"
+#include "convert/text/length.h"
 #include "libcgs/core/error.h"
-#include "meshing/down_sampling.h"
-#include "meshing/hidden_points.h"
-#include "meshing/outliers.h"
-#include "meshing/point_normals.h"
-#include "meshing/point_smoothing.h"
-#include "meshing/vertex_attributes.h"
+#include "meshing/mesh/point_normals.h"
+#include "meshing/mesh/vertex_attributes.h"
+#include "meshing/points/down_sampling.h"
+#include "meshing/points/hidden_points.h"
+#include "meshing/points/outliers.h"
+#include "meshing/points/point_smoothing.h"
 
 namespace cgs {
 

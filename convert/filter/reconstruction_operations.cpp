@@ -6,11 +6,11 @@
 
 #include "convert/filter/evidence_remark.h"
 #include "convert/filter/operations.h"
-#include "convert/length.h"
+#include "convert/text/length.h"
 #include "libcgs/core/error.h"
-#include "meshing/advancing_front.h"
-#include "meshing/point_normals.h"
-#include "meshing/poisson_surface.h"
+#include "meshing/mesh/point_normals.h"
+#include "meshing/surface/advancing_front.h"
+#include "meshing/surface/poisson_surface.h"
 
 namespace cgs {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <limits>
 
+#include "convert/files/mesh_files.h"
 #include "convert/filter/operations.h"
-#include "convert/length.h"
-#include "convert/mesh_files.h"
+#include "convert/text/length.h"
 #include "libcgs/core/error.h"
-#include "meshing/hole_filling.h"
-#include "meshing/hull.h"
-#include "meshing/repair.h"
+#include "meshing/edit/hole_filling.h"
+#include "meshing/edit/hull.h"
+#include "meshing/edit/repair.h"
 
 namespace cgs {
 

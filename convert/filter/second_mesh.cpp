@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "convert/stated_frame.h"
-#include "io/mesh_file.h"
+#include "convert/text/stated_frame.h"
+#include "io/meshes/mesh_file.h"
 #include "libcgs/core/error.h"
-#include "meshing/placement.h"
+#include "meshing/edit/placement.h"
 
 namespace cgs {
 

@@ -2,15 +2,15 @@
 #include <algorithm>
 #include <numeric>
 
+#include "convert/files/mesh_files.h"
 #include "convert/filter/operations.h"
-#include "convert/length.h"
-#include "convert/mesh_files.h"
+#include "convert/text/length.h"
 #include "libcgs/core/error.h"
-#include "meshing/clusters.h"
-#include "meshing/components.h"
-#include "meshing/cropping.h"
-#include "meshing/plane_search.h"
-#include "meshing/vertex_attributes.h"
+#include "meshing/edit/cropping.h"
+#include "meshing/mesh/components.h"
+#include "meshing/mesh/vertex_attributes.h"
+#include "meshing/points/clusters.h"
+#include "meshing/points/plane_search.h"
 
 namespace cgs {
 

@@ -5,17 +5,17 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/files/mesh_files.h"
 #include "convert/filter/evidence_remark.h"
 #include "convert/filter/operations.h"
 #include "convert/filter/second_mesh.h"
-#include "convert/html.h"
-#include "convert/length.h"
-#include "convert/mesh_files.h"
+#include "convert/text/html.h"
+#include "convert/text/length.h"
 #include "libcgs/core/error.h"
-#include "meshing/boolean.h"
-#include "meshing/closing.h"
-#include "meshing/flat_base.h"
-#include "meshing/wrapping.h"
+#include "meshing/edit/boolean.h"
+#include "meshing/edit/flat_base.h"
+#include "meshing/surface/closing.h"
+#include "meshing/surface/wrapping.h"
 
 namespace cgs {
 

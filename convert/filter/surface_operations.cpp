@@ -6,13 +6,13 @@
 #include <Eigen/Geometry>
 
 #include "convert/filter/operations.h"
-#include "convert/length.h"
+#include "convert/text/length.h"
 #include "libcgs/core/error.h"
-#include "meshing/loop_subdivision.h"
-#include "meshing/mesh_distance.h"
-#include "meshing/remeshing.h"
-#include "meshing/simplify.h"
-#include "meshing/smoothing.h"
+#include "meshing/edit/loop_subdivision.h"
+#include "meshing/edit/remeshing.h"
+#include "meshing/edit/simplify.h"
+#include "meshing/edit/smoothing.h"
+#include "meshing/mesh/mesh_distance.h"
 
 namespace cgs {
 

@@ -7,7 +7,7 @@
 
 namespace cgs {
 
-// All of these leave the values in another order. There must be one, and no NaN among them.
+// All but median_of() leave the values in another order. There must be one, and no NaN among them.
 
 /// The value that k others precede in ascending order; k < values.size().
 template <typename T>
@@ -27,6 +27,11 @@ T median(std::vector<T>& values) {
 template <typename T>
 T quantile(std::vector<T>& values, double q) {
   return nth_smallest(values, static_cast<size_t>(q * static_cast<double>(values.size() - 1)));
+}
+
+/// The middle value; of an even number of them the smaller one of the two.
+inline double median_of(std::vector<double> values) {
+  return nth_smallest(values, (values.size() - 1) / 2);
 }
 
 }  // namespace cgs

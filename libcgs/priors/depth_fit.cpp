@@ -104,10 +104,6 @@ bool reweighted(const std::vector<FitPoint>& points, LineFit& line) {
 
 }  // namespace
 
-double median_of(std::vector<double> values) {
-  return nth_smallest(values, (values.size() - 1) / 2);
-}
-
 double robust_deviation(std::vector<double> values) {
   if (values.empty()) return 0;
   const double median = median_of(values);

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "io/atomic_file.h"
+#include "io/bytes/atomic_file.h"
 #include "libcgs/core/error.h"
 #include "samples/capture/render.h"
 

@@ -11,14 +11,14 @@
 #include <random>
 #include <string>
 
-#include "io/mesh_ply.h"
-#include "meshing/clusters.h"
-#include "meshing/down_sampling.h"
-#include "meshing/mesh_distance.h"
-#include "meshing/outliers.h"
-#include "meshing/point_normals.h"
-#include "meshing/simplify.h"
-#include "meshing/smoothing.h"
+#include "io/meshes/mesh_ply.h"
+#include "meshing/edit/simplify.h"
+#include "meshing/edit/smoothing.h"
+#include "meshing/mesh/mesh_distance.h"
+#include "meshing/mesh/point_normals.h"
+#include "meshing/points/clusters.h"
+#include "meshing/points/down_sampling.h"
+#include "meshing/points/outliers.h"
 #include "tests/support/solid_meshes.h"
 
 namespace cgs {

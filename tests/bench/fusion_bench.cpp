@@ -14,12 +14,12 @@
 #include <sys/resource.h>
 #include <tbb/parallel_for.h>
 
-#include "io/mesh_file.h"
-#include "io/mesh_ply.h"
-#include "meshing/components.h"
-#include "meshing/isosurface.h"
-#include "meshing/mesh_distance.h"
-#include "meshing/tsdf.h"
+#include "io/meshes/mesh_file.h"
+#include "io/meshes/mesh_ply.h"
+#include "meshing/mesh/components.h"
+#include "meshing/mesh/mesh_distance.h"
+#include "meshing/surface/isosurface.h"
+#include "meshing/volume/tsdf.h"
 #include "samples/capture/bvh.h"
 #include "tests/support/depth_scenes.h"
 

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/png.h"
+#include "io/images/png.h"
 #include "tests/support/run_cgs.h"
 
 namespace cgs {

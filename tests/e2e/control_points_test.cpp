@@ -11,9 +11,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/cameras_json.h"
-#include "io/mesh_ply.h"
-#include "io/stl_reader.h"
+#include "io/meshes/mesh_ply.h"
+#include "io/meshes/stl_reader.h"
+#include "io/scenes/cameras_json.h"
 #include "samples/capture/files.h"
 #include "tests/support/run_cgs.h"
 

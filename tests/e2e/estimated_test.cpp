@@ -15,9 +15,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/gltf.h"
-#include "io/mesh_file.h"
-#include "io/mesh_ply.h"
+#include "io/meshes/gltf.h"
+#include "io/meshes/mesh_file.h"
+#include "io/meshes/mesh_ply.h"
 #include "tests/support/measuring_commands.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/sample_mesh.h"

@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "convert/measured_file.h"
-#include "meshing/mesh_distance.h"
+#include "convert/measure/measured_file.h"
+#include "meshing/mesh/mesh_distance.h"
 #include "samples/capture/courtyard.h"
 #include "samples/capture/files.h"
 #include "tests/support/run_cgs.h"

@@ -7,10 +7,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/mesh_file.h"
-#include "io/mesh_ply.h"
-#include "meshing/certificate.h"
-#include "meshing/vertex_attributes.h"
+#include "io/meshes/mesh_file.h"
+#include "io/meshes/mesh_ply.h"
+#include "meshing/mesh/certificate.h"
+#include "meshing/mesh/vertex_attributes.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/sample_mesh.h"
 

@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/image.h"
-#include "io/png.h"
-#include "io/scene_reader.h"
+#include "io/images/image.h"
+#include "io/images/png.h"
+#include "io/scenes/scene_reader.h"
 #include "samples/capture/render.h"
 #include "tests/support/fisheye_portal.h"
 #include "tests/support/run_cgs.h"

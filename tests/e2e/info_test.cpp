@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <openvdb/tools/LevelSetSphere.h>
 
-#include "io/exr.h"
-#include "io/mesh_ply.h"
-#include "io/vdb.h"
+#include "io/images/exr.h"
+#include "io/meshes/mesh_ply.h"
+#include "io/volumes/vdb.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/solid_meshes.h"
 

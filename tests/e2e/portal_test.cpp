@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/image.h"
-#include "io/png.h"
+#include "io/images/image.h"
+#include "io/images/png.h"
 #include "libcgs/core/exposure.h"
 #include "samples/capture/files.h"
 #include "tests/support/portal_measurement.h"

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/mesh_ply.h"
+#include "io/meshes/mesh_ply.h"
 #include "samples/capture/files.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/triangles.h"

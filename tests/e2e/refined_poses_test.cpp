@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/cameras_json.h"
+#include "io/scenes/cameras_json.h"
 #include "samples/capture/files.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/unposed_photos.h"

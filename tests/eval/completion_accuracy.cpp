@@ -14,8 +14,8 @@
 #include <exception>
 #include <vector>
 
-#include "convert/model.h"
-#include "io/scene_reader.h"
+#include "convert/model/model.h"
+#include "io/scenes/scene_reader.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/core/split_mix.h"
 #include "libcgs/priors/depth_completion.h"

@@ -14,11 +14,11 @@
 #include <string>
 #include <vector>
 
-#include "io/mesh_file.h"
-#include "io/mesh_ply.h"
-#include "meshing/boolean.h"
-#include "meshing/closing.h"
-#include "meshing/repair.h"
+#include "io/meshes/mesh_file.h"
+#include "io/meshes/mesh_ply.h"
+#include "meshing/edit/boolean.h"
+#include "meshing/edit/repair.h"
+#include "meshing/surface/closing.h"
 #include "tests/support/damaged_mesh.h"
 
 namespace {

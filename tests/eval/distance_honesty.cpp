@@ -15,9 +15,9 @@
 #include <cstdio>
 #include <exception>
 
-#include "io/mesh_file.h"
-#include "meshing/mesh_distance.h"
-#include "meshing/surface_measures.h"
+#include "io/meshes/mesh_file.h"
+#include "meshing/measure/surface_measures.h"
+#include "meshing/mesh/mesh_distance.h"
 #include "samples/capture/truth.h"
 
 namespace {

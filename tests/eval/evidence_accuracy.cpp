@@ -30,15 +30,15 @@
 #include <string>
 #include <vector>
 
-#include "convert/measured_file.h"
-#include "convert/model.h"
-#include "convert/run_record.h"
-#include "io/scene_reader.h"
+#include "convert/measure/measured_file.h"
+#include "convert/model/model.h"
+#include "convert/run/run_record.h"
+#include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/alignment.h"
 #include "libcgs/priors/estimate_priors.h"
 #include "libcgs/priors/plane_sweep.h"
-#include "meshing/mesh_distance.h"
+#include "meshing/mesh/mesh_distance.h"
 #include "samples/capture/courtyard.h"
 
 namespace {

@@ -19,11 +19,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/model_training.h"
-#include "convert/views.h"
-#include "io/atomic_file.h"
-#include "io/png.h"
-#include "io/scene_reader.h"
+#include "convert/model/model_training.h"
+#include "convert/model/views.h"
+#include "io/bytes/atomic_file.h"
+#include "io/images/png.h"
+#include "io/scenes/scene_reader.h"
 #include "tests/support/pane_scene.h"
 
 namespace {

@@ -21,14 +21,14 @@
 
 #include <glog/logging.h>
 
-#include "io/exif.h"
-#include "io/image.h"
-#include "io/scene_reader.h"
-#include "io/text_lines.h"
-#include "io/view_names.h"
+#include "io/bytes/text_lines.h"
+#include "io/images/exif.h"
+#include "io/images/image.h"
+#include "io/scenes/scene_reader.h"
+#include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
-#include "libcgs/priors/ray_meeting.h"
-#include "libcgs/priors/reconstruction.h"
+#include "libcgs/poses/ray_meeting.h"
+#include "libcgs/poses/reconstruction.h"
 #include "tests/support/unposed_photos.h"
 
 namespace {

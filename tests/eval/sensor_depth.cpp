@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "convert/model.h"
-#include "io/scene_reader.h"
-#include "io/view_names.h"
+#include "convert/model/model.h"
+#include "io/scenes/scene_reader.h"
+#include "io/scenes/view_names.h"
 #include "libcgs/core/order_statistics.h"
 #include "tests/support/exr_channel.h"
 

@@ -14,10 +14,10 @@
 
 #include <tbb/parallel_for.h>
 
-#include "meshing/simplify.h"
-#include "meshing/surface_measures.h"
-#include "meshing/tsdf.h"
-#include "meshing/watertight.h"
+#include "meshing/edit/simplify.h"
+#include "meshing/measure/surface_measures.h"
+#include "meshing/surface/watertight.h"
+#include "meshing/volume/tsdf.h"
 #include "tests/support/depth_scenes.h"
 
 namespace {

@@ -17,16 +17,16 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/camera_path.h"
-#include "convert/model.h"
-#include "convert/views.h"
-#include "convert/web_splats.h"
-#include "io/atomic_file.h"
-#include "io/png.h"
-#include "io/splat_glb.h"
-#include "io/splat_reader.h"
-#include "io/spz.h"
-#include "io/view_names.h"
+#include "convert/model/camera_path.h"
+#include "convert/model/model.h"
+#include "convert/model/views.h"
+#include "convert/run/web_splats.h"
+#include "io/bytes/atomic_file.h"
+#include "io/images/png.h"
+#include "io/scenes/view_names.h"
+#include "io/splats/splat_glb.h"
+#include "io/splats/splat_reader.h"
+#include "io/splats/spz.h"
 #include "libcgs/render/rasterizer.h"
 
 namespace {

@@ -10,10 +10,10 @@
 #include <cstdio>
 #include <exception>
 
-#include "convert/model.h"
-#include "io/atomic_file.h"
-#include "io/png.h"
-#include "io/scene_reader.h"
+#include "convert/model/model.h"
+#include "io/bytes/atomic_file.h"
+#include "io/images/png.h"
+#include "io/scenes/scene_reader.h"
 #include "libcgs/core/srgb.h"
 #include "libcgs/train/image_metrics.h"
 #include "tests/support/glb_file.h"

@@ -18,11 +18,11 @@
 #include <exception>
 #include <string>
 
-#include "convert/model.h"
-#include "convert/views.h"
-#include "io/exr.h"
-#include "io/scene_reader.h"
-#include "io/view_names.h"
+#include "convert/model/model.h"
+#include "convert/model/views.h"
+#include "io/images/exr.h"
+#include "io/scenes/scene_reader.h"
+#include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
 #include "libcgs/render/rasterizer.h"

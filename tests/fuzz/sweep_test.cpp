@@ -16,7 +16,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "io/sanitized.h"
+#include "io/bytes/sanitized.h"
 #include "libcgs/core/error.h"
 #include "tests/fuzz/file_kinds.h"
 #include "tests/support/temp_dir.h"

@@ -10,8 +10,8 @@
 
 #include <Eigen/Geometry>
 
-#include "meshing/components.h"
-#include "meshing/vertex_attributes.h"
+#include "meshing/mesh/components.h"
+#include "meshing/mesh/vertex_attributes.h"
 #include "tests/support/solid_meshes.h"
 
 namespace cgs::test {

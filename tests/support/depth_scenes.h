@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "libcgs/core/camera.h"
-#include "meshing/tsdf.h"
+#include "meshing/volume/tsdf.h"
 
 namespace cgs::test {
 

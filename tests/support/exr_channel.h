@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "io/exr.h"
+#include "io/images/exr.h"
 #include "libcgs/core/error.h"
 
 namespace cgs::test {

@@ -7,11 +7,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/atomic_file.h"
-#include "io/cameras_json.h"
-#include "io/exr.h"
-#include "io/fisheye_map.h"
-#include "io/png.h"
+#include "io/bytes/atomic_file.h"
+#include "io/images/exr.h"
+#include "io/images/png.h"
+#include "io/scenes/cameras_json.h"
+#include "io/scenes/fisheye_map.h"
 #include "libcgs/core/error.h"
 #include "samples/capture/compare.h"
 #include "samples/capture/render.h"

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "meshing/tsdf.h"
+#include "meshing/volume/tsdf.h"
 
 namespace cgs::test {
 

@@ -8,7 +8,7 @@
 #include <draco/mesh/mesh.h>
 #include <gtest/gtest.h>
 
-#include "io/image.h"
+#include "io/images/image.h"
 #include "libcgs/core/srgb.h"
 #include "tests/support/temp_dir.h"
 

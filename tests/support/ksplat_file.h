@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "io/byte_writer.h"
+#include "io/bytes/byte_writer.h"
 
 namespace cgs::test {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "io/byte_writer.h"
+#include "io/bytes/byte_writer.h"
 
 namespace cgs::test {
 

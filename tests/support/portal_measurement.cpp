@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "io/mesh_ply.h"
+#include "io/meshes/mesh_ply.h"
 #include "libcgs/render/support.h"
 #include "tests/support/exr_channel.h"
 

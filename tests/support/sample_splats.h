@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include "io/raw_splats.h"
+#include "io/splats/raw_splats.h"
 #include "libcgs/core/gaussians.h"
 
 namespace cgs::test {

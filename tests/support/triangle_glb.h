@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/byte_writer.h"
+#include "io/bytes/byte_writer.h"
 
 namespace cgs::test {
 

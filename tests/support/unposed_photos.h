@@ -9,7 +9,7 @@
 
 #include <Eigen/Dense>
 
-#include "libcgs/priors/solve_poses.h"
+#include "libcgs/poses/solve_poses.h"
 #include "tests/support/stereo_scene.h"
 
 namespace cgs::test {

@@ -15,10 +15,10 @@
 #include <tbb/global_control.h>
 
 #include "convert/filter/operations.h"
-#include "io/mesh_ply.h"
+#include "io/meshes/mesh_ply.h"
 #include "libcgs/core/error.h"
-#include "meshing/components.h"
-#include "meshing/simplify.h"
+#include "meshing/edit/simplify.h"
+#include "meshing/mesh/components.h"
 #include "tests/support/sample_mesh.h"
 #include "tests/support/solid_meshes.h"
 #include "tests/support/temp_dir.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "io/exr.h"
+#include "io/images/exr.h"
 #include "tests/e2e/bad_inputs/valid_inputs.h"
 
 namespace cgs::test {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "io/gaussian_ply.h"
-#include "io/mesh_ply.h"
+#include "io/meshes/mesh_ply.h"
+#include "io/splats/gaussian_ply.h"
 #include "tests/e2e/bad_inputs/valid_inputs.h"
 
 namespace cgs::test {

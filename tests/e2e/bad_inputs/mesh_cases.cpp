@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cstdio>
 
-#include "io/gltf.h"
-#include "io/mesh_file.h"
+#include "io/meshes/gltf.h"
+#include "io/meshes/mesh_file.h"
 #include "libcgs/core/error.h"
 #include "tests/e2e/bad_inputs/valid_inputs.h"
 #include "tests/support/sample_mesh.h"

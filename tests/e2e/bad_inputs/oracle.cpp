@@ -13,7 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "io/sanitized.h"
+#include "io/bytes/sanitized.h"
 #include "libcgs/core/error.h"
 #include "tests/e2e/bad_inputs/case.h"
 #include "tests/support/temp_dir.h"

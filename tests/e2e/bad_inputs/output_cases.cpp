@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "io/cameras_json.h"
+#include "io/scenes/cameras_json.h"
 #include "tests/e2e/bad_inputs/valid_inputs.h"
 
 namespace cgs::test {

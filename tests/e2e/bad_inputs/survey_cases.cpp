@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <sstream>
 
-#include "io/control_points.h"
+#include "io/scenes/control_points.h"
 #include "tests/e2e/bad_inputs/valid_inputs.h"
 
 namespace cgs::test {

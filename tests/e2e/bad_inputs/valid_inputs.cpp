@@ -8,7 +8,7 @@
 #include <fcntl.h>
 #include <sys/file.h>
 
-#include "io/scene_reader.h"
+#include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "tests/support/run_cgs.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <openvdb/openvdb.h>
 
-#include "io/vdb.h"
+#include "io/volumes/vdb.h"
 #include "tests/e2e/bad_inputs/valid_inputs.h"
 
 namespace cgs::test {

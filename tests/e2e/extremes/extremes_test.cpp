@@ -14,7 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <openvdb/openvdb.h>
 
-#include "io/exr.h"
+#include "io/images/exr.h"
 #include "tests/e2e/extremes/cell.h"
 #include "tests/e2e/extremes/closeness.h"
 #include "tests/support/glb_file.h"

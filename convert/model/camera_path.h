@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "convert/model/model.h"
+
+namespace cgs {
+
+/// Cameras along a path through a model, as sharp and as wide as its first input view, in internal
+/// units. The last one is followed by the first.
+///
+/// - "between": from input view to input view in their order, and back, slower at both ends
+/// - "spiral": an ellipse as wide as the input views are apart, looking at what they look at, as
+///   LLFF shows its scenes
+/// - "orbit": once around what they look at, about the up axis, most of it never seen by any of
+/// them
+///
+/// \param frames  2 to 10000
+/// \throws InvalidInput for another name or number, or for splats without input views;
+///         NumericalError if no depth is known
+/// Source of the spiral: Mildenhall et al. 2019, "Local Light Field Fusion".
+std::vector<Camera> camera_path(const Model& model, const std::string& name, int frames);
+
+/// The cameras of a file in the layout of cameras.json, in the coordinates of the files of a model.
+/// \throws BadInput as read_cameras_json()
+std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Model& model);
+
+}  // namespace cgs

@@ -1,0 +1,380 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/model/views.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/model/pictures.h"
+#include "convert/text/frame_json.h"
+#include "io/bytes/atomic_file.h"
+#include "io/bytes/scene_path.h"
+#include "io/images/png.h"
+#include "io/images/view_exr.h"
+#include "io/scenes/cameras_json.h"
+#include "io/scenes/resample.h"
+#include "io/scenes/scene_reader.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/exposure.h"
+#include "libcgs/train/image_metrics.h"
+
+namespace cgs {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// What a view was to the model; null where no view is an input, as of splats of other programs.
+Json role_of(const Scene& scene, int index) {
+  return scene.input.empty() ? Json() : Json(view_role(scene, index));
+}
+
+// Without the depth that input views saw, every pixel would look like a hole.
+bool knows_holes(const Model& model) { return !model.priors.empty(); }
+
+// Of the pixels that may be looked at; all may if there is no mask.
+Json hole_fractions(const Model& model, const RenderBuffers& buffers, const MaskMap& valid) {
+  if (!knows_holes(model)) return {{"hole_fraction", nullptr}};
+  const std::vector<Hole>& holes = buffers.hole.data;
+  std::array<size_t, kHoleKinds> counts{};
+  size_t looked_at = 0;
+  for (size_t i = 0; i < holes.size(); ++i) {
+    if (!valid.empty() && valid.data[i] == 0) continue;
+    ++counts.at(static_cast<size_t>(holes[i]));
+    ++looked_at;
+  }
+  const auto fraction = [&](Hole kind) {
+    const size_t count = counts.at(static_cast<size_t>(kind));
+    return looked_at > 0 ? static_cast<double>(count) / static_cast<double>(looked_at) : 0;
+  };
+  const double transparent = fraction(Hole::Transparent);
+  const double occluded = fraction(Hole::Occluded);
+  const double outside = fraction(Hole::Outside);
+  Json out = {{"hole_fraction", transparent + occluded + outside},
+              {"transparent_fraction", transparent},
+              {"occluded_fraction", occluded},
+              {"outside_fraction", outside},
+              {"estimated_fraction", fraction(Hole::Estimated)},
+              {"sky_fraction", fraction(Hole::Sky)}};
+  if (looked_at < holes.size()) {
+    out["masked_fraction"] = 1 - static_cast<double>(looked_at) / static_cast<double>(holes.size());
+  }
+  return out;
+}
+
+MaskMap intersection(const MaskMap& a, const MaskMap& b) {
+  if (b.empty()) return a;
+  MaskMap out = a;
+  for (size_t i = 0; i < out.data.size(); ++i) out.data[i] = a.data[i] & b.data[i];
+  return out;
+}
+
+// Where the photograph of a view may be looked at; empty = everywhere, also where it is gone.
+MaskMap valid_pixels(const Scene& scene, int view) {
+  if (scene.views[static_cast<size_t>(view)].image_path.empty()) return {};
+  std::vector<std::string> told_before;
+  try {
+    return loaded_view(scene, view, /*with_image=*/false, told_before).valid;
+  } catch (const BadInput&) {
+    return {};
+  }
+}
+
+ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
+  ViewRasters rasters;
+  rasters.color = buffers.color;
+  rasters.alpha = buffers.alpha;
+  rasters.depth = buffers.median_depth;
+  for (size_t i = 0; i < rasters.depth.data.size(); ++i) {
+    if (buffers.hole.data[i] == Hole::Sky) rasters.depth.data[i] = std::nanf("");
+  }
+  rasters.normal = normals_from_depth(rasters.depth, camera);
+  rasters.depth_variance = buffers.depth_variance;
+  rasters.support = buffers.support;
+  rasters.hole = buffers.hole;
+  return rasters;
+}
+
+Json write_view(const Model& model,
+                const std::vector<SupportView>& inputs,
+                int index,
+                const std::filesystem::path& folder) {
+  const View& view = model.scene.views[static_cast<size_t>(index)];
+  const RenderBuffers buffers = render_camera(model, inputs, view.camera);
+  ViewRasters rasters = view_rasters(buffers, view.camera);
+  rasters.valid = valid_pixels(model.scene, index);  // what is masked was seen, and is not wanted
+  write_view_exr(folder / (view.name + ".exr"), rasters, view.camera, model.scene.frame);
+  const auto png = [&](const char* what) { return folder / (view.name + "." + what + ".png"); };
+  write_png(png("color"), picture(buffers));
+  write_png(png("depth"), depth_picture(rasters.depth));
+  write_png(png("normal"), normal_picture(rasters.normal, view.camera.cam_from_world()));
+  if (knows_holes(model)) {
+    write_png(png("hole"), intersection(hole_mask(buffers), rasters.valid));
+  } else {
+    std::filesystem::remove(png("hole"));  // of another model
+  }
+  Json out = {{"name", view.name}, {"role", role_of(model.scene, index)}};
+  out.update(hole_fractions(model, buffers, rasters.valid));
+  return out;
+}
+
+std::string frame_name(size_t k) {
+  std::string number = std::to_string(k);
+  number.insert(0, number.size() < 4 ? 4 - number.size() : 0, '0');
+  return "frame_" + number;
+}
+
+std::vector<std::string> pictures_of_frame(size_t k) {
+  return {frame_name(k) + ".png", frame_name(k) + ".hole.png"};
+}
+
+// Pictures of an earlier path: those of a longer one must not follow the new ones.
+// \throws InvalidInput if pictures lie there whose cameras.json does not
+void remove_frames(const std::filesystem::path& folder) {
+  size_t earlier = 0;
+  try {
+    if (is_present(folder / "cameras.json")) {
+      earlier = read_cameras_json(folder / "cameras.json").views.size();
+    }
+  } catch (const Error&) {
+    earlier = 0;  // of another program
+  }
+  if (earlier == 0 && is_present(folder / pictures_of_frame(0).front())) {
+    throw InvalidInput(printable(folder) + " holds frame_0000.png but not the cameras.json that " +
+                       "would go with it: choose another folder, or remove the frames");
+  }
+  for (size_t k = 0; k < earlier; ++k) {
+    for (const std::string& name : pictures_of_frame(k)) std::filesystem::remove(folder / name);
+  }
+}
+
+// Where the frames were taken from, in the frame of the model.
+Scene scene_of_path(const Model& model, const std::vector<Camera>& path) {
+  Scene out;
+  out.kind = model.scene.kind;
+  out.folder = model.scene.folder;
+  out.frame = model.scene.frame;
+  for (size_t k = 0; k < path.size(); ++k) {
+    View view;
+    view.name = frame_name(k);
+    view.camera = path[k];
+    out.views.push_back(view);
+  }
+  return out;
+}
+
+// Small enough for a sheet of them to fit a screen.
+ColorImage thumbnail(ColorImage picture) {
+  constexpr int kWidest = 320;
+  if (picture.width <= kWidest) return picture;
+  MaskMap all;
+  const int height = std::max(1, picture.height * kWidest / picture.width);
+  area_downscale(picture, all, kWidest, height);
+  return picture;
+}
+
+// With black where nothing may be compared: windows beside it reach there.
+ColorImage blackened(ColorImage image, const MaskMap& valid) {
+  for (size_t i = 0; i < valid.data.size(); ++i) {
+    if (valid.data[i] == 0) image.data[i] = Eigen::Vector3f::Zero();
+  }
+  return image;
+}
+
+double share_of(const MaskMap& part, const MaskMap& whole) {
+  const auto count = [](const MaskMap& pixels) {
+    return static_cast<double>(std::count(pixels.data.begin(), pixels.data.end(), 1));
+  };
+  return count(part) / count(whole);
+}
+
+Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, int index) {
+  View view = model.scene.views[static_cast<size_t>(index)];
+  const RenderBuffers buffers = render_camera(model, inputs, view.camera);
+  const ColorImage shown = blackened(picture(buffers), view.valid);
+  MaskMap seen = hole_mask(buffers);
+  for (uint8_t& value : seen.data) value = 1 - value;
+  const MaskMap everywhere(seen.width, seen.height, 1);
+  const MaskMap all = intersection(everywhere, view.valid);
+  const MaskMap use = intersection(seen, view.valid);
+  const bool is_matched = is_exposed_otherwise(model, index);
+  if (is_matched) {
+    view.exposure = matching_gain(view.image, shown, use);
+    apply_exposure(view);
+  }
+  const ColorImage photograph = blackened(view.image, view.valid);
+  // The coarse scales of MS-SSIM mix what is masked with the rest, and count it as equal; the rim
+  // that a lens leaves does not matter.
+  constexpr double kNearlyWhole = 0.95;
+  const bool is_nearly_whole = share_of(all, everywhere) >= kNearlyWhole;
+  // Null where there is nothing to compare.
+  const auto has_any = [](const MaskMap& pixels) {
+    return std::find(pixels.data.begin(), pixels.data.end(), 1) != pixels.data.end();
+  };
+  const auto figure = [&](const auto& metric, const MaskMap& pixels) {
+    return has_any(pixels) ? Json(metric(shown, photograph, &pixels)) : Json();
+  };
+  const bool tells_holes = knows_holes(model);
+  return {{"name", view.name},
+          {"role", role_of(model.scene, index)},
+          {"psnr", figure(psnr, all)},
+          {"ssim", figure(ssim, all)},
+          {"psnr_seen", tells_holes ? figure(psnr, use) : Json()},
+          {"ssim_seen", tells_holes ? figure(ssim, use) : Json()},
+          {"hole_fraction", tells_holes && has_any(all) ? Json(1 - share_of(use, all)) : Json()},
+          {"ms_ssim", is_nearly_whole ? Json(ms_ssim(shown, photograph)) : Json()},
+          {"exposure", is_matched ? vector_to_json(view.exposure.cast<double>()) : Json()}};
+}
+
+// Of those views that say how well the model predicts, if there are any: it was trained on inputs.
+Json mean_of(const Json& rows, std::vector<std::string>& warnings) {
+  const auto is_input = [](const Json& row) { return row["role"] == "input"; };
+  const bool are_all_inputs = std::all_of(rows.begin(), rows.end(), is_input);
+  if (are_all_inputs) {
+    warnings.emplace_back(
+        "only input views are evaluated: the model was trained on them, so that the figures say "
+        "how well it fits, not how well it predicts");
+  }
+  Json mean;
+  for (const char* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}) {
+    double sum = 0;
+    size_t count = 0;
+    for (const Json& row : rows) {
+      if (!row[key].is_number() || (is_input(row) && !are_all_inputs)) continue;
+      sum += row[key].get<double>();
+      ++count;
+    }
+    mean[key] = count > 0 ? Json(sum / static_cast<double>(count)) : Json();
+  }
+  return mean;
+}
+
+// Those that have a photograph. \throws BadInput if none has
+std::vector<int> with_photograph(Scene& scene, const std::vector<int>& views) {
+  std::vector<int> out;
+  for (const int i : views) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (view.image_path.empty()) {
+      scene.warnings.push_back("view " + printable(view.name) +
+                               " has no photograph and is not evaluated");
+    } else {
+      out.push_back(i);
+    }
+  }
+  if (out.empty() && !is_folder(scene.folder)) {
+    throw BadInput(Defect::Open,
+                   scene.folder,
+                   "the folder of the photographs is gone; --scene says where they are");
+  }
+  if (out.empty()) {
+    throw BadInput(Defect::Empty, scene.folder, "no view to evaluate has a photograph");
+  }
+  return out;
+}
+
+}  // namespace
+
+// The exposure of the model is that of its input views. Where these had to be matched, the other
+// photographs of the scene were exposed by whatever they show.
+bool is_exposed_otherwise(const Model& model, int view) {
+  const Scene& scene = model.scene;
+  const std::string role = view_role(scene, view);
+  return role != "input" && std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
+           return scene.views[static_cast<size_t>(i)].exposure != Eigen::Vector3f::Ones();
+         });
+}
+
+std::string view_role(const Scene& scene, int view) {
+  const auto is_in = [&](const std::vector<int>& views) {
+    return std::find(views.begin(), views.end(), view) != views.end();
+  };
+  return is_in(scene.input) ? "input" : is_in(scene.held_out) ? "held out" : "not used";
+}
+
+std::vector<int> views_with_photograph(const Scene& scene) {
+  std::vector<int> views = scene.input;
+  views.insert(views.end(), scene.held_out.begin(), scene.held_out.end());
+  std::sort(views.begin(), views.end());
+  return views;
+}
+
+std::string unknown_holes_warning(const Model& model) {
+  if (knows_holes(model)) return {};
+  return "the model does not say what input views saw, so holes are not known: no mask of them is "
+         "written, and their figures are left out";
+}
+
+Json write_views(const Model& model,
+                 const std::vector<int>& views,
+                 const std::filesystem::path& folder,
+                 const Progress& progress) {
+  make_output_folder(folder);
+  const std::vector<SupportView> inputs = support_views(model);
+  Json out = Json::array();
+  for (size_t k = 0; k < views.size(); ++k) {
+    report(progress, static_cast<double>(k) / static_cast<double>(views.size()));
+    out.push_back(write_view(model, inputs, views[k], folder));
+  }
+  report(progress, 1);
+  return out;
+}
+
+Json write_path(const Model& model,
+                const std::vector<Camera>& path,
+                const std::filesystem::path& folder,
+                const Progress& progress) {
+  make_output_folder(folder);
+  const std::vector<SupportView> inputs = support_views(model);
+  remove_frames(folder);
+  write_cameras_json(folder / "cameras.json", scene_of_path(model, path));
+  constexpr size_t kOnSheet = 12;
+  const auto place_on_sheet = [&](size_t k) { return k * kOnSheet / path.size(); };
+  std::vector<ColorImage> sheet;
+  Json out = Json::array();
+  for (size_t k = 0; k < path.size(); ++k) {
+    report(progress, static_cast<double>(k) / static_cast<double>(path.size()));
+    const RenderBuffers buffers = render_camera(model, inputs, path[k]);
+    const ColorImage shown = picture(buffers);
+    MaskMap holes(shown.width, shown.height, 0);
+    const std::vector<std::string> names = pictures_of_frame(k);
+    write_png(folder / names[0], shown);
+    if (knows_holes(model)) {
+      holes = hole_mask(buffers);
+      write_png(folder / names[1], holes);
+    }
+    if (k == 0 || path.size() <= kOnSheet || place_on_sheet(k) != place_on_sheet(k - 1)) {
+      sheet.push_back(thumbnail(tinted(shown, holes)));
+    }
+    out.push_back({{"name", frame_name(k)}});
+    out.back().update(hole_fractions(model, buffers, {}));
+  }
+  constexpr int kColumns = 4;
+  write_png(folder / "contact.png", contact_sheet(sheet, kColumns));
+  report(progress, 1);
+  return out;
+}
+
+Json evaluate_views(Model& model, const std::vector<int>& views, const Progress& progress) {
+  std::vector<std::string>& warnings = model.scene.warnings;
+  if (const std::string text = unknown_holes_warning(model); !text.empty()) {
+    warnings.push_back(text);
+  }
+  const std::vector<int> shown = with_photograph(model.scene, views);
+  const std::vector<SupportView> inputs = support_views(model);
+  Json rows = Json::array();
+  for (size_t k = 0; k < shown.size(); ++k) {
+    report(progress, static_cast<double>(k) / static_cast<double>(shown.size()));
+    load_images(model.scene, {shown[k]});
+    rows.push_back(evaluate_view(model, inputs, shown[k]));
+    model.scene.views[static_cast<size_t>(shown[k])].image = {};  // one photograph at a time
+  }
+  const Json mean = mean_of(rows, warnings);
+  report(progress, 1);
+  return {{"mean", mean}, {"views", rows}};
+}
+
+}  // namespace cgs

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "convert/model/model.h"
+#include "libcgs/core/progress.h"
+
+namespace cgs {
+
+/// What to tell where a model has no priors, as splats of other programs: nothing is known of what
+/// its input views saw, nor which views those were. Empty if it has.
+std::string unknown_holes_warning(const Model& model);
+
+/// What a view, an index into scene.views, is to its scene: "input", "held out" or "not used".
+std::string view_role(const Scene& scene, int view);
+
+/// The input views and those held out, ascending.
+std::vector<int> views_with_photograph(const Scene& scene);
+
+/// Writes <name>.exr and <name>.{color,depth,normal,hole}.png for each of the given views of the
+/// model, and returns per view {"name", "role", "hole_fraction", …}, of pixels that
+/// are not masked. The role is view_role(), or null where no view is an input.
+/// Without priors no hole.png is written and the hole fraction is null; the EXR says, as it does of
+/// any pixel, that no input view can vouch for it.
+nlohmann::ordered_json write_views(const Model& model,
+                                   const std::vector<int>& views,
+                                   const std::filesystem::path& folder,
+                                   const Progress& progress);
+
+/// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
+/// says where they are, and contact.png: twelve of them, holes in magenta. Returns per frame
+/// {"name", "hole_fraction", …}. Without priors there are no masks and no magenta, and the fraction
+/// is null.
+nlohmann::ordered_json write_path(const Model& model,
+                                  const std::vector<Camera>& path,
+                                  const std::filesystem::path& folder,
+                                  const Progress& progress);
+
+/// Whether the photograph of a view, an index into model.scene.views, is to be matched in exposure
+/// to what is rendered: those of the input views were matched, and it is none of them.
+bool is_exposed_otherwise(const Model& model, int view);
+
+/// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
+/// that are not holes, and MS-SSIM over all: {"mean": {"psnr", "ssim", "psnr_seen", "ssim_seen",
+/// "hole_fraction", "ms_ssim"}, "views": [{"name", "role" as of write_views(), …}]}. Loads the
+/// photographs.
+///
+/// Where the exposures of input views were matched, the photographs of others are matched to what
+/// is rendered, by the factors "exposure" of red, green and blue light, else null.
+///
+/// Input views stay out of the mean where there are others. Warnings of the scene tell where there
+/// are none, and where nothing is known of holes, whose figures are then null.
+/// \throws BadInput if none of the views has a photograph.
+nlohmann::ordered_json evaluate_views(Model& model,
+                                      const std::vector<int>& views,
+                                      const Progress& progress);
+
+}  // namespace cgs

@@ -1,0 +1,463 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/run/pipeline.h"
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/model/memory_plan.h"
+#include "convert/model/model.h"
+#include "convert/model/model_training.h"
+#include "convert/model/views.h"
+#include "convert/report/report.h"
+#include "convert/report/report_viewer.h"
+#include "convert/run/disk_plan.h"
+#include "convert/run/recorded_request.h"
+#include "convert/run/run_files.h"
+#include "convert/run/run_record.h"
+#include "convert/run/run_stages.h"
+#include "convert/run/stage_cost.h"
+#include "convert/run/web_splats.h"
+#include "convert/scene/marker_bars.h"
+#include "convert/text/frame_json.h"
+#include "convert/text/stated_frame.h"
+#include "io/bytes/atomic_file.h"
+#include "io/bytes/json_file.h"
+#include "io/bytes/scene_path.h"
+#include "io/images/image.h"
+#include "io/scenes/depth_file.h"
+#include "io/scenes/photographs.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+/// One run: the request, what is in memory so far, and the record on disk.
+struct Run {
+  const RunRequest& request;
+  std::vector<StageFiles> stages;
+  RunRecord record;
+  Scene scene;  ///< As opened: world coordinates.
+  std::vector<KnownDistance> distances;
+  std::vector<MarkerBar> markers;
+  Json control;        ///< Of OpenedScene.
+  Json refined;        ///< RefinedPoses::report; null where it was not asked for.
+  double focal_sigma;  ///< Of OpenedScene.
+  // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
+  // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
+  std::optional<Model> model;
+  std::optional<TriangleMesh> mesh;  ///< Watertight.
+  std::vector<std::string> hitches;  ///< Of the stage that runs, for the terminal alone.
+  const Terminal& terminal;          ///< For what must be said before a stage ends.
+};
+
+// Decodes every photograph once before anything is written: a run must not stop halfway, or leave
+// a folder behind, because of a damaged file.
+void refuse_unreadable_images(const Scene& scene) {
+  for (const View& view : scene.views) {
+    if (!view.image_path.empty()) (void)read_image(view.image_path, nullptr, {});
+  }
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (!view.depth_path.empty()) (void)read_depth_file(view.depth_path);
+  }
+}
+
+Model& loaded_model(Run& run) {
+  if (!run.model) {
+    run.model = read_model(run.request.output / "model");
+    relink_views(run.model->scene, run.scene);  // masks and paths may have changed since
+  }
+  return *run.model;
+}
+
+const TriangleMesh& loaded_mesh(Run& run) {
+  if (!run.mesh) {
+    run.mesh = read_watertight(run.request.output, loaded_model(run).scene.frame);
+  }
+  return *run.mesh;
+}
+
+Json run_model(Run& run, const Progress& progress) {
+  const std::filesystem::path folder = run.request.output / "model";
+  ModelRequest request = {
+      {}, run.request.training, folder, run.request.scene.options.depth.network};
+  request.inspect = [&](const Model& model, const PriorsReport& priors) {
+    check_picks(run.distances, model);
+    run.terminal.note(coverage_words(priors, model.scene));
+  };
+  const TrainedModel trained = train_model(run.scene, request, progress);
+  // Pixels were read for the first time: more may be odd than the cameras told.
+  const std::vector<std::string>& found = trained.model.scene.warnings;
+  Json report = training_to_json(trained, request);
+  report["warnings"] = std::vector<std::string>(
+      found.begin() + static_cast<std::ptrdiff_t>(run.scene.warnings.size()), found.end());
+  write_model(folder, trained.model);
+  write_file(folder / "training.json", json_text(report) + "\n");
+  run.hitches = trained.hitches;
+  return report;
+}
+
+// What the model stage found, as it wrote it down.
+GivenDepthReport sensor_scale(const Json& model) {
+  GivenDepthReport out;
+  const Json given = model.value("given_depth", Json());
+  if (!given.is_object() || !given.contains("metres_per_unit")) return out;
+  out.metres_per_unit = given["metres_per_unit"].get<double>();
+  out.metres_sigma = given["metres_sigma"].get<double>();
+  return out;
+}
+
+// The scale is told apart from the model: people learn a length after they saw a first result.
+Json run_scale(Run& run, const Progress& progress) {
+  Model model = read_model_as_written(run.request.output / "model");
+  relink_views(model.scene, run.scene);
+  report(progress, 0);
+  Frame& frame = model.scene.frame;
+  const Frame before = frame;
+  frame.metres_per_unit = run.scene.frame.metres_per_unit;
+  frame.metres_sigma = run.scene.frame.metres_sigma;
+  frame.scale_source = run.scene.frame.scale_source;
+  frame.up = run.scene.frame.up;
+  take_sensor_scale(sensor_scale(run.record.result("model")), frame);
+  Json result = run.control;
+  if (result.is_null()) result = scale_by(run.distances, run.markers, model);
+  widen_by_focal(frame, run.focal_sigma);
+  if (result.is_object()) result["metres_sigma"] = frame.metres_sigma;
+  const bool is_new = frame.metres_per_unit != before.metres_per_unit ||
+                      frame.metres_sigma != before.metres_sigma ||
+                      frame.scale_source != before.scale_source || frame.up != before.up;
+  if (is_new && !restate_frame(run.request.output / "model", model)) {
+    run.hitches.push_back(printable(run.request.output / "model/gaussians.ply") +
+                          " was changed by another program; with the scale it was written anew, as "
+                          "it was read");
+  }
+  use_metres_where_measured(model.scene);
+  run.model = std::move(model);
+  return result;
+}
+
+Json run_views(Run& run, const Progress& progress) {
+  Model& model = loaded_model(run);
+  return write_views(
+      model, views_with_photograph(model.scene), run.request.output / "views", progress);
+}
+
+Json run_evaluation(Run& run, const Progress& progress) {
+  Model& model = loaded_model(run);
+  if (model.scene.held_out.empty()) return nullptr;
+  return evaluate_views(model, model.scene.held_out, progress);
+}
+
+Json run_splats(Run& run, const Progress& progress) {
+  return write_web_splats(run.request.output / "web", loaded_model(run), progress);
+}
+
+Json run_mesh(Run& run, const Progress& progress) {
+  return write_meshes(loaded_model(run), run.request, progress);
+}
+
+Json run_web(Run& run, const Progress& progress) {
+  const Model& model = loaded_model(run);
+  return write_assets(model,
+                      loaded_mesh(run),
+                      run.request,
+                      run.record.result("model").at("description"),
+                      run.record.result("mesh"),
+                      progress);
+}
+
+Json report_json(const Run& run) {
+  const Scene& scene = run.model->scene;
+  Json photographs = Json::object();
+  for (const View& view : scene.views) photographs[view.name] = view.image_path.string();
+  Json stages = Json::array();
+  for (const auto& [name, stage] : run.record.json()["stages"].items()) {
+    stages.push_back(
+        {{"stage", name}, {"seconds", stage["seconds"]}, {"peak_memory", stage["peak_memory"]}});
+  }
+  const Json mesh = run.record.result("mesh");
+  Json warnings = run.scene.warnings;
+  for (const char* stage : {"model", "scale"}) {
+    const Json result = run.record.result(stage);
+    if (!result.is_object()) continue;
+    const Json found = result.value("warnings", Json::array());
+    warnings.insert(warnings.end(), found.begin(), found.end());
+  }
+  std::vector<std::string> notes = run.scene.notes;
+  const Json model = run.record.result("model");
+  for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
+  for (const Json& view : model.value("coverage", Json::array())) {
+    if (view.contains("words")) notes.push_back(view["words"].get<std::string>());
+  }
+  Json out = {{"program", kProgramVersion},
+              {"scene", run.scene.kind},
+              {"folder", run.request.scene.path.string()},
+              {"units", scene.frame.unit_name()},
+              {"scale_source", scale_source_name(scene.frame.scale_source)},
+              {"frame", frame_to_json(scene.frame)},
+              {"scale", run.record.result("scale")},
+              {"model", model},
+              {"views", run.record.result("views")},
+              {"evaluation", run.record.result("evaluation")},
+              {"mesh", mesh},
+              {"certificate", mesh.at("certificate")},
+              {"web", run.record.result("web")},
+              {"splats", run.record.result("splats")},
+              {"photographs", photographs},
+              {"stages", stages},
+              {"warnings", warnings},
+              {"notes", notes}};
+  if (!run.refined.is_null()) out["refined_poses"] = run.refined;
+  if (!run.request.settings_reason.empty()) out["settings_reason"] = run.request.settings_reason;
+  return out;
+}
+
+Json run_report(Run& run, const Progress& progress) {
+  loaded_model(run);
+  report(progress, 0);
+  const Json json = report_json(run);
+  write_file(run.request.output / "report.json", json_text(json) + "\n");
+  const std::string viewer = viewer_section(loaded_model(run), loaded_mesh(run), progress);
+  write_html_report(run.request.output, json, run.model->scene, viewer);
+  return {{"pages", 1}};
+}
+
+/// Which stage a part of the request first has a say in; what is not here decides all.
+std::map<std::string, std::string> decided_stages(const RunRequest& request, const Scene& scene) {
+  // Which photographs are meant is decided by their names and hashes, wherever they lie.
+  std::map<std::string, std::string> out = {{"scene", "report"},
+                                            {"views", "report"},
+                                            {"assume_unit", "scale"},
+                                            {"up", "scale"},
+                                            {"known_distances", "scale"},
+                                            {"marker_size", "scale"},
+                                            {"control_points", "scale"},
+                                            {"stated_scale", "scale"},
+                                            {"held_out_images", "views"},
+                                            {"voxel_size", "mesh"},
+                                            {"estimated", "mesh"},
+                                            {"simplify", "mesh"},
+                                            {"max_error", "mesh"},
+                                            {"compression_error", "web"},
+                                            {"glb_encoding", "web"},
+                                            {"lods", "web"},
+                                            {"max_size", "web"}};
+  // Metric depth is brought into the scene by its unit where photographs do not tell how, and held
+  // against it where they do.
+  if (has_given_depth(request.scene, scene)) {
+    out.erase("assume_unit");
+    out.erase("control_points");
+    out.erase("stated_scale");
+  }
+  return out;
+}
+
+/// What a stage is called and does.
+struct StageWork {
+  const char* title;
+  Json (*run)(Run&, const Progress&);
+};
+
+const StageWork& work_of(const StageFiles& stage) {
+  static const std::map<std::string, StageWork> kWork = {
+      {"model", {"depth and Gaussians", run_model}},
+      {"scale", {"scale", run_scale}},
+      {"views", {"views", run_views}},
+      {"evaluation", {"held-out views", run_evaluation}},
+      {"splats", {"splats for browsers", run_splats}},
+      {"mesh", {"volume and mesh", run_mesh}},
+      {"web", {"textured assets", run_web}},
+      {"report", {"report", run_report}}};
+  return kWork.at(stage.stage);
+}
+
+// What somebody changed of the files of a finished stage may be wanted, and stays.
+void warn_of_changed_files(const StageFiles& stage, const Run& run, const Terminal& terminal) {
+  std::set<std::string> unsettled;  // a later stage may have been stopped after it wrote them
+  for (const StageFiles& other : run.stages) {
+    if (!run.record.is_done(other.stage, other.files)) unsettled.merge(other.all());
+  }
+  for (const std::string& file : run.record.changed_files(stage.stage)) {
+    if (unsettled.contains(file)) continue;
+    terminal.warn({printable(run.request.output / file) +
+                   " is not what the run wrote and stays as it is; remove it to have it made "
+                   "again"});
+  }
+}
+
+// Hashes of what the stages wrote when they did: verify_run() holds the disk against them.
+void note_outputs(Run& run, bool is_fresh) {
+  if (!is_fresh && run.record.json().contains("outputs")) return;
+  Json outputs = output_hashes(run.request.output, camera_files());
+  outputs.update(run.record.file_hashes());
+  run.record.note("outputs", outputs);
+}
+
+void warn_of(const Json& result, const Terminal& terminal) {
+  if (!result.is_object() || !result.contains("warnings")) return;
+  terminal.warn(result["warnings"].get<std::vector<std::string>>());
+}
+
+// What a user would not expect of a stage: "kept 33165 of 142884".
+std::string remark_on(const std::string& stage, const Json& result) {
+  if (stage == "model") {
+    std::string out = result["given_depth"].is_object()
+                          ? "depth files: " + result["given_depth"].value("words", "")
+                          : "";
+    for (const std::string& remark : remarks_on_photographs(result)) {
+      out += (out.empty() ? "" : "; ") + remark;
+    }
+    return out;
+  }
+  if (stage != "splats") return "";
+  const Json& thinning = result["thinning"];
+  return "kept " + std::to_string(thinning["kept"].get<size_t>()) + " of " +
+         std::to_string(thinning["of"].get<size_t>());
+}
+
+// Where files for CAD were left out, those of another program may stand by their names.
+void erase_left_out(const Json& result, std::set<std::string>& outputs) {
+  const Json output = result.is_object() ? result.value("output", Json()) : Json();
+  if (!output.is_object()) return;
+  const Json left_out = output.value("left_out", Json::object());
+  for (const auto& [name, why] : left_out.items()) outputs.erase("mesh/" + name);
+}
+
+Json run_stages(Run& run, Terminal& terminal) {
+  bool stale = false;  // a stage that ran makes everything after it stale
+  const std::filesystem::path& output = run.request.output;
+  for (const StageFiles& stage : run.stages) {
+    const StageWork& work = work_of(stage);
+    if (!stale && run.record.is_done(stage.stage, stage.files)) {
+      terminal.say(std::string(work.title) + ": done before");
+      warn_of(run.record.result(stage.stage), terminal);
+      warn_of_changed_files(stage, run, terminal);
+      continue;
+    }
+    if (!stale) remove_outputs_after(stage.stage, run.stages, run.record, output);
+    stale = true;
+    const Json before = earlier_outputs(stage, run.stages, run.record, output);
+    const CostMeter meter;  // from here on the peak of memory is that of the stage
+    const Json result = work.run(run, terminal.begin(work.title));
+    const double seconds = terminal.end(remark_on(stage.stage, result));
+    const std::vector<std::string> written = named_outputs(output, stage.all());
+    std::set<std::string> outputs(written.begin(), written.end());
+    erase_left_out(result, outputs);
+    const Json after = earlier_outputs(stage, run.stages, run.record, output);
+    for (const auto& [name, hash] : after.items()) {
+      if (before.value(name, Json()) == hash) outputs.erase(name);
+    }
+    run.record.finish(stage.stage, seconds, result, outputs);
+    warn_of(result, terminal);
+    terminal.warn(std::exchange(run.hitches, {}));
+  }
+  forget_checkpoints(output / "model");
+  run.record.note("focal", run.request.scene.focal);
+  const std::filesystem::path& control = run.request.scene.control.file;
+  if (!control.empty()) {
+    run.record.note("control_points", std::filesystem::weakly_canonical(control).string());
+  }
+  run.record.note("allow_external", run.request.scene.options.allow_external);
+  run.record.note("depth_options", depth_options_json(run.request.scene.options.depth));
+  note_outputs(run, stale);
+  loaded_model(run);
+  return report_json(run);
+}
+
+// Lengths that will be refused, before minutes are spent on cameras.
+void check_lengths_of_photographs(const RunRequest& request) {
+  if (!is_photographs(request.scene.path)) return;
+  Frame frame;
+  const DepthOptions& depth = request.scene.options.depth;
+  const bool has_depth = !depth.folder.empty() || is_folder(request.scene.path / "depth");
+  const bool may_be_metric = depth.kind == DepthKind::Unknown || depth.kind == DepthKind::Metric;
+  const bool may_tell_scale = has_depth && may_be_metric && depth.network.empty();
+  const bool states_unit =
+      !request.scene.assume_unit.empty() || !request.scene.control.file.empty();
+  if (states_unit || may_tell_scale) frame.metres_per_unit = 1;
+  check_lengths(request, frame);
+}
+
+void remove_all_abandoned_files(const std::filesystem::path& output) {
+  for (const char* folder : {"",
+                             "model",
+                             "model/colmap",
+                             "model/colmap/sparse/0",
+                             "model/priors",
+                             "views",
+                             "mesh",
+                             "web"}) {
+    remove_abandoned_files(output / folder);
+  }
+}
+
+}  // namespace
+
+Json run_pipeline(const RunRequest& request, Terminal& terminal) {
+  refuse_contradictions(request);
+  check_lengths_of_photographs(request);
+  OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
+  Scene& scene = opened.scene;
+  terminal.note(scene.notes);
+  terminal.warn(scene.warnings);
+  const PictureWork work = picture_work(request);
+  const std::vector<StageMemory> plan = memory_plan(scene, work);
+  terminal.say("memory: " + memory_plan_text(plan));
+  check_memory_plan(scene, work, memory_budget(request.memory_limit));
+  refuse_unreadable_images(scene);
+  const size_t known = scene.warnings.size();
+  const Json fit = check_stated_cameras(opened, terminal);
+  terminal.warn(std::vector(scene.warnings.begin() + std::ptrdiff_t(known), scene.warnings.end()));
+  std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
+  std::vector<MarkerBar> markers = marker_bars(scene, request.scene.marker_size);
+  check_lengths(request, scene);
+  make_output_folder(request.output);
+  const FolderLock lock(request.output);
+  std::vector<StageFiles> stages = stage_files(scene, request.lods);
+  if (!request.overwrite) refuse_foreign_files(request.output, stages);
+  const std::string little_room = little_room_warning(scene, request.output);
+  if (!little_room.empty()) terminal.warn(little_room);
+  RunRecord record(request.output,
+                   request_json(request, scene),
+                   request.overwrite,
+                   decided_stages(request, scene));
+  remove_all_abandoned_files(request.output);
+  opened.keep(request.output / "model");
+  Json predicted = Json::object();
+  for (const StageMemory& stage : plan) predicted[stage.stage] = stage.bytes;
+  record.note("predicted_memory", predicted);
+  record.note("camera_fit", fit);
+  record.note("refined_poses", opened.refined ? opened.refined->report : Json());
+  Run run{request,
+          std::move(stages),
+          std::move(record),
+          std::move(scene),
+          std::move(distances),
+          std::move(markers),
+          std::move(opened.control),
+          opened.refined ? std::move(opened.refined->report) : Json(),
+          opened.focal_sigma(),
+          {},
+          {},
+          {},
+          terminal};
+  try {
+    return run_stages(run, terminal);
+  } catch (const Json::exception&) {
+    throw BadInput(Defect::Schema,
+                   request.output / "run.json",
+                   "does not hold what finished stages wrote; remove it and say --overwrite to "
+                   "begin anew");
+  }
+}
+
+}  // namespace cgs

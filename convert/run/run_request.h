@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/model/fusion.h"
+#include "convert/model/memory_plan.h"
+#include "convert/scene/scene_request.h"
+#include "io/meshes/gltf.h"
+#include "libcgs/train/training_options.h"
+
+namespace cgs {
+
+/// What `cgs run` is asked for; lengths are as the user typed them, with or without a unit.
+struct RunRequest {
+  SceneRequest scene;
+  std::filesystem::path output;
+  TrainingOptions training;
+  std::string voxel_size;         ///< Empty = from the pixel footprint.
+  std::string simplify;           ///< Largest error of simplification; empty = default, "0" = none.
+  std::string compression_error;  ///< Of the compressed mesh; empty = 1/16384 of its size.
+  GlbEncoding glb_encoding = GlbEncoding::Draco;  ///< Of asset.glb.
+  EstimatedSurface estimated = EstimatedSurface::FillOnly;
+  std::string max_error;    ///< Promise: how far the written meshes lie from the fused
+                            ///< surface at most; empty = none.
+  size_t lods = 0;          ///< Coarser levels of asset.glb, 0 to kMostLods.
+  size_t max_size = 0;      ///< Promise: largest asset.glb [bytes]; 0 = any.
+  size_t memory_limit = 0;  ///< [bytes]; 0 = 80 % of what is free.
+  bool overwrite = false;
+  std::string settings_reason;  ///< Why size and training are these, for the report; may be empty.
+};
+
+/// Further levels would differ by less than a factor of 2 in scenes of the usual photographs.
+inline constexpr size_t kMostLods = 5;
+
+/// What of a request decides how much memory its run takes.
+PictureWork picture_work(const RunRequest& request);
+
+/// Refuses promises that contradict other settings.
+/// \throws InvalidInput naming both options
+void refuse_contradictions(const RunRequest& request);
+
+/// Refuses lengths that cannot be read before anything is computed.
+/// \param frame  of the scene as opened; where its scale will be known later, any stands for it
+/// \throws InvalidInput as parse_length()
+void check_lengths(const RunRequest& request, Frame frame);
+void check_lengths(const RunRequest& request, const Scene& scene);
+
+/// True if depth goes in beside the photographs, from files or a network.
+bool has_given_depth(const SceneRequest& request, const Scene& scene);
+
+/// Everything that decides the result of a request: arguments, and hashes of what goes in.
+nlohmann::ordered_json request_json(const RunRequest& request, const Scene& scene);
+
+}  // namespace cgs

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/run/web_splats.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/model/views.h"
+#include "convert/splats/splat_thinning.h"
+#include "io/bytes/atomic_file.h"
+#include "io/scenes/scene_reader.h"
+#include "io/splats/splat_glb.h"
+#include "io/splats/spz.h"
+#include "libcgs/coherence/initialisation.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/up_axis.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+// As many as the input views have pixels with depth, in their order.
+std::vector<size_t> counts_of_views(const Model& model) {
+  std::vector<size_t> out;
+  for (const ViewPriors& priors : model.priors) {
+    const std::vector<float>& depth = priors.depth.data;
+    out.push_back(static_cast<size_t>(std::count_if(depth.begin(), depth.end(), has_gaussian)));
+  }
+  return out;
+}
+
+// All splats where photographs are gone, or of names that cameras.json cannot hold: there is
+// nothing to judge by.
+ThinnedSplats thinned_splats(const Model& model, const Progress& progress) {
+  Scene scene = model.scene;
+  const bool has_photographs = std::all_of(scene.input.begin(), scene.input.end(), [&](int i) {
+    return !scene.views[static_cast<size_t>(i)].image_path.empty();
+  });
+  if (!has_photographs) {
+    ThinnedSplats all;
+    all.splats = model.gaussians;
+    return all;
+  }
+  load_images(scene, scene.input);
+  return thin_splats(model.gaussians, scene, counts_of_views(model), progress);
+}
+
+/// Two sets change places for as long as this lives: a model is large to copy.
+class Exchange {
+ public:
+  Exchange(Gaussians& a, Gaussians& b) : a_(a), b_(b) { std::swap(a_, b_); }
+  ~Exchange() { std::swap(a_, b_); }
+  Exchange(const Exchange&) = delete;
+  Exchange& operator=(const Exchange&) = delete;
+
+ private:
+  Gaussians& a_;
+  Gaussians& b_;
+};
+
+// What the model rests on, of which these splats are no longer one per pixel; "" where nobody says.
+std::string evidence_of_thinned(const Model& model, size_t kept) {
+  const size_t all = model.gaussians.size();
+  if (model.evidence.empty() || kept == all) return model.evidence;
+  return model.evidence + "; thinned to " + std::to_string(kept) + " of " + std::to_string(all) +
+         " Gaussians";
+}
+
+// How they show what was held out, as the evaluation of the model says of all of them; null
+// without.
+Json held_out_figures(Model& model, Gaussians& splats, const Progress& progress) {
+  if (model.scene.held_out.empty()) return nullptr;
+  const Exchange exchange(model.gaussians, splats);
+  return evaluate_views(model, model.scene.held_out, progress).at("mean");
+}
+
+}  // namespace
+
+Json write_web_splats(const std::filesystem::path& folder, Model& model, const Progress& progress) {
+  const Frame& frame = model.scene.frame;
+  const Eigen::Matrix3d y_up = y_up_from(model.scene.frame.up);
+  make_output_folder(folder);
+  ThinnedSplats thinned = thinned_splats(model, part_of(progress, 0, 0.9));
+  const size_t glb_bytes =
+      write_splat_glb(folder / "splats.glb",
+                      thinned.splats,
+                      frame,
+                      {y_up, evidence_of_thinned(model, thinned.splats.size())});
+  Json thinning = thinning_to_json(thinned, model.gaussians.size());
+  thinning["held_out"] = held_out_figures(model, thinned.splats, part_of(progress, 0.9, 1));
+  Json out = {{"thinning", thinning}, {"splats.glb", {{"bytes", glb_bytes}}}};
+  try {
+    constexpr double kOfPixel = 1.0 / 16;
+    const SpzReport spz = write_spz(folder / "splats.spz",
+                                    thinned.splats,
+                                    frame,
+                                    {.finest = kOfPixel * double{thinned.pixel}, .y_up = y_up});
+    out["splats.spz"] = {{"bytes", spz.bytes},
+                         {"fractional_bits", spz.fractional_bits},
+                         {"clamped_splats", spz.clamped}};
+  } catch (const InvalidInput& error) {
+    out["left_out"] = {{"splats.spz", error.what()}};
+  }
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/scene/baselines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+std::vector<Baseline> baselines(const Scene& scene) {
+  std::vector<Baseline> out;
+  for (size_t i = 0; i < scene.input.size(); ++i) {
+    for (size_t j = i + 1; j < scene.input.size(); ++j) {
+      const Camera& a = scene.views[static_cast<size_t>(scene.input[i])].camera;
+      const Camera& b = scene.views[static_cast<size_t>(scene.input[j])].camera;
+      const double length = (a.center() - b.center()).norm();
+      const double cosine =
+          a.world_from_cam.rotation().col(2).dot(b.world_from_cam.rotation().col(2));
+      const DepthRange range = depth_range(scene, scene.input[i]);
+      const double middle = 2 / (1 / range.near + 1 / range.far);
+      out.push_back({scene.input[i],
+                     scene.input[j],
+                     length,
+                     length / middle,
+                     std::acos(std::clamp(cosine, -1.0, 1.0))});
+    }
+  }
+  return out;
+}
+
+std::vector<std::string> baseline_warnings(const Scene& scene) {
+  constexpr double kWide = std::numbers::pi / 3;
+  constexpr double kLittle = 0.02;
+  std::vector<std::string> out;
+  double largest = 0;
+  const auto name = [&](int view) {
+    return printable(scene.views[static_cast<size_t>(view)].name);
+  };
+  for (const Baseline& pair : baselines(scene)) {
+    largest = std::max(largest, pair.to_depth);
+    if (pair.angle <= kWide) continue;
+    out.push_back("views " + name(pair.a) + " and " + name(pair.b) +
+                  " look in directions more than 60 degrees apart; they may share too little");
+  }
+  if (scene.input.size() > 1 && largest < kLittle) {
+    out.emplace_back("the largest baseline is below 2 % of the depth; depth will be uncertain");
+  }
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "convert/model/model.h"
+#include "convert/scene/marker_bars.h"
+
+namespace cgs {
+
+/// Two points picked in photographs and how far they are apart.
+struct KnownDistance {
+  /// A pixel of a photograph as its file has it, numbered as image viewers do: 0, 0 is the first.
+  struct Pick {
+    int view = 0;  ///< Index into Scene::views.
+    double x = 0;  ///< [pixels of the file]
+    double y = 0;
+  };
+  Pick a;
+  Pick b;
+  double metres = 0;
+  double sigma = 0;  ///< [m]; 0 where the user states none.
+  std::string text;  ///< As typed.
+};
+
+/// A distance as users type it: "view:x,y", "view:x,y" and "1.2m", the last with "+-3mm" after it
+/// where its uncertainty is known.
+using DistanceWords = std::array<std::string, 3>;
+
+/// \throws InvalidInput for what cannot be read, a view that is no input view, or a pixel outside
+///         of its photograph
+std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typed,
+                                           const Scene& scene);
+
+/// Whether depth was measured where every distance ends: known before the training.
+/// \throws InvalidInput as scale_by()
+void check_picks(const std::vector<KnownDistance>& distances, const Model& model);
+
+/// Gives a model the scale by which its depths fit the distances, and its cameras the markers; with
+/// none of both, does nothing.
+///
+/// The sigma of a picked length in the scene is that of the depths at both ends and of half a pixel
+/// of the images worked on.
+/// \return {"metres_per_unit", "metres_sigma", "distances": [{"distance", "known", "measured",
+///          "sigma", "residual", "used"}], "warnings"}, lengths in metres; null for neither
+/// \throws InvalidInput where no depth was measured at a pixel, or both ends fall together
+nlohmann::ordered_json scale_by(const std::vector<KnownDistance>& distances,
+                                const std::vector<MarkerBar>& markers,
+                                Model& model);
+
+}  // namespace cgs

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "convert/text/terminal.h"
+#include "io/bytes/scene_path.h"
+#include "io/scenes/colmap_model.h"
+
+namespace cgs {
+
+/// Cameras of a folder of photographs, and what they were solved from.
+struct PhotoPoses {
+  ColmapModel model;
+  std::string inputs;                 ///< Names and hashes of the photographs, options, program.
+  std::vector<std::string> warnings;  ///< Who is left out; whose Exif is refuted.
+  std::vector<std::string> notes;     ///< How the focal length was found.
+  double focal_sigma = 0;             ///< Largest of SolvedPhoto::focal_sigma.
+  bool is_stored = false;  ///< Read, not solved; the places of features are then not known.
+};
+
+/// Solves for the cameras of the photographs in a folder, or reads what write_photo_poses() stored
+/// in `stored` if that was solved from the same.
+///
+/// \param wanted  file names; if there are too many photographs to compare, only these are used;
+/// may
+///                be empty
+/// \param focal   [pixels] of every photograph as stored; 0 = from Exif, else solved for
+/// \param stored  may be empty or not exist
+/// \throws BadInput Empty (fewer than two photographs), and as read_image(); LimitError for more
+///         photographs than can be compared in reasonable time; NumericalError as solve_poses()
+PhotoPoses photo_poses(const SceneRoot& root,
+                       const std::vector<std::string>& wanted,
+                       double focal,
+                       const std::filesystem::path& stored,
+                       Terminal& terminal);
+
+/// Stores them as a COLMAP model in sparse/0 below the folder, with poses.json beside it.
+/// The other removes what was stored there. \throws IoError
+void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& poses);
+void forget_photo_poses(const std::filesystem::path& folder);
+
+}  // namespace cgs

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/scene/scene_request.h"
+
+#include <cmath>
+#include <utility>
+
+#include "convert/model/model.h"
+#include "convert/scene/baselines.h"
+#include "convert/scene/camera_fit.h"
+#include "convert/text/stated_frame.h"
+#include "io/scenes/photographs.h"
+#include "io/scenes/view_names.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+void refuse_two_scales(const SceneRequest& request) {
+  const ControlRequest& control = request.control;
+  if (control.file.empty() && !control.unit.empty()) {
+    throw InvalidInput("--control-unit is the unit of --control-points, which is not given");
+  }
+  for (const auto& [option, is_given] :
+       {std::pair("--known-distance", !request.known_distances.empty()),
+        std::pair("--marker-size", !request.marker_size.empty()),
+        std::pair("--assume-unit", !request.assume_unit.empty()),
+        std::pair("--up", !request.up.empty())}) {
+    if (control.file.empty() || !is_given) continue;
+    throw InvalidInput(std::string("--control-points tells scale, unit and up of the scene, and ") +
+                       option + " would tell it once more; leave that out");
+  }
+  if (!request.assume_unit.empty() && request.states_lengths()) {
+    throw InvalidInput(
+        "--assume-unit states the scale that --known-distance or --marker-size measures; give one");
+  }
+}
+
+void refine(const std::filesystem::path& model, Terminal& terminal, OpenedScene& out) {
+  out.refined = refined_poses(out.scene, model, terminal);
+  move_cameras(*out.refined, out.scene);
+  auto& warnings = out.scene.warnings;
+  warnings.insert(warnings.end(), out.refined->warnings.begin(), out.refined->warnings.end());
+}
+
+void warn_of_turned(Scene& scene) {
+  const size_t turned = turned_photographs(scene);
+  if (turned == 0) return;
+  scene.warnings.push_back(
+      std::to_string(turned) +
+      " photographs lie turned in their files (Exif); the cameras are for the files as they lie, "
+      "so views are shown lying; up is as Exif says");
+}
+
+// Which photographs there are is known before their cameras are, minutes earlier.
+// \return the names that a list stands for: indices are those of all photographs, also where some
+//         cannot be placed
+std::vector<std::string> names_of(const SceneRoot& root, const std::string& views) {
+  std::vector<std::string> out;
+  if (views.empty()) return out;
+  Scene named;
+  for (const PhotoFile& photograph : list_photographs(root)) {
+    View& view = named.views.emplace_back();
+    view.name = photograph.path.stem().string();
+    view.image_path = photograph.path;
+  }
+  for (const int i : select_views(named, views)) {
+    out.push_back(named.views[static_cast<size_t>(i)].image_path.filename().string());
+  }
+  return out;
+}
+
+// The same views among those that could be placed. \throws InvalidInput if one could not
+std::string placed_views(const std::vector<std::string>& names, const ColmapModel& model) {
+  std::string out;
+  for (const std::string& name : names) {
+    const bool is_placed =
+        std::any_of(model.images.begin(), model.images.end(), [&](const ColmapImage& image) {
+          return image.name == name;
+        });
+    if (!is_placed) {
+      throw InvalidInput("--views: photograph " + printable(name) +
+                         " could not be placed: too little of what it shows is in the others");
+    }
+    if (name.find(',') != std::string::npos) {
+      throw InvalidInput("--views: photograph " + printable(name) +
+                         " has a comma in its name, which ends a name there; rename it");
+    }
+    out += (out.empty() ? "" : ",") + name;
+  }
+  return out;
+}
+
+}  // namespace
+
+bool SceneRequest::states_lengths() const {
+  return !known_distances.empty() || !marker_size.empty();
+}
+
+OpenedScene open_scene(const SceneRequest& request,
+                       const std::filesystem::path& model,
+                       Terminal& terminal) {
+  refuse_two_scales(request);
+  require(request.focal >= 0 && std::isfinite(request.focal),
+          "--focal must be a number of pixels above 0",
+          request.focal);
+  OpenedScene out;
+  if (is_photographs(request.path)) {
+    if (request.refine_poses) {
+      throw InvalidInput("--refine-poses is for cameras that a scene states; " +
+                         printable(request.path) +
+                         " holds photographs alone, which are solved for as well as they can be");
+    }
+    request.options.validate();
+    const SceneRoot root{request.path, request.options.allow_external};
+    const std::vector<std::string> names = names_of(root, request.options.views);
+    const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
+    out.poses = photo_poses(root, names, request.focal, stored, terminal);
+    SceneOptions options = request.options;
+    options.views = placed_views(names, out.poses->model);
+    out.scene = scene_of_photographs(request.path, out.poses->model, options);
+    auto& warnings = out.scene.warnings;
+    warnings.insert(warnings.end(), out.poses->warnings.begin(), out.poses->warnings.end());
+    auto& notes = out.scene.notes;
+    notes.insert(notes.end(), out.poses->notes.begin(), out.poses->notes.end());
+  } else {
+    out.scene = read_scene(request.path, request.options);
+    if (request.focal > 0) {
+      throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
+                         " states them (" + out.scene.kind + ")");
+    }
+    warn_of_turned(out.scene);
+    if (request.refine_poses) refine(model, terminal, out);
+  }
+  for (std::string& warning : baseline_warnings(out.scene)) {
+    out.scene.warnings.push_back(std::move(warning));
+  }
+  if (!request.control.file.empty()) {
+    out.control = move_to_control_frame(request.control, out.scene);
+    if (out.refined) state_in_units(out.scene.world_per_stated_unit, *out.refined);
+    return out;
+  }
+  if (!request.assume_unit.empty()) {
+    const std::string refused = assume_unit(out.scene.frame, request.assume_unit);
+    if (!refused.empty()) out.scene.warnings.push_back(refused);
+    if (out.poses && refused.empty()) {
+      out.scene.warnings.emplace_back(
+          "--assume-unit: the cameras were solved for, so that a unit is the way from the first to "
+          "the farthest of them, however long it was; --known-distance and --marker-size tell the "
+          "scale");
+    }
+  }
+  out.scene.frame.up = up_of(out.scene, request.up);
+  return out;
+}
+
+void OpenedScene::keep(const std::filesystem::path& model) const {
+  if (poses && !poses->is_stored) write_photo_poses(model / kPosesFolder, *poses);
+  if (!poses) forget_photo_poses(model / kPosesFolder);
+  if (refined && !refined->is_stored) write_refined_poses(model, *refined);
+  if (!refined) forget_refined_poses(model);
+}
+
+nlohmann::ordered_json check_stated_cameras(OpenedScene& opened, Terminal& terminal) {
+  if (opened.poses || opened.refined) return nullptr;
+  nlohmann::ordered_json fit = camera_fit(opened.scene, terminal.begin("checking cameras"));
+  terminal.end("");
+  const std::string warning = camera_fit_warning(fit);
+  if (!warning.empty()) opened.scene.warnings.push_back(warning);
+  return fit;
+}
+
+}  // namespace cgs

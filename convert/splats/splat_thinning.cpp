@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/splats/splat_thinning.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/model/model.h"
+#include "convert/splats/splat_merging.h"
+#include "convert/splats/splat_refit.h"
+#include "convert/splats/splat_selection.h"
+#include "libcgs/core/order_statistics.h"
+#include "libcgs/render/rasterizer.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+constexpr std::array<float, 4> kLadder = {0.001f, 0.003f, 0.006f, 0.012f};
+
+std::vector<Camera> input_cameras(const Scene& scene) {
+  std::vector<Camera> out;
+  for (const int i : scene.input) out.push_back(scene.views[static_cast<size_t>(i)].camera);
+  return out;
+}
+
+// On the line from one camera to another at `place`: 0 and 1 are these, less and more lies beside.
+Camera on_the_way(const Camera& from, const Camera& to, double place) {
+  Camera out = from;
+  const Eigen::Matrix3d start = from.world_from_cam.linear();
+  const Eigen::AngleAxisd turn(Eigen::Matrix3d(start.transpose() * to.world_from_cam.linear()));
+  out.world_from_cam.linear() =
+      start * Eigen::AngleAxisd(place * turn.angle(), turn.axis()).toRotationMatrix();
+  out.world_from_cam.translation() = (1 - place) * from.center() + place * to.center();
+  return out;
+}
+
+// The input cameras, and those at the given places between neighbours in their order.
+std::vector<Camera> with_cameras_between(const std::vector<Camera>& inputs,
+                                         const std::vector<double>& places) {
+  constexpr size_t kMostPairs = 4;
+  constexpr double kWidest = 0.5;  // cosine between views: farther apart, the way may lead through
+                                   // what they look at
+  std::vector<std::pair<size_t, size_t>> pairs;
+  for (size_t i = 0; i + 1 < inputs.size(); ++i) pairs.emplace_back(i, i + 1);
+  if (inputs.size() > 2) pairs.emplace_back(inputs.size() - 1, 0);
+  const auto forward = [&](size_t i) { return inputs[i].world_from_cam.linear().col(2); };
+  pairs.erase(std::remove_if(
+                  pairs.begin(),
+                  pairs.end(),
+                  [&](const auto& p) { return forward(p.first).dot(forward(p.second)) < kWidest; }),
+              pairs.end());
+  std::vector<Camera> out = inputs;
+  const size_t count = std::min(pairs.size(), kMostPairs);
+  for (size_t k = 0; k < count; ++k) {
+    const auto& [a, b] = pairs[k * pairs.size() / count];
+    for (const double place : places) out.push_back(on_the_way(inputs[a], inputs[b], place));
+  }
+  return out;
+}
+
+// Mean squared error of a photograph where splats show something; empty if that is hardly anywhere:
+// edges alone, cut off by the frame, tell of nothing else. `own` are the splats of the photograph,
+// one per pixel of what it shows.
+std::optional<double> error_of(const Gaussians& g, const View& view, size_t own) {
+  constexpr float kShown = 0.5f;        // alpha
+  constexpr double kLeastShare = 0.05;  // of what has splats of its own
+  const RenderBuffers buffers = rasterize(g, view.camera);
+  const ColorImage shown = picture(buffers);
+  double sum = 0;
+  size_t count = 0;
+  for (size_t i = 0; i < shown.data.size(); ++i) {
+    if (!view.valid.empty() && view.valid.data[i] == 0) continue;
+    if (buffers.alpha.data[i] < kShown) continue;
+    sum += (shown.data[i] - view.image.data[i]).cast<double>().squaredNorm();
+    ++count;
+  }
+  if (count == 0 || double(count) < kLeastShare * double(own)) return std::nullopt;
+  return sum / (3 * double(count));
+}
+
+// PSNR of the input photographs against the splats of the others [dB].
+std::optional<double> psnr_of_unseen(const Gaussians& gaussians,
+                                     const Scene& scene,
+                                     std::span<const size_t> counts) {
+  constexpr double kLeastError = 1e-6;  // so that there is a logarithm
+  double sum = 0;
+  size_t count = 0;
+  size_t first = 0;
+  for (size_t n = 0; n < counts.size(); ++n) {
+    std::vector<uint8_t> keep(gaussians.size(), 1);
+    std::fill_n(keep.begin() + static_cast<std::ptrdiff_t>(first), counts[n], uint8_t{0});
+    first += counts[n];
+    Gaussians others = gaussians;
+    keep_only(others, keep);
+    const auto error =
+        error_of(others, scene.views[static_cast<size_t>(scene.input[n])], counts[n]);
+    if (!error) continue;
+    sum -= 10 * std::log10(std::max(*error, kLeastError));
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / double(count);
+}
+
+// Photographs may tell that the model is better than eight bits a channel can show. Nobody sees
+// then what differs by less than their step (root mean square), so this is allowed.
+double least_error_to_judge_by() {
+  constexpr double kStep = 1.0 / 255;
+  return kStep * kStep / (std::pow(10, 0.1 * kMostThinningLoss) - 1);
+}
+
+/// What all settings share.
+struct Trials {
+  WeighedSplats weighed;
+  /// Of all splats: from the input views, from cameras to fit to, from cameras to judge by.
+  std::vector<PictureToMatch> full;
+  size_t inputs = 0;
+  size_t fitted = 0;  ///< Those before the ones to judge by.
+  double unseen = 0;  ///< Mean squared error.
+  float pixel = 0;    ///< Of ThinnedSplats.
+};
+
+Gaussians thinned_by(const Trials& t, float most_cost, const Progress& progress) {
+  // Few splats need more passes, and these take little of the time: what fits them to the pictures
+  // halves what is lost, so that half as many do.
+  constexpr size_t kPasses = 96;
+  WeighedSplats merged = merge_splats(t.weighed, {.most_cost = most_cost});
+  const auto wanted = std::span(t.full).first(t.fitted);
+  refit_splats(merged.splats, merged.pixel, wanted, std::max(kPasses, wanted.size()), progress);
+  return std::move(merged.splats);
+}
+
+// Mean over the pictures [dB].
+double loss_of(const Trials& t, const Gaussians& g) {
+  double sum = 0;
+  size_t count = 0;
+  for (size_t k = 0; k < t.full.size(); ++k) {
+    if (k >= t.inputs && k < t.fitted) continue;
+    const std::vector<PictureToMatch> shown = pictures_to_match(g, std::span(&t.full[k].camera, 1));
+    sum += 10 * std::log10(1 + mean_square_difference(shown.front(), t.full[k]) / t.unseen);
+    ++count;
+  }
+  return sum / double(count);
+}
+
+// Of those that a camera sees; 0 if there are none.
+float pixel_of_nearest(const WeighedSplats& s) {
+  std::vector<float> pixels;
+  for (size_t i = 0; i < s.pixel.size(); ++i) {
+    if (!s.ray[i].isZero(0)) pixels.push_back(s.pixel[i]);
+  }
+  return pixels.empty() ? 0 : quantile(pixels, 0.01);
+}
+
+Trials prepare(const Gaussians& gaussians, const Scene& scene, double unseen_psnr) {
+  const std::vector<Camera> inputs = input_cameras(scene);
+  std::vector<Camera> cameras = with_cameras_between(inputs, {0.5, -0.3, 1.3});
+  Trials out;
+  out.weighed = weigh_splats(gaussians, cameras);
+  out.pixel = pixel_of_nearest(out.weighed);
+  out.inputs = inputs.size();
+  out.fitted = cameras.size();
+  const std::vector<Camera> judged = with_cameras_between(inputs, {0.25, -0.2});
+  cameras.insert(
+      cameras.end(), judged.begin() + static_cast<std::ptrdiff_t>(inputs.size()), judged.end());
+  out.full = pictures_to_match(gaussians, cameras);
+  out.unseen = std::max(std::pow(10, -0.1 * unseen_psnr), least_error_to_judge_by());
+  return out;
+}
+
+// The strongest setting of the ladder that loses little enough, if one does, by bisection.
+void choose(ThinnedSplats& out, const Trials& trials, const Progress& progress) {
+  size_t low = 0;  // settings below lose little enough, those from `high` on too much
+  size_t high = kLadder.size();
+  while (low < high) {
+    const size_t middle = (low + high) / 2;
+    const double done = 0.5 * double(out.tried.size());
+    Gaussians fewer =
+        thinned_by(trials, kLadder.at(middle), part_of(progress, done, std::min(1.0, done + 0.5)));
+    out.tried.push_back({kLadder.at(middle), fewer.size(), loss_of(trials, fewer)});
+    if (out.tried.back().loss <= kMostThinningLoss) {
+      out.most_cost = kLadder.at(middle);
+      out.splats = std::move(fewer);
+      out.pixel = trials.pixel;
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+}
+
+}  // namespace
+
+ThinnedSplats thin_splats(const Gaussians& gaussians,
+                          const Scene& scene,
+                          std::span<const size_t> counts,
+                          const Progress& progress) {
+  ThinnedSplats out;
+  report(progress, 0);
+  const size_t of_views = std::accumulate(counts.begin(), counts.end(), size_t{0});
+  const size_t most = counts.empty() ? 0 : *std::max_element(counts.begin(), counts.end());
+  const bool is_own = of_views <= gaussians.size() && gaussians.size() - of_views <= most;
+  if (is_own && counts.size() == scene.input.size()) {
+    out.unseen_psnr = psnr_of_unseen(gaussians, scene, counts);
+  }
+  if (out.unseen_psnr) {
+    choose(out, prepare(gaussians, scene, *out.unseen_psnr), part_of(progress, 0.2, 1));
+  }
+  if (!out.most_cost) out.splats = gaussians;
+  report(progress, 1);
+  return out;
+}
+
+Json thinning_to_json(const ThinnedSplats& thinned, size_t before) {
+  Json out = {{"kept", thinned.splats.size()},
+              {"of", before},
+              {"chosen", nullptr},
+              {"most_loss_db", kMostThinningLoss},
+              {"unseen_psnr", nullptr},
+              {"tried", Json::array()}};
+  // Numbers of the ladder as they are written there, not as float has them.
+  const auto as_written = [](float cost) { return std::round(double(cost) * 1e6) / 1e6; };
+  if (thinned.most_cost) out["chosen"] = as_written(*thinned.most_cost);
+  if (thinned.unseen_psnr) out["unseen_psnr"] = *thinned.unseen_psnr;
+  for (const ThinningTrial& t : thinned.tried) {
+    out["tried"].push_back(
+        {{"most_cost", as_written(t.most_cost)}, {"splats", t.splats}, {"loss_db", t.loss}});
+  }
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/glb/scene.h"
+
+#include "io/bytes/byte_writer.h"
+#include "io/glb/meshopt.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
+
+/// The matrix of a node: given as such, or as translation, rotation and scale.
+Eigen::Affine3d node_matrix(const JsonValue& node) {
+  Eigen::Affine3d out = Eigen::Affine3d::Identity();
+  if (node.find("matrix")) {
+    const std::vector<double> m = numbers_or(node, "matrix", std::vector<double>(16));
+    out.matrix() = Eigen::Map<const Eigen::Matrix4d>(m.data());
+    return out;
+  }
+  const std::vector<double> t = numbers_or(node, "translation", {0, 0, 0});
+  const std::vector<double> r = numbers_or(node, "rotation", {0, 0, 0, 1});
+  const std::vector<double> s = numbers_or(node, "scale", {1, 1, 1});
+  const Eigen::Quaterniond q(r[3], r[0], r[1], r[2]);
+  if (!(q.norm() > 0)) node.at("rotation").fail(Defect::Value, "is not a rotation");
+  out = Eigen::Translation3d(t[0], t[1], t[2]) * q.normalized() * Eigen::Scaling(s[0], s[1], s[2]);
+  return out;
+}
+
+/// Where a node shows its mesh, seen from the node: once, or as EXT_mesh_gpu_instancing lists.
+/// Source: EXT_mesh_gpu_instancing, Khronos Group.
+std::vector<Eigen::Affine3d> places_of_mesh(const GlbContainer& file, const JsonValue& node) {
+  const auto extensions = node.find("extensions");
+  const auto instancing = extensions ? extensions->find(kInstancing) : std::nullopt;
+  if (!instancing) return {Eigen::Affine3d::Identity()};
+  const JsonValue attributes = instancing->at("attributes");
+  size_t count = 0;
+  const auto values = [&](const char* name, size_t components) -> std::vector<float> {
+    const auto index = attributes.find(name);
+    if (!index) return {};
+    auto out = file.floats(file.element("accessors", *index), static_cast<int>(components));
+    if (count != 0 && out.size() != components * count) {
+      index->fail(Defect::Count, "differs in length from the other attributes");
+    }
+    count = out.size() / components;
+    return out;
+  };
+  const std::vector<float> t = values("TRANSLATION", 3);
+  const std::vector<float> r = values("ROTATION", 4);
+  const std::vector<float> s = values("SCALE", 3);
+  std::vector<Eigen::Affine3d> out(count, Eigen::Affine3d::Identity());
+  for (size_t i = 0; i < count; ++i) {
+    if (!t.empty()) out[i].translate(Eigen::Vector3d(t[3 * i], t[3 * i + 1], t[3 * i + 2]));
+    if (!r.empty()) {
+      const Eigen::Quaterniond q(r[4 * i + 3], r[4 * i], r[4 * i + 1], r[4 * i + 2]);
+      if (!(q.norm() > 0)) attributes.at("ROTATION").fail(Defect::Value, "holds no rotation");
+      out[i].rotate(q.normalized());
+    }
+    if (!s.empty()) out[i].scale(Eigen::Vector3d(s[3 * i], s[3 * i + 1], s[3 * i + 2]));
+  }
+  return out;
+}
+
+/// Follows the nodes of a file.
+class NodeVisitor {
+ public:
+  explicit NodeVisitor(const GlbContainer& file) : file_(file) {}
+
+  std::vector<GlbInstance> visit() {
+    const JsonValue root = file_.root();
+    const auto nodes = root.find("nodes");
+    visited_.assign(nodes ? nodes->size() : 0, false);
+    visit_scene(root);
+    return std::move(out_);
+  }
+
+ private:
+  // The scene that is to be shown, else the first; a file without scenes is a library of nodes.
+  void visit_scene(const JsonValue& root) {
+    const auto scenes = root.find("scenes");
+    const auto chosen = root.find("scene");
+    if (!scenes && !chosen) return visit_roots(root);
+    if (!chosen && scenes->size() == 0) return;
+    const JsonValue scene = chosen ? file_.element("scenes", *chosen) : scenes->at(size_t{0});
+    if (const auto nodes = scene.find("nodes")) visit_all(*nodes, Eigen::Affine3d::Identity(), 0);
+  }
+
+  void visit_roots(const JsonValue& root) {
+    std::vector<bool> is_child(visited_.size(), false);
+    for (size_t i = 0; i < visited_.size(); ++i) {
+      const auto children = root.at("nodes").at(i).find("children");
+      for (size_t k = 0; children && k < children->size(); ++k) {
+        const uint64_t child = whole_number(children->at(k));
+        if (child < is_child.size()) is_child[child] = true;  // others are refused on the way
+      }
+    }
+    for (size_t i = 0; i < visited_.size(); ++i) {
+      if (!is_child[i]) visit_node(root.at("nodes").at(i), i, Eigen::Affine3d::Identity(), 0);
+    }
+  }
+
+  void visit_all(const JsonValue& indices, const Eigen::Affine3d& parent, int depth) {
+    for (size_t i = 0; i < indices.size(); ++i) visit(indices.at(i), parent, depth);
+  }
+
+  void visit(const JsonValue& index, const Eigen::Affine3d& parent, int depth) {
+    const JsonValue node = file_.element("nodes", index);
+    const auto number = static_cast<size_t>(whole_number(index));
+    if (visited_[number]) index.fail(Defect::Ref, "names a node that has a parent already");
+    visit_node(node, number, parent, depth);
+  }
+
+  void visit_node(const JsonValue& node, size_t number, const Eigen::Affine3d& parent, int depth) {
+    constexpr int kDeepest = 256;
+    visited_[number] = true;
+    if (depth > kDeepest) throw LimitError(printable(file_.path()) + ": nodes nest too deeply");
+    const Eigen::Affine3d world = parent * node_matrix(node);
+    if (const auto skin = node.find("skin"); skin && node.find("mesh")) {
+      skin->fail(Defect::Unsupported,
+                 "joints of a skeleton place this mesh, which are not read: apply the armature "
+                 "before exporting");
+    }
+    if (const auto mesh = node.find("mesh")) {
+      for (const Eigen::Affine3d& place : places_of_mesh(file_, node)) {
+        out_.push_back({file_.element("meshes", *mesh), world * place});
+      }
+    }
+    if (const auto children = node.find("children")) visit_all(*children, world, depth + 1);
+  }
+
+  const GlbContainer& file_;
+  std::vector<GlbInstance> out_;
+  std::vector<bool> visited_;
+};
+
+void refuse_unknown_extensions(const JsonValue& root) {
+  const auto required = root.find("extensionsRequired");
+  for (size_t i = 0; required && i < required->size(); ++i) {
+    const std::string name = required->at(i).text();
+    const bool known = name == "KHR_draco_mesh_compression" || name == "KHR_mesh_quantization" ||
+                       name == kMeshopt || name == "EXT_mesh_features" ||
+                       name.starts_with("KHR_materials_") || name.starts_with("KHR_texture_") ||
+                       name.starts_with("EXT_texture_") || name == "KHR_lights_punctual" ||
+                       name == kInstancing || name == "KHR_gaussian_splatting";
+    if (!known) required->at(i).fail(Defect::Unsupported, name + " is required and not known");
+  }
+}
+
+std::string number_line(const char* key, double value) {
+  std::string out = std::string(key) + " ";
+  append_number(out, value);
+  return out;
+}
+
+}  // namespace
+
+std::vector<GlbInstance> glb_instances(const GlbContainer& file) {
+  refuse_unknown_extensions(file.root());
+  return NodeVisitor(file).visit();
+}
+
+GlbOrigin glb_origin(const GlbContainer& file) {
+  GlbOrigin out;
+  const auto extras = file.root().at("asset").find("extras");
+  if (!extras || !extras->is_object() || !extras->find("gltf_from_world")) {
+    out.comments = {"unit m", "metres_per_unit 1", "scale_source assumed"};
+    return out;
+  }
+  out.is_ours = true;
+  out.had_labels = extras->find("area").has_value();
+  const JsonValue rotation = extras->at("gltf_from_world");
+  const JsonValue origin = extras->at("origin_in_world");
+  if (rotation.size() != 9) rotation.fail(Defect::Count, "needs 9 numbers");
+  if (origin.size() != 3) origin.fail(Defect::Count, "needs 3 numbers");
+  for (int i = 0; i < 9; ++i) {
+    out.world_from_gltf(i % 3, i / 3) = rotation.at(static_cast<size_t>(i)).number();
+  }
+  const Eigen::Matrix3d off =
+      out.world_from_gltf * out.world_from_gltf.transpose() - Eigen::Matrix3d::Identity();
+  if (!(off.norm() < 1e-6)) rotation.fail(Defect::Value, "is not a rotation");
+  for (int i = 0; i < 3; ++i) out.origin[i] = origin.at(static_cast<size_t>(i)).number();
+  const double metres = extras->at("metres_per_unit").number();
+  if (extras->at("units").text() != "m") return out;
+  if (!(metres > 0)) extras->at("metres_per_unit").fail(Defect::Value, "must be > 0");
+  out.units_per_metre = 1 / metres;
+  out.comments = {number_line("metres_per_unit", metres),
+                  number_line("metres_sigma", extras->at("metres_sigma").number()),
+                  "scale_source " + extras->at("scale_source").text()};
+  return out;
+}
+
+}  // namespace cgs

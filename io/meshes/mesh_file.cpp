@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/meshes/mesh_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "io/bytes/scene_path.h"
+#include "io/meshes/glb_reader.h"
+#include "io/meshes/mesh_ply.h"
+#include "io/meshes/obj_reader.h"
+#include "io/meshes/off.h"
+#include "io/meshes/stl_reader.h"
+#include "io/meshes/threemf_reader.h"
+#include "io/ply/frame.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+// \param up  what the format says, in file axes; stays where it says nothing
+ParsedMesh parse(const std::filesystem::path& path, Eigen::Vector3d& up) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".ply") return parse_mesh_ply(path);
+  if (extension == ".obj") return read_obj(path);
+  if (extension == ".stl") {
+    up = Eigen::Vector3d::UnitZ();  // no rule of the format, but of the programs that print it
+    return read_stl(path);
+  }
+  if (extension == ".3mf") {
+    up = Eigen::Vector3d::UnitZ();
+    return read_3mf(path);
+  }
+  if (extension == ".off") return read_off(path);
+  throw BadInput(Defect::Unsupported,
+                 path,
+                 "'" + extension +
+                     "' is not a mesh format that is read; known are .ply, .obj, "
+                     ".stl, .off, .3mf and .glb");
+}
+
+// Three corners in one place or on one line: no area. Others keep such faces, so do we.
+size_t faces_without_area(const MeasurableMesh& content) {
+  size_t count = 0;
+  for (const auto& f : content.mesh.faces) {
+    const Eigen::Vector3d u = content.points[f[1]] - content.points[f[0]];
+    const Eigen::Vector3d v = content.points[f[2]] - content.points[f[0]];
+    if (u.cross(v).squaredNorm() == 0) ++count;
+  }
+  return count;
+}
+
+// \param up  0 = the format does not say
+MeasurableFile measurable(ParsedMesh parsed,
+                          const Eigen::Vector3d& up,
+                          const std::filesystem::path& path,
+                          const std::optional<Frame>& frame) {
+  check_significance(parsed, path);
+  PlyPlacement placement =
+      ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
+  if (!frame && !up.isZero(0)) placement.frame.up = up.normalized();
+  placement.frame.validate();
+  MeasurableFile out{
+      {std::move(parsed.mesh), std::move(parsed.positions), placement.frame, placement.file_origin},
+      std::move(parsed.warnings),
+      parsed.has_textures};
+  out.warnings.insert(out.warnings.end(), placement.warnings.begin(), placement.warnings.end());
+  out.content.mesh.vertices.reserve(out.content.points.size());
+  for (Eigen::Vector3d& p : out.content.points) {
+    p = out.content.internal_from_file(p);
+    out.content.mesh.vertices.emplace_back(p.cast<float>());
+  }
+  for (float& sigma : out.content.mesh.sigma) sigma = internal_sigma(sigma, placement.frame);
+  if (const size_t flat = faces_without_area(out.content); flat > 0) {
+    out.warnings.push_back(std::to_string(flat) + " faces have no area");
+  }
+  return out;
+}
+
+MeasurableFile measurable(GlbMesh glb,
+                          const std::filesystem::path& path,
+                          const std::optional<Frame>& frame) {
+  return measurable(std::move(glb.parsed), glb.up, path, frame);
+}
+
+}  // namespace
+
+bool is_mesh_name(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  const auto known = {".ply", ".obj", ".stl", ".off", ".3mf", ".glb"};
+  return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
+MeasurableFile read_mesh_file(const std::filesystem::path& path,
+                              const std::optional<Frame>& frame) {
+  if (lower_extension(path) == ".glb") return measurable(read_glb(path), path, frame);
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  ParsedMesh parsed = parse(path, up);
+  return measurable(std::move(parsed), up, path, frame);
+}
+
+MeasurableFile parse_glb_file(std::string content,
+                              const std::filesystem::path& path,
+                              const std::optional<Frame>& frame) {
+  return measurable(parse_glb(std::move(content), path), path, frame);
+}
+
+}  // namespace cgs

@@ -1,0 +1,374 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/meshes/mesh_ply.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <string_view>
+
+#include "io/bytes/atomic_file.h"
+#include "io/bytes/byte_writer.h"
+#include "io/bytes/mesh_arrays.h"
+#include "io/meshes/material_labels.h"
+#include "io/ply/frame.h"
+#include "io/ply/rows.h"
+
+namespace cgs {
+
+namespace {
+
+/// How the header line of files with labels begins, without "comment "; the numbers and names
+/// follow, in earlier versions fewer.
+constexpr std::string_view kPlyLabels = "provenance 0 inferred 1 single view 2 observed";
+
+/// "provenance 0 inferred 1 single view …"
+std::string labels_text() {
+  std::string out = "provenance";
+  for (size_t i = 0; i < kProvenanceCount; ++i) {
+    out += ' ' + std::to_string(i) + ' ';
+    out += kProvenanceTraits.at(i).name;
+  }
+  return out;
+}
+
+std::string header_text(const TriangleMesh& mesh,
+                        const Frame& frame,
+                        const std::vector<VertexScalar>& scalars) {
+  std::string out = "ply\nformat binary_little_endian 1.0\ncomment ";
+  out += kPlyGenerator;
+  out += '\n';
+  out += ply_frame_comments(frame);
+  if (!mesh.provenance.empty()) out += "comment " + labels_text() + "\n";
+  out += "element vertex " + std::to_string(mesh.vertices.size()) + "\n";
+  out += "property float x\nproperty float y\nproperty float z\n";
+  if (!mesh.normals.empty()) out += "property float nx\nproperty float ny\nproperty float nz\n";
+  if (!mesh.colors.empty()) {
+    out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  }
+  if (!mesh.support.empty()) out += "property float quality\n";
+  if (!mesh.sigma.empty()) out += "property float scalar_sigma\n";
+  for (const VertexScalar& scalar : scalars) out += "property float " + scalar.name + "\n";
+  out += "element face " + std::to_string(mesh.faces.size()) + "\n";
+  out += "property list uchar int vertex_indices\n";
+  if (!mesh.provenance.empty()) out += "property uchar scalar_provenance\nproperty float quality\n";
+  return out + "end_header\n";
+}
+
+void append_vertex(std::string& out, const TriangleMesh& mesh, const Frame& frame, size_t i) {
+  const Eigen::Vector3f p = frame.file_from_internal(mesh.vertices[i].cast<double>()).cast<float>();
+  for (const float c : p) append_bytes(out, c);
+  if (!mesh.normals.empty()) {
+    for (const float c : mesh.normals[i]) append_bytes(out, c);
+  }
+  if (!mesh.colors.empty()) {
+    for (const float c : mesh.colors[i]) append_bytes(out, color_byte(c));
+  }
+  if (!mesh.support.empty()) append_bytes(out, mesh.support[i]);
+  if (!mesh.sigma.empty()) {
+    const double sigma = mesh.sigma[i] * frame.scale;
+    append_bytes(out, sigma >= 0 ? static_cast<float>(sigma) : -1.0f);  // NaN too
+  }
+}
+
+/// Positions of the properties we know within an element; -1 = the file does not have it.
+struct VertexColumns {
+  std::array<int, 3> position{};
+  std::array<int, 3> normal{};
+  std::array<int, 3> color{};
+  int quality = -1;
+  int sigma = -1;
+  float color_scale = 1;
+  bool has_normals() const { return *std::min_element(normal.begin(), normal.end()) >= 0; }
+  bool has_colors() const { return *std::min_element(color.begin(), color.end()) >= 0; }
+};
+
+/// Position of a scalar property; lists of that name do not count.
+int find_scalar(const PlyElement& element, std::string_view name) {
+  const int i = element.find(name);
+  return i >= 0 && !element.properties[static_cast<size_t>(i)].is_list ? i : -1;
+}
+
+/// Whether a scalar called quality is the support that write_mesh_ply() keeps there: MeshLab and
+/// others call any number of a vertex so.
+bool quality_is_support(const PlyHeader& header, const PlyElement& vertex) {
+  const PlyElement* face = header.find("face");
+  return is_our_ply(header.comments) || vertex.find("scalar_sigma") >= 0 ||
+         (face != nullptr && face->find("scalar_provenance") >= 0);
+}
+
+VertexColumns vertex_columns(const PlyHeader& header, const std::filesystem::path& path) {
+  const PlyElement* vertex = header.find("vertex");
+  if (vertex == nullptr) throw BadInput(Defect::Schema, path, "missing element vertex");
+  if (vertex->count == 0) throw BadInput(Defect::Empty, path, "0 vertices");
+  constexpr std::array<const char*, 3> kPosition = {"x", "y", "z"};
+  constexpr std::array<const char*, 3> kNormal = {"nx", "ny", "nz"};
+  constexpr std::array<const char*, 3> kColor = {"red", "green", "blue"};
+  VertexColumns out;
+  for (size_t k = 0; k < 3; ++k) {
+    out.position.at(k) = find_scalar(*vertex, kPosition.at(k));
+    out.normal.at(k) = find_scalar(*vertex, kNormal.at(k));
+    out.color.at(k) = find_scalar(*vertex, kColor.at(k));
+    if (out.position.at(k) < 0) {
+      throw BadInput(Defect::Schema, path, std::string("missing property ") + kPosition.at(k));
+    }
+  }
+  if (quality_is_support(header, *vertex)) out.quality = find_scalar(*vertex, "quality");
+  out.sigma = find_scalar(*vertex, "scalar_sigma");
+  if (out.has_colors()) {
+    const PlyType type = vertex->properties[static_cast<size_t>(out.color[0])].type;
+    const bool coded = type == PlyType::UInt8 || type == PlyType::Int8;
+    const bool whole = type == PlyType::UInt32 || type == PlyType::Int32;
+    const bool wide = type == PlyType::UInt16 || type == PlyType::Int16;
+    out.color_scale = coded || whole ? 1.0f / 255.0f : wide ? 1.0f / 65535.0f : 1.0f;
+  }
+  return out;
+}
+
+/// Warning of a file that had labels, or may have had them; empty for others. Programs that know
+/// scalars of vertices only keep scalar_sigma.
+std::string lost_labels(const PlyHeader& header) {
+  const PlyElement* face = header.find("face");
+  if (face == nullptr || face->count == 0) return "";
+  if (find_scalar(*face, "scalar_provenance") >= 0) return "";
+  const auto& comments = header.comments;
+  const auto lists_labels = [](const std::string& line) { return line.starts_with(kPlyLabels); };
+  if (std::any_of(comments.begin(), comments.end(), lists_labels)) return kLostLabels;
+  if (is_our_ply(comments) || find_scalar(*header.find("vertex"), "scalar_sigma") < 0) return "";
+  return "it states sigma, but not where its faces come from: another program may have left out "
+         "the labels of a file of ours";
+}
+
+/// Whether a file has colours elsewhere than at its vertices, as MeshLab and VCG write them.
+bool states_other_colors(const PlyHeader& header) {
+  const PlyElement* face = header.find("face");
+  const bool has_texture = face != nullptr && face->find("texcoord") >= 0;
+  return has_texture || (face != nullptr && find_scalar(*face, "red") >= 0);
+}
+
+/// What a file says beyond what is read, for a warning: numbers of vertices by name, and elements
+/// that may be faces of another form.
+std::string unread_properties(const PlyHeader& header, bool has_colors) {
+  constexpr std::array<std::string_view, 14> kKnown = {"x",
+                                                       "y",
+                                                       "z",
+                                                       "nx",
+                                                       "ny",
+                                                       "nz",
+                                                       "red",
+                                                       "green",
+                                                       "blue",
+                                                       "alpha",
+                                                       "quality",
+                                                       "scalar_sigma",
+                                                       "s",
+                                                       "t"};
+  std::string out;
+  const auto add = [&](const std::string& what) {
+    constexpr size_t kShown = 200;  // characters
+    if (out.size() < kShown) out += (out.empty() ? "" : ", ") + printable(what);
+  };
+  for (const PlyProperty& property : header.find("vertex")->properties) {
+    const bool is_known = std::find(kKnown.begin(), kKnown.end(), property.name) != kKnown.end();
+    const bool is_other_quality =
+        property.name == "quality" && !quality_is_support(header, *header.find("vertex"));
+    if (!is_known || is_other_quality) add(property.name);
+  }
+  if (header.find("tristrips") != nullptr) add("triangle strips, which hold its faces");
+  const auto names_texture = [](const std::string& comment) {
+    return comment.starts_with("TextureFile");
+  };
+  if (has_colors &&  // else the texture is missed, and another warning says so
+      std::any_of(header.comments.begin(), header.comments.end(), names_texture)) {
+    add("its texture");
+  }
+  return out;
+}
+
+/// Collects rows; positions stay double in file coordinates until the frame is known.
+class MeshRows {
+ public:
+  MeshRows(const PlyHeader& header, const std::filesystem::path& path)
+      : path_(path), columns_(vertex_columns(header, path)) {
+    vertex_count_ = header.find("vertex")->count;
+    if (const PlyElement* face = header.find("face")) {
+      indices_ = face->find("vertex_indices");
+      if (indices_ < 0) indices_ = face->find("vertex_index");
+      provenance_ = find_scalar(*face, "scalar_provenance");
+      if (indices_ >= 0 && !face->properties[static_cast<size_t>(indices_)].is_list) indices_ = -1;
+      if (face->count > 0 && indices_ < 0) {
+        throw BadInput(Defect::Schema, path, "faces have no list vertex_indices");
+      }
+    }
+  }
+
+  void add(const PlyElement& element, uint64_t row_number, const PlyRow& row) {
+    if (element.name == "vertex") add_vertex(row_number, row);
+    if (element.name == "face") add_face(row_number, row);
+  }
+
+  std::vector<Eigen::Vector3d> positions;
+  TriangleMesh mesh;
+  uint64_t dropped_faces = 0;
+
+ private:
+  Eigen::Vector3d triple(const PlyRow& row, const std::array<int, 3>& columns) const {
+    return {row.values[static_cast<size_t>(columns[0])],
+            row.values[static_cast<size_t>(columns[1])],
+            row.values[static_cast<size_t>(columns[2])]};
+  }
+
+  void add_vertex(uint64_t row_number, const PlyRow& row) {
+    const Eigen::Vector3d p = triple(row, columns_.position);
+    if (!p.allFinite()) {
+      throw BadInput(
+          Defect::Value, path_, "vertex " + std::to_string(row_number) + " is not finite");
+    }
+    positions.push_back(p);
+    if (columns_.has_normals()) {
+      const Eigen::Vector3f n = triple(row, columns_.normal).cast<float>();
+      mesh.normals.push_back(n.allFinite() ? n : Eigen::Vector3f::Zero());
+    }
+    if (columns_.has_colors()) {
+      Eigen::Vector3f color = columns_.color_scale * triple(row, columns_.color).cast<float>();
+      for (float& c : color) c = c > 0 ? c : 0.0f;  // NaN too
+      mesh.colors.push_back(color);
+    }
+    if (columns_.quality >= 0) {
+      mesh.support.push_back(static_cast<float>(row.values[static_cast<size_t>(columns_.quality)]));
+    }
+    if (columns_.sigma >= 0) {
+      mesh.sigma.push_back(static_cast<float>(row.values[static_cast<size_t>(columns_.sigma)]));
+    }
+  }
+
+  void add_face(uint64_t row_number, const PlyRow& row) {
+    if (indices_ < 0) return;
+    const std::vector<double>& corners = row.lists[static_cast<size_t>(indices_)];
+    for (const double corner : corners) {
+      if (corner >= 0 && corner < static_cast<double>(vertex_count_)) continue;
+      throw BadInput(Defect::Ref,
+                     path_,
+                     "face " + std::to_string(row_number) + " names vertex " +
+                         std::to_string(static_cast<int64_t>(corner)) + " of " +
+                         std::to_string(vertex_count_));
+    }
+    if (corners.size() < 3) ++dropped_faces;
+    polygon_.assign(corners.begin(), corners.end());
+    append_polygon(polygon_, positions, mesh.faces);
+    if (provenance_ >= 0 && mesh.faces.size() > mesh.provenance.size()) {
+      mesh.provenance.resize(mesh.faces.size(), label(row_number, row));
+    }
+  }
+
+  Provenance label(uint64_t row_number, const PlyRow& row) const {
+    const double value = row.values[static_cast<size_t>(provenance_)];
+    for (const Provenance known : kProvenanceOrder) {
+      if (value == static_cast<double>(known)) return known;
+    }
+    throw BadInput(Defect::Value,
+                   path_,
+                   "face " + std::to_string(row_number) + " has scalar_provenance " +
+                       std::to_string(value) + ", allowed are 0 to " +
+                       std::to_string(kProvenanceCount - 1));
+  }
+
+  const std::filesystem::path& path_;
+  VertexColumns columns_;
+  uint64_t vertex_count_ = 0;
+  int indices_ = -1;
+  int provenance_ = -1;
+  std::vector<uint32_t> polygon_;
+};
+
+}  // namespace
+
+void write_mesh_ply(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const Frame& frame) {
+  write_mesh_ply(path, mesh, frame, {});
+}
+
+void write_mesh_ply(const std::filesystem::path& path,
+                    const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const std::vector<VertexScalar>& scalars) {
+  require_writable(mesh, "write_mesh_ply");
+  for (const VertexScalar& scalar : scalars) {
+    require(scalar.values.size() == mesh.vertices.size(),
+            "write_mesh_ply: " + scalar.name + " must have a number per vertex",
+            scalar.values.size());
+  }
+  AtomicFile file(path);
+  file.write(header_text(mesh, frame, scalars));
+  std::string record;
+  for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+    record.clear();
+    append_vertex(record, mesh, frame, i);
+    for (const VertexScalar& scalar : scalars) append_bytes(record, scalar.values[i]);
+    file.write(record);
+  }
+  for (size_t i = 0; i < mesh.faces.size(); ++i) {
+    record.assign(1, '\3');
+    for (const uint32_t corner : mesh.faces[i]) append_bytes(record, corner);
+    if (!mesh.provenance.empty()) {
+      append_bytes(record, static_cast<uint8_t>(mesh.provenance[i]));
+      append_bytes(record, static_cast<float>(mesh.provenance[i]));
+    }
+    file.write(record);
+  }
+  file.commit();
+}
+
+ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
+  const std::string bytes = read_file(path);
+  PlyHeader header = parse_ply_header(bytes, path);
+  MeshRows rows(header, path);
+  const uint64_t trailing = read_ply_rows(
+      bytes, path, header, [&](const PlyElement& element, uint64_t i, const PlyRow& row) {
+        rows.add(element, i, row);
+      });
+  ParsedMesh out{std::move(rows.positions), std::move(rows.mesh), header.comments, {}};
+  if (const PlyElement* vertex = header.find("vertex")) {
+    const int x = vertex->find("x");
+    const bool is_double =
+        x >= 0 && vertex->properties[static_cast<size_t>(x)].type == PlyType::Float64;
+    const bool is_text = header.format == PlyFormat::Ascii;
+    out.digits = is_double || is_text ? kDoubleDigits : kFloatDigits;
+  }
+  settle_colors(out);
+  if (out.mesh.colors.empty() && states_other_colors(header)) {
+    out.warnings.emplace_back(
+        "textures and colours of faces are not read, only colours of vertices, which it has none "
+        "of");
+  }
+  const std::string lost = lost_labels(header);
+  if (!lost.empty()) out.warnings.push_back(lost);
+  const std::string unread = unread_properties(header, !out.mesh.colors.empty());
+  if (!unread.empty()) out.warnings.push_back("not read: " + unread);
+  if (trailing > 0) {
+    out.warnings.push_back("trailing " + std::to_string(trailing) + " bytes ignored");
+  }
+  if (rows.dropped_faces > 0) {
+    out.warnings.push_back("dropped " + std::to_string(rows.dropped_faces) +
+                           " faces of fewer than 3 corners");
+  }
+  return out;
+}
+
+MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame) {
+  ParsedMesh parsed = parse_mesh_ply(path);
+  check_significance(parsed, path);
+  PlyPlacement placement =
+      ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
+  MeshFile out{std::move(parsed.mesh), placement.frame, std::move(placement.warnings)};
+  out.mesh.vertices.reserve(parsed.positions.size());
+  for (const Eigen::Vector3d& p : parsed.positions) {
+    out.mesh.vertices.emplace_back(placement.internal(p).cast<float>());
+  }
+  for (float& sigma : out.mesh.sigma) sigma = internal_sigma(sigma, out.frame);
+  out.warnings.insert(out.warnings.end(), parsed.warnings.begin(), parsed.warnings.end());
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "io/bytes/scene_path.h"
+#include "io/scenes/colmap_model.h"
+#include "libcgs/core/scene.h"
+
+namespace cgs {
+
+/// True if the folder, its sparse/ or its sparse/0/ holds cameras and images of a COLMAP model.
+bool is_colmap(const std::filesystem::path& folder);
+
+/// Reads a COLMAP reconstruction: the model in sparse/0, sparse or the folder itself, binary files
+/// preferred over text; the photographs in images/ or beside the model.
+///
+/// Cameras have the size the model states, and lens distortion is left to load_images(). Points
+/// keep the views that observed them; what is wrong with single points is dropped and counted in
+/// the warnings.
+/// \throws BadInput Ref (an image of an unknown camera; no observation fits), Value (poses, naming
+///         the image), Path (image names that leave the folder), and as the readers in
+///         colmap_model.h.
+/// Source: COLMAP documentation, "Output format"; poses are cam_from_world.
+Scene read_colmap(const SceneRoot& root);
+
+/// The scene of a model in memory whose photographs lie in the folder itself.
+/// \throws BadInput as read_colmap()
+Scene scene_of_colmap(const SceneRoot& root, const ColmapModel& model);
+
+}  // namespace cgs

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "io/bytes/scene_path.h"
+#include "io/images/exif.h"
+
+namespace cgs {
+
+/// A photograph whose camera is not known.
+struct PhotoFile {
+  std::filesystem::path path;
+  ImageSize size;       ///< Upright.
+  int orientation = 1;  ///< As exif_orientation().
+  LensHint hint;
+};
+
+/// True if the folder holds image files and no file that states cameras in a layout that
+/// read_scene() knows.
+bool is_photographs(const std::filesystem::path& folder);
+
+/// What people should know of files in a folder that are not read: raw photographs and other kinds
+/// of pictures, and cameras of other programs, one line each; empty if there are none.
+std::vector<std::string> unread_files(const std::filesystem::path& folder);
+
+/// The image files directly in a folder, in the order of their names.
+/// \throws BadInput Path (names with control characters, links that leave the folder), and as
+///         image_size(); LimitError
+std::vector<PhotoFile> list_photographs(const SceneRoot& root);
+
+}  // namespace cgs

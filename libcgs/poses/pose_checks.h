@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "libcgs/poses/bundle_adjustment.h"
+#include "libcgs/poses/photo_pairs.h"
+
+namespace cgs {
+
+/// Errors of focal lengths on nine sets of photographs, RMS, beside what adjustment claims.
+inline constexpr double kFocalOptimism = 3;
+
+/// What photographs cannot tell is refused, with the reason a user can act on.
+/// \throws NumericalError if fewer than two photographs show enough, naming one that does not, or
+/// no two
+///         share enough, naming the pair that shares most.
+void refuse_unconnected(const std::vector<UnposedPhoto>& photos,
+                        const std::vector<PhotoPair>& pairs);
+
+/// \throws NumericalError if turning the camera explains every connected pair, at a known focal
+///         length or at any.
+void refuse_turned_only(const std::vector<UnposedPhoto>& photos,
+                        const std::vector<LensPrior>& priors,
+                        const std::vector<PhotoPair>& pairs);
+
+/// \throws NumericalError if a focal length that was solved for is not determined, or most matches
+///         disagree with the solution.
+/// \param focal_sigmas  per lens, as from adjust_bundle()
+void refuse_unsure(const std::vector<UnposedPhoto>& photos,
+                   const std::vector<LensPrior>& priors,
+                   const std::vector<PhotoPair>& pairs,
+                   const Reconstruction& scene,
+                   const std::vector<double>& focal_sigmas);
+
+/// The reason to give where the photographs fit more than one focal length; `detail` may be empty.
+std::string undetermined_focal(const std::vector<PhotoPair>& pairs, const std::string& detail);
+
+/// The reason to give where matches exist that no two cameras explain.
+std::string unexplained_matches(const std::vector<UnposedPhoto>& photos,
+                                const std::vector<PhotoPair>& pairs);
+
+}  // namespace cgs

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/poses/resection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+
+namespace cgs {
+
+namespace {
+
+constexpr int kFewestPoints = 12;  // to place a photograph by
+
+// Pairs to begin with, the most promising first.
+std::vector<const PhotoPair*> ranked_pairs(const Reconstruction& scene,
+                                           const std::vector<PhotoPair>& pairs) {
+  struct Ranked {
+    const PhotoPair* pair;
+    double score;
+  };
+  std::vector<Ranked> ranked;
+  for (const PhotoPair& pair : pairs) {
+    if (!pair.is_connected) continue;
+    const double focal_a = scene.lens(pair.a).focal;
+    const double focal_b = scene.lens(pair.b).focal;
+    const double moved = parallax(pair.points, focal_a, focal_b);
+    if (!(moved >= kLeastParallax)) continue;
+    constexpr double kEnough = 0.15;  // [rad]; beyond, only the number of points counts
+    ranked.push_back({&pair, double(pair.matches.size()) * std::min(moved / focal_b, kEnough)});
+  }
+  std::stable_sort(ranked.begin(), ranked.end(), [](const Ranked& x, const Ranked& y) {
+    return x.score > y.score;
+  });
+  std::vector<const PhotoPair*> out;
+  out.reserve(ranked.size());
+  for (const Ranked& r : ranked) out.push_back(r.pair);
+  return out;
+}
+
+int known_points(const Reconstruction& scene) {
+  return static_cast<int>(std::count_if(
+      scene.tracks.begin(), scene.tracks.end(), [](const Track& track) { return track.is_known; }));
+}
+
+void forget(Reconstruction& scene) {
+  for (auto& pose : scene.poses) pose.reset();
+  for (Track& track : scene.tracks) {
+    track.is_known = false;
+    for (Sighting& s : track.seen) s.is_used = true;
+  }
+}
+
+void settle(Reconstruction& scene,
+            const std::vector<LensPrior>& priors,
+            const BundleOptions& options) {
+  triangulate(scene, kMostError, kLeastAngle);
+  adjust_bundle(scene, priors, options);
+  drop_outliers(scene, kMostError, kLeastAngle);
+}
+
+// Of the poses that the pair may mean, the one from which adjusting explains most.
+bool begin_with(const PhotoPair& pair,
+                const std::vector<LensPrior>& priors,
+                const Progress& progress,
+                Reconstruction& scene) {
+  forget(scene);
+  std::optional<Reconstruction> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const PhotoPose& pose : relative_poses(
+           pair.points, scene.lens(pair.a).focal, scene.lens(pair.b).focal, 0.5 * kMostError)) {
+    Reconstruction candidate = scene;
+    candidate.poses[static_cast<size_t>(pair.a)] = PhotoPose{};
+    candidate.poses[static_cast<size_t>(pair.b)] = pose;
+    settle(candidate, priors, {.first = pair.a, .second = pair.b, .progress = progress});
+    const double error = capped_error(candidate);
+    if (known_points(candidate) < kFewestPoints || !(error < least)) continue;
+    least = error;
+    best = std::move(candidate);
+  }
+  if (!best) return false;
+  scene = std::move(*best);
+  return true;
+}
+
+// The photograph not yet placed that shows the most known points; -1 if none shows enough.
+int next_photo(const Reconstruction& scene, const std::vector<char>& has_failed) {
+  int best = -1;
+  int most = kFewestPoints - 1;
+  for (int i = 0; i < static_cast<int>(scene.poses.size()); ++i) {
+    if (scene.pose(i) || has_failed[static_cast<size_t>(i)] != 0) continue;
+    const int count = points_in(scene, i);
+    if (count <= most) continue;
+    most = count;
+    best = i;
+  }
+  return best;
+}
+
+// Places a photograph by the known points it shows. \return false if they do not fit
+bool resect(Reconstruction& scene, int photo) {
+  std::vector<cv::Point3d> points;
+  std::vector<cv::Point2d> places;
+  std::vector<Sighting*> sightings;
+  const double focal = scene.lens(photo).focal;
+  for (Track& track : scene.tracks) {
+    if (!track.is_known) continue;
+    for (Sighting& s : track.seen) {
+      if (s.photo != photo) continue;
+      points.emplace_back(track.position.x(), track.position.y(), track.position.z());
+      places.emplace_back(s.at.x() / focal, s.at.y() / focal);
+      sightings.push_back(&s);
+    }
+  }
+  cv::Mat rotation;
+  cv::Mat translation;
+  cv::Mat inliers;
+  constexpr int kTrials = 1000;  // enough where three sightings of ten are right
+  const bool is_found = cv::solvePnPRansac(points,
+                                           places,
+                                           cv::Mat::eye(3, 3, CV_64F),
+                                           cv::noArray(),
+                                           rotation,
+                                           translation,
+                                           false,
+                                           kTrials,
+                                           static_cast<float>(kMostError / focal),
+                                           0.9999,
+                                           inliers,
+                                           cv::SOLVEPNP_AP3P);
+  if (!is_found || inliers.total() < static_cast<size_t>(kFewestPoints)) return false;
+  cv::Mat matrix;
+  cv::Rodrigues(rotation, matrix);
+  Eigen::Matrix3d R;
+  Eigen::Vector3d t;
+  cv::cv2eigen(matrix, R);
+  cv::cv2eigen(translation, t);
+  if (!R.allFinite() || !t.allFinite()) return false;
+  scene.poses[static_cast<size_t>(photo)] = PhotoPose{Eigen::Quaterniond(R).normalized(), t};
+  for (Sighting* s : sightings) s->is_used = false;
+  for (size_t i = 0; i < inliers.total(); ++i) {
+    sightings[static_cast<size_t>(inliers.at<int>(static_cast<int>(i)))]->is_used = true;
+  }
+  return true;
+}
+
+}  // namespace
+
+int points_in(const Reconstruction& scene, int photo) {
+  int count = 0;
+  for (const Track& track : scene.tracks) {
+    if (!track.is_known) continue;
+    for (const Sighting& s : track.seen) count += s.photo == photo && s.is_used ? 1 : 0;
+  }
+  return count;
+}
+
+double capped_error(const Reconstruction& scene) {
+  constexpr double kCap = kMostError * kMostError;
+  double sum = 0;
+  size_t count = 0;
+  for (const Track& track : scene.tracks) {
+    for (const Sighting& s : track.seen) {
+      ++count;
+      const bool is_comparable = track.is_known && scene.pose(s.photo);
+      const double error =
+          is_comparable ? reprojection_error(scene, track.position, s) : kMostError;
+      sum += std::min(error * error, kCap);
+    }
+  }
+  return count > 0 ? sum / double(count) : kCap;
+}
+
+std::optional<FirstPair> place_photos(Reconstruction& scene,
+                                      const std::vector<LensPrior>& priors,
+                                      const std::vector<PhotoPair>& pairs,
+                                      const Progress& progress) {
+  std::optional<FirstPair> begun;
+  double least = std::numeric_limits<double>::infinity();
+  Reconstruction best = scene;
+  forget(best);
+  constexpr int kMostTries = 3;
+  int tries = 0;
+  for (const PhotoPair* pair : ranked_pairs(scene, pairs)) {
+    if (!begin_with(*pair, priors, progress, scene)) continue;
+    place_more(scene, priors, {pair->a, pair->b}, progress);
+    const double error = capped_error(scene);
+    if (error < least) {
+      least = error;
+      best = scene;
+      begun = FirstPair{pair->a, pair->b};
+    }
+    if (++tries == kMostTries) break;
+  }
+  scene = best;
+  return begun;
+}
+
+void place_more(Reconstruction& scene,
+                const std::vector<LensPrior>& priors,
+                const FirstPair& begun,
+                const Progress& progress) {
+  triangulate(scene, kMostError, kLeastAngle);
+  std::vector<char> has_failed(scene.poses.size(), 0);
+  for (int photo = 0; (photo = next_photo(scene, has_failed)) >= 0;) {
+    has_failed[static_cast<size_t>(photo)] = 1;
+    if (!resect(scene, photo)) continue;
+    settle(scene, priors, {.first = begun.first, .second = begun.second, .progress = progress});
+    if (points_in(scene, photo) < kFewestPoints) scene.poses[static_cast<size_t>(photo)].reset();
+  }
+}
+
+}  // namespace cgs

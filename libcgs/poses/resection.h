@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "libcgs/poses/bundle_adjustment.h"
+#include "libcgs/poses/photo_pairs.h"
+
+namespace cgs {
+
+/// Thresholds of a reconstruction, in working pixels and radians.
+inline constexpr double kMostError = 4;
+inline constexpr double kLeastAngle = 0.01;
+inline constexpr double kLeastParallax = 1.5;  ///< Median, of pairs to begin with.
+
+/// The photographs a reconstruction began with, as BundleOptions wants them.
+struct FirstPair {
+  int first = 0;
+  int second = 0;
+};
+
+/// Places as many photographs as it can, at the focal lengths the lenses have: a pair with many
+/// matches and much parallax first, then the photograph that shows the most known points, again
+/// and again. Of the most promising pairs to begin with, the one that explains most is kept.
+///
+/// \param scene     with tracks and lenses; poses and positions are overwritten
+/// \param progress  told again and again, never how much is done
+/// \return nothing, and no pose, if no pair could be placed
+std::optional<FirstPair> place_photos(Reconstruction& scene,
+                                      const std::vector<LensPrior>& priors,
+                                      const std::vector<PhotoPair>& pairs,
+                                      const Progress& progress = {});
+
+/// Goes on from there: triangulates what the placed photographs show and places further ones.
+void place_more(Reconstruction& scene,
+                const std::vector<LensPrior>& priors,
+                const FirstPair& begun,
+                const Progress& progress = {});
+
+/// Sum of squared errors of all sightings, none counting more than kMostError² (which those without
+/// a point or pose count), per sighting: for comparing solutions of the same tracks.
+double capped_error(const Reconstruction& scene);
+
+/// Number of known points that a photograph uses.
+int points_in(const Reconstruction& scene, int photo);
+
+}  // namespace cgs

@@ -1,0 +1,379 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/poses/solve_poses.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <optional>
+
+#include <tbb/parallel_for.h>
+
+#include "libcgs/core/error.h"
+#include "libcgs/poses/bundle_adjustment.h"
+#include "libcgs/poses/photo_pairs.h"
+#include "libcgs/poses/pose_checks.h"
+#include "libcgs/poses/resection.h"
+#include "libcgs/poses/sighting_refinement.h"
+
+namespace cgs {
+
+namespace {
+
+// Focal lengths to begin with where nothing is known, in units of the larger side: from phones'
+// widest lenses (13 mm as on film) to short telephoto lenses (115 mm).
+constexpr std::array<double, 8> kFocals = {0.36, 0.5, 0.7, 0.9, 1.15, 1.5, 2.2, 3.2};
+
+double larger_side(const UnposedPhoto& photo) {
+  return std::max(photo.width, photo.height) / photo.features.pixel;
+}
+
+std::vector<LensPrior> lens_priors(const std::vector<UnposedPhoto>& photos) {
+  std::vector<LensPrior> priors;
+  for (const UnposedPhoto& photo : photos) {
+    const auto lens = static_cast<size_t>(photo.lens);
+    if (priors.size() <= lens) priors.resize(lens + 1);
+    priors[lens] = {photo.focal / photo.features.pixel, photo.focal_sigma, larger_side(photo)};
+  }
+  return priors;
+}
+
+/// A reconstruction on the way, and how well it explains its tracks.
+struct Attempt {
+  Reconstruction scene;
+  std::optional<FirstPair> begun;
+  double error = std::numeric_limits<double>::infinity();
+};
+
+// Up to `most` of the tracks, those that most photographs show first, else evenly.
+std::vector<Track> sample(const std::vector<Track>& tracks, size_t most) {
+  std::vector<Track> sorted = tracks;
+  std::stable_sort(sorted.begin(), sorted.end(), [](const Track& a, const Track& b) {
+    return a.seen.size() > b.seen.size();
+  });
+  if (sorted.size() <= most) return sorted;
+  std::vector<Track> out;
+  // Half of them the longest, which tie photographs together; half from all the rest.
+  const size_t longest = most / 2;
+  out.assign(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(longest));
+  for (size_t i = 0; i < most - longest; ++i) {
+    out.push_back(sorted[longest + i * (sorted.size() - longest) / (most - longest)]);
+  }
+  return out;
+}
+
+// \param start  without lenses and places
+Attempt attempt_at(double focal_of_side,
+                   const Reconstruction& start,
+                   const std::vector<LensPrior>& priors,
+                   const std::vector<PhotoPair>& pairs,
+                   const Progress& progress) {
+  Attempt out;
+  out.scene = start;
+  for (const LensPrior& prior : priors) {
+    out.scene.lenses.push_back({prior.focal > 0 ? prior.focal : focal_of_side * prior.side, 0});
+  }
+  out.begun = place_photos(out.scene, priors, pairs, progress);
+  if (!out.begun) return out;
+  const BundleOptions options{.first = out.begun->first,
+                              .second = out.begun->second,
+                              .solve_focal = true,
+                              .progress = progress};
+  adjust_bundle(out.scene, priors, options);
+  drop_outliers(out.scene, kMostError, kLeastAngle);
+  out.error = capped_error(out.scene);
+  return out;
+}
+
+// Share of the sightings that a reconstruction has no point or no pose for.
+double unexplained_share(const Reconstruction& scene) {
+  size_t unexplained = 0;
+  size_t all = 0;
+  for (const Track& track : scene.tracks) {
+    for (const Sighting& s : track.seen) {
+      ++all;
+      unexplained += track.is_known && scene.pose(s.photo) ? 0 : 1;
+    }
+  }
+  return all > 0 ? double(unexplained) / double(all) : 0;
+}
+
+// Whether a photograph of that lens has a pose; its focal length means nothing otherwise.
+bool places_lens(const Reconstruction& scene, size_t lens) {
+  for (size_t i = 0; i < scene.poses.size(); ++i) {
+    if (scene.poses[i] && static_cast<size_t>(scene.lens_of[i]) == lens) return true;
+  }
+  return false;
+}
+
+// Whether the points are explained about as well at quite another focal length. What the best
+// attempt explains counts: what nothing explains would make all look alike.
+bool has_rival(const Attempt& best,
+               const std::vector<Attempt>& attempts,
+               const std::vector<LensPrior>& priors) {
+  constexpr double kAsWell = 1.2;  // times the error; right solutions win by more
+  const double kOther = std::log(1.2);
+  const double common = kMostError * kMostError * unexplained_share(best.scene);
+  const double most = common + kAsWell * (best.error - common);
+  return std::any_of(attempts.begin(), attempts.end(), [&](const Attempt& attempt) {
+    if (!attempt.begun || attempt.error > most) return false;
+    for (size_t i = 0; i < priors.size(); ++i) {
+      if (!places_lens(best.scene, i) || !places_lens(attempt.scene, i)) continue;
+      const double ratio = attempt.scene.lenses[i].focal / best.scene.lenses[i].focal;
+      if (priors[i].focal == 0 && std::abs(std::log(ratio)) > kOther) return true;
+    }
+    return false;
+  });
+}
+
+// Placed at the focal length from which a part of the points is explained best.
+// \throws NumericalError if quite another one does nearly as well
+Attempt best_attempt(const std::vector<int>& lens_of,
+                     const std::vector<LensPrior>& priors,
+                     const std::vector<PhotoPair>& pairs,
+                     const std::vector<Track>& tracks,
+                     const Progress& progress) {
+  constexpr size_t kTracks = 600;
+  Reconstruction start;
+  start.tracks = sample(tracks, kTracks);
+  start.lens_of = lens_of;
+  start.poses.resize(lens_of.size());
+  const bool is_known = std::all_of(
+      priors.begin(), priors.end(), [](const LensPrior& prior) { return prior.focal > 0; });
+  std::vector<Attempt> attempts(is_known ? 1 : kFocals.size());
+  SharedProgress tried(progress, attempts.size());
+  tbb::parallel_for(size_t{0}, attempts.size(), [&](size_t i) {
+    attempts[i] = attempt_at(kFocals[i], start, priors, pairs, [&](double) { tried.tell(); });
+    tried.advance();
+  });
+  const Attempt& best =
+      *std::min_element(attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
+        return a.error < b.error;
+      });
+  if (best.begun && has_rival(best, attempts, priors)) {
+    throw NumericalError(undetermined_focal(pairs, "several explain them equally well"));
+  }
+  return best;
+}
+
+// Rounds of adjusting everything and looking again what agrees.
+// \return relative standard deviations of the focal lengths, per lens
+std::vector<double> polish(const std::vector<LensPrior>& priors,
+                           const BundleOptions& wanted,
+                           Reconstruction& scene) {
+  BundleOptions options = wanted;
+  options.solve_shape = false;
+  constexpr double kRoundShare = 0.2;  // of the time, of each round but the last
+  double done = 0;
+  for (const double most_error : {kMostError, 3.0, 2.5}) {
+    options.progress = part_of(wanted.progress, done, done + kRoundShare);
+    done += kRoundShare;
+    adjust_bundle(scene, priors, options);
+    drop_outliers(scene, most_error, kLeastAngle);
+    triangulate(scene, most_error, kLeastAngle);
+    options.solve_shape = wanted.solve_shape;
+  }
+  constexpr int kUntilSettled = 200;
+  options.most_iterations = kUntilSettled;
+  options.progress = part_of(wanted.progress, done, 1);
+  return adjust_bundle(scene, priors, options, true);
+}
+
+// The same with the shape of the lenses, unless that pulls a focal length away from where plain
+// lenses have it: then the photographs cannot tell one from the other, and plain lenses stay.
+std::vector<double> polish_with_shape(const std::vector<LensPrior>& priors,
+                                      const FirstPair& begun,
+                                      const Progress& progress,
+                                      Reconstruction& scene) {
+  constexpr double kMostPull = 0.1;  // of log(focal); distortion of real lenses does less
+  BundleOptions options{.first = begun.first,
+                        .second = begun.second,
+                        .solve_focal = true,
+                        .progress = part_of(progress, 0, 0.5)};
+  Reconstruction plain = scene;
+  std::vector<double> plain_sigmas = polish(priors, options, plain);
+  options.solve_shape = true;
+  options.progress = part_of(progress, 0.5, 1);
+  std::vector<double> sigmas = polish(priors, options, scene);
+  for (size_t i = 0; i < scene.lenses.size(); ++i) {
+    const double pull = std::abs(std::log(scene.lenses[i].focal / plain.lenses[i].focal));
+    if (pull <= kMostPull) {
+      if (sigmas[i] > 0) sigmas[i] = std::hypot(sigmas[i], pull);
+      continue;
+    }
+    scene = std::move(plain);
+    return plain_sigmas;
+  }
+  return sigmas;
+}
+
+// Makes the first placed photograph the origin and its distance to the farthest the unit. (To the
+// second it may be next to nothing: two pictures of a burst.)
+void move_to_first(Reconstruction& scene) {
+  std::optional<size_t> first;
+  double unit = 0;
+  for (size_t i = 0; i < scene.poses.size(); ++i) {
+    if (!scene.poses[i]) continue;
+    if (!first) first = i;
+    unit = std::max(unit, (scene.poses[i]->center() - scene.poses[*first]->center()).norm());
+  }
+  const PhotoPose origin = *scene.poses[*first];
+  for (auto& pose : scene.poses) {
+    if (!pose) continue;
+    const Eigen::Quaterniond rotation = (pose->rotation * origin.rotation.conjugate()).normalized();
+    pose = PhotoPose{rotation, (pose->translation - rotation * origin.translation) / unit};
+  }
+  scene.poses[*first] = PhotoPose{};
+  for (Track& track : scene.tracks) track.position = origin * track.position / unit;
+}
+
+SolvedPhoto solved_photo(const UnposedPhoto& photo, const Lens& lens, const PhotoPose& pose) {
+  SolvedPhoto out;
+  const double pixel = photo.features.pixel;
+  out.is_placed = true;
+  out.camera.width = photo.width;
+  out.camera.height = photo.height;
+  out.camera.fx = out.camera.fy = lens.focal * pixel;
+  out.camera.cx = 0.5 * photo.width + lens.centre.x() * pixel;
+  out.camera.cy = 0.5 * photo.height + lens.centre.y() * pixel;
+  out.camera.world_from_cam.linear() = pose.rotation.conjugate().toRotationMatrix();
+  out.camera.world_from_cam.translation() = pose.center();
+  out.k1 = lens.k1;
+  out.rotation = pose.rotation;
+  out.translation = pose.translation;
+  return out;
+}
+
+void add_points(const std::vector<UnposedPhoto>& photos,
+                const Reconstruction& scene,
+                PoseSolution& out) {
+  double sum = 0;
+  size_t count = 0;
+  for (const Track& track : scene.tracks) {
+    if (!track.is_known) continue;
+    SolvedPoint point{track.position, {}, 0};
+    for (const Sighting& s : track.seen) {
+      if (!s.is_used || !scene.pose(s.photo)) continue;
+      const UnposedPhoto& photo = photos[static_cast<size_t>(s.photo)];
+      const double pixel = photo.features.pixel;
+      const double error = reprojection_error(scene, track.position, s) * pixel;
+      const Eigen::Vector2d centre(0.5 * photo.width, 0.5 * photo.height);
+      point.track.push_back({s.photo, s.feature, centre + pixel * s.at});
+      point.error += error;
+      sum += error * error;
+      ++count;
+    }
+    point.error /= static_cast<double>(point.track.size());
+    out.points.push_back(std::move(point));
+  }
+  out.rms = count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
+}
+
+/// What is solved from: what photographs share.
+struct Matched {
+  std::vector<PhotoPair> pairs;
+  std::vector<Track> tracks;
+};
+
+PoseSolution solve(const std::vector<UnposedPhoto>& photos,
+                   const Matched& matched,
+                   const Progress& progress) {
+  const std::vector<LensPrior> priors = lens_priors(photos);
+  std::vector<int> lens_of;
+  lens_of.reserve(photos.size());
+  for (const UnposedPhoto& photo : photos) lens_of.push_back(photo.lens);
+  refuse_turned_only(photos, priors, matched.pairs);
+  constexpr double kPlaced = 0.6;  // of the time
+  Attempt attempt =
+      best_attempt(lens_of, priors, matched.pairs, matched.tracks, part_of(progress, 0, kPlaced));
+  if (!attempt.begun) throw NumericalError(unexplained_matches(photos, matched.pairs));
+  Reconstruction scene = std::move(attempt.scene);
+  scene.tracks = matched.tracks;
+  place_more(scene, priors, *attempt.begun, [&](double) { report(progress, kPlaced); });
+  refine_sightings(photos, scene, [&](double) { report(progress, kPlaced); });
+  const std::vector<double> sigmas =
+      polish_with_shape(priors, *attempt.begun, part_of(progress, kPlaced, 1), scene);
+  refuse_unsure(photos, priors, matched.pairs, scene, sigmas);
+  move_to_first(scene);
+
+  PoseSolution out;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const auto lens = static_cast<size_t>(lens_of[i]);
+    out.photos.push_back(scene.poses[i]
+                             ? solved_photo(photos[i], scene.lenses[lens], *scene.poses[i])
+                             : SolvedPhoto{});
+    out.photos.back().focal_sigma = kFocalOptimism * sigmas[lens];
+  }
+  add_points(photos, scene, out);
+  return out;
+}
+
+// The photographs without the focal lengths that a solution lies three sigma away from, if any.
+std::optional<std::vector<UnposedPhoto>> without_refuted(const std::vector<UnposedPhoto>& photos,
+                                                         const PoseSolution& solution) {
+  constexpr double kRefutingSigmas = 3;
+  std::vector<UnposedPhoto> out = photos;
+  bool any = false;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    if (!solution.photos[i].is_placed || !(photos[i].focal_sigma > 0)) continue;
+    const double off = std::abs(std::log(solution.photos[i].camera.fx / photos[i].focal));
+    if (off <= kRefutingSigmas * photos[i].focal_sigma) continue;
+    any = true;
+    for (UnposedPhoto& photo : out) {
+      if (photo.lens == photos[i].lens) photo.focal = photo.focal_sigma = 0;
+    }
+  }
+  if (!any) return std::nullopt;
+  return out;
+}
+
+// The photographs without any focal length that may be wrong, if there is one.
+std::optional<std::vector<UnposedPhoto>> without_stated(const std::vector<UnposedPhoto>& photos) {
+  std::vector<UnposedPhoto> out = photos;
+  bool any = false;
+  for (UnposedPhoto& photo : out) {
+    if (!(photo.focal_sigma > 0)) continue;
+    photo.focal = photo.focal_sigma = 0;
+    any = true;
+  }
+  if (!any) return std::nullopt;
+  return out;
+}
+
+}  // namespace
+
+PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress) {
+  require(photos.size() >= 2, "poses need at least 2 photographs", photos.size());
+  Matched matched;
+  matched.pairs = match_photos(photos, part_of(progress, 0, 0.5));
+  refuse_unconnected(photos, matched.pairs);
+  matched.tracks = chain_matches(photos, matched.pairs);
+  report(progress, 0.5);
+  PoseSolution out;
+  std::optional<std::vector<UnposedPhoto>> relaxed;
+  std::optional<NumericalError> failure;
+  try {
+    out = solve(photos, matched, part_of(progress, 0.5, 0.9));
+    relaxed = without_refuted(photos, out);
+  } catch (const NumericalError& error) {
+    failure = error;
+    relaxed = without_stated(photos);  // a lens far from what is stated may be why
+    if (!relaxed) throw;
+  }
+  if (relaxed) {
+    try {
+      out = solve(*relaxed, matched, part_of(progress, 0.9, 1));
+      for (size_t i = 0; i < photos.size(); ++i) {
+        out.photos[i].is_refuted = photos[i].focal > 0 && (*relaxed)[i].focal == 0;
+      }
+    } catch (const NumericalError&) {
+      if (failure) throw *failure;
+      // the photographs tell less than what was known of the lens: that stays
+    }
+  }
+  report(progress, 1);
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "libcgs/core/camera.h"
+#include "libcgs/core/progress.h"
+#include "libcgs/poses/unposed_photo.h"
+
+namespace cgs {
+
+/// A photograph's camera as solved.
+struct SolvedPhoto {
+  bool is_placed = false;
+  /// Undistorted = as if k1 were 0. fx = fy.
+  Camera camera;
+  double k1 = 0;           ///< Distorted = (1 + k1 r²) undistorted, in units of the focal length.
+  double focal_sigma = 0;  ///< Relative standard deviation of the focal length; 0 = it was given.
+  bool is_refuted =
+      false;  ///< The focal length known beforehand cannot be right, and was not used.
+  /// cam_from_world as solved; camera.world_from_cam is its inverse, with rounding.
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+};
+
+/// A feature that shows a solved point.
+struct SolvedSighting {
+  int photo = 0;
+  int feature = 0;
+  /// Where it was seen, more finely than the feature says where the photographs agree [pixels].
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();
+};
+
+/// A point that at least two photographs agree on.
+struct SolvedPoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  std::vector<SolvedSighting> track;  ///< By photograph.
+  double error = 0;                   ///< Mean distance from where it was seen [pixels].
+};
+
+/// World axes and origin are those of the first photograph that was placed; the unit is the
+/// distance to the farthest: there is no scale in photographs.
+struct PoseSolution {
+  std::vector<SolvedPhoto> photos;  ///< As given.
+  std::vector<SolvedPoint> points;
+  double rms = 0;  ///< Of the distances between points and where they were seen [pixels].
+};
+
+/// Cameras of photographs from nothing but what they show: matched features, relative pose of a
+/// pair that shows much depth, resection of the others, bundle adjustment. Where a focal length is
+/// unknown, the one from which the matches are explained best. A focal length that is known but for
+/// its sigma and turns out to lie three of them away, or with which no cameras are found, is taken
+/// as unknown, if one is found then.
+///
+/// focal_sigma is wider than adjustment has it, which knows nothing of what lenses do that no model
+/// states: by what errors were on photographs with known focal lengths (tests/eval/pose_accuracy).
+///
+/// The result does not depend on the number of threads, and on the order of the photographs only
+/// by rounding and by the choice of world axes.
+/// \pre lens counts from 0; equal lens means equal size, focal and focal_sigma
+/// \throws InvalidInput for fewer than two photographs; NumericalError where they cannot say: too
+///         few matches (naming the pair), no parallax (the camera was only turned), focal length
+///         not determined, matches that no cameras explain.
+PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress& progress = {});
+
+}  // namespace cgs

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/edit/simplify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "libcgs/core/error.h"
+#include "meshing/edit/edge_collapse.h"
+#include "meshing/mesh/provenance.h"
+#include "meshing/mesh/self_intersections.h"
+
+namespace cgs {
+
+namespace {
+
+// Of the largest error on edges, as a share of the error allowed.
+constexpr double kAccuracy = 1.0 / 256;
+
+// Distances from places of one mesh to another, by whether their face has evidence.
+struct Measured {
+  DistanceStatistics evidence;
+  DistanceStatistics inferred;
+  std::vector<uint32_t> too_far;  ///< Faces with a place beyond the limit, ascending.
+};
+
+Measured measure(const TriangleMesh& from,
+                 const TriangleMesh& to,
+                 const SimplifyOptions& options,
+                 const Progress& progress) {
+  constexpr size_t kLeast = 10000;
+  constexpr size_t kMost = 100000;
+  const SurfaceSamples samples =
+      sample_faces(from, std::clamp(2 * from.faces.size(), kLeast, kMost));
+  if (samples.points.empty()) return {};  // faces without area
+  const DistanceToMesh distance(to);
+  const std::vector<float> distances = distance.of(samples.points);
+  std::array<std::vector<float>, 2> by_label;
+  std::vector<float> of_face(from.faces.size(), 0);
+  for (size_t i = 0; i < distances.size(); ++i) {
+    const uint32_t f = samples.faces[i];
+    by_label[is_unmeasured(from, f) ? 1 : 0].push_back(distances[i]);
+    of_face[f] = std::max(of_face[f], distances[i]);
+  }
+  std::array<DistanceStatistics, 2> statistics_of = {statistics(by_label[0]),
+                                                     statistics(by_label[1])};
+  // Points over the area miss the farthest places, which lie on edges.
+  std::vector<float> known(from.faces.size());
+  for (size_t f = 0; f < known.size(); ++f) {
+    known[f] = float(statistics_of.at(is_unmeasured(from, f) ? 1 : 0).max);
+  }
+  const std::vector<float> on_edges =
+      distance.of_edges(from, known, kAccuracy * options.max_error, progress);
+  Measured out;
+  for (uint32_t f = 0; f < on_edges.size(); ++f) {
+    const bool inferred = is_unmeasured(from, f);
+    double& most = statistics_of.at(inferred ? 1 : 0).max;
+    most = std::max(most, double(on_edges[f]));
+    const double limit = inferred ? options.max_error_inferred : options.max_error;
+    if (double(std::max(of_face[f], on_edges[f])) > limit) out.too_far.push_back(f);
+  }
+  out.evidence = statistics_of[0];
+  out.inferred = statistics_of[1];
+  return out;
+}
+
+// The engine keeps input vertices within their tolerance, faces between them reach a little
+// farther.
+constexpr double kMargin = 0.8;
+
+std::vector<float> tolerances(const TriangleMesh& mesh, const SimplifyOptions& options) {
+  std::vector<float> out(mesh.vertices.size(), float(kMargin * options.max_error_inferred));
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (is_unmeasured(mesh, f)) continue;
+    for (const uint32_t v : mesh.faces[f]) out[v] = float(kMargin * options.max_error);
+  }
+  return out;
+}
+
+// Holds input vertices nearer to the result than in the last round.
+class Tightening {
+ public:
+  Tightening(std::vector<float>& tolerance, double least)
+      : tolerance_(tolerance), least_(least), marked_(tolerance.size(), 0) {}
+
+  void input_face(const TriangleMesh& input, uint32_t f) {
+    for (const uint32_t v : input.faces[f]) marked_[v] = 1;
+  }
+  // The input vertices near a face of the result, or near a neighbour of it if it has none.
+  void output_faces(const CollapsedMesh& output, const std::vector<uint32_t>& faces) {
+    std::vector<uint8_t> bad(output.mesh.faces.size(), 0);
+    std::vector<uint8_t> corner(output.mesh.vertices.size(), 0);
+    for (const uint32_t f : faces) {
+      for (const uint32_t v : output.mesh.faces[f]) corner[v] = 1;
+    }
+    for (size_t f = 0; f < bad.size(); ++f) {
+      const auto& face = output.mesh.faces[f];
+      bad[f] = std::any_of(face.begin(), face.end(), [&](uint32_t v) { return corner[v] != 0; });
+    }
+    for (size_t v = 0; v < marked_.size(); ++v) {
+      const uint32_t f = output.witness_of[v];
+      if (f < bad.size() && bad[f] != 0) marked_[v] = 1;
+    }
+  }
+  /// \return how many vertices changed.
+  size_t apply() {
+    size_t count = 0;
+    for (size_t v = 0; v < marked_.size(); ++v) {
+      if (marked_[v] == 0 || !(tolerance_[v] > 0)) continue;
+      tolerance_[v] *= 0.25f;
+      if (double(tolerance_[v]) < least_) tolerance_[v] = 0;
+      ++count;
+    }
+    return count;
+  }
+
+ private:
+  std::vector<float>& tolerance_;
+  double least_;
+  std::vector<uint8_t> marked_;
+};
+
+// Input vertices on faces of labels with evidence whose area has changed too much.
+bool tighten_for_area(const TriangleMesh& mesh,
+                      const SimplifyResult& result,
+                      double most_change,
+                      std::vector<float>& tolerance) {
+  std::array<bool, kProvenanceCount> changed{};
+  for (size_t label = 0; label < changed.size(); ++label) {
+    const bool counts = mesh.provenance.empty() || has_evidence(Provenance(label));
+    const double change = std::abs(result.area_after[label] - result.area_before[label]);
+    changed[label] = counts && change > most_change * result.area_before[label];
+  }
+  std::vector<uint8_t> marked(tolerance.size(), 0);
+  bool any = false;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (!changed[mesh.provenance.empty() ? 0 : size_t(mesh.provenance[f])]) continue;
+    any = true;
+    for (const uint32_t v : mesh.faces[f]) marked[v] = 1;
+  }
+  for (size_t v = 0; v < marked.size(); ++v) {
+    if (marked[v] != 0) tolerance[v] *= 0.25f;
+  }
+  return any;
+}
+
+SimplifyResult unchanged(const TriangleMesh& mesh) {
+  SimplifyResult result;
+  result.mesh = mesh;
+  result.faces_before = result.faces_after = mesh.faces.size();
+  result.area_before = result.area_after = area_by_provenance(mesh);
+  return result;
+}
+
+}  // namespace
+
+void SimplifyOptions::validate() const {
+  require(max_error > 0, "SimplifyOptions.max_error must be > 0", max_error);
+  require(max_error_inferred == 0 || max_error_inferred >= max_error,
+          "SimplifyOptions.max_error_inferred must be 0 or >= max_error",
+          max_error_inferred);
+  require(max_color_error > 0 && max_color_error <= 1,
+          "SimplifyOptions.max_color_error must be in (0, 1]",
+          max_color_error);
+  require(max_area_change > 0 && max_area_change <= 1,
+          "SimplifyOptions.max_area_change must be in (0, 1]",
+          max_area_change);
+}
+
+SimplifyResult simplify(const TriangleMesh& mesh,
+                        const SimplifyOptions& given,
+                        const Progress& progress) {
+  given.validate();
+  SimplifyOptions options = given;
+  if (options.max_error_inferred == 0) options.max_error_inferred = options.max_error;
+  for (const auto& p : mesh.vertices) {
+    require(p.allFinite(), "simplify needs finite vertices, a coordinate", p.sum());
+  }
+  SimplifyResult result = unchanged(mesh);
+  if (mesh.faces.empty()) return result;
+  CollapseLimits limits{
+      tolerances(mesh, options), float(options.max_color_error), options.target_faces, {}, 0};
+  constexpr int kRounds = 6;
+  for (int round = 1; round <= kRounds; ++round) {
+    const auto part = [&](double begin, double end) {
+      return part_of(progress, (round - 1 + begin) / kRounds, (round - 1 + end) / kRounds);
+    };
+    const CollapsedMesh out = collapse_edges(mesh, limits, part(0, 0.6));
+    result.rounds = round;
+    if (round == 1) limits.pass_costs = out.pass_costs;
+    result.area_after = area_by_provenance(out.mesh);
+    if (tighten_for_area(mesh, result, options.max_area_change, limits.tolerance)) continue;
+    Tightening tightening(limits.tolerance, options.max_error / 32);
+    std::vector<uint32_t> bad;
+    for (const auto& [f, g] : self_intersections(out.mesh)) bad.insert(bad.end(), {f, g});
+    const Measured forth = measure(out.mesh, mesh, options, part(0.7, 0.8));
+    const Measured back = measure(mesh, out.mesh, options, part(0.8, 1));
+    bad.insert(bad.end(), forth.too_far.begin(), forth.too_far.end());
+    if (!bad.empty()) tightening.output_faces(out, bad);
+    for (const uint32_t f : back.too_far) tightening.input_face(mesh, f);
+    if (bad.empty() && back.too_far.empty()) {
+      result.mesh = out.mesh;
+      result.faces_after = out.mesh.faces.size();
+      result.evidence = {forth.evidence, back.evidence};
+      result.inferred = {forth.inferred, back.inferred};
+      widen_sigma(result.mesh, result.evidence);
+      report(progress, 1);
+      return result;
+    }
+    tightening.apply();
+  }
+  const int rounds = result.rounds;
+  result = unchanged(mesh);
+  result.rounds = rounds;
+  return result;
+}
+
+}  // namespace cgs

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "meshing/surface/watertight.h"
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "libcgs/core/error.h"
+#include "meshing/mesh/provenance.h"
+#include "meshing/surface/closed_isosurface.h"
+#include "meshing/surface/solid.h"
+#include "meshing/volume/volume.h"
+
+namespace cgs {
+
+namespace {
+
+void check_memory(const Volume& volume, size_t limit) {
+  const double voxels = (volume.bounds.sizes().array() / double(volume.voxel_size) + 5).prod();
+  constexpr double kBytesPerVoxel = 6;  // inside, evidence, blurred, visited; part of the level set
+  if (voxels * kBytesPerVoxel > static_cast<double>(limit)) {
+    const auto mebibytes = [](double bytes) {
+      return std::to_string(std::lround(bytes / (1 << 20))) + " MiB";
+    };
+    throw LimitError("closing a volume of " + std::to_string(std::llround(voxels)) +
+                     " voxels may take " + mebibytes(voxels * kBytesPerVoxel) + ", allowed are " +
+                     mebibytes(static_cast<double>(limit)) +
+                     "; larger voxels need less, a larger memory limit allows it");
+  }
+}
+
+}  // namespace
+
+void WatertightOptions::validate() const {
+  require(min_part >= 0 && min_part <= 1, "WatertightOptions.min_part must be in [0, 1]", min_part);
+  require(max_gap >= 0, "WatertightOptions.max_gap must be >= 0", max_gap);
+}
+
+WatertightResult watertight_surface(Volume& volume,
+                                    const WatertightOptions& options,
+                                    const Progress& progress) {
+  options.validate();
+  check_memory(volume, options.memory_limit);
+  WatertightResult result;
+  {
+    Solid matter = solid(volume);
+    smooth(matter);
+    report(progress, 0.2);
+    (void)remove_small_parts(matter, options.min_part);
+    report(progress, 0.3);
+    volume.surface = level_set(matter, volume);
+  }
+  report(progress, 0.5);
+  ClosedIsosurface closed = closed_isosurface(*volume.surface);
+  result.mesh = std::move(closed.mesh);
+  result.certificate = closed.certificate;
+  result.method = std::move(closed.method);
+  result.voxels_smoothed = closed.voxels_smoothed;
+  report(progress, 0.9);
+  const VertexEvidence evidence = annotate_vertices(result.mesh, volume);
+  label_faces(result.mesh, evidence, options.max_gap * double(volume.voxel_size));
+  result.mesh.normals = vertex_normals(result.mesh);
+  const auto areas = area_by_provenance(result.mesh);
+  result.certificate.observed_area = areas[size_t(Provenance::Observed)];
+  result.certificate.single_view_area = areas[size_t(Provenance::SingleView)];
+  result.certificate.interpolated_area = areas[size_t(Provenance::Interpolated)];
+  result.certificate.estimated_area = areas[size_t(Provenance::Estimated)];
+  result.certificate.inferred_area = areas[size_t(Provenance::Inferred)];
+  result.certificate.virtual_area = areas[size_t(Provenance::Virtual)];
+  report(progress, 1.0);
+  return result;
+}
+
+}  // namespace cgs

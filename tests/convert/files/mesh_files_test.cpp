@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/files/mesh_files.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "libcgs/core/error.h"
+#include "tests/support/temp_dir.h"
+
+namespace cgs::mesh_files_test {
+namespace {
+
+// The corner of a cube of edge 1: volume 1/6, one slanted face that nobody saw.
+TriangleMesh corner() {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mesh.faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  mesh.provenance = {
+      Provenance::Observed, Provenance::Observed, Provenance::SingleView, Provenance::Inferred};
+  mesh.normals = vertex_normals(mesh);
+  mesh.colors.assign(4, Eigen::Vector3f(0.5f, 0.5f, 0.5f));
+  mesh.support.assign(4, 2);
+  mesh.sigma.assign(4, 0.01f);
+  return mesh;
+}
+
+Frame frame_of_scale_2() {
+  Frame frame;
+  frame.scale = 2;
+  return frame;
+}
+
+TEST(LostInFile, IsWhatTheFormatHasNoPlaceFor) {
+  EXPECT_EQ(lost_in_file("a.ply", corner(), {}), "");
+  EXPECT_EQ(lost_in_file("a.GLB", corner(), {}), "");
+  EXPECT_EQ(lost_in_file("a.obj", corner(), {}),
+            ".obj files hold no sigma, support; .ply and .glb do");
+  EXPECT_EQ(lost_in_file("a.STL", corner(), {}),
+            ".stl files hold no labels, colours, sigma, support; .ply and .glb do");
+  TriangleMesh bare = corner();
+  bare.sigma.clear();
+  bare.support.clear();
+  EXPECT_EQ(lost_in_file("a.3mf", bare, {}), ".3mf files hold no colours; .ply and .glb do")
+      << "but those of labels";
+  bare.colors.clear();
+  EXPECT_EQ(lost_in_file("a.3mf", bare, {}), "");
+}
+
+TEST(CertificateToJson, GivesMeasuresInFileUnits) {
+  const auto json = certificate_to_json(certify(corner()), corner(), frame_of_scale_2());
+  EXPECT_TRUE(json["passed"].get<bool>());
+  EXPECT_NEAR(json["volume"].get<double>(), 8.0 / 6, 1e-6);
+  EXPECT_NEAR(json["area_observed"].get<double>(), 4.0, 1e-6);
+  EXPECT_NEAR(json["area_single_view"].get<double>(), 2.0, 1e-6);
+  EXPECT_NEAR(json["area_inferred"].get<double>(), 2 * std::sqrt(3.0), 1e-6);
+  EXPECT_EQ(json["units"], "unknown");
+}
+
+TEST(CertificateToJson, SaysNothingOfLabelsThatAMeshDoesNotState) {
+  TriangleMesh mesh = corner();
+  mesh.provenance.clear();
+  const auto json = certificate_to_json(certify(mesh), mesh, frame_of_scale_2());
+  for (const char* area : {"area_observed", "area_single_view", "area_inferred"}) {
+    EXPECT_TRUE(json.at(area).is_null()) << area;
+  }
+}
+
+TEST(WriteMeshFiles, LeavesCadFilesOutWithoutAScaleAndSaysHowToGetThem) {
+  const test::TempDir dir;
+  const auto json = write_mesh_files(dir / "mesh", corner(), corner(), frame_of_scale_2());
+  EXPECT_TRUE(std::filesystem::exists(dir / "mesh/watertight.ply"));
+  EXPECT_FALSE(std::filesystem::exists(dir / "mesh/watertight.stl"));
+  for (const auto* name : {"watertight.stl", "watertight.3mf"}) {
+    const auto reason = json["left_out"][name].get<std::string>();
+    EXPECT_NE(reason.find("--assume-unit"), std::string::npos) << name;
+  }
+}
+
+TEST(WriteMeshFiles, WritesCadFilesOfAKnownScale) {
+  const test::TempDir dir;
+  Frame frame = frame_of_scale_2();
+  frame.metres_per_unit = 1;
+  frame.up = Eigen::Vector3d::UnitZ();
+  const auto json = write_mesh_files(dir / "mesh", corner(), corner(), frame);
+  EXPECT_TRUE(json["left_out"].empty());
+  for (const auto& name : json["files"]) {
+    EXPECT_TRUE(std::filesystem::exists(dir / "mesh" / name.get<std::string>())) << name;
+  }
+}
+
+TEST(WriteMeshFiles, RemovesCadFilesOfAnotherScaleThatItWroteAndNoOthers) {
+  const test::TempDir dir;
+  Frame frame = frame_of_scale_2();
+  frame.metres_per_unit = 1;
+  frame.up = Eigen::Vector3d::UnitZ();
+  write_mesh_files(dir / "own", corner(), corner(), frame);
+  write_mesh_files(dir / "own", corner(), corner(), frame_of_scale_2());
+  for (const auto* name : {"watertight.stl", "watertight.3mf"}) {
+    EXPECT_FALSE(std::filesystem::exists(dir / "own" / name)) << name;
+    test::write_bytes(dir / "others" / name, "made by hand");
+  }
+  write_mesh_files(dir / "others", corner(), corner(), frame_of_scale_2());
+  for (const auto* name : {"watertight.stl", "watertight.3mf"}) {
+    EXPECT_EQ(test::read_bytes(dir / "others" / name), "made by hand") << name;
+  }
+}
+
+TEST(WriteMeshFiles, RefusesAMeshWithoutSurfaceAndWritesNothing) {
+  const test::TempDir dir;
+  EXPECT_THROW(write_mesh_files(dir / "mesh", {}, {}, {}), NumericalError);
+  EXPECT_FALSE(std::filesystem::exists(dir / "mesh"));
+}
+
+}  // namespace
+}  // namespace cgs::mesh_files_test

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/bytes/byte_reader.h"
+
+#include <functional>
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include "tests/support/temp_dir.h"
+
+namespace cgs::byte_reader_test {
+namespace {
+
+using namespace std::string_view_literals;
+
+Defect defect_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const BadInput& error) {
+    return error.defect();
+  }
+  ADD_FAILURE() << "nothing was refused";
+  return Defect::Open;
+}
+
+TEST(ReadFile, RefusesWhatIsNotARegularFile) {
+  const test::TempDir dir;
+  mkfifo((dir / "fifo").c_str(), 0600);
+  EXPECT_EQ(defect_of([&] { read_file(dir / "fifo"); }), Defect::Open);
+  EXPECT_EQ(defect_of([&] { read_file(dir.path()); }), Defect::Open);
+  EXPECT_EQ(defect_of([&] { read_file("/dev/zero"); }), Defect::Open);
+  EXPECT_EQ(defect_of([&] { read_file(dir / "missing"); }), Defect::Open);
+}
+
+TEST(ReadFile, RefusesAnEmptyFileAndOneAboveTheLimit) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "empty", "");
+  test::write_bytes(dir / "big", std::string(100, 'x'));
+  EXPECT_EQ(defect_of([&] { read_file(dir / "empty"); }), Defect::Empty);
+  EXPECT_THROW(read_file(dir / "big", {.max_file_bytes = 99}), LimitError);
+  EXPECT_EQ(read_file(dir / "big").size(), 100u);
+}
+
+TEST(ReadFileStart, ReadsNoMoreThanAsked) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "ten", "0123456789");
+  EXPECT_EQ(read_file_start(dir / "ten", 4), "0123");
+  EXPECT_EQ(read_file_start(dir / "ten", 400), "0123456789");
+  EXPECT_EQ(defect_of([&] { read_file_start(dir.path(), 4); }), Defect::Open);
+}
+
+TEST(RefuseForeignContent, NamesWhatItFound) {
+  EXPECT_THROW(refuse_foreign_content("a.ply", "version https://git-lfs.github.com", "PLY"),
+               BadInput);
+  EXPECT_THROW(refuse_foreign_content("a.ply", "<html>", "PLY"), BadInput);
+  EXPECT_THROW(refuse_foreign_content("a.ply", "PK\x03\x04", "PLY"), BadInput);
+  EXPECT_NO_THROW(refuse_foreign_content("a.ply", "ply\n", "PLY"));
+}
+
+TEST(ByteReader, ReadsLittleEndianNumbers) {
+  ByteReader reader("\x01\x02\x00\x00\xff"sv, "f");
+  EXPECT_EQ(reader.get<uint32_t>("number"), 0x201u);
+  EXPECT_EQ(reader.get<int8_t>("number"), -1);
+  EXPECT_EQ(defect_of([&] { reader.get<uint8_t>("number"); }), Defect::Truncated);
+}
+
+TEST(ByteReader, RefusesCountsThatTheFileCannotHold) {
+  const ByteReader reader("0123456789"sv, "f");
+  EXPECT_NO_THROW(reader.expect_records(5, 2, "records"));
+  EXPECT_EQ(defect_of([&] { reader.expect_records(6, 2, "records"); }), Defect::Count);
+  EXPECT_EQ(defect_of([&] { reader.expect_records(uint64_t{1} << 61, 248, "records"); }),
+            Defect::Count);
+}
+
+TEST(ByteReader, TakesStringsUpToTheirEnd) {
+  ByteReader reader("name\0rest"sv, "f");
+  EXPECT_EQ(reader.take_c_string(10, "name"), "name");
+  EXPECT_EQ(defect_of([&] { reader.take_c_string(10, "name"); }), Defect::Truncated);
+}
+
+TEST(ParseNumber, WantsTheWholeToken) {
+  double value = 0;
+  EXPECT_TRUE(parse_number("1.5e3", value));
+  EXPECT_EQ(value, 1500);
+  EXPECT_TRUE(parse_number("+.5", value));
+  EXPECT_EQ(value, 0.5);
+  for (const auto* bad : {"", "1,5", "1.5x", "1e999", " 1", "+", "++1", "+-1", "+inf"}) {
+    EXPECT_FALSE(parse_number(bad, value)) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace cgs::byte_reader_test

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/meshes/mesh_ply.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/full_disk.h"
+#include "tests/support/sample_mesh.h"
+
+namespace cgs::mesh_ply_test {
+namespace {
+
+/// Origin of the file and of the frame agree: coordinates are the internal ones times 2^k, exact.
+Frame exact_frame() {
+  Frame frame = test::centimetre_frame();
+  frame.file_origin = frame.origin;
+  return frame;
+}
+
+const std::string kTriangle =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\n"
+    "property double z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n";
+
+std::string defect(const std::string& text) {
+  return test::defect_of(text, [](const auto& path) { (void)read_mesh_ply(path); });
+}
+
+TEST(MeshPly, ComesBackBitForBit) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::labelled_sphere();
+  write_mesh_ply(dir / "a.ply", mesh, exact_frame());
+  const MeshFile back = read_mesh_ply(dir / "a.ply", exact_frame());
+  EXPECT_TRUE(back.warnings.empty());
+  EXPECT_EQ(back.mesh.vertices, mesh.vertices);
+  EXPECT_EQ(back.mesh.faces, mesh.faces);
+  EXPECT_EQ(back.mesh.normals, mesh.normals);
+  EXPECT_EQ(back.mesh.support, mesh.support);
+  EXPECT_EQ(back.mesh.provenance, mesh.provenance);
+  ASSERT_EQ(back.mesh.colors.size(), mesh.colors.size());
+  ASSERT_EQ(back.mesh.sigma.size(), mesh.sigma.size());
+  for (size_t i = 0; i < mesh.colors.size(); ++i) {
+    EXPECT_LT((back.mesh.colors[i] - mesh.colors[i]).norm(), 1e-6);
+    EXPECT_TRUE(back.mesh.sigma[i] == mesh.sigma[i] ||
+                (std::isnan(back.mesh.sigma[i]) && std::isnan(mesh.sigma[i])));
+  }
+  write_mesh_ply(dir / "b.ply", back.mesh, back.frame);
+  EXPECT_EQ(test::read_bytes(dir / "a.ply"), test::read_bytes(dir / "b.ply"));
+}
+
+TEST(MeshPly, WithoutAFrameTheWorldStaysWhereItWas) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::labelled_sphere();
+  const Frame frame = test::centimetre_frame();
+  write_mesh_ply(dir / "a.ply", mesh, frame);
+  const MeshFile back = read_mesh_ply(dir / "a.ply");
+  EXPECT_EQ(back.frame.unit_name(), "cm");
+  ASSERT_EQ(back.mesh.vertices.size(), mesh.vertices.size());
+  for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const Eigen::Vector3d before = frame.world_from_internal(mesh.vertices[i].cast<double>());
+    const Eigen::Vector3d after =
+        back.frame.world_from_internal(back.mesh.vertices[i].cast<double>());
+    EXPECT_LT((before - after).norm(), 64 * 1e-6);
+    if (!std::isnan(mesh.sigma[i])) {
+      EXPECT_FLOAT_EQ(static_cast<float>(back.mesh.sigma[i] * back.frame.scale),
+                      static_cast<float>(mesh.sigma[i] * frame.scale));
+    }
+  }
+}
+
+TEST(MeshPly, FileHoldsWhatOtherProgramsLookFor) {
+  const test::TempDir dir;
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {0.5f, 0, 0}, {0, 0.5f, 0}};
+  mesh.faces = {{0, 1, 2}};
+  mesh.sigma = {0.25f, std::nanf(""), 0};
+  mesh.provenance = {Provenance::Interpolated};
+  write_mesh_ply(dir / "a.ply", mesh, exact_frame());
+  const std::string bytes = test::read_bytes(dir / "a.ply");
+  const size_t data = bytes.find("end_header\n") + 11;
+  EXPECT_NE(bytes.find("property float scalar_sigma\n"), std::string::npos);
+  EXPECT_NE(bytes.find("comment unit cm\n"), std::string::npos);
+  ASSERT_EQ(bytes.size() - data, 3 * 16 + 1 + 12 + 1 + 4u);
+  const auto number = [&](size_t offset) {
+    float value = 0;
+    std::memcpy(&value, bytes.data() + data + offset, 4);
+    return value;
+  };
+  EXPECT_EQ(number(16), 32.0f);  // 0.5 internal units of 64
+  EXPECT_EQ(number(12), 16.0f);
+  EXPECT_EQ(number(28), -1.0f);
+  EXPECT_EQ(bytes[data + 48], 3);
+  EXPECT_EQ(bytes[data + 61], 3);
+  EXPECT_EQ(number(62), 3.0f);
+}
+
+TEST(MeshPly, KeepsDoubleCoordinatesFarFromTheOrigin) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply",
+                    kTriangle +
+                        "450000.123456789 5400000.5 100\n450001 5400000 100\n450000 5400001 100\n"
+                        "450000 5400000 101.5\n4 0 1 2 3\n");
+  const MeshFile out = read_mesh_ply(dir / "a.ply");
+  ASSERT_EQ(out.mesh.faces.size(), 2u);  // a fan
+  EXPECT_EQ(out.mesh.faces[1], (std::array<uint32_t, 3>{0, 2, 3}));
+  const Eigen::Vector3d p = out.frame.world_from_internal(out.mesh.vertices[0].cast<double>());
+  EXPECT_LT((p - Eigen::Vector3d(450000.123456789, 5400000.5, 100)).norm(), 2e-7);
+}
+
+TEST(MeshPly, ReadsPointCloudsAndFloatColours) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+                    "property float z\nproperty float red\nproperty float green\n"
+                    "property float blue\nend_header\n0 0 0 0.5 1 2\n1 1 1 -1 nan 0\n");
+  const MeshFile out = read_mesh_ply(dir / "a.ply");
+  EXPECT_TRUE(out.mesh.faces.empty());
+  ASSERT_EQ(out.mesh.colors.size(), 2u);
+  EXPECT_EQ(out.mesh.colors[0], Eigen::Vector3f(0.5f, 1, 1));
+  EXPECT_EQ(out.mesh.colors[1], Eigen::Vector3f(0, 0, 0));
+}
+
+// MeshLab and others keep any number of a vertex under that name.
+TEST(MeshPly, QualityIsSupportOnlyInFilesOfOurs) {
+  const test::TempDir dir;
+  const auto support_of = [&](const std::string& comment, const std::string& more) {
+    test::write_bytes(dir / "a.ply",
+                      "ply\nformat ascii 1.0\n" + comment +
+                          "element vertex 1\nproperty float x\nproperty float y\n"
+                          "property float z\nproperty float quality\n" +
+                          more + "end_header\n0 0 0 2 1\n");
+    return read_mesh_ply(dir / "a.ply").mesh.support;
+  };
+  const std::string other = "property float scalar_other\n";
+  EXPECT_TRUE(support_of("comment VCGLIB generated\n", other).empty());
+  EXPECT_EQ(support_of("comment generator cgs\n", other), std::vector<float>{2});
+  EXPECT_EQ(support_of("comment VCGLIB generated\n", "property float scalar_sigma\n"),
+            std::vector<float>{2})
+      << "edited in MeshLab";
+}
+
+// CloudCompare keeps scalars of vertices, but none of faces.
+TEST(MeshPly, SaysThatLabelsOfOursAreLost) {
+  const test::TempDir dir;
+  const auto warnings_of = [&](const std::string& comment, const std::string& more) {
+    test::write_bytes(dir / "a.ply",
+                      "ply\nformat ascii 1.0\n" + comment +
+                          "element vertex 3\nproperty float x\nproperty float y\n"
+                          "property float z\nproperty float scalar_sigma\nelement face 1\n"
+                          "property list uchar int vertex_indices\n" +
+                          more + "end_header\n0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2 2\n");
+    return read_mesh_ply(dir / "a.ply").warnings;
+  };
+  const std::string ours = "comment generator cgs\n";
+  const std::string labelled =
+      "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual "
+      "5 estimated\n";
+  const std::string labels = "property uchar scalar_provenance\n";
+  const std::string other = "property uchar other\n";
+  const std::string earlier =
+      "comment provenance 0 inferred 1 single view 2 observed 3 interpolated 4 virtual\n";
+  for (const std::string& comment : {ours + labelled, labelled, earlier, std::string()}) {
+    EXPECT_TRUE(warnings_of(comment, labels).empty());
+    ASSERT_EQ(warnings_of(comment, other).size(), 1U);
+  }
+  EXPECT_TRUE(
+      warnings_of(labelled, other)[0].starts_with("where its faces come from is no longer known"));
+  EXPECT_TRUE(warnings_of("", other)[0].starts_with("it states sigma, but not where"));
+  EXPECT_TRUE(warnings_of(ours, other).empty()) << "it never had any";
+}
+
+TEST(MeshPly, NamesTheNumbersOfAllLabels) {
+  const test::TempDir dir;
+  write_mesh_ply(dir / "a.ply", test::labelled_sphere(3, 3), exact_frame());
+  const std::string bytes = test::read_bytes(dir / "a.ply");
+  EXPECT_NE(bytes.find("\ncomment provenance 0 inferred 1 single view 2 observed 3 interpolated "
+                       "4 virtual 5 estimated\n"),
+            std::string::npos);
+}
+
+TEST(MeshPly, SaysThatItLeavesOutTextures) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply",
+                    "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\n"
+                    "property float x\nproperty float y\nproperty float z\nelement face 1\n"
+                    "property list uchar int vertex_indices\n"
+                    "property list uchar float texcoord\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+                    "3 0 1 2 6 0 0 1 0 0 1\n");
+  const MeshFile out = read_mesh_ply(dir / "a.ply");
+  ASSERT_EQ(out.warnings.size(), 1U);
+  EXPECT_TRUE(out.warnings[0].starts_with("textures and colours of faces are not read"));
+}
+
+TEST(MeshPly, RefusesWhatIsNoMesh) {
+  const std::string points = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+  EXPECT_EQ(defect(kTriangle + points + "3 0 1 2\n"), "OK");
+  EXPECT_EQ(defect(kTriangle + points + "3 0 1 4\n"), "REF");
+  EXPECT_EQ(defect(kTriangle + points + "3 0 1 -1\n"), "REF");
+  EXPECT_EQ(defect(kTriangle + "0 0 0\n1 0 nan\n0 1 0\n0 0 1\n3 0 1 2\n"), "VALUE");
+  const std::string start = "ply\nformat ascii 1.0\n";
+  EXPECT_EQ(defect(start + "element vertex 0\nproperty float x\nproperty float y\n"
+                           "property float z\nend_header\n"),
+            "EMPTY");
+  EXPECT_EQ(
+      defect(start + "element vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n"),
+      "SCHEMA");
+  EXPECT_EQ(defect(start + "element face 1\nproperty float x\nend_header\n1\n"), "SCHEMA");
+  EXPECT_EQ(defect(start + "element vertex 1\nproperty float x\nproperty float y\n"
+                           "property float z\nelement face 1\nproperty list uchar int other\n"
+                           "end_header\n1 2 3\n0\n"),
+            "SCHEMA");
+  EXPECT_EQ(defect(start + "element vertex 1\nproperty float x\nproperty float y\n"
+                           "property float z\nelement face 1\n"
+                           "property list uchar int vertex_indices\n"
+                           "property uchar scalar_provenance\nend_header\n1 2 3\n3 0 0 0 9\n"),
+            "VALUE");
+}
+
+TEST(MeshPly, WarnsOfTrailingBytesAndFacesThatAreNone) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply", kTriangle + "0 0 0\n1 0 0\n0 1 0\n0 0 1\n2 0 1\nleft over\n");
+  const MeshFile out = read_mesh_ply(dir / "a.ply");
+  ASSERT_EQ(out.warnings.size(), 2u);
+  EXPECT_EQ(out.warnings[0], "trailing 10 bytes ignored");
+}
+
+TEST(MeshPly, RefusesEveryTruncation) {
+  const test::TempDir dir;
+  write_mesh_ply(dir / "a.ply", test::labelled_sphere(3, 3), exact_frame());
+  test::expect_every_truncation_is_refused(test::read_bytes(dir / "a.ply"),
+                                           [](const auto& path) { (void)read_mesh_ply(path); });
+}
+
+TEST(MeshPly, NoticesAFullDisk) {
+  test::expect_full_disk_is_noticed(
+      [](const auto& path) { write_mesh_ply(path, test::labelled_sphere(), exact_frame()); });
+}
+
+TEST(MeshPly, RefusesArraysThatDoNotFit) {
+  const test::TempDir dir;
+  const auto refused = [&](const auto& damage) {
+    TriangleMesh mesh = test::labelled_sphere();
+    damage(mesh);
+    EXPECT_THROW(write_mesh_ply(dir / "a.ply", mesh, exact_frame()), InvalidInput);
+  };
+  refused([](TriangleMesh& m) { m.normals.pop_back(); });
+  refused([](TriangleMesh& m) { m.colors.pop_back(); });
+  refused([](TriangleMesh& m) { m.support.pop_back(); });
+  refused([](TriangleMesh& m) { m.sigma.pop_back(); });
+  refused([](TriangleMesh& m) { m.provenance.pop_back(); });
+  refused([](TriangleMesh& m) { m.provenance[0] = static_cast<Provenance>(kProvenanceCount); });
+  refused([](TriangleMesh& m) { m.vertices[3].x() = std::nanf(""); });
+  refused([](TriangleMesh& m) { m.faces[3][1] = static_cast<uint32_t>(m.vertices.size()); });
+  EXPECT_EQ(test::entries(dir.path()), 0);
+}
+
+TEST(MeshPly, ReadsColoursAsNumbersUpTo255) {
+  const test::TempDir dir;
+  for (const std::string type : {"float", "int", "double", "uint"}) {
+    test::write_bytes(dir / "a.ply",
+                      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                      "property float y\nproperty float z\nproperty " +
+                          type + " red\nproperty " + type + " green\nproperty " + type +
+                          " blue\nend_header\n0 0 0 51 255 0\n");
+    const Eigen::Vector3f color = read_mesh_ply(dir / "a.ply").mesh.colors.at(0);
+    EXPECT_LT((color - Eigen::Vector3f(0.2f, 1, 0)).norm(), 1e-6f) << type;
+  }
+}
+
+TEST(MeshPly, NamesWhatItDoesNotRead) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                    "property float y\nproperty float z\nproperty float scalar_Intensity\n"
+                    "property float quality\nelement tristrips 1\nproperty list int int "
+                    "vertex_indices\nend_header\n"
+                    "0 0 0 7 1\n3 0 0 0\n");
+  const MeshFile out = read_mesh_ply(dir / "a.ply");
+  ASSERT_EQ(out.warnings.size(), 1U);
+  EXPECT_EQ(out.warnings[0],
+            "not read: scalar_Intensity, quality, triangle strips, which hold its faces");
+}
+
+}  // namespace
+}  // namespace cgs::mesh_ply_test

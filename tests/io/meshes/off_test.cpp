@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "io/meshes/off.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/full_disk.h"
+
+namespace cgs::off_test {
+namespace {
+
+std::string defect(const std::string& text) {
+  return test::defect_of(text, [](const auto& path) { (void)read_off(path); });
+}
+
+const std::string kPoints = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+
+TEST(ReadOff, ReadsCountsOnEitherLineCommentsAndColours) {
+  const test::TempDir dir;
+  for (const std::string head :
+       {"OFF\n4 2 0\n", "COFF 4 2 # both\n\n", "# first\nNOFF\n# x\n4 2 9\n"}) {
+    test::write_bytes(dir / "a.off", head + kPoints + "4 0 1 2 3 255 0 0\n3 0 1 3 # last\n");
+    const ParsedMesh mesh = read_off(dir / "a.off");
+    EXPECT_EQ(mesh.positions.size(), 4U);
+    const std::vector<std::array<uint32_t, 3>> faces = {{0, 1, 2}, {0, 2, 3}, {0, 1, 3}};
+    EXPECT_EQ(mesh.mesh.faces, faces);
+  }
+}
+
+TEST(ReadOff, ReadsColoursOfVertices) {
+  const test::TempDir dir;
+  const std::string faces = "3 0 1 2\n";
+  test::write_bytes(dir / "a.off",
+                    "COFF 3 1 0\n0 0 0 255 0 51 255\n1 0 0 0 0 0 255\n1 1 0 0 0 0 255\n" + faces);
+  const ParsedMesh bytes = read_off(dir / "a.off");
+  ASSERT_EQ(bytes.mesh.colors.size(), 3U);
+  EXPECT_LT((bytes.mesh.colors[0] - Eigen::Vector3f(1, 0, 0.2f)).norm(), 1e-6f);
+  EXPECT_EQ(bytes.warnings.size(), 1U);
+  test::write_bytes(
+      dir / "a.off",
+      "CNOFF 3 1 0\n0 0 0 9 9 9 1 0 .2 1\n1 0 0 9 9 9 0 0 0 1\n1 1 0 9 9 9 0 0 0 1\n" + faces);
+  const ParsedMesh floats = read_off(dir / "a.off");
+  ASSERT_EQ(floats.mesh.colors.size(), 3U);
+  EXPECT_LT((floats.mesh.colors[0] - bytes.mesh.colors[0]).norm(), 1e-6f);
+  EXPECT_TRUE(floats.warnings.empty());
+}
+
+TEST(ReadOff, TellsThatColoursOfFacesAreNotRead) {
+  const test::TempDir dir;
+  const std::string points = "OFF\n3 1 0\n0 0 0\n1 0 0\n1 1 0\n";
+  test::write_bytes(dir / "a.off", points + "3 0 1 2 255 0 0\n");
+  const ParsedMesh mesh = read_off(dir / "a.off");
+  EXPECT_EQ(mesh.warnings, std::vector<std::string>{"colours of faces are not read"});
+  EXPECT_EQ(mesh.mesh.faces.size(), 1U);
+  test::write_bytes(dir / "a.off", points + "3 0 1 2 # a comment\n");
+  EXPECT_TRUE(read_off(dir / "a.off").warnings.empty());
+}
+
+double area_of(const ParsedMesh& mesh) {
+  double sum = 0;
+  for (const auto& f : mesh.mesh.faces) {
+    const Eigen::Vector3d u = mesh.positions[f[1]] - mesh.positions[f[0]];
+    sum += u.cross(mesh.positions[f[2]] - mesh.positions[f[0]]).norm() / 2;
+  }
+  return sum;
+}
+
+// A U whose outline begins at any of its corners, either way round.
+TEST(ReadOff, CutsConcavePolygonsWithinTheirOutline) {
+  const test::TempDir dir;
+  const std::string points = "0 0 1\n3 0 1\n3 3 1\n2 3 1\n2 1 1\n1 1 1\n1 3 1\n0 3 1\n";
+  for (const bool turned : {false, true}) {
+    for (int first = 0; first < 8; ++first) {
+      std::string face = "8";
+      for (int k = 0; k < 8; ++k) {
+        face += ' ' + std::to_string(turned ? (first + 8 - k) % 8 : (first + k) % 8);
+      }
+      test::write_bytes(dir / "u.off", "OFF\n8 1 0\n" + points + face + "\n");
+      const ParsedMesh mesh = read_off(dir / "u.off");
+      ASSERT_EQ(mesh.mesh.faces.size(), 6U);
+      EXPECT_NEAR(area_of(mesh), 7, 1e-12);
+      const auto& f = mesh.mesh.faces[0];
+      const Eigen::Vector3d normal = (mesh.positions[f[1]] - mesh.positions[f[0]])
+                                         .cross(mesh.positions[f[2]] - mesh.positions[f[0]]);
+      EXPECT_EQ(normal.z() < 0, turned);
+    }
+  }
+}
+
+TEST(ReadOff, RefusesWhatIsDamaged) {
+  EXPECT_EQ(defect("PLY\n4 2 0\n"), "MAGIC");
+  EXPECT_EQ(defect("4OFF\n4 2 0\n"), "UNSUPPORTED");
+  EXPECT_EQ(defect("OFF BINARY\n"), "UNSUPPORTED");
+  EXPECT_EQ(defect("OFF\n-1 2 0\n"), "SYNTAX");
+  EXPECT_EQ(defect("OFF\n0 0 0\n"), "EMPTY");
+  EXPECT_EQ(defect("OFF\n4000000000 2 0\n" + kPoints), "COUNT");
+  EXPECT_EQ(defect("OFF\n4 3 0\n" + kPoints + "3 0 1 2\n"), "TRUNCATED");
+  EXPECT_EQ(defect("OFF\n4 1 0\n" + kPoints + "3 0 1 4\n"), "REF");
+  EXPECT_EQ(defect("OFF\n4 1 0\n" + kPoints + "9 0 1 2\n"), "COUNT");
+  EXPECT_EQ(defect("OFF\n4 1 0\n1 inf 0\n" + kPoints + "3 0 1 2\n"), "VALUE");
+}
+
+}  // namespace
+}  // namespace cgs::off_test

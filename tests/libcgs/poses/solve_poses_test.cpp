@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/poses/solve_poses.h"
+
+#include <algorithm>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "libcgs/core/error.h"
+#include "tests/support/unposed_photos.h"
+
+namespace cgs::solve_poses_test {
+namespace {
+
+using test::PointScene;
+using test::pose_errors;
+using test::unposed_photos;
+
+constexpr double kFocal = 900;
+
+Camera camera_at(double x, double y, double z) {
+  return test::looking_at({x, y, z}, {0.1 * x, 0.05, 0}, 1200, 900, kFocal);
+}
+
+// Three cameras before a box full of points.
+PointScene three_views() {
+  PointScene scene;
+  scene.cameras = {camera_at(-1.5, 0.2, -6), camera_at(0.1, -0.4, -6.5), camera_at(1.6, 0.3, -5.8)};
+  scene.points = test::scattered_points(500, {2.5, 1.8, 1.5});
+  return scene;
+}
+
+std::vector<UnposedPhoto> with_focal(std::vector<UnposedPhoto> photos, double focal, double sigma) {
+  for (UnposedPhoto& photo : photos) {
+    photo.focal = focal;
+    photo.focal_sigma = sigma;
+  }
+  return photos;
+}
+
+std::vector<Camera> cameras_of(const PoseSolution& solution) {
+  std::vector<Camera> out;
+  for (const SolvedPhoto& photo : solution.photos) {
+    EXPECT_TRUE(photo.is_placed);
+    out.push_back(photo.camera);
+  }
+  return out;
+}
+
+std::string refusal(const std::vector<UnposedPhoto>& photos) {
+  try {
+    solve_poses(photos);
+  } catch (const NumericalError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(SolvePoses, FindsCamerasOfKnownFocalLength) {
+  const PointScene scene = three_views();
+  const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kFocal, 0));
+  const auto errors = pose_errors(cameras_of(solution), scene.cameras);
+  EXPECT_LT(errors.rotation, 0.05);
+  EXPECT_LT(errors.direction, 0.2);
+  EXPECT_EQ(errors.focal, 0);
+  EXPECT_EQ(solution.photos[0].focal_sigma, 0);
+  EXPECT_GT(solution.points.size(), 400u);
+}
+
+// Placing and polishing take seconds on real photographs: they must not go on unheard.
+TEST(SolvePoses, TellsOfEveryIterationAndCanBeCancelledAtEach) {
+  const std::vector<UnposedPhoto> photos = unposed_photos(three_views());
+  std::vector<double> told;
+  solve_poses(photos, [&](double fraction) { told.push_back(fraction); });
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_EQ(told.back(), 1);
+  ASSERT_GT(told.size(), 100u);
+  // The attempts run at the same time and tell more or less often.
+  for (const size_t last : {size_t{1}, told.size() / 4, told.size() / 2}) {
+    size_t count = 0;
+    EXPECT_THROW(solve_poses(photos,
+                             [&](double) {
+                               if (++count >= last) throw Cancelled();
+                             }),
+                 Cancelled);
+  }
+}
+
+TEST(SolvePoses, FindsTheFocalLengthToo) {
+  for (const double focal : {500.0, 900.0, 2000.0}) {
+    PointScene scene = three_views();
+    for (Camera& camera : scene.cameras) {
+      camera.fx = camera.fy = focal;
+      camera.world_from_cam.translation().z() *= focal / kFocal;  // fills the picture
+    }
+    const PoseSolution solution = solve_poses(unposed_photos(scene));
+    const auto errors = pose_errors(cameras_of(solution), scene.cameras);
+    EXPECT_LT(errors.rotation, 0.1) << focal;
+    EXPECT_LT(errors.direction, 0.5) << focal;
+    EXPECT_LT(errors.focal, 0.01) << focal;
+    EXPECT_LT(errors.focal, 4 * solution.photos[0].focal_sigma) << focal;
+  }
+}
+
+TEST(SolvePoses, StandsWrongMatches) {
+  PointScene scene = three_views();
+  scene.outliers = 0.3;
+  const PoseSolution solution = solve_poses(unposed_photos(scene));
+  const auto errors = pose_errors(cameras_of(solution), scene.cameras);
+  EXPECT_LT(errors.rotation, 0.1);
+  EXPECT_LT(errors.direction, 0.5);
+  EXPECT_LT(errors.focal, 0.015);
+}
+
+TEST(SolvePoses, FindsDistortion) {
+  PointScene scene = three_views();
+  scene.k1 = 0.06;
+  const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kFocal, 0.03));
+  EXPECT_NEAR(solution.photos[0].k1, 0.06, 0.012);
+  const auto errors = pose_errors(cameras_of(solution), scene.cameras);
+  EXPECT_LT(errors.rotation, 0.1);
+  EXPECT_LT(errors.focal, 0.01);
+}
+
+TEST(SolvePoses, PointsAreWhereTheyWere) {
+  PointScene scene = three_views();
+  scene.noise = 1e-6;
+  const std::vector<UnposedPhoto> photos = with_focal(unposed_photos(scene), kFocal, 0);
+  const PoseSolution solution = solve_poses(photos);
+  const double unit = (scene.cameras[2].center() - scene.cameras[0].center()).norm();
+  double worst = 0;
+  for (const SolvedPoint& point : solution.points) {
+    const Eigen::Vector3d world =
+        scene.cameras[0].world_from_cam * Eigen::Vector3d(point.position * unit);
+    double nearest = 1e9;
+    for (const Eigen::Vector3d& truth : scene.points) {
+      nearest = std::min(nearest, (world - truth).norm());
+    }
+    worst = std::max(worst, nearest);
+  }
+  EXPECT_LT(worst, 1e-4);
+  EXPECT_LT(solution.rms, 1e-3);
+}
+
+TEST(SolvePoses, DoesNotDependOnTheOrderOfPhotographs) {
+  PointScene scene = three_views();
+  scene.cameras.push_back(camera_at(0.4, 1.5, -6.1));
+  const std::vector<UnposedPhoto> photos = unposed_photos(scene);
+  const std::vector<Camera> first = cameras_of(solve_poses(photos));
+  const std::vector<size_t> order = {2, 0, 3, 1};
+  std::vector<UnposedPhoto> other;
+  for (const size_t i : order) other.push_back(photos[i]);
+  const std::vector<Camera> solved = cameras_of(solve_poses(other));
+  std::vector<Camera> second(4);
+  for (size_t k = 0; k < 4; ++k) second[order[k]] = solved[k];
+  const auto errors = pose_errors(second, first);
+  EXPECT_LT(errors.rotation, 0.01);
+  EXPECT_LT(errors.direction, 0.03);
+  EXPECT_LT(errors.focal, 0.002);
+}
+
+TEST(SolvePoses, GivesTheSameBitsForAnyNumberOfThreads) {
+  const std::vector<UnposedPhoto> photos = unposed_photos(three_views());
+  std::vector<PoseSolution> solutions;
+  for (const size_t threads : {1, 2}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    solutions.push_back(solve_poses(photos));
+  }
+  ASSERT_EQ(solutions[0].points.size(), solutions[1].points.size());
+  for (size_t i = 0; i < solutions[0].points.size(); ++i) {
+    ASSERT_EQ(solutions[0].points[i].position, solutions[1].points[i].position);
+  }
+  for (size_t i = 0; i < photos.size(); ++i) {
+    EXPECT_EQ(solutions[0].photos[i].camera.fx, solutions[1].photos[i].camera.fx);
+    EXPECT_EQ(solutions[0].photos[i].rotation.coeffs(), solutions[1].photos[i].rotation.coeffs());
+    EXPECT_EQ(solutions[0].photos[i].translation, solutions[1].photos[i].translation);
+  }
+}
+
+TEST(SolvePoses, RefusesACameraThatWasOnlyTurned) {
+  PointScene scene = three_views();
+  for (size_t i = 1; i < 3; ++i) {
+    Camera& camera = scene.cameras[i];
+    camera.world_from_cam.translation() = scene.cameras[0].center();
+    camera.world_from_cam.linear() =
+        Eigen::AngleAxisd(0.12 * double(i), Eigen::Vector3d(0.2, 1, 0.1).normalized()) *
+        scene.cameras[0].world_from_cam.linear();
+  }
+  // Without what Exif states it is tried once more, and the first reason is told.
+  for (const auto& [focal, sigma] : {std::pair(0.0, 0.0), {kFocal, 0.0}, {kFocal, 0.03}}) {
+    const std::string reason = refusal(with_focal(unposed_photos(scene), focal, sigma));
+    EXPECT_NE(reason.find("turned"), std::string::npos) << reason;
+  }
+}
+
+TEST(SolvePoses, RefusesAPlaneWhereTheFocalLengthIsUnknownButNotWhereItIsGiven) {
+  PointScene scene = three_views();
+  for (Eigen::Vector3d& p : scene.points) p.z() = 0.2 * p.x();
+  scene.cameras.pop_back();
+  const std::string reason = refusal(unposed_photos(scene));
+  EXPECT_NE(reason.find("plane"), std::string::npos) << reason;
+  EXPECT_NE(reason.find("--focal"), std::string::npos) << reason;
+  scene.cameras = three_views().cameras;
+  const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kFocal, 0));
+  EXPECT_LT(pose_errors(cameras_of(solution), scene.cameras).rotation, 0.1);
+}
+
+TEST(SolvePoses, RefusesTooLittleOverlapNamingTheBestPair) {
+  PointScene left = three_views();
+  PointScene right = left;
+  right.points = test::scattered_points(500, {2.5, 1.8, 1.5});
+  std::reverse(right.points.begin(), right.points.end());  // other looks at the same places
+  std::vector<UnposedPhoto> photos = unposed_photos(left);
+  photos[1] = unposed_photos(right)[1];
+  photos.pop_back();
+  const std::string reason = refusal(with_focal(photos, kFocal, 0));
+  EXPECT_NE(reason.find("overlap"), std::string::npos) << reason;
+  EXPECT_NE(reason.find("photo_0 and photo_1"), std::string::npos) << reason;
+}
+
+TEST(SolvePoses, RefusesPhotographsThatShowNothing) {
+  std::vector<UnposedPhoto> photos = unposed_photos(three_views());
+  photos[1].features = {};
+  photos[2].features = {};
+  EXPECT_NE(refusal(photos).find("photo_2"), std::string::npos);
+  EXPECT_THROW(solve_poses({photos[0]}), InvalidInput);
+}
+
+TEST(SolvePoses, ADarkPhotographStopsNothing) {
+  std::vector<UnposedPhoto> photos = unposed_photos(three_views());
+  UnposedPhoto dark = photos[0];
+  dark.features = {};
+  photos.insert(photos.begin() + 1, dark);
+  const PoseSolution solution = solve_poses(photos);
+  for (size_t i = 0; i < photos.size(); ++i) EXPECT_EQ(solution.photos[i].is_placed, i != 1) << i;
+}
+
+TEST(SolvePoses, LeavesOutWhatItCannotPlace) {
+  PointScene scene = three_views();
+  std::vector<UnposedPhoto> photos = with_focal(unposed_photos(scene), kFocal, 0);
+  for (Eigen::Vector2d& p : photos[2].features.points) {
+    p = {1200 - 0.7 * p.y(), 0.5 * p.x() + std::fmod(31 * p.y(), 300)};  // shuffled
+  }
+  const PoseSolution solution = solve_poses(photos);
+  EXPECT_TRUE(solution.photos[0].is_placed);
+  EXPECT_TRUE(solution.photos[1].is_placed);
+  EXPECT_FALSE(solution.photos[2].is_placed);
+}
+
+TEST(SolvePoses, DropsAFocalLengthThatThePhotographsContradict) {
+  const PointScene scene = three_views();
+  const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), 0.5 * kFocal, 0.03));
+  const auto errors = pose_errors(cameras_of(solution), scene.cameras);
+  EXPECT_LT(errors.focal, 0.02);
+  for (const SolvedPhoto& photo : solution.photos) EXPECT_TRUE(photo.is_refuted);
+  const PoseSolution right = solve_poses(with_focal(unposed_photos(scene), 1.03 * kFocal, 0.03));
+  for (const SolvedPhoto& photo : right.photos) EXPECT_FALSE(photo.is_refuted);
+}
+
+// Its lens is another one, of which nothing is known and nothing can be told.
+TEST(SolvePoses, AStrayPhotographOfAnotherLensStopsNothing) {
+  const PointScene scene = three_views();
+  std::vector<UnposedPhoto> photos = unposed_photos(scene);
+  PointScene other = scene;
+  other.seed = 99;
+  photos.push_back(test::unposed_photo(other, 1));
+  photos.back().lens = 1;
+  std::mt19937 random(5);
+  for (Eigen::Index i = 0; i < photos.back().features.descriptors.size(); ++i) {
+    photos.back().features.descriptors.data()[i] =
+        float(std::normal_distribution<double>()(random));
+  }
+  photos.back().features.descriptors.rowwise().normalize();
+  const PoseSolution solution = solve_poses(photos);
+  for (size_t i = 0; i < 3; ++i) EXPECT_TRUE(solution.photos[i].is_placed);
+  EXPECT_FALSE(solution.photos[3].is_placed);
+}
+
+TEST(SolvePoses, TheUnitIsTheWayToTheFarthest) {
+  PointScene scene = three_views();
+  scene.cameras.insert(scene.cameras.begin() + 1, scene.cameras[0]);  // of a burst
+  scene.cameras[1].world_from_cam.translation().x() += 1e-5;
+  const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kFocal, 0));
+  double farthest = 0;
+  for (const SolvedPhoto& photo : solution.photos) {
+    ASSERT_TRUE(photo.is_placed);
+    farthest = std::max(farthest, photo.camera.center().norm());
+  }
+  EXPECT_NEAR(farthest, 1, 1e-9);
+}
+
+}  // namespace
+}  // namespace cgs::solve_poses_test
