@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <mutex>
 #include <set>
 
@@ -18,6 +17,7 @@
 #include "io/scenes/colmap_depth.h"
 #include "io/scenes/depth_file.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/nan.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/priors/given_depth.h"
 
@@ -27,7 +27,6 @@ namespace {
 
 // Scales nearer to each other than this are not told apart by frames.
 constexpr double kFinestFactor = 0.0125;
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 View& first_input(Scene& scene) { return scene.views[static_cast<size_t>(scene.input.front())]; }
 

@@ -25,11 +25,11 @@ namespace {
 
 constexpr float kDilation = ProjectionOptions{}.dilation;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr size_t kGrain = 2048;
+constexpr size_t kMergedAtOnce = 2048;
 
 template <typename Work>
 void for_each_splat(size_t count, const Work& work) {
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kGrain), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kMergedAtOnce), [&](const auto& range) {
     for (size_t i = range.begin(); i < range.end(); ++i) work(i);
   });
 }
@@ -131,24 +131,26 @@ std::vector<uint32_t> cheapest_partners(const WeighedSplats& s, const MergeOptio
   const Shapes shapes = shapes_of(s);
   const KdTree tree(s.splats.position);
   std::vector<uint32_t> out(s.splats.size(), kNobody);
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), kGrain), [&](const auto& range) {
-    std::vector<Neighbor> near;
-    for (size_t k = range.begin(); k < range.end(); ++k) {
-      const uint32_t i = tree.order()[k];
-      tree.nearest(s.splats.position[i], kNeighbors + 1, near);
-      float least = options.most_cost;
-      uint64_t first = UINT64_MAX;
-      for (const Neighbor& n : near) {
-        if (n.point == i) continue;
-        const float cost = merge_cost(s, shapes, options, i, n.point);
-        const uint64_t order = order_of_pair(i, n.point);
-        if (!(cost <= least) || (cost == least && order >= first)) continue;  // never NaN
-        least = cost;
-        first = order;
-        out[i] = n.point;
-      }
-    }
-  });
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), kMergedAtOnce),
+                    [&](const auto& range) {
+                      std::vector<Neighbor> near;
+                      for (size_t k = range.begin(); k < range.end(); ++k) {
+                        const uint32_t i = tree.order()[k];
+                        tree.nearest(s.splats.position[i], kNeighbors + 1, near);
+                        float least = options.most_cost;
+                        uint64_t first = UINT64_MAX;
+                        for (const Neighbor& n : near) {
+                          if (n.point == i) continue;
+                          const float cost = merge_cost(s, shapes, options, i, n.point);
+                          const uint64_t order = order_of_pair(i, n.point);
+                          if (!(cost <= least) || (cost == least && order >= first))
+                            continue;  // never NaN
+                          least = cost;
+                          first = order;
+                          out[i] = n.point;
+                        }
+                      }
+                    });
   return out;
 }
 

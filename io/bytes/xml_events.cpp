@@ -41,10 +41,10 @@ class Reader {
   }
 
   void read(std::string_view bytes) {
-    constexpr size_t kPiece = size_t{1} << 20;
-    for (size_t at = 0; at == 0 || at < bytes.size(); at += kPiece) {
-      const std::string_view piece = bytes.substr(at, kPiece);
-      const bool is_last = at + kPiece >= bytes.size();
+    constexpr size_t kParsedAtOnce = size_t{1} << 20;
+    for (size_t at = 0; at == 0 || at < bytes.size(); at += kParsedAtOnce) {
+      const std::string_view piece = bytes.substr(at, kParsedAtOnce);
+      const bool is_last = at + kParsedAtOnce >= bytes.size();
       const auto state =
           XML_Parse(parser_.get(), piece.data(), static_cast<int>(piece.size()), is_last ? 1 : 0);
       if (thrown_) std::rethrow_exception(thrown_);

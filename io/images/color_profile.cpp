@@ -25,7 +25,8 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-constexpr size_t kLargest = size_t{4} << 20;  // [bytes] printers' have 1 to 2 MB, cameras' less
+constexpr size_t kLargestProfile = size_t{4}
+                                   << 20;  // [bytes] printers' have 1 to 2 MB, cameras' less
 
 // In parts of at most 64 KiB, each with its number and how many there are.
 std::string of_jpeg(std::string_view bytes, const std::filesystem::path& path) {
@@ -50,7 +51,7 @@ std::string of_jpeg(std::string_view bytes, const std::filesystem::path& path) {
       continue;
     const std::string_view part = body.substr(kPartName.size() + 2);
     total += part.size();
-    if (total > kLargest) return "";
+    if (total > kLargestProfile) return "";
     parts.emplace(static_cast<unsigned char>(body[kPartName.size()]), part);
   }
   std::string out;
@@ -58,7 +59,7 @@ std::string of_jpeg(std::string_view bytes, const std::filesystem::path& path) {
   return out;
 }
 
-std::string of_png(std::string_view bytes, const std::filesystem::path& path) {
+std::string profile_of_png(std::string_view bytes, const std::filesystem::path& path) {
   std::string out;
   visit_png_chunks(bytes, path, [&](std::string_view name, std::string_view body) {
     if (name != "iCCP") return true;
@@ -66,7 +67,7 @@ std::string of_png(std::string_view bytes, const std::filesystem::path& path) {
     if (end == std::string_view::npos || end + 2 > body.size()) return false;
     out = inflate(body.substr(end + 2),
                   DeflateWrapping::Zlib,
-                  SizeRange{0, kLargest},
+                  SizeRange{0, kLargestProfile},
                   path,
                   "PNG colour profile");
     return false;
@@ -74,19 +75,19 @@ std::string of_png(std::string_view bytes, const std::filesystem::path& path) {
   return out;
 }
 
-std::string of_webp(std::string_view bytes, const std::filesystem::path& path) {
+std::string profile_of_webp(std::string_view bytes, const std::filesystem::path& path) {
   std::string out;
   visit_webp_chunks(bytes, path, [&](std::string_view name, std::string_view body) {
-    if (name == "ICCP") out = body.substr(0, kLargest);
+    if (name == "ICCP") out = body.substr(0, kLargestProfile);
     return out.empty();
   });
   return out;
 }
 
-std::string of_tiff(std::string_view bytes, const std::filesystem::path& path) {
+std::string profile_of_tiff(std::string_view bytes, const std::filesystem::path& path) {
   constexpr uint16_t kProfile = 34675;
   const auto field = TiffDirectory(bytes, path).field(kProfile);
-  return field && field->bytes.size() <= kLargest ? std::string(field->bytes) : "";
+  return field && field->bytes.size() <= kLargestProfile ? std::string(field->bytes) : "";
 }
 
 struct CloseProfile {
@@ -138,9 +139,9 @@ bool is_identity(const Transform& transform) {
 std::string color_profile(std::string_view bytes, const std::filesystem::path& path) {
   try {
     if (bytes.starts_with("\xff\xd8")) return of_jpeg(bytes, path);
-    if (bytes.starts_with("\x89PNG")) return of_png(bytes, path);
-    if (bytes.starts_with("RIFF")) return of_webp(bytes, path);
-    if (bytes.starts_with("II") || bytes.starts_with("MM")) return of_tiff(bytes, path);
+    if (bytes.starts_with("\x89PNG")) return profile_of_png(bytes, path);
+    if (bytes.starts_with("RIFF")) return profile_of_webp(bytes, path);
+    if (bytes.starts_with("II") || bytes.starts_with("MM")) return profile_of_tiff(bytes, path);
     if (!is_heif(bytes)) return "";
     const HeifProfile found = heif_profile(bytes, path);
     return found.is_display_p3 ? display_p3() : found.icc;

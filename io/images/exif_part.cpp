@@ -17,11 +17,11 @@ namespace {
 using std::string_view_literals::operator""sv;
 
 constexpr std::string_view kExif = "Exif\0\0"sv;
-constexpr uint64_t kLargest = 65'000;  // what a segment of JPEG holds
+constexpr uint64_t kLargestSegment = 65'000;  // what a segment of JPEG holds
 
 std::string with_header(std::string_view tiff) {
   if (tiff.starts_with(kExif)) tiff.remove_prefix(kExif.size());
-  return std::string(kExif) + std::string(tiff.substr(0, kLargest));
+  return std::string(kExif) + std::string(tiff.substr(0, kLargestSegment));
 }
 
 int hex_digit(char c) {
@@ -59,14 +59,14 @@ std::string of_text_chunk(std::string_view name,
     body.remove_prefix(keyword.size());
     if (name == "tEXt") return of_raw_profile(body);
     if (!body.empty()) body.remove_prefix(1);  // the method: deflate
-    constexpr size_t kLongest = 3 * kLargest;
+    constexpr size_t kLongest = 3 * kLargestSegment;
     return of_raw_profile(
         inflate(body, DeflateWrapping::Zlib, SizeRange{0, kLongest}, path, "PNG raw profile"));
   }
   return "";
 }
 
-std::string of_png(std::string_view bytes, const std::filesystem::path& path) {
+std::string part_of_png(std::string_view bytes, const std::filesystem::path& path) {
   std::string out;
   visit_png_chunks(bytes, path, [&](std::string_view name, std::string_view body) {
     if (name == "eXIf") out = with_header(body);
@@ -76,7 +76,7 @@ std::string of_png(std::string_view bytes, const std::filesystem::path& path) {
   return out;
 }
 
-std::string of_webp(std::string_view bytes, const std::filesystem::path& path) {
+std::string part_of_webp(std::string_view bytes, const std::filesystem::path& path) {
   std::string out;
   visit_webp_chunks(bytes, path, [&](std::string_view name, std::string_view body) {
     if (name == "EXIF") out = with_header(body);
@@ -154,7 +154,7 @@ std::vector<std::pair<uint16_t, TiffField>> fields_of(const TiffDirectory& direc
 }
 
 // The directories may lie anywhere in the file, far beyond what an Exif part may hold.
-std::string of_tiff(std::string_view bytes, const std::filesystem::path& path) {
+std::string part_of_tiff(std::string_view bytes, const std::filesystem::path& path) {
   constexpr uint16_t kMaker = 0x010f;
   constexpr uint16_t kModel = 0x0110;
   const TiffDirectory first(bytes, path);
@@ -172,11 +172,11 @@ std::string of_tiff(std::string_view bytes, const std::filesystem::path& path) {
 std::string exif_part(std::string_view bytes, const std::filesystem::path& path) {
   try {
     if (bytes.starts_with("\xff\xd8")) return std::string(bytes);
-    if (bytes.starts_with("\x89PNG")) return of_png(bytes, path);
+    if (bytes.starts_with("\x89PNG")) return part_of_png(bytes, path);
     if (bytes.starts_with("RIFF") && bytes.substr(0, 12).ends_with("WEBP")) {
-      return of_webp(bytes, path);
+      return part_of_webp(bytes, path);
     }
-    if (bytes.starts_with("II") || bytes.starts_with("MM")) return of_tiff(bytes, path);
+    if (bytes.starts_with("II") || bytes.starts_with("MM")) return part_of_tiff(bytes, path);
     if (is_heif(bytes)) return heif_exif(bytes, path);
   } catch (const BadInput&) {
     return "";  // of the picture as a whole its decoder tells

@@ -56,13 +56,13 @@ std::string png_bytes(int width, int height, png_uint_32 format, const std::stri
 }
 
 /// libjpeg reports errors through a call that must not return.
-struct JpegErrors {
+struct JpegEscape {
   jpeg_error_mgr base = {};
   std::jmp_buf escape = {};
 };
 
 void leave_jpeg(j_common_ptr info) {
-  std::longjmp(reinterpret_cast<JpegErrors*>(info->err)->escape, 1);  // NOLINT(bugprone-*)
+  std::longjmp(reinterpret_cast<JpegEscape*>(info->err)->escape, 1);  // NOLINT(bugprone-*)
 }
 
 /// What goes into the encoder and what comes out; `bytes` is the library's, to be freed.
@@ -78,7 +78,7 @@ struct JpegJob {
 /// No object with a destructor may live here: an error jumps out. \return false on an error.
 bool compress_jpeg(JpegJob& job) {
   jpeg_compress_struct info = {};
-  JpegErrors errors;
+  JpegEscape errors;
   info.err = jpeg_std_error(&errors.base);
   errors.base.error_exit = leave_jpeg;
   if (setjmp(errors.escape) != 0) {  // NOLINT(cert-err52-cpp)

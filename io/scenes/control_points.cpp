@@ -15,7 +15,8 @@ namespace cgs {
 
 namespace {
 
-constexpr std::array<std::string_view, 7> kNeeded = {"name", "x", "y", "z", "view", "px", "py"};
+constexpr std::array<std::string_view, 7> kColumnsNeeded = {
+    "name", "x", "y", "z", "view", "px", "py"};
 constexpr std::array<std::string_view, 2> kOptional = {"sigma", "role"};
 constexpr double kFarthest = 1e12;
 constexpr size_t kMostPoints = 10'000;
@@ -86,14 +87,14 @@ class Table {
     for (const std::string_view field : fields(*header, separator_)) {
       const std::string column = lower(unquoted(field));
       const bool is_known =
-          std::find(kNeeded.begin(), kNeeded.end(), column) != kNeeded.end() ||
+          std::find(kColumnsNeeded.begin(), kColumnsNeeded.end(), column) != kColumnsNeeded.end() ||
           std::find(kOptional.begin(), kOptional.end(), column) != kOptional.end();
       if (!is_known) lines_.fail(Defect::Schema, "unknown column " + quoted(column) + allowed);
       if (!columns_.emplace(column, columns_.size()).second) {
         lines_.fail(Defect::Schema, "column " + quoted(column) + " is there twice");
       }
     }
-    for (const std::string_view needed : kNeeded) {
+    for (const std::string_view needed : kColumnsNeeded) {
       if (columns_.contains(std::string(needed))) continue;
       lines_.fail(Defect::Schema, "has no column " + quoted(needed) + allowed);
     }

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -18,6 +17,7 @@
 #include "io/scenes/lens.h"
 #include "io/scenes/orientation.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/nan.h"
 
 namespace cgs {
 
@@ -25,7 +25,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kSameSurface = 0.05f;  // relative step between values that may be averaged
 
 // The file in a folder "depth" that goes with that of a photograph.

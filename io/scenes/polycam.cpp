@@ -41,7 +41,7 @@ std::string keyframes(const fs::path& folder) {
   return "";
 }
 
-Eigen::Isometry3d read_pose(const JsonValue& camera) {
+Eigen::Isometry3d read_polycam_pose(const JsonValue& camera) {
   Eigen::Matrix<double, 3, 4> M;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 4; ++c) {
@@ -54,7 +54,7 @@ Eigen::Isometry3d read_pose(const JsonValue& camera) {
                       [&](Defect defect, const std::string& why) { camera.fail(defect, why); });
 }
 
-Camera read_camera(const fs::path& path) {
+Camera read_polycam_camera(const fs::path& path) {
   const nlohmann::json json = read_json(path);
   const JsonValue document(json, path);
   Camera camera;
@@ -66,7 +66,7 @@ Camera read_camera(const fs::path& path) {
   camera.cy = document.at("cy").number();
   check_intrinsics(camera,
                    [&](Defect defect, const std::string& why) { document.fail(defect, why); });
-  camera.world_from_cam = read_pose(document);
+  camera.world_from_cam = read_polycam_pose(document);
   return camera;
 }
 
@@ -108,7 +108,7 @@ Scene read_polycam(const SceneRoot& root) {
   const fs::path cameras = prefix + "cameras";
   for (const std::string& name : json_files(inside(cameras))) {
     View view;
-    view.camera = read_camera(inside(cameras / name));
+    view.camera = read_polycam_camera(inside(cameras / name));
     const fs::path stem = fs::path(name).stem();
     for (const char* extension : {".jpg", ".jpeg", ".png"}) {
       const fs::path image = inside(fs::path(prefix + "images") / (stem.string() + extension));

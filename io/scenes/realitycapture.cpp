@@ -25,13 +25,13 @@ namespace {
 
 constexpr std::string_view kStart = "#name,";
 
-constexpr std::array<std::string_view, 8> kNeeded = {
+constexpr std::array<std::string_view, 8> kCameraColumns = {
     "name", "x", "y", "alt", "heading", "pitch", "roll", "f"};
 
 // Tables of points on the ground start alike, but do not turn.
 bool has_needed_columns(std::string_view header) {
   const std::vector<std::string_view> names = fields(header.substr(1), ',');
-  return std::all_of(kNeeded.begin(), kNeeded.end(), [&](std::string_view needed) {
+  return std::all_of(kCameraColumns.begin(), kCameraColumns.end(), [&](std::string_view needed) {
     return std::find(names.begin(), names.end(), needed) != names.end();
   });
 }
@@ -132,7 +132,7 @@ std::map<std::string, size_t> read_columns(TextLines& lines) {
       if (out.emplace(names[i], i).second) continue;
       lines.fail(Defect::Schema, "two columns are called " + std::string(names[i]));
     }
-    for (const std::string_view needed : kNeeded) {
+    for (const std::string_view needed : kCameraColumns) {
       if (!out.contains(std::string(needed))) {
         lines.fail(Defect::Schema,
                    "there is no column " + std::string(needed) +

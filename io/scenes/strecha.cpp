@@ -32,7 +32,7 @@ std::optional<std::string> camera_folder(const fs::path& folder) {
 
 constexpr size_t kNumbers = 9 + 3 + 9 + 3 + 2;
 
-Camera read_camera(const fs::path& path) {
+Camera read_strecha_camera(const fs::path& path) {
   const std::string text = read_file(path);
   refuse_foreign_content(path, text, "a .camera file");
   TextLines lines(text, path);
@@ -89,7 +89,7 @@ Scene read_strecha(const SceneRoot& root) {
   for (const std::string& name : camera_files(cameras)) {
     const fs::path path = cameras / name;
     View view;
-    view.camera = read_camera(path);
+    view.camera = read_strecha_camera(path);
     view.name = path.stem().string();  // 0000.jpg.camera belongs to 0000.jpg
     for (const std::string& place : {*folder, std::string("images"), std::string(".")}) {
       const fs::path image =

@@ -142,7 +142,7 @@ void read_intrinsics(const JsonValue& document, const JsonValue& frame, View& vi
   read_distortion(document, frame, view);
 }
 
-Eigen::Isometry3d read_pose(const JsonValue& matrix) {
+Eigen::Isometry3d read_transform(const JsonValue& matrix) {
   const size_t rows = matrix.size();
   if (rows != 4 && rows != 3) matrix.fail(Defect::Schema, "expected a 4 x 4 matrix");
   Eigen::Matrix4d M = Eigen::Matrix4d::Identity();
@@ -266,7 +266,7 @@ Scene read_transforms_json(const SceneRoot& root) {
       }
     }
     read_size(document, frame, view);
-    view.camera.world_from_cam = read_pose(frame.at("transform_matrix"));
+    view.camera.world_from_cam = read_transform(frame.at("transform_matrix"));
     const bool has_size = view.camera.width > 0 && view.camera.height > 0;
     if (!has_size && view.image_path.empty()) continue;  // nothing would ever tell its size
     read_intrinsics(document, frame, view);

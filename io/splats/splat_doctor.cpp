@@ -22,7 +22,7 @@ constexpr double kSmallestScale = 0x1p-60;
 constexpr double kLargestScale = 0x1p60;
 
 /// Places beyond this would not survive being written as floats again.
-constexpr double kFarthest = 0x1p127;
+constexpr double kFarthestKept = 0x1p127;
 
 /// Splats that cover the scene more often than this are no picture of anything.
 constexpr double kSuspiciousFill = 1e3;
@@ -124,7 +124,7 @@ class Examination {
     double out = 0;
     for (const Eigen::Vector3f& s : raw.log_scale) {
       const double radius = std::exp(double{s.maxCoeff()});
-      if (radius > 2 * kSmallestScale && radius <= kFarthest) out = std::max(out, radius);
+      if (radius > 2 * kSmallestScale && radius <= kFarthestKept) out = std::max(out, radius);
     }
     return raw.size() > 1 ? out : 0;
   }
@@ -161,7 +161,7 @@ class Examination {
     finite = finite && raw_.rotation[i].allFinite() && !std::isnan(logit);
     for (size_t k = 0; k < sh_count; ++k) finite = finite && raw_.sh[i * sh_count + k].allFinite();
     if (!finite) return &findings_.not_finite;
-    if (raw_.position[i].cwiseAbs().maxCoeff() > kFarthest) return &findings_.out_of_range;
+    if (raw_.position[i].cwiseAbs().maxCoeff() > kFarthestKept) return &findings_.out_of_range;
     if (!(raw_.rotation[i].cwiseAbs().maxCoeff() > 0)) return &findings_.without_rotation;
     if (logit == -std::numeric_limits<float>::infinity()) return &findings_.transparent;
     return nullptr;

@@ -21,9 +21,9 @@ namespace cgs {
 namespace {
 
 constexpr std::string_view kGzipMagic = "\x1f\x8b";
-constexpr size_t kHeaderBytes = 16;    // of versions 2 and 3
-constexpr size_t kHeader4Bytes = 32;   // of version 4
-constexpr uint8_t kHasExtensions = 2;  // flag
+constexpr size_t kSpzHeaderBytes = 16;  // of versions 2 and 3
+constexpr size_t kHeader4Bytes = 32;    // of version 4
+constexpr uint8_t kHasExtensions = 2;   // flag
 constexpr size_t kMostExtensionBytes = 1 << 20;
 constexpr uint32_t kCoordinateSystem = 0xADBE0003;  // extension of Adobe
 
@@ -50,7 +50,7 @@ constexpr std::array<std::string_view, 17> kAxes = {"RUB",
 /// Signs of the harmonics beyond degree 0 when y and z change theirs.
 constexpr std::array<float, 15> kShSigns = {-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1};
 
-struct Header {
+struct SpzHeader {
   uint32_t version = 0;
   uint32_t count = 0;
   int degree = 0;
@@ -65,9 +65,9 @@ struct Header {
   size_t rotation_bytes() const { return version == 2 ? 3 : 4; }
 };
 
-Header header_of(ByteReader& reader) {
+SpzHeader header_of(ByteReader& reader) {
   if (reader.take(4, "magic") != kSpzMagic) reader.fail(Defect::Magic, "expected SPZ, no NGSP");
-  Header out;
+  SpzHeader out;
   out.version = reader.get<uint32_t>("version");
   if (out.version < 2 || out.version > 4) {
     reader.fail(Defect::Unsupported,
@@ -90,10 +90,10 @@ Header header_of(ByteReader& reader) {
 }
 
 /// That of the beginning of a file.
-Header header_at(std::string_view bytes, const std::filesystem::path& path) {
+SpzHeader header_at(std::string_view bytes, const std::filesystem::path& path) {
   std::string start;
   if (bytes.substr(0, 2) == kGzipMagic) {
-    start = inflate_start(bytes, DeflateWrapping::Gzip, kHeaderBytes, path, "SPZ header");
+    start = inflate_start(bytes, DeflateWrapping::Gzip, kSpzHeaderBytes, path, "SPZ header");
   }
   ByteReader reader(start.empty() ? bytes : std::string_view(start), path);
   return header_of(reader);
@@ -102,7 +102,7 @@ Header header_at(std::string_view bytes, const std::filesystem::path& path) {
 constexpr std::array<const char*, PartCount> kPartNames = {
     "positions", "opacities", "colours", "scales", "rotations", "harmonics"};
 
-std::array<size_t, PartCount> part_sizes(const Header& header) {
+std::array<size_t, PartCount> part_sizes(const SpzHeader& header) {
   const size_t n = header.count;
   return {9 * n, n, 3 * n, 3 * n, header.rotation_bytes() * n, 3 * header.sh_in_file() * n};
 }
@@ -116,10 +116,10 @@ struct Parts {
 };
 
 Parts parts_of_one_stream(std::string_view file,
-                          const Header& header,
+                          const SpzHeader& header,
                           const std::filesystem::path& path) {
   const std::array<size_t, PartCount> sizes = part_sizes(header);
-  size_t total = kHeaderBytes;
+  size_t total = kSpzHeaderBytes;
   for (const size_t size : sizes) total += size;
   const size_t more = (header.flags & kHasExtensions) != 0 ? kMostExtensionBytes : 0;
   Parts out;
@@ -130,18 +130,18 @@ Parts parts_of_one_stream(std::string_view file,
     all = out.storage;
   }
   ByteReader reader(all, path);
-  (void)reader.take(kHeaderBytes, "header");
+  (void)reader.take(kSpzHeaderBytes, "header");
   for (size_t k = 0; k < PartCount; ++k) out.bytes.at(k) = reader.take(sizes[k], kPartNames.at(k));
   if (more > 0) out.extensions = all.substr(total);
   return out;
 }
 
 Parts parts_of_streams(std::string_view file,
-                       const Header& header,
+                       const SpzHeader& header,
                        const std::filesystem::path& path) {
   const std::array<size_t, PartCount> sizes = part_sizes(header);
   ByteReader reader(file, path);
-  (void)reader.take(kHeaderBytes, "header");
+  (void)reader.take(kSpzHeaderBytes, "header");
   const auto table_at = reader.get<uint32_t>("place of the table of streams");
   if (table_at < kHeader4Bytes || table_at > file.size()) {
     reader.fail(Defect::Schema, "the table of streams cannot begin at " + std::to_string(table_at));
@@ -261,7 +261,7 @@ Eigen::Vector4f four_byte_rotation(std::string_view bytes, size_t i) {
   return Eigen::Vector4d(q[3], q[0], q[1], q[2]).cast<float>();
 }
 
-RawSplats splats_of(const Parts& parts, const Header& header) {
+RawSplats splats_of(const Parts& parts, const SpzHeader& header) {
   RawSplats out;
   out.format = "SPZ " + std::to_string(header.version);
   out.sh_degree = std::min(header.degree, 3);
@@ -310,13 +310,13 @@ bool looks_like_spz(std::string_view bytes) {
 }
 
 SpzCount stated_spz_splats(std::string_view start, const std::filesystem::path& path) {
-  const Header header = header_at(start, path);
+  const SpzHeader header = header_at(start, path);
   const auto side = static_cast<uint64_t>(std::min(header.degree, 3)) + 1;
   return {header.count, side * side};
 }
 
 RawSplats parse_spz(std::string_view bytes, const std::filesystem::path& path) {
-  const Header header = header_at(bytes, path);
+  const SpzHeader header = header_at(bytes, path);
   if (header.version == 4 && bytes.substr(0, 2) == kGzipMagic) {
     throw BadInput(Defect::Schema, path, "SPZ 4 inside a gzip stream");
   }

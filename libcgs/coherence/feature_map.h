@@ -35,6 +35,16 @@ inline Float8 load8(const float* from) {
   return out;
 }
 inline void store8(const Float8& value, float* to) { std::memcpy(to, &value, sizeof(value)); }
+/// to += factor * from; count is a multiple of eight.
+inline void add_scaled(const float* from, float factor, size_t count, float* to) {
+  for (size_t i = 0; i < count; i += 8) store8(load8(to + i) + factor * load8(from + i), to + i);
+}
+
+/// The pixel that stands for pixel i, which may lie one or more beyond a border.
+inline int reflected(int i, int size) {
+  if (i < 0) return -i;
+  return i < size ? i : 2 * (size - 1) - i;
+}
 
 /// Channels of an image, `lanes` of them side by side, rows in bands of `band_rows` (the last band
 /// may be lower): channel c of pixel (x, y) is row(c / lanes, y)[x * lanes + c % lanes], and

@@ -10,11 +10,6 @@ namespace {
 
 constexpr int kTaps = 9;
 
-int reflected(int i, int size) {
-  if (i < 0) return -i;
-  return i < size ? i : 2 * (size - 1) - i;
-}
-
 // A row of pixels with their channels side by side and one reflected pixel at either end: what the
 // three taps of a kernel row see is one run of numbers.
 void gather_row(const FeatureMap& in, int y, FloatBuffer& out) {
@@ -54,10 +49,6 @@ float dot(const float* a, const float* b, size_t count) {
   }
   const Float8 sum = sums[0] + sums[1] + sums[2];
   return ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
-}
-
-void add_scaled(const float* from, float factor, size_t count, float* to) {
-  for (size_t i = 0; i < count; i += 8) store8(load8(to + i) + factor * load8(from + i), to + i);
 }
 
 // Calls work(y, rows) for the rows of a band in turn; rows[ky] is the gathered input row that

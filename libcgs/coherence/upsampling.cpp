@@ -15,10 +15,6 @@ void interpolate(const float* first, const float* second, float weight, size_t c
   }
 }
 
-void add_scaled(const float* from, float factor, size_t count, float* to) {
-  for (size_t i = 0; i < count; i += 8) store8(load8(to + i) + factor * load8(from + i), to + i);
-}
-
 template <size_t kLanes>
 void interpolate_row(const float* in, const std::vector<UpsampledTap>& taps, float* out) {
   for (const UpsampledTap& tap : taps) {
@@ -44,11 +40,6 @@ void interpolate_row(const FeatureMap& in, const float* row, const Upsampling& h
 
 void scatter_row(const FeatureMap& shape, const float* row, const Upsampling& how, float* out) {
   shape.lanes == 16 ? scatter_row<16>(row, how.x, out) : scatter_row<8>(row, how.x, out);
-}
-
-int reflected(int i, int size) {
-  if (i < 0) return -i;
-  return i < size ? i : 2 * (size - 1) - i;
 }
 
 }  // namespace

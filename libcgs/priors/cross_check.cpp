@@ -8,11 +8,11 @@
 
 #include <tbb/parallel_for.h>
 
+#include "libcgs/core/nan.h"
+
 namespace cgs {
 
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 const SweepSource& towards(const SweptView& from, const SweptView& to) {
   return *std::find_if(from.geometry.sources.begin(),

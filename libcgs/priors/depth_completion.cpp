@@ -4,20 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/nan.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/directions.h"
 
 namespace cgs {
 
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 struct Evidence {
   float inverse_depth = 0;

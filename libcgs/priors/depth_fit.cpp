@@ -13,7 +13,7 @@ namespace cgs {
 
 namespace {
 
-constexpr size_t kFewest = 50;
+constexpr size_t kFewestOfAFit = 50;
 constexpr double kNormal = 1.4826;  // median distance to standard deviation
 
 uint64_t hashed(uint64_t x) {
@@ -112,7 +112,7 @@ double robust_deviation(std::vector<double> values) {
 }
 
 std::optional<LineFit> fit_line(const std::vector<FitPoint>& points) {
-  if (points.size() < kFewest) return std::nullopt;
+  if (points.size() < kFewestOfAFit) return std::nullopt;
   LineFit line = least_median_line(points);
   if (!std::isfinite(line.scatter)) return std::nullopt;
   line.scatter = std::max(line.scatter, 1e-6);
@@ -129,7 +129,7 @@ std::optional<LineFit> fit_line(const std::vector<FitPoint>& points) {
 }
 
 std::optional<LineFit> fit_scale(const std::vector<FitPoint>& points) {
-  if (points.size() < kFewest) return std::nullopt;
+  if (points.size() < kFewestOfAFit) return std::nullopt;
   std::vector<double> logs(points.size());
   std::transform(points.begin(), points.end(), logs.begin(), [](const FitPoint& p) {
     return std::log(p.y / p.x);

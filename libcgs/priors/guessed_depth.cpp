@@ -95,12 +95,12 @@ class ErrorByDistance {
   // percentile; beyond, it is more often what was hidden that errs. Bins with too few errors are as
   // bad as the one before, grown as a random walk.
   void settle() {
-    constexpr size_t kFewest = 200;
+    constexpr size_t kFewestPixels = 200;
     constexpr double kGrowth = 1.41;
     double last = 0;
     for (size_t k = 0; k < kBins; ++k) {
       std::vector<double>& e = errors_[k];
-      if (e.size() >= kFewest) {
+      if (e.size() >= kFewestPixels) {
         std::sort(e.begin(), e.end());
         last = std::max(last, std::max(1.4826 * e[e.size() / 2], e[e.size() * 4 / 5] / 1.2816));
       } else {
@@ -170,7 +170,7 @@ GuessErrors try_out(const FittedDepth& fitted, const View& view, const ViewPrior
   out.by_distance.settle();
   // What is left near depth edges, over their steepness, is how far they are out of place.
   constexpr double kSteep = 0.01;
-  constexpr size_t kFewest = 100;
+  constexpr size_t kFewestPixels = 100;
   std::vector<double> shifts;
   for (int y = 0; y < bent.height; ++y) {
     for (int x = 0; x < bent.width; ++x) {
@@ -183,7 +183,7 @@ GuessErrors try_out(const FittedDepth& fitted, const View& view, const ViewPrior
       shifts.push_back(std::sqrt(std::max(0.0, error * error - expected * expected)) / steep);
     }
   }
-  if (shifts.size() >= kFewest) {
+  if (shifts.size() >= kFewestPixels) {
     std::sort(shifts.begin(), shifts.end());
     out.edge_shift = shifts[shifts.size() * 4 / 5] / 1.2816;
   }

@@ -2,17 +2,15 @@
 #include "libcgs/priors/joint_surface.h"
 
 #include <cmath>
-#include <limits>
 
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/bilinear.h"
+#include "libcgs/core/nan.h"
 
 namespace cgs {
 
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 PlaceMap places_in(const View& from,
                    const ViewPriors& own,

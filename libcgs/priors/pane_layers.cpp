@@ -37,10 +37,10 @@ struct Around {
 };
 
 Around around(const MaskMap& through, int x, int y) {
-  constexpr int kMargin = 6;  // [pixels]
+  constexpr int kAside = 6;  // [pixels]
   Around out;
-  for (const int dy : {-kMargin, 0, kMargin}) {
-    for (const int dx : {-kMargin, 0, kMargin}) {
+  for (const int dy : {-kAside, 0, kAside}) {
+    for (const int dx : {-kAside, 0, kAside}) {
       if (!through.contains(x + dx, y + dy)) continue;
       ++(through(x + dx, y + dy) != 0 ? out.through : out.beside);
     }
@@ -169,7 +169,7 @@ std::vector<ColorImage> with_hidden_pieces(std::vector<ColorImage> photographs) 
 }  // namespace
 
 float contrast_lost(const JointSurface& surface, const PanePlaces& places) {
-  constexpr size_t kFewest = 300;
+  constexpr size_t kFewestSamples = 300;
   constexpr int kApart = 8;  // [pixels]: what differs so far is not blurred by looking it up
   Contrast sum;
   for (size_t v = 0; v < surface.count(); ++v) {
@@ -179,7 +179,7 @@ float contrast_lost(const JointSurface& surface, const PanePlaces& places) {
       add_contrast(surface, places, v, u, {0, kApart}, sum);
     }
   }
-  if (sum.count < kFewest || !(sum.squares > 0)) return 0;
+  if (sum.count < kFewestSamples || !(sum.squares > 0)) return 0;
   return static_cast<float>(1 - sum.products / sum.squares);
 }
 

@@ -3,20 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/nan.h"
 #include "libcgs/priors/cross_check.h"
 #include "libcgs/priors/directions.h"
 
 namespace cgs {
 
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 void require_images(const Scene& scene) {
   require(
@@ -196,11 +194,11 @@ float depth_sigma(const RefinedPixel& pixel,
                   const Agreement& agreement,
                   float roughness,
                   float to_texture) {
-  constexpr float kFloor = 0.05f;  // calibration and interpolation, however good the texture
-  constexpr float kMore = 1.12f;   // what terms of this form leave out
+  constexpr float kLeastSpread = 0.05f;  // calibration and interpolation, however good the texture
+  constexpr float kMore = 1.12f;         // what terms of this form leave out
   // Where a plane is more than a pixel, floor and noise are of the plane, as neighbours are.
   const float planes_per_pixel = 1 / std::min(agreement.parallax, 1.0f);
-  const float floor = kFloor * planes_per_pixel;
+  const float floor = kLeastSpread * planes_per_pixel;
   const float noise =
       std::min(kTexture * pixel.sigma / agreement.parallax, kMostNoise * planes_per_pixel);
   const float bend = kBend * to_texture * to_texture * planes_per_pixel;

@@ -5,13 +5,13 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <span>
 #include <vector>
 
 #include <Eigen/Cholesky>
 #include <tbb/parallel_for.h>
 
+#include "libcgs/core/nan.h"
 #include "libcgs/priors/matching_cost.h"
 
 namespace cgs {
@@ -23,14 +23,13 @@ constexpr int kPatchSide = 2 * kPatchRadius + 1;
 constexpr size_t kTaps = (kPatchSide * kPatchSide + 1) / 2;  // every other pixel, like a chessboard
 constexpr size_t kSamples = (kTaps + 7) / 8 * 8;             // padded with weight 0
 constexpr size_t kCenter = kTaps / 2;
-constexpr float kLevelScale = 12;       // bilateral weight halves at this difference [gray levels]
-constexpr float kDistanceScale = 1.6f;  // … and at this distance [pixels]
-constexpr float kNoiseVariance = 4;     // [gray levels squared]
-constexpr float kSmoothness = 0.12f;    // cost of a full disagreement with the neighbours
-constexpr float kTruncation = 0.8f;     // largest disagreement that counts [planes]
-constexpr float kUnseenCost = 1.0f;     // as uncorrelated
-constexpr float kMaxSlope = 2.0f;       // [planes per pixel]
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kLevelScale = 12;        // bilateral weight halves at this difference [gray levels]
+constexpr float kDistanceScale = 1.6f;   // … and at this distance [pixels]
+constexpr float kGrayNoiseVariance = 4;  // [gray levels squared]
+constexpr float kSmoothness = 0.12f;     // cost of a full disagreement with the neighbours
+constexpr float kTruncation = 0.8f;      // largest disagreement that counts [planes]
+constexpr float kUnseenCost = 1.0f;      // as uncorrelated
+constexpr float kMaxSlope = 2.0f;        // [planes per pixel]
 
 struct Offset {
   int dx, dy;
@@ -259,8 +258,8 @@ float SlantedRefinement::correlation(const Window& w,
   const float inv = 1 / std::max(sum(sw), 1e-6f);
   const float ma = sum(sa) * inv;
   const float mb = sum(sb) * inv;
-  const float va = std::max(sum(saa) * inv - ma * ma, 0.0f) + kNoiseVariance;
-  const float vb = std::max(sum(sbb) * inv - mb * mb, 0.0f) + kNoiseVariance;
+  const float va = std::max(sum(saa) * inv - ma * ma, 0.0f) + kGrayNoiseVariance;
+  const float vb = std::max(sum(sbb) * inv - mb * mb, 0.0f) + kGrayNoiseVariance;
   return (sum(sab) * inv - ma * mb) / std::sqrt(va * vb);
 }
 
@@ -334,15 +333,15 @@ bool SlantedRefinement::normal_equations(const Window& w,
   // Photometric gain and offset first, by regression of the reference on the source.
   const float inv = 1 / M(4, 4);
   const Eigen::Matrix<float, 6, 6> C = M - inv * M.col(4) * M.row(4);
-  const float gain = C(3, 5) / (C(3, 3) + kNoiseVariance * M(4, 4));
+  const float gain = C(3, 5) / (C(3, 3) + kGrayNoiseVariance * M(4, 4));
   if (!(gain > 0.1f)) return false;
-  const float inv_gain = 1 / (C(3, 3) + kNoiseVariance * M(4, 4));
+  const float inv_gain = 1 / (C(3, 3) + kGrayNoiseVariance * M(4, 4));
   const Eigen::Matrix3f H =
       C.topLeftCorner<3, 3>() - inv_gain * C.block<3, 1>(0, 3) * C.block<1, 3>(3, 0);
   const Eigen::Vector3f g = C.block<3, 1>(0, 5) - gain * C.block<3, 1>(0, 3);
   const float residual = std::max(C(5, 5) - gain * C(3, 5), 0.0f);
   // Divided by the variance of the reference, so that sources count as in the correlation.
-  const float scale = 1 / (C(5, 5) * inv + kNoiseVariance);
+  const float scale = 1 / (C(5, 5) * inv + kGrayNoiseVariance);
   total.H += scale * gain * gain * H;
   total.g += scale * gain * g;
   total.residual += scale * residual;

@@ -25,7 +25,7 @@ namespace {
 constexpr size_t kBlock = 4096;  // Gaussians that one task projects or differentiates
 
 // One row of tiles.
-struct Band {
+struct TrainingBand {
   std::vector<TileEntry> in_tiles;  // tile by tile, nearest first
   std::vector<size_t> begin;        // per tile, and the end of the last
   std::vector<uint64_t> keys;
@@ -97,7 +97,7 @@ struct TrainingRasterizer::Tape {
   std::vector<TileRange> reach;
   std::vector<SplatMoments> moments;
   std::vector<ColorDerivative> color_derivatives;
-  std::vector<Band> bands;
+  std::vector<TrainingBand> bands;
   std::vector<TileEnd> ends;
   TrainingBuffers out;
   tbb::enumerable_thread_specific<BandRecords> records;
@@ -126,7 +126,7 @@ struct TrainingRasterizer::Tape {
 };
 
 TileSplats TrainingRasterizer::Tape::tile_splats(int column, int row) {
-  Band& band = bands[row];
+  TrainingBand& band = bands[row];
   const size_t begin = band.begin[column];
   return {std::span(splats).subspan(row_begin[row], band_size(row)),
           std::span(band.in_tiles).subspan(begin, band.begin[column + 1] - begin),
@@ -186,7 +186,7 @@ void TrainingRasterizer::Tape::pack_entries() {
 }
 
 void TrainingRasterizer::Tape::bin_into_tiles(int row) {
-  Band& band = bands[row];
+  TrainingBand& band = bands[row];
   const size_t first = row_begin[row];
   const size_t count = band_size(row);
   band.keys.resize(count);

@@ -15,7 +15,7 @@ namespace cgs {
 
 namespace {
 
-constexpr size_t kFewest = 100;
+constexpr size_t kFewestPoints = 100;
 constexpr double kReach = 4.6851;  // widths of Tukey's weights: 95 % efficient for normal errors
 
 // What was invented of a surface says nothing of where it lies, unless all of it was.
@@ -53,7 +53,7 @@ std::vector<Pair> pairs(const std::vector<Eigen::Vector3d>& points,
   });
   out.erase(std::remove_if(out.begin(), out.end(), [](const Pair& p) { return !p.counts; }),
             out.end());
-  if (out.size() < kFewest) {
+  if (out.size() < kFewestPoints) {
     throw NumericalError(
         "the surfaces hardly meet where both were seen; lay them onto each other "
         "first, and compare without --icp");
@@ -153,7 +153,8 @@ Registration register_points(const std::vector<Eigen::Vector3d>& points,
                              const MeasurableMesh& mesh,
                              const NearestSurface& surface,
                              bool with_scale) {
-  require(points.size() >= kFewest, "a registration needs points, their number", points.size());
+  require(
+      points.size() >= kFewestPoints, "a registration needs points, their number", points.size());
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& p : points) box.extend(p);
   const double radius = box.diagonal().norm() / 2;

@@ -124,22 +124,22 @@ class Stitcher {
 
  private:
   Chain follow(size_t piece, size_t start) {
-    constexpr auto kNone = static_cast<size_t>(-1);
+    constexpr auto kNoPiece = static_cast<size_t>(-1);
     Chain chain;
     size_t node = start;
     size_t backwards = 0;
-    while (piece != kNone) {
+    while (piece != kNoPiece) {
       used_[piece] = 1;
       chain.nodes.push_back(node);
       chain.faces.push_back(pieces_[piece].face);
       if (pieces_[piece].from != node) ++backwards;
       node = pieces_[piece].from == node ? pieces_[piece].to : pieces_[piece].from;
       if (node == start) break;
-      piece = kNone;
+      piece = kNoPiece;
       for (auto it = std::lower_bound(at_.begin(), at_.end(), std::pair{node, size_t{0}});
            it != at_.end() && it->first == node;
            ++it) {
-        if (used_[it->second] == 0 && (piece == kNone || pieces_[it->second].from == node)) {
+        if (used_[it->second] == 0 && (piece == kNoPiece || pieces_[it->second].from == node)) {
           piece = it->second;
         }
       }

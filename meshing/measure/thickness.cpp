@@ -17,7 +17,7 @@ namespace cgs {
 
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoThickness = std::numeric_limits<double>::quiet_NaN();
 constexpr double kMayReachIn = 0.05;  // of the radius
 constexpr double kBeside = 0.5;       // cosine of 60 degrees
 constexpr double kSmooth = 0.866;     // cosine of 30 degrees
@@ -71,7 +71,7 @@ ThicknessPart part_of_all(std::vector<double> values, size_t all) {
 // -d cosine / (1 - cosine) if the near end does, as the ball's centre stays on the near normal.
 double sigma_of_diameter(double near_sigma, double far_sigma, double cosine) {
   constexpr double kSameDirection = 1e-6;
-  if (1 - cosine < kSameDirection) return kNone;
+  if (1 - cosine < kSameDirection) return kNoThickness;
   return 2 * std::hypot(cosine * near_sigma, far_sigma) / (1 - cosine);
 }
 
@@ -150,7 +150,7 @@ Thickness ThicknessGauge::at(const SurfacePoint& point) const {
   constexpr double kRounding = 1e-9;
   const bool is_too_wide = 2 * radius > (1 + kRounding) * start_;  // then it cannot lie inside
   if (radius == start_ || is_too_wide) {
-    out.value.value = kNone;
+    out.value.value = kNoThickness;
     return out;
   }
   out.value.value = 2 * radius;
@@ -205,7 +205,7 @@ VertexThickness thickness_of_vertices(const MeasurableMesh& mesh, const NearestS
   std::vector<Thickness> of_face(mesh.mesh.faces.size());
   tbb::parallel_for(size_t(0), of_face.size(), [&](size_t f) {
     const auto face = static_cast<uint32_t>(f);
-    of_face[f].value.value = kNone;
+    of_face[f].value.value = kNoThickness;
     if (twice_area(mesh, face) > 0) of_face[f] = gauge.behind_face(face);
   });
   std::vector<double> sums(mesh.points.size(), 0);
@@ -224,7 +224,7 @@ VertexThickness thickness_of_vertices(const MeasurableMesh& mesh, const NearestS
     }
   }
   for (size_t v = 0; v < sums.size(); ++v) {
-    out.value.push_back(static_cast<float>(areas[v] > 0 ? sums[v] / areas[v] : kNone));
+    out.value.push_back(static_cast<float>(areas[v] > 0 ? sums[v] / areas[v] : kNoThickness));
   }
   return out;
 }

@@ -75,10 +75,10 @@ std::vector<Link> sorted_links(const std::vector<Eigen::Vector3f>& normals,
   return links;
 }
 
-constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNotReached = std::numeric_limits<uint32_t>::max();
 
 // Walks the tree from `start` and turns what disagrees with the point it was reached from.
-// \param start_of  per point; kNone where no walk has come yet
+// \param start_of  per point; kNotReached where no walk has come yet
 void turn_part(std::vector<Eigen::Vector3f>& normals,
                const std::vector<std::vector<uint32_t>>& tree,
                std::vector<uint32_t>& start_of,
@@ -90,7 +90,7 @@ void turn_part(std::vector<Eigen::Vector3f>& normals,
     const uint32_t a = open.back();
     open.pop_back();
     for (const uint32_t b : tree[a]) {
-      if (start_of[b] != kNone) continue;
+      if (start_of[b] != kNotReached) continue;
       start_of[b] = start;
       if (normals[a].dot(normals[b]) < 0) normals[b] = -normals[b];
       open.push_back(b);
@@ -158,9 +158,9 @@ std::vector<uint32_t> turn_consistently(std::vector<Eigen::Vector3f>& normals,
   std::stable_sort(from_top.begin(), from_top.end(), [&](uint32_t a, uint32_t b) {
     return points[a].z() > points[b].z();
   });
-  std::vector<uint32_t> start_of(points.size(), kNone);
+  std::vector<uint32_t> start_of(points.size(), kNotReached);
   for (const uint32_t start : from_top) {
-    if (start_of[start] == kNone) turn_part(normals, tree, start_of, start);
+    if (start_of[start] == kNotReached) turn_part(normals, tree, start_of, start);
   }
   return start_of;
 }

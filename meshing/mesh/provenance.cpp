@@ -12,14 +12,13 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/face_adjacency.h"
+#include "libcgs/core/nan.h"
 #include "libcgs/core/srgb.h"
 #include "meshing/volume/volume.h"
 
 namespace cgs {
 
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 // A weighted mean over those of the eight voxels that have a value.
 template <typename T>

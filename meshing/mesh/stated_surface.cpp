@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <utility>
 
@@ -11,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/nan.h"
 #include "libcgs/core/order_statistics.h"
 #include "meshing/mesh/corner_shares.h"
 #include "meshing/mesh/kd_tree.h"
@@ -103,8 +103,6 @@ double point_spacing(const std::vector<Eigen::Vector3f>& points) {
 }
 
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 enum class Side : uint8_t { Front, Bridge, Back };
 

@@ -6,13 +6,12 @@
 #include <limits>
 #include <utility>
 
+#include "libcgs/core/nan.h"
 #include "meshing/mesh/components.h"
 
 namespace cgs {
 
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 // Appends the array of a second mesh; one that states nothing counts as `missing` throughout.
 template <typename T>

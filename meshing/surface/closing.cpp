@@ -15,6 +15,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/face_adjacency.h"
+#include "libcgs/core/nan.h"
 #include "meshing/edit/boolean.h"
 #include "meshing/edit/hole_filling.h"
 #include "meshing/edit/repair.h"
@@ -32,8 +33,6 @@
 namespace cgs {
 
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 double diagonal_of(const TriangleMesh& mesh) {
   Eigen::AlignedBox3d box;

@@ -90,9 +90,9 @@ struct LinearPart {
 /// The grid points around the zero surface of a function: all corners of every voxel that it comes
 /// into. Beyond a box around the points, to which sheets that nothing closes run out, is outside.
 /// The grid counts in voxels, for OpenVDB takes no tiny ones.
-class Band {
+class PoissonBand {
  public:
-  Band(const Eigen::AlignedBox3d& box, double voxel) : box_(box), voxel_(voxel) {}
+  PoissonBand(const Eigen::AlignedBox3d& box, double voxel) : box_(box), voxel_(voxel) {}
 
   /// \throws LimitError if that takes too many grid points
   void add(const LinearPart& part) {
@@ -288,7 +288,7 @@ PoissonSurface poisson_surface(const TriangleMesh& cloud,
   const std::vector<LinearPart> parts = crossed_parts(function);
   const Eigen::AlignedBox3d box = box_around(points.vertices);
   out.spacing = grid_spacing(parts, box, out.spacing, options.spacing > 0);
-  Band band(box, out.spacing);
+  PoissonBand band(box, out.spacing);
   for (const LinearPart& part : parts) band.add(part);
   out.mesh = closed_surface(*band.distances(function), out.spacing);
   report(progress, 0.9);

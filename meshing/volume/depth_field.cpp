@@ -5,11 +5,11 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/lanes.h"
+#include "libcgs/core/nan.h"
 #include "libcgs/core/padded_raster.h"
 #include "meshing/volume/sighting_kernel.h"
 
@@ -17,7 +17,6 @@ namespace cgs {
 
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kBackground = 1e6f;  // Depth of rays that hit nothing; far beyond any surface.
 constexpr float kMinSlope = 0.25f;   // At grazing incidence the local plane says little.
 constexpr float kMinFacing = 0.05f;  // Cosine of incidence.
