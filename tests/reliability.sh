@@ -47,7 +47,7 @@ bad_inputs() { figures 'bad inputs:' "$bin/e2e_bad_inputs_test"; }
 sweep() {
   CGS_SWEEP=full TMPDIR=$(tests/memory_folder.sh) figures 'sweep:' "$bin/bad_input_sweep"
 }
-extremes() { figures 'extremes cells' "$bin/extremes_test"; }
+extremes() { CGS_SWEEP=full figures 'extremes cells' "$bin/extremes_test"; }
 hashes() { figures 'hashes:' "$bin/e2e_verify_test"; }
 power_cuts() {
   CGS_FAULTS=$faults figures 'power cuts:' tests/e2e/power_loss_test.py "$bin/cgs" "$bin/cgs_make_capture" \

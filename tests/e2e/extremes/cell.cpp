@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <sstream>
+#include <string_view>
 
 #include <nlohmann/json.hpp>
 
@@ -89,14 +91,18 @@ bool Cell::is_exact() const {
 
 const std::vector<Cell>& cells() {
   static const std::vector<Cell> kCells = [] {
-    const std::vector<std::pair<const char*, Eigen::Vector3d>> moves = {
+    const std::vector<std::pair<std::string_view, Eigen::Vector3d>> moves = {
         {"T=0", Eigen::Vector3d::Zero()},
         {"T=1e3", Eigen::Vector3d(1e3, -1e3, 1e3)},
         {"T=UTM", Eigen::Vector3d(4.5e5, 5.4e6, 100)},
         {"T=ECEF", Eigen::Vector3d(-2.49e6, -4.68e6, 3.53e6)}};
+    const char* const wish = std::getenv("CGS_SWEEP");
+    const bool is_full = wish != nullptr && std::string_view(wish) == "full";
     std::vector<Cell> out;
     for (const auto& [name, move] : moves) {
       for (const double scale : {0x1p-20, 1e-6, 1e-3, 1.0, 1e3, 1e6, 0x1p20}) {
+        const bool is_corner = (scale == 0x1p-20 || scale == 0x1p20) && !name.starts_with("T=1");
+        if (!is_full && name != "T=UTM" && scale != 1 && !is_corner) continue;
         std::ostringstream label;
         label << "S=" << scale << " " << name;
         out.push_back({scale, move, label.str()});

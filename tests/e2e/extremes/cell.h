@@ -32,7 +32,8 @@ struct Cell {
   static constexpr double kExtent = 2;  ///< Of what the cells hold, roughly.
 };
 
-/// 7 scales times 4 places.
+/// 7 scales times 4 places where CGS_SWEEP=full says so; else half of these: all scales at one
+/// place, all places at one scale, and the corners of the grid.
 const std::vector<Cell>& cells();
 
 /// What a kind of work found in a cell.
