@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "samples/capture/files.h"
+#include "tests/support/portal_capture.h"
 #include "tests/support/run_cgs.h"
 
 namespace cgs {
@@ -21,10 +21,7 @@ using test::TempDir;
 class Budget : public testing::Test {
  protected:
   // 252 x 189 pixels at 2, 168 x 126 at 3.
-  void make_capture(int divisor) const {
-    const auto views = capture_views(divisor);
-    write_capture(dir_ / "capture", portal_scene(), views, input_cameras(views));
-  }
+  void make_capture(int divisor) const { test::copy_portal_capture(dir_ / "capture", divisor); }
 
   test::ProgramResult run(const std::string& budget, const std::string& more = "") const {
     return run_cgs("run " + (dir_ / "capture").string() +

@@ -14,7 +14,8 @@
 #include "io/meshes/mesh_ply.h"
 #include "io/meshes/stl_reader.h"
 #include "io/scenes/cameras_json.h"
-#include "samples/capture/files.h"
+#include "samples/capture/truth.h"
+#include "tests/support/portal_capture.h"
 #include "tests/support/run_cgs.h"
 
 namespace cgs {
@@ -52,7 +53,7 @@ class ControlPoints : public testing::Test {
     dir_ = new TempDir;
     const auto views = capture_views(kDivisor);
     const PortalScene scene = portal_scene();
-    write_capture(*dir_ / "capture", scene, views, input_cameras(views));
+    test::copy_portal_capture(*dir_ / "capture", kDivisor);
     depth_ = new DepthMap(exact_depth(scene, views[1].camera));
     points_ = new std::vector<Eigen::Vector3d>(visible_points(scene, views));
     write_table();

@@ -15,7 +15,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
-#include "samples/capture/files.h"
+#include "tests/support/portal_capture.h"
 #include "tests/support/run_folder.h"
 
 namespace cgs {
@@ -85,9 +85,8 @@ class Faults : public testing::Test {
       return;
     }
     dir_ = new test::TempDir;
-    auto views = capture_views(3);
-    views.erase(views.begin() + 4, views.end());  // more that are held out only repeat its calls
-    write_capture(*dir_ / "capture", portal_scene(), views, input_cameras(views));
+    constexpr size_t kViews = 4;  // more that are held out only repeat its calls
+    test::copy_portal_capture(*dir_ / "capture", 3, kViews);
     const std::string trace =
         "-y -e trace=" + std::string(kCalls) + " -o " + (*dir_ / "calls").string();
     ASSERT_EQ(run("whole", trace), 0) << message();

@@ -16,7 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "samples/capture/files.h"
+#include "tests/support/portal_capture.h"
 #include "tests/support/run_folder.h"
 
 namespace cgs {
@@ -108,15 +108,10 @@ int wished_kills(int otherwise) {
   return wish != nullptr ? std::atoi(wish) : otherwise;
 }
 
-void write_small_capture(const fs::path& folder) {
-  const auto views = capture_views(3);
-  write_capture(folder, portal_scene(), views, input_cameras(views));
-}
-
 TEST(Killed, TrainingLosesWhatWasDoneSinceItsLastState) {
   constexpr double kBetweenStates = 20;  // [s]
   const test::TempDir dir;
-  write_small_capture(dir / "capture");
+  test::copy_portal_capture(dir / "capture", 3);
   const Arguments arguments = train_arguments(dir / "capture", "steps=100000", dir / "model");
   std::mt19937 random(11);
   double worst = 0;
@@ -135,7 +130,7 @@ TEST(Killed, TrainingLosesWhatWasDoneSinceItsLastState) {
 // Interrupted, a training saves its state: whatever moments these are, it ends with the same model.
 TEST(Killed, InterruptedTrainingEndsWithTheModelOfOneThatWasNot) {
   const test::TempDir dir;
-  write_small_capture(dir / "capture");
+  test::copy_portal_capture(dir / "capture", 3);
   const auto arguments = [&](const char* model) {
     return train_arguments(dir / "capture", "steps=600", dir / model);
   };
@@ -162,7 +157,7 @@ TEST(Killed, InterruptedTrainingEndsWithTheModelOfOneThatWasNot) {
 // The second ends the program at once, wherever it is.
 TEST(Killed, TwoInterruptsLeaveNoHalfFile) {
   const test::TempDir dir;
-  write_small_capture(dir / "capture");
+  test::copy_portal_capture(dir / "capture", 3);
   const Arguments arguments = run_arguments(dir / "capture", dir / "out");
   ASSERT_EQ(exit_code_of(start_cgs(run_arguments(dir / "capture", dir / "whole"))), 0);
   const auto expected = test::files_of_run(dir / "whole");
@@ -185,7 +180,7 @@ TEST(Killed, TwoInterruptsLeaveNoHalfFile) {
 TEST(Killed, RunGoesOnToTheFilesOfOneThatWasNotKilled) {
   const test::TempDir dir;
   const fs::path capture = dir / "capture";
-  write_small_capture(capture);
+  test::copy_portal_capture(capture, 3);
   const auto start = std::chrono::steady_clock::now();
   ASSERT_EQ(exit_code_of(start_cgs(run_arguments(capture, dir / "whole"))), 0);
   const Seconds whole = std::chrono::steady_clock::now() - start;

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "samples/capture/files.h"
+#include "tests/support/portal_capture.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/triangles.h"
 
@@ -26,11 +26,6 @@ std::string run_arguments(const TempDir& dir, const std::string& more) {
   return "run " + (dir / "capture").string() +
          " --views view_01,view_02,view_03 --assume-unit ft --set steps=0 -q -o " +
          (dir / "out").string() + " " + more;
-}
-
-void make_capture(const TempDir& dir, int divisor) {
-  const auto views = capture_views(divisor);
-  write_capture(dir / "capture", portal_scene(), views, input_cameras(views));
 }
 
 json parsed(const fs::path& path) { return json::parse(test::read_bytes(path)); }
@@ -134,7 +129,7 @@ size_t pixels_of(const test::Glb& glb) {
 
 TEST(Asset, LeavesOutFacesThatHoldColoursAndStaysNear) {
   const TempDir dir;
-  make_capture(dir, 3);
+  test::copy_portal_capture(dir / "capture", 3);
   const auto run = run_cgs(run_arguments(dir, "--json --voxel-size 0.08"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const json report = json::parse(run.out);
@@ -149,7 +144,7 @@ TEST(Asset, LeavesOutFacesThatHoldColoursAndStaysNear) {
 
 TEST(Levels, AreSmallerAndAsFarOffAsTheySay) {
   const TempDir dir;
-  make_capture(dir, 3);
+  test::copy_portal_capture(dir / "capture", 3);
   const auto run = run_cgs(run_arguments(dir, "--lods 2 --json --voxel-size 0.08"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const json levels = parsed(dir / "out/run.json")["stages"]["web"]["result"]["levels"];
@@ -206,7 +201,7 @@ TEST(Levels, AreSmallerAndAsFarOffAsTheySay) {
 
 TEST(Levels, AreOutputsOfTheRunAsOthersAre) {
   const TempDir dir;
-  make_capture(dir, 18);
+  test::copy_portal_capture(dir / "capture", 18);
   const auto succeeds = [&](const std::string& more) {
     const auto run = run_cgs(run_arguments(dir, more));
     EXPECT_EQ(run.exit_code, 0) << run.err;
@@ -241,7 +236,7 @@ TEST(Levels, AreOutputsOfTheRunAsOthersAre) {
 
 TEST(Levels, GoOnFromWhatAPromiseLeaves) {
   const TempDir dir;
-  make_capture(dir, 18);
+  test::copy_portal_capture(dir / "capture", 18);
   const auto run = run_cgs(run_arguments(dir, "--lods 1 --max-error 20cm --max-size 60kB"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_LE(fs::file_size(dir / "out/web/asset.glb"), 60'000u);

@@ -7,7 +7,7 @@
 #include "io/images/image.h"
 #include "io/images/png.h"
 #include "libcgs/core/exposure.h"
-#include "samples/capture/files.h"
+#include "tests/support/portal_capture.h"
 #include "tests/support/portal_measurement.h"
 #include "tests/support/run_cgs.h"
 
@@ -17,17 +17,10 @@ namespace {
 using nlohmann::ordered_json;
 using test::run_cgs;
 
-const std::filesystem::path kCapture = std::filesystem::path(CGS_TEST_FOLDER) / "capture";
-const std::filesystem::path kSmallCapture =
-    std::filesystem::path(CGS_TEST_FOLDER) / "capture_small";
+const std::filesystem::path kCapture = test::portal_capture(1);
+const std::filesystem::path kSmallCapture = test::portal_capture(3);
 const std::filesystem::path kRun = std::filesystem::path(CGS_TEST_FOLDER) / "run";
 const std::filesystem::path kSmallRun = std::filesystem::path(CGS_TEST_FOLDER) / "run_small";
-
-void make_capture(const std::filesystem::path& folder, int downscale) {
-  if (std::filesystem::exists(folder / "capture.json")) return;
-  const auto views = capture_views(downscale);
-  write_capture(folder, portal_scene(), views, input_cameras(views));
-}
 
 std::string run_arguments(const std::filesystem::path& capture, const std::filesystem::path& out) {
   return "run " + capture.string() + " --views view_01,view_02,view_03 --assume-unit m -q -o " +
@@ -35,7 +28,6 @@ std::string run_arguments(const std::filesystem::path& capture, const std::files
 }
 
 TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
-  make_capture(kCapture, 1);
   std::filesystem::remove_all(kRun);
   const auto result = run_cgs(run_arguments(kCapture, kRun));
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -83,7 +75,6 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
 }
 
 TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
-  make_capture(kSmallCapture, 3);
   std::filesystem::remove_all(kSmallRun);
   const std::string arguments = run_arguments(kSmallCapture, kSmallRun) +
                                 " --voxel-size 8cm --lods 2";  // for other_readers.sh, too
@@ -97,7 +88,6 @@ TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
 }
 
 TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
-  make_capture(kSmallCapture, 3);
   const test::TempDir dir;
   ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "1") + " --threads 1").exit_code, 0);
   ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "3") + " --threads 3").exit_code, 0);
@@ -113,7 +103,6 @@ TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
 }
 
 TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
-  make_capture(kSmallCapture, 3);
   const test::TempDir dir;
   const auto result = run_cgs("run " + kSmallCapture.string() + " --views 0,1,2 --json -o " +
                               (dir / "out").string());
@@ -139,7 +128,7 @@ TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
 
 TEST(Portal, StrictEndsAtAWarningBeforeAnythingIsWritten) {
   const test::TempDir dir;
-  make_capture(dir / "capture", 6);
+  test::copy_portal_capture(dir / "capture", 6);
   std::filesystem::remove(dir / "capture/images/view_05.png");
   const auto strict = run_cgs(run_arguments(dir / "capture", dir / "out") + " --strict");
   EXPECT_EQ(strict.exit_code, 3);
@@ -151,7 +140,7 @@ TEST(Portal, StrictEndsAtAWarningBeforeAnythingIsWritten) {
 
 TEST(Portal, StrictLetsPassThatAFocalLengthWasSolvedFor) {
   const test::TempDir dir;
-  make_capture(dir / "capture", 1);
+  test::copy_portal_capture(dir / "capture", 1);
   std::filesystem::create_directory(dir / "photos");
   for (const char* name : {"view_01.png", "view_02.png", "view_03.png"}) {
     std::filesystem::rename(dir / "capture/images" / name, dir / "photos" / name);
@@ -167,7 +156,6 @@ TEST(Portal, StrictLetsPassThatAFocalLengthWasSolvedFor) {
 }
 
 TEST(Portal, StagesByHandGiveTheFilesOfARun) {
-  make_capture(kSmallCapture, 3);
   const test::TempDir dir;
   const std::string out = dir.path().string();
   ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "run")).exit_code, 0);
@@ -214,7 +202,6 @@ double held_out_psnr(const std::filesystem::path& capture, const std::filesystem
 }
 
 TEST(Portal, LosesNothingToAnAutomaticExposure) {
-  make_capture(kSmallCapture, 3);
   const test::TempDir dir;
   std::filesystem::copy(kSmallCapture, dir / "capture", std::filesystem::copy_options::recursive);
   for (const auto& [name, gain] : {std::pair("view_02.png", Eigen::Vector3f(0.7f, 0.65f, 0.6f)),

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/meshes/mesh_ply.h"
-#include "samples/capture/files.h"
+#include "tests/support/portal_capture.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/triangles.h"
 
@@ -24,11 +24,6 @@ using test::TempDir;
 using test::Triangle;
 using test::triangles_of_glb;
 using test::two_ways;
-
-void make_capture(const fs::path& folder, int divisor) {
-  const auto views = capture_views(divisor);
-  write_capture(folder, portal_scene(), views, input_cameras(views));
-}
 
 std::string run_arguments(const TempDir& dir, const std::string& out) {
   return "run " + (dir / "capture").string() +
@@ -85,7 +80,7 @@ std::pair<double, double> areas_known_to(const fs::path& path, double length) {
 
 TEST(MaxError, IsKeptByEveryMeshFile) {
   const TempDir dir;
-  make_capture(dir / "capture", 9);
+  test::copy_portal_capture(dir / "capture", 9);
   const auto run = run_cgs(run_arguments(dir, "out") + " --max-error 12cm --json");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const fs::path out = dir / "out";
@@ -118,7 +113,7 @@ TEST(MaxError, IsKeptByEveryMeshFile) {
 
 TEST(MaxSize, IsKeptWithTheDeviationStated) {
   const TempDir dir;
-  make_capture(dir / "capture", 9);
+  test::copy_portal_capture(dir / "capture", 9);
   ASSERT_EQ(run_cgs(run_arguments(dir, "out")).exit_code, 0);
   const fs::path out = dir / "out";
   const fs::path asset = out / "web/asset.glb";
@@ -147,7 +142,7 @@ TEST(MaxSize, IsKeptWithTheDeviationStated) {
 
 TEST(MaxSize, ThatCannotBeReachedSaysWhatCanAndKeepsTheOthers) {
   const TempDir dir;
-  make_capture(dir / "capture", 18);
+  test::copy_portal_capture(dir / "capture", 18);
   const auto run = run_cgs(run_arguments(dir, "out") + " --max-size 1kB");
   EXPECT_EQ(run.exit_code, 4);
   EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
@@ -167,7 +162,7 @@ TEST(MaxSize, ThatCannotBeReachedSaysWhatCanAndKeepsTheOthers) {
 
 TEST(Promises, RedoWhatTheyChangeAlone) {
   const TempDir dir;
-  make_capture(dir / "capture", 18);
+  test::copy_portal_capture(dir / "capture", 18);
   const auto begun = [&](const std::string& options) {
     const auto run = run_cgs(run_arguments(dir, "out") + " " + options);
     EXPECT_EQ(run.exit_code, 0) << run.err;
@@ -192,7 +187,7 @@ TEST(Promises, RedoWhatTheyChangeAlone) {
 
 TEST(Promises, ThatContradictOrCannotBeReadAreRefusedBeforeAnyWork) {
   const TempDir dir;
-  make_capture(dir / "capture", 18);
+  test::copy_portal_capture(dir / "capture", 18);
   for (const auto& [options, words] :
        {std::pair("--max-error 1cm --simplify 2mm", "--simplify"),
         std::pair("--max-error 1cm --compression-error 2mm", "--compression-error"),

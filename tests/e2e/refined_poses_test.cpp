@@ -6,7 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "io/scenes/cameras_json.h"
-#include "samples/capture/files.h"
+#include "samples/capture/truth.h"
+#include "tests/support/portal_capture.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/unposed_photos.h"
 
@@ -26,7 +27,7 @@ class RefinedPoses : public testing::Test {
     dir_ = new test::TempDir;
     auto views = capture_views(kDivisor);
     views.resize(4);
-    write_capture(scene(), portal_scene(), views, input_cameras(views));
+    test::copy_portal_capture(scene(), kDivisor, views.size());
     json transforms = json::parse(test::read_bytes(scene() / "transforms.json"));
     for (size_t i = 0; i < views.size(); ++i) {
       json& rows = transforms["frames"][i]["transform_matrix"];

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Opens report.html of a small run in a browser and works it as people do: mouse, keys, buttons.
 
-usage: report_page_test.py CGS CGS_MAKE_CAPTURE FOLDER
+usage: report_page_test.py CGS CAPTURE FOLDER
 
 What the page says is held against the photograph, the cameras and `cgs measure`. Pictures of the
 page stay in FOLDER/screens. Exit status 77: the browser cannot be started.
@@ -33,7 +33,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
 SKIPPED = 77
-CGS, MAKE_CAPTURE, FOLDER = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
+CGS, CAPTURE, FOLDER = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
 OUT = FOLDER / 'run'
 SCREENS = FOLDER / 'screens'
 
@@ -42,7 +42,7 @@ def setUpModule():
     shutil.rmtree(FOLDER, ignore_errors=True)
     SCREENS.mkdir(parents=True)
     capture = FOLDER / 'capture'
-    subprocess.run([MAKE_CAPTURE, capture, '--downscale', '3'], check=True)
+    shutil.copytree(CAPTURE, capture)
     crop_and_stretch(capture, 'view_02')
     # Metres that are not the units of the files, so that no figure is right by chance.
     subprocess.run([CGS, 'run', capture, '--views', 'view_01,view_02,view_03', '--assume-unit', 'ft',

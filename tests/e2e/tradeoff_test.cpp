@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "samples/capture/files.h"
+#include "tests/support/portal_capture.h"
 #include "tests/support/run_cgs.h"
 
 namespace cgs {
@@ -13,11 +13,6 @@ namespace {
 using nlohmann::json;
 using test::run_cgs;
 using test::TempDir;
-
-void make_capture(const std::filesystem::path& folder) {
-  const auto views = capture_views(18);
-  write_capture(folder, portal_scene(), views, input_cameras(views));
-}
 
 std::string arguments(const TempDir& dir, const std::string& out) {
   return "tradeoff " + (dir / "capture").string() +
@@ -38,7 +33,7 @@ json qualities(const std::filesystem::path& folder) {
 
 TEST(Tradeoff, MeasuresRecommendsAndResumes) {
   const TempDir dir;
-  make_capture(dir / "capture");
+  test::copy_portal_capture(dir / "capture", 18);
   const auto whole =
       run_cgs(arguments(dir, "whole") + " --want 'size<1MB' --want 'time<1h' --json");
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
@@ -88,7 +83,7 @@ TEST(Tradeoff, MeasuresRecommendsAndResumes) {
 
 TEST(Tradeoff, RefusesBadRequestsInOneLineBeforeAnyWork) {
   const TempDir dir;
-  make_capture(dir / "capture");
+  test::copy_portal_capture(dir / "capture", 18);
   const std::string scene =
       "tradeoff " + (dir / "capture").string() + " -o " + (dir / "o").string();
   for (const std::string& bad : {std::string("--want speed=3"),
