@@ -83,15 +83,12 @@ TimedRun trial(const Search& search, int downscale, int steps) {
   (void)search.terminal.begin("trying " + size_words(search.opened.scene, downscale));
   Terminal silent = Terminal::silent();
   const auto start = Clock::now();
-  const Json report = run_pipeline(request, silent);
   TimedRun out;
+  out.stages = run_pipeline(request, silent).seconds;
   out.pixels = search.pixels_at(downscale);
   out.steps = steps;
   out.opening = std::chrono::duration<double>(Clock::now() - start).count();
-  for (const Json& stage : report.at("stages")) {
-    out.stages.emplace_back(stage.at("stage"), stage.at("seconds"));
-    out.opening -= out.stages.back().second;
-  }
+  for (const auto& [stage, seconds] : out.stages) out.opening -= seconds;
   out.opening = std::max(0.0, out.opening);
   (void)search.terminal.end(std::to_string(steps) + " steps");
   return out;
@@ -262,7 +259,7 @@ Json choose(Search& search) {
   Json trials = Json::array();
   for (const TimedRun& run : search.runs) {
     Json stages = Json::object();
-    for (const auto& [stage, seconds] : run.stages) stages[stage] = seconds;
+    for (const auto& [stage, seconds] : run.stages) stages[traits(stage).name] = seconds;
     trials.push_back({{"pixels", run.pixels},
                       {"steps", run.steps},
                       {"opening_seconds", run.opening},

@@ -22,6 +22,7 @@
 #include "convert/run_files.h"
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
+#include "convert/stage.h"
 #include "convert/stage_cost.h"
 #include "convert/stated_frame.h"
 #include "convert/views.h"
@@ -58,6 +59,12 @@ struct Run {
   std::vector<std::string> hitches;  ///< Of the stage that runs, for the terminal alone.
   const Terminal& terminal;          ///< For what must be said before a stage ends.
 };
+
+bool is_done(const Run& run, const StageFiles& stage) {
+  return run.record.is_done(traits(stage.stage).name, stage.files);
+}
+
+Json result_of(const Run& run, Stage stage) { return run.record.result(traits(stage).name); }
 
 // Decodes every photograph once before anything is written: a run must not stop halfway, or leave
 // a folder behind, because of a damaged file.
@@ -127,7 +134,7 @@ Json run_scale(Run& run, const Progress& progress) {
   frame.metres_sigma = run.scene.frame.metres_sigma;
   frame.scale_source = run.scene.frame.scale_source;
   frame.up = run.scene.frame.up;
-  take_sensor_scale(sensor_scale(run.record.result("model")), frame);
+  take_sensor_scale(sensor_scale(result_of(run, Stage::Model)), frame);
   Json result = run.control;
   if (result.is_null()) result = scale_by(run.distances, run.markers, model);
   widen_by_focal(frame, run.focal_sigma);
@@ -170,8 +177,8 @@ Json run_web(Run& run, const Progress& progress) {
   return write_assets(model,
                       loaded_mesh(run),
                       run.request,
-                      run.record.result("model").at("description"),
-                      run.record.result("mesh"),
+                      result_of(run, Stage::Model).at("description"),
+                      result_of(run, Stage::Mesh),
                       progress);
 }
 
@@ -184,16 +191,16 @@ Json report_json(const Run& run) {
     stages.push_back(
         {{"stage", name}, {"seconds", stage["seconds"]}, {"peak_memory", stage["peak_memory"]}});
   }
-  const Json mesh = run.record.result("mesh");
+  const Json mesh = result_of(run, Stage::Mesh);
   Json warnings = run.scene.warnings;
-  for (const char* stage : {"model", "scale"}) {
-    const Json result = run.record.result(stage);
+  for (const Stage stage : {Stage::Model, Stage::Scale}) {
+    const Json result = result_of(run, stage);
     if (!result.is_object()) continue;
     const Json found = result.value("warnings", Json::array());
     warnings.insert(warnings.end(), found.begin(), found.end());
   }
   std::vector<std::string> notes = run.scene.notes;
-  const Json model = run.record.result("model");
+  const Json model = result_of(run, Stage::Model);
   for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
   for (const Json& view : model.value("coverage", Json::array())) {
     if (view.contains("words")) notes.push_back(view["words"].get<std::string>());
@@ -204,14 +211,14 @@ Json report_json(const Run& run) {
               {"units", scene.frame.unit_name()},
               {"scale_source", scale_source_name(scene.frame.scale_source)},
               {"frame", frame_to_json(scene.frame)},
-              {"scale", run.record.result("scale")},
+              {"scale", result_of(run, Stage::Scale)},
               {"model", model},
-              {"views", run.record.result("views")},
-              {"evaluation", run.record.result("evaluation")},
+              {"views", result_of(run, Stage::Views)},
+              {"evaluation", result_of(run, Stage::Evaluation)},
               {"mesh", mesh},
               {"certificate", mesh.at("certificate")},
-              {"web", run.record.result("web")},
-              {"splats", run.record.result("splats")},
+              {"web", result_of(run, Stage::Web)},
+              {"splats", result_of(run, Stage::Splats)},
               {"photographs", photographs},
               {"stages", stages},
               {"warnings", warnings},
@@ -261,32 +268,35 @@ std::map<std::string, std::string> decided_stages(const RunRequest& request, con
   return out;
 }
 
-/// What a stage is called and does.
-struct StageWork {
-  const char* title;
-  Json (*run)(Run&, const Progress&);
-};
-
-const StageWork& work_of(const StageFiles& stage) {
-  static const std::map<std::string, StageWork> kWork = {
-      {"model", {"depth and Gaussians", run_model}},
-      {"scale", {"scale", run_scale}},
-      {"views", {"views", run_views}},
-      {"evaluation", {"held-out views", run_evaluation}},
-      {"splats", {"splats for browsers", run_splats}},
-      {"mesh", {"volume and mesh", run_mesh}},
-      {"web", {"textured assets", run_web}},
-      {"report", {"report", run_report}}};
-  return kWork.at(stage.stage);
+Json do_work(Stage stage, Run& run, const Progress& progress) {
+  switch (stage) {
+    case Stage::Model:
+      return run_model(run, progress);
+    case Stage::Scale:
+      return run_scale(run, progress);
+    case Stage::Views:
+      return run_views(run, progress);
+    case Stage::Evaluation:
+      return run_evaluation(run, progress);
+    case Stage::Splats:
+      return run_splats(run, progress);
+    case Stage::Mesh:
+      return run_mesh(run, progress);
+    case Stage::Web:
+      return run_web(run, progress);
+    case Stage::Report:
+      break;
+  }
+  return run_report(run, progress);
 }
 
 // What somebody changed of the files of a finished stage may be wanted, and stays.
 void warn_of_changed_files(const StageFiles& stage, const Run& run, const Terminal& terminal) {
   std::set<std::string> unsettled;  // a later stage may have been stopped after it wrote them
   for (const StageFiles& other : run.stages) {
-    if (!run.record.is_done(other.stage, other.files)) unsettled.merge(other.all());
+    if (!is_done(run, other)) unsettled.merge(other.all());
   }
-  for (const std::string& file : run.record.changed_files(stage.stage)) {
+  for (const std::string& file : run.record.changed_files(traits(stage.stage).name)) {
     if (unsettled.contains(file)) continue;
     terminal.warn({printable(run.request.output / file) +
                    " is not what the run wrote and stays as it is; remove it to have it made "
@@ -308,8 +318,8 @@ void warn_of(const Json& result, const Terminal& terminal) {
 }
 
 // What a user would not expect of a stage: "kept 33165 of 142884".
-std::string remark_on(const std::string& stage, const Json& result) {
-  if (stage == "model") {
+std::string remark_on(Stage stage, const Json& result) {
+  if (stage == Stage::Model) {
     std::string out = result["given_depth"].is_object()
                           ? "depth files: " + result["given_depth"].value("words", "")
                           : "";
@@ -318,7 +328,7 @@ std::string remark_on(const std::string& stage, const Json& result) {
     }
     return out;
   }
-  if (stage != "splats") return "";
+  if (stage != Stage::Splats) return "";
   const Json& thinning = result["thinning"];
   return "kept " + std::to_string(thinning["kept"].get<size_t>()) + " of " +
          std::to_string(thinning["of"].get<size_t>());
@@ -332,33 +342,37 @@ void erase_left_out(const Json& result, std::set<std::string>& outputs) {
   for (const auto& [name, why] : left_out.items()) outputs.erase("mesh/" + name);
 }
 
-Json run_stages(Run& run, Terminal& terminal) {
+void do_stage(const StageFiles& stage, Run& run, Terminal& terminal) {
+  const std::filesystem::path& output = run.request.output;
+  const Json before = earlier_outputs(stage, run.stages, run.record, output);
+  const CostMeter meter;  // from here on the peak of memory is that of the stage
+  const Json result = do_work(stage.stage, run, terminal.begin(traits(stage.stage).title));
+  const double seconds = terminal.end(remark_on(stage.stage, result));
+  const std::vector<std::string> written = named_outputs(output, stage.all());
+  std::set<std::string> outputs(written.begin(), written.end());
+  erase_left_out(result, outputs);
+  const Json after = earlier_outputs(stage, run.stages, run.record, output);
+  for (const auto& [name, hash] : after.items()) {
+    if (before.value(name, Json()) == hash) outputs.erase(name);
+  }
+  run.record.finish(traits(stage.stage).name, seconds, result, outputs);
+  warn_of(result, terminal);
+  terminal.warn(std::exchange(run.hitches, {}));
+}
+
+FinishedRun run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
   const std::filesystem::path& output = run.request.output;
   for (const StageFiles& stage : run.stages) {
-    const StageWork& work = work_of(stage);
-    if (!stale && run.record.is_done(stage.stage, stage.files)) {
-      terminal.say(std::string(work.title) + ": done before");
-      warn_of(run.record.result(stage.stage), terminal);
+    if (!stale && is_done(run, stage)) {
+      terminal.say(std::string(traits(stage.stage).title) + ": done before");
+      warn_of(result_of(run, stage.stage), terminal);
       warn_of_changed_files(stage, run, terminal);
       continue;
     }
     if (!stale) remove_outputs_after(stage.stage, run.stages, run.record, output);
     stale = true;
-    const Json before = earlier_outputs(stage, run.stages, run.record, output);
-    const CostMeter meter;  // from here on the peak of memory is that of the stage
-    const Json result = work.run(run, terminal.begin(work.title));
-    const double seconds = terminal.end(remark_on(stage.stage, result));
-    const std::vector<std::string> written = named_outputs(output, stage.all());
-    std::set<std::string> outputs(written.begin(), written.end());
-    erase_left_out(result, outputs);
-    const Json after = earlier_outputs(stage, run.stages, run.record, output);
-    for (const auto& [name, hash] : after.items()) {
-      if (before.value(name, Json()) == hash) outputs.erase(name);
-    }
-    run.record.finish(stage.stage, seconds, result, outputs);
-    warn_of(result, terminal);
-    terminal.warn(std::exchange(run.hitches, {}));
+    do_stage(stage, run, terminal);
   }
   forget_checkpoints(output / "model");
   run.record.note("focal", run.request.scene.focal);
@@ -370,7 +384,11 @@ Json run_stages(Run& run, Terminal& terminal) {
   run.record.note("depth_options", depth_options_json(run.request.scene.options.depth));
   note_outputs(run, stale);
   loaded_model(run);
-  return report_json(run);
+  FinishedRun out{report_json(run), {}};
+  for (const StageFiles& stage : run.stages) {
+    out.seconds.emplace_back(stage.stage, run.record.seconds(traits(stage.stage).name));
+  }
+  return out;
 }
 
 // Lengths that will be refused, before minutes are spent on cameras.
@@ -402,7 +420,7 @@ void remove_all_abandoned_files(const std::filesystem::path& output) {
 
 }  // namespace
 
-Json run_pipeline(const RunRequest& request, Terminal& terminal) {
+FinishedRun run_pipeline(const RunRequest& request, Terminal& terminal) {
   refuse_contradictions(request);
   check_lengths_of_photographs(request);
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
@@ -433,7 +451,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   remove_all_abandoned_files(request.output);
   opened.keep(request.output / "model");
   Json predicted = Json::object();
-  for (const StageMemory& stage : plan) predicted[stage.stage] = stage.bytes;
+  for (const StageMemory& stage : plan) predicted[traits(stage.stage).title] = stage.bytes;
   record.note("predicted_memory", predicted);
   record.note("camera_fit", fit);
   record.note("refined_poses", opened.refined ? opened.refined->report : Json());

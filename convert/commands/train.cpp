@@ -82,7 +82,7 @@ void run_train(const TrainArgs& args) {
   terminal.note(scene.notes);
   terminal.warn(scene.warnings);
   TrainedModel trained =
-      train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
+      train_model(std::move(scene), request, terminal.begin(traits(Stage::Model).title));
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
   const std::vector<std::string> found(warnings.begin() + static_cast<std::ptrdiff_t>(known),
                                        warnings.end());
