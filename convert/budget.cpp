@@ -14,6 +14,7 @@
 #include "convert/memory_plan.h"
 #include "convert/model_training.h"
 #include "convert/pipeline.h"
+#include "convert/request_fields.h"
 #include "convert/time_model.h"
 #include "io/atomic_file.h"
 #include "io/content_hash.h"

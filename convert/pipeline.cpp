@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/pipeline.h"
 
-#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -16,9 +15,9 @@
 #include "convert/memory_plan.h"
 #include "convert/model.h"
 #include "convert/model_training.h"
-#include "convert/recorded_request.h"
 #include "convert/report.h"
 #include "convert/report_viewer.h"
+#include "convert/request_fields.h"
 #include "convert/run_files.h"
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
@@ -238,36 +237,6 @@ Json run_report(Run& run, const Progress& progress) {
   return {{"pages", 1}};
 }
 
-/// Which stage a part of the request first has a say in; what is not here decides all.
-std::map<std::string, std::string> decided_stages(const RunRequest& request, const Scene& scene) {
-  // Which photographs are meant is decided by their names and hashes, wherever they lie.
-  std::map<std::string, std::string> out = {{"scene", "report"},
-                                            {"views", "report"},
-                                            {"assume_unit", "scale"},
-                                            {"up", "scale"},
-                                            {"known_distances", "scale"},
-                                            {"marker_size", "scale"},
-                                            {"control_points", "scale"},
-                                            {"stated_scale", "scale"},
-                                            {"held_out_images", "views"},
-                                            {"voxel_size", "mesh"},
-                                            {"estimated", "mesh"},
-                                            {"simplify", "mesh"},
-                                            {"max_error", "mesh"},
-                                            {"compression_error", "web"},
-                                            {"glb_encoding", "web"},
-                                            {"lods", "web"},
-                                            {"max_size", "web"}};
-  // Metric depth is brought into the scene by its unit where photographs do not tell how, and held
-  // against it where they do.
-  if (has_given_depth(request.scene, scene)) {
-    out.erase("assume_unit");
-    out.erase("control_points");
-    out.erase("stated_scale");
-  }
-  return out;
-}
-
 Json do_work(Stage stage, Run& run, const Progress& progress) {
   switch (stage) {
     case Stage::Model:
@@ -375,13 +344,10 @@ FinishedRun run_stages(Run& run, Terminal& terminal) {
     do_stage(stage, run, terminal);
   }
   forget_checkpoints(output / "model");
-  run.record.note("focal", run.request.scene.focal);
-  const std::filesystem::path& control = run.request.scene.control.file;
-  if (!control.empty()) {
-    run.record.note("control_points", std::filesystem::weakly_canonical(control).string());
+  for (const RequestField& field : noted_fields()) {
+    const Json value = field.write(run.request, run.scene);
+    if (!value.is_null()) run.record.note(field.key, value);
   }
-  run.record.note("allow_external", run.request.scene.options.allow_external);
-  run.record.note("depth_options", depth_options_json(run.request.scene.options.depth));
   note_outputs(run, stale);
   loaded_model(run);
   FinishedRun out{report_json(run), {}};

@@ -15,6 +15,7 @@
 #include "convert/comparison.h"
 #include "convert/measured_file.h"
 #include "convert/memory_plan.h"
+#include "convert/request_fields.h"
 #include "convert/run_record.h"
 #include "convert/run_stages.h"
 #include "convert/tradeoff_stages.h"

@@ -7,6 +7,7 @@
 
 #include "convert/pipeline.h"
 #include "convert/recorded_request.h"
+#include "convert/request_fields.h"
 #include "convert/run_record.h"
 #include "io/atomic_file.h"
 #include "io/byte_reader.h"

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "convert/request_fields.h"
 #include "io/atomic_file.h"
 #include "io/masks.h"
 #include "libcgs/core/error.h"
