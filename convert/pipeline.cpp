@@ -92,7 +92,15 @@ const TriangleMesh& loaded_mesh(Run& run) {
   return *run.mesh;
 }
 
-Json run_model(Run& run, const Progress& progress) {
+/// What a stage did.
+struct StageResult {
+  Json report = {};         ///< Goes into run.json.
+  std::string remark = {};  ///< What a user would not expect of it: "kept 33165 of 142884".
+  /// Files that it left out, below the folder of the run: those of another program may stand there.
+  std::vector<std::string> left_out = {};
+};
+
+StageResult run_model(Run& run, const Progress& progress) {
   const std::filesystem::path folder = run.request.output / "model";
   ModelRequest request = {
       {}, run.request.training, folder, run.request.scene.options.depth.network};
@@ -109,21 +117,16 @@ Json run_model(Run& run, const Progress& progress) {
   write_model(folder, trained.model);
   write_file(folder / "training.json", json_text(report) + "\n");
   run.hitches = trained.hitches;
-  return report;
-}
-
-// What the model stage found, as it wrote it down.
-GivenDepthReport sensor_scale(const Json& model) {
-  GivenDepthReport out;
-  const Json given = model.value("given_depth", Json());
-  if (!given.is_object() || !given.contains("metres_per_unit")) return out;
-  out.metres_per_unit = given["metres_per_unit"].get<double>();
-  out.metres_sigma = given["metres_sigma"].get<double>();
-  return out;
+  const GivenDepthReport& given = trained.priors.given;
+  std::string remark = given.kind == DepthKind::Unknown ? "" : "depth files: " + given.found;
+  for (const std::string& words : remarks_on_photographs(report)) {
+    remark += (remark.empty() ? "" : "; ") + words;
+  }
+  return {report, remark};
 }
 
 // The scale is told apart from the model: people learn a length after they saw a first result.
-Json run_scale(Run& run, const Progress& progress) {
+StageResult run_scale(Run& run, const Progress& progress) {
   Model model = read_model_as_written(run.request.output / "model");
   relink_views(model.scene, run.scene);
   report(progress, 0);
@@ -133,7 +136,7 @@ Json run_scale(Run& run, const Progress& progress) {
   frame.metres_sigma = run.scene.frame.metres_sigma;
   frame.scale_source = run.scene.frame.scale_source;
   frame.up = run.scene.frame.up;
-  take_sensor_scale(sensor_scale(result_of(run, Stage::Model)), frame);
+  take_sensor_scale(recorded_sensor_scale(result_of(run, Stage::Model)), frame);
   Json result = run.control;
   if (result.is_null()) result = scale_by(run.distances, run.markers, model);
   widen_by_focal(frame, run.focal_sigma);
@@ -148,37 +151,45 @@ Json run_scale(Run& run, const Progress& progress) {
   }
   use_metres_where_measured(model.scene);
   run.model = std::move(model);
-  return result;
+  return {result};
 }
 
-Json run_views(Run& run, const Progress& progress) {
+StageResult run_views(Run& run, const Progress& progress) {
   Model& model = loaded_model(run);
-  return write_views(
-      model, views_with_photograph(model.scene), run.request.output / "views", progress);
+  return {write_views(
+      model, views_with_photograph(model.scene), run.request.output / "views", progress)};
 }
 
-Json run_evaluation(Run& run, const Progress& progress) {
+StageResult run_evaluation(Run& run, const Progress& progress) {
   Model& model = loaded_model(run);
-  if (model.scene.held_out.empty()) return nullptr;
-  return evaluate_views(model, model.scene.held_out, progress);
+  if (model.scene.held_out.empty()) return {};
+  return {evaluate_views(model, model.scene.held_out, progress)};
 }
 
-Json run_splats(Run& run, const Progress& progress) {
-  return write_web_splats(run.request.output / "web", loaded_model(run), progress);
+StageResult run_splats(Run& run, const Progress& progress) {
+  const WebSplats made = write_web_splats(run.request.output / "web", loaded_model(run), progress);
+  return {web_splats_to_json(made),
+          "kept " + std::to_string(made.thinned.splats.size()) + " of " + std::to_string(made.of)};
 }
 
-Json run_mesh(Run& run, const Progress& progress) {
-  return write_meshes(loaded_model(run), run.request, progress);
+StageResult run_mesh(Run& run, const Progress& progress) {
+  const MeshesReport made = write_meshes(loaded_model(run), run.request, progress);
+  StageResult out{meshes_to_json(made, run.model->scene.frame)};
+  for (const auto& [name, why] : made.files.left_out) out.left_out.push_back("mesh/" + name);
+  return out;
 }
 
-Json run_web(Run& run, const Progress& progress) {
+StageResult run_web(Run& run, const Progress& progress) {
   const Model& model = loaded_model(run);
-  return write_assets(model,
-                      loaded_mesh(run),
-                      run.request,
-                      result_of(run, Stage::Model).at("description"),
-                      result_of(run, Stage::Mesh),
-                      progress);
+  const Frame& frame = model.scene.frame;
+  const AssetsReport made =
+      write_assets(model,
+                   loaded_mesh(run),
+                   run.request,
+                   result_of(run, Stage::Model).at("description").get<std::string>(),
+                   mesh_findings(result_of(run, Stage::Mesh), frame),
+                   progress);
+  return {assets_to_json(made, frame)};
 }
 
 Json report_json(const Run& run) {
@@ -201,9 +212,6 @@ Json report_json(const Run& run) {
   std::vector<std::string> notes = run.scene.notes;
   const Json model = result_of(run, Stage::Model);
   for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
-  for (const Json& view : model.value("coverage", Json::array())) {
-    if (view.contains("words")) notes.push_back(view["words"].get<std::string>());
-  }
   Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
               {"folder", run.request.scene.path.string()},
@@ -227,17 +235,17 @@ Json report_json(const Run& run) {
   return out;
 }
 
-Json run_report(Run& run, const Progress& progress) {
+StageResult run_report(Run& run, const Progress& progress) {
   loaded_model(run);
   report(progress, 0);
   const Json json = report_json(run);
   write_file(run.request.output / "report.json", json_text(json) + "\n");
   const std::string viewer = viewer_section(loaded_model(run), loaded_mesh(run), progress);
   write_html_report(run.request.output, json, run.model->scene, viewer);
-  return {{"pages", 1}};
+  return {Json{{"pages", 1}}};
 }
 
-Json do_work(Stage stage, Run& run, const Progress& progress) {
+StageResult do_work(Stage stage, Run& run, const Progress& progress) {
   switch (stage) {
     case Stage::Model:
       return run_model(run, progress);
@@ -286,46 +294,21 @@ void warn_of(const Json& result, const Terminal& terminal) {
   terminal.warn(result["warnings"].get<std::vector<std::string>>());
 }
 
-// What a user would not expect of a stage: "kept 33165 of 142884".
-std::string remark_on(Stage stage, const Json& result) {
-  if (stage == Stage::Model) {
-    std::string out = result["given_depth"].is_object()
-                          ? "depth files: " + result["given_depth"].value("words", "")
-                          : "";
-    for (const std::string& remark : remarks_on_photographs(result)) {
-      out += (out.empty() ? "" : "; ") + remark;
-    }
-    return out;
-  }
-  if (stage != Stage::Splats) return "";
-  const Json& thinning = result["thinning"];
-  return "kept " + std::to_string(thinning["kept"].get<size_t>()) + " of " +
-         std::to_string(thinning["of"].get<size_t>());
-}
-
-// Where files for CAD were left out, those of another program may stand by their names.
-void erase_left_out(const Json& result, std::set<std::string>& outputs) {
-  const Json output = result.is_object() ? result.value("output", Json()) : Json();
-  if (!output.is_object()) return;
-  const Json left_out = output.value("left_out", Json::object());
-  for (const auto& [name, why] : left_out.items()) outputs.erase("mesh/" + name);
-}
-
 void do_stage(const StageFiles& stage, Run& run, Terminal& terminal) {
   const std::filesystem::path& output = run.request.output;
   const Json before = earlier_outputs(stage, run.stages, run.record, output);
   const CostMeter meter;  // from here on the peak of memory is that of the stage
-  const Json result = do_work(stage.stage, run, terminal.begin(traits(stage.stage).title));
-  const double seconds = terminal.end(remark_on(stage.stage, result));
+  const StageResult result = do_work(stage.stage, run, terminal.begin(traits(stage.stage).title));
+  const double seconds = terminal.end(result.remark);
   const std::vector<std::string> written = named_outputs(output, stage.all());
   std::set<std::string> outputs(written.begin(), written.end());
-  erase_left_out(result, outputs);
+  for (const std::string& file : result.left_out) outputs.erase(file);
   const Json after = earlier_outputs(stage, run.stages, run.record, output);
   for (const auto& [name, hash] : after.items()) {
     if (before.value(name, Json()) == hash) outputs.erase(name);
   }
-  run.record.finish(traits(stage.stage).name, seconds, result, outputs);
-  warn_of(result, terminal);
+  run.record.finish(traits(stage.stage).name, seconds, result.report, outputs);
+  warn_of(result.report, terminal);
   terminal.warn(std::exchange(run.hitches, {}));
 }
 
