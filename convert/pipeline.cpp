@@ -49,7 +49,7 @@ struct Run {
   std::vector<KnownDistance> distances;
   std::vector<MarkerBar> markers;
   Json control;        ///< Of OpenedScene.
-  Json refined;        ///< RefinedPoses::report; null where it was not asked for.
+  Json refined;        ///< As refinement_to_json(); null where it was not asked for.
   double focal_sigma;  ///< Of OpenedScene.
   // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
   // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
@@ -403,7 +403,8 @@ FinishedRun run_pipeline(const RunRequest& request, Terminal& terminal) {
   for (const StageMemory& stage : plan) predicted[traits(stage.stage).title] = stage.bytes;
   record.note("predicted_memory", predicted);
   record.note("camera_fit", fit);
-  record.note("refined_poses", opened.refined ? opened.refined->report : Json());
+  const Json refined = opened.refined ? refinement_to_json(opened.refined->report) : Json();
+  record.note("refined_poses", refined);
   Run run{request,
           std::move(stages),
           std::move(record),
@@ -411,7 +412,7 @@ FinishedRun run_pipeline(const RunRequest& request, Terminal& terminal) {
           std::move(distances),
           std::move(markers),
           std::move(opened.control),
-          opened.refined ? std::move(opened.refined->report) : Json(),
+          refined,
           opened.focal_sigma(),
           {},
           {},

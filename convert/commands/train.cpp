@@ -88,7 +88,7 @@ void run_train(const TrainArgs& args) {
                                        warnings.end());
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
-  if (opened.refined) report["refined_poses"] = opened.refined->report;
+  if (opened.refined) report["refined_poses"] = refinement_to_json(opened.refined->report);
   nlohmann::ordered_json scale = opened.control;
   const bool is_measured = !distances.empty() || !markers.empty();
   if (scale.is_null()) scale = scale_by(distances, markers, trained.model);
