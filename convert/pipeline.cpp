@@ -382,7 +382,7 @@ FinishedRun run_pipeline(const RunRequest& request, Terminal& terminal) {
   check_memory_plan(scene, work, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
   const size_t known = scene.warnings.size();
-  const Json fit = check_stated_cameras(opened, terminal);
+  const Json fit = camera_fit_to_json(check_stated_cameras(opened, terminal));
   terminal.warn(std::vector(scene.warnings.begin() + std::ptrdiff_t(known), scene.warnings.end()));
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
   std::vector<MarkerBar> markers = marker_bars(scene, request.scene.marker_size);

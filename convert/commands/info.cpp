@@ -200,7 +200,7 @@ Json checked_cameras(OpenedScene& opened) {
   Terminal quiet(true);
   std::string reason;
   try {
-    return check_stated_cameras(opened, quiet);
+    return camera_fit_to_json(check_stated_cameras(opened, quiet));
   } catch (const BadInput& error) {
     reason = error.what();
   } catch (const LimitError& error) {
