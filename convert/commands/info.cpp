@@ -106,7 +106,7 @@ Json scene_json(const OpenedScene& opened, const Json& fit) {
           {"baselines", baselines_json(scene)},
           {"depth_files", depth_json(scene)},
           {"camera_fit", fit},
-          {"refined_poses", opened.refined ? opened.refined->report : Json()},
+          {"refined_poses", opened.refined ? refinement_to_json(opened.refined->report) : Json()},
           {"missing", scene.missing},
           {"warnings", scene.warnings},
           {"notes", scene.notes}};
@@ -121,7 +121,7 @@ void print_fit(const Json& info) {
   }
   const Json& refined = info["refined_poses"];
   if (refined.is_null()) return;
-  std::printf("refined: %s\n", refinement_words(refined).c_str());
+  std::printf("refined: %s\n", refinement_words(refinement_from_json(refined)).c_str());
   for (const Json& view : refined["views"]) {
     std::printf(
         "  %-24s %-9s %6d matches, %6d points, moved %.3f degrees, %.4g units, error %s -> %s "
@@ -200,7 +200,7 @@ Json checked_cameras(OpenedScene& opened) {
   Terminal quiet(true);
   std::string reason;
   try {
-    return check_stated_cameras(opened, quiet);
+    return camera_fit_to_json(check_stated_cameras(opened, quiet));
   } catch (const BadInput& error) {
     reason = error.what();
   } catch (const LimitError& error) {

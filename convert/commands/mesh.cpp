@@ -39,15 +39,15 @@ void run_mesh_command(const MeshArgs& args) {
   WatertightOptions closing;
   closing.memory_limit = memory_budget(stated_memory_limit(args.common));
   WatertightResult closed = watertight_surface(file.volume, closing, part_of(progress, 0.1, 0.5));
-  const nlohmann::ordered_json simplification =
-      simplify_meshes(open, closed, options, file.frame, part_of(progress, 0.5, 0.9));
-  nlohmann::ordered_json files = write_mesh_files(args.output, open, closed.mesh, file.frame);
+  const std::optional<Simplification> simplification =
+      simplify_meshes(open, closed, options, part_of(progress, 0.5, 0.9));
+  MeshFiles files = write_mesh_files(args.output, open, closed.mesh, file.frame);
   write_obj(args.output / "watertight.obj", closed.mesh, file.frame);
-  files["files"].push_back("watertight.obj");
+  files.written.emplace_back("watertight.obj");
   terminal.end(std::to_string(closed.mesh.faces.size()) + " faces, " +
                (closed.certificate.passed() ? "certified watertight" : "NOT certified"));
-  for (const auto& [name, reason] : files["left_out"].items()) {
-    terminal.say(name + " left out: " + reason.get<std::string>());
+  for (const auto& [name, reason] : files.left_out) {
+    terminal.say(name + " left out: " + reason);
   }
   if (!closed.certificate.passed()) {
     terminal.warn("the watertight mesh is NOT certified; --json says what is wrong with it");
@@ -56,8 +56,8 @@ void run_mesh_command(const MeshArgs& args) {
   const nlohmann::ordered_json report = {
       {"certificate", certificate_to_json(closed.certificate, closed.mesh, file.frame)},
       {"method", closed.method},
-      {"simplification", simplification},
-      {"output", files}};
+      {"simplification", simplification_to_json(simplification, file.frame)},
+      {"output", mesh_files_to_json(files)}};
   std::cout << json_text(report) << "\n";
 }
 

@@ -82,7 +82,7 @@ void run_run(const RunArgs& args) {
     throw InvalidInput("--budget chooses the steps of the training; give it or --set steps");
   }
   if (budget > 0) request = within_budget(request, budget, start, terminal);
-  const nlohmann::ordered_json report = run_pipeline(request, terminal);
+  const nlohmann::ordered_json report = run_pipeline(request, terminal).report;
   if (args.common.json) std::cout << json_text(report) << "\n";
   say_summary(report, args, terminal);
   if (budget > 0) {

@@ -82,13 +82,13 @@ void run_train(const TrainArgs& args) {
   terminal.note(scene.notes);
   terminal.warn(scene.warnings);
   TrainedModel trained =
-      train_model(std::move(scene), request, terminal.begin("depth and Gaussians"));
+      train_model(std::move(scene), request, terminal.begin(traits(Stage::Model).title));
   const std::vector<std::string>& warnings = trained.model.scene.warnings;
   const std::vector<std::string> found(warnings.begin() + static_cast<std::ptrdiff_t>(known),
                                        warnings.end());
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
-  if (opened.refined) report["refined_poses"] = opened.refined->report;
+  if (opened.refined) report["refined_poses"] = refinement_to_json(opened.refined->report);
   nlohmann::ordered_json scale = opened.control;
   const bool is_measured = !distances.empty() || !markers.empty();
   if (scale.is_null()) scale = scale_by(distances, markers, trained.model);

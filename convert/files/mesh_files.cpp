@@ -64,10 +64,16 @@ void remove_own(const std::filesystem::path& path) {
 
 }  // namespace
 
-Json write_mesh_files(const std::filesystem::path& folder,
-                      const TriangleMesh& open_surface,
-                      const TriangleMesh& watertight,
-                      const Frame& frame) {
+Json mesh_files_to_json(const MeshFiles& files) {
+  Json left_out = Json::object();
+  for (const auto& [name, why] : files.left_out) left_out[name] = why;
+  return {{"files", files.written}, {"left_out", left_out}};
+}
+
+MeshFiles write_mesh_files(const std::filesystem::path& folder,
+                           const TriangleMesh& open_surface,
+                           const TriangleMesh& watertight,
+                           const Frame& frame) {
   if (watertight.faces.empty()) {
     throw NumericalError(
         "no surface was found: the views agree on no depth; choose views that overlap more");
@@ -75,13 +81,13 @@ Json write_mesh_files(const std::filesystem::path& folder,
   make_output_folder(folder);
   write_mesh_ply(folder / "surface.ply", open_surface, frame);
   write_mesh_ply(folder / "watertight.ply", watertight, frame);
-  Json files = {"surface.ply", "watertight.ply"};
-  Json left_out = Json::object();
+  MeshFiles out{{"surface.ply", "watertight.ply"}, {}};
   for (const char* name : {"watertight.stl", "watertight.3mf"}) {
     if (!frame.has_metric_scale()) {
-      left_out[name] =
+      out.left_out.emplace_back(
+          name,
           "the scale of this scene is unknown and CAD files are in millimetres; --known-distance "
-          "tells it, --assume-unit m says that one scene unit is a metre";
+          "tells it, --assume-unit m says that one scene unit is a metre");
       remove_own(folder / name);
       continue;
     }
@@ -91,9 +97,9 @@ Json write_mesh_files(const std::filesystem::path& folder,
     } else {
       write_3mf(folder / name, watertight, frame, z_up);
     }
-    files.push_back(name);
+    out.written.emplace_back(name);
   }
-  return {{"files", files}, {"left_out", left_out}};
+  return out;
 }
 
 bool is_writable_mesh_name(const std::filesystem::path& path) {

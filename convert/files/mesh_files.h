@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -21,15 +23,23 @@ nlohmann::ordered_json certificate_to_json(const Certificate& certificate,
                                            const TriangleMesh& mesh,
                                            const Frame& frame);
 
+/// Files below one folder.
+struct MeshFiles {
+  std::vector<std::string> written;
+  std::vector<std::pair<std::string, std::string>> left_out;  ///< With the reasons, for people.
+};
+
+/// {"files": […], "left_out": {"watertight.stl": "why", …}}
+nlohmann::ordered_json mesh_files_to_json(const MeshFiles& files);
+
 /// Writes surface.ply, watertight.ply and, where the scale is known, watertight.{stl,3mf}. (The OBJ
 /// may carry photographs, which not every caller has.)
 /// In STL and 3MF frame.up, which must be known, becomes +Z. Where the scale is unknown, those that
-/// this program wrote before are removed.
-/// \return {"files": […], "left_out": {"watertight.stl": "why", …}}
-nlohmann::ordered_json write_mesh_files(const std::filesystem::path& folder,
-                                        const TriangleMesh& open_surface,
-                                        const TriangleMesh& watertight,
-                                        const Frame& frame);
+/// this program wrote before are removed. \throws NumericalError where there is no surface
+MeshFiles write_mesh_files(const std::filesystem::path& folder,
+                           const TriangleMesh& open_surface,
+                           const TriangleMesh& watertight,
+                           const Frame& frame);
 
 /// True for the endings that write_mesh_as() takes: .ply, .obj, .stl, .3mf, .glb, in any case.
 bool is_writable_mesh_name(const std::filesystem::path& path);

@@ -17,28 +17,6 @@ namespace {
 
 constexpr double kMebi = 1 << 20;
 
-/// What a stage needs without a picture, and for each pixel of pictures. Measured on the portal
-/// capture at 60,000 to 620,000 pixels, of one size and of several; depth, splats and volume on
-/// LLFF's fern, depth on 920,000 pixels of a temple, too. Whether colours depend on the direction
-/// of view, which takes 36 bytes more of every copy of a Gaussian, is not known yet: these are
-/// halfway.
-struct StageFactors {
-  const char* stage;
-  double base;        ///< [bytes]
-  double of_pixel;    ///< [bytes per pixel of all input views]
-  double of_largest;  ///< [bytes per pixel of the largest picture that is drawn]
-  double of_voxel;    ///< [bytes per pixel where all views are as fine as voxels], to kMostPixels
-  double of_fused;    ///< The same on top, where files are held against the fused surface.
-};
-constexpr std::array<StageFactors, 7> kFactors = {
-    {{"depth and Gaussians", 115 * kMebi, 930, 0, 0, 0},
-     {"views", 105 * kMebi, 160, 231, 0, 0},
-     {"held-out views", 105 * kMebi, 160, 231, 0, 0},
-     {"splats for browsers", 124 * kMebi, 745, 0, 0, 0},
-     {"volume and mesh", 160 * kMebi, 112, 0, 2000, 720},
-     {"textured assets", 124 * kMebi, 155, 0, 235, 1410},
-     {"report", 150 * kMebi, 105, 0, 126, 0}}};
-
 // Above, voxels grow with the pixels: TsdfOptions::max_voxels.
 constexpr double kMostPixels = 570e3;
 
@@ -128,8 +106,9 @@ void refuse_above(size_t budget, MostAt most_at) {
                                ? "a --downscale " + std::to_string(factor) +
                                      " times as large or fewer --views make it fit, a "
                                : "no --downscale makes it fit, only a ";
-  throw LimitError("'" + most.stage + "' needs about " + mebibytes(most.bytes) + " and " +
-                   mebibytes(budget) + " may be used; " + fits + "larger --memory-limit allows it");
+  throw LimitError("'" + std::string(traits(most.stage).title) + "' needs about " +
+                   mebibytes(most.bytes) + " and " + mebibytes(budget) + " may be used; " + fits +
+                   "larger --memory-limit allows it");
 }
 
 }  // namespace
@@ -141,28 +120,27 @@ std::vector<StageMemory> memory_plan(const Scene& scene, const PictureWork& work
   const double reading_held_out = of_reading(scene, scene.held_out, work.downscale);
   constexpr double kOfModel = 160;  // bytes per pixel of all input views
   std::vector<StageMemory> plan;
-  plan.reserve(kFactors.size());
-  for (const StageFactors& f : kFactors) {
-    const std::string stage = f.stage;
-    if (stage == "held-out views" && scene.held_out.empty()) continue;
+  for (const StageTraits& stage : stage_table()) {
+    const MemoryFactors& f = stage.memory;
+    const bool draws_held_out = stage.id == Stage::Evaluation;
+    if (f.base == 0 || (draws_held_out && scene.held_out.empty())) continue;
     if (f.of_voxel > 0 && !work.chooses_voxels) continue;
-    const bool measures = stage == "volume and mesh" ? work.measured.meshes : work.measured.asset;
+    const bool measures = stage.id == Stage::Mesh ? work.measured.meshes : work.measured.asset;
     const double of_voxel = f.of_voxel + (measures ? f.of_fused : 0);
     // Voxels that must keep an error are not made coarser to save memory.
     const double voxel_pixels =
         work.measured.meshes ? input.as_voxels : std::min(input.as_voxels, kMostPixels);
-    const bool draws_held_out = stage == "held-out views";
     const double largest = draws_held_out ? held_out.largest : input.largest;
     const double reading = draws_held_out ? reading_held_out : reading_input;
     double bytes =
         f.base + f.of_pixel * input.all + f.of_largest * largest + of_voxel * voxel_pixels;
-    if (stage == "depth and Gaussians") {
+    if (stage.id == Stage::Model) {
       bytes += of_networks(work.coherence, scene.input.size(), input.all);
     }
     // The report shows photographs beside all that it holds; other stages read them before.
-    bytes = stage == "report" ? bytes + std::max(reading_input, reading_held_out)
-                              : std::max(bytes, f.base + kOfModel * input.all + reading);
-    plan.push_back({stage, static_cast<size_t>(bytes)});
+    bytes = stage.id == Stage::Report ? bytes + std::max(reading_input, reading_held_out)
+                                      : std::max(bytes, f.base + kOfModel * input.all + reading);
+    plan.push_back({stage.id, static_cast<size_t>(bytes)});
   }
   return plan;
 }
@@ -185,7 +163,8 @@ std::string mebibytes(size_t bytes) {
 std::string memory_plan_text(const std::vector<StageMemory>& plan) {
   std::string out;
   for (const StageMemory& stage : plan) {
-    out += (out.empty() ? "" : ", ") + stage.stage + " " + mebibytes(stage.bytes);
+    out += (out.empty() ? "" : ", ") + std::string(traits(stage.stage).title) + " " +
+           mebibytes(stage.bytes);
   }
   return out;
 }
@@ -223,7 +202,7 @@ size_t free_of_group(const std::filesystem::path& folder, const char* most, cons
   return limit - std::min(limit, used);
 }
 
-std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
+std::vector<SplatMemory> splat_memory_plan(const SplatWork& work) {
   constexpr double kBase = 60 * kMebi;
   constexpr double kHarmonic = 12;                  // bytes per coefficient
   constexpr double kAsRead = 24 + 12 + 16 + 4 + 4;  // place in double, scale, rotation, opacity,
@@ -239,39 +218,38 @@ std::vector<StageMemory> splat_memory_plan(const SplatWork& work) {
   const double as_read = splats * (kAsRead + colors);
   const double in_frame = splats * (kInFrame + colors);
   const auto bytes = [](double count) { return static_cast<size_t>(count); };
-  std::vector<StageMemory> plan;
+  constexpr const char* kFewer = "fewer splats or none of spherical harmonics need less, ";
+  std::vector<SplatMemory> plan;
   if (work.file_bytes > 0) {
     // The file is gone before the splats are moved into their frame.
     const double beside = std::max(double(work.file_bytes), splats * kMoved);
-    plan.push_back({"reading the splats", bytes(kBase + as_read + beside)});
+    plan.push_back({"reading the splats", bytes(kBase + as_read + beside), kFewer});
   }
   if (work.finds_floaters) {
     constexpr double kCells = 304.0 * 304 * 304 * (4 + 1 + 4);  // opacity, at matter, part
     constexpr double kOfSplat = 12 + 1 + 1 + 4 + 4 + 8;  // place, kind, kept, part, size, tree
-    plan.push_back({"finding floaters", bytes(kBase + in_frame + kCells + splats * kOfSplat)});
+    plan.push_back(
+        {"finding floaters", bytes(kBase + in_frame + kCells + splats * kOfSplat), kFewer});
   }
   if (work.read_back_bytes > 0) {
     const double file = double(work.read_back_bytes);
-    plan.push_back({"reading back", bytes(kBase + in_frame + as_read + 2 * file)});
+    plan.push_back({"reading back", bytes(kBase + in_frame + as_read + 2 * file), kFewer});
   }
   if (work.pictures > 0) {
     const double pixels = double(work.picture_pixels);
     plan.push_back({"taking pictures",
                     bytes(kBase + in_frame + splats * (kProjected + kSorted) +
-                          pixels * (kPicturePixel * double(work.pictures) + kDrawnPixel))});
+                          pixels * (kPicturePixel * double(work.pictures) + kDrawnPixel)),
+                    "fewer splats, --virtual-views or --virtual-size need less, "});
   }
   return plan;
 }
 
 void check_splat_memory_plan(const SplatWork& work, size_t budget) {
-  for (const StageMemory& stage : splat_memory_plan(work)) {
-    if (stage.bytes <= budget) continue;
-    const bool pictures = stage.stage == "taking pictures";
-    const std::string less = pictures
-                                 ? "fewer splats, --virtual-views or --virtual-size need less, "
-                                 : "fewer splats or none of spherical harmonics need less, ";
-    throw LimitError("'" + stage.stage + "' needs about " + mebibytes(stage.bytes) + " and " +
-                     mebibytes(budget) + " may be used; " + less +
+  for (const SplatMemory& part : splat_memory_plan(work)) {
+    if (part.bytes <= budget) continue;
+    throw LimitError("'" + std::string(part.work) + "' needs about " + mebibytes(part.bytes) +
+                     " and " + mebibytes(budget) + " may be used; " + part.to_lower +
                      "a larger --memory-limit allows it");
   }
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "convert/model/stage.h"
 #include "libcgs/coherence/coherent_gaussians.h"
 #include "libcgs/core/scene.h"
 
@@ -14,7 +15,7 @@ namespace cgs {
 
 /// Largest memory of the process while a stage of a run works [bytes].
 struct StageMemory {
-  std::string stage;
+  Stage stage = Stage::Model;
   size_t bytes = 0;
 };
 
@@ -67,11 +68,18 @@ struct SplatWork {
   bool finds_floaters = false;
 };
 
+/// A piece of that work.
+struct SplatMemory {
+  const char* work;      ///< For people.
+  size_t bytes = 0;      ///< Largest memory of the process during it.
+  const char* to_lower;  ///< What makes it need less, for people.
+};
+
 /// The same for splats: reading, floaters, pictures, reading back. How large voxels will be is
 /// known only after the pictures: the volume itself refuses what does not fit.
-std::vector<StageMemory> splat_memory_plan(const SplatWork& work);
+std::vector<SplatMemory> splat_memory_plan(const SplatWork& work);
 
-/// \throws LimitError naming the stage of splat_memory_plan() that needs most and what to lower, if
+/// \throws LimitError naming the work of splat_memory_plan() that needs most and what to lower, if
 ///         it needs more than `budget` [bytes].
 void check_splat_memory_plan(const SplatWork& work, size_t budget);
 

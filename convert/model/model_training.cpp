@@ -441,6 +441,15 @@ nlohmann::ordered_json view_dependence_to_json(const ViewDependence& found) {
 
 }  // namespace
 
+GivenDepthReport recorded_sensor_scale(const nlohmann::ordered_json& training) {
+  GivenDepthReport out;
+  const nlohmann::ordered_json given = training.value("given_depth", nlohmann::ordered_json());
+  if (!given.is_object() || !given.contains("metres_per_unit")) return out;
+  out.metres_per_unit = given["metres_per_unit"].get<double>();
+  out.metres_sigma = given["metres_sigma"].get<double>();
+  return out;
+}
+
 std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training) {
   std::vector<std::string> out;
   for (const char* key : {"exposure", "view_dependence", "pane"}) {

@@ -77,6 +77,10 @@ nlohmann::ordered_json settings_to_json(const TrainingOptions& options);
 /// words, the effective settings, and the loss over the steps.
 nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request);
 
+/// The scale that training_to_json() tells of, as take_sensor_scale() takes it.
+/// \throws nlohmann::json::exception
+GivenDepthReport recorded_sensor_scale(const nlohmann::ordered_json& training);
+
 /// What training_to_json() tells of the photographs that their owner may not know.
 std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training);
 

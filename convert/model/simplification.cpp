@@ -52,30 +52,39 @@ std::optional<SimplifyOptions> simplify_options(const std::string& length,
   return options;
 }
 
-Json simplify_meshes(TriangleMesh& open_surface,
-                     WatertightResult& watertight,
-                     const std::optional<SimplifyOptions>& options,
-                     const Frame& frame,
-                     const Progress& progress) {
-  if (!options) return nullptr;
-  SimplifyResult open = simplify(open_surface, *options, part_of(progress, 0, 0.3));
+std::optional<Simplification> simplify_meshes(TriangleMesh& open_surface,
+                                              WatertightResult& watertight,
+                                              const std::optional<SimplifyOptions>& options,
+                                              const Progress& progress) {
+  if (!options) return std::nullopt;
+  Simplification out;
+  out.options = *options;
+  out.open_surface = simplify(open_surface, *options, part_of(progress, 0, 0.3));
   SimplifyResult closed = simplify(watertight.mesh, *options, part_of(progress, 0.3, 1));
-  Json json = {{"max_error", options->max_error * frame.scale},
-               {"max_error_inferred", options->max_error_inferred * frame.scale},
-               {"max_color_error", options->max_color_error},
-               {"units", frame.unit_name()},
-               {"open_surface", result_to_json(open, frame)}};
-  open_surface = std::move(open.mesh);
-  const Certificate certificate = certify(closed.mesh);
-  const bool kept = certificate.passed() || !watertight.certificate.passed();
-  json["watertight"] = kept ? result_to_json(closed, frame) : Json(nullptr);
-  json["volume_before"] = watertight.certificate.volume * std::pow(frame.scale, 3);
-  if (kept) {
-    watertight.mesh = std::move(closed.mesh);
+  open_surface = std::exchange(out.open_surface.mesh, {});
+  TriangleMesh simplified = std::exchange(closed.mesh, {});
+  const Certificate certificate = certify(simplified);
+  out.volume_before = watertight.certificate.volume;
+  if (certificate.passed() || !watertight.certificate.passed()) {
+    watertight.mesh = std::move(simplified);
     watertight.certificate = certificate;
+    out.watertight = std::move(closed);
   }
-  json["volume_after"] = watertight.certificate.volume * std::pow(frame.scale, 3);
-  return json;
+  out.volume_after = watertight.certificate.volume;
+  return out;
+}
+
+Json simplification_to_json(const std::optional<Simplification>& done, const Frame& frame) {
+  if (!done) return nullptr;
+  const double volume_unit = std::pow(frame.scale, 3);
+  return {{"max_error", done->options.max_error * frame.scale},
+          {"max_error_inferred", done->options.max_error_inferred * frame.scale},
+          {"max_color_error", done->options.max_color_error},
+          {"units", frame.unit_name()},
+          {"open_surface", result_to_json(done->open_surface, frame)},
+          {"watertight", done->watertight ? result_to_json(*done->watertight, frame) : Json()},
+          {"volume_before", done->volume_before * volume_unit},
+          {"volume_after", done->volume_after * volume_unit}};
 }
 
 }  // namespace cgs

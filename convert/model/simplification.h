@@ -23,15 +23,27 @@ std::optional<SimplifyOptions> simplify_options(const std::string& length,
                                                 double voxel,
                                                 const Frame& frame);
 
+/// What became of both meshes of a volume; the results hold no mesh.
+struct Simplification {
+  SimplifyOptions options;
+  SimplifyResult open_surface;
+  std::optional<SimplifyResult> watertight;  ///< Empty = that mesh stayed as it was.
+  double volume_before = 0;                  ///< Of the watertight mesh [internal units cubed].
+  double volume_after = 0;
+};
+
 /// Simplifies both meshes of a volume and certifies the watertight one anew. It stays as it was if
 /// it was certified and its simplification is not.
 ///
-/// \return "simplification" of a report, in file units: limits, and per mesh the faces before and
-///         after, the measured errors and the areas; null without options.
-nlohmann::ordered_json simplify_meshes(TriangleMesh& open_surface,
-                                       WatertightResult& watertight,
-                                       const std::optional<SimplifyOptions>& options,
-                                       const Frame& frame,
-                                       const Progress& progress);
+/// \return empty without options
+std::optional<Simplification> simplify_meshes(TriangleMesh& open_surface,
+                                              WatertightResult& watertight,
+                                              const std::optional<SimplifyOptions>& options,
+                                              const Progress& progress);
+
+/// "simplification" of a report, in file units: limits, and per mesh the faces before and after,
+/// the measured errors and the areas; null without.
+nlohmann::ordered_json simplification_to_json(const std::optional<Simplification>& done,
+                                              const Frame& frame);
 
 }  // namespace cgs

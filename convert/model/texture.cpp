@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <Eigen/Geometry>
+#include <nlohmann/json.hpp>
 
 #include "io/scenes/resample.h"
 #include "io/scenes/scene_reader.h"
@@ -46,40 +47,23 @@ double largest_stretch(const TriangleMesh& mesh, const PhotoTexture& texture) {
   return worst;
 }
 
-Json report_of(const TriangleMesh& mesh,
-               const PhotoTexture& texture,
-               const std::vector<Eigen::Vector3f>& gains,
-               const std::vector<size_t>& samples,
-               const Frame& frame) {
+// Which photograph shows how much.
+void count_faces(const TriangleMesh& mesh,
+                 const PhotoTexture& texture,
+                 const Frame& frame,
+                 TextureReport& out) {
   const double area_unit = frame.scale * frame.scale;
-  std::vector<size_t> faces(texture.photographs.size(), 0);
-  std::vector<double> area(texture.photographs.size(), 0);
-  size_t faces_without = 0;
-  double area_without = 0;
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     const int i = texture.of_face[f];
     if (i >= 0) {
-      ++faces[static_cast<size_t>(i)];
-      area[static_cast<size_t>(i)] += face_area(mesh, f) * area_unit;
+      TextureReport::Shown& view = out.views[static_cast<size_t>(i)];
+      ++view.faces;
+      view.area += face_area(mesh, f) * area_unit;
     } else if (mesh.provenance.empty() || was_seen(mesh.provenance[f])) {
-      ++faces_without;
-      area_without += face_area(mesh, f) * area_unit;
+      ++out.faces_without_view;
+      out.area_without_view += face_area(mesh, f) * area_unit;
     }
   }
-  Json views = Json::array();
-  for (size_t i = 0; i < faces.size(); ++i) {
-    const Eigen::Vector3f& gain = gains[i];
-    views.push_back({{"name", texture.photographs[i].name},
-                     {"faces", faces[i]},
-                     {"area", area[i]},
-                     {"gain", {gain.x(), gain.y(), gain.z()}},
-                     {"samples", samples[i]}});
-  }
-  return {{"views", views},
-          {"faces_without_view", faces_without},
-          {"area_without_view", area_without},
-          {"largest_stretch", largest_stretch(mesh, texture)},
-          {"units", frame.unit_name()}};
 }
 
 // Median size of a pixel of a photograph on the faces that show it [internal units]; 0 = no face.
@@ -129,35 +113,55 @@ double coarsen_texture(PhotoTexture& texture, const TriangleMesh& mesh, double t
   return largest_share > 0 ? largest_share : 1;
 }
 
-PhotoTexture texture_from_photographs(const Scene& scene,
-                                      const TriangleMesh& mesh,
-                                      nlohmann::ordered_json& report) {
-  Scene loaded = scene;
-  std::vector<View> views;
+PhotographedMesh texture_from_photographs(const Scene& scene, const TriangleMesh& mesh) {
+  PhotographedMesh out;
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
     if (view.image_path.empty() || !std::filesystem::exists(view.image_path)) {
-      report = {{"left_out", "the photograph of " + view.name + " is missing"}};
-      return {};
+      out.report.left_out = "the photograph of " + view.name + " is missing";
+      return out;
     }
   }
+  Scene loaded = scene;
+  std::vector<View> views;
   load_images(loaded, scene.input);
   for (const int i : scene.input) views.push_back(std::move(loaded.views[static_cast<size_t>(i)]));
   const FaceScores scores = face_scores(mesh, views);
   const FaceViews chosen = choose_face_views(mesh, scores);
   const ExposureGains exposure = exposure_gains(mesh, scores, views);
-  std::vector<Eigen::Vector3f> gains;  // with those that load_images() applied
-  PhotoTexture texture;
-  texture.of_face = chosen.of_face;
+  out.texture.of_face = chosen.of_face;
   for (size_t i = 0; i < views.size(); ++i) {
-    apply_gain(views[i].image, exposure.gain[i]);
-    gains.emplace_back(exposure.gain[i].cwiseProduct(views[i].exposure));
-    texture.photographs.push_back({views[i].name, views[i].camera, std::move(views[i].image)});
+    View& view = views[i];
+    apply_gain(view.image, exposure.gain[i]);
+    // With the gain that load_images() applied.
+    out.report.views.push_back(
+        {view.name, 0, 0, exposure.gain[i].cwiseProduct(view.exposure), exposure.samples[i]});
+    out.texture.photographs.push_back({view.name, view.camera, std::move(view.image)});
   }
-  report = report_of(mesh, texture, gains, exposure.samples, scene.frame);
-  report["seam_length"] = chosen.seam_length * scene.frame.scale;
-  report["seam_length_unsmoothed"] = chosen.best_seam_length * scene.frame.scale;
-  return texture;
+  count_faces(mesh, out.texture, scene.frame, out.report);
+  out.report.largest_stretch = largest_stretch(mesh, out.texture);
+  out.report.seam_length = chosen.seam_length * scene.frame.scale;
+  out.report.seam_length_unsmoothed = chosen.best_seam_length * scene.frame.scale;
+  return out;
+}
+
+Json texture_to_json(const TextureReport& report, const Frame& frame) {
+  if (!report.left_out.empty()) return {{"left_out", report.left_out}};
+  Json views = Json::array();
+  for (const TextureReport::Shown& view : report.views) {
+    views.push_back({{"name", view.name},
+                     {"faces", view.faces},
+                     {"area", view.area},
+                     {"gain", {view.gain.x(), view.gain.y(), view.gain.z()}},
+                     {"samples", view.samples}});
+  }
+  return {{"views", views},
+          {"faces_without_view", report.faces_without_view},
+          {"area_without_view", report.area_without_view},
+          {"largest_stretch", report.largest_stretch},
+          {"units", frame.unit_name()},
+          {"seam_length", report.seam_length},
+          {"seam_length_unsmoothed", report.seam_length_unsmoothed}};
 }
 
 }  // namespace cgs

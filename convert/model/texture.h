@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "libcgs/core/photo_texture.h"
 #include "libcgs/core/scene.h"
@@ -9,16 +12,38 @@
 
 namespace cgs {
 
+/// What photographs show of a mesh; lengths and areas in units of files.
+struct TextureReport {
+  struct Shown {
+    std::string name;  ///< Of the view.
+    size_t faces = 0;
+    double area = 0;
+    Eigen::Vector3f gain = Eigen::Vector3f::Ones();  ///< Its pixels were multiplied by.
+    size_t samples = 0;                              ///< Exposure was levelled by.
+  };
+  std::string left_out;  ///< Why there is none, for people; empty = there is one.
+  std::vector<Shown> views;
+  size_t faces_without_view = 0;  ///< Of seen surface.
+  double area_without_view = 0;
+  /// Between linear texture coordinates and the projection, at the middles of edges [pixels].
+  double largest_stretch = 0;
+  double seam_length = 0;
+  double seam_length_unsmoothed = 0;
+};
+
+/// {"views": [{"name", "faces", "area", "gain": [r, g, b], "samples"}], "faces_without_view", …};
+/// or {"left_out": "why"}
+nlohmann::ordered_json texture_to_json(const TextureReport& report, const Frame& frame);
+
+struct PhotographedMesh {
+  PhotoTexture texture;  ///< Empty if a photograph is missing.
+  TextureReport report;
+};
+
 /// Loads the input photographs of a scene, chooses one for every face, and levels their exposure.
-/// \param scene   in the frame of the mesh
-/// \param report  set to {"views": [{"name", "faces", "area", "gain": [r, g, b], "samples"}],
-///   "faces_without_view" and "area_without_view" (of seen surface), "largest_stretch" (distance
-///   between linear texture coordinates and the projection, at the middles of edges) [pixels],
-///   "units", "seam_length", "seam_length_unsmoothed"}; or to {"left_out": "why"}
-/// \return empty if a photograph is missing
-PhotoTexture texture_from_photographs(const Scene& scene,
-                                      const TriangleMesh& mesh,
-                                      nlohmann::ordered_json& report);
+/// \param scene  in the frame of the mesh
+/// \throws as load_images()
+PhotographedMesh texture_from_photographs(const Scene& scene, const TriangleMesh& mesh);
 
 /// The size of a pixel on the surface [internal units], of the photograph where it is smallest, by
 /// the median over the faces that show it; 0 where none is shown.

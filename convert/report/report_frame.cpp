@@ -91,7 +91,7 @@ std::string refinement_section(const Json& report) {
   if (!report.contains("refined_poses")) return "";
   const Json& refined = report["refined_poses"];
   std::ostringstream html;
-  html << "<h2>Cameras</h2>\n<p>" << escaped(refinement_words(refined))
+  html << "<h2>Cameras</h2>\n<p>" << escaped(refinement_words(refinement_from_json(refined)))
        << ".</p>\n<table>\n<tr><th>view</th><th></th><th>matches</th><th>points</th><th>turned "
           "[degrees]</th>"
           "<th>moved [scene units]</th><th>error before [pixels]</th><th>after</th></tr>\n";

@@ -11,14 +11,11 @@
 
 #include "convert/files/mesh_files.h"
 #include "convert/model/texture.h"
-#include "convert/run/size_search.h"
-#include "convert/run/written_surface.h"
 #include "convert/text/html.h"
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/byte_reader.h"
 #include "io/glb/primitive.h"
-#include "io/meshes/gltf.h"
 #include "io/meshes/mesh_file.h"
 #include "io/meshes/tileset.h"
 #include "libcgs/core/error.h"
@@ -75,7 +72,8 @@ class AssetWriter {
         frame_(model.scene.frame),
         path_(request.output / "web/asset.glb"),
         y_up_(y_up_from(model.scene.frame.up)),
-        summary_(content.summary),
+        description_(content.description),
+        certificate_(content.certificate),
         encoding_(request.glb_encoding),
         box_(box_of(content.mesh)) {
     if (!request.compression_error.empty()) {
@@ -86,7 +84,7 @@ class AssetWriter {
     rounding_ = kRoomForRounding * *promise_;
   }
 
-  Form whole() const { return {0, mesh_, texture_, 1, glb_options(rounding_, summary_)}; }
+  Form whole() const { return {0, mesh_, texture_, 1, glb_options(rounding_)}; }
 
   /// Without the faces that hold nothing but colours which photographs show.
   Form finest() const {
@@ -126,11 +124,9 @@ class AssetWriter {
     GlbFile first = made(form);
     // In the frame that a reader would give it: where faces nearly touch, rounding decides.
     const MeasurableMesh held = parse_glb_file(first.bytes, path_).content;
-    Json summary = Json::parse(form.options.summary_json);
-    Json stated = certificate_to_json(certify(held.mesh), held.mesh, held.frame);
-    if (summary["certificate"] == stated) return first;
-    summary["certificate"] = std::move(stated);
-    form.options.summary_json = summary.dump();
+    const Json stated = certificate_to_json(certify(held.mesh), held.mesh, held.frame);
+    if (stated == certificate_) return first;
+    form.options.summary_json = summary(stated);
     return made(form);
   }
 
@@ -169,13 +165,17 @@ class AssetWriter {
   const std::filesystem::path& path() const { return path_; }
 
  private:
-  GlbOptions glb_options(double rounding, const Json& summary) const {
+  std::string summary(const Json& certificate) const {
+    return Json{{"model", description_}, {"certificate", certificate}}.dump();
+  }
+
+  GlbOptions glb_options(double rounding) const {
     GlbOptions out;
     out.encoding = encoding_;
     out.y_up = y_up_;
     out.center = box_.center();
     out.max_error = rounding * frame_.scale;
-    out.summary_json = summary.dump();
+    out.summary_json = summary(certificate_);
     // Finer than any grid of the encoding: floats as they are.
     const bool short_numbers =
         encoding_ == GlbEncoding::Quantized || encoding_ == GlbEncoding::Meshopt;
@@ -194,14 +194,13 @@ class AssetWriter {
         texture_.empty() ? std::min(1.0, coarser * options.max_color_error) : 1;
     options.max_area_change = std::min(0.1, coarser * options.max_area_change);
     out.mesh = simplify(mesh_, options).mesh;
-    Json unused;
-    if (!texture_.empty()) out.texture = texture_from_photographs(scene_, out.mesh, unused);
+    if (!texture_.empty()) out.texture = texture_from_photographs(scene_, out.mesh).texture;
   }
 
   // \param texel  of textures, in details
   void leave_out_below(double detail, double texel, double rounding, Form& out) const {
     out.detail = detail;
-    out.options = glb_options(rounding, summary_);
+    out.options = glb_options(rounding);
     out.texture_share = coarsen_texture(out.texture, out.mesh, texel * detail);
   }
 
@@ -212,7 +211,8 @@ class AssetWriter {
   const Frame& frame_;
   std::filesystem::path path_;
   Eigen::Matrix3d y_up_;
-  const Json& summary_;
+  const std::string& description_;
+  const Json& certificate_;  ///< Of mesh_.
   GlbEncoding encoding_;
   Eigen::AlignedBox3d box_;        ///< Of mesh_.
   double rounding_ = 0;            ///< [internal units]; 0 = default of the format
@@ -262,33 +262,11 @@ Written form_within(const AssetWriter& writer,
   return out;
 }
 
-Json glb_to_json(const GlbReport& glb, const Frame& frame) {
-  return {{"bytes", glb.bytes},
-          {"texture_bytes", glb.texture_bytes},
-          {"textured_triangles", glb.textured_triangles},
-          {"collapsed_triangles", glb.collapsed_triangles},
-          {"measured_texture_error", glb.measured_texture_error},
-          {"position_bits", glb.position_bits},
-          {"measured_max_error", glb.measured_max_error},
-          {"units", frame.unit_name()}};
-}
-
 Json deviation_to_json(const SurfaceDeviation& deviation, const Frame& frame) {
   return {{"evidence", deviation.evidence * frame.scale},
           {"inferred", deviation.inferred * frame.scale},
           {"places", deviation.places},
           {"units", frame.unit_name()}};
-}
-
-Json form_to_json(const Written& written, const Frame& frame) {
-  Json tried = Json::array();
-  for (const TriedSize& form : written.tried) {
-    tried.push_back({{"detail", form.detail * frame.scale}, {"bytes", form.bytes}});
-  }
-  return {{"detail", written.form.detail * frame.scale},
-          {"faces", written.form.mesh.faces.size()},
-          {"texture_share", written.form.texture_share},
-          {"tried", tried}};
 }
 
 std::string words_for(const Written& written,
@@ -313,39 +291,44 @@ std::string words_for(const Written& written,
          " places, both ways)";
 }
 
-// The form on disk, and what the report says of it.
-std::pair<Form, Json> write_promised(const AssetWriter& writer,
-                                     const RunRequest& request,
-                                     const TriangleMesh& mesh,
-                                     const Frame& frame,
-                                     const Progress& progress) {
+// \return the form on disk
+Form write_promised(const AssetWriter& writer,
+                    const RunRequest& request,
+                    const TriangleMesh& mesh,
+                    const Frame& frame,
+                    const Progress& progress,
+                    WrittenAsset& out) {
   const TriangleMesh fused = fused_surface(request.output / "volume.vdb", request.memory_limit);
   const double already = request.max_size > 0 ? surface_deviation(mesh, fused).evidence : 0;
   Written written =
       form_within(writer, request.max_size, already, frame, part_of(progress, 0.1, 0.9));
   const SurfaceDeviation deviation = writer.deviation_from(fused, written.glb);
   write_file(writer.path(), written.glb.bytes);
-  Json out = glb_to_json(written.glb.report, frame);
-  out["deviation"] = deviation_to_json(deviation, frame);
-  out["form"] = form_to_json(written, frame);
-  out["words"] = words_for(written, deviation, request.max_size, mesh.faces.size(), frame);
-  return {std::move(written.form), std::move(out)};
+  out.glb = written.glb.report;
+  out.promise = {deviation,
+                 written.form.detail,
+                 written.form.texture_share,
+                 written.tried,
+                 words_for(written, deviation, request.max_size, mesh.faces.size(), frame)};
+  return std::move(written.form);
 }
 
 /// Without a promise, the form is the finest.
-std::pair<Form, Json> write_finest(const AssetWriter& writer,
-                                   const RunRequest& request,
-                                   const TriangleMesh& mesh,
-                                   const Frame& frame,
-                                   const Progress& progress) {
+Form write_finest(const AssetWriter& writer,
+                  const RunRequest& request,
+                  const TriangleMesh& mesh,
+                  const Frame& frame,
+                  const Progress& progress,
+                  WrittenAsset& out) {
   if (request.max_error.empty() && request.max_size == 0) {
     Form form = writer.finest();
     const GlbFile glb = writer.certified(form);
     write_file(writer.path(), glb.bytes);
-    return {std::move(form), glb_to_json(glb.report, frame)};
+    out.glb = glb.report;
+    return form;
   }
   try {
-    return write_promised(writer, request, mesh, frame, progress);
+    return write_promised(writer, request, mesh, frame, progress, out);
   } catch (...) {
     std::filesystem::remove(writer.path());  // one that was there may break the promise
     throw;
@@ -366,18 +349,7 @@ std::vector<double> level_details(double finest, double side, size_t levels) {
   return out;
 }
 
-/// A coarser level on disk.
-struct Level {
-  std::string file;
-  size_t bytes = 0;
-  size_t faces = 0;
-  double texture_share = 1;
-  double detail = 0;           ///< [internal units]
-  SurfaceDeviation deviation;  ///< From the finest level, as that reads.
-  Eigen::AlignedBox3d box;     ///< [units of the files]
-};
-
-Json level_to_json(const Level& level, const Frame& frame) {
+Json level_to_json(const AssetLevel& level, const Frame& frame) {
   const std::string words =
       level.file + ": " + format_file_size(level.bytes) + ", " + std::to_string(level.faces) +
       " faces, textures " + number(100 * level.texture_share, "%.0f") +
@@ -393,36 +365,22 @@ Json level_to_json(const Level& level, const Frame& frame) {
           {"words", words}};
 }
 
-Tileset tileset_of(const AssetWriter& writer,
-                   const std::vector<Level>& levels,
-                   const TriangleMesh& full,
-                   const Frame& frame) {
-  Tileset out;
-  out.units = frame.has_metric_scale() ? "m" : "unknown";
-  out.place = writer.place();
-  out.levels = {{writer.path().filename().string(), 0}};
-  out.box = writer.box_in_file(full);
-  for (const Level& level : levels) {
-    // A viewer must not find the way to what is finer barred by a level that came out better.
-    const double error =
-        std::max(out.levels.front().geometric_error, level.deviation.max() * writer.file_unit());
-    out.levels.insert(out.levels.begin(), {level.file, error});
-    out.box.extend(level.box);
-  }
-  return out;
-}
-
-Json write_levels(const AssetWriter& writer,
-                  Form finest_form,
-                  size_t count,
-                  const Frame& frame,
-                  const Progress& progress) {
+std::vector<AssetLevel> write_levels(const AssetWriter& writer,
+                                     Form finest_form,
+                                     size_t count,
+                                     const Frame& frame,
+                                     const Progress& progress) {
   const double shown = texel_size(finest_form.texture, finest_form.mesh) / kLevelTexel;
   const double finest = std::max(shown, finest_form.detail);
   finest_form = {};
   const std::filesystem::path folder = writer.path().parent_path();
   const TriangleMesh full = writer.read(read_file(writer.path()));
-  std::vector<Level> levels;
+  Tileset tileset;
+  tileset.units = frame.has_metric_scale() ? "m" : "unknown";
+  tileset.place = writer.place();
+  tileset.levels = {{writer.path().filename().string(), 0}};
+  tileset.box = writer.box_in_file(full);
+  std::vector<AssetLevel> levels;
   for (const double detail : level_details(finest, writer.side(), count)) {
     report(progress, double(levels.size()) / double(count));
     Form form = writer.level(detail, finest > 0 ? finest : detail / kLevelStep);
@@ -435,13 +393,15 @@ Json write_levels(const AssetWriter& writer,
                       mesh.faces.size(),  // as it reads: rounding lets some vanish
                       form.texture_share,
                       detail,
-                      surface_deviation(mesh, full),
-                      writer.box_in_file(mesh)});
+                      surface_deviation(mesh, full)});
+    // A viewer must not find the way to what is finer barred by a level that came out better.
+    const double error = std::max(tileset.levels.front().geometric_error,
+                                  levels.back().deviation.max() * writer.file_unit());
+    tileset.levels.insert(tileset.levels.begin(), {name, error});
+    tileset.box.extend(writer.box_in_file(mesh));
   }
-  write_tileset(folder / kTilesetName, tileset_of(writer, levels, full, frame));
-  Json out = Json::array();
-  for (const Level& level : levels) out.push_back(level_to_json(level, frame));
-  return out;
+  write_tileset(folder / kTilesetName, tileset);
+  return levels;
 }
 
 // Of a run that wanted more of them.
@@ -458,6 +418,39 @@ std::vector<std::string> level_files(size_t levels) {
   return out;
 }
 
+Json asset_to_json(const WrittenAsset& written, const Frame& frame) {
+  const GlbReport& glb = written.glb;
+  Json out = {{"bytes", glb.bytes},
+              {"texture_bytes", glb.texture_bytes},
+              {"textured_triangles", glb.textured_triangles},
+              {"collapsed_triangles", glb.collapsed_triangles},
+              {"measured_texture_error", glb.measured_texture_error},
+              {"position_bits", glb.position_bits},
+              {"measured_max_error", glb.measured_max_error},
+              {"units", frame.unit_name()}};
+  if (written.promise) {
+    const AssetPromise& promise = *written.promise;
+    Json tried = Json::array();
+    for (const TriedSize& form : promise.tried) {
+      tried.push_back({{"detail", form.detail * frame.scale}, {"bytes", form.bytes}});
+    }
+    out["deviation"] = deviation_to_json(promise.deviation, frame);
+    out["form"] = {{"detail", promise.detail * frame.scale},
+                   {"faces", written.faces},
+                   {"texture_share", promise.texture_share},
+                   {"tried", tried}};
+    out["words"] = promise.words;
+  }
+  out["faces"] = written.faces;
+  return out;
+}
+
+Json levels_to_json(const WrittenAsset& written, const Frame& frame) {
+  Json out = Json::array();
+  for (const AssetLevel& level : written.levels) out.push_back(level_to_json(level, frame));
+  return out;
+}
+
 WrittenAsset write_asset(const Model& model,
                          const AssetContent& content,
                          const RunRequest& request,
@@ -466,10 +459,10 @@ WrittenAsset write_asset(const Model& model,
   const AssetWriter writer(model, content, request);
   remove_levels(writer.path().parent_path());
   const double of_finest = request.lods > 0 ? 0.5 : 1;
-  auto [form, asset] =
-      write_finest(writer, request, content.mesh, frame, part_of(progress, 0, of_finest));
-  asset["faces"] = form.mesh.faces.size();
-  WrittenAsset out{std::move(asset), Json::array()};
+  WrittenAsset out;
+  Form form =
+      write_finest(writer, request, content.mesh, frame, part_of(progress, 0, of_finest), out);
+  out.faces = form.mesh.faces.size();
   if (request.lods == 0) return out;
   out.levels =
       write_levels(writer, std::move(form), request.lods, frame, part_of(progress, of_finest, 1));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,9 @@
 
 #include "convert/model/model.h"
 #include "convert/run/run_request.h"
+#include "convert/run/size_search.h"
+#include "convert/run/written_surface.h"
+#include "io/meshes/gltf.h"
 #include "libcgs/core/photo_texture.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/core/triangle_mesh.h"
@@ -23,19 +27,49 @@ std::vector<std::string> level_files(size_t levels);
 
 /// What asset.glb is made from.
 struct AssetContent {
-  const TriangleMesh& mesh;               ///< Watertight, as the run wrote it.
-  const PhotoTexture& texture;            ///< Of this mesh.
-  double simplify;                        ///< How far faces that only hold colours may go from it
-                                          ///< where there is a texture [internal units].
-  const nlohmann::ordered_json& summary;  ///< Goes into the file; its certificate becomes that of
-                                          ///< the mesh as the file holds it.
+  const TriangleMesh& mesh;        ///< Watertight, as the run wrote it.
+  const PhotoTexture& texture;     ///< Of this mesh.
+  double simplify;                 ///< How far faces that only hold colours may go from it
+                                   ///< where there is a texture [internal units].
+  const std::string& description;  ///< Of the model; goes into the file.
+  const nlohmann::ordered_json& certificate;  ///< Of `mesh`, as certificate_to_json(); likewise,
+                                              ///< where the mesh that the file holds has the same.
 };
 
-/// What was written, for the report.
-struct WrittenAsset {
-  nlohmann::ordered_json asset;
-  nlohmann::ordered_json levels;  ///< Empty without request.lods.
+/// How asset.glb keeps a promise.
+struct AssetPromise {
+  SurfaceDeviation deviation;    ///< From the fused surface.
+  double detail = 0;             ///< What is left out is below [internal units]; 0 = nothing is.
+  double texture_share = 1;      ///< Of the width of photographs.
+  std::vector<TriedSize> tried;  ///< Coarser forms than the whole; in internal units.
+  std::string words;             ///< For people.
 };
+
+/// A coarser level on disk.
+struct AssetLevel {
+  std::string file;
+  size_t bytes = 0;
+  size_t faces = 0;
+  double texture_share = 1;
+  double detail = 0;           ///< [internal units]
+  SurfaceDeviation deviation;  ///< From the finest level, as that reads.
+};
+
+/// What was written.
+struct WrittenAsset {
+  GlbReport glb;
+  size_t faces = 0;
+  std::optional<AssetPromise> promise;
+  std::vector<AssetLevel> levels;  ///< Empty without request.lods.
+};
+
+/// "asset.glb" of a report: bytes, measured errors and faces; with a promise "deviation", "form"
+/// and, for people, "words".
+nlohmann::ordered_json asset_to_json(const WrittenAsset& written, const Frame& frame);
+
+/// "levels" of a report: of each level "file", "bytes", "faces", "texture_share", "detail",
+/// "deviation" from asset.glb, "words".
+nlohmann::ordered_json levels_to_json(const WrittenAsset& written, const Frame& frame);
 
 /// Writes web/asset.glb below request.output, as small as request.max_size and as near to the fused
 /// surface as request.max_error demand.
@@ -54,9 +88,6 @@ struct WrittenAsset {
 /// object; such surface stays as near as the rest. None of them keeps a promise; how far it is
 /// off asset.glb is measured.
 ///
-/// \return of asset.glb bytes, faces and measured errors; with a promise "deviation", "form" and,
-///         for people, "words"; of each level "file", "bytes", "faces", "texture_share", "detail",
-///         "deviation" from asset.glb, "words"
 /// \throws LimitError with the smallest size that can be reached, and no asset.glb is left;
 ///         NumericalError where the file is farther off than promised
 WrittenAsset write_asset(const Model& model,

@@ -13,6 +13,7 @@
 #include "convert/model/memory_plan.h"
 #include "convert/model/model_training.h"
 #include "convert/run/pipeline.h"
+#include "convert/run/request_fields.h"
 #include "convert/run/time_model.h"
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
@@ -42,6 +43,13 @@ struct Candidate {
   int downscale = 1;
   std::string preset;
   double seconds = 0;
+};
+
+/// What was chosen; budget.json keeps it.
+struct Choice {
+  int downscale = 1;
+  std::string preset;
+  std::string words;  ///< For people.
 };
 
 struct Search {
@@ -83,15 +91,12 @@ TimedRun trial(const Search& search, int downscale, int steps) {
   (void)search.terminal.begin("trying " + size_words(search.opened.scene, downscale));
   Terminal silent = Terminal::silent();
   const auto start = Clock::now();
-  const Json report = run_pipeline(request, silent);
   TimedRun out;
+  out.stages = run_pipeline(request, silent).seconds;
   out.pixels = search.pixels_at(downscale);
   out.steps = steps;
   out.opening = std::chrono::duration<double>(Clock::now() - start).count();
-  for (const Json& stage : report.at("stages")) {
-    out.stages.emplace_back(stage.at("stage"), stage.at("seconds"));
-    out.opening -= out.stages.back().second;
-  }
+  for (const auto& [stage, seconds] : out.stages) out.opening -= seconds;
   out.opening = std::max(0.0, out.opening);
   (void)search.terminal.end(std::to_string(steps) + " steps");
   return out;
@@ -247,8 +252,8 @@ std::string words_of(const Search& search, const Candidate& chosen) {
          format_seconds(better.seconds * kReserve + search.elapsed());
 }
 
-// \return what was chosen, as budget.json holds it
-Json choose(Search& search) {
+// \param asked  for: the same takes what was chosen from the file
+Choice choose(Search& search, const std::string& asked, const fs::path& file) {
   run_trials(search);
   const double left = search.left();
   const std::optional<Candidate> chosen = best_within(search, left);
@@ -262,19 +267,23 @@ Json choose(Search& search) {
   Json trials = Json::array();
   for (const TimedRun& run : search.runs) {
     Json stages = Json::object();
-    for (const auto& [stage, seconds] : run.stages) stages[stage] = seconds;
+    for (const auto& [stage, seconds] : run.stages) stages[traits(stage).name] = seconds;
     trials.push_back({{"pixels", run.pixels},
                       {"steps", run.steps},
                       {"opening_seconds", run.opening},
                       {"stage_seconds", stages}});
   }
-  return {{"seconds", search.deadline},
-          {"downscale", chosen->downscale},
-          {"preset", chosen->preset},
-          {"foretold_seconds", chosen->seconds},
-          {"trying_seconds", search.elapsed()},
-          {"words", words_of(search, *chosen)},
-          {"trials", trials}};
+  const std::string words = words_of(search, *chosen);
+  const Json record = {{"seconds", search.deadline},
+                       {"downscale", chosen->downscale},
+                       {"preset", chosen->preset},
+                       {"foretold_seconds", chosen->seconds},
+                       {"trying_seconds", search.elapsed()},
+                       {"words", words},
+                       {"trials", trials},
+                       {"request", asked}};
+  write_file(file, json_text(record) + "\n");
+  return {chosen->downscale, chosen->preset, words};
 }
 
 // Holds the folder of the run, and takes away what trials wrote to it, those of a start that was
@@ -301,22 +310,24 @@ class TrialFolder {
   FolderLock lock_;
 };
 
-// What an earlier start chose for the same, if it still fits into memory; null if there is none.
-Json chosen_before(const fs::path& file,
-                   double seconds,
-                   const std::string& request,
-                   const std::vector<int>& sizes) {
+// What an earlier start chose for the same, if it still fits into memory.
+std::optional<Choice> chosen_before(const fs::path& file,
+                                    double seconds,
+                                    const std::string& asked,
+                                    const std::vector<int>& sizes) {
   std::error_code ignored;
-  if (!fs::is_regular_file(file, ignored)) return nullptr;
+  if (!fs::is_regular_file(file, ignored)) return std::nullopt;
   const Json record = read_json(file);
   const bool is_same = record.is_object() && record.value("seconds", Json()) == Json(seconds) &&
-                       record.value("request", Json()) == Json(request) &&
+                       record.value("request", Json()) == Json(asked) &&
                        record.value("preset", Json()).is_string() &&
                        record.value("words", Json()).is_string();
-  const Json size = is_same ? record.value("downscale", Json()) : Json();
-  const bool is_usable =
-      std::any_of(sizes.begin(), sizes.end(), [&](int usable) { return size == Json(usable); });
-  return is_usable ? record : Json();
+  if (!is_same) return std::nullopt;
+  const auto size = std::find_if(sizes.begin(), sizes.end(), [&](int usable) {
+    return record.value("downscale", Json()) == Json(usable);
+  });
+  if (size == sizes.end()) return std::nullopt;
+  return Choice{*size, record["preset"].get<std::string>(), record["words"].get<std::string>()};
 }
 
 void refuse_other_run(const RunRequest& request) {
@@ -327,21 +338,21 @@ void refuse_other_run(const RunRequest& request) {
 }
 
 // The choice of an earlier start, so that its run can go on, or a new one.
-Json choice(const RunRequest& request,
-            const RunRequest& full,
-            double seconds,
-            Clock::time_point start,
-            Terminal& terminal) {
+Choice choice(const RunRequest& request,
+              const RunRequest& full,
+              double seconds,
+              Clock::time_point start,
+              Terminal& terminal) {
   const fs::path file = request.output / kRecordFile;
   const OpenedScene opened = open_scene(full.scene, request.output / "model", terminal);
   Json key = request_json(full, opened.scene);
   key["threads"] = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
   const std::string asked = std::to_string(content_hash(json_text(key, -1)));
   const Sizes sizes = usable_sizes(request, opened.scene);
-  Json chosen = chosen_before(file, seconds, asked, sizes.usable);
-  if (chosen.is_null()) refuse_other_run(request);
+  const std::optional<Choice> before = chosen_before(file, seconds, asked, sizes.usable);
+  if (!before) refuse_other_run(request);
   const TrialFolder trials(request.output);
-  if (!chosen.is_null()) return chosen;
+  if (before) return *before;
   opened.keep(request.output / "model");
   Search search{request,
                 opened,
@@ -351,10 +362,7 @@ Json choice(const RunRequest& request,
                 seconds,
                 start,
                 terminal};
-  chosen = choose(search);
-  chosen["request"] = asked;
-  write_file(file, json_text(chosen) + "\n");
-  return chosen;
+  return choose(search, asked, file);
 }
 
 }  // namespace
@@ -368,10 +376,10 @@ RunRequest within_budget(const RunRequest& request,
   }
   RunRequest full = request;
   full.scene.options.downscale = 1;
-  const Json chosen = choice(request, full, seconds, start, terminal);
-  full.scene.options.downscale = chosen.at("downscale").get<int>();
-  full.training.steps = training_preset(chosen.at("preset").get<std::string>()).steps;
-  full.settings_reason = chosen.at("words").get<std::string>();
+  const Choice chosen = choice(request, full, seconds, start, terminal);
+  full.scene.options.downscale = chosen.downscale;
+  full.training.steps = training_preset(chosen.preset).steps;
+  full.settings_reason = chosen.words;
   terminal.say(full.settings_reason);
   return full;
 }

@@ -86,7 +86,7 @@ DeviationLedger::Surface DeviationLedger::surface_of(const TriangleMesh& mesh) {
 
 void DeviationLedger::take(const std::vector<Provenance>& labels,
                            const std::vector<float>& distances,
-                           Distances& out) {
+                           DeviationStep& out) {
   std::vector<float> evidence;
   std::vector<float> inferred;
   for (size_t i = 0; i < distances.size(); ++i) {
@@ -100,38 +100,38 @@ void DeviationLedger::take(const std::vector<Provenance>& labels,
   out.inferred = larger(out.inferred, statistics(std::move(inferred)));
 }
 
-void DeviationLedger::take_measured(std::vector<float> distances, Row& row) const {
+void DeviationLedger::take_measured(std::vector<float> distances, DeviationStep& step) const {
   const auto told =
       std::partition(distances.begin(), distances.end(), [](float d) { return std::isfinite(d); });
   distances.erase(told, distances.end());
-  row.outside = 1 - static_cast<double>(distances.size()) /
-                        static_cast<double>(std::max<size_t>(1, measured_.size()));
-  row.from_measured = statistics(std::move(distances));
+  step.outside = 1 - static_cast<double>(distances.size()) /
+                         static_cast<double>(std::max<size_t>(1, measured_.size()));
+  step.from_measured = statistics(std::move(distances));
 }
 
 void DeviationLedger::add(const std::string& step, const Volume& volume) {
-  Row row{step, last_, {}, {}, 0, measured_.size()};
+  DeviationStep row = {.step = step, .against = last_, .samples = measured_.size()};
   const std::vector<float> distances = distances_to_observed(volume, measured_);
-  take({}, distances, row.distances);
+  take({}, distances, row);
   take_measured(distances, row);
-  rows_.push_back(std::move(row));
+  steps_.push_back(std::move(row));
   last_ = step;
   volume_ = &volume;
 }
 
 void DeviationLedger::add(const std::string& step, const TriangleMesh& mesh) {
   Surface now = surface_of(mesh);
-  Row row{step, last_, {}, {}, 0, now.samples.points.size()};
+  DeviationStep row = {.step = step, .against = last_, .samples = now.samples.points.size()};
   if (surface_) {
-    take(now.labels, surface_->distance.of(now.samples.points), row.distances);
-    take(surface_->labels, now.distance.of(surface_->samples.points), row.distances);
+    take(now.labels, surface_->distance.of(now.samples.points), row);
+    take(surface_->labels, now.distance.of(surface_->samples.points), row);
   } else if (volume_ != nullptr) {
-    take(now.labels, distances_to_observed(*volume_, now.samples.points), row.distances);
+    take(now.labels, distances_to_observed(*volume_, now.samples.points), row);
   } else {
-    take({}, now.distance.of(measured_), row.distances);
+    take({}, now.distance.of(measured_), row);
   }
   take_measured(now.distance.of(measured_), row);
-  rows_.push_back(std::move(row));
+  steps_.push_back(std::move(row));
   go_on_from(step, std::move(now));
 }
 
@@ -145,25 +145,19 @@ void DeviationLedger::go_on_from(const std::string& step, Surface surface) {
   surface_ = std::move(surface);
 }
 
-Json DeviationLedger::json(const Frame& frame) const {
+Json deviations_to_json(const std::vector<DeviationStep>& steps, const Frame& frame) {
   Json out = Json::array();
-  for (const Row& row : rows_) {
-    Json line = {{"step", row.step},
-                 {"against", row.against},
-                 {"with_evidence", nullptr},
-                 {"inferred", nullptr},
-                 {"from_measured", nullptr},
-                 {"samples", row.samples}};
-    if (row.distances.has_evidence) {
-      line["with_evidence"] = statistics_json(row.distances.with_evidence, frame.scale);
-    }
-    if (row.distances.has_inferred) {
-      line["inferred"] = statistics_json(row.distances.inferred, frame.scale);
-    }
-    if (row.outside < 1) {
-      line["from_measured"] = statistics_json(row.from_measured, frame.scale);
-      line["from_measured"]["outside"] = row.outside;
-    }
+  for (const DeviationStep& step : steps) {
+    const auto figures = [&](bool has_any, const DistanceStatistics& s) {
+      return has_any ? statistics_json(s, frame.scale) : Json();
+    };
+    Json line = {{"step", step.step},
+                 {"against", step.against},
+                 {"with_evidence", figures(step.has_evidence, step.with_evidence)},
+                 {"inferred", figures(step.has_inferred, step.inferred)},
+                 {"from_measured", figures(step.outside < 1, step.from_measured)},
+                 {"samples", step.samples}};
+    if (step.outside < 1) line["from_measured"]["outside"] = step.outside;
     out.push_back(std::move(line));
   }
   return out;

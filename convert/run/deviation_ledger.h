@@ -18,6 +18,25 @@ namespace cgs {
 /// any depth), evenly over all their pixels and the same for the same model [internal units].
 std::vector<Eigen::Vector3f> measured_points(const Model& model, size_t count);
 
+/// What one step moves [internal units]. Of a pair of meshes samples of both are taken, and of each
+/// figure the larger of the two ways.
+struct DeviationStep {
+  std::string step;
+  std::string against;                    ///< The step before.
+  DistanceStatistics with_evidence = {};  ///< Of seen surface.
+  DistanceStatistics inferred = {};       ///< Of inferred and estimated surface.
+  bool has_evidence = false;              ///< There are samples of it.
+  bool has_inferred = false;
+  DistanceStatistics from_measured = {};  ///< Of the measured points.
+  double outside = 0;                     ///< Share of these that cannot be told.
+  size_t samples = 0;
+};
+
+/// [{"step", "against", "with_evidence": {"max", "rms", "p95"}, "inferred", "from_measured":
+/// {"max", "rms", "p95", "outside"}, "samples"}] in file units; null for what has no samples.
+nlohmann::ordered_json deviations_to_json(const std::vector<DeviationStep>& steps,
+                                          const Frame& frame);
+
 /// What every step on the way from measured depth to a delivered mesh moves: distances of each step
 /// to the one before and of the measured points to each step, by samples. Steps are added in their
 /// order; only the last one is kept in memory.
@@ -35,28 +54,9 @@ class DeviationLedger {
   /// What the next step is held against, where it has been added to another ledger.
   void go_on_from(const std::string& step, const TriangleMesh& mesh);
 
-  /// [{"step", "against": the step before, "with_evidence": {"max", "rms", "p95"}, "inferred": the
-  /// same of inferred and estimated surface, "from_measured": {"max", "rms", "p95", "outside":
-  /// share of the points that cannot be told}, "samples"}] in file units; null for what has no
-  /// samples. Of a pair of meshes samples of both are taken, and of each figure the larger of the
-  /// two ways.
-  nlohmann::ordered_json json(const Frame& frame) const;
+  const std::vector<DeviationStep>& steps() const { return steps_; }
 
  private:
-  struct Distances {
-    DistanceStatistics with_evidence;
-    DistanceStatistics inferred;
-    bool has_evidence = false;
-    bool has_inferred = false;
-  };
-  struct Row {
-    std::string step;
-    std::string against;
-    Distances distances;
-    DistanceStatistics from_measured;
-    double outside = 0;
-    size_t samples = 0;
-  };
   struct Surface {
     SurfaceSamples samples;
     std::vector<Provenance> labels;  // of the samples; empty = none
@@ -66,14 +66,14 @@ class DeviationLedger {
   static Surface surface_of(const TriangleMesh& mesh);
   static void take(const std::vector<Provenance>& labels,
                    const std::vector<float>& distances,
-                   Distances& out);
-  void take_measured(std::vector<float> distances, Row& row) const;
+                   DeviationStep& out);
+  void take_measured(std::vector<float> distances, DeviationStep& step) const;
 
   std::vector<Eigen::Vector3f> measured_;
   std::string last_ = "measured depth";
   const Volume* volume_ = nullptr;  // the last step, where it is a volume
   std::optional<Surface> surface_;  // the last step, where it is a mesh
-  std::vector<Row> rows_;
+  std::vector<DeviationStep> steps_;
 };
 
 }  // namespace cgs

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/run/pipeline.h"
 
-#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -13,11 +12,12 @@
 #include "convert/model/memory_plan.h"
 #include "convert/model/model.h"
 #include "convert/model/model_training.h"
+#include "convert/model/stage.h"
 #include "convert/model/views.h"
 #include "convert/report/report.h"
 #include "convert/report/report_viewer.h"
 #include "convert/run/disk_plan.h"
-#include "convert/run/recorded_request.h"
+#include "convert/run/request_fields.h"
 #include "convert/run/run_files.h"
 #include "convert/run/run_record.h"
 #include "convert/run/run_stages.h"
@@ -49,7 +49,7 @@ struct Run {
   std::vector<KnownDistance> distances;
   std::vector<MarkerBar> markers;
   Json control;        ///< Of OpenedScene.
-  Json refined;        ///< RefinedPoses::report; null where it was not asked for.
+  Json refined;        ///< As refinement_to_json(); null where it was not asked for.
   double focal_sigma;  ///< Of OpenedScene.
   // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
   // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
@@ -58,6 +58,12 @@ struct Run {
   std::vector<std::string> hitches;  ///< Of the stage that runs, for the terminal alone.
   const Terminal& terminal;          ///< For what must be said before a stage ends.
 };
+
+bool is_done(const Run& run, const StageFiles& stage) {
+  return run.record.is_done(traits(stage.stage).name, stage.files);
+}
+
+Json result_of(const Run& run, Stage stage) { return run.record.result(traits(stage).name); }
 
 // Decodes every photograph once before anything is written: a run must not stop halfway, or leave
 // a folder behind, because of a damaged file.
@@ -86,7 +92,15 @@ const TriangleMesh& loaded_mesh(Run& run) {
   return *run.mesh;
 }
 
-Json run_model(Run& run, const Progress& progress) {
+/// What a stage did.
+struct StageResult {
+  Json report = {};         ///< Goes into run.json.
+  std::string remark = {};  ///< What a user would not expect of it: "kept 33165 of 142884".
+  /// Files that it left out, below the folder of the run: those of another program may stand there.
+  std::vector<std::string> left_out = {};
+};
+
+StageResult run_model(Run& run, const Progress& progress) {
   const std::filesystem::path folder = run.request.output / "model";
   ModelRequest request = {
       {}, run.request.training, folder, run.request.scene.options.depth.network};
@@ -103,21 +117,16 @@ Json run_model(Run& run, const Progress& progress) {
   write_model(folder, trained.model);
   write_file(folder / "training.json", json_text(report) + "\n");
   run.hitches = trained.hitches;
-  return report;
-}
-
-// What the model stage found, as it wrote it down.
-GivenDepthReport sensor_scale(const Json& model) {
-  GivenDepthReport out;
-  const Json given = model.value("given_depth", Json());
-  if (!given.is_object() || !given.contains("metres_per_unit")) return out;
-  out.metres_per_unit = given["metres_per_unit"].get<double>();
-  out.metres_sigma = given["metres_sigma"].get<double>();
-  return out;
+  const GivenDepthReport& given = trained.priors.given;
+  std::string remark = given.kind == DepthKind::Unknown ? "" : "depth files: " + given.found;
+  for (const std::string& words : remarks_on_photographs(report)) {
+    remark += (remark.empty() ? "" : "; ") + words;
+  }
+  return {report, remark};
 }
 
 // The scale is told apart from the model: people learn a length after they saw a first result.
-Json run_scale(Run& run, const Progress& progress) {
+StageResult run_scale(Run& run, const Progress& progress) {
   Model model = read_model_as_written(run.request.output / "model");
   relink_views(model.scene, run.scene);
   report(progress, 0);
@@ -127,7 +136,7 @@ Json run_scale(Run& run, const Progress& progress) {
   frame.metres_sigma = run.scene.frame.metres_sigma;
   frame.scale_source = run.scene.frame.scale_source;
   frame.up = run.scene.frame.up;
-  take_sensor_scale(sensor_scale(run.record.result("model")), frame);
+  take_sensor_scale(recorded_sensor_scale(result_of(run, Stage::Model)), frame);
   Json result = run.control;
   if (result.is_null()) result = scale_by(run.distances, run.markers, model);
   widen_by_focal(frame, run.focal_sigma);
@@ -142,37 +151,45 @@ Json run_scale(Run& run, const Progress& progress) {
   }
   use_metres_where_measured(model.scene);
   run.model = std::move(model);
-  return result;
+  return {result};
 }
 
-Json run_views(Run& run, const Progress& progress) {
+StageResult run_views(Run& run, const Progress& progress) {
   Model& model = loaded_model(run);
-  return write_views(
-      model, views_with_photograph(model.scene), run.request.output / "views", progress);
+  return {write_views(
+      model, views_with_photograph(model.scene), run.request.output / "views", progress)};
 }
 
-Json run_evaluation(Run& run, const Progress& progress) {
+StageResult run_evaluation(Run& run, const Progress& progress) {
   Model& model = loaded_model(run);
-  if (model.scene.held_out.empty()) return nullptr;
-  return evaluate_views(model, model.scene.held_out, progress);
+  if (model.scene.held_out.empty()) return {};
+  return {evaluate_views(model, model.scene.held_out, progress)};
 }
 
-Json run_splats(Run& run, const Progress& progress) {
-  return write_web_splats(run.request.output / "web", loaded_model(run), progress);
+StageResult run_splats(Run& run, const Progress& progress) {
+  const WebSplats made = write_web_splats(run.request.output / "web", loaded_model(run), progress);
+  return {web_splats_to_json(made),
+          "kept " + std::to_string(made.thinned.splats.size()) + " of " + std::to_string(made.of)};
 }
 
-Json run_mesh(Run& run, const Progress& progress) {
-  return write_meshes(loaded_model(run), run.request, progress);
+StageResult run_mesh(Run& run, const Progress& progress) {
+  const MeshesReport made = write_meshes(loaded_model(run), run.request, progress);
+  StageResult out{meshes_to_json(made, run.model->scene.frame)};
+  for (const auto& [name, why] : made.files.left_out) out.left_out.push_back("mesh/" + name);
+  return out;
 }
 
-Json run_web(Run& run, const Progress& progress) {
+StageResult run_web(Run& run, const Progress& progress) {
   const Model& model = loaded_model(run);
-  return write_assets(model,
-                      loaded_mesh(run),
-                      run.request,
-                      run.record.result("model").at("description"),
-                      run.record.result("mesh"),
-                      progress);
+  const Frame& frame = model.scene.frame;
+  const AssetsReport made =
+      write_assets(model,
+                   loaded_mesh(run),
+                   run.request,
+                   result_of(run, Stage::Model).at("description").get<std::string>(),
+                   mesh_findings(result_of(run, Stage::Mesh), frame),
+                   progress);
+  return {assets_to_json(made, frame)};
 }
 
 Json report_json(const Run& run) {
@@ -184,34 +201,31 @@ Json report_json(const Run& run) {
     stages.push_back(
         {{"stage", name}, {"seconds", stage["seconds"]}, {"peak_memory", stage["peak_memory"]}});
   }
-  const Json mesh = run.record.result("mesh");
+  const Json mesh = result_of(run, Stage::Mesh);
   Json warnings = run.scene.warnings;
-  for (const char* stage : {"model", "scale"}) {
-    const Json result = run.record.result(stage);
+  for (const Stage stage : {Stage::Model, Stage::Scale}) {
+    const Json result = result_of(run, stage);
     if (!result.is_object()) continue;
     const Json found = result.value("warnings", Json::array());
     warnings.insert(warnings.end(), found.begin(), found.end());
   }
   std::vector<std::string> notes = run.scene.notes;
-  const Json model = run.record.result("model");
+  const Json model = result_of(run, Stage::Model);
   for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
-  for (const Json& view : model.value("coverage", Json::array())) {
-    if (view.contains("words")) notes.push_back(view["words"].get<std::string>());
-  }
   Json out = {{"program", kProgramVersion},
               {"scene", run.scene.kind},
               {"folder", run.request.scene.path.string()},
               {"units", scene.frame.unit_name()},
               {"scale_source", scale_source_name(scene.frame.scale_source)},
               {"frame", frame_to_json(scene.frame)},
-              {"scale", run.record.result("scale")},
+              {"scale", result_of(run, Stage::Scale)},
               {"model", model},
-              {"views", run.record.result("views")},
-              {"evaluation", run.record.result("evaluation")},
+              {"views", result_of(run, Stage::Views)},
+              {"evaluation", result_of(run, Stage::Evaluation)},
               {"mesh", mesh},
               {"certificate", mesh.at("certificate")},
-              {"web", run.record.result("web")},
-              {"splats", run.record.result("splats")},
+              {"web", result_of(run, Stage::Web)},
+              {"splats", result_of(run, Stage::Splats)},
               {"photographs", photographs},
               {"stages", stages},
               {"warnings", warnings},
@@ -221,72 +235,45 @@ Json report_json(const Run& run) {
   return out;
 }
 
-Json run_report(Run& run, const Progress& progress) {
+StageResult run_report(Run& run, const Progress& progress) {
   loaded_model(run);
   report(progress, 0);
   const Json json = report_json(run);
   write_file(run.request.output / "report.json", json_text(json) + "\n");
   const std::string viewer = viewer_section(loaded_model(run), loaded_mesh(run), progress);
   write_html_report(run.request.output, json, run.model->scene, viewer);
-  return {{"pages", 1}};
+  return {Json{{"pages", 1}}};
 }
 
-/// Which stage a part of the request first has a say in; what is not here decides all.
-std::map<std::string, std::string> decided_stages(const RunRequest& request, const Scene& scene) {
-  // Which photographs are meant is decided by their names and hashes, wherever they lie.
-  std::map<std::string, std::string> out = {{"scene", "report"},
-                                            {"views", "report"},
-                                            {"assume_unit", "scale"},
-                                            {"up", "scale"},
-                                            {"known_distances", "scale"},
-                                            {"marker_size", "scale"},
-                                            {"control_points", "scale"},
-                                            {"stated_scale", "scale"},
-                                            {"held_out_images", "views"},
-                                            {"voxel_size", "mesh"},
-                                            {"estimated", "mesh"},
-                                            {"simplify", "mesh"},
-                                            {"max_error", "mesh"},
-                                            {"compression_error", "web"},
-                                            {"glb_encoding", "web"},
-                                            {"lods", "web"},
-                                            {"max_size", "web"}};
-  // Metric depth is brought into the scene by its unit where photographs do not tell how, and held
-  // against it where they do.
-  if (has_given_depth(request.scene, scene)) {
-    out.erase("assume_unit");
-    out.erase("control_points");
-    out.erase("stated_scale");
+StageResult do_work(Stage stage, Run& run, const Progress& progress) {
+  switch (stage) {
+    case Stage::Model:
+      return run_model(run, progress);
+    case Stage::Scale:
+      return run_scale(run, progress);
+    case Stage::Views:
+      return run_views(run, progress);
+    case Stage::Evaluation:
+      return run_evaluation(run, progress);
+    case Stage::Splats:
+      return run_splats(run, progress);
+    case Stage::Mesh:
+      return run_mesh(run, progress);
+    case Stage::Web:
+      return run_web(run, progress);
+    case Stage::Report:
+      break;
   }
-  return out;
-}
-
-/// What a stage is called and does.
-struct StageWork {
-  const char* title;
-  Json (*run)(Run&, const Progress&);
-};
-
-const StageWork& work_of(const StageFiles& stage) {
-  static const std::map<std::string, StageWork> kWork = {
-      {"model", {"depth and Gaussians", run_model}},
-      {"scale", {"scale", run_scale}},
-      {"views", {"views", run_views}},
-      {"evaluation", {"held-out views", run_evaluation}},
-      {"splats", {"splats for browsers", run_splats}},
-      {"mesh", {"volume and mesh", run_mesh}},
-      {"web", {"textured assets", run_web}},
-      {"report", {"report", run_report}}};
-  return kWork.at(stage.stage);
+  return run_report(run, progress);
 }
 
 // What somebody changed of the files of a finished stage may be wanted, and stays.
 void warn_of_changed_files(const StageFiles& stage, const Run& run, const Terminal& terminal) {
   std::set<std::string> unsettled;  // a later stage may have been stopped after it wrote them
   for (const StageFiles& other : run.stages) {
-    if (!run.record.is_done(other.stage, other.files)) unsettled.merge(other.all());
+    if (!is_done(run, other)) unsettled.merge(other.all());
   }
-  for (const std::string& file : run.record.changed_files(stage.stage)) {
+  for (const std::string& file : run.record.changed_files(traits(stage.stage).name)) {
     if (unsettled.contains(file)) continue;
     terminal.warn({printable(run.request.output / file) +
                    " is not what the run wrote and stays as it is; remove it to have it made "
@@ -307,70 +294,50 @@ void warn_of(const Json& result, const Terminal& terminal) {
   terminal.warn(result["warnings"].get<std::vector<std::string>>());
 }
 
-// What a user would not expect of a stage: "kept 33165 of 142884".
-std::string remark_on(const std::string& stage, const Json& result) {
-  if (stage == "model") {
-    std::string out = result["given_depth"].is_object()
-                          ? "depth files: " + result["given_depth"].value("words", "")
-                          : "";
-    for (const std::string& remark : remarks_on_photographs(result)) {
-      out += (out.empty() ? "" : "; ") + remark;
-    }
-    return out;
+void do_stage(const StageFiles& stage, Run& run, Terminal& terminal) {
+  const std::filesystem::path& output = run.request.output;
+  const Json before = earlier_outputs(stage, run.stages, run.record, output);
+  const CostMeter meter;  // from here on the peak of memory is that of the stage
+  const StageResult result = do_work(stage.stage, run, terminal.begin(traits(stage.stage).title));
+  const double seconds = terminal.end(result.remark);
+  const std::vector<std::string> written = named_outputs(output, stage.all());
+  std::set<std::string> outputs(written.begin(), written.end());
+  for (const std::string& file : result.left_out) outputs.erase(file);
+  const Json after = earlier_outputs(stage, run.stages, run.record, output);
+  for (const auto& [name, hash] : after.items()) {
+    if (before.value(name, Json()) == hash) outputs.erase(name);
   }
-  if (stage != "splats") return "";
-  const Json& thinning = result["thinning"];
-  return "kept " + std::to_string(thinning["kept"].get<size_t>()) + " of " +
-         std::to_string(thinning["of"].get<size_t>());
+  run.record.finish(traits(stage.stage).name, seconds, result.report, outputs);
+  warn_of(result.report, terminal);
+  terminal.warn(std::exchange(run.hitches, {}));
 }
 
-// Where files for CAD were left out, those of another program may stand by their names.
-void erase_left_out(const Json& result, std::set<std::string>& outputs) {
-  const Json output = result.is_object() ? result.value("output", Json()) : Json();
-  if (!output.is_object()) return;
-  const Json left_out = output.value("left_out", Json::object());
-  for (const auto& [name, why] : left_out.items()) outputs.erase("mesh/" + name);
-}
-
-Json run_stages(Run& run, Terminal& terminal) {
+FinishedRun run_stages(Run& run, Terminal& terminal) {
   bool stale = false;  // a stage that ran makes everything after it stale
   const std::filesystem::path& output = run.request.output;
   for (const StageFiles& stage : run.stages) {
-    const StageWork& work = work_of(stage);
-    if (!stale && run.record.is_done(stage.stage, stage.files)) {
-      terminal.say(std::string(work.title) + ": done before");
-      warn_of(run.record.result(stage.stage), terminal);
+    if (!stale && is_done(run, stage)) {
+      terminal.say(std::string(traits(stage.stage).title) + ": done before");
+      warn_of(result_of(run, stage.stage), terminal);
       warn_of_changed_files(stage, run, terminal);
       continue;
     }
     if (!stale) remove_outputs_after(stage.stage, run.stages, run.record, output);
     stale = true;
-    const Json before = earlier_outputs(stage, run.stages, run.record, output);
-    const CostMeter meter;  // from here on the peak of memory is that of the stage
-    const Json result = work.run(run, terminal.begin(work.title));
-    const double seconds = terminal.end(remark_on(stage.stage, result));
-    const std::vector<std::string> written = named_outputs(output, stage.all());
-    std::set<std::string> outputs(written.begin(), written.end());
-    erase_left_out(result, outputs);
-    const Json after = earlier_outputs(stage, run.stages, run.record, output);
-    for (const auto& [name, hash] : after.items()) {
-      if (before.value(name, Json()) == hash) outputs.erase(name);
-    }
-    run.record.finish(stage.stage, seconds, result, outputs);
-    warn_of(result, terminal);
-    terminal.warn(std::exchange(run.hitches, {}));
+    do_stage(stage, run, terminal);
   }
   forget_checkpoints(output / "model");
-  run.record.note("focal", run.request.scene.focal);
-  const std::filesystem::path& control = run.request.scene.control.file;
-  if (!control.empty()) {
-    run.record.note("control_points", std::filesystem::weakly_canonical(control).string());
+  for (const RequestField& field : noted_fields()) {
+    const Json value = field.write(run.request, run.scene);
+    if (!value.is_null()) run.record.note(field.key, value);
   }
-  run.record.note("allow_external", run.request.scene.options.allow_external);
-  run.record.note("depth_options", depth_options_json(run.request.scene.options.depth));
   note_outputs(run, stale);
   loaded_model(run);
-  return report_json(run);
+  FinishedRun out{report_json(run), {}};
+  for (const StageFiles& stage : run.stages) {
+    out.seconds.emplace_back(stage.stage, run.record.seconds(traits(stage.stage).name));
+  }
+  return out;
 }
 
 // Lengths that will be refused, before minutes are spent on cameras.
@@ -402,7 +369,7 @@ void remove_all_abandoned_files(const std::filesystem::path& output) {
 
 }  // namespace
 
-Json run_pipeline(const RunRequest& request, Terminal& terminal) {
+FinishedRun run_pipeline(const RunRequest& request, Terminal& terminal) {
   refuse_contradictions(request);
   check_lengths_of_photographs(request);
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
@@ -415,7 +382,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   check_memory_plan(scene, work, memory_budget(request.memory_limit));
   refuse_unreadable_images(scene);
   const size_t known = scene.warnings.size();
-  const Json fit = check_stated_cameras(opened, terminal);
+  const Json fit = camera_fit_to_json(check_stated_cameras(opened, terminal));
   terminal.warn(std::vector(scene.warnings.begin() + std::ptrdiff_t(known), scene.warnings.end()));
   std::vector<KnownDistance> distances = known_distances(request.scene.known_distances, scene);
   std::vector<MarkerBar> markers = marker_bars(scene, request.scene.marker_size);
@@ -433,10 +400,11 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
   remove_all_abandoned_files(request.output);
   opened.keep(request.output / "model");
   Json predicted = Json::object();
-  for (const StageMemory& stage : plan) predicted[stage.stage] = stage.bytes;
+  for (const StageMemory& stage : plan) predicted[traits(stage.stage).title] = stage.bytes;
   record.note("predicted_memory", predicted);
   record.note("camera_fit", fit);
-  record.note("refined_poses", opened.refined ? opened.refined->report : Json());
+  const Json refined = opened.refined ? refinement_to_json(opened.refined->report) : Json();
+  record.note("refined_poses", refined);
   Run run{request,
           std::move(stages),
           std::move(record),
@@ -444,7 +412,7 @@ Json run_pipeline(const RunRequest& request, Terminal& terminal) {
           std::move(distances),
           std::move(markers),
           std::move(opened.control),
-          opened.refined ? std::move(opened.refined->report) : Json(),
+          refined,
           opened.focal_sigma(),
           {},
           {},

@@ -9,10 +9,6 @@
 
 namespace cgs {
 
-/// How depth was given, for run.json: it must be known to read the inputs again, while what it
-/// leads to is part of the request already.
-nlohmann::ordered_json depth_options_json(const DepthOptions& options);
-
 /// The record of a run that came to its end.
 /// \throws BadInput Missing (no run.json), Schema (not of a finished run)
 nlohmann::ordered_json finished_record(const std::filesystem::path& output);

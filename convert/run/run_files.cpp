@@ -2,6 +2,7 @@
 #include "convert/run/run_files.h"
 
 #include <system_error>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -52,40 +53,46 @@ std::set<std::string> StageFiles::all() const {
   return out;
 }
 
-std::vector<StageFiles> stage_files(const Scene& scene, size_t lods) {
-  std::vector<std::string> view_files;
-  for (const int i : views_with_photograph(scene)) {
-    const std::string stem = "views/" + scene.views[static_cast<size_t>(i)].name;
-    for (const char* suffix : {".exr", ".color.png", ".depth.png", ".normal.png", ".hole.png"}) {
-      view_files.push_back(stem + suffix);
+namespace {
+
+/// What stands for names in StageTraits::files, and the names.
+using Place = std::pair<std::string, std::vector<std::string>>;
+
+Place names_of_views(const char* place, const Scene& scene, const std::vector<int>& views) {
+  Place out = {place, {}};
+  for (const int i : views) out.second.push_back(scene.views[static_cast<size_t>(i)].name);
+  return out;
+}
+
+// The path itself where it has no place for names.
+void add_files(const std::string& path,
+               const std::vector<Place>& places,
+               std::vector<std::string>& out) {
+  for (const auto& [place, names] : places) {
+    const size_t at = path.find(place);
+    if (at == std::string::npos) continue;
+    for (const std::string& name : names) {
+      out.push_back(std::string(path).replace(at, place.size(), name));
     }
+    return;
   }
-  std::vector<std::string> model_files = {"model/gaussians.ply", "model/cameras.json"};
-  for (const int i : scene.input) {
-    model_files.push_back("model/priors/" + scene.views[static_cast<size_t>(i)].name + ".exr");
+  out.push_back(path);
+}
+
+}  // namespace
+
+std::vector<StageFiles> stage_files(const Scene& scene, size_t lods) {
+  const std::vector<Place> places = {names_of_views("<input>", scene, scene.input),
+                                     names_of_views("<view>", scene, views_with_photograph(scene)),
+                                     {"<level>", level_files(lods)}};
+  std::vector<StageFiles> out;
+  for (const StageTraits& stage : stage_table()) {
+    StageFiles& files = out.emplace_back();
+    files.stage = stage.id;
+    files.further.assign(stage.further.begin(), stage.further.end());
+    for (const char* path : stage.files) add_files(path, places, files.files);
   }
-  std::vector<std::string> web_files = {
-      "web/asset.glb", "mesh/watertight.obj", "mesh/watertight.mtl"};
-  for (const std::string& name : level_files(lods)) web_files.push_back("web/" + name);
-  return {{"model", model_files, {"model/training.json"}},
-          {"scale", {}, {"model/gaussians.ply", "model/cameras.json"}},
-          {"views", view_files},
-          {"evaluation", {}},
-          {"splats", {"web/splats.glb"}, {"web/splats.spz"}},
-          {"mesh",
-           {"volume.vdb",
-            "mesh/surface.ply",
-            "mesh/watertight.ply",
-            "mesh/front.png",
-            "mesh/side.png",
-            "mesh/front.provenance.png",
-            "mesh/side.provenance.png"},
-           {"mesh/watertight.stl", "mesh/watertight.3mf"}},
-          {"web",
-           web_files,
-           // Pictures of the texture, levels of a run that wanted more of them.
-           {"mesh/watertight.*.jpg", "web/asset.lod*.glb", "web/tileset.json"}},
-          {"report", {"report.html", "report.json"}}};
+  return out;
 }
 
 std::set<std::string> camera_files() {
@@ -116,14 +123,14 @@ Json earlier_outputs(const StageFiles& stage,
   std::set<std::string> names;
   for (const StageFiles& other : stages) {
     if (other.stage == stage.stage) break;
-    for (const std::string& file : record.files(other.stage)) {
+    for (const std::string& file : record.files(traits(other.stage).name)) {
       if (own.contains(file)) names.insert(file);
     }
   }
   return output_hashes(output, names);
 }
 
-void remove_outputs_after(const std::string& stage,
+void remove_outputs_after(Stage stage,
                           const std::vector<StageFiles>& stages,
                           const RunRecord& record,
                           const fs::path& output) {
@@ -132,7 +139,7 @@ void remove_outputs_after(const std::string& stage,
   std::set<std::string> names;
   for (const StageFiles& other : stages) {
     (is_later ? names : kept).insert(other.files.begin(), other.files.end());
-    for (const std::string& file : record.files(other.stage)) {
+    for (const std::string& file : record.files(traits(other.stage).name)) {
       (is_later ? names : kept).insert(file);
     }
     is_later = is_later || other.stage == stage;

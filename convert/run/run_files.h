@@ -9,6 +9,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "convert/model/stage.h"
 #include "convert/run/run_record.h"
 #include "libcgs/core/scene.h"
 
@@ -27,7 +28,7 @@ nlohmann::ordered_json output_hashes(const std::filesystem::path& output,
 
 /// What a stage of a run writes, as paths below the folder of the run.
 struct StageFiles {
-  std::string stage;
+  Stage stage = Stage::Model;
   std::vector<std::string> files;         ///< One of them absent means that the stage must run.
   std::vector<std::string> further = {};  ///< What it may write besides, as for named_outputs().
 
@@ -54,7 +55,7 @@ nlohmann::ordered_json earlier_outputs(const StageFiles& stage,
 /// Removes what stages after `stage` wrote: made of other settings, it must not stand beside what
 /// comes now, as if it belonged to it, should this run end before them. Files of like names that no
 /// stage is known to have written are the user's.
-void remove_outputs_after(const std::string& stage,
+void remove_outputs_after(Stage stage,
                           const std::vector<StageFiles>& stages,
                           const RunRecord& record,
                           const std::filesystem::path& output);

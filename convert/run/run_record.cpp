@@ -154,6 +154,10 @@ Json RunRecord::result(const std::string& stage) const {
   return json_["stages"].contains(stage) ? json_["stages"][stage]["result"] : Json();
 }
 
+double RunRecord::seconds(const std::string& stage) const {
+  return json_.at("stages").at(stage).at("seconds").get<double>();
+}
+
 std::vector<std::string> RunRecord::files(const std::string& stage) const {
   return json_["stages"].contains(stage) ? files_of(json_["stages"][stage])
                                          : std::vector<std::string>();

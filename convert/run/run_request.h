@@ -5,8 +5,6 @@
 #include <filesystem>
 #include <string>
 
-#include <nlohmann/json.hpp>
-
 #include "convert/model/fusion.h"
 #include "convert/model/memory_plan.h"
 #include "convert/scene/scene_request.h"
@@ -52,8 +50,5 @@ void check_lengths(const RunRequest& request, const Scene& scene);
 
 /// True if depth goes in beside the photographs, from files or a network.
 bool has_given_depth(const SceneRequest& request, const Scene& scene);
-
-/// Everything that decides the result of a request: arguments, and hashes of what goes in.
-nlohmann::ordered_json request_json(const RunRequest& request, const Scene& scene);
 
 }  // namespace cgs

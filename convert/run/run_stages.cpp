@@ -2,23 +2,14 @@
 #include "convert/run/run_stages.h"
 
 #include <algorithm>
-#include <map>
-#include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
-#include "convert/files/mesh_files.h"
 #include "convert/files/volume_file.h"
 #include "convert/model/fusion.h"
 #include "convert/model/memory_plan.h"
-#include "convert/model/simplification.h"
-#include "convert/model/texture.h"
-#include "convert/run/asset.h"
-#include "convert/run/deviation_ledger.h"
-#include "convert/run/written_surface.h"
 #include "convert/text/html.h"
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
@@ -49,15 +40,13 @@ DeviationLedger fusion_ledger(const Model& model,
   return ledger;
 }
 
-// What simplification for asset.glb and its compression move, told by the file itself.
-Json asset_deviations(const Model& model,
-                      const TriangleMesh& mesh,
-                      const std::filesystem::path& asset) {
-  const Frame& frame = model.scene.frame;
+DeviationStep asset_deviation(const Model& model,
+                              const TriangleMesh& mesh,
+                              const std::filesystem::path& asset) {
   DeviationLedger ledger(measured_points(model, DeviationLedger::kSamples));
   ledger.go_on_from("watertight.ply", mesh);
-  ledger.add("asset.glb", read_mesh_file(asset, frame).content.mesh);
-  return ledger.json(frame);
+  ledger.add("asset.glb", read_mesh_file(asset, model.scene.frame).content.mesh);
+  return ledger.steps().front();
 }
 
 // Two pictures of the mesh for the report: as the middle input camera sees it, and from the side.
@@ -82,12 +71,12 @@ struct Surfaces {
   WatertightResult closed;
 };
 
-/// What became of them on disk, for the report.
+/// What became of them on disk.
 struct WrittenSurfaces {
   Surfaces surfaces;
-  Json simplification;
-  Json files;
-  Json promise;  ///< null without one
+  std::optional<Simplification> simplification;
+  MeshFiles files;
+  std::optional<MeshPromise> promise;
 };
 
 WrittenSurfaces write_surfaces(Surfaces surfaces,
@@ -98,16 +87,10 @@ WrittenSurfaces write_surfaces(Surfaces surfaces,
   WrittenSurfaces out{std::move(surfaces), {}, {}, {}};
   TriangleMesh& open = out.surfaces.open;
   WatertightResult& closed = out.surfaces.closed;
-  out.simplification = simplify_meshes(open, closed, options, scene.frame, progress);
+  out.simplification = simplify_meshes(open, closed, options, progress);
   out.files = write_mesh_files(folder, open, closed.mesh, scene.frame);
   return out;
 }
-
-/// What the mesh files are once they are read again.
-struct FileDeviations {
-  std::map<std::string, double> largest;  ///< Distance from what was fused [internal units].
-  std::vector<std::string> too_large;     ///< Files that are above what is read of their format.
-};
 
 FileDeviations deviations_of_files(const Surfaces& fused,
                                    const WrittenSurfaces& written,
@@ -122,8 +105,7 @@ FileDeviations deviations_of_files(const Surfaces& fused,
   const TriangleMesh read = read_mesh_ply(folder / "watertight.ply", frame).mesh;
   const double of_mesh = surface_deviation(read, fused.closed.mesh).max();
   out.largest["watertight.ply"] = of_mesh;
-  for (const Json& file : written.files["files"]) {
-    const auto name = file.get<std::string>();
+  for (const std::string& name : written.files.written) {
     if (name != "watertight.stl" && name != "watertight.3mf") continue;
     // The same mesh: it is as far off, and what its vertices were rounded by.
     try {
@@ -136,25 +118,6 @@ FileDeviations deviations_of_files(const Surfaces& fused,
   return out;
 }
 
-std::string words_for(const FileDeviations& deviations,
-                      double promise,
-                      const KnownArea& known,
-                      const Frame& frame) {
-  std::string out;
-  for (const auto& [file, deviation] : deviations.largest) {
-    out += (out.empty() ? "" : ", ") + file + " is at most " + format_length(deviation, frame);
-  }
-  out += " off the fused surface, " + format_length(promise, frame) + " were asked for. ";
-  for (const std::string& file : deviations.too_large) {
-    out += file + " was not read again because of its size. ";
-  }
-  return out +
-         "That is the conversion; what the photographs tell is another matter: "
-         "of the surface they show, " +
-         number(100 * known.share(), "%.1f") + " % is known to " + format_length(promise, frame) +
-         " (one standard deviation)";
-}
-
 // Simplifies less and less until what was written, read again, lies within the promise.
 WrittenSurfaces write_surfaces_within(const Surfaces& fused,
                                       double promise,
@@ -162,33 +125,22 @@ WrittenSurfaces write_surfaces_within(const Surfaces& fused,
                                       const std::filesystem::path& folder,
                                       const Progress& progress) {
   const Frame& frame = scene.frame;
-  Json files;
+  MeshFiles files;
   for (const double share : {0.7, 0.35, 0.0}) {
     std::optional<SimplifyOptions> options;
     if (share > 0) options = SimplifyOptions{.max_error = share * promise};
     WrittenSurfaces out = write_surfaces(fused, options, scene, folder, progress);
-    files = out.files["files"];
+    files = out.files;
     const FileDeviations deviations = deviations_of_files(fused, out, scene, folder);
     double worst = 0;
     for (const auto& [file, deviation] : deviations.largest) worst = std::max(worst, deviation);
     // Twice the room: other samples of the same surface may lie somewhat farther off.
     if (worst > (1 - 2 * kRoomForRounding) * promise) continue;
-    const KnownArea known = known_within(fused.closed.mesh, promise);
-    const double area_unit = frame.scale * frame.scale;
-    out.promise = {{"promised", promise * frame.scale},
-                   {"units", frame.unit_name()},
-                   {"files", Json::object()},
-                   {"not_read_again", deviations.too_large},
-                   {"area_seen", known.seen * area_unit},
-                   {"area_known_as_well", known.within * area_unit},
-                   {"words", words_for(deviations, promise, known, frame)}};
-    for (const auto& [file, deviation] : deviations.largest) {
-      out.promise["files"][file] = deviation * frame.scale;
-    }
+    out.promise = {promise, deviations, known_within(fused.closed.mesh, promise)};
     return out;
   }
-  for (const Json& file : files) {
-    std::filesystem::remove(folder / file.get<std::string>());  // none of what was asked for
+  for (const std::string& file : files.written) {
+    std::filesystem::remove(folder / file);  // none of what was asked for
   }
   throw NumericalError("--max-error: the files hold no coordinates as fine as " +
                        format_length(promise, frame));
@@ -202,16 +154,58 @@ void require_obj_in_place(const RunRequest& request, const TriangleMesh& mesh, c
   throw NumericalError("--max-error: watertight.obj was rounded by " + format_length(moved, frame));
 }
 
-// What asset.glb may go off the watertight mesh [internal units]: as much as that may go off the
-// fused surface, where nothing was promised of both.
-double as_much_again(const Json& simplification, const RunRequest& request, const Frame& frame) {
-  if (simplification.is_null() || !request.max_error.empty()) return 0;
-  return simplification.at("max_error").get<double>() / frame.scale;
+std::string words_for(const MeshPromise& promise, const Frame& frame) {
+  const std::string length = format_length(promise.length, frame);
+  std::string out;
+  for (const auto& [file, deviation] : promise.files.largest) {
+    out += (out.empty() ? "" : ", ") + file + " is at most " + format_length(deviation, frame);
+  }
+  out += " off the fused surface, " + length + " were asked for. ";
+  for (const std::string& file : promise.files.too_large) {
+    out += file + " was not read again because of its size. ";
+  }
+  return out +
+         "That is the conversion; what the photographs tell is another matter: "
+         "of the surface they show, " +
+         number(100 * promise.known.share(), "%.1f") + " % is known to " + length +
+         " (one standard deviation)";
+}
+
+Json promise_to_json(const MeshPromise& promise, const Frame& frame) {
+  const double area_unit = frame.scale * frame.scale;
+  Json files = Json::object();
+  for (const auto& [file, deviation] : promise.files.largest) files[file] = deviation * frame.scale;
+  return {{"promised", promise.length * frame.scale},
+          {"units", frame.unit_name()},
+          {"files", files},
+          {"not_read_again", promise.files.too_large},
+          {"area_seen", promise.known.seen * area_unit},
+          {"area_known_as_well", promise.known.within * area_unit},
+          {"words", words_for(promise, frame)}};
 }
 
 }  // namespace
 
-Json write_meshes(const Model& model, const RunRequest& request, const Progress& progress) {
+Json meshes_to_json(const MeshesReport& report, const Frame& frame) {
+  return {{"fusion", fusion_to_json(report.fusion, frame)},
+          {"method", report.method},
+          {"certificate", report.certificate},
+          {"simplification", simplification_to_json(report.simplification, frame)},
+          {"promise", report.promise ? promise_to_json(*report.promise, frame) : Json()},
+          {"deviations", deviations_to_json(report.deviations, frame)},
+          {"open_surface_faces", report.open_surface_faces},
+          {"output", mesh_files_to_json(report.files)}};
+}
+
+MeshFindings mesh_findings(const Json& report, const Frame& frame) {
+  MeshFindings out{0, report.at("certificate")};
+  const Json& simplification = report.at("simplification");
+  if (simplification.is_null()) return out;
+  out.simplified = simplification.at("max_error").get<double>() / frame.scale;
+  return out;
+}
+
+MeshesReport write_meshes(const Model& model, const RunRequest& request, const Progress& progress) {
   const Scene& scene = model.scene;
   const Frame& frame = scene.frame;
   const double promise = request.max_error.empty() ? 0 : parse_length(request.max_error, frame);
@@ -237,17 +231,17 @@ Json write_meshes(const Model& model, const RunRequest& request, const Progress&
                            rest);
   write_volume(request.output / "volume.vdb", fused.volume, frame);
   const WatertightResult& closed = written.surfaces.closed;
-  if (!written.simplification.is_null()) ledger.add("simplified", closed.mesh);
+  if (written.simplification) ledger.add("simplified", closed.mesh);
   write_mesh_pictures(scene, closed.mesh, folder);
   report(progress, 1);
-  return {{"fusion", fusion_to_json(fused.report, frame)},
-          {"method", closed.method},
-          {"certificate", certificate_to_json(closed.certificate, closed.mesh, frame)},
-          {"simplification", written.simplification},
-          {"promise", written.promise},
-          {"deviations", ledger.json(frame)},
-          {"open_surface_faces", written.surfaces.open.faces.size()},
-          {"output", written.files}};
+  return {fused.report,
+          closed.method,
+          certificate_to_json(closed.certificate, closed.mesh, frame),
+          written.simplification,
+          written.promise,
+          ledger.steps(),
+          written.surfaces.open.faces.size(),
+          written.files};
 }
 
 TriangleMesh read_watertight(const std::filesystem::path& output, const Frame& frame) {
@@ -257,31 +251,37 @@ TriangleMesh read_watertight(const std::filesystem::path& output, const Frame& f
   return mesh;
 }
 
-Json write_assets(const Model& model,
-                  const TriangleMesh& mesh,
-                  const RunRequest& request,
-                  const Json& description,
-                  const Json& mesh_report,
-                  const Progress& progress) {
+AssetsReport write_assets(const Model& model,
+                          const TriangleMesh& mesh,
+                          const RunRequest& request,
+                          const std::string& description,
+                          const MeshFindings& findings,
+                          const Progress& progress) {
   report(progress, 0);
   make_output_folder(request.output / "web");
-  Json texture_report;
-  const PhotoTexture texture = texture_from_photographs(model.scene, mesh, texture_report);
+  const auto [texture, texture_report] = texture_from_photographs(model.scene, mesh);
   report(progress, 0.3);
   write_obj(request.output / "mesh/watertight.obj", mesh, texture, model.scene.frame);
   if (!request.max_error.empty()) require_obj_in_place(request, mesh, model.scene.frame);
-  const double simplify =
-      as_much_again(mesh_report.at("simplification"), request, model.scene.frame);
-  const Json summary = {{"model", description}, {"certificate", mesh_report.at("certificate")}};
-  const WrittenAsset written =
-      write_asset(model, {mesh, texture, simplify, summary}, request, part_of(progress, 0.4, 0.9));
-  Json out = {{"texture", texture_report},
-              {"deviations", asset_deviations(model, mesh, request.output / "web/asset.glb")},
-              {"asset.glb", written.asset}};
-  if (request.lods > 0) out["levels"] = written.levels;
-  if (texture_report.contains("left_out")) {
-    out["warnings"] = {"no photographs on the meshes: " +
-                       texture_report["left_out"].get<std::string>()};
+  // As much as the watertight mesh may go off the fused surface, where nothing was promised of
+  // both.
+  const double simplify = request.max_error.empty() ? findings.simplified : 0;
+  WrittenAsset written = write_asset(model,
+                                     {mesh, texture, simplify, description, findings.certificate},
+                                     request,
+                                     part_of(progress, 0.4, 0.9));
+  return {texture_report,
+          asset_deviation(model, mesh, request.output / "web/asset.glb"),
+          std::move(written)};
+}
+
+Json assets_to_json(const AssetsReport& report, const Frame& frame) {
+  Json out = {{"texture", texture_to_json(report.texture, frame)},
+              {"deviations", deviations_to_json({report.deviation}, frame)},
+              {"asset.glb", asset_to_json(report.asset, frame)}};
+  if (!report.asset.levels.empty()) out["levels"] = levels_to_json(report.asset, frame);
+  if (!report.texture.left_out.empty()) {
+    out["warnings"] = {"no photographs on the meshes: " + report.texture.left_out};
   }
   return out;
 }

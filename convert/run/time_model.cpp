@@ -13,12 +13,12 @@ namespace {
 
 constexpr double kSteepest = 1.5;  // planes of a sweep grow with the side of a picture
 
-bool has_stage(const TimedRun& run, const std::string& stage) {
+bool has_stage(const TimedRun& run, Stage stage) {
   return std::any_of(
       run.stages.begin(), run.stages.end(), [&](const auto& s) { return s.first == stage; });
 }
 
-double seconds_of(const TimedRun& run, const std::string& stage) {
+double seconds_of(const TimedRun& run, Stage stage) {
   const auto found = std::find_if(
       run.stages.begin(), run.stages.end(), [&](const auto& s) { return s.first == stage; });
   return found == run.stages.end() ? 0 : found->second;

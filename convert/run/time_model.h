@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <string>
 #include <utility>
 #include <vector>
+
+#include "convert/model/stage.h"
 
 namespace cgs {
 
 /// The stage that takes longer with more steps of the training.
-inline constexpr const char* kTrainedStage = "model";
+inline constexpr Stage kTrainedStage = Stage::Model;
 
 /// What a run took.
 struct TimedRun {
   double pixels = 0;   ///< Of all input views.
   int steps = 0;       ///< Of the training.
   double opening = 0;  ///< [s] outside of the stages: photographs read and checked.
-  /// Name and time [s]; the same in all runs, but for runs of kTrainedStage alone.
-  std::vector<std::pair<std::string, double>> stages;
+  /// With their times [s]; the same in all runs, but for runs of kTrainedStage alone.
+  std::vector<std::pair<Stage, double>> stages;
 };
 
 /// Foretells how long a run of another size will take.

@@ -7,6 +7,7 @@
 
 #include "convert/run/pipeline.h"
 #include "convert/run/recorded_request.h"
+#include "convert/run/request_fields.h"
 #include "convert/run/run_record.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/byte_reader.h"

@@ -2,18 +2,15 @@
 #include "convert/run/web_splats.h"
 
 #include <algorithm>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "convert/model/views.h"
-#include "convert/splats/splat_thinning.h"
 #include "io/bytes/atomic_file.h"
 #include "io/scenes/scene_reader.h"
 #include "io/splats/splat_glb.h"
-#include "io/splats/spz.h"
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
@@ -81,30 +78,41 @@ Json held_out_figures(Model& model, Gaussians& splats, const Progress& progress)
 
 }  // namespace
 
-Json write_web_splats(const std::filesystem::path& folder, Model& model, const Progress& progress) {
+WebSplats write_web_splats(const std::filesystem::path& folder,
+                           Model& model,
+                           const Progress& progress) {
   const Frame& frame = model.scene.frame;
   const Eigen::Matrix3d y_up = y_up_from(model.scene.frame.up);
   make_output_folder(folder);
-  ThinnedSplats thinned = thinned_splats(model, part_of(progress, 0, 0.9));
-  const size_t glb_bytes =
-      write_splat_glb(folder / "splats.glb",
-                      thinned.splats,
-                      frame,
-                      {y_up, evidence_of_thinned(model, thinned.splats.size())});
-  Json thinning = thinning_to_json(thinned, model.gaussians.size());
-  thinning["held_out"] = held_out_figures(model, thinned.splats, part_of(progress, 0.9, 1));
-  Json out = {{"thinning", thinning}, {"splats.glb", {{"bytes", glb_bytes}}}};
+  WebSplats out;
+  out.thinned = thinned_splats(model, part_of(progress, 0, 0.9));
+  out.of = model.gaussians.size();
+  Gaussians& splats = out.thinned.splats;
+  out.glb_bytes = write_splat_glb(
+      folder / "splats.glb", splats, frame, {y_up, evidence_of_thinned(model, splats.size())});
+  out.held_out = held_out_figures(model, splats, part_of(progress, 0.9, 1));
   try {
     constexpr double kOfPixel = 1.0 / 16;
-    const SpzReport spz = write_spz(folder / "splats.spz",
-                                    thinned.splats,
-                                    frame,
-                                    {.finest = kOfPixel * double{thinned.pixel}, .y_up = y_up});
-    out["splats.spz"] = {{"bytes", spz.bytes},
-                         {"fractional_bits", spz.fractional_bits},
-                         {"clamped_splats", spz.clamped}};
+    out.spz = write_spz(folder / "splats.spz",
+                        splats,
+                        frame,
+                        {.finest = kOfPixel * double{out.thinned.pixel}, .y_up = y_up});
   } catch (const InvalidInput& error) {
-    out["left_out"] = {{"splats.spz", error.what()}};
+    out.spz_left_out = error.what();
+  }
+  return out;
+}
+
+Json web_splats_to_json(const WebSplats& made) {
+  Json thinning = thinning_to_json(made.thinned, made.of);
+  thinning["held_out"] = made.held_out;
+  Json out = {{"thinning", thinning}, {"splats.glb", {{"bytes", made.glb_bytes}}}};
+  if (made.spz) {
+    out["splats.spz"] = {{"bytes", made.spz->bytes},
+                         {"fractional_bits", made.spz->fractional_bits},
+                         {"clamped_splats", made.spz->clamped}};
+  } else {
+    out["left_out"] = {{"splats.spz", made.spz_left_out}};
   }
   return out;
 }

@@ -2,25 +2,41 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
 
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 
 #include "convert/model/model.h"
+#include "convert/splats/splat_thinning.h"
+#include "io/splats/spz.h"
 #include "libcgs/core/progress.h"
 
 namespace cgs {
+
+/// What write_web_splats() made.
+struct WebSplats {
+  ThinnedSplats thinned;
+  size_t of = 0;                    ///< Splats of the model.
+  nlohmann::ordered_json held_out;  ///< Mean of evaluate_views(); null where none was held out.
+  size_t glb_bytes = 0;
+  std::optional<SpzReport> spz;
+  std::string spz_left_out;  ///< Why there is none, for people.
+};
+
+/// {"thinning": {…, "held_out"}, "splats.glb": {…}, "splats.spz": {…}, "left_out": {"splats.spz":
+/// "why"}}
+nlohmann::ordered_json web_splats_to_json(const WebSplats& made);
 
 /// Writes the splats of a model for viewers in browsers: splats.glb and splats.spz, thinned by
 /// thin_splats(); SPZ tells places apart to a sixteenth of a pixel. Splats that reach too far for
 /// SPZ are no reason to end a run: it is left out then.
 /// The .glb says what the model rests on, and what vouches for each splat where that is stated; SPZ
 /// has no place for these.
-/// \return {"thinning": {…, "held_out": mean of evaluate_views() or null}, "splats.glb": {…},
-///          "splats.spz": {…}, "left_out": {"splats.spz": "why"}}
 /// \param model  as before when this returns or throws
 /// \throws as load_images()
-nlohmann::ordered_json write_web_splats(const std::filesystem::path& folder,
-                                        Model& model,
-                                        const Progress& progress = {});
+WebSplats write_web_splats(const std::filesystem::path& folder,
+                           Model& model,
+                           const Progress& progress = {});
 
 }  // namespace cgs

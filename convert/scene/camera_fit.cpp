@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -71,7 +70,7 @@ PosedPhoto posed_photo(const View& view, const FeatureOptions& options) {
   return out;
 }
 
-Json camera_fit(const Scene& scene, const Progress& progress) {
+std::optional<CameraFit> camera_fit(const Scene& scene, const Progress& progress) {
   constexpr FeatureOptions kFew{.largest_side = 800, .most = 2000};
   const double count = static_cast<double>(scene.input.size());
   std::vector<PosedPhoto> photos;
@@ -84,45 +83,57 @@ Json camera_fit(const Scene& scene, const Progress& progress) {
     worked_on.push_back(photo.features.pixel * view.camera.width / photo.camera.width);
   }
   const std::vector<EpipolarFit> fits = epipolar_fits(photos, part_of(progress, 0.7, 1));
-  if (fits.empty()) return nullptr;
-  Json out = {{"fits", true},
-              {"matches", size_t{0}},
-              {"error", 0.0},
-              {"views", Json::array()},
-              {"pairs", Json::array()}};
+  if (fits.empty()) return std::nullopt;
+  CameraFit out;
   for (const EpipolarFit& fit : fits) {
     const auto a = static_cast<size_t>(fit.a);
     const auto b = static_cast<size_t>(fit.b);
     const double error = 0.5 * (worked_on[a] + worked_on[b]) * fit.error;
-    out["pairs"].push_back(
-        {{"views", {photos[a].name, photos[b].name}}, {"matches", fit.matches}, {"error", error}});
-    out["matches"] = out["matches"].get<size_t>() + fit.matches;
+    out.pairs.push_back({photos[a].name, photos[b].name, fit.matches, error});
+    out.matches += fit.matches;
   }
   double worst = 0;  // [working pixels]
   for (size_t i = 0; i < photos.size(); ++i) {
     const double error = error_of(static_cast<int>(i), fits);
     if (error == 0) continue;
-    out["views"].push_back(
-        {{"view", photos[i].name}, {"error", worked_on[i] * error}, {"fits", error <= kMostError}});
+    out.views.push_back({photos[i].name, worked_on[i] * error, error <= kMostError});
     if (error <= worst) continue;
     worst = error;
-    out["error"] = worked_on[i] * error;
+    out.error = worked_on[i] * error;
   }
-  out["fits"] = worst <= kMostError;
+  out.fits = worst <= kMostError;
   return out;
 }
 
-std::string camera_fit_warning(const Json& fit) {
-  if (fit.is_null() || fit["fits"] == true) return "";
+Json camera_fit_to_json(const std::optional<CameraFit>& fit) {
+  if (!fit) return nullptr;
+  Json views = Json::array();
+  for (const CameraFit::OfView& view : fit->views) {
+    views.push_back({{"view", view.view}, {"error", view.error}, {"fits", view.fits}});
+  }
+  Json pairs = Json::array();
+  for (const CameraFit::OfPair& pair : fit->pairs) {
+    pairs.push_back(
+        {{"views", {pair.a, pair.b}}, {"matches", pair.matches}, {"error", pair.error}});
+  }
+  return {{"fits", fit->fits},
+          {"matches", fit->matches},
+          {"error", fit->error},
+          {"views", views},
+          {"pairs", pairs}};
+}
+
+std::string camera_fit_warning(const CameraFit& fit) {
+  if (fit.fits) return "";
   std::string names;
   size_t count = 0;
-  for (const Json& view : fit["views"]) {
-    if (view["fits"] == true) continue;
-    names += (count++ == 0 ? "" : ", ") + view["view"].get<std::string>();
+  for (const CameraFit::OfView& view : fit.views) {
+    if (view.fits) continue;
+    names += (count++ == 0 ? "" : ", ") + view.view;
   }
   return std::string("the ") + (count == 1 ? "camera of " : "cameras of ") + names +
          (count == 1 ? " does" : " do") + " not fit what the photographs show, by up to " +
-         number(fit["error"], "%.1f") + " pixels; --refine-poses may put " +
+         number(fit.error, "%.1f") + " pixels; --refine-poses may put " +
          (count == 1 ? "it" : "them") + " right";
 }
 

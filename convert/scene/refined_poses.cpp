@@ -25,13 +25,15 @@ namespace {
 constexpr const char* kFileName = "refined_poses.json";
 constexpr size_t kNumbers = 16;  // of a pose: its matrix, by columns
 
-/// A view and what it is used for.
-using Part = std::pair<int, const char*>;
+/// A view, and whether it is an input; else it is held out.
+using Part = std::pair<int, bool>;
+
+const char* role_name(bool is_input) { return is_input ? "input" : "held out"; }
 
 std::vector<Part> parts_of(const Scene& scene) {
   std::vector<Part> out;
-  for (const int i : scene.input) out.emplace_back(i, "input");
-  for (const int i : scene.held_out) out.emplace_back(i, "held out");
+  for (const int i : scene.input) out.emplace_back(i, true);
+  for (const int i : scene.held_out) out.emplace_back(i, false);
   return out;
 }
 
@@ -47,7 +49,7 @@ std::string inputs_text(const Scene& scene) {
     const Camera camera = camera_of_file(view);
     const Eigen::Matrix4d pose = camera.world_from_cam.matrix();
     views.push_back({view.name,
-                     part.second,
+                     role_name(part.second),
                      file_hash(view.image_path),
                      view.mask_path.empty() ? "" : file_hash(view.mask_path),
                      {camera.fx, camera.fy, camera.cx, camera.cy},
@@ -92,46 +94,59 @@ std::optional<Eigen::Isometry3d> pose_from(const Json& numbers) {
   return is_pose ? std::optional(pose) : std::nullopt;
 }
 
-bool is_length(const Json& value) {
-  return value.is_number() && std::isfinite(value.get<double>()) && value.get<double>() >= 0;
+Json error_json(const std::optional<double>& pixels) { return pixels ? Json(*pixels) : Json(); }
+
+// Without what refinement_to_json() adds of all views.
+Json fit_to_json(const Refinement& fit) {
+  Json views = Json::array();
+  for (const RefinedView& view : fit.views) {
+    views.push_back({{"view", view.view},
+                     {"role", role_name(view.is_input)},
+                     {"matches", view.matches},
+                     {"points", view.points},
+                     {"refined", view.is_refined},
+                     {"degrees", view.degrees},
+                     {"distance", view.distance},
+                     {"error_before", error_json(view.error_before)},
+                     {"error_after", error_json(view.error_after)}});
+  }
+  return {{"refined", fit.is_refined}, {"views", views}};
 }
 
-bool is_count(const Json& value) {
-  return value.is_number_integer() && value.get<double>() >= 0 &&
-         value.get<double>() <= std::numeric_limits<int>::max();
+bool is_length(const std::optional<double>& value) {
+  return value && std::isfinite(*value) && *value >= 0;
 }
 
-// Whether an entry of a report can be what is said of a view and its pose.
-bool is_entry_of(const Json& entry,
+// Whether an entry can be what is said of a view and its pose.
+bool is_entry_of(const RefinedView& entry,
                  const View& view,
-                 const char* role,
+                 bool is_input,
                  const RefinedPoses& refined) {
-  if (entry.at("view") != view.name || entry.at("role") != role) return false;
-  if (!is_count(entry.at("matches")) || !is_count(entry.at("points"))) return false;
-  for (const char* which : {"error_before", "error_after"}) {
-    const Json& error = entry.at(which);
-    if (entry.at("points") == 0 ? !error.is_null() : !is_length(error)) return false;
+  if (entry.view != view.name || entry.is_input != is_input) return false;
+  if (entry.matches < 0 || entry.points < 0) return false;
+  for (const std::optional<double>& error : {entry.error_before, entry.error_after}) {
+    if (entry.points == 0 ? error.has_value() : !is_length(error)) return false;
   }
   const auto pose = refined.poses.find(view.name);
   const bool is_refined = pose != refined.poses.end();
   const Eigen::Isometry3d& given = view.camera.world_from_cam;
-  return entry.at("refined") == is_refined && is_length(entry.at("degrees")) &&
-         entry.at("degrees") == (is_refined ? degrees_between(given, pose->second) : 0.0) &&
-         entry.at("distance") == (is_refined ? distance_between(given, pose->second) : 0.0);
+  return entry.is_refined == is_refined && is_length(entry.degrees) &&
+         entry.degrees == (is_refined ? degrees_between(given, pose->second) : 0.0) &&
+         entry.distance == (is_refined ? distance_between(given, pose->second) : 0.0);
 }
 
-bool is_fit_of(const Json& fit, const Scene& scene, const RefinedPoses& refined) {
+bool is_fit_of(const Refinement& fit, const Scene& scene, const RefinedPoses& refined) {
   const std::vector<Part> parts = parts_of(scene);
-  const Json& views = fit.at("views");
-  if (!views.is_array() || views.size() != parts.size()) return false;
+  if (fit.views.size() != parts.size()) return false;
   size_t moved = 0;
   bool is_refined = false;
   for (size_t i = 0; i < parts.size(); ++i) {
-    if (!is_entry_of(views[i], view_of(scene, parts[i]), parts[i].second, refined)) return false;
-    moved += views[i]["refined"] == true;
-    is_refined = is_refined || (views[i]["refined"] == true && views[i]["role"] == "input");
+    const RefinedView& view = fit.views[i];
+    if (!is_entry_of(view, view_of(scene, parts[i]), parts[i].second, refined)) return false;
+    moved += view.is_refined ? 1 : 0;
+    is_refined = is_refined || (view.is_refined && view.is_input);
   }
-  return fit.at("refined") == is_refined && moved == refined.poses.size();
+  return fit.is_refined == is_refined && moved == refined.poses.size();
 }
 
 // Damaged or odd: nothing, and what was stored is made anew.
@@ -145,9 +160,11 @@ std::optional<RefinedPoses> stored_poses(const std::filesystem::path& folder,
     (void)parse_json(text, folder / kFileName);  // refuses what is nested too deep to be copied
     const Json record = Json::parse(text);
     RefinedPoses out;
-    out.fit = record.at("fit");
+    const Json& fit = record.at("fit");
+    out.fit = refinement_from_json(fit);
     const Json& poses = record.at("poses");
-    if (record.at("inputs") != inputs || record.at("hash") != hash_of(out.fit, poses)) {
+    if (record.at("inputs") != inputs || record.at("hash") != hash_of(fit, poses) ||
+        fit_to_json(out.fit) != fit) {
       return std::nullopt;
     }
     for (const auto& [name, numbers] : poses.items()) {
@@ -168,50 +185,43 @@ std::optional<RefinedPoses> stored_poses(const std::filesystem::path& folder,
   }
 }
 
-Json view_json(const View& view, const char* role, const RefinedPose& refined) {
+void add_view(const View& view, bool is_input, const RefinedPose& refined, RefinedPoses& out) {
   const Eigen::Isometry3d& given = view.camera.world_from_cam;
-  const bool moved = refined.is_refined;
-  const auto error = [&](double pixels) { return refined.points > 0 ? Json(pixels) : Json(); };
-  return {{"view", view.name},
-          {"role", role},
-          {"matches", refined.matches},
-          {"points", refined.points},
-          {"refined", moved},
-          {"degrees", moved ? degrees_between(given, refined.world_from_cam) : 0},
-          {"distance", moved ? distance_between(given, refined.world_from_cam) : 0},
-          {"error_before", error(refined.error_before)},
-          {"error_after", error(refined.error_after)}};
+  RefinedView& entry = out.fit.views.emplace_back();
+  entry.view = view.name;
+  entry.is_input = is_input;
+  entry.matches = refined.matches;
+  entry.points = refined.points;
+  entry.is_refined = refined.is_refined;
+  if (refined.points > 0) {
+    entry.error_before = refined.error_before;
+    entry.error_after = refined.error_after;
+  }
+  if (!refined.is_refined) return;
+  entry.degrees = degrees_between(given, refined.world_from_cam);
+  entry.distance = distance_between(given, refined.world_from_cam);
+  out.poses[view.name] = refined.world_from_cam;
 }
 
-void add_view(const View& view, const char* role, const RefinedPose& refined, RefinedPoses& out) {
-  out.fit["views"].push_back(view_json(view, role, refined));
-  if (refined.is_refined) out.poses[view.name] = refined.world_from_cam;
-}
-
-// Of the input views, the worst; null if none is known.
-Json worst_error(const Json& views, const char* which) {
-  Json worst;
-  for (const Json& view : views) {
-    if (view["role"] != "input" || view[which].is_null()) continue;
-    if (worst.is_null() || view[which] > worst) worst = view[which];
+std::optional<double> worst_error(const std::vector<RefinedView>& views,
+                                  std::optional<double> RefinedView::*error) {
+  std::optional<double> worst;
+  for (const RefinedView& view : views) {
+    if (view.is_input) worst = std::max(worst, view.*error);  // none is less than any
   }
   return worst;
 }
 
 // The fit in pixels of the photographs as worked on.
-Json report_of(const Json& fit, const Scene& scene) {
-  Json out = fit;
+Refinement report_of(const Refinement& fit, const Scene& scene) {
+  Refinement out = fit;
   const std::vector<Part> parts = parts_of(scene);
   for (size_t i = 0; i < parts.size(); ++i) {
     const View& view = view_of(scene, parts[i]);
     const double worked_on = double(view.camera.width) / camera_of_file(view).width;
-    for (const char* which : {"error_before", "error_after"}) {
-      Json& error = out["views"][i][which];
-      if (!error.is_null()) error = worked_on * error.get<double>();
+    for (std::optional<double>* error : {&out.views[i].error_before, &out.views[i].error_after}) {
+      if (*error) **error *= worked_on;
     }
-  }
-  for (const char* which : {"error_before", "error_after"}) {
-    out[which] = worst_error(out["views"], which);
   }
   return out;
 }
@@ -220,25 +230,24 @@ struct Names {
   std::string text;
   size_t count = 0;
 
-  void add(const Json& name) { text += (count++ == 0 ? "" : ", ") + name.get<std::string>(); }
+  void add(const std::string& name) { text += (count++ == 0 ? "" : ", ") + name; }
   const char* form(const char* one, const char* several) const {
     return count == 1 ? one : several;
   }
 };
 
-std::vector<std::string> remarks(const Json& report) {
+std::vector<std::string> remarks(const Refinement& report) {
   Names alone;
   Names far_off;
   Names left;  // behind
-  for (const Json& view : report["views"]) {
-    if (view["points"] != 0) continue;
+  for (const RefinedView& view : report.views) {
+    if (view.points != 0) continue;
     // What a held-out view shares with one input alone cannot place it, however good its camera is.
-    const bool is_input = view["role"] == "input";
-    (is_input && view["matches"] != 0 ? far_off : alone).add(view["view"]);
-    if (view["role"] == "held out" && report["refined"] == true) left.add(view["view"]);
+    (view.is_input && view.matches != 0 ? far_off : alone).add(view.view);
+    if (!view.is_input && report.is_refined) left.add(view.view);
   }
   const std::string option = "--refine-poses: ";
-  if (alone.count == report["views"].size()) {
+  if (alone.count == report.views.size()) {
     return {option + "the photographs share too little to tell; the cameras stay as given"};
   }
   std::vector<std::string> out;
@@ -277,11 +286,10 @@ RefinedPoses solved_poses(const Scene& scene, const Progress& progress) {
   }
   const PoseRefinement refined = refine_poses(photos, part_of(progress, 0.4, 0.7));
   RefinedPoses out;
-  out.fit = {{"refined", false}, {"views", Json::array()}};
   for (size_t k = 0; k < inputs; ++k) {
     add_view(view_of(scene, parts[k]), parts[k].second, refined.photos[k], out);
   }
-  out.fit["refined"] = !out.poses.empty();
+  out.fit.is_refined = !out.poses.empty();
   const double step = 0.3 / double(std::max<size_t>(1, parts.size() - inputs));
   for (size_t k = inputs; k < parts.size(); ++k) {
     const double done = 0.7 + step * double(k - inputs);
@@ -314,41 +322,74 @@ void move_cameras(const RefinedPoses& refined, Scene& scene) {
 }
 
 void state_in_units(double factor, RefinedPoses& refined) {
-  for (Json& view : refined.report["views"]) {
-    view["distance"] = factor * view["distance"].get<double>();
-  }
+  for (RefinedView& view : refined.report.views) view.distance *= factor;
 }
 
-std::string refinement_words(const Json& report) {
+std::optional<double> Refinement::error_before() const {
+  return worst_error(views, &RefinedView::error_before);
+}
+
+std::optional<double> Refinement::error_after() const {
+  return worst_error(views, &RefinedView::error_after);
+}
+
+Json refinement_to_json(const Refinement& refinement) {
+  Json out = fit_to_json(refinement);
+  out["error_before"] = error_json(refinement.error_before());
+  out["error_after"] = error_json(refinement.error_after());
+  return out;
+}
+
+Refinement refinement_from_json(const Json& json) {
+  const auto error = [](const Json& pixels) {
+    return pixels.is_null() ? std::nullopt : std::optional(pixels.get<double>());
+  };
+  Refinement out;
+  out.is_refined = json.at("refined").get<bool>();
+  for (const Json& view : json.at("views")) {
+    out.views.push_back({view.at("view").get<std::string>(),
+                         view.at("role") == role_name(true),
+                         view.at("matches").get<int>(),
+                         view.at("points").get<int>(),
+                         view.at("refined").get<bool>(),
+                         view.at("degrees").get<double>(),
+                         view.at("distance").get<double>(),
+                         error(view.at("error_before")),
+                         error(view.at("error_after"))});
+  }
+  return out;
+}
+
+std::string refinement_words(const Refinement& report) {
   size_t inputs = 0;
   size_t held_out = 0;
   double degrees = 0;
   double distance = 0;
-  for (const Json& view : report["views"]) {
-    if (!view["refined"].get<bool>()) continue;
-    (view["role"] == "input" ? inputs : held_out) += 1;
-    degrees = std::max(degrees, view["degrees"].get<double>());
-    distance = std::max(distance, view["distance"].get<double>());
+  for (const RefinedView& view : report.views) {
+    if (!view.is_refined) continue;
+    (view.is_input ? inputs : held_out) += 1;
+    degrees = std::max(degrees, view.degrees);
+    distance = std::max(distance, view.distance);
   }
+  const std::string before = number(error_json(report.error_before()), "%.2f");
   if (inputs + held_out == 0) {
-    if (report["error_before"].is_null()) return "cameras stay as given";
-    return "the input cameras fit the photographs to " + number(report["error_before"], "%.2f") +
-           " pixels; they stay as given";
+    if (!report.error_before()) return "cameras stay as given";
+    return "the input cameras fit the photographs to " + before + " pixels; they stay as given";
   }
   return std::to_string(inputs) + " input and " + std::to_string(held_out) +
          " held-out cameras moved, by at most " + number(degrees, "%.3f") + " degrees and " +
-         number(distance) + " scene units; error of the input views " +
-         number(report["error_before"], "%.2f") + " -> " + number(report["error_after"], "%.2f") +
-         " pixels";
+         number(distance) + " scene units; error of the input views " + before + " -> " +
+         number(error_json(report.error_after()), "%.2f") + " pixels";
 }
 
 void write_refined_poses(const std::filesystem::path& folder, const RefinedPoses& refined) {
   make_output_folder(folder);
   const Json poses = poses_json(refined);
+  const Json fit = fit_to_json(refined.fit);
   write_file(folder / kFileName,
              json_text({{"inputs", refined.inputs},
-                        {"hash", hash_of(refined.fit, poses)},
-                        {"fit", refined.fit},
+                        {"hash", hash_of(fit, poses)},
+                        {"fit", fit},
                         {"poses", poses}}) +
                  "\n");
 }

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,19 +15,44 @@
 
 namespace cgs {
 
+/// What became of the camera of a view.
+struct RefinedView {
+  std::string view;
+  bool is_input = true;     ///< Else it is held out.
+  int matches = 0;          ///< With views that show the same.
+  int points = 0;           ///< That come of them.
+  bool is_refined = false;  ///< It moved.
+  double degrees = 0;
+  double distance = 0;  ///< [scene units]
+  /// Median distances between where points appear and where they were seen [pixels]; empty where no
+  /// points tell.
+  std::optional<double> error_before;
+  std::optional<double> error_after;
+};
+
+struct Refinement {
+  bool is_refined = false;  ///< A camera of an input view moved.
+  std::vector<RefinedView> views;
+
+  /// Of the input views, the worst; empty if none is known.
+  std::optional<double> error_before() const;
+  std::optional<double> error_after() const;
+};
+
+/// {"refined", "views": [{"view", "role", "matches", "points", "refined", "degrees", "distance",
+/// "error_before", "error_after"}], "error_before", "error_after"}; null for what is empty
+nlohmann::ordered_json refinement_to_json(const Refinement& refinement);
+/// \throws nlohmann::json::exception
+Refinement refinement_from_json(const nlohmann::ordered_json& json);
+
 /// Cameras of a scene that were moved to where its photographs have them.
-struct RefinedPoses {  // NOLINT(bugprone-exception-escape): moving JSON does not throw
+struct RefinedPoses {
   std::map<std::string, Eigen::Isometry3d> poses;  ///< world_from_cam of the views that moved.
-  /// {"refined": whether any camera of an input view moved, "views": [{"view", "role", "matches":
-  ///  with views that show the same, "points": that come of them, "refined", "degrees", "distance"
-  ///  [scene units], "error_before", "error_after"}], "error_before", "error_after": median
-  ///  distances between where points appear and where they were seen, worst input view [pixels of
-  ///  the photographs as worked on]}; errors are null where no points tell
-  nlohmann::ordered_json report;
-  nlohmann::ordered_json fit;         ///< "refined" and "views" in pixels of the files.
-  std::vector<std::string> warnings;  ///< What could not be told or placed, and why.
-  std::string inputs;                 ///< Hashes of photographs and cameras, program.
-  bool is_stored = false;             ///< Read, not solved.
+  Refinement report;                               ///< In pixels of the photographs as worked on.
+  Refinement fit;                                  ///< In pixels of the files.
+  std::vector<std::string> warnings;               ///< What could not be told or placed, and why.
+  std::string inputs;                              ///< Hashes of photographs and cameras, program.
+  bool is_stored = false;                          ///< Read, not solved.
 };
 
 /// Refines the cameras of the input views as refine_poses(), and each held-out view against the
@@ -48,7 +74,7 @@ void move_cameras(const RefinedPoses& refined, Scene& scene);
 void state_in_units(double factor, RefinedPoses& refined);
 
 /// One line on it for people. \param report  of RefinedPoses
-std::string refinement_words(const nlohmann::ordered_json& report);
+std::string refinement_words(const Refinement& report);
 
 /// Stores them as refined_poses.json in a folder, or removes what was stored there.
 /// \throws IoError

@@ -6,7 +6,6 @@
 
 #include "convert/model/model.h"
 #include "convert/scene/baselines.h"
-#include "convert/scene/camera_fit.h"
 #include "convert/text/stated_frame.h"
 #include "io/scenes/photographs.h"
 #include "io/scenes/view_names.h"
@@ -161,11 +160,11 @@ void OpenedScene::keep(const std::filesystem::path& model) const {
   if (!refined) forget_refined_poses(model);
 }
 
-nlohmann::ordered_json check_stated_cameras(OpenedScene& opened, Terminal& terminal) {
-  if (opened.poses || opened.refined) return nullptr;
-  nlohmann::ordered_json fit = camera_fit(opened.scene, terminal.begin("checking cameras"));
+std::optional<CameraFit> check_stated_cameras(OpenedScene& opened, Terminal& terminal) {
+  if (opened.poses || opened.refined) return std::nullopt;
+  std::optional<CameraFit> fit = camera_fit(opened.scene, terminal.begin("checking cameras"));
   terminal.end("");
-  const std::string warning = camera_fit_warning(fit);
+  const std::string warning = fit ? camera_fit_warning(*fit) : "";
   if (!warning.empty()) opened.scene.warnings.push_back(warning);
   return fit;
 }

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/scene/camera_fit.h"
 #include "convert/scene/control_frame.h"
 #include "convert/scene/known_distances.h"
 #include "convert/scene/photo_poses.h"
@@ -65,7 +66,7 @@ OpenedScene open_scene(const SceneRequest& request,
                        Terminal& terminal);
 
 /// How well cameras that were taken as the scene states them fit the photographs, as camera_fit();
-/// null for others. What is wrong with them is added to the warnings of the scene.
-nlohmann::ordered_json check_stated_cameras(OpenedScene& opened, Terminal& terminal);
+/// empty for others. What is wrong with them is added to the warnings of the scene.
+std::optional<CameraFit> check_stated_cameras(OpenedScene& opened, Terminal& terminal);
 
 }  // namespace cgs

@@ -179,7 +179,7 @@ TriangleMesh make_mesh(const ConversionRequest& request,
     WatertightResult closed = watertight_surface(volume, closing, part_of(progress, 0, 0.5));
     TriangleMesh none;
     if (!closed.mesh.faces.empty()) {
-      simplify_meshes(none, closed, options, frame, part_of(progress, 0.5, 1));
+      simplify_meshes(none, closed, options, part_of(progress, 0.5, 1));
     }
     report["certificate"] = certificate_to_json(closed.certificate, closed.mesh, frame);
     report["method"] = closed.method;

@@ -15,6 +15,7 @@
 #include "convert/measure/comparison.h"
 #include "convert/measure/measured_file.h"
 #include "convert/model/memory_plan.h"
+#include "convert/run/request_fields.h"
 #include "convert/run/run_record.h"
 #include "convert/run/run_stages.h"
 #include "convert/tradeoff/tradeoff_stages.h"

@@ -72,11 +72,12 @@ Json make_meshes(const fs::path& model_folder,
   const Model model = read_model(model_folder);
   make_output_folder(request.output);
   const CostMeter meter;
-  const Json report = write_meshes(model, request, progress);
+  const MeshesReport report = write_meshes(model, request, progress);
+  const Frame& frame = model.scene.frame;
   Json out = {{"cost", cost_json(meter)},
-              {"voxel", report.at("fusion").at("voxel_size")},
-              {"certificate", report.at("certificate")},
-              {"simplification", report.at("simplification")},
+              {"voxel", report.fusion.voxel_size * frame.scale},
+              {"certificate", report.certificate},
+              {"simplification", simplification_to_json(report.simplification, frame)},
               {"bytes", fs::file_size(request.output / "mesh/watertight.ply")}};
   fs::remove(request.output / "volume.vdb");
   for (const auto& entry : fs::directory_iterator(request.output / "mesh")) {
@@ -88,19 +89,21 @@ Json make_meshes(const fs::path& model_folder,
 Json make_assets(const fs::path& model_folder,
                  const fs::path& mesh_folder,
                  const RunRequest& request,
-                 const Json& description,
-                 const Json& mesh_report,
+                 const std::string& description,
+                 const Json& meshes,
                  const Progress& progress) {
   fs::remove_all(request.output);
   const Model model = read_model(model_folder);
   const TriangleMesh mesh = read_watertight(mesh_folder, model.scene.frame);
   make_output_folder(request.output / "mesh");
   const CostMeter meter;
-  const Json report = write_assets(model, mesh, request, description, mesh_report, progress);
-  const Json& off_mesh = report.at("deviations").at(0).at("with_evidence");
+  const Frame& frame = model.scene.frame;
+  const AssetsReport report =
+      write_assets(model, mesh, request, description, mesh_findings(meshes, frame), progress);
+  const DeviationStep& off_mesh = report.deviation;
   Json out = {{"cost", cost_json(meter)},
-              {"bytes", report.at("asset.glb").at("bytes")},
-              {"error", off_mesh.is_null() ? 0.0 : off_mesh.at("p95").get<double>()}};
+              {"bytes", report.asset.glb.bytes},
+              {"error", off_mesh.has_evidence ? off_mesh.with_evidence.p95 * frame.scale : 0.0}};
   fs::remove_all(request.output);
   return out;
 }

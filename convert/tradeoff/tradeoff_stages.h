@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -34,12 +35,12 @@ nlohmann::ordered_json make_meshes(const std::filesystem::path& model_folder,
 /// Model and watertight mesh to what a web page shows. {…, "error": 95 % of the surface with
 /// evidence are off the watertight mesh by less [scene units]}
 /// \param description  as write_assets() takes it
-/// \param mesh_report  likewise; what make_meshes() returned will do
+/// \param meshes       what make_meshes() returned
 nlohmann::ordered_json make_assets(const std::filesystem::path& model_folder,
                                    const std::filesystem::path& mesh_folder,
                                    const RunRequest& request,
-                                   const nlohmann::ordered_json& description,
-                                   const nlohmann::ordered_json& mesh_report,
+                                   const std::string& description,
+                                   const nlohmann::ordered_json& meshes,
                                    const Progress& progress);
 
 }  // namespace cgs

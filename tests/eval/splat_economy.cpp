@@ -109,7 +109,7 @@ void run(const std::filesystem::path& folder,
   cgs::write_spz(output / "all/splats.spz", model.gaussians, model.scene.frame);
   cgs::write_splat_glb(output / "all/splats.glb", model.gaussians, model.scene.frame, {});
   const std::clock_t begin = std::clock();
-  const Json web = cgs::write_web_splats(output / "web", model);
+  const Json web = cgs::web_splats_to_json(cgs::write_web_splats(output / "web", model));
   const double seconds = double(std::clock() - begin) / CLOCKS_PER_SEC;
   const cgs::Gaussians all = std::exchange(model.gaussians, {});
   print("all", read_back(model, output / "all", views));

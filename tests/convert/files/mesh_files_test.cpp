@@ -69,7 +69,8 @@ TEST(CertificateToJson, SaysNothingOfLabelsThatAMeshDoesNotState) {
 
 TEST(WriteMeshFiles, LeavesCadFilesOutWithoutAScaleAndSaysHowToGetThem) {
   const test::TempDir dir;
-  const auto json = write_mesh_files(dir / "mesh", corner(), corner(), frame_of_scale_2());
+  const auto json =
+      mesh_files_to_json(write_mesh_files(dir / "mesh", corner(), corner(), frame_of_scale_2()));
   EXPECT_TRUE(std::filesystem::exists(dir / "mesh/watertight.ply"));
   EXPECT_FALSE(std::filesystem::exists(dir / "mesh/watertight.stl"));
   for (const auto* name : {"watertight.stl", "watertight.3mf"}) {
@@ -83,10 +84,11 @@ TEST(WriteMeshFiles, WritesCadFilesOfAKnownScale) {
   Frame frame = frame_of_scale_2();
   frame.metres_per_unit = 1;
   frame.up = Eigen::Vector3d::UnitZ();
-  const auto json = write_mesh_files(dir / "mesh", corner(), corner(), frame);
-  EXPECT_TRUE(json["left_out"].empty());
-  for (const auto& name : json["files"]) {
-    EXPECT_TRUE(std::filesystem::exists(dir / "mesh" / name.get<std::string>())) << name;
+  const MeshFiles files = write_mesh_files(dir / "mesh", corner(), corner(), frame);
+  EXPECT_TRUE(files.left_out.empty());
+  EXPECT_EQ(files.written.size(), 4u);
+  for (const std::string& name : files.written) {
+    EXPECT_TRUE(std::filesystem::exists(dir / "mesh" / name)) << name;
   }
 }
 

@@ -56,11 +56,11 @@ TEST(MemoryPlan, GrowsWithThePixelsOfTheInputViewsAlone) {
   EXPECT_GT(most(memory_plan(scene_of(3, 800, 600))), most(memory_plan(scene)));
 }
 
-double of_stage(const Scene& scene, const std::string& stage) {
+double of_stage(const Scene& scene, Stage stage) {
   for (const StageMemory& s : memory_plan(scene)) {
     if (s.stage == stage) return double(s.bytes);
   }
-  ADD_FAILURE() << "no stage " << stage;
+  ADD_FAILURE() << "no stage " << traits(stage).title;
   return 0;
 }
 
@@ -69,7 +69,7 @@ TEST(MemoryPlan, ASmallPictureBesideLargeOnesGetsTheirVoxels) {
   const Scene mostly_fine = scene_of({{400, 300}, {200, 150}, {200, 150}});
   const Scene mostly_coarse = scene_of({{280, 214}, {200, 150}, {200, 150}, {200, 150}});
   const Scene coarse = scene_of(4, 200, 150);
-  const std::string stage = "volume and mesh";
+  const Stage stage = Stage::Mesh;
   EXPECT_GT(of_stage(mostly_fine, stage), 0.95 * of_stage(fine, stage));
   EXPECT_LT(of_stage(mostly_coarse, stage), 1.05 * of_stage(coarse, stage));
 }
@@ -77,11 +77,11 @@ TEST(MemoryPlan, ASmallPictureBesideLargeOnesGetsTheirVoxels) {
 TEST(MemoryPlan, TheLargestPictureIsDrawnAsAWhole) {
   const Scene mixed = scene_of({{400, 300}, {200, 150}, {200, 150}});
   const Scene even = scene_of(3, 300, 200);
-  EXPECT_GT(of_stage(mixed, "views"), of_stage(even, "views"));
+  EXPECT_GT(of_stage(mixed, Stage::Views), of_stage(even, Stage::Views));
   Scene held_out = even;
   held_out.views.push_back(mixed.views[0]);
   held_out.held_out.push_back(3);
-  EXPECT_GT(of_stage(held_out, "held-out views"), of_stage(held_out, "views"));
+  EXPECT_GT(of_stage(held_out, Stage::Evaluation), of_stage(held_out, Stage::Views));
 }
 
 // A photograph is read at its own size, whatever it is worked on at; the report holds all else,
@@ -93,18 +93,18 @@ TEST(MemoryPlan, CountsTheReadingOfLargePhotographs) {
   Scene large = small;
   large.views[1].image_path = dir / "large.png";
   constexpr double kPhotograph = 3000.0 * 2000 * (3 + 2 * 12);
-  EXPECT_NEAR(of_stage(large, "report") - of_stage(small, "report"), kPhotograph, 2);
-  EXPECT_GT(of_stage(large, "views"), kPhotograph);
+  EXPECT_NEAR(of_stage(large, Stage::Report) - of_stage(small, Stage::Report), kPhotograph, 2);
+  EXPECT_GT(of_stage(large, Stage::Views), kPhotograph);
   large.views[1].camera.width = 3000;
   large.views[1].camera.height = 2000;
   Scene whole = large;
   whole.views[1].image_path.clear();
-  EXPECT_EQ(of_stage(large, "report"), of_stage(whole, "report"));
+  EXPECT_EQ(of_stage(large, Stage::Report), of_stage(whole, Stage::Report));
   EXPECT_GT(double(memory_plan(large, {.downscale = 8}).back().bytes), kPhotograph);
   large.input = {0};
   large.held_out = {1};
   large.views[1].camera = small.views[1].camera;
-  EXPECT_GT(of_stage(large, "report"), kPhotograph) << "which shows views held out, too";
+  EXPECT_GT(of_stage(large, Stage::Report), kPhotograph) << "which shows views held out, too";
 }
 
 TEST(MemoryPlan, LeavesOutWhatTheUsersVoxelsDecide) {
@@ -140,9 +140,9 @@ TEST(MemoryPlan, CountsNetworksWhileTheyAreTrained) {
   const auto published = memory_plan(scene, {.coherence = networks});
   const auto wide = memory_plan(scene, {.coherence = wider});
   for (size_t i = 0; i < lattices.size(); ++i) {
-    const bool trains = lattices[i].stage == "depth and Gaussians";
-    EXPECT_EQ(published[i].bytes > lattices[i].bytes, trains) << lattices[i].stage;
-    EXPECT_EQ(wide[i].bytes > published[i].bytes, trains) << lattices[i].stage;
+    const bool trains = lattices[i].stage == Stage::Model;
+    EXPECT_EQ(published[i].bytes > lattices[i].bytes, trains) << traits(lattices[i].stage).title;
+    EXPECT_EQ(wide[i].bytes > published[i].bytes, trains) << traits(lattices[i].stage).title;
   }
   const size_t needed = most(published);
   EXPECT_THROW(check_memory_plan(scene, {.coherence = networks}, needed - 1), LimitError);
@@ -155,10 +155,10 @@ TEST(MemoryPlan, CountsTheFusedSurfaceWhereFilesAreHeldAgainstIt) {
   const auto sized = memory_plan(scene, {.measured = {.asset = true}});
   const auto near = memory_plan(scene, {.measured = {.meshes = true, .asset = true}});
   for (size_t i = 0; i < plain.size(); ++i) {
-    const bool assets = plain[i].stage == "textured assets";
-    const bool meshes = plain[i].stage == "volume and mesh";
-    EXPECT_EQ(sized[i].bytes > plain[i].bytes, assets) << plain[i].stage;
-    EXPECT_EQ(near[i].bytes > plain[i].bytes, assets || meshes) << plain[i].stage;
+    const bool assets = plain[i].stage == Stage::Web;
+    const bool meshes = plain[i].stage == Stage::Mesh;
+    EXPECT_EQ(sized[i].bytes > plain[i].bytes, assets) << traits(plain[i].stage).title;
+    EXPECT_EQ(near[i].bytes > plain[i].bytes, assets || meshes) << traits(plain[i].stage).title;
   }
 }
 
@@ -209,10 +209,10 @@ TEST(SplatMemoryPlan, NamesTheStageThatDoesNotFitAndWhatToLower) {
     EXPECT_NO_THROW(check_splat_memory_plan(work, plan[0].bytes));
     try {
       check_splat_memory_plan(work, plan[0].bytes - 1);
-      ADD_FAILURE() << plan[0].stage;
+      ADD_FAILURE() << plan[0].work;
     } catch (const LimitError& error) {
       const std::string message = error.what();
-      EXPECT_NE(message.find(plan[0].stage), std::string::npos) << message;
+      EXPECT_NE(message.find(plan[0].work), std::string::npos) << message;
       EXPECT_NE(message.find("--memory-limit"), std::string::npos) << message;
       const char* const lower = work.pictures > 0 ? "--virtual-size" : "spherical harmonics";
       EXPECT_NE(message.find(lower), std::string::npos) << message;
@@ -236,7 +236,7 @@ TEST(SplatMemoryPlan, HoldsWhereEverySplatCoversThePicture) {
       splats.sh.push_back(Eigen::Vector3f::Zero());
     }
     const RenderBuffers picture = rasterize(splats, camera);
-    const std::vector<StageMemory> plan = splat_memory_plan(
+    const std::vector<SplatMemory> plan = splat_memory_plan(
         {.splats = splats.size(), .pictures = 1, .picture_pixels = picture.alpha.data.size()});
     const double ratio = double(plan.back().bytes) / double(peak_memory());
     std::fprintf(stderr, "predicted over actual: %.2f\n", ratio);

@@ -2,6 +2,7 @@
 #include "convert/model/texture.h"
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "io/images/png.h"
 #include "meshing/pictures/exposure.h"
@@ -33,8 +34,7 @@ Scene scene_in(const test::TempDir& dir) {
 TEST(TextureFromPhotographs, LevelsExposureAndReportsWhatItDid) {
   const test::TempDir dir;
   const TriangleMesh mesh = test::box(20);
-  nlohmann::ordered_json report;
-  const PhotoTexture texture = texture_from_photographs(scene_in(dir), mesh, report);
+  const auto [texture, report] = texture_from_photographs(scene_in(dir), mesh);
   ASSERT_EQ(texture.photographs.size(), 3u);
   ASSERT_EQ(texture.of_face.size(), mesh.faces.size());
   // Every textured face has the colour of the pattern, at the mean exposure of the photographs.
@@ -55,21 +55,23 @@ TEST(TextureFromPhotographs, LevelsExposureAndReportsWhatItDid) {
   }
   EXPECT_GT(textured, 3 * 800 * 9 / 10u);  // -z, +y and parts of -x and +x
   EXPECT_GT(static_cast<double>(right) / static_cast<double>(textured), 0.9);
-  const auto& views = report["views"];
-  EXPECT_NEAR(views[1]["gain"][0].get<double>(), 2 * exposure, 0.02);
-  EXPECT_NEAR(views[2]["gain"][2].get<double>(), exposure, 0.01);
-  size_t faces = report["faces_without_view"];
-  for (const auto& view : views) faces += view["faces"].get<size_t>();
+  EXPECT_NEAR(report.views[1].gain[0], 2 * exposure, 0.02);
+  EXPECT_NEAR(report.views[2].gain[2], exposure, 0.01);
+  size_t faces = report.faces_without_view;
+  for (const TextureReport::Shown& view : report.views) faces += view.faces;
   EXPECT_EQ(faces, mesh.faces.size());
-  EXPECT_LT(report["largest_stretch"].get<double>(), 0.1);
-  EXPECT_LE(report["seam_length"].get<double>(), report["seam_length_unsmoothed"].get<double>());
+  EXPECT_LT(report.largest_stretch, 0.1);
+  EXPECT_LE(report.seam_length, report.seam_length_unsmoothed);
+  const auto json = texture_to_json(report, {});
+  EXPECT_EQ(json["views"].size(), 3u);
+  EXPECT_EQ(json["views"][1]["gain"][0].get<float>(), report.views[1].gain[0]);
+  EXPECT_EQ(json["seam_length"].get<double>(), report.seam_length);
 }
 
 TEST(CoarsenTexture, MakesPixelsAsLargeAsAskedAndKeepsTheirPlaces) {
   const test::TempDir dir;
   const TriangleMesh mesh = test::box(20);
-  nlohmann::ordered_json report;
-  const PhotoTexture fine = texture_from_photographs(scene_in(dir), mesh, report);
+  const PhotoTexture fine = texture_from_photographs(scene_in(dir), mesh).texture;
   PhotoTexture same = fine;
   EXPECT_EQ(coarsen_texture(same, mesh, 1e-9), 1);
   EXPECT_EQ(same.photographs[0].image.data, fine.photographs[0].image.data);
@@ -96,10 +98,10 @@ TEST(TextureFromPhotographs, SaysWhenAPhotographIsGone) {
   const test::TempDir dir;
   const Scene scene = scene_in(dir);
   std::filesystem::remove(dir / "b.png");
-  nlohmann::ordered_json report;
-  const PhotoTexture texture = texture_from_photographs(scene, test::box(4), report);
+  const auto [texture, report] = texture_from_photographs(scene, test::box(4));
   EXPECT_TRUE(texture.empty());
-  EXPECT_NE(report["left_out"].get<std::string>().find(" b "), std::string::npos);
+  EXPECT_NE(report.left_out.find(" b "), std::string::npos);
+  EXPECT_EQ(texture_to_json(report, {})["left_out"], report.left_out);
 }
 
 }  // namespace

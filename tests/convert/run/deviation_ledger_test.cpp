@@ -34,7 +34,7 @@ TEST(DeviationLedger, HoldsEveryStepAgainstTheOneBeforeAndAgainstMeasuredPoints)
   DeviationLedger ledger(points_at(0.30));
   ledger.add("first", half_seen(0.31));
   ledger.add("second", half_seen(0.315));
-  const Json rows = ledger.json({});
+  const Json rows = deviations_to_json(ledger.steps(), {});
   ASSERT_EQ(rows.size(), 2U);
   EXPECT_EQ(rows[0]["against"], "measured depth");
   EXPECT_TRUE(rows[0]["inferred"].is_null());
@@ -61,7 +61,7 @@ TEST(DeviationLedger, TakesTheLargerOfBothWays) {
   DeviationLedger ledger(points_at(0.1));
   ledger.go_on_from("both", both);
   ledger.add("one", one);
-  const Json row = ledger.json({})[0];
+  const Json row = deviations_to_json(ledger.steps(), {})[0];
   EXPECT_NEAR(row["with_evidence"]["max"].get<double>(), 1, 0.01);  // its far side
   EXPECT_NEAR(row["from_measured"]["max"].get<double>(), 0, 1e-6);
 }
@@ -71,8 +71,10 @@ TEST(DeviationLedger, TellsLengthsInUnitsOfTheFile) {
   ledger.add("mesh", half_seen(0.31));
   Frame frame;
   frame.scale = 8;
-  const double internal = ledger.json({})[0]["with_evidence"]["rms"].get<double>();
-  EXPECT_EQ(ledger.json(frame)[0]["with_evidence"]["rms"].get<double>(), 8 * internal);
+  const double internal =
+      deviations_to_json(ledger.steps(), {})[0]["with_evidence"]["rms"].get<double>();
+  EXPECT_EQ(deviations_to_json(ledger.steps(), frame)[0]["with_evidence"]["rms"].get<double>(),
+            8 * internal);
 }
 
 TEST(DeviationLedger, TakesVolumesOfWhichPartOfThePointsSaysNothing) {
@@ -91,7 +93,7 @@ TEST(DeviationLedger, TakesVolumesOfWhichPartOfThePointsSaysNothing) {
   square.vertices = {{0, 0, 0.005f}, {0.2f, 0, 0.005f}, {0.2f, 0.2f, 0.005f}, {0, 0.2f, 0.005f}};
   square.faces = {{0, 1, 2}, {0, 2, 3}};
   ledger.add("mesh", square);
-  const Json rows = ledger.json({});
+  const Json rows = deviations_to_json(ledger.steps(), {});
   EXPECT_NEAR(rows[0]["from_measured"]["rms"].get<double>(), 0.004, 1e-8);
   EXPECT_EQ(rows[0]["from_measured"]["outside"], 0.25);
   EXPECT_NEAR(rows[1]["with_evidence"]["max"].get<double>(), 0.001, 1e-8);

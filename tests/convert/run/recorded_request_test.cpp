@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "convert/run/request_fields.h"
 #include "libcgs/core/error.h"
 #include "tests/support/temp_dir.h"
 
@@ -52,12 +53,9 @@ RunRequest unusual_request(const test::TempDir& dir) {
 
 // As run_pipeline() notes it.
 Json record_of(const RunRequest& request) {
-  return {{"request", request_json(request, Scene())},
-          {"outputs", Json::object()},
-          {"focal", request.scene.focal},
-          {"control_points", request.scene.control.file.string()},
-          {"allow_external", request.scene.options.allow_external},
-          {"depth_options", depth_options_json(request.scene.options.depth)}};
+  Json out = {{"request", request_json(request, Scene())}, {"outputs", Json::object()}};
+  for (const RequestField& field : noted_fields()) out[field.key] = field.write(request, Scene());
+  return out;
 }
 
 TEST(RecordedRequest, IsTheOneThatWasMade) {

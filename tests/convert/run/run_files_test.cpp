@@ -24,14 +24,14 @@ void write_files(const std::filesystem::path& folder, const Names& names) {
   }
 }
 
-const StageFiles& files_of(const std::vector<StageFiles>& stages, const std::string& name) {
-  const auto of_name = [&](const StageFiles& stage) { return stage.stage == name; };
-  return *std::find_if(stages.begin(), stages.end(), of_name);
+const StageFiles& files_of(const std::vector<StageFiles>& stages, Stage stage) {
+  return stages.at(static_cast<size_t>(stage));
 }
 
 // Three stages, of which the second writes anew what the first wrote.
-const std::vector<StageFiles> kStages = {
-    {"model", {"model/a"}}, {"scale", {}, {"model/a"}}, {"web", {"web/b"}, {"web/b.*.jpg"}}};
+const std::vector<StageFiles> kStages = {{Stage::Model, {"model/a"}},
+                                         {Stage::Scale, {}, {"model/a"}},
+                                         {Stage::Web, {"web/b"}, {"web/b.*.jpg"}}};
 
 TEST(NamedOutputs, AreFilesOfTheseNamesAndNothingElse) {
   const test::TempDir dir;
@@ -53,17 +53,17 @@ TEST(StageFiles, AreThoseOfTheViewsAndLevelsOfARun) {
   scene.input = {2, 0};
   scene.held_out = {1};
   const std::vector<StageFiles> stages = stage_files(scene, 2);
-  EXPECT_EQ(files_of(stages, "model").files,
+  EXPECT_EQ(files_of(stages, Stage::Model).files,
             (Names{"model/gaussians.ply",
                    "model/cameras.json",
                    "model/priors/third.exr",
                    "model/priors/first.exr"}));
-  const Names& views = files_of(stages, "views").files;
+  const Names& views = files_of(stages, Stage::Views).files;
   EXPECT_EQ(views.size(), 15u);
   EXPECT_EQ(views.front(), "views/first.exr");
   EXPECT_EQ(views.back(), "views/third.hole.png");
-  EXPECT_TRUE(files_of(stages, "web").all().contains("web/asset.lod2.glb"));
-  EXPECT_FALSE(files_of(stage_files(scene, 0), "web").all().contains("web/asset.lod2.glb"));
+  EXPECT_TRUE(files_of(stages, Stage::Web).all().contains("web/asset.lod2.glb"));
+  EXPECT_FALSE(files_of(stage_files(scene, 0), Stage::Web).all().contains("web/asset.lod2.glb"));
 }
 
 TEST(RefuseForeignFiles, UnlessARunWroteThere) {
@@ -96,9 +96,9 @@ TEST(RemoveOutputsAfter, LeavesWhatNoStageIsKnownToHaveWritten) {
   RunRecord record(dir.path(), {}, false);
   record.finish("model", 1, nullptr, {"model/a"});
   record.finish("web", 1, nullptr, {"web/b", "web/b.0.jpg"});
-  remove_outputs_after("web", kStages, record, dir.path());
+  remove_outputs_after(Stage::Web, kStages, record, dir.path());
   EXPECT_TRUE(std::filesystem::exists(dir / "web/b"));
-  remove_outputs_after("model", kStages, record, dir.path());
+  remove_outputs_after(Stage::Model, kStages, record, dir.path());
   EXPECT_TRUE(std::filesystem::exists(dir / "model/a")) << "a later stage writes it anew";
   EXPECT_FALSE(std::filesystem::exists(dir / "web/b"));
   EXPECT_FALSE(std::filesystem::exists(dir / "web/b.0.jpg"));

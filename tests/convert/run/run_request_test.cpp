@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "convert/run/request_fields.h"
 #include "io/bytes/atomic_file.h"
 #include "io/scenes/masks.h"
 #include "libcgs/core/error.h"

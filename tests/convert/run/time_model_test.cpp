@@ -17,8 +17,8 @@ TimedRun run_of(double pixels, int steps) {
   out.pixels = pixels;
   out.steps = steps;
   out.opening = 0.7;
-  out.stages = {{"model", 2e-6 * std::pow(pixels, 1.25) + 3e-7 * pixels * steps},
-                {"mesh", 0.4 + 2e-5 * pixels}};
+  out.stages = {{Stage::Model, 2e-6 * std::pow(pixels, 1.25) + 3e-7 * pixels * steps},
+                {Stage::Mesh, 0.4 + 2e-5 * pixels}};
   return out;
 }
 
@@ -55,11 +55,11 @@ TEST(TimeModel, ScalesOneSizeWithThePixels) {
 
 TEST(TimeModel, NoiseMakesNothingNegativeOrWild) {
   TimedRun slow = run_of(4e4, 5);
-  slow.stages = {{"model", 3}, {"mesh", 5}};
+  slow.stages = {{Stage::Model, 3}, {Stage::Mesh, 5}};
   TimedRun quick = run_of(4e4, 20);
-  quick.stages = {{"model", 2}, {"mesh", 1e-9}};
+  quick.stages = {{Stage::Model, 2}, {Stage::Mesh, 1e-9}};
   TimedRun larger = run_of(1.6e5, 5);
-  larger.stages = {{"model", 1}, {"mesh", 90}};
+  larger.stages = {{Stage::Model, 1}, {Stage::Mesh, 90}};
   const double seconds = foretold_seconds({slow, quick, larger}, 6.4e5, 60);
   EXPECT_GT(seconds, 90);
   EXPECT_LE(seconds, 0.7 + 2 + 90 * std::pow(4, 1.5));  // no power above 1.5

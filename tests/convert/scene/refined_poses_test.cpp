@@ -100,18 +100,19 @@ TEST_F(RefinedPosesTest, BringInputAndHeldOutCamerasBack) {
     EXPECT_LT(errors(refined.scene).direction, 0.15);
     EXPECT_TRUE(refined.scene.warnings.empty());
     const auto& report = refined.refined->report;
-    EXPECT_TRUE(report["refined"].get<bool>());
-    EXPECT_LT(report["error_after"], 0.6);
-    EXPECT_GT(report["error_before"], report["error_after"]);
-    ASSERT_EQ(report["views"].size(), 4u);
-    EXPECT_EQ(report["views"][3]["role"], "held out");
+    EXPECT_TRUE(report.is_refined);
+    EXPECT_LT(report.error_after(), 0.6);
+    EXPECT_GT(report.error_before(), report.error_after());
+    ASSERT_EQ(report.views.size(), 4u);
+    EXPECT_FALSE(report.views[3].is_input);
+    EXPECT_EQ(refinement_to_json(report)["views"][3]["role"], "held out");
     for (size_t i = 0; i < 4; ++i) {
-      const auto& view = report["views"][i];
-      EXPECT_EQ(view["refined"].get<bool>(), i != 0);  // the first is held
+      const RefinedView& view = report.views[i];
+      EXPECT_EQ(view.is_refined, i != 0);  // the first is held
       const Eigen::AngleAxisd turn(
           Eigen::Matrix3d(given.views[i].camera.world_from_cam.linear().transpose() *
                           refined.scene.views[i].camera.world_from_cam.linear()));
-      EXPECT_NEAR(view["degrees"].get<double>(), turn.angle() * 180 / M_PI, 1e-9);
+      EXPECT_NEAR(view.degrees, turn.angle() * 180 / M_PI, 1e-9);
     }
     EXPECT_NE(refinement_words(report).find("2 input and 1 held-out cameras moved"),
               std::string::npos)
@@ -142,9 +143,9 @@ TEST_F(RefinedPosesTest, AreTakenFromTheModelUntilSomethingChangesAndAreTheSameA
   for (const int downscale : {1, 3}) {
     const OpenedScene again = opened(true, model, downscale);
     EXPECT_TRUE(again.refined->is_stored);
-    EXPECT_EQ(again.refined->fit, solved.refined->fit);
-    EXPECT_NEAR(again.refined->report["error_before"].get<double>() * downscale,
-                solved.refined->report["error_before"].get<double>(),
+    EXPECT_EQ(refinement_to_json(again.refined->fit), refinement_to_json(solved.refined->fit));
+    EXPECT_NEAR(*again.refined->report.error_before() * downscale,
+                *solved.refined->report.error_before(),
                 1e-9);
     const OpenedScene anew = opened(true, {}, downscale);
     for (size_t i = 0; i < 4; ++i) {
@@ -212,17 +213,18 @@ TEST_F(RefinedPosesTest, AreAdvisedForCamerasThatDoNotFit) {
   for (const double degrees : {0.0, 0.3, 0.5}) {
     state_cameras(degrees);
     OpenedScene small = opened(false, {}, 3);
-    EXPECT_EQ(check_stated_cameras(small, terminal)["fits"], degrees == 0);
+    EXPECT_EQ(check_stated_cameras(small, terminal)->fits, degrees == 0);
     OpenedScene scene = opened(false);
     const auto fit = check_stated_cameras(scene, terminal);
-    EXPECT_GT(fit["matches"], 100);
-    EXPECT_EQ(fit["pairs"].size(), 3u);
-    ASSERT_EQ(scene.scene.warnings.size(), degrees > 0 ? 1u : 0u) << fit;
+    ASSERT_TRUE(fit.has_value());
+    EXPECT_GT(fit->matches, 100u);
+    EXPECT_EQ(fit->pairs.size(), 3u);
+    ASSERT_EQ(scene.scene.warnings.size(), degrees > 0 ? 1u : 0u) << camera_fit_to_json(fit);
     if (degrees == 0) continue;
-    EXPECT_GT(fit["error"], 0.5);
+    EXPECT_GT(fit->error, 0.5);
     EXPECT_NE(scene.scene.warnings[0].find("--refine-poses"), std::string::npos);
     OpenedScene refined = opened(true);
-    EXPECT_TRUE(check_stated_cameras(refined, terminal).is_null());
+    EXPECT_FALSE(check_stated_cameras(refined, terminal).has_value());
   }
 }
 
