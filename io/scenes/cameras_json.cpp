@@ -17,13 +17,13 @@ namespace cgs {
 
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-json vector_json(const Eigen::Vector3d& v) { return json::array({v.x(), v.y(), v.z()}); }
+Json vector_json(const Eigen::Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
-json frame_json(const Scene& scene) {
+Json frame_json(const Scene& scene) {
   const Frame& frame = scene.frame;
-  json out = {{"origin", vector_json(frame.origin)},
+  Json out = {{"origin", vector_json(frame.origin)},
               {"scale", frame.scale},
               {"file_origin", vector_json(frame.file_origin)},
               {"metres_per_unit", frame.metres_per_unit},
@@ -36,7 +36,7 @@ json frame_json(const Scene& scene) {
   return out;
 }
 
-json fisheye_json(const Fisheye& fisheye) {
+Json fisheye_json(const Fisheye& fisheye) {
   const Camera& c = fisheye.photograph;
   return {{"width", c.width},
           {"height", c.height},
@@ -49,7 +49,7 @@ json fisheye_json(const Fisheye& fisheye) {
           {"radius", fisheye.radius}};
 }
 
-json camera_json(const Scene& scene, size_t index) {
+Json camera_json(const Scene& scene, size_t index) {
   const View& view = scene.views[index];
   const Camera& camera = view.camera;
   const Eigen::Matrix3d R = camera.world_from_cam.linear();
@@ -57,14 +57,14 @@ json camera_json(const Scene& scene, size_t index) {
                          std::isfinite(camera.fy) && std::isfinite(camera.cx) &&
                          std::isfinite(camera.cy);
   require(is_finite, "write_cameras_json: every camera must be finite", view.name);
-  json entry = {
+  Json entry = {
       {"id", index},
       {"img_name", view.name},
       {"width", camera.width},
       {"height", camera.height},
       {"position", vector_json(scene.frame.file_from_internal(camera.center()))},
       {"rotation",
-       json::array({vector_json(R.row(0)), vector_json(R.row(1)), vector_json(R.row(2))})},
+       Json::array({vector_json(R.row(0)), vector_json(R.row(1)), vector_json(R.row(2))})},
       {"fx", camera.fx},
       {"fy", camera.fy},
       {"cx", camera.cx},
@@ -257,18 +257,18 @@ void read_paths(const JsonValue& entry, View& view, Scene& scene) {
 }  // namespace
 
 void write_cameras_json(const std::filesystem::path& path, const Scene& scene) {
-  json document = json::array();
+  Json document = Json::array();
   for (size_t i = 0; i < scene.views.size(); ++i) {
     document.push_back(camera_json(scene, i));
     if (i == 0) document.back()["frame"] = frame_json(scene);
   }
   // File names need not be UTF-8, JSON has to be.
-  write_file(path, document.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+  write_file(path, document.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 Scene read_cameras_json(const std::filesystem::path& path, std::vector<std::string>* names) {
   const ReadLimits limits;
-  const json document = read_json(path, limits);
+  const Json document = read_json(path, limits);
   const JsonValue entries(document, path);
   if (entries.size() == 0) entries.fail(Defect::Empty, "there is no camera");
   if (entries.size() > limits.max_views) {

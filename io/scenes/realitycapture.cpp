@@ -88,8 +88,8 @@ class Row {
 
 Eigen::Isometry3d read_pose(const Row& row, const Refuse& refuse) {
   const auto turn = [&](const std::string& column, double sign, const Eigen::Vector3d& axis) {
-    constexpr double kDegree = std::numbers::pi / 180;
-    return Eigen::AngleAxisd(sign * row.number(column) * kDegree, axis);
+    constexpr double kRadians = std::numbers::pi / 180;  // per degree
+    return Eigen::AngleAxisd(sign * row.number(column) * kRadians, axis);
   };
   const Eigen::Matrix3d world_from_opengl =
       (turn("heading", -1, Eigen::Vector3d::UnitZ()) * turn("pitch", 1, Eigen::Vector3d::UnitX()) *

@@ -13,13 +13,13 @@ namespace cgs {
 
 namespace {
 
-constexpr size_t kGrain = 1024;
+constexpr size_t kPointsAtOnce = 1024;
 
 // Per point, the mean distance to so many other points.
 std::vector<double> mean_distances(const std::vector<Eigen::Vector3f>& points, size_t neighbors) {
   const KdTree tree(points);
   std::vector<double> out(points.size(), 0);
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kGrain), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kPointsAtOnce), [&](const auto& range) {
     std::vector<Neighbor> found;
     for (size_t i = range.begin(); i != range.end(); ++i) {
       const uint32_t point = tree.order()[i];
@@ -61,7 +61,7 @@ std::vector<uint8_t> without_lonely_points(const std::vector<Eigen::Vector3f>& p
   require(radius > 0, "the radius must be > 0", radius);
   const KdTree tree(points);
   std::vector<uint8_t> keep(points.size(), 0);
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kGrain), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kPointsAtOnce), [&](const auto& range) {
     for (size_t i = range.begin(); i != range.end(); ++i) {
       const uint32_t point = tree.order()[i];
       const size_t found = tree.count_within(points[point], float(radius), neighbors + 1);
