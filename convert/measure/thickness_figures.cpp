@@ -29,12 +29,12 @@ Json part_json(const ThicknessPart& part, double unit) {
 }
 
 /// What lies between the 5th and the 95th percentile.
-struct Range {
+struct ThicknessRange {
   float low = 0;
   float high = 0;
 };
 
-Range range_of(std::vector<float> values) {
+ThicknessRange range_of(std::vector<float> values) {
   values.erase(std::remove_if(values.begin(), values.end(), [](float v) { return std::isnan(v); }),
                values.end());
   if (values.empty()) return {};
@@ -42,7 +42,7 @@ Range range_of(std::vector<float> values) {
   return {values[(values.size() - 1) * 5 / 100], values[(values.size() - 1) * 95 / 100]};
 }
 
-Eigen::Vector3f color_of(float value, const Range& range) {
+Eigen::Vector3f color_of(float value, const ThicknessRange& range) {
   if (std::isnan(value)) return Eigen::Vector3f::Constant(0.5f);
   const Eigen::Vector3f thin(0.62f, 0.0f, 0.15f);
   const Eigen::Vector3f thick(1.0f, 0.97f, 0.72f);
@@ -82,7 +82,7 @@ void write_thickness_ply(const std::filesystem::path& path,
                          const MeasurableMesh& mesh,
                          const VertexThickness& thickness) {
   TriangleMesh out = mesh.mesh;
-  const Range range = range_of(thickness.value);
+  const ThicknessRange range = range_of(thickness.value);
   VertexScalar value{"scalar_thickness", {}};
   VertexScalar unseen{"scalar_thickness_unseen", {}};
   out.colors.clear();

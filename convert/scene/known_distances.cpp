@@ -110,12 +110,12 @@ Picked picked_point(const KnownDistance::Pick& pick, const Model& model, const s
                        std::to_string(std::lround(pick.y)) +
                        "; pick a point with texture that a second photograph shows, too");
   }
-  constexpr double kPickSigma = 0.5;  // [pixels of the image worked on]
+  constexpr double kTapeEndSigma = 0.5;  // [pixels of the image worked on]
   const double z = priors.depth.data[static_cast<size_t>(pixel)];
   return {view.camera.unproject(at.x(), at.y(), z),
           view.camera.world_from_cam.linear() * view.camera.ray_in_cam(at.x(), at.y()),
           priors.sigma.data[static_cast<size_t>(pixel)],
-          kPickSigma * z / std::sqrt(view.camera.fx * view.camera.fy)};
+          kTapeEndSigma * z / std::sqrt(view.camera.fx * view.camera.fy)};
 }
 
 // Variance of a length by one of its ends; `direction` is that of the length.

@@ -23,17 +23,17 @@ constexpr double kCornerSigma = 0.2;  // [pixels of the photograph]
 constexpr double kCornerBias = 0.1;   // out of the marker or into it, as light and blur have it
 
 /// A marker in a photograph.
-struct Sighting {
+struct MarkerSighting {
   std::array<SightRay, 4> rays;  // to its corners
   double side;                   // mean [pixels of the photograph]
 };
-using Sightings = std::vector<Sighting>;
+using Sightings = std::vector<MarkerSighting>;
 
 // Nothing where the lens cannot be undone.
-std::optional<Sighting> sighting_of(const Marker& marker,
-                                    const LensMap& lens,
-                                    const Camera& picture) {
-  Sighting out{};
+std::optional<MarkerSighting> sighting_of(const Marker& marker,
+                                          const LensMap& lens,
+                                          const Camera& picture) {
+  MarkerSighting out{};
   for (size_t k = 0; k < 4; ++k) {
     const auto corner = lens(marker.corners.at(k));
     if (!corner) return std::nullopt;
@@ -60,7 +60,7 @@ std::map<std::string, Sightings> sightings(const Scene& scene) {
 std::vector<SightRay> rays_to(const Sightings& seen, size_t corner) {
   std::vector<SightRay> out;
   out.reserve(seen.size());
-  for (const Sighting& s : seen) out.push_back(s.rays.at(corner));
+  for (const MarkerSighting& s : seen) out.push_back(s.rays.at(corner));
   return out;
 }
 
@@ -110,7 +110,7 @@ std::optional<std::pair<double, double>> side_and_sigma(const Sightings& seen) {
 // Both ends of a side are shifted.
 double common_sigma(const Sightings& seen) {
   double sum = 0;
-  for (const Sighting& s : seen) sum += 2 * kCornerBias / s.side;
+  for (const MarkerSighting& s : seen) sum += 2 * kCornerBias / s.side;
   return sum / double(seen.size());
 }
 
