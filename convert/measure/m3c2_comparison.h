@@ -68,7 +68,8 @@ std::string m3c2_text(const M3c2Comparison& found, const FigureUnit& unit);
 /// A with the normals used, coloured where the change is significant (white: it is not; grey:
 /// nothing can be told), and scalar_distance, scalar_detection, scalar_roughness_a,
 /// scalar_roughness_b [world units; NaN = cannot be told], scalar_count_a, scalar_count_b,
-/// scalar_change (the numbers of Change) and scalar_significant (0 or 1). \throws IoError
+/// scalar_change (the numbers of Change) and scalar_significant (0 or 1).
+/// \throws IoError
 void write_m3c2_ply(const std::filesystem::path& path,
                     const MeasurableMesh& a,
                     const M3c2Comparison& found);

@@ -42,7 +42,7 @@ struct PhotographedMesh {
 
 /// Loads the input photographs of a scene, chooses one for every face, and levels their exposure.
 /// \param scene  in the frame of the mesh
-/// \throws as load_images()
+/// \throws Error as load_images()
 PhotographedMesh texture_from_photographs(const Scene& scene, const TriangleMesh& mesh);
 
 /// The size of a pixel on the surface [internal units], of the photograph where it is smallest, by

@@ -31,7 +31,8 @@ class RunRecord {
   bool is_done(const std::string& stage, const std::vector<std::string>& files) const;
   /// What the stage reported when it finished; null if it did not.
   nlohmann::ordered_json result(const std::string& stage) const;
-  /// How long a finished stage took [s]. \pre it is in the record
+  /// How long a finished stage took [s].
+  /// \pre it is in the record
   double seconds(const std::string& stage) const;
   /// Files that a finished stage wrote, as paths below the folder.
   std::vector<std::string> files(const std::string& stage) const;

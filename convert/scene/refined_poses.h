@@ -61,7 +61,7 @@ struct RefinedPoses {
 ///
 /// \param scene   in world coordinates, with the identity frame
 /// \param stored  folder; may be empty or not exist
-/// \throws as read_photograph()
+/// \throws Error as read_photograph()
 RefinedPoses refined_poses(const Scene& scene,
                            const std::filesystem::path& stored,
                            Terminal& terminal);
@@ -69,11 +69,12 @@ RefinedPoses refined_poses(const Scene& scene,
 /// Moves the cameras of a scene.
 void move_cameras(const RefinedPoses& refined, Scene& scene);
 
-/// States the report in other units of length. \param factor  of those per unit of the scene as
-/// read
+/// States the report in other units of length.
+/// \param factor  of those per unit of the scene as read
 void state_in_units(double factor, RefinedPoses& refined);
 
-/// One line on it for people. \param report  of RefinedPoses
+/// One line on it for people.
+/// \param report  of RefinedPoses
 std::string refinement_words(const Refinement& report);
 
 /// Stores them as refined_poses.json in a folder, or removes what was stored there.

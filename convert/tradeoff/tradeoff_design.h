@@ -43,14 +43,14 @@ std::vector<Setting> tradeoff_design();
 /// \param standard        what the user asked for
 /// \param downscale       of the standard setting
 /// \param standard_voxel  its voxel edge [scene units]; a setting that does not need it may be
-/// asked
-///                        for before it is known, with 0
+///                        asked for before it is known, with 0
 RunRequest request_of(const Setting& setting,
                       const RunRequest& standard,
                       int downscale,
                       double standard_voxel);
 
-/// The command line of a run, to be pasted into a shell. \param threads  0 = all
+/// The command line of a run, to be pasted into a shell.
+/// \param threads  0 = all
 std::string command_line(const RunRequest& request, int threads = 0);
 
 }  // namespace cgs

@@ -17,7 +17,8 @@ inline uint64_t content_hash(std::string_view bytes, uint64_t state = kHashStart
   return state;
 }
 
-/// The same of a file's content, as 16 hexadecimal digits. \throws BadInput as read_in_parts()
+/// The same of a file's content, as 16 hexadecimal digits.
+/// \throws BadInput as read_in_parts()
 std::string file_hash(const std::filesystem::path& file);
 
 }  // namespace cgs

@@ -98,7 +98,7 @@ GlbReport write_glb(const std::filesystem::path& path,
 ///   are KHR_materials_unlit; readers that do not know it find a rough non-metal.
 /// - With Draco, texture coordinates move by at most 0.1 pixels, measured.
 ///
-/// \throws as above; InvalidInput if the texture does not fit the mesh: see require_texture().
+/// \throws Error as above; InvalidInput if the texture does not fit the mesh, see require_texture()
 GlbReport write_glb(const std::filesystem::path& path,
                     const TriangleMesh& mesh,
                     const PhotoTexture& texture,
@@ -111,7 +111,8 @@ struct GlbFile {
   GlbReport report;
 };
 
-/// What write_glb() would write. \throws as that, but for IoError
+/// What write_glb() would write.
+/// \throws Error as that, but for IoError
 GlbFile make_glb(const TriangleMesh& mesh,
                  const PhotoTexture& texture,
                  const Frame& frame,

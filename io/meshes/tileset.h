@@ -30,8 +30,7 @@ struct Tileset {
 /// is there. Viewers turn +Y of glTF into +Z themselves.
 ///
 /// \throws InvalidInput if there is no level, an error grows from coarse to fine or is no length,
-/// or
-///         the box is empty; IoError
+///         or the box is empty; IoError
 /// Source: OGC 22-025r4, "3D Tiles Specification 1.1".
 void write_tileset(const std::filesystem::path& path, const Tileset& tileset);
 

@@ -56,7 +56,7 @@ Scene read_scene(const std::filesystem::path& folder, const SceneOptions& option
 /// that states them; `kind` is "photographs".
 ///
 /// \param folder  holds the photographs
-/// \throws as read_scene()
+/// \throws Error as read_scene()
 Scene scene_of_photographs(const std::filesystem::path& folder,
                            const ColmapModel& model,
                            const SceneOptions& options = {});
@@ -74,7 +74,7 @@ void load_images(Scene& scene, const std::vector<int>& views, const Progress& pr
 ///
 /// \param with_image  false leaves `image` empty where it can be, which is much quicker
 /// \param warnings    gets what is odd
-/// \throws as load_images()
+/// \throws Error as load_images()
 View loaded_view(const Scene& scene, int view, bool with_image, std::vector<std::string>& warnings);
 
 }  // namespace cgs

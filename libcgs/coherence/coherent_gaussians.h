@@ -65,11 +65,11 @@ void require_decodable(const Scene& scene, const CoherenceOptions& options);
 /// Until shapes are free, Gaussians are balls of radius_factor pixels. A free shape is an ellipse
 /// of three numbers in its own picture, laid on the starting surface: with the steps P = [p_x p_y]
 /// (3x2) from its point to the next pixels' points and a lower triangle L with e^a, e^b on its
-/// diagonal, the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a
-/// photograph cannot show, how far a Gaussian reaches along the ray, thus follows the surface
-/// instead of drifting. Colours are those of the pixels,
-/// seen from the own view; where surfaces demand it, they change with the direction. Free colours
-/// move where depth is measured: elsewhere, they would learn by heart what another view shows.
+/// diagonal, the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. A photograph
+/// cannot show how far a Gaussian reaches along the ray; this way, that follows the surface instead
+/// of drifting. Seen from its own view, a Gaussian has the colour of its pixel; where surfaces
+/// demand it, the colour changes with the direction. Free colours move only where depth is
+/// measured: elsewhere, they would learn by heart what another view shows.
 ///
 /// A pane in front of the scene is a second layer: one more Gaussian per pixel of the view it is
 /// drawn from, after those of all views. They stay on its plane, and are wide enough that together
@@ -127,14 +127,16 @@ class CoherentGaussians {
   void add_gradients(const GaussianGradients& gaussians, std::span<const Raster<float>> depth);
 
   /// Adds weight times the mean over Gaussians of the squared change of the logit of their opacity,
-  /// and its gradient. \return weight times the mean
+  /// and its gradient.
+  /// \return weight times the mean
   double add_opacity_prior(double weight);
 
   /// The same for the squared change of colour, summed over its channels.
   double add_color_prior(double weight);
 
   /// Adds the bending energies of the lattices of depth and opacity, times weights; networks have
-  /// none. \return the weighted sum
+  /// none.
+  /// \return the weighted sum
   double add_bending(double depth_weight, double opacity_weight);
 
  private:

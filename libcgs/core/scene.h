@@ -85,7 +85,7 @@ struct Scene {
 };
 
 /// Where the input cameras stand and what they look at, on their axes [scene units].
-/// \throws as depth_range()
+/// \throws Error as depth_range()
 std::vector<Eigen::Vector3d> subject_points(const Scene& scene);
 
 /// Moves cameras, depth ranges and sparse points of a scene into its canonical frame.

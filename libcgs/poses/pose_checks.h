@@ -14,8 +14,7 @@ inline constexpr double kFocalOptimism = 3;
 
 /// What photographs cannot tell is refused, with the reason a user can act on.
 /// \throws NumericalError if fewer than two photographs show enough, naming one that does not, or
-/// no two
-///         share enough, naming the pair that shares most.
+///         no two share enough, naming the pair that shares most.
 void refuse_unconnected(const std::vector<UnposedPhoto>& photos,
                         const std::vector<PhotoPair>& pairs);
 

@@ -38,9 +38,8 @@ struct CompletionWitness {
 /// value at `background_share` is taken: what one view alone shows is mostly what nearer surfaces
 /// hide from the others, so it belongs to the farther one. Evidence that would put the pixel where
 /// a witness looks through does not count; if none is left, the pixel moves back until no witness
-/// objects. Then the values are smoothed towards
-/// neighbours on the same surface, which turns steps on slanted surfaces into slopes; what is then
-/// before the sky of a witness moves back once more.
+/// objects. Then the values are smoothed towards neighbours on the same surface, which turns steps
+/// on slanted surfaces into slopes; what is then before the sky of a witness moves back once more.
 ///
 /// \throws NumericalError if nothing is measured and there is no fallback
 void complete_depth(ViewPriors& priors,

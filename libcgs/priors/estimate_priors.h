@@ -65,8 +65,9 @@ struct EstimatedPriors {
 /// Everything known about the input views before training: sweep, align, enter the depth of
 /// sensors, find the sky, complete, put guesses of given depth where they are better, tell what of
 /// all that is estimated, layers. The depth of views of which nothing was measured stays unknown.
-/// Preconditions and errors as plane_sweep(); \throws InvalidInput if masks leave nothing of all
-/// views; NumericalError if nothing of any was measured
+/// Preconditions and errors as plane_sweep().
+/// \throws InvalidInput if masks leave nothing of all views; NumericalError if nothing of any was
+///         measured
 EstimatedPriors estimate_priors(const Scene& scene,
                                 const PriorsOptions& options,
                                 const Progress& progress = {});

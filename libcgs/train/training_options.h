@@ -58,7 +58,7 @@ struct TrainingOptions {
   void validate() const;
 };
 
-/// The settings of a name. \throws InvalidInput if it is none of:
+/// The settings of a name:
 /// - "draft", "standard" and "fine": lattices, a third, all and twice the steps;
 /// - "reference": the schedule that CoherentGS was published with, as far as it has a meaning here.
 ///   Networks; balls for 8/13 of the time, drawn at twice the size from 5/13 on; its losses but the
@@ -70,6 +70,8 @@ struct TrainingOptions {
 ///   theirs are from an optical flow, as a mean over the pixels of all pairs of views; a background
 ///   of another colour in each step; drawing at twice the size along each axis; a change of depth
 ///   that is bounded by max_depth_change; steps and rates for three views, however many there are.
+///
+/// \throws InvalidInput for another name
 TrainingOptions training_preset(std::string_view name);
 
 /// Sets one field by its name, e.g. ("steps", "500") or ("depth_spacing", "64,16"); the names are

@@ -41,7 +41,8 @@ struct M3c2Place {
 };
 
 /// Diameter of a cylinder that holds about 30 points of the sparser of two clouds where these are
-/// spread over a surface. \throws InvalidInput without seen points in different places
+/// spread over a surface.
+/// \throws InvalidInput without seen points in different places
 double spacing_cylinder(const ComparedPoints& a, const ComparedPoints& b);
 
 /// The scales that go with a cylinder: twice its diameter for normals, ten times for the depth.

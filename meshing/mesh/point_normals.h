@@ -26,7 +26,8 @@ std::vector<Eigen::Vector3f> estimated_normals(const std::vector<Eigen::Vector3f
 void turn_like(std::vector<Eigen::Vector3f>& normals, const std::vector<Eigen::Vector3f>& hints);
 
 /// Turns the normals of each part together, to the side that most hints for its points say; parts
-/// without any stay. \param part_of  per point a number of its part, as from turn_consistently()
+/// without any stay.
+/// \param part_of  per point a number of its part, as from turn_consistently()
 void turn_parts_like(std::vector<Eigen::Vector3f>& normals,
                      const std::vector<Eigen::Vector3f>& hints,
                      const std::vector<uint32_t>& part_of);
