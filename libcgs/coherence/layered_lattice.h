@@ -41,8 +41,7 @@ class LayeredLattice {
   Range level(size_t index) const { return levels_[index].range; }
   size_t level_count() const { return levels_.size(); }
 
-  /// The function at every pixel, into `value`, which is given the size of the view if it has
-  /// another one.
+  /// Writes the function at every pixel into `value`, which gets the size of the view.
   /// \param parameters  parameter_count() values
   void evaluate(std::span<const float> parameters, Raster<float>& value) const;
 

@@ -43,7 +43,8 @@ struct RowBlock {
   FloatBuffer data;
 };
 
-/// The transpose of upsample(): the derivative by those rows of `shape` that the range depends on.
+/// The transpose of upsample(): the derivative with respect to those rows of `shape` that the range
+/// depends on.
 ///
 /// \param gradient  as `out` of upsample()
 /// \param shape     only its sizes matter

@@ -14,8 +14,8 @@ enum class ScaleSource { Unknown, Assumed, CameraPoses, KnownDistance, ControlPo
 
 std::string scale_source_name(ScaleSource source);
 
-/// Relative standard deviation of scales that come of tracked poses, as phones and programs state
-/// them without one.
+/// Relative standard deviation of scales from tracked poses, for which phones and programs state
+/// none.
 inline constexpr double kTrackedScale = 0.05 / 3;
 
 /// The canonical frame all float data live in, and how to leave it.

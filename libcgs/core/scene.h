@@ -15,8 +15,8 @@
 
 namespace cgs {
 
-/// What the values of a given depth mean; where that is not known, how they fit the depth that the
-/// photographs show tells.
+/// What the values of given depth mean; where that is not known, it is judged by how they fit the
+/// depth measured from the photographs.
 enum class DepthKind : uint8_t {
   Unknown,    ///< One of the following.
   Metric,     ///< z-depth, by a sensor.
@@ -75,8 +75,8 @@ struct Scene {
   double depth_scale = 0;  ///< Values of depth files per metre; 0 = 1000 where they are whole
                            ///< numbers, else 1.
   DepthKind depth_kind = DepthKind::Unknown;  ///< Of View::given_depth.
-  /// World units per unit in which the cameras were stated, where they were moved since; depth in
-  /// units of the scene is in those.
+  /// World units per unit in which the cameras were stated; 1 unless they were moved since. Depth
+  /// in units of the scene is in the stated unit.
   double world_per_stated_unit = 1;
   std::vector<std::string> missing;   ///< Image files that cameras name but the disk lacks.
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
