@@ -82,7 +82,7 @@ TrainingOptions training_options(const TrainingArguments& arguments);
 /// \throws InvalidInput if `output`, unless it is empty, has another ending (".svg") in its name
 void require_ending(const std::filesystem::path& output, const char* ending, const char* option);
 
-/// Results must not land on what they are made from.
+/// Refuses outputs that would overwrite the input.
 /// \throws InvalidInput if `output` is `input` or lies in that folder.
 void keep_apart(const std::filesystem::path& output, const std::filesystem::path& input);
 

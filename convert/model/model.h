@@ -81,8 +81,8 @@ Eigen::Vector3d world_up(const Scene& scene);
 /// \throws InvalidInput as up_direction(); BadInput as world_up()
 Eigen::Vector3d up_of(const Scene& scene, const std::vector<double>& stated);
 
-/// How many photographs lie turned in their files where their cameras are for the files as they
-/// lie.
+/// Number of photographs that lie turned in their files, as Exif says, with cameras that are for
+/// the pixels as they are stored.
 /// \throws BadInput as exif_orientation()
 size_t turned_photographs(const Scene& scene);
 

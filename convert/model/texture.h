@@ -19,7 +19,8 @@ struct TextureReport {
     size_t faces = 0;
     double area = 0;
     Eigen::Vector3f gain = Eigen::Vector3f::Ones();  ///< Its pixels were multiplied by.
-    size_t samples = 0;                              ///< Exposure was levelled by.
+    size_t samples = 0;                              ///< Surface points by which its exposure was
+                                                     ///< levelled.
   };
   std::string left_out;  ///< Why there is none, for people; empty = there is one.
   std::vector<Shown> views;

@@ -18,10 +18,11 @@ class RunRecord {
   /// Opens the record of `folder`, or begins one if there is none.
   ///
   /// `request` is everything that decides the result: arguments and hashes of the input files.
-  /// \param decides  for keys of the request the first stage they have a say in; others decide all
-  /// \throws InvalidInput if the folder holds another request's results and `overwrite` is not
-  ///         set; with it, the stages that another answer would come from are forgotten, and
-  ///         their files removed: the new ones may have other names.
+  /// \param decides  for keys of the request, the first stage that depends on them; on others all
+  ///                 depend
+  /// \throws InvalidInput if the folder holds another request's results and `overwrite` is not set;
+  ///         with it, the stages whose results would differ are forgotten, and their files removed:
+  ///         the new ones may have other names.
   RunRecord(std::filesystem::path folder,
             nlohmann::ordered_json request,
             bool overwrite,

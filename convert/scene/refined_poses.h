@@ -24,8 +24,7 @@ struct RefinedView {
   bool is_refined = false;  ///< It moved.
   double degrees = 0;
   double distance = 0;  ///< [scene units]
-  /// Median distances between where points appear and where they were seen [pixels]; empty where no
-  /// points tell.
+  /// Median reprojection errors of the points [pixels]; empty where there are none.
   std::optional<double> error_before;
   std::optional<double> error_after;
 };

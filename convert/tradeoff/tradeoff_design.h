@@ -32,8 +32,8 @@ std::string model_key(const Setting& setting);
 std::string mesh_key(const Setting& setting);
 std::string asset_key(const Setting& setting);
 
-/// The settings to measure, those that tell most first: each of the things to turn by itself, and
-/// the corners where turning two of them should pay. The first is the standard setting.
+/// The settings to measure, those that tell most first: each parameter changed by itself, and the
+/// corners where changing two of them should pay. The first is the standard setting.
 ///
 /// Not in it, as it moves pictures by 0.1 dB and time by nothing: the knots of the lattices.
 std::vector<Setting> tradeoff_design();

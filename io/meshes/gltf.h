@@ -32,9 +32,9 @@ struct GlbOptions {
   GlbEncoding encoding = GlbEncoding::Draco;  ///< Meshes smaller than 1e-6 [units of the file] are
                                               ///< stored plain where Draco is asked for, which
                                               ///< cannot hold them.
-  double max_error = 0;  ///< Largest move of a vertex by Draco or Meshopt [world units]; 0 =
-                         ///< extent / 2^14, else > extent / 2^21 and extent / 2^16. Quantized moves
-                         ///< it by extent / 2^16 at most.
+  double max_error = 0;  ///< Largest move of a vertex by Draco or Meshopt [world units]; 0 = extent
+                         ///< / 2^14, else > extent / 2^21 (Draco) or extent / 2^16 (Meshopt).
+                         ///< Quantized moves it by extent / 2^16 at most.
   int speed = 1;         ///< Of the encoder, 0 to 10 (fastest); files of 0 are no smaller.
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
   std::optional<Eigen::Vector3d> center;  ///< What becomes (0, 0, 0) [internal units]; default: the

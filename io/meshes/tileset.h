@@ -26,7 +26,7 @@ struct Tileset {
 };
 
 /// Writes a 3D Tiles tileset: a chain of tiles, each of which is replaced by the next finer one as
-/// soon as a viewer that stands near sees its error. The chain ends at an error of 0: nothing finer
+/// soon as a viewer is so near that its error shows. The chain ends at an error of 0: nothing finer
 /// is there. Viewers turn +Y of glTF into +Z themselves.
 ///
 /// \throws InvalidInput if there is no level, an error grows from coarse to fine or is no length,

@@ -28,9 +28,9 @@ std::map<std::string, DepthKind> depth_kinds();
 
 /// Gives every view that has a photograph the file with its depth, if there is one: in the folder
 /// of the options, else where the layout of the scene says, else in a folder "depth" beside that of
-/// the photograph, or in it. There only input views get one, and a file that cannot be used (of
-/// colours, of another shape, damaged) becomes a warning, as do input views that have none while
-/// others do. So does depth that COLMAP made with photographs that are held out.
+/// the photograph, or in it. From such a folder only input views get one, and a file that cannot be
+/// used (of colours, of another shape, damaged) becomes a warning, as do input views that have none
+/// while others do. So does depth that COLMAP made with photographs that are held out.
 /// \throws BadInput Missing (the folder of the options holds no file for an input view), Path,
 ///         Ref (one file for two views); InvalidInput where the scene or the options say that depth
 ///         maps of COLMAP, which are in units of the scene, are in metres

@@ -21,8 +21,8 @@ struct SceneOptions {
   std::string views;
   bool all_views = false;  ///< Where `views` is empty, take every one.
   /// Divide image sizes by this; >= 1. Empty = choose: the smallest that leaves no side above
-  /// kLongestSide, for photographs much smaller than the largest one of their own; what was chosen
-  /// becomes a warning.
+  /// kLongestSide; photographs much smaller than the largest have one of their own. What was chosen
+  /// becomes a note.
   std::optional<int> downscale;
   bool allow_external = false;  ///< Follow links and absolute paths that leave the scene folder.
   DepthOptions depth;
@@ -34,8 +34,8 @@ struct SceneOptions {
   void validate() const;
 };
 
-/// Recognises the layout of a folder (LLFF, transforms.json, COLMAP, Strecha) and reads cameras and
-/// image sizes, but no pixels.
+/// Recognises the layout of a folder (see layout_of()) and reads cameras and image sizes, but no
+/// pixels.
 ///
 /// The result is in world coordinates with the identity frame, views sorted by name. Cameras have
 /// the size of the image file divided by `downscale`, rounded down; where the layout states

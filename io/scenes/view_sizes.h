@@ -23,10 +23,10 @@ void fit_cameras(Scene& scene);
 /// \throws BadInput as check_fisheye()
 void make_pinholes(Scene& scene);
 
-/// The divisors that options leave open, one per view: that of the largest photograph or, as that
-/// is what is worked on, undistorted picture of a fisheye, so that no side is above
-/// SceneOptions::kLongestSide. Where it would leave half or less of what a photograph has to give,
-/// that one has its own: cameras whose sizes differ little agree. What was chosen becomes a note.
+/// The divisors of image sizes where the options state none, one per view: that of the largest
+/// photograph (of a fisheye, its undistorted picture), so that no side is above
+/// SceneOptions::kLongestSide. A photograph of which it would leave half or less of what is
+/// possible has its own: cameras whose sizes differ little agree. What was chosen becomes a note.
 std::vector<int> chosen_divisors(Scene& scene);
 
 /// Makes cameras smaller, rounded down to whole pixels.

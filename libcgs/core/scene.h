@@ -98,13 +98,15 @@ void to_canonical(Scene& scene);
 /// Median length of the baselines between input views [scene units]; 0 for fewer than two.
 double median_baseline(const Scene& scene);
 
-/// A depth range that holds everything the input views may show: near and far of the view if it
-/// has them, else from sparse points, else from where the optical axes converge.
-/// \throws BadInput(Value) if the cameras share one centre (no depth can be measured).
+/// What depth_range() returns: z-depths [scene units].
 struct DepthRange {
   double near = 0;
   double far = 0;
 };
+
+/// A depth range that holds everything the input views may show: near and far of the view if it
+/// has them, else from sparse points, else from where the optical axes converge.
+/// \throws BadInput(Value) if the cameras share one centre (no depth can be measured).
 DepthRange depth_range(const Scene& scene, int view);
 
 }  // namespace cgs

@@ -29,9 +29,9 @@ struct CompletionWitness {
   const ViewPriors* priors = nullptr;  ///< Likewise. Only measured pixels and sky speak.
 };
 
-/// Gives every valid pixel a finite depth but sky and what would stand before the sky of a witness
-/// at any depth. Measured pixels are left as they are; the others get origin Completed, a large
-/// sigma and keep their confidence.
+/// Gives every valid pixel a finite depth, but not sky, nor what would hide the sky of a witness at
+/// any depth. Measured pixels are left as they are; the others get origin Completed, a large sigma
+/// and keep their confidence.
 ///
 /// Works in inverse depth. From a pixel without depth, rays in 16 directions collect the first
 /// measured pixel each, weighted down by the way and by the colour changes along it. Of those the

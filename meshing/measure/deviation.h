@@ -8,7 +8,7 @@
 
 namespace cgs {
 
-/// Whether a place of A differs from B by more than both state they are wrong.
+/// Whether a place of A differs from B by more than the sigmas that both state explain.
 enum class Change : uint8_t {
   Unknown = 0,  ///< One side was not observed or states no sigma there, or B ends before it gets
                 ///< there: nothing can be said.

@@ -14,7 +14,7 @@ namespace cgs {
 inline bool is_known_normal(const Eigen::Vector3f& normal) { return !normal.isZero(0); }
 
 /// Unit normals of a point cloud: per point the direction in which it and its nearest neighbours
-/// spread least; which of the two is open. 0 where the neighbours are one point or on a line.
+/// spread least, with either sign. 0 where the neighbours are one point or on a line.
 /// \param neighbors  the point included, >= 3
 /// Source: Hoppe et al. 1992, "Surface reconstruction from unorganized points", section 3.2.
 /// \throws InvalidInput for fewer neighbours
