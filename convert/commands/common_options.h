@@ -40,7 +40,8 @@ struct CommonOptions {
 /// Adds them to a command; limit_threads() must be called when the command runs.
 void add_common_options(CLI::App& command, CommonOptions& options);
 
-/// What --memory-limit says [bytes]; 0 where it is not given. \throws InvalidInput as parse_bytes()
+/// What --memory-limit says [bytes]; 0 where it is not given.
+/// \throws InvalidInput as parse_bytes()
 size_t stated_memory_limit(const CommonOptions& options);
 
 /// The same options without --memory-limit, for commands that plan no memory.
@@ -74,13 +75,14 @@ struct TrainingArguments {
 /// --preset and --set.
 void add_training_options(CLI::App& command, TrainingArguments& arguments);
 
-/// The preset with the settings applied. \throws InvalidInput
+/// The preset with the settings applied.
+/// \throws InvalidInput
 TrainingOptions training_options(const TrainingArguments& arguments);
 
 /// \throws InvalidInput if `output`, unless it is empty, has another ending (".svg") in its name
 void require_ending(const std::filesystem::path& output, const char* ending, const char* option);
 
-/// Results must not land on what they are made from.
+/// Refuses outputs that would overwrite the input.
 /// \throws InvalidInput if `output` is `input` or lies in that folder.
 void keep_apart(const std::filesystem::path& output, const std::filesystem::path& input);
 

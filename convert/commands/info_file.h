@@ -12,7 +12,7 @@ namespace cgs {
 /// a volume or the channels of an EXR; of a folder that run wrote, what was done; of a model, its
 /// splats.
 /// \return what was printed; nothing if the path is none of these, but perhaps a scene
-/// \throws as the readers of the formats
+/// \throws Error as the readers of the formats
 std::optional<nlohmann::ordered_json> print_file_info(const std::filesystem::path& path,
                                                       bool as_json);
 

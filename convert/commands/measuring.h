@@ -20,7 +20,8 @@ namespace cgs {
 
 /// Takes figures of one mesh. Each is kept for figures(), and printed at once unless the whole is
 /// to be printed as JSON. Points and planes are texts of the command line, in coordinates of the
-/// file. \throws InvalidInput for texts that name no point, plane or length, or none on the mesh
+/// file.
+/// \throws InvalidInput for texts that name no point, plane or length, or none on the mesh
 class Measuring {
  public:
   using Json = nlohmann::ordered_json;

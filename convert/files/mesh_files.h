@@ -35,7 +35,8 @@ nlohmann::ordered_json mesh_files_to_json(const MeshFiles& files);
 /// Writes surface.ply, watertight.ply and, where the scale is known, watertight.{stl,3mf}. (The OBJ
 /// may carry photographs, which not every caller has.)
 /// In STL and 3MF frame.up, which must be known, becomes +Z. Where the scale is unknown, those that
-/// this program wrote before are removed. \throws NumericalError where there is no surface
+/// this program wrote before are removed.
+/// \throws NumericalError where there is no surface
 MeshFiles write_mesh_files(const std::filesystem::path& folder,
                            const TriangleMesh& open_surface,
                            const TriangleMesh& watertight,
@@ -75,7 +76,7 @@ std::string lost_in_file(const std::filesystem::path& path,
 /// \param frame    whose `up` becomes +Z in STL and 3MF, +Y in GLB, and must be known for these
 /// \param options  for a GLB; its y_up is set from there
 /// \return what the encoding of a GLB lost of the mesh, for people; empty if nothing
-/// \throws as the writers and require_writable_as()
+/// \throws Error as the writers and require_writable_as()
 std::string write_mesh_as(const std::filesystem::path& path,
                           const TriangleMesh& mesh,
                           const Frame& frame,

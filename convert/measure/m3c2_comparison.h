@@ -20,7 +20,7 @@ struct M3c2Request {
   std::string depth;
   std::string registration;  ///< Empty = 0.
   double scale_sigma = 0;    ///< Of one file's scale against the other's, as a share of it.
-  /// What an error of that scale leaves in its place [internal units].
+  /// The point that an error of that scale does not move [internal units].
   Eigen::Vector3d scale_center = Eigen::Vector3d::Zero();
 };
 
@@ -43,11 +43,11 @@ struct M3c2Comparison {
 
 /// Compares the vertices of A with those of B, faces aside: every vertex of a reconstruction is a
 /// measurement, points between them are not. Faces, or normals that a cloud states, say which side
-/// is outside (where these are 0: the nearest that are not); else neighbours agree with each other,
-/// and of every part that hangs together the topmost point, by the up of A's frame (+z where it is
-/// not known), looks up: where that is steep, the sign is not known.
-/// Where both A and B have faces or such normals, the other wall of what is thin is left out, as
-/// m3c2() does, also if one of the two is inside out.
+/// is outside (where these are 0: the nearest that are not); else normals of neighbours are made to
+/// agree, and in every connected part that of the topmost point, by the up of A's frame (+z where
+/// it is not known), looks up: where the surface is steep there, the sign is not known. Where both
+/// A and B have faces or such normals, the other wall of what is thin is left out, as m3c2() does,
+/// also if one of the two is inside out.
 /// \throws InvalidInput for a length that cannot be, clouds without seen points, or where no point
 ///         of A has a normal, or points of B in its cylinder
 M3c2Comparison compare_m3c2(const M3c2Request& request,
@@ -68,7 +68,8 @@ std::string m3c2_text(const M3c2Comparison& found, const FigureUnit& unit);
 /// A with the normals used, coloured where the change is significant (white: it is not; grey:
 /// nothing can be told), and scalar_distance, scalar_detection, scalar_roughness_a,
 /// scalar_roughness_b [world units; NaN = cannot be told], scalar_count_a, scalar_count_b,
-/// scalar_change (the numbers of Change) and scalar_significant (0 or 1). \throws IoError
+/// scalar_change (the numbers of Change) and scalar_significant (0 or 1).
+/// \throws IoError
 void write_m3c2_ply(const std::filesystem::path& path,
                     const MeasurableMesh& a,
                     const M3c2Comparison& found);

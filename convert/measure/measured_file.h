@@ -34,10 +34,12 @@ std::string measured_line(const std::filesystem::path& path,
 /// "closed, manifold, oriented outward, no self-intersection, 1 component, genus 0"
 std::string certificate_line(const Certificate& certificate);
 
-/// Three numbers, "x,y,z". \throws InvalidInput
+/// Three numbers, "x,y,z".
+/// \throws InvalidInput
 Eigen::Vector3d parse_point(const std::string& text);
 
-/// "x=…", "y=…", "z=…" or "px,py,pz/nx,ny,nz" in coordinates of the file. \throws InvalidInput
+/// "x=…", "y=…", "z=…" or "px,py,pz/nx,ny,nz" in coordinates of the file.
+/// \throws InvalidInput
 CutPlane parse_plane(const std::string& text, const MeasurableMesh& mesh);
 
 /// A section in its unit. Across an axis, numbers are coordinates of the file (times the unit).

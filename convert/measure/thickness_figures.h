@@ -21,7 +21,8 @@ std::string thickness_text(const ThicknessPart& part, const FigureUnit& unit);
 
 /// The mesh coloured by thickness (red: thin, yellow: thick, between the 5th and 95th percentile;
 /// grey: no far side), with scalar_thickness [world units; NaN = no far side] and
-/// scalar_thickness_unseen (1 where no photograph vouches for an end of it). \throws IoError
+/// scalar_thickness_unseen (1 where no photograph vouches for an end of it).
+/// \throws IoError
 void write_thickness_ply(const std::filesystem::path& path,
                          const MeasurableMesh& mesh,
                          const VertexThickness& thickness);

@@ -14,13 +14,12 @@ namespace cgs {
 /// - "between": from input view to input view in their order, and back, slower at both ends
 /// - "spiral": an ellipse as wide as the input views are apart, looking at what they look at, as
 ///   LLFF shows its scenes
-/// - "orbit": once around what they look at, about the up axis, most of it never seen by any of
-/// them
+/// - "orbit": once around what they look at, about the up axis; no input view saw most of that
 ///
 /// \param frames  2 to 10000
 /// \throws InvalidInput for another name or number, or for splats without input views;
 ///         NumericalError if no depth is known
-/// Source of the spiral: Mildenhall et al. 2019, "Local Light Field Fusion".
+/// Source: Mildenhall et al. 2019, "Local Light Field Fusion", for the spiral.
 std::vector<Camera> camera_path(const Model& model, const std::string& name, int frames);
 
 /// The cameras of a file in the layout of cameras.json, in the coordinates of the files of a model.

@@ -13,11 +13,11 @@ namespace cgs {
 /// How well depth frames fit each other, and whether that shows that cameras and depth have the
 /// same unit.
 struct DepthAgreement {
-  /// Median, relative, of what frames measure off what others measured there; NaN = too few pairs
+  /// Median relative difference between the depth of frames at the same place; NaN = too few pairs
   /// of frames show the same.
   double off = std::numeric_limits<double>::quiet_NaN();
-  /// Depth multiplied by this agrees best, clearly better than as it is if it is not 1; NaN as
-  /// above for every factor.
+  /// Depth multiplied by this agrees best; another factor than 1 must be clearly better than 1. NaN
+  /// as above for every factor.
   double best_factor = std::numeric_limits<double>::quiet_NaN();
   /// True if depth as it is agrees, and smaller and larger depth does not: cameras that hardly move
   /// and plain walls agree with depth of any unit.

@@ -54,7 +54,8 @@ std::string memory_plan_text(const std::vector<StageMemory>& plan);
 ///         the pictures down, if it needs more than `budget` [bytes].
 void check_memory_plan(const Scene& scene, const PictureWork& work, size_t budget);
 
-/// The same for the training alone, the first stage. \throws LimitError
+/// The same for the training alone, the first stage.
+/// \throws LimitError
 void check_training_memory(const Scene& scene, size_t budget, const CoherenceOptions& coherence);
 
 /// What `convert` makes of splats that came without cameras.

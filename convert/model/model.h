@@ -22,12 +22,14 @@ struct Model {
   std::string evidence;  ///< What the Gaussians rest on, in words; empty where nobody says.
 };
 
-/// Writes gaussians.ply, cameras.json and priors/<view>.exr. \throws IoError
+/// Writes gaussians.ply, cameras.json and priors/VIEW.exr.
+/// \throws IoError
 void write_model(const std::filesystem::path& folder, const Model& model);
 
 /// Writes anew what `model.scene.frame` tells of unit and up, in the files that write_model() wrote
 /// of this model. The splats keep their bytes: written again from what was read, logarithms could
-/// end in another bit, and whether they do depends on the processor. \throws BadInput; IoError
+/// end in another bit, and whether they do depends on the processor.
+/// \throws BadInput; IoError
 /// \return false if another program changed the splats since, which are then written anew as they
 ///         were read
 bool restate_frame(const std::filesystem::path& folder, const Model& model);
@@ -47,7 +49,8 @@ Model read_model_as_written(const std::filesystem::path& folder);
 void use_metres_where_measured(Scene& scene);
 
 /// Finds the photographs of a model anew in a scene folder, by the names of the views, for a model
-/// or photographs that were moved. \throws BadInput as read_scene()
+/// or photographs that were moved.
+/// \throws BadInput as read_scene()
 void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow_external = false);
 
 /// Takes photographs and masks from another reading of the same scene, by the names of the views.
@@ -78,8 +81,9 @@ Eigen::Vector3d world_up(const Scene& scene);
 /// \throws InvalidInput as up_direction(); BadInput as world_up()
 Eigen::Vector3d up_of(const Scene& scene, const std::vector<double>& stated);
 
-/// How many photographs lie turned in their files where their cameras are for the files as they
-/// lie. \throws BadInput as exif_orientation()
+/// Number of photographs that lie turned in their files, as Exif says, with cameras that are for
+/// the pixels as they are stored.
+/// \throws BadInput as exif_orientation()
 size_t turned_photographs(const Scene& scene);
 
 }  // namespace cgs

@@ -67,7 +67,8 @@ void take_sensor_scale(const GivenDepthReport& given, Frame& frame);
 /// True if a training began in that folder and did not end.
 bool has_checkpoints(const std::filesystem::path& folder);
 
-/// Removes the checkpoints of finished work. \throws IoError
+/// Removes the checkpoints of finished work.
+/// \throws IoError
 void forget_checkpoints(const std::filesystem::path& folder);
 
 /// Every field of the options and its value, as set_training_field() takes them.

@@ -24,8 +24,8 @@ MaskMap hole_mask(const RenderBuffers& buffers);
 /// A picture with its masked pixels in magenta, through which it shines a little.
 ColorImage tinted(ColorImage picture, const MaskMap& mask);
 
-/// Pictures side by side, row by row, smaller ones amid places for the largest. \pre pictures are
-/// not empty, columns > 0
+/// Pictures side by side, row by row, smaller ones amid places for the largest.
+/// \pre pictures are not empty, columns > 0
 ColorImage contact_sheet(const std::vector<ColorImage>& pictures, int columns);
 
 }  // namespace cgs

@@ -19,7 +19,8 @@ struct TextureReport {
     size_t faces = 0;
     double area = 0;
     Eigen::Vector3f gain = Eigen::Vector3f::Ones();  ///< Its pixels were multiplied by.
-    size_t samples = 0;                              ///< Exposure was levelled by.
+    size_t samples = 0;                              ///< Surface points by which its exposure was
+                                                     ///< levelled.
   };
   std::string left_out;  ///< Why there is none, for people; empty = there is one.
   std::vector<Shown> views;
@@ -42,7 +43,7 @@ struct PhotographedMesh {
 
 /// Loads the input photographs of a scene, chooses one for every face, and levels their exposure.
 /// \param scene  in the frame of the mesh
-/// \throws as load_images()
+/// \throws Error as load_images()
 PhotographedMesh texture_from_photographs(const Scene& scene, const TriangleMesh& mesh);
 
 /// The size of a pixel on the surface [internal units], of the photograph where it is smallest, by

@@ -22,9 +22,9 @@ std::string view_role(const Scene& scene, int view);
 /// The input views and those held out, ascending.
 std::vector<int> views_with_photograph(const Scene& scene);
 
-/// Writes <name>.exr and <name>.{color,depth,normal,hole}.png for each of the given views of the
-/// model, and returns per view {"name", "role", "hole_fraction", …}, of pixels that
-/// are not masked. The role is view_role(), or null where no view is an input.
+/// Writes NAME.exr and NAME.{color,depth,normal,hole}.png for each of the given views of the model.
+/// Returns per view {"name", "role", "hole_fraction", …}, the fraction of the pixels that are not
+/// masked. The role is view_role(), or null where no view is an input.
 /// Without priors no hole.png is written and the hole fraction is null; the EXR says, as it does of
 /// any pixel, that no input view can vouch for it.
 nlohmann::ordered_json write_views(const Model& model,

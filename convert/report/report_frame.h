@@ -17,7 +17,8 @@ std::string far_origin(const nlohmann::ordered_json& frame);
 /// How far cameras were moved, if they were refined.
 std::string refinement_section(const nlohmann::ordered_json& report);
 
-/// What the unit of the files is, where known distances tell it. \pre report["scale"] is not null
+/// What the unit of the files is, where known distances tell it.
+/// \pre report["scale"] is not null
 std::string scale_words(const nlohmann::ordered_json& report);
 
 /// Where the scale came from, if from known distances or control points.

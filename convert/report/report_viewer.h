@@ -22,7 +22,8 @@ struct ShownMesh {
 };
 
 /// A mesh with about `most_faces` faces, if it can be had within 1/100 of its size and with every
-/// label keeping its area; else the nearest to it that can. \pre mesh has faces
+/// label keeping its area; else the nearest to it that can.
+/// \pre mesh has faces
 ShownMesh shown_mesh(const TriangleMesh& mesh, size_t most_faces, const Progress& progress);
 
 /// What the viewer of the report shows, as viewer.js reads it: the mesh with its evidence in the

@@ -18,8 +18,7 @@
 
 namespace cgs {
 
-/// What a mesh that is to keep request.max_error leaves of it for the rounding of files made from
-/// it.
+/// Share of request.max_error that a mesh leaves for the rounding of the files made from it.
 inline constexpr double kRoomForRounding = 0.1;
 
 /// The files below web/ that so many levels take: asset.lod1.glb, …, tileset.json; none for 0.

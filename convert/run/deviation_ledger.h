@@ -47,7 +47,8 @@ class DeviationLedger {
   /// \param measured  the first step, from measured_points()
   explicit DeviationLedger(std::vector<Eigen::Vector3f> measured);
 
-  /// The observed surface of a volume. \pre the first of the steps
+  /// The observed surface of a volume.
+  /// \pre the first of the steps
   void add(const std::string& step, const Volume& volume);
   /// \pre the mesh has a face with area
   void add(const std::string& step, const TriangleMesh& mesh);

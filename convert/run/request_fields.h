@@ -16,12 +16,12 @@ namespace cgs {
 /// A part of a request as run.json keeps it.
 struct RequestField {
   const char* key;
-  /// The first stage it has a say in: where it changes, what earlier ones made is kept.
+  /// The first stage that depends on it: where it changes, what earlier stages made is kept.
   Stage decides;
   /// Null leaves the key out, so that folders of runs without such a setting go on as before.
   std::function<nlohmann::ordered_json(const RunRequest&, const Scene&)> write;
   /// Takes what was written; empty for what the scene tells. A value of another type counts as not
-  /// stated where versions of before did not state it.
+  /// stated where earlier versions did not state it.
   /// \throws nlohmann::json::exception or std::out_of_range for one that cannot be taken
   std::function<void(const nlohmann::ordered_json&, RunRequest&)> read = {};
   /// The member of a request that it keeps; empty for what the scene tells.
@@ -42,7 +42,7 @@ nlohmann::ordered_json request_json(const RunRequest& request, const Scene& scen
 /// leads to is in "request" already. These decide no stage.
 const std::vector<RequestField>& noted_fields();
 
-/// By its key in "request", the stage that a part first has a say in; what is not here decides all.
+/// For keys of "request", the first stage that depends on them; on other keys all stages depend.
 std::map<std::string, std::string> decided_stages(const RunRequest& request, const Scene& scene);
 
 }  // namespace cgs

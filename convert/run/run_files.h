@@ -22,7 +22,8 @@ namespace cgs {
 std::vector<std::string> named_outputs(const std::filesystem::path& output,
                                        const std::set<std::string>& names);
 
-/// Hashes of named_outputs(). \throws IoError
+/// Hashes of named_outputs().
+/// \throws IoError
 nlohmann::ordered_json output_hashes(const std::filesystem::path& output,
                                      const std::set<std::string>& names);
 
@@ -35,18 +36,21 @@ struct StageFiles {
   std::set<std::string> all() const;
 };
 
-/// The stages of a run in their order. \param lods  levels of detail of the asset
+/// The stages of a run in their order.
+/// \param lods  levels of detail of the asset
 std::vector<StageFiles> stage_files(const Scene& scene, size_t lods);
 
 /// What OpenedScene::keep() writes, before the first stage.
 std::set<std::string> camera_files();
 
 /// A folder without the record of a run may hold work of somebody else under the names that a run
-/// writes to. \throws InvalidInput if it does
+/// writes to.
+/// \throws InvalidInput if it does
 void refuse_foreign_files(const std::filesystem::path& output,
                           const std::vector<StageFiles>& stages);
 
-/// Hashes of what stages before `stage` wrote and it may write anew. \throws IoError
+/// Hashes of what stages before `stage` wrote and it may write anew.
+/// \throws IoError
 nlohmann::ordered_json earlier_outputs(const StageFiles& stage,
                                        const std::vector<StageFiles>& stages,
                                        const RunRecord& record,

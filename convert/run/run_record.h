@@ -18,10 +18,11 @@ class RunRecord {
   /// Opens the record of `folder`, or begins one if there is none.
   ///
   /// `request` is everything that decides the result: arguments and hashes of the input files.
-  /// \param decides  for keys of the request the first stage they have a say in; others decide all
-  /// \throws InvalidInput if the folder holds another request's results and `overwrite` is not
-  ///         set; with it, the stages that another answer would come from are forgotten, and
-  ///         their files removed: the new ones may have other names.
+  /// \param decides  for keys of the request, the first stage that depends on them; on others all
+  ///                 depend
+  /// \throws InvalidInput if the folder holds another request's results and `overwrite` is not set;
+  ///         with it, the stages whose results would differ are forgotten, and their files removed:
+  ///         the new ones may have other names.
   RunRecord(std::filesystem::path folder,
             nlohmann::ordered_json request,
             bool overwrite,
@@ -31,7 +32,8 @@ class RunRecord {
   bool is_done(const std::string& stage, const std::vector<std::string>& files) const;
   /// What the stage reported when it finished; null if it did not.
   nlohmann::ordered_json result(const std::string& stage) const;
-  /// How long a finished stage took [s]. \pre it is in the record
+  /// How long a finished stage took [s].
+  /// \pre it is in the record
   double seconds(const std::string& stage) const;
   /// Files that a finished stage wrote, as paths below the folder.
   std::vector<std::string> files(const std::string& stage) const;

@@ -58,14 +58,16 @@ struct MeshFindings {
 };
 
 /// Takes it from what meshes_to_json() made of it: a resumed run must give the bits of one that was
-/// not interrupted. \throws nlohmann::json::exception
+/// not interrupted.
+/// \throws nlohmann::json::exception
 MeshFindings mesh_findings(const nlohmann::ordered_json& report, const Frame& frame);
 
 /// The stage of a run from model to meshes: writes volume.vdb and mesh/ (all but the OBJ) below
 /// request.output.
 MeshesReport write_meshes(const Model& model, const RunRequest& request, const Progress& progress);
 
-/// The watertight mesh of a run, in a frame. \throws BadInput
+/// The watertight mesh of a run, in a frame.
+/// \throws BadInput
 TriangleMesh read_watertight(const std::filesystem::path& output, const Frame& frame);
 
 /// What the stage of the assets did.

@@ -20,7 +20,7 @@ struct TimedRun {
   std::vector<std::pair<Stage, double>> stages;
 };
 
-/// Foretells how long a run of another size will take.
+/// Predicts how long a run of another size will take.
 ///
 /// Training costs the same per pixel and step. What is left of a stage is continued from the two
 /// largest runs: along a line where time grows slower than pixels (part of it is fixed), else along

@@ -20,8 +20,7 @@ struct Verification {
 /// Reads the inputs and outputs of a finished run again and compares them with what its run.json
 /// says. Nothing is computed or written; files that the run did not make are not looked at.
 /// \throws BadInput Missing, Schema (no record of a finished run), and as open_scene() where a
-/// scene
-///         cannot be read any more
+///         scene cannot be read any more
 Verification verify_run(const std::filesystem::path& output, Terminal& terminal);
 
 /// Where recompute_run() works, below the folder of the run.
@@ -29,10 +28,10 @@ inline constexpr const char* kRecomputedFolder = "recomputed";
 
 /// verify_run(), and does all of the run again, from its inputs, to compare what comes out with
 /// what is there. It works in a folder below the run's, where an interrupted call goes on; it stays
-/// if anything differs. Nothing is computed if an input is no longer what it was. \param
-/// memory_limit  [bytes]; 0 = 80 % of what is free \throws as verify_run(), recorded_request() and
-/// run_pipeline(); IoError if a run works in the
-///         folder; InvalidInput if something else stands where it would compute
+/// if anything differs. Nothing is computed if an input is no longer what it was.
+/// \param memory_limit  [bytes]; 0 = 80 % of what is free
+/// \throws Error as verify_run(), recorded_request() and run_pipeline(); IoError if a run works in
+///         the folder; InvalidInput if something else stands where it would compute
 Verification recompute_run(const std::filesystem::path& output,
                            size_t memory_limit,
                            Terminal& terminal);

@@ -34,7 +34,7 @@ nlohmann::ordered_json web_splats_to_json(const WebSplats& made);
 /// The .glb says what the model rests on, and what vouches for each splat where that is stated; SPZ
 /// has no place for these.
 /// \param model  as before when this returns or throws
-/// \throws as load_images()
+/// \throws Error as load_images()
 WebSplats write_web_splats(const std::filesystem::path& folder,
                            Model& model,
                            const Progress& progress = {});

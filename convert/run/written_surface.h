@@ -25,7 +25,8 @@ struct SurfaceDeviation {
 SurfaceDeviation surface_deviation(const TriangleMesh& written, const TriangleMesh& fused);
 
 /// The surface of a volume.vdb that was fused, closed but not simplified: what the watertight mesh
-/// of a run was made from. \throws BadInput
+/// of a run was made from.
+/// \throws BadInput
 TriangleMesh fused_surface(const std::filesystem::path& volume, size_t memory_limit);
 
 /// The largest distance of a vertex from where it was, of files with the same vertices in the same

@@ -14,11 +14,13 @@
 namespace cgs {
 
 /// picture_camera() of a view without the rounding that --downscale leaves; the same whatever
-/// --downscale says. \throws as picture_camera()
+/// --downscale says.
+/// \throws Error as picture_camera()
 Camera camera_of_file(const View& view);
 
 /// Features of the photograph of a view, without those that the undistorted picture does not hold,
-/// and camera_of_file(). \throws as read_photograph()
+/// and camera_of_file().
+/// \throws Error as read_photograph()
 PosedPhoto posed_photo(const View& view, const FeatureOptions& options = {});
 
 /// Errors in pixels of the photographs as worked on.

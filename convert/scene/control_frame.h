@@ -33,7 +33,8 @@ struct ControlRequest {
 ///         a frame, saying what is missing)
 nlohmann::ordered_json move_to_control_frame(const ControlRequest& request, Scene& scene);
 
-/// One line on it for people. \param scale  as move_to_control_frame() returns it
+/// One line on it for people.
+/// \param scale  as move_to_control_frame() returns it
 std::string control_words(const nlohmann::ordered_json& scale);
 
 }  // namespace cgs

@@ -41,7 +41,7 @@ std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typ
 void check_picks(const std::vector<KnownDistance>& distances, const Model& model);
 
 /// Gives a model the scale by which its depths fit the distances, and its cameras the markers; with
-/// none of both, does nothing.
+/// neither, does nothing.
 ///
 /// The sigma of a picked length in the scene is that of the depths at both ends and of half a pixel
 /// of the images worked on.

@@ -25,8 +25,7 @@ struct PhotoPoses {
 /// in `stored` if that was solved from the same.
 ///
 /// \param wanted  file names; if there are too many photographs to compare, only these are used;
-/// may
-///                be empty
+///                may be empty
 /// \param focal   [pixels] of every photograph as stored; 0 = from Exif, else solved for
 /// \param stored  may be empty or not exist
 /// \throws BadInput Empty (fewer than two photographs), and as read_image(); LimitError for more
@@ -38,7 +37,8 @@ PhotoPoses photo_poses(const SceneRoot& root,
                        Terminal& terminal);
 
 /// Stores them as a COLMAP model in sparse/0 below the folder, with poses.json beside it.
-/// The other removes what was stored there. \throws IoError
+/// The other removes what was stored there.
+/// \throws IoError
 void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& poses);
 void forget_photo_poses(const std::filesystem::path& folder);
 

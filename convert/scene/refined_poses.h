@@ -24,8 +24,7 @@ struct RefinedView {
   bool is_refined = false;  ///< It moved.
   double degrees = 0;
   double distance = 0;  ///< [scene units]
-  /// Median distances between where points appear and where they were seen [pixels]; empty where no
-  /// points tell.
+  /// Median reprojection errors of the points [pixels]; empty where there are none.
   std::optional<double> error_before;
   std::optional<double> error_after;
 };
@@ -61,7 +60,7 @@ struct RefinedPoses {
 ///
 /// \param scene   in world coordinates, with the identity frame
 /// \param stored  folder; may be empty or not exist
-/// \throws as read_photograph()
+/// \throws Error as read_photograph()
 RefinedPoses refined_poses(const Scene& scene,
                            const std::filesystem::path& stored,
                            Terminal& terminal);
@@ -69,11 +68,12 @@ RefinedPoses refined_poses(const Scene& scene,
 /// Moves the cameras of a scene.
 void move_cameras(const RefinedPoses& refined, Scene& scene);
 
-/// States the report in other units of length. \param factor  of those per unit of the scene as
-/// read
+/// States the report in other units of length.
+/// \param factor  of those per unit of the scene as read
 void state_in_units(double factor, RefinedPoses& refined);
 
-/// One line on it for people. \param report  of RefinedPoses
+/// One line on it for people.
+/// \param report  of RefinedPoses
 std::string refinement_words(const Refinement& report);
 
 /// Stores them as refined_poses.json in a folder, or removes what was stored there.

@@ -28,9 +28,9 @@ struct SceneRequest {
   double focal = 0;        ///< Of photographs without cameras [pixels]; 0 = not given.
   /// Move the cameras a scene states to where the photographs have them.
   bool refine_poses = false;
-  std::vector<DistanceWords> known_distances;  ///< Where they are given, no assume_unit.
-  std::string marker_size;  ///< Side of printed markers; where it is given, no assume_unit.
-  ControlRequest control;   ///< Where it is given, nothing else of scale, unit and up.
+  std::vector<DistanceWords> known_distances;  ///< Exclude assume_unit.
+  std::string marker_size;                     ///< Side of printed markers; excludes assume_unit.
+  ControlRequest control;                      ///< Excludes all else on scale, unit and up.
 
   /// Whether lengths seen in the photographs tell the scale.
   bool states_lengths() const;
@@ -39,15 +39,7 @@ struct SceneRequest {
 /// Where solved cameras lie, below the folder of the model.
 inline constexpr const char* kPosesFolder = "colmap";
 
-/// Reads a scene, solving for the cameras of a folder that holds nothing but photographs or
-/// refining those it states as asked, and gives it the unit the user assumes, or moves it into the
-/// frame of control points, if any.
-///
-/// \param model  folder of the model the scene is for; cameras stored there by OpenedScene::keep()
-///               are taken where they were solved from the same. Empty = none.
-/// \throws InvalidInput where a focal length is given for a scene with cameras, refinement is asked
-///         for where there are none, or two options state the scale; as read_scene(),
-///         photo_poses(), refined_poses() and move_to_control_frame()
+/// What open_scene() returns.
 struct OpenedScene {
   Scene scene;
   std::optional<PhotoPoses> poses;      ///< If they were solved for.
@@ -61,6 +53,16 @@ struct OpenedScene {
   /// the next time, and takes away those of an earlier scene.
   void keep(const std::filesystem::path& model) const;
 };
+
+/// Reads a scene, solving for the cameras of a folder that holds nothing but photographs or
+/// refining those it states as asked, and gives it the unit the user assumes, or moves it into the
+/// frame of control points, if any.
+///
+/// \param model  folder of the model the scene is for; cameras stored there by OpenedScene::keep()
+///               are taken where they were solved from the same. Empty = none.
+/// \throws InvalidInput where a focal length is given for a scene with cameras, refinement is asked
+///         for where there are none, or two options state the scale; as read_scene(),
+///         photo_poses(), refined_poses() and move_to_control_frame()
 OpenedScene open_scene(const SceneRequest& request,
                        const std::filesystem::path& model,
                        Terminal& terminal);

@@ -36,6 +36,7 @@ struct Floaters {
 ///   theirs at what the others make matter,
 /// - of what is left, parts of matter that do not touch, and hold fewer than a two-thousandth of
 ///   all splats (at least 30, if that is no more than a hundredth of them), are islands.
+///
 /// The scene is the cube of one and a half times the size of the box from the 1st to the 99th
 /// percentile of the splats of opacity 0.1 and more. Same bits for any number of threads.
 /// \throws InvalidInput if there are no Gaussians

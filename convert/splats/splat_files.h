@@ -37,7 +37,7 @@ struct SplatFileOptions {
 /// \return {"format", "splats", "provenance", "loss", …}; "provenance" of the file as
 ///         splat_file_to_json() has it; "loss" is {"not_measured": why} where the file could not be
 ///         read back
-/// \throws as the writers; Cancelled
+/// \throws Error as the writers; Cancelled
 nlohmann::ordered_json write_splat_file(const std::filesystem::path& path,
                                         const Gaussians& gaussians,
                                         const Frame& frame,

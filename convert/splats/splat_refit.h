@@ -19,7 +19,7 @@ struct PictureToMatch {
 };
 
 /// The pictures that splats give.
-/// \throws as TrainingRasterizer::forward()
+/// \throws Error as TrainingRasterizer::forward()
 std::vector<PictureToMatch> pictures_to_match(const Gaussians& gaussians,
                                               std::span<const Camera> cameras);
 
@@ -35,7 +35,7 @@ double mean_square_difference(const PictureToMatch& a, const PictureToMatch& b);
 /// bits for any number of threads.
 ///
 /// \param pixel  as WeighedSplats has it
-/// \throws as TrainingRasterizer::forward(); what `progress` throws
+/// \throws Error as TrainingRasterizer::forward(); what `progress` throws
 void refit_splats(Gaussians& gaussians,
                   const std::vector<float>& pixel,
                   std::span<const PictureToMatch> pictures,

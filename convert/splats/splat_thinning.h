@@ -55,10 +55,9 @@ inline constexpr double kMostThinningLoss = 0.2;
 ///
 /// \param scene   with the pixels of its input views
 /// \param counts  how many of the splats are of each input view, in their order; those of a pane
-/// may
-///                follow, fewer than of a view. If there are fewer or more splats than that, nobody
-///                knows whose they are, and all are kept
-/// \throws as weigh_splats() and refit_splats()
+///                may follow, fewer than of a view. If there are fewer or more splats than that,
+///                nobody knows whose they are, and all are kept
+/// \throws Error as weigh_splats() and refit_splats()
 ThinnedSplats thin_splats(const Gaussians& gaussians,
                           const Scene& scene,
                           std::span<const size_t> counts,

@@ -36,11 +36,12 @@ void widen_by_focal(Frame& frame, double focal_sigma);
 std::string turned_text(const Frame& a, const Frame& b);
 
 /// Sets what is up: as given, else as the frame knows, else +z, or -y as splats of others mostly
-/// lie. \throws InvalidInput as up_direction()
+/// lie.
+/// \throws InvalidInput as up_direction()
 void settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats = false);
 
-/// The direction of --up, of unit length. \throws InvalidInput unless it is three finite numbers,
-/// not all 0
+/// The direction of --up, of unit length.
+/// \throws InvalidInput unless it is three finite numbers, not all 0
 Eigen::Vector3d up_direction(const std::vector<double>& numbers);
 
 }  // namespace cgs

@@ -24,7 +24,8 @@ class Terminal {
   /// Begins a named stage and returns the function that shows how far it is. The function throws
   /// Cancelled after SIGINT or SIGTERM.
   Progress begin(const std::string& stage);
-  /// Ends the stage with a remark ("412 k Gaussians"). \return seconds since begin().
+  /// Ends the stage with a remark ("412 k Gaussians").
+  /// \return seconds since begin().
   double end(const std::string& remark);
   /// One line for the user, unless quiet.
   void say(const std::string& line) const;
@@ -44,7 +45,7 @@ class Terminal {
 };
 
 /// From now on SIGINT and SIGTERM make the next progress report throw Cancelled; a second signal
-/// ends the program at once. \return nothing; the exit code is 130 or 143.
+/// ends the program at once, with exit code 130 or 143.
 void catch_interrupts();
 /// Undoes it: for commands that write nothing before their end and report no progress.
 void let_interrupts_end();

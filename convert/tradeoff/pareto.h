@@ -6,7 +6,7 @@
 
 namespace cgs {
 
-/// Something that costs and is worse or better for it: less is better of both.
+/// What something costs, and how bad its result is: of both, less is better.
 struct CostAndLoss {
   double cost = 0;
   double loss = 0;

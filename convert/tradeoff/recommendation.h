@@ -19,12 +19,12 @@ struct TradeoffFigures {
   double error = kNotMeasured;  ///< Of the surface [scene units].
   double psnr = kNotMeasured;   ///< On held-out views [dB].
   double bytes = kNotMeasured;  ///< Of the web asset.
-  /// Errors are measured from its surface: its own, that of asset.glb alone, is the least, but
-  /// meets no want.
+  /// Errors are measured from its surface. Its own error, that of asset.glb alone, is the least,
+  /// but meets no want.
   bool is_ruler = false;
 };
 
-/// How far figures differ for no reason: relative, of repeated runs.
+/// How far figures of repeated runs differ, relative.
 struct TradeoffNoise {
   double cpu = 0;
   double wall = 0;

@@ -28,7 +28,8 @@ struct ShownSurface {
 /// \throws InvalidInput if nothing is shown
 ShownSurface shown_surface(TriangleMesh mesh, const std::vector<Camera>& inputs);
 
-/// Distances of what is shown of either surface from the other one. \pre both in one frame
+/// Distances of what is shown of either surface from the other one.
+/// \pre both in one frame
 SurfaceError surface_error(const ShownSurface& a, const ShownSurface& b);
 
 }  // namespace cgs

@@ -56,7 +56,7 @@ struct MeasuredSetting {
   /// Of the surface: 95 % of it are within, against the truth where there is one; NaN = unknown, as
   /// that of the ruler is.
   double error() const;
-  /// With that of asset.glb: what that is off.
+  /// With the error of asset.glb added.
   double asset_and_surface_error() const { return error() + asset_error; }
 };
 

@@ -32,8 +32,8 @@ std::string model_key(const Setting& setting);
 std::string mesh_key(const Setting& setting);
 std::string asset_key(const Setting& setting);
 
-/// The settings to measure, those that tell most first: each of the things to turn by itself, and
-/// the corners where turning two of them should pay. The first is the standard setting.
+/// The settings to measure, those that tell most first: each parameter changed by itself, and the
+/// corners where changing two of them should pay. The first is the standard setting.
 ///
 /// Not in it, as it moves pictures by 0.1 dB and time by nothing: the knots of the lattices.
 std::vector<Setting> tradeoff_design();
@@ -43,14 +43,14 @@ std::vector<Setting> tradeoff_design();
 /// \param standard        what the user asked for
 /// \param downscale       of the standard setting
 /// \param standard_voxel  its voxel edge [scene units]; a setting that does not need it may be
-/// asked
-///                        for before it is known, with 0
+///                        asked for before it is known, with 0
 RunRequest request_of(const Setting& setting,
                       const RunRequest& standard,
                       int downscale,
                       double standard_voxel);
 
-/// The command line of a run, to be pasted into a shell. \param threads  0 = all
+/// The command line of a run, to be pasted into a shell.
+/// \param threads  0 = all
 std::string command_line(const RunRequest& request, int threads = 0);
 
 }  // namespace cgs

@@ -27,8 +27,8 @@ nlohmann::ordered_json tradeoff_json(const TradeoffReport& report);
 /// with a star; then what was left out and what is recommended.
 std::string tradeoff_text(const TradeoffReport& report);
 
-/// Writes tradeoff.json, tradeoff.svg and tradeoff.html (the same plots and the text). \throws
-/// IoError
+/// Writes tradeoff.json, tradeoff.svg and tradeoff.html (the same plots and the text).
+/// \throws IoError
 void write_tradeoff(const std::filesystem::path& folder, const TradeoffReport& report);
 
 }  // namespace cgs

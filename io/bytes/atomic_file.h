@@ -57,13 +57,16 @@ class FolderLock {
 };
 
 /// Removes the temporaries of AtomicFile that processes which are gone left in a folder, not below
-/// it. Does nothing if there is no such folder. \throws IoError
+/// it. Does nothing if there is no such folder.
+/// \throws IoError
 void remove_abandoned_files(const std::filesystem::path& folder);
 
-/// Writes a whole file atomically. \throws IoError
+/// Writes a whole file atomically.
+/// \throws IoError
 void write_file(const std::filesystem::path& path, std::string_view bytes);
 
-/// Creates a folder and its parents and checks that files can be created in it. \throws IoError
+/// Creates a folder and its parents and checks that files can be created in it.
+/// \throws IoError
 void make_output_folder(const std::filesystem::path& folder);
 
 /// Makes a folder as make_output_folder() and, if there was none, takes it away again should

@@ -31,8 +31,8 @@ struct ReadLimits {
 /// \throws BadInput Open (missing, not a regular file, no permission), Empty; LimitError.
 std::string read_file(const std::filesystem::path& path, const ReadLimits& limits = {});
 
-/// Hands a regular file over in parts, whatever its size; an empty one in none. \throws BadInput
-/// Open
+/// Hands a regular file over in parts, whatever its size; an empty one in none.
+/// \throws BadInput Open
 void read_in_parts(const std::filesystem::path& path,
                    const std::function<void(std::string_view)>& take);
 
@@ -41,7 +41,8 @@ void read_in_parts(const std::filesystem::path& path,
 std::string read_file_start(const std::filesystem::path& path, uint64_t max_bytes);
 
 /// Refuses, with advice, what is often found under a wrong name: HTML, Git LFS pointers, archives.
-/// `expected` names the format for the message ("PLY"). \throws BadInput Magic
+/// `expected` names the format for the message ("PLY").
+/// \throws BadInput Magic
 void refuse_foreign_content(const std::filesystem::path& path,
                             std::string_view bytes,
                             std::string_view expected);
@@ -56,7 +57,8 @@ class ByteReader {
   size_t remaining() const { return bytes_.size() - offset_; }
   const std::filesystem::path& path() const { return path_; }
 
-  /// The next n bytes. \throws BadInput Truncated
+  /// The next n bytes.
+  /// \throws BadInput Truncated
   std::string_view take(size_t n, std::string_view what);
 
   /// One little-endian number.
@@ -68,11 +70,13 @@ class ByteReader {
     return value;
   }
 
-  /// Bytes up to a terminating NUL, which is consumed. \throws BadInput Truncated; LimitError
+  /// Bytes up to a terminating NUL, which is consumed.
+  /// \throws BadInput Truncated; LimitError
   std::string_view take_c_string(size_t max_bytes, std::string_view what);
 
   /// Checks that `count` records of at least `bytes_each` bytes can still follow; call before
-  /// allocating for them. \throws BadInput Count
+  /// allocating for them.
+  /// \throws BadInput Count
   void expect_records(uint64_t count, uint64_t bytes_each, std::string_view what) const;
 
   /// \throws BadInput with the current offset in the message.
@@ -85,7 +89,8 @@ class ByteReader {
 };
 
 /// The whole token as a number: no locale, no leftovers, no overflow; a number that need not be
-/// whole may begin with "+". \return false if it is none.
+/// whole may begin with "+".
+/// \return false if it is none.
 bool parse_number(std::string_view token, double& value);
 bool parse_number(std::string_view token, int64_t& value);
 bool parse_number(std::string_view token, uint64_t& value);

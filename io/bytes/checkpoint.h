@@ -9,8 +9,8 @@
 
 namespace cgs {
 
-/// Saves the state of unfinished work to <folder>/<name>.checkpoint. The one before is kept as
-/// <name>.previous.checkpoint, so that there is a whole one at any moment.
+/// Saves the state of unfinished work to NAME.checkpoint in a folder. The one before is kept as
+/// NAME.previous.checkpoint, so that there is a whole one at any moment.
 ///
 /// Layout, little-endian: "CGSCKPT1", u64 belongs_to, u64 size, `size` bytes of state, u64 FNV-1a
 /// of everything before.
@@ -37,7 +37,8 @@ SavedState read_checkpoint(const std::filesystem::path& folder,
 /// True if there is a file of either generation, whole or not.
 bool has_checkpoint(const std::filesystem::path& folder, const std::string& name);
 
-/// Removes both generations once the work is done. \throws IoError
+/// Removes both generations once the work is done.
+/// \throws IoError
 void remove_checkpoint(const std::filesystem::path& folder, const std::string& name);
 
 }  // namespace cgs

@@ -20,7 +20,8 @@ namespace cgs {
 /// Source: RFC 8259; a UTF-8 byte order mark is skipped.
 nlohmann::json read_json(const std::filesystem::path& path, const ReadLimits& limits = {});
 
-/// The same for the content of a file that is part of another one. \pre within max_json_bytes
+/// The same for the content of a file that is part of another one.
+/// \pre within max_json_bytes
 nlohmann::json parse_json(std::string_view bytes,
                           const std::filesystem::path& path,
                           const ReadLimits& limits = {});
@@ -38,11 +39,14 @@ class JsonValue {
  public:
   JsonValue(const nlohmann::json& value, std::filesystem::path path, std::string pointer = "");
 
-  /// A member of an object. \throws BadInput Schema if this is no object or lacks the key.
+  /// A member of an object.
+  /// \throws BadInput Schema if this is no object or lacks the key.
   JsonValue at(std::string_view key) const;
-  /// The same, or nothing if the key is absent. \throws BadInput Schema if this is no object.
+  /// The same, or nothing if the key is absent.
+  /// \throws BadInput Schema if this is no object.
   std::optional<JsonValue> find(std::string_view key) const;
-  /// Number of elements. \throws BadInput Schema if this is no array.
+  /// Number of elements.
+  /// \throws BadInput Schema if this is no array.
   size_t size() const;
   /// \pre index < size()
   JsonValue at(size_t index) const;
@@ -51,7 +55,8 @@ class JsonValue {
   double number() const;
   std::string text() const;
   bool boolean() const;
-  /// A number without fraction (1080.0 counts) in [0, 2^31). \throws BadInput Schema
+  /// A number without fraction (1080.0 counts) in [0, 2^31).
+  /// \throws BadInput Schema
   int count() const;
 
   bool is_array() const;

@@ -6,7 +6,7 @@
 
 namespace cgs {
 
-/// For decoders and encoders in C, which tell an allocation that failed as they tell damage: set
+/// For decoders and encoders in C, which report a failed allocation as they report damage: set
 /// errno to 0 before they work, and call this where they refuse, in the same thread.
 /// \throws std::bad_alloc if an allocation failed since
 inline void throw_if_memory_ran_out() {

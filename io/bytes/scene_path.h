@@ -25,15 +25,15 @@ std::filesystem::path resolve_in_scene(const SceneRoot& root,
                                        std::string_view name,
                                        const std::filesystem::path& named_in);
 
-/// What a path that is in use is called from the folder of a data set: by its names if they lead
-/// there, else by where links lead. Elsewhere it is absolute with allow_external, and nothing
-/// without. The folder itself is the empty path.
+/// A path relative to the folder of a data set: by its names if they lead there, else with links
+/// resolved. Outside of the folder it is absolute with allow_external, and nothing without. The
+/// folder itself is the empty path.
 std::optional<std::filesystem::path> path_in_scene(const SceneRoot& root,
                                                    const std::filesystem::path& path);
 
-/// Folders of a data set, as path_in_scene(), in which files of the photographs in another may lie,
-/// in the order to look: those called `name` below the folder of the photographs and below any
-/// above it, there in the same folders below it (masks/rig1 for images/rig1).
+/// Folders of a data set, as path_in_scene(), that may hold files for the photographs in the folder
+/// `photographs`, in the order to look: those called `name` in it and in each folder above it,
+/// there with the same subfolders (masks/rig1 for images/rig1).
 std::vector<std::filesystem::path> companion_folders(const SceneRoot& root,
                                                      const std::filesystem::path& photographs,
                                                      const std::string& name);
@@ -51,7 +51,7 @@ bool is_present(const std::filesystem::path& path);
 /// True if the path leads to a folder; never throws.
 bool is_folder(const std::filesystem::path& path);
 
-/// What a folder is called, however somebody writes the way there: "photos/", ".", "../photos".
+/// The name of a folder, however the path to it is written: "photos/", ".", "../photos".
 std::string folder_name(const std::filesystem::path& path);
 
 /// The names of what lies in a folder, sorted; empty if it cannot be listed.

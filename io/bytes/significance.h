@@ -18,7 +18,8 @@ constexpr int kFloatDigits = 24;   ///< … as float.
 /// \param box     of the content, in the coordinates of the file
 /// \param digits  kDoubleDigits or kFloatDigits
 /// \return what to warn of (float below 14 digits, fewer than our own files have); empty = nothing.
-/// A box without extent passes. \throws BadInput Value, "input has only N significant bits: …"
+/// A box without extent passes.
+/// \throws BadInput Value, "input has only N significant bits: …"
 std::string check_significance(const std::filesystem::path& path,
                                const Eigen::AlignedBox3d& box,
                                int digits);

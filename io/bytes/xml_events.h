@@ -28,11 +28,13 @@ class XmlElement {
   std::optional<std::string_view> find(std::string_view attribute) const;
   /// \throws BadInput Schema if it is not there
   std::string_view at(std::string_view attribute) const;
-  /// Also with a leading '+'. \throws BadInput Schema, Syntax (no number), Value (not finite)
+  /// Also with a leading '+'.
+  /// \throws BadInput Schema, Syntax (no number), Value (not finite)
   double number(std::string_view attribute) const;
   /// As number(), of all that blanks separate.
   std::vector<double> numbers(std::string_view attribute) const;
-  /// A whole number. \throws BadInput Schema, Syntax
+  /// A whole number.
+  /// \throws BadInput Schema, Syntax
   uint64_t count(std::string_view attribute) const;
   /// \throws BadInput that names the line
   [[noreturn]] void fail(Defect defect, const std::string& reason) const;

@@ -27,12 +27,13 @@ class GlbContainer {
   JsonValue root() const { return {json_, path_}; }
   const std::filesystem::path& path() const { return path_; }
 
-  /// Element `index` of a top-level array. \throws BadInput Ref where there is none
+  /// Element `index` of a top-level array.
+  /// \throws BadInput Ref where there is none
   JsonValue element(const char* array, const JsonValue& index) const;
 
   /// The bytes of the buffer view of a number, in the binary chunk or as EXT_meshopt_compression
-  /// decodes them. \throws BadInput Unsupported for a buffer in another file, Count where it leaves
-  /// the chunk
+  /// decodes them.
+  /// \throws BadInput Unsupported for a buffer in another file, Count where it leaves the chunk
   std::string_view view_bytes(const JsonValue& index) const;
 
   /// The values of an accessor of `components` numbers per element (glTF types SCALAR, VEC2 to
@@ -41,7 +42,8 @@ class GlbContainer {
   /// Source: glTF 2.0, section 3.6.2.
   std::vector<float> floats(const JsonValue& accessor, int components) const;
 
-  /// The values of an accessor of whole scalars: indices. \throws BadInput
+  /// The values of an accessor of whole scalars: indices.
+  /// \throws BadInput
   std::vector<uint32_t> indices(const JsonValue& accessor) const;
 
  private:
@@ -76,7 +78,8 @@ std::vector<double> numbers_or(const JsonValue& object,
                                const char* key,
                                std::vector<double> otherwise);
 
-/// A number without sign or fraction, up to 2^53. \throws BadInput Schema
+/// A number without sign or fraction, up to 2^53.
+/// \throws BadInput Schema
 uint64_t whole_number(const JsonValue& value);
 
 }  // namespace cgs

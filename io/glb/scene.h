@@ -40,7 +40,8 @@ struct GlbOrigin {
   }
 };
 
-/// What asset.extras of write_glb() and write_splat_glb() say. \throws BadInput
+/// What asset.extras of write_glb() and write_splat_glb() say.
+/// \throws BadInput
 GlbOrigin glb_origin(const GlbContainer& file);
 
 }  // namespace cgs

@@ -28,8 +28,8 @@ struct TextureImage {
   }
 };
 
-/// One for each photograph of the texture. \param quality of JPEG, 1 … 100; colour is not
-/// subsampled.
+/// One for each photograph of the texture.
+/// \param quality  of JPEG, 1 … 100; colour is not subsampled.
 /// \pre require_texture()
 std::vector<TextureImage> texture_images(const TriangleMesh& mesh,
                                          const PhotoTexture& texture,

@@ -10,8 +10,8 @@
 namespace cgs {
 
 /// The ICC profile that a JPEG, PNG, TIFF, WebP, HEIC or AVIF file holds; of HEIC and AVIF that
-/// state the primaries of Display P3 by number, a profile of these. Empty if there is none, or
-/// none that can be found: of the picture as a whole its decoder tells.
+/// state the primaries of Display P3 by number, a profile of these. Empty if there is none, or none
+/// that can be found: whether the picture is whole, its decoder tells.
 /// Source: ICC.1:2022 annex B.4 (JPEG, APP2); PNG 3rd edition 11.3.2.3 (iCCP); TIFF tag 34675; WebP
 ///         container (ICCP); ISO/IEC 14496-12 (colr); ITU-T H.273 (primaries 12).
 std::string color_profile(std::string_view bytes, const std::filesystem::path& path);

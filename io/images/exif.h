@@ -14,13 +14,13 @@ struct LensHint {
   double focal = 0;    ///< [pixels of the stored image]; 0 = not said.
   double sigma = 0;    ///< Relative standard deviation of `focal`.
   double marked = 0;   ///< Focal length as the lens is marked [mm]; 0 = not said.
-  double zoom = 1;     ///< Times the camera enlarged the picture by itself; `focal` is 0 then.
+  double zoom = 1;     ///< Digital zoom; `focal` is 0 where the camera used it.
 };
 
 /// Reads the Exif part of an image, as exif_part() finds it: focal length from the resolution of
 /// the focal plane, else, or where that contradicts it, from the focal length as on 35 mm film.
-/// What is damaged or absurd counts as not said, and so does any where the camera enlarged the
-/// picture by itself: programs differ in whether they count that in.
+/// What is damaged or absurd counts as not said, and so does any focal length with digital zoom:
+/// programs differ in whether they include it.
 ///
 /// The film equivalent compares diagonals and is rounded to whole millimetres. Where the picture
 /// has another shape than the usual sensors (3:2 and 4:3) it was cut, and sigma is larger.

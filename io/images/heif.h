@@ -23,9 +23,10 @@ ImageSize heif_size(std::string_view bytes, const std::filesystem::path& path);
 
 /// Decodes the primary image, upright, row by row. Colours stay coded as they are, as those of a
 /// JPEG with a profile do. Video decoders repair what is damaged within pixels: that is not
-/// noticed. \param size  as heif_size() gives it \return 8 bits each of red, green and blue per
-/// pixel, and of alpha where the image has it \throws BadInput Syntax, also for an image of another
-/// size; LimitError
+/// noticed.
+/// \param size  as heif_size() gives it
+/// \return 8 bits each of red, green and blue per pixel, and of alpha where the image has it
+/// \throws BadInput Syntax, also for an image of another size; LimitError
 std::string decode_heif(std::string_view bytes,
                         const ImageSize& size,
                         const std::filesystem::path& path);

@@ -47,9 +47,8 @@ struct StoredSamples {
 };
 
 /// Decodes a PNG or TIFF (one page) of grey levels.
-/// \throws as read_image(); BadInput Unsupported for JPEG and WebP, which do not keep values, and
-/// for
-///         more than one channel beside alpha
+/// \throws Error as read_image(); BadInput Unsupported for JPEG and WebP, which do not keep values,
+///         and for more than one channel beside alpha
 StoredSamples read_samples(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 }  // namespace cgs

@@ -32,8 +32,8 @@ ImageHeader parse_image_header(std::string_view bytes,
                                const std::filesystem::path& path,
                                const ReadLimits& limits = {});
 
-/// The same TIFF but for its orientation tag, which says upright: decoders that turn what it says
-/// otherwise then give the pixels as they are stored.
+/// The same TIFF with an orientation tag that says upright: decoders that heed the tag then give
+/// the pixels as they are stored.
 /// Source: TIFF 6.0 section 8, Orientation.
 std::string upright_tiff(std::string_view bytes, const std::filesystem::path& path);
 

@@ -32,7 +32,8 @@ std::optional<std::array<size_t, 2>> picture_sides(const std::vector<size_t>& sh
 /// Source: numpy.lib.format, "NPY format" versions 1.0, 2.0 and 3.0.
 NpyArray read_npy(const std::filesystem::path& path, const ReadLimits& limits = {});
 
-/// The same from memory. \param path  for messages
+/// The same from memory.
+/// \param path  for messages
 NpyArray parse_npy(std::string_view bytes,
                    const std::filesystem::path& path,
                    const ReadLimits& limits = {});

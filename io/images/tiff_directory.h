@@ -25,7 +25,8 @@ struct TiffField {
 /// Source: TIFF 6.0 section 2; BigTIFF (AWare Systems).
 class TiffDirectory {
  public:
-  /// The first one. \pre the bytes begin as those of a TIFF file
+  /// The first one.
+  /// \pre the bytes begin as those of a TIFF file
   TiffDirectory(std::string_view bytes, const std::filesystem::path& path);
 
   /// The one that a tag of this one points to; empty if the tag is absent.
@@ -43,7 +44,8 @@ class TiffDirectory {
   /// Where the one 16-bit value of a tag lies in the file; empty if it has none such.
   std::optional<uint64_t> place_of_short(uint64_t tag) const;
 
-  /// A whole number of the file. \param width  in bytes, up to 8
+  /// A whole number of the file.
+  /// \param width  in bytes, up to 8
   uint64_t number(uint64_t at, uint64_t width) const;
 
   bool is_big_endian() const { return is_big_endian_; }

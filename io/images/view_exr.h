@@ -38,8 +38,9 @@ struct ViewRasters {
 /// Attributes: worldToCamera (left-handed, see ExrImage); as text, numbers row by row,
 /// cgs:worldToCamera (+x right, +y down, +z forward), cgs:K [pixels], cgs:units ("m", …,
 /// "unknown"), cgs:fileOrigin (world point of (0, 0, 0)). World points count from
-/// frame.file_origin. \param camera  in the canonical frame \throws InvalidInput if a raster has
-/// another size than the camera; IoError
+/// frame.file_origin.
+/// \param camera  in the canonical frame
+/// \throws InvalidInput if a raster has another size than the camera; IoError
 void write_view_exr(const std::filesystem::path& path,
                     const ViewRasters& view,
                     const Camera& camera,

@@ -44,8 +44,9 @@ inline constexpr int kDracoColorBits = 11;
 /// of its place, every face there, no face added, texture coordinates within kDracoTextureError.
 ///
 /// Normals keep 10 bits, sigma 11, rounded up where it is less than a step; support and features
-/// are exact up to 65535. \param speed  0 (smallest) to 10 (fastest) \throws NumericalError if the
-/// library fails or the comparison does
+/// are exact up to 65535.
+/// \param speed  0 (smallest) to 10 (fastest)
+/// \throws NumericalError if the library fails or the comparison does
 DracoPrimitive draco_compress(const GlbPrimitive& primitive, const DracoGrid& grid, int speed);
 
 }  // namespace cgs

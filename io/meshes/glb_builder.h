@@ -51,7 +51,8 @@ class GlbBuilder {
   /// \param draco  `in`, compressed
   void add_compressed(const GlbPrimitive& in, const DracoPrimitive& draco);
 
-  /// The file. \throws LimitError  it would reach 4 GiB
+  /// The file.
+  /// \throws LimitError if it would reach 4 GiB
   std::string bytes();
 
  private:

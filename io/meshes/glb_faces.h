@@ -23,10 +23,10 @@ struct GlbFaces {
 
 /// Reads a primitive, plain or compressed with KHR_draco_mesh_compression: a list, strip or fan of
 /// triangles. Points and lines have none.
+/// \param texcoord_set  number of the texture coordinates to read; -1 = none
 /// \throws BadInput as GlbContainer and read_draco(); Ref for an index out of range; Count for
 ///         attributes of different length
 /// Source: glTF 2.0, section 3.7.2.1, and KHR_draco_mesh_compression, Khronos Group.
-/// \param texcoord_set  number of the texture coordinates to read; -1 = none
 GlbFaces read_glb_primitive(const GlbContainer& file, const JsonValue& primitive, int texcoord_set);
 
 }  // namespace cgs

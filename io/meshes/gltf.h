@@ -32,9 +32,9 @@ struct GlbOptions {
   GlbEncoding encoding = GlbEncoding::Draco;  ///< Meshes smaller than 1e-6 [units of the file] are
                                               ///< stored plain where Draco is asked for, which
                                               ///< cannot hold them.
-  double max_error = 0;  ///< Largest move of a vertex by Draco or Meshopt [world units]; 0 =
-                         ///< extent / 2^14, else > extent / 2^21 and extent / 2^16. Quantized moves
-                         ///< it by extent / 2^16 at most.
+  double max_error = 0;  ///< Largest move of a vertex by Draco or Meshopt [world units]; 0 = extent
+                         ///< / 2^14, else > extent / 2^21 (Draco) or extent / 2^16 (Meshopt).
+                         ///< Quantized moves it by extent / 2^16 at most.
   int speed = 1;         ///< Of the encoder, 0 to 10 (fastest); files of 0 are no smaller.
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
   std::optional<Eigen::Vector3d> center;  ///< What becomes (0, 0, 0) [internal units]; default: the
@@ -98,7 +98,7 @@ GlbReport write_glb(const std::filesystem::path& path,
 ///   are KHR_materials_unlit; readers that do not know it find a rough non-metal.
 /// - With Draco, texture coordinates move by at most 0.1 pixels, measured.
 ///
-/// \throws as above; InvalidInput if the texture does not fit the mesh: see require_texture().
+/// \throws Error as above; InvalidInput if the texture does not fit the mesh, see require_texture()
 GlbReport write_glb(const std::filesystem::path& path,
                     const TriangleMesh& mesh,
                     const PhotoTexture& texture,
@@ -111,7 +111,8 @@ struct GlbFile {
   GlbReport report;
 };
 
-/// What write_glb() would write. \throws as that, but for IoError
+/// What write_glb() would write.
+/// \throws Error as that, but for IoError
 GlbFile make_glb(const TriangleMesh& mesh,
                  const PhotoTexture& texture,
                  const Frame& frame,

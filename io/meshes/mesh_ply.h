@@ -34,7 +34,7 @@ struct VertexScalar {
 };
 
 /// The same with further numbers per vertex behind the others.
-/// \throws as above; InvalidInput if there are not as many numbers as vertices
+/// \throws Error as above; InvalidInput if there are not as many numbers as vertices
 void write_mesh_ply(const std::filesystem::path& path,
                     const TriangleMesh& mesh,
                     const Frame& frame,
@@ -61,7 +61,7 @@ struct MeshFile {
 MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame = {});
 
 /// The content of the file as read_mesh_ply() reads it, in file coordinates and double.
-/// \throws as read_mesh_ply()
+/// \throws Error as read_mesh_ply()
 ParsedMesh parse_mesh_ply(const std::filesystem::path& path);
 
 }  // namespace cgs

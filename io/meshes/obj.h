@@ -22,12 +22,12 @@ namespace cgs {
 void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh, const Frame& frame);
 
 /// The same with photographs as texture: within their group, faces with a photograph have material
-/// "observed_<photograph>" ("view_<photograph>" without labels) and texture coordinates ("vt u v",
+/// "observed_PHOTOGRAPH" ("view_PHOTOGRAPH" without labels) and texture coordinates ("vt u v",
 /// v upwards), and the used part of the photograph lies beside the file as
-/// <stem>.<photograph>.jpg. Characters that do not belong in such names become '_'.
+/// STEM.PHOTOGRAPH.jpg. Characters that do not belong in such names become '_'.
 ///
 /// Images are replaced first and the .obj last; what was not there before a failure is removed.
-/// \throws as above; InvalidInput if the texture does not fit the mesh: see require_texture().
+/// \throws Error as above; InvalidInput if the texture does not fit the mesh, see require_texture()
 void write_obj(const std::filesystem::path& path,
                const TriangleMesh& mesh,
                const PhotoTexture& texture,

@@ -62,11 +62,13 @@ class PlaceNumbers {
 /// \throws BadInput Truncated where the file ends instead; LimitError for lines above 4 MiB
 std::string_view expect_line(TextLines& lines, std::string_view what);
 
-/// Two opposite corners of the bounding box. \pre there is a point.
+/// Two opposite corners of the bounding box.
+/// \pre there is a point.
 std::vector<Eigen::Vector3d> opposite_corners(const std::vector<Eigen::Vector3d>& points);
 
 /// Refuses positions that were rounded too much, and warns of some: as the function of that name
-/// for boxes. \pre there is a point.
+/// for boxes.
+/// \pre there is a point.
 void check_significance(ParsedMesh& parsed, const std::filesystem::path& path);
 
 /// A standard deviation of a file in internal units; NaN where it is negative or not finite.

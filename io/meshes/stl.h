@@ -14,9 +14,9 @@ namespace cgs {
 ///
 /// Vertices are file coordinates, rotated and scaled; facet normals follow the corners. STL has no
 /// place for a unit or for evidence: the header line names the unit and, where file_origin is not
-/// 0, what to add to the coordinates. \param up_rotation  world axes to file axes; z_up_from(up),
-/// as readers of STL expect \throws InvalidInput if the scale of the frame is unknown, the mesh has
-/// no face or is not
+/// 0, what to add to the coordinates.
+/// \param up_rotation  world axes to file axes; z_up_from(up), as readers of STL expect
+/// \throws InvalidInput if the scale of the frame is unknown, the mesh has no face or is not
 ///         writable (an array does not fit, a vertex is not finite); IoError
 void write_stl(const std::filesystem::path& path,
                const TriangleMesh& mesh,

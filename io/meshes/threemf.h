@@ -19,9 +19,9 @@ namespace cgs {
 /// triangle carries the base material of its class ("observed", "single view", "interpolated",
 /// "estimated", "inferred", "virtual"), and the Description metadata tells the area of each, and
 /// how many millimetres to add to the coordinates where file_origin is not 0. The same mesh gives
-/// the same bytes. \param up_rotation  world axes to file axes; z_up_from(up), as the format
-/// demands \throws InvalidInput if the scale of the frame is unknown, nothing is left of the mesh,
-/// no unit
+/// the same bytes.
+/// \param up_rotation  world axes to file axes; z_up_from(up), as the format demands
+/// \throws InvalidInput if the scale of the frame is unknown, nothing is left of the mesh, no unit
 ///         holds it, or it is not writable (an array does not fit, a vertex is not finite); IoError
 /// Source: 3MF Core Specification 1.x, 3MF Consortium.
 void write_3mf(const std::filesystem::path& path,

@@ -10,8 +10,8 @@ namespace cgs {
 /// Reads everything that a 3MF file builds as one mesh: objects, their components and where the
 /// build puts them, in the unit the file states; +Z is up. Nothing is extracted to disk.
 ///
-/// Files of ours lead back to what was observed of each face, which a warning says where another
-/// program left it out, and to the origin they were moved from, unless the unit is no longer the
+/// From files of ours, the label of each face is restored (a warning says where another program
+/// left it out), and so is the origin they were moved from, unless the unit is no longer the
 /// millimetre or an object is moved, turned or built twice. Objects of type support, solidsupport
 /// and other are left out, surfaces are kept; warnings say how many. In other files labels are
 /// those that MaterialLabels finds in names of materials. The type of an object speaks for its own

@@ -26,12 +26,11 @@ struct Tileset {
 };
 
 /// Writes a 3D Tiles tileset: a chain of tiles, each of which is replaced by the next finer one as
-/// soon as a viewer that stands near sees its error. The chain ends at an error of 0: nothing finer
+/// soon as a viewer is so near that its error shows. The chain ends at an error of 0: nothing finer
 /// is there. Viewers turn +Y of glTF into +Z themselves.
 ///
 /// \throws InvalidInput if there is no level, an error grows from coarse to fine or is no length,
-/// or
-///         the box is empty; IoError
+///         or the box is empty; IoError
 /// Source: OGC 22-025r4, "3D Tiles Specification 1.1".
 void write_tileset(const std::filesystem::path& path, const Tileset& tileset);
 

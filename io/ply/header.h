@@ -53,7 +53,7 @@ PlyHeader parse_ply_header(std::string_view bytes,
                            const ReadLimits& limits = {});
 
 /// The header of a file, of which no more is read; empty if it does not begin as a PLY file.
-/// \throws as above, and as read_file_start()
+/// \throws Error as above, and as read_file_start()
 std::optional<PlyHeader> read_ply_header(const std::filesystem::path& path);
 
 }  // namespace cgs

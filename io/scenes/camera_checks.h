@@ -25,7 +25,7 @@ Eigen::Isometry3d checked_pose(const Eigen::Matrix3d& rotation,
                                const Refuse& refuse);
 
 /// Calls refuse(Value) unless sizes and focal lengths are positive, everything is finite and the
-/// principal point lies within ten image sizes of the image, and that it has at most max_pixels.
+/// principal point lies within ten image sizes of the image, which has at most max_pixels.
 void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimits& limits = {});
 
 /// Sets focal lengths and principal point from fx 0 cx / 0 fy cy / 0 0 1; the size is that of the
@@ -33,8 +33,8 @@ void check_intrinsics(const Camera& camera, const Refuse& refuse, const ReadLimi
 /// check_intrinsics().
 void set_intrinsics(Camera& camera, const Eigen::Matrix3d& K, const Refuse& refuse);
 
-/// Distorted radius as a function of the undistorted one (both in units of the focal length)
-/// grows only up to a largest undistorted radius; infinity if it grows for ever.
+/// The undistorted radius up to which the distorted radius grows with it (both in units of the
+/// focal length); infinity if it grows for ever.
 ///
 /// \param distortion  k1 k2 p1 p2 k3
 double fold_radius(const std::array<double, 5>& distortion);
@@ -42,7 +42,7 @@ double fold_radius(const std::array<double, 5>& distortion);
 /// The same of a lens that is r (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8), r in any unit.
 double fold_radius(const std::array<double, 4>& radial);
 
-/// Calls refuse(Value) unless a coefficient is finite and what is made of it can be.
+/// Calls refuse(Value) unless a coefficient is finite and so small that its powers are.
 void check_coefficient(double value, const Refuse& refuse);
 
 /// Calls refuse(Value) as check_coefficient(), or if the distortion cannot be undone

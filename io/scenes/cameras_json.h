@@ -18,8 +18,9 @@ constexpr const char* kForeignCameras = "cameras.json";
 ///
 /// Keys that other viewers ignore make the scene complete: per entry cx, cy, role ("input",
 /// "held_out" or ""), near, far, distortion, fisheye, image_path (absolute) and internal_position,
-/// in the first entry also frame. \throws InvalidInput if a camera is not finite, IoError. Source:
-/// graphdeco-inria/gaussian-splatting, the cameras.json of a trained model.
+/// in the first entry also frame.
+/// \throws InvalidInput if a camera is not finite; IoError
+/// Source: graphdeco-inria/gaussian-splatting, the cameras.json of a trained model.
 void write_cameras_json(const std::filesystem::path& path, const Scene& scene);
 
 /// Restores the scene of write_cameras_json() in internal units, without pixels and sparse points;

@@ -11,8 +11,8 @@ namespace cgs {
 /// z-depth in units of the cameras, of pictures without distortion.
 bool is_colmap_depth_name(const std::filesystem::path& path);
 
-/// The depth map of a photograph: <name>.geometric.bin, which views agree on, else
-/// <name>.photometric.bin; empty if there is none. Names in COLMAP begin below its image folder, so
+/// The depth map of a photograph: NAME.geometric.bin, which views agree on, else
+/// NAME.photometric.bin; empty if there is none. Names in COLMAP begin below its image folder, so
 /// those of rigs are looked for with their folders first.
 /// \param folder  in which links must not lead elsewhere unless allow_external
 /// \throws BadInput Path

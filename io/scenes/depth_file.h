@@ -10,9 +10,9 @@ namespace cgs {
 /// depth maps of COLMAP.
 bool has_depth_extension(const std::filesystem::path& path);
 
-/// The file of a photograph in a folder of depth files: as colmap_depth_of(), else of the same
-/// stem, in the same folders below it (cam0/0001.png for images/cam0/0001.jpg) or in itself, and of
-/// several the one whose format comes first above; empty if there is none.
+/// The file of a photograph in a folder of depth files: as colmap_depth_of(), else the one of the
+/// same stem, in the same subfolders (cam0/0001.png for images/cam0/0001.jpg) or in the folder
+/// itself; of several the one whose format comes first above; empty if there is none.
 /// \param folder  in which links must not lead elsewhere unless allow_external
 /// \throws BadInput Path
 std::filesystem::path depth_file_of(const SceneRoot& folder,
@@ -29,7 +29,8 @@ std::filesystem::path depth_file_of(const SceneRoot& folder,
 StoredSamples read_depth_file(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// The same for values that are known up to an offset: where a file holds several numbers below 0,
-/// all of its values are raised above 0. A single number below 0, however often, is none.
+/// all of its values are raised above 0. Where all numbers below 0 are the same, they mark pixels
+/// without depth.
 StoredSamples read_relative_depth_file(const std::filesystem::path& path,
                                        const ReadLimits& limits = {});
 

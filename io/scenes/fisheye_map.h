@@ -10,8 +10,8 @@
 
 namespace cgs {
 
-/// A point of a picture and by how much a pixel of the photograph covers a larger angle there than
-/// one of the picture does across the radius.
+/// A point of a picture, and how many times the angle of a pixel of the picture, across the radius,
+/// a pixel of the photograph covers there.
 struct PicturePoint {
   Eigen::Vector2d at;  ///< [pixels]
   double stretch = 1;  ///< Along the radius or across it, whichever is more.

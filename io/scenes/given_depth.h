@@ -28,16 +28,17 @@ std::map<std::string, DepthKind> depth_kinds();
 
 /// Gives every view that has a photograph the file with its depth, if there is one: in the folder
 /// of the options, else where the layout of the scene says, else in a folder "depth" beside that of
-/// the photograph, or in it. There only input views get one, and a file that cannot be used (of
-/// colours, of another shape, damaged) becomes a warning, as do input views that have none while
-/// others do. So does depth that COLMAP made with photographs that are held out.
+/// the photograph, or in it. From such a folder only input views get one, and a file that cannot be
+/// used (of colours, of another shape, damaged) becomes a warning, as do input views that have none
+/// while others do. So does depth that COLMAP made with photographs that are held out.
 /// \throws BadInput Missing (the folder of the options holds no file for an input view), Path,
 ///         Ref (one file for two views); InvalidInput where the scene or the options say that depth
 ///         maps of COLMAP, which are in units of the scene, are in metres
 void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_external);
 
 /// The file that says how far to trust the depth of a view, as Polycam lays it out; empty if there
-/// is none. \throws BadInput Path where it leads out of the scene and that is not allowed
+/// is none.
+/// \throws BadInput Path where it leads out of the scene and that is not allowed
 std::filesystem::path confidence_file(const Scene& scene, const View& view, bool allow_external);
 
 /// Reads the depth of a view at the size of its camera, which has no distortion. In Polycam's
@@ -48,8 +49,8 @@ std::filesystem::path confidence_file(const Scene& scene, const View& view, bool
 /// median of the values under a pixel and what differs from it by at most 5 % are averaged: values
 /// of both sides of a depth edge never mix. A photograph that is stored turned may come with depth
 /// that is turned or upright.
-/// \param photograph  size of the photograph, upright [pixels]
 /// Depth maps of COLMAP, of undistorted pictures, do not go with a photograph that has distortion.
+/// \param photograph  size of the photograph, upright [pixels]
 /// \throws BadInput Mismatch for another shape or such a map, and as read_depth_file(); LimitError
 void load_given_depth(const Scene& scene, View& view, const ImageSize& photograph);
 

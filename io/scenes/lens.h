@@ -13,14 +13,15 @@ namespace cgs {
 bool has_lens_distortion(const View& view);
 
 /// The camera of the undistorted picture of a view before it is made smaller: for a fisheye that of
-/// its FisheyeMap, at the size of the photograph. \throws as photograph_size()
+/// its FisheyeMap, at the size of the photograph.
+/// \throws Error as photograph_size()
 Camera picture_camera(const View& view);
 
 /// Where points of the photograph of a view lie in its undistorted picture of full size, and back.
 class LensMap {
  public:
   /// \param camera  picture_camera(view)
-  /// \throws as photograph_size()
+  /// \throws Error as photograph_size()
   LensMap(const View& view, const Camera& camera);
 
   /// \param in_photograph  [pixels], the first centre at 0.5

@@ -23,8 +23,9 @@ class MaskIndex {
  public:
   explicit MaskIndex(SceneRoot root);
 
-  /// Says which pixels of a photograph may be used; empty if there is none. \throws BadInput Path
-  /// where it is a link that leaves the scene, as resolve_in_scene(); LimitError
+  /// Says which pixels of a photograph may be used; empty if there is none.
+  /// \throws BadInput Path where it is a link that leaves the scene, as resolve_in_scene();
+  ///         LimitError
   std::filesystem::path mask_of(const std::filesystem::path& photograph);
 
   /// True if there is a folder of masks, and none in it is for this photograph.
@@ -42,7 +43,8 @@ class MaskIndex {
 };
 
 /// Finds the masks of views whose data set names none. Input views without one are warned of where
-/// others have one. \throws as MaskIndex
+/// others have one.
+/// \throws Error as MaskIndex
 void find_masks(const SceneRoot& root, Scene& scene);
 
 /// Leaves usable only the pixels where the mask of a view, if it has one, is at least half as
@@ -51,7 +53,7 @@ void find_masks(const SceneRoot& root, Scene& scene);
 /// The mask of a photograph that is turned upright is upright, too: as its own Exif says, or as
 /// viewers showed the photograph to whoever painted it. Only where its size tells that it lies as
 /// the photograph is stored, it is turned with it.
-/// \param size  of the photograph [pixels], turned as the view says
+/// \param size    of the photograph [pixels], turned as the view says
 /// \param usable  in and out: 1 = may be used; empty = all may
 /// \throws BadInput Mismatch for a mask of another size, and as read_image()
 void apply_mask(const View& view, const ImageSize& size, MaskMap& usable);

@@ -22,11 +22,13 @@ Eigen::Vector2d stored_pixel(const Eigen::Vector2d& upright,
                              int orientation);
 
 /// Size of the photograph of a view as image viewers show it, which turn pictures as Exif says
-/// [pixels]. \throws BadInput as image_size()
+/// [pixels].
+/// \throws BadInput as image_size()
 ImageSize shown_size(const View& view);
 
 /// True if the shape of a mask or of depth cannot tell whether it lies as the photograph is stored
-/// or upright. \throws BadInput as image_size()
+/// or upright.
+/// \throws BadInput as image_size()
 bool may_lie_turned(const View& view);
 
 /// Where a pixel that was picked in an image viewer lies in the photograph that the camera of the
@@ -35,12 +37,14 @@ bool may_lie_turned(const View& view);
 /// \throws BadInput as image_size()
 std::optional<Eigen::Vector2d> picked_pixel(const View& view, const Eigen::Vector2d& shown);
 
-/// Size of the photograph of a view [pixels] and the photograph itself, turned as the view says.
-/// \param usable  where not null: pixels neither transparent nor masked, as read_image() gives them
-/// \param root    of the scene, where masks are looked for
-/// \throws BadInput, LimitError as image_size(), read_image() and apply_mask()
+/// Size of the photograph of a view, turned as the view says [pixels].
+/// \throws BadInput, LimitError as image_size()
 ImageSize photograph_size(const View& view);
+/// The photograph itself, turned likewise.
+/// \throws BadInput, LimitError as image_size() and read_image()
 ColorImage read_photograph(const View& view);
+/// \param usable  receives the pixels neither transparent nor masked, as read_image() gives them
+/// \throws BadInput, LimitError as read_photograph() and apply_mask()
 ColorImage read_photograph(const View& view, MaskMap& usable);
 
 }  // namespace cgs

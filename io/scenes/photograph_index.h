@@ -18,8 +18,9 @@ class PhotographIndex {
   explicit PhotographIndex(const SceneRoot& root);
 
   /// The file of a name that may have a folder in front, of Windows too, and may lack its
-  /// extension; empty if there is none. \throws BadInput Ref if another name took that file: one of
-  /// the two cameras would see what it never photographed
+  /// extension; empty if there is none.
+  /// \throws BadInput Ref if another name took that file: one of the two cameras would see what it
+  ///         never photographed
   std::filesystem::path take(std::string_view name);
 
  private:

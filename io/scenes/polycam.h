@@ -14,8 +14,9 @@ bool is_polycam(const std::filesystem::path& folder);
 /// looking to -z) in metres, +y up. The corrected cameras and images are taken where both are
 /// there, as they are optimised and without distortion; depth is that of the sensor, in
 /// millimetres, without what confidence/ calls low. Other images than those of the corrected
-/// cameras keep what distortion they have. \throws BadInput Schema (a field is missing), Value,
-/// Empty, as read_json(); LimitError Source: PolyCam/polyform, README.md, "Polycam's data format".
+/// cameras keep what distortion they have.
+/// \throws BadInput Schema (a field is missing), Value, Empty, as read_json(); LimitError
+/// Source: PolyCam/polyform, README.md, "Polycam's data format".
 Scene read_polycam(const SceneRoot& root);
 
 }  // namespace cgs

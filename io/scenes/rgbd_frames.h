@@ -13,10 +13,9 @@ bool is_rgbd_frames(const std::filesystem::path& folder);
 /// forward) in metres and their depth in millimetres:
 ///
 /// - 7-Scenes and 3DMatch: frame-N.color.png (or .jpg), frame-N.depth.png and frame-N.pose.txt
-/// (four
-///   rows of four numbers), beside camera-intrinsics.txt (three rows of three) or in seq-* below
-///   it. A pose that is not finite tells that tracking was lost: the frame is left out, with a
-///   warning.
+///   (four rows of four numbers), beside camera-intrinsics.txt (three rows of three) or in seq-*
+///   below it. A pose that is not finite tells that tracking was lost: the frame is left out, with
+///   a warning.
 /// - Open3D: color/ (or image/, rgb/) and depth/ with as many files, trajectory.log (or in scene/)
 ///   with a pose for each in their order, and camera_intrinsic.json or intrinsic.json.
 ///

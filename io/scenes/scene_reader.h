@@ -21,8 +21,8 @@ struct SceneOptions {
   std::string views;
   bool all_views = false;  ///< Where `views` is empty, take every one.
   /// Divide image sizes by this; >= 1. Empty = choose: the smallest that leaves no side above
-  /// kLongestSide, for photographs much smaller than the largest one of their own; what was chosen
-  /// becomes a warning.
+  /// kLongestSide; photographs much smaller than the largest have one of their own. What was chosen
+  /// becomes a note.
   std::optional<int> downscale;
   bool allow_external = false;  ///< Follow links and absolute paths that leave the scene folder.
   DepthOptions depth;
@@ -34,8 +34,8 @@ struct SceneOptions {
   void validate() const;
 };
 
-/// Recognises the layout of a folder (LLFF, transforms.json, COLMAP, Strecha) and reads cameras and
-/// image sizes, but no pixels.
+/// Recognises the layout of a folder (see layout_of()) and reads cameras and image sizes, but no
+/// pixels.
 ///
 /// The result is in world coordinates with the identity frame, views sorted by name. Cameras have
 /// the size of the image file divided by `downscale`, rounded down; where the layout states
@@ -56,7 +56,7 @@ Scene read_scene(const std::filesystem::path& folder, const SceneOptions& option
 /// that states them; `kind` is "photographs".
 ///
 /// \param folder  holds the photographs
-/// \throws as read_scene()
+/// \throws Error as read_scene()
 Scene scene_of_photographs(const std::filesystem::path& folder,
                            const ColmapModel& model,
                            const SceneOptions& options = {});
@@ -74,7 +74,7 @@ void load_images(Scene& scene, const std::vector<int>& views, const Progress& pr
 ///
 /// \param with_image  false leaves `image` empty where it can be, which is much quicker
 /// \param warnings    gets what is odd
-/// \throws as load_images()
+/// \throws Error as load_images()
 View loaded_view(const Scene& scene, int view, bool with_image, std::vector<std::string>& warnings);
 
 }  // namespace cgs

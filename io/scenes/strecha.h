@@ -6,7 +6,8 @@
 
 namespace cgs {
 
-/// True if the folder or a folder directly in it holds files <image file name>.camera.
+/// True if the folder or a folder directly in it holds files IMAGE.camera, IMAGE being the name of
+/// an image file.
 bool is_strecha(const std::filesystem::path& folder);
 
 /// Reads cameras of the Strecha benchmark: per image a text file with K, a row of zeros for

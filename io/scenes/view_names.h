@@ -25,13 +25,15 @@ std::vector<int> views_called(const Scene& scene, const std::string& word);
 /// \pre view is an index into scene.views
 int index_of(const Scene& scene, int view);
 
-/// The one view that a word means. \param option  that the word was given to, for messages
+/// The one view that a word means.
+/// \param option  that the word was given to, for messages
 /// \return index into scene.views
 /// \throws InvalidInput if there is none, or more than one
 int find_view(const Scene& scene, const std::string& word, const std::string& option);
 
 /// The views a list names: comma-separated file stems or indices in name order, as in
-/// SceneOptions::views. \return indices into scene.views, ascending
+/// SceneOptions::views.
+/// \return indices into scene.views, ascending
 /// \throws InvalidInput for a view that does not exist or is named twice
 std::vector<int> select_views(const Scene& scene, const std::string& list);
 

@@ -22,8 +22,7 @@ bool is_compressed_ply(const PlyHeader& header);
 /// four packed 32-bit numbers, and perhaps an element `sh` with a byte per coefficient.
 ///
 /// \throws BadInput as parse_ply_header() and read_ply_rows(); Schema (a property is missing),
-/// Count
-///         (too few chunks, or not one row of `sh` per splat), Empty; LimitError
+///         Count (too few chunks, or not one row of `sh` per splat), Empty; LimitError
 /// Source: PlayCanvas, splat-transform, the compressed.ply of its reader and writer.
 RawSplats parse_compressed_ply(std::string_view bytes, const std::filesystem::path& path);
 

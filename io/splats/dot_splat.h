@@ -29,8 +29,9 @@ struct DotSplatReport {
   bool dropped_sh = false;      ///< Spherical harmonics above degree 0 were left out.
 };
 
-/// Writes a .splat file in file coordinates. \throws InvalidInput as write_gaussian_ply(), or if
-/// looks_like_dot_splat() would not know the file again; IoError
+/// Writes a .splat file in file coordinates.
+/// \throws InvalidInput as write_gaussian_ply(), or if looks_like_dot_splat() would not know the
+///         file again; IoError
 DotSplatReport write_dot_splat(const std::filesystem::path& path,
                                const Gaussians& gaussians,
                                const Frame& frame);

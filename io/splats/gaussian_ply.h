@@ -28,8 +28,9 @@ void write_gaussian_ply(const std::filesystem::path& path,
                         const std::string& evidence = {});
 
 /// Writes anew what the header of a file of write_gaussian_ply() tells of its frame; the splats
-/// keep their bytes, and the evidence its words. \return false if another program wrote the file,
-/// which is left alone \throws BadInput; IoError
+/// keep their bytes, and the evidence its words.
+/// \return false if another program wrote the file, which is left alone
+/// \throws BadInput; IoError
 bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame);
 
 /// Reads the 3DGS layout, ASCII or binary, properties in any order and of any type, others ignored.
@@ -38,8 +39,7 @@ bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame)
 /// become a thousandth of their smaller width thick. Colour may be red, green, blue instead of
 /// f_dc_*. Labels of provenance are read where there are any, from whole numbers of any type.
 /// \throws BadInput as parse_ply_header() and read_ply_rows(); Schema (a property is missing, or
-/// the
-///         number of f_rest_* is none of the five), Empty (0 vertices); LimitError
+///         the number of f_rest_* is none of the five), Empty (0 vertices); LimitError
 RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path& path);
 
 /// The same from a file, judged by examine_splats().

@@ -42,11 +42,10 @@ struct GaussianFile {
 
 /// Judges every splat and moves the good ones into their frame.
 ///
-/// - Dropped and counted: values that are not finite, quaternion 0, opacity 0, scales or places
-/// that
-///   leave the range of float.
-/// - Clamped and counted: opacity 1 becomes 0.99, vanishing scales the smallest that can be
-/// squared.
+/// - Dropped and counted: values that are not finite, quaternion 0, opacity 0, scales or positions
+///   that leave the range of float.
+/// - Clamped and counted: opacity 1 becomes 0.99, vanishing scales become the smallest that can be
+///   squared.
 /// - Opacities that all lie in [0, 1] and spread over a tenth of it are probabilities, not logits.
 /// - Scales of which none is negative are taken for lengths instead of logarithms if opacities are
 ///   probabilities, or if as logarithms they would cover the scene a thousand times over, and as

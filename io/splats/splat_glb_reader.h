@@ -38,8 +38,7 @@ bool is_splat_glb(const std::filesystem::path& path);
 /// \throws BadInput as GlbContainer and glb_instances(); Empty without splats; Schema for an
 ///         attribute that is missing or a primitive of no points; Count for attributes of different
 ///         lengths; Unsupported for compressed splats; Value for a node that flattens them;
-///         LimitError for more than 2^26 splats, or 2^28 colours
-///         of theirs
+///         LimitError for more than 2^26 splats, or 2^28 coefficients of their colours
 /// Source: Khronos Group, KHR_gaussian_splatting.
 RawSplats parse_splat_glb(std::string content, const std::filesystem::path& path);
 

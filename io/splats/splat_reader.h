@@ -17,9 +17,8 @@ struct SplatCount {
 };
 
 /// Tells what a file holds by its header (a .glb is read for that), if it holds splats; none for
-/// SOG, whose header is compressed, and for .ksplat. Nothing is promised: headers can
-/// lie. \throws BadInput as parse_ply_header() and count_glb_splats(), or if the file cannot be
-/// opened
+/// SOG, whose header is compressed, and for .ksplat. Nothing is promised: headers can lie.
+/// \throws BadInput as parse_ply_header() and count_glb_splats(), or if the file cannot be opened
 std::optional<SplatCount> stated_splats(const std::filesystem::path& path);
 
 /// Reads splats of any format we know, recognised by content: 3DGS and 2DGS PLY, packed PLY, SPZ 2

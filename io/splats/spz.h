@@ -14,8 +14,9 @@ namespace cgs {
 
 struct SpzOptions {
   int version = 3;  ///< 2 (rotations in 3 bytes, what glTF extensions embed) or 3 (in 4 bytes).
-  /// Up to this far, places need not be told apart [internal units]; 0 = as write_spz() says. What
-  /// no picture can show takes a third of the bits of a place, and compresses like noise.
+  /// Distance below which positions need not be told apart [internal units]; 0 = as write_spz()
+  /// says. Digits that no picture can show take a third of the bits of a position, and compress
+  /// like noise.
   double finest = 0;
   /// World axes to right, up and back; the usual ones are those that parse_spz() turns back. With
   /// y_up_from(up) a scene stands upright in viewers, and is read turned.

@@ -31,10 +31,10 @@ SpzCount stated_spz_splats(std::string_view start, const std::filesystem::path& 
 /// other axes (SPZ_ADOBE_coordinate_system) are turned from those; other extensions are left out.
 ///
 /// \throws BadInput Magic, Unsupported (another version or coordinate system), Empty (no splats),
-/// Count, Truncated,
-///         Schema (degree, fractional bits, streams of v4), Syntax (a damaged stream); LimitError
+///         Count, Truncated, Schema (degree, fractional bits, streams of v4), Syntax (a damaged
+///         stream); LimitError
 /// Source: nianticlabs/spz, its README, splat-types.h and loader; N. Zhang et al., "smallest three"
-/// of v3.
+///         of v3.
 RawSplats parse_spz(std::string_view bytes, const std::filesystem::path& path);
 
 }  // namespace cgs

@@ -17,11 +17,10 @@ namespace cgs {
 /// at exactly the places the grid's own table states. What decoding needs in memory is then bounded
 /// by the file: a node takes at most some 60 times its bytes.
 ///
-/// Read are files of version 224 (OpenVDB 4 and later) with 5-4-3 trees of numbers or 3-vectors,
+/// Files of version 224 (OpenVDB 4 and later) are read, with 5-4-3 trees of numbers or 3-vectors,
 /// uncompressed, zip or blosc-LZ4; other codecs of blosc are known to overrun.
 /// \return where the type names of tables for delayed loading stand: the library would believe
-/// their
-///         sizes, so the first letter of each must be overwritten to make it skip them
+///         their sizes, so the first letter of each must be overwritten to make it skip them
 /// \throws BadInput Magic, Unsupported, Truncated, Count, Syntax, Value (transform), Empty (no
 ///         grid); LimitError
 /// Source: openvdb/io/{Archive,GridDescriptor,Compression}.h, openvdb/tree/*.h; blosc 1 header.

@@ -19,7 +19,7 @@ namespace cgs {
 /// published convolutional networks, one for depth and one for opacity, shared by all views.
 enum class ResidualDecoder { Lattice, Conv };
 
-/// How Gaussians hang together.
+/// How the Gaussians of a view move together.
 struct CoherenceOptions {
   ResidualDecoder decoder = ResidualDecoder::Lattice;
   std::vector<int> depth_spacing = {128, 64, 32, 16};  ///< Knots of the depth lattice [pixels].
@@ -33,14 +33,14 @@ struct CoherenceOptions {
   float max_logit_change = 12.0f;  ///< Bound of the change of the opacity's logit; > 0.
   float radius_factor = 0.4f;      ///< As in InitialisationOptions.
   float min_radius = 0.15f;  ///< Of free shapes [pixels of the own view]; in (0, radius_factor].
-                             ///< Gaussians that shrink open gaps, which show from elsewhere and
-                             ///< not in the photographs.
+                             ///< Gaussians that shrink open gaps, which other views show and the
+                             ///< photographs do not.
   float max_radius = 3.0f;   ///< Of free shapes; >= radius_factor.
   float opacity = 0;         ///< As in InitialisationOptions.
-  int sh_degree = 1;         ///< Most that colours may have: 0, or 1 = where it pays, as
+  int sh_degree = 1;         ///< Highest degree of colours: 0, or 1 = where it pays, as
                              ///< add_view_dependence() judges.
-  int layers_per_ray = 2;    ///< Most that there may be: 1, or 2 = one more where photographs show
-                             ///< a pane, as find_pane() judges.
+  int layers_per_ray = 2;    ///< Most Gaussians on a ray: 1, or 2 = one more where find_pane()
+                             ///< finds a pane.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
@@ -53,8 +53,8 @@ struct ConvWidths {
 };
 ConvWidths conv_widths(const CoherenceOptions& options, size_t views);
 
-/// \throws InvalidInput if the networks of options cannot draw the input views: these must be of
-///         one size.
+/// \throws InvalidInput if the networks of the options cannot decode the input views, which must be
+///         of one size.
 void require_decodable(const Scene& scene, const CoherenceOptions& options);
 
 /// One Gaussian per input pixel, on the ray of its pixel, moved by few numbers.
@@ -65,11 +65,11 @@ void require_decodable(const Scene& scene, const CoherenceOptions& options);
 /// Until shapes are free, Gaussians are balls of radius_factor pixels. A free shape is an ellipse
 /// of three numbers in its own picture, laid on the starting surface: with the steps P = [p_x p_y]
 /// (3x2) from its point to the next pixels' points and a lower triangle L with e^a, e^b on its
-/// diagonal, the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, n across P. What a
-/// photograph cannot show, how far a Gaussian reaches along the ray, thus follows the surface
-/// instead of drifting. Colours are those of the pixels,
-/// seen from the own view; where surfaces demand it, they change with the direction. Free colours
-/// move where depth is measured: elsewhere, they would learn by heart what another view shows.
+/// diagonal, the covariance is P L L^T P^T + (min_radius pixels)^2 n n^T, with n normal to P. A
+/// photograph cannot show how far a Gaussian reaches along the ray; this way, that follows the
+/// surface instead of drifting. Seen from its own view, a Gaussian has the colour of its pixel;
+/// where surfaces demand it, the colour changes with the direction. Free colours move only where
+/// depth is measured: elsewhere, they would learn by heart what another view shows.
 ///
 /// A pane in front of the scene is a second layer: one more Gaussian per pixel of the view it is
 /// drawn from, after those of all views. They stay on its plane, and are wide enough that together
@@ -83,8 +83,7 @@ void require_decodable(const Scene& scene, const CoherenceOptions& options);
 class CoherentGaussians {
  public:
   /// \param priors  in the order of scene.input; pixels of NaN depth have no Gaussian
-  /// \param pane    if given, one in front of what the images of the scene show: these are
-  ///                then Pane::behind
+  /// \param pane    if given, a pane in front of the scene, whose images are then Pane::behind
   /// \throws InvalidInput if priors, images and cameras are not of one size, or as
   ///         require_decodable()
   CoherentGaussians(const Scene& scene,
@@ -92,14 +91,14 @@ class CoherentGaussians {
                     const CoherenceOptions& options,
                     const Pane* pane = nullptr);
 
-  /// What the optimiser may change: blocks of depth (one per view of lattices, one of a network),
-  /// blocks of opacity alike, one block of colour per view (a pane counts as one): change of red,
-  /// green and blue per Gaussian, empty until free_colors(), and one of shape: (a, b, corner of L)
-  /// per Gaussian, empty until free_shapes().
+  /// What the optimiser may change: blocks of depth (lattices have one per view, a network has one
+  /// in all), blocks of opacity alike, and per view (a pane counts as one) a block of colour, the
+  /// change of red, green and blue of each Gaussian, empty until free_colors(), and a block of
+  /// shape, (a, b, corner of L) of each Gaussian, empty until free_shapes().
   std::vector<ParameterBlock> parameters;
 
-  /// From now on every Gaussian has a shape of its own, at first L = radius_factor: it covers its
-  /// pixel's piece of the surface and is longer than the ball it was along the slope.
+  /// From now on every Gaussian has a shape of its own, at first L = radius_factor: it covers the
+  /// piece of surface that its pixel shows and is, on a slope, longer than the ball was.
   void free_shapes();
   bool shapes_are_free() const { return shapes_are_free_; }
 
@@ -112,7 +111,7 @@ class CoherentGaussians {
   const ViewDependence& view_dependence() const { return view_dependence_; }
   size_t view_count() const { return views_.size(); }  ///< A pane counts as one.
   const DepthMap& depth(size_t view) const { return views_[view].depth; }
-  /// Indices [first, last) in gaussians() of those of one view, in row-major order of its pixels.
+  /// Indices [first, last) of the Gaussians of one view, in row-major order of its pixels.
   struct Range {
     size_t first, last;
   };
@@ -127,14 +126,16 @@ class CoherentGaussians {
   void add_gradients(const GaussianGradients& gaussians, std::span<const Raster<float>> depth);
 
   /// Adds weight times the mean over Gaussians of the squared change of the logit of their opacity,
-  /// and its gradient. \return weight times the mean
+  /// and its gradient.
+  /// \return weight times the mean
   double add_opacity_prior(double weight);
 
   /// The same for the squared change of colour, summed over its channels.
   double add_color_prior(double weight);
 
   /// Adds the bending energies of the lattices of depth and opacity, times weights; networks have
-  /// none. \return the weighted sum
+  /// none.
+  /// \return the weighted sum
   double add_bending(double depth_weight, double opacity_weight);
 
  private:

@@ -77,7 +77,8 @@ class ConvDecoder {
   /// Weights from N(0, 0.02^2), biases 0: the same on every machine.
   std::vector<float> initial_parameters() const;
 
-  /// The values of all views. \param parameters  parameter_count() values
+  /// The values of all views.
+  /// \param parameters  parameter_count() values
   void evaluate(std::span<const float> parameters, std::vector<Raster<float>>& value_per_view);
 
   /// Adds dL/dparameters at the parameters of the last evaluate(), given dL/dvalue.

@@ -45,7 +45,7 @@ class Convolution {
 
   /// Floats that backward_parameters() writes, in an order of its own.
   size_t gradient_size() const;
-  /// What a band read, and the derivative of the loss by what it gave.
+  /// The input of a band, and the derivative of the loss with respect to its output.
   struct Band {
     const float* input;
     const float* output_gradient;

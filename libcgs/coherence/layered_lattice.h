@@ -41,8 +41,8 @@ class LayeredLattice {
   Range level(size_t index) const { return levels_[index].range; }
   size_t level_count() const { return levels_.size(); }
 
-  /// The function at every pixel, into `value`, which is given the size of the view if it has
-  /// another one. \param parameters  parameter_count() values
+  /// Writes the function at every pixel into `value`, which gets the size of the view.
+  /// \param parameters  parameter_count() values
   void evaluate(std::span<const float> parameters, Raster<float>& value) const;
 
   /// Adds the transpose of evaluate() applied to `gradient`: dL/dparameters from dL/df.
@@ -52,7 +52,8 @@ class LayeredLattice {
   /// that have parameters (along x, along y, and twice the mixed one). A level of spacing h counts
   /// 1 / (h^2 width height), so that it approximates the integral of squared second derivatives
   /// [1 / pixel^2] per pixel of the view.
-  /// Adds weight times its derivative to `sum`. \return weight times the energy
+  /// Adds weight times its derivative to `sum`.
+  /// \return weight times the energy
   double add_bending(std::span<const float> parameters, double weight, std::span<float> sum) const;
 
  private:

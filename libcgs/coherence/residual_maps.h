@@ -26,7 +26,7 @@ class ResidualMaps {
   /// One block per view of lattices, one of a network.
   std::vector<ParameterBlock> initial_blocks(ParameterRole role) const;
 
-  /// \param value  per view; given the size of the view if it has another one
+  /// \param value  per view; gets the size of the view
   void evaluate(std::span<const ParameterBlock> blocks, std::vector<Raster<float>>& value);
 
   /// Adds to the gradients of blocks, at the parameters of the last evaluate().

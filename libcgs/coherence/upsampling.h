@@ -16,7 +16,8 @@ struct UpsampledTap {
 /// How one axis grows from `from` to `to` samples and makes room for a convolution that takes one
 /// off either end. Doubled by linear interpolation that keeps the first and the last sample in
 /// place (or, if `to` is `from`, left as it is), then extended to `to` + 2 samples by reflection
-/// that does not repeat the edge: by 1 in front, by the rest behind. \return to + 2 taps
+/// that does not repeat the edge: by 1 in front, by the rest behind.
+/// \return to + 2 taps
 /// \pre from >= 2, and `to` is from, 2 from or 2 from + 1
 /// Source: Paliwal et al. 2024, "CoherentGS", published implementation.
 std::vector<UpsampledTap> upsampled_axis(int from, int to);
@@ -42,7 +43,8 @@ struct RowBlock {
   FloatBuffer data;
 };
 
-/// The transpose of upsample(): the derivative by those rows of `shape` that the range depends on.
+/// The transpose of upsample(): the derivative with respect to those rows of `shape` that the range
+/// depends on.
 ///
 /// \param gradient  as `out` of upsample()
 /// \param shape     only its sizes matter

@@ -14,8 +14,8 @@ enum class ScaleSource { Unknown, Assumed, CameraPoses, KnownDistance, ControlPo
 
 std::string scale_source_name(ScaleSource source);
 
-/// Relative standard deviation of scales that come of tracked poses, as phones and programs state
-/// them without one.
+/// Relative standard deviation of scales from tracked poses, for which phones and programs state
+/// none.
 inline constexpr double kTrackedScale = 0.05 / 3;
 
 /// The canonical frame all float data live in, and how to leave it.
@@ -58,7 +58,8 @@ Frame canonical_frame(const std::vector<Eigen::Vector3d>& points_in_world);
 /// from there would keep fewer than 16 bits of the content, then at the origin of the frame.
 Eigen::Vector3d file_origin_near(const Frame& frame, const Eigen::Vector3d& wanted);
 
-/// The same frame of a world whose unit is the metre. \pre frame.has_metric_scale()
+/// The same frame of a world whose unit is the metre.
+/// \pre frame.has_metric_scale()
 Frame in_metres(Frame frame);
 
 /// How many binary digits of the coordinates in a box tell its points apart: log2 of its largest

@@ -7,8 +7,8 @@
 
 namespace cgs {
 
-/// Of a loss with respect to the entries xx, yy, zz, yz, xz, xy of a covariance in world axes; the
-/// last three stand for both off-diagonal entries.
+/// Derivative of a loss with respect to the entries xx, yy, zz, yz, xz, xy of a covariance in world
+/// axes; the last three stand for both off-diagonal entries.
 using CovarianceGradient = Eigen::Matrix<float, 6, 1>;
 
 /// G with dL = trace(G dC) for the covariance C.

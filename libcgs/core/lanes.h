@@ -41,7 +41,7 @@ inline Floats multiply_add(Floats a, Floats b, Floats c) { return _mm256_fmadd_p
 
 inline Floats magnitude(Floats values) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), values); }
 
-/// By a comparison.
+/// In each lane `yes` where the comparison holds, else `no`.
 inline Floats select(Ints mask, Floats yes, Floats no) {
   return _mm256_blendv_ps(no, yes, std::bit_cast<__m256>(mask));
 }

@@ -21,7 +21,8 @@ struct MeasurableMesh {
   std::vector<Eigen::Vector3d> points;  ///< [internal units], with all digits of the file.
   Frame frame;
   Eigen::Vector3d file_origin = Eigen::Vector3d::Zero();  ///< World point of (0, 0, 0) of the file
-                                                          ///< read; what is written has frame's.
+                                                          ///< read; files written use that of
+                                                          ///< `frame`.
 
   Eigen::Vector3d internal_from_file(const Eigen::Vector3d& p) const {
     return (p - (frame.origin - file_origin)) / frame.scale;
@@ -30,7 +31,7 @@ struct MeasurableMesh {
     return (frame.origin - file_origin) + frame.scale * p;
   }
   bool states_provenance() const { return !mesh.provenance.empty(); }
-  /// Of any of its vertices: files of meshes without sigma may have the place for it.
+  /// Whether any vertex has a sigma: files without one may still have the attribute.
   bool states_sigma() const {
     return std::any_of(
         mesh.sigma.begin(), mesh.sigma.end(), [](float s) { return std::isfinite(s); });

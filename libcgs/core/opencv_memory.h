@@ -7,7 +7,7 @@
 
 namespace cgs {
 
-/// Lets an error of OpenCV that means a lack of memory be one: input is not to blame for it.
+/// Turns an error of OpenCV that means a lack of memory into one: the input is not to blame for it.
 /// \throws std::bad_alloc
 inline void throw_if_out_of_memory(const cv::Exception& error) {
   if (error.code == cv::Error::StsNoMem) throw std::bad_alloc();

@@ -23,21 +23,21 @@ inline Progress part_of(const Progress& progress, double begin, double end) {
   return [=](double fraction) { progress(begin + (end - begin) * fraction); };
 }
 
-/// Tells of items that several threads work on at once, so that even one long loop over the rows of
-/// an image can be cancelled.
+/// Reports the progress of items that several threads work on at once, so that even one long loop
+/// over the rows of an image can be cancelled.
 class SharedProgress {
  public:
   /// \param progress  not owned; must outlive this
   /// \param items     > 0
   SharedProgress(const Progress& progress, size_t items) : progress_(progress), items_(items) {}
 
-  /// Called for every finished item, from any thread; what is told never falls. A thread that finds
-  /// another one telling goes on with its work.
+  /// Called for every finished item, from any thread; what is reported never falls. A thread that
+  /// finds another one reporting goes on with its work.
   void advance() {
     ++done_;
     tell();
   }
-  /// Amid a long item: tells again what is done, from any thread.
+  /// Reports again amid a long item, from any thread.
   void tell() {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (lock) report(progress_, double(done_) / double(items_));

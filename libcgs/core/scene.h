@@ -15,8 +15,8 @@
 
 namespace cgs {
 
-/// What the values of a given depth mean; where that is not known, how they fit the depth that the
-/// photographs show tells.
+/// What the values of given depth mean; where that is not known, it is judged by how they fit the
+/// depth measured from the photographs.
 enum class DepthKind : uint8_t {
   Unknown,    ///< One of the following.
   Metric,     ///< z-depth, by a sensor.
@@ -75,8 +75,8 @@ struct Scene {
   double depth_scale = 0;  ///< Values of depth files per metre; 0 = 1000 where they are whole
                            ///< numbers, else 1.
   DepthKind depth_kind = DepthKind::Unknown;  ///< Of View::given_depth.
-  /// World units per unit in which the cameras were stated, where they were moved since; depth in
-  /// units of the scene is in those.
+  /// World units per unit in which the cameras were stated; 1 unless they were moved since. Depth
+  /// in units of the scene is in the stated unit.
   double world_per_stated_unit = 1;
   std::vector<std::string> missing;   ///< Image files that cameras name but the disk lacks.
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
@@ -85,7 +85,7 @@ struct Scene {
 };
 
 /// Where the input cameras stand and what they look at, on their axes [scene units].
-/// \throws as depth_range()
+/// \throws Error as depth_range()
 std::vector<Eigen::Vector3d> subject_points(const Scene& scene);
 
 /// Moves cameras, depth ranges and sparse points of a scene into its canonical frame.
@@ -98,13 +98,15 @@ void to_canonical(Scene& scene);
 /// Median length of the baselines between input views [scene units]; 0 for fewer than two.
 double median_baseline(const Scene& scene);
 
-/// A depth range that holds everything the input views may show: near and far of the view if it
-/// has them, else from sparse points, else from where the optical axes converge.
-/// \throws BadInput(Value) if the cameras share one centre (no depth can be measured).
+/// What depth_range() returns: z-depths [scene units].
 struct DepthRange {
   double near = 0;
   double far = 0;
 };
+
+/// A depth range that holds everything the input views may show: near and far of the view if it
+/// has them, else from sparse points, else from where the optical axes converge.
+/// \throws BadInput(Value) if the cameras share one centre (no depth can be measured).
 DepthRange depth_range(const Scene& scene, int view);
 
 }  // namespace cgs

@@ -8,7 +8,7 @@ namespace cgs {
 /// Step between the states of a SplitMix64 generator.
 inline constexpr uint64_t kSplitMixStep = 0x9E3779B97F4A7C15u;
 
-/// A state of SplitMix64 as the number it stands for: every bit depends on all of them.
+/// The output of SplitMix64 for a state: every bit depends on all bits of it.
 /// Source: Steele et al. 2014, "Fast splittable pseudorandom number generators".
 inline uint64_t split_mix(uint64_t x) {
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;

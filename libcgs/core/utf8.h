@@ -7,7 +7,8 @@
 namespace cgs {
 
 /// Bytes of the UTF-8 sequence at the start of a text that can be shown: no control character; 0 if
-/// there is none. Source: RFC 3629 section 4.
+/// there is none.
+/// Source: RFC 3629 section 4.
 size_t shown_sequence(std::string_view text);
 
 }  // namespace cgs

@@ -35,8 +35,8 @@ struct BundleOptions {
   Progress progress = {};  ///< Told of every iteration; the scene stays as it is if it throws.
 };
 
-/// Moves placed photographs, known points and, as asked, lenses to where the points appear where
-/// they were seen.
+/// Adjusts placed photographs, known points and, if asked, lenses so that the points project to
+/// where they were seen.
 ///
 /// \param priors  per lens
 /// \return  standard deviation of log(focal) per lens where with_sigma and the lens is solved for,

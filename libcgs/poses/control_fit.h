@@ -29,7 +29,7 @@ struct Similarity {
   }
 };
 
-/// How well a pair is met.
+/// How well the fit meets a pair.
 struct ControlResidual {
   Eigen::Vector3d off = Eigen::Vector3d::Zero();  ///< Measured minus known, control frame.
   /// Root mean square of the three coordinates of `off` in standard deviations: of both

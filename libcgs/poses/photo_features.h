@@ -17,8 +17,8 @@ struct PhotoFeatures {
   Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> descriptors;
   std::vector<int> point_of;  ///< Of each row; empty = row i is of point i.
   double pixel = 1;  ///< Side of a pixel of the picture searched, in pixels of the photograph.
-  /// The picture searched, grey, levels 0 ... 255: places are measured more finely in it. Empty =
-  /// the points are not where they were found; they count as they are.
+  /// The picture searched, grey, levels 0 ... 255, in which refine_sightings() measures places more
+  /// finely. Empty = the points no longer lie where they were found, and are used as they are.
   Raster<uint8_t> picture;
 };
 
@@ -41,9 +41,9 @@ PhotoFeatures detect_features(const ColorImage& image,
                               const MaskMap& usable = {},
                               const FeatureOptions& options = {});
 
-/// Finds SIFT features also as they would look from aside, the picture compressed by the square
-/// root of two in four directions, and says of each place what it looks like from wherever it was
-/// found: photographs from far apart share more of them. Takes five times as long, holds up to
+/// Finds SIFT features also as they would look from the side, in the picture compressed by the
+/// square root of two along four directions; a point has a descriptor for each picture in which it
+/// was found. Photographs from far apart share more of them. Takes five times as long, holds up to
 /// twice `most` descriptors.
 ///
 /// Source: Morel and Yu 2009, "ASIFT: A New Framework for Fully Affine Invariant Image Comparison".
@@ -58,8 +58,8 @@ struct FeatureMatch {
   int b = 0;
 };
 
-/// Points that are each other's nearest, and nearer than 0.8 times the second nearest, seen from
-/// both sides; each once, in the order of a.
+/// Features that are each other's nearest, and nearer than 0.8 times the second nearest, in both
+/// directions; each once, in the order of a.
 std::vector<FeatureMatch> match_features(const PhotoFeatures& a,
                                          const PhotoFeatures& b,
                                          const Progress& progress = {});

@@ -16,7 +16,7 @@ struct PhotoPair {
   int b = 0;
   std::vector<FeatureMatch> matches;
   MatchedPoints points;       ///< Of the matches.
-  bool is_connected = false;  ///< More of them than chance brings.
+  bool is_connected = false;  ///< More matches than chance brings.
 };
 
 /// Fewest matches that say that two photographs show the same.
@@ -29,8 +29,8 @@ PhotoPair match_pair(const UnposedPhoto& a, const UnposedPhoto& b, const Progres
 std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,
                                     const Progress& progress);
 
-/// Chains the matches of connected pairs into points of the scene. Chains that lead to two places
-/// of one photograph are left out.
+/// Chains the matches of connected pairs into tracks. Those with two places in one photograph are
+/// left out.
 std::vector<Track> chain_matches(const std::vector<UnposedPhoto>& photos,
                                  const std::vector<PhotoPair>& pairs);
 

@@ -9,13 +9,12 @@
 
 namespace cgs {
 
-/// Errors of focal lengths on nine sets of photographs, RMS, beside what adjustment claims.
+/// RMS error of focal lengths on nine sets of photographs, in sigmas that the adjustment claims.
 inline constexpr double kFocalOptimism = 3;
 
-/// What photographs cannot tell is refused, with the reason a user can act on.
+/// Refuses photographs that do not determine cameras, with a reason that a user can act on.
 /// \throws NumericalError if fewer than two photographs show enough, naming one that does not, or
-/// no two
-///         share enough, naming the pair that shares most.
+///         no two share enough, naming the pair that shares most.
 void refuse_unconnected(const std::vector<UnposedPhoto>& photos,
                         const std::vector<PhotoPair>& pairs);
 

@@ -22,8 +22,8 @@ struct PosedPhoto {
 /// The focal length of its working pixels.
 double working_focal(const PosedPhoto& photo);
 
-/// The same photograph as one that has this focal length and its principal point in the centre:
-/// what is compared with others as photographs without cameras are.
+/// The same photograph with this focal length and the principal point in the centre, to be matched
+/// as photographs without cameras are.
 UnposedPhoto as_unposed(const PosedPhoto& photo);
 
 /// How well the cameras of two photographs agree with what both show.
@@ -36,8 +36,8 @@ struct EpipolarFit {
   double error = 0;
 };
 
-/// Matches photographs and holds the matches that any two cameras could explain against the cameras
-/// given. The same for any number of threads.
+/// Matches photographs and compares the matches that any two cameras could explain with the given
+/// cameras. The same for any number of threads.
 /// \return pairs a < b that share enough
 std::vector<EpipolarFit> epipolar_fits(const std::vector<PosedPhoto>& photos,
                                        const Progress& progress = {});

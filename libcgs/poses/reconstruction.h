@@ -80,9 +80,9 @@ double reprojection_error(const Reconstruction& scene,
                           const Eigen::Vector3d& position,
                           const Sighting& sighting);
 
-/// Gives every track a position that has none and can have one: seen by two placed photographs
-/// under an angle of at least `least_angle` [rad], and within `most_error` of where it is seen
-/// there. Sightings further off are no longer used.
+/// Gives a position to every track that has none and can have one: two placed photographs see it
+/// under an angle of at least `least_angle` [rad], and it projects to within `most_error` of where
+/// they see it. Sightings further off are no longer used.
 void triangulate(Reconstruction& scene, double most_error, double least_angle);
 
 /// Stops using sightings further than `most_error` from their point, and forgets the positions of

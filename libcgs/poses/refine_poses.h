@@ -10,23 +10,23 @@
 
 namespace cgs {
 
-/// A camera after refinement. Errors are median distances between where points appear and where
-/// they were seen, of the points that count in the end [pixels of the photograph].
+/// A camera after refinement. Errors are median reprojection errors of the points that are used in
+/// the end [pixels of the photograph].
 struct RefinedPose {
   Eigen::Isometry3d world_from_cam = Eigen::Isometry3d::Identity();
   bool is_refined = false;  ///< Else the pose is, bit for bit, the one given.
   int matches = 0;          ///< With photographs that show the same.
-  int points = 0;           ///< That come of them; 0 = too few to say anything.
+  int points = 0;           ///< Triangulated from them; 0 = too few to say anything.
   double error_before = 0;  ///< Meaningless without points.
   double error_after = 0;   ///< Meaningless without points.
 };
 
-/// Points of the scene as refined cameras see them: further cameras can be held against them.
+/// Points of the scene as refined cameras see them, to refine further cameras by.
 struct KnownPoints {
   std::vector<UnposedPhoto> photos;  ///< As as_unposed() gives them.
   Reconstruction scene;              ///< In the frame; one lens per photograph.
   Frame frame;
-  bool is_moved = false;  ///< They are no longer where the cameras given have them.
+  bool is_moved = false;  ///< They differ from those that the given cameras see.
 };
 
 struct PoseRefinement {

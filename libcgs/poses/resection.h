@@ -38,8 +38,8 @@ void place_more(Reconstruction& scene,
                 const FirstPair& begun,
                 const Progress& progress = {});
 
-/// Sum of squared errors of all sightings, none counting more than kMostError² (which those without
-/// a point or pose count), per sighting: for comparing solutions of the same tracks.
+/// Mean squared error of all sightings, each at most kMostError² (those without a point or pose
+/// count as much): for comparing solutions of the same tracks.
 double capped_error(const Reconstruction& scene);
 
 /// Number of known points that a photograph uses.

@@ -27,7 +27,7 @@ struct SolvedPhoto {
 struct SolvedSighting {
   int photo = 0;
   int feature = 0;
-  /// Where it was seen, more finely than the feature says where the photographs agree [pixels].
+  /// Where it was seen, refined where the photographs agree [pixels].
   Eigen::Vector2d at = Eigen::Vector2d::Zero();
 };
 
@@ -48,12 +48,12 @@ struct PoseSolution {
 
 /// Cameras of photographs from nothing but what they show: matched features, relative pose of a
 /// pair that shows much depth, resection of the others, bundle adjustment. Where a focal length is
-/// unknown, the one from which the matches are explained best. A focal length that is known but for
-/// its sigma and turns out to lie three of them away, or with which no cameras are found, is taken
-/// as unknown, if one is found then.
+/// unknown, the one that explains the matches best is found. One that is known with a sigma is
+/// taken as unknown where it turns out to be three sigma off, or where no cameras are found with it
+/// but some without.
 ///
-/// focal_sigma is wider than adjustment has it, which knows nothing of what lenses do that no model
-/// states: by what errors were on photographs with known focal lengths (tests/eval/pose_accuracy).
+/// focal_sigma is wider than that of the adjustment, which knows nothing of errors of the lens
+/// model: by the errors on photographs with known focal lengths (tests/eval/pose_accuracy).
 ///
 /// The result does not depend on the number of threads, and on the order of the photographs only
 /// by rounding and by the choice of world axes.

@@ -22,9 +22,10 @@ std::vector<char> epipolar_inliers(const MatchedPoints& matches, double threshol
 /// Which matches a homography explains; likewise.
 std::vector<char> homography_inliers(const MatchedPoints& matches, double threshold);
 
-/// Poses of b (of a: identity; |translation| = 1) that matches, mostly right, may mean: the one
-/// that explains them best, and where they lie near a plane, those that the plane allows. There,
-/// noise decides which of two explains them better; only a full adjustment tells them apart.
+/// Possible poses of b (that of a is the identity; |translation| = 1) for matches that are mostly
+/// right: the one that explains them best, and where they lie near a plane, those that the plane
+/// allows. There, noise decides which of two explains them better; only a full adjustment tells
+/// them apart.
 /// \return nothing where no essential matrix puts at least half of the points before both cameras
 /// Source: Nistér 2004, "An efficient solution to the five-point relative pose problem"; Malis and
 /// Vargas 2007, "Deeper understanding of the homography decomposition for vision-based control".

@@ -26,9 +26,10 @@ class DepthNetwork {
   /// Values at the size of the photograph, moved so that the smallest is a hundredth of their
   /// range; NaN where the photograph is masked. The photograph is resized to the input of the
   /// network, or to 256 x 256 where that takes any size, and the output back. Runs in one thread:
-  /// the same bits every time. \pre the image of the view is loaded \throws BadInput Unsupported
-  /// (OpenCV fails on the way), Schema (not one value per pixel), Value
-  ///         (values that are not finite)
+  /// the same bits every time.
+  /// \pre the image of the view is loaded
+  /// \throws BadInput Unsupported (OpenCV fails on the way), Schema (not one value per pixel),
+  ///         Value (values that are not finite)
   DepthMap operator()(const View& view);
 
  private:

@@ -33,10 +33,10 @@ struct PriorsCoverage {
   double guessed = 0;
   double sky = 0;
   double left_open = 0;  ///< Not measured, and not filled in either.
-  double estimated = 0;  ///< Of those completed and guessed: what is no evidence.
+  double estimated = 0;  ///< The part of completed and guessed that is no evidence.
 };
 
-/// Share of a view below which false matches may be all that was measured.
+/// Below this share of a view, all that was measured may be false matches.
 inline constexpr double kLeastMeasured = 0.01;
 
 /// Whether anything of a view was measured; if not, its depth stays unknown.
@@ -65,8 +65,9 @@ struct EstimatedPriors {
 /// Everything known about the input views before training: sweep, align, enter the depth of
 /// sensors, find the sky, complete, put guesses of given depth where they are better, tell what of
 /// all that is estimated, layers. The depth of views of which nothing was measured stays unknown.
-/// Preconditions and errors as plane_sweep(); \throws InvalidInput if masks leave nothing of all
-/// views; NumericalError if nothing of any was measured
+/// Preconditions and errors as plane_sweep().
+/// \throws InvalidInput if masks leave nothing of all views; NumericalError if nothing of any was
+///         measured
 EstimatedPriors estimate_priors(const Scene& scene,
                                 const PriorsOptions& options,
                                 const Progress& progress = {});

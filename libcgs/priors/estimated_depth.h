@@ -7,7 +7,8 @@
 namespace cgs {
 
 /// How far from a measured pixel filled-in depth still counts as evidence. Found by hiding measured
-/// pixels: tests/eval/completion_accuracy prints how far off they are by their way.
+/// pixels: tests/eval/completion_accuracy prints how far off they are by their distance from
+/// measured ones.
 struct AdjoiningOptions {
   float way = 4;              ///< To the nearest measured pixel [pixels], colours considered; >= 0.
   float level_scale = 0.04f;  ///< Colour change that costs as much as one pixel of way; > 0.
@@ -21,14 +22,13 @@ struct AdjoiningOptions {
 /// path of `way` leads to one over pixels of depth, with steps of depth below `largest_step`.
 void mark_estimated(ViewPriors& priors, const View& view, const AdjoiningOptions& options = {});
 
-/// Takes back what was completed beyond as many pixels as were measured or guessed, the farthest
-/// from these first: a view of which little was measured says little of the scene.
+/// Removes completed depth until no more pixels are completed than were measured or guessed, those
+/// farthest from these first: a view of which little was measured says little of the scene.
 void limit_completion(ViewPriors& priors);
 
-/// Estimated pixels that stand for little and are framed by evidence, 1 where they are: patches of
-/// one surface with at most a quarter as many pixels as have evidence, half or more of whose rim
-/// goes on in such pixels, and at most a quarter of whose rim is at the border of the picture, at
-/// sky or at what nothing is known of.
+/// 1 at estimated pixels of small patches framed by evidence: patches of one surface with at most a
+/// quarter as many pixels as have evidence, where half or more of the rim goes on in pixels with
+/// evidence, and at most a quarter is at the border of the picture, at sky or at unknown depth.
 MaskMap framed_estimates(const ViewPriors& priors);
 
 }  // namespace cgs

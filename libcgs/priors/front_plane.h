@@ -13,7 +13,7 @@
 
 namespace cgs {
 
-/// A plane in front of the surface, on which views agree once that is taken away.
+/// A plane in front of the surface, on which views agree once the surface is removed from them.
 struct FrontPlane {
   Eigen::Hyperplane<double, 3> plane;  ///< [internal units]
   /// Pixels of each view that lie on it, row-major indices: one for each of a smaller image.
@@ -29,8 +29,8 @@ double depth_on(const Eigen::Hyperplane<double, 3>& plane,
 /// Where the pixels of one camera lie in another one, on a plane; NaN where it does not see that.
 PlaceMap places_on(const Eigen::Hyperplane<double, 3>& plane, const Camera& from, const Camera& to);
 
-/// Matches what is left of each photograph without the surface, and looks for the plane that most
-/// of what lies in front of that is on; none if those are fewer than one in 200 of the pixels.
+/// Matches what is left of each photograph without the surface, and finds the plane on which most
+/// matches in front of the surface lie; none if they are fewer than one in 200 of the pixels.
 ///
 /// \param left  of each input view, what it shows less what the others show of the same surface;
 ///              NaN = unknown

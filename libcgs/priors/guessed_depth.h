@@ -37,7 +37,8 @@ void remove_contradictions(const std::vector<Camera>& cameras,
                            std::vector<DepthGuess>& guesses);
 
 /// Puts guesses in place of completed depth whose relative sigma is larger; they get origin
-/// Guessed. \return number of pixels
+/// Guessed.
+/// \return number of pixels
 size_t enter_guess(const DepthGuess& guess, ViewPriors& priors);
 
 }  // namespace cgs

@@ -13,8 +13,8 @@ using PlaceMap = Raster<Eigen::Vector2f>;  ///< In another image [pixels, centre
 inline bool is_known(const Eigen::Vector2f& place) { return !std::isnan(place.x()); }
 inline bool is_known(const Eigen::Vector3f& color) { return !std::isnan(color.x()); }
 
-/// Where a camera sees a world point; NaN where it does not. As a float it still lies within the
-/// picture, which a place next to its far border may not by rounding.
+/// Where a camera sees a world point; NaN where it does not. Rounding to float does not move it out
+/// of the picture.
 Eigen::Vector2f place_of(const Camera& camera, const Eigen::Vector3d& point);
 
 /// The input views, and where each sees the surface that another one sees.
@@ -27,7 +27,7 @@ struct JointSurface {
 };
 
 /// A pixel is seen in another view where that has the same depth within 2 %, measured or filled in:
-/// what a pane disturbs of depth must not hide it.
+/// depth that a pane disturbs must not hide it.
 ///
 /// \param priors  of scene.input, in its order
 /// \pre images of scene.input are loaded; the scene outlives the result

@@ -25,10 +25,10 @@ struct Pane {
 ///
 /// Where views agree on the depth of a surface and not on its colour, what is left of each
 /// photograph without what the others show is matched again. What then lies in front, on one plane,
-/// is where a pane may be; it reaches as far as all views differ so. Its opacity is what
-/// surfaces lose of their contrast through it, 0.3 where nothing of it is seen from beside; its
-/// colours are pane_colors(). It is there if it foretells at least 1 dB better than the surface
-/// alone (foretelling_gain()).
+/// is where a pane may be; it reaches as far as all views differ so. Its opacity is what surfaces
+/// lose of their contrast through it, 0.3 where nothing of it is seen from beside; its colours are
+/// pane_colors(). It is there if hidden pixels are predicted at least 1 dB better with it
+/// (foretelling_gain()).
 ///
 /// \param priors  of scene.input, in its order
 /// \pre images of scene.input are loaded and matched in exposure; the scene is in its canonical

@@ -22,8 +22,8 @@ float contrast_lost(const JointSurface& surface, const PanePlaces& places);
 
 /// Colours T of a pane from which, with those W behind it, photographs follow best,
 ///   I_v = (1 - opacity) W_v + opacity T,
-/// where W_v is the same for all views that see a point of the surface. Only what is of at least
-/// two views tells T and W apart; an even part may be in either.
+/// where W_v is the same for all views that see a point of the surface. Only what at least two
+/// views see tells T and W apart; a uniform part may be in either.
 ///
 /// \param photographs  one per view; NaN = unknown
 /// \return of the size of places.extent; within [0, 1]
@@ -38,9 +38,9 @@ std::vector<ColorImage> without_pane(const PanePlaces& places,
                                      const ColorImage& colors,
                                      const std::vector<ColorImage>& photographs);
 
-/// By how much [dB] a pane foretells better than the surface alone what was hidden from pieces of
-/// 16 x 16 pixels, a quarter of all that look through it. What foretells must not know: its numbers
-/// are paid for. 0 where nothing can be foretold.
+/// How much better [dB] the surface with a pane predicts hidden pixels than the surface alone.
+/// Hidden is a quarter of the pieces of 16 x 16 pixels that look through it: a prediction of what
+/// it was not fitted to pays for the numbers of the pane. 0 where nothing can be predicted.
 double foretelling_gain(const JointSurface& surface, const PanePlaces& places, float opacity);
 
 }  // namespace cgs

@@ -9,7 +9,7 @@
 
 namespace cgs {
 
-/// What one view's pixel and a point of another view's depth map show in common.
+/// A pixel of one view, and where another view shows the same point of the surface.
 struct PixelMatch {
   int32_t pixel = 0;  ///< Index of the pixel in the first view, row-major.
   float u = 0;        ///< Place in the second view [pixels, centres at +0.5].

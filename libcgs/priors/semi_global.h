@@ -15,7 +15,8 @@ struct SmoothnessPenalties {
 };
 
 /// Plane of least cost per pixel after regularisation along eight paths, refined between planes by
-/// a parabola. Source: Hirschmüller 2008, "Stereo processing by semiglobal matching".
+/// a parabola.
+/// Source: Hirschmüller 2008, "Stereo processing by semiglobal matching".
 ///
 /// \param guide gray levels of the view the volume belongs to
 Raster<float> semi_global_planes(const CostVolume& volume,

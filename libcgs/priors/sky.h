@@ -15,8 +15,8 @@ namespace cgs {
 /// most of the rest. From there it is followed as far as it stays so; what it encloses is sky, too,
 /// if it is white (clouds), and so is what shows the same colours a small way behind its rim
 /// (between bars and branches). Its rim reaches up to where the colours change: what was measured
-/// there is the silhouette before it, which matching makes too wide. A surface of like looks that
-/// was measured nearby, all over, such as a white wall, is none.
+/// there is the silhouette before it, which matching makes too wide. A surface that looks alike but
+/// was measured nearby, all over, such as a white wall, is no sky.
 ///
 /// \param up  world direction that is up; zero = the top of the picture
 /// \param priors  of plane_sweep(), or empty rasters where nothing was measured

@@ -61,8 +61,9 @@ struct SweepSampling {
 /// \throws BadInput(Value) if the cameras share one centre.
 SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling& sampling);
 
-/// With the sources alone that tell planes apart. What was taken from almost the same place as the
-/// reference, as of a burst, agrees with it on every plane and would outvote what does not.
+/// The same without sources that cannot tell planes apart. A photograph taken from almost the same
+/// place as the reference, as in a burst, agrees with it on every plane and would outvote the
+/// others.
 SweepGeometry with_parallax(SweepGeometry geometry);
 
 }  // namespace cgs

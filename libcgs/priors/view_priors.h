@@ -22,7 +22,8 @@ enum class DepthOrigin : uint8_t {
                   ///< surface (mark_estimated()): nothing tells whether it is right.
 };
 
-/// What vouches for a pixel. \pre it has a depth
+/// What vouches for a pixel.
+/// \pre it has a depth
 inline DepthEvidence depth_evidence(DepthOrigin origin) {
   switch (origin) {
     case DepthOrigin::Completed:

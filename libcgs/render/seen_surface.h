@@ -27,8 +27,8 @@ struct SeenSurface {
 /// seen at a grazing angle. Elsewhere cells end half a pixel from their centre and the surface is
 /// torn: what lies behind the tear was hidden.
 ///
-/// A cell that the other camera sees from behind is none: the view saw its front. It hides what
-/// lies behind it.
+/// A cell that the other camera sees from behind is not seen: the view saw its front. It still
+/// hides what lies behind it.
 SeenSurface seen_surface(const DepthCells& cells, const Camera& camera);
 
 }  // namespace cgs

@@ -60,7 +60,8 @@ class TrainingRasterizer {
   TrainingRasterizer(TrainingRasterizer&&) noexcept;
   TrainingRasterizer& operator=(TrainingRasterizer&&) noexcept;
 
-  /// From the next forward() on. The memory stays. \throws InvalidInput as validate()
+  /// From the next forward() on. The memory stays.
+  /// \throws InvalidInput as validate()
   void set_options(const TrainingRasterizerOptions& options);
 
   /// Draws. Both arguments must stay unchanged until backward() is done with them.

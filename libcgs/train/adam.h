@@ -16,7 +16,8 @@ struct AdamState {
 };
 
 /// What a running mean of `steps` values that began at 0 is multiplied by: 1 / (1 - decay^steps),
-/// in double and without taking nearly equal numbers from each other. \param decay  in (0, 1)
+/// in double and without taking nearly equal numbers from each other.
+/// \param decay  of the mean, in (0, 1)
 /// \param steps  > 0
 double bias_correction(double decay, int64_t steps);
 

@@ -59,7 +59,8 @@ double total_variation(const TrainingBuffers& rendered,
 /// interpolated bilinearly in inverse depth. Correspondences whose pixel, or one of the four
 /// pixels around whose place, is unknown or outside add nothing.
 ///
-/// \param gradient_first   adds dL/d(depth of first), gradient_second dL/d(depth of second)
+/// \param gradient_first   dL/d(depth of first) is added to it
+/// \param gradient_second  dL/d(depth of second) is added to it
 /// Source: Paliwal et al. 2024, "CoherentGS", flow loss; sampling here is at pixel centres.
 double flow_consistency(const Camera& first,
                         const DepthMap& depth_first,

@@ -38,13 +38,14 @@ struct TrainingOptions {
   double ssim_weight = 0.2;
   double tv_weight = 0;         ///< Total variation of the rendered disparity.
   double masked_tv_weight = 0;  ///< The same within layers.
-  double tv_to_layers = 0;      ///< Share of tv_weight that goes over to the layers until the end.
+  double tv_to_layers = 0;      ///< Share of tv_weight that moves to the layers until the end.
   /// Distance of corresponding points [scene extents]. They correspond by the measured depth of the
   /// views, not by an optical flow: the term holds together what the plane sweep found, and tells
   /// nothing new.
   double flow_weight = 0;
-  double prior_weight = 0.002;  ///< Departure of measured depths from their prior, in sigmas. Less
-                                ///< lets rounding decide where photographs hardly tell depth.
+  double prior_weight = 0.002;  ///< Departure of measured depths from their prior, in sigmas. With
+                                ///< less, rounding decides where photographs hardly determine
+                                ///< depth.
   double depth_bending = 0;     ///< Of the depth lattice; 0 with decoder=conv, which has no knots.
   double opacity_bending = 0;
   double opacity_prior = 0.001;  ///< Squared change of the logit, mean over Gaussians.
@@ -58,7 +59,7 @@ struct TrainingOptions {
   void validate() const;
 };
 
-/// The settings of a name. \throws InvalidInput if it is none of:
+/// The settings of a name:
 /// - "draft", "standard" and "fine": lattices, a third, all and twice the steps;
 /// - "reference": the schedule that CoherentGS was published with, as far as it has a meaning here.
 ///   Networks; balls for 8/13 of the time, drawn at twice the size from 5/13 on; its losses but the
@@ -70,6 +71,8 @@ struct TrainingOptions {
 ///   theirs are from an optical flow, as a mean over the pixels of all pairs of views; a background
 ///   of another colour in each step; drawing at twice the size along each axis; a change of depth
 ///   that is bounded by max_depth_change; steps and rates for three views, however many there are.
+///
+/// \throws InvalidInput for another name
 TrainingOptions training_preset(std::string_view name);
 
 /// Sets one field by its name, e.g. ("steps", "500") or ("depth_spacing", "64,16"); the names are

@@ -9,9 +9,9 @@ namespace cgs {
 
 /// What of a mesh or point cloud lies where (p - point) . normal >= 0.
 ///
-/// Faces across the plane are cut, neighbours at the same places, so that a mesh without cracks
-/// keeps none; the cut is left open. Parts keep the label of their face, new vertices lie between
-/// the ends of the edge they cut; see append_blend().
+/// Faces across the plane are cut, neighbours at the same points, so that no cracks open; the cut
+/// is left open. Parts keep the label of their face, new vertices lie between the ends of the edge
+/// they cut; see append_blend().
 /// \param point, normal  [internal units]; normal of any length > 0
 TriangleMesh cropped_by_plane(const TriangleMesh& mesh,
                               const Eigen::Vector3d& point,

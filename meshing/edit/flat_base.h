@@ -8,8 +8,8 @@
 
 namespace cgs {
 
-/// The mean direction that faces look to which somebody saw (observed or single view); 0 where no
-/// face is labelled so, or where they look everywhere alike. Not of unit length.
+/// The mean direction that seen faces (observed or single view) look to; 0 where there are none, or
+/// where they look to all sides alike. Not of unit length.
 Eigen::Vector3d seen_side(const TriangleMesh& mesh);
 
 /// A solid cut flat behind what was seen of it, such as a relief that is to stand on a plate.

@@ -22,10 +22,11 @@ struct FilledMesh {
 /// What closes a hole is invented: its faces are Inferred, its vertices have support 0 and no
 /// sigma, and take colour from the rim, the nearer the more. Faces and vertices that were there
 /// come first and stay as they are; normals of new vertices come from the faces. A mesh that does
-/// not state provenance states none afterwards either. \param widest  largest diagonal of the box
-/// around a hole's rim [internal units] Source: Liepa 2003, "Filling holes in meshes", as in CGAL.
-/// \throws NumericalError if the mesh is not manifold
+/// not state provenance states none afterwards either.
+/// \param widest       largest diagonal of the box around a hole's rim [internal units]
 /// \param longest_rim  in edges; the time of a hole may grow with the cube of them
+/// \throws NumericalError if the mesh is not manifold
+/// Source: Liepa 2003, "Filling holes in meshes", as in CGAL.
 FilledMesh holes_filled(const TriangleMesh& mesh,
                         double widest,
                         const Progress& progress = {},

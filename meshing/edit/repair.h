@@ -24,8 +24,8 @@ struct RepairedMesh {
 /// Makes a mesh out of any set of triangles.
 ///
 /// Merged vertices take the largest sigma (NaN if one has none) and the smallest support of those
-/// they were, the rest of the first. Of duplicate faces the one that vouches for most is kept.
-/// Faces of a part turn with the majority of its area; if the whole is closed and free of
+/// they were, the rest of the first. Of duplicate faces the one with the strongest evidence is
+/// kept. Faces of a part turn with the majority of its area or, if the whole is closed and free of
 /// self-intersection, so that it bounds a volume. Where a face without area is flipped away beside
 /// an Inferred one, both become Inferred.
 /// Source: CGAL, Polygon Mesh Processing.

@@ -8,7 +8,7 @@
 
 namespace cgs {
 
-/// Whether a place of A differs from B by more than both state they are wrong.
+/// Whether a place of A differs from B by more than the sigmas that both state explain.
 enum class Change : uint8_t {
   Unknown = 0,  ///< One side was not observed or states no sigma there, or B ends before it gets
                 ///< there: nothing can be said.
@@ -41,7 +41,8 @@ ComparedPoints points_by_area(const MeasurableMesh& mesh, size_t count);
 ComparedPoints points_by_vertex(const MeasurableMesh& mesh);
 
 /// Adds to sigma how far an error of the scale moves places away from `center`, where it moves
-/// none. \param relative  standard deviation of the scale as a share of it
+/// none.
+/// \param relative  standard deviation of the scale as a share of it
 void add_scale_sigma(ComparedPoints& points, double relative, const Eigen::Vector3d& center);
 
 /// Signed distances of points to a surface, and whether they are more than uncertainty.

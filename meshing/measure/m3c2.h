@@ -16,7 +16,7 @@ struct M3c2Options {
   double cylinder = 0;  ///< Diameter of the cylinder along the normal whose points of A and of B
                         ///< are averaged; > 0.
   double depth = 0;     ///< How far the cylinder reaches to either side; > 0.
-  double registration = 0;  ///< Standard deviation of laying A onto B; >= 0.
+  double registration = 0;  ///< Standard deviation of the registration of A to B; >= 0.
   double scale_sigma = 0;   ///< That of one scale against the other, as a share of it; >= 0.
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< Where an error of scale moves nothing.
 
@@ -41,7 +41,8 @@ struct M3c2Place {
 };
 
 /// Diameter of a cylinder that holds about 30 points of the sparser of two clouds where these are
-/// spread over a surface. \throws InvalidInput without seen points in different places
+/// spread over a surface.
+/// \throws InvalidInput without seen points in different places
 double spacing_cylinder(const ComparedPoints& a, const ComparedPoints& b);
 
 /// The scales that go with a cylinder: twice its diameter for normals, ten times for the depth.

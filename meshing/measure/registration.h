@@ -8,7 +8,7 @@
 
 namespace cgs {
 
-/// How one surface was laid onto another.
+/// How one surface was registered to another.
 struct Registration {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< [internal units]
@@ -24,7 +24,8 @@ struct Registration {
   }
 };
 
-/// Lays points onto a surface from where they are (iterative closest points, point to plane).
+/// Registers points to a surface, starting where they are (iterative closest points, point to
+/// plane).
 ///
 /// Robust: distances count by Tukey's weights, whose width follows the median of the distances, so
 /// that what really changed pulls little. What has no counterpart within 4.7 times that width takes

@@ -32,7 +32,7 @@ struct ShapeFit {
                    ///< facets cut off.
   double largest = 0;
   MeasuredValue area;   ///< Of the patch.
-  size_t vertices = 0;  ///< Places of them, around faces that the patch has a part of.
+  size_t vertices = 0;  ///< Different positions of them, of the faces that the patch has a part of.
 };
 
 /// Fits a shape to the part of the surface within a ball.

@@ -33,13 +33,15 @@ MeasuredValue surface_area(const MeasurableMesh& mesh);
 
 /// Volume within the faces. It has no parts by provenance: what is observed is the surface around
 /// it. sigma is that of the part of the surface that states one: the rest is unknown, and moves the
-/// volume by its area times its own error. \pre the mesh is closed and oriented, else the figure
-/// means nothing
+/// volume by its area times its own error.
+/// \pre the mesh is closed and oriented, else the figure means nothing
 MeasuredValue enclosed_volume(const MeasurableMesh& mesh);
 
-/// Centre of the area of all faces [internal units]. \pre the mesh has area
+/// Centre of the area of all faces [internal units].
+/// \pre the mesh has area
 Eigen::Vector3d area_centroid(const MeasurableMesh& mesh);
-/// Centre of the volume within the faces [internal units]. \pre closed, oriented, not flat
+/// Centre of the volume within the faces [internal units].
+/// \pre closed, oriented, not flat
 Eigen::Vector3d volume_centroid(const MeasurableMesh& mesh);
 
 /// Straight distance between two points of the surface, whose errors are independent.
@@ -64,8 +66,9 @@ struct OrientedBox {
 /// The box around the vertices that faces use, or around all points of a cloud.
 ///
 /// sigma of an extent is that of the two points that hold it; it belongs to the weaker provenance
-/// of their faces. Source: Chang et al. 2011, "Fast oriented bounding box optimization on the
-/// rotation group SO(3)", as in CGAL.
+/// of their faces.
+/// Source: Chang et al. 2011, "Fast oriented bounding box optimization on the rotation group
+///         SO(3)", as in CGAL.
 /// \throws InvalidInput if there is no point
 OrientedBox oriented_box(const MeasurableMesh& mesh);
 

@@ -43,7 +43,8 @@ class ThicknessGauge {
                  double tolerance = 1e-9);
 
   Thickness at(const SurfacePoint& point) const;
-  /// Behind the middle of a face. \pre it has an area
+  /// Behind the middle of a face.
+  /// \pre it has an area
   Thickness behind_face(uint32_t face) const;
 
  private:

@@ -65,7 +65,8 @@ class DistanceToMesh {
   std::unique_ptr<Parts> parts_;
 };
 
-/// The same for points that are all known at once. \pre mesh has faces.
+/// The same for points that are all known at once.
+/// \pre mesh has faces.
 std::vector<float> distances_to(const TriangleMesh& mesh,
                                 const std::vector<Eigen::Vector3f>& points);
 

@@ -14,7 +14,7 @@ namespace cgs {
 inline bool is_known_normal(const Eigen::Vector3f& normal) { return !normal.isZero(0); }
 
 /// Unit normals of a point cloud: per point the direction in which it and its nearest neighbours
-/// spread least; which of the two is open. 0 where the neighbours are one point or on a line.
+/// spread least, with either sign. 0 where the neighbours are one point or on a line.
 /// \param neighbors  the point included, >= 3
 /// Source: Hoppe et al. 1992, "Surface reconstruction from unorganized points", section 3.2.
 /// \throws InvalidInput for fewer neighbours
@@ -26,7 +26,8 @@ std::vector<Eigen::Vector3f> estimated_normals(const std::vector<Eigen::Vector3f
 void turn_like(std::vector<Eigen::Vector3f>& normals, const std::vector<Eigen::Vector3f>& hints);
 
 /// Turns the normals of each part together, to the side that most hints for its points say; parts
-/// without any stay. \param part_of  per point a number of its part, as from turn_consistently()
+/// without any stay.
+/// \param part_of  per point a number of its part, as from turn_consistently()
 void turn_parts_like(std::vector<Eigen::Vector3f>& normals,
                      const std::vector<Eigen::Vector3f>& hints,
                      const std::vector<uint32_t>& part_of);

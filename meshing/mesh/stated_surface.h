@@ -20,8 +20,8 @@ struct StatedPlace {
   std::array<VertexShare, 3> shares;                   ///< Of its vertices, the largest first.
 };
 
-/// What a mesh or point cloud states, asked from surfaces that are made anew over it. Queries may
-/// run in parallel.
+/// What a mesh or point cloud states, for surfaces that are reconstructed over it. Queries may run
+/// in parallel.
 ///
 /// Faces have the label of the mesh. Points of a cloud, which have none, are labelled by their
 /// support: Observed from two views on, SingleView for one, else Inferred.
@@ -71,10 +71,10 @@ EvidenceTransfer take_labels(TriangleMesh& surface, const StatedSurface& source,
 ///
 /// A face takes the weakest label found at its middle and towards its corners, and is Inferred
 /// where one of these is farther away than `reach` or looks the other way. Vertices take what the
-/// nearest place states; their sigma becomes the root of sigma^2 + distance^2. Without a face that
-/// has evidence (if the source has no labels: that is no bridge and looks its way) they have no
-/// sigma and support 0. Normals, if the source has some, are made from the faces. What the source
-/// does not state, the surface does not state either.
+/// nearest place states; their sigma becomes the root of sigma^2 + distance^2. Vertices without a
+/// face that has evidence (if the source has no labels: that is no bridge and looks the same way)
+/// have no sigma and support 0. Normals, if the source has some, are made from the faces. What the
+/// source does not state, the surface does not state either.
 /// \param surface  vertices and faces
 /// \param reach    [internal units]
 EvidenceTransfer take_evidence(TriangleMesh& surface, const StatedSurface& source, double reach);

@@ -10,7 +10,7 @@
 namespace cgs {
 
 /// The gains of views from the middles of faces that several of them show.
-/// \throws as exposure_gains() of core/exposure.h
+/// \throws Error as exposure_gains() of core/exposure.h
 ExposureGains exposure_gains(const TriangleMesh& mesh,
                              const FaceScores& scores,
                              const std::vector<View>& views);

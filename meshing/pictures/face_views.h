@@ -30,8 +30,8 @@ struct FaceScores {
 FaceScores face_scores(const TriangleMesh& mesh, const std::vector<View>& views);
 
 struct FaceViewOptions {
-  /// What a seam costs: one of this length [pixels of the photographs] is accepted where it lets
-  /// one pixel for each pixel of its length be shown e times better. >= 0; 0 = take the best.
+  /// Cost of a seam per pixel of its length: it is accepted where it lets so many pixels of the
+  /// photographs be shown e times better. >= 0; 0 = each face takes its best view.
   double seam_cost = 30;
 
   /// \throws InvalidInput naming the first field out of range.

@@ -23,8 +23,9 @@ struct PointClusters {
 /// Points with at least `neighbors` points within `radius`, itself included, are dense; dense
 /// points within the radius of each other are in one cluster. Other points belong to the cluster of
 /// the nearest dense point within the radius, so that no order of points matters; else they are
-/// noise. Source: Ester et al. 1996, "A density-based algorithm for discovering clusters". \throws
-/// InvalidInput unless radius > 0 and neighbors > 0
+/// noise.
+/// Source: Ester et al. 1996, "A density-based algorithm for discovering clusters".
+/// \throws InvalidInput unless radius > 0 and neighbors > 0
 PointClusters dense_clusters(const std::vector<Eigen::Vector3f>& points,
                              double radius,
                              size_t neighbors,

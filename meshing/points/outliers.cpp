@@ -19,16 +19,17 @@ constexpr size_t kPointsAtOnce = 1024;
 std::vector<double> mean_distances(const std::vector<Eigen::Vector3f>& points, size_t neighbors) {
   const KdTree tree(points);
   std::vector<double> out(points.size(), 0);
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kPointsAtOnce), [&](const auto& range) {
-    std::vector<Neighbor> found;
-    for (size_t i = range.begin(); i != range.end(); ++i) {
-      const uint32_t point = tree.order()[i];
-      tree.nearest(points[point], neighbors + 1, found);  // the point itself is among them
-      double sum = 0;
-      for (const Neighbor& n : found) sum += std::sqrt(double(n.squared_distance));
-      if (found.size() > 1) out[point] = sum / static_cast<double>(found.size() - 1);
-    }
-  });
+  tbb::parallel_for(
+      tbb::blocked_range<size_t>(0, points.size(), kPointsAtOnce), [&](const auto& range) {
+        std::vector<Neighbor> found;
+        for (size_t i = range.begin(); i != range.end(); ++i) {
+          const uint32_t point = tree.order()[i];
+          tree.nearest(points[point], neighbors + 1, found);  // the point itself is among them
+          double sum = 0;
+          for (const Neighbor& n : found) sum += std::sqrt(double(n.squared_distance));
+          if (found.size() > 1) out[point] = sum / static_cast<double>(found.size() - 1);
+        }
+      });
   return out;
 }
 
@@ -61,13 +62,14 @@ std::vector<uint8_t> without_lonely_points(const std::vector<Eigen::Vector3f>& p
   require(radius > 0, "the radius must be > 0", radius);
   const KdTree tree(points);
   std::vector<uint8_t> keep(points.size(), 0);
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kPointsAtOnce), [&](const auto& range) {
-    for (size_t i = range.begin(); i != range.end(); ++i) {
-      const uint32_t point = tree.order()[i];
-      const size_t found = tree.count_within(points[point], float(radius), neighbors + 1);
-      keep[point] = found > neighbors ? 1 : 0;
-    }
-  });
+  tbb::parallel_for(
+      tbb::blocked_range<size_t>(0, points.size(), kPointsAtOnce), [&](const auto& range) {
+        for (size_t i = range.begin(); i != range.end(); ++i) {
+          const uint32_t point = tree.order()[i];
+          const size_t found = tree.count_within(points[point], float(radius), neighbors + 1);
+          keep[point] = found > neighbors ? 1 : 0;
+        }
+      });
   return keep;
 }
 

@@ -32,8 +32,7 @@ struct OpenSurfaceOptions {
 /// whose eight voxels were observed.
 ///
 /// \return a mesh with all attributes; provenance is Observed, SingleView, Estimated or Virtual.
-/// Empty if there is no
-///         surface.
+///         Empty if there is no surface.
 TriangleMesh open_surface(const Volume& volume, const OpenSurfaceOptions& options);
 
 }  // namespace cgs

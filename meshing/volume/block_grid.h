@@ -74,7 +74,8 @@ struct BlockGrid {
   std::vector<EightBoxes> block_boxes(size_t c) const;
 };
 
-/// The blocks around a box [internal units]. \throws LimitError if they are too many or too far off
+/// The blocks around a box [internal units].
+/// \throws LimitError if they are too many or too far off
 BlockGrid block_grid(const Eigen::AlignedBox3d& bounds, double voxel);
 
 }  // namespace cgs

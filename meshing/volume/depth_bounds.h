@@ -8,8 +8,8 @@
 
 namespace cgs {
 
-/// Between which depths the surface of a depth map may be met, over windows of pixels of several
-/// sizes: each size is kept on a grid so fine that one value tells about all around a place.
+/// Bounds of the depth at which the surface of a depth map may lie, over windows of pixels of
+/// several sizes: the grid of each size is so fine that one value covers all around a place.
 class DepthBounds {
  public:
   /// \param depth  [internal units], NaN where unknown

@@ -115,7 +115,8 @@ class DepthField {
   };
 
   void put_depth(const DepthMap& depth, const Raster<uint8_t>& continuous, const DepthMap& hides);
-  // Sets slope, weight and sigma. \return the slack of DepthBounds of every pixel
+  // Sets slope, weight and sigma.
+  // \return the slack of DepthBounds of every pixel
   Raster<float> look_along(const TsdfView& view, const DepthMap& depth);
 
   const Pixel& pixel_at(int x, int y) const {

@@ -30,7 +30,7 @@ class FusionViews {
   size_t size() const { return count_; }
   bool are_in_memory() const { return source_ == nullptr; }
   /// Calls work(i, view) for views first ... last - 1, several at once.
-  /// \throws what the first view throws that fails, whichever thread met which
+  /// \throws Error that the first view to fail throws, whichever thread met which
   template <typename Work>
   void each(size_t first, size_t last, bool with_color, const Work& work) const {
     std::atomic<size_t> first_failed = last;

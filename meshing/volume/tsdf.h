@@ -31,6 +31,7 @@ struct FusedVolume {
 ///   has the voxel in front of or nearer behind its own: plates and edges would grow.
 /// - Free: farther than max(truncation, 3 sigma) in front of the surface. Where one view says free
 ///   and others a voxel behind their surface, the larger weight wins; a tie keeps it.
+///
 /// The result is bit-identical for any number of threads.
 ///
 /// Of a source, only as many views are held at once as fit into `view_memory` and into a quarter of

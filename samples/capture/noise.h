@@ -8,8 +8,8 @@
 
 namespace cgs {
 
-/// Mixes a counter; the same bits on every machine. Source: M. O'Neill, PCG (output function
-/// RXS-M-XS), 2014.
+/// Mixes a counter; the same bits on every machine.
+/// Source: M. O'Neill, PCG (output function RXS-M-XS), 2014.
 inline uint32_t mixed(uint32_t x) {
   x = x * 747796405U + 2891336453U;
   x = ((x >> ((x >> 28U) + 4U)) ^ x) * 277803737U;

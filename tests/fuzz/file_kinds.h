@@ -23,7 +23,8 @@ struct FileKind {
   bool is_isolated = false;  ///< Decoded in a child process, where a fuzzer sees nothing.
 };
 
-/// For what must hold of anything that was read. \throws std::logic_error
+/// For what must hold of anything that was read.
+/// \throws std::logic_error
 inline void require(bool holds, const char* what) {
   if (!holds) throw std::logic_error(what);
 }

@@ -35,8 +35,8 @@ inline std::string exif_number(uint32_t value, int bytes, bool is_big) {
   return out;
 }
 
-/// A TIFF file of nothing but the given entries in its Exif directory. \param pixels  bytes that
-/// stand before the directories
+/// A TIFF file of nothing but the given entries in its Exif directory.
+/// \param pixels  bytes that stand before the directories
 inline std::string exif_tiff(const std::vector<ExifEntry>& entries,
                              bool is_big,
                              uint32_t pixels = 0) {

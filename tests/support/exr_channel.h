@@ -10,7 +10,8 @@
 
 namespace cgs::test {
 
-/// The values of a channel. \throws BadInput Schema if there is none of that name
+/// The values of a channel.
+/// \throws BadInput Schema if there is none of that name
 inline const std::vector<float>& channel(const ExrImage& image,
                                          const std::string& name,
                                          const std::filesystem::path& path) {

@@ -77,7 +77,8 @@ inline Eigen::Vector3f checker(const Eigen::Vector3d& p) {
   return {base, 0.5f + static_cast<float>(p.x()), 0.5f + static_cast<float>(p.y() - p.z()) / 2};
 }
 
-/// Nearest intersection of a ray with a box, by slabs. \return distance, or infinity
+/// Nearest intersection of a ray with a box, by slabs.
+/// \return distance, or infinity
 inline double hit_box(const Eigen::Vector3d& eye,
                       const Eigen::Vector3d& direction,
                       const Eigen::AlignedBox3d& bounds) {
