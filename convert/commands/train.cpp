@@ -58,6 +58,7 @@ void run_train(const TrainArgs& args) {
   keep_scene_apart(args.output, args.scene.path, {"priors", "colmap"});
   refuse_to_replace(args);
   Terminal terminal(args.common.quiet, args.common.strict);
+  std::vector<std::string> hitches;
   const ModelRequest request = {{},
                                 training_options(args.training),
                                 args.output,
@@ -65,7 +66,8 @@ void run_train(const TrainArgs& args) {
                                 !args.overwrite,
                                 [&](const Model& model, const PriorsReport& priors) {
                                   terminal.note(coverage_words(priors, model.scene));
-                                }};
+                                },
+                                [&](const std::string& words) { hitches.push_back(words); }};
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   check_training_memory(
       opened.scene, memory_budget(stated_memory_limit(args.common)), request.training.coherence);
@@ -107,7 +109,7 @@ void run_train(const TrainArgs& args) {
   for (const std::string& remark : remarks_on_photographs(report)) terminal.say(remark);
   if (args.common.json) std::cout << json_text(report) << "\n";
   terminal.warn(found);
-  terminal.warn(trained.hitches);
+  terminal.warn(hitches);
 }
 
 }  // namespace

@@ -20,7 +20,6 @@
 #include "io/scenes/scene_reader.h"
 #include "io/splats/gaussian_ply.h"
 #include "libcgs/core/error.h"
-#include "libcgs/render/rasterizer.h"
 
 namespace cgs {
 
@@ -232,42 +231,6 @@ void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow
                                printable(view.name));
     }
   }
-}
-
-EvidenceMap evidence_of(const ViewPriors& priors) {
-  EvidenceMap out(priors.origin.width, priors.origin.height, DepthEvidence::Measured);
-  std::transform(
-      priors.origin.data.begin(), priors.origin.data.end(), out.data.begin(), depth_evidence);
-  return out;
-}
-
-std::vector<SupportView> support_views(const Model& model) {
-  std::vector<SupportView> views;
-  for (size_t k = 0; k < model.priors.size(); ++k) {
-    const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
-    const ViewPriors& priors = model.priors[k];
-    views.push_back({view.camera, priors.depth, priors.sigma, evidence_of(priors)});
-  }
-  return views;
-}
-
-RenderBuffers render_camera(const Model& model,
-                            const std::vector<SupportView>& inputs,
-                            const Camera& camera) {
-  RenderBuffers buffers = rasterize(model.gaussians, camera);
-  annotate_support(buffers, camera, inputs);
-  return buffers;
-}
-
-ColorImage picture(const RenderBuffers& buffers) {
-  ColorImage out = buffers.color;
-  constexpr float kMinAlpha = 0.5f;
-  for (size_t i = 0; i < out.data.size(); ++i) {
-    const float alpha = buffers.alpha.data[i];
-    if (alpha >= kMinAlpha) out.data[i] /= alpha;
-    out.data[i] = out.data[i].cwiseMax(0.0f).cwiseMin(1.0f);
-  }
-  return out;
 }
 
 namespace {

@@ -2,25 +2,12 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 #include <vector>
 
-#include "libcgs/core/gaussians.h"
 #include "libcgs/core/scene.h"
-#include "libcgs/priors/view_priors.h"
-#include "libcgs/render/render_buffers.h"
-#include "libcgs/render/support.h"
+#include "libcgs/reconstruct/model.h"
 
 namespace cgs {
-
-/// A reconstruction: cameras, Gaussians, and what the input views know about depth. This is what
-/// the folder OUT/model holds.
-struct Model {
-  Scene scene;  ///< In its canonical frame; pixels only where loaded.
-  Gaussians gaussians;
-  std::vector<ViewPriors> priors;  ///< In the order of scene.input; empty for foreign splats.
-  std::string evidence;  ///< What the Gaussians rest on, in words; empty where nobody says.
-};
 
 /// Writes gaussians.ply, cameras.json and priors/VIEW.exr.
 /// \throws IoError
@@ -55,21 +42,6 @@ void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow
 
 /// Takes photographs and masks from another reading of the same scene, by the names of the views.
 void relink_views(Scene& scene, const Scene& found);
-
-/// What vouches for the depth of every pixel of a view.
-EvidenceMap evidence_of(const ViewPriors& priors);
-
-/// The input views with their depth and its uncertainty: who can vouch for a rendered pixel.
-std::vector<SupportView> support_views(const Model& model);
-
-/// Rasters of one camera with support and hole mask.
-RenderBuffers render_camera(const Model& model,
-                            const std::vector<SupportView>& inputs,
-                            const Camera& camera);
-
-/// The rendered colour as a picture: divided by alpha where alpha reaches one half, black in holes
-/// without colour. Values in [0, 1].
-ColorImage picture(const RenderBuffers& buffers);
 
 /// World direction that is up in the photographs, by the axis all cameras were turned around
 /// (people hold cameras level), or by the mean image up where the cameras do not turn. Photographs

@@ -8,11 +8,11 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "convert/model/model.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/estimate_priors.h"
-#include "libcgs/train/trainer.h"
+#include "libcgs/reconstruct/evidence_words.h"
+#include "libcgs/reconstruct/reconstruct.h"
 
 namespace cgs {
 
@@ -28,41 +28,15 @@ struct ModelRequest {
   /// Sees the cameras and what was measured, before the training, which takes much longer: what it
   /// throws ends the work.
   std::function<void(const Model&, const PriorsReport&)> inspect = {};
+  /// Hears of a checkpoint that could not be read or written, which changes no result.
+  std::function<void(const std::string&)> hitch = {};
 };
 
-/// What became of a pane in the photographs.
-struct PaneReport {
-  std::string view;    ///< The one it is drawn from; empty = there is none.
-  double share = 0;    ///< Of the pixels of that view.
-  double opacity = 0;  ///< Before the training.
-  double gain = 0;     ///< Pane::gain [dB]
-};
-
-/// A model, and how it was come by.
-struct TrainedModel {
-  Model model;
-  PriorsReport priors;
-  float exposure_difference = 0;  ///< ExposureGains::difference() of the input views
-  ViewDependence view_dependence;
-  PaneReport pane;
-  std::vector<StepReport> steps;  ///< Of the training; empty = aligned initialisation.
-  /// Checkpoints that could not be read or written, for the terminal: they change no result.
-  std::vector<std::string> hitches;
-};
-
-/// Scene -> model. Loads the images of the input views, moves the scene to its canonical frame,
-/// estimates depth and optimises the Gaussians; goes on from a checkpoint of the same work. Where
-/// the photographs show a pane, depth is estimated once more from what lies behind it.
-/// If the progress function throws Cancelled, the training so far is saved first.
-/// \throws BadInput Mismatch for a checkpoint of other work that is to be kept
+/// reconstruct() of a scene from its files, going on from a checkpoint of the same work. If the
+/// progress function throws Cancelled, the training so far is saved first.
+/// \throws BadInput Mismatch for a checkpoint of other work that is to be kept; as load_images(),
+///         DepthNetwork and reconstruct()
 TrainedModel train_model(Scene scene, const ModelRequest& request, const Progress& progress);
-
-/// How much of each input view was measured, is sky, is estimated or stays open; a line each, for
-/// people.
-std::vector<std::string> coverage_words(const PriorsReport& priors, const Scene& scene);
-
-/// Gives a frame without scale the one that metric depth of the photographs tells, if it does.
-void take_sensor_scale(const GivenDepthReport& given, Frame& frame);
 
 /// True if a training began in that folder and did not end.
 bool has_checkpoints(const std::filesystem::path& folder);

@@ -108,6 +108,7 @@ StageResult run_model(Run& run, const Progress& progress) {
     check_picks(run.distances, model);
     run.terminal.note(coverage_words(priors, model.scene));
   };
+  request.hitch = [&](const std::string& words) { run.hitches.push_back(words); };
   const TrainedModel trained = train_model(run.scene, request, progress);
   // Pixels were read for the first time: more may be odd than the cameras told.
   const std::vector<std::string>& found = trained.model.scene.warnings;
@@ -116,7 +117,6 @@ StageResult run_model(Run& run, const Progress& progress) {
       found.begin() + static_cast<std::ptrdiff_t>(run.scene.warnings.size()), found.end());
   write_model(folder, trained.model);
   write_file(folder / "training.json", json_text(report) + "\n");
-  run.hitches = trained.hitches;
   const GivenDepthReport& given = trained.priors.given;
   std::string remark = given.kind == DepthKind::Unknown ? "" : "depth files: " + given.found;
   for (const std::string& words : remarks_on_photographs(report)) {

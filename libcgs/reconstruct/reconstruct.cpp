@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/reconstruct/reconstruct.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <optional>
+#include <utility>
+
+#include "libcgs/coherence/coherent_gaussians.h"
+#include "libcgs/coherence/initialisation.h"
+#include "libcgs/core/error.h"
+#include "libcgs/core/exposure.h"
+#include "libcgs/priors/exposure.h"
+#include "libcgs/priors/measured_range.h"
+#include "libcgs/reconstruct/evidence_words.h"
+
+namespace cgs {
+
+namespace {
+
+// What would else show only after minutes.
+void require_possible(const Scene& scene, const ReconstructionOptions& options) {
+  options.priors.validate();
+  options.training.validate();
+  require_decodable(scene, options.training.coherence);
+}
+
+void load_photographs(Scene& scene, const ReconstructionHooks& hooks, const Progress& progress) {
+  if (hooks.load_photographs) hooks.load_photographs(scene, progress);
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (view.image.empty()) {
+      throw InvalidInput("the photograph of view " + view.name + " is not loaded");
+    }
+  }
+}
+
+// Splats keep the colours of the photographs they stem from: where exposures differ, the same
+// surface would come in two colours, and every step of the training would fight over them.
+// Returns ExposureGains::difference().
+float match_exposures(Scene& scene, const std::vector<ViewPriors>& priors) {
+  const ExposureGains exposure = exposure_gains(scene, priors);
+  for (size_t k = 0; k < scene.input.size(); ++k) {
+    View& view = scene.views[static_cast<size_t>(scene.input[k])];
+    view.exposure = exposure.gain[k];
+    apply_exposure(view);
+  }
+  return exposure.difference();
+}
+
+PaneReport report_of(const Pane& pane, const Scene& scene) {
+  const auto pixels = static_cast<double>(pane.depth.data.size());
+  const auto covered = std::count_if(pane.depth.data.begin(), pane.depth.data.end(), has_gaussian);
+  return {scene.views[static_cast<size_t>(scene.input[pane.drawn_from])].name,
+          static_cast<double>(covered) / pixels,
+          double{pane.opacity},
+          pane.gain};
+}
+
+// A pane in the photographs, and then the priors of what lies behind it: what it shows disturbs
+// their matching, and the better they are, the better the two are told apart.
+std::optional<Pane> look_behind_pane(const Scene& scene,
+                                     const ReconstructionOptions& options,
+                                     EstimatedPriors& priors,
+                                     const Progress& progress) {
+  if (options.training.coherence.layers_per_ray < 2) return std::nullopt;  // none to draw it by
+  std::optional<Pane> pane = find_pane(scene, priors.views, part_of(progress, 0, 0.1));
+  if (!pane) return pane;
+  priors = estimate_priors(behind_pane(scene, *pane), options.priors, part_of(progress, 0.1, 0.9));
+  std::optional<Pane> better = find_pane(scene, priors.views, part_of(progress, 0.9, 1));
+  return better ? better : pane;
+}
+
+// Views whose depth rests on little.
+void warn_of_little_depth(const std::vector<PriorsCoverage>& coverage, Scene& scene) {
+  constexpr double kLittle = 0.1;
+  for (size_t i = 0; i < coverage.size(); ++i) {
+    const View& view = scene.views[static_cast<size_t>(scene.input[i])];
+    const double share = coverage[i].measured + coverage[i].guessed;
+    if (share >= kLittle) continue;
+    std::array<char, 120> text{};
+    std::snprintf(text.data(), text.size(), "depth was found for %.1f %% of view ", 100 * share);
+    scene.warnings.push_back(
+        text.data() + view.name +
+        (is_measured(coverage[i])
+             ? "; what is filled in from there is an estimate: see that views overlap and show "
+               "texture"
+             : ", so it adds nothing: hardly a point of it is seen in another input view"));
+  }
+}
+
+// What the priors tell of the scene itself.
+void take_findings(const PriorsReport& found, Scene& scene) {
+  const std::vector<std::string>& remarks = found.given.remarks;
+  scene.warnings.insert(scene.warnings.end(), remarks.begin(), remarks.end());
+  take_sensor_scale(found.given, scene.frame);
+  warn_of_little_depth(found.coverage, scene);
+}
+
+void train(Trainer& trainer,
+           int steps,
+           const ReconstructionHooks& hooks,
+           const Progress& progress) {
+  while (!trainer.done()) {
+    trainer.step();
+    try {
+      report(progress, double(trainer.steps_done()) / steps);
+    } catch (const Cancelled&) {
+      if (hooks.on_cancel) hooks.on_cancel(trainer);
+      throw;
+    }
+    if (hooks.after_step) hooks.after_step(trainer);
+  }
+  if (hooks.after_training) hooks.after_training(trainer);
+}
+
+}  // namespace
+
+TrainedModel reconstruct(Scene scene,
+                         const ReconstructionOptions& options,
+                         const Progress& progress) {
+  const ReconstructionHooks& hooks = options.hooks;
+  TrainedModel out;
+  require_possible(scene, options);
+  load_photographs(scene, hooks, part_of(progress, 0, 0.01));
+  to_canonical(scene);
+  narrow_depth_ranges(scene, options.priors.sweep, part_of(progress, 0.01, 0.02));
+  EstimatedPriors priors = estimate_priors(scene, options.priors, part_of(progress, 0.02, 0.18));
+  out.exposure_difference = match_exposures(scene, priors.views);
+  // There hardly ever is one, and without one this is quick.
+  const std::optional<Pane> pane =
+      look_behind_pane(scene, options, priors, part_of(progress, 0.18, 0.2));
+  const Pane* const drawn_before = pane ? &*pane : nullptr;
+  if (pane) out.pane = report_of(*pane, scene);
+  take_findings(priors.report, scene);
+  out.priors = std::move(priors.report);
+  out.model.priors = std::move(priors.views);
+  out.model.scene = std::move(scene);
+  if (hooks.inspect) hooks.inspect(out.model, out.priors);
+  // Its constructor places one Gaussian on the ray of each pixel.
+  Trainer trainer(out.model.scene, out.model.priors, options.training, drawn_before);
+  if (hooks.begin_training) hooks.begin_training(out.model, drawn_before, trainer);
+  train(trainer, options.training.steps, hooks, part_of(progress, 0.2, 1));
+  out.model.gaussians = trainer.model().gaussians();
+  out.view_dependence = trainer.model().view_dependence();
+  out.steps = trainer.history();
+  // The depth of the priors stays that of the sweep: meshes and support rest on what was measured,
+  // pictures on what was optimised to look right.
+  out.model.evidence = description_of(out, options.training);
+  report(progress, 1);
+  return out;
+}
+
+void take_sensor_scale(const GivenDepthReport& given, Frame& frame) {
+  if (frame.has_metric_scale() || !(given.metres_per_unit > 0)) return;
+  frame.metres_per_unit = given.metres_per_unit;
+  frame.metres_sigma = given.metres_sigma;
+  frame.scale_source = ScaleSource::DepthSensor;
+}
+
+}  // namespace cgs

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "libcgs/core/progress.h"
+#include "libcgs/core/scene.h"
+#include "libcgs/priors/estimate_priors.h"
+#include "libcgs/priors/pane.h"
+#include "libcgs/reconstruct/model.h"
+#include "libcgs/train/trainer.h"
+
+namespace cgs {
+
+/// What a caller may do on the way; each may be empty. What they throw ends the work.
+struct ReconstructionHooks {
+  /// Fills View::image, valid and given_depth of the input views, in place of having them.
+  std::function<void(Scene&, const Progress&)> load_photographs = {};
+  /// Sees the cameras and what was measured, before the training, which takes much longer.
+  std::function<void(const Model&, const PriorsReport&)> inspect = {};
+  /// Before the first step: may Trainer::restore() what a trainer of the same model and pane saved.
+  std::function<void(const Model&, const Pane*, Trainer&)> begin_training = {};
+  std::function<void(const Trainer&)> after_step = {};
+  std::function<void(const Trainer&)> after_training = {};  ///< Also where there was no step.
+  /// The progress function threw Cancelled, which goes on once this returns.
+  std::function<void(const Trainer&)> on_cancel = {};
+};
+
+struct ReconstructionOptions {
+  PriorsOptions priors;
+  TrainingOptions training;
+  ReconstructionHooks hooks = {};
+};
+
+/// What became of a pane in the photographs.
+struct PaneReport {
+  std::string view;    ///< The one it is drawn from; empty = there is none.
+  double share = 0;    ///< Of the pixels of that view.
+  double opacity = 0;  ///< Before the training.
+  double gain = 0;     ///< Pane::gain [dB]
+};
+
+/// A model, and how it was come by.
+struct TrainedModel {
+  Model model;
+  PriorsReport priors;
+  float exposure_difference = 0;  ///< ExposureGains::difference() of the input views
+  ViewDependence view_dependence;
+  PaneReport pane;
+  std::vector<StepReport> steps;  ///< Of the training; empty = aligned initialisation.
+};
+
+/// The method from photographs with cameras to Gaussians: canonical frame, depth priors, exposures,
+/// a pane, one Gaussian on the ray of each pixel, training. Where the photographs show a pane,
+/// depth is estimated once more from what lies behind it. Same scene and options, same bits, for
+/// any number of threads.
+///
+/// \param scene  in world coordinates with the identity frame; Scene::input are the views to
+///               reconstruct from, two or more. Their photographs are loaded, sRGB-coded in [0, 1]
+///               and of the size of their cameras, or hooks.load_photographs loads them.
+/// \return the model in its canonical frame [internal units], with metres per unit where
+///         depth of a sensor tells them; what is odd of the photographs is in Scene::warnings
+/// \throws InvalidInput for an option out of range, too few pixels for the decoder, photographs
+///         that are not loaded; and as to_canonical(), estimate_priors() and the Trainer
+/// Source: Paliwal et al. 2024, "CoherentGS", section 3, with depth of a plane sweep.
+TrainedModel reconstruct(Scene scene,
+                         const ReconstructionOptions& options,
+                         const Progress& progress = {});
+
+/// Gives a frame without scale the one that metric depth of the photographs tells, if it does.
+void take_sensor_scale(const GivenDepthReport& given, Frame& frame);
+
+}  // namespace cgs

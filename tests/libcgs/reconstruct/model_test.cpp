@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/reconstruct/model.h"
+
+#include <gtest/gtest.h>
+
+namespace cgs::reconstructed_model_test {
+namespace {
+
+TEST(SupportViews, AreTheInputViewsWithWhatVouchesForTheirDepth) {
+  Model model;
+  model.scene.views.resize(3);
+  for (int i = 0; i < 3; ++i) model.scene.views[static_cast<size_t>(i)].camera.fx = 10 + i;
+  model.scene.input = {2, 0};
+  ViewPriors priors;
+  priors.depth = DepthMap(2, 1, 3);
+  priors.sigma = DepthMap(2, 1, 0.1f);
+  priors.origin = Raster<DepthOrigin>(2, 1, DepthOrigin::Measured);
+  priors.origin(1, 0) = DepthOrigin::Sky;
+  model.priors = {priors, priors};
+  const std::vector<SupportView> views = support_views(model);
+  ASSERT_EQ(views.size(), 2u);
+  EXPECT_EQ(views[0].camera.fx, 12);
+  EXPECT_EQ(views[1].camera.fx, 10);
+  EXPECT_EQ(views[0].evidence(0, 0), DepthEvidence::Measured);
+  EXPECT_EQ(views[0].evidence(1, 0), DepthEvidence::Sky);
+  model.priors.clear();  // as of splats of other programs
+  EXPECT_TRUE(support_views(model).empty());
+}
+
+TEST(Picture, DividesByAlphaAboveOneHalfOnly) {
+  RenderBuffers buffers;
+  buffers.color = ColorImage(2, 1, Eigen::Vector3f(0.3f, 0.3f, 0.3f));
+  buffers.alpha = Raster<float>(2, 1, 0.6f);
+  buffers.alpha(1, 0) = 0.4f;
+  const ColorImage shown = picture(buffers);
+  EXPECT_NEAR(shown(0, 0).x(), 0.5f, 1e-6f);
+  EXPECT_NEAR(shown(1, 0).x(), 0.3f, 1e-6f);
+}
+
+}  // namespace
+}  // namespace cgs::reconstructed_model_test
