@@ -58,7 +58,11 @@ double error_of(int photo, const std::vector<EpipolarFit>& fits) {
 
 Camera camera_of_file(const View& view) {
   Camera out = picture_camera(view);
-  for (double* value : {&out.fx, &out.fy, &out.cx, &out.cy}) *value = without_rounding(*value);
+  // One by one: GCC 12 loses assignments through a list of their addresses where it inlines this.
+  out.fx = without_rounding(out.fx);
+  out.fy = without_rounding(out.fy);
+  out.cx = without_rounding(out.cx);
+  out.cy = without_rounding(out.cy);
   return out;
 }
 

@@ -7,9 +7,10 @@ View reduced_view(const View& view, int factor) {
   View out = view;
   out.camera.width = view.camera.width / factor;
   out.camera.height = view.camera.height / factor;
-  for (double* value : {&out.camera.fx, &out.camera.fy, &out.camera.cx, &out.camera.cy}) {
-    *value /= factor;
-  }
+  out.camera.fx /= factor;
+  out.camera.fy /= factor;
+  out.camera.cx /= factor;
+  out.camera.cy /= factor;
   const float share = 1.0f / static_cast<float>(factor * factor);
   out.image = ColorImage(out.camera.width, out.camera.height, Eigen::Vector3f::Zero());
   if (!view.valid.empty()) out.valid = MaskMap(out.camera.width, out.camera.height, 1);
