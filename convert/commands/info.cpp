@@ -92,7 +92,7 @@ Json scene_json(const OpenedScene& opened, const Json& fit) {
   }
   Eigen::AlignedBox3d box;
   for (const View& view : scene.views) box.extend(view.camera.center());
-  return {{"kind", scene.kind},
+  return {{"kind", scene_kind_name(scene.kind)},
           {"counts",
            {{"views", scene.views.size()},
             {"input", scene.input.size()},

@@ -213,7 +213,7 @@ Json report_json(const Run& run) {
   const Json model = result_of(run, Stage::Model);
   for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
   Json out = {{"program", kProgramVersion},
-              {"scene", run.scene.kind},
+              {"scene", scene_kind_name(run.scene.kind)},
               {"folder", run.request.scene.path.string()},
               {"units", scene.frame.unit_name()},
               {"scale_source", scale_source_name(scene.frame.scale_source)},

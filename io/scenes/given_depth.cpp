@@ -320,7 +320,7 @@ void DepthOptions::validate() const {
 }
 
 fs::path confidence_file(const Scene& scene, const View& view, bool allow_external) {
-  if (scene.kind != "Polycam") return {};
+  if (scene.kind != SceneKind::Polycam) return {};
   const fs::path depth = view.depth_path.lexically_relative(scene.folder).parent_path();
   if (depth.filename() != "depth" || *depth.begin() == "..") return {};
   const fs::path name = depth.parent_path() / "confidence";

@@ -120,7 +120,7 @@ std::vector<int> llff_protocol(const std::vector<int>& usable) {
 // LLFF's scenes have a protocol that others publish figures for.
 std::vector<int> some_views(const Scene& scene, const std::vector<int>& usable) {
   std::vector<int> out;
-  if (scene.kind != "LLFF") out = choose_input_views(scene, usable, kInputs);
+  if (scene.kind != SceneKind::Llff) out = choose_input_views(scene, usable, kInputs);
   return out.empty() ? llff_protocol(usable) : out;
 }
 
@@ -280,7 +280,7 @@ Scene scene_of_photographs(const fs::path& folder,
                            const SceneOptions& options) {
   options.validate();
   Scene scene = scene_of_colmap({folder, options.allow_external}, model);
-  scene.kind = "photographs";
+  scene.kind = SceneKind::Photographs;
   for (const PhotoFile& photograph : list_photographs({folder, options.allow_external})) {
     scene.photographs.push_back(photograph.path.filename().string());
   }
