@@ -26,6 +26,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
 #include "libcgs/core/input_views.h"
+#include "libcgs/core/remedy.h"
 
 namespace cgs {
 
@@ -133,10 +134,12 @@ void choose_views(Scene& scene, const std::string& list, bool all_views) {
     for (const int i : scene.input) {
       const View& view = scene.views[static_cast<size_t>(i)];
       if (!view.image_path.empty()) continue;
-      throw InvalidInput("--views: view \"" + printable(view.name) + "\" has no image file");
+      throw WithRemedy<InvalidInput>(Remedy::ChosenViews,
+                                     "view \"" + printable(view.name) + "\" has no image file");
     }
     if (scene.input.size() < 2) {
-      throw InvalidInput("--views names one view; two or more are needed, from different places");
+      throw WithRemedy<InvalidInput>(
+          Remedy::ChosenViews, "one view is named; two or more are needed, from different places");
     }
   } else {
     const bool takes_all = all_views || usable.size() <= kTakeAll;

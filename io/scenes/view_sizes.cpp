@@ -110,7 +110,7 @@ std::vector<int> chosen_divisors(Scene& scene) {
                           size_text(largest.camera.width, largest.camera.height) +
                           " pixels are worked on at 1/" + std::to_string(common) +
                           " of their size" + (has_smaller ? ", smaller ones at more" : "") +
-                          "; --downscale 1 takes all of it, and longer");
+                          "; a downscale of 1 takes all of it, and longer");
   }
   return out;
 }
