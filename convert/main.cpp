@@ -21,6 +21,7 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/usage.h"
+#include "convert/text/advice.h"
 #include "convert/text/terminal.h"
 #include "libcgs/core/error.h"
 
@@ -173,7 +174,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "\ncgs: interrupted; finished stages are kept\n");
     return cgs::interrupt_exit_code();
   } catch (const cgs::Error& error) {
-    std::fprintf(stderr, "cgs: %s\n", error.what());
+    std::fprintf(stderr, "cgs: %s\n", cgs::words_of(error).c_str());
     return error.exit_code();
   } catch (const std::filesystem::filesystem_error& error) {
     if (error.code() == std::errc::not_enough_memory) end_without_memory();

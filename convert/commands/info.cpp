@@ -14,6 +14,7 @@
 #include "convert/model/views.h"
 #include "convert/scene/baselines.h"
 #include "convert/scene/scene_request.h"
+#include "convert/text/advice.h"
 #include "convert/text/frame_json.h"
 #include "convert/text/html.h"
 #include "io/bytes/json_file.h"
@@ -92,7 +93,7 @@ Json scene_json(const OpenedScene& opened, const Json& fit) {
   }
   Eigen::AlignedBox3d box;
   for (const View& view : scene.views) box.extend(view.camera.center());
-  return {{"kind", scene.kind},
+  return {{"kind", scene_kind_name(scene.kind)},
           {"counts",
            {{"views", scene.views.size()},
             {"input", scene.input.size()},
@@ -202,9 +203,9 @@ Json checked_cameras(OpenedScene& opened) {
   try {
     return camera_fit_to_json(check_stated_cameras(opened, quiet));
   } catch (const BadInput& error) {
-    reason = error.what();
+    reason = words_of(error);
   } catch (const LimitError& error) {
-    reason = error.what();
+    reason = words_of(error);
   }
   opened.scene.warnings.push_back("whether the cameras fit could not be told: " + reason);
   return nullptr;

@@ -141,7 +141,7 @@ std::vector<Camera> camera_path(const Model& model, const std::string& name, int
 std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Model& model) {
   Scene path = read_cameras_json(file);
   use_metres_where_measured(path);  // as read_model() does
-  const bool states_frame = path.kind != kForeignCameras;
+  const bool states_frame = path.kind != SceneKind::ForeignCameras;
   std::vector<Camera> out;
   for (const View& view : path.views) {
     Camera camera = view.camera;

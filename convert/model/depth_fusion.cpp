@@ -11,6 +11,7 @@
 #include "convert/model/depth_agreement.h"
 #include "convert/model/memory_plan.h"
 #include "convert/model/model.h"
+#include "convert/text/advice.h"
 #include "convert/text/html.h"
 #include "convert/text/length.h"
 #include "convert/text/stated_frame.h"
@@ -147,7 +148,7 @@ class Frames {
       out.depth_states_metres = true;
       if (with_color)
         out.image = ColorImage(out.camera.width, out.camera.height, Eigen::Vector3f::Zero());
-      warnings.push_back("view " + printable(out.name) + " is left out: " + error.what());
+      warnings.push_back("view " + printable(out.name) + " is left out: " + words_of(error));
     }
     const std::lock_guard lock(mutex_);
     warnings_.insert(warnings.begin(), warnings.end());

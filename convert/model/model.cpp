@@ -152,7 +152,7 @@ Model read_model(const std::filesystem::path& folder) {
 void use_metres_where_measured(Scene& scene) {
   const bool is_measured = scene.frame.scale_source == ScaleSource::KnownDistance ||
                            scene.frame.scale_source == ScaleSource::DepthSensor;
-  if (scene.kind == "photographs" && is_measured) scene.frame = in_metres(scene.frame);
+  if (scene.kind == SceneKind::Photographs && is_measured) scene.frame = in_metres(scene.frame);
 }
 
 Model read_model_as_written(const std::filesystem::path& folder) {
@@ -164,7 +164,7 @@ Model read_model_as_written(const std::filesystem::path& folder) {
   if (is_of_run) return read_model_as_written(folder / "model");
   Model model;
   model.scene = read_cameras_json(folder / "cameras.json");
-  const bool has_frame = model.scene.kind != kForeignCameras;
+  const bool has_frame = model.scene.kind != SceneKind::ForeignCameras;
   const auto frame = has_frame ? std::optional(model.scene.frame) : std::nullopt;
   GaussianFile file = read_gaussian_ply(folder / "gaussians.ply", frame);
   if (!has_frame) move_foreign_cameras(model.scene, file);

@@ -216,7 +216,7 @@ Json report_json(const Run& run) {
     notes.push_back(view.at("words").get<std::string>());
   }
   Json out = {{"program", kProgramVersion},
-              {"scene", run.scene.kind},
+              {"scene", scene_kind_name(run.scene.kind)},
               {"folder", run.request.scene.path.string()},
               {"units", scene.frame.unit_name()},
               {"scale_source", scale_source_name(scene.frame.scale_source)},

@@ -9,6 +9,7 @@
 #include "convert/run/recorded_request.h"
 #include "convert/run/request_fields.h"
 #include "convert/run/run_record.h"
+#include "convert/text/advice.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/byte_reader.h"
 #include "io/bytes/content_hash.h"
@@ -50,7 +51,7 @@ void verify_inputs(const Json& record,
     } catch (const Cancelled&) {
       throw;
     } catch (const Error& error) {
-      out.differing.push_back(std::string(kInput) + error.what());
+      out.differing.push_back(std::string(kInput) + words_of(error));
       return OpenedScene();
     }
   }();

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/model/model.h"
+#include "convert/text/advice.h"
 #include "convert/text/frame_json.h"
 #include "convert/text/html.h"
 #include "convert/text/length.h"
@@ -227,7 +228,7 @@ ControlFit checked_fit(const std::vector<Sighted>& points, const std::filesystem
   try {
     return fit_control(pairs_of(points));
   } catch (const NumericalError& error) {
-    std::string text = error.what();
+    std::string text = words_of(error);
     for (const Sighted& s : points) {
       if (s.meeting || s.point.is_check) continue;
       text += "; not used: \"" + printable(s.point.name) + "\", " + s.remark;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -289,12 +290,12 @@ Attempt solved_photos(MaskIndex& masks,
                       double focal,
                       Terminal& terminal) {
   std::optional<Attempt> first;
-  std::optional<NumericalError> failure;
+  std::exception_ptr failure;
   const Progress progress = terminal.begin("cameras of photographs");
   try {
     first = attempted(masks, photographs, focal, false, progress);
-  } catch (const NumericalError& error) {
-    failure = error;
+  } catch (const NumericalError&) {
+    failure = std::current_exception();
   }
   terminal.end(first ? attempt_text(*first) : "not found");
   if (first && first->placed() == photographs.size()) return std::move(*first);
@@ -306,7 +307,7 @@ Attempt solved_photos(MaskIndex& masks,
   } catch (const NumericalError&) {
     terminal.end("not found");
   }
-  if (failure) throw *failure;
+  if (failure) std::rethrow_exception(failure);
   return std::move(*first);
 }
 

@@ -126,7 +126,7 @@ OpenedScene open_scene(const SceneRequest& request,
     out.scene = read_scene(request.path, request.options);
     if (request.focal > 0) {
       throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
-                         " states them (" + out.scene.kind + ")");
+                         " states them (" + scene_kind_name(out.scene.kind) + ")");
     }
     warn_of_turned(out.scene);
     if (request.refine_poses) refine(model, terminal, out);

@@ -18,6 +18,7 @@
 #include "convert/run/request_fields.h"
 #include "convert/run/run_record.h"
 #include "convert/run/run_stages.h"
+#include "convert/text/advice.h"
 #include "convert/tradeoff/tradeoff_stages.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/content_hash.h"
@@ -75,11 +76,11 @@ Json stage(Bench& bench, const std::string& key, const std::string& title, const
     throw;
   } catch (const LimitError& error) {
     if (!bench.standard_is_done()) throw;
-    result = {{"failed", error.what()}};
+    result = {{"failed", words_of(error)}};
     is_lasting = false;
   } catch (const Error& error) {
     if (!bench.standard_is_done()) throw;
-    result = {{"failed", error.what()}};
+    result = {{"failed", words_of(error)}};
   } catch (const std::bad_alloc&) {
     if (!bench.standard_is_done()) throw;
     result = {{"failed", "out of memory"}};

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "io/bytes/byte_reader.h"
+#include "libcgs/core/remedy.h"
 
 namespace cgs {
 
@@ -45,24 +46,30 @@ fs::path resolve_in_scene(const SceneRoot& root, std::string_view name, const fs
   const auto refuse = [&](const std::string& reason) {
     throw BadInput(Defect::Path, named_in, "\"" + printable(fs::path(name)) + "\" " + reason);
   };
-  const std::string advice = "; allow it with --allow-external if you trust the data set";
+  const auto refuse_external = [&](const std::string& reason) {
+    throw WithRemedy<BadInput>(Remedy::ExternalFiles,
+                               Defect::Path,
+                               named_in,
+                               "\"" + printable(fs::path(name)) + "\" " + reason +
+                                   "; external files can be allowed if you trust the data set");
+  };
   if (name.empty()) refuse("is an empty path");
   if (name.find('\0') != std::string_view::npos) refuse("contains a NUL byte");
   if (looks_like_url(name)) refuse("is a URL; only local files are read");
   const fs::path path(name);
   fs::path joined = root.folder / path;  // an absolute path replaces the folder
   if (root.allow_external) return joined;
-  if (path.is_absolute()) refuse("is an absolute path" + advice);
+  if (path.is_absolute()) refuse_external("is an absolute path");
   const fs::path normal = path.lexically_normal();
   if (!normal.empty() && *normal.begin() == "..")
-    refuse("escapes the folder of the scene" + advice);
+    refuse_external("escapes the folder of the scene");
   std::error_code error;
   const fs::path folder = fs::weakly_canonical(root.folder, error);
   const fs::path target = error ? fs::path() : fs::weakly_canonical(joined, error);
   if (error == std::errc::not_enough_memory) throw std::bad_alloc();
   if (error) refuse("cannot be followed: " + error.message());
   if (!is_beneath(target, folder)) {
-    refuse("escapes the folder of the scene through a symbolic link" + advice);
+    refuse_external("escapes the folder of the scene through a symbolic link");
   }
   return joined;
 }

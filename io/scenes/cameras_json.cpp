@@ -30,7 +30,7 @@ Json frame_json(const Scene& scene) {
               {"metres_sigma", frame.metres_sigma},
               {"scale_source", scale_source_name(frame.scale_source)},
               {"up", vector_json(frame.up)},
-              {"kind", scene.kind},
+              {"kind", scene_kind_name(scene.kind)},
               {"folder", std::filesystem::absolute(scene.folder).lexically_normal().string()}};
   if (!scene.photographs.empty()) out["photographs"] = scene.photographs;
   return out;
@@ -120,7 +120,7 @@ void read_frame(const JsonValue& value, Scene& scene) {
   } catch (const InvalidInput& error) {
     value.fail(Defect::Value, error.what());
   }
-  scene.kind = value.at("kind").text();
+  scene.kind = scene_kind_of(value.at("kind").text());
   scene.folder = value.at("folder").text();
   // Numbers of views count them, those that have no camera, too.
   if (const auto names = value.find("photographs")) {
@@ -275,7 +275,7 @@ Scene read_cameras_json(const std::filesystem::path& path, std::vector<std::stri
     throw LimitError(printable(path) + ": " + std::to_string(entries.size()) + " cameras");
   }
   Scene scene;
-  scene.kind = kForeignCameras;
+  scene.kind = SceneKind::ForeignCameras;
   scene.folder = path.parent_path();
   const auto frame = entries.at(size_t{0}).find("frame");
   if (frame) read_frame(*frame, scene);

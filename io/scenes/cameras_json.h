@@ -9,9 +9,6 @@
 
 namespace cgs {
 
-/// Scene::kind of files that state no frame.
-constexpr const char* kForeignCameras = "cameras.json";
-
 /// Writes the cameras of a scene in the layout of 3D Gaussian Splatting: an array of {id, img_name,
 /// width, height, position, rotation, fx, fy}, position and rotation being world_from_cam in file
 /// coordinates (Frame::file_from_internal), rotation as rows.
@@ -27,10 +24,10 @@ void write_cameras_json(const std::filesystem::path& path, const Scene& scene);
 /// internal cameras come back bit for bit. A position that was edited in the file counts.
 ///
 /// In files of other programs the principal point is the centre, the frame the identity, the kind
-/// kForeignCameras, and neither input nor held-out views are known; of "cam1/0.png" the view is
-/// cam1_0.png. Images that no longer exist are listed as missing.
-/// \param names  gets the name of each view as the file has it
-/// \throws BadInput Syntax, Schema, Value, naming the JSON pointer; Empty (no camera); LimitError.
+/// SceneKind::ForeignCameras, and neither input nor held-out views are known; of "cam1/0.png" the
+/// view is cam1_0.png. Images that no longer exist are listed as missing. \param names  gets the
+/// name of each view as the file has it \throws BadInput Syntax, Schema, Value, naming the JSON
+/// pointer; Empty (no camera); LimitError.
 Scene read_cameras_json(const std::filesystem::path& path,
                         std::vector<std::string>* names = nullptr);
 

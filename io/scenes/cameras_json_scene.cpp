@@ -43,7 +43,7 @@ Scene read_cameras_json_scene(const SceneRoot& root) {
   std::vector<std::string> names;
   Scene scene = read_cameras_json(resolve_in_scene(root, kName, root.folder), &names);
   PhotographIndex photographs(root);
-  scene.kind = kName;
+  scene.kind = SceneKind::CamerasJson;
   scene.folder = root.folder;
   scene.input.clear();
   scene.held_out.clear();

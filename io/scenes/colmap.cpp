@@ -187,7 +187,7 @@ Scene read_colmap(const SceneRoot& root) {
   const std::optional<fs::path> folder = model_folder(root.folder);
   if (!folder) throw BadInput(Defect::Schema, root.folder, "no COLMAP model");
   Scene scene;
-  scene.kind = "COLMAP";
+  scene.kind = SceneKind::Colmap;
   scene.folder = root.folder;
   const ColmapModel model =
       read_model(resolve_in_scene(root, folder->string(), root.folder), scene);
@@ -197,7 +197,7 @@ Scene read_colmap(const SceneRoot& root) {
 
 Scene scene_of_colmap(const SceneRoot& root, const ColmapModel& model) {
   Scene scene;
-  scene.kind = "COLMAP";
+  scene.kind = SceneKind::Colmap;
   scene.folder = root.folder;
   add_model(root, ".", model, scene);
   return scene;

@@ -18,6 +18,7 @@
 #include "io/scenes/orientation.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/nan.h"
+#include "libcgs/core/remedy.h"
 
 namespace cgs {
 
@@ -261,9 +262,10 @@ void check_colmap_maps(Scene& scene) {
   const auto first = std::find_if(scene.input.begin(), scene.input.end(), is_map);
   if (first == scene.input.end()) return;
   if (scene.depth_kind == DepthKind::Metric || scene.depth_scale > 0) {
-    throw InvalidInput(
-        "depth maps of COLMAP are in units of the scene, not in metres: leave --depth-kind metric "
-        "and --depth-scale out; --assume-unit tells the scale");
+    throw WithRemedy<InvalidInput>(
+        Remedy::SceneUnit,
+        "depth maps of COLMAP are in units of the scene, not in metres: neither is their kind "
+        "metric, nor have they a scale of their own; the unit of the cameras tells the scale");
   }
   const fs::path& map = scene.views[static_cast<size_t>(*first)].depth_path;
   const auto shaped_them = [&](int i) {
@@ -297,7 +299,8 @@ void leave_out_files(Scene& scene) {
     view.depth_path.clear();
   }
   if (count == 0 && !is_folder(scene.folder / "depth")) return;
-  scene.warnings.emplace_back("the depth files of this scene are not used, as --depth-model is");
+  scene.warnings.emplace_back(
+      "the depth files of this scene are not used, as a network guesses depth");
 }
 
 }  // namespace
@@ -320,7 +323,7 @@ void DepthOptions::validate() const {
 }
 
 fs::path confidence_file(const Scene& scene, const View& view, bool allow_external) {
-  if (scene.kind != "Polycam") return {};
+  if (scene.kind != SceneKind::Polycam) return {};
   const fs::path depth = view.depth_path.lexically_relative(scene.folder).parent_path();
   if (depth.filename() != "depth" || *depth.begin() == "..") return {};
   const fs::path name = depth.parent_path() / "confidence";
@@ -360,10 +363,12 @@ void find_given_depth(Scene& scene, const DepthOptions& options, bool allow_exte
                    ".geometric.bin of COLMAP");
   }
   if (count == 0 && (options.kind != DepthKind::Unknown || options.scale > 0)) {
-    throw BadInput(Defect::Missing,
-                   scene.folder,
-                   "has no depth for an input photograph, though its kind or scale was stated; a "
-                   "folder of depth is called 'depth', or is named by --depth");
+    throw WithRemedy<BadInput>(
+        Remedy::DepthFolder,
+        Defect::Missing,
+        scene.folder,
+        "has no depth for an input photograph, though its kind or scale was stated; a folder of "
+        "depth is called 'depth', or is named");
   }
   if (count == 0) return;
   check_colmap_maps(scene);

@@ -181,7 +181,7 @@ Scene read_llff(const SceneRoot& root) {
     throw BadInput(Defect::Schema, path, "expected shape (N,17), found (" + shape + ")");
   }
   Scene scene;
-  scene.kind = "LLFF";
+  scene.kind = SceneKind::Llff;
   scene.folder = root.folder;
   scene.views = views_of_rows(array, path);
   pair_with_images(root, scene);

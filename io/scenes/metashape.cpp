@@ -256,7 +256,7 @@ class MetashapeReader {
   explicit MetashapeReader(const SceneRoot& root)
       : file_(resolve_in_scene(root, xml_name(root.folder).value_or("cameras.xml"), root.folder)),
         photographs_(root) {
-    scene_.kind = "Metashape";
+    scene_.kind = SceneKind::Metashape;
     scene_.folder = root.folder;
   }
 

@@ -98,7 +98,7 @@ Scene read_polycam(const SceneRoot& root) {
     return resolve_in_scene(root, (base / name).lexically_normal().string(), root.folder);
   };
   Scene scene;
-  scene.kind = "Polycam";
+  scene.kind = SceneKind::Polycam;
   scene.folder = root.folder;
   scene.depth_kind = DepthKind::Metric;
   scene.frame.metres_per_unit = 1;

@@ -159,7 +159,7 @@ Scene read_realitycapture(const SceneRoot& root) {
   PhotographIndex photographs(root);
   const Refuse refuse = [&](Defect defect, const std::string& why) { lines.fail(defect, why); };
   Scene scene;
-  scene.kind = "RealityCapture";
+  scene.kind = SceneKind::RealityCapture;
   scene.folder = root.folder;
   scene.frame.up = Eigen::Vector3d::UnitZ();  // heading, pitch and altitude are about it
   while (const auto line = lines.next_data()) {

@@ -311,10 +311,10 @@ Scene read_rgbd_frames(const SceneRoot& root) {
   scene.frame.metres_sigma = kTrackedScale;
   size_t lost = 0;
   if (sequences(root.folder).empty()) {
-    scene.kind = "Open3D RGB-D";
+    scene.kind = SceneKind::Open3dRgbd;
     lost = read_open3d(root, scene);
   } else {
-    scene.kind = "RGB-D frames";
+    scene.kind = SceneKind::RgbdFrames;
     lost = read_frames(root, scene);
     if (!scene.views.empty()) set_cameras(root, scene);
   }

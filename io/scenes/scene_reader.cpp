@@ -26,6 +26,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
 #include "libcgs/core/input_views.h"
+#include "libcgs/core/remedy.h"
 
 namespace cgs {
 
@@ -120,7 +121,7 @@ std::vector<int> llff_protocol(const std::vector<int>& usable) {
 // LLFF's scenes have a protocol that others publish figures for.
 std::vector<int> some_views(const Scene& scene, const std::vector<int>& usable) {
   std::vector<int> out;
-  if (scene.kind != "LLFF") out = choose_input_views(scene, usable, kInputs);
+  if (scene.kind != SceneKind::Llff) out = choose_input_views(scene, usable, kInputs);
   return out.empty() ? llff_protocol(usable) : out;
 }
 
@@ -133,10 +134,12 @@ void choose_views(Scene& scene, const std::string& list, bool all_views) {
     for (const int i : scene.input) {
       const View& view = scene.views[static_cast<size_t>(i)];
       if (!view.image_path.empty()) continue;
-      throw InvalidInput("--views: view \"" + printable(view.name) + "\" has no image file");
+      throw WithRemedy<InvalidInput>(Remedy::ChosenViews,
+                                     "view \"" + printable(view.name) + "\" has no image file");
     }
     if (scene.input.size() < 2) {
-      throw InvalidInput("--views names one view; two or more are needed, from different places");
+      throw WithRemedy<InvalidInput>(
+          Remedy::ChosenViews, "one view is named; two or more are needed, from different places");
     }
   } else {
     const bool takes_all = all_views || usable.size() <= kTakeAll;
@@ -280,7 +283,7 @@ Scene scene_of_photographs(const fs::path& folder,
                            const SceneOptions& options) {
   options.validate();
   Scene scene = scene_of_colmap({folder, options.allow_external}, model);
-  scene.kind = "photographs";
+  scene.kind = SceneKind::Photographs;
   for (const PhotoFile& photograph : list_photographs({folder, options.allow_external})) {
     scene.photographs.push_back(photograph.path.filename().string());
   }

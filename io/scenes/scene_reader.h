@@ -53,7 +53,7 @@ struct SceneOptions {
 Scene read_scene(const std::filesystem::path& folder, const SceneOptions& options = {});
 
 /// The scene of photographs whose cameras were solved for, as read_scene() gives it for a folder
-/// that states them; `kind` is "photographs".
+/// that states them; `kind` is SceneKind::Photographs.
 ///
 /// \param folder  holds the photographs
 /// \throws Error as read_scene()

@@ -83,7 +83,7 @@ Scene read_strecha(const SceneRoot& root) {
   const std::optional<std::string> folder = camera_folder(root.folder);
   if (!folder) throw BadInput(Defect::Schema, root.folder, "no .camera files");
   Scene scene;
-  scene.kind = "Strecha";
+  scene.kind = SceneKind::Strecha;
   scene.folder = root.folder;
   const fs::path cameras = resolve_in_scene(root, *folder, root.folder);
   for (const std::string& name : camera_files(cameras)) {

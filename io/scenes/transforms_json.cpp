@@ -224,7 +224,7 @@ Scene read_transforms_json(const SceneRoot& root) {
   const JsonValue frames = document.at("frames");
   check_other_paths(root, document, path);
   Scene scene;
-  scene.kind = "transforms.json";
+  scene.kind = SceneKind::TransformsJson;
   scene.folder = root.folder;
   if (frames.size() == 0) frames.fail(Defect::Empty, "there are no frames");
   std::set<fs::path> seen;

@@ -8,6 +8,7 @@
 #include "io/bytes/byte_reader.h"
 #include "io/bytes/scene_path.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/remedy.h"
 #include "libcgs/core/utf8.h"
 
 namespace cgs {
@@ -102,18 +103,36 @@ int index_of(const Scene& scene, int view) {
   return found == all.end() ? view : static_cast<int>(found - all.begin());
 }
 
-int find_view(const Scene& scene, const std::string& word, const std::string& option) {
+namespace {
+
+// The one view that a word means, or why there is none such.
+struct FoundView {
+  int index = -1;
+  std::string refusal;
+};
+
+FoundView found_view(const Scene& scene, const std::string& word) {
   const std::vector<int> found = views_called(scene, word);
-  if (found.size() == 1) return found.front();
+  if (found.size() == 1) return {found.front(), ""};
   std::vector<std::string> names;
   if (found.empty()) {
     for (const View& view : scene.views) names.push_back(view.name);
-    throw InvalidInput(option + ": there is no view \"" + printable(word) + "\" among " +
-                       std::to_string(names.size()) + ": " + first_few(names));
+    return {-1,
+            "there is no view \"" + printable(word) + "\" among " + std::to_string(names.size()) +
+                ": " + first_few(names)};
   }
   for (const int i : found) names.push_back(scene.views[static_cast<size_t>(i)].name);
-  throw InvalidInput(option + ": \"" + printable(word) + "\" is the file of " +
-                     std::to_string(names.size()) + " views: " + first_few(names));
+  return {-1,
+          "\"" + printable(word) + "\" is the file of " + std::to_string(names.size()) +
+              " views: " + first_few(names)};
+}
+
+}  // namespace
+
+int find_view(const Scene& scene, const std::string& word, const std::string& option) {
+  const FoundView found = found_view(scene, word);
+  if (!found.refusal.empty()) throw InvalidInput(option + ": " + found.refusal);
+  return found.index;
 }
 
 std::vector<int> select_views(const Scene& scene, const std::string& list) {
@@ -124,10 +143,12 @@ std::vector<int> select_views(const Scene& scene, const std::string& list) {
     std::string token = list.substr(at, end - at);
     token.erase(0, token.find_first_not_of(' '));
     token.erase(token.find_last_not_of(' ') + 1);
-    const int view = find_view(scene, token, "--views");
+    const auto [view, refusal] = found_view(scene, token);
+    if (!refusal.empty()) throw WithRemedy<InvalidInput>(Remedy::ChosenViews, refusal);
     if (std::find(out.begin(), out.end(), view) != out.end()) {
       const std::string& name = scene.views[static_cast<size_t>(view)].name;
-      throw InvalidInput("--views: view \"" + printable(name) + "\" is named twice");
+      throw WithRemedy<InvalidInput>(Remedy::ChosenViews,
+                                     "view \"" + printable(name) + "\" is named twice");
     }
     out.push_back(view);
     at = end + 1;

@@ -39,7 +39,8 @@ void fit_cameras(Scene& scene) {
       camera = resized(camera, size.width, size.height);
     }
   }
-  const bool is_expected = scene.kind == "LLFF";  // states the size of the full photographs
+  const bool is_expected =
+      scene.kind == SceneKind::Llff;  // states the size of the full photographs
   if (rescaled > 0 && !is_expected) {
     scene.warnings.push_back(std::to_string(rescaled) +
                              " images are of another size than their camera states; intrinsics "
@@ -109,7 +110,7 @@ std::vector<int> chosen_divisors(Scene& scene) {
                           size_text(largest.camera.width, largest.camera.height) +
                           " pixels are worked on at 1/" + std::to_string(common) +
                           " of their size" + (has_smaller ? ", smaller ones at more" : "") +
-                          "; --downscale 1 takes all of it, and longer");
+                          "; a downscale of 1 takes all of it, and longer");
   }
   return out;
 }

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/core/scene.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -14,6 +17,21 @@
 namespace cgs {
 
 namespace {
+
+constexpr std::array<std::pair<SceneKind, const char*>, 13> kSceneKinds = {
+    {{SceneKind::Unknown, ""},
+     {SceneKind::Llff, "LLFF"},
+     {SceneKind::TransformsJson, "transforms.json"},
+     {SceneKind::Colmap, "COLMAP"},
+     {SceneKind::Strecha, "Strecha"},
+     {SceneKind::Polycam, "Polycam"},
+     {SceneKind::RgbdFrames, "RGB-D frames"},
+     {SceneKind::Open3dRgbd, "Open3D RGB-D"},
+     {SceneKind::Metashape, "Metashape"},
+     {SceneKind::RealityCapture, "RealityCapture"},
+     {SceneKind::CamerasJson, "cameras.json"},
+     {SceneKind::ForeignCameras, "cameras.json"},
+     {SceneKind::Photographs, "photographs"}}};
 
 constexpr double kOrderQuantile = 0.01;  // of sparse points trimmed on each side, as outliers
 
@@ -85,6 +103,16 @@ DepthRange range_of(const Scene& scene, int view, const std::function<double()>&
 }
 
 }  // namespace
+
+std::string scene_kind_name(SceneKind kind) {
+  return kSceneKinds.at(static_cast<size_t>(kind)).second;
+}
+
+SceneKind scene_kind_of(std::string_view name) {
+  const auto* const found = std::find_if(
+      kSceneKinds.begin(), kSceneKinds.end(), [&](const auto& row) { return row.second == name; });
+  return found == kSceneKinds.end() ? SceneKind::Unknown : found->first;
+}
 
 double median_baseline(const Scene& scene) {
   std::vector<double> lengths;

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "libcgs/core/camera.h"
@@ -23,6 +24,30 @@ enum class DepthKind : uint8_t {
   Relative,   ///< z-depth up to scale and offset, as networks guess it.
   Disparity,  ///< Inverse z-depth up to scale and offset, likewise.
 };
+
+/// Where the cameras of a scene are from.
+enum class SceneKind : uint8_t {
+  Unknown,
+  Llff,
+  TransformsJson,  ///< nerfstudio, NeRF
+  Colmap,
+  Strecha,
+  Polycam,
+  RgbdFrames,
+  Open3dRgbd,
+  Metashape,
+  RealityCapture,
+  CamerasJson,     ///< cameras.json of 3DGS, beside photographs; or any that states a frame.
+  ForeignCameras,  ///< cameras.json of another program, beside its splats: it states no frame.
+  Photographs,     ///< Solved for here, from photographs alone.
+};
+
+/// As files and people have it: "LLFF", "COLMAP", "photographs"; empty for Unknown. Both kinds of
+/// cameras.json have one name.
+std::string scene_kind_name(SceneKind kind);
+
+/// The first kind of that name; Unknown for others, as versions to come may have.
+SceneKind scene_kind_of(std::string_view name);
 
 /// One photograph and the camera that took it.
 struct View {
@@ -64,7 +89,7 @@ struct SparsePoint {
 /// Readers return it in world coordinates with the identity frame; to_canonical() moves it into
 /// its canonical frame, and everything after that works in internal units.
 struct Scene {
-  std::string kind;              ///< "LLFF", "COLMAP", "transforms.json", "Strecha".
+  SceneKind kind = SceneKind::Unknown;
   std::filesystem::path folder;  ///< What was opened.
   std::vector<View> views;       ///< All of them, sorted by name.
   /// Names of all photographs in their order, where some may have no camera; else empty.

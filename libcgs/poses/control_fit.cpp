@@ -13,6 +13,7 @@
 #include <ceres/ceres.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/remedy.h"
 #include "libcgs/core/split_mix.h"
 
 namespace cgs {
@@ -334,9 +335,10 @@ Places candidates_of(const std::vector<ControlPair>& pairs) {
     if (!pairs[i].is_check) out.push_back(i);
   }
   if (out.size() == 2) {
-    throw NumericalError(
+    throw WithRemedy<NumericalError>(
+        Remedy::KnownDistance,
         "2 control points can be used, at least 3 are needed that lie on no line; two points tell "
-        "only the scale, for which --known-distance is there");
+        "only the scale, as a known distance does");
   }
   if (out.size() < kFewest) {
     throw NumericalError(std::to_string(out.size()) +

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "libcgs/core/error.h"
 #include "libcgs/poses/resection.h"
 
 namespace cgs {
@@ -127,24 +126,26 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
     const double focal = scene.lenses[lens].focal / priors[lens].side;
     if (priors[lens].focal == 0 && !(focal >= kShortest && focal <= kLongest)) {
       constexpr double kFilm = 36;  // [mm] wide
-      throw NumericalError(undetermined_focal(
-          pairs, "they ask for a lens of " + decimals(kFilm * focal, 0) + " mm as on film"));
+      throw undetermined_focal(
+          pairs, "they ask for a lens of " + decimals(kFilm * focal, 0) + " mm as on film");
     }
     if (focal_sigmas[lens] <= kMostSigma) continue;
-    throw NumericalError(undetermined_focal(
+    throw undetermined_focal(
         pairs,
         std::isfinite(focal_sigmas[lens])
             ? "uncertain by " + decimals(100 * kFocalOptimism * focal_sigmas[lens], 0) + " %"
-            : ""));
+            : "");
   }
 }
 
-std::string undetermined_focal(const std::vector<PhotoPair>& pairs, const std::string& detail) {
+WithRemedy<NumericalError> undetermined_focal(const std::vector<PhotoPair>& pairs,
+                                              const std::string& detail) {
   constexpr double kPlanar = 0.9;
   const bool is_planar = share_on_planes(pairs) >= kPlanar;
-  return std::string("the focal length cannot be told from these photographs") +
-         (is_planar ? ", since what they share lies in one plane" : "") +
-         (detail.empty() ? "" : " (" + detail + ")") + "; give it with --focal, in pixels";
+  const std::string text = std::string("the focal length cannot be told from these photographs") +
+                           (is_planar ? ", since what they share lies in one plane" : "") +
+                           (detail.empty() ? "" : " (" + detail + ")") + "; state it, in pixels";
+  return WithRemedy<NumericalError>(Remedy::FocalLength, text);
 }
 
 std::string unexplained_matches(const std::vector<UnposedPhoto>& photos,

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "libcgs/core/error.h"
+#include "libcgs/core/remedy.h"
 #include "libcgs/poses/bundle_adjustment.h"
 #include "libcgs/poses/photo_pairs.h"
 
@@ -33,8 +35,9 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
                    const Reconstruction& scene,
                    const std::vector<double>& focal_sigmas);
 
-/// The reason to give where the photographs fit more than one focal length; `detail` may be empty.
-std::string undetermined_focal(const std::vector<PhotoPair>& pairs, const std::string& detail);
+/// The error where the photographs fit more than one focal length; `detail` may be empty.
+WithRemedy<NumericalError> undetermined_focal(const std::vector<PhotoPair>& pairs,
+                                              const std::string& detail);
 
 /// The reason to give where matches exist that no two cameras explain.
 std::string unexplained_matches(const std::vector<UnposedPhoto>& photos,

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <limits>
 #include <optional>
 
@@ -152,7 +153,7 @@ Attempt best_attempt(const std::vector<int>& lens_of,
         return a.error < b.error;
       });
   if (best.begun && has_rival(best, attempts, priors)) {
-    throw NumericalError(undetermined_focal(pairs, "several explain them equally well"));
+    throw undetermined_focal(pairs, "several explain them equally well");
   }
   return best;
 }
@@ -352,12 +353,12 @@ PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress
   report(progress, 0.5);
   PoseSolution out;
   std::optional<std::vector<UnposedPhoto>> relaxed;
-  std::optional<NumericalError> failure;
+  std::exception_ptr failure;
   try {
     out = solve(photos, matched, part_of(progress, 0.5, 0.9));
     relaxed = without_refuted(photos, out);
-  } catch (const NumericalError& error) {
-    failure = error;
+  } catch (const NumericalError&) {
+    failure = std::current_exception();
     relaxed = without_stated(photos);  // a lens far from what is stated may be why
     if (!relaxed) throw;
   }
@@ -368,7 +369,7 @@ PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress
         out.photos[i].is_refuted = photos[i].focal > 0 && (*relaxed)[i].focal == 0;
       }
     } catch (const NumericalError&) {
-      if (failure) throw *failure;
+      if (failure) std::rethrow_exception(failure);
       // the photographs tell less than what was known of the lens: that stays
     }
   }

@@ -11,6 +11,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/core/remedy.h"
 #include "libcgs/core/split_mix.h"
 #include "libcgs/train/learning_rate.h"
 
@@ -357,8 +358,9 @@ StepReport Trainer::step() {
   // The state is still that of the last good step; a NaN in every parameter would look like a
   // result.
   if (!std::isfinite(report.total())) {
-    throw NumericalError("the loss is not finite in step " + std::to_string(step_ + 1) +
-                         " of the training; --set steps=0 leaves it out");
+    throw WithRemedy<NumericalError>(Remedy::NoTraining,
+                                     "the loss is not finite in step " + std::to_string(step_ + 1) +
+                                         " of the training; a training of 0 steps leaves it out");
   }
   report.skipped = update();
   ++step_;

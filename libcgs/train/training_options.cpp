@@ -196,7 +196,7 @@ TrainingOptions training_preset(std::string_view name) {
     return options;
   }
   if (name == "reference") return reference_options();
-  throw InvalidInput("--preset must be draft, standard, fine or reference, but is " +
+  throw InvalidInput("the preset must be draft, standard, fine or reference, but is " +
                      std::string(name));
 }
 

@@ -9,6 +9,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/core/remedy.h"
 #include "meshing/mesh/measured_value.h"
 
 namespace cgs {
@@ -54,9 +55,10 @@ std::vector<Pair> pairs(const std::vector<Eigen::Vector3d>& points,
   out.erase(std::remove_if(out.begin(), out.end(), [](const Pair& p) { return !p.counts; }),
             out.end());
   if (out.size() < kFewestPoints) {
-    throw NumericalError(
-        "the surfaces hardly meet where both were seen; lay them onto each other "
-        "first, and compare without --icp");
+    throw WithRemedy<NumericalError>(
+        Remedy::NoRegistration,
+        "the surfaces hardly meet where both were seen; lay them onto each other first, and "
+        "compare them as they lie");
   }
   return out;
 }
@@ -124,10 +126,11 @@ Vector7 step(const std::vector<Pair>& all,
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(part);
   constexpr double kSliding = 1e-8;
   if (!(eigen.eigenvalues()[0] > kSliding * eigen.eigenvalues()[unknowns - 1])) {
-    throw NumericalError(
+    throw WithRemedy<NumericalError>(
+        Remedy::NoRegistration,
         "the surfaces do not hold each other in every direction: a plane, a ball or a tube slides, "
         "and so do surfaces that hardly meet, being of other units or elsewhere; lay them onto "
-        "each other first, and compare without --icp");
+        "each other first, and compare them as they lie");
   }
   Vector7 out = Vector7::Zero();
   out.head(unknowns) = part.ldlt().solve(right.head(unknowns));

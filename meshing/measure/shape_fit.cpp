@@ -333,7 +333,7 @@ Fitted solve(Shape shape,
   if (samples.size() <= static_cast<size_t>(parameter_count(shape)) ||
       !out.parameters.allFinite() || !is_determined(shape, out.at)) {
     throw NumericalError(
-        "the surface within the ball does not determine this shape; take a larger --radius or "
+        "the surface within the ball does not determine this shape; take a larger radius or "
         "another shape");
   }
   return out;

@@ -13,6 +13,7 @@
 #include <openvdb/tools/SignedFloodFill.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/remedy.h"
 #include "meshing/mesh/certificate.h"
 #include "meshing/mesh/point_normals.h"
 #include "meshing/points/down_sampling.h"
@@ -242,10 +243,10 @@ double grid_spacing(const std::vector<LinearPart>& parts,
   if (is_stated && faces <= kMostFaces) return spacing;
   const std::string count = std::to_string(static_cast<uint64_t>(std::min(faces, 1e18)));
   if (!is_stated) {
-    throw LimitError("closing all gaps as finely as the points lie would take about " + count +
-                     " faces, most of them far from any point; remove what lies apart (--op "
-                     "statistical-outliers=NEIGHBOURS,SIGMAS) or state a spacing (--op "
-                     "poisson=SPACING)");
+    throw WithRemedy<LimitError>(
+        Remedy::PoissonSpacing,
+        "closing all gaps as finely as the points lie would take about " + count +
+            " faces, most of them far from any point; remove what lies apart or state a spacing");
   }
   throw LimitError("Poisson's surface would have about " + count +
                    " faces, allowed are 20000000; state a spacing " +

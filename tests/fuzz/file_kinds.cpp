@@ -350,7 +350,7 @@ void add_scene_descriptions(Kinds& kinds) {
 
 Scene two_cameras(Folder folder) {
   Scene scene;
-  scene.kind = "LLFF";
+  scene.kind = SceneKind::Llff;
   scene.folder = folder;
   scene.frame = centimetre_frame();
   for (int i = 0; i < 2; ++i) {

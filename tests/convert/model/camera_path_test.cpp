@@ -121,7 +121,7 @@ TEST(CameraPath, OfAFileIsInTheCoordinatesOfTheModelsFiles) {
 // cameras that were solved for.
 TEST(CameraPath, OfTheModelItselfIsWhereItsCamerasAre) {
   Model model = row_of_cameras();
-  model.scene.kind = "photographs";
+  model.scene.kind = SceneKind::Photographs;
   model.scene.folder = "somewhere";
   model.scene.frame.metres_per_unit = 3.5;
   model.scene.frame.scale_source = ScaleSource::KnownDistance;

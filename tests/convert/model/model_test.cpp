@@ -147,6 +147,24 @@ TEST(RestateFrame, WritesSplatsAnewThatAnotherProgramChanged) {
   EXPECT_NE(test::read_bytes(dir / "gaussians.ply").find("comment up 1 0 0"), std::string::npos);
 }
 
+// The cameras of such scenes are in a file that states no frame, those of their models are not.
+TEST(ReadModel, RestoresCamerasOfAnySceneBitForBit) {
+  const test::TempDir dir;
+  Model model = model_of_one_view(dir.path());
+  const Eigen::Vector3d place(0.125, -0.25, 0.1);
+  model.scene.views[0].camera.world_from_cam.translation() = place;
+  model.scene.frame.scale = 8;
+  model.scene.frame.origin = {0.5, -5, 2};
+  for (int i = 0; i <= static_cast<int>(SceneKind::Photographs); ++i) {
+    model.scene.kind = static_cast<SceneKind>(i);
+    write_model(dir.path(), model);
+    const Scene back = read_model(dir.path()).scene;
+    EXPECT_EQ(back.views[0].camera.world_from_cam.translation(), place)
+        << scene_kind_name(model.scene.kind);
+    EXPECT_EQ(scene_kind_name(back.kind), scene_kind_name(model.scene.kind));
+  }
+}
+
 TEST(ReadModel, OfPhotographsAloneIsInMetresOnceSomethingMeasuredTellsTheirScale) {
   const test::TempDir dir;
   Model model;
@@ -163,7 +181,7 @@ TEST(ReadModel, OfPhotographsAloneIsInMetresOnceSomethingMeasuredTellsTheirScale
   frame.origin = {1, 2, 3};
   frame.up = Eigen::Vector3d::UnitY();
   frame.metres_per_unit = 0.3;
-  const auto read_with = [&](const std::string& kind, ScaleSource source) {
+  const auto read_with = [&](SceneKind kind, ScaleSource source) {
     model.scene.kind = kind;
     frame.scale_source = source;
     write_model(dir.path(), model);
@@ -171,7 +189,7 @@ TEST(ReadModel, OfPhotographsAloneIsInMetresOnceSomethingMeasuredTellsTheirScale
     return read_model(dir.path());
   };
   for (const ScaleSource source : {ScaleSource::KnownDistance, ScaleSource::DepthSensor}) {
-    const Model metric = read_with("photographs", source);
+    const Model metric = read_with(SceneKind::Photographs, source);
     EXPECT_EQ(metric.scene.frame.unit_name(), "m");
     EXPECT_DOUBLE_EQ(metric.scene.frame.scale, 4 * 0.3);
     for (size_t i = 0; i < model.gaussians.size(); ++i) {
@@ -179,9 +197,9 @@ TEST(ReadModel, OfPhotographsAloneIsInMetresOnceSomethingMeasuredTellsTheirScale
     }
   }
   // Somebody else knows these coordinates, or nobody measured anything.
-  EXPECT_EQ(read_with("COLMAP", ScaleSource::KnownDistance).scene.frame.scale, 4);
-  EXPECT_EQ(read_with("photographs", ScaleSource::Assumed).scene.frame.scale, 4);
-  EXPECT_EQ(read_with("photographs", ScaleSource::ControlPoints).scene.frame.scale, 4);
+  EXPECT_EQ(read_with(SceneKind::Colmap, ScaleSource::KnownDistance).scene.frame.scale, 4);
+  EXPECT_EQ(read_with(SceneKind::Photographs, ScaleSource::Assumed).scene.frame.scale, 4);
+  EXPECT_EQ(read_with(SceneKind::Photographs, ScaleSource::ControlPoints).scene.frame.scale, 4);
 }
 
 }  // namespace

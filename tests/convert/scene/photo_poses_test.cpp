@@ -63,7 +63,7 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
   }
   const PhotoPoses poses = solved(dir / "photos");
   const Scene scene = scene_of_photographs(dir / "photos", poses.model);
-  EXPECT_EQ(scene.kind, "photographs");
+  EXPECT_EQ(scene.kind, SceneKind::Photographs);
   EXPECT_FALSE(scene.frame.has_metric_scale());
   ASSERT_EQ(scene.views.size(), truth.size());
   const auto errors = test::pose_errors(cameras_of(scene), truth);

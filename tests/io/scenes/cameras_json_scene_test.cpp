@@ -31,7 +31,7 @@ TEST_F(CamerasJsonScene, ReadsWhatGaussianSplattingWrites) {
   EXPECT_FALSE(is_cameras_json(dir_.path()));
   test::write_bytes(dir_ / "cameras.json", kOther);
   const Scene scene = read_scene(dir_.path());
-  EXPECT_EQ(scene.kind, "cameras.json");
+  EXPECT_EQ(scene.kind, SceneKind::CamerasJson);
   ASSERT_EQ(scene.input.size(), 2u);
   // The photographs are twice the size of the cameras.
   const Eigen::Vector3d uvz = scene.views[0].camera.project({5, -1, -0.5});

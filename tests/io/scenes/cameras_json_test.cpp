@@ -19,7 +19,7 @@ using test::defect_of;
 
 Scene far_away_scene() {
   Scene scene;
-  scene.kind = "COLMAP";
+  scene.kind = SceneKind::Colmap;
   scene.folder = "/data/scene";
   for (int i = 0; i < 3; ++i) {
     View view;
@@ -90,7 +90,7 @@ TEST_F(CamerasJson, RestoresTheSceneBitForBit) {
   }
   EXPECT_EQ(out.input, scene.input);
   EXPECT_EQ(out.held_out, scene.held_out);
-  EXPECT_EQ(out.kind, "COLMAP");
+  EXPECT_EQ(out.kind, SceneKind::Colmap);
   EXPECT_EQ(out.frame.origin, scene.frame.origin);
   EXPECT_EQ(out.frame.scale, scene.frame.scale);
   EXPECT_EQ(out.frame.file_origin, scene.frame.file_origin);

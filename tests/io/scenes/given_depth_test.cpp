@@ -367,7 +367,7 @@ TEST_F(GivenDepthFiles, ThatANetworkReplacesAreNamed) {
   SceneOptions guessed;
   guessed.depth.network = dir_ / "network.onnx";
   EXPECT_TRUE(first(guessed).depth_path.empty());
-  EXPECT_NE(all_warnings_.find("are not used, as --depth-model is"), std::string::npos);
+  EXPECT_NE(all_warnings_.find("are not used, as a network guesses depth"), std::string::npos);
 }
 
 TEST(DepthOptions, RefusesAScaleOutOfRange) {

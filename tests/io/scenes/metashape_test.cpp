@@ -106,7 +106,7 @@ TEST_F(ReadMetashape, ProjectsAsTheManualSays) {
   const Scene scene = read(xml_);
   ASSERT_EQ(scene.views.size(), 2u);
   EXPECT_TRUE(scene.missing.empty());
-  EXPECT_EQ(scene.kind, "Metashape");
+  EXPECT_EQ(scene.kind, SceneKind::Metashape);
   for (const int i : {1, 2}) {
     const View& view = scene.views[static_cast<size_t>(i - 1)];
     EXPECT_EQ(view.image_path.filename(), "IMG_" + std::to_string(i) + ".png");

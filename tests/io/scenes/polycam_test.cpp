@@ -86,7 +86,7 @@ TEST_F(ReadPolycam, ProjectsAsArKitDoes) {
 
 TEST_F(ReadPolycam, BringsItsDepthInMetres) {
   Scene scene = read_scene(dir_.path());
-  EXPECT_EQ(scene.kind, "Polycam");
+  EXPECT_EQ(scene.kind, SceneKind::Polycam);
   load_images(scene, scene.input);
   EXPECT_EQ(scene.views[0].given_depth(30, 20), 1.5f);
   EXPECT_TRUE(scene.views[1].given_depth.empty());
@@ -125,7 +125,7 @@ TEST_F(ReadPolycam, TakesPlainCamerasWhereNoneAreCorrected) {
   EXPECT_EQ(read_polycam({dir_.path()}).views[0].camera.fx, 51.5);
   std::filesystem::remove_all(dir_ / "keyframes/corrected_images");
   EXPECT_EQ(read_polycam({dir_.path()}).views[0].camera.fx, 60);
-  EXPECT_EQ(read_scene(dir_ / "keyframes").kind, "Polycam");
+  EXPECT_EQ(read_scene(dir_ / "keyframes").kind, SceneKind::Polycam);
 }
 
 TEST_F(ReadPolycam, RefusesWhatItCannotUse) {

@@ -102,7 +102,7 @@ TEST_F(ReadRealityCapture, IsRecognisedByItsHeader) {
   EXPECT_FALSE(is_realitycapture(dir_.path()));
   read("#cameras 2\n" + kHeader + "\n" + kFirst + "\n" + kSecond + "\n");
   EXPECT_TRUE(is_realitycapture(dir_.path()));
-  EXPECT_EQ(read_scene(dir_.path()).kind, "RealityCapture");
+  EXPECT_EQ(read_scene(dir_.path()).kind, SceneKind::RealityCapture);
 }
 
 TEST_F(ReadRealityCapture, RefusesWhatItCannotUse) {

@@ -71,7 +71,7 @@ TEST_F(RgbdFrames, ReadsFramesBesideTheirIntrinsics) {
   write_frame("frame-000000", 0.5);
   write_frame("frame-000020", 1.5);
   Scene scene = read_scene(dir_.path());
-  EXPECT_EQ(scene.kind, "RGB-D frames");
+  EXPECT_EQ(scene.kind, SceneKind::RgbdFrames);
   ASSERT_EQ(scene.views.size(), 2u);
   EXPECT_EQ(scene.views[1].name, "frame-000020");
   expect_projects(scene.views[0], 0.5, 16, 12);
@@ -112,7 +112,7 @@ TEST_F(RgbdFrames, LeavesOutWhatLostTrack) {
 TEST_F(RgbdFrames, ReadsWhatOpen3dRecords) {
   write_open3d();
   Scene scene = read_scene(dir_.path());
-  EXPECT_EQ(scene.kind, "Open3D RGB-D");
+  EXPECT_EQ(scene.kind, SceneKind::Open3dRgbd);
   ASSERT_EQ(scene.views.size(), 2u);
   expect_projects(scene.views[0], 0.5, 15.5, 11.5);
   expect_projects(scene.views[1], 1.5, 15.5, 11.5);

@@ -44,7 +44,7 @@ TEST_F(ReadScene, SortsViewsByNameWithTheirCameras) {
   write(3);
   test::write_bytes(dir_ / "sparse/0/points3D.txt", "1 0 0 5 1 1 1 0.1 1 0 3 0\n");
   const Scene scene = read();
-  EXPECT_EQ(scene.kind, "COLMAP");
+  EXPECT_EQ(scene.kind, SceneKind::Colmap);
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(scene.views[i].name, "v0" + std::to_string(i));
     EXPECT_EQ(scene.views[i].camera.center().x(), double(i));
@@ -86,7 +86,7 @@ TEST_F(ReadScene, FollowsTheLlffProtocolAboveFourViewsOfLlff) {
   }
   test::write_bytes(dir_ / "poses_bounds.npy", test::npy_of_rows(rows));
   const Scene scene = read();
-  EXPECT_EQ(scene.kind, "LLFF");
+  EXPECT_EQ(scene.kind, SceneKind::Llff);
   EXPECT_EQ(scene.input, (Indices{1, 10, 19}));  // as published for the 20 views of "fern"
   EXPECT_EQ(scene.held_out.size(), 17u);
   EXPECT_EQ(scene.held_out[0], 0);

@@ -27,6 +27,19 @@ Scene converging_scene() {
   return scene;
 }
 
+TEST(SceneKind, IsToldByItsName) {
+  for (int i = 0; i <= static_cast<int>(SceneKind::Photographs); ++i) {
+    const auto kind = static_cast<SceneKind>(i);
+    const SceneKind told = scene_kind_of(scene_kind_name(kind));
+    if (kind != SceneKind::ForeignCameras) EXPECT_EQ(told, kind) << i;
+  }
+  EXPECT_EQ(scene_kind_name(SceneKind::Llff), "LLFF");
+  EXPECT_EQ(scene_kind_name(SceneKind::Photographs), "photographs");
+  // What was read of a file that states a frame is not foreign, whatever it was made from.
+  EXPECT_EQ(scene_kind_of(scene_kind_name(SceneKind::ForeignCameras)), SceneKind::CamerasJson);
+  EXPECT_EQ(scene_kind_of("of a version to come"), SceneKind::Unknown);
+}
+
 TEST(DepthRange, TakesTheViewsOwnBoundsFirst) {
   Scene scene = converging_scene();
   scene.views[1].near = 1.5;
