@@ -212,9 +212,6 @@ Json report_json(const Run& run) {
   std::vector<std::string> notes = run.scene.notes;
   const Json model = result_of(run, Stage::Model);
   for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
-  for (const Json& view : model.value("depth_of_views", Json::array())) {
-    notes.push_back(view.at("words").get<std::string>());
-  }
   Json out = {{"program", kProgramVersion},
               {"scene", scene_kind_name(run.scene.kind)},
               {"folder", run.request.scene.path.string()},
