@@ -23,7 +23,11 @@ constexpr double kWrongMatches = 2.5;  // [working pixels]
 
 // Cameras come divided by --downscale; going back leaves rounding, which poses and the key of what
 // is stored must not depend on.
-double without_rounding(double pixels) { return static_cast<double>(static_cast<float>(pixels)); }
+double without_rounding(double pixels) {
+  // By way of memory: GCC 12 drops the two conversions where it inlines them into camera_of_file().
+  const volatile float rounded = static_cast<float>(pixels);
+  return static_cast<double>(rounded);
+}
 
 void take_out_distortion(const LensMap& lens, const Camera& picture, PhotoFeatures& features) {
   size_t kept = 0;
@@ -58,7 +62,6 @@ double error_of(int photo, const std::vector<EpipolarFit>& fits) {
 
 Camera camera_of_file(const View& view) {
   Camera out = picture_camera(view);
-  // One by one: GCC 12 loses assignments through a list of their addresses where it inlines this.
   out.fx = without_rounding(out.fx);
   out.fy = without_rounding(out.fy);
   out.cx = without_rounding(out.cx);

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "libcgs/core/error.h"
+#include "tests/support/remedy_of_refusal.h"
 
 namespace cgs::control_fit_test {
 namespace {
@@ -213,7 +214,7 @@ std::string refusal(const std::vector<ControlPair>& all) {
 
 TEST(ControlFit, SaysWhatIsMissing) {
   std::vector<ControlPair> all = pairs(8, 0.002, 1);
-  EXPECT_NE(refusal({all[0], all[1]}).find("--known-distance"), std::string::npos);
+  EXPECT_EQ(test::remedy_of_refusal([&] { fit_control({all[0], all[1]}); }), Remedy::KnownDistance);
   EXPECT_NE(refusal({all[0]}).find("at least 3"), std::string::npos);
   std::vector<ControlPair> checks = all;
   for (size_t i = 2; i < checks.size(); ++i) checks[i].is_check = true;

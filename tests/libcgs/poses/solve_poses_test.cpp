@@ -8,6 +8,7 @@
 #include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
+#include "tests/support/remedy_of_refusal.h"
 #include "tests/support/unposed_photos.h"
 
 namespace cgs::solve_poses_test {
@@ -200,7 +201,9 @@ TEST(SolvePoses, RefusesAPlaneWhereTheFocalLengthIsUnknownButNotWhereItIsGiven) 
   scene.cameras.pop_back();
   const std::string reason = refusal(unposed_photos(scene));
   EXPECT_NE(reason.find("plane"), std::string::npos) << reason;
-  EXPECT_NE(reason.find("--focal"), std::string::npos) << reason;
+  EXPECT_NE(reason.find("state it"), std::string::npos) << reason;
+  EXPECT_EQ(test::remedy_of_refusal([&] { solve_poses(unposed_photos(scene)); }),
+            Remedy::FocalLength);
   scene.cameras = three_views().cameras;
   const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kFocal, 0));
   EXPECT_LT(pose_errors(cameras_of(solution), scene.cameras).rotation, 0.1);

@@ -10,6 +10,7 @@
 #include "libcgs/core/error.h"
 #include "meshing/mesh/certificate.h"
 #include "meshing/mesh/vertex_attributes.h"
+#include "tests/support/remedy_of_refusal.h"
 #include "tests/support/solid_meshes.h"
 #include "tests/support/sphere_cloud.h"
 
@@ -109,7 +110,8 @@ TEST(PoissonSurface, RefusesToLoseThePointsToOneFarAway) {
   cloud.support.push_back(3);
   cloud.sigma.push_back(0);
   const std::string refusal = refusal_of(cloud, {});
-  EXPECT_NE(refusal.find("--op statistical-outliers"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("remove what lies apart"), std::string::npos) << refusal;
+  EXPECT_EQ(test::remedy_of_refusal([&] { poisson_surface(cloud, {}); }), Remedy::PoissonSpacing);
   EXPECT_EQ(refusal_of(ball, {}), "none");
 }
 
