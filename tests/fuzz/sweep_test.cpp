@@ -7,7 +7,6 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <ostream>
@@ -19,6 +18,7 @@
 #include "io/bytes/sanitized.h"
 #include "libcgs/core/error.h"
 #include "tests/fuzz/file_kinds.h"
+#include "tests/support/full_sweep.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs {
@@ -48,11 +48,6 @@ void on_crash(int signal) {
   (void)!::write(STDERR_FILENO, "\n", 1);
   (void)std::signal(signal, SIG_DFL);
   (void)std::raise(signal);
-}
-
-bool is_full() {
-  const char* const wish = std::getenv("CGS_SWEEP");
-  return wish != nullptr && std::string(wish) == "full";
 }
 
 /// Totals over all formats, printed at the end.
@@ -125,7 +120,7 @@ TEST_P(Sweep, DamageIsReadOrRefused) {
   GetParam().write(dir_.path());
   ASSERT_NO_THROW(GetParam().read(dir_.path())) << "the valid twin";
   const std::string good = read_bytes(file_);
-  const size_t step = std::max<size_t>(1, good.size() / (is_full() ? 8192 : kShare));
+  const size_t step = std::max<size_t>(1, good.size() / (test::is_full_sweep() ? 8192 : kShare));
   for (size_t n = 0; n < good.size(); n += step) attempt(good.substr(0, n), "cut to", n);
   for (int kind = 0; kind < 6; ++kind) {
     // Not the same places for each kind.

@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <sstream>
@@ -11,6 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/support/full_sweep.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/solid_meshes.h"
 #include "tests/support/stereo_scene.h"
@@ -96,8 +96,7 @@ const std::vector<Cell>& cells() {
         {"T=1e3", Eigen::Vector3d(1e3, -1e3, 1e3)},
         {"T=UTM", Eigen::Vector3d(4.5e5, 5.4e6, 100)},
         {"T=ECEF", Eigen::Vector3d(-2.49e6, -4.68e6, 3.53e6)}};
-    const char* const wish = std::getenv("CGS_SWEEP");
-    const bool is_full = wish != nullptr && std::string_view(wish) == "full";
+    const bool is_full = is_full_sweep();
     std::vector<Cell> out;
     for (const auto& [name, move] : moves) {
       for (const double scale : {0x1p-20, 1e-6, 1e-3, 1.0, 1e3, 1e6, 0x1p20}) {
