@@ -11,6 +11,7 @@
 #include "convert/files/volume_file.h"
 #include "convert/model/depth_fusion.h"
 #include "convert/model/fusion.h"
+#include "convert/model/memory_plan.h"
 #include "convert/text/length.h"
 #include "io/bytes/json_file.h"
 #include "io/bytes/scene_path.h"
@@ -70,9 +71,9 @@ void run_fuse(const FuseArgs& args) {
     const Model model = read_model(request.scene);
     terminal.warn(model.scene.warnings);
     const FusedVolume fused = fuse_model(model,
-                                         {request.voxel_size,
+                                         {length_or_zero(request.voxel_size, model.scene.frame),
                                           args.estimated.value_or(EstimatedSurface::FillOnly),
-                                          request.memory_limit},
+                                          memory_budget(request.memory_limit)},
                                          terminal.begin("fuse"));
     write_volume(args.output, fused.volume, model.scene.frame);
     terminal.end("voxel " + format_length(fused.report.voxel_size, model.scene.frame));

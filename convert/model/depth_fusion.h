@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "convert/text/terminal.h"
 #include "io/scenes/scene_reader.h"
+#include "libcgs/core/progress.h"
 #include "meshing/volume/tsdf.h"
 
 namespace cgs {

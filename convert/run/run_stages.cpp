@@ -208,11 +208,13 @@ MeshFindings mesh_findings(const Json& report, const Frame& frame) {
 MeshesReport write_meshes(const Model& model, const RunRequest& request, const Progress& progress) {
   const Scene& scene = model.scene;
   const Frame& frame = scene.frame;
-  const double promise = request.max_error.empty() ? 0 : parse_length(request.max_error, frame);
-  FusedVolume fused =
-      fuse_model(model,
-                 {request.voxel_size, request.estimated, request.memory_limit, promise},
-                 part_of(progress, 0, 0.3));
+  const double promise = length_or_zero(request.max_error, frame);
+  FusedVolume fused = fuse_model(model,
+                                 {length_or_zero(request.voxel_size, frame),
+                                  request.estimated,
+                                  memory_budget(request.memory_limit),
+                                  promise},
+                                 part_of(progress, 0, 0.3));
   Surfaces surfaces;
   surfaces.open = open_surface(fused.volume, {});
   WatertightOptions closing;

@@ -148,8 +148,9 @@ Volume make_volume(const ConversionRequest& request,
   const Progress progress = terminal.begin("fuse");
   FusedVolume fused;
   if (source.model) {
-    const ModelFusion fusion = {.voxel_size = wanted.voxel_size,
-                                .memory_limit = wanted.memory_limit};
+    const ModelFusion fusion = {
+        .voxel_size = length_or_zero(wanted.voxel_size, source.model->scene.frame),
+        .memory_limit = memory_budget(wanted.memory_limit)};
     fused = fuse_model(*source.model, fusion, progress);
     report["fusion"] = fusion_to_json(fused.report, source.frame);
   } else {

@@ -63,6 +63,10 @@ double parse_length(const std::string& text, const Frame& frame) {
   return metres / frame.metres_per_unit / frame.scale;
 }
 
+double length_or_zero(const std::string& text, const Frame& frame) {
+  return text.empty() ? 0 : parse_length(text, frame);
+}
+
 double parse_coordinate(const std::string& text, const Frame& frame) {
   const bool is_negative = text.starts_with('-');
   const std::string size = is_negative ? text.substr(1) : text;

@@ -18,6 +18,9 @@ double metres_in(const std::string& unit);
 /// \throws InvalidInput for what is no positive length, or for a unit in a scene without scale.
 double parse_length(const std::string& text, const Frame& frame);
 
+/// The same of a length that may be left out: 0 for an empty text.
+double length_or_zero(const std::string& text, const Frame& frame);
+
 /// A coordinate, likewise, but of any sign, and zero.
 /// \return in units of the file, not internal
 double parse_coordinate(const std::string& text, const Frame& frame);

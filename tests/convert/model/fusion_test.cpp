@@ -1,140 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/model/fusion.h"
 
-#include <map>
-#include <string>
-
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "tests/support/depth_scenes.h"
-
 namespace cgs::fusion_test {
 namespace {
-
-using Eigen::Vector3d;
-
-// Places on the plane z = 0, of which two cameras look at all from z = -1.
-const Vector3d kMeasured(-0.25, 0.1, 0);
-const Vector3d kFramed(0, 0, 0);
-const Vector3d kAtBorder(0.36, 0.1, 0);
-const Vector3d kSky(-0.1, -0.27, 0);  // y points down
-
-DepthOrigin origin_at(const Vector3d& p) {
-  if (p.y() < -0.22) return DepthOrigin::Sky;
-  if (p.x() > 0.28) return DepthOrigin::Estimated;
-  if (p.head<2>().cwiseAbs().maxCoeff() < 0.08) return DepthOrigin::Estimated;
-  return p.x() < -0.35 ? DepthOrigin::Completed : DepthOrigin::Measured;
-}
-
-// A plane with an estimated patch amid what was measured, an estimated slab that goes on beyond
-// the pictures, and sky above.
-Model plane_below_sky() {
-  Model model;
-  for (const double x : {-0.1, 0.1}) {
-    View view;
-    view.name = x < 0 ? "left" : "right";
-    view.camera = test::camera_at({x, 0, -1}, {0, 0, 0}, 64);
-    const TsdfView seen = test::photographed(test::plane({0, 0, 1}, 0), view.camera);
-    ViewPriors priors;
-    priors.depth = seen.depth;
-    priors.sigma = DepthMap(seen.depth.width, seen.depth.height, 0.002f);
-    priors.origin = Raster<DepthOrigin>(seen.depth.width, seen.depth.height, DepthOrigin::Unknown);
-    for (int v = 0; v < seen.depth.height; ++v) {
-      for (int u = 0; u < seen.depth.width; ++u) {
-        float& depth = priors.depth(u, v);
-        priors.origin(u, v) = origin_at(view.camera.unproject(u + 0.5, v + 0.5, double(depth)));
-        if (priors.origin(u, v) == DepthOrigin::Sky) depth = 5;  // of a backdrop
-      }
-    }
-    model.scene.input.push_back(static_cast<int>(model.scene.views.size()));
-    model.scene.views.push_back(view);
-    model.priors.push_back(priors);
-  }
-  return model;
-}
-
-FusedVolume fused(EstimatedSurface estimated) {
-  return fuse_model(plane_below_sky(), {.voxel_size = "", .estimated = estimated}, {});
-}
-
-openvdb::Coord voxel_at(const Volume& volume, const Vector3d& p) {
-  return volume.state->transform().worldToIndexNodeCentered(openvdb::Vec3d(p.x(), p.y(), p.z()));
-}
-
-VoxelState state_at(const Volume& volume, const Vector3d& p) {
-  return static_cast<VoxelState>(volume.state->tree().getValue(voxel_at(volume, p)));
-}
-
-bool has_surface(const Volume& volume, const Vector3d& p) {
-  return volume.tsdf->tree().isValueOn(voxel_at(volume, p));
-}
-
-TEST(FuseModel, TakesEstimatedSurfaceAsItIsTold) {
-  const Volume keep = fused(EstimatedSurface::Keep).volume;
-  EXPECT_EQ(state_at(keep, kFramed), VoxelState::Estimated);
-  EXPECT_EQ(state_at(keep, kAtBorder), VoxelState::Estimated);
-  const Volume fill = fused(EstimatedSurface::FillOnly).volume;
-  EXPECT_EQ(state_at(fill, kFramed), VoxelState::Estimated);
-  EXPECT_FALSE(has_surface(fill, kAtBorder));
-  const Volume drop = fused(EstimatedSurface::Drop).volume;
-  EXPECT_FALSE(has_surface(drop, kFramed));
-  EXPECT_FALSE(has_surface(drop, kAtBorder));
-  for (const Volume& volume : {keep, fill, drop}) {
-    EXPECT_EQ(state_at(volume, kMeasured), VoxelState::Occupied);
-    EXPECT_EQ(volume.support->tree().getValue(voxel_at(volume, kMeasured)), 2);
-  }
-}
-
-TEST(FuseModel, CountsEstimatedVoxels) {
-  std::map<EstimatedSurface, TsdfReport> reports;
-  for (const auto& [name, estimated] : estimated_surfaces()) {
-    const FusedVolume all = fused(estimated);
-    reports[estimated] = all.report;
-    size_t count = 0;
-    for (auto at = all.volume.state->cbeginValueOn(); at; ++at) {
-      if (*at != int(VoxelState::Estimated)) continue;
-      ++count;
-      ASSERT_TRUE(all.volume.tsdf->tree().isValueOn(at.getCoord()));
-    }
-    EXPECT_EQ(all.report.estimated, count) << name;
-    EXPECT_EQ(fusion_to_json(all.report, {})["voxels"]["estimated"], count) << name;
-    EXPECT_GT(all.report.occupied, 1000u) << name;
-  }
-  EXPECT_EQ(reports[EstimatedSurface::Drop].estimated, 0u);
-  EXPECT_GT(reports[EstimatedSurface::FillOnly].estimated, 0u);
-  EXPECT_GT(reports[EstimatedSurface::Keep].estimated,
-            2 * reports[EstimatedSurface::FillOnly].estimated);
-}
-
-// Whatever goes in, it is no evidence.
-TEST(FuseModel, GivesNoSupportToWhatIsEstimated) {
-  for (const EstimatedSurface estimated : {EstimatedSurface::Keep, EstimatedSurface::FillOnly}) {
-    const Volume volume = fused(estimated).volume;
-    for (auto at = volume.state->cbeginValueOn(); at; ++at) {
-      if (*at == int(VoxelState::Estimated)) {
-        ASSERT_EQ(volume.support->tree().getValue(at.getCoord()), 0);
-        ASSERT_FALSE(volume.sigma->tree().isValueOn(at.getCoord()));
-      } else if (*at == int(VoxelState::Occupied)) {
-        ASSERT_GT(volume.support->tree().getValue(at.getCoord()), 0);
-      }
-    }
-  }
-}
-
-TEST(FuseModel, SeesThroughTheSky) {
-  for (const auto& [name, estimated] : estimated_surfaces()) {
-    const Volume volume = fused(estimated).volume;
-    // Before, in and behind the plane.
-    for (const double z : {-0.05, 0.0, 0.05}) {
-      EXPECT_EQ(state_at(volume, kSky + Vector3d(0, 0, z)), VoxelState::Free) << name << ' ' << z;
-    }
-    EXPECT_LT(volume.bounds.max().z(), 1) << "the backdrop is none of what was fused";
-    for (auto at = volume.tsdf->cbeginValueOn(); at; ++at) {
-      ASSERT_GT(at.getCoord().y() * double(volume.voxel_size), -0.26) << name;
-    }
-  }
-}
 
 TEST(EstimatedSurfaces, HaveTheNamesOfTheCommandLine) {
   const std::map<std::string, EstimatedSurface> expected = {
@@ -142,6 +13,15 @@ TEST(EstimatedSurfaces, HaveTheNamesOfTheCommandLine) {
       {"fill-only", EstimatedSurface::FillOnly},
       {"drop", EstimatedSurface::Drop}};
   EXPECT_EQ(estimated_surfaces(), expected);
+}
+
+TEST(FusionToJson, TellsEstimatedVoxelsApartFromOccupiedOnes) {
+  TsdfReport report;
+  report.occupied = 5;
+  report.estimated = 3;
+  const nlohmann::ordered_json voxels = fusion_to_json(report, {})["voxels"];
+  EXPECT_EQ(voxels["occupied"], 5);
+  EXPECT_EQ(voxels["estimated"], 3);
 }
 
 }  // namespace

@@ -20,6 +20,13 @@ TEST(ParseLength, BareNumbersAreSceneUnits) {
   EXPECT_DOUBLE_EQ(parse_length("8", Frame{}), 8);
 }
 
+TEST(LengthOrZero, IsZeroWhereNothingIsStated) {
+  const Frame frame;
+  EXPECT_EQ(length_or_zero("", frame), 0);
+  EXPECT_EQ(length_or_zero("0.5", frame), parse_length("0.5", frame));
+  EXPECT_THROW((void)length_or_zero("0", frame), InvalidInput);
+}
+
 TEST(ParseLength, UnitsGoThroughMetres) {
   EXPECT_DOUBLE_EQ(parse_length("0.8cm", frame_in_millimetres()), 2);
   EXPECT_DOUBLE_EQ(parse_length("8 mm", frame_in_millimetres()), 2);
