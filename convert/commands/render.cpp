@@ -8,7 +8,7 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
-#include "convert/model/camera_path.h"
+#include "convert/model/camera_path_file.h"
 #include "convert/model/model.h"
 #include "convert/model/views.h"
 #include "convert/text/terminal.h"
@@ -16,6 +16,7 @@
 #include "io/bytes/scene_path.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
+#include "libcgs/reconstruct/camera_path.h"
 
 namespace cgs {
 

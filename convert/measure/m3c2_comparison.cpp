@@ -14,8 +14,8 @@
 #include "io/bytes/json_file.h"
 #include "io/meshes/mesh_ply.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/kd_tree.h"
 #include "libcgs/core/up_axis.h"
-#include "meshing/mesh/kd_tree.h"
 #include "meshing/mesh/point_normals.h"
 
 namespace cgs {

@@ -8,7 +8,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/model/depth_agreement.h"
 #include "convert/model/memory_plan.h"
 #include "convert/model/model.h"
 #include "convert/text/advice.h"
@@ -21,6 +20,7 @@
 #include "libcgs/core/nan.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/priors/given_depth.h"
+#include "meshing/volume/depth_agreement.h"
 
 namespace cgs {
 

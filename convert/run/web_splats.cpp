@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/model/views.h"
+#include "convert/splats/splat_reports.h"
 #include "io/bytes/atomic_file.h"
 #include "io/scenes/scene_reader.h"
 #include "io/splats/splat_glb.h"

@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/model/model.h"
-#include "convert/splats/splat_thinning.h"
 #include "io/splats/spz.h"
 #include "libcgs/core/progress.h"
+#include "libcgs/splats/splat_thinning.h"
 
 namespace cgs {
 

@@ -11,12 +11,12 @@
 #include "convert/model/fusion.h"
 #include "convert/model/memory_plan.h"
 #include "convert/model/model.h"
-#include "convert/splats/splat_selection.h"
 #include "convert/text/length.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/render/thin_sheets.h"
+#include "libcgs/splats/splat_selection.h"
 
 namespace cgs {
 

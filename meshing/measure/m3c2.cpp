@@ -11,8 +11,8 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/kd_tree.h"
 #include "libcgs/core/order_statistics.h"
-#include "meshing/mesh/kd_tree.h"
 
 namespace cgs {
 

@@ -10,10 +10,10 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/kd_tree.h"
 #include "libcgs/core/nan.h"
 #include "libcgs/core/order_statistics.h"
 #include "meshing/mesh/corner_shares.h"
-#include "meshing/mesh/kd_tree.h"
 #include "meshing/mesh/measured_value.h"
 #include "meshing/mesh/nearest_surface.h"
 #include "meshing/mesh/point_normals.h"

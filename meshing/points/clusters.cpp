@@ -8,7 +8,7 @@
 
 #include "libcgs/core/disjoint_sets.h"
 #include "libcgs/core/error.h"
-#include "meshing/mesh/kd_tree.h"
+#include "libcgs/core/kd_tree.h"
 
 namespace cgs {
 

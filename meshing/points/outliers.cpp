@@ -7,7 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "meshing/mesh/kd_tree.h"
+#include "libcgs/core/kd_tree.h"
 
 namespace cgs {
 

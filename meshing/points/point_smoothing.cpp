@@ -14,7 +14,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "meshing/mesh/kd_tree.h"
+#include "libcgs/core/kd_tree.h"
 #include "meshing/mesh/polygon_mesh.h"
 
 namespace cgs {

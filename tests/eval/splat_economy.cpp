@@ -17,7 +17,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/model/camera_path.h"
 #include "convert/model/model.h"
 #include "convert/model/views.h"
 #include "convert/run/web_splats.h"
@@ -27,6 +26,7 @@
 #include "io/splats/splat_glb.h"
 #include "io/splats/splat_reader.h"
 #include "io/splats/spz.h"
+#include "libcgs/reconstruct/camera_path.h"
 #include "libcgs/render/rasterizer.h"
 
 namespace {

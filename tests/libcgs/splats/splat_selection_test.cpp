@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "convert/splats/splat_selection.h"
+#include "libcgs/splats/splat_selection.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "convert/model/depth_agreement.h"
+#include "meshing/volume/depth_agreement.h"
 
 #include <algorithm>
 #include <array>

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "convert/splats/floaters.h"
+#include "libcgs/splats/floaters.h"
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
 
-#include <nlohmann/json.hpp>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/disjoint_sets.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/kd_tree.h"
 #include "libcgs/core/order_statistics.h"
-#include "meshing/mesh/kd_tree.h"
 
 namespace cgs {
 
@@ -363,16 +362,6 @@ Floaters find_floaters(const Gaussians& g) {
     out.keep[i] = kinds[i] == Kind::Surface || kinds[i] == Kind::Outside ? 1 : 0;
   }
   return out;
-}
-
-nlohmann::ordered_json floaters_to_json(const Floaters& f, const Frame& frame) {
-  return {{"removed", f.doubtful ? 0 : f.count()},
-          {"haze", f.haze},
-          {"needles", f.needles},
-          {"islands", f.islands},
-          {"not_judged", f.outside},
-          {"doubtful", f.doubtful},
-          {"cell", f.cell * frame.scale}};
 }
 
 std::string floaters_text(const Floaters& f) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "meshing/mesh/kd_tree.h"
+#include "libcgs/core/kd_tree.h"
 
 #include <algorithm>
 #include <random>

@@ -1,34 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "convert/model/camera_path.h"
+#include "libcgs/reconstruct/camera_path.h"
 
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
-#include "io/scenes/cameras_json.h"
 #include "libcgs/core/error.h"
-#include "tests/support/temp_dir.h"
+#include "tests/support/camera_row.h"
 
 namespace cgs::camera_path_test {
 namespace {
 
-/// Three cameras in a row, a metre apart, that look along +z at a wall five metres away; y is down.
-Model row_of_cameras() {
-  Model out;
-  for (int i = 0; i < 3; ++i) {
-    View view;
-    view.name = "v" + std::to_string(i);
-    view.camera = {40, 30, 50, 50, 20, 15, Eigen::Isometry3d::Identity()};
-    view.camera.world_from_cam.translation() << i - 1, 0, 0;
-    out.scene.views.push_back(view);
-    out.scene.input.push_back(i);
-    out.priors.emplace_back();
-    out.priors.back().depth = DepthMap(40, 30, 5);
-  }
-  out.scene.frame.up = -Eigen::Vector3d::UnitY();
-  return out;
-}
+using test::row_of_cameras;
 
 const Eigen::Vector3d kSubject(0, 0, 5);
 
@@ -91,47 +75,6 @@ TEST(CameraPath, BetweenVisitsEveryInputViewAndComesBack) {
   EXPECT_LT((path[1].center() - model.scene.views[1].camera.center()).norm(), 1e-9);
   EXPECT_LT((path[2].center() - model.scene.views[2].camera.center()).norm(), 1e-9);
   EXPECT_LT((path[3].center() - path[1].center()).norm(), 1e-9);
-}
-
-TEST(CameraPath, OfAFileIsInTheCoordinatesOfTheModelsFiles) {
-  Model model = row_of_cameras();
-  model.scene.folder = "somewhere";
-  model.scene.frame.scale = 4;
-  model.scene.frame.origin = {1024, -512, 64};
-  const test::TempDir dir;
-  write_cameras_json(dir / "path.json", model.scene);
-  const auto path = camera_path_from(dir / "path.json", model);
-  ASSERT_EQ(path.size(), 3u);
-  EXPECT_LT((path[2].center() - model.scene.views[2].camera.center()).norm(), 1e-9);
-  // A path of another model of the same place, whose files have another origin.
-  Model far = model;
-  far.scene.frame.file_origin = {1000, -500, 0};
-  const auto other = camera_path_from(dir / "path.json", far);
-  EXPECT_LT((other[2].center() - model.scene.views[2].camera.center()).norm(), 1e-9);
-  test::write_bytes(dir / "foreign.json",
-                    R"([{"id": 0, "img_name": "a", "width": 40, "height": 30, "fx": 50, "fy": 50,
-                         "position": [1028, -512, 64],
-                         "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}])");
-  const auto foreign = camera_path_from(dir / "foreign.json", model);
-  ASSERT_EQ(foreign.size(), 1u);
-  EXPECT_LT((foreign[0].center() - Eigen::Vector3d(1, 0, 0)).norm(), 1e-9);
-}
-
-// Photographs that a tape gave their scale: the model is in metres, its file in the unit of the
-// cameras that were solved for.
-TEST(CameraPath, OfTheModelItselfIsWhereItsCamerasAre) {
-  Model model = row_of_cameras();
-  model.scene.kind = SceneKind::Photographs;
-  model.scene.folder = "somewhere";
-  model.scene.frame.metres_per_unit = 3.5;
-  model.scene.frame.scale_source = ScaleSource::KnownDistance;
-  const test::TempDir dir;
-  write_cameras_json(dir / "cameras.json", model.scene);
-  use_metres_where_measured(model.scene);
-  const auto path = camera_path_from(dir / "cameras.json", model);
-  for (size_t i = 0; i < path.size(); ++i) {
-    EXPECT_LT((path[i].center() - model.scene.views[i].camera.center()).norm(), 1e-9);
-  }
 }
 
 TEST(CameraPath, RefusesWhatLeadsNowhere) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "convert/splats/splat_refit.h"
+#include "libcgs/splats/splat_refit.h"
 
 #include <algorithm>
 #include <cmath>

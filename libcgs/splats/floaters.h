@@ -3,11 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
-#include <nlohmann/json_fwd.hpp>
-
-#include "libcgs/core/frame.h"
 #include "libcgs/core/gaussians.h"
 
 namespace cgs {
@@ -41,10 +39,6 @@ struct Floaters {
 /// percentile of the splats of opacity 0.1 and more. Same bits for any number of threads.
 /// \throws InvalidInput if there are no Gaussians
 Floaters find_floaters(const Gaussians& gaussians);
-
-/// {"removed", "haze", "needles", "islands", "not_judged", "doubtful", "cell"}, the cell in file
-/// units.
-nlohmann::ordered_json floaters_to_json(const Floaters& floaters, const Frame& frame);
 
 /// "removed 312 of 7000 splats as floaters: 100 haze, …"
 std::string floaters_text(const Floaters& floaters);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "convert/splats/splat_merging.h"
+#include "libcgs/splats/splat_merging.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,12 +12,12 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "convert/splats/splat_selection.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/kd_tree.h"
 #include "libcgs/core/split_mix.h"
 #include "libcgs/render/projection.h"
 #include "libcgs/render/training_rasterizer.h"
-#include "meshing/mesh/kd_tree.h"
+#include "libcgs/splats/splat_selection.h"
 
 namespace cgs {
 

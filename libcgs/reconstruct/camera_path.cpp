@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "convert/model/camera_path.h"
+#include "libcgs/reconstruct/camera_path.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "io/scenes/cameras_json.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"
 
@@ -134,22 +133,6 @@ std::vector<Camera> camera_path(const Model& model, const std::string& name, int
     out.push_back(name == "between"  ? between(model, turn)
                   : name == "spiral" ? on_spiral(model, subject, turn)
                                      : on_orbit(model, subject, turn));
-  }
-  return out;
-}
-
-std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Model& model) {
-  Scene path = read_cameras_json(file);
-  use_metres_where_measured(path);  // as read_model() does
-  const bool states_frame = path.kind != SceneKind::ForeignCameras;
-  std::vector<Camera> out;
-  for (const View& view : path.views) {
-    Camera camera = view.camera;
-    const Frame& frame = model.scene.frame;  // whose coordinates in files may have another origin
-    camera.world_from_cam.translation() =
-        states_frame ? frame.internal_from_world(path.frame.world_from_internal(camera.center()))
-                     : frame.internal_from_file(camera.center());
-    out.push_back(camera);
   }
   return out;
 }

@@ -5,8 +5,6 @@
 #include <span>
 #include <vector>
 
-#include <nlohmann/json_fwd.hpp>
-
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/core/scene.h"
@@ -62,9 +60,5 @@ ThinnedSplats thin_splats(const Gaussians& gaussians,
                           const Scene& scene,
                           std::span<const size_t> counts,
                           const Progress& progress = {});
-
-/// {"kept", "of", "chosen", "most_loss_db", "unseen_psnr", "tried": [{"most_cost", "splats",
-/// "loss_db"}]}
-nlohmann::ordered_json thinning_to_json(const ThinnedSplats& thinned, size_t before);
 
 }  // namespace cgs

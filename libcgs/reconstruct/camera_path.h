@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "convert/model/model.h"
+#include "libcgs/reconstruct/model.h"
 
 namespace cgs {
 
@@ -21,9 +21,5 @@ namespace cgs {
 ///         NumericalError if no depth is known
 /// Source: Mildenhall et al. 2019, "Local Light Field Fusion", for the spiral.
 std::vector<Camera> camera_path(const Model& model, const std::string& name, int frames);
-
-/// The cameras of a file in the layout of cameras.json, in the coordinates of the files of a model.
-/// \throws BadInput as read_cameras_json()
-std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Model& model);
 
 }  // namespace cgs

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "convert/splats/splat_thinning.h"
+#include "libcgs/splats/splat_thinning.h"
 
 #include <algorithm>
 #include <array>
@@ -7,18 +7,14 @@
 #include <numeric>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
-#include "convert/model/model.h"
-#include "convert/splats/splat_merging.h"
-#include "convert/splats/splat_refit.h"
-#include "convert/splats/splat_selection.h"
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/reconstruct/model.h"
 #include "libcgs/render/rasterizer.h"
+#include "libcgs/splats/splat_merging.h"
+#include "libcgs/splats/splat_refit.h"
+#include "libcgs/splats/splat_selection.h"
 
 namespace cgs {
-
-using Json = nlohmann::ordered_json;
 
 namespace {
 
@@ -215,24 +211,6 @@ ThinnedSplats thin_splats(const Gaussians& gaussians,
   }
   if (!out.most_cost) out.splats = gaussians;
   report(progress, 1);
-  return out;
-}
-
-Json thinning_to_json(const ThinnedSplats& thinned, size_t before) {
-  Json out = {{"kept", thinned.splats.size()},
-              {"of", before},
-              {"chosen", nullptr},
-              {"most_loss_db", kMostThinningLoss},
-              {"unseen_psnr", nullptr},
-              {"tried", Json::array()}};
-  // Numbers of the ladder as they are written there, not as float has them.
-  const auto as_written = [](float cost) { return std::round(double(cost) * 1e6) / 1e6; };
-  if (thinned.most_cost) out["chosen"] = as_written(*thinned.most_cost);
-  if (thinned.unseen_psnr) out["unseen_psnr"] = *thinned.unseen_psnr;
-  for (const ThinningTrial& t : thinned.tried) {
-    out["tried"].push_back(
-        {{"most_cost", as_written(t.most_cost)}, {"splats", t.splats}, {"loss_db", t.loss}});
-  }
   return out;
 }
 
