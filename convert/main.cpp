@@ -61,7 +61,7 @@ int run_program(int argc, char** argv) {
   app.footer(kFooter);
   app.require_subcommand(1);
   app.failure_message(cgs::usage_message);
-  app.set_version_flag("--version", cgs::kProgramVersion);
+  app.set_version_flag("--version", cgs::program_version());
   cgs::add_run(app);
   cgs::add_info(app);
   cgs::add_train(app);

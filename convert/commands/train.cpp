@@ -58,16 +58,17 @@ void run_train(const TrainArgs& args) {
   keep_scene_apart(args.output, args.scene.path, {"priors", "colmap"});
   refuse_to_replace(args);
   Terminal terminal(args.common.quiet, args.common.strict);
-  std::vector<std::string> hitches;
-  const ModelRequest request = {{},
-                                training_options(args.training),
-                                args.output,
-                                args.scene.options.depth.network,
-                                !args.overwrite,
-                                [&](const Model& model, const PriorsReport& priors) {
-                                  terminal.note(coverage_words(priors, model.scene));
-                                },
-                                [&](const std::string& words) { hitches.push_back(words); }};
+  std::vector<std::string> checkpoint_warnings;
+  const ModelRequest request = {
+      {},
+      training_options(args.training),
+      args.output,
+      args.scene.options.depth.network,
+      !args.overwrite,
+      [&](const Model& model, const PriorsReport& priors) {
+        terminal.note(coverage_words(priors, model.scene));
+      },
+      [&](const std::string& words) { checkpoint_warnings.push_back(words); }};
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   check_training_memory(
       opened.scene, memory_budget(stated_memory_limit(args.common)), request.training.coherence);
@@ -109,7 +110,7 @@ void run_train(const TrainArgs& args) {
   for (const std::string& remark : remarks_on_photographs(report)) terminal.say(remark);
   if (args.common.json) std::cout << json_text(report) << "\n";
   terminal.warn(found);
-  terminal.warn(hitches);
+  terminal.warn(checkpoint_warnings);
 }
 
 }  // namespace

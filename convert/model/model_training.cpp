@@ -25,7 +25,7 @@ constexpr const char* kCheckpointName = "training";
 
 // Everything the training depends on.
 uint64_t training_key(const Model& model, const TrainingOptions& options, const Pane* pane) {
-  uint64_t key = content_hash(kProgramVersion);
+  uint64_t key = content_hash(program_version());
   for (const auto& [name, value] : training_fields(options)) {
     key = content_hash(value, content_hash(name, key));
   }
@@ -99,8 +99,8 @@ class TrainingCheckpoint {
   }
 
  private:
-  void tell(const std::string& hitch) const {
-    if (request_.hitch) request_.hitch(hitch);
+  void tell(const std::string& words) const {
+    if (request_.warn) request_.warn(words);
   }
 
   const ModelRequest& request_;

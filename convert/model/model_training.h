@@ -29,7 +29,7 @@ struct ModelRequest {
   /// throws ends the work.
   std::function<void(const Model&, const PriorsReport&)> inspect = {};
   /// Hears of a checkpoint that could not be read or written, which changes no result.
-  std::function<void(const std::string&)> hitch = {};
+  std::function<void(const std::string&)> warn = {};
 };
 
 /// reconstruct() of a scene from its files, going on from a checkpoint of the same work. If the

@@ -54,9 +54,9 @@ struct Run {
   // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
   // memory when it wrote them: a resumed run must give the bits of one that was not interrupted.
   std::optional<Model> model;
-  std::optional<TriangleMesh> mesh;  ///< Watertight.
-  std::vector<std::string> hitches;  ///< Of the stage that runs, for the terminal alone.
-  const Terminal& terminal;          ///< For what must be said before a stage ends.
+  std::optional<TriangleMesh> mesh;   ///< Watertight.
+  std::vector<std::string> warnings;  ///< Of the stage that runs, for the terminal alone.
+  const Terminal& terminal;           ///< For what must be said before a stage ends.
 };
 
 bool is_done(const Run& run, const StageFiles& stage) {
@@ -108,7 +108,7 @@ StageResult run_model(Run& run, const Progress& progress) {
     check_picks(run.distances, model);
     run.terminal.note(coverage_words(priors, model.scene));
   };
-  request.hitch = [&](const std::string& words) { run.hitches.push_back(words); };
+  request.warn = [&](const std::string& words) { run.warnings.push_back(words); };
   const TrainedModel trained = train_model(run.scene, request, progress);
   // Pixels were read for the first time: more may be odd than the cameras told.
   const std::vector<std::string>& found = trained.model.scene.warnings;
@@ -145,9 +145,10 @@ StageResult run_scale(Run& run, const Progress& progress) {
                       frame.metres_sigma != before.metres_sigma ||
                       frame.scale_source != before.scale_source || frame.up != before.up;
   if (is_new && !restate_frame(run.request.output / "model", model)) {
-    run.hitches.push_back(printable(run.request.output / "model/gaussians.ply") +
-                          " was changed by another program; with the scale it was written anew, as "
-                          "it was read");
+    run.warnings.push_back(
+        printable(run.request.output / "model/gaussians.ply") +
+        " was changed by another program; with the scale it was written anew, as "
+        "it was read");
   }
   use_metres_where_measured(model.scene);
   run.model = std::move(model);
@@ -212,7 +213,7 @@ Json report_json(const Run& run) {
   std::vector<std::string> notes = run.scene.notes;
   const Json model = result_of(run, Stage::Model);
   for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
-  Json out = {{"program", kProgramVersion},
+  Json out = {{"program", program_version()},
               {"scene", scene_kind_name(run.scene.kind)},
               {"folder", run.request.scene.path.string()},
               {"units", scene.frame.unit_name()},
@@ -309,7 +310,7 @@ void do_stage(const StageFiles& stage, Run& run, Terminal& terminal) {
   }
   run.record.finish(traits(stage.stage).name, seconds, result.report, outputs);
   warn_of(result.report, terminal);
-  terminal.warn(std::exchange(run.hitches, {}));
+  terminal.warn(std::exchange(run.warnings, {}));
 }
 
 FinishedRun run_stages(Run& run, Terminal& terminal) {

@@ -137,8 +137,9 @@ RunRecord::RunRecord(std::filesystem::path folder,
     // First, as a stage without its files is not done, whichever request the record states.
     if (readable) remove_files_of_others(folder_, old["stages"], stages);
   }
-  json_ = {
-      {"program", kProgramVersion}, {"request", std::move(request)}, {"stages", std::move(stages)}};
+  json_ = {{"program", program_version()},
+           {"request", std::move(request)},
+           {"stages", std::move(stages)}};
   save();
 }
 

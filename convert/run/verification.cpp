@@ -103,7 +103,7 @@ void remove_finished(const fs::path& fresh) {
   }
   const Json record = Json::parse(read_file(fresh / "run.json"), nullptr, false);
   const bool goes_on = record.is_object() && !record.contains("outputs") &&
-                       record.value("program", Json()) == Json(kProgramVersion);
+                       record.value("program", Json()) == Json(program_version());
   if (!goes_on) fs::remove_all(fresh);
 }
 

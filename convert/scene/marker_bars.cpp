@@ -23,17 +23,17 @@ constexpr double kCornerSigma = 0.2;  // [pixels of the photograph]
 constexpr double kCornerBias = 0.1;   // out of the marker or into it, as light and blur have it
 
 /// A marker in a photograph.
-struct MarkerSighting {
+struct MarkerObservation {
   std::array<SightRay, 4> rays;  // to its corners
   double side;                   // mean [pixels of the photograph]
 };
-using Sightings = std::vector<MarkerSighting>;
+using Observations = std::vector<MarkerObservation>;
 
 // Nothing where the lens cannot be undone.
-std::optional<MarkerSighting> sighting_of(const Marker& marker,
-                                          const LensMap& lens,
-                                          const Camera& picture) {
-  MarkerSighting out{};
+std::optional<MarkerObservation> observation_of(const Marker& marker,
+                                                const LensMap& lens,
+                                                const Camera& picture) {
+  MarkerObservation out{};
   for (size_t k = 0; k < 4; ++k) {
     const auto corner = lens(marker.corners.at(k));
     if (!corner) return std::nullopt;
@@ -43,29 +43,29 @@ std::optional<MarkerSighting> sighting_of(const Marker& marker,
   return out;
 }
 
-std::map<std::string, Sightings> sightings(const Scene& scene) {
-  std::map<std::string, Sightings> out;
+std::map<std::string, Observations> observations(const Scene& scene) {
+  std::map<std::string, Observations> out;
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
     const Camera picture = picture_camera(view);
     const LensMap lens(view, picture);
     for (const Marker& marker : find_markers(read_photograph(view))) {
-      const auto sighting = sighting_of(marker, lens, picture);
-      if (sighting) out[marker.name].push_back(*sighting);
+      const auto observation = observation_of(marker, lens, picture);
+      if (observation) out[marker.name].push_back(*observation);
     }
   }
   return out;
 }
 
-std::vector<SightRay> rays_to(const Sightings& seen, size_t corner) {
+std::vector<SightRay> rays_to(const Observations& seen, size_t corner) {
   std::vector<SightRay> out;
   out.reserve(seen.size());
-  for (const MarkerSighting& s : seen) out.push_back(s.rays.at(corner));
+  for (const MarkerObservation& s : seen) out.push_back(s.rays.at(corner));
   return out;
 }
 
 /// The mean side of a marker [internal units]; nothing where it is no square.
-std::optional<std::pair<double, double>> side_and_sigma(const Sightings& seen) {
+std::optional<std::pair<double, double>> side_and_sigma(const Observations& seen) {
   constexpr double kWorst = 15;  // [sigmas] of a corner: 3 pixels, also for cameras not quite right
   std::array<RayMeeting, 4> corners;
   for (size_t k = 0; k < 4; ++k) {
@@ -108,13 +108,13 @@ std::optional<std::pair<double, double>> side_and_sigma(const Sightings& seen) {
 }
 
 // Both ends of a side are shifted.
-double common_sigma(const Sightings& seen) {
+double common_sigma(const Observations& seen) {
   double sum = 0;
-  for (const MarkerSighting& s : seen) sum += 2 * kCornerBias / s.side;
+  for (const MarkerObservation& s : seen) sum += 2 * kCornerBias / s.side;
   return sum / double(seen.size());
 }
 
-[[noreturn]] void refuse(const std::map<std::string, Sightings>& seen) {
+[[noreturn]] void refuse(const std::map<std::string, Observations>& seen) {
   std::string text = "--marker-size: no square marker is shown by two input photographs; found: ";
   for (const auto& [name, places] : seen) {
     text += name + " in " + std::to_string(places.size()) +
@@ -133,7 +133,7 @@ double common_sigma(const Sightings& seen) {
 std::vector<MarkerBar> marker_bars(const Scene& scene, const std::string& size) {
   if (size.empty()) return {};
   const auto [known, known_sigma] = parse_metres_with_sigma(size);
-  const std::map<std::string, Sightings> seen = sightings(scene);
+  const std::map<std::string, Observations> seen = observations(scene);
   std::vector<MarkerBar> out;
   for (const auto& [name, places] : seen) {
     if (places.size() < 2) continue;

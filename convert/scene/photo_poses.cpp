@@ -64,7 +64,7 @@ std::string inputs_text(MaskIndex& masks, const std::vector<PhotoFile>& photogra
     const std::filesystem::path mask = masks.mask_of(photograph.path);
     if (!mask.empty()) hashes[name + ", mask"] = file_hash(mask);
   }
-  return json_text({{"program", kProgramVersion}, {"focal", focal}, {"photographs", hashes}}, -1);
+  return json_text({{"program", program_version()}, {"focal", focal}, {"photographs", hashes}}, -1);
 }
 
 // Of the files that write_photo_poses() writes: cameras that somebody moved are not solved ones.
@@ -226,9 +226,9 @@ ColmapModel colmap_model(const std::vector<UnposedPhoto>& photos,
   for (ColmapImage& image : model.images) image_of[image.id - 1] = &image;
   for (const SolvedPoint& point : solution.points) {
     ColmapPoint out{point.position, {}, {}, point.error};
-    const SolvedSighting& first = point.track.front();
+    const SolvedObservation& first = point.track.front();
     out.color = colors[static_cast<size_t>(first.photo)][static_cast<size_t>(first.feature)];
-    for (const SolvedSighting& s : point.track) {
+    for (const SolvedObservation& s : point.track) {
       out.track.emplace_back(static_cast<uint32_t>(s.photo + 1), static_cast<uint32_t>(s.feature));
       image_of[static_cast<size_t>(s.photo)]->points[static_cast<size_t>(s.feature)] = s.at;
     }

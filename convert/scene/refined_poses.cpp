@@ -56,7 +56,7 @@ std::string inputs_text(const Scene& scene) {
                      lens_numbers(view),
                      std::vector<double>(pose.data(), pose.data() + pose.size())});
   }
-  return json_text({{"program", kProgramVersion}, {"views", views}}, -1);
+  return json_text({{"program", program_version()}, {"views", views}}, -1);
 }
 
 double degrees_between(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {

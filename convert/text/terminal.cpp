@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/version.h"
 
 namespace cgs {
 
@@ -27,6 +28,8 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 }  // namespace
+
+std::string program_version() { return std::string("cgs ") + version(); }
 
 Terminal::Terminal(bool quiet, bool is_strict)
     : quiet_(quiet), is_strict_(is_strict), rewrites_(::isatty(STDERR_FILENO) == 1), start_() {}

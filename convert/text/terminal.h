@@ -10,7 +10,7 @@
 namespace cgs {
 
 /// Name and version, for --version, run.json and report.json.
-inline constexpr const char* kProgramVersion = "cgs 0.1.0";
+std::string program_version();
 
 /// Progress and messages on standard error: a line that is rewritten on a terminal, one line per
 /// finished stage elsewhere.

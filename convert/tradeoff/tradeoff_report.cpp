@@ -347,7 +347,7 @@ Json tradeoff_json(const TradeoffReport& report) {
   Json wants = Json::array();
   for (const Want& want : report.wants) wants.push_back(want.text);
   return {
-      {"program", kProgramVersion},
+      {"program", program_version()},
       {"scene", tradeoff.scene.folder.string()},
       {"units", tradeoff.scene.frame.unit_name()},
       {"noise",

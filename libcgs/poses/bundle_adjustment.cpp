@@ -141,13 +141,13 @@ struct Unknowns {
   }
 };
 
-void add_sightings(const Reconstruction& scene,
-                   Unknowns& unknowns,
-                   ceres::LossFunction* loss,
-                   ceres::Problem& problem) {
+void add_observations(const Reconstruction& scene,
+                      Unknowns& unknowns,
+                      ceres::LossFunction* loss,
+                      ceres::Problem& problem) {
   for (size_t k = 0; k < scene.tracks.size(); ++k) {
     if (!scene.tracks[k].is_known) continue;
-    for (const Sighting& s : scene.tracks[k].seen) {
+    for (const Observation& s : scene.tracks[k].seen) {
       const auto photo = static_cast<size_t>(s.photo);
       if (!s.is_used || !scene.poses[photo]) continue;
       problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Reprojection, 2, 4, 3, kPerLens, 3>(
@@ -381,7 +381,7 @@ std::vector<double> adjust_bundle(Reconstruction& scene,
   ceres::Problem::Options problem_options;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem problem(problem_options);
-  add_sightings(scene, unknowns, &loss, problem);
+  add_observations(scene, unknowns, &loss, problem);
   if (problem.NumResidualBlocks() == 0) return std::vector<double>(scene.lenses.size(), 0.0);
   restrain_poses(options, unknowns, problem);
   hold_gauge(options, unknowns, problem);

@@ -17,8 +17,8 @@ struct PhotoFeatures {
   Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> descriptors;
   std::vector<int> point_of;  ///< Of each row; empty = row i is of point i.
   double pixel = 1;  ///< Side of a pixel of the picture searched, in pixels of the photograph.
-  /// The picture searched, grey, levels 0 ... 255, in which refine_sightings() measures places more
-  /// finely. Empty = the points no longer lie where they were found, and are used as they are.
+  /// The picture searched, grey, levels 0 ... 255, in which refine_observations() measures places
+  /// more finely. Empty = the points no longer lie where they were found, and are used as they are.
   Raster<uint8_t> picture;
 };
 

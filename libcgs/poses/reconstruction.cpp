@@ -13,19 +13,19 @@ namespace cgs {
 
 namespace {
 
-bool counts(const Reconstruction& scene, const Sighting& s) {
+bool counts(const Reconstruction& scene, const Observation& s) {
   return s.is_used && scene.pose(s.photo).has_value();
 }
 
-Eigen::Vector3d ray_in_world(const Reconstruction& scene, const Sighting& s) {
+Eigen::Vector3d ray_in_world(const Reconstruction& scene, const Observation& s) {
   const Eigen::Vector2d direction = direction_at(scene.lens(s.photo), s.at);
   return scene.pose(s.photo)->rotation.conjugate() * direction.homogeneous().normalized();
 }
 
-// The two sightings whose rays meet under the largest angle.
+// The two observations whose rays meet under the largest angle.
 struct WidestPair {
-  const Sighting* a = nullptr;
-  const Sighting* b = nullptr;
+  const Observation* a = nullptr;
+  const Observation* b = nullptr;
   double angle = 0;  // [rad]
 };
 
@@ -44,10 +44,12 @@ WidestPair widest_pair(const Reconstruction& scene, const Track& track) {
 }
 
 // The point nearest to two rays.
-Eigen::Vector3d meeting_point(const Reconstruction& scene, const Sighting& a, const Sighting& b) {
+Eigen::Vector3d meeting_point(const Reconstruction& scene,
+                              const Observation& a,
+                              const Observation& b) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
-  for (const Sighting* s : {&a, &b}) {
+  for (const Observation* s : {&a, &b}) {
     const Eigen::Vector3d ray = ray_in_world(scene, *s);
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray * ray.transpose();
     A += across;
@@ -56,10 +58,10 @@ Eigen::Vector3d meeting_point(const Reconstruction& scene, const Sighting& a, co
   return A.ldlt().solve(rhs);
 }
 
-// \return sightings that agree with the position
+// \return observations that agree with the position
 int use_what_agrees(const Reconstruction& scene, double most_error, Track& track) {
   int agreeing = 0;
-  for (Sighting& s : track.seen) {
+  for (Observation& s : track.seen) {
     if (!counts(scene, s)) continue;
     s.is_used = reprojection_error(scene, track.position, s) <= most_error;
     agreeing += s.is_used ? 1 : 0;
@@ -81,12 +83,12 @@ Eigen::Vector2d direction_at(const Lens& lens, const Eigen::Vector2d& at) {
 
 double reprojection_error(const Reconstruction& scene,
                           const Eigen::Vector3d& position,
-                          const Sighting& sighting) {
-  const Eigen::Vector3d p = *scene.pose(sighting.photo) * position;
+                          const Observation& observation) {
+  const Eigen::Vector3d p = *scene.pose(observation.photo) * position;
   if (!(p.z() > 0)) return std::numeric_limits<double>::infinity();
-  const Lens& lens = scene.lens(sighting.photo);
+  const Lens& lens = scene.lens(observation.photo);
   const Eigen::Vector2d direction = p.hnormalized();
-  return (through_lens(lens.focal, lens.k1, lens.centre, direction) - sighting.at).norm();
+  return (through_lens(lens.focal, lens.k1, lens.centre, direction) - observation.at).norm();
 }
 
 void triangulate(Reconstruction& scene, double most_error, double least_angle) {

@@ -28,10 +28,10 @@ struct PhotoPose {
 };
 
 inline constexpr double kFeatureSigma = 0.3;   ///< Of the place of a feature [working pixels].
-inline constexpr double kRefinedSigma = 0.07;  ///< At best, refined by refine_sightings().
+inline constexpr double kRefinedSigma = 0.07;  ///< At best, refined by refine_observations().
 
 /// A feature that shows the point of its track.
-struct Sighting {
+struct Observation {
   int photo = 0;
   int feature = 0;
   Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< From the image centre [working pixels].
@@ -41,7 +41,7 @@ struct Sighting {
 
 /// One point of the scene, in at most one place of each photograph.
 struct Track {
-  std::vector<Sighting> seen;  ///< In the order of photographs.
+  std::vector<Observation> seen;  ///< In the order of photographs.
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   bool is_known = false;  ///< position is triangulated.
 };
@@ -74,22 +74,23 @@ Eigen::Matrix<T, 2, 1> through_lens(const T& focal,
 /// The direction x/z, y/z that a lens shows at a place; the inverse of through_lens().
 Eigen::Vector2d direction_at(const Lens& lens, const Eigen::Vector2d& at);
 
-/// Distance between a sighting and its point's image [working pixels]; infinite behind the camera.
+/// Distance between an observation and its point's image [working pixels]; infinite behind the
+/// camera.
 /// \pre the photograph is placed
 double reprojection_error(const Reconstruction& scene,
                           const Eigen::Vector3d& position,
-                          const Sighting& sighting);
+                          const Observation& observation);
 
 /// Gives a position to every track that has none and can have one: two placed photographs see it
 /// under an angle of at least `least_angle` [rad], and it projects to within `most_error` of where
-/// they see it. Sightings further off are no longer used.
+/// they see it. Observations further off are no longer used.
 void triangulate(Reconstruction& scene, double most_error, double least_angle);
 
-/// Stops using sightings further than `most_error` from their point, and forgets the positions of
-/// tracks that two photographs no longer vouch for.
+/// Stops using observations further than `most_error` from their point, and forgets the positions
+/// of tracks that two photographs no longer vouch for.
 void drop_outliers(Reconstruction& scene, double most_error, double least_angle);
 
-/// Largest angle [rad] between the rays of the used sightings in placed photographs.
+/// Largest angle [rad] between the rays of the used observations in placed photographs.
 double ray_angle(const Reconstruction& scene, const Track& track);
 
 }  // namespace cgs

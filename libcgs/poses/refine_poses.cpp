@@ -17,8 +17,8 @@ namespace cgs {
 
 namespace {
 
-// How far a sighting may be off in each round [working pixels]: poses that are off by a degree or
-// two show points where they are not.
+// How far an observation may be off in each round [working pixels]: poses that are off by a degree
+// or two show points where they are not.
 constexpr std::array<double, 4> kRounds = {80, 16, 4, 2.5};
 constexpr double kLossShare = 0.25;  // of that: scale of the loss
 
@@ -94,11 +94,11 @@ Frame frame_of(const std::vector<PosedPhoto>& photos, const Gauge& gauge) {
   return frame;
 }
 
-// Points from the poses as they are now; every sighting may count again.
+// Points from the poses as they are now; every observation may count again.
 void triangulate_anew(Reconstruction& scene, double most_error) {
   for (Track& track : scene.tracks) {
     track.is_known = false;
-    for (Sighting& s : track.seen) s.is_used = true;
+    for (Observation& s : track.seen) s.is_used = true;
   }
   triangulate(scene, most_error, kLeastAngle);
 }
@@ -118,12 +118,12 @@ void adjust(const std::vector<LensPrior>& lenses,
   drop_outliers(scene, kRounds.back(), kLeastAngle);
 }
 
-// Distances of the used sightings of a photograph [working pixels].
+// Distances of the used observations of a photograph [working pixels].
 std::vector<double> errors_in(const Reconstruction& scene, int photo) {
   std::vector<double> out;
   for (const Track& track : scene.tracks) {
     if (!track.is_known) continue;
-    for (const Sighting& s : track.seen) {
+    for (const Observation& s : track.seen) {
       if (!s.is_used || s.photo != photo) continue;
       out.push_back(reprojection_error(scene, track.position, s));
     }
@@ -138,7 +138,7 @@ Reconstruction as_given(const Reconstruction& refined,
                         const Progress& progress) {
   Reconstruction out = refined;
   out.poses = given;
-  // Every sighting counts: a loss that forgives would find points that two of three agree on.
+  // Every observation counts: a loss that forgives would find points that two of three agree on.
   const BundleOptions options{
       .hold_poses = true, .loss_scale = kRounds.front(), .progress = progress};
   adjust_bundle(out, lenses, options);
@@ -189,7 +189,7 @@ std::vector<std::ptrdiff_t> tracks_of(const KnownPoints& points, int photo) {
   for (size_t k = 0; k < points.scene.tracks.size(); ++k) {
     const Track& track = points.scene.tracks[k];
     if (!track.is_known) continue;
-    for (const Sighting& s : track.seen) {
+    for (const Observation& s : track.seen) {
       if (s.is_used && s.photo == photo) out[static_cast<size_t>(s.feature)] = std::ptrdiff_t(k);
     }
   }
@@ -240,7 +240,7 @@ Reconstruction resection_of(const PosedPhoto& photo,
 
 void use_what_is_within(Reconstruction& scene, double most_error) {
   for (Track& track : scene.tracks) {
-    Sighting& s = track.seen.front();
+    Observation& s = track.seen.front();
     s.is_used = reprojection_error(scene, track.position, s) <= most_error;
   }
 }

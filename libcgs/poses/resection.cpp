@@ -49,7 +49,7 @@ void forget(Reconstruction& scene) {
   for (auto& pose : scene.poses) pose.reset();
   for (Track& track : scene.tracks) {
     track.is_known = false;
-    for (Sighting& s : track.seen) s.is_used = true;
+    for (Observation& s : track.seen) s.is_used = true;
   }
 }
 
@@ -103,21 +103,21 @@ int next_photo(const Reconstruction& scene, const std::vector<char>& has_failed)
 bool resect(Reconstruction& scene, int photo) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> places;
-  std::vector<Sighting*> sightings;
+  std::vector<Observation*> observations;
   const double focal = scene.lens(photo).focal;
   for (Track& track : scene.tracks) {
     if (!track.is_known) continue;
-    for (Sighting& s : track.seen) {
+    for (Observation& s : track.seen) {
       if (s.photo != photo) continue;
       points.emplace_back(track.position.x(), track.position.y(), track.position.z());
       places.emplace_back(s.at.x() / focal, s.at.y() / focal);
-      sightings.push_back(&s);
+      observations.push_back(&s);
     }
   }
   cv::Mat rotation;
   cv::Mat translation;
   cv::Mat inliers;
-  constexpr int kTrials = 1000;  // enough where three sightings of ten are right
+  constexpr int kTrials = 1000;  // enough where three observations of ten are right
   const bool is_found = cv::solvePnPRansac(points,
                                            places,
                                            cv::Mat::eye(3, 3, CV_64F),
@@ -139,9 +139,9 @@ bool resect(Reconstruction& scene, int photo) {
   cv::cv2eigen(translation, t);
   if (!R.allFinite() || !t.allFinite()) return false;
   scene.poses[static_cast<size_t>(photo)] = PhotoPose{Eigen::Quaterniond(R).normalized(), t};
-  for (Sighting* s : sightings) s->is_used = false;
+  for (Observation* s : observations) s->is_used = false;
   for (size_t i = 0; i < inliers.total(); ++i) {
-    sightings[static_cast<size_t>(inliers.at<int>(static_cast<int>(i)))]->is_used = true;
+    observations[static_cast<size_t>(inliers.at<int>(static_cast<int>(i)))]->is_used = true;
   }
   return true;
 }
@@ -152,7 +152,7 @@ int points_in(const Reconstruction& scene, int photo) {
   int count = 0;
   for (const Track& track : scene.tracks) {
     if (!track.is_known) continue;
-    for (const Sighting& s : track.seen) count += s.photo == photo && s.is_used ? 1 : 0;
+    for (const Observation& s : track.seen) count += s.photo == photo && s.is_used ? 1 : 0;
   }
   return count;
 }
@@ -162,7 +162,7 @@ double capped_error(const Reconstruction& scene) {
   double sum = 0;
   size_t count = 0;
   for (const Track& track : scene.tracks) {
-    for (const Sighting& s : track.seen) {
+    for (const Observation& s : track.seen) {
       ++count;
       const bool is_comparable = track.is_known && scene.pose(s.photo);
       const double error =

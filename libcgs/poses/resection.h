@@ -38,7 +38,7 @@ void place_more(Reconstruction& scene,
                 const FirstPair& begun,
                 const Progress& progress = {});
 
-/// Mean squared error of all sightings, each at most kMostError² (those without a point or pose
+/// Mean squared error of all observations, each at most kMostError² (those without a point or pose
 /// count as much): for comparing solutions of the same tracks.
 double capped_error(const Reconstruction& scene);
 

@@ -13,10 +13,10 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/poses/bundle_adjustment.h"
+#include "libcgs/poses/observation_refinement.h"
 #include "libcgs/poses/photo_pairs.h"
 #include "libcgs/poses/pose_checks.h"
 #include "libcgs/poses/resection.h"
-#include "libcgs/poses/sighting_refinement.h"
 
 namespace cgs {
 
@@ -87,12 +87,12 @@ Attempt attempt_at(double focal_of_side,
   return out;
 }
 
-// Share of the sightings that a reconstruction has no point or no pose for.
+// Share of the observations that a reconstruction has no point or no pose for.
 double unexplained_share(const Reconstruction& scene) {
   size_t unexplained = 0;
   size_t all = 0;
   for (const Track& track : scene.tracks) {
-    for (const Sighting& s : track.seen) {
+    for (const Observation& s : track.seen) {
       ++all;
       unexplained += track.is_known && scene.pose(s.photo) ? 0 : 1;
     }
@@ -254,7 +254,7 @@ void add_points(const std::vector<UnposedPhoto>& photos,
   for (const Track& track : scene.tracks) {
     if (!track.is_known) continue;
     SolvedPoint point{track.position, {}, 0};
-    for (const Sighting& s : track.seen) {
+    for (const Observation& s : track.seen) {
       if (!s.is_used || !scene.pose(s.photo)) continue;
       const UnposedPhoto& photo = photos[static_cast<size_t>(s.photo)];
       const double pixel = photo.features.pixel;
@@ -292,7 +292,7 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
   Reconstruction scene = std::move(attempt.scene);
   scene.tracks = matched.tracks;
   place_more(scene, priors, *attempt.begun, [&](double) { report(progress, kPlaced); });
-  refine_sightings(photos, scene, [&](double) { report(progress, kPlaced); });
+  refine_observations(photos, scene, [&](double) { report(progress, kPlaced); });
   const std::vector<double> sigmas =
       polish_with_shape(priors, *attempt.begun, part_of(progress, kPlaced, 1), scene);
   refuse_unsure(photos, priors, matched.pairs, scene, sigmas);

@@ -24,7 +24,7 @@ struct SolvedPhoto {
 };
 
 /// A feature that shows a solved point.
-struct SolvedSighting {
+struct SolvedObservation {
   int photo = 0;
   int feature = 0;
   /// Where it was seen, refined where the photographs agree [pixels].
@@ -34,8 +34,8 @@ struct SolvedSighting {
 /// A point that at least two photographs agree on.
 struct SolvedPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  std::vector<SolvedSighting> track;  ///< By photograph.
-  double error = 0;                   ///< Mean distance from where it was seen [pixels].
+  std::vector<SolvedObservation> track;  ///< By photograph.
+  double error = 0;                      ///< Mean distance from where it was seen [pixels].
 };
 
 /// World axes and origin are those of the first photograph that was placed; the unit is the

@@ -32,7 +32,7 @@ void count_up(uint16_t* counts, unsigned bits_set) {
 }
 
 // A bit per point.
-unsigned points_of(DepthEvidence kind, const Sightings& seen, const EvidenceMap& evidence) {
+unsigned points_of(DepthEvidence kind, const Observations& seen, const EvidenceMap& evidence) {
   unsigned out = 0;
   for (size_t lane = 0; lane < kLanes; ++lane) {
     if (evidence.data[size_t(seen.pixel[lane])] == kind) out |= 1U << lane;
@@ -130,24 +130,26 @@ void BlockEvidence::add(const Place& place, const DepthField& field, const TsdfV
         points[count++] = place.group(g);
       }
     }
-    std::array<Sightings, kGroupsPerPart> sightings;
-    field.at(std::span(points).first(count), sightings.data());
-    for (size_t k = 0; k < count; ++k) add_group(asked[k], sightings[k], view);
+    std::array<Observations, kGroupsPerPart> observations;
+    field.at(std::span(points).first(count), observations.data());
+    for (size_t k = 0; k < count; ++k) add_group(asked[k], observations[k], view);
   }
 }
 
-void BlockEvidence::add_group(size_t group, const Sightings& sightings, const TsdfView& view) {
-  hidden_[group] = static_cast<uint8_t>(hidden_[group] | sightings.hidden);
-  free_[group] = static_cast<uint8_t>(free_[group] | sightings.free);
+void BlockEvidence::add_group(size_t group,
+                              const Observations& observations,
+                              const TsdfView& view) {
+  hidden_[group] = static_cast<uint8_t>(hidden_[group] | observations.hidden);
+  free_[group] = static_cast<uint8_t>(free_[group] | observations.free);
   if (!has_band()) return;
-  if (sightings.free != 0) {
+  if (observations.free != 0) {
     float* const sum = &(*free_weight_)[group * kLanes];
-    store(load<Floats>(sum) + load<Floats>(sightings.free_weight.data()), sum);
+    store(load<Floats>(sum) + load<Floats>(observations.free_weight.data()), sum);
   }
-  if (sightings.band != 0) add_band(group, sightings, view);
+  if (observations.band != 0) add_band(group, observations, view);
 }
 
-void BlockEvidence::add_band(size_t group, const Sightings& seen, const TsdfView& view) {
+void BlockEvidence::add_band(size_t group, const Observations& seen, const TsdfView& view) {
   if (!sums_) sums_ = std::make_unique<Sums>();
   Sums& s = *sums_;
   const size_t first = group * kLanes;
@@ -197,7 +199,7 @@ void BlockEvidence::add_band(size_t group, const Sightings& seen, const TsdfView
 
 void BlockEvidence::add_color(size_t first,
                               unsigned taken,
-                              const Sightings& seen,
+                              const Observations& seen,
                               const ColorImage& image) {
   if (!color_) color_ = std::make_unique<ColorSums>();
   for (unsigned left = taken; left != 0; left &= left - 1) {

@@ -89,9 +89,9 @@ class BlockEvidence {
     std::array<Doubles, 3> color = {};
   };
 
-  void add_group(size_t group, const Sightings& seen, const TsdfView& view);
-  void add_band(size_t group, const Sightings& seen, const TsdfView& view);
-  void add_color(size_t first, unsigned taken, const Sightings& seen, const ColorImage& image);
+  void add_group(size_t group, const Observations& seen, const TsdfView& view);
+  void add_band(size_t group, const Observations& seen, const TsdfView& view);
+  void add_color(size_t first, unsigned taken, const Observations& seen, const ColorImage& image);
   void forget_band(size_t n);
 
   unsigned touched_;

@@ -11,7 +11,7 @@
 #include "libcgs/core/lanes.h"
 #include "libcgs/core/nan.h"
 #include "libcgs/core/padded_raster.h"
-#include "meshing/volume/sighting_kernel.h"
+#include "meshing/volume/observation_kernel.h"
 
 namespace cgs {
 
@@ -297,8 +297,8 @@ float DepthField::interpolated(float u, float v) const {
   return 1 / ((1 - b) * top + b * bottom);
 }
 
-PointSighting DepthField::at(const Eigen::Vector3f& point) const {
-  PointSighting out;
+PointObservation DepthField::at(const Eigen::Vector3f& point) const {
+  PointObservation out;
   const Eigen::Vector3f p = R_ * point + t_;
   if (!(p.z() > 0)) return out;
   const float u = fx_ * p.x() / p.z() + cx_;

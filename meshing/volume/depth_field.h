@@ -23,7 +23,7 @@ enum class Sight : uint8_t {
 };
 
 /// A depth map seen from one point of space.
-struct PointSighting {
+struct PointObservation {
   Sight sight = Sight::Nothing;
   float distance = 0;       ///< To the surface, + in front [internal units].
   float weight = 0;         ///< In (0, 1].
@@ -38,11 +38,11 @@ struct EightPoints {
   alignas(32) std::array<float, 8> x, y, z;
 };
 
-/// Sightings of eight points; a bit per point says what it is.
-struct Sightings {
+/// Observations of eight points; a bit per point says what it is.
+struct Observations {
   unsigned free = 0;  ///< Where the weight is above 0.
   unsigned band = 0, hidden = 0;
-  unsigned assumed = 0;                               ///< Of the band, as in PointSighting.
+  unsigned assumed = 0;                               ///< Of the band, as in PointObservation.
   bool has_sigma = false;                             ///< False where sigma is 0 throughout.
   alignas(32) std::array<float, 8> free_weight;       ///< 0 where the point is not.
   alignas(32) std::array<float, 8> weight_in_band;    ///< 0 where the point is not.
@@ -91,11 +91,11 @@ class DepthField {
              Asked asked = Asked::Points);
 
   /// What the view says about a point [internal units].
-  PointSighting at(const Eigen::Vector3f& point) const;
+  PointObservation at(const Eigen::Vector3f& point) const;
 
   /// The same, to the bit, about many points.
   /// \param out  one for each eight points
-  void at(std::span<const EightPoints> points, Sightings* out) const;
+  void at(std::span<const EightPoints> points, Observations* out) const;
 
   /// What it says about all points within boxes.
   Looks look(const EightBoxes& boxes) const;

@@ -121,14 +121,14 @@ Photos photos_of(const Scene& scene, bool from_aside) {
 }
 
 /// Where a point was seen in each of its photographs.
-using Sightings = std::vector<SolvedSighting>;
+using Observations = std::vector<SolvedObservation>;
 
-// The sightings of the solved points, as lenses without distortion show them.
-std::vector<Sightings> undistorted(const PoseSolution& solution) {
-  std::vector<Sightings> out;
+// The observations of the solved points, as lenses without distortion show them.
+std::vector<Observations> undistorted(const PoseSolution& solution) {
+  std::vector<Observations> out;
   for (const SolvedPoint& point : solution.points) {
     out.push_back(point.track);
-    for (SolvedSighting& s : out.back()) {
+    for (SolvedObservation& s : out.back()) {
       const SolvedPhoto& photo = solution.photos[static_cast<size_t>(s.photo)];
       const Eigen::Vector2d centre(photo.camera.cx, photo.camera.cy);
       const Lens lens{photo.camera.fx, photo.k1, centre};
@@ -138,19 +138,19 @@ std::vector<Sightings> undistorted(const PoseSolution& solution) {
   return out;
 }
 
-// RMS distance [pixels] between sightings and the points that agree with them best.
+// RMS distance [pixels] between observations and the points that agree with them best.
 // \param cameras  per photograph
-double sighting_rms(const std::vector<Sightings>& seen, const std::vector<Camera>& cameras) {
+double observation_rms(const std::vector<Observations>& seen, const std::vector<Camera>& cameras) {
   double sum = 0;
   size_t count = 0;
-  for (const Sightings& sightings : seen) {
+  for (const Observations& observations : seen) {
     std::vector<SightRay> rays;
-    for (const SolvedSighting& s : sightings) {
+    for (const SolvedObservation& s : observations) {
       rays.push_back(sight_ray(cameras[static_cast<size_t>(s.photo)], s.at, 1));
     }
     const std::optional<RayMeeting> meeting = ray_meeting(rays);
     if (!meeting) continue;
-    for (const SolvedSighting& s : sightings) {
+    for (const SolvedObservation& s : observations) {
       const Camera& camera = cameras[static_cast<size_t>(s.photo)];
       sum += (camera.project(meeting->point).head<2>() - s.at).squaredNorm();
       ++count;
@@ -175,7 +175,7 @@ bool measure(const Set& set,
   try {
     const PoseSolution solution = solve_poses(photos);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    const std::vector<Sightings> seen = undistorted(solution);
+    const std::vector<Observations> seen = undistorted(solution);
     std::vector<Camera> all;
     std::vector<Camera> solved;
     std::vector<Camera> truth;
@@ -194,8 +194,8 @@ bool measure(const Set& set,
                 errors.direction,
                 100 * errors.focal,
                 100 * solution.photos[0].focal_sigma,
-                sighting_rms(seen, all),
-                sighting_rms(seen, given),
+                observation_rms(seen, all),
+                observation_rms(seen, given),
                 seconds.count());
     std::fflush(stdout);
     return solved.size() == photos.size();

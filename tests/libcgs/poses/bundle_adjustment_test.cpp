@@ -12,7 +12,7 @@
 namespace cgs::bundle_adjustment_test {
 namespace {
 
-// Cameras around points, all of them known; sightings with noise [working pixels].
+// Cameras around points, all of them known; observations with noise [working pixels].
 Reconstruction around_points(double noise, unsigned seed) {
   Reconstruction scene;
   scene.lenses = {{900, 0, {0, 0}}};
@@ -111,7 +111,7 @@ TEST(AdjustBundle, LeavesPosesWhereTheyWereKnownToBeIfPointsDoNotTell) {
   EXPECT_GT((scene.pose(2)->center() - given.center()).norm(), 0.001);
 }
 
-TEST(AdjustBundle, StandsAWrongSighting) {
+TEST(AdjustBundle, StandsAWrongObservation) {
   Reconstruction scene = around_points(0, 1);
   scene.tracks[0].seen[1].at += Eigen::Vector2d(40, -30);
   adjust_bundle(scene, {{0, 0, 1200}}, {.solve_focal = true, .most_iterations = 200});

@@ -15,7 +15,7 @@ Reconstruction two_of_three() {
   return scene;
 }
 
-Sighting sighting(const Reconstruction& scene, int photo, const Eigen::Vector3d& point) {
+Observation observation(const Reconstruction& scene, int photo, const Eigen::Vector3d& point) {
   const Lens& lens = scene.lens(photo);
   const Eigen::Vector2d direction = (*scene.pose(photo) * point).hnormalized();
   return {photo, 0, through_lens(lens.focal, lens.k1, lens.centre, direction), true};
@@ -31,15 +31,15 @@ TEST(Lens, ShowsADirectionWhereItIsLookedUp) {
   }
 }
 
-TEST(Triangulate, FindsPointsAndTellsWrongSightings) {
+TEST(Triangulate, FindsPointsAndTellsWrongObservations) {
   Reconstruction scene = two_of_three();
   const Eigen::Vector3d truth(0.4, -0.3, 5);
   Track good;
-  good.seen = {sighting(scene, 0, truth), sighting(scene, 1, truth), {2, 0, {0, 0}, true}};
+  good.seen = {observation(scene, 0, truth), observation(scene, 1, truth), {2, 0, {0, 0}, true}};
   Track wrong = good;
   wrong.seen[1].at.y() += 50;
   Track far = good;
-  far.seen = {sighting(scene, 0, {10, 0, 5000}), sighting(scene, 1, {10, 0, 5000})};
+  far.seen = {observation(scene, 0, {10, 0, 5000}), observation(scene, 1, {10, 0, 5000})};
   scene.tracks = {good, wrong, far};
   triangulate(scene, 2, 0.01);
   ASSERT_TRUE(scene.tracks[0].is_known);
@@ -54,7 +54,7 @@ TEST(DropOutliers, ForgetsPointsThatOnePhotographVouchesFor) {
   Reconstruction scene = two_of_three();
   const Eigen::Vector3d truth(0.4, -0.3, 5);
   Track track;
-  track.seen = {sighting(scene, 0, truth), sighting(scene, 1, truth)};
+  track.seen = {observation(scene, 0, truth), observation(scene, 1, truth)};
   scene.tracks = {track};
   triangulate(scene, 2, 0.01);
   drop_outliers(scene, 2, 0.01);

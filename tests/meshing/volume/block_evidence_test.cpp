@@ -31,10 +31,10 @@ struct SlowVoxel {
   bool is_adjoining = false, is_estimated = false, has_sigma = true;
 
   // Whether it adds to what is measured.
-  bool takes(const PointSighting& s) const {
+  bool takes(const PointObservation& s) const {
     return s.sight == Sight::Band && !(s.is_assumed && is_measured);
   }
-  void add(const PointSighting& s, const TsdfView& view, bool is_behind) {
+  void add(const PointObservation& s, const TsdfView& view, bool is_behind) {
     is_free |= s.sight == Sight::Free;
     is_hidden |= s.sight == Sight::Hidden;
     if (s.sight == Sight::Free) free_weight += s.weight;
@@ -164,7 +164,7 @@ std::vector<bool> views_from_behind(const openvdb::Coord& origin,
   for (size_t i = 0; i < views.size(); ++i) {
     bool measures = false;
     for (int n = 0; n < 512; ++n) {
-      const PointSighting s = fields[i].at(position(n / 64, n / 8 % 8, n % 8));
+      const PointObservation s = fields[i].at(position(n / 64, n / 8 % 8, n % 8));
       measures = measures || voxels[size_t(n)].takes(s);
       voxels[size_t(n)].add(s, views[i], false);
     }

@@ -116,10 +116,10 @@ TEST(DepthField, SaysTheSameOfManyPointsAsOfEach) {
         points[n / 8].y[n % 8] = y + 0.01f * float(n % 3);
         points[n / 8].z[n % 8] = -1.2f + 0.0125f * float(n);
       }
-      std::vector<Sightings> many(points.size());
+      std::vector<Observations> many(points.size());
       field.at(points, many.data());
       for (size_t n = 0; n < points.size(); ++n) {  // eight at once, where sixteen are otherwise
-        Sightings alone;
+        Observations alone;
         field.at(std::span(points).subspan(n, 1), &alone);
         ASSERT_EQ(alone.free, many[n].free);
         ASSERT_EQ(alone.hidden, many[n].hidden);
@@ -131,8 +131,8 @@ TEST(DepthField, SaysTheSameOfManyPointsAsOfEach) {
       for (size_t n = 0; n < 8 * points.size(); ++n) {
         const size_t k = n % 8;
         const EightPoints& eight = points[n / 8];
-        const Sightings& row = many[n / 8];
-        const PointSighting one = field.at({eight.x[k], eight.y[k], eight.z[k]});
+        const Observations& row = many[n / 8];
+        const PointObservation one = field.at({eight.x[k], eight.y[k], eight.z[k]});
         ++told[size_t(one.sight)];
         const auto is = [&](unsigned bits) { return (bits >> k & 1) != 0; };
         ASSERT_EQ(is(row.free), one.sight == Sight::Free);

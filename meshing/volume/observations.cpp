@@ -2,7 +2,7 @@
 #include <bit>
 
 #include "libcgs/core/lanes.h"
-#include "meshing/volume/sighting_kernel.h"
+#include "meshing/volume/observation_kernel.h"
 
 namespace cgs {
 
@@ -18,10 +18,10 @@ struct Lanes8 {
   static Values load(const EightPoints* from, Member member) {
     return cgs::load<Floats>((from->*member).data());
   }
-  static void store(Values v, Sightings* to, std::array<float, 8> Sightings::*member) {
+  static void store(Values v, Observations* to, std::array<float, 8> Observations::*member) {
     cgs::store(v, (to->*member).data());
   }
-  static void store(Indices v, Sightings* to, std::array<int32_t, 8> Sightings::*member) {
+  static void store(Indices v, Observations* to, std::array<int32_t, 8> Observations::*member) {
     cgs::store(v, (to->*member).data());
   }
   static Values min(Values a, Values b) { return cgs::min(a, b); }
@@ -63,20 +63,20 @@ struct Lanes8 {
 
 }  // namespace
 
-void DepthField::at(std::span<const EightPoints> points, Sightings* out) const {
+void DepthField::at(std::span<const EightPoints> points, Observations* out) const {
   static_assert(sizeof(Pixel) == 4 * sizeof(float));
-  SightingSource source = {.R = {},
-                           .t = {t_.x(), t_.y(), t_.z()},
-                           .fx = fx_,
-                           .fy = fy_,
-                           .cx = cx_,
-                           .cy = cy_,
-                           .width = width_,
-                           .height = height_,
-                           .truncation = truncation_,
-                           .voxel = voxel_,
-                           .pixels = &pixels_[0].depth,
-                           .sigma = sigma_.empty() ? nullptr : sigma_.data.data()};
+  ObservationSource source = {.R = {},
+                              .t = {t_.x(), t_.y(), t_.z()},
+                              .fx = fx_,
+                              .fy = fy_,
+                              .cx = cx_,
+                              .cy = cy_,
+                              .width = width_,
+                              .height = height_,
+                              .truncation = truncation_,
+                              .voxel = voxel_,
+                              .pixels = &pixels_[0].depth,
+                              .sigma = sigma_.empty() ? nullptr : sigma_.data.data()};
   for (size_t r = 0; r < 3; ++r) {
     for (size_t k = 0; k < 3; ++k) source.R[r][k] = R_(Eigen::Index(r), Eigen::Index(k));
   }

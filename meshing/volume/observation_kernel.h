@@ -21,7 +21,7 @@ inline constexpr float kLeastBehind = 0.05f;  ///< Of the weight at the far end 
 inline constexpr float kMeasured = 2;
 
 /// What a depth field knows.
-struct SightingSource {
+struct ObservationSource {
   std::array<std::array<float, 3>, 3> R;  ///< cam_from_world
   std::array<float, 3> t;
   float fx, fy, cx, cy;
@@ -32,7 +32,7 @@ struct SightingSource {
 };
 
 /// With AVX-512: sixteen points at once.
-void see_wide(const SightingSource& source, const EightPoints* points, Sightings* out);
+void see_wide(const ObservationSource& source, const EightPoints* points, Observations* out);
 
 namespace {  // NOLINT(google-build-namespaces): see above
 
@@ -44,7 +44,7 @@ struct Interpolated {
 
 // Depth between pixels, as DepthField::interpolated() has it.
 template <typename Lanes>
-Interpolated<Lanes> interpolated(const SightingSource& source,
+Interpolated<Lanes> interpolated(const ObservationSource& source,
                                  typename Lanes::Values u,
                                  typename Lanes::Values v,
                                  typename Lanes::Mask inside) {
@@ -73,7 +73,7 @@ Interpolated<Lanes> interpolated(const SightingSource& source,
 
 // Without branches that depend on the points: guessed wrong, each would cost as much as all.
 template <typename Lanes>
-inline void see(const SightingSource& source, const EightPoints* points, Sightings* out) {
+inline void see(const ObservationSource& source, const EightPoints* points, Observations* out) {
   using Values = typename Lanes::Values;
   const Values zero = {};
   const Values x = Lanes::load(points, &EightPoints::x);
@@ -115,11 +115,11 @@ inline void see(const SightingSource& source, const EightPoints* points, Sightin
   const Values measured = Lanes::max(zero + kMeasured * source.voxel, 3.0f * sigma);
   const auto assumed = Lanes::both(in_band, Lanes::below(measured, -distance));
 
-  Lanes::store(Lanes::where(is_free, weight), out, &Sightings::free_weight);
-  Lanes::store(Lanes::where(in_band, lessened), out, &Sightings::weight_in_band);
-  Lanes::store(Lanes::where(in_band, distance), out, &Sightings::distance_in_band);
-  Lanes::store(Lanes::where(in_band, sigma), out, &Sightings::sigma);
-  Lanes::store(pixel, out, &Sightings::pixel);
+  Lanes::store(Lanes::where(is_free, weight), out, &Observations::free_weight);
+  Lanes::store(Lanes::where(in_band, lessened), out, &Observations::weight_in_band);
+  Lanes::store(Lanes::where(in_band, distance), out, &Observations::distance_in_band);
+  Lanes::store(Lanes::where(in_band, sigma), out, &Observations::sigma);
+  Lanes::store(pixel, out, &Observations::pixel);
   const unsigned free = Lanes::bits(is_free);
   const unsigned hidden = Lanes::bits(is_behind) | Lanes::bits(is_behind_gap);
   const unsigned banded = Lanes::bits(in_band);

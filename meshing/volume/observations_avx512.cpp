@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The loops of sightings.cpp with 16 lanes. Only what this file defines may use AVX-512: inline
+// The loops of observations.cpp with 16 lanes. Only what this file defines may use AVX-512: inline
 // functions of other headers could be the copies that the whole program gets, so those come first.
 #include <array>
 #include <cstddef>
@@ -20,7 +20,7 @@
 #pragma GCC target("avx512f,avx512dq,avx512vl")
 #endif
 
-#include "meshing/volume/sighting_kernel.h"
+#include "meshing/volume/observation_kernel.h"
 
 namespace cgs {
 
@@ -37,11 +37,11 @@ struct Lanes16 {
     const __m256 upper = _mm256_load_ps(&(from[1].*member)[0]);
     return _mm512_insertf32x8(_mm512_castps256_ps512(lower), upper, 1);
   }
-  static void store(Values v, Sightings* to, std::array<float, 8> Sightings::*member) {
+  static void store(Values v, Observations* to, std::array<float, 8> Observations::*member) {
     _mm256_store_ps(&(to[0].*member)[0], _mm512_castps512_ps256(v));
     _mm256_store_ps(&(to[1].*member)[0], _mm512_extractf32x8_ps(v, 1));
   }
-  static void store(Indices v, Sightings* to, std::array<int32_t, 8> Sightings::*member) {
+  static void store(Indices v, Observations* to, std::array<int32_t, 8> Observations::*member) {
     const auto whole = reinterpret_cast<__m512i>(v);
     _mm256_store_si256(reinterpret_cast<__m256i*>(&(to[0].*member)[0]),
                        _mm512_castsi512_si256(whole));
@@ -93,7 +93,7 @@ struct Lanes16 {
 
 }  // namespace
 
-void see_wide(const SightingSource& source, const EightPoints* points, Sightings* out) {
+void see_wide(const ObservationSource& source, const EightPoints* points, Observations* out) {
   see<Lanes16>(source, points, out);
 }
 

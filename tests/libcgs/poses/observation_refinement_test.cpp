@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "libcgs/poses/sighting_refinement.h"
+#include "libcgs/poses/observation_refinement.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 
 #include "tests/support/stereo_scene.h"
 
-namespace cgs::sighting_refinement_test {
+namespace cgs::observation_refinement_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -78,8 +78,8 @@ Photographed photographed(double noise) {
   return out;
 }
 
-// How far a sighting is from where its photograph shows what the one that stays shows.
-double error_of(const Photographed& photos, const Sighting& fixed, const Sighting& s) {
+// How far an observation is from where its photograph shows what the one that stays shows.
+double error_of(const Photographed& photos, const Observation& fixed, const Observation& s) {
   const Vector2d at = fixed.at + Vector2d(0.5 * kWidth, 0.5 * kHeight);
   const Camera& from = photos.cameras[static_cast<size_t>(fixed.photo)];
   const test::Hit hit = test::cast(photos.patches, from, at.x(), at.y());
@@ -93,10 +93,10 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-TEST(SightingRefinement, FindsWhatTheMiddlePhotographShowsToATwentiethOfAPixel) {
+TEST(ObservationRefinement, FindsWhatTheMiddlePhotographShowsToATwentiethOfAPixel) {
   Photographed photos = photographed(0.4);
   const std::vector<Track> before = photos.scene.tracks;
-  refine_sightings(photos.photos, photos.scene);
+  refine_observations(photos.photos, photos.scene);
   std::vector<double> errors_before;
   std::vector<double> errors;
   size_t within_sigma = 0;
@@ -120,13 +120,13 @@ TEST(SightingRefinement, FindsWhatTheMiddlePhotographShowsToATwentiethOfAPixel) 
   EXPECT_GT(within_sigma, errors.size() * 8 / 10);
 }
 
-TEST(SightingRefinement, BrightnessAndContrastDoNotMatter) {
+TEST(ObservationRefinement, BrightnessAndContrastDoNotMatter) {
   Photographed photos = photographed(0.4);
   Photographed darker = photos;
   for (uint8_t& level : darker.photos[0].features.picture.data)
     level = uint8_t(20 + level * 6 / 10);
-  refine_sightings(photos.photos, photos.scene);
-  refine_sightings(darker.photos, darker.scene);
+  refine_observations(photos.photos, photos.scene);
+  refine_observations(darker.photos, darker.scene);
   std::vector<double> differences;
   for (size_t k = 0; k < photos.scene.tracks.size(); ++k) {
     differences.push_back(
@@ -135,7 +135,7 @@ TEST(SightingRefinement, BrightnessAndContrastDoNotMatter) {
   EXPECT_LT(median(differences), 0.03);
 }
 
-TEST(SightingRefinement, WhatCannotBeToldStaysAsItWas) {
+TEST(ObservationRefinement, WhatCannotBeToldStaysAsItWas) {
   Photographed photos = photographed(0.4);
   Photographed blank = photos;
   std::fill(blank.photos[0].features.picture.data.begin(),
@@ -143,7 +143,7 @@ TEST(SightingRefinement, WhatCannotBeToldStaysAsItWas) {
             uint8_t(90));
   blank.photos[2].features.picture = {};
   const std::vector<Track> before = blank.scene.tracks;
-  refine_sightings(blank.photos, blank.scene);
+  refine_observations(blank.photos, blank.scene);
   for (size_t k = 0; k < before.size(); ++k) {
     for (size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(blank.scene.tracks[k].seen[i].at, before[k].seen[i].at);
@@ -153,17 +153,17 @@ TEST(SightingRefinement, WhatCannotBeToldStaysAsItWas) {
   // A match with another place is not moved there.
   Track& wrong = photos.scene.tracks[20];
   wrong.seen[0].at = before[25].seen[0].at;
-  refine_sightings(photos.photos, photos.scene);
+  refine_observations(photos.photos, photos.scene);
   EXPECT_EQ(wrong.seen[0].at, before[25].seen[0].at);
   EXPECT_EQ(wrong.seen[0].sigma, kFeatureSigma);
 }
 
-TEST(SightingRefinement, DoesNotDependOnTheNumberOfThreads) {
+TEST(ObservationRefinement, DoesNotDependOnTheNumberOfThreads) {
   Photographed several = photographed(0.4);
   Photographed single = several;
-  refine_sightings(several.photos, several.scene);
+  refine_observations(several.photos, several.scene);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  refine_sightings(single.photos, single.scene);
+  refine_observations(single.photos, single.scene);
   for (size_t k = 0; k < several.scene.tracks.size(); ++k) {
     for (size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(several.scene.tracks[k].seen[i].at, single.scene.tracks[k].seen[i].at);
@@ -172,4 +172,4 @@ TEST(SightingRefinement, DoesNotDependOnTheNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace cgs::sighting_refinement_test
+}  // namespace cgs::observation_refinement_test

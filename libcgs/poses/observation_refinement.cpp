@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "libcgs/poses/sighting_refinement.h"
+#include "libcgs/poses/observation_refinement.h"
 
 #include <algorithm>
 #include <array>
@@ -70,7 +70,7 @@ bool sample(const Raster<uint8_t>& picture, const Vector2d& at, Sample& out) {
   return true;
 }
 
-/// Between the plane in which a photograph's sightings lie and the pixels of its picture.
+/// Between the plane in which a photograph's observations lie and the pixels of its picture.
 struct PicturePlane {
   Vector2d scale;   // pixels of the picture per working pixel
   Vector2d centre;  // [pixels of the picture]
@@ -82,7 +82,7 @@ struct PicturePlane {
   Vector2d in_picture(const Vector2d& at) const { return centre + scale.cwiseProduct(at); }
 };
 
-/// Levels around the sighting that stays.
+/// Levels around the observation that stays.
 struct Patch {
   static constexpr size_t kSide = 2 * kRadius + 1;
   std::array<double, kSide * kSide> level;
@@ -194,7 +194,7 @@ double place_sigma(const Equations& e) {
   return std::sqrt(eigen.eigenvalues()[1]);
 }
 
-/// What is known of a sighting.
+/// What is known of an observation.
 struct Refined {
   Vector2d at = Vector2d::Zero();
   double sigma = 0;  // [working pixels]
@@ -232,8 +232,8 @@ std::optional<Refined> fitted(const Patch& patch, const UnposedPhoto& photo, con
 // How a small surface at the point, facing both cameras, is warped between two photographs.
 std::optional<Matrix2d> expected_warp(const Reconstruction& scene,
                                       const Vector3d& point,
-                                      const Sighting& from,
-                                      const Sighting& to) {
+                                      const Observation& from,
+                                      const Observation& to) {
   const PhotoPose& from_pose = *scene.pose(from.photo);
   const PhotoPose& to_pose = *scene.pose(to.photo);
   const Lens& from_lens = scene.lens(from.photo);
@@ -261,21 +261,21 @@ std::optional<Matrix2d> expected_warp(const Reconstruction& scene,
 
 bool can_take_part(const std::vector<UnposedPhoto>& photos,
                    const Reconstruction& scene,
-                   const Sighting& s) {
+                   const Observation& s) {
   return s.is_used && scene.pose(s.photo) &&
          !photos[static_cast<size_t>(s.photo)].features.picture.empty();
 }
 
-// The sighting from the middle of the others: the largest sum of cosines to their rays.
-Sighting* most_central(const Reconstruction& scene,
-                       const std::vector<Sighting*>& sightings,
-                       const Vector3d& point) {
-  Sighting* best = nullptr;
+// The observation from the middle of the others: the largest sum of cosines to their rays.
+Observation* most_central(const Reconstruction& scene,
+                          const std::vector<Observation*>& observations,
+                          const Vector3d& point) {
+  Observation* best = nullptr;
   double most = -2;
-  for (Sighting* s : sightings) {
+  for (Observation* s : observations) {
     const Vector3d ray = (scene.pose(s->photo)->center() - point).normalized();
     double sum = 0;
-    for (const Sighting* other : sightings) {
+    for (const Observation* other : observations) {
       sum += ray.dot((scene.pose(other->photo)->center() - point).normalized());
     }
     if (best != nullptr && !(sum > most)) continue;
@@ -286,15 +286,15 @@ Sighting* most_central(const Reconstruction& scene,
 }
 
 void refine(const std::vector<UnposedPhoto>& photos, const Reconstruction& scene, Track& track) {
-  std::vector<Sighting*> sightings;
-  for (Sighting& s : track.seen) {
-    if (can_take_part(photos, scene, s)) sightings.push_back(&s);
+  std::vector<Observation*> observations;
+  for (Observation& s : track.seen) {
+    if (can_take_part(photos, scene, s)) observations.push_back(&s);
   }
-  if (sightings.size() < 2) return;
-  Sighting* const fixed = most_central(scene, sightings, track.position);
+  if (observations.size() < 2) return;
+  Observation* const fixed = most_central(scene, observations, track.position);
   const auto patch = patch_at(photos[static_cast<size_t>(fixed->photo)], fixed->at);
   if (!patch) return;
-  for (Sighting* s : sightings) {
+  for (Observation* s : observations) {
     if (s == fixed) continue;
     const auto warp = expected_warp(scene, track.position, *fixed, *s);
     if (!warp) continue;
@@ -308,9 +308,9 @@ void refine(const std::vector<UnposedPhoto>& photos, const Reconstruction& scene
 
 }  // namespace
 
-void refine_sightings(const std::vector<UnposedPhoto>& photos,
-                      Reconstruction& scene,
-                      const Progress& progress) {
+void refine_observations(const std::vector<UnposedPhoto>& photos,
+                         Reconstruction& scene,
+                         const Progress& progress) {
   SharedProgress shared(progress, scene.tracks.size());
   tbb::parallel_for(size_t{0}, scene.tracks.size(), [&](size_t k) {
     if (scene.tracks[k].is_known) refine(photos, scene, scene.tracks[k]);
