@@ -14,6 +14,8 @@ class ByteReader;
 
 /// The files inside a ZIP archive that is in memory; only what other formats are made of: stored or
 /// deflated, not encrypted, with 32-bit or 64-bit sizes. Nothing is ever written to disk.
+/// Own code, because archives come from strangers: what libraries state of sizes and names is what
+/// the file claims, and several files of one name, as attacks use them, would pass.
 /// Source: PKWARE, APPNOTE.TXT 6.3.
 class ZipArchive {
  public:

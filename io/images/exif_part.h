@@ -11,6 +11,7 @@ namespace cgs {
 /// a JPEG the file itself. From a TIFF file, whose directories are those of its Exif part, come the
 /// maker, the model and what tells the focal length. Empty for other files, for those without such
 /// a part, and where it is damaged.
+/// Own code, because libexif finds that part in JPEG only.
 /// \param bytes  the whole file; of a JPEG its first segments are enough
 /// Source: CIPA DC-008 (Exif 2.32) 4.5 and 4.6; PNG (W3C, 3rd ed.) 11.3.2.6, eXIf; raw profiles of
 ///         PNG as ExifTool's tables tell them; WebP container specification, EXIF.

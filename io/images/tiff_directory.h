@@ -22,6 +22,8 @@ struct TiffField {
 /// The tags of a directory of a TIFF file, of either byte order, classic or BigTIFF. It refers to
 /// the bytes and the path that it was made of. All that is read lies within the bytes, else it
 /// throws BadInput: Truncated, Count, Syntax.
+/// Own code, because it reads parts of other files (Exif in JPEG, PNG, WebP), from memory, which
+/// libtiff does not.
 /// Source: TIFF 6.0 section 2; BigTIFF (AWare Systems).
 class TiffDirectory {
  public:

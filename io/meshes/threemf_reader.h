@@ -18,6 +18,7 @@ namespace cgs {
 /// mesh, not for its components. Colours of faces and their corners become those of vertices, but
 /// not where labels have them. Textures, mixtures and what is not built are not read.
 ///
+/// Own code, because lib3mf, which writes, keeps coordinates as float.
 /// \throws BadInput Magic (no ZIP archive), as ZipArchive and parse_threemf_model(); Missing (a
 ///         part that is named), Path (a part whose name would leave the archive), Ref (an object
 ///         that is not there, or is a component of itself), Empty (nothing is built); LimitError:

@@ -3,11 +3,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include <Eigen/Geometry>
 
 #include "libcgs/core/error.h"
-#include "meshing/mesh/certificate.h"
+#include "meshing/mesh/components.h"
 
 namespace cgs {
 
@@ -62,6 +63,12 @@ TriangleMesh box_before(const TriangleMesh& mesh, const Eigen::Vector3d& front, 
   return out;
 }
 
+// Of a closed mesh, signed.
+double enclosed(const TriangleMesh& mesh) {
+  const MeshComponents parts = components(mesh);
+  return std::accumulate(parts.volume.begin(), parts.volume.end(), 0.0);
+}
+
 }  // namespace
 
 Eigen::Vector3d seen_side(const TriangleMesh& mesh) {
@@ -87,7 +94,7 @@ FlatBase with_flat_base(const TriangleMesh& mesh, const Eigen::Vector3d& front, 
   const TriangleMesh box = box_before(mesh, towards, hindmost(mesh, towards) - thickness);
   FlatBase out;
   out.solid = boolean(mesh, box, BooleanOperation::Intersection);
-  out.cut_off = 1 - certify(out.solid.mesh).volume / certify(mesh).volume;
+  out.cut_off = 1 - enclosed(out.solid.mesh) / enclosed(mesh);
   return out;
 }
 

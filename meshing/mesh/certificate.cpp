@@ -159,6 +159,13 @@ double smallest_angle(const TriangleMesh& mesh) {
 
 }  // namespace
 
+bool is_closed(const TriangleMesh& mesh) { return edge_facts(sorted_half_edges(mesh)).closed; }
+
+bool is_closed_manifold(const TriangleMesh& mesh) {
+  const std::vector<HalfEdge> edges = sorted_half_edges(mesh);
+  return edge_facts(edges).closed && vertex_manifold(mesh, edges);
+}
+
 Certificate certify(const TriangleMesh& mesh, const Progress& progress) {
   Certificate out;
   const std::vector<HalfEdge> edges = sorted_half_edges(mesh);

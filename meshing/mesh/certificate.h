@@ -37,6 +37,12 @@ struct Certificate {
   }
 };
 
+/// Whether every edge has exactly two faces; false for no faces. Quick beside certify().
+/// \pre as certify()
+bool is_closed(const TriangleMesh& mesh);
+/// The same, and the faces around every vertex form one fan.
+bool is_closed_manifold(const TriangleMesh& mesh);
+
 /// Examines a mesh. Volume and area are double sums about the centre of the bounding box.
 /// \param progress  as self_intersections() tells it, which takes most of the time
 /// \pre every face index is below mesh.vertices.size().

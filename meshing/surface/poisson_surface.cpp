@@ -263,8 +263,7 @@ TriangleMesh closed_surface(const openvdb::FloatGrid& distance, double voxel) {
   if (certify(mesh).passed()) return mesh;
   // More faces, but they never cut each other.
   mesh = scaled(zero_surface_by_tetrahedra(distance), voxel);
-  const Certificate facts = certify(mesh);
-  if (facts.closed && facts.edge_manifold && facts.vertex_manifold) return mesh;
+  if (is_closed_manifold(mesh)) return mesh;
   throw NumericalError("these points and normals enclose nothing");
 }
 
