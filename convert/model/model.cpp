@@ -209,6 +209,7 @@ void relink_views(Scene& scene, const Scene& found) {
     view.image_path = match->image_path;
     view.mask_path = match->mask_path;
   }
+  scene.cache = found.cache;
 }
 
 void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow_external) {

@@ -40,7 +40,8 @@ void use_metres_where_measured(Scene& scene);
 /// \throws BadInput as read_scene()
 void relink_images(Scene& scene, const std::filesystem::path& folder, bool allow_external = false);
 
-/// Takes photographs and masks from another reading of the same scene, by the names of the views.
+/// Takes photographs and masks from another reading of the same scene, by the names of the views,
+/// and its cache.
 void relink_views(Scene& scene, const Scene& found);
 
 /// World direction that is up in the photographs, by the axis all cameras were turned around

@@ -79,6 +79,7 @@ std::string mesh_section(const std::filesystem::path& folder) {
 ColorImage photograph_of(const Scene& scene, int index) {
   Scene one;
   one.folder = scene.folder;
+  one.cache = scene.cache;
   one.views = {scene.views[static_cast<size_t>(index)]};
   load_images(one, {0});
   return one.views[0].image;

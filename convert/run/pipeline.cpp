@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/run/pipeline.h"
 
+#include <algorithm>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -32,7 +34,9 @@
 #include "io/images/image.h"
 #include "io/scenes/depth_file.h"
 #include "io/scenes/photographs.h"
+#include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/photograph_cache.h"
 
 namespace cgs {
 
@@ -65,16 +69,32 @@ bool is_done(const Run& run, const StageFiles& stage) {
 
 Json result_of(const Run& run, Stage stage) { return run.record.result(traits(stage).name); }
 
-// Decodes every photograph once before anything is written: a run must not stop halfway, or leave
-// a folder behind, because of a damaged file.
+// Loads every photograph before anything is written: a run must not stop halfway, or leave a folder
+// behind, because of a damaged file. Those that the run works with stay in the cache.
 void refuse_unreadable_images(const Scene& scene) {
-  for (const View& view : scene.views) {
-    if (!view.image_path.empty()) (void)read_image(view.image_path, nullptr, {});
+  std::set<int> used(scene.input.begin(), scene.input.end());
+  used.insert(scene.held_out.begin(), scene.held_out.end());
+  std::vector<std::string> told_when_used;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    if (scene.views[i].image_path.empty()) continue;
+    if (used.count(static_cast<int>(i)) > 0) {
+      (void)loaded_view(scene, static_cast<int>(i), /*with_image=*/true, told_when_used);
+    } else {
+      (void)read_image(scene.views[i].image_path);
+    }
   }
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
     if (!view.depth_path.empty()) (void)read_depth_file(view.depth_path);
   }
+}
+
+// What photographs may be kept in [bytes]: some of what no stage needs.
+size_t spare_memory(const std::vector<StageMemory>& plan, size_t budget) {
+  constexpr size_t kMost = size_t{256} << 20;
+  size_t most = 0;
+  for (const StageMemory& stage : plan) most = std::max(most, stage.bytes);
+  return std::min(kMost, budget - std::min(budget, most));
 }
 
 Model& loaded_model(Run& run) {
@@ -380,7 +400,9 @@ FinishedRun run_pipeline(const RunRequest& request, Terminal& terminal) {
   const PictureWork work = picture_work(request);
   const std::vector<StageMemory> plan = memory_plan(scene, work);
   terminal.say("memory: " + memory_plan_text(plan));
-  check_memory_plan(scene, work, memory_budget(request.memory_limit));
+  const size_t budget = memory_budget(request.memory_limit);
+  check_memory_plan(scene, work, budget);
+  scene.cache = std::make_shared<PhotographCache>(spare_memory(plan, budget));
   refuse_unreadable_images(scene);
   const size_t known = scene.warnings.size();
   const Json fit = camera_fit_to_json(check_stated_cameras(opened, terminal));

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 #include <sstream>
+#include <type_traits>
 #include <utility>
 
 #include "io/bytes/byte_reader.h"
@@ -26,6 +27,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
 #include "libcgs/core/input_views.h"
+#include "libcgs/core/photograph_cache.h"
 #include "libcgs/core/remedy.h"
 
 namespace cgs {
@@ -201,11 +203,45 @@ bool is_whole(const View& view) {
   return is_jpeg && !has_lens_distortion(view) && view.mask_path.empty();
 }
 
-void load_image(const Scene& scene, View& view, std::vector<std::string>& warnings) {
-  if (view.image_path.empty()) {
-    throw BadInput(Defect::Missing, scene.folder, "view " + printable(view.name) + " has no image");
+// The bytes of a number.
+template <typename T>
+void append(std::string& key, const T& number) {
+  static_assert(std::is_arithmetic_v<T>);
+  key.append(reinterpret_cast<const char*>(&number), sizeof number);
+}
+
+void append(std::string& key, const fs::path& file) {
+  key += file.string() + '\0';
+  if (file.empty()) return;
+  append(key, fs::last_write_time(file).time_since_epoch().count());
+  append(key, fs::file_size(file));
+}
+
+void append(std::string& key, const Camera& camera) {
+  for (const int side : {camera.width, camera.height}) append(key, side);
+  for (const double length : {camera.fx, camera.fy, camera.cx, camera.cy}) append(key, length);
+}
+
+// All that the pixels of a view depend on, but for its exposure.
+std::string cache_key(const View& view) {
+  std::string key;
+  append(key, view.image_path);
+  append(key, view.mask_path);
+  append(key, view.orientation);
+  append(key, view.camera);
+  for (const double k : view.distortion) append(key, k);
+  if (view.fisheye) {
+    append(key, view.fisheye->photograph);
+    for (const double k : view.fisheye->k) append(key, k);
+    for (const double p : view.fisheye->p) append(key, p);
+    append(key, view.fisheye->radius);
   }
-  Camera& camera = view.camera;
+  return key;
+}
+
+// Decoded, without lens distortion, of the size of the camera.
+void load_pixels(View& view) {
+  const Camera& camera = view.camera;
   view.image = read_photograph(view, view.valid);
   const int width = view.image.width;
   const int height = view.image.height;
@@ -224,8 +260,30 @@ void load_image(const Scene& scene, View& view, std::vector<std::string>& warnin
   }
   if (view.image.width < camera.width || view.image.height < camera.height) refuse_size();
   area_downscale(view.image, view.valid, camera.width, camera.height);
+}
+
+void take_pixels(PhotographCache* cache, View& view) {
+  if (cache == nullptr) {
+    load_pixels(view);
+    return;
+  }
+  const std::string key = cache_key(view);
+  if (auto kept = cache->find(key)) {
+    view.image = std::move(kept->image);
+    view.valid = std::move(kept->valid);
+    return;
+  }
+  load_pixels(view);
+  cache->keep(key, {view.image, view.valid});
+}
+
+void load_image(const Scene& scene, View& view, std::vector<std::string>& warnings) {
+  if (view.image_path.empty()) {
+    throw BadInput(Defect::Missing, scene.folder, "view " + printable(view.name) + " has no image");
+  }
+  take_pixels(scene.cache.get(), view);
   apply_exposure(view);
-  load_given_depth(scene, view, {width, height});
+  load_given_depth(scene, view, photograph_size(view));
   const auto is_set = [](uint8_t set) { return set != 0; };
   const bool is_masked =
       !view.valid.empty() && std::none_of(view.valid.data.begin(), view.valid.data.end(), is_set);

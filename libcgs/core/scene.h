@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,8 @@
 #include "libcgs/core/raster.h"
 
 namespace cgs {
+
+class PhotographCache;
 
 /// What the values of given depth mean; where that is not known, it is judged by how they fit the
 /// depth measured from the photographs.
@@ -107,6 +110,9 @@ struct Scene {
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
   std::vector<std::string> notes;     ///< One line each: what was done that raises no doubt.
   Frame frame;
+  /// Where load_images() looks before it reads files, and keeps what it made of them; copies of a
+  /// scene share it. Empty = nothing is kept.
+  std::shared_ptr<PhotographCache> cache = {};
 };
 
 /// Where the input cameras stand and what they look at, on their axes [scene units].
