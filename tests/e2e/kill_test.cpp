@@ -35,6 +35,8 @@ Arguments run_arguments(const fs::path& capture, const fs::path& out) {
           "m",
           "--voxel-size",
           "8cm",
+          "--set",
+          "steps=10",  // no stage takes much longer than the others
           "-q",
           "-o",
           out.string()};

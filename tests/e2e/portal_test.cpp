@@ -27,6 +27,9 @@ std::string run_arguments(const std::filesystem::path& capture, const std::files
          out.string();
 }
 
+// Where what is asked does not depend on how long the training goes on.
+constexpr const char* kShort = " --set steps=12";
+
 TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
   std::filesystem::remove_all(kRun);
   const auto result = run_cgs(run_arguments(kCapture, kRun));
@@ -77,7 +80,7 @@ TEST(Portal, RunsFromPhotographsToAssetsWithinTheStatedAccuracy) {
 TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
   std::filesystem::remove_all(kSmallRun);
   const std::string arguments = run_arguments(kSmallCapture, kSmallRun) +
-                                " --voxel-size 8cm --lods 2";  // for other_readers.sh, too
+                                " --voxel-size 8cm --lods 2" + kShort;  // for other_readers.sh, too
   ASSERT_EQ(run_cgs(arguments).exit_code, 0);
   const auto splats_written = std::filesystem::last_write_time(kSmallRun / "model/gaussians.ply");
   const auto glb = test::read_bytes(kSmallRun / "web/asset.glb");
@@ -89,8 +92,10 @@ TEST(Portal, ResumesAtTheFirstStageWhoseOutputIsMissing) {
 
 TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
   const test::TempDir dir;
-  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "1") + " --threads 1").exit_code, 0);
-  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "3") + " --threads 3").exit_code, 0);
+  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "1") + kShort + " --threads 1").exit_code,
+            0);
+  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "3") + kShort + " --threads 3").exit_code,
+            0);
   for (const auto* file : {"model/gaussians.ply",
                            "views/view_04.exr",
                            "volume.vdb",
@@ -105,15 +110,15 @@ TEST(Portal, GivesTheSameBytesForAnyNumberOfThreads) {
 TEST(Portal, WithoutScaleLeavesCadFilesOutAndSaysWhy) {
   const test::TempDir dir;
   const auto result = run_cgs("run " + kSmallCapture.string() + " --views 0,1,2 --json -o " +
-                              (dir / "out").string());
+                              (dir / "out").string() + kShort);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
   EXPECT_FALSE(std::filesystem::exists(dir / "out/mesh/watertight.3mf"));
   EXPECT_NE(result.err.find("--assume-unit"), std::string::npos);
   EXPECT_EQ(ordered_json::parse(result.out)["units"], "unknown");
 
-  const std::string again =
-      "run " + kSmallCapture.string() + " --views 0,1,2 -q -w -o " + (dir / "out").string();
+  const std::string again = "run " + kSmallCapture.string() + " --views 0,1,2 -q -w -o " +
+                            (dir / "out").string() + kShort;
   ASSERT_EQ(run_cgs(again + " --assume-unit m").exit_code, 0);
   EXPECT_TRUE(std::filesystem::exists(dir / "out/mesh/watertight.stl"));
   const auto model_written = std::filesystem::last_write_time(dir / "out/model/gaussians.ply");
@@ -158,11 +163,12 @@ TEST(Portal, StrictLetsPassThatAFocalLengthWasSolvedFor) {
 TEST(Portal, StagesByHandGiveTheFilesOfARun) {
   const test::TempDir dir;
   const std::string out = dir.path().string();
-  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "run")).exit_code, 0);
-  ASSERT_EQ(run_cgs("train " + kSmallCapture.string() +
-                    " --views view_01,view_02,view_03 --assume-unit m -q -o " + out + "/model")
-                .exit_code,
-            0);
+  ASSERT_EQ(run_cgs(run_arguments(kSmallCapture, dir / "run") + kShort).exit_code, 0);
+  ASSERT_EQ(
+      run_cgs("train " + kSmallCapture.string() +
+              " --views view_01,view_02,view_03 --assume-unit m -q -o " + out + "/model" + kShort)
+          .exit_code,
+      0);
   EXPECT_EQ(run_cgs("render " + out + "/model -q -o " + out + "/views").exit_code, 0);
   const std::string path = "render " + out + "/model --path spiral --frames 3 --json -q -o " + out;
   const auto spiral = run_cgs(path + "/spiral");
