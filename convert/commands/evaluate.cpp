@@ -80,10 +80,11 @@ void run_evaluate(const EvaluateArgs& args) {
                        " is gone; --scene says where the photographs are");
   }
   const size_t told = model.scene.warnings.size();
-  const nlohmann::ordered_json report = evaluate_views(model, views, terminal.begin("evaluate"));
-  terminal.end(std::to_string(report["views"].size()) + " views");
+  const Evaluation evaluation = evaluate_views(model, views, terminal.begin("evaluate"));
+  terminal.end(std::to_string(evaluation.views.size()) + " views");
   const auto& warnings = model.scene.warnings;
   terminal.warn(std::vector(warnings.begin() + static_cast<std::ptrdiff_t>(told), warnings.end()));
+  const nlohmann::ordered_json report = evaluation_to_json(evaluation);
   if (args.common.json) {
     std::cout << json_text(report) << "\n";
   } else {

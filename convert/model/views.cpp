@@ -192,7 +192,7 @@ double share_of(const MaskMap& part, const MaskMap& whole) {
   return count(part) / count(whole);
 }
 
-Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, int index) {
+EvaluatedView evaluate_view(const Model& model, const std::vector<SupportView>& inputs, int index) {
   View view = model.scene.views[static_cast<size_t>(index)];
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
   const ColorImage shown = blackened(picture(buffers), view.valid);
@@ -201,54 +201,63 @@ Json evaluate_view(const Model& model, const std::vector<SupportView>& inputs, i
   const MaskMap everywhere(seen.width, seen.height, 1);
   const MaskMap all = intersection(everywhere, view.valid);
   const MaskMap use = intersection(seen, view.valid);
-  const bool is_matched = is_exposed_otherwise(model, index);
-  if (is_matched) {
+  EvaluatedView out;
+  out.name = view.name;
+  if (!model.scene.input.empty()) out.role = view_role(model.scene, index);
+  if (is_exposed_otherwise(model, index)) {
     view.exposure = matching_gain(view.image, shown, use);
     apply_exposure(view);
+    out.exposure = view.exposure;
   }
   const ColorImage photograph = blackened(view.image, view.valid);
   // The coarse scales of MS-SSIM mix what is masked with the rest, and count it as equal; the rim
   // that a lens leaves does not matter.
   constexpr double kNearlyWhole = 0.95;
-  const bool is_nearly_whole = share_of(all, everywhere) >= kNearlyWhole;
-  // Null where there is nothing to compare.
   const auto has_any = [](const MaskMap& pixels) {
     return std::find(pixels.data.begin(), pixels.data.end(), 1) != pixels.data.end();
   };
-  const auto figure = [&](const auto& metric, const MaskMap& pixels) {
-    return has_any(pixels) ? Json(metric(shown, photograph, &pixels)) : Json();
-  };
-  const bool tells_holes = knows_holes(model);
-  return {{"name", view.name},
-          {"role", role_of(model.scene, index)},
-          {"psnr", figure(psnr, all)},
-          {"ssim", figure(ssim, all)},
-          {"psnr_seen", tells_holes ? figure(psnr, use) : Json()},
-          {"ssim_seen", tells_holes ? figure(ssim, use) : Json()},
-          {"hole_fraction", tells_holes && has_any(all) ? Json(1 - share_of(use, all)) : Json()},
-          {"ms_ssim", is_nearly_whole ? Json(ms_ssim(shown, photograph)) : Json()},
-          {"exposure", is_matched ? vector_to_json(view.exposure.cast<double>()) : Json()}};
+  if (has_any(all)) {
+    out.figures.psnr = psnr(shown, photograph, &all);
+    out.figures.ssim = ssim(shown, photograph, &all);
+  }
+  if (share_of(all, everywhere) >= kNearlyWhole) out.figures.ms_ssim = ms_ssim(shown, photograph);
+  if (!knows_holes(model)) return out;
+  if (has_any(use)) {
+    out.figures.psnr_seen = psnr(shown, photograph, &use);
+    out.figures.ssim_seen = ssim(shown, photograph, &use);
+  }
+  if (has_any(all)) out.figures.hole_fraction = 1 - share_of(use, all);
+  return out;
 }
 
+// By their names in reports.
+constexpr std::array<std::pair<const char*, std::optional<double> ViewFigures::*>, 6> kFigures = {
+    {{"psnr", &ViewFigures::psnr},
+     {"ssim", &ViewFigures::ssim},
+     {"psnr_seen", &ViewFigures::psnr_seen},
+     {"ssim_seen", &ViewFigures::ssim_seen},
+     {"hole_fraction", &ViewFigures::hole_fraction},
+     {"ms_ssim", &ViewFigures::ms_ssim}}};
+
 // Of those views that say how well the model predicts, if there are any: it was trained on inputs.
-Json mean_of(const Json& rows, std::vector<std::string>& warnings) {
-  const auto is_input = [](const Json& row) { return row["role"] == "input"; };
-  const bool are_all_inputs = std::all_of(rows.begin(), rows.end(), is_input);
+ViewFigures mean_of(const std::vector<EvaluatedView>& views, std::vector<std::string>& warnings) {
+  const auto is_input = [](const EvaluatedView& view) { return view.role == "input"; };
+  const bool are_all_inputs = std::all_of(views.begin(), views.end(), is_input);
   if (are_all_inputs) {
     warnings.emplace_back(
         "only input views are evaluated: the model was trained on them, so that the figures say "
         "how well it fits, not how well it predicts");
   }
-  Json mean;
-  for (const char* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}) {
+  ViewFigures mean;
+  for (const auto& [name, figure] : kFigures) {
     double sum = 0;
     size_t count = 0;
-    for (const Json& row : rows) {
-      if (!row[key].is_number() || (is_input(row) && !are_all_inputs)) continue;
-      sum += row[key].get<double>();
+    for (const EvaluatedView& view : views) {
+      if (!(view.figures.*figure) || (is_input(view) && !are_all_inputs)) continue;
+      sum += *(view.figures.*figure);
       ++count;
     }
-    mean[key] = count > 0 ? Json(sum / static_cast<double>(count)) : Json();
+    if (count > 0) mean.*figure = sum / static_cast<double>(count);
   }
   return mean;
 }
@@ -358,23 +367,42 @@ Json write_path(const Model& model,
   return out;
 }
 
-Json evaluate_views(Model& model, const std::vector<int>& views, const Progress& progress) {
+Json figures_to_json(const ViewFigures& figures) {
+  Json out;
+  for (const auto& [name, figure] : kFigures) {
+    out[name] = figures.*figure ? Json(*(figures.*figure)) : Json();
+  }
+  return out;
+}
+
+Json evaluation_to_json(const Evaluation& evaluation) {
+  Json rows = Json::array();
+  for (const EvaluatedView& view : evaluation.views) {
+    Json row = {{"name", view.name}, {"role", view.role.empty() ? Json() : Json(view.role)}};
+    row.update(figures_to_json(view.figures));
+    row["exposure"] = view.exposure ? vector_to_json(view.exposure->cast<double>()) : Json();
+    rows.push_back(row);
+  }
+  return {{"mean", figures_to_json(evaluation.mean)}, {"views", rows}};
+}
+
+Evaluation evaluate_views(Model& model, const std::vector<int>& views, const Progress& progress) {
   std::vector<std::string>& warnings = model.scene.warnings;
   if (const std::string text = unknown_holes_warning(model); !text.empty()) {
     warnings.push_back(text);
   }
   const std::vector<int> shown = with_photograph(model.scene, views);
   const std::vector<SupportView> inputs = support_views(model);
-  Json rows = Json::array();
+  Evaluation out;
   for (size_t k = 0; k < shown.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(shown.size()));
     load_images(model.scene, {shown[k]});
-    rows.push_back(evaluate_view(model, inputs, shown[k]));
+    out.views.push_back(evaluate_view(model, inputs, shown[k]));
     model.scene.views[static_cast<size_t>(shown[k])].image = {};  // one photograph at a time
   }
-  const Json mean = mean_of(rows, warnings);
+  out.mean = mean_of(out.views, warnings);
   report(progress, 1);
-  return {{"mean", mean}, {"views", rows}};
+  return out;
 }
 
 }  // namespace cgs

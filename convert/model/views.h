@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,19 +46,43 @@ nlohmann::ordered_json write_path(const Model& model,
 /// to what is rendered: those of the input views were matched, and it is none of them.
 bool is_exposed_otherwise(const Model& model, int view);
 
+/// How well a rendered view agrees with its photograph. Each is empty where there is nothing to
+/// compare, where a mask hides too much for it (MS-SSIM), or where nobody knows of holes.
+struct ViewFigures {
+  std::optional<double> psnr = {};  ///< [dB]
+  std::optional<double> ssim = {};
+  std::optional<double> psnr_seen = {};  ///< Over pixels that are no holes [dB].
+  std::optional<double> ssim_seen = {};
+  std::optional<double> hole_fraction = {};  ///< Of the pixels that are not masked.
+  std::optional<double> ms_ssim = {};
+};
+
+struct EvaluatedView {
+  std::string name;
+  std::string role;  ///< As view_role(); empty where no view is an input.
+  ViewFigures figures;
+  std::optional<Eigen::Vector3f> exposure;  ///< By which the photograph was matched, if it was.
+};
+
+struct Evaluation {
+  ViewFigures mean;
+  std::vector<EvaluatedView> views;
+};
+
+/// {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}, null for what is empty.
+nlohmann::ordered_json figures_to_json(const ViewFigures& figures);
+/// {"mean": {…}, "views": [{"name", "role" as of write_views(), …, "exposure"}]}
+nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
+
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
-/// that are not holes, and MS-SSIM over all: {"mean": {"psnr", "ssim", "psnr_seen", "ssim_seen",
-/// "hole_fraction", "ms_ssim"}, "views": [{"name", "role" as of write_views(), …}]}. Loads the
-/// photographs.
+/// that are not holes, and MS-SSIM over all. Loads the photographs.
 ///
 /// Where the exposures of input views were matched, the photographs of others are matched to what
-/// is rendered, by the factors "exposure" of red, green and blue light, else null.
+/// is rendered, by factors on red, green and blue light.
 ///
 /// Input views stay out of the mean where there are others. Warnings of the scene tell where there
-/// are none, and where nothing is known of holes, whose figures are then null.
+/// are none, and where nothing is known of holes, whose figures are then empty.
 /// \throws BadInput if none of the views has a photograph.
-nlohmann::ordered_json evaluate_views(Model& model,
-                                      const std::vector<int>& views,
-                                      const Progress& progress);
+Evaluation evaluate_views(Model& model, const std::vector<int>& views, const Progress& progress);
 
 }  // namespace cgs

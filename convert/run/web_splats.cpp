@@ -7,7 +7,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "convert/model/views.h"
 #include "convert/splats/splat_reports.h"
 #include "io/bytes/atomic_file.h"
 #include "io/scenes/scene_reader.h"
@@ -69,12 +68,13 @@ std::string evidence_of_thinned(const Model& model, size_t kept) {
          " Gaussians";
 }
 
-// How they show what was held out, as the evaluation of the model says of all of them; null
-// without.
-Json held_out_figures(Model& model, Gaussians& splats, const Progress& progress) {
-  if (model.scene.held_out.empty()) return nullptr;
+// How they show what was held out, as the evaluation of the model says of all of them.
+std::optional<ViewFigures> held_out_figures(Model& model,
+                                            Gaussians& splats,
+                                            const Progress& progress) {
+  if (model.scene.held_out.empty()) return std::nullopt;
   const Exchange exchange(model.gaussians, splats);
-  return evaluate_views(model, model.scene.held_out, progress).at("mean");
+  return evaluate_views(model, model.scene.held_out, progress).mean;
 }
 
 }  // namespace
@@ -106,7 +106,7 @@ WebSplats write_web_splats(const std::filesystem::path& folder,
 
 Json web_splats_to_json(const WebSplats& made) {
   Json thinning = thinning_to_json(made.thinned, made.of);
-  thinning["held_out"] = made.held_out;
+  thinning["held_out"] = made.held_out ? figures_to_json(*made.held_out) : Json();
   Json out = {{"thinning", thinning}, {"splats.glb", {{"bytes", made.glb_bytes}}}};
   if (made.spz) {
     out["splats.spz"] = {{"bytes", made.spz->bytes},

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/model/model.h"
+#include "convert/model/views.h"
 #include "io/splats/spz.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/splats/splat_thinning.h"
@@ -17,8 +18,9 @@ namespace cgs {
 /// What write_web_splats() made.
 struct WebSplats {
   ThinnedSplats thinned;
-  size_t of = 0;                    ///< Splats of the model.
-  nlohmann::ordered_json held_out;  ///< Mean of evaluate_views(); null where none was held out.
+  size_t of = 0;  ///< Splats of the model.
+  std::optional<ViewFigures>
+      held_out;  ///< Mean of evaluate_views(); empty where none was held out.
   size_t glb_bytes = 0;
   std::optional<SpzReport> spz;
   std::string spz_left_out;  ///< Why there is none, for people.

@@ -61,7 +61,7 @@ Json make_model(const RunRequest& request,
   if (model.scene.held_out.empty()) return out;
   show_held_out_as(standard, model.scene);
   out["evaluation"] =
-      evaluate_views(model, model.scene.held_out, part_of(progress, 0.95, 1)).at("mean");
+      figures_to_json(evaluate_views(model, model.scene.held_out, part_of(progress, 0.95, 1)).mean);
   return out;
 }
 

@@ -96,13 +96,14 @@ void measure(const std::filesystem::path& folder,
   cgs::SceneOptions options;
   options.views = kInput;
   cgs::TrainedModel trained = cgs::train_model(cgs::read_scene(folder, options), request, {});
-  const Json shown = cgs::evaluate_views(trained.model, trained.model.scene.held_out, {})["mean"];
+  const cgs::ViewFigures shown =
+      cgs::evaluate_views(trained.model, trained.model.scene.held_out, {}).mean;
   const cgs::PaneReport& pane = trained.pane;
   std::printf("%-14s %d layer(s): depth behind %5.1f %%, held out %.2f dB, ",
               name,
               layers,
               100 * share_behind(trained, planted),
-              shown["psnr_seen"].get<double>());
+              shown.psnr_seen.value());
   if (pane.view.empty()) {
     std::puts("no pane");
   } else {

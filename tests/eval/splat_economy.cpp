@@ -37,7 +37,7 @@ struct Files {
   size_t splats = 0;
   size_t spz = 0;
   size_t glb = 0;
-  Json shown;  ///< As the SPZ reads back.
+  cgs::ViewFigures shown;  ///< As the SPZ reads back.
 };
 
 size_t bytes_of(const std::filesystem::path& file) {
@@ -54,7 +54,7 @@ Files read_back(cgs::Model& model,
   out.splats = model.gaussians.size();
   out.spz = bytes_of(folder / "splats.spz");
   out.glb = bytes_of(folder / "splats.glb");
-  out.shown = cgs::evaluate_views(model, views, {})["mean"];
+  out.shown = cgs::evaluate_views(model, views, {}).mean;
   return out;
 }
 
@@ -64,8 +64,8 @@ void print(const char* name, const Files& files) {
               files.splats,
               files.spz,
               files.glb,
-              files.shown["psnr"].get<double>(),
-              files.shown["ssim"].get<double>());
+              files.shown.psnr.value(),
+              files.shown.ssim.value());
 }
 
 // Writes one picture of the path, of both.

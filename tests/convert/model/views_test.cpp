@@ -20,6 +20,10 @@ namespace {
 
 constexpr int kSide = 40;
 
+nlohmann::ordered_json evaluated(Model& model, const std::vector<int>& views) {
+  return evaluation_to_json(evaluate_views(model, views, {}));
+}
+
 // A view becomes an input that saw nothing anywhere: then everything is a hole, and known to be.
 void say_that_it_saw_nothing(Model& model, int view) {
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -73,7 +77,7 @@ TEST(EvaluateViews, LooksAtNoMaskedPixel) {
   }
   model.scene.views.push_back(model.scene.views[0]);
   say_that_it_saw_nothing(model, 2);
-  const auto rows = evaluate_views(model, {0, 1}, {})["views"];
+  const auto rows = evaluated(model, {0, 1})["views"];
   ASSERT_TRUE(rows[0]["ssim"].is_number());
   EXPECT_EQ(rows[0]["ssim"], rows[1]["ssim"]);
   EXPECT_EQ(rows[0]["psnr"], rows[1]["psnr"]);
@@ -81,11 +85,11 @@ TEST(EvaluateViews, LooksAtNoMaskedPixel) {
 
   Model without = model;
   without.scene.views[1].image_path.clear();
-  EXPECT_EQ(evaluate_views(without, {0, 1}, {})["views"].size(), 1u);
+  EXPECT_EQ(evaluated(without, {0, 1})["views"].size(), 1u);
   EXPECT_EQ(without.scene.warnings.back(), "view magenta has no photograph and is not evaluated");
 
   write_png(model.scene.views[0].mask_path, ColorImage(kSide, kSide, Eigen::Vector3f::Zero()));
-  const auto masked = evaluate_views(model, {0, 1}, {});
+  const auto masked = evaluated(model, {0, 1});
   EXPECT_TRUE(masked["views"][0]["hole_fraction"].is_null()) << "nothing may be looked at";
   EXPECT_EQ(masked["mean"]["hole_fraction"], masked["views"][1]["hole_fraction"]);
 }
@@ -96,11 +100,11 @@ TEST(EvaluateViews, KeepsInputsOutOfTheMeanAndSaysWhatAViewIs) {
   say_that_it_saw_nothing(model, 0);
   say_that_it_saw_nothing(model, 1);
   model.scene.held_out = {2};
-  const auto all = evaluate_views(model, {0, 1, 2, 3}, {});
+  const auto all = evaluated(model, {0, 1, 2, 3});
   const std::vector<std::string> roles = {"input", "input", "held out", "not used"};
   for (size_t k = 0; k < roles.size(); ++k) EXPECT_EQ(all["views"][k]["role"], roles[k]);
   EXPECT_NE(all["views"][0]["psnr"], all["views"][2]["psnr"]);
-  const auto others = evaluate_views(model, {2, 3}, {});
+  const auto others = evaluated(model, {2, 3});
   EXPECT_EQ(all["mean"], others["mean"]);
   EXPECT_TRUE(model.scene.warnings.empty()) << model.scene.warnings.front();
 }
@@ -110,7 +114,7 @@ TEST(EvaluateViews, SaysOnceThatOnlyInputsAreEvaluated) {
   Model model = model_of_greys(dir, 3);
   say_that_it_saw_nothing(model, 0);
   say_that_it_saw_nothing(model, 1);
-  const auto report = evaluate_views(model, {0, 1}, {});
+  const auto report = evaluated(model, {0, 1});
   EXPECT_TRUE(report["mean"]["psnr"].is_number());
   ASSERT_EQ(model.scene.warnings.size(), 1u);
   EXPECT_NE(model.scene.warnings[0].find("only input views"), std::string::npos);
@@ -120,7 +124,7 @@ TEST(EvaluateViews, SaysOnceThatOnlyInputsAreEvaluated) {
 TEST(EvaluateViews, LeavesHolesOutWhereNothingIsKnownOfThem) {
   const test::TempDir dir;
   Model model = model_of_greys(dir, 2);
-  const auto report = evaluate_views(model, {0, 1}, {});
+  const auto report = evaluated(model, {0, 1});
   for (const auto& row : {report["views"][0], report["views"][1], report["mean"]}) {
     EXPECT_TRUE(row["psnr"].is_number());
     for (const char* key : {"hole_fraction", "psnr_seen", "ssim_seen"}) {
