@@ -15,7 +15,7 @@ namespace cgs {
 namespace {
 
 constexpr size_t kFrames = 8;
-constexpr int kStep = 7;        // [pixels]
+constexpr int kPixelStep = 7;   // [pixels]
 constexpr size_t kFewest = 50;  // comparisons that tell something
 constexpr double kFewestShare = 0.05;
 constexpr double kAgrees = 0.05;
@@ -91,8 +91,8 @@ class Comparison {
   static Sampled sampled(const TsdfView& view) {
     Sampled out;
     out.camera = view.camera;
-    for (int y = 0; y < view.depth.height; y += kStep) {
-      for (int x = 0; x < view.depth.width; x += kStep) {
+    for (int y = 0; y < view.depth.height; y += kPixelStep) {
+      for (int x = 0; x < view.depth.width; x += kPixelStep) {
         if (view.depth(x, y) > 0) out.pixels.push_back({x, y, view.depth(x, y)});
       }
     }
