@@ -48,7 +48,7 @@ struct FocalPrior {
 
   template <typename T>
   bool operator()(const T* lens, T* out) const {
-    out[0] = (lens[0] - T(std::log(prior.focal))) / T(prior.sigma);
+    out[0] = (lens[0] - T(std::log(prior.focal))) * T(kOptimism / prior.sigma);
     return true;
   }
 };
@@ -61,10 +61,10 @@ struct ShapePrior {
   template <typename T>
   bool operator()(const T* lens, T* out) const {
     constexpr double kDistortion = 0.03;
-    constexpr double kOffCentre = 0.005;  // [larger sides]
-    out[0] = lens[1] / T(kDistortion);
-    out[1] = lens[2] / T(kOffCentre * side);
-    out[2] = lens[3] / T(kOffCentre * side);
+    constexpr double kOffCentre = 0.01;  // [larger sides]
+    out[0] = lens[1] * T(kOptimism / kDistortion);
+    out[1] = lens[2] * T(kOptimism / (kOffCentre * side));
+    out[2] = lens[3] * T(kOptimism / (kOffCentre * side));
     return true;
   }
 };

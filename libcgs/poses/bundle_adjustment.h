@@ -8,6 +8,12 @@
 
 namespace cgs {
 
+/// How many times too sure an adjustment is whose observations are taken to err independently: RMS
+/// error of focal lengths on nine sets of photographs, in sigmas that it claims. What is known of
+/// lenses beforehand counts that much more beside them, or photographs would overrule it by errors
+/// that they share.
+inline constexpr double kOptimism = 3;
+
 /// What is known of a lens before photographs are compared.
 struct LensPrior {
   double focal = 0;  ///< [working pixels]; 0 = nothing known.
@@ -40,7 +46,8 @@ struct BundleOptions {
 ///
 /// \param priors  per lens
 /// \return  standard deviation of log(focal) per lens where with_sigma and the lens is solved for,
-///          else 0; infinite where the photographs do not determine it
+///          else 0, for observations that err independently (see kOptimism); infinite where
+///          nothing determines it
 /// Source: Triggs et al. 1999, "Bundle Adjustment - A Modern Synthesis".
 std::vector<double> adjust_bundle(Reconstruction& scene,
                                   const std::vector<LensPrior>& priors,

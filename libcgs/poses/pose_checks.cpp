@@ -133,7 +133,7 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
     throw undetermined_focal(
         pairs,
         std::isfinite(focal_sigmas[lens])
-            ? "uncertain by " + decimals(100 * kFocalOptimism * focal_sigmas[lens], 0) + " %"
+            ? "uncertain by " + decimals(100 * kOptimism * focal_sigmas[lens], 0) + " %"
             : "");
   }
 }

@@ -11,9 +11,6 @@
 
 namespace cgs {
 
-/// RMS error of focal lengths on nine sets of photographs, in sigmas that the adjustment claims.
-inline constexpr double kFocalOptimism = 3;
-
 /// Refuses photographs that do not determine cameras, with a reason that a user can act on.
 /// \throws NumericalError if fewer than two photographs show enough, naming one that does not, or
 ///         no two share enough, naming the pair that shares most.

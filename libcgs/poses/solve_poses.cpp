@@ -304,22 +304,37 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
     out.photos.push_back(scene.poses[i]
                              ? solved_photo(photos[i], scene.lenses[lens], *scene.poses[i])
                              : SolvedPhoto{});
-    out.photos.back().focal_sigma = kFocalOptimism * sigmas[lens];
+    out.photos.back().focal_sigma = kOptimism * sigmas[lens];
   }
   add_points(photos, scene, out);
   return out;
 }
 
+// Whether the focal length of a photograph in a solution is three sigma off what was stated.
+bool is_contradicted(const UnposedPhoto& photo, const SolvedPhoto& solved, double sigma) {
+  constexpr double kRefutingSigmas = 3;
+  if (!solved.is_placed || !(photo.focal_sigma > 0)) return false;
+  return std::abs(std::log(solved.camera.fx / photo.focal)) > kRefutingSigmas * sigma;
+}
+
+// Whether a solution that did not know the stated focal lengths contradicts one of them: one that
+// hardly tells them contradicts none.
+bool contradicts(const PoseSolution& solution, const std::vector<UnposedPhoto>& photos) {
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const SolvedPhoto& solved = solution.photos[i];
+    const double sigma = std::hypot(photos[i].focal_sigma, solved.focal_sigma);
+    if (is_contradicted(photos[i], solved, sigma)) return true;
+  }
+  return false;
+}
+
 // The photographs without the focal lengths that a solution lies three sigma away from, if any.
 std::optional<std::vector<UnposedPhoto>> without_refuted(const std::vector<UnposedPhoto>& photos,
                                                          const PoseSolution& solution) {
-  constexpr double kRefutingSigmas = 3;
   std::vector<UnposedPhoto> out = photos;
   bool any = false;
   for (size_t i = 0; i < photos.size(); ++i) {
-    if (!solution.photos[i].is_placed || !(photos[i].focal_sigma > 0)) continue;
-    const double off = std::abs(std::log(solution.photos[i].camera.fx / photos[i].focal));
-    if (off <= kRefutingSigmas * photos[i].focal_sigma) continue;
+    if (!is_contradicted(photos[i], solution.photos[i], photos[i].focal_sigma)) continue;
     any = true;
     for (UnposedPhoto& photo : out) {
       if (photo.lens == photos[i].lens) photo.focal = photo.focal_sigma = 0;
@@ -364,7 +379,12 @@ PoseSolution solve_poses(const std::vector<UnposedPhoto>& photos, const Progress
   }
   if (relaxed) {
     try {
-      out = solve(*relaxed, matched, part_of(progress, 0.9, 1));
+      PoseSolution free = solve(*relaxed, matched, part_of(progress, 0.9, 1));
+      if (!failure && !contradicts(free, photos)) {
+        report(progress, 1);
+        return out;  // what was stated is the better measurement of the two
+      }
+      out = std::move(free);
       for (size_t i = 0; i < photos.size(); ++i) {
         out.photos[i].is_refuted = photos[i].focal > 0 && (*relaxed)[i].focal == 0;
       }

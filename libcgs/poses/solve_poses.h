@@ -49,8 +49,9 @@ struct PoseSolution {
 /// Cameras of photographs from nothing but what they show: matched features, relative pose of a
 /// pair that shows much depth, resection of the others, bundle adjustment. Where a focal length is
 /// unknown, the one that explains the matches best is found. One that is known with a sigma is
-/// taken as unknown where it turns out to be three sigma off, or where no cameras are found with it
-/// but some without.
+/// taken as unknown where it turns out to be three sigma off and the photographs, without it, are
+/// three sigma of both together away from it; or where no cameras are found with it but some
+/// without.
 ///
 /// focal_sigma is wider than that of the adjustment, which knows nothing of errors of the lens
 /// model: by the errors on photographs with known focal lengths (tests/eval/pose_accuracy).
