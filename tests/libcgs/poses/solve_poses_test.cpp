@@ -2,6 +2,7 @@
 #include "libcgs/poses/solve_poses.h"
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -259,6 +260,27 @@ TEST(SolvePoses, DropsAFocalLengthThatThePhotographsContradict) {
   for (const SolvedPhoto& photo : solution.photos) EXPECT_TRUE(photo.is_refuted);
   const PoseSolution right = solve_poses(with_focal(unposed_photos(scene), 1.03 * kFocal, 0.03));
   for (const SolvedPhoto& photo : right.photos) EXPECT_FALSE(photo.is_refuted);
+}
+
+// As of a rolling shutter or a lens that no model describes: the places of neighbours are off alike,
+// by what no number of them averages out.
+TEST(SolvePoses, BelievesAStatedFocalLengthBeforeErrorsThatPhotographsShare) {
+  const PointScene scene = three_views();
+  constexpr double kWidest = 1.5;  // [pixels]
+  constexpr double kStatedSigma = 0.01;
+  std::vector<UnposedPhoto> photos = with_focal(unposed_photos(scene), kFocal, kStatedSigma);
+  for (size_t i = 0; i < photos.size(); ++i) {
+    for (Eigen::Vector2d& at : photos[i].features.points) {
+      const Eigen::Vector2d turn = at / 250 + Eigen::Vector2d::Constant(2.0 * double(i));
+      at += kWidest * Eigen::Vector2d(std::sin(turn.y()), std::cos(turn.x()));
+    }
+  }
+  const PoseSolution solution = solve_poses(photos);
+  EXPECT_LT(pose_errors(cameras_of(solution), scene.cameras).focal, kStatedSigma);
+  for (const SolvedPhoto& photo : solution.photos) {
+    EXPECT_FALSE(photo.is_refuted);
+    EXPECT_LE(photo.focal_sigma, 2 * kStatedSigma);
+  }
 }
 
 // Its lens is another one, of which nothing is known and nothing can be told.
