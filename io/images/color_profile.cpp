@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <type_traits>
+#include <vector>
 
 #include <lcms2.h>
 #include <tbb/blocked_range.h>
@@ -31,29 +32,20 @@ constexpr size_t kLargestProfile = size_t{4}
 // In parts of at most 64 KiB, each with its number and how many there are.
 std::string of_jpeg(std::string_view bytes, const std::filesystem::path& path) {
   constexpr std::string_view kPartName = "ICC_PROFILE\0"sv;
-  constexpr unsigned char kStartOfScan = 0xda;
-  constexpr unsigned char kApp2 = 0xe2;
+  constexpr int kApp2 = 0xe2;
   ByteReader file(bytes, path);
-  file.take(2, "JPEG magic");
   std::map<int, std::string_view> parts;
   size_t total = 0;
-  while (true) {
-    while (file.get<uint8_t>("JPEG marker") != 0xff) {
-    }
-    uint8_t marker = 0xff;
-    while (marker == 0xff) marker = file.get<uint8_t>("JPEG marker");
-    if (marker == kStartOfScan) break;
-    const auto high = file.get<uint8_t>("JPEG length");
-    const size_t length = size_t{high} << 8 | file.get<uint8_t>("JPEG length");
-    if (length < 2) return "";
-    const std::string_view body = file.take(length - 2, "JPEG segment");
-    if (marker != kApp2 || !body.starts_with(kPartName) || body.size() < kPartName.size() + 2)
-      continue;
+  visit_jpeg_segments(file, [&](int marker, std::string_view body) {
+    const bool is_part =
+        marker == kApp2 && body.starts_with(kPartName) && body.size() >= kPartName.size() + 2;
+    if (!is_part) return true;
     const std::string_view part = body.substr(kPartName.size() + 2);
     total += part.size();
-    if (total > kLargestProfile) return "";
     parts.emplace(static_cast<unsigned char>(body[kPartName.size()]), part);
-  }
+    return total <= kLargestProfile;
+  });
+  if (total > kLargestProfile) return "";
   std::string out;
   for (const auto& [number, part] : parts) out += part;
   return out;
@@ -134,6 +126,31 @@ bool is_identity(const Transform& transform) {
   return true;
 }
 
+// Null where the bytes are no profile of that space.
+Transform transform_to_srgb(std::string_view bytes,
+                            cmsColorSpaceSignature space,
+                            cmsUInt32Number format) {
+  if (bytes.empty()) return nullptr;
+  errno = 0;
+  const auto from = made<Profile>(
+      cmsOpenProfileFromMem(bytes.data(), static_cast<cmsUInt32Number>(bytes.size())));
+  if (!from || cmsGetColorSpace(from.get()) != space) return nullptr;
+  const auto srgb = made<Profile>(cmsCreate_sRGBProfile());
+  if (!srgb) return nullptr;
+  return made<Transform>(cmsCreateTransform(from.get(),
+                                            format,
+                                            srgb.get(),
+                                            TYPE_RGB_FLT,
+                                            INTENT_RELATIVE_COLORIMETRIC,
+                                            cmsFLAGS_NOCACHE));
+}
+
+void clamp_colors(Eigen::Vector3f* colors, size_t count) {
+  for (size_t i = 0; i < count; ++i) {
+    for (float& c : colors[i]) c = c > 0 ? std::min(c, 1.0f) : 0.0f;  // also what is no number
+  }
+}
+
 }  // namespace
 
 std::string color_profile(std::string_view bytes, const std::filesystem::path& path) {
@@ -151,29 +168,43 @@ std::string color_profile(std::string_view bytes, const std::filesystem::path& p
 }
 
 void to_srgb(std::string_view bytes, ColorImage& image) {
-  if (bytes.empty()) return;
-  errno = 0;
-  const auto from = made<Profile>(
-      cmsOpenProfileFromMem(bytes.data(), static_cast<cmsUInt32Number>(bytes.size())));
-  if (!from || cmsGetColorSpace(from.get()) != cmsSigRgbData) return;
-  const auto srgb = made<Profile>(cmsCreate_sRGBProfile());
-  if (!srgb) return;
-  const auto transform = made<Transform>(cmsCreateTransform(from.get(),
-                                                            TYPE_RGB_FLT,
-                                                            srgb.get(),
-                                                            TYPE_RGB_FLT,
-                                                            INTENT_RELATIVE_COLORIMETRIC,
-                                                            cmsFLAGS_NOCACHE));
+  const Transform transform = transform_to_srgb(bytes, cmsSigRgbData, TYPE_RGB_FLT);
   if (!transform || is_identity(transform)) return;
   static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
   tbb::parallel_for(tbb::blocked_range<size_t>(0, image.data.size(), 4096), [&](const auto& range) {
     Eigen::Vector3f* const colors = image.data.data() + range.begin();
-    const auto count = static_cast<cmsUInt32Number>(range.size());
-    cmsDoTransform(transform.get(), colors->data(), colors->data(), count);
-    for (size_t i = 0; i < range.size(); ++i) {
-      for (float& c : colors[i]) c = c > 0 ? std::min(c, 1.0f) : 0.0f;  // also what is no number
-    }
+    cmsDoTransform(transform.get(),
+                   colors->data(),
+                   colors->data(),
+                   static_cast<cmsUInt32Number>(range.size()));
+    clamp_colors(colors, range.size());
   });
+}
+
+ColorImage srgb_of_inks(std::string_view profile, const InkImage& inks) {
+  ColorImage out(inks.width, inks.height, Eigen::Vector3f::Zero());
+  const Transform transform = transform_to_srgb(profile, cmsSigCmykData, TYPE_CMYK_FLT);
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, out.data.size(), 4096), [&](const auto& range) {
+    Eigen::Vector3f* const colors = out.data.data() + range.begin();
+    const std::array<float, 4>* const from = inks.data.data() + range.begin();
+    if (!transform) {
+      for (size_t i = 0; i < range.size(); ++i) {
+        const auto& [c, m, y, k] = from[i];
+        colors[i] = (1 - k) * Eigen::Vector3f(1 - c, 1 - m, 1 - y);
+      }
+      return;
+    }
+    std::vector<std::array<float, 4>> percent(from, from + range.size());  // as lcms counts inks
+    for (auto& ink : percent) {
+      for (float& amount : ink) amount *= 100;
+    }
+    cmsDoTransform(transform.get(),
+                   percent.data(),
+                   colors->data(),
+                   static_cast<cmsUInt32Number>(range.size()));
+    clamp_colors(colors, range.size());
+  });
+  return out;
 }
 
 }  // namespace cgs

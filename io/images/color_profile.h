@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -20,5 +21,12 @@ std::string color_profile(std::string_view bytes, const std::filesystem::path& p
 /// lose saturation. Profiles that say sRGB change no bit, and what is no profile of RGB is ignored.
 /// \param image  coded as the profile says, in [0, 1]
 void to_srgb(std::string_view profile, ColorImage& image);
+
+/// Amounts of cyan, magenta, yellow and black, from 0 to 1 = full.
+using InkImage = Raster<std::array<float, 4>>;
+
+/// The sRGB-coded colours of inks: by the profile where it is one of CMYK, relative to white, else
+/// (1 - ink)(1 - black).
+ColorImage srgb_of_inks(std::string_view profile, const InkImage& inks);
 
 }  // namespace cgs

@@ -66,6 +66,18 @@ std::string of_text_chunk(std::string_view name,
   return "";
 }
 
+// The first segment with Exif, wherever it stands among others.
+std::string part_of_jpeg(std::string_view bytes, const std::filesystem::path& path) {
+  constexpr int kApp1 = 0xe1;
+  std::string out;
+  ByteReader file(bytes, path);
+  visit_jpeg_segments(file, [&](int marker, std::string_view body) {
+    if (marker == kApp1 && body.starts_with(kExif)) out = body;
+    return out.empty();
+  });
+  return out;
+}
+
 std::string part_of_png(std::string_view bytes, const std::filesystem::path& path) {
   std::string out;
   visit_png_chunks(bytes, path, [&](std::string_view name, std::string_view body) {
@@ -171,7 +183,7 @@ std::string part_of_tiff(std::string_view bytes, const std::filesystem::path& pa
 
 std::string exif_part(std::string_view bytes, const std::filesystem::path& path) {
   try {
-    if (bytes.starts_with("\xff\xd8")) return std::string(bytes);
+    if (bytes.starts_with("\xff\xd8")) return part_of_jpeg(bytes, path);
     if (bytes.starts_with("\x89PNG")) return part_of_png(bytes, path);
     if (bytes.starts_with("RIFF") && bytes.substr(0, 12).ends_with("WEBP")) {
       return part_of_webp(bytes, path);

@@ -7,8 +7,8 @@
 
 namespace cgs {
 
-/// The Exif part of an image file as libexif takes it: "Exif", two zeros and a small TIFF file; of
-/// a JPEG the file itself. From a TIFF file, whose directories are those of its Exif part, come the
+/// The Exif part of an image file as libexif takes it: "Exif", two zeros and a small TIFF file.
+/// From a TIFF file, whose directories are those of its Exif part, come the
 /// maker, the model and what tells the focal length. Empty for other files, for those without such
 /// a part, and where it is damaged.
 /// Own code, because libexif finds that part in JPEG only.

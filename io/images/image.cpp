@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/images/image.h"
 
-// jpeglib.h needs FILE declared before it.
-#include <cstdio>
-// clang-format off
-#include <jpeglib.h>
-#include <jerror.h>
-// clang-format on
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <csetjmp>
 #include <cstddef>
 #include <mutex>
 #include <new>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +19,8 @@
 #include "io/images/color_profile.h"
 #include "io/images/heif.h"
 #include "io/images/image_header.h"
+#include "io/images/jpeg.h"
+#include "io/images/tiff_pixels.h"
 #include "libcgs/core/opencv_memory.h"
 
 namespace cgs {
@@ -33,69 +29,6 @@ namespace {
 
 bool is_all_usable(const MaskMap& usable) {
   return std::all_of(usable.data.begin(), usable.data.end(), [](uint8_t set) { return set != 0; });
-}
-
-// What libjpeg calls instead of exit() and fprintf().
-struct JpegErrors {
-  jpeg_error_mgr base;  // first, so that a pointer to it is a pointer to this
-  std::jmp_buf jump;
-  char message[JMSG_LENGTH_MAX];
-};
-
-void on_jpeg_error(j_common_ptr info) {
-  auto* errors = reinterpret_cast<JpegErrors*>(info->err);
-  info->err->format_message(info, errors->message);
-  std::longjmp(errors->jump, 1);  // NOLINT(cert-err52-cpp): the way out libjpeg documents
-}
-
-void on_jpeg_message(j_common_ptr info, int level) {
-  constexpr int kWarning = -1;
-  if (level != kWarning) return;
-  auto* errors = reinterpret_cast<JpegErrors*>(info->err);
-  // Some cameras pad the picture before its end marker; a cut one would be another warning.
-  const bool is_padding =
-      info->err->msg_code == JWRN_EXTRANEOUS_DATA && info->err->msg_parm.i[1] == JPEG_EOI;
-  if (is_padding) return;
-  if (info->err->num_warnings++ == 0) info->err->format_message(info, errors->message);
-}
-
-// Decodes into rgb, which holds width * height * 3 bytes. Only plain data lives in this frame,
-// since an error leaves it by longjmp.
-// \return false after an error; errors.message says which
-bool decode_jpeg(const unsigned char* bytes,
-                 unsigned long size,
-                 const ImageHeader& header,
-                 unsigned char* rgb,
-                 JpegErrors& errors) {
-  jpeg_decompress_struct info;
-  info.err = jpeg_std_error(&errors.base);
-  errors.base.error_exit = on_jpeg_error;
-  errors.base.emit_message = on_jpeg_message;
-  errors.message[0] = '\0';
-  jpeg_create_decompress(&info);
-  if (setjmp(errors.jump) != 0) {  // NOLINT(cert-err52-cpp)
-    jpeg_destroy_decompress(&info);
-    return false;
-  }
-  jpeg_mem_src(&info, bytes, size);
-  jpeg_read_header(&info, TRUE);
-  info.out_color_space = JCS_RGB;
-  jpeg_start_decompress(&info);
-  const bool is_as_announced = info.output_width == static_cast<JDIMENSION>(header.width) &&
-                               info.output_height == static_cast<JDIMENSION>(header.height) &&
-                               info.output_components == 3;
-  if (!is_as_announced) {
-    std::snprintf(errors.message, sizeof errors.message, "second frame header of another size");
-    jpeg_destroy_decompress(&info);
-    return false;
-  }
-  while (info.output_scanline < info.output_height) {
-    JSAMPROW row = rgb + size_t{info.output_scanline} * info.output_width * 3;
-    jpeg_read_scanlines(&info, &row, 1);
-  }
-  jpeg_finish_decompress(&info);  // reads on to the end marker: a missing one is a warning
-  jpeg_destroy_decompress(&info);
-  return true;
 }
 
 ColorImage from_bytes(const ImageHeader& header, const char* samples, int channels) {
@@ -129,22 +62,16 @@ ColorImage read_heif(std::string_view bytes,
 
 ColorImage read_jpeg(std::string_view bytes,
                      const ImageHeader& header,
+                     std::string_view profile,
                      const std::filesystem::path& path) {
-  std::string rgb(size_t{3} * size_t(header.width) * size_t(header.height), '\0');
-  JpegErrors errors = {};
-  const bool is_decoded = decode_jpeg(reinterpret_cast<const unsigned char*>(bytes.data()),
-                                      bytes.size(),
-                                      header,
-                                      reinterpret_cast<unsigned char*>(rgb.data()),
-                                      errors);
-  if (!is_decoded && errors.base.msg_code == JERR_OUT_OF_MEMORY) throw std::bad_alloc();
-  if (!is_decoded) throw BadInput(Defect::Syntax, path, std::string("JPEG: ") + errors.message);
-  if (errors.base.num_warnings > 0) {
-    throw BadInput(Defect::Truncated,
-                   path,
-                   std::string("JPEG data is cut or damaged (") + errors.message + ")");
+  const JpegPixels pixels = decode_jpeg(bytes, header, path);
+  if (pixels.channels == 3) return from_bytes(header, pixels.samples.data(), 3);
+  InkImage inks(header.width, header.height, {});
+  const auto* p = reinterpret_cast<const unsigned char*>(pixels.samples.data());
+  for (auto& ink : inks.data) {
+    for (float& amount : ink) amount = float(255 - *p++) / 255.0f;
   }
-  return from_bytes(header, rgb.data(), 3);
+  return srgb_of_inks(profile, inks);
 }
 
 /// Sends standard error nowhere while any of its kind lives: the decoders behind OpenCV print their
@@ -268,6 +195,114 @@ void convert(const cv::Mat& pixels, double full, ColorImage& image, MaskMap& usa
   }
 }
 
+ColorImage read_with_opencv(std::string_view bytes,
+                            const ImageHeader& header,
+                            const std::filesystem::path& path,
+                            MaskMap& usable) {
+  const cv::Mat pixels = decode_as_announced(bytes, header, path);
+  ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
+  switch (pixels.depth()) {
+    case CV_8U:
+      convert<uint8_t>(pixels, 255, image, usable);
+      break;
+    case CV_16U:
+      convert<uint16_t>(pixels, 65535, image, usable);
+      break;
+    case CV_32F:
+      convert<float>(pixels, 1, image, usable);
+      break;
+    case CV_64F:
+      convert<double>(pixels, 1, image, usable);
+      break;
+    default:
+      throw BadInput(Defect::Unsupported, path, "signed whole-number samples are not read");
+  }
+  return image;
+}
+
+Eigen::Vector3f color_of(const TiffForm& form, std::span<const float> samples) {
+  const double full = form.full();
+  const auto part = [&](size_t c) { return static_cast<float>(double(samples[c]) / full); };
+  switch (form.kind) {
+    case TiffForm::Kind::Rgb:
+      return {part(0), part(1), part(2)};
+    case TiffForm::Kind::White:
+      return Eigen::Vector3f::Constant(1 - part(0));
+    case TiffForm::Kind::Palette:
+      return Eigen::Map<const Eigen::Vector3f>(form.palette[size_t(samples[0])].data());
+    default:
+      return Eigen::Vector3f::Constant(part(0));
+  }
+}
+
+ColorImage read_tiff(const TiffPixels& tiff,
+                     const ImageHeader& header,
+                     std::string_view profile,
+                     MaskMap& usable) {
+  const TiffForm& form = tiff.form();
+  const bool has_inks = form.kind == TiffForm::Kind::Inks;
+  ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
+  InkImage inks;
+  if (has_inks) inks = InkImage(header.width, header.height, {});
+  const auto within = [](float value) {
+    return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : 0.0f;
+  };
+  tiff.read([&](int x, int y, std::span<const float> row) {
+    for (; !row.empty(); ++x, row = row.subspan(size_t(form.channels))) {
+      float opacity = 1;
+      if (form.alpha >= 0) opacity = float(double(row[size_t(form.alpha)]) / form.full());
+      bool is_usable = opacity >= 0.5f;
+      if (has_inks) {
+        for (size_t c = 0; c < 4; ++c) inks(x, y)[c] = within(float(double(row[c]) / form.full()));
+      } else {
+        Eigen::Vector3f color = color_of(form, row);
+        is_usable = is_usable && color.allFinite();
+        if (form.is_premultiplied && opacity > 0) color /= opacity;
+        for (int c = 0; c < 3; ++c) image(x, y)[c] = within(color[c]);
+      }
+      usable(x, y) = is_usable ? 1 : 0;
+    }
+  });
+  return has_inks ? srgb_of_inks(profile, inks) : image;
+}
+
+StoredSamples samples_of_tiff(const TiffPixels& tiff,
+                              const ImageHeader& header,
+                              const std::filesystem::path& path) {
+  const TiffForm& form = tiff.form();
+  const bool is_grey = form.kind == TiffForm::Kind::Grey || form.kind == TiffForm::Kind::White;
+  if (!is_grey || form.channels > 2) {
+    throw BadInput(Defect::Unsupported, path, "holds colours, expected one value per pixel");
+  }
+  StoredSamples out{Raster<float>(header.width, header.height, 0)};
+  if (!form.is_float && form.bits <= 16) out.whole_bits = form.bits <= 8 ? 8 : 16;
+  tiff.read([&](int x, int y, std::span<const float> row) {
+    for (size_t i = 0; i < row.size(); i += size_t(form.channels)) out.values(x++, y) = row[i];
+  });
+  return out;
+}
+
+ColorImage decoded(std::string_view bytes,
+                   std::string_view profile,
+                   const std::filesystem::path& path,
+                   MaskMap* alpha_mask,
+                   const ReadLimits& limits) {
+  const ImageHeader header = parse_image_header(bytes, path, limits);
+  check_image_is_whole(bytes, header, path);
+  if (alpha_mask != nullptr) *alpha_mask = {};
+  if (header.format == ImageFormat::Jpeg) return read_jpeg(bytes, header, profile, path);
+  if (header.format == ImageFormat::Heif) return read_heif(bytes, header, path, alpha_mask);
+  MaskMap usable(header.width, header.height, 1);
+  ColorImage image;
+  if (header.format == ImageFormat::Tiff) {
+    const TiffPixels tiff(bytes, header, path);
+    if (tiff.is_read()) image = read_tiff(tiff, header, profile, usable);
+  }
+  if (image.empty()) image = read_with_opencv(bytes, header, path, usable);
+  if (alpha_mask != nullptr && !is_all_usable(usable)) *alpha_mask = std::move(usable);
+  return image;
+}
+
 }  // namespace
 
 ImageSize image_size(const std::filesystem::path& path, const ReadLimits& limits) {
@@ -288,8 +323,9 @@ ColorImage read_image(const std::filesystem::path& path,
                       MaskMap* alpha_mask,
                       const ReadLimits& limits) {
   const std::string bytes = read_image_file(path, limits);
-  ColorImage image = decode_image(bytes, path, alpha_mask, limits);
-  to_srgb(color_profile(bytes, path), image);
+  const std::string profile = color_profile(bytes, path);
+  ColorImage image = decoded(bytes, profile, path, alpha_mask, limits);
+  to_srgb(profile, image);
   return image;
 }
 
@@ -297,33 +333,7 @@ ColorImage decode_image(std::string_view bytes,
                         const std::filesystem::path& path,
                         MaskMap* alpha_mask,
                         const ReadLimits& limits) {
-  const ImageHeader header = parse_image_header(bytes, path, limits);
-  check_image_is_whole(bytes, header, path);
-  if (alpha_mask != nullptr) *alpha_mask = {};
-  if (header.format == ImageFormat::Jpeg) return read_jpeg(bytes, header, path);
-  if (header.format == ImageFormat::Heif) return read_heif(bytes, header, path, alpha_mask);
-
-  const cv::Mat pixels = decode_as_announced(bytes, header, path);
-  ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
-  MaskMap usable(header.width, header.height, 1);
-  switch (pixels.depth()) {
-    case CV_8U:
-      convert<uint8_t>(pixels, 255, image, usable);
-      break;
-    case CV_16U:
-      convert<uint16_t>(pixels, 65535, image, usable);
-      break;
-    case CV_32F:
-      convert<float>(pixels, 1, image, usable);
-      break;
-    case CV_64F:
-      convert<double>(pixels, 1, image, usable);
-      break;
-    default:
-      throw BadInput(Defect::Unsupported, path, "signed whole-number samples are not read");
-  }
-  if (alpha_mask != nullptr && !is_all_usable(usable)) *alpha_mask = std::move(usable);
-  return image;
+  return decoded(bytes, "", path, alpha_mask, limits);
 }
 
 StoredSamples read_samples(const std::filesystem::path& path, const ReadLimits& limits) {
@@ -332,6 +342,10 @@ StoredSamples read_samples(const std::filesystem::path& path, const ReadLimits& 
   check_image_is_whole(bytes, header, path);
   if (header.format != ImageFormat::Png && header.format != ImageFormat::Tiff) {
     throw BadInput(Defect::Unsupported, path, "only PNG and TIFF keep values as they are");
+  }
+  if (header.format == ImageFormat::Tiff) {
+    const TiffPixels tiff(bytes, header, path);
+    if (tiff.is_read()) return samples_of_tiff(tiff, header, path);
   }
   const cv::Mat pixels = decode_as_announced(bytes, header, path);
   if (pixels.channels() > 2) {

@@ -42,4 +42,29 @@ void visit_webp_chunks(std::string_view bytes, const std::filesystem::path& path
   }
 }
 
+/// Calls visit(marker, body) for the segments of a JPEG file up to the first scan, until it says
+/// false. Stray bytes before a marker are passed over, as decoders do.
+/// \throws BadInput Truncated, Syntax (a segment shorter than its own length)
+template <typename Visit>
+void visit_jpeg_segments(ByteReader& file, Visit visit) {
+  constexpr int kStartOfScan = 0xDA;
+  constexpr int kEnd = 0xD9;
+  file.take(2, "JPEG start marker");
+  while (true) {
+    int marker = 0;  // also what stands for a byte 0xFF of data
+    while (marker == 0) {
+      while (file.get<uint8_t>("JPEG marker") != 0xFF) {
+      }
+      marker = 0xFF;
+      while (marker == 0xFF) marker = file.get<uint8_t>("JPEG marker");  // fill bytes
+    }
+    if (marker == 0x01 || (marker >= 0xD0 && marker <= 0xD8)) continue;  // have no length
+    if (marker == kStartOfScan || marker == kEnd) return;
+    const auto high = file.get<uint8_t>("JPEG segment length");
+    const size_t length = size_t{high} << 8 | file.get<uint8_t>("JPEG segment length");
+    if (length < 2) file.fail(Defect::Syntax, "JPEG segment shorter than its own length field");
+    if (!visit(marker, file.take(length - 2, "JPEG segment"))) return;
+  }
+}
+
 }  // namespace cgs

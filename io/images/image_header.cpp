@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/images/image_header.h"
 
+#include <algorithm>
+#include <array>
 #include <optional>
 #include <vector>
 
 #include <zlib.h>
 
 #include "io/images/heif.h"
+#include "io/images/image_chunks.h"
 #include "io/images/tiff_directory.h"
 
 namespace cgs {
@@ -52,47 +55,44 @@ ImageHeader checked(ImageFormat format,
 struct JpegFrame {
   uint32_t width = 0;
   uint32_t height = 0;
+  int components = 0;
 };
 
 JpegFrame parse_jpeg_frame(std::string_view segment, int marker, const ByteReader& file) {
   if (segment.size() < 6) file.fail(Defect::Syntax, "JPEG frame header too short");
   const auto precision = static_cast<uint8_t>(segment[0]);
-  const auto components = static_cast<uint8_t>(segment[5]);
-  const JpegFrame frame{big_endian(segment.substr(3, 2)), big_endian(segment.substr(1, 2))};
+  const JpegFrame frame{big_endian(segment.substr(3, 2)),
+                        big_endian(segment.substr(1, 2)),
+                        static_cast<uint8_t>(segment[5])};
+  constexpr std::array<int, 5> kRead = {0xC0, 0xC1, 0xC2, 0xC9, 0xCA};
+  if (std::find(kRead.begin(), kRead.end(), marker) == kRead.end()) {
+    file.fail(Defect::Unsupported, "JPEG that is neither baseline nor progressive (lossless?)");
+  }
   if (precision != 8) {
     file.fail(Defect::Unsupported, "JPEG of " + std::to_string(precision) + " bits, 8 are read");
   }
-  if (components != 1 && components != 3) {
+  if (frame.components != 1 && frame.components != 3 && frame.components != 4) {
     file.fail(Defect::Unsupported,
-              "JPEG of " + std::to_string(components) +
-                  " colour components (CMYK?); grey and RGB are read");
+              "JPEG of " + std::to_string(frame.components) +
+                  " colour components; grey, RGB and CMYK are read");
   }
-  if (marker != 0xC0 && marker != 0xC1 && marker != 0xC2) {
-    file.fail(Defect::Unsupported, "JPEG that is neither baseline nor progressive Huffman");
+  if (frame.height == 0 && frame.width > 0) {
+    file.fail(Defect::Unsupported, "JPEG that states its height behind its data (DNL)");
   }
   return frame;
 }
 
-// Walks the marker segments to the first frame header (T.81 B.1.1).
+// From the first frame header (T.81 B.1.1).
 JpegFrame find_jpeg_frame(ByteReader& file) {
-  file.take(2, "JPEG start marker");
-  while (true) {
-    if (file.get<uint8_t>("JPEG marker") != 0xFF) {
-      file.fail(Defect::Syntax, "expected a JPEG marker");
-    }
-    int marker = 0xFF;
-    while (marker == 0xFF) marker = file.get<uint8_t>("JPEG marker");  // fill bytes are allowed
-    if (marker == 0x01 || (marker >= 0xD0 && marker <= 0xD7)) continue;
-    if (marker == 0xD9 || marker == 0xDA) {
-      file.fail(Defect::Syntax, "JPEG without a frame header before its data");
-    }
-    const uint32_t length = big_endian(file.take(2, "JPEG segment length"));
-    if (length < 2) file.fail(Defect::Syntax, "JPEG segment shorter than its own length field");
-    const std::string_view segment = file.take(length - 2, "JPEG segment");
+  std::optional<JpegFrame> frame;
+  visit_jpeg_segments(file, [&](int marker, std::string_view segment) {
     const bool is_frame =
         marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
-    if (is_frame) return parse_jpeg_frame(segment, marker, file);
-  }
+    if (is_frame) frame = parse_jpeg_frame(segment, marker, file);
+    return !is_frame;
+  });
+  if (!frame) file.fail(Defect::Syntax, "JPEG without a frame header before its data");
+  return *frame;
 }
 
 // --- TIFF -----------------------------------------------------------------------------------
@@ -221,7 +221,9 @@ ImageHeader parse_image_header(std::string_view bytes,
   if (bytes.starts_with(kPngMagic)) return parse_png(file, limits);
   if (bytes.starts_with("\xff\xd8")) {
     const JpegFrame frame = find_jpeg_frame(file);
-    return checked(ImageFormat::Jpeg, frame.width, frame.height, path, limits);
+    ImageHeader header = checked(ImageFormat::Jpeg, frame.width, frame.height, path, limits);
+    header.inks = frame.components == 4 ? 4 : 0;
+    return header;
   }
   if (bytes.starts_with("RIFF") && bytes.substr(0, 12).ends_with("WEBP")) {
     return parse_webp(file, limits);

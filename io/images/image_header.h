@@ -19,13 +19,15 @@ struct ImageHeader {
   /// How the picture lies in its file, as Exif counts (1 = upright), by the tag of TIFF; others
   /// state it in their Exif part.
   int orientation = 1;
+  int inks = 0;  ///< Of a JPEG in CMYK or YCCK: 4.
 };
 
 /// Recognises the format by its magic bytes and reads the size, without decoding. That of HEIC and
 /// AVIF is the size upright.
 ///
-/// \throws BadInput Magic (no image), Unsupported (other image formats; JPEG in CMYK, or with other
-///         than 8 bits), Truncated, Syntax, Value (a side of 0); LimitError above max_pixels.
+/// \throws BadInput Magic (no image), Unsupported (other image formats; JPEG without loss, with
+///         other than 8 bits, or with its height behind its data), Truncated, Syntax, Value (a side
+///         of 0); LimitError above max_pixels.
 /// Source: PNG (W3C, 2nd ed.) 5; JPEG (ITU-T T.81) Annex B; TIFF 6.0 section 2 and BigTIFF; WebP
 ///         container specification, VP8 (RFC 6386) 9.1 and VP8L.
 ImageHeader parse_image_header(std::string_view bytes,

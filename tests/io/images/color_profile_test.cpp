@@ -14,6 +14,7 @@
 #include "tests/support/heif_file.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
+#include "tests/support/tiff_file.h"
 
 namespace cgs::color_profile_test {
 namespace {
@@ -80,6 +81,74 @@ TEST(ToSrgb, ChangesNoBitOfWhatIsSrgbNorByWhatIsNoProfile) {
     ColorImage image(2, 1, Eigen::Vector3f(0.3f, 0.7f, 0.1f));
     to_srgb(profile, image);
     EXPECT_EQ(image.data[0], Eigen::Vector3f(0.3f, 0.7f, 0.1f));
+  }
+}
+
+// Of inks whose mixtures lie on straight lines between the colours of the 16 full ones: no ink is
+// white, and each takes its part of the light; black takes all.
+std::string ink_profile() {
+  const cmsHPROFILE profile = cmsCreateProfilePlaceholder(nullptr);
+  cmsSetProfileVersion(profile, 4.3);
+  cmsSetDeviceClass(profile, cmsSigOutputClass);
+  cmsSetColorSpace(profile, cmsSigCmykData);
+  cmsSetPCS(profile, cmsSigLabData);
+  cmsPipeline* const pipeline = cmsPipelineAlloc(nullptr, 4, 3);
+  const auto sample = [](const cmsUInt16Number* in, cmsUInt16Number* out, void*) {
+    const auto has = [&](int ink) { return in[ink] > 0x7fff; };
+    const cmsCIELab lab = {has(3) ? 0.0 : 100.0 - 20 * (has(0) + has(1) + has(2)), 0, 0};
+    cmsFloat2LabEncoded(out, &lab);
+    return 1;
+  };
+  cmsStage* const table = cmsStageAllocCLut16bit(nullptr, 2, 4, 3, nullptr);
+  cmsStageSampleCLut16bit(table, sample, nullptr, 0);
+  cmsPipelineInsertStage(pipeline, cmsAT_END, table);
+  cmsWriteTag(profile, cmsSigAToB0Tag, pipeline);
+  cmsWriteTag(profile, cmsSigAToB1Tag, pipeline);
+  cmsPipelineFree(pipeline);
+  cmsUInt32Number size = 0;
+  cmsSaveProfileToMem(profile, nullptr, &size);
+  std::string out(size, '\0');
+  cmsSaveProfileToMem(profile, out.data(), &size);
+  cmsCloseProfile(profile);
+  return out;
+}
+
+// The grey of a lightness (CIE 15): the curve of L*, then that of sRGB.
+double grey_of(double lightness) { return coded(std::pow((lightness + 16) / 116, 3)); }
+
+TEST(SrgbOfInks, FollowsTheProfile) {
+  InkImage inks(5, 1, {});
+  inks(1, 0) = {1, 0, 0, 0};
+  inks(2, 0) = {1, 1, 0, 0};
+  inks(3, 0) = {0.5f, 0, 0, 0};  // half-way: L* = 90
+  inks(4, 0) = {0, 0, 0, 1};
+  const ColorImage found = srgb_of_inks(ink_profile(), inks);
+  const std::array<double, 5> expected = {1, grey_of(80), grey_of(60), grey_of(90), 0};
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_LT((found(i, 0).array() - float(expected[size_t(i)])).abs().maxCoeff(), 1.5 / 255) << i;
+  }
+  // No profile, or one of other colours: plain mixing.
+  for (const std::string& profile : {std::string(), srgb(), std::string("nothing")}) {
+    EXPECT_LT((srgb_of_inks(profile, inks)(2, 0) - Eigen::Vector3f(0, 0, 1)).norm(), 1e-6);
+  }
+}
+
+TEST(SrgbOfInks, IsAskedByFilesOfInks) {
+  const test::TempDir dir;
+  const std::string profile = ink_profile();
+  test::TiffTag tag{34675, 1, {}};
+  for (const char c : profile) tag.values.push_back(static_cast<unsigned char>(c));
+  for (const uint32_t bytes : {1U, 2U}) {
+    const std::string ink = std::string(bytes, '\xff') + std::string(3 * bytes, '\0');  // cyan
+    test::write_bytes(
+        dir / "a.tif",
+        test::tiff_file(test::with_tags(test::tiff_tags(1, 1, 4, 8 * bytes, 5), {tag}), {ink}));
+    EXPECT_LT((read_image(dir / "a.tif")(0, 0).array() - float(grey_of(80))).abs().maxCoeff(),
+              1.5 / 255);
+    EXPECT_LT(
+        (decode_image(test::read_bytes(dir / "a.tif"), "a.tif")(0, 0) - Eigen::Vector3f(0, 1, 1))
+            .norm(),
+        1e-6);
   }
 }
 

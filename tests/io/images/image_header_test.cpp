@@ -85,14 +85,23 @@ TEST(ParseImageHeader, NamesOtherContent) {
   EXPECT_EQ(refused("x"), "MAGIC");
 }
 
-TEST(ParseImageHeader, RefusesJpegThatIsNotEightBitGreyOrRgb) {
-  EXPECT_EQ(refused(test::jpeg(8, 8, 4)), "UNSUPPORTED");
-  std::string deep = test::jpeg(8, 8);
-  deep[deep.find("\xff\xc0") + 4] = 12;
+TEST(ParseImageHeader, RefusesJpegOfKindsThatAreNotRead) {
+  EXPECT_EQ(parse(test::jpeg(8, 8, 4)).inks, 4);
+  EXPECT_EQ(parse(test::jpeg(8, 8, 3)).inks, 0);
+  const std::string whole = test::jpeg(8, 8);
+  const size_t frame = whole.find("\xff\xc0");
+  std::string deep = whole;
+  deep[frame + 4] = 12;
   EXPECT_EQ(refused(deep), "UNSUPPORTED");
-  std::string arithmetic = test::jpeg(8, 8);
-  arithmetic[arithmetic.find("\xff\xc0") + 1] = '\xc9';
-  EXPECT_EQ(refused(arithmetic), "UNSUPPORTED");
+  std::string lossless = whole;
+  lossless[frame + 1] = '\xc3';
+  EXPECT_EQ(refused(lossless), "UNSUPPORTED");
+  std::string two = whole;
+  two[frame + 9] = 2;
+  EXPECT_EQ(refused(two), "UNSUPPORTED");
+  std::string late = whole;  // its height stands behind the data
+  late[frame + 6] = 0;
+  EXPECT_EQ(refused(late), "UNSUPPORTED");
 }
 
 TEST(ParseImageHeader, SurvivesTruncationAndDamageOfEveryHeaderByte) {
