@@ -76,6 +76,10 @@ void add_depth_options(CLI::App& command, SceneOptions& options) {
   command.add_flag("--allow-external",
                    options.allow_external,
                    "Follow links and absolute paths that leave the scene folder");
+  command.add_option("--chunk",
+                     options.chunk,
+                     "Of Metashape's cameras the chunk to read: its label, or its index from 0; "
+                     "default: the first with aligned cameras");
   const OptionGroup group(command, kDepthHeading);
   command.add_option(
       "--depth",

@@ -38,6 +38,7 @@ void refuse_depth_options(const DepthFusionRequest& request) {
   const SceneOptions& options = request.options;
   for (const auto& [option, is_given] :
        {std::pair("--views", !options.views.empty()),
+        std::pair("--chunk", !options.chunk.empty()),
         std::pair("--downscale", options.downscale.has_value()),
         std::pair("--depth", !options.depth.folder.empty()),
         std::pair("--depth-kind", options.depth.kind != DepthKind::Unknown),

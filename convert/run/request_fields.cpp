@@ -255,6 +255,7 @@ std::vector<RequestField> all_fields() {
       asked("max_size", Stage::Web, &RunRequest::max_size)};
   for (RequestField& field : found_in_scene()) out.push_back(std::move(field));
   out.push_back(control_points());
+  out.push_back(chosen("chunk", Stage::Model, in_options(&SceneOptions::chunk)));
   out.push_back(chosen("refine_poses", Stage::Model, in_scene(&SceneRequest::refine_poses)));
   out.push_back(lods());
   out.push_back(chosen("glb_encoding", Stage::Web, &RunRequest::glb_encoding));

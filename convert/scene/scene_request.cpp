@@ -110,6 +110,10 @@ OpenedScene open_scene(const SceneRequest& request,
                          printable(request.path) +
                          " holds photographs alone, which are solved for as well as they can be");
     }
+    if (!request.options.chunk.empty()) {
+      throw InvalidInput("--chunk is for cameras of Metashape; " + printable(request.path) +
+                         " holds photographs alone");
+    }
     request.options.validate();
     const SceneRoot root{request.path, request.options.allow_external};
     const std::vector<std::string> names = names_of(root, request.options.views);

@@ -144,6 +144,7 @@ std::string command_line(const RunRequest& request, int threads) {
   }
   if (depth.scale > 0) add("--depth-scale", exact(depth.scale));
   add("--depth-model", depth.network.string());
+  add("--chunk", scene.options.chunk);
   if (scene.options.allow_external) out += " --allow-external";
   if (scene.focal > 0) add("--focal", exact(scene.focal));
   if (scene.refine_poses) out += " --refine-poses";

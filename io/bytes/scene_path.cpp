@@ -6,6 +6,9 @@
 #include <new>
 #include <system_error>
 
+#include <unicode/normalizer2.h>
+#include <unicode/unistr.h>
+
 #include "io/bytes/byte_reader.h"
 #include "libcgs/core/remedy.h"
 
@@ -133,6 +136,25 @@ std::string lower_extension(const fs::path& path) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
   return out;
+}
+
+std::string folded_name(std::string_view name) {
+  const auto is_plain = [](char c) { return static_cast<unsigned char>(c) < 0x80; };
+  if (std::all_of(name.begin(), name.end(), is_plain)) {
+    std::string out(name);
+    for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    return out;
+  }
+  constexpr char16_t kReplacement = 0xFFFD;  // of what is no UTF-8
+  UErrorCode error = U_ZERO_ERROR;
+  const icu::Normalizer2* const composed = icu::Normalizer2::getNFCInstance(error);
+  icu::UnicodeString text = icu::UnicodeString::fromUTF8(
+      icu::StringPiece(name.data(), static_cast<int32_t>(name.size())));
+  if (U_FAILURE(error) || text.indexOf(kReplacement) >= 0) return std::string(name);
+  text = composed->normalize(composed->normalize(text, error).foldCase(), error);
+  std::string out;
+  text.toUTF8String(out);
+  return U_FAILURE(error) ? std::string(name) : out;
 }
 
 bool has_image_extension(const fs::path& path) {

@@ -60,6 +60,12 @@ std::vector<std::string> sorted_entries(const std::filesystem::path& folder);
 /// The ending of a name with its dot, ASCII letters in lower case.
 std::string lower_extension(const std::filesystem::path& path);
 
+/// A name without the differences that file systems and programs make of it: letter case folded,
+/// in Unicode normal form C, so that names which macOS wrote equal those of others. What is no
+/// UTF-8 stays as it is.
+/// Source: Unicode Standard Annex 15; Unicode 3.13, caseless matching.
+std::string folded_name(std::string_view name);
+
 /// True for the extensions of image files: .png .jpg .jpeg .tif .tiff .webp, in any case.
 bool has_image_extension(const std::filesystem::path& path);
 

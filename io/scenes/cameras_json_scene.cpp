@@ -62,6 +62,7 @@ Scene read_cameras_json_scene(const SceneRoot& root) {
     view.near *= scene.frame.scale;
     view.far *= scene.frame.scale;
   }
+  for (const std::string& note : photographs.notes()) scene.notes.push_back(note);
   Frame world;
   world.metres_per_unit = scene.frame.metres_per_unit;
   world.metres_sigma = scene.frame.metres_sigma;

@@ -19,6 +19,7 @@ struct CameraModel {
   size_t parameters;
 };
 
+// Those that are read.
 constexpr std::array<CameraModel, 8> kModels = {{{0, "SIMPLE_PINHOLE", 3},
                                                  {1, "PINHOLE", 4},
                                                  {2, "SIMPLE_RADIAL", 4},
@@ -27,6 +28,26 @@ constexpr std::array<CameraModel, 8> kModels = {{{0, "SIMPLE_PINHOLE", 3},
                                                  {5, "OPENCV_FISHEYE", 8},
                                                  {8, "SIMPLE_RADIAL_FISHEYE", 4},
                                                  {9, "RADIAL_FISHEYE", 5}}};
+
+// How many parameters stand in a binary file for the others.
+constexpr std::array<CameraModel, 10> kOtherModels = {{{6, "FULL_OPENCV", 12},
+                                                       {7, "FOV", 5},
+                                                       {10, "THIN_PRISM_FISHEYE", 12},
+                                                       {11, "RAD_TAN_THIN_PRISM_FISHEYE", 16},
+                                                       {12, "SIMPLE_DIVISION", 4},
+                                                       {13, "DIVISION", 5},
+                                                       {14, "SIMPLE_FISHEYE", 3},
+                                                       {15, "FISHEYE", 4},
+                                                       {16, "EUCM", 6},
+                                                       {17, "EQUIRECTANGULAR", 2}}};
+
+// Null if the list has no such model.
+template <size_t N>
+const CameraModel* model_of(const std::array<CameraModel, N>& models, int32_t id) {
+  const auto* const found = std::find_if(
+      models.begin(), models.end(), [&](const CameraModel& model) { return model.id == id; });
+  return found == models.end() ? nullptr : found;
+}
 
 std::string unsupported(const std::string& model) {
   return "camera model " + model +
@@ -81,37 +102,45 @@ uint32_t id_from(const TextLines& lines, std::string_view token) {
 
 }  // namespace
 
-ColmapCameras read_colmap_cameras_binary(const std::filesystem::path& path) {
+ColmapCameras read_colmap_cameras_binary(const std::filesystem::path& path,
+                                         const std::set<uint32_t>* used) {
   const std::string bytes = read_file(path);
   refuse_foreign_content(path, bytes, "a COLMAP model");
   ByteReader file(bytes, path);
   const auto count = file.get<uint64_t>("number of cameras");
-  file.expect_records(count, 24 + 3 * 8, "cameras");
+  file.expect_records(count, 24 + 2 * 8, "cameras");
   ColmapCameras cameras;
+  std::set<uint32_t> ids;
   for (uint64_t i = 0; i < count; ++i) {
     const auto id = file.get<uint32_t>("camera id");
     const Refuse refuse = [&](Defect defect, const std::string& reason) {
       file.fail(defect, "camera " + std::to_string(id) + ": " + reason);
     };
     const auto model_id = file.get<int32_t>("camera model");
-    const auto* const model = std::find_if(
-        kModels.begin(), kModels.end(), [&](const CameraModel& m) { return m.id == model_id; });
-    if (model == kModels.end()) refuse(Defect::Unsupported, unsupported(std::to_string(model_id)));
+    const bool is_used = used == nullptr || used->contains(id);
+    const CameraModel* const model = model_of(kModels, model_id);
+    const CameraModel* const other = model_of(kOtherModels, model_id);
+    if (model == nullptr && (other == nullptr || is_used)) {
+      refuse(Defect::Unsupported,
+             unsupported(other != nullptr ? std::string(other->name) : std::to_string(model_id)));
+    }
     const auto width = file.get<uint64_t>("camera width");
     const auto height = file.get<uint64_t>("camera height");
-    std::vector<double> parameters(model->parameters);
+    std::vector<double> parameters(model != nullptr ? model->parameters : other->parameters);
     for (double& p : parameters) p = file.get<double>("camera parameter");
-    const ColmapCamera camera = camera_from(*model, width, height, parameters, refuse);
-    if (!cameras.emplace(id, camera).second) refuse(Defect::Syntax, "the id occurs twice");
+    if (!ids.insert(id).second) refuse(Defect::Syntax, "the id occurs twice");
+    if (is_used) cameras.emplace(id, camera_from(*model, width, height, parameters, refuse));
   }
   return cameras;
 }
 
-ColmapCameras read_colmap_cameras_text(const std::filesystem::path& path) {
+ColmapCameras read_colmap_cameras_text(const std::filesystem::path& path,
+                                       const std::set<uint32_t>* used) {
   const std::string text = read_file(path);
   refuse_foreign_content(path, text, "a COLMAP model");
   TextLines lines(text, path);
   ColmapCameras cameras;
+  std::set<uint32_t> ids;
   while (const auto line = lines.next_data()) {
     const auto parts = tokens(*line);
     if (parts.size() < 4) lines.fail(Defect::Syntax, "expected id, model, width and height");
@@ -119,6 +148,8 @@ ColmapCameras read_colmap_cameras_text(const std::filesystem::path& path) {
     const Refuse refuse = [&](Defect defect, const std::string& reason) {
       lines.fail(defect, "camera " + std::to_string(id) + ": " + reason);
     };
+    if (!ids.insert(id).second) refuse(Defect::Syntax, "the id occurs twice");
+    if (used != nullptr && !used->contains(id)) continue;
     const auto* const model = std::find_if(
         kModels.begin(), kModels.end(), [&](const CameraModel& m) { return m.name == parts[1]; });
     if (model == kModels.end()) {
@@ -129,9 +160,8 @@ ColmapCameras read_colmap_cameras_text(const std::filesystem::path& path) {
     }
     std::vector<double> parameters;
     for (const auto& part : std::span(parts).subspan(4)) parameters.push_back(lines.number(part));
-    const ColmapCamera camera =
-        camera_from(*model, lines.count(parts[2]), lines.count(parts[3]), parameters, refuse);
-    if (!cameras.emplace(id, camera).second) refuse(Defect::Syntax, "the id occurs twice");
+    cameras.emplace(
+        id, camera_from(*model, lines.count(parts[2]), lines.count(parts[3]), parameters, refuse));
   }
   return cameras;
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -53,8 +54,13 @@ struct ColmapModel {
 /// \throws BadInput Truncated, Count, Syntax (also ids that occur twice), Unsupported (other camera
 ///         models), Value (intrinsics out of range, naming the camera); LimitError.
 /// Source: COLMAP documentation, "Output format"; binary layout of COLMAP 3.x.
-ColmapCameras read_colmap_cameras_binary(const std::filesystem::path& path);
-ColmapCameras read_colmap_cameras_text(const std::filesystem::path& path);
+///
+/// \param used  ids of the cameras that images name: others are left out, and neither their model
+///              nor their parameters are judged; null: all are read
+ColmapCameras read_colmap_cameras_binary(const std::filesystem::path& path,
+                                         const std::set<uint32_t>* used = nullptr);
+ColmapCameras read_colmap_cameras_text(const std::filesystem::path& path,
+                                       const std::set<uint32_t>* used = nullptr);
 std::vector<ColmapImage> read_colmap_images_binary(const std::filesystem::path& path);
 std::vector<ColmapImage> read_colmap_images_text(const std::filesystem::path& path);
 std::vector<ColmapPoint> read_colmap_points_binary(const std::filesystem::path& path);

@@ -38,20 +38,60 @@ bool is_depth(float value, const std::string& extension, int whole_bits) {
   return whole_bits != 16 || value < kLargestWhole;
 }
 
+// Layer and component of a channel, as "ViewLayer.Depth" and "Z".
+std::pair<std::string, std::string> layer_of(const std::string& channel) {
+  const size_t dot = channel.rfind('.');
+  if (dot == std::string::npos) return {"", channel};
+  return {channel.substr(0, dot), channel.substr(dot + 1)};
+}
+
+// The depth among the channels of a picture of several layers, as Blender writes it: that of a
+// layer called Depth in any view layer, else the Z beside colours; not that of positions, normals
+// and motion, which have X and Y, too.
+std::vector<std::string> layered_depth(const ExrImage& image) {
+  std::vector<std::string> named;
+  std::vector<std::string> others;
+  for (const auto& [channel, values] : image.channels) {
+    const auto [layer, component] = layer_of(channel);
+    const std::string pass = folded_name(layer_of(layer).second);
+    const bool is_depth = pass == "depth" && (component == "Z" || component == "V");
+    const bool is_alone =
+        image.find(layer + ".X") == nullptr && image.find(layer + ".Y") == nullptr;
+    if (is_depth) named.push_back(channel);
+    if (!is_depth && component == "Z" && is_alone && pass != "mist") others.push_back(channel);
+  }
+  return named.empty() ? others : named;
+}
+
+// \throws BadInput Schema if there is none, or more than one and nothing says which
+const std::vector<float>& depth_channel(const ExrImage& image, const fs::path& path) {
+  for (const char* name : {"Z", "depth.Z", "depth.V"}) {
+    if (const auto* const values = image.find(name)) return *values;
+  }
+  const std::vector<std::string> layered = layered_depth(image);
+  if (layered.size() == 1) return *image.find(layered.front());
+  if (layered.size() > 1) {
+    throw BadInput(Defect::Schema,
+                   path,
+                   "the depth may be that of channel " + printable(layered[0]) + " or " +
+                       printable(layered[1]) + "; export one view layer");
+  }
+  for (const char* name : {"Y", "R"}) {
+    if (const auto* const values = image.find(name)) return *values;
+  }
+  if (image.channels.size() == 1) return image.channels.front().second;
+  throw BadInput(Defect::Schema,
+                 path,
+                 "has none of the channels Z, depth.Z, depth.V, Y and R, nor a layer with depth");
+}
+
 Raster<float> from_exr(const fs::path& path, const ReadLimits& limits) {
   const ExrImage image = read_exr(path, limits);
-  const std::vector<float>* values = nullptr;
-  for (const char* name : {"Z", "depth.Z", "depth.V", "Y", "R"}) {
-    if (values == nullptr) values = image.find(name);
-  }
-  if (values == nullptr && image.channels.size() == 1) values = &image.channels.front().second;
-  if (values == nullptr) {
-    throw BadInput(Defect::Schema, path, "has none of the channels Z, depth.Z, depth.V, Y and R");
-  }
+  const std::vector<float>& values = depth_channel(image, path);
   Raster<float> stored;
   stored.width = image.width;
   stored.height = image.height;
-  stored.data = *values;
+  stored.data = values;
   const ExrWindow& shown = image.display;
   if (shown == ExrWindow{0, 0, image.width, image.height}) return stored;
   const uint64_t pixels = uint64_t(shown.width) * uint64_t(shown.height);
@@ -95,20 +135,29 @@ bool has_depth_extension(const fs::path& path) {
 
 namespace {
 
-// The file of that stem whose format comes first; empty if there is none.
-std::string file_of_stem(const fs::path& folder, const fs::path& stem) {
+// The file of that stem whose format comes first, be it that its name differs in letter case or
+// Unicode normal form; empty if there is none.
+std::string file_of_stem(const fs::path& folder, const fs::path& stem, bool is_folded = false) {
   std::string out;
   size_t best = kExtensions.size();
+  const std::string wanted = is_folded ? folded_name(stem.string()) : stem.string();
   for (const std::string& entry : sorted_entries(folder)) {
-    if (fs::path(entry).stem() != stem) continue;
+    const std::string own = fs::path(entry).stem().string();
+    if ((is_folded ? folded_name(own) : own) != wanted) continue;
     const auto* const format =
         std::find(kExtensions.begin(), kExtensions.end(), lower_extension(entry));
     const auto rank = static_cast<size_t>(format - kExtensions.begin());
+    if (rank == best && is_folded && best < kExtensions.size()) {
+      throw BadInput(Defect::Ref,
+                     folder / out,
+                     "and " + printable(fs::path(entry)) + " may both be the depth of " +
+                         printable(stem) + "; rename one of them");
+    }
     if (rank >= best) continue;
     best = rank;
     out = entry;
   }
-  return out;
+  return out.empty() && !is_folded ? file_of_stem(folder, stem, true) : out;
 }
 
 }  // namespace

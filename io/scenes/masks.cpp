@@ -8,6 +8,7 @@
 
 #include "io/images/exif.h"
 #include "io/scenes/orientation.h"
+#include "io/scenes/view_sizes.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -52,6 +53,7 @@ const MaskIndex::Folder& MaskIndex::listed(const std::string& folder) {
   for (const fs::path& file : image_files(root_, folder)) {
     place->second.files.emplace(file.filename().string(), file);
     place->second.stems.emplace(file.stem().string(), file);
+    place->second.folded[folded_name(file.stem().string())].push_back(file);
   }
   return place->second;
 }
@@ -63,6 +65,15 @@ fs::path MaskIndex::mask_of(const fs::path& photograph) {
     if (file != folder.files.end()) return file->second;
     const auto same_stem = folder.stems.find(photograph.stem().string());
     if (same_stem != folder.stems.end()) return same_stem->second;
+    for (const fs::path& name_of_mask : {photograph.filename(), photograph.stem()}) {
+      const auto close = folder.folded.find(folded_name(name_of_mask.string()));
+      if (close == folder.folded.end()) continue;
+      if (close->second.size() == 1) return close->second.front();
+      throw BadInput(Defect::Ref,
+                     close->second[0],
+                     "and " + printable(close->second[1]) + " may both be the mask of " +
+                         printable(photograph.filename()) + "; rename one of them");
+    }
   }
   return {};
 }
@@ -70,6 +81,25 @@ fs::path MaskIndex::mask_of(const fs::path& photograph) {
 bool MaskIndex::lacks(const fs::path& photograph) {
   return !mask_folders(root_, photograph).empty() && mask_of(photograph).empty();
 }
+
+namespace {
+
+void tell_of_other_sizes(Scene& scene) {
+  int count = 0;
+  for (const int i : scene.input) {
+    const View& view = scene.views[static_cast<size_t>(i)];
+    if (view.mask_path.empty() || view.image_path.empty()) continue;
+    const ImageSize mask = image_size(view.mask_path);
+    const ImageSize photograph = photograph_size(view);
+    const auto sides = [](const ImageSize& size) { return std::minmax(size.width, size.height); };
+    count += sides(mask) != sides(photograph) ? 1 : 0;  // a mask may lie turned
+  }
+  if (count == 0) return;
+  scene.notes.push_back(std::to_string(count) + (count == 1 ? " mask is" : " masks are") +
+                        " of another size than the photograph; each pixel takes the nearest");
+}
+
+}  // namespace
 
 void find_masks(const SceneRoot& root, Scene& scene) {
   MaskIndex masks(root);
@@ -98,17 +128,23 @@ void apply_mask(const View& view, const ImageSize& size, MaskMap& usable) {
   if (file.empty()) return;
   ColorImage mask = read_image(file);
   if (view.orientation != 1) mask = upright(mask, file, view.orientation, size);
-  if (mask.width != size.width || mask.height != size.height) {
+  if (!have_same_shape(mask.width, mask.height, size.width, size.height)) {
     throw BadInput(Defect::Mismatch,
                    file,
-                   "the mask has " + std::to_string(mask.width) + " x " +
-                       std::to_string(mask.height) + " pixels, its photograph " +
-                       std::to_string(size.width) + " x " + std::to_string(size.height));
+                   "the mask has " + size_text(mask.width, mask.height) +
+                       " pixels, its photograph " + size_text(size.width, size.height) +
+                       ", which is another shape");
   }
   if (usable.empty()) usable = MaskMap(size.width, size.height, 1);
   const float bright = brightness_of_use(mask);
-  for (size_t i = 0; i < mask.data.size(); ++i) {
-    if (mask.data[i].mean() < bright) usable.data[i] = 0;
+  const auto nearest = [](int i, int of, int wanted) {
+    return static_cast<int>((2 * int64_t{i} + 1) * wanted / (2 * int64_t{of}));
+  };
+  for (int y = 0; y < size.height; ++y) {
+    const int row = nearest(y, size.height, mask.height);
+    for (int x = 0; x < size.width; ++x) {
+      if (mask(nearest(x, size.width, mask.width), row).mean() < bright) usable(x, y) = 0;
+    }
   }
   const auto is_set = [](uint8_t set) { return set != 0; };
   if (std::all_of(usable.data.begin(), usable.data.end(), is_set)) usable = MaskMap();

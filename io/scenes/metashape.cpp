@@ -120,11 +120,16 @@ class MetashapeFile {
     return found ? numbers<1>(found)[0] : 0;
   }
 
-  // The first chunk with cameras.
-  pugi::xml_node chunk() const {
-    for (const pugi::xml_node& chunk : document_.child("document").children("chunk")) {
-      if (chunk.child("cameras")) return chunk;
+  // All with cameras, also below others.
+  std::vector<pugi::xml_node> chunks() const {
+    std::vector<pugi::xml_node> out;
+    const pugi::xml_node document = document_.child("document");
+    for (const pugi::xml_node& parent : {document, document.child("chunks")}) {
+      for (const pugi::xml_node& chunk : parent.children("chunk")) {
+        if (chunk.child("cameras")) out.push_back(chunk);
+      }
     }
+    if (!out.empty()) return out;
     throw BadInput(Defect::Schema, path_, "no <document> with a <chunk> that has <cameras>");
   }
   const fs::path& path() const { return path_; }
@@ -251,6 +256,83 @@ Similarity read_similarity(const MetashapeFile& file, const pugi::xml_node& node
   return out;
 }
 
+// A camera with what stands around it.
+struct CameraNode {
+  pugi::xml_node node;
+  pugi::xml_node master;  // of a rig; null if it has a place of its own
+  std::string group;      // its label; often the folder of the photographs
+};
+
+bool is_enabled(const pugi::xml_node& camera) {
+  const std::string_view enabled = camera.attribute("enabled").as_string("true");
+  return enabled != "false" && enabled != "0";
+}
+
+std::vector<CameraNode> cameras_of(const pugi::xml_node& chunk) {
+  std::vector<CameraNode> out;
+  const pugi::xml_node all = chunk.child("cameras");
+  for (const pugi::xml_node& node : all.children("camera")) out.push_back({node, {}, {}});
+  for (const pugi::xml_node& group : all.children("group")) {
+    const std::string label = group.attribute("label").value();
+    for (const pugi::xml_node& node : group.children("camera")) out.push_back({node, {}, label});
+  }
+  std::map<std::string, pugi::xml_node> by_id;
+  for (const CameraNode& camera : out) by_id[camera.node.attribute("id").value()] = camera.node;
+  for (CameraNode& camera : out) {
+    const std::string master = camera.node.attribute("master_id").value();
+    if (master.empty() || camera.node.child("transform")) continue;
+    const auto found = by_id.find(master);
+    if (found != by_id.end()) camera.master = found->second;
+  }
+  return out;
+}
+
+// The one that states the place: the camera itself, or the master of its rig.
+const pugi::xml_node& placed(const CameraNode& camera) {
+  return camera.master ? camera.master : camera.node;
+}
+
+bool is_used(const CameraNode& camera) {
+  return placed(camera).child("transform") && is_enabled(camera.node);
+}
+
+std::string component_of(const CameraNode& camera) {
+  const std::string own = camera.node.attribute("component_id").value();
+  return own.empty() ? placed(camera).attribute("component_id").value() : own;
+}
+
+std::string label_of(const pugi::xml_node& chunk) { return chunk.attribute("label").value(); }
+
+std::string labels_of(const std::vector<pugi::xml_node>& chunks) {
+  std::string out;
+  for (size_t i = 0; i < chunks.size(); ++i) {
+    out += (i > 0 ? ", " : "") + std::to_string(i) + " \"" + one_line(label_of(chunks[i])) + "\"";
+  }
+  return out;
+}
+
+// The chunk of a label, else of an index; without a choice the first with a camera that is aligned.
+size_t chosen_chunk(const std::vector<pugi::xml_node>& chunks, const std::string& choice) {
+  if (choice.empty()) {
+    const auto has_used = [](const pugi::xml_node& chunk) {
+      const std::vector<CameraNode> cameras = cameras_of(chunk);
+      return std::any_of(cameras.begin(), cameras.end(), is_used);
+    };
+    const auto found = std::find_if(chunks.begin(), chunks.end(), has_used);
+    return found == chunks.end() ? 0 : static_cast<size_t>(found - chunks.begin());
+  }
+  std::vector<size_t> called;
+  for (size_t i = 0; i < chunks.size(); ++i) {
+    if (label_of(chunks[i]) == choice) called.push_back(i);
+  }
+  if (called.size() == 1) return called.front();
+  uint64_t index = 0;
+  if (called.empty() && parse_number(choice, index) && index < chunks.size()) return index;
+  throw InvalidInput("chunk \"" + one_line(choice) + "\" " +
+                     (called.empty() ? "does not exist" : "occurs more than once") +
+                     "; there are " + labels_of(chunks));
+}
+
 class MetashapeReader {
  public:
   explicit MetashapeReader(const SceneRoot& root)
@@ -260,56 +342,54 @@ class MetashapeReader {
     scene_.folder = root.folder;
   }
 
-  Scene run() {
-    const pugi::xml_node chunk = file_.chunk();
+  Scene run(const std::string& choice) {
+    const std::vector<pugi::xml_node> chunks = file_.chunks();
+    const size_t index = chosen_chunk(chunks, choice);
+    const pugi::xml_node& chunk = chunks[index];
     for (const auto& node : file_.child(chunk, "sensors").children("sensor")) {
       sensors_[node.attribute("id").value()] = node;
     }
-    choose_component(chunk);
+    const std::vector<CameraNode> cameras = cameras_of(chunk);
+    choose_component(chunk, cameras);
     whole_ = read_similarity(file_, chunk);  // of versions without components
-    for (const pugi::xml_node& node : cameras_of(chunk)) add_camera(node);
+    for (const CameraNode& camera : cameras) add_camera(camera);
     if (scene_.views.empty()) {
-      throw BadInput(Defect::Empty, file_.path(), "no camera has a <transform>: none is aligned");
+      throw BadInput(Defect::Empty,
+                     file_.path(),
+                     disabled_ > 0 ? "no camera that is enabled has a <transform>: none is aligned"
+                                   : "no camera has a <transform>: none is aligned");
     }
-    if (left_out_ > 0) {
-      scene_.warnings.push_back(std::to_string(left_out_) +
-                                " cameras are not aligned or disabled, and were left out");
+    if (chunks.size() > 1) {
+      scene_.notes.push_back("chunk " + std::to_string(index) + " \"" + one_line(label_of(chunk)) +
+                             "\" was read, of " + labels_of(chunks));
     }
-    if (elsewhere_ > 0) {
-      scene_.warnings.push_back(std::to_string(elsewhere_) +
-                                " cameras were aligned apart from the others (in another component "
-                                "than " +
-                                component_ + "), and were left out");
-    }
+    tell_what_was_left_out();
+    for (const std::string& note : photographs_.notes()) scene_.notes.push_back(note);
     return std::move(scene_);
   }
 
  private:
-  static std::vector<pugi::xml_node> cameras_of(const pugi::xml_node& chunk) {
-    std::vector<pugi::xml_node> out;
-    const auto add = [&](const pugi::xml_node& parent) {
-      for (const pugi::xml_node& node : parent.children("camera")) out.push_back(node);
+  void tell_what_was_left_out() {
+    const auto tell = [&](size_t count, const std::string& why) {
+      if (count == 0) return;
+      scene_.warnings.push_back(std::to_string(count) + " cameras " + why + ", and were left out");
     };
-    add(chunk.child("cameras"));
-    for (const pugi::xml_node& group : chunk.child("cameras").children("group")) add(group);
-    return out;
-  }
-
-  static bool is_used(const pugi::xml_node& camera) {
-    const std::string_view enabled = camera.attribute("enabled").as_string("true");
-    return camera.child("transform") && enabled != "false" && enabled != "0";
+    tell(left_out_, "are not aligned");
+    tell(disabled_, "are disabled");
+    tell(elsewhere_,
+         "were aligned apart from the others (in another component than " + component_ + ")");
   }
 
   // Components do not know where they lie relative to each other: one of them is the scene. That is
   // the active one, or else the one with most cameras.
-  void choose_component(const pugi::xml_node& chunk) {
+  void choose_component(const pugi::xml_node& chunk, const std::vector<CameraNode>& cameras) {
     const pugi::xml_node list = chunk.child("components");
     for (const pugi::xml_node& node : list.children("component")) {
       components_[node.attribute("id").value()] = read_similarity(file_, node);
     }
     std::map<std::string, size_t> sizes;  // by component
-    for (const pugi::xml_node& camera : cameras_of(chunk)) {
-      const std::string id = camera.attribute("component_id").value();
+    for (const CameraNode& camera : cameras) {
+      const std::string id = component_of(camera);
       if (is_used(camera) && components_.contains(id)) ++sizes[id];
     }
     const std::string active = list.attribute("active_id").value();
@@ -321,12 +401,12 @@ class MetashapeReader {
     if (sizes.contains(active)) component_ = active;
   }
 
-  void add_camera(const pugi::xml_node& node) {
-    if (!is_used(node)) {
-      ++left_out_;
+  void add_camera(const CameraNode& camera) {
+    if (!is_used(camera)) {
+      ++(is_enabled(camera.node) ? left_out_ : disabled_);
       return;
     }
-    if (!component_.empty() && node.attribute("component_id").value() != component_) {
+    if (!component_.empty() && component_of(camera) != component_) {
       ++elsewhere_;
       return;
     }
@@ -334,29 +414,55 @@ class MetashapeReader {
       throw LimitError(printable(file_.path()) + ": more than " +
                        std::to_string(ReadLimits{}.max_views) + " cameras");
     }
-    scene_.views.push_back(read_view(node));
+    scene_.views.push_back(read_view(camera));
   }
 
-  View read_view(const pugi::xml_node& node) {
+  View read_view(const CameraNode& camera) {
     View view;
-    const std::string label = node.attribute("label").value();
-    if (label.empty()) file_.fail(Defect::Schema, node, "has no label");
-    view.image_path = photographs_.take(label);
-    view.name = view.image_path.empty() ? label : view.image_path.filename().string();
-    if (view.image_path.empty()) scene_.missing.push_back(label);
-    const auto sensor = sensors_.find(node.attribute("sensor_id").value());
+    const std::string label = camera.node.attribute("label").value();
+    if (label.empty()) file_.fail(Defect::Schema, camera.node, "has no label");
+    view.image_path = photographs_.take(camera.group.empty() ? label : camera.group + "/" + label);
+    view.name = label;
+    if (view.image_path.empty()) {
+      scene_.missing.push_back(label);
+    } else {
+      view.name = name_below(scene_.folder, view.image_path);
+    }
+    const auto sensor = sensors_.find(camera.node.attribute("sensor_id").value());
     if (sensor == sensors_.end()) {
-      file_.fail(Defect::Ref, node, "names a sensor that does not exist");
+      file_.fail(Defect::Ref, camera.node, "names a sensor that does not exist");
     }
     const Sensor read = read_sensor(file_, sensor->second);
     view.camera = read.camera;
     view.distortion = read.distortion;
     view.fisheye = read.fisheye;
-    view.camera.world_from_cam = read_pose(node);
+    Eigen::Isometry3d pose = read_transform(placed(camera));
+    if (camera.master) pose = pose * read_place_in_rig(sensor->second);
+    const auto found = components_.find(component_of(camera));
+    const Similarity& world = found != components_.end() ? found->second : whole_;
+    pose.translation() *= world.scale;
+    view.camera.world_from_cam = world.pose * pose;
     return view;
   }
 
-  Eigen::Isometry3d read_pose(const pugi::xml_node& node) const {
+  // From the axes of a slave to those of its master, in the unit of the component; that of the
+  // master itself where nothing is stated.
+  Eigen::Isometry3d read_place_in_rig(const pugi::xml_node& sensor) const {
+    using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d location = Eigen::Vector3d::Zero();
+    if (const auto part = sensor.child("rotation")) {
+      rotation = Eigen::Map<const RowMajor>(file_.numbers<9>(part).data());
+    }
+    if (const auto part = sensor.child("location")) {
+      location = Eigen::Map<const Eigen::Vector3d>(file_.numbers<3>(part).data());
+    }
+    return checked_pose(rotation, location, [&](Defect defect, const std::string& why) {
+      file_.fail(defect, sensor, why);
+    });
+  }
+
+  Eigen::Isometry3d read_transform(const pugi::xml_node& node) const {
     const pugi::xml_node transform = node.child("transform");
     const std::array<double, 16> m = file_.numbers<16>(transform);
     const Eigen::Matrix4d M =
@@ -367,12 +473,7 @@ class MetashapeReader {
     if ((M.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > 1e-9) {
       refuse(Defect::Value, "the last row must be 0 0 0 1");
     }
-    Eigen::Isometry3d pose =
-        checked_pose(M.topLeftCorner<3, 3>(), M.topRightCorner<3, 1>(), refuse);
-    const auto found = components_.find(node.attribute("component_id").value());
-    const Similarity& world = found != components_.end() ? found->second : whole_;
-    pose.translation() *= world.scale;
-    return world.pose * pose;
+    return checked_pose(M.topLeftCorner<3, 3>(), M.topRightCorner<3, 1>(), refuse);
   }
 
   MetashapeFile file_;
@@ -382,6 +483,7 @@ class MetashapeReader {
   Similarity whole_;
   std::string component_;  // whose cameras are read; empty if the file has none
   size_t left_out_ = 0;
+  size_t disabled_ = 0;
   size_t elsewhere_ = 0;  // aligned, in other components
   Scene scene_;
 };
@@ -390,6 +492,10 @@ class MetashapeReader {
 
 bool is_metashape(const fs::path& folder) { return xml_name(folder).has_value(); }
 
-Scene read_metashape(const SceneRoot& root) { return MetashapeReader(root).run(); }
+Scene read_metashape(const SceneRoot& root) { return read_metashape_chunk(root, ""); }
+
+Scene read_metashape_chunk(const SceneRoot& root, const std::string& chunk) {
+  return MetashapeReader(root).run(chunk);
+}
 
 }  // namespace cgs

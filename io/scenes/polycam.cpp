@@ -2,14 +2,17 @@
 #include "io/scenes/polycam.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "io/bytes/json_file.h"
+#include "io/images/image.h"
 #include "io/scenes/camera_checks.h"
 #include "io/scenes/depth_file.h"
+#include "io/scenes/photograph_index.h"
 
 namespace cgs {
 
@@ -26,19 +29,41 @@ bool has_pose(const fs::path& file) {
   }
 }
 
-// Name, relative to the scene, of the folder that holds cameras/; empty if there is none.
-std::string keyframes(const fs::path& folder) {
-  for (const char* name : {"keyframes", "."}) {
-    for (const char* cameras : {"corrected_cameras", "cameras"}) {
-      const fs::path candidate = folder / name / cameras;
-      std::error_code error;
-      for (fs::directory_iterator entry(candidate, error), end; !error && entry != end;
-           entry.increment(error)) {
-        if (entry->path().extension() == ".json" && has_pose(entry->path())) return name;
-      }
-    }
+bool holds_cameras(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".json" && has_pose(entry->path())) return true;
   }
-  return "";
+  return false;
+}
+
+bool holds_images(const fs::path& folder) {
+  const std::vector<std::string> entries = sorted_entries(folder);
+  return std::any_of(entries.begin(), entries.end(), [](const std::string& entry) {
+    return has_image_extension(entry);
+  });
+}
+
+// The folders of a capture, relative to the scene.
+struct Keyframes {
+  fs::path base;
+  fs::path cameras;
+  fs::path images;
+};
+
+// The corrected cameras come first, but not without their images: they are without distortion.
+std::optional<Keyframes> keyframes(const fs::path& folder) {
+  for (const char* base : {"keyframes", "."}) {
+    const auto holds = [&](const char* cameras) { return holds_cameras(folder / base / cameras); };
+    const bool is_corrected = holds("corrected_cameras");
+    if (is_corrected && holds_images(folder / base / "corrected_images")) {
+      return Keyframes{base, "corrected_cameras", "corrected_images"};
+    }
+    if (holds("cameras")) return Keyframes{base, "cameras", "images"};
+    if (is_corrected) return Keyframes{base, "corrected_cameras", "images"};
+  }
+  return std::nullopt;
 }
 
 Eigen::Isometry3d read_polycam_pose(const JsonValue& camera) {
@@ -54,19 +79,40 @@ Eigen::Isometry3d read_polycam_pose(const JsonValue& camera) {
                       [&](Defect defect, const std::string& why) { camera.fail(defect, why); });
 }
 
-Camera read_polycam_camera(const fs::path& path) {
+// Captures since 2025 do not state the size, which is then that of the photograph.
+// \return false if nothing tells it
+bool read_polycam_size(const JsonValue& document, const fs::path& image, Camera& camera) {
+  const auto width = document.find("width");
+  const auto height = document.find("height");
+  if (width && height) {
+    camera.width = width->count();
+    camera.height = height->count();
+    return true;
+  }
+  if (image.empty()) return false;
+  const ImageSize size = image_size(image);
+  camera.width = size.width;
+  camera.height = size.height;
+  return true;
+}
+
+// Empty if nothing tells the size of the photograph.
+std::optional<Camera> read_polycam_camera(const fs::path& path, const fs::path& image) {
   const nlohmann::json json = read_json(path);
   const JsonValue document(json, path);
+  const auto number_or = [&](const char* key, double fallback) {
+    const auto value = document.find(key);
+    return value ? value->number() : fallback;
+  };
   Camera camera;
-  camera.width = document.at("width").count();
-  camera.height = document.at("height").count();
+  camera.world_from_cam = read_polycam_pose(document);
+  if (!read_polycam_size(document, image, camera)) return std::nullopt;
   camera.fx = document.at("fx").number();
-  camera.fy = document.at("fy").number();
-  camera.cx = document.at("cx").number();
-  camera.cy = document.at("cy").number();
+  camera.fy = number_or("fy", camera.fx);
+  camera.cx = number_or("cx", 0.5 * camera.width);
+  camera.cy = number_or("cy", 0.5 * camera.height);
   check_intrinsics(camera,
                    [&](Defect defect, const std::string& why) { document.fail(defect, why); });
-  camera.world_from_cam = read_polycam_pose(document);
   return camera;
 }
 
@@ -87,15 +133,16 @@ std::vector<std::string> json_files(const fs::path& folder) {
 
 }  // namespace
 
-bool is_polycam(const fs::path& folder) { return !keyframes(folder).empty(); }
+bool is_polycam(const fs::path& folder) { return keyframes(folder).has_value(); }
 
 Scene read_polycam(const SceneRoot& root) {
-  const fs::path base = keyframes(root.folder);
-  const bool is_corrected = is_folder(root.folder / base / "corrected_cameras") &&
-                            is_folder(root.folder / base / "corrected_images");
-  const std::string prefix = is_corrected ? "corrected_" : "";
+  const std::optional<Keyframes> found = keyframes(root.folder);
+  if (!found) throw BadInput(Defect::Schema, root.folder, "no cameras of Polycam");
+  const auto place = [&](const fs::path& name) {
+    return (found->base / name).lexically_normal().string();
+  };
   const auto inside = [&](const fs::path& name) {
-    return resolve_in_scene(root, (base / name).lexically_normal().string(), root.folder);
+    return resolve_in_scene(root, place(name), root.folder);
   };
   Scene scene;
   scene.kind = SceneKind::Polycam;
@@ -105,21 +152,22 @@ Scene read_polycam(const SceneRoot& root) {
   scene.frame.scale_source = ScaleSource::CameraPoses;
   scene.frame.metres_sigma = kTrackedScale;
   scene.frame.up = Eigen::Vector3d::UnitY();  // of ARKit, along gravity
-  const fs::path cameras = prefix + "cameras";
-  for (const std::string& name : json_files(inside(cameras))) {
-    View view;
-    view.camera = read_polycam_camera(inside(cameras / name));
+  PhotographIndex photographs(root, {place(found->images)});
+  for (const std::string& name : json_files(inside(found->cameras))) {
     const fs::path stem = fs::path(name).stem();
-    for (const char* extension : {".jpg", ".jpeg", ".png"}) {
-      const fs::path image = inside(fs::path(prefix + "images") / (stem.string() + extension));
-      if (view.image_path.empty() && is_present(image)) view.image_path = image;
-    }
+    View view;
     view.name = stem.string();
+    view.image_path = photographs.take(view.name);
     if (view.image_path.empty()) scene.missing.push_back(stem.string() + ".jpg");
+    const auto camera = read_polycam_camera(inside(found->cameras / name), view.image_path);
+    if (!camera) continue;
+    view.camera = *camera;
     view.depth_path = depth_file_of({inside("depth"), root.allow_external}, stem);
     scene.views.push_back(std::move(view));
   }
-  if (scene.views.empty()) throw BadInput(Defect::Empty, root.folder, "there is no camera");
+  if (scene.views.empty() && scene.missing.empty()) {
+    throw BadInput(Defect::Empty, root.folder, "there is no camera");
+  }
   return scene;
 }
 

@@ -171,11 +171,12 @@ Scene read_realitycapture(const SceneRoot& root) {
       scene.missing.emplace_back(row.text("name"));  // nothing would ever tell its size
       continue;
     }
-    view.name = view.image_path.filename().string();
+    view.name = name_below(root.folder, view.image_path);
     read_intrinsics(row, refuse, view);
     if (scene.views.size() >= limits.max_views) lines.fail(Defect::Count, "too many cameras");
     scene.views.push_back(std::move(view));
   }
+  for (const std::string& note : photographs.notes()) scene.notes.push_back(note);
   if (scene.views.empty() && scene.missing.empty()) {
     throw BadInput(Defect::Empty, path, "there is no camera");
   }

@@ -11,7 +11,7 @@ bool is_realitycapture(const std::filesystem::path& folder);
 
 /// Reads the registration that RealityCapture (RealityScan) exports as CSV "Internal/External
 /// camera parameters": a line that starts with `#name` and says which column is which, then one
-/// line per photograph. Photographs lie in images/ or beside the file.
+/// line per photograph. Photographs lie in images/ or beside the file, or in folders below.
 ///
 /// f is that of 35 mm film (36 mm along the longer side); px and py count from the middle of the
 /// picture in units of its longer side. heading, pitch and roll, in degrees, turn a camera that

@@ -18,6 +18,7 @@
 #include "io/scenes/fisheye_map.h"
 #include "io/scenes/lens.h"
 #include "io/scenes/masks.h"
+#include "io/scenes/metashape.h"
 #include "io/scenes/orientation.h"
 #include "io/scenes/photographs.h"
 #include "io/scenes/resample.h"
@@ -48,14 +49,21 @@ std::string hints(const fs::path& folder) {
   return out;
 }
 
-Scene read_layout(const SceneRoot& root) {
+Scene read_layout(const SceneRoot& root, const std::string& chunk) {
   std::error_code error;
   const fs::file_status status = fs::status(root.folder, error);
   if (!fs::exists(status)) {
     throw BadInput(Defect::Open, root.folder, error ? error.message() : "no such folder");
   }
   if (!fs::is_directory(status)) throw BadInput(Defect::Open, root.folder, "not a folder");
-  if (const SceneLayout* const layout = layout_of(root.folder)) return layout->read(root);
+  const SceneLayout* const layout = layout_of(root.folder);
+  if (!chunk.empty()) {
+    if (layout != nullptr && layout->read == read_metashape)
+      return read_metashape_chunk(root, chunk);
+    throw InvalidInput("chunk \"" + one_line(chunk) + "\" is asked for, but the cameras in " +
+                       printable(root.folder) + " are not of Metashape");
+  }
+  if (layout != nullptr) return layout->read(root);
   throw BadInput(Defect::Schema,
                  root.folder,
                  hints(root.folder) +
@@ -333,7 +341,7 @@ void SceneOptions::validate() const {
 
 Scene read_scene(const fs::path& folder, const SceneOptions& options) {
   options.validate();
-  return prepared(read_layout({folder, options.allow_external}), options);
+  return prepared(read_layout({folder, options.allow_external}, options.chunk), options);
 }
 
 Scene scene_of_photographs(const fs::path& folder,

@@ -24,6 +24,9 @@ struct SceneOptions {
   /// kLongestSide; photographs much smaller than the largest have one of their own. What was chosen
   /// becomes a note.
   std::optional<int> downscale;
+  /// Of Metashape's cameras, the chunk to read: its label or its index from 0. Empty = the first
+  /// with aligned cameras.
+  std::string chunk;
   bool allow_external = false;  ///< Follow links and absolute paths that leave the scene folder.
   DepthOptions depth;
 

@@ -8,6 +8,7 @@
 
 #include "io/bytes/text_lines.h"
 #include "io/scenes/camera_checks.h"
+#include "io/scenes/photograph_index.h"
 
 namespace cgs {
 
@@ -86,6 +87,7 @@ Scene read_strecha(const SceneRoot& root) {
   scene.kind = SceneKind::Strecha;
   scene.folder = root.folder;
   const fs::path cameras = resolve_in_scene(root, *folder, root.folder);
+  std::optional<PhotographIndex> index;  // made for the first name that is not there as it is
   for (const std::string& name : camera_files(cameras)) {
     const fs::path path = cameras / name;
     View view;
@@ -98,8 +100,15 @@ Scene read_strecha(const SceneRoot& root) {
       view.image_path = image;
       break;
     }
+    if (view.image_path.empty()) {
+      if (!index) index.emplace(root, std::vector<std::string>{*folder, "images", "."});
+      view.image_path = index->take_path(view.name);
+    }
     if (view.image_path.empty()) scene.missing.push_back(view.name);
     scene.views.push_back(std::move(view));
+  }
+  if (index) {
+    for (const std::string& note : index->notes()) scene.notes.push_back(note);
   }
   return scene;
 }

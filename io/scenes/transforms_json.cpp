@@ -14,6 +14,8 @@
 #include "io/scenes/camera_checks.h"
 #include "io/scenes/depth_file.h"
 #include "io/scenes/fisheye_map.h"
+#include "io/scenes/photograph_index.h"
+#include "io/scenes/view_sizes.h"
 
 namespace cgs {
 
@@ -184,22 +186,29 @@ fs::path photograph(const SceneRoot& root, const std::string& name, const fs::pa
   return path;
 }
 
-// Sets the size of the view's camera from w and h or from the file.
+// Sets the size of the view's camera from w and h, to which its intrinsics refer, or from the file.
 void read_size(const JsonValue& document, const JsonValue& frame, View& view) {
   const auto w = setting(document, frame, "w");
   const auto h = setting(document, frame, "h");
-  view.camera.width = w ? w->count() : 0;
-  view.camera.height = h ? h->count() : 0;
+  Camera& camera = view.camera;
+  camera.width = w ? w->count() : 0;
+  camera.height = h ? h->count() : 0;
   if (view.image_path.empty()) return;
   const ImageSize size = image_size(view.image_path);
-  if ((w && view.camera.width != size.width) || (h && view.camera.height != size.height)) {
-    frame.fail(Defect::Mismatch,
-               "w x h is " + std::to_string(view.camera.width) + " x " +
-                   std::to_string(view.camera.height) + ", the image file has " +
-                   std::to_string(size.width) + " x " + std::to_string(size.height));
+  if (!w && !h) {
+    camera.width = size.width;
+    camera.height = size.height;
+    return;
   }
-  view.camera.width = size.width;
-  view.camera.height = size.height;
+  const auto other = [](int stated, int of, int wanted) {
+    return static_cast<int>(std::lround(double(stated) * wanted / of));
+  };
+  if (!w) camera.width = other(camera.height, size.height, size.width);
+  if (!h) camera.height = other(camera.width, size.width, size.height);
+  if (have_same_shape(camera.width, camera.height, size.width, size.height)) return;
+  frame.fail(Defect::Mismatch,
+             "w x h is " + size_text(camera.width, camera.height) + ", the image file has " +
+                 size_text(size.width, size.height));
 }
 
 // Paths that this reader does not follow are held to the same rule as those it does.
@@ -228,12 +237,17 @@ Scene read_transforms_json(const SceneRoot& root) {
   scene.folder = root.folder;
   if (frames.size() == 0) frames.fail(Defect::Empty, "there are no frames");
   std::set<fs::path> seen;
+  std::optional<PhotographIndex> index;  // made for the first name that is not there as it is
   for (size_t i = 0; i < frames.size(); ++i) {
     const JsonValue frame = frames.at(i);
     check_other_paths(root, frame, path);
     View view;
     const std::string name = frame.at("file_path").text();
-    const fs::path image = photograph(root, name, path);
+    fs::path image = photograph(root, name, path);
+    if (!is_present(image)) {
+      if (!index) index.emplace(root, std::vector<std::string>{"."});
+      if (fs::path close = index->take_path(name); !close.empty()) image = std::move(close);
+    }
     if (!seen.insert(image.lexically_normal()).second) {
       scene.warnings.push_back(frame.pointer() + ": \"" + printable(name) +
                                "\" occurs twice; the first was taken");
@@ -271,6 +285,9 @@ Scene read_transforms_json(const SceneRoot& root) {
     if (!has_size && view.image_path.empty()) continue;  // nothing would ever tell its size
     read_intrinsics(document, frame, view);
     scene.views.push_back(std::move(view));
+  }
+  if (index) {
+    for (const std::string& note : index->notes()) scene.notes.push_back(note);
   }
   return scene;
 }

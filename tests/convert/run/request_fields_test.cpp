@@ -37,7 +37,7 @@ TEST(RequestFields, KeepEveryMemberOfARequestButWhatDecidesNothing) {
                known_distances,
                marker_size,
                control] = scene;
-  const auto& [views, all_views, downscale, allow_external, depth] = options;
+  const auto& [views, all_views, downscale, chunk, allow_external, depth] = options;
   const auto& [table, unit] = control;
   const std::map<std::string, const void*> members = {
       {"training", &training},
@@ -58,6 +58,7 @@ TEST(RequestFields, KeepEveryMemberOfARequestButWhatDecidesNothing) {
       {"scene.marker_size", &marker_size},
       {"scene.options.views", &views},
       {"scene.options.downscale", &downscale},
+      {"scene.options.chunk", &chunk},
       {"scene.options.allow_external", &allow_external},
       {"scene.options.depth", &depth},
       {"scene.control.file", &table},

@@ -107,13 +107,14 @@ TEST(CommandLine, SurvivesAShell) {
 TEST(CommandLine, HasEveryOptionThatTheSceneWasOpenedWith) {
   RunRequest r = request_of({}, {}, 2, 0.5);
   r.scene.path = "photos";
+  r.scene.options.chunk = "left";
   r.scene.options.allow_external = true;
   r.scene.focal = 812.25;
   r.scene.options.depth = {"my depth", DepthKind::Relative, "", 0};
   r.output = "out";
   EXPECT_EQ(words(command_line(r)),
             "cgs\nrun\nphotos\n--downscale\n2\n--depth\nmy depth\n--depth-kind\ndepth\n"
-            "--allow-external\n--focal\n812.25\n-o\nout\n");
+            "--chunk\nleft\n--allow-external\n--focal\n812.25\n-o\nout\n");
   r.scene.options.depth = {"", DepthKind::Disparity, "net it's.onnx", 0};
   EXPECT_NE(words(command_line(r)).find("--depth-kind\ndisparity\n--depth-model\nnet it's.onnx\n"),
             std::string::npos);

@@ -100,6 +100,31 @@ TEST_F(ColmapModel, ReadsEveryKnownCameraModelInBothForms) {
   }
 }
 
+// Parameters by the list of COLMAP's models: 12 of FULL_OPENCV, 5 of FOV, 2 of EQUIRECTANGULAR.
+TEST_F(ColmapModel, JudgesNoCameraThatIsNotUsed) {
+  const std::vector<double> twelve(12, 0.1);
+  const std::string binary = packed(uint64_t(5)) + camera_record(1, 6, twelve) +
+                             camera_record(2, 7, {1, 2, 3, 4, 5}) + camera_record(3, 17, {6, 7}) +
+                             camera_record(4, 0, {-1, 320, 240}) +
+                             camera_record(5, 1, {500, 510, 320, 240});
+  const std::string text =
+      "1 FULL_OPENCV 640 480 500 510 320 240 0 0 0 0 0 0 0 0\n2 OF_THE_FUTURE 640 480 what ever\n"
+      "3 PINHOLE 640 480 500\n4 SIMPLE_PINHOLE 640 480 -1 320 240\n"
+      "5 PINHOLE 640 480 500 510 320 240\n";
+  const std::set<uint32_t> used = {5};
+  for (const ColmapCameras& cameras : {read_colmap_cameras_binary(file(binary), &used),
+                                       read_colmap_cameras_text(file(text), &used)}) {
+    ASSERT_EQ(cameras.size(), 1u);
+    EXPECT_EQ(cameras.at(5).camera.fy, 510);
+  }
+  EXPECT_EQ(cameras_refused(binary), "UNSUPPORTED");
+  for (const uint32_t id : {1U, 2U, 3U, 4U}) {
+    const std::set<uint32_t> one = {id};
+    EXPECT_NE(defect_of([&] { read_colmap_cameras_binary(file(binary), &one); }), "") << id;
+    EXPECT_NE(defect_of([&] { read_colmap_cameras_text(file(text), &one); }), "") << id;
+  }
+}
+
 TEST_F(ColmapModel, RefusesBadCameras) {
   const std::string one = packed(uint64_t(1));
   EXPECT_EQ(cameras_refused(packed(uint64_t(1) << 63) + std::string(64, '\0')), "COUNT");

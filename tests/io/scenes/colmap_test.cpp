@@ -58,6 +58,76 @@ TEST_F(ReadColmap, SaysThatThereAreOtherModels) {
   EXPECT_NE(scene.warnings[0].find("sparse/1"), std::string::npos);
 }
 
+TEST_F(ReadColmap, TakesTheModelWithMostImages) {
+  std::filesystem::copy(dir_ / "sparse/0", dir_ / "sparse/1");
+  images("1 1 0 0 0 0 0 0 1 a.png\n\n");  // of sparse/0
+  const Scene scene = read();
+  EXPECT_EQ(scene.views.size(), 2u);
+  ASSERT_EQ(scene.warnings.size(), 1u);
+  EXPECT_NE(scene.warnings[0].find("sparse/1 was read, with 2 images"), std::string::npos);
+  EXPECT_NE(scene.warnings[0].find("sparse/0 (1)"), std::string::npos);
+  // One that cannot be read has none.
+  test::write_bytes(dir_ / "sparse/2/images.bin", "xyz");
+  test::write_bytes(dir_ / "sparse/2/cameras.bin", "xyz");
+  EXPECT_EQ(read().views.size(), 2u);
+}
+
+TEST_F(ReadColmap, FindsModelsInOtherPlaces) {
+  for (const char* place :
+       {"sparse/1", "sparse_3/0", "sparse_3", "colmap/sparse/0", "distorted/sparse/0"}) {
+    const test::TempDir other;
+    std::filesystem::create_directories((other / place).parent_path());
+    std::filesystem::copy(dir_ / "sparse/0", other / place);
+    std::filesystem::copy(
+        dir_ / "images", other / "images", std::filesystem::copy_options::recursive);
+    EXPECT_TRUE(is_colmap(other.path())) << place;
+    const Scene scene = read_colmap({other.path()});
+    EXPECT_EQ(scene.views.size(), 2u) << place;
+    EXPECT_TRUE(scene.missing.empty()) << place;
+  }
+}
+
+// What the converter of 3DGS leaves: photographs as taken in input/, undistorted ones in images/.
+TEST_F(ReadColmap, TakesThePhotographsThatAModelIsOf) {
+  std::filesystem::create_directories(dir_ / "distorted/sparse");
+  std::filesystem::rename(dir_ / "sparse/0", dir_ / "distorted/sparse/0");
+  EXPECT_EQ(read().views[0].image_path.parent_path().filename(), "images");
+  std::filesystem::copy(dir_ / "images", dir_ / "input");
+  EXPECT_EQ(read().views[0].image_path.parent_path().filename(), "input");
+  std::filesystem::create_directories(dir_ / "sparse");
+  std::filesystem::rename(dir_ / "distorted/sparse/0", dir_ / "sparse/0");
+  EXPECT_EQ(read().views[0].image_path.parent_path().filename(), "images");
+  std::filesystem::remove_all(dir_ / "images");
+  EXPECT_EQ(read().views[0].image_path.parent_path().filename(), "input");
+}
+
+TEST_F(ReadColmap, JudgesNoCameraThatNoImageNames) {
+  write("cameras.txt",
+        "1 PINHOLE 80 60 100 110 41 29\n2 FULL_OPENCV 80 60 1 1 1 1 0 0 0 0 0 0 0 0\n");
+  EXPECT_EQ(read().views.size(), 2u);
+  images("1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 -1 0 0 2 b.png\n\n");
+  EXPECT_EQ(refused(), "UNSUPPORTED");
+}
+
+TEST_F(ReadColmap, LooksThroughLetterCaseAndEnding) {
+  images("1 1 0 0 0 0 0 0 1 A.PNG\n\n2 1 0 0 0 -1 0 0 1 Sub/img.jpg\n\n");
+  const Scene scene = read();
+  EXPECT_EQ(scene.views[0].image_path.filename(), "a.png");
+  EXPECT_EQ(scene.views[1].image_path.filename(), "img.png");
+  ASSERT_EQ(scene.notes.size(), 1u);
+  EXPECT_EQ(scene.notes[0].rfind("2 photographs", 0), 0u) << scene.notes[0];
+  // Not in another folder, and not for two images.
+  images("1 1 0 0 0 0 0 0 1 sub/A.png\n\n2 1 0 0 0 -1 0 0 1 b.png\n\n");
+  EXPECT_EQ(read().missing, (std::vector<std::string>{"sub/A.png"}));
+  images("1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 -1 0 0 1 A.jpg\n\n");
+  EXPECT_EQ(refused(), "REF");
+  test::write_bytes(dir_ / "images/A.png", test::rgb_png(80, 60));
+  images("1 1 0 0 0 0 0 0 1 a.jpg\n\n");
+  const std::string why = test::message_of([&] { read(); });
+  EXPECT_NE(why.find("a.png"), std::string::npos) << why;
+  EXPECT_NE(why.find("A.png"), std::string::npos) << why;
+}
+
 TEST_F(ReadColmap, PrefersBinaryOverText) {
   write("cameras.bin",
         test::packed(

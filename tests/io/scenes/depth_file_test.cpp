@@ -129,6 +129,41 @@ TEST_F(DepthFile, TakesTheChannelThatIsDepth) {
   EXPECT_EQ(test::defect_of([&] { read_depth_file(dir_ / "a.exr"); }), "SCHEMA");
 }
 
+// As Blender names the channels of a file of several layers.
+TEST_F(DepthFile, FindsTheDepthAmongLayers) {
+  const auto first = [&](const std::vector<std::string>& channels) {
+    write_exr_with(channels);
+    return read_depth_file(dir_ / "a.exr").values(0, 0);
+  };
+  EXPECT_EQ(first({"Composite.Combined.R", "ViewLayer.Combined.R", "ViewLayer.Depth.Z"}), 3);
+  EXPECT_EQ(first({"R", "ViewLayer.Depth.Z", "ViewLayer.Mist.Z"}), 2);
+  EXPECT_EQ(first({"RenderLayer.Combined.A", "RenderLayer.Depth.V"}), 2);
+  EXPECT_EQ(first({"View Layer.Combined.B",
+                   "View Layer.Combined.Z",
+                   "View Layer.Normal.X",
+                   "View Layer.Normal.Y",
+                   "View Layer.Normal.Z"}),
+            2);
+  EXPECT_EQ(first({"Depth.Z", "Left.Z"}), 1);
+  const auto defect = [&](const std::vector<std::string>& channels) {
+    return test::defect_of([&] { first(channels); });
+  };
+  EXPECT_EQ(defect({"A.Depth.Z", "B.Depth.Z"}), "SCHEMA");
+  EXPECT_EQ(defect({"V.Mist.Z", "V.Combined.B"}), "SCHEMA");
+  const std::string why = test::message_of([&] { first({"A.Depth.Z", "B.Depth.Z"}); });
+  EXPECT_NE(why.find("A.Depth.Z or B.Depth.Z"), std::string::npos) << why;
+}
+
+TEST_F(DepthFile, IsFoundUnderOtherLetterCase) {
+  const SceneRoot root{dir_.path(), false};
+  test::write_bytes(dir_ / "IMG_1.png", "");
+  EXPECT_EQ(depth_file_of(root, "img_1.JPG").filename(), "IMG_1.png");
+  test::write_bytes(dir_ / "Img_1.png", "");
+  EXPECT_EQ(test::defect_of([&] { depth_file_of(root, "img_1.JPG"); }), "REF");
+  test::write_bytes(dir_ / "img_1.png", "");
+  EXPECT_EQ(depth_file_of(root, "img_1.JPG").filename(), "img_1.png");
+}
+
 TEST_F(DepthFile, RefusesWhatHoldsNoDepth) {
   EXPECT_EQ(refused("a.png", test::rgb_png(8, 6)), "UNSUPPORTED");
   EXPECT_EQ(refused("b.png", test::jpeg(8, 6)), "UNSUPPORTED");

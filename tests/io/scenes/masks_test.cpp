@@ -167,9 +167,40 @@ TEST_F(Masks, OfPhotographsTurnedByHalfAreTold) {
   }
 }
 
-TEST_F(Masks, OfAnotherSizeAreRefused) {
+TEST_F(Masks, OfAnotherShapeAreRefused) {
   write_mask("masks/v1.png", 4, kWidth / 2);
   EXPECT_EQ(test::defect_of([&] { usable_columns(); }), "MISMATCH");
+}
+
+// Half of the columns are white, at any size of the same shape.
+TEST_F(Masks, OfAnotherSizeAreTakenByTheNearestPixel) {
+  for (const int factor : {2, 3}) {
+    ColorImage large(factor * kWidth, factor * kHeight, Eigen::Vector3f::Zero());
+    for (int y = 0; y < large.height; ++y) {
+      for (int x = 0; x < large.width / 2; ++x) large(x, y).setOnes();
+    }
+    std::filesystem::create_directories(dir_ / "masks");
+    write_png(dir_ / "masks/v1.png", large);
+    EXPECT_EQ(usable_columns(), kWidth / 2) << factor;
+  }
+  ColorImage small(kWidth / 2, kHeight / 2, Eigen::Vector3f::Ones());
+  for (int y = 0; y < small.height; ++y) small(0, y).setZero();
+  write_png(dir_ / "masks/v1.png", small);
+  EXPECT_EQ(usable_columns(), kWidth - 2);
+  const Scene scene = read_scene(dir_.path());
+  const auto tells = [](const std::string& note) { return note.rfind("1 mask is", 0) == 0; };
+  EXPECT_EQ(std::count_if(scene.notes.begin(), scene.notes.end(), tells), 1);
+}
+
+TEST_F(Masks, AreFoundUnderOtherLetterCase) {
+  write_mask("masks/V1.PNG.PNG", 1);
+  EXPECT_FALSE(found());
+  write_mask("masks/V1.PNG", 1);
+  EXPECT_EQ(found(), "masks/V1.PNG");
+  write_mask("masks/V1.png", 1);
+  EXPECT_EQ(test::defect_of([&] { found(); }), "REF");
+  write_mask("masks/v1.png", 1);
+  EXPECT_EQ(found(), "masks/v1.png");
 }
 
 TEST_F(Masks, OutsideOfTheSceneAreNotLookedAt) {

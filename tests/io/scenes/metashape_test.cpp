@@ -175,6 +175,102 @@ TEST_F(ReadMetashape, LeavesOutWhatIsNotAligned) {
   EXPECT_NE(scene.warnings[0].find("1 cameras are not aligned"), std::string::npos);
 }
 
+TEST_F(ReadMetashape, CountsDisabledCamerasApart) {
+  const Scene scene = read(with("<camera id=\"2\"", "<camera enabled=\"false\" id=\"2\""));
+  ASSERT_EQ(scene.views.size(), 1u);
+  EXPECT_EQ(scene.views[0].name, "IMG_1.png");
+  ASSERT_EQ(scene.warnings.size(), 1u);
+  EXPECT_NE(scene.warnings[0].find("1 cameras are disabled"), std::string::npos);
+}
+
+// slave = master [R | t]: a point at X of the slave lies at R X + t of the master.
+TEST_F(ReadMetashape, PlacesTheCamerasOfARig) {
+  const Eigen::Matrix3d rotation = turn(0.3, {0.1, 1, -0.2});
+  const Eigen::Vector3d location(0.4, -0.05, 0.1);
+  std::string xml = with("  </sensors>",
+                         "<sensor id=\"1\" type=\"frame\" master_id=\"0\"><resolution width=\"80\" "
+                         "height=\"60\"/><calibration><f>70</f></calibration><rotation>" +
+                             text_of(rotation) + "</rotation><location>" +
+                             text_of(location.transpose()) + "</location></sensor></sensors>");
+  xml.insert(xml.find("  </cameras>"),
+             "<camera id=\"7\" sensor_id=\"1\" master_id=\"2\" label=\"slave\"/>"
+             "<camera id=\"8\" sensor_id=\"1\" master_id=\"2\" label=\"off\" enabled=\"0\"/>"
+             "<camera id=\"9\" sensor_id=\"1\" master_id=\"55\" label=\"lost\"/>");
+  const Scene scene = read(xml);
+  ASSERT_EQ(scene.views.size(), 3u);
+  EXPECT_EQ(scene.views[2].name, "slave");
+  ASSERT_EQ(scene.warnings.size(), 2u);
+  EXPECT_NE(scene.warnings[0].find("1 cameras are not aligned"), std::string::npos);
+  EXPECT_NE(scene.warnings[1].find("1 cameras are disabled"), std::string::npos);
+  const Camera& camera = scene.views[2].camera;
+  for (int k = 0; k < 10; ++k) {
+    const Eigen::Vector3d local(0.1 * k - 0.4, 0.3 - 0.07 * k, 1.5 + 0.2 * k);
+    const Eigen::Vector3d in_master = rotation * local + location;
+    const Eigen::Vector3d in_chunk = (camera_matrix(2) * in_master.homogeneous()).head<3>();
+    const Eigen::Vector3d world = kShift + kScale * (kWorldTurn * in_chunk);
+    const Eigen::Vector3d uvz = camera.project(world);
+    EXPECT_NEAR(uvz.x(), 40 + 70 * local.x() / local.z(), 1e-5);
+    EXPECT_NEAR(uvz.y(), 30 + 70 * local.y() / local.z(), 1e-5);
+    EXPECT_NEAR(uvz.z(), kScale * local.z(), 1e-6);
+  }
+  // A master that is disabled itself still tells where it is.
+  const Scene alone = read(std::string(xml).replace(
+      xml.find("<camera id=\"2\""), 14, "<camera enabled=\"false\" id=\"2\""));
+  ASSERT_EQ(alone.views.size(), 2u);
+  EXPECT_TRUE(alone.views[1].camera.world_from_cam.isApprox(camera.world_from_cam, 1e-12));
+}
+
+TEST_F(ReadMetashape, SaysWhichChunkItReads) {
+  const size_t begin = xml_.find(" <chunk");
+  const size_t end = xml_.find("</document>");
+  std::string empty = "<chunk label=\"raw\"><sensors/><cameras/></chunk>";
+  std::string second = xml_.substr(begin, end - begin);
+  second.replace(second.find("Chunk 1"), 7, "left, \xc3\xa4");
+  second.replace(second.find("<f>70"), 5, "<f>75");
+  const std::string xml = std::string(xml_).insert(end, second).insert(begin, empty);
+  const Scene first = read(xml);
+  EXPECT_EQ(first.views[0].camera.fy, 70) << "the first chunk has no aligned camera";
+  ASSERT_EQ(first.notes.size(), 1u);
+  EXPECT_EQ(first.notes[0],
+            "chunk 1 \"Chunk 1\" was read, of 0 \"raw\", 1 \"Chunk 1\", 2 \"left, \xc3\xa4\"");
+  const auto focal = [&](const std::string& choice) {
+    return read_metashape_chunk({dir_.path()}, choice).views[0].camera.fy;
+  };
+  EXPECT_EQ(focal("left, \xc3\xa4"), 75);
+  EXPECT_EQ(focal("2"), 75);
+  EXPECT_EQ(focal("Chunk 1"), 70);
+  EXPECT_EQ(test::defect_of([&] { focal("raw"); }), "EMPTY");
+  for (const char* none : {"3", "-1", "right", ""}) {
+    if (*none == '\0') continue;
+    EXPECT_THROW(focal(none), InvalidInput) << none;
+  }
+  SceneOptions options;
+  options.chunk = "left, \xc3\xa4";
+  EXPECT_EQ(read_scene(dir_.path(), options).views[0].camera.fy, 75);
+}
+
+TEST_F(ReadMetashape, FindsPhotographsInFoldersByLabelsAndGroups) {
+  for (const char* folder : {"left", "right"}) {
+    for (const int i : {1, 2}) {
+      test::write_bytes(
+          dir_ / ("images/" + std::string(folder) + "/IMG_" + std::to_string(i) + ".png"),
+          test::rgb_png(80, 60, i));
+    }
+  }
+  for (const int i : {1, 2}) {
+    std::filesystem::remove(dir_ / ("images/IMG_" + std::to_string(i) + ".png"));
+  }
+  const std::string refused = test::message_of([&] { read(xml_); });
+  EXPECT_NE(refused.find("left/IMG_1.png"), std::string::npos) << refused;
+  EXPECT_NE(refused.find("right/IMG_1.png"), std::string::npos) << refused;
+  std::string grouped = with("<camera id=\"1\"", "<group label=\"right\"><camera id=\"1\"");
+  grouped.insert(grouped.find("  </cameras>"), "</group>");
+  EXPECT_EQ(read(grouped).views[0].name, "right/IMG_1.png");
+  std::filesystem::remove_all(dir_ / "images/right");
+  EXPECT_EQ(read(xml_).views[1].name, "left/IMG_2.png");
+  EXPECT_EQ(read_scene(dir_.path()).views[1].name, "IMG_2");
+}
+
 TEST_F(ReadMetashape, TakesOneComponent) {
   const std::string identity = text_of(Eigen::Matrix4d::Identity());
   const auto names = [&](const std::string& active, int in_second) {

@@ -119,6 +119,19 @@ TEST_F(ReadRealityCapture, RefusesWhatItCannotUse) {
   EXPECT_EQ(refused(kFirst + "\n" + kSecond + "\n", ""), "EMPTY");
 }
 
+TEST_F(ReadRealityCapture, FindsPhotographsInFolders) {
+  std::filesystem::create_directories(dir_ / "flight/one");
+  std::filesystem::rename(dir_ / "a.png", dir_ / "flight/one/a.png");
+  const std::string table = kHeader + "\n" + kFirst + "\n" + kSecond;
+  const Scene scene = read(table);
+  EXPECT_TRUE(scene.missing.empty());
+  EXPECT_EQ(scene.views[0].name, "flight/one/a.png");
+  ASSERT_EQ(scene.notes.size(), 1u);
+  std::filesystem::create_directories(dir_ / "flight/two");
+  std::filesystem::copy(dir_ / "flight/one/a.png", dir_ / "flight/two/a.png");
+  EXPECT_EQ(test::defect_of([&] { read(table); }), "REF");
+}
+
 TEST_F(ReadRealityCapture, NamesTheMissingPhotograph) {
   std::filesystem::remove(dir_ / "a.png");
   const Scene scene = read(kHeader + "\n" + kFirst + "\n" + kSecond);

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/scenes/view_sizes.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
 
@@ -159,8 +160,47 @@ TEST_F(ReadTransforms, RefusesPathsThatLeaveTheScene) {
   EXPECT_EQ(refused_with("/frames/0/file_path", std::string("a\0.png", 6)), "PATH");
 }
 
-TEST_F(ReadTransforms, RefusesSizesThatAreNotThoseOfTheFile) {
-  EXPECT_EQ(refused_with("/w", 81), "MISMATCH");
+// Of photographs that were made smaller or larger afterwards.
+TEST_F(ReadTransforms, ScalesIntrinsicsToTheFile) {
+  document_["w"] = 160;
+  document_["h"] = 120;
+  Scene scene = read();
+  fit_cameras(scene);
+  const Camera& camera = scene.views[0].camera;
+  EXPECT_EQ(camera.width, 80);
+  EXPECT_EQ(camera.height, 60);
+  EXPECT_EQ(camera.fx, 50);
+  EXPECT_EQ(camera.fy, 55);
+  EXPECT_EQ(camera.cx, 20.5);
+  EXPECT_EQ(camera.cy, 14.5);
+  ASSERT_EQ(scene.warnings.size(), 1u);
+  EXPECT_EQ(scene.warnings[0].rfind("2 images are of another size", 0), 0u) << scene.warnings[0];
+  document_.erase("h");  // 120 by the shape of the file
+  EXPECT_EQ(read().views[0].camera.height, 120);
+  document_.erase("fl_x");
+  document_.erase("fl_y");
+  document_["camera_angle_x"] = 2 * std::atan(0.5);  // f = the width, here of the file
+  scene = read();
+  fit_cameras(scene);
+  EXPECT_NEAR(scene.views[0].camera.fx, 80, 1e-9);
+}
+
+TEST_F(ReadTransforms, LooksThroughLetterCaseAndEnding) {
+  std::filesystem::rename(dir_ / "images/a.png", dir_ / "images/A.PNG");
+  document_["frames"][1]["file_path"] = "Images/b.png";
+  const Scene scene = read();
+  EXPECT_TRUE(scene.missing.empty());
+  EXPECT_EQ(scene.views[0].image_path.filename(), "A.PNG");
+  EXPECT_EQ(scene.views[1].image_path.filename(), "b.jpg");
+  ASSERT_EQ(scene.notes.size(), 1u);
+  test::write_bytes(dir_ / "images/A.jpg", test::jpeg(80, 60));
+  document_["frames"][0]["file_path"] = "images/a.webp";
+  EXPECT_EQ(refused(), "REF");
+}
+
+TEST_F(ReadTransforms, RefusesShapesThatAreNotThoseOfTheFile) {
+  EXPECT_EQ(refused_with("/w", 90), "MISMATCH");
+  EXPECT_EQ(refused_with("/w", 60), "MISMATCH");
   EXPECT_EQ(refused_with("/w", 1.5), "SCHEMA");
   EXPECT_EQ(refused_with("/w", "640"), "SCHEMA");
   EXPECT_EQ(refused_with("/w", std::pow(2.0, 70)), "SCHEMA");
