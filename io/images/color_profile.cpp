@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <map>
 #include <memory>
+#include <new>
 #include <type_traits>
 #include <vector>
 
@@ -126,14 +127,10 @@ bool is_identity(const Transform& transform) {
   return true;
 }
 
-// Null where the bytes are no profile of that space.
-Transform transform_to_srgb(std::string_view bytes,
+// Null where there is no profile, or one of another space.
+Transform transform_to_srgb(const Profile& from,
                             cmsColorSpaceSignature space,
                             cmsUInt32Number format) {
-  if (bytes.empty()) return nullptr;
-  errno = 0;
-  const auto from = made<Profile>(
-      cmsOpenProfileFromMem(bytes.data(), static_cast<cmsUInt32Number>(bytes.size())));
   if (!from || cmsGetColorSpace(from.get()) != space) return nullptr;
   const auto srgb = made<Profile>(cmsCreate_sRGBProfile());
   if (!srgb) return nullptr;
@@ -145,10 +142,34 @@ Transform transform_to_srgb(std::string_view bytes,
                                             cmsFLAGS_NOCACHE));
 }
 
+Transform transform_to_srgb(std::string_view bytes,
+                            cmsColorSpaceSignature space,
+                            cmsUInt32Number format) {
+  if (bytes.empty()) return nullptr;
+  errno = 0;
+  return transform_to_srgb(made<Profile>(cmsOpenProfileFromMem(
+                               bytes.data(), static_cast<cmsUInt32Number>(bytes.size()))),
+                           space,
+                           format);
+}
+
 void clamp_colors(Eigen::Vector3f* colors, size_t count) {
   for (size_t i = 0; i < count; ++i) {
     for (float& c : colors[i]) c = c > 0 ? std::min(c, 1.0f) : 0.0f;  // also what is no number
   }
+}
+
+// In place.
+void transform_colors(const Transform& transform, ColorImage& image) {
+  static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, image.data.size(), 4096), [&](const auto& range) {
+    Eigen::Vector3f* const colors = image.data.data() + range.begin();
+    cmsDoTransform(transform.get(),
+                   colors->data(),
+                   colors->data(),
+                   static_cast<cmsUInt32Number>(range.size()));
+    clamp_colors(colors, range.size());
+  });
 }
 
 }  // namespace
@@ -169,16 +190,15 @@ std::string color_profile(std::string_view bytes, const std::filesystem::path& p
 
 void to_srgb(std::string_view bytes, ColorImage& image) {
   const Transform transform = transform_to_srgb(bytes, cmsSigRgbData, TYPE_RGB_FLT);
-  if (!transform || is_identity(transform)) return;
-  static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, image.data.size(), 4096), [&](const auto& range) {
-    Eigen::Vector3f* const colors = image.data.data() + range.begin();
-    cmsDoTransform(transform.get(),
-                   colors->data(),
-                   colors->data(),
-                   static_cast<cmsUInt32Number>(range.size()));
-    clamp_colors(colors, range.size());
-  });
+  if (transform && !is_identity(transform)) transform_colors(transform, image);
+}
+
+void lab_to_srgb(ColorImage& image) {
+  errno = 0;
+  const auto transform =
+      transform_to_srgb(made<Profile>(cmsCreateLab4Profile(nullptr)), cmsSigLabData, TYPE_Lab_FLT);
+  if (!transform) throw std::bad_alloc();  // nothing else can fail
+  transform_colors(transform, image);
 }
 
 ColorImage srgb_of_inks(std::string_view profile, const InkImage& inks) {

@@ -22,6 +22,10 @@ std::string color_profile(std::string_view bytes, const std::filesystem::path& p
 /// \param image  coded as the profile says, in [0, 1]
 void to_srgb(std::string_view profile, ColorImage& image);
 
+/// Turns L* of 0 to 100, a* and b* (CIE 1976, white D50) into sRGB-coded colours, relative to
+/// white.
+void lab_to_srgb(ColorImage& image);
+
 /// Amounts of cyan, magenta, yellow and black, from 0 to 1 = full.
 using InkImage = Raster<std::array<float, 4>>;
 

@@ -230,6 +230,13 @@ Eigen::Vector3f color_of(const TiffForm& form, std::span<const float> samples) {
       return Eigen::Vector3f::Constant(1 - part(0));
     case TiffForm::Kind::Palette:
       return Eigen::Map<const Eigen::Vector3f>(form.palette[size_t(samples[0])].data());
+    case TiffForm::Kind::Lab: {
+      // Lightness up to 100; the others with a sign, of 16 bits in parts of 256.
+      const auto opponent = [&](float value) {
+        return (value <= full / 2 ? value : value - float(full) - 1) / (form.bits == 8 ? 1 : 256);
+      };
+      return {100 * part(0), opponent(samples[1]), opponent(samples[2])};
+    }
     default:
       return Eigen::Vector3f::Constant(part(0));
   }
@@ -258,11 +265,13 @@ ColorImage read_tiff(const TiffPixels& tiff,
         Eigen::Vector3f color = color_of(form, row);
         is_usable = is_usable && color.allFinite();
         if (form.is_premultiplied && opacity > 0) color /= opacity;
-        for (int c = 0; c < 3; ++c) image(x, y)[c] = within(color[c]);
+        if (form.kind != TiffForm::Kind::Lab) color = color.unaryExpr(within).eval();
+        image(x, y) = color;
       }
       usable(x, y) = is_usable ? 1 : 0;
     }
   });
+  if (form.kind == TiffForm::Kind::Lab) lab_to_srgb(image);
   return has_inks ? srgb_of_inks(profile, inks) : image;
 }
 

@@ -144,7 +144,9 @@ void unpack(const TiffForm& form, const uint8_t* row, size_t count, float* out, 
 
 double TiffForm::full() const { return is_float ? 1 : std::ldexp(1.0, bits) - 1; }
 
-int TiffForm::color_channels() const { return kind == Kind::Rgb ? 3 : kind == Kind::Inks ? 4 : 1; }
+int TiffForm::color_channels() const {
+  return kind == Kind::Rgb || kind == Kind::Lab ? 3 : kind == Kind::Inks ? 4 : 1;
+}
 
 // The open file, and what is told of its layout.
 struct TiffPixels::Handle {
@@ -231,6 +233,11 @@ bool TiffPixels::Handle::read_kind(TiffForm& form) {
     case PHOTOMETRIC_SEPARATED:
       form.kind = TiffForm::Kind::Inks;
       return field_or<uint16_t>(file.get(), TIFFTAG_INKSET, INKSET_CMYK) == INKSET_CMYK;
+    case PHOTOMETRIC_CIELAB: {
+      form.kind = TiffForm::Kind::Lab;
+      const auto bits = field_or<uint16_t>(file.get(), TIFFTAG_BITSPERSAMPLE, 1);
+      return bits == 8 || bits == 16;
+    }
     case PHOTOMETRIC_YCBCR:
       form.kind = TiffForm::Kind::Rgb;  // as libjpeg makes it
       return field_or<uint16_t>(file.get(), TIFFTAG_COMPRESSION, 0) == COMPRESSION_JPEG &&

@@ -16,7 +16,7 @@ namespace cgs {
 
 /// What the samples of a TIFF file mean.
 struct TiffForm {
-  enum class Kind : uint8_t { Grey, White, Rgb, Palette, Inks };  // White: 0 is white
+  enum class Kind : uint8_t { Grey, White, Rgb, Palette, Inks, Lab };  // White: 0 is white
   Kind kind = Kind::Grey;
   int channels = 1;               ///< Samples of a pixel, those beside its colour included.
   int alpha = -1;                 ///< Which of them is opacity; -1: none.
@@ -43,7 +43,7 @@ class TiffPixels {
   TiffPixels(const TiffPixels&) = delete;
   TiffPixels& operator=(const TiffPixels&) = delete;
 
-  /// False for colours that are coded in another way, as CIELab or LogLuv: read() must not be
+  /// False for colours that are coded in another way, as ICCLab or LogLuv: read() must not be
   /// called then, and `form` says nothing.
   bool is_read() const { return is_read_; }
   const TiffForm& form() const { return form_; }

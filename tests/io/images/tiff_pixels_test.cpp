@@ -229,6 +229,24 @@ TEST_F(ReadTiff, MixesInksWithoutAProfile) {
   EXPECT_EQ(mask.data, (std::vector<uint8_t>{0}));
 }
 
+// Greys by the curves of L* (CIE 15) and sRGB; a red as tables of D50 give it.
+TEST_F(ReadTiff, TurnsLabIntoSrgb) {
+  const auto grey = [](double lightness) {
+    const double light = std::pow((lightness + 16) / 116, 3);
+    return 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+  };
+  // In the middle L* = 54.5, a* = 81, b* = 70: sRGB (255, 0, 0).
+  const std::string bytes("\x80\0\0\x8b\x51\x46\xff\0\0", 9);
+  const ColorImage image = read(tiff_file(tiff_tags(3, 1, 3, 8, 8), {bytes}));
+  const double half = grey(100 * 128 / 255.0);
+  expect_color(image(0, 0), half, half, half, 2e-3);
+  expect_color(image(1, 0), 1, 0, 0, 0.03);
+  expect_color(image(2, 0), 1, 1, 1, 2e-3);
+  const std::string deep = test::packed(uint16_t(0x8000), int16_t(-30 * 256), int16_t(0));
+  const Eigen::Vector3f green = read(tiff_file(tiff_tags(1, 1, 3, 16, 8), {deep}))(0, 0);
+  EXPECT_LT(green[0] + 0.1f, green[1]) << "a* below 0 is green";
+}
+
 TEST_F(ReadTiff, TellsOpacityFromOtherChannels) {
   const std::string pixel = "\x33\x66\x99\x40"s;
   const auto mask_of = [&](const std::vector<test::TiffTag>& more) {
