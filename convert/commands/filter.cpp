@@ -45,7 +45,10 @@ void run_filter_command(const FilterArgs& args) {
   (void)prepare_filters(args.operations, Frame{.metres_per_unit = 1});  // before a long read
   MeasurableFile file = read_measured(args.input, args.assume_unit);
   terminal.warn(file.warnings);
-  if (!args.up.empty()) file.content.frame.up = up_direction(args.up);
+  if (!args.up.empty()) {
+    file.content.frame.up = up_direction(args.up);
+    file.assumed_up.clear();
+  }
   FilterState state{std::move(file.content.mesh), file.content.frame, file.content.file_origin};
   const std::vector<PreparedFilter> filters = prepare_filters(args.operations, state.frame);
   for (const PreparedFilter& filter : filters) {
@@ -54,12 +57,16 @@ void run_filter_command(const FilterArgs& args) {
   require_writable_as(args.output, state.frame);
   const nlohmann::ordered_json report = run_filters(state, filters, terminal);
   check_content(args.output, state);
-  for (const std::string& lost :
-       {textures_text(file.has_textures), lost_in_file(args.output, state.mesh, state.frame)}) {
+  Frame written = state.frame;
+  if (is_turned_upright(args.output)) {
+    const std::string assumed = settle_up(written, {});
+    if (!assumed.empty()) file.assumed_up = assumed;
+  }
+  for (const std::string& lost : {textures_text(file.has_textures),
+                                  lost_in_file(args.output, state.mesh, state.frame),
+                                  assumed_up_text(args.input, args.output, file.assumed_up)}) {
     if (!lost.empty()) terminal.say(lost);
   }
-  Frame written = state.frame;
-  if (is_turned_upright(args.output)) settle_up(written, {});
   // Nothing is rounded, so that what was certified stays that: cgs convert compresses.
   GlbOptions exact;
   exact.encoding = GlbEncoding::Plain;

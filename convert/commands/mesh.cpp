@@ -32,7 +32,7 @@ void run_mesh_command(const MeshArgs& args) {
   limit_threads(args.common.threads);
   Terminal terminal(args.common.quiet, args.common.strict);
   VolumeFile file = read_volume(args.volume);
-  settle_up(file.frame, args.up);
+  (void)settle_up(file.frame, args.up);
   const Progress progress = terminal.begin("mesh");
   const auto options = simplify_options(args.simplify, file.volume.voxel_size, file.frame);
   TriangleMesh open = open_surface(file.volume, {});

@@ -112,6 +112,14 @@ bool is_turned_upright(const std::filesystem::path& path) {
   return extension == ".stl" || extension == ".3mf" || extension == ".glb";
 }
 
+std::string assumed_up_text(const std::filesystem::path& from,
+                            const std::filesystem::path& to,
+                            const std::string& assumed) {
+  const bool stays_printable = lower_extension(from) == ".stl" && lower_extension(to) != ".glb";
+  if (assumed.empty() || !is_turned_upright(to) || stays_printable) return "";
+  return assumed + "; --up says otherwise (--up 0 1 0 for y)";
+}
+
 void require_writable_as(const std::filesystem::path& path, const Frame& frame) {
   const std::string extension = lower_extension(path);
   if (extension != ".stl" && extension != ".3mf") return;

@@ -49,6 +49,13 @@ bool is_writable_mesh_name(const std::filesystem::path& path);
 /// and .glb. What else is written keeps its axes, and says what is up only where that is known.
 bool is_turned_upright(const std::filesystem::path& path);
 
+/// What was assumed to be up in a file that did not say it, where that decides how the file that is
+/// written lies, for a note; empty where it does not.
+/// \param assumed  of MeasurableFile, or of settle_up()
+std::string assumed_up_text(const std::filesystem::path& from,
+                            const std::filesystem::path& to,
+                            const std::string& assumed);
+
 /// What can be refused before any work: STL and 3MF of a scene of unknown scale.
 /// \throws InvalidInput
 void require_writable_as(const std::filesystem::path& path, const Frame& frame);

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "convert/files/mesh_files.h"
 #include "convert/filter/operations.h"
 #include "convert/text/length.h"
 #include "libcgs/core/error.h"
@@ -44,11 +45,15 @@ FilterStep prepare_taubin(FilterArguments& arguments) {
 std::string take_simplified(FilterState& state, SimplifyResult result) {
   state.mesh = std::move(result.mesh);
   if (result.faces_after == result.faces_before) {
-    return "nothing left out, as the result would be too far off or cut itself; where the input "
-           "cuts "
-           "itself, cut-self-intersections goes before";
+    const std::string seams = seams_text(state.mesh);
+    return "nothing left out, as the result would be too far off or cut itself; " +
+           (seams.empty() ? "where the input cuts itself, cut-self-intersections goes before"
+                          : seams);
   }
-  return "largest error measured " +
+  return (result.joined_vertices == 0
+              ? ""
+              : std::to_string(result.joined_vertices) + " vertices joined along seams; ") +
+         "largest error measured " +
          format_length(std::max(result.evidence.hausdorff(), result.inferred.hausdorff()),
                        state.frame);
 }

@@ -52,18 +52,28 @@ struct Source {
   TriangleMesh mesh;
   std::vector<std::string> warnings;  ///< Of reading the mesh.
   bool has_textures = false;          ///< As MeasurableFile.
+  std::string assumed_up;             ///< Likewise, or of settle_up().
   Frame frame;
   Eigen::Vector3d file_origin = Eigen::Vector3d::Zero();  ///< Of the mesh that was read.
 };
 
-/// Files of a mesh: PLY and .glb have to be looked into, they may hold splats.
+/// Files of a mesh or a plain cloud: PLY and .glb have to be looked into, they may hold splats.
 bool holds_mesh(const std::filesystem::path& path) {
   if (!is_mesh_name(path)) return false;
   if (lower_extension(path) == ".glb") return !is_splat_glb(path);
   if (lower_extension(path) != ".ply") return true;
   const std::optional<PlyHeader> header = read_ply_header(path);
-  const PlyElement* face = header ? header->find("face") : nullptr;
-  return face != nullptr && face->count > 0;
+  if (!header) return false;
+  for (const char* const name : {"face", "tristrips"}) {
+    const PlyElement* const faces = header->find(name);
+    if (faces != nullptr && faces->count > 0) return true;
+  }
+  const PlyElement* const vertex = header->find("vertex");
+  if (vertex == nullptr || vertex->find("x") < 0) return false;
+  const auto of_splats = {"f_dc_0", "opacity", "scale_0", "rot_0", "packed_position"};
+  return std::none_of(of_splats.begin(), of_splats.end(), [&](const char* name) {
+    return vertex->find(name) >= 0;
+  });
 }
 
 /// \throws LimitError before a file is read that would not fit
@@ -101,6 +111,7 @@ Source read_source(const std::filesystem::path& path, size_t memory_limit) {
     out.frame = file.content.frame;
     out.warnings = std::move(file.warnings);
     out.has_textures = file.has_textures;
+    out.assumed_up = std::move(file.assumed_up);
     out.file_origin = file.content.file_origin;
   } else {
     check_size(path, memory_limit);
@@ -302,8 +313,11 @@ void check_before_work(const ConversionRequest& request, const Source& source, C
 // The axes and the unit that the output has.
 void settle_frame(const ConversionRequest& request, Source& source) {
   const bool keeps_axes = source.content == Content::Mesh && !is_turned_upright(request.output);
+  if (!request.up.empty()) source.assumed_up.clear();
   if (!keeps_axes || !request.up.empty()) {
-    settle_up(source.frame, request.up, source.content == Content::Splats);
+    const std::string assumed =
+        settle_up(source.frame, request.up, source.content == Content::Splats);
+    if (!assumed.empty()) source.assumed_up = assumed;
   }
   if (request.assume_unit.empty()) return;
   const std::string refused = assume_unit(source.frame, request.assume_unit);
@@ -330,11 +344,15 @@ void write_as_mesh(const ConversionRequest& request,
                    Terminal& terminal,
                    const Json& report) {
   if (source.mesh.faces.empty() && lower_extension(request.output) != ".ply") {
-    throw BadInput(
-        Defect::Empty, request.input, "has no faces; a point cloud can only be written as .ply");
+    throw BadInput(Defect::Empty,
+                   request.input,
+                   "has no faces; a point cloud can only be written as .ply, and "
+                   "cgs filter makes a surface of it (--op poisson, --op advancing-front)");
   }
-  for (const std::string& lost : {textures_text(source.has_textures),
-                                  lost_in_file(request.output, source.mesh, source.frame)}) {
+  for (const std::string& lost :
+       {textures_text(source.has_textures),
+        lost_in_file(request.output, source.mesh, source.frame),
+        assumed_up_text(request.input, request.output, source.assumed_up)}) {
     if (!lost.empty()) terminal.say(lost);
   }
   if (source.content == Content::Mesh) {

@@ -56,13 +56,15 @@ std::string turned_text(const Frame& a, const Frame& b) {
          "has to be turned (cgs filter --op rotate) or laid on (cgs compare --icp)";
 }
 
-void settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats) {
+std::string settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats) {
   if (!given.empty()) {
     frame.up = up_direction(given);
-  } else if (!frame.knows_up()) {
-    frame.up = Eigen::Vector3d::UnitZ();
-    if (is_of_splats) frame.up = -Eigen::Vector3d::UnitY();
+    return "";
   }
+  if (frame.knows_up()) return "";
+  frame.up = is_of_splats ? Eigen::Vector3d(-Eigen::Vector3d::UnitY()) : Eigen::Vector3d::UnitZ();
+  return std::string("the file does not say what is up: ") + (is_of_splats ? "-y" : "+z") +
+         " is assumed";
 }
 
 Eigen::Vector3d up_direction(const std::vector<double>& numbers) {

@@ -37,8 +37,9 @@ std::string turned_text(const Frame& a, const Frame& b);
 
 /// Sets what is up: as given, else as the frame knows, else +z, or -y as splats of others mostly
 /// lie.
+/// \return what was assumed, for a note; empty where nothing was
 /// \throws InvalidInput as up_direction()
-void settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats = false);
+std::string settle_up(Frame& frame, const std::vector<double>& given, bool is_of_splats = false);
 
 /// The direction of --up, of unit length.
 /// \throws InvalidInput unless it is three finite numbers, not all 0

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <cmath>
+#include <limits>
 #include <system_error>
 
 #include <fcntl.h>
@@ -173,6 +175,30 @@ bool parse_number(std::string_view token, double& value) {
   }
   return parse_whole(token, value);
 }
+
+bool parse_measured(std::string_view token, double& value) {
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  if (parse_number(token, value)) return true;
+  const bool is_negative = token.starts_with('-');
+  std::string_view digits = token;
+  if (is_negative || digits.starts_with('+')) digits.remove_prefix(1);
+  const double sign = is_negative ? -1 : 1;
+  if (digits.starts_with("1.#")) {
+    value = digits.starts_with("1.#INF") ? sign * kInfinite : std::nan("");
+    return true;
+  }
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (digits.starts_with('-') || end != digits.data() + digits.size()) return false;
+  if (error == std::errc()) return !std::isfinite(value);  // "+nan"
+  if (error != std::errc::result_out_of_range) return false;
+  const size_t exponent = digits.find_first_of("eE");
+  const bool is_small = exponent == std::string_view::npos
+                            ? digits.find_first_of("0.") == 0
+                            : digits.substr(exponent + 1).starts_with('-');
+  value = is_small ? 0 : sign * kInfinite;
+  return true;
+}
+
 bool parse_number(std::string_view token, int64_t& value) { return parse_whole(token, value); }
 bool parse_number(std::string_view token, uint64_t& value) { return parse_whole(token, value); }
 

@@ -95,4 +95,8 @@ bool parse_number(std::string_view token, double& value);
 bool parse_number(std::string_view token, int64_t& value);
 bool parse_number(std::string_view token, uint64_t& value);
 
+/// The same for measured values as programs print them, which may be lacking: "nan", "-inf",
+/// "1.#QNAN" of older C libraries, and what is too large (infinite) or too small (0) for double.
+bool parse_measured(std::string_view token, double& value);
+
 }  // namespace cgs

@@ -49,6 +49,12 @@ double TextLines::number(std::string_view token) const {
   return value;
 }
 
+double TextLines::measured(std::string_view token) const {
+  double value = 0;
+  if (!parse_measured(token, value)) fail_at(token, "is not a number");
+  return value;
+}
+
 uint64_t TextLines::count(std::string_view token) const {
   uint64_t value = 0;
   if (!parse_number(token, value)) fail_at(token, "is not a whole number >= 0");

@@ -27,6 +27,8 @@ class TextLines {
   size_t line_number() const { return line_number_; }
   /// \throws BadInput Syntax naming line and column unless the token is a finite number.
   double number(std::string_view token) const;
+  /// The same for a number that may be not finite, see parse_measured().
+  double measured(std::string_view token) const;
   /// \throws BadInput Syntax likewise for a whole number >= 0.
   uint64_t count(std::string_view token) const;
   /// \throws BadInput with the current line number in the message.

@@ -155,6 +155,15 @@ double XmlElement::number(std::string_view attribute) const {
   return parse(attribute, trimmed(at(attribute)));
 }
 
+double XmlElement::measured(std::string_view attribute) const {
+  const std::string_view word = trimmed(at(attribute));
+  double out = 0;
+  if (!parse_measured(word, out)) {
+    fail(Defect::Syntax, std::string(attribute) + ": " + quoted(word) + " is no number");
+  }
+  return out;
+}
+
 std::vector<double> XmlElement::numbers(std::string_view attribute) const {
   std::vector<double> out;
   for (const std::string_view word : tokens(at(attribute))) out.push_back(parse(attribute, word));

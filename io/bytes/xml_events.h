@@ -31,6 +31,9 @@ class XmlElement {
   /// Also with a leading '+'.
   /// \throws BadInput Schema, Syntax (no number), Value (not finite)
   double number(std::string_view attribute) const;
+  /// A number that may be not finite, see parse_measured().
+  /// \throws BadInput Schema, Syntax
+  double measured(std::string_view attribute) const;
   /// As number(), of all that blanks separate.
   std::vector<double> numbers(std::string_view attribute) const;
   /// A whole number.

@@ -22,17 +22,20 @@ struct Layer {
   const char* line_type;
 };
 
-// By label, the one for drawings without labels last.
-constexpr std::array<Layer, kProvenanceCount + 1> kLayers = {{{"INFERRED", 6, "DASHED"},
+constexpr Layer kOutline = {"OUTLINE", 9, "CONTINUOUS"};  // light grey, so that dashes show
+
+// By label, the one for drawings without labels and the outline last.
+constexpr std::array<Layer, kProvenanceCount + 2> kLayers = {{{"INFERRED", 6, "DASHED"},
                                                               {"SINGLE_VIEW", 4, "CONTINUOUS"},
                                                               {"OBSERVED", 7, "CONTINUOUS"},
                                                               {"INTERPOLATED", 3, "DOT"},
                                                               {"VIRTUAL", 5, "DASHED"},
                                                               {"ESTIMATED", 2, "DASHED"},
-                                                              {"SECTION", 7, "CONTINUOUS"}}};
+                                                              {"SECTION", 7, "CONTINUOUS"},
+                                                              kOutline}};
 
 const Layer& layer_of(int label) {
-  return label < 0 ? kLayers.back() : kLayers.at(static_cast<size_t>(label));
+  return kLayers.at(label < 0 ? kProvenanceCount : static_cast<size_t>(label));
 }
 
 // Collects pairs of group code and value.
@@ -107,10 +110,9 @@ void add_tables(Groups& out, double extent) {
   out.text(0, "ENDTAB").text(0, "ENDSEC");
 }
 
-void add_polyline(Groups& out, const LabelledRun& run) {
+void add_polyline(Groups& out, const LabelledRun& run, const char* layer) {
   constexpr int kClosed = 1;
   constexpr int kPatternRunsThrough = 128;
-  const char* const layer = layer_of(run.label).name;
   out.text(0, "POLYLINE").text(8, layer).count(66, 1).number(10, 0).number(20, 0).number(30, 0);
   out.count(70, kPatternRunsThrough + (run.closed ? kClosed : 0));
   for (const Eigen::Vector2d& p : run.points) {
@@ -150,7 +152,14 @@ void write_dxf(const std::filesystem::path& path, const Drawing& drawing) {
   add_tables(out, box.sizes().maxCoeff());
   out.text(0, "SECTION").text(2, "ENTITIES");
   for (const DrawnLine& line : drawing.lines) {
-    for (const LabelledRun& run : labelled_runs(line)) add_polyline(out, run);
+    if (line.closed && !line.of_segment.empty()) {
+      add_polyline(out, {line.points, -1, true}, kOutline.name);
+    }
+  }
+  for (const DrawnLine& line : drawing.lines) {
+    for (const LabelledRun& run : labelled_runs(line)) {
+      add_polyline(out, run, layer_of(run.label).name);
+    }
   }
   out.text(0, "ENDSEC").text(0, "EOF");
   write_file(path, out.all());

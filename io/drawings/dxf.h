@@ -11,6 +11,8 @@ namespace cgs {
 ///
 /// Lines become polylines on the layers OBSERVED, SINGLE_VIEW, INTERPOLATED (dotted), VIRTUAL,
 /// ESTIMATED and INFERRED (dashed), or SECTION if nothing is stated, cut where the layer changes.
+/// Where labels are stated, closed lines stand once more in one piece on the layer OUTLINE, below
+/// the others: an open polyline bounds no hatch.
 /// Coordinates are those of the drawing with all digits; $INSUNITS and comments name the unit.
 /// \throws InvalidInput if there is no line; IoError
 /// Source: Autodesk, "DXF Reference", release 12 group codes.

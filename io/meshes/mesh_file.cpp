@@ -20,17 +20,39 @@ namespace cgs {
 
 namespace {
 
-// \param up  what the format says, in file axes; stays where it says nothing
-ParsedMesh parse(const std::filesystem::path& path, Eigen::Vector3d& up) {
+// What is up in a file, in its axes.
+struct UpAxis {
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // 0 = nobody knows
+  std::string assumed;                                  // why, where neither file nor format says
+};
+
+// Blender writes OBJ files with y up unless it is told otherwise, and its name on the first line.
+UpAxis up_of_obj(const ParsedMesh& parsed) {
+  const auto says = [&](const char* start) {
+    return std::any_of(parsed.comments.begin(), parsed.comments.end(), [&](const auto& comment) {
+      return comment.starts_with(start);
+    });
+  };
+  if (!says("Blender") || says("up ")) return {};
+  return {Eigen::Vector3d::UnitY(),
+          "the file does not say what is up: +y is assumed, as Blender writes OBJ files"};
+}
+
+ParsedMesh parse(const std::filesystem::path& path, UpAxis& up) {
   const std::string extension = lower_extension(path);
   if (extension == ".ply") return parse_mesh_ply(path);
-  if (extension == ".obj") return read_obj(path);
-  if (extension == ".stl") {
-    up = Eigen::Vector3d::UnitZ();  // no rule of the format, but of the programs that print it
+  if (extension == ".obj") {
+    ParsedMesh out = read_obj(path);
+    up = up_of_obj(out);
+    return out;
+  }
+  if (extension == ".stl") {  // no rule of the format, but of the programs that print it
+    up = {Eigen::Vector3d::UnitZ(),
+          "the file does not say what is up: +z is assumed, as programs write STL files"};
     return read_stl(path);
   }
   if (extension == ".3mf") {
-    up = Eigen::Vector3d::UnitZ();
+    up.direction = Eigen::Vector3d::UnitZ();
     return read_3mf(path);
   }
   if (extension == ".off") return read_off(path);
@@ -52,20 +74,21 @@ size_t faces_without_area(const MeasurableMesh& content) {
   return count;
 }
 
-// \param up  0 = the format does not say
 MeasurableFile measurable(ParsedMesh parsed,
-                          const Eigen::Vector3d& up,
+                          const UpAxis& up,
                           const std::filesystem::path& path,
                           const std::optional<Frame>& frame) {
   check_significance(parsed, path);
   PlyPlacement placement =
       ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
-  if (!frame && !up.isZero(0)) placement.frame.up = up.normalized();
+  const bool tells_up = !frame && !up.direction.isZero(0);
+  if (tells_up) placement.frame.up = up.direction.normalized();
   placement.frame.validate();
   MeasurableFile out{
       {std::move(parsed.mesh), std::move(parsed.positions), placement.frame, placement.file_origin},
       std::move(parsed.warnings),
-      parsed.has_textures};
+      parsed.has_textures,
+      tells_up ? up.assumed : ""};
   out.warnings.insert(out.warnings.end(), placement.warnings.begin(), placement.warnings.end());
   out.content.mesh.vertices.reserve(out.content.points.size());
   for (Eigen::Vector3d& p : out.content.points) {
@@ -82,7 +105,7 @@ MeasurableFile measurable(ParsedMesh parsed,
 MeasurableFile measurable(GlbMesh glb,
                           const std::filesystem::path& path,
                           const std::optional<Frame>& frame) {
-  return measurable(std::move(glb.parsed), glb.up, path, frame);
+  return measurable(std::move(glb.parsed), {glb.up, ""}, path, frame);
 }
 
 }  // namespace
@@ -96,7 +119,7 @@ bool is_mesh_name(const std::filesystem::path& path) {
 MeasurableFile read_mesh_file(const std::filesystem::path& path,
                               const std::optional<Frame>& frame) {
   if (lower_extension(path) == ".glb") return measurable(read_glb(path), path, frame);
-  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  UpAxis up;
   ParsedMesh parsed = parse(path, up);
   return measurable(std::move(parsed), up, path, frame);
 }

@@ -15,6 +15,8 @@ struct MeasurableFile {
   MeasurableMesh content;
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
   bool has_textures = false;          ///< Whose colours the vertices took.
+  std::string assumed_up;  ///< Why `frame.up` is taken to be up where the file does not say it, for
+                           ///< a note; empty where it says, or nothing is assumed.
 };
 
 /// True for the endings that read_mesh_file() takes: .ply, .obj, .stl, .off, .3mf, .glb, in any

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <string_view>
 
@@ -71,22 +72,57 @@ void append_vertex(std::string& out, const TriangleMesh& mesh, const Frame& fram
   }
 }
 
+/// Where an element keeps a colour.
+struct ColorColumns {
+  std::array<int, 3> at = {-1, -1, -1};
+  float scale = 1;       ///< To [0, 1], but for floats up to 255.
+  float below_zero = 0;  ///< What to add to signed numbers that ran over.
+  bool has_any() const { return at[0] >= 0; }
+  Eigen::Vector3f of(const PlyRow& row) const {
+    Eigen::Vector3f out;
+    for (int k = 0; k < 3; ++k) {
+      const auto value = static_cast<float>(row.values[static_cast<size_t>(at.at(size_t(k)))]);
+      out[k] = scale * (value < 0 ? value + below_zero : value);
+    }
+    return out;
+  }
+};
+
 /// Positions of the properties we know within an element; -1 = the file does not have it.
 struct VertexColumns {
   std::array<int, 3> position{};
   std::array<int, 3> normal{};
-  std::array<int, 3> color{};
+  ColorColumns color;
   int quality = -1;
   int sigma = -1;
-  float color_scale = 1;
   bool has_normals() const { return *std::min_element(normal.begin(), normal.end()) >= 0; }
-  bool has_colors() const { return *std::min_element(color.begin(), color.end()) >= 0; }
 };
+
+/// Names that programs give to the three parts of a colour, the usual ones first.
+constexpr std::array<std::array<const char*, 3>, 3> kColorNames = {
+    {{"red", "green", "blue"}, {"diffuse_red", "diffuse_green", "diffuse_blue"}, {"r", "g", "b"}}};
 
 /// Position of a scalar property; lists of that name do not count.
 int find_scalar(const PlyElement& element, std::string_view name) {
   const int i = element.find(name);
   return i >= 0 && !element.properties[static_cast<size_t>(i)].is_list ? i : -1;
+}
+
+ColorColumns color_columns(const PlyElement& element) {
+  ColorColumns out;
+  for (const auto& names : kColorNames) {
+    std::array<int, 3> found{};
+    for (size_t k = 0; k < 3; ++k) found.at(k) = find_scalar(element, names.at(k));
+    if (*std::min_element(found.begin(), found.end()) < 0) continue;
+    const PlyType type = element.properties[static_cast<size_t>(found[0])].type;
+    const bool is_wide = type == PlyType::UInt16 || type == PlyType::Int16;
+    const bool is_float = type == PlyType::Float32 || type == PlyType::Float64;
+    out.at = found;
+    out.scale = is_float ? 1.0f : is_wide ? 1.0f / 65535.0f : 1.0f / 255.0f;
+    out.below_zero = type == PlyType::Int8 ? 256.0f : type == PlyType::Int16 ? 65536.0f : 0.0f;
+    break;
+  }
+  return out;
 }
 
 /// Whether a scalar called quality is the support that write_mesh_ply() keeps there: MeshLab and
@@ -103,25 +139,17 @@ VertexColumns vertex_columns(const PlyHeader& header, const std::filesystem::pat
   if (vertex->count == 0) throw BadInput(Defect::Empty, path, "0 vertices");
   constexpr std::array<const char*, 3> kPosition = {"x", "y", "z"};
   constexpr std::array<const char*, 3> kNormal = {"nx", "ny", "nz"};
-  constexpr std::array<const char*, 3> kColor = {"red", "green", "blue"};
   VertexColumns out;
   for (size_t k = 0; k < 3; ++k) {
     out.position.at(k) = find_scalar(*vertex, kPosition.at(k));
     out.normal.at(k) = find_scalar(*vertex, kNormal.at(k));
-    out.color.at(k) = find_scalar(*vertex, kColor.at(k));
     if (out.position.at(k) < 0) {
       throw BadInput(Defect::Schema, path, std::string("missing property ") + kPosition.at(k));
     }
   }
   if (quality_is_support(header, *vertex)) out.quality = find_scalar(*vertex, "quality");
   out.sigma = find_scalar(*vertex, "scalar_sigma");
-  if (out.has_colors()) {
-    const PlyType type = vertex->properties[static_cast<size_t>(out.color[0])].type;
-    const bool coded = type == PlyType::UInt8 || type == PlyType::Int8;
-    const bool whole = type == PlyType::UInt32 || type == PlyType::Int32;
-    const bool wide = type == PlyType::UInt16 || type == PlyType::Int16;
-    out.color_scale = coded || whole ? 1.0f / 255.0f : wide ? 1.0f / 65535.0f : 1.0f;
-  }
+  out.color = color_columns(*vertex);
   return out;
 }
 
@@ -139,42 +167,44 @@ std::string lost_labels(const PlyHeader& header) {
          "the labels of a file of ours";
 }
 
-/// Whether a file has colours elsewhere than at its vertices, as MeshLab and VCG write them.
-bool states_other_colors(const PlyHeader& header) {
+/// Whether a file shows a picture on its faces, as MeshLab and VCG write them.
+bool states_texture(const PlyHeader& header) {
   const PlyElement* face = header.find("face");
-  const bool has_texture = face != nullptr && face->find("texcoord") >= 0;
-  return has_texture || (face != nullptr && find_scalar(*face, "red") >= 0);
+  return face != nullptr && face->find("texcoord") >= 0;
 }
 
 /// What a file says beyond what is read, for a warning: numbers of vertices by name, and elements
 /// that may be faces of another form.
 std::string unread_properties(const PlyHeader& header, bool has_colors) {
-  constexpr std::array<std::string_view, 14> kKnown = {"x",
+  constexpr std::array<std::string_view, 13> kKnown = {"x",
                                                        "y",
                                                        "z",
                                                        "nx",
                                                        "ny",
                                                        "nz",
-                                                       "red",
-                                                       "green",
-                                                       "blue",
                                                        "alpha",
+                                                       "diffuse_alpha",
+                                                       "a",
                                                        "quality",
                                                        "scalar_sigma",
                                                        "s",
                                                        "t"};
+  const PlyElement& vertex = *header.find("vertex");
+  const ColorColumns color = color_columns(vertex);
+  const auto is_color = [&](const PlyProperty& property) {
+    const int at = vertex.find(property.name);
+    return std::find(color.at.begin(), color.at.end(), at) != color.at.end();
+  };
   std::string out;
   const auto add = [&](const std::string& what) {
     constexpr size_t kShown = 200;  // characters
     if (out.size() < kShown) out += (out.empty() ? "" : ", ") + printable(what);
   };
-  for (const PlyProperty& property : header.find("vertex")->properties) {
+  for (const PlyProperty& property : vertex.properties) {
     const bool is_known = std::find(kKnown.begin(), kKnown.end(), property.name) != kKnown.end();
-    const bool is_other_quality =
-        property.name == "quality" && !quality_is_support(header, *header.find("vertex"));
-    if (!is_known || is_other_quality) add(property.name);
+    const bool is_other_quality = property.name == "quality" && !quality_is_support(header, vertex);
+    if ((!is_known && !is_color(property)) || is_other_quality) add(property.name);
   }
-  if (header.find("tristrips") != nullptr) add("triangle strips, which hold its faces");
   const auto names_texture = [](const std::string& comment) {
     return comment.starts_with("TextureFile");
   };
@@ -192,23 +222,33 @@ class MeshRows {
       : path_(path), columns_(vertex_columns(header, path)) {
     vertex_count_ = header.find("vertex")->count;
     if (const PlyElement* face = header.find("face")) {
-      indices_ = face->find("vertex_indices");
-      if (indices_ < 0) indices_ = face->find("vertex_index");
+      indices_ = list_of_vertices(*face);
       provenance_ = find_scalar(*face, "scalar_provenance");
-      if (indices_ >= 0 && !face->properties[static_cast<size_t>(indices_)].is_list) indices_ = -1;
+      face_color_ = color_columns(*face);
       if (face->count > 0 && indices_ < 0) {
         throw BadInput(Defect::Schema, path, "faces have no list vertex_indices");
+      }
+    }
+    if (const PlyElement* strips = header.find("tristrips")) {
+      strip_ = list_of_vertices(*strips);
+      if (strips->count > 0 && strip_ < 0) {
+        throw BadInput(Defect::Schema, path, "triangle strips have no list vertex_indices");
+      }
+      if (strip_ >= 0) {
+        restart_ = largest_of(strips->properties[static_cast<size_t>(strip_)].type);
       }
     }
   }
 
   void add(const PlyElement& element, uint64_t row_number, const PlyRow& row) {
-    if (element.name == "vertex") add_vertex(row_number, row);
+    if (element.name == "vertex") add_vertex(row);
     if (element.name == "face") add_face(row_number, row);
+    if (element.name == "tristrips") add_strips(row_number, row);
   }
 
   std::vector<Eigen::Vector3d> positions;
   TriangleMesh mesh;
+  CornerColors colors_of_faces;
   uint64_t dropped_faces = 0;
 
  private:
@@ -218,22 +258,32 @@ class MeshRows {
             row.values[static_cast<size_t>(columns[2])]};
   }
 
-  void add_vertex(uint64_t row_number, const PlyRow& row) {
-    const Eigen::Vector3d p = triple(row, columns_.position);
-    if (!p.allFinite()) {
-      throw BadInput(
-          Defect::Value, path_, "vertex " + std::to_string(row_number) + " is not finite");
+  static int list_of_vertices(const PlyElement& element) {
+    int out = element.find("vertex_indices");
+    if (out < 0) out = element.find("vertex_index");
+    return out >= 0 && element.properties[static_cast<size_t>(out)].is_list ? out : -1;
+  }
+
+  /// What -1 is in a type without sign; -1 for others.
+  static double largest_of(PlyType type) {
+    switch (type) {
+      case PlyType::UInt8:
+        return std::numeric_limits<uint8_t>::max();
+      case PlyType::UInt16:
+        return std::numeric_limits<uint16_t>::max();
+      case PlyType::UInt32:
+        return std::numeric_limits<uint32_t>::max();
+      default:
+        return -1;
     }
-    positions.push_back(p);
+  }
+
+  void add_vertex(const PlyRow& row) {
+    positions.push_back(triple(row, columns_.position));
     if (columns_.has_normals()) {
-      const Eigen::Vector3f n = triple(row, columns_.normal).cast<float>();
-      mesh.normals.push_back(n.allFinite() ? n : Eigen::Vector3f::Zero());
+      mesh.normals.emplace_back(triple(row, columns_.normal).cast<float>());
     }
-    if (columns_.has_colors()) {
-      Eigen::Vector3f color = columns_.color_scale * triple(row, columns_.color).cast<float>();
-      for (float& c : color) c = c > 0 ? c : 0.0f;  // NaN too
-      mesh.colors.push_back(color);
-    }
+    if (columns_.color.has_any()) mesh.colors.push_back(columns_.color.of(row));
     if (columns_.quality >= 0) {
       mesh.support.push_back(static_cast<float>(row.values[static_cast<size_t>(columns_.quality)]));
     }
@@ -245,20 +295,48 @@ class MeshRows {
   void add_face(uint64_t row_number, const PlyRow& row) {
     if (indices_ < 0) return;
     const std::vector<double>& corners = row.lists[static_cast<size_t>(indices_)];
-    for (const double corner : corners) {
-      if (corner >= 0 && corner < static_cast<double>(vertex_count_)) continue;
-      throw BadInput(Defect::Ref,
-                     path_,
-                     "face " + std::to_string(row_number) + " names vertex " +
-                         std::to_string(static_cast<int64_t>(corner)) + " of " +
-                         std::to_string(vertex_count_));
-    }
+    for (const double corner : corners) require_vertex(corner, "face ", row_number);
     if (corners.size() < 3) ++dropped_faces;
     polygon_.assign(corners.begin(), corners.end());
     append_polygon(polygon_, positions, mesh.faces);
+    if (face_color_.has_any() && !columns_.color.has_any()) {
+      const Eigen::Vector3f color = face_color_.of(row);
+      for (const uint32_t corner : polygon_) colors_of_faces.add(corner, color);
+    }
     if (provenance_ >= 0 && mesh.faces.size() > mesh.provenance.size()) {
       mesh.provenance.resize(mesh.faces.size(), label(row_number, row));
     }
+  }
+
+  void require_vertex(double corner, const char* what, uint64_t row_number) const {
+    if (corner >= 0 && corner < static_cast<double>(vertex_count_)) return;
+    throw BadInput(Defect::Ref,
+                   path_,
+                   what + std::to_string(row_number) + " names vertex " +
+                       std::to_string(static_cast<int64_t>(corner)) + " of " +
+                       std::to_string(vertex_count_));
+  }
+
+  // -1 ends a strip. Corners that are named twice begin triangles that turn the other way, and have
+  // no area themselves.
+  void add_strips(uint64_t row_number, const PlyRow& row) {
+    if (strip_ < 0) return;
+    polygon_.clear();  // of the strip so far
+    for (const double corner : row.lists[static_cast<size_t>(strip_)]) {
+      if (corner == -1 || (corner == restart_ && corner >= static_cast<double>(vertex_count_))) {
+        polygon_.clear();
+        continue;
+      }
+      require_vertex(corner, "triangle strip ", row_number);
+      polygon_.push_back(static_cast<uint32_t>(corner));
+      const size_t n = polygon_.size();
+      if (n < 3) continue;
+      std::array<uint32_t, 3> face = {polygon_[n - 3], polygon_[n - 2], polygon_[n - 1]};
+      if (n % 2 == 0) std::swap(face[0], face[1]);
+      const bool is_flat = face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
+      if (!is_flat) mesh.faces.push_back(face);
+    }
+    if (provenance_ >= 0) mesh.provenance.resize(mesh.faces.size(), Provenance::Inferred);
   }
 
   Provenance label(uint64_t row_number, const PlyRow& row) const {
@@ -278,6 +356,9 @@ class MeshRows {
   uint64_t vertex_count_ = 0;
   int indices_ = -1;
   int provenance_ = -1;
+  int strip_ = -1;
+  double restart_ = -1;  // ends a strip, as -1 does
+  ColorColumns face_color_;
   std::vector<uint32_t> polygon_;
 };
 
@@ -337,7 +418,8 @@ ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
     out.digits = is_double || is_text ? kDoubleDigits : kFloatDigits;
   }
   settle_colors(out);
-  if (out.mesh.colors.empty() && states_other_colors(header)) {
+  if (!rows.colors_of_faces.empty()) rows.colors_of_faces.settle(out);
+  if (out.mesh.colors.empty() && states_texture(header)) {
     out.warnings.emplace_back(
         "textures and colours of faces are not read, only colours of vertices, which it has none "
         "of");
@@ -353,6 +435,7 @@ ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
     out.warnings.push_back("dropped " + std::to_string(rows.dropped_faces) +
                            " faces of fewer than 3 corners");
   }
+  drop_unusable(out, path);
   return out;
 }
 

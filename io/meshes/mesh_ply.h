@@ -49,15 +49,17 @@ struct MeshFile {
 
 /// Reads a PLY mesh or point cloud, ASCII or binary, written by us or by others.
 ///
-/// Polygons become fans of triangles. Colours may be uchar or float in [0, 1]. Our own names are
-/// understood as written; a negative or non-finite scalar_sigma is NaN. Arrays the file does not
-/// have stay empty; a warning says where another program left out, or may have, the labels of a
-/// file of ours.
+/// Polygons become triangles, and so do triangle strips ("tristrips" of Stanford, where -1 ends a
+/// strip). Colours are red green blue, diffuse_red … or r g b, whole numbers or floats up to 1 or
+/// 255, of vertices or else of faces. What is not finite is dropped, see drop_unusable(). Our own
+/// names are understood as written; a negative or non-finite scalar_sigma is NaN. Arrays the file
+/// does not have stay empty; a warning says where another program left out, or may have, the labels
+/// of a file of ours.
 /// \param frame  read into exactly this frame; without it a canonical frame is made from the
 ///               vertices, with unit and origin from the comments
 /// \throws BadInput as parse_ply_header() and read_ply_rows(); Schema (no vertices with x y z),
-///         Empty (0 vertices), Value (a coordinate that is not finite), Ref (a face that names a
-///         vertex that is not there); LimitError
+///         Empty (0 vertices), Value (as drop_unusable()), Ref (a face that names a vertex that is
+///         not there); LimitError
 MeshFile read_mesh_ply(const std::filesystem::path& path, const std::optional<Frame>& frame = {});
 
 /// The content of the file as read_mesh_ply() reads it, in file coordinates and double.

@@ -8,6 +8,7 @@
 
 #include "io/bytes/mesh_arrays.h"
 #include "io/meshes/material_labels.h"
+#include "io/meshes/obj_materials.h"
 
 namespace cgs {
 
@@ -26,6 +27,12 @@ std::optional<Provenance> provenance_of_group(std::string_view name) {
 bool may_go_on(std::string_view line) {
   const auto words = tokens(line);
   return !words.empty() && !words[0].starts_with('#') && words[0] != "mtllib";
+}
+
+std::string_view rest_of_line(std::string_view line, std::string_view word) {
+  line.remove_prefix(static_cast<size_t>(word.data() - line.data()) + word.size());
+  line.remove_prefix(std::min(line.find_first_not_of(" \t\r"), line.size()));
+  return line.substr(0, line.find_last_not_of(" \t\r") + 1);
 }
 
 class ObjRows {
@@ -59,30 +66,39 @@ class ObjRows {
     if (line.starts_with('#')) return;
     const auto words = tokens(line);
     if (words.empty()) return;
+    const std::string_view rest = rest_of_line(line, words[0]);
     if (words[0] == "v") add_vertex(words);
     if (words[0] == "f") add_face(words);
-    if (words[0] == "usemtl") set_material(words);
-    if (words[0] == "vt") has_texture_ = true;
+    if (words[0] == "mtllib") paint_.add_library(rest);
+    if (words[0] == "usemtl") set_material(rest);
+    if (words[0] == "vt") add_texcoord(words);
     if (words[0] == "g") {
       group_ = words.size() == 2 ? provenance_of_group(words[1]) : std::nullopt;
     }
   }
 
   // Programs leave blanks in names as they are.
-  void set_material(const std::vector<std::string_view>& words) {
+  void set_material(std::string_view name) {
     has_materials_ = true;
-    const char* const end = words.back().data() + words.back().size();
-    const char* const begin = words.size() > 1 ? words[1].data() : end;
-    material_ = provenance_of_material({begin, static_cast<size_t>(end - begin)});
+    material_ = provenance_of_material(name);
+    paint_.use(name);
+  }
+
+  void add_texcoord(const std::vector<std::string_view>& words) {
+    const auto part = [&](size_t at) {
+      double value = 0;
+      return at < words.size() && parse_measured(words[at], value) ? static_cast<float>(value)
+                                                                   : 0.0f;
+    };
+    paint_.add_texcoord({part(1), part(2)});
   }
 
   double number(std::string_view word) const {
     double value = 0;
-    if (!parse_number(word, value)) {
+    if (!parse_measured(word, value)) {
       lines_.fail(Defect::Syntax,
                   "'" + printable(std::string(word.substr(0, 40))) + "' is not a number");
     }
-    if (!std::isfinite(value)) lines_.fail(Defect::Value, "a number is not finite");
     return value;
   }
 
@@ -113,6 +129,16 @@ class ObjRows {
     return static_cast<uint32_t>(at);
   }
 
+  // Of a corner "v/vt/vn", counted from 0; -1 = none, or none that is there.
+  int64_t texcoord(std::string_view word) const {
+    const size_t slash = word.find('/');
+    if (slash == std::string_view::npos) return -1;
+    word.remove_prefix(slash + 1);
+    int64_t index = 0;
+    if (!parse_number(word.substr(0, word.find('/')), index)) return -1;
+    return index < 0 ? static_cast<int64_t>(paint_.texcoords()) + index : index - 1;
+  }
+
   void add_face(const std::vector<std::string_view>& words) {
     if (words.size() < 4) {
       ++small_faces_;
@@ -120,7 +146,10 @@ class ObjRows {
     }
     std::vector<uint32_t> corners;
     corners.reserve(words.size() - 1);
-    for (size_t k = 1; k < words.size(); ++k) corners.push_back(corner(words[k]));
+    for (size_t k = 1; k < words.size(); ++k) {
+      corners.push_back(corner(words[k]));
+      if (has_materials_) paint_.add_corner(corners.back(), texcoord(words[k]));
+    }
     append_polygon(corners, out_.positions, out_.mesh.faces);
     all_grouped_ = all_grouped_ && group_.has_value();
     if (all_grouped_) out_.mesh.provenance.resize(out_.mesh.faces.size(), *group_);
@@ -146,15 +175,30 @@ class ObjRows {
     settle_colors(out_);
     fill_in_colors(out_, colored_);
     settle_labels();
-    if (has_materials_ && out_.mesh.colors.empty() && out_.mesh.provenance.empty()) {
-      out_.warnings.emplace_back(
-          "materials and textures are not read, only colours of vertices, which it has none of");
-    } else if (has_materials_ && has_texture_) {
-      out_.warnings.emplace_back("textures are not read");
-    }
+    settle_paint();
     if (small_faces_ > 0) {
       out_.warnings.push_back("dropped " + std::to_string(small_faces_) +
                               " faces of fewer than 3 corners");
+    }
+    drop_unusable(out_, lines_.path());
+  }
+
+  // Colours of vertices come first, but for one that all of them have: that is a default, as some
+  // programs write it beside textures.
+  void settle_paint() {
+    if (!paint_.is_used()) return;
+    const std::vector<Eigen::Vector3f>& colors = out_.mesh.colors;
+    const bool are_the_same = std::all_of(
+        colors.begin(), colors.end(), [&](const auto& color) { return color == colors.front(); });
+    if (colors.empty()) {
+      paint_.paint(out_, lines_.path(), !out_.mesh.provenance.empty());
+    } else if (are_the_same && paint_.texcoords() > 0) {
+      const size_t warnings = out_.warnings.size();
+      paint_.paint(out_, lines_.path(), true);
+      if (!out_.has_textures) out_.warnings.resize(warnings);
+    }
+    if (!colors.empty() && !out_.has_textures && paint_.texcoords() > 0 && !colored_.empty()) {
+      out_.warnings.emplace_back("textures are not read");
     }
   }
 
@@ -167,7 +211,7 @@ class ObjRows {
   MaterialLabels materials_;
   std::vector<Provenance> by_material_;  // of faces
   bool has_materials_ = false;
-  bool has_texture_ = false;
+  ObjPaint paint_;
   uint64_t small_faces_ = 0;
 };
 

@@ -1,66 +1,183 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/meshes/off.h"
 
+#include <algorithm>
+#include <optional>
+#include <utility>
+
 #include "io/bytes/byte_reader.h"
 
 namespace cgs {
 
 namespace {
 
-std::vector<std::string_view> words_of(std::string_view line) {
-  return tokens(line.substr(0, line.find('#')));
-}
+using OffWords = std::vector<std::string_view>;
+
+OffWords words_of(std::string_view line) { return tokens(line.substr(0, line.find('#'))); }
 
 struct OffHeader {
   uint64_t vertices = 0;
   uint64_t faces = 0;
-  size_t color = 0;  ///< Place of the red of a vertex among its numbers; 0 = it has none.
+  size_t normal = 0;  ///< Place of the first part among the numbers of a vertex; 0 = it has none.
+  size_t color = 0;   ///< Likewise.
 };
 
-/// The numbers may follow the keyword on its line.
-OffHeader read_header(TextLines& lines) {
-  auto words = words_of(expect_line(lines, "the OFF keyword"));
-  const std::string_view keyword = words.empty() ? std::string_view() : words[0];
-  if (!keyword.ends_with("OFF")) lines.fail(Defect::Magic, "does not start with OFF");
-  const std::string_view kind = keyword.substr(0, keyword.size() - 3);
-  if (kind.find_first_of("4n") != std::string_view::npos) {
-    lines.fail(Defect::Unsupported, "only three dimensions are supported");
+/// Whether a word begins with a keyword of the format, "STCNOFF": its letters before "OFF".
+std::optional<std::string_view> kind_in(std::string_view word) {
+  const size_t end = word.find("OFF");
+  if (end == std::string_view::npos) return std::nullopt;
+  std::string_view rest = word.substr(0, end);
+  for (const std::string_view letter : {"ST", "C", "N", "4", "n"}) {
+    if (rest.starts_with(letter)) rest.remove_prefix(letter.size());
   }
-  const bool has_colors = kind.find('C') != std::string_view::npos;
-  const bool has_normals = kind.find('N') != std::string_view::npos;
-  words.erase(words.begin());
+  const bool is_other_order = rest == "N" || rest == "C";  // "NCOFF", as some write it
+  if (!rest.empty() && !is_other_order) return std::nullopt;
+  return word.substr(0, end);
+}
+
+/// The numbers may follow the keyword on its line, in some files even without a blank; and the
+/// keyword may be left out.
+OffHeader read_header(TextLines& lines) {
+  OffWords words = words_of(expect_line(lines, "the OFF keyword"));
+  if (words.empty()) lines.fail(Defect::Magic, "does not start with OFF");
+  const auto kind = kind_in(words[0]);
+  uint64_t number = 0;
+  const bool is_bare = words.size() == 3 && std::all_of(words.begin(), words.end(), [&](auto word) {
+                         return parse_number(word, number);
+                       });
+  if (!kind && !is_bare) lines.fail(Defect::Magic, "does not start with OFF");
+  OffHeader out;
+  if (kind) {
+    if (kind->find_first_of("4n") != std::string_view::npos) {
+      lines.fail(Defect::Unsupported, "only three dimensions are supported");
+    }
+    if (kind->find('N') != std::string_view::npos) out.normal = 3;
+    if (kind->find('C') != std::string_view::npos) out.color = out.normal + 3;
+    words[0].remove_prefix(kind->size() + 3);
+    if (words[0].empty()) words.erase(words.begin());
+  }
   if (!words.empty() && words[0] == "BINARY") {
     lines.fail(Defect::Unsupported, "binary OFF is not supported");
   }
   if (words.empty()) words = words_of(expect_line(lines, "the numbers of vertices and faces"));
   if (words.size() < 2) lines.fail(Defect::Syntax, "expected the numbers of vertices and faces");
-  const size_t color = !has_colors ? 0 : has_normals ? 6 : 3;
-  return {lines.count(words[0]), lines.count(words[1]), color};
-}
-
-struct Polygon {
-  std::vector<uint32_t> corners;
-  bool has_color = false;  ///< Numbers follow the corners.
-};
-
-Polygon read_polygon(TextLines& lines, uint64_t vertices) {
-  const auto words = words_of(expect_line(lines, "a face"));
-  const uint64_t count = words.empty() ? 0 : lines.count(words[0]);
-  if (words.empty() || count > words.size() - 1) {
-    lines.fail(Defect::Count, "a face has fewer corners than it says");
-  }
-  Polygon out{{}, words.size() > count + 1};
-  for (uint64_t k = 1; k <= count; ++k) {
-    const uint64_t corner = lines.count(words[k]);
-    if (corner >= vertices) {
-      lines.fail(
-          Defect::Ref,
-          "a face names vertex " + std::to_string(corner) + " of " + std::to_string(vertices));
-    }
-    out.corners.push_back(static_cast<uint32_t>(corner));
-  }
+  out.vertices = lines.count(words[0]);
+  out.faces = lines.count(words[1]);
   return out;
 }
+
+Eigen::Vector3d off_triple(const TextLines& lines, const OffWords& words, size_t at) {
+  return {lines.measured(words[at]), lines.measured(words[at + 1]), lines.measured(words[at + 2])};
+}
+
+/// The vertices and what is said of them.
+class OffVertices {
+ public:
+  OffVertices(TextLines& lines, const OffHeader& header, ParsedMesh& out)
+      : lines_(lines), header_(header), out_(out) {}
+
+  void read() {
+    for (uint64_t i = 0; i < header_.vertices; ++i) add(words_of(expect_line(lines_, "a vertex")));
+    if (!all_have_normals_) out_.mesh.normals.clear();
+    settle_colors(out_);
+    fill_in_colors(out_, colored_);
+  }
+
+ private:
+  void add(const OffWords& words) {
+    if (words.size() < 3) lines_.fail(Defect::Syntax, "a vertex needs three coordinates");
+    out_.positions.push_back(off_triple(lines_, words, 0));
+    all_have_normals_ = all_have_normals_ && header_.normal > 0 && words.size() >= 6;
+    if (all_have_normals_) {
+      const Eigen::Vector3d n = off_triple(lines_, words, header_.normal);
+      const double length = n.norm();
+      out_.mesh.normals.emplace_back((length > 0 ? n / length : n).cast<float>());
+    }
+    if (header_.color == 0 || words.size() < header_.color + 3) return;
+    colored_.push_back(out_.positions.size() - 1);
+    out_.mesh.colors.emplace_back(off_triple(lines_, words, header_.color).cast<float>());
+  }
+
+  TextLines& lines_;
+  const OffHeader& header_;
+  ParsedMesh& out_;
+  std::vector<size_t> colored_;  // vertices that state a colour
+  bool all_have_normals_ = true;
+};
+
+/// The faces, and their colours: three or four numbers behind the corners, whole ones from 0 to 255
+/// or floats up to 1. A single one is a place in a colour map elsewhere.
+class OffFaces {
+ public:
+  OffFaces(TextLines& lines, const OffHeader& header, ParsedMesh& out)
+      : lines_(lines), header_(header), out_(out) {}
+
+  void read() {
+    for (uint64_t i = 0; i < header_.faces; ++i) add(words_of(expect_line(lines_, "a face")));
+    settle_face_colors();
+    if (has_numbered_colors_) {
+      out_.warnings.emplace_back("colours of faces that are numbers of a colour map are not read");
+    }
+    if (dropped_ > 0) {
+      out_.warnings.push_back("dropped " + std::to_string(dropped_) +
+                              " faces of fewer than 3 corners");
+    }
+  }
+
+ private:
+  void add(const OffWords& words) {
+    const uint64_t count = words.empty() ? 0 : lines_.count(words[0]);
+    if (words.empty() || count > words.size() - 1) {
+      lines_.fail(Defect::Count, "a face has fewer corners than it says");
+    }
+    corners_.clear();
+    for (uint64_t k = 1; k <= count; ++k) {
+      const uint64_t corner = lines_.count(words[k]);
+      if (corner >= header_.vertices) {
+        lines_.fail(Defect::Ref,
+                    "a face names vertex " + std::to_string(corner) + " of " +
+                        std::to_string(header_.vertices));
+      }
+      corners_.push_back(static_cast<uint32_t>(corner));
+    }
+    if (count < 3) ++dropped_;
+    append_polygon(corners_, out_.positions, out_.mesh.faces);
+    if (out_.mesh.colors.empty())
+      add_color({words.begin() + static_cast<ptrdiff_t>(count) + 1, words.end()});
+  }
+
+  void add_color(const OffWords& words) {
+    if (words.size() == 1) has_numbered_colors_ = true;
+    if (words.size() < 3) return;
+    const Eigen::Vector3f color = off_triple(lines_, words, 0).cast<float>();
+    const bool is_whole = std::all_of(words.begin(), words.begin() + 3, [](std::string_view word) {
+      uint64_t unused = 0;
+      return parse_number(word, unused);
+    });
+    are_whole_ = are_whole_ && is_whole;
+    brightest_ = std::max(brightest_, color.maxCoeff());
+    for (const uint32_t corner : corners_) colors_.emplace_back(corner, color);
+  }
+
+  // Floats may be written without a point, so that all of them are looked at.
+  void settle_face_colors() {
+    if (colors_.empty()) return;
+    const float scale = are_whole_ && brightest_ > 1 ? 1.0f / 255 : 1.0f;
+    CornerColors of_corners;
+    for (const auto& [corner, color] : colors_) of_corners.add(corner, scale * color);
+    of_corners.settle(out_);
+  }
+
+  TextLines& lines_;
+  const OffHeader& header_;
+  ParsedMesh& out_;
+  std::vector<uint32_t> corners_;
+  std::vector<std::pair<uint32_t, Eigen::Vector3f>> colors_;  // of corners
+  bool are_whole_ = true;                                     // all numbers of them
+  float brightest_ = 0;
+  bool has_numbered_colors_ = false;
+  uint64_t dropped_ = 0;
+};
 
 }  // namespace
 
@@ -68,38 +185,14 @@ ParsedMesh read_off(const std::filesystem::path& path) {
   const std::string bytes = read_file(path);
   refuse_foreign_content(path, bytes, "OFF");
   TextLines lines(bytes, path);
-  const auto [vertices, faces, color] = read_header(lines);
-  ByteReader(bytes, path).expect_records(vertices, 6, "vertices");
-  ByteReader(bytes, path).expect_records(faces, 2, "faces");
-  if (vertices == 0) throw BadInput(Defect::Empty, path, "0 vertices");
+  const OffHeader header = read_header(lines);
+  ByteReader(bytes, path).expect_records(header.vertices, 6, "vertices");
+  ByteReader(bytes, path).expect_records(header.faces, 2, "faces");
+  if (header.vertices == 0) throw BadInput(Defect::Empty, path, "0 vertices");
   ParsedMesh out;
-  std::vector<size_t> colored;  // vertices that state a colour
-  for (uint64_t i = 0; i < vertices; ++i) {
-    const auto words = words_of(expect_line(lines, "a vertex"));
-    if (words.size() < 3) lines.fail(Defect::Syntax, "a vertex needs three coordinates");
-    out.positions.emplace_back(
-        lines.number(words[0]), lines.number(words[1]), lines.number(words[2]));
-    if (color == 0 || words.size() < color + 3) continue;
-    colored.push_back(out.positions.size() - 1);
-    Eigen::Vector3f& rgb = out.mesh.colors.emplace_back();
-    for (size_t c = 0; c < 3; ++c) {
-      rgb[static_cast<Eigen::Index>(c)] = static_cast<float>(lines.number(words[color + c]));
-    }
-  }
-  settle_colors(out);
-  fill_in_colors(out, colored);
-  uint64_t dropped = 0;
-  bool has_face_colors = false;
-  for (uint64_t i = 0; i < faces; ++i) {
-    const Polygon polygon = read_polygon(lines, vertices);
-    if (polygon.corners.size() < 3) ++dropped;
-    has_face_colors |= polygon.has_color;
-    append_polygon(polygon.corners, out.positions, out.mesh.faces);
-  }
-  if (has_face_colors) out.warnings.emplace_back("colours of faces are not read");
-  if (dropped > 0) {
-    out.warnings.push_back("dropped " + std::to_string(dropped) + " faces of fewer than 3 corners");
-  }
+  OffVertices(lines, header, out).read();
+  OffFaces(lines, header, out).read();
+  drop_unusable(out, path);
   return out;
 }
 

@@ -7,8 +7,10 @@
 
 namespace cgs {
 
-/// Reads an ASCII OFF file (OFF, COFF, NOFF, CNOFF, STOFF and their combinations); polygons become
-/// fans of triangles, what follows the coordinates is ignored.
+/// Reads an ASCII OFF file (OFF, COFF, NOFF, CNOFF, STOFF and their combinations; the keyword may
+/// stand right before the numbers, or be missing); polygons become triangles. Normals and colours
+/// of vertices, else colours of faces, are taken, texture coordinates are not. What is not finite
+/// is dropped, see drop_unusable().
 ///
 /// \throws BadInput Magic, Unsupported (binary, four dimensions), Syntax, Count, Truncated, Ref,
 ///         Value, Empty, with the line number; LimitError

@@ -11,6 +11,8 @@ namespace cgs {
 
 namespace {
 
+constexpr float kOtherColor = 0.1f;  // more than compression or shading makes of one
+
 // A polygon laid into the plane of its two largest extents, counter-clockwise.
 class FlatPolygon {
  public:
@@ -97,6 +99,17 @@ std::vector<std::array<uint32_t, 3>> ears_of(const std::vector<uint32_t>& corner
 void settle_colors(ParsedMesh& parsed) {
   constexpr float kBeyondWhite = 2;
   std::vector<Eigen::Vector3f>& colors = parsed.mesh.colors;
+  const bool fit = colors.size() == parsed.positions.size();
+  size_t bad = 0;
+  for (size_t i = 0; i < colors.size(); ++i) {
+    if (colors[i].allFinite()) continue;
+    const bool is_dropped = fit && !parsed.positions[i].allFinite();
+    bad += is_dropped ? 0 : 1;
+    for (float& c : colors[i]) c = std::isfinite(c) ? c : 0.0f;
+  }
+  if (bad > 0) {
+    parsed.warnings.push_back("colours of " + counted(bad, "vertex") + " are not finite: 0");
+  }
   const bool are_bytes = std::any_of(colors.begin(), colors.end(), [](const Eigen::Vector3f& c) {
     return c.maxCoeff() > kBeyondWhite;
   });
@@ -107,6 +120,42 @@ void settle_colors(ParsedMesh& parsed) {
     if (are_bytes) c /= 255;
     c = c.cwiseMax(0).cwiseMin(1);
   }
+}
+
+void CornerColors::add(uint32_t vertex, const Eigen::Vector3f& color) {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  if (!color.allFinite()) return;
+  if (vertex >= colors_.size()) {
+    const size_t size = std::max<size_t>(size_t{vertex} + 1, colors_.size() + colors_.size() / 2);
+    colors_.resize(size, Eigen::Vector3f::Constant(kNone));
+  }
+  Eigen::Vector3f& known = colors_[vertex];
+  if (known.hasNaN()) known = color;
+  if ((known - color).cwiseAbs().maxCoeff() > kOtherColor) ++recolored_;
+}
+
+void CornerColors::settle(ParsedMesh& parsed) {
+  std::vector<size_t> colored;
+  colors_.resize(parsed.positions.size(),
+                 Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  parsed.mesh.colors.clear();
+  for (size_t v = 0; v < colors_.size(); ++v) {
+    if (colors_[v].hasNaN()) continue;
+    colored.push_back(v);
+    parsed.mesh.colors.push_back(colors_[v]);
+  }
+  settle_colors(parsed);
+  fill_in_colors(parsed, colored);
+  if (recolored_ == 0) return;
+  parsed.warnings.push_back("surfaces of different colours meet at " + std::to_string(recolored_) +
+                            " corners; vertices have one, that of the first");
+}
+
+std::string counted(size_t count, const std::string& what) {
+  if (count == 1) return "1 " + what;
+  const bool is_vertex = what.ends_with("ex");
+  return std::to_string(count) + " " +
+         (is_vertex ? what.substr(0, what.size() - 2) + "ices" : what + "s");
 }
 
 void fill_in_colors(ParsedMesh& parsed, const std::vector<size_t>& colored) {
@@ -124,7 +173,11 @@ void append_polygon(const std::vector<uint32_t>& corners,
                     std::vector<std::array<uint32_t, 3>>& triangles) {
   constexpr size_t kMost = 1024;
   const auto is_placed = [&](uint32_t corner) { return corner < positions.size(); };
-  if (corners.size() > 3 && corners.size() <= kMost &&
+  const auto is_lost = [&](uint32_t corner) {
+    return is_placed(corner) && !positions[corner].allFinite();
+  };
+  const auto lost = std::find_if(corners.begin(), corners.end(), is_lost);
+  if (corners.size() > 3 && corners.size() <= kMost && lost == corners.end() &&
       std::all_of(corners.begin(), corners.end(), is_placed)) {
     const FlatPolygon polygon(corners, positions);
     if (!polygon.is_convex()) {
@@ -133,9 +186,91 @@ void append_polygon(const std::vector<uint32_t>& corners,
       if (!ears.empty()) return;
     }
   }
-  for (size_t k = 2; k < corners.size(); ++k) {
-    triangles.push_back({corners[0], corners[k - 1], corners[k]});
+  const size_t n = corners.size();
+  const size_t first = lost == corners.end() ? 0 : static_cast<size_t>(lost - corners.begin());
+  for (size_t k = 2; k < n; ++k) {
+    triangles.push_back({corners[first], corners[(first + k - 1) % n], corners[(first + k) % n]});
   }
+}
+
+namespace {
+
+constexpr uint32_t kDropped = 0xffffffff;
+
+// Keeps the entries whose new number is known, in their order.
+template <typename T>
+void keep_numbered(std::vector<T>& values, const std::vector<uint32_t>& number) {
+  if (values.empty()) return;
+  size_t kept = 0;
+  for (size_t v = 0; v < number.size(); ++v) {
+    if (number[v] != kDropped) values[kept++] = values[v];
+  }
+  values.resize(kept);
+}
+
+// \return how many are gone
+size_t drop_faces_of_dropped(TriangleMesh& mesh, const std::vector<uint32_t>& number) {
+  size_t kept = 0;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    std::array<uint32_t, 3> face{};
+    for (size_t k = 0; k < 3; ++k) face.at(k) = number[mesh.faces[f].at(k)];
+    if (std::find(face.begin(), face.end(), kDropped) != face.end()) continue;
+    mesh.faces[kept] = face;
+    if (!mesh.provenance.empty()) mesh.provenance[kept] = mesh.provenance[f];
+    ++kept;
+  }
+  const size_t dropped = mesh.faces.size() - kept;
+  mesh.faces.resize(kept);
+  if (!mesh.provenance.empty()) mesh.provenance.resize(kept);
+  return dropped;
+}
+
+void settle_normals(ParsedMesh& parsed) {
+  size_t bad = 0;
+  for (size_t v = 0; v < parsed.mesh.normals.size(); ++v) {
+    Eigen::Vector3f& normal = parsed.mesh.normals[v];
+    if (normal.allFinite()) continue;
+    bad += parsed.positions[v].allFinite() ? 1 : 0;
+    normal.setZero();
+  }
+  if (bad == 0) return;
+  parsed.warnings.push_back("normals of " + counted(bad, "vertex") + " are not finite: none");
+}
+
+}  // namespace
+
+void drop_unusable(ParsedMesh& parsed, const std::filesystem::path& path) {
+  settle_normals(parsed);
+  const size_t vertices = parsed.positions.size();
+  const size_t faces = parsed.mesh.faces.size();
+  std::vector<uint32_t> number(vertices, kDropped);
+  uint32_t kept = 0;
+  for (size_t v = 0; v < vertices; ++v) {
+    if (parsed.positions[v].allFinite()) number[v] = kept++;
+  }
+  const size_t dropped = vertices - kept;
+  if (dropped == 0) return;
+  const size_t dropped_faces = drop_faces_of_dropped(parsed.mesh, number);
+  const bool is_cloud = faces == 0;
+  if (is_cloud ? 2 * dropped > vertices : 2 * dropped_faces > faces) {
+    throw BadInput(Defect::Value,
+                   path,
+                   counted(dropped, "vertex") + " of " + std::to_string(vertices) +
+                       " are not finite" +
+                       (is_cloud ? ""
+                                 : ", and " + std::to_string(dropped_faces) + " of " +
+                                       counted(faces, "face") + " name them") +
+                       ": that is more than half");
+  }
+  keep_numbered(parsed.positions, number);
+  keep_numbered(parsed.mesh.normals, number);
+  keep_numbered(parsed.mesh.colors, number);
+  keep_numbered(parsed.mesh.support, number);
+  keep_numbered(parsed.mesh.sigma, number);
+  parsed.warnings.push_back(
+      "dropped " + counted(dropped, "vertex") + " of " + std::to_string(vertices) +
+      (dropped == 1 ? " that is" : " that are") + " not finite" +
+      (dropped_faces > 0 ? ", and " + counted(dropped_faces, "face") + " there" : ""));
 }
 
 size_t PlaceNumbers::Hash::operator()(const Eigen::Vector3d& place) const {

@@ -27,20 +27,46 @@ struct ParsedMesh {
 
 /// Appends a polygon as triangles: a fan where no corner is reflex, else ears cut off in its plane.
 /// Polygons that cross themselves, those of more than 1024 corners and those with corners that have
-/// no position yet become fans.
-/// \param positions  finite
+/// no position yet become fans; around a corner that is not finite, so that drop_unusable() takes
+/// all of it.
 /// Source: ear clipping, Meisters 1975; normal of a polygon, Newell.
 void append_polygon(const std::vector<uint32_t>& corners,
                     const std::vector<Eigen::Vector3d>& positions,
                     std::vector<std::array<uint32_t, 3>>& triangles);
 
 /// Colours as formats of text state them: 0 to 1, or 0 to 255 where any is above 2 (brighter than
-/// white by a little they may be), which a warning then says. Brings them to [0, 1].
+/// white by a little they may be), which a warning then says. Brings them to [0, 1]; what is not
+/// finite becomes 0, and is counted.
 void settle_colors(ParsedMesh& parsed);
 
 /// Gives the colours that some vertices state to those, and white to the others, with a warning.
 /// \param colored  the vertices of parsed.mesh.colors, ascending
 void fill_in_colors(ParsedMesh& parsed, const std::vector<size_t>& colored);
+
+/// Colours of faces, or of their corners, for the vertices: each takes that of the first.
+class CornerColors {
+ public:
+  /// \param color  as settle_colors() takes it; one that is not finite is none
+  void add(uint32_t vertex, const Eigen::Vector3f& color);
+  /// Whether any vertex has one.
+  bool empty() const { return colors_.empty(); }
+  /// Makes them the colours of a mesh that states none, white where there are none, in [0, 1];
+  /// warns of that, and where faces of different colours meet.
+  void settle(ParsedMesh& parsed);
+
+ private:
+  std::vector<Eigen::Vector3f> colors_;  // NaN where there is none
+  size_t recolored_ = 0;                 // corners of another colour than their vertex has
+};
+
+/// Drops vertices that are not finite and the faces that name them, and counts both in a warning.
+/// Normals that are not finite become 0 0 0, which counts as none, with a warning.
+/// \throws BadInput Value where that would take more than half of the faces, or of the points of a
+///         cloud
+void drop_unusable(ParsedMesh& parsed, const std::filesystem::path& path);
+
+/// "1 vertex", "7 vertices", "1 face", "2 faces"
+std::string counted(size_t count, const std::string& what);
 
 /// Numbers places in the order they first appear, for formats that repeat a vertex per face.
 class PlaceNumbers {

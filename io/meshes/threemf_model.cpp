@@ -231,7 +231,7 @@ class ModelReader {
 
   void add_vertex(const XmlElement& element) {
     inside(element).vertices.emplace_back(
-        element.number("x"), element.number("y"), element.number("z"));
+        element.measured("x"), element.measured("y"), element.measured("z"));
   }
 
   void add_triangle(const XmlElement& element) {

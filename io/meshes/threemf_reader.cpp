@@ -80,6 +80,7 @@ class Assembly {
     }
     settle_labels(model);
     settle_colors();
+    drop_unusable(out_, path_);
     out_.comments.push_back("metres_per_unit " + model.metres_per_unit);
     if (is_ours_) {
       add_scale(model);
@@ -179,7 +180,7 @@ class Assembly {
     }
     for (const Eigen::Vector3d& vertex : object.vertices) {
       out_.positions.emplace_back(world * vertex);
-      if (out_.positions.back().allFinite()) continue;
+      if (out_.positions.back().allFinite() || !vertex.allFinite()) continue;
       throw BadInput(Defect::Value,
                      path_ / at.part,
                      "object " + std::to_string(at.object) + " is placed at infinity");

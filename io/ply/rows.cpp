@@ -167,8 +167,10 @@ class AsciiRows {
     const std::string_view token = next_token();
     if (token.empty()) fail(Defect::Syntax, "no value for property " + what);
     double value = 0;
-    const bool whole = type == PlyType::Float32 || type == PlyType::Float64;
-    if (!parse_number(token, value) || (!whole && value != std::floor(value))) {
+    const bool is_float = type == PlyType::Float32 || type == PlyType::Float64;
+    const bool is_number = is_float ? parse_measured(token, value)
+                                    : parse_number(token, value) && value == std::floor(value);
+    if (!is_number) {
       fail(Defect::Syntax,
            "property " + what + ": '" + printable(std::string(token.substr(0, 40))) +
                "' is not a number of its type");

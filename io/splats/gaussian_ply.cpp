@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/byte_writer.h"
@@ -66,9 +67,10 @@ struct SplatColumns {
   int opacity = -1;
   std::vector<int> scale;  ///< Three, or two of 2D splats.
   std::array<int, 4> rotation{};
-  int filter = -1;         ///< filter_3D, -1 if there is none.
-  int provenance = -1;     ///< -1 if there is none.
-  double color_range = 0;  ///< Largest value of red, green and blue; 0 = f_dc_*.
+  int filter = -1;            ///< filter_3D, -1 if there is none.
+  int provenance = -1;        ///< -1 if there is none.
+  double color_range = 0;     ///< Largest value of red, green and blue; 0 = f_dc_*.
+  bool may_be_bytes = false;  ///< These are floats, which some programs write up to 255.
 };
 
 class ColumnFinder {
@@ -101,6 +103,17 @@ class ColumnFinder {
     std::array<int, N> out{};
     for (size_t k = 0; k < N; ++k) out.at(k) = column(prefix + std::to_string(k));
     return out;
+  }
+
+  /// Names that programs give to the three parts of a colour.
+  std::optional<std::array<const char*, 3>> color_names() const {
+    for (const std::array<const char*, 3>& names :
+         {std::array{"red", "green", "blue"},
+          std::array{"diffuse_red", "diffuse_green", "diffuse_blue"},
+          std::array{"r", "g", "b"}}) {
+      if (has(names[0]) && has(names[1]) && has(names[2])) return names;
+    }
+    return std::nullopt;
   }
 
   /// Colour as a byte, in a wider whole number too, as 16 bits, or a float in [0, 1].
@@ -147,9 +160,10 @@ SplatColumns splat_columns(const PlyHeader& header, const std::filesystem::path&
   out.opacity = find.column("opacity");
   if (find.has("filter_3D")) out.filter = find.column("filter_3D");
   out.provenance = find.optional_column(kProvenanceProperty);
-  if (!find.has("f_dc_0") && find.has("red") && find.has("green") && find.has("blue")) {
-    out.color = {find.column("red"), find.column("green"), find.column("blue")};
+  if (const auto names = find.color_names(); names && !find.has("f_dc_0")) {
+    for (size_t k = 0; k < 3; ++k) out.color.at(k) = find.column(names->at(k));
     out.color_range = find.color_range(out.color[0]);
+    out.may_be_bytes = out.color_range == 1;
   } else {
     out.color = find.columns<3>("f_dc_");
   }
@@ -232,11 +246,22 @@ class SplatRows {
     add_color(row);
   }
 
-  RawSplats take() { return std::move(splats_); }
+  RawSplats take() {
+    if (columns_.may_be_bytes && brightest_ > kBeyondWhite) {
+      splats_.notes.emplace_back("colours above 2: taken as values from 0 to 255");
+      const auto count = static_cast<size_t>((splats_.sh_degree + 1) * (splats_.sh_degree + 1));
+      for (size_t i = 0; i < splats_.sh.size(); i += count) {
+        const Eigen::Array3f color = splats_.sh[i].array() * kShC0 + 0.5f;
+        splats_.sh[i] = (color / 255 - 0.5f) / kShC0;
+      }
+    }
+    return std::move(splats_);
+  }
 
  private:
   void add_color(const PlyRow& row) {
     auto color = gather<Eigen::Vector3d>(row, columns_.color);
+    if (color.allFinite()) brightest_ = std::max(brightest_, color.maxCoeff());
     if (columns_.color_range > 0) color = (color / columns_.color_range).array() - 0.5;
     if (columns_.color_range > 0) color /= double{kShC0};
     splats_.sh.emplace_back(color.cast<float>());
@@ -251,7 +276,9 @@ class SplatRows {
     }
   }
 
+  static constexpr double kBeyondWhite = 2;  // a little brighter than white colours may be
   SplatColumns columns_;
+  double brightest_ = 0;  // of colours as stored
   size_t kept_per_channel_ = 0;
   RawSplats splats_;
 };

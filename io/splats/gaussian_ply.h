@@ -36,8 +36,9 @@ bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame)
 /// Reads the 3DGS layout, ASCII or binary, properties in any order and of any type, others ignored.
 ///
 /// Normals and f_rest_* may be absent; degree 4 is read as degree 3. Without scale_2 (2DGS) splats
-/// become a thousandth of their smaller width thick. Colour may be red, green, blue instead of
-/// f_dc_*. Labels of provenance are read where there are any, from whole numbers of any type.
+/// become a thousandth of their smaller width thick. Colour may be red, green, blue (or
+/// diffuse_red …, or r, g, b; floats up to 1 or 255) instead of f_dc_*. Labels of provenance are
+/// read where there are any, from whole numbers of any type.
 /// \throws BadInput as parse_ply_header() and read_ply_rows(); Schema (a property is missing, or
 ///         the number of f_rest_* is none of the five), Empty (0 vertices); LimitError
 RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path& path);

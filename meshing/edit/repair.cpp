@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
@@ -13,6 +14,7 @@
 #include <CGAL/Polygon_mesh_processing/repair_degeneracies.h>
 #include <Eigen/Geometry>
 
+#include "meshing/edit/stitching.h"
 #include "meshing/mesh/certificate.h"
 #include "meshing/mesh/components.h"
 #include "meshing/mesh/polygon_mesh.h"
@@ -55,10 +57,7 @@ size_t merge_vertices(TriangleMesh& mesh) {
     }
     ++merged;
     renamed[v] = kept;
-    if (!mesh.support.empty()) mesh.support[kept] = std::min(mesh.support[kept], mesh.support[v]);
-    if (!mesh.sigma.empty() && !(mesh.sigma[v] <= mesh.sigma[kept])) {  // NaN takes over, and stays
-      if (!std::isnan(mesh.sigma[kept])) mesh.sigma[kept] = mesh.sigma[v];
-    }
+    take_weaker_claims(mesh, kept, v);
   }
   for (Face& face : mesh.faces) {
     for (uint32_t& v : face) v = renamed[v];
@@ -251,6 +250,11 @@ RepairedMesh repaired(const TriangleMesh& mesh) {
   out.mesh = mesh;
   out.merged_vertices = merge_vertices(out.mesh);
   drop_improper_faces(out);
+  if (auto stitched = without_t_junctions(out.mesh)) {
+    out.split_edges = stitched->vertices;
+    out.mesh = std::move(stitched->mesh);
+    drop_improper_faces(out);  // a part may be one that was there
+  }
   orient_faces(out);
   const size_t vertices = out.mesh.vertices.size();
   remove_flat_faces(out);

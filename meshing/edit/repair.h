@@ -15,6 +15,7 @@ struct RepairedMesh {
   size_t flat_faces = 0;       ///< Without area, collapsed or flipped away.
   size_t flat_left = 0;        ///< Without area, that could be neither collapsed nor flipped.
   size_t duplicate_faces = 0;  ///< With the corners of another one.
+  size_t split_edges = 0;      ///< Places where a vertex lay on an open edge of another face.
   size_t turned_faces = 0;     ///< Whose corners now run the other way.
   size_t split_vertices = 0;   ///< Added where more than two faces met at an edge, or only corners
                                ///< of two sheets.
@@ -24,10 +25,10 @@ struct RepairedMesh {
 /// Makes a mesh out of any set of triangles.
 ///
 /// Merged vertices take the largest sigma (NaN if one has none) and the smallest support of those
-/// they were, the rest of the first. Of duplicate faces the one with the strongest evidence is
-/// kept. Faces of a part turn with the majority of its area or, if the whole is closed and free of
-/// self-intersection, so that it bounds a volume. Where a face without area is flipped away beside
-/// an Inferred one, both become Inferred.
+/// they were, the rest of the first. T-junctions are split, see without_t_junctions(). Of duplicate
+/// faces the one with the strongest evidence is kept. Faces of a part turn with the majority of its
+/// area or, if the whole is closed and free of self-intersection, so that it bounds a volume. Where
+/// a face without area is flipped away beside an Inferred one, both become Inferred.
 /// Source: CGAL, Polygon Mesh Processing.
 /// \pre face indices are below mesh.vertices.size()
 RepairedMesh repaired(const TriangleMesh& mesh);

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "libcgs/core/error.h"
 #include "meshing/edit/edge_collapse.h"
+#include "meshing/edit/stitching.h"
 #include "meshing/mesh/provenance.h"
 #include "meshing/mesh/self_intersections.h"
 
@@ -153,32 +155,11 @@ SimplifyResult unchanged(const TriangleMesh& mesh) {
   return result;
 }
 
-}  // namespace
-
-void SimplifyOptions::validate() const {
-  require(max_error > 0, "SimplifyOptions.max_error must be > 0", max_error);
-  require(max_error_inferred == 0 || max_error_inferred >= max_error,
-          "SimplifyOptions.max_error_inferred must be 0 or >= max_error",
-          max_error_inferred);
-  require(max_color_error > 0 && max_color_error <= 1,
-          "SimplifyOptions.max_color_error must be in (0, 1]",
-          max_color_error);
-  require(max_area_change > 0 && max_area_change <= 1,
-          "SimplifyOptions.max_area_change must be in (0, 1]",
-          max_area_change);
-}
-
-SimplifyResult simplify(const TriangleMesh& mesh,
-                        const SimplifyOptions& given,
-                        const Progress& progress) {
-  given.validate();
-  SimplifyOptions options = given;
-  if (options.max_error_inferred == 0) options.max_error_inferred = options.max_error;
-  for (const auto& p : mesh.vertices) {
-    require(p.allFinite(), "simplify needs finite vertices, a coordinate", p.sum());
-  }
+// \param options  valid, and complete
+SimplifyResult simplify_connected(const TriangleMesh& mesh,
+                                  const SimplifyOptions& options,
+                                  const Progress& progress) {
   SimplifyResult result = unchanged(mesh);
-  if (mesh.faces.empty()) return result;
   CollapseLimits limits{
       tolerances(mesh, options), float(options.max_color_error), options.target_faces, {}, 0};
   constexpr int kRounds = 6;
@@ -213,6 +194,39 @@ SimplifyResult simplify(const TriangleMesh& mesh,
   const int rounds = result.rounds;
   result = unchanged(mesh);
   result.rounds = rounds;
+  return result;
+}
+
+}  // namespace
+
+void SimplifyOptions::validate() const {
+  require(max_error > 0, "SimplifyOptions.max_error must be > 0", max_error);
+  require(max_error_inferred == 0 || max_error_inferred >= max_error,
+          "SimplifyOptions.max_error_inferred must be 0 or >= max_error",
+          max_error_inferred);
+  require(max_color_error > 0 && max_color_error <= 1,
+          "SimplifyOptions.max_color_error must be in (0, 1]",
+          max_color_error);
+  require(max_area_change > 0 && max_area_change <= 1,
+          "SimplifyOptions.max_area_change must be in (0, 1]",
+          max_area_change);
+}
+
+SimplifyResult simplify(const TriangleMesh& mesh,
+                        const SimplifyOptions& given,
+                        const Progress& progress) {
+  given.validate();
+  SimplifyOptions options = given;
+  if (options.max_error_inferred == 0) options.max_error_inferred = options.max_error;
+  for (const auto& p : mesh.vertices) {
+    require(p.allFinite(), "simplify needs finite vertices, a coordinate", p.sum());
+  }
+  if (mesh.faces.empty()) return unchanged(mesh);
+  const std::optional<StitchedMesh> stitched = with_joined_seams(mesh);
+  if (!stitched) return simplify_connected(mesh, options, progress);
+  SimplifyResult result = simplify_connected(stitched->mesh, options, progress);
+  if (result.faces_after == result.faces_before) return unchanged(mesh);
+  result.joined_vertices = stitched->vertices;
   return result;
 }
 

@@ -37,10 +37,14 @@ struct SimplifyResult {
   std::array<double, kProvenanceCount> area_before =
       {};  ///< By provenance [internal units squared].
   std::array<double, kProvenanceCount> area_after = {};
-  int rounds = 0;  ///< Times the collapses were run.
+  int rounds = 0;              ///< Times the collapses were run.
+  size_t joined_vertices = 0;  ///< That were gone before, see with_joined_seams().
 };
 
 /// A mesh with fewer faces that stays within a stated distance of the input.
+///
+/// Vertices that are doubled along seams are joined first, see with_joined_seams(): two rims could
+/// hardly become simpler.
 ///
 /// Sigma grows by the measured error, see widen_sigma(). Faces keep their labels, borders between
 /// labels and open rims stay where they are within the error, topology is kept; see

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -63,6 +64,14 @@ void append_blend(TriangleMesh& to, const TriangleMesh& from, std::span<const Ve
   if (!from.colors.empty()) to.colors.emplace_back(from.colors[first] + color);
   if (!from.support.empty()) to.support.push_back(support);
   if (!from.sigma.empty()) to.sigma.push_back(from.sigma[first] + sigma);
+}
+
+void take_weaker_claims(TriangleMesh& mesh, uint32_t kept, uint32_t other) {
+  if (!mesh.support.empty()) {
+    mesh.support[kept] = std::min(mesh.support[kept], mesh.support[other]);
+  }
+  if (mesh.sigma.empty() || mesh.sigma[other] <= mesh.sigma[kept]) return;
+  if (!std::isnan(mesh.sigma[kept])) mesh.sigma[kept] = mesh.sigma[other];  // NaN takes over
 }
 
 TriangleMesh with_vertices(const TriangleMesh& mesh, const std::vector<uint8_t>& keep) {

@@ -25,6 +25,10 @@ void append_vertex(TriangleMesh& to, const TriangleMesh& from, uint32_t v);
 /// takes part states none.
 void append_blend(TriangleMesh& to, const TriangleMesh& from, std::span<const VertexShare> shares);
 
+/// Lets a vertex speak for another one, too, that becomes one with it: the smallest support and the
+/// largest sigma, NaN as soon as one states none. All else stays.
+void take_weaker_claims(TriangleMesh& mesh, uint32_t kept, uint32_t other);
+
 /// Of a mesh the faces all of whose corners are kept, and the vertices these use; of a point cloud
 /// the points that are kept. All attributes stay.
 /// \pre keep holds 0 or 1 for every vertex
