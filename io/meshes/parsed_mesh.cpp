@@ -11,8 +11,6 @@ namespace cgs {
 
 namespace {
 
-constexpr float kOtherColor = 0.1f;  // more than compression or shading makes of one
-
 // A polygon laid into the plane of its two largest extents, counter-clockwise.
 class FlatPolygon {
  public:
@@ -124,6 +122,7 @@ void settle_colors(ParsedMesh& parsed) {
 
 void CornerColors::add(uint32_t vertex, const Eigen::Vector3f& color) {
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kOtherColor = 0.1f;  // more than compression or shading makes of one
   if (!color.allFinite()) return;
   if (vertex >= colors_.size()) {
     const size_t size = std::max<size_t>(size_t{vertex} + 1, colors_.size() + colors_.size() / 2);

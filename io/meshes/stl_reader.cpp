@@ -86,8 +86,7 @@ class LostFacets {
   void settle(ParsedMesh& out, const std::filesystem::path& path) const {
     if (lost_ == 0) return;
     const std::string found = counted(lost_, "facet") + " of " + std::to_string(all_) +
-                              (lost_ == 1 ? " has a corner" : " have a corner") +
-                              " that is not finite";
+                              " with a corner that is not finite";
     if (2 * lost_ > all_) {
       throw BadInput(Defect::Value, path, found + ": that is more than half");
     }

@@ -89,5 +89,27 @@ TEST(ParseNumber, WantsTheWholeToken) {
   }
 }
 
+TEST(ParseMeasured, TakesWhatProgramsPrintForNumbersThatAreNone) {
+  const auto value_of = [](const std::string& text) {
+    double value = 7;
+    EXPECT_TRUE(parse_measured(text, value)) << text;
+    return value;
+  };
+  for (const char* text :
+       {"nan", "-nan", "+nan", "NaN", "NAN", "-nan(ind)", "1.#QNAN", "-1.#IND"}) {
+    EXPECT_TRUE(std::isnan(value_of(text))) << text;
+  }
+  for (const char* text : {"inf", "+inf", "Infinity", "1.#INF", "1e999", "+1E+999"}) {
+    EXPECT_EQ(value_of(text), HUGE_VAL) << text;
+  }
+  for (const char* text : {"-inf", "-1.#INF00", "-1e999"}) EXPECT_EQ(value_of(text), -HUGE_VAL);
+  for (const char* text : {"1e-999", "-1e-999"}) EXPECT_EQ(value_of(text), 0) << text;
+  EXPECT_EQ(value_of("+2.5"), 2.5);
+  double unused = 0;
+  for (const char* text : {"", "-", "+", "--nan", "+-1", "nano", "1.5x", "1e999x", "x1.#INF"}) {
+    EXPECT_FALSE(parse_measured(text, unused)) << text;
+  }
+}
+
 }  // namespace
 }  // namespace cgs::byte_reader_test

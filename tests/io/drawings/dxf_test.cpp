@@ -75,8 +75,9 @@ TEST(WriteDxf, HasWhatReadersLookFor) {
   }
   EXPECT_EQ(count["SECTION"], 3);
   EXPECT_EQ(count["ENDSEC"], 3);
-  EXPECT_EQ(count["POLYLINE"], 2);
-  EXPECT_EQ(count["SEQEND"], 2);
+  EXPECT_EQ(count["POLYLINE"], 3);
+  EXPECT_EQ(count["SEQEND"], 3);
+  EXPECT_EQ(vertices_on["OUTLINE"], 4);
   EXPECT_EQ(vertices_on["OBSERVED"], 3);
   EXPECT_EQ(vertices_on["INFERRED"], 3);
   EXPECT_EQ(line_type["INFERRED"], "DASHED");
@@ -90,7 +91,10 @@ TEST(WriteDxf, HasALayerForEveryLabel) {
   const auto layer_of = [&](std::vector<Provenance> labels) {
     write_dxf(dir / "a.dxf", square(std::move(labels)));
     const auto all = groups(test::read_bytes(dir / "a.dxf"));
-    const auto line = std::find(all.begin(), all.end(), std::pair(0, std::string("POLYLINE")));
+    auto line = std::find(all.begin(), all.end(), std::pair(0, std::string("POLYLINE")));
+    if (std::next(line)->second == "OUTLINE") {
+      line = std::find(std::next(line), all.end(), std::pair(0, std::string("POLYLINE")));
+    }
     const std::string name = std::next(line)->second;
     const std::pair<int, std::string> defined(2, name);
     EXPECT_NE(std::find(all.begin(), line, defined), line) << name;
@@ -105,6 +109,41 @@ TEST(WriteDxf, NeedsALineAndADisk) {
   const test::TempDir dir;
   EXPECT_THROW(write_dxf(dir / "a.dxf", Drawing{}), InvalidInput);
   test::expect_full_disk_is_noticed([](const auto& path) { write_dxf(path, square({})); });
+}
+
+// What a hatch needs: one closed polyline around each area, its corners in their order.
+TEST(WriteDxf, HasAClosedOutlineOfWhatLabelsCut) {
+  const test::TempDir dir;
+  Drawing drawing = square({kInvented, kSeen, kSeen, kInvented});
+  drawing.lines.push_back(
+      {{{5000001, 1.5}, {5000001.5, 2}, {5000001, 2}}, {kSeen, kSeen, kSeen}, true});
+  drawing.lines.push_back({{{0, 0}, {1, 0}, {2, 0}}, {kSeen, kInvented}, false});
+  write_dxf(dir / "a.dxf", drawing);
+  const auto all = groups(test::read_bytes(dir / "a.dxf"));
+  std::vector<std::vector<Eigen::Vector2d>> closed;
+  size_t lines = 0;
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (all[i] == std::pair(0, std::string("POLYLINE"))) {
+      ++lines;
+      const bool is_outline = all[i + 1] == std::pair(8, std::string("OUTLINE"));
+      EXPECT_EQ(is_outline, lines <= 2) << "below the others";
+      if (!is_outline) break;
+      closed.emplace_back();
+      const auto flags = std::find_if(all.begin() + static_cast<ptrdiff_t>(i),
+                                      all.end(),
+                                      [](const auto& group) { return group.first == 70; });
+      EXPECT_EQ(std::stoi(flags->second) & 1, 1);
+    } else if (all[i] == std::pair(0, std::string("VERTEX"))) {
+      closed.back().emplace_back(std::stod(all[i + 2].second), std::stod(all[i + 3].second));
+    }
+  }
+  ASSERT_EQ(closed.size(), 2U);
+  EXPECT_EQ(closed[0], drawing.lines[0].points);
+  EXPECT_EQ(closed[1], drawing.lines[1].points);
+  write_dxf(dir / "b.dxf", square({}));
+  const std::string bare = test::read_bytes(dir / "b.dxf");
+  const size_t entities = bare.find("ENTITIES");
+  EXPECT_EQ(bare.find("OUTLINE", entities), std::string::npos) << "SECTION is closed already";
 }
 
 }  // namespace

@@ -97,5 +97,27 @@ TEST(ReadMeshFile, SurvivesFilesOfOthers) {
   EXPECT_GE(refused, 5);
 }
 
+TEST(ReadMeshFile, SaysWhichAxisItAssumesToBeUp) {
+  const test::TempDir dir;
+  const std::string shape = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const auto obj = [&](const std::string& comments) {
+    test::write_bytes(dir / "a.obj", comments + shape);
+    return read_mesh_file(dir / "a.obj");
+  };
+  const MeasurableFile blender = obj("# Blender 3.6.2\n# www.blender.org\n");
+  EXPECT_EQ(blender.content.frame.up, Eigen::Vector3d::UnitY());
+  EXPECT_NE(blender.assumed_up.find("+y is assumed"), std::string::npos);
+  const MeasurableFile stated = obj("# Blender 3.6.2\n# up 1 0 0\n");
+  EXPECT_EQ(stated.content.frame.up, Eigen::Vector3d::UnitX());
+  EXPECT_EQ(stated.assumed_up, "");
+  EXPECT_FALSE(obj("# a program\n").content.frame.knows_up());
+  test::write_bytes(dir / "a.stl",
+                    "solid\nfacet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 "
+                    "endloop endfacet\nendsolid\n");
+  const MeasurableFile stl = read_mesh_file(dir / "a.stl");
+  EXPECT_EQ(stl.content.frame.up, Eigen::Vector3d::UnitZ());
+  EXPECT_NE(stl.assumed_up.find("+z is assumed"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace cgs::mesh_file_test

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "io/bytes/byte_writer.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
 
@@ -277,8 +278,110 @@ TEST(MeshPly, NamesWhatItDoesNotRead) {
                     "0 0 0 7 1\n3 0 0 0\n");
   const MeshFile out = read_mesh_ply(dir / "a.ply");
   ASSERT_EQ(out.warnings.size(), 1U);
-  EXPECT_EQ(out.warnings[0],
-            "not read: scalar_Intensity, quality, triangle strips, which hold its faces");
+  EXPECT_EQ(out.warnings[0], "not read: scalar_Intensity, quality");
+}
+
+// As depth cameras write what they did not see.
+TEST(MeshPly, DropsPointsThatAreNotFinite) {
+  const test::TempDir dir;
+  const std::string properties =
+      "element vertex 70\nproperty float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+  std::string text = "ply\nformat ascii 1.0\n" + properties;
+  std::string binary = "ply\nformat binary_little_endian 1.0\n" + properties;
+  for (int i = 0; i < 70; ++i) {
+    const bool is_bad = i % 7 == 0;
+    text += (is_bad ? "nan nan nan" : std::to_string(i) + " 1 2") + " 255 0 " + std::to_string(i) +
+            "\n";
+    const float bad = i % 14 == 0 ? std::nanf("") : -HUGE_VALF;
+    for (const float c : {is_bad ? bad : float(i), 1.0f, 2.0f}) append_bytes(binary, c);
+    for (const int c : {255, 0, i}) append_bytes(binary, static_cast<uint8_t>(c));
+  }
+  for (const std::string& bytes : {text, binary}) {
+    test::write_bytes(dir / "a.ply", bytes);
+    const ParsedMesh out = parse_mesh_ply(dir / "a.ply");
+    ASSERT_EQ(out.positions.size(), 60U);
+    EXPECT_EQ(out.positions[0], Eigen::Vector3d(1, 1, 2));
+    EXPECT_EQ(out.positions[6], Eigen::Vector3d(8, 1, 2));
+    EXPECT_FLOAT_EQ(out.mesh.colors[6].z(), 8 / 255.0f);
+    EXPECT_EQ(out.warnings,
+              std::vector<std::string>{"dropped 10 vertices of 70 that are not finite"});
+  }
+}
+
+// Every other triangle of a strip is turned over, and a corner named twice turns the rest.
+TEST(MeshPly, ReadsTriangleStrips) {
+  const test::TempDir dir;
+  const auto faces_of = [&](const std::string& type, const std::string& strips) {
+    test::write_bytes(dir / "a.ply",
+                      "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\n"
+                      "property float y\nproperty float z\nelement tristrips 1\n"
+                      "property list int " +
+                          type +
+                          " vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n"
+                          "0 2 0\n1 2 0\n" +
+                          strips + "\n");
+    return parse_mesh_ply(dir / "a.ply").mesh.faces;
+  };
+  using Faces = std::vector<std::array<uint32_t, 3>>;
+  const Faces ladder = {{0, 1, 2}, {2, 1, 3}, {2, 3, 4}, {4, 3, 5}};
+  EXPECT_EQ(faces_of("int", "6 0 1 2 3 4 5"), ladder);
+  const Faces two = {{0, 1, 2}, {2, 1, 3}, {2, 3, 4}};
+  EXPECT_EQ(faces_of("int", "9 0 1 2 3 -1 2 3 4 -1"), two);
+  EXPECT_EQ(faces_of("uint", "9 0 1 2 3 4294967295 2 3 4 4294967295"), two);
+  EXPECT_EQ(faces_of("uchar", "8 0 1 2 3 255 2 3 4"), two);
+  EXPECT_EQ(faces_of("int", "5 0 1 2 2 4"), (Faces{{0, 1, 2}})) << "flat ones have no area";
+  EXPECT_EQ(faces_of("int", "4 1 0 0 2"), Faces{}) << "nor these";
+  EXPECT_THROW(faces_of("int", "4 0 1 2 6"), BadInput);
+  EXPECT_THROW(faces_of("int", "4 0 1 2 -2"), BadInput);
+}
+
+TEST(MeshPly, ReadsColoursByEveryNameAndType) {
+  const test::TempDir dir;
+  const auto read =
+      [&](const std::string& prefix, const std::string& type, const std::string& row) {
+        std::string properties;
+        const bool is_short = prefix == "-";
+        for (const std::string name : {"red", "green", "blue", "alpha"}) {
+          properties +=
+              "property " + type + " " + (is_short ? name.substr(0, 1) : prefix + name) + "\n";
+        }
+        test::write_bytes(dir / "a.ply",
+                          "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                          "property float y\nproperty float z\n" +
+                              properties + "end_header\n0 0 0 " + row + "\n");
+        return read_mesh_ply(dir / "a.ply");
+      };
+  const Eigen::Vector3f color(1, 0.2f, 0);
+  for (const std::string prefix : {"", "diffuse_", "-"}) {
+    for (const auto& [type, row] : {std::pair("uchar", "255 51 0 7"),
+                                    {"char", "-1 51 0 7"},
+                                    {"int", "255 51 0 7"},
+                                    {"ushort", "65535 13107 0 7"},
+                                    {"float", "1 0.2 0 1"},
+                                    {"double", "255 51 0 255"}}) {
+      const MeshFile out = read(prefix, type, row);
+      ASSERT_EQ(out.mesh.colors.size(), 1U) << prefix << type;
+      EXPECT_LT((out.mesh.colors[0] - color).norm(), 1e-6f) << prefix << type;
+      const bool is_doubtful = type == std::string("double");  // of floats up to 255
+      EXPECT_EQ(out.warnings.size(), is_doubtful ? 1U : 0U) << prefix << type;
+    }
+  }
+}
+
+TEST(MeshPly, ReadsColoursOfFaces) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+                    "property float z\nelement face 2\nproperty list ushort ushort vertex_index\n"
+                    "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+                    "0 0 0\n1 0 0\n1 1 0\n0 1 0\n2 0 0\n4 0 1 2 3 0 255 0\n3 1 4 2 0 0 255\n");
+  const MeshFile out = read_mesh_ply(dir / "a.ply");
+  ASSERT_EQ(out.mesh.colors.size(), 5U);
+  for (size_t v = 0; v < 4; ++v) EXPECT_EQ(out.mesh.colors[v], Eigen::Vector3f::UnitY());
+  EXPECT_EQ(out.mesh.colors[4], Eigen::Vector3f::UnitZ());
+  ASSERT_EQ(out.warnings.size(), 1U);
+  EXPECT_TRUE(out.warnings[0].starts_with("surfaces of different colours meet at 2 corners"));
 }
 
 }  // namespace

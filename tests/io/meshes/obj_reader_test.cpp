@@ -117,5 +117,15 @@ TEST(ReadObj, SaysThatATextureIsLostBesideColours) {
   EXPECT_EQ(mesh.warnings[0], "textures are not read");
 }
 
+TEST(ReadObj, DropsVerticesThatAreNotFinite) {
+  const ParsedMesh mesh = parsed(
+      "v 0 0 0\nv -nan(ind) 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1e999\nf 1 3 4 5\nf 1 2 3 4\n");
+  EXPECT_EQ(mesh.positions.size(), 4U);
+  EXPECT_EQ(mesh.mesh.faces, (std::vector<std::array<uint32_t, 3>>{{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_EQ(
+      mesh.warnings,
+      std::vector<std::string>{"dropped 2 vertices of 6 that are not finite, and 2 faces there"});
+}
+
 }  // namespace
 }  // namespace cgs::obj_reader_test

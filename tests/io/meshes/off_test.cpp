@@ -44,15 +44,67 @@ TEST(ReadOff, ReadsColoursOfVertices) {
   EXPECT_TRUE(floats.warnings.empty());
 }
 
-TEST(ReadOff, TellsThatColoursOfFacesAreNotRead) {
+TEST(ReadOff, ReadsColoursOfFaces) {
   const test::TempDir dir;
-  const std::string points = "OFF\n3 1 0\n0 0 0\n1 0 0\n1 1 0\n";
-  test::write_bytes(dir / "a.off", points + "3 0 1 2 255 0 0\n");
+  const std::string points = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+  const auto read = [&](const std::string& first, const std::string& second) {
+    test::write_bytes(dir / "a.off", points + "3 0 1 2" + first + "\r\n3 0 2 3" + second + "\r\n");
+    return read_off(dir / "a.off");
+  };
+  const Eigen::Vector3f color(0.2f, 1, 0);
+  for (const std::string text : {" 51 255 0", " 51 255 0 255", " .2 1 0", " 0.2 1 0 1 # all"}) {
+    const ParsedMesh mesh = read(text, text);
+    EXPECT_TRUE(mesh.warnings.empty());
+    ASSERT_EQ(mesh.mesh.colors.size(), 4U) << text;
+    for (const auto& c : mesh.mesh.colors) EXPECT_LT((c - color).norm(), 1e-6f) << text;
+  }
+  const ParsedMesh some = read(" 0 0 255", "");
+  EXPECT_EQ(some.mesh.colors[3], Eigen::Vector3f::Ones());
+  EXPECT_EQ(some.warnings, std::vector<std::string>{"1 of 4 vertices state no colour: white"});
+  const ParsedMesh floats = read(" 1 0 0", " 0.5 0 0");  // the first is no byte
+  EXPECT_EQ(floats.mesh.colors[1], Eigen::Vector3f::UnitX());
+  const ParsedMesh numbered = read(" 7", "");
+  EXPECT_TRUE(numbered.mesh.colors.empty());
+  EXPECT_EQ(numbered.warnings,
+            std::vector<std::string>{"colours of faces that are numbers of a colour map are not "
+                                     "read"});
+  EXPECT_TRUE(read(" # a comment", "").warnings.empty());
+}
+
+// Thousands of files of ModelNet begin so.
+TEST(ReadOff, TheKeywordMayStandRightBeforeTheNumbersOrBeMissing) {
+  const test::TempDir dir;
+  for (const std::string head :
+       {"OFF4 2 0\n", "COFF4 2 0\n", "OFF 4 2 0\n", "4 2 0\n", "OFF4 2\n"}) {
+    test::write_bytes(dir / "a.off", head + kPoints + "4 0 1 2 3\n3 0 1 3\n");
+    const ParsedMesh mesh = read_off(dir / "a.off");
+    EXPECT_EQ(mesh.positions.size(), 4U) << head;
+    EXPECT_EQ(mesh.mesh.faces.size(), 3U) << head;
+  }
+  EXPECT_EQ(defect("OFFX 4 2 0\n" + kPoints), "SYNTAX");
+  EXPECT_EQ(defect("4 two 0\n" + kPoints), "MAGIC");
+}
+
+TEST(ReadOff, ReadsNormals) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.off",
+                    "NOFF 3 1 0\n0 0 0 0 0 2\n1 0 0 nan 0 1\n1 1 0 0 0 1\n3 0 1 2\n");
   const ParsedMesh mesh = read_off(dir / "a.off");
-  EXPECT_EQ(mesh.warnings, std::vector<std::string>{"colours of faces are not read"});
-  EXPECT_EQ(mesh.mesh.faces.size(), 1U);
-  test::write_bytes(dir / "a.off", points + "3 0 1 2 # a comment\n");
-  EXPECT_TRUE(read_off(dir / "a.off").warnings.empty());
+  ASSERT_EQ(mesh.mesh.normals.size(), 3U);
+  EXPECT_EQ(mesh.mesh.normals[0], Eigen::Vector3f::UnitZ());
+  EXPECT_EQ(mesh.mesh.normals[1], Eigen::Vector3f::Zero());
+  EXPECT_EQ(mesh.warnings, std::vector<std::string>{"normals of 1 vertex are not finite: none"});
+}
+
+TEST(ReadOff, DropsVerticesThatAreNotFinite) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.off",
+                    "OFF\n5 3 0\n-nan(ind) 0 0\n" + kPoints + "3 1 2 3\n3 1 3 4\n3 0 1 2\n");
+  const ParsedMesh mesh = read_off(dir / "a.off");
+  EXPECT_EQ(mesh.positions.size(), 4U);
+  EXPECT_EQ(mesh.mesh.faces, (std::vector<std::array<uint32_t, 3>>{{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_EQ(mesh.warnings,
+            std::vector<std::string>{"dropped 1 vertex of 5 that is not finite, and 1 face there"});
 }
 
 double area_of(const ParsedMesh& mesh) {

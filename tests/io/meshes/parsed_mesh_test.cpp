@@ -14,6 +14,8 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "libcgs/core/error.h"
+
 namespace cgs::parsed_mesh_test {
 namespace {
 
@@ -164,6 +166,110 @@ TEST(InternalSigma, IsUnknownWhereTheFileStatesNone) {
   for (const float none : {-1.0f, kNaN, std::numeric_limits<float>::infinity()}) {
     EXPECT_TRUE(std::isnan(internal_sigma(none, frame))) << none;
   }
+}
+
+// A strip of n squares with a label per square; vertex v at (v / 2, v % 2).
+ParsedMesh strip(uint32_t squares) {
+  ParsedMesh out;
+  for (uint32_t v = 0; v < 2 * squares + 2; ++v) {
+    out.positions.emplace_back(v / 2, v % 2, 0);
+    out.mesh.support.push_back(float(v));
+    out.mesh.sigma.push_back(float(v) / 2);
+    out.mesh.colors.push_back(Eigen::Vector3f::Constant(float(v) / 100));
+    out.mesh.normals.push_back(Eigen::Vector3f::UnitZ());
+  }
+  for (uint32_t q = 0; q < squares; ++q) {
+    append_polygon({2 * q, 2 * q + 2, 2 * q + 3, 2 * q + 1}, out.positions, out.mesh.faces);
+    out.mesh.provenance.resize(out.mesh.faces.size(), Provenance(q % kProvenanceCount));
+  }
+  return out;
+}
+
+TEST(DropUnusable, TakesTheFacesOfAVertexAndKeepsAllElse) {
+  ParsedMesh mesh = strip(5);
+  mesh.positions[3].y() = kNaN;  // between the first two squares
+  mesh.mesh.normals[7].x() = kNaN;
+  drop_unusable(mesh, "a.ply");
+  ASSERT_EQ(mesh.positions.size(), 11U);
+  EXPECT_EQ(mesh.positions[3], Eigen::Vector3d(2, 0, 0)) << "what was vertex 4";
+  EXPECT_EQ(mesh.mesh.support[3], 4);
+  EXPECT_EQ(mesh.mesh.sigma[3], 2);
+  EXPECT_EQ(mesh.mesh.colors[3], Eigen::Vector3f::Constant(0.04f));
+  EXPECT_EQ(mesh.mesh.normals[6], Eigen::Vector3f::Zero()) << "what was vertex 7";
+  // Of the squares 0 and 1 the triangles that name it: (0, 2, 3), (0, 3, 1) and (2, 4, 5) stays,
+  // (2, 5, 3) goes.
+  ASSERT_EQ(mesh.mesh.faces.size(), 7U);
+  EXPECT_EQ(mesh.mesh.faces[0], (std::array<uint32_t, 3>{2, 3, 4}));
+  EXPECT_EQ(mesh.mesh.provenance[0], Provenance(1));
+  EXPECT_EQ(mesh.mesh.provenance.size(), 7U);
+  EXPECT_EQ(
+      mesh.warnings,
+      (std::vector<std::string>{"normals of 1 vertex are not finite: none",
+                                "dropped 1 vertex of 12 that is not finite, and 3 faces there"}));
+}
+
+TEST(DropUnusable, RefusesWhereMoreThanHalfWouldGo) {
+  for (const uint32_t bad : {5U, 6U}) {
+    ParsedMesh cloud;
+    for (uint32_t v = 0; v < 10; ++v) cloud.positions.emplace_back(v < bad ? kNaN : 1, 0, 0);
+    const auto drop = [&] { drop_unusable(cloud, "cloud.ply"); };
+    if (bad == 6) {
+      EXPECT_THROW(drop(), BadInput);
+    } else {
+      drop();
+      EXPECT_EQ(cloud.positions.size(), 5U);
+    }
+  }
+  ParsedMesh mesh = strip(2);
+  mesh.positions[2].x() = std::numeric_limits<double>::infinity();  // of three of four faces
+  EXPECT_THROW(drop_unusable(mesh, "a.ply"), BadInput);
+  ParsedMesh unused = strip(1);
+  for (int k = 0; k < 9; ++k) unused.positions.emplace_back(kNaN, 0, 0);  // that no face names
+  for (auto* values : {&unused.mesh.support, &unused.mesh.sigma}) values->resize(13);
+  for (auto* values : {&unused.mesh.colors, &unused.mesh.normals}) values->resize(13);
+  drop_unusable(unused, "a.ply");
+  EXPECT_EQ(unused.positions.size(), 4U);
+  EXPECT_EQ(unused.mesh.faces.size(), 2U);
+}
+
+TEST(DropUnusable, LeavesNothingOfAPolygonWithALostCorner) {
+  const std::vector<Eigen::Vector3d> square = {{0, 0, 0}, {1, 0, 0}, {1, kNaN, 0}, {0, 1, 0}};
+  for (uint32_t first = 0; first < 4; ++first) {
+    for (const auto& triangle : cut_up(corners_from(first, 4), square)) {
+      EXPECT_NE(std::find(triangle.begin(), triangle.end(), 2U), triangle.end());
+    }
+  }
+}
+
+TEST(CornerColors, AVertexTakesThatOfTheFirst) {
+  ParsedMesh mesh = strip(1);
+  CornerColors colors;
+  colors.add(2, Eigen::Vector3f(1, 0, 0));
+  colors.add(2, Eigen::Vector3f(0.95f, 0, 0));  // as good as the same
+  colors.add(2, Eigen::Vector3f(0, 1, 0));
+  colors.add(0, Eigen::Vector3f(0, 0, 1));
+  colors.add(1, Eigen::Vector3f(0, kNaN, 1));
+  colors.settle(mesh);
+  ASSERT_EQ(mesh.mesh.colors.size(), 4U);
+  EXPECT_EQ(mesh.mesh.colors[0], Eigen::Vector3f::UnitZ());
+  EXPECT_EQ(mesh.mesh.colors[1], Eigen::Vector3f::Ones());
+  EXPECT_EQ(mesh.mesh.colors[2], Eigen::Vector3f::UnitX());
+  EXPECT_EQ(mesh.warnings,
+            (std::vector<std::string>{
+                "2 of 4 vertices state no colour: white",
+                "surfaces of different colours meet at 1 corners; vertices have one, that of the "
+                "first"}));
+}
+
+TEST(SettleColors, CountsWhatIsNotFinite) {
+  ParsedMesh mesh = strip(1);
+  mesh.mesh.colors = {{kNaN, 1, 0}, {1, 0.5f, 0}, {0, 0, INFINITY}, {kNaN, kNaN, kNaN}};
+  mesh.positions[3].x() = kNaN;  // which is dropped with its colour
+  settle_colors(mesh);
+  EXPECT_EQ(mesh.mesh.colors[0], Eigen::Vector3f::UnitY());
+  EXPECT_EQ(mesh.mesh.colors[1], Eigen::Vector3f(1, 0.5f, 0)) << "infinity makes no bytes of it";
+  EXPECT_EQ(mesh.mesh.colors[2], Eigen::Vector3f::Zero());
+  EXPECT_EQ(mesh.warnings, std::vector<std::string>{"colours of 2 vertices are not finite: 0"});
 }
 
 }  // namespace

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/meshes/stl_reader.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include "io/bytes/byte_writer.h"
@@ -10,6 +15,8 @@
 
 namespace cgs::stl_reader_test {
 namespace {
+
+using std::string_literals::operator""s;
 
 std::string defect(const std::string& bytes) {
   return test::defect_of(bytes, [](const auto& path) { (void)read_stl(path); });
@@ -76,6 +83,87 @@ TEST(ReadStl, ReadsTextInCapitalsAndSigns) {
   const ParsedMesh mesh = read_stl(dir / "a.stl");
   ASSERT_EQ(mesh.mesh.faces.size(), 1U);
   EXPECT_EQ(mesh.positions[0], Eigen::Vector3d(1, 0, 0));
+}
+
+/// A binary file of triangles side by side, each with two bytes behind it.
+std::string binary(std::string header, const std::vector<uint16_t>& attributes) {
+  header.resize(80, ' ');
+  append_bytes(header, static_cast<uint32_t>(attributes.size()));
+  float left = 0;
+  for (const uint16_t attribute : attributes) {
+    for (const float c : {0.f, 0.f, 1.f, left, 0.f, 0.f, left + 1, 0.f, 0.f, left, 1.f, 0.f}) {
+      append_bytes(header, c);
+    }
+    append_bytes(header, attribute);
+    left += 2;
+  }
+  return header;
+}
+
+ParsedMesh read_bytes_as_stl(const std::string& bytes) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.stl", bytes);
+  return read_stl(dir / "a.stl");
+}
+
+// Blue lowest, and the highest bit says that there is a colour.
+TEST(ReadStl, ReadsColoursOfVisCam) {
+  const ParsedMesh mesh = read_bytes_as_stl(binary("", {0x8000 | 31 << 10, 0x8000 | 8, 31 << 5}));
+  ASSERT_EQ(mesh.mesh.colors.size(), 9U);
+  EXPECT_EQ(mesh.mesh.colors[0], Eigen::Vector3f::UnitX());
+  EXPECT_LT((mesh.mesh.colors[3] - Eigen::Vector3f(0, 0, 8 / 31.0f)).norm(), 1e-6f);
+  EXPECT_EQ(mesh.mesh.colors[6], Eigen::Vector3f::Ones()) << "without the bit";
+  EXPECT_TRUE(read_bytes_as_stl(binary("", {0, 7, 31})).mesh.colors.empty());
+}
+
+// Red lowest, and the highest bit says that the colour of the header counts.
+TEST(ReadStl, ReadsColoursOfMagics) {
+  const std::string header = std::string("any words COLOR=") + "\x00\x33\xff\xff"s + ",MATERIAL=";
+  const ParsedMesh mesh = read_bytes_as_stl(binary(header, {31, 31 << 10, 0x8000 | 31}));
+  ASSERT_EQ(mesh.mesh.colors.size(), 9U);
+  EXPECT_EQ(mesh.mesh.colors[0], Eigen::Vector3f::UnitX());
+  EXPECT_EQ(mesh.mesh.colors[3], Eigen::Vector3f::UnitZ());
+  EXPECT_LT((mesh.mesh.colors[6] - Eigen::Vector3f(0, 0.2f, 1)).norm(), 1e-6f);
+  EXPECT_TRUE(mesh.warnings.empty());
+}
+
+TEST(ReadStl, DropsFacetsThatAreNotFinite) {
+  std::string bytes = binary("", {0, 0, 0x8000});
+  const float bad = std::nanf("");
+  std::memcpy(bytes.data() + 84 + 50 + 12, &bad, sizeof bad);
+  const ParsedMesh mesh = read_bytes_as_stl(bytes);
+  EXPECT_EQ(mesh.mesh.faces.size(), 2U);
+  EXPECT_EQ(mesh.positions.size(), 6U);
+  EXPECT_EQ(mesh.positions[3].x(), 4);
+  EXPECT_EQ(mesh.warnings[0], "dropped 1 facet of 3 with a corner that is not finite");
+  const std::string text = std::string(kFacet).replace(kFacet.find("1 0 0"), 1, "1.#INF");
+  const ParsedMesh of_text = read_bytes_as_stl("solid\n" + text + kFacet + "endsolid\n");
+  EXPECT_EQ(of_text.mesh.faces.size(), 1U);
+  EXPECT_EQ(of_text.warnings.size(), 1U);
+}
+
+TEST(ReadStl, TextMayBreakItsLinesAnywhere) {
+  std::string in_one = "solid part " + kFacet + kFacet + " endsolid part";
+  std::replace(in_one.begin(), in_one.end(), '\n', ' ');
+  std::string old_mac = "solid a\n" + kFacet + "endsolid a\n";
+  std::replace(old_mac.begin(), old_mac.end(), '\n', '\r');
+  std::string of_words = "solid\n" + kFacet + "endsolid\n";
+  std::replace(of_words.begin(), of_words.end(), ' ', '\n');
+  const std::string marked = "\xef\xbb\xbfsolid facet of a stone\n" + kFacet + "endsolid\n\0\0"s;
+  const std::string indented = " \t solid x\r\n\r\n" + kFacet + "\v\f endsolid\r\n";
+  const std::string without_normal = "solid\nfacet normal -nan(ind) -nan(ind) -nan(ind)\n" +
+                                     kFacet.substr(kFacet.find(" outer")) + "endsolid\n";
+  for (const std::string& text : {in_one, old_mac, of_words, marked, indented, without_normal}) {
+    const ParsedMesh mesh = read_bytes_as_stl(text);
+    EXPECT_EQ(mesh.mesh.faces.size(), text == in_one ? 2U : 1U) << text;
+    EXPECT_EQ(mesh.positions.size(), 3U) << text;
+  }
+}
+
+TEST(ReadStl, WhatFollowsTheFacetsOfABinaryFileOfSolidIsNoText) {
+  const ParsedMesh mesh = read_bytes_as_stl(binary("solid of some CAD", {0, 0}) + "more");
+  EXPECT_EQ(mesh.mesh.faces.size(), 2U);
+  EXPECT_EQ(mesh.warnings, std::vector<std::string>{"trailing 4 bytes ignored"});
 }
 
 }  // namespace

@@ -480,5 +480,18 @@ TEST_F(Read3mf, RefusesComponentsThatMultiply) {
   EXPECT_EQ(refused(file), "LIMIT") << "a long chain";
 }
 
+TEST_F(Read3mf, DropsVerticesThatAreNotFinite) {
+  ThreeMfFile file;
+  std::string mesh = ThreeMfFile::tetrahedron();
+  mesh.insert(mesh.find("</vertices>"), "<vertex x=\"NaN\" y=\"0\" z=\"1e999\"/>");
+  mesh.insert(mesh.find("</triangles>"), "<triangle v1=\"0\" v2=\"1\" v3=\"4\"/>");
+  file.resources = ThreeMfFile::object(1, mesh);
+  const ParsedMesh out = read(file);
+  EXPECT_EQ(out.positions.size(), 4U);
+  EXPECT_EQ(out.mesh.faces.size(), 4U);
+  EXPECT_EQ(out.warnings,
+            std::vector<std::string>{"dropped 1 vertex of 5 that is not finite, and 1 face there"});
+}
+
 }  // namespace
 }  // namespace cgs::threemf_reader_test

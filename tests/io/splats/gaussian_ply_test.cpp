@@ -378,6 +378,14 @@ TEST(GaussianPly, ReadsColourInsteadOfHarmonics) {
   const GaussianFile floats = read_dialect(before + lines_of({"red", "green", "blue"}) + after,
                                            "0 0 0 2 -3 -3 -3 1 0 0.2 1 0 0 0");
   EXPECT_LT((floats.gaussians.sh[0] - bytes.gaussians.sh[0]).norm(), 1e-6f);
+  const auto up_to_255 = lines_of({"diffuse_red", "diffuse_green", "diffuse_blue"});
+  const GaussianFile large =
+      read_dialect(before + up_to_255 + after, "0 0 0 2 -3 -3 -3 255 0 51 1 0 0 0");
+  EXPECT_LT((large.gaussians.sh[0] - bytes.gaussians.sh[0]).norm(), 1e-5f);
+  EXPECT_TRUE(warns(large, "colours above 2"));
+  const GaussianFile letters = read_dialect(before + lines_of({"r", "g", "b"}, "uchar") + after,
+                                            "0 0 0 2 -3 -3 -3 255 0 51 1 0 0 0");
+  EXPECT_EQ(letters.gaussians.sh[0], bytes.gaussians.sh[0]);
 }
 
 TEST(GaussianPly, LeavesOutHarmonicsOfDegreeFour) {
