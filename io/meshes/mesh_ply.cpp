@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <string>
 #include <string_view>
 
@@ -12,6 +13,7 @@
 #include "io/bytes/byte_writer.h"
 #include "io/bytes/mesh_arrays.h"
 #include "io/meshes/material_labels.h"
+#include "io/meshes/texture_file.h"
 #include "io/ply/frame.h"
 #include "io/ply/rows.h"
 
@@ -93,6 +95,7 @@ struct VertexColumns {
   std::array<int, 3> position{};
   std::array<int, 3> normal{};
   ColorColumns color;
+  std::array<int, 2> texcoord = {-1, -1};
   int quality = -1;
   int sigma = -1;
   bool has_normals() const { return *std::min_element(normal.begin(), normal.end()) >= 0; }
@@ -125,6 +128,29 @@ ColorColumns color_columns(const PlyElement& element) {
   return out;
 }
 
+/// Texture coordinates of vertices; -1 where there are none.
+std::array<int, 2> texcoord_columns(const PlyElement& vertex) {
+  constexpr std::array<std::array<const char*, 2>, 4> kNames = {
+      {{"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}}};
+  for (const auto& names : kNames) {
+    const std::array<int, 2> found = {find_scalar(vertex, names[0]), find_scalar(vertex, names[1])};
+    if (found[0] >= 0 && found[1] >= 0) return found;
+  }
+  return {-1, -1};
+}
+
+/// The pictures that comments name, as MeshLab, Metashape and others do.
+std::vector<std::string> texture_names(const PlyHeader& header) {
+  constexpr std::string_view kKey = "TextureFile ";
+  std::vector<std::string> out;
+  for (const std::string& comment : header.comments) {
+    if (!comment.starts_with(kKey)) continue;
+    const size_t begin = std::min(comment.find_first_not_of(" \t", kKey.size()), comment.size());
+    out.push_back(comment.substr(begin, comment.find_last_not_of(" \t") + 1 - begin));
+  }
+  return out;
+}
+
 /// Whether a scalar called quality is the support that write_mesh_ply() keeps there: MeshLab and
 /// others call any number of a vertex so.
 bool quality_is_support(const PlyHeader& header, const PlyElement& vertex) {
@@ -150,6 +176,7 @@ VertexColumns vertex_columns(const PlyHeader& header, const std::filesystem::pat
   if (quality_is_support(header, *vertex)) out.quality = find_scalar(*vertex, "quality");
   out.sigma = find_scalar(*vertex, "scalar_sigma");
   out.color = color_columns(*vertex);
+  out.texcoord = texcoord_columns(*vertex);
   return out;
 }
 
@@ -175,7 +202,7 @@ bool states_texture(const PlyHeader& header) {
 
 /// What a file says beyond what is read, for a warning: numbers of vertices by name, and elements
 /// that may be faces of another form.
-std::string unread_properties(const PlyHeader& header, bool has_colors) {
+std::string unread_properties(const PlyHeader& header, const ParsedMesh& read) {
   constexpr std::array<std::string_view, 13> kKnown = {"x",
                                                        "y",
                                                        "z",
@@ -191,9 +218,11 @@ std::string unread_properties(const PlyHeader& header, bool has_colors) {
                                                        "t"};
   const PlyElement& vertex = *header.find("vertex");
   const ColorColumns color = color_columns(vertex);
-  const auto is_color = [&](const PlyProperty& property) {
+  const std::array<int, 2> texcoord = texcoord_columns(vertex);
+  const auto is_taken = [&](const PlyProperty& property) {
     const int at = vertex.find(property.name);
-    return std::find(color.at.begin(), color.at.end(), at) != color.at.end();
+    const bool is_texcoord = read.has_textures && (at == texcoord[0] || at == texcoord[1]);
+    return is_texcoord || std::find(color.at.begin(), color.at.end(), at) != color.at.end();
   };
   std::string out;
   const auto add = [&](const std::string& what) {
@@ -203,15 +232,10 @@ std::string unread_properties(const PlyHeader& header, bool has_colors) {
   for (const PlyProperty& property : vertex.properties) {
     const bool is_known = std::find(kKnown.begin(), kKnown.end(), property.name) != kKnown.end();
     const bool is_other_quality = property.name == "quality" && !quality_is_support(header, vertex);
-    if ((!is_known && !is_color(property)) || is_other_quality) add(property.name);
+    if ((!is_known && !is_taken(property)) || is_other_quality) add(property.name);
   }
-  const auto names_texture = [](const std::string& comment) {
-    return comment.starts_with("TextureFile");
-  };
-  if (has_colors &&  // else the texture is missed, and another warning says so
-      std::any_of(header.comments.begin(), header.comments.end(), names_texture)) {
-    add("its texture");
-  }
+  const bool has_other_colors = !read.mesh.colors.empty() && !read.has_textures;
+  if (has_other_colors && !texture_names(header).empty()) add("its texture");
   return out;
 }
 
@@ -221,10 +245,16 @@ class MeshRows {
   MeshRows(const PlyHeader& header, const std::filesystem::path& path)
       : path_(path), columns_(vertex_columns(header, path)) {
     vertex_count_ = header.find("vertex")->count;
+    shows_pictures_ = !columns_.color.has_any() && !texture_names(header).empty();
     if (const PlyElement* face = header.find("face")) {
       indices_ = list_of_vertices(*face);
       provenance_ = find_scalar(*face, "scalar_provenance");
       face_color_ = color_columns(*face);
+      texcoords_ = face->find("texcoord");
+      if (texcoords_ >= 0 && !face->properties[static_cast<size_t>(texcoords_)].is_list) {
+        texcoords_ = -1;
+      }
+      texture_ = find_scalar(*face, "texnumber");
       if (face->count > 0 && indices_ < 0) {
         throw BadInput(Defect::Schema, path, "faces have no list vertex_indices");
       }
@@ -249,6 +279,7 @@ class MeshRows {
   std::vector<Eigen::Vector3d> positions;
   TriangleMesh mesh;
   CornerColors colors_of_faces;
+  std::map<size_t, std::vector<PaintedCorner>> painted;  ///< By the number of the picture.
   uint64_t dropped_faces = 0;
 
  private:
@@ -284,6 +315,12 @@ class MeshRows {
       mesh.normals.emplace_back(triple(row, columns_.normal).cast<float>());
     }
     if (columns_.color.has_any()) mesh.colors.push_back(columns_.color.of(row));
+    if (shows_pictures_ && columns_.texcoord[0] >= 0) {
+      const double u = row.values[static_cast<size_t>(columns_.texcoord[0])];
+      const double v = row.values[static_cast<size_t>(columns_.texcoord[1])];
+      painted[0].push_back({static_cast<uint32_t>(positions.size() - 1),
+                            {static_cast<float>(u), static_cast<float>(v)}});
+    }
     if (columns_.quality >= 0) {
       mesh.support.push_back(static_cast<float>(row.values[static_cast<size_t>(columns_.quality)]));
     }
@@ -303,8 +340,21 @@ class MeshRows {
       const Eigen::Vector3f color = face_color_.of(row);
       for (const uint32_t corner : polygon_) colors_of_faces.add(corner, color);
     }
+    if (shows_pictures_ && texcoords_ >= 0) paint(row);
     if (provenance_ >= 0 && mesh.faces.size() > mesh.provenance.size()) {
       mesh.provenance.resize(mesh.faces.size(), label(row_number, row));
+    }
+  }
+
+  // Two numbers for each corner.
+  void paint(const PlyRow& row) {
+    const std::vector<double>& list = row.lists[static_cast<size_t>(texcoords_)];
+    const double number = texture_ < 0 ? 0 : row.values[static_cast<size_t>(texture_)];
+    if (list.size() < 2 * polygon_.size() || !(number >= 0)) return;
+    std::vector<PaintedCorner>& corners = painted[static_cast<size_t>(std::min(number, 1e6))];
+    for (size_t k = 0; k < polygon_.size(); ++k) {
+      corners.push_back(
+          {polygon_[k], {static_cast<float>(list[2 * k]), static_cast<float>(list[2 * k + 1])}});
     }
   }
 
@@ -359,8 +409,24 @@ class MeshRows {
   int strip_ = -1;
   double restart_ = -1;  // ends a strip, as -1 does
   ColorColumns face_color_;
+  int texcoords_ = -1;  // of the corners of faces
+  int texture_ = -1;    // the number of their picture
+  bool shows_pictures_ = false;
   std::vector<uint32_t> polygon_;
 };
+
+void paint_by_pictures(const MeshRows& rows,
+                       const std::vector<std::string>& names,
+                       const std::filesystem::path& path,
+                       ParsedMesh& out) {
+  CornerColors colors;
+  for (const auto& [number, corners] : rows.painted) {
+    if (number >= names.size()) continue;
+    const bool is_read = paint_corners(path, names[number], {}, corners, colors, out.warnings);
+    out.has_textures = out.has_textures || is_read;
+  }
+  if (!colors.empty()) colors.settle(out);
+}
 
 }  // namespace
 
@@ -418,15 +484,17 @@ ParsedMesh parse_mesh_ply(const std::filesystem::path& path) {
     out.digits = is_double || is_text ? kDoubleDigits : kFloatDigits;
   }
   settle_colors(out);
-  if (!rows.colors_of_faces.empty()) rows.colors_of_faces.settle(out);
-  if (out.mesh.colors.empty() && states_texture(header)) {
+  const size_t warnings = out.warnings.size();
+  paint_by_pictures(rows, texture_names(header), path, out);
+  if (!out.has_textures && !rows.colors_of_faces.empty()) rows.colors_of_faces.settle(out);
+  if (out.mesh.colors.empty() && out.warnings.size() == warnings && states_texture(header)) {
     out.warnings.emplace_back(
         "textures and colours of faces are not read, only colours of vertices, which it has none "
         "of");
   }
   const std::string lost = lost_labels(header);
   if (!lost.empty()) out.warnings.push_back(lost);
-  const std::string unread = unread_properties(header, !out.mesh.colors.empty());
+  const std::string unread = unread_properties(header, out);
   if (!unread.empty()) out.warnings.push_back("not read: " + unread);
   if (trailing > 0) {
     out.warnings.push_back("trailing " + std::to_string(trailing) + " bytes ignored");

@@ -51,7 +51,8 @@ struct MeshFile {
 ///
 /// Polygons become triangles, and so do triangle strips ("tristrips" of Stanford, where -1 ends a
 /// strip). Colours are red green blue, diffuse_red … or r g b, whole numbers or floats up to 1 or
-/// 255, of vertices or else of faces. What is not finite is dropped, see drop_unusable(). Our own
+/// 255, of vertices, else of pictures in the folder of the file ("comment TextureFile"), else of
+/// faces. What is not finite is dropped, see drop_unusable(). Our own
 /// names are understood as written; a negative or non-finite scalar_sigma is NaN. Arrays the file
 /// does not have stay empty; a warning says where another program left out, or may have, the labels
 /// of a file of ours.

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "io/bytes/byte_writer.h"
+#include "io/images/png.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_mesh.h"
 
@@ -179,7 +180,7 @@ TEST(MeshPly, NamesTheNumbersOfAllLabels) {
             std::string::npos);
 }
 
-TEST(MeshPly, SaysThatItLeavesOutTextures) {
+TEST(MeshPly, SaysThatItLeavesOutATextureThatIsNotThere) {
   const test::TempDir dir;
   test::write_bytes(dir / "a.ply",
                     "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\n"
@@ -189,7 +190,42 @@ TEST(MeshPly, SaysThatItLeavesOutTextures) {
                     "3 0 1 2 6 0 0 1 0 0 1\n");
   const MeshFile out = read_mesh_ply(dir / "a.ply");
   ASSERT_EQ(out.warnings.size(), 1U);
-  EXPECT_TRUE(out.warnings[0].starts_with("textures and colours of faces are not read"));
+  EXPECT_TRUE(out.warnings[0].starts_with("texture a.png is left out: it does not lie in the"));
+}
+
+// As MeshLab, VCG and Metashape write them: of the corners of faces, or of vertices.
+TEST(MeshPly, TakesTheColoursOfTextures) {
+  const test::TempDir dir;
+  ColorImage picture(2, 1, Eigen::Vector3f::UnitX());
+  write_png(dir / "red.png", picture);
+  picture(1, 0) = Eigen::Vector3f::UnitZ();
+  write_png(dir / "a b.png", picture);
+  const std::string points = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n";
+  const std::string start =
+      "ply\nformat ascii 1.0\ncomment TextureFile a b.png\ncomment TextureFile red.png\n"
+      "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
+  test::write_bytes(dir / "faces.ply",
+                    start +
+                        "element face 2\nproperty list uchar int vertex_indices\n"
+                        "property list uchar float texcoord\nproperty int texnumber\n"
+                        "end_header\n" +
+                        points + "3 0 1 2 6 .25 .5 .75 .5 .25 .5 0\n3 1 3 2 6 0 0 0 0 0 0 1\n");
+  test::write_bytes(dir / "vertices.ply",
+                    start +
+                        "property float texture_u\nproperty float texture_v\n"
+                        "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+                        "0 0 0 .25 .5\n1 0 0 .75 .5\n0 1 0 .25 0\n1 1 0 nan 0\n4 0 1 3 2\n");
+  const ParsedMesh faces = parse_mesh_ply(dir / "faces.ply");
+  const ParsedMesh vertices = parse_mesh_ply(dir / "vertices.ply");
+  for (const ParsedMesh* mesh : {&faces, &vertices}) {
+    EXPECT_TRUE(mesh->has_textures);
+    ASSERT_EQ(mesh->mesh.colors.size(), 4U);
+    EXPECT_LT((mesh->mesh.colors[0] - Eigen::Vector3f::UnitX()).norm(), 1e-5f);
+    EXPECT_LT((mesh->mesh.colors[1] - Eigen::Vector3f::UnitZ()).norm(), 1e-5f);
+    EXPECT_LT((mesh->mesh.colors[2] - Eigen::Vector3f::UnitX()).norm(), 1e-5f);
+  }
+  EXPECT_LT((faces.mesh.colors[3] - Eigen::Vector3f::UnitX()).norm(), 1e-5f) << "of the other one";
+  EXPECT_EQ(vertices.mesh.colors[3], Eigen::Vector3f::Ones());
 }
 
 TEST(MeshPly, RefusesWhatIsNoMesh) {
