@@ -122,7 +122,8 @@ Source read_source(const std::filesystem::path& path, size_t memory_limit) {
 }
 
 /// What the output is to hold, by its name, the flag, and for .ply and .glb the input.
-Content wanted_content(const ConversionRequest& request, Content from) {
+Content wanted_content(const ConversionRequest& request, const Source& source) {
+  const Content from = source.content;
   const std::string extension = lower_extension(request.output);
   const auto is = [&](std::initializer_list<const char*> names) {
     return std::find(names.begin(), names.end(), extension) != names.end();
@@ -146,7 +147,8 @@ Content wanted_content(const ConversionRequest& request, Content from) {
       from == Content::Splats || out == Content::Mesh,
       std::string("convert goes from splats to volume to mesh, not back: the output would be ") +
           kNames.at(static_cast<size_t>(out)) + "; the input",
-      kNames.at(static_cast<size_t>(from)));
+      source.mesh.faces.empty() && from == Content::Mesh ? "a plain point cloud"
+                                                         : kNames.at(static_cast<size_t>(from)));
   return out;
 }
 
@@ -386,7 +388,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   ConversionRequest request = given;
   Source source = read_source(request.input, request.volume.memory_limit);
   settle_frame(request, source);
-  const Content wanted = wanted_content(request, source.content);
+  const Content wanted = wanted_content(request, source);
   check_before_work(request, source, wanted);
   // Splats of others are rough at the size of a voxel: hardly a face could go within a part of one.
   if (source.splats && request.simplify.empty()) request.simplify = "0";

@@ -183,6 +183,8 @@ void ObjPaint::paint(ParsedMesh& out, const std::filesystem::path& path, bool ha
   if (known.empty()) {
     std::string why = missing.empty() ? "the file names none that lies beside it" : missing.front();
     out.warnings.push_back("materials and textures are not read: " + why);
+  } else if (!missing.empty()) {
+    out.warnings.push_back("materials are left out: " + missing.front());
   } else if (unknown > 0) {
     out.warnings.push_back(counted(unknown, "material") + " of " + std::to_string(corners_.size()) +
                            " in no library that was found: without colour");

@@ -115,5 +115,16 @@ TEST(WriteMeshFiles, RefusesAMeshWithoutSurfaceAndWritesNothing) {
   EXPECT_FALSE(std::filesystem::exists(dir / "mesh"));
 }
 
+TEST(AssumedUpText, IsSaidWhereItDecidesHowAFileLies) {
+  EXPECT_EQ(assumed_up_text("a.obj", "a.ply", "y"), "");
+  EXPECT_EQ(assumed_up_text("a.obj", "a.GLB", ""), "");
+  EXPECT_EQ(assumed_up_text("a.STL", "b.3mf", "z"), "") << "which have the same axes";
+  for (const char* to : {"a.glb", "a.stl", "a.3mf"}) {
+    EXPECT_EQ(assumed_up_text("a.obj", to, "+y is assumed"),
+              "+y is assumed; --up says otherwise (--up 0 1 0 for y)");
+  }
+  EXPECT_NE(assumed_up_text("a.stl", "a.glb", "+z is assumed"), "");
+}
+
 }  // namespace
 }  // namespace cgs::mesh_files_test

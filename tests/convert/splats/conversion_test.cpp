@@ -296,5 +296,28 @@ TEST_F(Conversion, CadFilesNeedAUnit) {
   EXPECT_GT(std::filesystem::file_size(dir_ / "a.stl"), 10'000u);
 }
 
+// Neither splats nor faces: what a depth camera or a scanner writes.
+TEST_F(Conversion, TellsPlainCloudsAndTriangleStripsFromSplats) {
+  const std::string start =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\n";
+  const std::string points = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n";
+  test::write_bytes(dir_ / "cloud.ply", start + "end_header\n" + points);
+  convert("cloud.ply", "again.ply");
+  EXPECT_EQ(read_mesh_ply(dir_ / "again.ply").mesh.vertices.size(), 4U);
+  const auto refused = [&](const std::string& to) {
+    return test::message_of([&] { convert("cloud.ply", to); });
+  };
+  EXPECT_NE(refused("a.obj").find("cgs filter makes a surface of it"), std::string::npos);
+  EXPECT_NE(refused("a.spz").find("a plain point cloud"), std::string::npos);
+  test::write_bytes(dir_ / "strips.ply",
+                    start +
+                        "element tristrips 1\nproperty list int int vertex_indices\n"
+                        "end_header\n" +
+                        points + "4 0 1 2 3\n");
+  convert("strips.ply", "strips.obj");
+  EXPECT_EQ(read_mesh_file(dir_ / "strips.obj").content.mesh.faces.size(), 2U);
+}
+
 }  // namespace
 }  // namespace cgs::conversion_test
