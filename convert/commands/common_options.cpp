@@ -146,6 +146,14 @@ void add_glb_option(CLI::App& command, GlbEncoding& encoding) {
           CLI::CheckedTransformer(glb_encodings()).description("draco, meshopt, quantized, plain"));
 }
 
+void add_local_origin_option(CLI::App& command, bool& local_origin, const std::string& files) {
+  command.add_flag("--local-origin",
+                   local_origin,
+                   files +
+                       " lies about an origin near by instead of where the input lies, for viewers "
+                       "that compute in single precision, of surveys in national coordinates");
+}
+
 void add_estimated_option(CLI::App& command, std::optional<EstimatedSurface>& estimated) {
   command
       .add_option(

@@ -60,6 +60,10 @@ void add_depth_options(CLI::App& command, SceneOptions& options);
 /// --glb-encoding.
 void add_glb_option(CLI::App& command, GlbEncoding& encoding);
 
+/// --local-origin.
+/// \param files  what it is of, the first words of its help
+void add_local_origin_option(CLI::App& command, bool& local_origin, const std::string& files);
+
 /// --estimated.
 void add_estimated_option(CLI::App& command, std::optional<EstimatedSurface>& estimated);
 

@@ -64,6 +64,7 @@ void add_convert(CLI::App& app) {
                 request.filter_floaters,
                 "Leave out splats that float in free space: haze, needles, small islands");
   add_glb_option(*cmd, request.encoding);
+  add_local_origin_option(*cmd, request.local_origin, "The .glb");
   cmd->add_option("--assume-unit", request.assume_unit, "What one unit is: m, cm, mm, in, ft");
   cmd->add_option("--up",
                   request.up,

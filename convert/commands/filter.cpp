@@ -25,6 +25,7 @@ struct FilterArgs {
   std::vector<std::string> operations;
   std::string assume_unit;
   std::vector<double> up;
+  bool local_origin = false;
   CommonOptions common;
 };
 
@@ -39,6 +40,9 @@ void run_filter_command(const FilterArgs& args) {
   keep_apart(args.output, args.input);
   require(is_writable_mesh_name(args.output),
           "the output must end in .ply, .obj, .stl, .3mf or .glb",
+          printable(args.output.filename()));
+  require(!args.local_origin || lower_extension(args.output) == ".glb",
+          "--local-origin is for .glb; the output",
           printable(args.output.filename()));
   { const AtomicFile can_be_written(args.output); }  // before all the work
   Terminal terminal(args.common.quiet, args.common.strict);
@@ -70,10 +74,13 @@ void run_filter_command(const FilterArgs& args) {
   // Nothing is rounded, so that what was certified stays that: cgs convert compresses.
   GlbOptions exact;
   exact.encoding = GlbEncoding::Plain;
+  exact.local_origin = args.local_origin;
   (void)write_mesh_as(args.output, state.mesh, written, exact);
   const std::string moved =
       moved_origin_text(args.output, state.file_origin, state.frame.file_origin);
   if (!moved.empty()) terminal.warn(moved);
+  const std::string place = glb_place_text(args.output, state.frame, args.local_origin);
+  if (!place.empty()) terminal.say(place);
   if (args.common.json) std::cout << json_text({{"operations", report}}) << "\n";
 }
 
@@ -83,7 +90,8 @@ void add_filter(CLI::App& app) {
   auto args = std::make_shared<FilterArgs>();
   auto* cmd = app.add_subcommand(
       "filter", "Clean, crop, smooth, simplify ... meshes and point clouds; labels and sigma stay");
-  cmd->add_option("input", args->input, "Mesh or point cloud: .ply, .obj, .stl, .off, .3mf, .glb")
+  cmd->add_option("input", args->input, "Mesh or point cloud: .ply, .obj, .stl, .off, .3mf, .glb, "
+                  ".gltf")
       ->required();
   cmd->add_option("output", args->output, "File to write: .ply, .obj, .stl, .3mf, .glb")
       ->required();
@@ -97,6 +105,7 @@ void add_filter(CLI::App& app) {
                   "Direction that is up, for .stl, .3mf and .glb; default: as the file says, "
                   "else 0 0 1")
       ->expected(3);
+  add_local_origin_option(*cmd, args->local_origin, "The .glb");
   add_output_options(*cmd, args->common);
   cmd->footer(filter_help() +
               "Coordinates are those of the file. Lengths and coordinates take a unit (2mm, -3cm) "

@@ -9,11 +9,13 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/files/mesh_files.h"
 #include "convert/report/report_frame.h"
 #include "convert/report/report_surface.h"
 #include "convert/run/budget.h"
 #include "convert/run/pipeline.h"
 #include "convert/run/verification.h"
+#include "convert/text/frame_json.h"
 #include "convert/text/length.h"
 #include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
@@ -48,6 +50,9 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
   }
   const std::string origin = far_origin(report["frame"]);
   if (!origin.empty()) terminal.say(origin);
+  const std::string place = glb_place_text(
+      "web/asset.glb", frame_from_json(report["frame"]), args.request.local_origin);
+  if (!place.empty()) terminal.say(place);
   const auto& certificate = report["certificate"];
   terminal.say(std::string("watertight mesh: ") +
                (certificate["passed"].get<bool>() ? "closed, manifold, no self-intersection"
@@ -106,6 +111,8 @@ void add_surface_options(CLI::App& command, RunArgs& args) {
                      args.request.compression_error,
                      "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
   add_glb_option(command, args.request.glb_encoding);
+  add_local_origin_option(
+      command, args.request.local_origin, "What is in web/, but for splats.spz,");
   add_estimated_option(command, args.estimated);
   command
       .add_option(

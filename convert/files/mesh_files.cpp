@@ -3,13 +3,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <string>
 
 #include <nlohmann/json.hpp>
 
+#include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/scene_path.h"
+#include "io/bytes/significance.h"
 #include "io/meshes/mesh_ply.h"
 #include "io/meshes/obj.h"
 #include "io/meshes/stl.h"
@@ -141,9 +145,37 @@ std::string seams_text(const TriangleMesh& mesh) {
 std::string moved_origin_text(const std::filesystem::path& path,
                               const Eigen::Vector3d& read,
                               const Eigen::Vector3d& written) {
-  if (read == written) return "";
+  // Nodes of .glb state in double where they lie.
+  if (read == written || lower_extension(path) == ".glb") return "";
   return "coordinates in " + printable(path) +
          " are from another origin, which the file states: floats would lose digits";
+}
+
+std::string glb_place_text(const std::filesystem::path& path,
+                           const Frame& frame,
+                           bool has_local_origin) {
+  if (lower_extension(path) != ".glb") return "";
+  const std::string name = printable(path.filename());
+  if (has_local_origin) {
+    std::array<char, 128> place{};
+    std::snprintf(place.data(),
+                  place.size(),
+                  "%.15g, %.15g, %.15g",
+                  frame.origin.x(),
+                  frame.origin.y(),
+                  frame.origin.z());
+    return "(0, 0, 0) of " + name + " is " + place.data() +
+           " of the input, as asset.extras.origin_in_world of the file states";
+  }
+  constexpr int kEnough = 14;  // binary digits; what readers warn of
+  const Eigen::Vector3d half = Eigen::Vector3d::Constant(frame.scale / 2);
+  const Eigen::AlignedBox3d box(frame.origin - half, frame.origin + half);
+  if (significant_bits(box, kFloatDigits) >= kEnough) return "";
+  const double distance = frame.origin.norm() / frame.scale;
+  return name + " lies " + format_length(distance, frame) +
+         " from its (0, 0, 0): programs that place it in single precision are off by up to " +
+         format_length(std::ldexp(distance, -kFloatDigits), frame) +
+         "; --local-origin writes it about an origin near by";
 }
 
 std::string lost_in_file(const std::filesystem::path& path,

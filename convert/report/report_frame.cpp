@@ -67,7 +67,7 @@ std::string control_section(const Json& scale) {
   std::ostringstream html;
   html << "<h2>Control points</h2>\n<p>Files are in the coordinates of "
        << escaped(control["file"].get<std::string>())
-       << ", z up. GLB is in metres and y up, STL and 3MF are in millimetres; each states its own "
+       << ", z up. GLB is in metres and y up; STL and 3MF are in millimetres and state their own "
           "origin."
           " Standard deviations of the frame: "
        << "scale "

@@ -15,7 +15,7 @@
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/byte_reader.h"
-#include "io/glb/primitive.h"
+#include "io/glb/place.h"
 #include "io/meshes/mesh_file.h"
 #include "io/meshes/tileset.h"
 #include "libcgs/core/error.h"
@@ -71,7 +71,7 @@ class AssetWriter {
         simplify_(content.texture.empty() ? 0 : content.simplify),
         frame_(model.scene.frame),
         path_(request.output / "web/asset.glb"),
-        y_up_(y_up_from(model.scene.frame.up)),
+        place_{y_up_from(model.scene.frame.up), request.local_origin},
         description_(content.description),
         certificate_(content.certificate),
         encoding_(request.glb_encoding),
@@ -146,20 +146,14 @@ class AssetWriter {
 
   /// Of a mesh, in the coordinates of the files.
   Eigen::AlignedBox3d box_in_file(const TriangleMesh& mesh) const {
-    const GlbPlacement placement{y_up_, file_unit(), box_.center()};
     Eigen::AlignedBox3d out;
-    for (const Eigen::Vector3f& p : mesh.vertices) out.extend(placement(p).cast<double>());
+    for (const Eigen::Vector3f& p : mesh.vertices) {
+      out.extend(place_.of(p.cast<double>(), frame_));
+    }
     return out;
   }
   /// Units of the files per internal unit.
-  double file_unit() const {
-    return frame_.scale * (frame_.has_metric_scale() ? frame_.metres_per_unit : 1.0);
-  }
-  /// Where the files' (0, 0, 0) lies in the world, turned so that up is +Z [units of the files].
-  Eigen::Vector3d place() const {
-    const Eigen::Vector3d in_world = frame_.world_from_internal(box_.center());
-    return file_unit() / frame_.scale * (z_up_from(frame_.up) * in_world);
-  }
+  double file_unit() const { return GlbPlace::unit(frame_); }
 
   double side() const { return box_.sizes().maxCoeff(); }
   const std::filesystem::path& path() const { return path_; }
@@ -172,7 +166,8 @@ class AssetWriter {
   GlbOptions glb_options(double rounding) const {
     GlbOptions out;
     out.encoding = encoding_;
-    out.y_up = y_up_;
+    out.y_up = place_.y_up;
+    out.local_origin = place_.has_local_origin;
     out.center = box_.center();
     out.max_error = rounding * frame_.scale;
     out.summary_json = summary(certificate_);
@@ -210,7 +205,7 @@ class AssetWriter {
   double simplify_;
   const Frame& frame_;
   std::filesystem::path path_;
-  Eigen::Matrix3d y_up_;
+  GlbPlace place_;
   const std::string& description_;
   const Json& certificate_;  ///< Of mesh_.
   GlbEncoding encoding_;
@@ -377,7 +372,6 @@ std::vector<AssetLevel> write_levels(const AssetWriter& writer,
   const TriangleMesh full = writer.read(read_file(writer.path()));
   Tileset tileset;
   tileset.units = frame.has_metric_scale() ? "m" : "unknown";
-  tileset.place = writer.place();
   tileset.levels = {{writer.path().filename().string(), 0}};
   tileset.box = writer.box_in_file(full);
   std::vector<AssetLevel> levels;

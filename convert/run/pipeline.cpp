@@ -188,7 +188,8 @@ StageResult run_evaluation(Run& run, const Progress& progress) {
 }
 
 StageResult run_splats(Run& run, const Progress& progress) {
-  const WebSplats made = write_web_splats(run.request.output / "web", loaded_model(run), progress);
+  const WebSplats made = write_web_splats(
+      run.request.output / "web", loaded_model(run), progress, run.request.local_origin);
   return {web_splats_to_json(made),
           "kept " + std::to_string(made.thinned.splats.size()) + " of " + std::to_string(made.of)};
 }

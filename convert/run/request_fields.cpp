@@ -259,6 +259,7 @@ std::vector<RequestField> all_fields() {
   out.push_back(chosen("refine_poses", Stage::Model, in_scene(&SceneRequest::refine_poses)));
   out.push_back(lods());
   out.push_back(chosen("glb_encoding", Stage::Web, &RunRequest::glb_encoding));
+  out.push_back(chosen("local_origin", Stage::Splats, &RunRequest::local_origin));
   out.push_back(chosen("estimated", Stage::Mesh, &RunRequest::estimated));
   out.push_back(stating_scale({"stated_scale", Stage::Scale, stated_scale}));
   out.push_back({"depth", Stage::Model, depth_of});

@@ -81,7 +81,8 @@ std::optional<ViewFigures> held_out_figures(Model& model,
 
 WebSplats write_web_splats(const std::filesystem::path& folder,
                            Model& model,
-                           const Progress& progress) {
+                           const Progress& progress,
+                           bool local_origin) {
   const Frame& frame = model.scene.frame;
   const Eigen::Matrix3d y_up = y_up_from(model.scene.frame.up);
   make_output_folder(folder);
@@ -89,8 +90,10 @@ WebSplats write_web_splats(const std::filesystem::path& folder,
   out.thinned = thinned_splats(model, part_of(progress, 0, 0.9));
   out.of = model.gaussians.size();
   Gaussians& splats = out.thinned.splats;
-  out.glb_bytes = write_splat_glb(
-      folder / "splats.glb", splats, frame, {y_up, evidence_of_thinned(model, splats.size())});
+  out.glb_bytes = write_splat_glb(folder / "splats.glb",
+                                  splats,
+                                  frame,
+                                  {y_up, evidence_of_thinned(model, splats.size()), local_origin});
   out.held_out = held_out_figures(model, splats, part_of(progress, 0.9, 1));
   try {
     constexpr double kOfPixel = 1.0 / 16;

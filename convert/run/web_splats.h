@@ -35,10 +35,12 @@ nlohmann::ordered_json web_splats_to_json(const WebSplats& made);
 /// SPZ are no reason to end a run: it is left out then.
 /// The .glb says what the model rests on, and what vouches for each splat where that is stated; SPZ
 /// has no place for these.
-/// \param model  as before when this returns or throws
+/// \param model         as before when this returns or throws
+/// \param local_origin  of splats.glb, as SplatGlbOptions
 /// \throws Error as load_images()
 WebSplats write_web_splats(const std::filesystem::path& folder,
                            Model& model,
-                           const Progress& progress = {});
+                           const Progress& progress = {},
+                           bool local_origin = false);
 
 }  // namespace cgs

@@ -60,7 +60,7 @@ struct Source {
 /// Files of a mesh or a plain cloud: PLY and .glb have to be looked into, they may hold splats.
 bool holds_mesh(const std::filesystem::path& path) {
   if (!is_mesh_name(path)) return false;
-  if (lower_extension(path) == ".glb") return !is_splat_glb(path);
+  if (has_gltf_extension(path)) return !is_splat_glb(path);
   if (lower_extension(path) != ".ply") return true;
   const std::optional<PlyHeader> header = read_ply_header(path);
   if (!header) return false;
@@ -223,6 +223,7 @@ std::string write_mesh(const ConversionRequest& request, const Source& source, c
     options.max_error = parse_length(request.compression_error, source.frame) * source.frame.scale;
   }
   options.summary_json = json_text(report, -1);
+  options.local_origin = request.local_origin;
   return write_mesh_as(request.output, source.mesh, source.frame, options);
 }
 
@@ -280,6 +281,7 @@ void refuse_without_effect(const ConversionRequest& request, const Source& sourc
        "is for meshes in .glb alone"},
       {"--simplify", !request.simplify.empty(), true, "", to_mesh},
       {"--glb-encoding", request.encoding != usual.encoding, true, "", to_glb},
+      {"--local-origin", request.local_origin, true, "", extension == ".glb"},
       {"--look-from",
        cameras.placement != usual_cameras.placement,
        from_file,
@@ -336,7 +338,8 @@ void write_as_splats(const ConversionRequest& request,
                        source.frame,
                        {request.spz_version,
                         request.volume.memory_limit,
-                        source.model ? source.model->evidence : source.splats->evidence},
+                        source.model ? source.model->evidence : source.splats->evidence,
+                        request.local_origin},
                        terminal);
 }
 
@@ -366,6 +369,11 @@ void write_as_mesh(const ConversionRequest& request,
   if (!lost_by_encoding.empty()) terminal.say(lost_by_encoding);
 }
 
+void say_place(const ConversionRequest& request, const Frame& frame, Terminal& terminal) {
+  const std::string place = glb_place_text(request.output, frame, request.local_origin);
+  if (!place.empty()) terminal.say(place);
+}
+
 }  // namespace
 
 std::string conversion_table() {
@@ -375,11 +383,11 @@ std::string conversion_table() {
          "                                     .compressed.ply\n"
          "3DGS, 2DGS or packed .ply, .splat,\n"
          "  .spz 2 to 4, .sog 2, .ksplat,\n"
-         "  .glb with splats                   yes              yes      yes, virtual cameras\n"
+         "  .glb, .gltf with splats            yes              yes      yes, virtual cameras\n"
          "model folder of train or run         yes              yes      yes, its own cameras\n"
          ".vdb of fuse, run or convert         no               no       yes\n"
          ".ply with faces, .obj, .stl, .off,\n"
-         "  .3mf, .glb with triangles          no               no       yes\n"
+         "  .3mf, .glb, .gltf with triangles   no               no       yes\n"
          "Where the ending can be both, .ply stays splats and .glb becomes a mesh; --as mesh and\n"
          "--as splats say otherwise. .stl and .3mf need a known scale, or --assume-unit.\n";
 }
@@ -404,6 +412,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   }
   if (wanted == Content::Splats) {
     write_as_splats(request, source, terminal, report);
+    say_place(request, source.frame, terminal);
     return report;
   }
   const bool from_splats_alone = source.splats.has_value();
@@ -427,6 +436,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
     simplify_mesh(request, source, terminal);
   }
   write_as_mesh(request, source, terminal, report);
+  say_place(request, source.frame, terminal);
   return report;
 }
 

@@ -23,6 +23,7 @@ struct ConversionRequest {
                          ///< from volumes, none for meshes and for splats without cameras.
   std::string compression_error;              ///< Of a .glb; empty = 1/16384 of its size.
   GlbEncoding encoding = GlbEncoding::Draco;  ///< Of a .glb with a mesh.
+  bool local_origin = false;                  ///< Of a .glb, as GlbOptions.
   std::string assume_unit;  ///< Unit of one scene unit where the input does not say.
   std::vector<double>
       up;  ///< World direction; empty = of the input, else +z for meshes, -y as 3DGS files lie.

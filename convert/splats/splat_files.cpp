@@ -69,7 +69,8 @@ WrittenSplats write_splats(const std::filesystem::path& path,
             {}};
   }
   if (extension == ".glb") {
-    const size_t bytes = write_splat_glb(path, g, frame, {y_up_from(frame.up), options.evidence});
+    const size_t bytes = write_splat_glb(
+        path, g, frame, {y_up_from(frame.up), options.evidence, options.local_origin});
     return {{{"format", "KHR_gaussian_splatting"}, {"splats", g.size()}, {"bytes", bytes}}, {}};
   }
   if (is_compressed_ply_name(path)) {
@@ -167,7 +168,7 @@ bool is_compressed_ply_name(const std::filesystem::path& path) {
 
 bool is_splat_file(const std::filesystem::path& path) {
   if (is_folder(path)) return false;
-  if (lower_extension(path) == ".glb") return is_splat_glb(path);
+  if (has_gltf_extension(path)) return is_splat_glb(path);
   if (lower_extension(path) != ".ply") return false;
   const std::optional<PlyHeader> header = read_ply_header(path);
   const PlyElement* vertex = header ? header->find("vertex") : nullptr;

@@ -14,7 +14,7 @@
 
 namespace cgs {
 
-/// True for a PLY file whose vertices have what makes a splat, and for a .glb file of splats.
+/// True for a PLY file whose vertices have what makes a splat, and for a .glb or .gltf file of splats.
 /// \throws BadInput as read_ply_header() and is_splat_glb()
 bool is_splat_file(const std::filesystem::path& path);
 
@@ -29,6 +29,7 @@ struct SplatFileOptions {
   int spz_version = 3;
   size_t memory_limit = 0;    ///< In bytes, for reading back; 0 = as memory_budget().
   std::string evidence = {};  ///< What the splats rest on, in words; empty = nobody says.
+  bool local_origin = false;  ///< Of a .glb, as SplatGlbOptions.
 };
 
 /// Writes splats in the format that the name of the file says, reads them back and says on the

@@ -176,4 +176,6 @@ int JsonValue::count() const {
 bool JsonValue::is_array() const { return value_->is_array(); }
 bool JsonValue::is_object() const { return value_->is_object(); }
 
+bool JsonValue::is_text() const { return value_->is_string(); }
+
 }  // namespace cgs

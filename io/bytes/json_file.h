@@ -61,6 +61,7 @@ class JsonValue {
 
   bool is_array() const;
   bool is_object() const;
+  bool is_text() const;
   const std::string& pointer() const { return pointer_; }
   /// \throws BadInput whose message starts with the pointer.
   [[noreturn]] void fail(Defect defect, const std::string& reason) const;

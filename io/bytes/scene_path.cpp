@@ -157,6 +157,11 @@ std::string folded_name(std::string_view name) {
   return U_FAILURE(error) ? std::string(name) : out;
 }
 
+bool has_gltf_extension(const fs::path& path) {
+  const std::string extension = lower_extension(path);
+  return extension == ".glb" || extension == ".gltf";
+}
+
 bool has_image_extension(const fs::path& path) {
   static constexpr std::array<std::string_view, 11> kKnown = {".png",
                                                               ".jpg",

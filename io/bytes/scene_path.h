@@ -69,6 +69,9 @@ std::string folded_name(std::string_view name);
 /// True for the extensions of image files: .png .jpg .jpeg .tif .tiff .webp, in any case.
 bool has_image_extension(const std::filesystem::path& path);
 
+/// True for the extensions of glTF: .glb .gltf, in any case.
+bool has_gltf_extension(const std::filesystem::path& path);
+
 /// The image files directly inside a folder, sorted by file name.
 /// \throws BadInput Open if the folder cannot be listed, Path as resolve_in_scene(); LimitError
 std::vector<std::filesystem::path> image_files(const SceneRoot& root, const std::string& subfolder);

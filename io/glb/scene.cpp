@@ -2,7 +2,7 @@
 #include "io/glb/scene.h"
 
 #include "io/bytes/byte_writer.h"
-#include "io/glb/meshopt.h"
+#include "io/glb/extensions.h"
 
 namespace cgs {
 
@@ -30,8 +30,7 @@ Eigen::Affine3d node_matrix(const JsonValue& node) {
 /// Where a node shows its mesh, seen from the node: once, or as EXT_mesh_gpu_instancing lists.
 /// Source: EXT_mesh_gpu_instancing, Khronos Group.
 std::vector<Eigen::Affine3d> places_of_mesh(const GlbContainer& file, const JsonValue& node) {
-  const auto extensions = node.find("extensions");
-  const auto instancing = extensions ? extensions->find(kInstancing) : std::nullopt;
+  const auto instancing = extension_of(node, kInstancing);
   if (!instancing) return {Eigen::Affine3d::Identity()};
   const JsonValue attributes = instancing->at("attributes");
   size_t count = 0;
@@ -66,11 +65,15 @@ class NodeVisitor {
  public:
   explicit NodeVisitor(const GlbContainer& file) : file_(file) {}
 
-  std::vector<GlbInstance> visit() {
+  GlbScene visit() {
     const JsonValue root = file_.root();
     const auto nodes = root.find("nodes");
     visited_.assign(nodes ? nodes->size() : 0, false);
     visit_scene(root);
+    if (hidden_ > 0) {
+      out_.warnings.push_back("left out " + std::to_string(hidden_) +
+                              " nodes that the file says are not visible, with what hangs on them");
+    }
     return std::move(out_);
   }
 
@@ -82,6 +85,10 @@ class NodeVisitor {
     if (!scenes && !chosen) return visit_roots(root);
     if (!chosen && scenes->size() == 0) return;
     const JsonValue scene = chosen ? file_.element("scenes", *chosen) : scenes->at(size_t{0});
+    if (scenes->size() > 1) {
+      out_.warnings.push_back("the file holds " + std::to_string(scenes->size()) +
+                              " scenes; read is " + (chosen ? "the one it shows" : "the first"));
+    }
     if (const auto nodes = scene.find("nodes")) visit_all(*nodes, Eigen::Affine3d::Identity(), 0);
   }
 
@@ -114,37 +121,38 @@ class NodeVisitor {
     constexpr int kDeepest = 256;
     visited_[number] = true;
     if (depth > kDeepest) throw LimitError(printable(file_.path()) + ": nodes nest too deeply");
+    if (is_hidden(node)) {
+      ++hidden_;
+      return;
+    }
     const Eigen::Affine3d world = parent * node_matrix(node);
     if (const auto skin = node.find("skin"); skin && node.find("mesh")) {
       skin->fail(Defect::Unsupported,
                  "joints of a skeleton place this mesh, which are not read: apply the armature "
                  "before exporting");
     }
-    if (const auto mesh = node.find("mesh")) {
+    if (const auto index = node.find("mesh")) {
+      const JsonValue mesh = file_.element("meshes", *index);
+      const auto own_weights = node.find("weights");
+      const auto weights = own_weights ? own_weights : mesh.find("weights");
       for (const Eigen::Affine3d& place : places_of_mesh(file_, node)) {
-        out_.push_back({file_.element("meshes", *mesh), world * place});
+        out_.instances.push_back({mesh, world * place, weights});
       }
     }
     if (const auto children = node.find("children")) visit_all(*children, world, depth + 1);
   }
 
-  const GlbContainer& file_;
-  std::vector<GlbInstance> out_;
-  std::vector<bool> visited_;
-};
-
-void refuse_unknown_extensions(const JsonValue& root) {
-  const auto required = root.find("extensionsRequired");
-  for (size_t i = 0; required && i < required->size(); ++i) {
-    const std::string name = required->at(i).text();
-    const bool known = name == "KHR_draco_mesh_compression" || name == "KHR_mesh_quantization" ||
-                       name == kMeshopt || name == "EXT_mesh_features" ||
-                       name.starts_with("KHR_materials_") || name.starts_with("KHR_texture_") ||
-                       name.starts_with("EXT_texture_") || name == "KHR_lights_punctual" ||
-                       name == kInstancing || name == "KHR_gaussian_splatting";
-    if (!known) required->at(i).fail(Defect::Unsupported, name + " is required and not known");
+  static bool is_hidden(const JsonValue& node) {
+    const auto extension = extension_of(node, "KHR_node_visibility");
+    const auto visible = extension ? extension->find("visible") : std::nullopt;
+    return visible && !visible->boolean();
   }
-}
+
+  const GlbContainer& file_;
+  GlbScene out_;
+  std::vector<bool> visited_;
+  size_t hidden_ = 0;
+};
 
 std::string number_line(const char* key, double value) {
   std::string out = std::string(key) + " ";
@@ -154,9 +162,18 @@ std::string number_line(const char* key, double value) {
 
 }  // namespace
 
-std::vector<GlbInstance> glb_instances(const GlbContainer& file) {
-  refuse_unknown_extensions(file.root());
-  return NodeVisitor(file).visit();
+GlbScene glb_scene(const GlbContainer& file) {
+  const JsonValue root = file.root();
+  refuse_unknown_extensions(root);
+  GlbScene out = NodeVisitor(file).visit();
+  const auto add = [&](const std::string& line) { out.warnings.push_back(line); };
+  for (const std::string& line : unread_extensions(root)) add(line);
+  const auto animations = root.find("animations");
+  if (animations && animations->is_array() && animations->size() > 0) {
+    add(std::to_string(animations->size()) +
+        " animations are left out; what is read is how the file looks before they begin");
+  }
+  return out;
 }
 
 GlbOrigin glb_origin(const GlbContainer& file) {

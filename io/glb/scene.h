@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,13 +18,22 @@ inline constexpr const char* kGaussianSplatting = "KHR_gaussian_splatting";
 struct GlbInstance {
   JsonValue mesh;  ///< Refers to the container.
   Eigen::Affine3d gltf_from_mesh = Eigen::Affine3d::Identity();
+  std::optional<JsonValue> weights = {};  ///< Of morph targets: the node's, else the mesh's.
 };
 
-/// Every mesh of the default scene of a binary glTF file (of all nodes, if it has no scenes), in
-/// the order of the nodes.
-/// \throws BadInput Unsupported for a required extension that is not known; Ref for a node with two
-///         parents; Schema, Count, Value for a node's matrix; LimitError for nodes too deep
-std::vector<GlbInstance> glb_instances(const GlbContainer& file);
+/// What a file shows.
+struct GlbScene {
+  std::vector<GlbInstance> instances;  ///< In the order of the nodes.
+  std::vector<std::string> warnings;   ///< One line each: what the file holds beside it.
+};
+
+/// Every mesh of the default scene of a glTF file (of all nodes, if it has no scenes), but for those
+/// that KHR_node_visibility hides.
+/// \throws BadInput Unsupported for a required extension that is not known, or for a skin; Ref for
+///         a node with two parents; Schema, Count, Value for a node's matrix; LimitError for nodes
+///         too deep
+/// Source: glTF 2.0, section 3.5, EXT_mesh_gpu_instancing and KHR_node_visibility, Khronos Group.
+GlbScene glb_scene(const GlbContainer& file);
 
 /// Scale and place of a file in the world; that of other programs' files is the identity.
 struct GlbOrigin {
@@ -40,7 +50,9 @@ struct GlbOrigin {
   }
 };
 
-/// What asset.extras of write_glb() and write_splat_glb() say.
+/// What asset.extras of write_glb() and write_splat_glb() say. Where "origin_in_world" is not 0, as
+/// in files of earlier versions, whose nodes do not say where they lie, (0, 0, 0) of the file lies
+/// there.
 /// \throws BadInput
 GlbOrigin glb_origin(const GlbContainer& file);
 

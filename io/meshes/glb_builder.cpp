@@ -63,7 +63,8 @@ Eigen::Vector3f extreme(const std::vector<Eigen::Vector3f>& points, bool low) {
 
 }  // namespace
 
-GlbBuilder::GlbBuilder() : model_(std::make_unique<tinygltf::Model>()) {
+GlbBuilder::GlbBuilder(const Eigen::Vector3d& place)
+    : place_(place), model_(std::make_unique<tinygltf::Model>()) {
   model_->asset.version = "2.0";
   model_->asset.generator = "cgs";
   model_->buffers.resize(1);
@@ -72,6 +73,7 @@ GlbBuilder::GlbBuilder() : model_(std::make_unique<tinygltf::Model>()) {
   model_->nodes.resize(1);
   model_->nodes[0].mesh = 0;
   model_->nodes[0].name = "mesh";
+  model_->nodes[0].translation = {place.x(), place.y(), place.z()};
   model_->scenes.resize(1);
   model_->scenes[0].nodes = {0};
   model_->defaultScene = 0;
@@ -144,7 +146,8 @@ void GlbBuilder::add_plain(const GlbPrimitive& in) {
 void GlbBuilder::add_quantized(const GlbPrimitive& in,
                                const QuantizedPrimitive& stored,
                                const QuantizedGrid& grid) {
-  model_->nodes[0].translation = {grid.origin.x(), grid.origin.y(), grid.origin.z()};
+  const Eigen::Vector3d origin = place_ + grid.origin;
+  model_->nodes[0].translation = {origin.x(), origin.y(), origin.z()};
   model_->nodes[0].scale = {grid.step, grid.step, grid.step};
   use_extension(kQuantization);
   model_->extensionsRequired = {kQuantization};

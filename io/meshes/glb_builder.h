@@ -29,7 +29,8 @@ namespace cgs {
 /// KHR_materials_unlit, EXT_mesh_features.
 class GlbBuilder {
  public:
-  GlbBuilder();
+  /// \param place  where the positions' (0, 0, 0) lies: the translation of the node
+  explicit GlbBuilder(const Eigen::Vector3d& place);
   ~GlbBuilder();
   GlbBuilder(const GlbBuilder&) = delete;
   GlbBuilder& operator=(const GlbBuilder&) = delete;
@@ -76,6 +77,7 @@ class GlbBuilder {
   void set_stored_type(int number, int component, bool is_normalized, size_t stride);
   void set_bounds(int number, const Eigen::Vector3f& low, const Eigen::Vector3f& high);
 
+  Eigen::Vector3d place_;
   std::unique_ptr<tinygltf::Model> model_;
   std::vector<std::string> names_;  // of photographs
   std::vector<int> texture_of_;     // per photograph

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "io/glb/extensions.h"
 #include "io/images/image.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/srgb.h"
@@ -55,10 +56,8 @@ GlbColors::Base GlbColors::base(const JsonValue& primitive) const {
   const auto index = primitive.find("material");
   if (!index) return {};
   const JsonValue material = file_.element("materials", *index);
-  const auto extensions = material.find("extensions");
   // Comes first: what stands beside it is for programs that do not know it.
-  const auto diffuse = extensions ? extensions->find("KHR_materials_pbrSpecularGlossiness")
-                                  : std::optional<JsonValue>();
+  const auto diffuse = extension_of(material, "KHR_materials_pbrSpecularGlossiness");
   const auto stated = diffuse ? diffuse : material.find("pbrMetallicRoughness");
   if (!stated) return {};
   return {numbers_or(*stated, diffuse ? "diffuseFactor" : "baseColorFactor", {1, 1, 1, 1}),
@@ -70,9 +69,9 @@ GlbColors::Texture GlbColors::texture(const JsonValue& info) const {
   const JsonValue texture = file_.element("textures", info.at("index"));
   if (const auto set = info.find("texCoord")) out.texcoord_set = set->count();
   auto source = texture.find("source");
-  if (const auto extensions = texture.find("extensions")) {
-    const auto webp = extensions->find("EXT_texture_webp");
-    if (webp && webp->find("source")) source = webp->find("source");
+  for (const char* name : {"EXT_texture_webp", "EXT_texture_avif"}) {
+    const auto other = extension_of(texture, name);
+    if (other && other->find("source")) source = other->find("source");
   }
   out.wrap = {kRepeat, kRepeat};
   if (const auto index = texture.find("sampler")) {
@@ -81,16 +80,23 @@ GlbColors::Texture GlbColors::texture(const JsonValue& info) const {
     if (const auto t = sampler.find("wrapT")) out.wrap[1] = t->count();
   }
   if (source) out.image = source->count();
-  const auto extensions = info.find("extensions");
-  const auto transform =
-      extensions ? extensions->find("KHR_texture_transform") : std::optional<JsonValue>();
+  const auto transform = extension_of(info, "KHR_texture_transform");
   if (!transform) return out;
   out.offset = numbers_or(*transform, "offset", {0, 0});
   out.scale = numbers_or(*transform, "scale", {1, 1});
   if (const auto set = transform->find("texCoord")) out.texcoord_set = set->count();
-  const auto rotation = transform->find("rotation");
-  if (rotation && rotation->number() != 0) out.image = -1;
+  if (const auto rotation = transform->find("rotation")) out.rotation = rotation->number();
   return out;
+}
+
+// Counter-clockwise where v points down, as the text of the extension, its sample and all that read
+// it have it; the matrix in its listing turns the other way.
+std::array<double, 2> GlbColors::Texture::place(double u, double v) const {
+  const double x = scale[0] * u;
+  const double y = scale[1] * v;
+  const double c = std::cos(rotation);
+  const double s = std::sin(rotation);
+  return {offset[0] + c * x + s * y, offset[1] - s * x + c * y};
 }
 
 int GlbColors::texcoord_set(const JsonValue& primitive) const {
@@ -109,18 +115,13 @@ const ColorImage* GlbColors::image(int index) {
   if (known != images_.end()) return known->second.empty() ? nullptr : &known->second;
   ColorImage& out = images_[index];
   if (index < 0) {
-    warn("a texture is left out: it is packed for graphics cards, or turned");
+    warn("a texture is left out: it is packed for graphics cards");
     return nullptr;
   }
   const JsonValue images = file_.root().at("images");
   if (static_cast<size_t>(index) >= images.size()) images.fail(Defect::Ref, "has no such image");
-  const auto view = images.at(static_cast<size_t>(index)).find("bufferView");
-  if (!view) {
-    warn("textures in other files are not read");
-    return nullptr;
-  }
   try {
-    out = decode_image(file_.view_bytes(*view), file_.path());
+    out = decode_image(file_.image_bytes(images.at(static_cast<size_t>(index))), file_.path());
   } catch (const BadInput& error) {
     warn("texture " + std::to_string(index) + " is left out: " + error.what());
     return nullptr;
@@ -128,8 +129,23 @@ const ColorImage* GlbColors::image(int index) {
   return &out;
 }
 
+// Colours of vertices are those of opaque surface under white light.
+void GlbColors::warn_of_material(const JsonValue& primitive) {
+  const auto index = primitive.find("material");
+  if (!index || has_tints_) return;
+  const JsonValue material = file_.element("materials", *index);
+  const auto alpha = material.find("alphaMode");
+  if (alpha && alpha->text() != "OPAQUE") {
+    warn("surface that is transparent, in part or as a whole, is read as opaque");
+  }
+  if (numbers_or(material, "emissiveFactor", {0, 0, 0}) != std::vector<double>{0, 0, 0}) {
+    warn("light that surfaces give off is left out of their colours");
+  }
+}
+
 std::vector<float> GlbColors::of_vertices(const JsonValue& primitive, const GlbFaces& faces) {
   std::vector<float> out = faces.colors;
+  warn_of_material(primitive);
   const auto [factor, info] = base(primitive);
   const size_t vertices = faces.positions.size() / 3;
   const bool is_white = factor[0] == 1 && factor[1] == 1 && factor[2] == 1;
@@ -142,13 +158,11 @@ std::vector<float> GlbColors::of_vertices(const JsonValue& primitive, const GlbF
   for (size_t v = 0; v < vertices; ++v) {
     Eigen::Vector3f times = Eigen::Vector3f::Ones();
     if (picture != nullptr) {
-      std::array<double, 2> uv{};
-      for (size_t k = 0; k < 2; ++k) {
-        const auto stored = double(faces.texcoords[2 * v + k]);
-        uv.at(k) =
-            looked_up.offset.at(k) + looked_up.scale.at(k) * (std::isfinite(stored) ? stored : 0);
-      }
-      times = sampled(*picture, uv, looked_up.wrap);
+      const auto stored = [&](size_t k) {
+        const double coordinate = faces.texcoords[2 * v + k];
+        return std::isfinite(coordinate) ? coordinate : 0;
+      };
+      times = sampled(*picture, looked_up.place(stored(0), stored(1)), looked_up.wrap);
     }
     for (size_t c = 0; c < 3; ++c) {
       if (is_colored) times[static_cast<Eigen::Index>(c)] *= static_cast<float>(factor.at(c));

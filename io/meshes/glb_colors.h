@@ -15,12 +15,12 @@ namespace cgs {
 
 /// What glTF says of the colour of surface: that of its vertices, times the base colour of its
 /// material (diffuse colour of KHR_materials_pbrSpecularGlossiness), times its texture.
-/// Source: glTF 2.0, section 3.9.2, KHR_materials_pbrSpecularGlossiness, and KHR_texture_transform
-///         without rotation, Khronos Group.
+/// Source: glTF 2.0, section 3.9.2, KHR_materials_pbrSpecularGlossiness, and KHR_texture_transform,
+///         Khronos Group.
 class GlbColors {
  public:
   /// \param has_tints  base colours are tints that tell classes apart, and no colour of the surface
-  GlbColors(const GlbContainer& file, bool has_tints) : file_(file), has_tints_(has_tints) {}
+  GlbColors(GlbContainer& file, bool has_tints) : file_(file), has_tints_(has_tints) {}
 
   /// Number of the texture coordinates that the material of a primitive asks for; -1 = none.
   int texcoord_set(const JsonValue& primitive) const;
@@ -32,7 +32,7 @@ class GlbColors {
   /// True once colours of a texture went to vertices.
   bool has_textures() const { return has_textures_; }
 
-  /// What of it could not be read, one line each.
+  /// What of it could not be read, or has no place here, one line each.
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
@@ -40,7 +40,11 @@ class GlbColors {
     int image = -1;  ///< -1 = of a kind that is not read.
     int texcoord_set = 0;
     std::vector<double> offset = {0, 0}, scale = {1, 1};
+    double rotation = 0;           ///< [radians]
     std::array<int, 2> wrap = {};  ///< As samplers state it.
+
+    /// Where stated texture coordinates lead.
+    std::array<double, 2> place(double u, double v) const;
   };
 
   /// Of a material: white without one.
@@ -52,9 +56,10 @@ class GlbColors {
   Base base(const JsonValue& primitive) const;
   Texture texture(const JsonValue& info) const;
   const ColorImage* image(int index);
+  void warn_of_material(const JsonValue& primitive);
   void warn(const std::string& line);
 
-  const GlbContainer& file_;
+  GlbContainer& file_;
   bool has_tints_;
   std::map<int, ColorImage> images_;  // an empty one could not be read
   bool has_textures_ = false;

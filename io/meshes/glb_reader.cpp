@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -12,6 +13,7 @@
 #include "io/bytes/mesh_arrays.h"
 #include "io/bytes/significance.h"
 #include "io/glb/container.h"
+#include "io/glb/extensions.h"
 #include "io/glb/scene.h"
 #include "io/meshes/glb_colors.h"
 #include "io/meshes/glb_faces.h"
@@ -27,42 +29,65 @@ constexpr uint64_t kMostCorners = uint64_t{1} << 31;
 /// Puts the primitives of all nodes together.
 class SceneReader {
  public:
-  SceneReader(const GlbContainer& file, const GlbOrigin& origin)
+  SceneReader(GlbContainer& file, const GlbOrigin& origin)
       : file_(file), origin_(origin), colors_(file, origin.is_ours) {}
 
   GlbMesh read() {
-    for (const GlbInstance& instance : glb_instances(file_)) {
-      add_mesh(instance.mesh, instance.gltf_from_mesh);
-    }
+    const GlbScene scene = glb_scene(file_);
+    is_cloud_ = !shows_triangles(scene);
+    for (const GlbInstance& instance : scene.instances) add_mesh(instance);
     TriangleMesh& mesh = out_.parsed.mesh;
-    if (mesh.faces.empty()) {
-      throw BadInput(Defect::Empty, file_.path(), "holds no triangles");
+    if (mesh.faces.empty() && out_.parsed.positions.empty()) {
+      throw BadInput(Defect::Empty,
+                     file_.path(),
+                     "holds no triangles" + (is_cloud_ ? std::string(" and no points") : "") +
+                         (lines_ > 0 ? ", but " + std::to_string(lines_) + " lines" : ""));
     }
     const std::string odd = check_significance(file_.path(), stored_, kFloatDigits);
-    if (!odd.empty()) out_.parsed.warnings.push_back(odd);
+    if (!odd.empty()) warn(odd);
     if (!has_colors_) mesh.colors.clear();
     if (!all_have_support_) mesh.support.clear();
     if (!all_have_sigma_) mesh.sigma.clear();
+    if (!all_have_normals_ || !is_cloud_) mesh.normals.clear();
     settle_labels();
-    if (has_splats_) {
-      out_.parsed.warnings.emplace_back("left out the splats that lie beside the triangles");
-    }
-    out_.parsed.warnings.insert(
-        out_.parsed.warnings.end(), colors_.warnings().begin(), colors_.warnings().end());
-    out_.parsed.has_textures = colors_.has_textures();
-    if (collapsed_ > 0) {
-      out_.parsed.warnings.push_back("left out " + std::to_string(collapsed_) +
-                                     " faces with two corners in one place");
-    }
-    if (recolored_ > 0 && !origin_.is_ours) {  // ours are of photographs that differ a little
-      out_.parsed.warnings.push_back("surfaces of different colours meet at " +
-                                     std::to_string(recolored_) +
-                                     " corners; vertices have one, that of the first");
-    }
+    for (const std::string& line : scene.warnings) warn(line);
+    warn_of_what_is_left_out();
     return std::move(out_);
   }
 
  private:
+  void warn(const std::string& line) { out_.parsed.warnings.push_back(line); }
+
+  // A file of points and lines alone is a cloud.
+  bool shows_triangles(const GlbScene& scene) const {
+    std::set<std::string> seen;
+    for (const GlbInstance& instance : scene.instances) {
+      if (!seen.insert(instance.mesh.pointer()).second) continue;
+      const JsonValue primitives = instance.mesh.at("primitives");
+      for (size_t i = 0; i < primitives.size(); ++i) {
+        if (glb_kind(primitives.at(i)) == GlbKind::Triangles) return true;
+      }
+    }
+    return false;
+  }
+
+  void warn_of_what_is_left_out() {
+    const auto left_out = [&](uint64_t count, const char* what) {
+      if (count > 0) warn("left out " + std::to_string(count) + " " + what);
+    };
+    if (has_splats_) warn("left out the splats that lie beside the triangles");
+    left_out(points_, "points that lie beside the triangles");
+    left_out(lines_, "line segments");
+    left_out(lost_points_, "points whose place is not a number");
+    for (const std::string& line : colors_.warnings()) warn(line);
+    out_.parsed.has_textures = colors_.has_textures();
+    left_out(collapsed_, "faces with two corners in one place");
+    if (recolored_ > 0 && !origin_.is_ours) {  // ours are of photographs that differ a little
+      warn("surfaces of different colours meet at " + std::to_string(recolored_) +
+           " corners; vertices have one, that of the first");
+    }
+  }
+
   void settle_labels() {
     ParsedMesh& out = out_.parsed;
     const bool are_told = all_have_labels_ && (origin_.is_ours || materials_.are_told());
@@ -75,20 +100,40 @@ class SceneReader {
     }
   }
 
-  void add_mesh(const JsonValue& mesh, const Eigen::Affine3d& world) {
-    const JsonValue primitives = mesh.at("primitives");
+  void add_mesh(const GlbInstance& instance) {
+    const JsonValue primitives = instance.mesh.at("primitives");
     for (size_t i = 0; i < primitives.size(); ++i) {
       const JsonValue primitive = primitives.at(i);
-      const auto extensions = primitive.find("extensions");
-      has_splats_ = has_splats_ || (extensions && extensions->find(kGaussianSplatting));
-      GlbFaces faces = read_glb_primitive(file_, primitive, colors_.texcoord_set(primitive));
-      if (faces.faces.empty()) continue;  // points and lines neither add vertices nor lack colours
-      faces.colors = colors_.of_vertices(primitive, faces);
-      add(faces, world, labels_of(primitive, faces));
-      if (out_.parsed.mesh.faces.size() > kMostCorners / 3) {
-        throw LimitError(printable(file_.path()) + ": more than " +
-                         std::to_string(kMostCorners / 3) + " triangles");
+      if (extension_of(primitive, kGaussianSplatting)) {
+        has_splats_ = true;
+      } else if (!is_read(glb_kind(primitive))) {
+        const bool are_points = glb_kind(primitive) == GlbKind::Points;
+        (are_points ? points_ : lines_) += stated_elements(file_, primitive);
+      } else {
+        add_primitive(primitive, instance);
       }
+    }
+  }
+
+  bool is_read(GlbKind kind) const {
+    return kind == (is_cloud_ ? GlbKind::Points : GlbKind::Triangles);
+  }
+
+  void add_primitive(const JsonValue& primitive, const GlbInstance& instance) {
+    GlbFaces in =
+        read_glb_primitive(file_, primitive, colors_.texcoord_set(primitive), instance.weights);
+    if (in.faces.empty() && in.points.empty()) return;  // which lacks no colours either
+    in.colors = colors_.of_vertices(primitive, in);
+    if (is_cloud_) {
+      add_points(in, instance.gltf_from_mesh);
+    } else {
+      add(in, instance.gltf_from_mesh, labels_of(primitive, in));
+    }
+    const size_t most = kMostCorners / 3;
+    if (out_.parsed.mesh.faces.size() > most || out_.parsed.positions.size() > kMostCorners) {
+      throw LimitError(printable(file_.path()) + ": more than " +
+                       std::to_string(is_cloud_ ? kMostCorners : most) +
+                       (is_cloud_ ? " points" : " triangles"));
     }
   }
 
@@ -133,10 +178,7 @@ class SceneReader {
     const bool is_mirrored = world.linear().determinant() < 0;
     std::vector<uint32_t> numbers(in.positions.size() / 3);
     for (size_t v = 0; v < numbers.size(); ++v) {
-      const Eigen::Vector3f p(
-          in.positions[3 * v], in.positions[3 * v + 1], in.positions[3 * v + 2]);
-      const Eigen::Vector3d place = origin_.world(world * p.cast<double>());
-      stored_.extend(world.linear() * p.cast<double>());
+      const Eigen::Vector3d place = place_of(in, world, v);
       if (!place.allFinite()) {
         throw BadInput(Defect::Value, file_.path(), "a vertex is not finite");
       }
@@ -155,9 +197,42 @@ class SceneReader {
       mesh.provenance.push_back(labels.empty() ? Provenance::Inferred : labels[f]);
     }
     all_have_labels_ = all_have_labels_ && !labels.empty();
+    note_attributes(in);
+  }
+
+  // Two points in one place stay two, unlike vertices of faces.
+  void add_points(const GlbFaces& in, const Eigen::Affine3d& world) {
+    const Eigen::Matrix3d turn = origin_.world_from_gltf * world.linear().inverse().transpose();
+    for (const uint32_t v : in.points) {
+      const Eigen::Vector3d place = place_of(in, world, v);
+      if (!place.allFinite()) {
+        ++lost_points_;
+        continue;
+      }
+      append_vertex(place, in, v);
+      Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+      if (!in.normals.empty()) normal = (turn * three(in.normals, v)).stableNormalized();
+      if (!normal.allFinite()) normal.setZero();
+      out_.parsed.mesh.normals.push_back(normal.cast<float>());
+    }
+    all_have_normals_ = all_have_normals_ && !in.normals.empty();
+    note_attributes(in);
+  }
+
+  void note_attributes(const GlbFaces& in) {
     has_colors_ = has_colors_ || !in.colors.empty();
     all_have_support_ = all_have_support_ && !in.support.empty();
     all_have_sigma_ = all_have_sigma_ && !in.sigma.empty();
+  }
+
+  static Eigen::Vector3d three(const std::vector<float>& values, size_t v) {
+    return {values[3 * v], values[3 * v + 1], values[3 * v + 2]};
+  }
+
+  Eigen::Vector3d place_of(const GlbFaces& in, const Eigen::Affine3d& world, size_t v) {
+    const Eigen::Vector3d p = three(in.positions, v);
+    if (p.allFinite() || !is_cloud_) stored_.extend(world.linear() * p);
+    return origin_.world(world * p);
   }
 
   static Eigen::Vector3f color_of(const GlbFaces& in, size_t v) {
@@ -174,21 +249,26 @@ class SceneReader {
     constexpr float kOtherColor = 0.1f;  // more than compression or shading makes of one
     ParsedMesh& out = out_.parsed;
     const uint32_t number = places_.number(place);
-    const Eigen::Vector3f color = color_of(in, v);
     if (number < out.positions.size()) {
+      const Eigen::Vector3f color = color_of(in, v);
       const bool is_other = (out.mesh.colors[number] - color).cwiseAbs().maxCoeff() > kOtherColor;
       recolored_ += !in.colors.empty() && is_other ? 1 : 0;
       return number;
     }
-    out.positions.push_back(place);
-    out.mesh.colors.push_back(color);
-    out.mesh.support.push_back(in.support.empty() ? 0.0f : in.support[v]);
-    const float sigma = in.sigma.empty() ? -1.0f : in.sigma[v];
-    out.mesh.sigma.push_back(static_cast<float>(double{sigma} * origin_.units_per_metre));
+    append_vertex(place, in, v);
     return number;
   }
 
-  const GlbContainer& file_;
+  void append_vertex(const Eigen::Vector3d& place, const GlbFaces& in, size_t v) {
+    ParsedMesh& out = out_.parsed;
+    out.positions.push_back(place);
+    out.mesh.colors.push_back(color_of(in, v));
+    out.mesh.support.push_back(in.support.empty() ? 0.0f : in.support[v]);
+    const float sigma = in.sigma.empty() ? -1.0f : in.sigma[v];
+    out.mesh.sigma.push_back(static_cast<float>(double{sigma} * origin_.units_per_metre));
+  }
+
+  GlbContainer& file_;
   const GlbOrigin& origin_;
   GlbColors colors_;
   GlbMesh out_;
@@ -202,7 +282,12 @@ class SceneReader {
   MaterialLabels materials_;
   bool all_have_support_ = true;
   bool all_have_sigma_ = true;
+  bool all_have_normals_ = true;  // of a cloud
   bool has_splats_ = false;
+  bool is_cloud_ = false;     // no triangles, so that points are read
+  uint64_t points_ = 0;       // left out
+  uint64_t lines_ = 0;        // segments
+  uint64_t lost_points_ = 0;  // not finite
 };
 
 }  // namespace
@@ -210,7 +295,7 @@ class SceneReader {
 GlbMesh read_glb(const std::filesystem::path& path) { return parse_glb(read_file(path), path); }
 
 GlbMesh parse_glb(std::string content, const std::filesystem::path& path) {
-  const GlbContainer file(std::move(content), path);
+  GlbContainer file(std::move(content), path);
   GlbOrigin origin = glb_origin(file);
   GlbMesh out = SceneReader(file, origin).read();
   out.parsed.comments = std::move(origin.comments);

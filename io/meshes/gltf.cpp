@@ -12,6 +12,7 @@
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/mesh_arrays.h"
 #include "io/glb/meshopt.h"
+#include "io/glb/place.h"
 #include "io/glb/primitive.h"
 #include "io/glb/quantized.h"
 #include "io/glb/texture_images.h"
@@ -89,15 +90,7 @@ nlohmann::json extras_for(const TriangleMesh& mesh,
                           const Frame& frame,
                           const GlbPlacement& placement,
                           const GlbOptions& options) {
-  const Eigen::Vector3d origin = frame.world_from_internal(placement.center);
-  nlohmann::json rotation = nlohmann::json::array();
-  for (int i = 0; i < 9; ++i) rotation.push_back(placement.rotation(i / 3, i % 3));
-  nlohmann::json out = {{"units", frame.has_metric_scale() ? "m" : "unknown"},
-                        {"metres_per_unit", frame.metres_per_unit},
-                        {"metres_sigma", frame.metres_sigma},
-                        {"scale_source", scale_source_name(frame.scale_source)},
-                        {"origin_in_world", {origin.x(), origin.y(), origin.z()}},
-                        {"gltf_from_world", rotation}};
+  nlohmann::json out = glb_place_to_json({options.y_up, options.local_origin}, frame);
   if (!mesh.provenance.empty()) {
     const auto area = area_by_provenance(mesh);
     for (const Provenance label : kProvenanceOrder) {
@@ -118,7 +111,7 @@ GlbPlacement placement_for(const TriangleMesh& mesh,
   const auto [low, high] = bounds(mesh);
   GlbPlacement out;
   out.rotation = options.y_up;
-  out.scale = frame.scale * (frame.has_metric_scale() ? frame.metres_per_unit : 1.0);
+  out.scale = GlbPlace::unit(frame);
   out.center = options.center.value_or(0.5 * (low.cast<double>() + high.cast<double>()));
   const double reach = out.scale * std::max((high.cast<double>() - out.center).norm(),
                                             (low.cast<double>() - out.center).norm());
@@ -252,7 +245,8 @@ GlbFile make_glb(const TriangleMesh& mesh,
   const double world_scale = placement.scale / frame.scale;  // units of the file per world unit
   const double max_error = options.max_error * world_scale;
   GlbReport report;
-  GlbBuilder builder;
+  const GlbPlace place{options.y_up, options.local_origin};
+  GlbBuilder builder(place.of(placement.center, frame));
   builder.set_extras(extras_for(mesh, frame, placement, options));
   builder.add_photographs(texture, images);
   for (const TextureImage& image : images) report.texture_bytes += image.jpeg.size();

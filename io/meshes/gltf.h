@@ -37,10 +37,11 @@ struct GlbOptions {
                          ///< Quantized moves it by extent / 2^16 at most.
   int speed = 1;         ///< Of the encoder, 0 to 10 (fastest); files of 0 are no smaller.
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
-  std::optional<Eigen::Vector3d> center;  ///< What becomes (0, 0, 0) [internal units]; default: the
-                                          ///< middle of the mesh.
+  std::optional<Eigen::Vector3d> center;  ///< What positions are stored relative to [internal
+                                          ///< units]; default: the middle of the mesh.
   int jpeg_quality = 90;                  ///< Of textures, 1 to 100.
   std::string summary_json;               ///< JSON text for asset.extras.summary; may be empty.
+  bool local_origin = false;              ///< As GlbPlace::has_local_origin.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
@@ -67,9 +68,11 @@ struct GlbReport {
 ///   "interpolated", "estimated", "inferred", or "surface" if the mesh has no labels), double-sided
 ///   and opaque; inferred surface is tinted magenta, interpolated surface orange, estimated surface
 ///   amber.
-/// - POSITION is relative to options.center. asset.extras tells where that lies
-///   (origin_in_world), the axes (gltf_from_world, row by row), units ("m" or "unknown"),
-///   metres_per_unit, metres_sigma, scale_source, the area of each class, and the summary.
+/// - POSITION is relative to options.center, and the translation of the node, in double, leads from
+///   there to where GlbPlace has the mesh. asset.extras tells how the world follows from the
+///   coordinates of the file: where their (0, 0, 0) lies (origin_in_world), the axes
+///   (gltf_from_world, row by row), units ("m" or "unknown"), metres_per_unit, metres_sigma,
+///   scale_source; also the area of each class, and the summary.
 /// - NORMAL, which Draco and Meshopt leave out where the material is unlit: it follows from the
 ///   faces, and nothing asks for it there. COLOR_0 in linear light; _SUPPORT (number of views that
 ///   see the vertex); _SIGMA (standard deviation along the normal [units of the file]; negative =
@@ -77,8 +80,7 @@ struct GlbReport {
 ///   asset.extras.provenance_names), which programs that pack files for the web keep.
 /// - With Draco (edgebreaker) all primitives share one quantisation grid, so that borders between
 ///   them stay closed. The result is decoded again and compared with the input. Quantized and
-///   with meshopt, the node's translation and scale lead from the shared grid to the units of the
-///   file.
+///   with meshopt, the node's scale and translation lead from the shared grid to the same place.
 ///
 /// \throws InvalidInput if options or mesh are not usable (an array does not fit, no face with an
 ///         area, coordinates beyond 1e18); NumericalError if the mesh as stored differs from the

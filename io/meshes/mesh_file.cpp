@@ -60,7 +60,7 @@ ParsedMesh parse(const std::filesystem::path& path, UpAxis& up) {
                  path,
                  "'" + extension +
                      "' is not a mesh format that is read; known are .ply, .obj, "
-                     ".stl, .off, .3mf and .glb");
+                     ".stl, .off, .3mf, .glb and .gltf");
 }
 
 // Three corners in one place or on one line: no area. Others keep such faces, so do we.
@@ -112,13 +112,13 @@ MeasurableFile measurable(GlbMesh glb,
 
 bool is_mesh_name(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
-  const auto known = {".ply", ".obj", ".stl", ".off", ".3mf", ".glb"};
-  return std::find(known.begin(), known.end(), extension) != known.end();
+  const auto known = {".ply", ".obj", ".stl", ".off", ".3mf"};
+  return has_gltf_extension(path) || std::find(known.begin(), known.end(), extension) != known.end();
 }
 
 MeasurableFile read_mesh_file(const std::filesystem::path& path,
                               const std::optional<Frame>& frame) {
-  if (lower_extension(path) == ".glb") return measurable(read_glb(path), path, frame);
+  if (has_gltf_extension(path)) return measurable(read_glb(path), path, frame);
   UpAxis up;
   ParsedMesh parsed = parse(path, up);
   return measurable(std::move(parsed), up, path, frame);

@@ -23,7 +23,6 @@ void validate(const Tileset& tileset) {
   require(!tileset.box.isEmpty() && tileset.box.sizes().allFinite(),
           "write_tileset: the box must hold something; sizes",
           tileset.box.sizes().transpose());
-  require(tileset.place.allFinite(), "write_tileset: place must be finite", tileset.place);
   double coarser = tileset.box.diagonal().norm();
   for (const TilesetLevel& level : tileset.levels) {
     require(level.geometric_error >= 0 && level.geometric_error <= coarser,
@@ -58,9 +57,6 @@ void write_tileset(const std::filesystem::path& path, const Tileset& tileset) {
     if (!tile.is_null()) coarser["children"] = Json::array({std::move(tile)});
     tile = std::move(coarser);
   }
-  const Eigen::Vector3d& place = tileset.place;
-  // Column by column; children inherit it.
-  tile["transform"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, place.x(), place.y(), place.z(), 1};
   const Json json = {{"asset", {{"version", "1.1"}, {"extras", {{"units", tileset.units}}}}},
                      // Of showing nothing at all.
                      {"geometricError", tileset.box.diagonal().norm()},

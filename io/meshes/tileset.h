@@ -20,14 +20,13 @@ struct TilesetLevel {
 struct Tileset {
   std::vector<TilesetLevel> levels;  ///< From coarse to fine.
   Eigen::AlignedBox3d box;           ///< Around all levels [units of the files], glTF axes (+Y up).
-  Eigen::Vector3d place =
-      Eigen::Vector3d::Zero();  ///< Of their origin in the coordinates of the tileset (+Z up).
   std::string units;            ///< "m", or "unknown" as extras of the files say it.
 };
 
 /// Writes a 3D Tiles tileset: a chain of tiles, each of which is replaced by the next finer one as
 /// soon as a viewer is so near that its error shows. The chain ends at an error of 0: nothing finer
-/// is there. Viewers turn +Y of glTF into +Z themselves.
+/// is there. Viewers turn +Y of glTF into +Z themselves. The nodes of the files say where they lie,
+/// so that tiles have no transform.
 ///
 /// \throws InvalidInput if there is no level, an error grows from coarse to fine or is no length,
 ///         or the box is empty; IoError

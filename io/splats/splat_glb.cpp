@@ -15,6 +15,7 @@
 #include "io/bytes/byte_writer.h"
 #include "io/bytes/json_file.h"
 #include "io/glb/bytes.h"
+#include "io/glb/place.h"
 #include "io/glb/scene.h"
 #include "io/splats/splat_arrays.h"
 #include "libcgs/core/error.h"
@@ -136,23 +137,6 @@ void add_looks(SplatBuffer& buffer, const Gaussians& g) {
   buffer.add(named("OPACITY"), "SCALAR", [&](size_t i) { return std::array{g.opacity[i]}; });
 }
 
-/// What asset.extras say, and lead readers of ours back by.
-Json place_in_world(const Frame& frame,
-                    const Eigen::Vector3f& center,
-                    const Eigen::Matrix3d& y_up) {
-  const Eigen::Vector3d origin = frame.world_from_internal(center.cast<double>());
-  Json rotation = Json::array();
-  for (int i = 0; i < 9; ++i) rotation.push_back(y_up(i / 3, i % 3));
-  const Eigen::Vector3d& file_origin = frame.file_origin;
-  return {{"units", frame.has_metric_scale() ? "m" : "unknown"},
-          {"metres_per_unit", frame.metres_per_unit},
-          {"metres_sigma", frame.metres_sigma},
-          {"scale_source", scale_source_name(frame.scale_source)},
-          {"origin_in_world", {origin.x(), origin.y(), origin.z()}},
-          {"gltf_from_world", std::move(rotation)},
-          {"file_origin", {file_origin.x(), file_origin.y(), file_origin.z()}}};
-}
-
 }  // namespace
 
 std::string splat_harmonic_name(int degree, int order) {
@@ -171,7 +155,7 @@ size_t write_splat_glb(const std::filesystem::path& path,
   options.validate();
   require_writable(g);
   require(g.size() > 0, "write_splat_glb: number of splats must be > 0", 0);
-  const double unit = frame.scale * (frame.has_metric_scale() ? frame.metres_per_unit : 1.0);
+  const double unit = GlbPlace::unit(frame);
   const Eigen::Vector3f center = median_position(g);
   const auto placed = [&](size_t i) {
     return Eigen::Vector3f((unit * (g.position[i] - center).cast<double>()).cast<float>());
@@ -200,10 +184,15 @@ size_t write_splat_glb(const std::filesystem::path& path,
   add_harmonics(buffer, g);
   add_provenance(buffer, g);
   Json document = buffer.document();
+  const auto vector = [](const Eigen::Vector3d& v) { return Json{v.x(), v.y(), v.z()}; };
+  const GlbPlace place{options.y_up, options.local_origin};
   const Eigen::Quaterniond turn(options.y_up);
-  document["nodes"][0]["rotation"] = {turn.x(), turn.y(), turn.z(), turn.w()};
+  Json& node = document["nodes"][0];
+  node["translation"] = vector(place.of(center.cast<double>(), frame));
+  node["rotation"] = {turn.x(), turn.y(), turn.z(), turn.w()};
   Json& extras = document["asset"]["extras"];
-  extras = place_in_world(frame, center, options.y_up);
+  extras = glb_place_to_json(place, frame);
+  extras["file_origin"] = vector(frame.file_origin);
   if (!options.evidence.empty()) extras["evidence"] = options.evidence;
   const std::string out = glb_bytes(json_text(document, -1), buffer.take_bytes());
   write_file(path, out);

@@ -21,6 +21,7 @@ std::string splat_harmonic_name(int degree, int order);
 struct SplatGlbOptions {
   Eigen::Matrix3d y_up = Eigen::Matrix3d::Identity();  ///< World to glTF axes; y_up_from(up).
   std::string evidence = {};  ///< As write_gaussian_ply(); for asset.extras.
+  bool local_origin = false;  ///< As GlbPlace::has_local_origin.
 
   /// \throws InvalidInput if y_up is no rotation.
   void validate() const;
@@ -30,9 +31,10 @@ struct SplatGlbOptions {
 /// opacity and spherical harmonics as float attributes, and COLOR_0 (linear, with opacity) for
 /// readers that only know points; also _PROVENANCE, the number of the label, where splats state it.
 ///
-/// In metres where the scale is known, else in world units; positions are relative to their median,
-/// and the node turns them +Y up. Its place in the world stands in asset.extras, in double, and
-/// leads parse_splat_glb() back there.
+/// In metres where the scale is known, else in world units; positions are relative to their median.
+/// The node turns them +Y up and moves them, in double, to where GlbPlace has them, so that they
+/// lie on meshes that write_glb() wrote with the same options. asset.extras say how the world follows
+/// from that, which leads parse_splat_glb() back there.
 /// \return bytes of the file
 /// \throws InvalidInput as write_gaussian_ply(), or if a scale or place leaves the range of float;
 ///         LimitError above 4 GiB; IoError

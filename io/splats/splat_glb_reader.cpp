@@ -13,9 +13,11 @@
 
 #include "io/bytes/byte_writer.h"
 #include "io/glb/container.h"
+#include "io/glb/extensions.h"
 #include "io/glb/scene.h"
 #include "io/splats/sh_rotation.h"
 #include "io/splats/splat_glb.h"
+#include "io/splats/spz_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/srgb.h"
@@ -30,8 +32,13 @@ constexpr uint64_t kMostHarmonics = uint64_t{1} << 28;
 constexpr uint64_t kMostPrimitives = uint64_t{1} << 20;
 
 std::optional<JsonValue> splat_extension(const JsonValue& primitive) {
-  const auto extensions = primitive.find("extensions");
-  return extensions ? extensions->find(kGaussianSplatting) : std::nullopt;
+  return extension_of(primitive, kGaussianSplatting);
+}
+
+/// The extension by which splats are compressed with SPZ, inside that of splats.
+std::optional<JsonValue> spz_extension(const JsonValue& splats) {
+  const auto spz = extension_of(splats, "KHR_gaussian_splatting_compression_spz_2");
+  return spz ? spz : extension_of(splats, "KHR_gaussian_splatting_compression_spz");
 }
 
 /// The highest degree of which anything is there.
@@ -66,10 +73,19 @@ ScenePrimitives scene_primitives(const GlbContainer& file,
     }
     for (size_t i = 0; i < primitives.size(); ++i) {
       const JsonValue primitive = primitives.at(i);
-      if (!splat_extension(primitive)) {
+      const auto extension = splat_extension(primitive);
+      if (!extension) {
         const auto mode = primitive.find("mode");
         out.has_triangles = out.has_triangles || !mode || mode->count() >= kTriangles;
         out.others.insert(primitive.pointer());
+        continue;
+      }
+      if (const auto spz = spz_extension(*extension)) {
+        const std::string_view bytes = file.view_bytes(spz->at("bufferView"));
+        const SpzCount stated = stated_spz_splats(bytes, file.path());
+        out.splats += std::min(stated.splats, kSpzSplatsPerByte * bytes.size());
+        out.sh_degree = std::max(
+            out.sh_degree, static_cast<int>(std::lround(std::sqrt(stated.harmonics))) - 1);
         continue;
       }
       const JsonValue attributes = primitive.at("attributes");
@@ -176,14 +192,15 @@ class SplatScene {
   }
 
   RawSplats read() {
-    const std::vector<GlbInstance> instances = glb_instances(file_);
-    examine(instances);
+    const GlbScene scene = glb_scene(file_);
+    examine(scene.instances);
     place();
-    for (const GlbInstance& instance : instances) add_mesh(instance);
+    for (const GlbInstance& instance : scene.instances) add_mesh(instance);
     if (!splats_.provenance.empty()) leave_unlabelled(splats_.size());
     if (splats_.size() == 0) throw BadInput(Defect::Empty, file_.path(), "holds no splats");
     const std::string odd = check_significance(file_.path(), stored_, kFloatDigits);
     if (!odd.empty()) splats_.notes.push_back(odd);
+    splats_.notes.insert(splats_.notes.end(), scene.warnings.begin(), scene.warnings.end());
     if (others_ > 0) {
       splats_.notes.push_back("left out " + std::to_string(others_) +
                               " primitives of the file that are no splats");
@@ -247,18 +264,61 @@ class SplatScene {
     const JsonValue primitives = instance.mesh.at("primitives");
     for (size_t i = 0; i < primitives.size(); ++i) {
       const auto extension = splat_extension(primitives.at(i));
-      if (extension) add(primitives.at(i), *extension, file_from_gltf_ * instance.gltf_from_mesh);
+      if (!extension) continue;
+      const Eigen::Affine3d file_from_mesh = file_from_gltf_ * instance.gltf_from_mesh;
+      const Eigen::Matrix3d linear = file_from_mesh.linear();
+      if (!linear.allFinite() || linear.determinant() == 0 ||
+          !std::isfinite(linear.determinant())) {
+        primitives.at(i).fail(Defect::Value, "lies in a node that flattens splats");
+      }
+      if (const auto spz = spz_extension(*extension)) {
+        add_compressed(*spz, file_from_mesh);
+      } else {
+        add(primitives.at(i), *extension, file_from_mesh);
+      }
     }
   }
 
-  Attributes attributes_of(const JsonValue& primitive, const JsonValue& extension) const {
-    const JsonValue in = primitive.at("attributes");
-    const auto named = [](const char* what) {
-      return std::string(kGaussianSplatting) + ":" + what;
-    };
-    if (extension.find("extensions") && !in.find(named("ROTATION"))) {
-      extension.fail(Defect::Unsupported, "holds compressed splats; save them uncompressed");
+  /// What parse_spz() turned into the axes of the 3DGS PLY is turned on into those of glTF: blobs
+  /// are packed as left, up, front.
+  /// Source: Khronos Group, KHR_gaussian_splatting_compression_spz_2, draft of 2025.
+  void add_compressed(const JsonValue& spz, const Eigen::Affine3d& file_from_mesh) {
+    const RawSplats in = parse_spz(file_.view_bytes(spz.at("bufferView")), file_.path());
+    const Eigen::Affine3d file_from_spz =
+        file_from_mesh * Eigen::Affine3d(Eigen::Scaling(-1.0, -1.0, 1.0));
+    splats_.is_antialiased = splats_.is_antialiased || in.is_antialiased;
+    for (const std::string& note : in.notes) splats_.notes.push_back(note);
+    if (!splats_.provenance.empty()) leave_unlabelled(splats_.size() + in.size());
+    const SplatTurn turn(file_from_spz.linear());
+    for (size_t i = 0; i < in.size(); ++i) {
+      stored_.extend(file_from_spz.linear() * in.position[i]);
+      splats_.position.push_back(file_from_spz * in.position[i]);
+      Eigen::Vector3d scale = in.log_scale[i].cast<double>().array().exp();
+      Eigen::Vector4f rotation = in.rotation[i];
+      turn.apply(scale, rotation);
+      splats_.log_scale.emplace_back(scale.array().log().matrix().cast<float>());
+      splats_.rotation.push_back(rotation);
+      splats_.logit.push_back(in.logit[i]);
+      const size_t begin = splats_.sh.size();
+      splats_.sh.resize(begin + splats_.sh_count(), Eigen::Vector3f::Zero());
+      const std::span<Eigen::Vector3f> out = std::span(splats_.sh).subspan(begin);
+      std::copy_n(in.sh.begin() + static_cast<std::ptrdiff_t>(i * in.sh_count()),
+                  std::min(in.sh_count(), out.size()),
+                  out.begin());
+      turn.apply(out);
     }
+  }
+
+  /// Drafts of the extension named attributes otherwise.
+  static std::string attribute_name(const JsonValue& attributes, const char* what) {
+    const std::string name = std::string(kGaussianSplatting) + ":" + what;
+    const std::string draft = std::string("_") + what;
+    return !attributes.find(name) && attributes.find(draft) ? draft : name;
+  }
+
+  Attributes attributes_of(const JsonValue& primitive) const {
+    const JsonValue in = primitive.at("attributes");
+    const auto named = [&](const char* what) { return attribute_name(in, what); };
     Attributes out;
     const auto accessor = [&](const std::string& name) {
       return file_.element("accessors", in.at(name));
@@ -277,6 +337,10 @@ class SplatScene {
     out.position = values("POSITION", 3);
     out.rotation = values(named("ROTATION"), 4);
     out.scale = values(named("SCALE"), 3);
+    if (named("ROTATION").front() == '_' && !in.find(named("OPACITY"))) {
+      take_colors(values("COLOR_0", 4), out);
+      return out;
+    }
     out.opacity = values(named("OPACITY"), 1);
     if (const auto normalized = accessor(named("OPACITY")).find("normalized")) {
       constexpr int kUnsignedByte = 5121;
@@ -297,6 +361,15 @@ class SplatScene {
     return out;
   }
 
+  static void take_colors(const std::vector<float>& rgba, Attributes& out) {
+    out.opacity_step = 1 / 255.0;
+    out.harmonics.emplace_back();
+    for (size_t i = 0; i < rgba.size(); ++i) {
+      if (i % 4 == 3) out.opacity.push_back(rgba[i]);
+      if (i % 4 != 3) out.harmonics[0].push_back((rgba[i] - 0.5F) / kShC0);
+    }
+  }
+
   void add(const JsonValue& primitive,
            const JsonValue& extension,
            const Eigen::Affine3d& file_from_mesh) {
@@ -310,10 +383,7 @@ class SplatScene {
                    (!is_linear && color_space != "srgb_rec709_display");
     is_linear_ = is_linear_ || is_linear;
     const Eigen::Matrix3d linear = file_from_mesh.linear();
-    if (!linear.allFinite() || linear.determinant() == 0 || !std::isfinite(linear.determinant())) {
-      primitive.fail(Defect::Value, "lies in a node that flattens splats");
-    }
-    Attributes in = attributes_of(primitive, extension);
+    Attributes in = attributes_of(primitive);
     // The extension's text says lengths; files after its draft hold logarithms.
     const bool is_negative =
         std::any_of(in.scale.begin(), in.scale.end(), [](float s) { return s < 0; });
@@ -382,7 +452,7 @@ class SplatScene {
 
 GlbSplatCount count_glb_splats(const std::filesystem::path& path) {
   const GlbContainer file(path);
-  const ScenePrimitives found = scene_primitives(file, glb_instances(file));
+  const ScenePrimitives found = scene_primitives(file, glb_scene(file).instances);
   const uint64_t side = static_cast<uint64_t>(found.sh_degree) + 1;
   return {found.splats, side * side, found.has_triangles};
 }

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "io/bytes/byte_reader.h"
+#include "io/bytes/scene_path.h"
+#include "io/glb/container.h"
 #include "io/splats/compressed_ply.h"
 #include "io/splats/dot_splat.h"
 #include "io/splats/gaussian_ply.h"
@@ -18,6 +20,12 @@ namespace cgs {
 
 namespace {
 
+bool looks_like_gltf(std::string_view bytes, const std::filesystem::path& path) {
+  if (bytes.starts_with("glTF")) return true;
+  return is_gltf_text(bytes) && (lower_extension(path) == ".gltf" ||
+                                 bytes.find("\"asset\"") != std::string_view::npos);
+}
+
 RawSplats parse(std::string bytes, const std::filesystem::path& path) {
   const std::string_view all = bytes;
   if (all.substr(0, 4) == "ply\n" || all.substr(0, 4) == "ply\r") {
@@ -27,17 +35,14 @@ RawSplats parse(std::string bytes, const std::filesystem::path& path) {
   if (looks_like_spz(all)) return parse_spz(all, path);
   if (looks_like_sog(all)) return parse_sog(all, path);
   if (looks_like_ksplat(all)) return parse_ksplat(all, path);
-  if (all.substr(0, 4) == "glTF") return parse_splat_glb(std::move(bytes), path);
-  if (all.find("\"asset\"") < 65536) {
-    throw BadInput(Defect::Unsupported, path, "glTF as text; splats are read from .glb");
-  }
+  if (looks_like_gltf(all, path)) return parse_splat_glb(std::move(bytes), path);
   // First: the bytes of a coordinate may be those that another format starts with.
   if (looks_like_dot_splat(all)) return parse_dot_splat(all, path);
   refuse_foreign_content(path, all, "splats");
   throw BadInput(
       Defect::Magic,
       path,
-      "no splats: expected .ply, .spz, .sog, .ksplat, .glb, or records of .splat (32 bytes each)");
+      "no splats: expected .ply, .spz, .sog, .ksplat, .glb, .gltf, or records of .splat (32 bytes each)");
 }
 
 }  // namespace
@@ -48,7 +53,7 @@ std::optional<SplatCount> stated_splats(const std::filesystem::path& path) {
   std::error_code unknown;
   out.file_bytes = std::filesystem::file_size(path, unknown);
   if (unknown) return {};
-  if (start.substr(0, 4) == "glTF") {
+  if (looks_like_gltf(start, path)) {
     const GlbSplatCount found = count_glb_splats(path);
     out.splats = found.splats;
     out.harmonics = found.harmonics;

@@ -129,6 +129,7 @@ class Glb:
         return np.asarray(Image.open(io.BytesIO(self.view(source['bufferView']))).convert('RGB'), dtype=float)
 
     def in_world(self, positions):
+        positions = positions + self.json['nodes'][0]['translation']
         extras = self.json['asset']['extras']
         return positions @ np.array(extras['gltf_from_world']).reshape(3, 3) + extras['origin_in_world']
 

@@ -67,7 +67,10 @@ std::vector<Tile> tiles_of(const json& tileset) {
 }
 
 // Content has +Y up, tiles have +Z up.
-Eigen::Vector3d in_tile(const std::vector<float>& p) { return {p[0], -p[2], p[1]}; }
+Eigen::Vector3d in_tile(const test::Glb& glb, const std::vector<float>& position) {
+  const Eigen::Vector3d p = test::placed(glb, position);
+  return {p.x(), -p.z(), p.y()};
+}
 
 // How far outside of a box a place lies, as a share of the half length that it is outside along.
 double reach(const json& box, const Eigen::Vector3d& place) {
@@ -90,12 +93,12 @@ void expect_placed(const Tile& tile, const test::Glb& glb) {
   double farthest = 0;
   for (const test::GlbPart& part : glb.parts) {
     for (const auto& p : part.values.at("POSITION")) {
-      farthest = std::max(farthest, reach(tile.object["boundingVolume"]["box"], in_tile(p)));
+      farthest = std::max(farthest, reach(tile.object["boundingVolume"]["box"], in_tile(glb, p)));
       // The same place by what the file says of itself; its second axis is up.
-      const Eigen::Vector3d in_world = test::in_world(extras, p);
+      const Eigen::Vector3d in_world = test::in_world(glb, p);
       const Eigen::Vector3d expected(world(0, in_world), -world(2, in_world), world(1, in_world));
       const Eigen::Vector3d found =
-          (tile.tileset_from_tile * in_tile(p).homogeneous()).hnormalized();
+          (tile.tileset_from_tile * in_tile(glb, p).homogeneous()).hnormalized();
       ASSERT_LT((found - expected).norm(), 1e-5);
     }
   }

@@ -115,8 +115,7 @@ class Painter {
       const GlbPart& part = glb_.parts[p];
       std::vector<Eigen::Vector3d> corners;
       for (const auto& position : part.values.at("POSITION")) {
-        corners.push_back(camera_.project_in_cam(cam_from_world *
-                                                 in_world(glb_.json["asset"]["extras"], position)));
+        corners.push_back(camera_.project_in_cam(cam_from_world * in_world(glb_, position)));
       }
       for (const auto& face : part.faces) draw(p, face, corners);
     }
@@ -238,13 +237,24 @@ Glb parse_glb(const std::string& bytes) {
   return glb;
 }
 
-Eigen::Vector3d in_world(const nlohmann::json& extras, const std::vector<float>& position) {
+Eigen::Vector3d placed(const Glb& glb, const std::vector<float>& position) {
+  const auto& node = glb.json["nodes"][0];
+  const auto shift = node.value("translation", std::vector<double>{0, 0, 0});
+  const auto scale = node.value("scale", std::vector<double>{1, 1, 1});
+  EXPECT_FALSE(node.contains("matrix") || node.contains("rotation"));
+  Eigen::Vector3d out;
+  for (size_t k = 0; k < 3; ++k) out[int(k)] = shift[k] + scale[k] * double{position[k]};
+  return out;
+}
+
+Eigen::Vector3d in_world(const Glb& glb, const std::vector<float>& position) {
+  const auto& extras = glb.json["asset"]["extras"];
   Eigen::Matrix3d R;
   for (int i = 0; i < 9; ++i) R(i / 3, i % 3) = extras["gltf_from_world"][static_cast<size_t>(i)];
   Eigen::Vector3d origin;
   for (int k = 0; k < 3; ++k) origin[k] = extras["origin_in_world"][static_cast<size_t>(k)];
   const double unit = extras["units"] == "m" ? extras["metres_per_unit"].get<double>() : 1.0;
-  return origin + R.transpose() * Eigen::Vector3d(position[0], position[1], position[2]) / unit;
+  return origin + R.transpose() * placed(glb, position) / unit;
 }
 
 GlbPicture render_glb(const Glb& glb, const Camera& camera) { return Painter(glb, camera).paint(); }

@@ -35,8 +35,11 @@ struct Glb {
 /// container, the counts or the bounds of POSITION are wrong.
 Glb parse_glb(const std::string& bytes);
 
-/// World coordinates of a position in the file, by what its extras say.
-Eigen::Vector3d in_world(const nlohmann::json& extras, const std::vector<float>& position);
+/// Where any reader has a position of the file, by its first node: translation and scale, in double.
+Eigen::Vector3d placed(const Glb& glb, const std::vector<float>& position);
+
+/// World coordinates of a position in the file, by its node and what its extras say.
+Eigen::Vector3d in_world(const Glb& glb, const std::vector<float>& position);
 
 /// What a viewer without lights shows: base colour texture (bilinear, sRGB-coded) times COLOR_0
 /// times the base colour factor.

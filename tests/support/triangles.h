@@ -67,7 +67,7 @@ inline std::vector<Triangle> triangles_of_glb(const std::filesystem::path& path)
     for (const auto& face : part.faces) {
       Triangle& t = out.emplace_back();
       for (size_t k = 0; k < 3; ++k) {
-        t.at(k) = in_world(glb.json["asset"]["extras"], part.values.at("POSITION")[face.at(k)]);
+        t.at(k) = in_world(glb, part.values.at("POSITION")[face.at(k)]);
       }
     }
   }

@@ -299,7 +299,7 @@ Finding glb(const Cell& cell) {
   Points points;
   for (const GlbPart& part : read.parts) {
     for (const auto& p : part.values.at("POSITION")) {
-      points.push_back(cell.plain(in_world(read.json["asset"]["extras"], p)));
+      points.push_back(cell.plain(in_world(read, p)));
     }
   }
   const double allowed = 2 * 1.01 / 16384 + 1e-6;  // what `--max-error` defaults to

@@ -95,14 +95,63 @@ TEST(GlbColors, DiffuseColoursStandForBaseColours) {
   EXPECT_LT((t.linear_colors()[2] - Eigen::Vector3f(0.25f, 0.5f, 1)).norm(), 1e-5f);
 }
 
+// A quarter turn takes what lay to the right of the corner up from it, where v is less.
+TEST(GlbColors, TexturesAreTurnedScaledAndMoved) {
+  TexturedTriangle t;
+  Json& transform = t.material()["baseColorTexture"]["extensions"]["KHR_texture_transform"];
+  transform = {{"rotation", 0.5 * M_PI}};
+  auto colors = t.linear_colors();
+  EXPECT_LT((colors[0] - Eigen::Vector3f(0, 0, 1)).norm(), 1e-4f) << "(1/4, 1/4) to (1/4, 3/4)";
+  EXPECT_LT((colors[1] - Eigen::Vector3f(1, 0, 0)).norm(), 1e-4f) << "(3/4, 1/4) to (1/4, 1/4)";
+  transform["offset"] = {0.5, 0};
+  EXPECT_LT((t.linear_colors()[1] - Eigen::Vector3f(0, 1, 0)).norm(), 1e-4f) << "(3/4, 1/4)";
+  // (3/4, 1/4) times (1, 3) is (3/4, 3/4), turned (3/4, -3/4), moved (5/4, -3/4), a whole less on
+  // either side (1/4, 1/4).
+  transform["scale"] = {1, 3};
+  EXPECT_LT((t.linear_colors()[1] - Eigen::Vector3f(1, 0, 0)).norm(), 1e-4f);
+}
+
+TEST(GlbColors, TheTransformOfATextureMayNameOtherCoordinates) {
+  TexturedTriangle t;
+  Json& texture = t.material()["baseColorTexture"];
+  texture["texCoord"] = 1;
+  texture["extensions"]["KHR_texture_transform"]["texCoord"] = 0;
+  EXPECT_LT((t.linear_colors()[0] - Eigen::Vector3f(1, 0, 0)).norm(), 1e-5f);
+}
+
+TEST(GlbColors, PicturesMayLieBesideTheFile) {
+  TexturedTriangle t;
+  const test::TempDir dir;
+  const auto& view = t.json["bufferViews"][3];
+  test::write_bytes(dir / "my wall.png",
+                    t.binary.substr(view["byteOffset"].get<size_t>(),
+                                    view["byteLength"].get<size_t>()));
+  t.json["images"][0] = {{"uri", "my%20wall.png"}};
+  test::write_bytes(dir / "a.glb", t.bytes());
+  const GlbMesh mesh = read_glb(dir / "a.glb");
+  EXPECT_TRUE(mesh.parsed.has_textures);
+  EXPECT_TRUE(mesh.parsed.warnings.empty());
+  EXPECT_LT((mesh.parsed.mesh.colors[0] - Eigen::Vector3f(1, 0, 0)).norm(), 1e-5f);
+}
+
+TEST(GlbColors, SayWhatHasNoPlaceInColoursOfVertices) {
+  TexturedTriangle t;
+  t.json["materials"][0]["alphaMode"] = "BLEND";
+  t.json["materials"][0]["emissiveFactor"] = {0, 0, 1};
+  const auto warnings = t.read().parsed.warnings;
+  ASSERT_EQ(warnings.size(), 2U);
+  EXPECT_NE(warnings[0].find("read as opaque"), std::string::npos);
+  EXPECT_NE(warnings[1].find("light that surfaces give off"), std::string::npos);
+}
+
 TEST(GlbColors, TexturesThatCannotBeReadAreTold) {
   TexturedTriangle t;
-  t.json["images"][0] = {{"uri", "a.png"}};
+  t.json["images"][0] = {{"uri", "absent.png"}};
   const GlbMesh elsewhere = t.read();
   EXPECT_TRUE(elsewhere.parsed.mesh.colors.empty());
   EXPECT_FALSE(elsewhere.parsed.has_textures);
   ASSERT_EQ(elsewhere.parsed.warnings.size(), 1U);
-  EXPECT_EQ(elsewhere.parsed.warnings[0], "textures in other files are not read");
+  EXPECT_TRUE(elsewhere.parsed.warnings[0].starts_with("texture 0 is left out: OPEN"));
   t.json["images"][0] = {{"bufferView", 0}};
   const GlbMesh broken = t.read();
   ASSERT_EQ(broken.parsed.warnings.size(), 1U);

@@ -129,6 +129,8 @@ TEST(ReadGlb, PointsBesideTrianglesAddNothing) {
   const GlbMesh mesh = t.read();
   EXPECT_EQ(mesh.parsed.positions.size(), 3U);
   EXPECT_EQ(mesh.parsed.mesh.colors.size(), 3U);
+  EXPECT_EQ(mesh.parsed.warnings,
+            (std::vector<std::string>{"left out 3 points that lie beside the triangles"}));
 }
 
 TEST(ReadGlb, RefusesFloatsThatKeepTooLittle) {
@@ -176,11 +178,11 @@ TEST(ReadGlb, NamesWhatIsWrong) {
   EXPECT_EQ(broken("/accessors/1/count", -1), "SCHEMA");
   EXPECT_EQ(broken("/accessors/1/type", "VEC2"), "SCHEMA");
   EXPECT_EQ(broken("/accessors/1/componentType", 5130), "SCHEMA");
-  EXPECT_EQ(broken("/accessors/1/sparse", Json::object()), "UNSUPPORTED");
+  EXPECT_EQ(broken("/accessors/1/sparse", Json::object()), "SCHEMA");
   EXPECT_EQ(broken("/bufferViews/1/byteOffset", 9), "COUNT");
   EXPECT_EQ(broken("/bufferViews/1/byteOffset", 9007199254740992.0), "COUNT");
   EXPECT_EQ(broken("/bufferViews/1/byteStride", 4), "VALUE");
-  EXPECT_EQ(broken("/buffers/0/uri", "/etc/passwd"), "UNSUPPORTED");
+  EXPECT_EQ(broken("/buffers/0/uri", "/etc/passwd"), "PATH");
   EXPECT_EQ(broken("/nodes/0/children", {0}), "REF");
   EXPECT_EQ(broken("/nodes/0/mesh", 1), "REF");
   EXPECT_EQ(broken("/nodes/0/skin", 0), "UNSUPPORTED");
@@ -188,7 +190,8 @@ TEST(ReadGlb, NamesWhatIsWrong) {
   EXPECT_EQ(broken("/scenes", Json::object()), "SCHEMA");
   EXPECT_EQ(broken("/scene", 1), "REF");
   EXPECT_EQ(broken("/extensionsRequired", {"KHR_meshopt_compression"}), "UNSUPPORTED");
-  EXPECT_EQ(broken("/meshes/0/primitives/0/mode", 0), "EMPTY");
+  EXPECT_EQ(broken("/meshes/0/primitives/0/mode", 1), "EMPTY");
+  EXPECT_EQ(broken("/meshes/0/primitives/0/mode", 7), "SCHEMA");
   Triangle t;
   t.binary[2] = 3;  // an index
   EXPECT_EQ(defect(t.bytes()), "REF");

@@ -85,7 +85,7 @@ TEST(WriteTexturedGlb, TextureCoordinatesAreTheProjections) {
       for (size_t v = 0; v < part.values.at("TEXCOORD_0").size(); ++v) {
         // The nearest vertex of the mesh, by trying all.
         const Eigen::Vector3d p = test::centimetre_frame().internal_from_world(
-            in_world(out.glb.json["asset"]["extras"], part.values.at("POSITION")[v]));
+            in_world(out.glb, part.values.at("POSITION")[v]));
         Eigen::Vector3d nearest = out.box.mesh.vertices[0].cast<double>();
         for (const auto& q : out.box.mesh.vertices) {
           if ((q.cast<double>() - p).norm() < (nearest - p).norm()) nearest = q.cast<double>();

@@ -24,7 +24,7 @@ TEST(SplatReader, SaysWhatAFileIsInstead) {
   EXPECT_EQ(defect("<!DOCTYPE html>"), "MAGIC");
   EXPECT_EQ(defect("version https://git-lfs.github.com/spec/v1\n"), "MAGIC");
   EXPECT_EQ(defect("glTF\x02"), "TRUNCATED");
-  EXPECT_EQ(defect("{\"asset\": {\"version\": \"2.0\"}}"), "UNSUPPORTED");
+  EXPECT_EQ(defect("{\"asset\": {\"version\": \"2.0\"}}"), "EMPTY");
   EXPECT_EQ(defect(std::string("\0\1\0\0", 4) + std::string(5000, '\0')), "EMPTY");
   EXPECT_EQ(defect("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
                    "property float z\nend_header\n0 0 0\n"),
