@@ -90,7 +90,9 @@ void add_filter(CLI::App& app) {
   auto args = std::make_shared<FilterArgs>();
   auto* cmd = app.add_subcommand(
       "filter", "Clean, crop, smooth, simplify ... meshes and point clouds; labels and sigma stay");
-  cmd->add_option("input", args->input, "Mesh or point cloud: .ply, .obj, .stl, .off, .3mf, .glb, "
+  cmd->add_option("input",
+                  args->input,
+                  "Mesh or point cloud: .ply, .obj, .stl, .off, .3mf, .glb, "
                   ".gltf")
       ->required();
   cmd->add_option("output", args->output, "File to write: .ply, .obj, .stl, .3mf, .glb")

@@ -50,8 +50,8 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
   }
   const std::string origin = far_origin(report["frame"]);
   if (!origin.empty()) terminal.say(origin);
-  const std::string place = glb_place_text(
-      "web/asset.glb", frame_from_json(report["frame"]), args.request.local_origin);
+  const std::string place =
+      glb_place_text("web/asset.glb", frame_from_json(report["frame"]), args.request.local_origin);
   if (!place.empty()) terminal.say(place);
   const auto& certificate = report["certificate"];
   terminal.say(std::string("watertight mesh: ") +

@@ -74,9 +74,9 @@ std::string moved_origin_text(const std::filesystem::path& path,
                               const Eigen::Vector3d& read,
                               const Eigen::Vector3d& written);
 
-/// Says, of a .glb that is written, where its (0, 0, 0) lies if that is a local origin, or else that
-/// the content lies so far from it that programs in single precision cannot place it well; empty
-/// where there is nothing to say.
+/// Says, of a .glb that is written, where its (0, 0, 0) lies if that is a local origin, or else
+/// that the content lies so far from it that programs in single precision cannot place it well;
+/// empty where there is nothing to say.
 std::string glb_place_text(const std::filesystem::path& path,
                            const Frame& frame,
                            bool has_local_origin);

@@ -23,12 +23,12 @@ struct RunRequest {
   std::string compression_error;  ///< Of the compressed mesh; empty = 1/16384 of its size.
   GlbEncoding glb_encoding = GlbEncoding::Draco;  ///< Of asset.glb.
   EstimatedSurface estimated = EstimatedSurface::FillOnly;
-  std::string max_error;    ///< Promise: how far the written meshes lie from the fused
-                            ///< surface at most; empty = none.
+  std::string max_error;      ///< Promise: how far the written meshes lie from the fused
+                              ///< surface at most; empty = none.
   bool local_origin = false;  ///< Of asset.glb, its levels and splats.glb, as GlbOptions.
-  size_t lods = 0;          ///< Coarser levels of asset.glb, 0 to kMostLods.
-  size_t max_size = 0;      ///< Promise: largest asset.glb [bytes]; 0 = any.
-  size_t memory_limit = 0;  ///< [bytes]; 0 = 80 % of what is free.
+  size_t lods = 0;            ///< Coarser levels of asset.glb, 0 to kMostLods.
+  size_t max_size = 0;        ///< Promise: largest asset.glb [bytes]; 0 = any.
+  size_t memory_limit = 0;    ///< [bytes]; 0 = 80 % of what is free.
   bool overwrite = false;
   std::string settings_reason;  ///< Why size and training are these, for the report; may be empty.
 };

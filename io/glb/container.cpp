@@ -88,8 +88,8 @@ uint32_t index_at(const char* bytes, int type, const JsonValue& typed) {
 }
 
 [[noreturn]] void refuse_long_json(const std::filesystem::path& path, uint64_t bytes) {
-  throw LimitError(printable(path) + ": " + std::to_string(bytes) +
-                   " bytes of JSON, allowed are " + std::to_string(ReadLimits{}.max_json_bytes));
+  throw LimitError(printable(path) + ": " + std::to_string(bytes) + " bytes of JSON, allowed are " +
+                   std::to_string(ReadLimits{}.max_json_bytes));
 }
 
 }  // namespace
@@ -207,7 +207,6 @@ void GlbContainer::find_buffers() {
       buffers_.push_back(i == 0 && !binary_.empty() ? std::optional(binary_) : std::nullopt);
     }
   }
-  bytes_ = content_.size() + files_.size();
 }
 
 // Of a buffer view, or of the extension of one that is compressed.
@@ -229,7 +228,7 @@ std::string_view GlbContainer::chunk_bytes(const JsonValue& part) const {
 // Several views may name the same stream: together they hold no more than one that fills the file.
 void GlbContainer::decode_views() {
   const auto views = root().find("bufferViews");
-  uint64_t room = kMostMeshoptRatio * bytes_;
+  uint64_t room = kMostMeshoptRatio * (binary_.size() + files_.size());
   for (size_t i = 0; views && i < views->size(); ++i) {
     const auto extensions = views->at(i).find("extensions");
     const auto meshopt = extensions ? extensions->find(kMeshopt) : std::nullopt;
@@ -305,10 +304,11 @@ GlbContainer::Elements GlbContainer::stored(const JsonValue& part, const Layout&
 // Nothing in the file bounds how many there are, but each is for a vertex that lies in it.
 std::string GlbContainer::zeros(const JsonValue& accessor, const Layout& in) const {
   constexpr uint64_t kMostRatio = 64;  // as of compressed vertices
-  if (in.count > kMostRatio * bytes_ / in.size) {
+  const uint64_t bytes = content_.size() + files_.size();
+  if (in.count > kMostRatio * bytes / in.size) {
     accessor.fail(Defect::Count,
                   "has " + std::to_string(in.count) + " zeros, in a file of " +
-                      std::to_string(bytes_) + " bytes");
+                      std::to_string(bytes) + " bytes");
   }
   return std::string(in.count * in.size, '\0');
 }
@@ -326,8 +326,7 @@ void GlbContainer::replace_some(const JsonValue& sparse,
   const Elements at = stored(places, numbers);
   const Elements with = stored(sparse.at("values"), replaced);
   for (uint64_t i = 0; i < replaced.count; ++i) {
-    const uint32_t k =
-        index_at(at.bytes.data() + i * at.stride, numbers.component_type, places);
+    const uint32_t k = index_at(at.bytes.data() + i * at.stride, numbers.component_type, places);
     if (k >= in.count) {
       places.fail(Defect::Ref,
                   "names element " + std::to_string(k) + " of " + std::to_string(in.count));

@@ -19,8 +19,8 @@ namespace cgs {
 /// Whether a file may be glTF as text: JSON.
 bool is_gltf_text(std::string_view content);
 
-/// A glTF file, binary or text, taken apart but not yet believed: numbers are checked where they are
-/// used. Buffers may lie in its binary chunk, in files beside it or in data: URIs.
+/// A glTF file, binary or text, taken apart but not yet believed: numbers are checked where they
+/// are used. Buffers may lie in its binary chunk, in files beside it or in data: URIs.
 class GlbContainer {
  public:
   /// \throws BadInput Magic, Unsupported (another version), Truncated, Syntax; as read_json(),
@@ -87,7 +87,6 @@ class GlbContainer {
   nlohmann::json json_;
   GltfFiles files_;
   std::vector<std::optional<std::string_view>> buffers_;  // nothing for those without data
-  uint64_t bytes_ = 0;                                    // of the file and all buffers
   // Of a compressed buffer view.
   struct DecodedView {
     std::string bytes;

@@ -13,8 +13,8 @@ namespace cgs {
 /// \throws BadInput Unsupported, which names it
 void refuse_unknown_extensions(const JsonValue& root);
 
-/// One line for each extension that a file uses although it can do without, that may change shape or
-/// colour and is not read. Those of textures are told where a texture is left out.
+/// One line for each extension that a file uses although it can do without, that may change shape
+/// or colour and is not read. Those of textures are told where a texture is left out.
 std::vector<std::string> unread_extensions(const JsonValue& root);
 
 /// An extension of an object; nothing without it.

@@ -26,8 +26,8 @@ std::string percent_decoded(std::string_view text) {
   for (size_t i = 0; i < text.size(); ++i) {
     const bool is_code = text[i] == '%' && i + 2 < text.size() && hex_digit(text[i + 1]) >= 0 &&
                          hex_digit(text[i + 2]) >= 0;
-    out += is_code ? static_cast<char>(16 * hex_digit(text[i + 1]) + hex_digit(text[i + 2]))
-                   : text[i];
+    out +=
+        is_code ? static_cast<char>(16 * hex_digit(text[i + 1]) + hex_digit(text[i + 2])) : text[i];
     if (is_code) i += 2;
   }
   return out;

@@ -20,8 +20,8 @@ class GltfFiles {
   /// The bytes that object.uri names; they live as long as this does. A file is read once, however
   /// often it is named.
   /// \throws BadInput Path as resolve_in_scene() (absolute paths, "..", links and URLs that lead out
-  ///         of the folder), Open for a file that is not there, Syntax for a data: URI that does not
-  ///         decode; LimitError
+  ///         of the folder), Open for a file that is not there, Syntax for a data: URI that does
+  ///         not decode; LimitError
   /// Source: glTF 2.0, section 2.8 (URIs); RFC 2397, RFC 3986 (percent-encoding), RFC 4648.
   std::string_view bytes(const JsonValue& object);
 

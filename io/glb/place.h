@@ -25,8 +25,8 @@ struct GlbPlace {
     return has_local_origin ? frame.origin : Eigen::Vector3d::Zero();
   }
 
-  /// Where an internal point lies in the file, in double: the translation of a node whose content is
-  /// stored relative to that point.
+  /// Where an internal point lies in the file, in double: the translation of a node whose content
+  /// is stored relative to that point.
   Eigen::Vector3d of(const Eigen::Vector3d& internal, const Frame& frame) const {
     const Eigen::Vector3d from_origin = (frame.origin - origin(frame)) / frame.scale;
     return unit(frame) * (y_up * (from_origin + internal));

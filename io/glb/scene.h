@@ -27,8 +27,8 @@ struct GlbScene {
   std::vector<std::string> warnings;   ///< One line each: what the file holds beside it.
 };
 
-/// Every mesh of the default scene of a glTF file (of all nodes, if it has no scenes), but for those
-/// that KHR_node_visibility hides.
+/// Every mesh of the default scene of a glTF file (of all nodes, if it has no scenes), but for
+/// those that KHR_node_visibility hides.
 /// \throws BadInput Unsupported for a required extension that is not known, or for a skin; Ref for
 ///         a node with two parents; Schema, Count, Value for a node's matrix; LimitError for nodes
 ///         too deep

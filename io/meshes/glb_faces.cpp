@@ -157,8 +157,7 @@ class PrimitiveReader {
     }
     for (size_t i = 2; i < corners.size() && mode == kTriangleStrip; ++i) {
       const size_t odd = i % 2;  // every other triangle of a strip is turned over
-      const std::array<uint32_t, 3> face = {
-          corners[i - 2], corners[i - 1 + odd], corners[i - odd]};
+      const std::array<uint32_t, 3> face = {corners[i - 2], corners[i - 1 + odd], corners[i - odd]};
       // A corner named twice leads from one strip to the next.
       const bool is_seam = face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
       if (!is_seam) out.push_back(face);

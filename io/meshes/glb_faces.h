@@ -21,8 +21,8 @@ GlbKind glb_kind(const JsonValue& primitive);
 /// \throws BadInput as GlbContainer
 uint64_t stated_elements(const GlbContainer& file, const JsonValue& primitive);
 
-/// The triangles or points of one glTF primitive in the coordinates of its node. Arrays are empty or
-/// fit the positions.
+/// The triangles or points of one glTF primitive in the coordinates of its node. Arrays are empty
+/// or fit the positions.
 struct GlbFaces {
   std::vector<float> positions;  ///< Three each.
   std::vector<float> normals;    ///< Three each; of points alone.

@@ -16,8 +16,8 @@ struct GlbMesh {
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();  ///< Unit length, in the axes of the positions.
 };
 
-/// Reads every triangle of the default scene of a glTF file, binary or text with files beside it (of
-/// all nodes, if it has no scenes), plain, quantised (KHR_mesh_quantization) or compressed
+/// Reads every triangle of the default scene of a glTF file, binary or text with files beside it
+/// (of all nodes, if it has no scenes), plain, quantised (KHR_mesh_quantization) or compressed
 /// (KHR_draco_mesh_compression), nodes placed and morph targets weighted as the file says. Vertices
 /// at one place become one: the format repeats them wherever normals, textures or materials change.
 /// A file without triangles is a cloud of its points, with their normals; those whose place is not
@@ -29,8 +29,9 @@ struct GlbMesh {
 /// makes of theirs, materials and textures.
 ///
 /// \throws BadInput as GlbContainer; Empty without triangles and points; Unsupported for an
-///         extension that changes the geometry, or skins; Ref for a node with two parents; Value for positions that are
-///         infinite or that floats round too much, as check_significance(); LimitError
+///         extension that changes the geometry, or skins; Ref for a node with two parents; Value
+///         for positions that are infinite or that floats round too much, as check_significance();
+///         LimitError
 /// Source: glTF 2.0, KHR_mesh_quantization and KHR_draco_mesh_compression, Khronos Group.
 GlbMesh read_glb(const std::filesystem::path& path);
 /// The same for the content of a file, whose name is for messages.

@@ -113,7 +113,8 @@ MeasurableFile measurable(GlbMesh glb,
 bool is_mesh_name(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
   const auto known = {".ply", ".obj", ".stl", ".off", ".3mf"};
-  return has_gltf_extension(path) || std::find(known.begin(), known.end(), extension) != known.end();
+  return has_gltf_extension(path) ||
+         std::find(known.begin(), known.end(), extension) != known.end();
 }
 
 MeasurableFile read_mesh_file(const std::filesystem::path& path,

@@ -20,7 +20,7 @@ struct TilesetLevel {
 struct Tileset {
   std::vector<TilesetLevel> levels;  ///< From coarse to fine.
   Eigen::AlignedBox3d box;           ///< Around all levels [units of the files], glTF axes (+Y up).
-  std::string units;            ///< "m", or "unknown" as extras of the files say it.
+  std::string units;                 ///< "m", or "unknown" as extras of the files say it.
 };
 
 /// Writes a 3D Tiles tileset: a chain of tiles, each of which is replaced by the next finer one as

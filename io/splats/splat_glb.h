@@ -33,8 +33,8 @@ struct SplatGlbOptions {
 ///
 /// In metres where the scale is known, else in world units; positions are relative to their median.
 /// The node turns them +Y up and moves them, in double, to where GlbPlace has them, so that they
-/// lie on meshes that write_glb() wrote with the same options. asset.extras say how the world follows
-/// from that, which leads parse_splat_glb() back there.
+/// lie on meshes that write_glb() wrote with the same options. asset.extras say how the world
+/// follows from that, which leads parse_splat_glb() back there.
 /// \return bytes of the file
 /// \throws InvalidInput as write_gaussian_ply(), or if a scale or place leaves the range of float;
 ///         LimitError above 4 GiB; IoError

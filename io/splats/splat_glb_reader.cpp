@@ -84,8 +84,8 @@ ScenePrimitives scene_primitives(const GlbContainer& file,
         const std::string_view bytes = file.view_bytes(spz->at("bufferView"));
         const SpzCount stated = stated_spz_splats(bytes, file.path());
         out.splats += std::min(stated.splats, kSpzSplatsPerByte * bytes.size());
-        out.sh_degree = std::max(
-            out.sh_degree, static_cast<int>(std::lround(std::sqrt(stated.harmonics))) - 1);
+        out.sh_degree =
+            std::max(out.sh_degree, static_cast<int>(std::lround(std::sqrt(stated.harmonics))) - 1);
         continue;
       }
       const JsonValue attributes = primitive.at("attributes");

@@ -22,8 +22,8 @@ namespace {
 
 bool looks_like_gltf(std::string_view bytes, const std::filesystem::path& path) {
   if (bytes.starts_with("glTF")) return true;
-  return is_gltf_text(bytes) && (lower_extension(path) == ".gltf" ||
-                                 bytes.find("\"asset\"") != std::string_view::npos);
+  return is_gltf_text(bytes) &&
+         (lower_extension(path) == ".gltf" || bytes.find("\"asset\"") != std::string_view::npos);
 }
 
 RawSplats parse(std::string bytes, const std::filesystem::path& path) {
@@ -39,10 +39,10 @@ RawSplats parse(std::string bytes, const std::filesystem::path& path) {
   // First: the bytes of a coordinate may be those that another format starts with.
   if (looks_like_dot_splat(all)) return parse_dot_splat(all, path);
   refuse_foreign_content(path, all, "splats");
-  throw BadInput(
-      Defect::Magic,
-      path,
-      "no splats: expected .ply, .spz, .sog, .ksplat, .glb, .gltf, or records of .splat (32 bytes each)");
+  throw BadInput(Defect::Magic,
+                 path,
+                 "no splats: expected .ply, .spz, .sog, .ksplat, .glb, .gltf, or records of .splat "
+                 "(32 bytes each)");
 }
 
 }  // namespace

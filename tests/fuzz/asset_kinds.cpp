@@ -26,6 +26,7 @@
 #include "tests/support/splat_ply.h"
 #include "tests/support/temp_dir.h"
 #include "tests/support/threemf_file.h"
+#include "tests/support/triangle_glb.h"
 
 namespace cgs::test {
 
@@ -80,6 +81,23 @@ FileKind of_own_splats(const std::string& name, const std::string& file, const W
           }};
 }
 
+/// Splats in glTF as SPZ packs them.
+std::string spz_glb() {
+  const TempDir dir;
+  write_spz(dir / "a.spz", varied_splats(3, 1), Frame{}, {});
+  std::string blob = read_bytes(dir / "a.spz");
+  const std::string json = R"({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}],
+ "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"mode": 0, "attributes": {},
+  "extensions": {"KHR_gaussian_splatting": {"extensions":
+   {"KHR_gaussian_splatting_compression_spz_2": {"bufferView": 0}}}}}]}],
+ "bufferViews": [{"buffer": 0, "byteLength": )" +
+                           std::to_string(blob.size()) +
+                           "}], \"buffers\": [{\"byteLength\": " + std::to_string(blob.size()) +
+                           "}]}";
+  blob.resize((blob.size() + 3) / 4 * 4);
+  return glb(json, blob);
+}
+
 void add_splats(Kinds& kinds) {
   kinds.push_back(of_own_splats("splat-ply", "a.ply", write_splat_ply));
   kinds.push_back(of_splats(
@@ -108,6 +126,8 @@ void add_splats(Kinds& kinds) {
       "splat-glb", "a.glb", [](const fs::path& file, const Gaussians& g, const Frame& f) {
         write_splat_glb(file, g, f);
       }));
+  kinds.push_back(of_splats(
+      "splat-glb-spz", "a.glb", [](const fs::path& file) { write_bytes(file, spz_glb()); }));
   for (const uint16_t level : {0, 1, 2}) {
     const std::string name = "ksplat-" + std::to_string(level);
     kinds.push_back(of_splats(name, "a.ksplat", [=](const fs::path& file) {
@@ -211,7 +231,27 @@ void add_own_meshes(Kinds& kinds) {
   }
 }
 
+/// A triangle in glTF as text whose last corner a sparse morph target lifts; points beside it.
+std::string morphed_gltf() {
+  return R"({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}],
+ "nodes": [{"mesh": 0, "translation": [1, 2, 3], "weights": [0.5]}],
+ "meshes": [{"weights": [0], "primitives": [
+  {"attributes": {"POSITION": 0}, "targets": [{"POSITION": 1}]},
+  {"attributes": {"POSITION": 0}, "mode": 0, "targets": [{}]}]}],
+ "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+  {"componentType": 5126, "count": 3, "type": "VEC3", "sparse": {"count": 1,
+   "indices": {"bufferView": 1, "componentType": 5125}, "values": {"bufferView": 2}}}],
+ "bufferViews": [{"buffer": 0, "byteLength": 36},
+  {"buffer": 0, "byteOffset": 36, "byteLength": 4},
+  {"buffer": 0, "byteOffset": 40, "byteLength": 12}],
+ "buffers": [{"byteLength": 52, "uri": "data:application/octet-stream;base64,)"
+         "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAEAAAAAAAgAAAAAAAAAAAAAAAACAPw=="
+         R"("}]})";
+}
+
 void add_meshes(Kinds& kinds) {
+  kinds.push_back(
+      of_mesh("gltf", "a.gltf", [](const fs::path& file) { write_bytes(file, morphed_gltf()); }));
   kinds.push_back(of_mesh("mesh-ply", "a.ply", [](const fs::path& file) {
     write_mesh_ply(file, labelled_sphere(4, 4), centimetre_frame());
   }));

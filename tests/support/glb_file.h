@@ -35,7 +35,8 @@ struct Glb {
 /// container, the counts or the bounds of POSITION are wrong.
 Glb parse_glb(const std::string& bytes);
 
-/// Where any reader has a position of the file, by its first node: translation and scale, in double.
+/// Where any reader has a position of the file, by its first node: translation and scale, in
+/// double.
 Eigen::Vector3d placed(const Glb& glb, const std::vector<float>& position);
 
 /// World coordinates of a position in the file, by its node and what its extras say.

@@ -48,6 +48,51 @@ TEST(LostInFile, IsWhatTheFormatHasNoPlaceFor) {
   EXPECT_EQ(lost_in_file("a.3mf", bare, {}), "");
 }
 
+/// Where any reader of glTF has the largest x of a file that holds one mesh in one node.
+double farthest_x(const std::string& glb) {
+  const auto json = nlohmann::json::parse(glb.substr(20, glb.find("BIN") - 4 - 20));
+  const auto& node = json["nodes"][0];
+  double out = -1e300;
+  for (const auto& primitive : json["meshes"][0]["primitives"]) {
+    const auto& positions = json["accessors"][primitive["attributes"]["POSITION"].get<size_t>()];
+    out = std::max(out, positions["max"][0].get<double>());
+  }
+  return node["translation"][0].get<double>() +
+         node.value("scale", std::vector<double>{1, 1, 1})[0] * out;
+}
+
+TEST(WriteMeshAs, PartsOfAnAssemblyLieApartInGlb) {
+  const test::TempDir dir;
+  for (const auto& [name, encoding] : glb_encodings()) {
+    for (const double begin : {0.0, 10.0, 4e6}) {
+      Frame frame;
+      frame.origin = {begin, 0, 0};
+      frame.up = Eigen::Vector3d::UnitZ();
+      write_mesh_as(dir / "a.glb", corner(), frame, {.encoding = encoding});
+      const std::string placed = test::read_bytes(dir / "a.glb");
+      EXPECT_NEAR(farthest_x(placed), begin + 1, 1e-4) << name;
+      write_mesh_as(dir / "a.glb", corner(), frame, {.encoding = encoding, .local_origin = true});
+      EXPECT_NEAR(farthest_x(test::read_bytes(dir / "a.glb")), 1, 1e-4) << name;
+    }
+  }
+}
+
+TEST(GlbPlaceText, TellsWhatViewersInSinglePrecisionDo) {
+  Frame frame;
+  frame.metres_per_unit = 1;
+  EXPECT_EQ(glb_place_text("a.glb", frame, false), "");
+  frame.origin = {100, 0, 0};  // a hundred times its size
+  EXPECT_EQ(glb_place_text("a.glb", frame, false), "");
+  frame.origin = {4194304, 0, 0};  // 2^22 m, where floats are half a metre apart
+  EXPECT_EQ(glb_place_text("x/a.GLB", frame, false),
+            "a.GLB lies 4.194e+06 m from its (0, 0, 0): programs that place it in single precision "
+            "are off by up to 250 mm; --local-origin writes it about an origin near by");
+  EXPECT_EQ(glb_place_text("a.glb", frame, true),
+            "(0, 0, 0) of a.glb is 4194304, 0, 0 of the input, as asset.extras.origin_in_world of "
+            "the file states");
+  EXPECT_EQ(glb_place_text("a.ply", frame, false), "");
+}
+
 TEST(CertificateToJson, GivesMeasuresInFileUnits) {
   const auto json = certificate_to_json(certify(corner()), corner(), frame_of_scale_2());
   EXPECT_TRUE(json["passed"].get<bool>());

@@ -15,8 +15,9 @@ TEST(GlbExtensions, ThoseThatMayChangeWhatIsShownAreTold) {
   t.json["extensionsUsed"] = {
       "KHR_materials_clearcoat", "KHR_lights_punctual", "EXT_texture_webp", "EXT_shape_of_things"};
   EXPECT_EQ(parse_glb(t.bytes(), "a.glb").parsed.warnings,
-            (std::vector<std::string>{"the extension EXT_shape_of_things is not known: what it says of shape or colour "
-                  "is not read"}));
+            (std::vector<std::string>{
+                "the extension EXT_shape_of_things is not known: what it says of shape or colour "
+                "is not read"}));
   t.json["extensionsRequired"] = t.json["extensionsUsed"];
   const std::string bytes = t.bytes();
   EXPECT_EQ(test::defect_of(bytes, [](const auto& path) { (void)read_glb(path); }), "UNSUPPORTED");

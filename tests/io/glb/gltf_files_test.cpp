@@ -47,7 +47,8 @@ TEST(GltfFiles, BuffersLieBesideTheFile) {
   EXPECT_EQ(read_mesh_file(t.dir / "a.gltf").content.points.size(), 3U);
   std::filesystem::create_directory(t.dir / "parts");
   std::filesystem::rename(t.dir / "a.bin", t.dir / "parts/a.bin");
-  for (const char* name : {"parts/a.bin", "./parts//a.bin", "parts/../parts/a.bin", "parts\\a.bin"}) {
+  for (const char* name :
+       {"parts/a.bin", "./parts//a.bin", "parts/../parts/a.bin", "parts\\a.bin"}) {
     t.name_it(name);
     t.expect_triangle();
   }
@@ -89,14 +90,15 @@ TEST(GltfFiles, StayInTheFolderOfTheFile) {
   const test::TempDir outside;
   test::write_bytes(outside / "a.bin", t.binary);
   std::filesystem::create_symlink(outside / "a.bin", t.dir / "link.bin");
-  for (const std::string& name : {(outside / "a.bin").string(),
-                                  std::string("../") + outside.path().filename().string() + "/a.bin",
-                                  std::string("%2e%2e/a.bin"),
-                                  std::string("link.bin"),
-                                  std::string("file:///etc/passwd"),
-                                  std::string("http://example.org/a.bin"),
-                                  std::string("a\0.bin", 6),
-                                  std::string()}) {
+  for (const std::string& name :
+       {(outside / "a.bin").string(),
+        std::string("../") + outside.path().filename().string() + "/a.bin",
+        std::string("%2e%2e/a.bin"),
+        std::string("link.bin"),
+        std::string("file:///etc/passwd"),
+        std::string("http://example.org/a.bin"),
+        std::string("a\0.bin", 6),
+        std::string()}) {
     t.name_it(name);
     EXPECT_EQ(t.defect(), "PATH") << name;
   }

@@ -89,7 +89,8 @@ TEST(GlbPlace, MeshesLieWhereTheirNodeSaysInEveryEncoding) {
     EXPECT_EQ(json["asset"]["extras"]["origin_in_world"], zero) << name;
     const MeasurableFile back = read_mesh_file(dir / "a.glb");
     for (const Eigen::Vector3d& p : back.content.points) {
-      const Eigen::Vector3d q = frame.internal_from_world(back.content.frame.world_from_internal(p));
+      const Eigen::Vector3d q =
+          frame.internal_from_world(back.content.frame.world_from_internal(p));
       EXPECT_NEAR((q - Eigen::Vector3d(0.05, -0.1, 0.15)).norm(), 0.4, is_exact ? 2e-7 : 1e-4);
     }
   }
@@ -122,8 +123,7 @@ TEST(GlbPlace, SplatsLieOnTheMeshOfTheirScene) {
   Gaussians splats = test::varied_splats(int(mesh.vertices.size()), 0);
   splats.position = mesh.vertices;
   for (const bool local_origin : {false, true}) {
-    write_splat_glb(
-        dir / "s.glb", splats, frame, {.y_up = y_up, .local_origin = local_origin});
+    write_splat_glb(dir / "s.glb", splats, frame, {.y_up = y_up, .local_origin = local_origin});
     write_glb(dir / "m.glb",
               mesh,
               frame,
@@ -144,8 +144,10 @@ TEST(GlbPlace, ALocalOriginIsThatOfTheFrame) {
   const test::TempDir dir;
   const Frame frame = national_grid();
   for (const auto& [name, encoding] : glb_encodings()) {
-    write_glb(
-        dir / "a.glb", test::labelled_sphere(), frame, {.encoding = encoding, .local_origin = true});
+    write_glb(dir / "a.glb",
+              test::labelled_sphere(),
+              frame,
+              {.encoding = encoding, .local_origin = true});
     const Json json = json_of(test::read_bytes(dir / "a.glb"));
     Frame near = frame;
     near.origin.setZero();
@@ -154,9 +156,8 @@ TEST(GlbPlace, ALocalOriginIsThatOfTheFrame) {
     for (int k = 0; k < 3; ++k) EXPECT_EQ(stated[size_t(k)], frame.origin[k]) << name;
     const MeasurableFile back = read_mesh_file(dir / "a.glb");
     const Eigen::Vector3d p = back.content.frame.world_from_internal(back.content.points[0]);
-    EXPECT_NEAR((frame.internal_from_world(p) - Eigen::Vector3d(0.05, -0.1, 0.15)).norm(),
-                0.4,
-                1e-4)
+    EXPECT_NEAR(
+        (frame.internal_from_world(p) - Eigen::Vector3d(0.05, -0.1, 0.15)).norm(), 0.4, 1e-4)
         << name;
   }
 }

@@ -123,9 +123,9 @@ TEST(GlbColors, PicturesMayLieBesideTheFile) {
   TexturedTriangle t;
   const test::TempDir dir;
   const auto& view = t.json["bufferViews"][3];
-  test::write_bytes(dir / "my wall.png",
-                    t.binary.substr(view["byteOffset"].get<size_t>(),
-                                    view["byteLength"].get<size_t>()));
+  test::write_bytes(
+      dir / "my wall.png",
+      t.binary.substr(view["byteOffset"].get<size_t>(), view["byteLength"].get<size_t>()));
   t.json["images"][0] = {{"uri", "my%20wall.png"}};
   test::write_bytes(dir / "a.glb", t.bytes());
   const GlbMesh mesh = read_glb(dir / "a.glb");

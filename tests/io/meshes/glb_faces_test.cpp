@@ -29,11 +29,11 @@ struct BoxGlb {
                      {(i & 1) != 0 ? 3.0f : 0, (i & 2) != 0 ? 2.0f : 0, (i & 4) != 0 ? 0.5f : 0});
     }
     primitive()["attributes"]["POSITION"] = accessor(corners, "VEC3", 5126);
-    primitive()["indices"] = accessor(
-        std::vector<uint16_t>{0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                              2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5},
-        "SCALAR",
-        5123);
+    primitive()["indices"] =
+        accessor(std::vector<uint16_t>{0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5},
+                 "SCALAR",
+                 5123);
   }
 
   Json& primitive() { return json["meshes"][0]["primitives"][0]; }
@@ -41,9 +41,8 @@ struct BoxGlb {
   template <typename T>
   size_t view(const std::vector<T>& values) {
     binary.resize((binary.size() + 3) / 4 * 4);
-    json["bufferViews"].push_back({{"buffer", 0},
-                                   {"byteOffset", binary.size()},
-                                   {"byteLength", values.size() * sizeof(T)}});
+    json["bufferViews"].push_back(
+        {{"buffer", 0}, {"byteOffset", binary.size()}, {"byteLength", values.size() * sizeof(T)}});
     for (const T value : values) append_bytes(binary, value);
     json["buffers"][0]["byteLength"] = binary.size();
     return json["bufferViews"].size() - 1;
@@ -159,10 +158,11 @@ TEST(GlbFaces, AFileOfPointsAloneIsACloud) {
   BoxGlb t;
   t.primitive()["mode"] = 0;
   t.primitive().erase("indices");
-  t.primitive()["attributes"]["NORMAL"] = t.accessor(
-      std::vector<float>{0, 0, -1, 0, 0, -1, 0, 0, -1, 0, 0, -1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1},
-      "VEC3",
-      5126);
+  t.primitive()["attributes"]["NORMAL"] =
+      t.accessor(std::vector<float>{0, 0, -1, 0, 0, -1, 0, 0, -1, 0, 0, -1,
+                                    0, 0, 1,  0, 0, 1,  0, 0, 1,  0, 0, 1},
+                 "VEC3",
+                 5126);
   const double h = std::sqrt(0.5);  // a quarter turn about x: z to -y
   t.json["nodes"][0]["rotation"] = {h, 0, 0, h};
   t.json["nodes"][0]["translation"] = {0, 0, 7};
@@ -170,7 +170,9 @@ TEST(GlbFaces, AFileOfPointsAloneIsACloud) {
   ASSERT_EQ(file.content.points.size(), 8U);
   EXPECT_TRUE(file.content.mesh.faces.empty());
   EXPECT_TRUE(file.warnings.empty());
-  const auto place = [&](size_t i) { return file.content.file_from_internal(file.content.points[i]); };
+  const auto place = [&](size_t i) {
+    return file.content.file_from_internal(file.content.points[i]);
+  };
   EXPECT_LT((place(7) - Eigen::Vector3d(3, -0.5, 9)).norm(), 1e-6);
   EXPECT_LT((file.content.mesh.normals[7] - Eigen::Vector3f(0, -1, 0)).norm(), 1e-6f);
 }
@@ -179,8 +181,8 @@ TEST(GlbFaces, AFileOfPointsAloneIsACloud) {
 TEST(GlbFaces, PointsThatAreNoNumbersAreCounted) {
   BoxGlb t;
   t.primitive()["mode"] = 0;
-  t.primitive()["attributes"]["POSITION"] = t.accessor(
-      std::vector<float>{1, 2, 3, NAN, 0, 0, 1, 2, 3, 4, 5, 6}, "VEC3", 5126);
+  t.primitive()["attributes"]["POSITION"] =
+      t.accessor(std::vector<float>{1, 2, 3, NAN, 0, 0, 1, 2, 3, 4, 5, 6}, "VEC3", 5126);
   t.primitive().erase("indices");
   const GlbMesh mesh = t.read();
   EXPECT_EQ(mesh.parsed.positions.size(), 3U);

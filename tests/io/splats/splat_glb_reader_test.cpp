@@ -416,10 +416,10 @@ TEST(SplatGlbReader, ReadsDraftsOfTheExtensionAndText) {
   const GaussianFile read = read_splats(dir / "a.gltf");
   ASSERT_EQ(read.gaussians.size(), 1u);
   const Gaussians& g = read.gaussians;
-  EXPECT_LT((read.frame.world_from_internal(g.position[0].cast<double>()) -
-             Eigen::Vector3d(-1, -2, 3))
-                .norm(),
-            1e-5);
+  EXPECT_LT(
+      (read.frame.world_from_internal(g.position[0].cast<double>()) - Eigen::Vector3d(-1, -2, 3))
+          .norm(),
+      1e-5);
   EXPECT_NEAR(g.opacity[0], 0.8f, 1e-5f);
   EXPECT_NEAR(g.scale[0].maxCoeff() * read.frame.scale, 4, 1e-5);
   constexpr float kFirst = 0.28209479f;

@@ -111,14 +111,15 @@ TEST(SplatGlb, StandsUprightInMetresAndKnowsItsPlace) {
   EXPECT_LT((turn * up - Eigen::Vector3d::UnitY()).norm(), 1e-9);
   const auto& extras = file.json["asset"]["extras"];
   EXPECT_EQ(extras["units"], "m");
-  const Eigen::Vector3d origin(extras["origin_in_world"][0].get<double>(),
-                               extras["origin_in_world"][1].get<double>(),
-                               extras["origin_in_world"][2].get<double>());
+  EXPECT_EQ(extras["origin_in_world"], nlohmann::json({0.0, 0.0, 0.0}));
+  const auto& t = file.json["nodes"][0]["translation"];
+  const Eigen::Vector3d shift(t[0].get<double>(), t[1].get<double>(), t[2].get<double>());
   Eigen::AlignedBox3f box;
   for (size_t i = 0; i < g.size(); ++i) {
     const Eigen::Vector3f p(position[3 * i], position[3 * i + 1], position[3 * i + 2]);
     box.extend(p);
-    const Eigen::Vector3d world = origin + p.cast<double>() / 0.01;
+    // Turned and moved by the node, back from there, and from metres to centimetres.
+    const Eigen::Vector3d world = turn.inverse() * (shift + turn * p.cast<double>()) / 0.01;
     EXPECT_LT((world - frame.world_from_internal(g.position[i].cast<double>())).norm(), 1e-4);
   }
   const auto& bounds = file.json["accessors"][0];
