@@ -39,7 +39,7 @@ void run_filter_command(const FilterArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.input);
   require(is_writable_mesh_name(args.output),
-          "the output must end in .ply, .obj, .stl, .3mf or .glb",
+          "the output must end in .ply, .obj, .stl, .om, .3mf or .glb",
           printable(args.output.filename()));
   require(!args.local_origin || lower_extension(args.output) == ".glb",
           "--local-origin is for .glb; the output",
@@ -92,10 +92,10 @@ void add_filter(CLI::App& app) {
       "filter", "Clean, crop, smooth, simplify ... meshes and point clouds; labels and sigma stay");
   cmd->add_option("input",
                   args->input,
-                  "Mesh or point cloud: .ply, .obj, .stl, .off, .3mf, .glb, "
+                  "Mesh or point cloud: .ply, .obj, .stl, .off, .om, .3mf, .glb, "
                   ".gltf")
       ->required();
-  cmd->add_option("output", args->output, "File to write: .ply, .obj, .stl, .3mf, .glb")
+  cmd->add_option("output", args->output, "File to write: .ply, .obj, .stl, .om, .3mf, .glb")
       ->required();
   cmd->add_option("--op", args->operations, "An operation, name=arguments; may be repeated")
       ->required()

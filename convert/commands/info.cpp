@@ -256,7 +256,7 @@ void add_info(CLI::App& app) {
          "scene",
          args->scene.path,
          "Folder of a scene, as for run, or what run made of one, or its model; a mesh (.ply, "
-         ".obj, .stl, .off, .3mf, .glb, .gltf), which gets a certificate; splats (.ply, .spz, "
+         ".obj, .stl, .off, .om, .3mf, .glb, .gltf), which gets a certificate; splats (.ply, .spz, "
          ".splat, .sog, .ksplat, .glb, .gltf); a volume (.vdb); layers of a picture (.exr)")
       ->required();
   add_scene_options(*cmd, args->scene.options);

@@ -157,7 +157,7 @@ void add_measure(CLI::App& app) {
   auto* cmd = app.add_subcommand(
       "measure", "Distances, areas, volumes, sections and fits on a mesh, each with its sigma");
   cmd->add_option(
-         "mesh", args->mesh, "Mesh, ours or of others: .ply, .obj, .stl, .off, .3mf, .glb, .gltf")
+         "mesh", args->mesh, "Mesh, ours or of others: .ply, .obj, .stl, .off, .om, .3mf, .glb, .gltf")
       ->required();
   add_figures(*cmd, *args);
   add_orthophoto(*cmd, args->orthophoto);

@@ -16,6 +16,7 @@
 #include "io/bytes/significance.h"
 #include "io/meshes/mesh_ply.h"
 #include "io/meshes/obj.h"
+#include "io/meshes/om.h"
 #include "io/meshes/stl.h"
 #include "io/meshes/threemf.h"
 #include "io/meshes/threemf_reader.h"
@@ -107,7 +108,7 @@ MeshFiles write_mesh_files(const std::filesystem::path& folder,
 }
 
 bool is_writable_mesh_name(const std::filesystem::path& path) {
-  constexpr std::array<const char*, 5> kKnown = {".ply", ".obj", ".stl", ".3mf", ".glb"};
+  constexpr std::array<const char*, 6> kKnown = {".ply", ".obj", ".stl", ".om", ".3mf", ".glb"};
   return std::find(kKnown.begin(), kKnown.end(), lower_extension(path)) != kKnown.end();
 }
 
@@ -182,7 +183,7 @@ std::string lost_in_file(const std::filesystem::path& path,
                          const TriangleMesh& mesh,
                          const Frame& frame) {
   const std::string extension = lower_extension(path);
-  if (extension == ".ply" || extension == ".glb") return "";
+  if (extension == ".ply" || extension == ".om" || extension == ".glb") return "";
   std::string out;
   const auto add = [&](bool is_lost, const char* what) {
     if (is_lost) out += (out.empty() ? "" : ", ") + std::string(what);
@@ -209,6 +210,7 @@ std::string write_mesh_as(const std::filesystem::path& path,
   if (extension == ".stl") write_stl(path, mesh, frame, z_up_from(frame.up));
   if (extension == ".3mf") write_3mf(path, mesh, frame, z_up_from(frame.up));
   if (extension == ".obj") write_obj(path, mesh, frame);
+  if (extension == ".om") write_om(path, mesh, frame);
   if (extension == ".ply") write_mesh_ply(path, mesh, frame);
   if (extension != ".glb") return "";
   options.y_up = y_up_from(frame.up);

@@ -42,7 +42,8 @@ MeshFiles write_mesh_files(const std::filesystem::path& folder,
                            const TriangleMesh& watertight,
                            const Frame& frame);
 
-/// True for the endings that write_mesh_as() takes: .ply, .obj, .stl, .3mf, .glb, in any case.
+/// True for the endings that write_mesh_as() takes: .ply, .obj, .stl, .om, .3mf, .glb, in any
+/// case.
 bool is_writable_mesh_name(const std::filesystem::path& path);
 
 /// True for the endings whose format says which axis is up, so that a mesh is turned: .stl, .3mf

@@ -130,8 +130,8 @@ Content wanted_content(const ConversionRequest& request, const Source& source) {
   };
   const bool known_as = request.as.empty() || request.as == "mesh" || request.as == "splats";
   require(known_as, "--as must be mesh or splats", request.as);
-  require(is({".ply", ".splat", ".spz", ".vdb", ".obj", ".stl", ".3mf", ".glb"}),
-          "the output must end in .ply, .splat, .spz, .vdb, .obj, .stl, .3mf or .glb",
+  require(is({".ply", ".splat", ".spz", ".vdb", ".obj", ".stl", ".om", ".3mf", ".glb"}),
+          "the output must end in .ply, .splat, .spz, .vdb, .obj, .stl, .om, .3mf or .glb",
           extension.empty() ? "without an ending" : extension);
   const bool stays = is({".ply"}) && request.as.empty() && from == Content::Splats;
   const bool asked = is({".ply", ".glb"}) && request.as == "splats";
@@ -379,7 +379,7 @@ void say_place(const ConversionRequest& request, const Frame& frame, Terminal& t
 std::string conversion_table() {
   return "from                                 to splats        to .vdb  to a mesh\n"
          "                                     .ply .splat      volume   .ply .obj .stl\n"
-         "                                     .spz .glb                 .3mf .glb\n"
+         "                                     .spz .glb                 .om .3mf .glb\n"
          "                                     .compressed.ply\n"
          "3DGS, 2DGS or packed .ply, .splat,\n"
          "  .spz 2 to 4, .sog 2, .ksplat,\n"
@@ -387,7 +387,7 @@ std::string conversion_table() {
          "model folder of train or run         yes              yes      yes, its own cameras\n"
          ".vdb of fuse, run or convert         no               no       yes\n"
          ".ply with faces, .obj, .stl, .off,\n"
-         "  .3mf, .glb, .gltf with triangles   no               no       yes\n"
+         "  .om, .3mf, .glb, .gltf, triangles   no               no       yes\n"
          "Where the ending can be both, .ply stays splats and .glb becomes a mesh; --as mesh and\n"
          "--as splats say otherwise. .stl and .3mf need a known scale, or --assume-unit.\n";
 }

@@ -11,6 +11,7 @@
 #include "io/meshes/mesh_ply.h"
 #include "io/meshes/obj_reader.h"
 #include "io/meshes/off.h"
+#include "io/meshes/om_reader.h"
 #include "io/meshes/stl_reader.h"
 #include "io/meshes/threemf_reader.h"
 #include "io/ply/frame.h"
@@ -56,11 +57,12 @@ ParsedMesh parse(const std::filesystem::path& path, UpAxis& up) {
     return read_3mf(path);
   }
   if (extension == ".off") return read_off(path);
+  if (extension == ".om") return read_om(path);
   throw BadInput(Defect::Unsupported,
                  path,
                  "'" + extension +
                      "' is not a mesh format that is read; known are .ply, .obj, "
-                     ".stl, .off, .3mf, .glb and .gltf");
+                     ".stl, .off, .om, .3mf, .glb and .gltf");
 }
 
 // Three corners in one place or on one line: no area. Others keep such faces, so do we.
@@ -112,7 +114,7 @@ MeasurableFile measurable(GlbMesh glb,
 
 bool is_mesh_name(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
-  const auto known = {".ply", ".obj", ".stl", ".off", ".3mf"};
+  const auto known = {".ply", ".obj", ".stl", ".off", ".om", ".3mf"};
   return has_gltf_extension(path) ||
          std::find(known.begin(), known.end(), extension) != known.end();
 }

@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/edit/loop_subdivision.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <tuple>
 #include <vector>
 
-#include "libcgs/core/face_adjacency.h"
 #include "meshing/edit/remeshing.h"
 #include "meshing/mesh/face_split.h"
+#include "meshing/mesh/halfedges.h"
 #include "meshing/mesh/vertex_attributes.h"
 
 namespace cgs {
 
 namespace {
 
-bool was_seen(const TriangleMesh& mesh, size_t face) {
-  return !mesh.provenance.empty() && cgs::was_seen(mesh.provenance[face]);
+using halfedges::EdgeHandle;
+using halfedges::HalfedgeHandle;
+using halfedges::HalfedgeMesh;
+
+bool was_seen(const TriangleMesh& mesh, halfedges::FaceHandle face) {
+  return !mesh.provenance.empty() && cgs::was_seen(mesh.provenance[size_t(face.idx())]);
 }
 
 /// An edge with the corners opposite to it.
@@ -28,17 +30,30 @@ struct Edge {
   bool sharp;
 };
 
-std::vector<Edge> edges_of(const TriangleMesh& mesh) {
-  const std::vector<FaceSide> sides = sides_by_edge(mesh);
-  const auto tip = [&](const FaceSide& s) { return mesh.faces[s.face].at((s.side + 2) % 3); };
+using Middle = OpenMesh::EPropHandleT<uint32_t>;
+
+// Edges that repeat another have their middle in common with it.
+// \param middle  of every edge its place in what is returned
+std::vector<Edge> edges_of(const TriangleMesh& mesh, HalfedgeMesh& links, Middle middle) {
   std::vector<Edge> out;
-  for (size_t i = 0; i < sides.size();) {
-    size_t end = i + 1;
-    while (end < sides.size() && sides[end].same_edge(sides[i])) ++end;
-    const FaceSide& last = sides[end - 1];
-    const bool inside = end - i == 2 && was_seen(mesh, sides[i].face) == was_seen(mesh, last.face);
-    out.push_back({last.low, last.high, tip(sides[i]), tip(last), !inside});
-    i = end;
+  out.reserve(links.n_edges());
+  for (const EdgeHandle e : links.edges()) {
+    if (!halfedges::repeats_edge(links, e)) {
+      std::array<HalfedgeHandle, 2> sides;  // the first and the last
+      size_t count = 0;
+      halfedges::for_each_side(
+          links, e, [&](HalfedgeHandle side) { sides.at(count++ == 0 ? 0 : 1) = side; });
+      if (count == 1) sides[1] = sides[0];
+      const bool inside = count == 2 && was_seen(mesh, links.face_handle(sides[0])) ==
+                                            was_seen(mesh, links.face_handle(sides[1]));
+      const auto [low, high] = halfedges::ends_of(links, e);
+      out.push_back({low,
+                     high,
+                     halfedges::tip_of(links, sides[0]),
+                     halfedges::tip_of(links, sides[1]),
+                     !inside});
+    }
+    links.property(middle, e) = static_cast<uint32_t>(out.size() - 1);
   }
   return out;
 }
@@ -88,7 +103,10 @@ std::vector<Eigen::Vector3d> places(const TriangleMesh& mesh, const std::vector<
 }
 
 TriangleMesh loop_subdivided_once(const TriangleMesh& mesh) {
-  const std::vector<Edge> edges = edges_of(mesh);
+  HalfedgeMesh links = halfedges::halfedges_of(mesh);
+  Middle middle;
+  links.add_property(middle);
+  const std::vector<Edge> edges = edges_of(mesh, links, middle);
   const std::vector<Eigen::Vector3d> to = places(mesh, edges);
   TriangleMesh out = mesh;
   out.faces.clear();
@@ -102,15 +120,9 @@ TriangleMesh loop_subdivided_once(const TriangleMesh& mesh) {
     if (out.sigma.empty() || moved == 0) continue;
     out.sigma[v] = static_cast<float>(std::hypot(double{out.sigma[v]}, moved));
   }
-  const auto middle = [&](uint32_t a, uint32_t b) {
-    const auto [low, high] = std::minmax(a, b);
-    const auto found = std::lower_bound(
-        edges.begin(), edges.end(), std::pair(low, high), [](const Edge& e, const auto& ends) {
-          return std::tie(e.low, e.high) < std::tie(ends.first, ends.second);
-        });
-    return static_cast<uint32_t>(mesh.vertices.size() + size_t(found - edges.begin()));
-  };
-  split_faces(mesh, middle, out);
+  const auto count = static_cast<uint32_t>(mesh.vertices.size());
+  split_faces(
+      mesh, links, [&](EdgeHandle e) { return count + links.property(middle, e); }, out);
   return out;
 }
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include <CGAL/Polygon_mesh_processing/connected_components.h>
@@ -14,6 +13,7 @@
 
 #include "libcgs/core/error.h"
 #include "meshing/mesh/face_split.h"
+#include "meshing/mesh/halfedges.h"
 #include "meshing/mesh/polygon_mesh.h"
 #include "meshing/mesh/self_intersections.h"
 #include "meshing/mesh/stated_surface.h"
@@ -29,17 +29,20 @@ TriangleMesh subdivided_once(const TriangleMesh& mesh) {
   TriangleMesh out = mesh;
   out.faces.clear();
   out.provenance.clear();
-  std::unordered_map<uint64_t, uint32_t> middles;
-  const auto middle = [&](uint32_t a, uint32_t b) {
-    if (a > b) std::swap(a, b);
-    const auto [at, is_new] = middles.try_emplace(uint64_t{a} << 32 | b, 0);
-    if (is_new) {
-      at->second = static_cast<uint32_t>(out.vertices.size());
-      append_blend(out, mesh, std::array<VertexShare, 2>{{{a, 0.5f}, {b, 0.5f}}});
+  halfedges::HalfedgeMesh links = halfedges::halfedges_of(mesh);
+  OpenMesh::EPropHandleT<uint32_t> middle;  // 0 = not there yet
+  links.add_property(middle);
+  const auto middle_of = [&](halfedges::EdgeHandle edge) {
+    const auto first = halfedges::first_edge(links, edge);
+    uint32_t& known = links.property(middle, first);
+    if (known == 0) {
+      const auto [low, high] = halfedges::ends_of(links, first);
+      known = static_cast<uint32_t>(out.vertices.size());
+      append_blend(out, mesh, std::array<VertexShare, 2>{{{low, 0.5f}, {high, 0.5f}}});
     }
-    return at->second;
+    return known;
   };
-  split_faces(mesh, middle, out);
+  split_faces(mesh, links, middle_of, out);
   return out;
 }
 

@@ -15,7 +15,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "libcgs/core/face_adjacency.h"
+#include "meshing/mesh/halfedges.h"
 #include "meshing/mesh/triangle_tree.h"
 
 namespace cgs {
@@ -203,29 +203,31 @@ std::vector<float> DistanceToMesh::of_edges(const TriangleMesh& mesh,
     return std::vector<float>(mesh.faces.size(), std::numeric_limits<float>::infinity());
   }
   const EdgeSearch search(parts_->triangles, parts_->tree, accuracy);
-  const std::vector<FaceSide> sides = sides_by_edge(mesh);
+  const halfedges::HalfedgeMesh links = halfedges::halfedges_of(mesh);
   std::vector<Place> corners(mesh.vertices.size());
   for_each_in_parts(corners.size(), part_of(progress, 0, 0.3), [&](size_t v) {
     corners[v] = search.place(mesh.vertices[v].cast<double>());
   });
-  // Of every side the bound of its edge, found once at the first of them.
-  std::vector<float> of_side(sides.size(), 0);
-  for_each_in_parts(sides.size(), part_of(progress, 0.3, 1), [&](size_t i) {
-    if (i > 0 && sides[i].same_edge(sides[i - 1])) return;
-    double least = double(enough[sides[i].face]);
-    size_t end = i + 1;
-    for (; end < sides.size() && sides[end].same_edge(sides[i]); ++end) {
-      least = std::min(least, double(enough[sides[end].face]));
-    }
-    const double bound = search.farthest(corners[sides[i].low], corners[sides[i].high], least);
+  std::vector<float> of_edge(links.n_edges(), 0);  // for those that repeat another, at the first
+  for_each_in_parts(of_edge.size(), part_of(progress, 0.3, 1), [&](size_t i) {
+    const halfedges::EdgeHandle edge(static_cast<int>(i));
+    if (halfedges::repeats_edge(links, edge)) return;
+    double least = std::numeric_limits<double>::infinity();
+    halfedges::for_each_side(links, edge, [&](halfedges::HalfedgeHandle side) {
+      least = std::min(least, double(enough[size_t(links.face_handle(side).idx())]));
+    });
+    const auto [low, high] = halfedges::ends_of(links, edge);
+    const double bound = search.farthest(corners[low], corners[high], least);
     if (bound <= least) return;
-    std::fill(of_side.begin() + std::ptrdiff_t(i),
-              of_side.begin() + std::ptrdiff_t(end),
-              std::nextafter(float(bound), std::numeric_limits<float>::infinity()));
+    of_edge[i] = std::nextafter(float(bound), std::numeric_limits<float>::infinity());
   });
   std::vector<float> out(mesh.faces.size(), 0);
-  for (size_t i = 0; i < sides.size(); ++i) {
-    out[sides[i].face] = std::max(out[sides[i].face], of_side[i]);
+  for (const auto face : links.faces()) {
+    for (const auto side : links.fh_range(face)) {
+      const auto edge = halfedges::first_edge(links, links.edge_handle(side));
+      float& most = out[size_t(face.idx())];
+      most = std::max(most, of_edge[size_t(edge.idx())]);
+    }
   }
   return out;
 }

@@ -11,9 +11,9 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "libcgs/core/face_adjacency.h"
 #include "libcgs/core/nan.h"
 #include "libcgs/core/srgb.h"
+#include "meshing/mesh/halfedges.h"
 #include "meshing/volume/volume.h"
 
 namespace cgs {
@@ -148,8 +148,6 @@ void spread_colors(TriangleMesh& mesh) {
   }
 }
 
-using Edge = std::array<uint32_t, 2>;
-
 // Faces without evidence that hang together over edges.
 struct Patch {
   std::vector<uint32_t> faces;
@@ -163,7 +161,7 @@ struct Patch {
 class PatchLabeller {
  public:
   explicit PatchLabeller(TriangleMesh& mesh)
-      : mesh_(mesh), adjacent_(adjacent_faces(mesh)), seen_(mesh.faces.size(), 0) {}
+      : mesh_(mesh), links_(halfedges::halfedges_of(mesh)), seen_(mesh.faces.size(), 0) {}
 
   void label(double gap) {
     for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
@@ -191,7 +189,8 @@ class PatchLabeller {
       const Eigen::Vector3d area = 0.5 * area_vector(mesh_, mesh_.faces[f]);
       patch.direction += area;
       patch.area += area.norm();
-      for (const uint32_t g : adjacent_[f]) {
+      for (const auto side : links_.fh_range(halfedges::FaceHandle(int(f)))) {
+        const auto g = static_cast<uint32_t>(halfedges::face_across(links_, side).idx());
         if (g == f) patch.at_border = true;
         if (is_labelled(g)) patch.rim_direction += 0.5 * area_vector(mesh_, mesh_.faces[g]);
         if (is_labelled(g) && !was_seen(mesh_.provenance[g])) patch.rim_is_unseen = true;
@@ -205,14 +204,12 @@ class PatchLabeller {
 
   // Euler characteristic 1.
   bool is_disc(const Patch& patch) const {
-    std::vector<uint32_t> vertices;
-    std::vector<Edge> edges;
+    std::vector<int> vertices;
+    std::vector<int> edges;
     for (const uint32_t f : patch.faces) {
-      for (size_t k = 0; k < 3; ++k) {
-        const uint32_t a = mesh_.faces[f][k];
-        const uint32_t b = mesh_.faces[f][(k + 1) % 3];
-        vertices.push_back(a);
-        edges.push_back({std::min(a, b), std::max(a, b)});
+      for (const auto side : links_.fh_range(halfedges::FaceHandle(int(f)))) {
+        vertices.push_back(links_.to_vertex_handle(side).idx());
+        edges.push_back(halfedges::first_edge(links_, links_.edge_handle(side)).idx());
       }
     }
     const auto distinct = [](auto& items) {
@@ -223,7 +220,7 @@ class PatchLabeller {
   }
 
   TriangleMesh& mesh_;
-  std::vector<std::array<uint32_t, 3>> adjacent_;
+  halfedges::HalfedgeMesh links_;
   std::vector<uint8_t> seen_;
   std::vector<uint32_t> interpolated_;
 };

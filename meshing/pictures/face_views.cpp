@@ -10,8 +10,8 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "libcgs/core/face_adjacency.h"
 #include "libcgs/core/order_statistics.h"
+#include "meshing/mesh/halfedges.h"
 #include "meshing/mesh/projected_faces.h"
 
 namespace cgs {
@@ -119,7 +119,7 @@ bool may_have_photograph(const TriangleMesh& mesh, size_t f) {
 class Labelling {
  public:
   Labelling(const TriangleMesh& mesh, const FaceScores& scores, double seam_cost)
-      : scores_(scores), adjacent_(adjacent_faces(mesh)), label_(mesh.faces.size(), -1) {
+      : scores_(scores), adjacent_(halfedges::adjacent_faces(mesh)), label_(mesh.faces.size(), -1) {
     const size_t n = mesh.faces.size();
     area_.resize(n);
     length_.resize(n);

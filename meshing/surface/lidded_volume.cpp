@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/surface/lidded_volume.h"
 
-#include <algorithm>
-#include <array>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -10,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "libcgs/core/disjoint_sets.h"
+#include "meshing/mesh/halfedges.h"
 
 namespace cgs {
 
@@ -22,23 +21,21 @@ struct RimSide {
   uint32_t face = 0;
 };
 
-uint64_t key(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
-
 // Nothing where two faces have the same side in the same direction.
 std::optional<std::vector<RimSide>> rim_sides(const TriangleMesh& mesh) {
-  std::vector<uint64_t> sides;
-  sides.reserve(3 * mesh.faces.size());
-  for (const auto& [a, b, c] : mesh.faces) {
-    sides.insert(sides.end(), {key(a, b), key(b, c), key(c, a)});
+  const auto links = halfedges::halfedges_of(mesh);
+  for (const auto edge : links.edges()) {
+    if (halfedges::repeats_edge(links, edge)) return std::nullopt;
   }
-  std::sort(sides.begin(), sides.end());
-  if (std::adjacent_find(sides.begin(), sides.end()) != sides.end()) return std::nullopt;
   std::vector<RimSide> out;
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    for (size_t k = 0; k < 3; ++k) {
-      const uint32_t a = mesh.faces[f].at(k);
-      const uint32_t b = mesh.faces[f].at((k + 1) % 3);
-      if (!std::binary_search(sides.begin(), sides.end(), key(b, a))) out.push_back({a, b, f});
+  for (const auto face : links.faces()) {
+    for (const auto side : links.fh_range(face)) {
+      if (!links.is_boundary(links.opposite_halfedge_handle(side))) continue;
+      const auto vertex = [](auto v) { return static_cast<uint32_t>(v.idx()); };
+      const RimSide rim{vertex(links.from_vertex_handle(side)),
+                        vertex(links.to_vertex_handle(side)),
+                        static_cast<uint32_t>(face.idx())};
+      if (rim.from != rim.to) out.push_back(rim);  // not that of a face that names a vertex twice
     }
   }
   return out;

@@ -8,6 +8,7 @@
 #include "io/meshes/mesh_file.h"
 #include "io/meshes/mesh_ply.h"
 #include "io/meshes/obj.h"
+#include "io/meshes/om.h"
 #include "io/meshes/stl.h"
 #include "io/meshes/threemf.h"
 #include "io/meshes/threemf_model.h"
@@ -19,6 +20,7 @@
 #include "io/splats/spz.h"
 #include "tests/fuzz/file_kinds.h"
 #include "tests/support/ksplat_file.h"
+#include "tests/support/openmesh_file.h"
 #include "tests/support/packed_ply.h"
 #include "tests/support/sample_mesh.h"
 #include "tests/support/sample_splats.h"
@@ -200,6 +202,11 @@ void add_own_meshes(Kinds& kinds) {
         return mesh.faces.size();
       }));
   kinds.push_back(of_own_mesh(
+      "om", "a.om", [](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
+        write_om(file, mesh, frame);
+        return mesh.faces.size();
+      }));
+  kinds.push_back(of_own_mesh(
       "stl", "a.stl", [](const fs::path& file, const TriangleMesh& mesh, const Frame& frame) {
         write_stl(file, mesh, frame, Eigen::Matrix3d::Identity());
         return mesh.faces.size();
@@ -262,6 +269,16 @@ void add_meshes(Kinds& kinds) {
   }));
   kinds.push_back(of_mesh("off", "a.off", [](const fs::path& file) {
     write_bytes(file, "OFF\n# a\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2 255 0 0\n4 0 1 3 2\n");
+  }));
+  kinds.push_back(of_mesh("om-of-openmesh", "a.om", [](const fs::path& file) {
+    OpenTriMesh mesh;
+    std::vector<OpenMesh::VertexHandle> v;
+    for (const auto& p : {OpenMesh::Vec3f(0, 0, 0), {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}) {
+      v.push_back(mesh.add_vertex(p));
+      mesh.set_color(v.back(), {255, 0, 7});
+    }
+    for (size_t k = 0; k < 3; ++k) mesh.add_face(v[0], v[1 + (k + 1) % 3], v[1 + k]);
+    require(write_with_openmesh(file, mesh), "OpenMesh did not write");
   }));
   const auto placed = [] {
     ThreeMfFile out;
