@@ -43,7 +43,7 @@ void write_each(AtomicFile& file, size_t count, const Append& append) {
   }
 }
 
-void write_vertices(AtomicFile& file, const TriangleMesh& mesh, const Frame& frame) {
+void write_om_vertices(AtomicFile& file, const TriangleMesh& mesh, const Frame& frame) {
   const size_t count = mesh.vertices.size();
   write_chunk(file, {OmEntity::Vertex, OmType::Position, false, true, 3});
   write_each(file, count, [&](std::string& out, size_t v) {
@@ -130,7 +130,7 @@ void write_om(const std::filesystem::path& path, const TriangleMesh& mesh, const
   append_bytes(header, edge_count(mesh));
   AtomicFile file(path);
   file.write(header);
-  write_vertices(file, mesh, frame);
+  write_om_vertices(file, mesh, frame);
   write_faces(file, mesh);
   write_frame(file, mesh, frame);
   write_chunk(file, {OmEntity::End, OmType::Position});

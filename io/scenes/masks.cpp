@@ -121,6 +121,7 @@ void find_masks(const SceneRoot& root, Scene& scene) {
     scene.warnings.push_back("there are masks, but none for view " + printable(view.name) +
                              ", of which everything is used");
   }
+  tell_of_other_sizes(scene);
 }
 
 void apply_mask(const View& view, const ImageSize& size, MaskMap& usable) {
