@@ -199,12 +199,13 @@ JsonValue GlbContainer::element(const char* array, const JsonValue& index) const
 // none.
 void GlbContainer::find_buffers() {
   const auto list = root().find("buffers");
+  const bool is_binary = !is_gltf_text(content_);
   for (size_t i = 0; list && i < list->size(); ++i) {
     const JsonValue buffer = list->at(i);
     if (buffer.find("uri")) {
       buffers_.emplace_back(files_.bytes(buffer));
     } else {
-      buffers_.push_back(i == 0 && !binary_.empty() ? std::optional(binary_) : std::nullopt);
+      buffers_.push_back(i == 0 && is_binary ? std::optional(binary_) : std::nullopt);
     }
   }
 }

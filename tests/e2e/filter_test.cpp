@@ -368,6 +368,39 @@ TEST_F(Filter, WritesGlbAsExactAsPly) {
               1e-5);
 }
 
+/// The box along x of a .glb of one mesh, as every reader of glTF places it.
+std::pair<double, double> x_range(const std::string& glb) {
+  const auto json = nlohmann::json::parse(glb.substr(20, glb.find("BIN") - 4 - 20));
+  const auto& mesh = json["meshes"][0]["primitives"][0];
+  const auto& stored = json["accessors"][mesh["attributes"]["POSITION"].get<size_t>()];
+  const double begin = json["nodes"][0]["translation"][0];
+  return {begin + stored["min"][0].get<double>(), begin + stored["max"][0].get<double>()};
+}
+
+TEST_F(Filter, LeavesAModelWhereItIs) {
+  test::write_bytes(dir_ / "far.obj",
+                    "v 100 0 0\nv 103 0 0\nv 100 2 0\nv 100 0 1\n"
+                    "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  ASSERT_EQ(filter("far.obj", "a.glb", "-q --op repair").exit_code, 0);
+  ASSERT_EQ(filter("a.glb", "b.glb", "-q --op repair").exit_code, 0);
+  for (const char* name : {"a.glb", "b.glb"}) {
+    const auto [low, high] = x_range(test::read_bytes(dir_ / name));
+    EXPECT_NEAR(low, 100, 1e-5) << name;
+    EXPECT_NEAR(high, 103, 1e-5) << name;
+  }
+  const ProgramResult local = filter("a.glb", "local.glb", "--op repair --local-origin");
+  ASSERT_EQ(local.exit_code, 0) << local.err;
+  EXPECT_NE(local.err.find("(0, 0, 0) of local.glb is "), std::string::npos) << local.err;
+  const auto [low, high] = x_range(test::read_bytes(dir_ / "local.glb"));
+  EXPECT_LT(std::max(std::abs(low), std::abs(high)), 4);
+  EXPECT_NEAR(high - low, 3, 1e-5);
+  // It states where it was, so that it comes back.
+  ASSERT_EQ(filter("local.glb", "again.glb", "-q --op repair").exit_code, 0);
+  EXPECT_NEAR(x_range(test::read_bytes(dir_ / "again.glb")).first, 100, 1e-5);
+  EXPECT_EQ(filter("a.glb", "no.ply", "-q --op repair --local-origin").exit_code, 2);
+  EXPECT_FALSE(exists("no.ply"));
+}
+
 // Other programs write normals of 0 where they know of none.
 TEST_F(Filter, TakesNormalsOfZeroForNone) {
   TriangleMesh cloud = test::labelled_sphere(32, 48);

@@ -2,6 +2,8 @@
 //
 // Coarser levels of asset.glb and their tileset.json, on a small portal capture. The tileset is
 // followed as 3D Tiles 1.1 says a viewer does it; distances are measured by trying every triangle.
+#include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <set>
 
@@ -128,6 +130,65 @@ size_t pixels_of(const test::Glb& glb) {
   size_t out = 0;
   for (const ColorImage& image : glb.images) out += image.data.size();
   return out;
+}
+
+/// Every 499th splat of splats.glb where its node has it, in the units of the file.
+std::vector<Eigen::Vector3d> places_of_splats(const fs::path& path) {
+  const std::string bytes = test::read_bytes(path);
+  const size_t binary = bytes.find(std::string("BIN\0", 4)) + 4;
+  const json file = json::parse(bytes.substr(20, binary - 8 - 20));
+  const json& node = file["nodes"][0];
+  const json& at = file["meshes"][0]["primitives"][0]["attributes"]["POSITION"];
+  const json& accessor = file["accessors"][at.get<size_t>()];
+  const json& view = file["bufferViews"][accessor["bufferView"].get<size_t>()];
+  const auto q = node["rotation"].get<std::vector<double>>();
+  const auto t = node["translation"].get<std::vector<double>>();
+  const Eigen::Affine3d placed =
+      Eigen::Translation3d(t[0], t[1], t[2]) * Eigen::Quaterniond(q[3], q[0], q[1], q[2]);
+  std::vector<Eigen::Vector3d> out;
+  for (size_t i = 0; i < accessor["count"].get<size_t>(); i += 499) {
+    Eigen::Vector3f p;
+    std::memcpy(p.data(),
+                bytes.data() + binary + view["byteOffset"].get<size_t>() + i * sizeof p,
+                sizeof p);
+    out.push_back(placed * p.cast<double>());
+  }
+  return out;
+}
+
+// What no reader has to know: both files are in one place by their nodes alone.
+TEST(Asset, HasTheSplatsOnItsSurface) {
+  constexpr double kVoxel = 0.08;  // [feet]
+  const TempDir dir;
+  test::copy_portal_capture(dir / "capture", 3);
+  const auto median_distance = [&](const std::string& more) {
+    const auto run = run_cgs(run_arguments(dir, "--voxel-size 0.08 " + more));
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    const test::Glb glb = test::parse_glb(test::read_bytes(dir / "out/web/asset.glb"));
+    std::vector<test::Triangle> surface;
+    for (const test::GlbPart& part : glb.parts) {
+      for (const auto& face : part.faces) {
+        test::Triangle& t = surface.emplace_back();
+        for (size_t k = 0; k < 3; ++k) {
+          t.at(k) = test::placed(glb, part.values.at("POSITION")[face.at(k)]);
+        }
+      }
+    }
+    std::vector<double> distances;
+    for (const Eigen::Vector3d& p : places_of_splats(dir / "out/web/splats.glb")) {
+      double least = 1e300;
+      for (const test::Triangle& t : surface) {
+        least = std::min(least, (test::nearest_on(t, p) - p).norm());
+      }
+      distances.push_back(least);
+    }
+    EXPECT_GT(distances.size(), 20u);
+    std::nth_element(
+        distances.begin(), distances.begin() + long(distances.size() / 2), distances.end());
+    return distances[distances.size() / 2];
+  };
+  EXPECT_LT(median_distance(""), 0.1 * kVoxel * kMetresPerFoot);
+  EXPECT_LT(median_distance("--local-origin"), 0.1 * kVoxel * kMetresPerFoot);
 }
 
 TEST(Asset, LeavesOutFacesThatHoldColoursAndStaysNear) {
