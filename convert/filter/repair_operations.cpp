@@ -20,7 +20,7 @@ std::string repair_remark(const RepairedMesh& result) {
       {result.flat_faces, " faces without area removed"},
       {result.flat_left, " faces without area LEFT"},
       {result.duplicate_faces, " duplicate faces removed"},
-      {result.split_edges, " edges split at vertices on them"},
+      {result.split_edges, " vertices on edges of other faces joined to these"},
       {result.turned_faces, " faces turned round"},
       {result.split_vertices, " vertices split off"},
       {result.self_intersections, " self-intersecting pairs of faces LEFT"}};

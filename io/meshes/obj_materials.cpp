@@ -186,8 +186,8 @@ void ObjPaint::paint(ParsedMesh& out, const std::filesystem::path& path, bool ha
   } else if (!missing.empty()) {
     out.warnings.push_back("materials are left out: " + missing.front());
   } else if (unknown > 0) {
-    out.warnings.push_back(counted(unknown, "material") + " of " + std::to_string(corners_.size()) +
-                           " in no library that was found: without colour");
+    out.warnings.push_back(std::to_string(unknown) + " of " + counted(corners_.size(), "material") +
+                           " without colour: in no library that was found");
   }
 }
 

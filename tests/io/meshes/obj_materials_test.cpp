@@ -74,7 +74,7 @@ TEST_F(PaintedObj, GivesVerticesTheColoursOfTheirMaterials) {
   EXPECT_EQ(late.mesh.colors[3], Eigen::Vector3f::UnitX());
   const ParsedMesh unknown = read(mtl, "usemtl z\nf 1 2 3\n", "usemtl a\nf 4 5 6\n");
   EXPECT_EQ(unknown.mesh.colors[0], Eigen::Vector3f::Ones());
-  EXPECT_TRUE(unknown.warnings.back().starts_with("1 material of 2 in no library"));
+  EXPECT_TRUE(unknown.warnings.back().starts_with("1 of 2 materials without colour"));
   const ParsedMesh white = read("newmtl a\nKd 1 1 1\n", "usemtl a\nf 1 2 3\n", "");
   EXPECT_TRUE(white.mesh.colors.empty());
   EXPECT_TRUE(white.warnings.empty());

@@ -148,7 +148,7 @@ TEST(ReadOff, RefusesWhatIsDamaged) {
   EXPECT_EQ(defect("OFF\n4 3 0\n" + kPoints + "3 0 1 2\n"), "TRUNCATED");
   EXPECT_EQ(defect("OFF\n4 1 0\n" + kPoints + "3 0 1 4\n"), "REF");
   EXPECT_EQ(defect("OFF\n4 1 0\n" + kPoints + "9 0 1 2\n"), "COUNT");
-  EXPECT_EQ(defect("OFF\n4 1 0\n1 inf 0\n" + kPoints + "3 0 1 2\n"), "VALUE");
+  EXPECT_EQ(defect("OFF\n5 1 0\n1 inf 0\n" + kPoints + "3 0 1 2\n"), "VALUE");
 }
 
 }  // namespace
