@@ -22,11 +22,13 @@ int main(int argc, char** argv) try {
   scene.frame.scale_source = cgs::ScaleSource::Assumed;
   cgs::load_images(scene, scene.input);
   cgs::to_canonical(scene);  // cameras are in internal units from here on
-  std::vector<cgs::TsdfView> frames;
-  for (const int i : scene.input) {
-    cgs::View& view = scene.views[size_t(i)];
-    for (float& z : view.given_depth.data) z = float(z / scene.frame.scale);
-    frames.push_back({view.camera, view.given_depth, {}, view.image, view.valid});
+  std::vector<cgs::TsdfView> frames(scene.input.size());
+  for (size_t k = 0; k < frames.size(); ++k) {
+    const cgs::View& view = scene.views[size_t(scene.input[k])];
+    frames[k].camera = view.camera;
+    frames[k].color = view.image;
+    frames[k].depth = view.given_depth;
+    for (float& z : frames[k].depth.data) z = float(z / scene.frame.scale);
   }
   const cgs::FusedVolume fused = cgs::fuse(frames, {});
   const cgs::TriangleMesh mesh = cgs::open_surface(fused.volume, {});
