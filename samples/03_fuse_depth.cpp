@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Fuses metric depth, a file per photograph of a scene in metres, into the surface that it shows.
 // usage: sample_03_fuse_depth SCENE OUT.ply
-#include <exception>
 #include <iostream>
 
 #include "io/meshes/mesh_ply.h"
@@ -33,8 +32,8 @@ int main(int argc, char** argv) try {
   const cgs::FusedVolume fused = cgs::fuse(frames, {});
   const cgs::TriangleMesh mesh = cgs::open_surface(fused.volume, {});
   cgs::write_mesh_ply(argv[2], mesh, scene.frame);
-  std::cout << frames.size() << " frames, voxels of " << fused.report.voxel_size * scene.frame.scale
-            << " m, " << mesh.faces.size() << " faces\n";
+  const double voxel = fused.report.voxel_size * scene.frame.scale;
+  std::cout << frames.size() << " frames, voxels of " << voxel << " m\n";
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';
   return 1;
