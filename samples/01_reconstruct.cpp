@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Reads photographs with cameras, reconstructs, and writes the Gaussians for any 3DGS viewer.
 // usage: sample_01_reconstruct SCENE OUT.ply
+#include <exception>
 #include <iostream>
 
 #include "io/scenes/scene_reader.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Draws splats of any format from the cameras of a scene and from halfway between them.
 // usage: sample_02_render_path SPLATS SCENE OUT_FOLDER
+#include <exception>
 #include <iostream>
 
 #include "io/images/png.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Fuses metric depth, a file per photograph of a scene in metres, into the surface that it shows.
 // usage: sample_03_fuse_depth SCENE OUT.ply
+#include <exception>
 #include <iostream>
 
 #include "io/meshes/mesh_ply.h"
@@ -32,8 +33,7 @@ int main(int argc, char** argv) try {
   const cgs::FusedVolume fused = cgs::fuse(frames, {});
   const cgs::TriangleMesh mesh = cgs::open_surface(fused.volume, {});
   cgs::write_mesh_ply(argv[2], mesh, scene.frame);
-  const double voxel = fused.report.voxel_size * scene.frame.scale;
-  std::cout << frames.size() << " frames, voxels of " << voxel << " m\n";
+  std::cout << frames.size() << " frames, " << mesh.faces.size() << " faces\n";
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';
   return 1;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Makes any mesh bound a volume, and says what was done to it and what can be proved of the result.
 // usage: sample_04_close_and_certify MESH OUT.ply
+#include <exception>
 #include <iostream>
 
 #include "io/meshes/mesh_file.h"

@@ -2,6 +2,7 @@
 // Measures a mesh: every figure with its standard deviation, and with what it rests on.
 // usage: sample_05_measure MESH
 #include <cmath>
+#include <exception>
 #include <iostream>
 #include <string>
 
