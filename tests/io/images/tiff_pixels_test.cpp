@@ -306,9 +306,10 @@ TEST_F(ReadTiff, RefusesWhatCannotBe) {
 }
 
 TEST_F(ReadTiff, SurvivesEveryDamagedByte) {
-  const std::string whole = tiff_file(
-      with_tags(tiff_tags(kWidth, kHeight, 3, 16, 2), {{259, 3, {8}}, {317, 3, {2}}, {338, 3, {}}}),
-      {test::deflated(part({}, 2, 0, 0, kWidth, kHeight, -1))});
+  const std::string whole =
+      tiff_file(with_tags(tiff_tags(kWidth, kHeight, 3, 16, 2),
+                          {{259, 3, {8}}, {317, 3, {2}}, {278, 4, {kHeight}}}),
+                {test::deflated(part({}, 2, 0, 0, kWidth, kHeight, -1))});
   for (size_t i = 4; i < whole.size(); ++i) {
     for (const char value : {'\x00', '\x01', '\x7f', '\xff'}) {
       std::string bytes = whole;
