@@ -60,8 +60,8 @@ struct ShapePrior {
 
   template <typename T>
   bool operator()(const T* lens, T* out) const {
-    constexpr double kDistortion = 0.03;
-    constexpr double kOffCentre = 0.01;  // [larger sides]
+    constexpr double kDistortion = 0.09;
+    constexpr double kOffCentre = 0.015;  // [larger sides]
     out[0] = lens[1] * T(kOptimism / kDistortion);
     out[1] = lens[2] * T(kOptimism / (kOffCentre * side));
     out[2] = lens[3] * T(kOptimism / (kOffCentre * side));

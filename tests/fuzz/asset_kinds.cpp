@@ -280,6 +280,41 @@ void add_meshes(Kinds& kinds) {
     for (size_t k = 0; k < 3; ++k) mesh.add_face(v[0], v[1 + (k + 1) % 3], v[1 + k]);
     require(write_with_openmesh(file, mesh), "OpenMesh did not write");
   }));
+  kinds.push_back(of_mesh("ply-strips", "a.ply", [](const fs::path& file) {
+    write_bytes(file,
+                "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 5\n"
+                "property float x\nproperty float y\nproperty float z\nproperty float s\n"
+                "property float t\nelement tristrips 1\nproperty list int int vertex_indices\n"
+                "element face 1\nproperty list uchar uint vertex_index\nproperty uchar red\n"
+                "property uchar green\nproperty uchar blue\nend_header\n0 0 0 0 0\n1 0 0 1 0\n"
+                "0 1 0 0 1\n1 1 0 1 1\nnan 0 1 0 0\n8 0 1 2 3 -1 0 2 1\n4 0 2 3 1 9 8 7\n");
+  }));
+  kinds.push_back(of_mesh("stl-colors", "a.stl", [](const fs::path& file) {
+    std::string bytes = "COLOR=abcd";
+    bytes.resize(80, ' ');
+    bytes += std::string("\2\0\0\0", 4);
+    for (const char attribute : {'\0', '\x80'}) {
+      bytes += std::string(12, '\0');
+      for (const float c : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) {
+        bytes.append(reinterpret_cast<const char*>(&c), sizeof c);
+      }
+      bytes += std::string("\x1f") + attribute;
+    }
+    write_bytes(file, bytes);
+  }));
+  kinds.push_back({"mtl",
+                   "a.mtl",
+                   [](Folder folder) {
+                     write_bytes(folder / "a.mtl",
+                                 "newmtl a b\nKd 1 .5 0\nmap_Kd -o 1 2 -s 2 2 -clamp on a.png\n"
+                                 "newmtl c\nKd 0.1\n");
+                   },
+                   [](Folder folder) {
+                     write_bytes(folder / "a.obj",
+                                 "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a b\n"
+                                 "f 1/1 2/1 3/1\nusemtl c\nf 1 3 2\n");
+                     expect_mesh_back(read_mesh_file(folder / "a.obj"), folder / "again.ply");
+                   }});
   const auto placed = [] {
     ThreeMfFile out;
     out.resources += ThreeMfFile::object(
