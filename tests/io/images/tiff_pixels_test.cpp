@@ -23,7 +23,7 @@ constexpr int kHeight = 4;
 
 // What the test pictures show, in whole numbers up to `full`.
 uint32_t level(int x, int y, int c, uint32_t full) {
-  return uint32_t(x * 7919 + y * 104729 + c * 1299709) % (full + 1);
+  return uint32_t(uint64_t(x * 7919 + y * 104729 + c * 1299709) % (uint64_t{full} + 1));
 }
 
 void expect_color(const Eigen::Vector3f& found, double r, double g, double b, double error = 2e-7) {

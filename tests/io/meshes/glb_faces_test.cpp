@@ -216,7 +216,7 @@ TEST(GlbFaces, ACornerNamedTwiceLeadsFromStripToStrip) {
   ASSERT_EQ(mesh.parsed.mesh.faces.size(), 4U);
   EXPECT_TRUE(mesh.parsed.warnings.empty());
   EXPECT_EQ(mesh.parsed.mesh.faces[2], (std::array<uint32_t, 3>{4, 5, 6}));
-  EXPECT_EQ(mesh.parsed.mesh.faces[3], (std::array<uint32_t, 3>{6, 5, 7}));
+  EXPECT_EQ(mesh.parsed.mesh.faces[3], (std::array<uint32_t, 3>{5, 7, 6}));
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ TEST(WriteOm, OpenMeshFindsEvidenceInPropertiesOfItsName) {
     EXPECT_EQ(mesh.property(provenance, f),
               static_cast<uint8_t>(sphere.provenance[static_cast<size_t>(f.idx())]));
   }
-  EXPECT_EQ(mesh.property(text).find("unit centimetre"), 0U) << mesh.property(text);
+  EXPECT_EQ(mesh.property(text).find("unit cm"), 0U) << mesh.property(text);
 }
 
 TEST(WriteOm, IsReadBackWithAllThatAMeshStates) {
