@@ -300,7 +300,8 @@ void add_compare(CLI::App& app) {
   auto args = std::make_shared<CompareArgs>();
   auto* cmd = app.add_subcommand(
       "compare", "Signed distances of a mesh or point cloud to a mesh, and what really changed");
-  cmd->add_option("a", args->a, "Mesh or point cloud: .ply, .obj, .stl, .off, .om, .3mf, .glb, .gltf")
+  cmd->add_option(
+         "a", args->a, "Mesh or point cloud: .ply, .obj, .stl, .off, .om, .3mf, .glb, .gltf")
       ->required();
   cmd->add_option("b",
                   args->b,

@@ -156,8 +156,9 @@ void add_measure(CLI::App& app) {
   auto args = std::make_shared<MeasureArgs>();
   auto* cmd = app.add_subcommand(
       "measure", "Distances, areas, volumes, sections and fits on a mesh, each with its sigma");
-  cmd->add_option(
-         "mesh", args->mesh, "Mesh, ours or of others: .ply, .obj, .stl, .off, .om, .3mf, .glb, .gltf")
+  cmd->add_option("mesh",
+                  args->mesh,
+                  "Mesh, ours or of others: .ply, .obj, .stl, .off, .om, .3mf, .glb, .gltf")
       ->required();
   add_figures(*cmd, *args);
   add_orthophoto(*cmd, args->orthophoto);

@@ -19,8 +19,8 @@ struct MeasurableFile {
                            ///< a note; empty where it says, or nothing is assumed.
 };
 
-/// True for the endings that read_mesh_file() takes: .ply, .obj, .stl, .off, .om, .3mf, .glb, .gltf,
-/// in any case.
+/// True for the endings that read_mesh_file() takes: .ply, .obj, .stl, .off, .om, .3mf, .glb,
+/// .gltf, in any case.
 bool is_mesh_name(const std::filesystem::path& path);
 
 /// Reads a mesh or point cloud that we or others wrote, as PLY, OBJ, STL, OFF, OM,

@@ -140,9 +140,8 @@ HalfedgeMesh halfedges_of(const TriangleMesh& mesh) {
   HalfedgeMesh out;
   out.resize(mesh.vertices.size(), edges, mesh.faces.size());
   Linker linker(mesh, out);
-  for_each_pair(mesh, sides, [&](uint32_t side, const uint32_t* second) {
-    linker.add_edge(side, second);
-  });
+  for_each_pair(
+      mesh, sides, [&](uint32_t side, const uint32_t* second) { linker.add_edge(side, second); });
   linker.link();
   return out;
 }

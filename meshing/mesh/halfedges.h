@@ -53,7 +53,8 @@ inline EdgeHandle first_edge(const HalfedgeMesh& mesh, EdgeHandle edge) {
   return edge;
 }
 
-/// Calls `visit` with the halfedges in faces of an edge and of those that repeat it, by their faces.
+/// Calls `visit` with the halfedges in faces of an edge and of those that repeat it, by their
+/// faces.
 template <typename Visit>
 void for_each_side(const HalfedgeMesh& mesh, EdgeHandle edge, const Visit& visit) {
   do {

@@ -5,7 +5,6 @@
 
 // Before its meshes, which else refuse to be written.
 #include <OpenMesh/Core/IO/MeshIO.hh>
-
 #include <OpenMesh/Core/Mesh/PolyMesh_ArrayKernelT.hh>
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 

@@ -262,8 +262,8 @@ TEST(SolvePoses, DropsAFocalLengthThatThePhotographsContradict) {
   for (const SolvedPhoto& photo : right.photos) EXPECT_FALSE(photo.is_refuted);
 }
 
-// As of a rolling shutter or a lens that no model describes: the places of neighbours are off alike,
-// by what no number of them averages out.
+// As of a rolling shutter or a lens that no model describes: the places of neighbours are off
+// alike, by what no number of them averages out.
 TEST(SolvePoses, BelievesAStatedFocalLengthBeforeErrorsThatPhotographsShare) {
   const PointScene scene = three_views();
   constexpr double kWidest = 1.5;  // [pixels]
