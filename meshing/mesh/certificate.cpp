@@ -159,7 +159,7 @@ double smallest_angle(const TriangleMesh& mesh) {
 
 }  // namespace
 
-bool is_closed(const TriangleMesh& mesh) { return edge_facts(sorted_half_edges(mesh)).closed; }
+bool is_closed_mesh(const TriangleMesh& mesh) { return edge_facts(sorted_half_edges(mesh)).closed; }
 
 bool is_closed_manifold(const TriangleMesh& mesh) {
   const std::vector<HalfEdge> edges = sorted_half_edges(mesh);

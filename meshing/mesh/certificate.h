@@ -39,7 +39,7 @@ struct Certificate {
 
 /// Whether every edge has exactly two faces; false for no faces. Quick beside certify().
 /// \pre as certify()
-bool is_closed(const TriangleMesh& mesh);
+bool is_closed_mesh(const TriangleMesh& mesh);
 /// The same, and the faces around every vertex form one fan.
 bool is_closed_manifold(const TriangleMesh& mesh);
 

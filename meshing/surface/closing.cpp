@@ -235,14 +235,14 @@ class Closing {
     return attempt("cut-self-intersections", 0, [&] {
       TriangleMesh made = cut_and_filled(base_);
       (void)reference_volume();  // of the surface before it was cut
-      if (!is_closed(base_) && is_closed(made)) base_ = made;
+      if (!is_closed_mesh(base_) && is_closed_mesh(made)) base_ = made;
       return made;
     });
   }
 
   bool enclose(double voxel) {
     return attempt("level-set", voxel, [&] {
-      if (!is_closed(base_)) throw NumericalError("holes are left that nothing could fill");
+      if (!is_closed_mesh(base_)) throw NumericalError("holes are left that nothing could fill");
       if (std::isnan(reference_volume())) throw NumericalError("the surface surrounds nothing");
       const openvdb::FloatGrid::Ptr field = enclosing_level_set(base_, voxel);
       TriangleMesh made = closed_isosurface(*field).mesh;
@@ -364,7 +364,7 @@ class Closing {
     if (reference_) return *reference_;
     constexpr double kVoxels = 256;  // along the diagonal
     double volume = kNaN;
-    if (is_closed(base_)) {
+    if (is_closed_mesh(base_)) {
       try {
         volume = enclosed_by_level_set(*enclosing_level_set(base_, diagonal_ / kVoxels));
       } catch (const openvdb::Exception&) {  // of voxels too small for it: nothing to hold against

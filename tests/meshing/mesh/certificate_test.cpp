@@ -200,19 +200,19 @@ TEST(Certify, DoesNotPassAnEmptyMesh) { EXPECT_FALSE(certify({}).passed()); }
 
 TEST(IsClosed, AsksForTwoFacesAtEveryEdgeAndForOneFanAtEveryVertex) {
   TriangleMesh mesh = cube({0, 0, 0}, {1, 1, 1});
-  EXPECT_TRUE(is_closed(mesh));
+  EXPECT_TRUE(is_closed_mesh(mesh));
   EXPECT_TRUE(is_closed_manifold(mesh));
   TriangleMesh open = mesh;
   open.faces.pop_back();
-  EXPECT_FALSE(is_closed(open));
+  EXPECT_FALSE(is_closed_mesh(open));
   EXPECT_FALSE(is_closed_manifold(open));
   append(mesh, cube({1, 1, 1}, {2, 2, 2}));
   for (auto& face : mesh.faces) {
     for (auto& v : face) v = v == 8 ? 7 : v;
   }
-  EXPECT_TRUE(is_closed(mesh));
+  EXPECT_TRUE(is_closed_mesh(mesh));
   EXPECT_FALSE(is_closed_manifold(mesh)) << "two cubes at one vertex";
-  EXPECT_FALSE(is_closed({}));
+  EXPECT_FALSE(is_closed_mesh({}));
 }
 
 TEST(Certificate, TellsEulerNumberAndSmallestAngle) {
