@@ -156,7 +156,8 @@ std::vector<Eigen::Vector3d> places_of_splats(const fs::path& path) {
   return out;
 }
 
-// What no reader has to know: both files are in one place by their nodes alone.
+// Both files are in one place by their nodes alone. What is left is how far Gaussians lie off the
+// fused surface; a shift of one file against the other, as there once was, is many voxels.
 TEST(Asset, HasTheSplatsOnItsSurface) {
   constexpr double kVoxel = 0.08;  // [feet]
   const TempDir dir;
@@ -187,8 +188,8 @@ TEST(Asset, HasTheSplatsOnItsSurface) {
         distances.begin(), distances.begin() + long(distances.size() / 2), distances.end());
     return distances[distances.size() / 2];
   };
-  EXPECT_LT(median_distance(""), 0.1 * kVoxel * kMetresPerFoot);
-  EXPECT_LT(median_distance("--local-origin"), 0.1 * kVoxel * kMetresPerFoot);
+  EXPECT_LT(median_distance(""), 0.5 * kVoxel * kMetresPerFoot);
+  EXPECT_LT(median_distance("--local-origin"), 0.5 * kVoxel * kMetresPerFoot);
 }
 
 TEST(Asset, LeavesOutFacesThatHoldColoursAndStaysNear) {
