@@ -37,7 +37,7 @@ class SceneReader {
     is_cloud_ = !shows_triangles(scene);
     for (const GlbInstance& instance : scene.instances) add_mesh(instance);
     TriangleMesh& mesh = out_.parsed.mesh;
-    if (mesh.faces.empty() && out_.parsed.positions.empty()) {
+    if (is_cloud_ ? out_.parsed.positions.empty() : mesh.faces.empty()) {
       throw BadInput(Defect::Empty,
                      file_.path(),
                      "holds no triangles" + (is_cloud_ ? std::string(" and no points") : "") +

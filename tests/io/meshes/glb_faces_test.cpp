@@ -190,6 +190,13 @@ TEST(GlbFaces, PointsThatAreNoNumbersAreCounted) {
   EXPECT_EQ(mesh.parsed.warnings[0], "left out 1 points whose place is not a number");
 }
 
+// What had triangles is no cloud when all of them vanish.
+TEST(GlbFaces, FlattenedTrianglesLeaveNoCloud) {
+  BoxGlb t;
+  t.json["nodes"][0]["scale"] = {0, 0, 0};
+  EXPECT_EQ(t.defect(), "EMPTY");
+}
+
 TEST(GlbFaces, LinesAreCounted) {
   BoxGlb t;
   const auto with = [&](int mode) {
