@@ -252,14 +252,14 @@ void drop_unusable(ParsedMesh& parsed, const std::filesystem::path& path) {
   const size_t dropped_faces = drop_faces_of_dropped(parsed.mesh, number);
   const bool is_cloud = faces == 0;
   if (is_cloud ? 2 * dropped > vertices : 2 * dropped_faces > faces) {
+    const auto share = [](size_t part, size_t all) {
+      return std::to_string(part) + " of " + std::to_string(all);
+    };
     throw BadInput(Defect::Value,
                    path,
-                   counted(dropped, "vertex") + " of " + std::to_string(vertices) +
-                       " are not finite" +
-                       (is_cloud ? ""
-                                 : ", and " + std::to_string(dropped_faces) + " of " +
-                                       counted(faces, "face") + " name them") +
-                       ": that is more than half");
+                   "vertices that are not finite: " + share(dropped, vertices) +
+                       (is_cloud ? "" : ", faces there: " + share(dropped_faces, faces)) +
+                       "; that is more than half");
   }
   keep_numbered(parsed.positions, number);
   keep_numbered(parsed.mesh.normals, number);
