@@ -31,6 +31,7 @@
 #include "tests/support/sample_mesh.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/temp_dir.h"
+#include "tests/support/tiff_file.h"
 #include "tests/support/zip_bytes.h"
 
 namespace cgs::test {
@@ -102,6 +103,21 @@ void add_pictures(Kinds& kinds) {
   heic.is_isolated = true;
   kinds.push_back(heic);
   kinds.push_back(of_bytes("tiff", "a.tif", tiff_bytes, read));
+  kinds.push_back(of_bytes(
+      "jpeg-inks", "a.jpg", [] { return jpeg(16, 12, 4); }, read));
+  const auto planes = [] {
+    const auto tags =
+        with_tags(tiff_tags(12, 9, 4, 16, 5), {{259, 3, {8}}, {317, 3, {2}}, {284, 3, {2}}});
+    return tiff_file(tags, std::vector<std::string>(4, deflated(std::string(216, 'g'))), true);
+  };
+  kinds.push_back(of_bytes("tiff-planes", "a.tif", planes, read));
+  const auto tiles = [] {
+    const auto tags =
+        with_tags(tiff_tags(12, 9, 1, 4, 3),
+                  {{320, 3, std::vector<uint32_t>(48, 30000)}, {322, 3, {16}}, {323, 3, {16}}});
+    return tiff_file(tags, {std::string(128, 'g')});
+  };
+  kinds.push_back(of_bytes("tiff-tiles", "a.tif", tiles, read));
   const auto read_lens = [](const fs::path& file) { return lens_hint(file, {36, 24}); };
   const auto exif = [] { return exif_tiff({{0x920a, 5, 280}, {0xa405, 3, 28}}, true); };
   kinds.push_back(of_bytes("exif-of-tiff", "a.tif", exif, read_lens));
