@@ -248,13 +248,16 @@ ColorImage read_tiff(const TiffPixels& tiff,
                      MaskMap& usable) {
   const TiffForm& form = tiff.form();
   const bool has_inks = form.kind == TiffForm::Kind::Inks;
-  ColorImage image(header.width, header.height, Eigen::Vector3f::Zero());
+  ColorImage image;  // made when the first pixels are there: headers promise much
   InkImage inks;
-  if (has_inks) inks = InkImage(header.width, header.height, {});
   const auto within = [](float value) {
     return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : 0.0f;
   };
   tiff.read([&](int x, int y, std::span<const float> row) {
+    if (image.empty() && inks.empty()) {
+      if (has_inks) inks = InkImage(header.width, header.height, {});
+      if (!has_inks) image = ColorImage(header.width, header.height, Eigen::Vector3f::Zero());
+    }
     for (; !row.empty(); ++x, row = row.subspan(size_t(form.channels))) {
       float opacity = 1;
       if (form.alpha >= 0) opacity = float(double(row[size_t(form.alpha)]) / form.full());
@@ -283,9 +286,10 @@ StoredSamples samples_of_tiff(const TiffPixels& tiff,
   if (!is_grey || form.channels > 2) {
     throw BadInput(Defect::Unsupported, path, "holds colours, expected one value per pixel");
   }
-  StoredSamples out{Raster<float>(header.width, header.height, 0)};
+  StoredSamples out;
   if (!form.is_float && form.bits <= 16) out.whole_bits = form.bits <= 8 ? 8 : 16;
   tiff.read([&](int x, int y, std::span<const float> row) {
+    if (out.values.empty()) out.values = Raster<float>(header.width, header.height, 0);
     for (size_t i = 0; i < row.size(); i += size_t(form.channels)) out.values(x++, y) = row[i];
   });
   return out;

@@ -142,7 +142,9 @@ void unpack(const TiffForm& form, const uint8_t* row, size_t count, float* out, 
 
 }  // namespace
 
-double TiffForm::full() const { return is_float ? 1 : std::ldexp(1.0, bits) - 1; }
+double TiffForm::full() const {
+  return is_float ? 1 : static_cast<double>((uint64_t{1} << bits) - 1);
+}
 
 int TiffForm::color_channels() const {
   return kind == Kind::Rgb || kind == Kind::Lab ? 3 : kind == Kind::Inks ? 4 : 1;
@@ -181,7 +183,7 @@ struct TiffPixels::Handle {
                   uint32_t x,
                   uint32_t y,
                   uint32_t rows,
-                  std::vector<std::vector<uint8_t>>& planes) const;
+                  std::vector<std::unique_ptr<uint8_t[]>>& planes) const;
 
   TiffMemory memory;
   ImageHeader header;
@@ -256,8 +258,10 @@ void TiffPixels::Handle::read_samples_of(TiffForm& form) const {
   if (form.channels < form.color_channels() || form.channels > kMostChannels) {
     refuse(Defect::Syntax, "TIFF of " + std::to_string(form.channels) + " samples per pixel");
   }
-  if (format == SAMPLEFORMAT_INT) {
-    refuse(Defect::Unsupported, "signed whole-number samples are not read");
+  if (format == SAMPLEFORMAT_INT || (form.is_float && form.kind == TiffForm::Kind::Lab)) {
+    refuse(Defect::Unsupported,
+           form.is_float ? "floats of CIELab are not read"
+                         : "signed whole-number samples are not read");
   }
   const bool is_known =
       form.is_float ? form.bits == 16 || form.bits == 24 || form.bits == 32 || form.bits == 64
@@ -332,7 +336,7 @@ void TiffPixels::Handle::read_block(const Blocks& blocks,
                                     uint32_t x,
                                     uint32_t y,
                                     uint32_t rows,
-                                    std::vector<std::vector<uint8_t>>& planes) const {
+                                    std::vector<std::unique_ptr<uint8_t[]>>& planes) const {
   for (size_t p = 0; p < planes.size(); ++p) {
     const auto plane = static_cast<uint16_t>(p);
     auto& bytes = planes[p];
@@ -340,9 +344,9 @@ void TiffPixels::Handle::read_block(const Blocks& blocks,
     const tmsize_t got =
         blocks.are_tiles
             ? TIFFReadEncodedTile(
-                  file.get(), TIFFComputeTile(file.get(), x, y, 0, plane), bytes.data(), wanted)
+                  file.get(), TIFFComputeTile(file.get(), x, y, 0, plane), bytes.get(), wanted)
             : TIFFReadEncodedStrip(
-                  file.get(), TIFFComputeStrip(file.get(), y, plane), bytes.data(), wanted);
+                  file.get(), TIFFComputeStrip(file.get(), y, plane), bytes.get(), wanted);
     if (got < wanted) refuse(Defect::Truncated, "the pixels are cut or damaged");
   }
 }
@@ -369,8 +373,11 @@ void TiffPixels::read(const TakeRow& take) const {
   const Handle::Blocks blocks = handle_->blocks(form_);
   const auto width = uint32_t(handle_->header.width);
   const auto height = uint32_t(handle_->header.height);
-  std::vector<std::vector<uint8_t>> planes(size_t(blocks.planes));
-  for (auto& plane : planes) plane.resize(blocks.row_bytes * blocks.height);
+  // Unwritten memory is only address space, until a file turns out to hold what it promises.
+  std::vector<std::unique_ptr<uint8_t[]>> planes(size_t(blocks.planes));
+  for (auto& plane : planes) {
+    plane = std::make_unique_for_overwrite<uint8_t[]>(blocks.row_bytes * blocks.height);
+  }
   std::vector<float> samples(size_t{blocks.width} * size_t(form_.channels));
   errno = 0;
   for (uint32_t y = 0; y < height; y += blocks.height) {
@@ -380,7 +387,7 @@ void TiffPixels::read(const TakeRow& take) const {
       const size_t shown = std::min(blocks.width, width - x);
       for (uint32_t r = 0; r < rows; ++r) {
         for (size_t p = 0; p < planes.size(); ++p) {
-          const uint8_t* row = planes[p].data() + blocks.row_bytes * r;
+          const uint8_t* row = planes[p].get() + blocks.row_bytes * r;
           const bool is_alone = planes.size() > 1;
           unpack(form_,
                  row,
