@@ -378,7 +378,7 @@ void TiffPixels::read(const TakeRow& take) const {
   for (auto& plane : planes) {
     plane = std::make_unique_for_overwrite<uint8_t[]>(blocks.row_bytes * blocks.height);
   }
-  std::vector<float> samples(size_t{blocks.width} * size_t(form_.channels));
+  std::vector<float> samples(size_t{std::min(blocks.width, width)} * size_t(form_.channels));
   errno = 0;
   for (uint32_t y = 0; y < height; y += blocks.height) {
     const uint32_t rows = std::min(blocks.height, height - y);
