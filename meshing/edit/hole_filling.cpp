@@ -6,32 +6,68 @@
 #include <limits>
 #include <vector>
 
-#include <CGAL/Polygon_mesh_processing/border.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
+#include <CGAL/boost/graph/graph_traits_TriMesh_ArrayKernelT.h>
 #include <Eigen/Geometry>
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 
+#include "meshing/mesh/halfedges.h"
 #include "meshing/mesh/polygon_mesh.h"
 
 namespace cgs {
 
 namespace {
 
-using polygon_mesh::PolygonMesh;
-namespace pmp = CGAL::Polygon_mesh_processing;
+struct DoublePlaces : OpenMesh::DefaultTraits {
+  using Point = OpenMesh::Vec3d;
+};
+using PlacedMesh = OpenMesh::TriMesh_ArrayKernelT<DoublePlaces>;
+using Graph = boost::graph_traits<PlacedMesh>;  // by which CGAL knows it
 
-/// The rim of a hole and what closes it.
+/// The rim of a hole, the border halfedge it starts with, and what closes it.
 struct Hole {
+  Graph::halfedge_descriptor start;
   std::vector<uint32_t> rim;
-  std::vector<PolygonMesh::Face_index> faces;
-  std::vector<PolygonMesh::Vertex_index> vertices;
+  std::vector<Graph::face_descriptor> faces;
+  std::vector<Graph::vertex_descriptor> vertices;
 };
 
-std::vector<uint32_t> rim_of(const PolygonMesh& mesh, PolygonMesh::Halfedge_index start) {
-  std::vector<uint32_t> rim;
-  for (const auto h : CGAL::halfedges_around_face(start, mesh)) {
-    rim.push_back(static_cast<uint32_t>(mesh.target(h)));
+// \throws NumericalError where it is not manifold
+PlacedMesh placed(const TriangleMesh& mesh) {
+  PlacedMesh out;
+  halfedges::fill_halfedges(mesh, out);
+  // CGAL's own mesh refuses the same, and says which face it is.
+  if (!halfedges::is_manifold(out)) (void)polygon_mesh::from_triangles(mesh, "filling holes");
+  for (const auto v : out.vertices()) {
+    const Eigen::Vector3d p = mesh.vertices[size_t(v.idx())].cast<double>();
+    out.set_point(v, {p.x(), p.y(), p.z()});
   }
-  return rim;
+  return out;
+}
+
+Eigen::Vector3f place_of(const PlacedMesh& mesh, halfedges::VertexHandle v) {
+  const auto& p = mesh.point(v);
+  return Eigen::Vector3d(p[0], p[1], p[2]).cast<float>();
+}
+
+// In the order of the faces along them.
+std::vector<Hole> holes_of(const PlacedMesh& mesh) {
+  std::vector<Hole> out;
+  std::vector<uint8_t> seen(mesh.n_halfedges(), 0);
+  for (const auto face : mesh.faces()) {
+    for (const auto side : mesh.fh_range(face)) {
+      const auto start = mesh.opposite_halfedge_handle(side);
+      if (!mesh.is_boundary(start) || seen[size_t(start.idx())] != 0) continue;
+      Hole& hole = out.emplace_back();
+      hole.start = start;
+      for (const auto h : mesh.hl_range(start)) {
+        seen[size_t(h.idx())] = 1;
+        hole.rim.push_back(static_cast<uint32_t>(mesh.to_vertex_handle(h).idx()));
+      }
+    }
+  }
+  return out;
 }
 
 double width_of(const TriangleMesh& mesh, const std::vector<uint32_t>& rim) {
@@ -55,15 +91,15 @@ Eigen::Vector3f rim_color(const TriangleMesh& mesh,
 }
 
 // Vertices are appended in the order CGAL numbered them, all holes together.
-void append_vertices(TriangleMesh& out, const PolygonMesh& closed, const std::vector<Hole>& holes) {
+void append_vertices(TriangleMesh& out, const PlacedMesh& closed, const std::vector<Hole>& holes) {
   const size_t before = out.vertices.size();
-  std::vector<const Hole*> hole_of(closed.number_of_vertices() - before, nullptr);
+  std::vector<const Hole*> hole_of(closed.n_vertices() - before, nullptr);
   for (const Hole& hole : holes) {
-    for (const auto v : hole.vertices) hole_of[size_t(v) - before] = &hole;
+    for (const auto v : hole.vertices) hole_of[size_t(v.idx()) - before] = &hole;
   }
   for (size_t i = 0; i < hole_of.size(); ++i) {
-    const Eigen::Vector3f at = polygon_mesh::vector_of(
-        closed.point(PolygonMesh::Vertex_index(static_cast<uint32_t>(before + i))));
+    const Eigen::Vector3f at =
+        place_of(closed, halfedges::VertexHandle(static_cast<int>(before + i)));
     if (!out.colors.empty()) out.colors.push_back(rim_color(out, hole_of[i]->rim, at));
     out.vertices.push_back(at);
     if (!out.normals.empty()) out.normals.emplace_back(Eigen::Vector3f::Zero());
@@ -72,15 +108,13 @@ void append_vertices(TriangleMesh& out, const PolygonMesh& closed, const std::ve
   }
 }
 
-double append_faces(TriangleMesh& out, const PolygonMesh& closed, const std::vector<Hole>& holes) {
+double append_faces(TriangleMesh& out, const PlacedMesh& closed, const std::vector<Hole>& holes) {
   double area = 0;
   for (const Hole& hole : holes) {
     for (const auto f : hole.faces) {
       std::array<uint32_t, 3> face{};
       size_t k = 0;
-      for (const auto v : CGAL::vertices_around_face(closed.halfedge(f), closed)) {
-        face.at(k++) = static_cast<uint32_t>(v);
-      }
+      for (const auto v : closed.fv_range(f)) face.at(k++) = static_cast<uint32_t>(v.idx());
       out.faces.push_back(face);
       if (!out.provenance.empty()) out.provenance.push_back(Provenance::Inferred);
       const Eigen::Vector3d a = out.vertices[face[0]].cast<double>();
@@ -99,20 +133,17 @@ FilledMesh holes_filled(const TriangleMesh& mesh,
                         const Progress& progress,
                         size_t longest_rim) {
   CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
-  PolygonMesh closed = polygon_mesh::from_triangles(mesh, "filling holes");
-  std::vector<PolygonMesh::Halfedge_index> starts;
-  pmp::extract_boundary_cycles(closed, std::back_inserter(starts));
+  PlacedMesh closed = placed(mesh);
   FilledMesh out{mesh, 0, 0, 0};
-  std::vector<Hole> holes;
-  for (size_t i = 0; i < starts.size(); ++i) {
-    report(progress, double(i) / double(starts.size()));
-    Hole hole{rim_of(closed, starts[i]), {}, {}};
+  std::vector<Hole> holes = holes_of(closed);
+  for (size_t i = 0; i < holes.size(); ++i) {
+    report(progress, double(i) / double(holes.size()));
+    Hole& hole = holes[i];
     if (hole.rim.size() <= longest_rim && width_of(mesh, hole.rim) <= widest) {
-      pmp::triangulate_refine_and_fair_hole(
-          closed, starts[i], std::back_inserter(hole.faces), std::back_inserter(hole.vertices));
+      CGAL::Polygon_mesh_processing::triangulate_refine_and_fair_hole(
+          closed, hole.start, std::back_inserter(hole.faces), std::back_inserter(hole.vertices));
     }
     ++(hole.faces.empty() ? out.left_open : out.filled);
-    if (!hole.faces.empty()) holes.push_back(std::move(hole));
   }
   const size_t before = mesh.vertices.size();
   append_vertices(out.mesh, closed, holes);

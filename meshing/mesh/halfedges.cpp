@@ -13,19 +13,45 @@ namespace cgs::halfedges {
 
 namespace {
 
-/// The sides of all faces (3 * face + corner they start at) by their lower vertex: those of v are
-/// at first[v] ... first[v + 1], sorted by their higher vertex and then by number.
+template <typename Work>
+void for_each_parallel(size_t count, const Work& work) {
+  constexpr size_t kGrain = 4096;
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kGrain), [&](const auto& range) {
+    for (size_t i = range.begin(); i != range.end(); ++i) work(i);
+  });
+}
+
+/// A side of a face: 3 * face + the corner it starts at.
+struct Side {
+  uint64_t key = 0;  // to sort by: higher vertex << 32 | number << 1 | upwards
+
+  uint32_t high() const { return static_cast<uint32_t>(key >> 32); }
+  uint32_t number() const { return static_cast<uint32_t>(key) >> 1; }
+  bool is_upwards() const { return (key & 1) != 0; }  // from its lower vertex to its higher one
+};
+
+/// The sides of all faces by their lower vertex: those of v are of[first[v] ... first[v + 1]).
 struct SidesByVertex {
   std::vector<size_t> first;
-  std::vector<uint64_t> sides;  // higher vertex << 32 | side
+  std::vector<Side> of;
 
-  uint32_t high(size_t at) const { return static_cast<uint32_t>(sides[at] >> 32); }
-  uint32_t side(size_t at) const { return static_cast<uint32_t>(sides[at]); }
+  // Calls `visit` for each edge below v, with its sides; the second is null at a border.
+  template <typename Visit>
+  void for_each_edge(size_t v, const Visit& visit) const {
+    for (size_t i = first[v]; i < first[v + 1];) {
+      size_t end = i + 1;
+      while (end < first[v + 1] && of[end].high() == of[i].high()) ++end;
+      const bool is_shared = end == i + 2 && of[i].is_upwards() != of[i + 1].is_upwards();
+      if (is_shared) visit(of[i], &of[i + 1]);
+      for (; !is_shared && i < end; ++i) visit(of[i], nullptr);
+      i = end;
+    }
+  }
 };
 
 SidesByVertex sides_by_vertex(const TriangleMesh& mesh) {
   SidesByVertex out{std::vector<size_t>(mesh.vertices.size() + 1, 0),
-                    std::vector<uint64_t>(3 * mesh.faces.size())};
+                    std::vector<Side>(3 * mesh.faces.size())};
   for (const auto& [a, b, c] : mesh.faces) {
     for (const uint32_t low : {std::min(a, b), std::min(b, c), std::min(c, a)}) {
       ++out.first[size_t{low} + 1];
@@ -33,18 +59,31 @@ SidesByVertex sides_by_vertex(const TriangleMesh& mesh) {
   }
   for (size_t v = 1; v < out.first.size(); ++v) out.first[v] += out.first[v - 1];
   std::vector<size_t> next(out.first.begin(), out.first.end() - 1);
-  uint32_t side = 0;
+  uint64_t number = 0;
+  const auto add = [&](uint32_t from, uint32_t to) {
+    const auto [low, high] = std::minmax(from, to);
+    out.of[next[low]++].key = uint64_t{high} << 32 | number++ << 1 | (from == low ? 1 : 0);
+  };
   for (const auto& [a, b, c] : mesh.faces) {
-    for (const auto& [low, high] : {std::minmax(a, b), std::minmax(b, c), std::minmax(c, a)}) {
-      out.sides[next[low]++] = uint64_t{high} << 32 | side++;
-    }
+    add(a, b);
+    add(b, c);
+    add(c, a);
   }
-  constexpr size_t kGrain = 4096;
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, next.size(), kGrain), [&](const auto& range) {
-    for (size_t v = range.begin(); v != range.end(); ++v) {
-      std::sort(out.sides.data() + out.first[v], out.sides.data() + out.first[v + 1]);
-    }
+  for_each_parallel(next.size(), [&](size_t v) {
+    std::sort(out.of.data() + out.first[v],
+              out.of.data() + out.first[v + 1],
+              [](const Side& a, const Side& b) { return a.key < b.key; });
   });
+  return out;
+}
+
+// Of every vertex the number of the first edge below it; at the end that of all.
+std::vector<uint64_t> first_edges(const SidesByVertex& sides) {
+  std::vector<uint64_t> out(sides.first.size(), 0);
+  for_each_parallel(out.size() - 1, [&](size_t v) {
+    sides.for_each_edge(v, [&](const Side&, const Side*) { ++out[v + 1]; });
+  });
+  for (size_t v = 1; v < out.size(); ++v) out[v] += out[v - 1];
   return out;
 }
 
@@ -54,74 +93,62 @@ class Linker {
   Linker(const TriangleMesh& mesh, HalfedgeMesh& out)
       : mesh_(mesh), out_(out), of_side_(3 * mesh.faces.size()) {}
 
-  /// \param second  the side of the other face; nothing for a border edge
-  void add_edge(uint32_t side, const uint32_t* second) {
-    const HalfedgeHandle along = out_.halfedge_handle(EdgeHandle(edges_++), 0);
-    const HalfedgeHandle back = out_.opposite_halfedge_handle(along);
+  /// \param second  of the other face; null for a border edge
+  void put_edge(EdgeHandle edge, uint32_t low, const Side& side, const Side* second) {
+    const HalfedgeHandle along = out_.halfedge_handle(edge, 0);
+    const HalfedgeHandle back = out_.halfedge_handle(edge, 1);
     put(along, side);
-    if (second != nullptr) {
-      put(back, *second);
-    } else {
-      out_.set_vertex_handle(back, vertex(side));
-      out_.set_boundary(back);
-    }
+    if (second != nullptr) put(back, *second);
+    const VertexHandle lower(static_cast<int>(low));
+    const VertexHandle higher(static_cast<int>(side.high()));
+    out_.set_vertex_handle(along, side.is_upwards() ? higher : lower);
+    out_.set_vertex_handle(back, side.is_upwards() ? lower : higher);
   }
 
   void link() {
-    for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
-      const HalfedgeHandle* sides = of_side_.data() + size_t{3} * f;
-      for (size_t k = 0; k < 3; ++k) {
-        out_.set_next_halfedge_handle(sides[k], sides[(k + 1) % 3]);
-        out_.set_halfedge_handle(VertexHandle(int(mesh_.faces[f].at(k))), sides[k]);
+    for_each_parallel(mesh_.faces.size(), [&](size_t f) {
+      const HalfedgeHandle* sides = of_side_.data() + 3 * f;
+      for (size_t k = 0; k < 3; ++k) out_.set_next_halfedge_handle(sides[k], sides[(k + 1) % 3]);
+      out_.set_halfedge_handle(FaceHandle(static_cast<int>(f)), sides[0]);
+    });
+    const HalfedgeHandle* side = of_side_.data();
+    for (const auto& face : mesh_.faces) {
+      for (const uint32_t v : face) {
+        out_.set_halfedge_handle(VertexHandle(static_cast<int>(v)), *side++);
       }
-      out_.set_halfedge_handle(FaceHandle(int(f)), sides[0]);
     }
-    for (int h = 0; h < static_cast<int>(out_.n_halfedges()); ++h) {
-      if (out_.is_boundary(HalfedgeHandle(h))) link_border(HalfedgeHandle(h));
+    for (const auto edge : out_.edges()) {
+      const HalfedgeHandle back = out_.halfedge_handle(edge, 1);
+      if (out_.is_boundary(back)) link_border(back);
     }
   }
 
  private:
-  VertexHandle vertex(uint32_t corner) const {
-    return VertexHandle(int(mesh_.faces[corner / 3].at(corner % 3)));
+  void put(HalfedgeHandle halfedge, const Side& side) {
+    of_side_[side.number()] = halfedge;
+    out_.set_face_handle(halfedge, FaceHandle(static_cast<int>(side.number() / 3)));
   }
-  void put(HalfedgeHandle halfedge, uint32_t side) {
-    of_side_[side] = halfedge;
-    out_.set_vertex_handle(halfedge, vertex(side % 3 == 2 ? side - 2 : side + 1));
-    out_.set_face_handle(halfedge, FaceHandle(int(side / 3)));
-  }
-  // Turns around the vertex that a border runs to, through its fan, to where the border goes on.
+  // Turns around the vertex that a border runs to, through its fan, to the other border of that.
+  // Where the vertex has fans already, this one comes between two of them.
   void link_border(HalfedgeHandle border) {
-    HalfedgeHandle next = border;
+    HalfedgeHandle next = out_.opposite_halfedge_handle(border);
     do {
-      next = out_.opposite_halfedge_handle(next);
       next = out_.opposite_halfedge_handle(out_.prev_halfedge_handle(next));
     } while (!out_.is_boundary(next));
+    const VertexHandle at = out_.to_vertex_handle(border);
+    const HalfedgeHandle known = out_.halfedge_handle(at);
+    if (out_.is_boundary(known)) {
+      out_.set_next_halfedge_handle(out_.prev_halfedge_handle(known), next);
+      next = known;
+    } else {
+      out_.set_halfedge_handle(at, next);
+    }
     out_.set_next_halfedge_handle(border, next);
-    out_.set_halfedge_handle(out_.to_vertex_handle(border), next);
   }
   const TriangleMesh& mesh_;
   HalfedgeMesh& out_;
   std::vector<HalfedgeHandle> of_side_;
-  int edges_ = 0;
 };
-
-// Calls `add` for every edge, with its sides; the second is null at a border.
-template <typename Add>
-void for_each_pair(const TriangleMesh& mesh, const SidesByVertex& sides, const Add& add) {
-  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
-    const auto starts_low = [&](uint32_t side) { return mesh.faces[side / 3].at(side % 3) == v; };
-    for (size_t i = sides.first[v]; i < sides.first[v + 1];) {
-      size_t end = i + 1;
-      while (end < sides.first[v + 1] && sides.high(end) == sides.high(i)) ++end;
-      const uint32_t last = sides.side(end - 1);
-      const bool is_shared = end == i + 2 && starts_low(sides.side(i)) != starts_low(last);
-      if (is_shared) add(sides.side(i), &last);
-      for (; !is_shared && i < end; ++i) add(sides.side(i), nullptr);
-      i = end;
-    }
-  }
-}
 
 void require_few(uint64_t edges) {
   constexpr uint64_t kMost = uint64_t{1} << 30;
@@ -131,19 +158,44 @@ void require_few(uint64_t edges) {
 
 }  // namespace
 
-HalfedgeMesh halfedges_of(const TriangleMesh& mesh) {
-  require_few(mesh.faces.size());  // sides are numbered in 32 bits
+void fill_halfedges(const TriangleMesh& mesh, HalfedgeMesh& out) {
+  require_few((3 * mesh.faces.size() + 1) / 2);  // no edge has more than two sides
   const SidesByVertex sides = sides_by_vertex(mesh);
-  uint64_t edges = 0;
-  for_each_pair(mesh, sides, [&](uint32_t, const uint32_t*) { ++edges; });
-  require_few(edges);
-  HalfedgeMesh out;
-  out.resize(mesh.vertices.size(), edges, mesh.faces.size());
+  const std::vector<uint64_t> first = first_edges(sides);
+  require_few(first.back());
+  out.resize(mesh.vertices.size(), first.back(), mesh.faces.size());
   Linker linker(mesh, out);
-  for_each_pair(
-      mesh, sides, [&](uint32_t side, const uint32_t* second) { linker.add_edge(side, second); });
+  for_each_parallel(mesh.vertices.size(), [&](size_t v) {
+    int edge = static_cast<int>(first[v]);
+    sides.for_each_edge(v, [&](const Side& side, const Side* second) {
+      linker.put_edge(EdgeHandle(edge++), static_cast<uint32_t>(v), side, second);
+    });
+  });
   linker.link();
+}
+
+HalfedgeMesh halfedges_of(const TriangleMesh& mesh) {
+  HalfedgeMesh out;
+  fill_halfedges(mesh, out);
   return out;
+}
+
+bool is_manifold(const HalfedgeMesh& mesh) {
+  for (const auto edge : mesh.edges()) {
+    const auto [low, high] = ends_of(mesh, edge);
+    if (low == high || repeats_edge(mesh, edge)) return false;
+  }
+  std::vector<uint32_t> corners(mesh.n_vertices(), 0);
+  for (const auto face : mesh.faces()) {
+    for (const auto v : mesh.fv_range(face)) ++corners[size_t(v.idx())];
+  }
+  for (const auto v : mesh.vertices()) {
+    for (const auto side : mesh.voh_range(v)) {
+      if (!mesh.is_boundary(side)) --corners[size_t(v.idx())];
+    }
+    if (corners[size_t(v.idx())] != 0) return false;
+  }
+  return true;
 }
 
 std::vector<std::array<uint32_t, 3>> adjacent_faces(const TriangleMesh& mesh) {

@@ -84,6 +84,9 @@ def main():
             theirs = {}
         print(f"{'operation':40} {'ours wall':>10} {'ours CPU':>10} {'o3d wall':>10} {'o3d CPU':>10} {'CPU ratio':>10}")
         for line in ours.splitlines():
+            if line.startswith("#"):
+                print(line)
+                continue
             name, wall, cpu, result = line.split("\t")
             row = f"{name:40} {float(wall):10.2f} {float(cpu):10.2f}"
             if name in theirs:

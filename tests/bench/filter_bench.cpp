@@ -1,57 +1,37 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Times the operations of `cgs filter` on a million triangles and a million points, and writes
 // both to a folder so that other programs can be timed on the same; filter_against_open3d.py does.
+// OpenMesh's decimater is timed here, and what comes out of it measured as ours is.
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
 #include <functional>
-#include <numbers>
-#include <random>
 #include <string>
+
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+#include <OpenMesh/Tools/Decimater/DecimaterT.hh>
+#include <OpenMesh/Tools/Decimater/ModNormalFlippingT.hh>
+#include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 
 #include "io/meshes/mesh_ply.h"
 #include "meshing/edit/simplify.h"
 #include "meshing/edit/smoothing.h"
+#include "meshing/mesh/certificate.h"
 #include "meshing/mesh/mesh_distance.h"
 #include "meshing/mesh/point_normals.h"
 #include "meshing/points/clusters.h"
 #include "meshing/points/down_sampling.h"
 #include "meshing/points/outliers.h"
-#include "tests/support/solid_meshes.h"
+#include "tests/bench/bumpy_ball.h"
 
 namespace cgs {
 namespace {
 
-constexpr double kDiagonal = 3.4;  // of the ball's bounding box, about
+using bench::bumpy_radius;
+using bench::kDiagonal;
+using bench::Noise;
 constexpr size_t kPoints = 1'000'000;
-
-double bumpy_radius(const Eigen::Vector3d& d) {
-  return 1 + 0.1 * std::sin(5 * d.x()) * std::sin(6 * d.y() + 1) * std::sin(4 * d.z() + 2);
-}
-
-class Noise {
- public:
-  double even() { return double(random_()) / 4294967296.0; }
-  double normal() {  // Box and Muller, because the library's generators differ
-    return std::sqrt(-2 * std::log(1 - even())) * std::cos(2 * std::numbers::pi * even());
-  }
-
- private:
-  std::mt19937 random_{1};
-};
-
-// A bumpy ball of about a million triangles, with noise of 5e-5 of its diagonal.
-TriangleMesh bumpy_ball() {
-  TriangleMesh mesh = test::sphere_mesh(1, 500, 1001).mesh;
-  Noise noise;
-  for (auto& p : mesh.vertices) {
-    const Eigen::Vector3d d = p.cast<double>().normalized();
-    p = (d * (bumpy_radius(d) + 5e-5 * kDiagonal * noise.normal())).cast<float>();
-  }
-  return mesh;
-}
 
 // A million points of it with noise of 5e-4 of its diagonal; the first 2 % anywhere in the box.
 TriangleMesh noisy_cloud() {
@@ -125,8 +105,64 @@ void time_mesh(const TriangleMesh& mesh) {
     const SimplifyResult out =
         simplify(mesh, {.max_error = 2 * kDiagonal, .max_color_error = 1, .target_faces = 100'000});
     return std::to_string(out.faces_after) + " faces, mean error " +
-           std::to_string(1e6 * out.evidence.accuracy.mean / kDiagonal) + "e-6 diagonals";
+           std::to_string(1e6 * out.evidence.accuracy.mean / kDiagonal) +
+           "e-6 diagonals, largest " + std::to_string(1e6 * out.evidence.hausdorff() / kDiagonal) +
+           "e-6";
   });
+}
+
+using OpenMesh3 = OpenMesh::TriMesh_ArrayKernelT<>;
+
+OpenMesh3 to_openmesh(const TriangleMesh& mesh) {
+  OpenMesh3 out;
+  for (const auto& p : mesh.vertices) out.add_vertex({p.x(), p.y(), p.z()});
+  for (const auto& f : mesh.faces) {
+    out.add_face(OpenMesh::VertexHandle(int(f[0])),
+                 OpenMesh::VertexHandle(int(f[1])),
+                 OpenMesh::VertexHandle(int(f[2])));
+  }
+  out.request_face_normals();
+  out.update_face_normals();
+  return out;
+}
+
+TriangleMesh from_openmesh(const OpenMesh3& mesh) {
+  TriangleMesh out;
+  for (const auto v : mesh.vertices()) {
+    out.vertices.emplace_back(mesh.point(v)[0], mesh.point(v)[1], mesh.point(v)[2]);
+  }
+  for (const auto f : mesh.faces()) {
+    auto& face = out.faces.emplace_back();
+    size_t k = 0;
+    for (const auto v : mesh.fv_range(f)) face.at(k++) = static_cast<uint32_t>(v.idx());
+  }
+  return out;
+}
+
+// Quadrics, and no face turned over; without that it is a little faster and intersects itself.
+void time_openmesh_decimater(const TriangleMesh& mesh) {
+  const OpenMesh3 whole = to_openmesh(mesh);
+  TriangleMesh out;
+  time_it("simplification 1M to 100k by OpenMesh", [&] {
+    OpenMesh3 copy = whole;
+    OpenMesh::Decimater::DecimaterT<OpenMesh3> decimater(copy);
+    OpenMesh::Decimater::ModQuadricT<OpenMesh3>::Handle quadrics;
+    OpenMesh::Decimater::ModNormalFlippingT<OpenMesh3>::Handle flips;
+    decimater.add(quadrics);
+    decimater.add(flips);
+    decimater.module(quadrics).unset_max_err();
+    decimater.initialize();
+    decimater.decimate_to_faces(0, 100'000);
+    copy.garbage_collection();
+    out = from_openmesh(copy);
+    return std::to_string(out.faces.size()) + " faces";
+  });
+  const MeshDistance distance = mesh_distance(out, mesh, 1'000'000);
+  std::printf(
+      "# OpenMesh's: mean error %.1fe-6, largest %.1fe-6 diagonals, %zu self-intersections\n",
+      1e6 * distance.accuracy.mean / kDiagonal,
+      1e6 * distance.hausdorff() / kDiagonal,
+      certify(out).self_intersections);
 }
 
 }  // namespace
@@ -138,11 +174,12 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder = argv[1];
-  const cgs::TriangleMesh mesh = cgs::bumpy_ball();
+  const cgs::TriangleMesh mesh = cgs::bench::bumpy_ball();
   const cgs::TriangleMesh cloud = cgs::noisy_cloud();
   cgs::write_mesh_ply(folder / "mesh.ply", mesh, {});
   cgs::write_mesh_ply(folder / "cloud.ply", cloud, {});
   cgs::time_points(cloud);
   cgs::time_mesh(mesh);
+  cgs::time_openmesh_decimater(mesh);
   return 0;
 }
