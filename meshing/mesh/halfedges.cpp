@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/mesh/halfedges.h"
 
+#include <cmath>
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -121,6 +123,7 @@ class Linker {
       const HalfedgeHandle back = out_.halfedge_handle(edge, 1);
       if (out_.is_boundary(back)) link_border(back);
     }
+    link_touching();
   }
 
  private:
@@ -129,25 +132,85 @@ class Linker {
     out_.set_face_handle(halfedge, FaceHandle(static_cast<int>(side.number() / 3)));
   }
   // Turns around the vertex that a border runs to, through its fan, to the other border of that.
-  // Where the vertex has fans already, this one comes between two of them.
   void link_border(HalfedgeHandle border) {
     HalfedgeHandle next = out_.opposite_halfedge_handle(border);
     do {
       next = out_.opposite_halfedge_handle(out_.prev_halfedge_handle(next));
     } while (!out_.is_boundary(next));
+    out_.set_next_halfedge_handle(border, next);
     const VertexHandle at = out_.to_vertex_handle(border);
-    const HalfedgeHandle known = out_.halfedge_handle(at);
-    if (out_.is_boundary(known)) {
-      out_.set_next_halfedge_handle(out_.prev_halfedge_handle(known), next);
-      next = known;
+    if (out_.is_boundary(out_.halfedge_handle(at))) {
+      touching_.push_back(border);
     } else {
       out_.set_halfedge_handle(at, next);
     }
-    out_.set_next_halfedge_handle(border, next);
   }
+
+  /// An open fan of faces around a vertex, by the border that runs into it.
+  struct Fan {
+    HalfedgeHandle border;
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();  // sum of directions to its faces
+    Eigen::Vector3d area = Eigen::Vector3d::Zero();    // sum of its area vectors
+    double angle = 0;
+  };
+  Fan fan_of(HalfedgeHandle border) const {
+    Fan out{border};
+    const auto place = [&](VertexHandle v) -> Eigen::Vector3d {
+      return mesh_.vertices[static_cast<size_t>(v.idx())].cast<double>();
+    };
+    const Eigen::Vector3d center = place(out_.to_vertex_handle(border));
+    HalfedgeHandle side = out_.opposite_halfedge_handle(border);
+    do {
+      const Eigen::Vector3d a = place(out_.to_vertex_handle(side)) - center;
+      side = out_.prev_halfedge_handle(side);
+      const Eigen::Vector3d b = place(out_.from_vertex_handle(side)) - center;
+      out.middle += a + b;
+      out.area += a.cross(b);
+      side = out_.opposite_halfedge_handle(side);
+    } while (!out_.is_boundary(side));
+    return out;
+  }
+
+  // Where fans touch at a vertex, a border goes on along the fan that lies next around it, so that
+  // holes that touch have rims of their own.
+  void link_fans(std::vector<Fan> fans) {
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+    for (const Fan& fan : fans) normal += fan.area;
+    const Eigen::Vector3d x = normal.unitOrthogonal();
+    const Eigen::Vector3d y = normal.normalized().cross(x);
+    for (Fan& fan : fans) {
+      const double angle = std::atan2(fan.middle.dot(y), fan.middle.dot(x));
+      if (std::isfinite(angle)) fan.angle = angle;
+    }
+    std::stable_sort(
+        fans.begin(), fans.end(), [](const Fan& a, const Fan& b) { return a.angle > b.angle; });
+    const HalfedgeHandle first = out_.next_halfedge_handle(fans[0].border);
+    for (size_t i = 0; i < fans.size(); ++i) {
+      const bool is_last = i + 1 == fans.size();
+      out_.set_next_halfedge_handle(
+          fans[i].border, is_last ? first : out_.next_halfedge_handle(fans[i + 1].border));
+    }
+  }
+
+  void link_touching() {
+    const auto at = [&](HalfedgeHandle border) { return out_.to_vertex_handle(border); };
+    std::stable_sort(touching_.begin(), touching_.end(), [&](HalfedgeHandle a, HalfedgeHandle b) {
+      return at(a) < at(b);
+    });
+    for (size_t i = 0; i < touching_.size();) {
+      const VertexHandle vertex = at(touching_[i]);
+      std::vector<Fan> fans = {fan_of(out_.prev_halfedge_handle(out_.halfedge_handle(vertex)))};
+      for (; i < touching_.size() && at(touching_[i]) == vertex; ++i) {
+        fans.push_back(fan_of(touching_[i]));
+      }
+      link_fans(std::move(fans));
+    }
+  }
+
   const TriangleMesh& mesh_;
   HalfedgeMesh& out_;
   std::vector<HalfedgeHandle> of_side_;
+  std::vector<HalfedgeHandle> touching_;  // borders into vertices that others run into, too
 };
 
 void require_few(uint64_t edges) {

@@ -28,8 +28,9 @@ using OpenMesh::VertexHandle;
 /// if they alone have its ends next to each other and run it in opposite directions. Where more
 /// faces meet, or two disagree on what is outside, each gets a border edge of its own; these are
 /// numbered one after the other, by their faces. A walk around a vertex passes all its open fans of
-/// faces in turn. Built in linear time, because OpenMesh::PolyConnectivity::add_face() takes four
-/// times as long, twenty times where faces come in no order, and refuses what is not manifold.
+/// faces in turn, as they lie around it. Built in linear time, because
+/// OpenMesh::PolyConnectivity::add_face() takes half as long again, eight times as long where faces
+/// come in no order (tests/bench/halfedges_bench.cpp), and refuses what is not manifold.
 /// \throws LimitError beyond 2^30 edges, which is all that OpenMesh can number
 /// \pre every face index is below mesh.vertices.size()
 HalfedgeMesh halfedges_of(const TriangleMesh& mesh);

@@ -119,7 +119,7 @@ class Estimated : public testing::Test {
 TEST_F(Estimated, SurvivesEveryFormatThatStatesLabels) {
   const Areas before = areas_in(dir_ / "ball.ply");
   std::vector<std::pair<std::string, std::string>> files = {
-      {"again.ply", ""}, {"a.obj", ""}, {"a.3mf", ""}};
+      {"again.ply", ""}, {"a.obj", ""}, {"a.om", ""}, {"a.3mf", ""}};
   for (const auto& [encoding, value] : glb_encodings()) {
     files.emplace_back(encoding + ".glb", " --glb-encoding " + encoding);
   }

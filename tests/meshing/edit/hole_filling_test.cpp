@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/edit/hole_filling.h"
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -9,6 +11,7 @@
 #include "meshing/mesh/certificate.h"
 #include "meshing/mesh/components.h"
 #include "tests/support/sample_mesh.h"
+#include "tests/support/solid_meshes.h"
 
 namespace cgs::hole_filling_test {
 namespace {
@@ -71,6 +74,39 @@ TEST(HolesFilled, LeavesWiderHolesOpen) {
   EXPECT_EQ(out.filled, 1U);
   EXPECT_EQ(out.left_open, 1U);
   EXPECT_FALSE(certify(out.mesh).closed);
+}
+
+TEST(HolesFilled, ClosesHolesThatTouchEachForItselfInWhateverOrderFacesCome) {
+  TriangleMesh torus = test::torus_mesh(1, 0.4, 24, 12).mesh;
+  std::mt19937 random(1);
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    // Every second of the six faces around vertex 100, around which they are sorted.
+    const Eigen::Vector3d center = torus.vertices[100].cast<double>();
+    std::vector<std::pair<double, size_t>> around;
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+    for (const auto& f : torus.faces) {
+      if (std::count(f.begin(), f.end(), 100U) > 0) normal += area_vector(torus, f).normalized();
+    }
+    const Eigen::Vector3d x = normal.unitOrthogonal();
+    const Eigen::Vector3d y = normal.cross(x);
+    for (size_t f = 0; f < torus.faces.size(); ++f) {
+      const auto& face = torus.faces[f];
+      if (std::count(face.begin(), face.end(), 100U) == 0) continue;
+      Eigen::Vector3d d = Eigen::Vector3d::Zero();
+      for (const uint32_t v : face) d += torus.vertices[v].cast<double>() - center;
+      around.emplace_back(std::atan2(d.dot(y), d.dot(x)), f);
+    }
+    ASSERT_EQ(around.size(), 6U);
+    std::sort(around.begin(), around.end());
+    std::vector<uint8_t> keep(torus.faces.size(), 1);
+    for (size_t i = 0; i < 6; i += 2) keep[around[i].second] = 0;
+    const FilledMesh out = holes_filled(with_faces(torus, keep), 10);
+    EXPECT_EQ(out.filled, 3U);
+    EXPECT_EQ(out.left_open, 0U);
+    EXPECT_EQ(out.mesh.faces.size(), torus.faces.size());
+    EXPECT_TRUE(certify(out.mesh).passed());
+    std::shuffle(torus.faces.begin(), torus.faces.end(), random);
+  }
 }
 
 TEST(HolesFilled, WithoutProvenanceThereIsNoneAfterwards) {

@@ -30,7 +30,7 @@ TriangleMesh sheet() {
 // a vertex of none.
 TriangleMesh odd() {
   TriangleMesh mesh;
-  mesh.vertices.resize(10);
+  mesh.vertices.resize(10, Eigen::Vector3f::Zero());
   mesh.faces = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}, {1, 5, 6}, {5, 7, 6}, {5, 7, 8}};
   return mesh;
 }
@@ -129,6 +129,27 @@ TEST(Halfedges, ThereAreNoneOfNothing) {
   TriangleMesh points;
   points.vertices.resize(3);
   EXPECT_EQ(halfedges_of(points).n_vertices(), 3U);
+}
+
+TEST(Halfedges, KnowWhatIsManifold) {
+  EXPECT_TRUE(is_manifold(halfedges_of(test::labelled_sphere())));
+  EXPECT_TRUE(is_manifold(halfedges_of(sheet())));
+  EXPECT_FALSE(is_manifold(halfedges_of(odd())));
+  TriangleMesh twice = sheet();
+  twice.faces.push_back({0, 0, 1});
+  EXPECT_FALSE(is_manifold(halfedges_of(twice)));
+  TriangleMesh cone = test::labelled_sphere();  // and a face that touches its pole
+  cone.vertices.resize(cone.vertices.size() + 2, Eigen::Vector3f::Zero());
+  const auto last = static_cast<uint32_t>(cone.vertices.size() - 1);
+  cone.faces.push_back({0, last, last - 1});
+  EXPECT_FALSE(is_manifold(halfedges_of(cone)));
+  TriangleMesh bow;  // two faces that touch at a vertex
+  bow.vertices = {{0, 0, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 0}};
+  bow.faces = {{0, 1, 2}, {0, 3, 4}};
+  const HalfedgeMesh links = halfedges_of(bow);
+  EXPECT_TRUE(is_manifold(links));
+  EXPECT_EQ(links.valence(VertexHandle(0)), 4U);  // a walk passes both fans
+  EXPECT_EQ(borders(links), borders(made_by_openmesh(bow)));
 }
 
 TEST(AdjacentFaces, ShareTheEdgeTheyStandFor) {
