@@ -293,7 +293,10 @@ TEST_F(ReadTiff, RefusesWhatCannotBe) {
   const auto tags = tiff_tags(kWidth, kHeight, 3, 8, 2);
   const std::string pixels(60, '\x55');
   EXPECT_EQ(refused(tiff_file(tags, {pixels})), "");
-  EXPECT_EQ(refused(tiff_file(tags, {pixels.substr(1)})), "TRUNCATED");
+  // Of a single strip libtiff works the length out itself, where what is stated is too short.
+  const auto strips = with_tags(tags, {{278, 4, {2}}});
+  EXPECT_EQ(refused(tiff_file(strips, {pixels.substr(30), pixels.substr(30)})), "");
+  EXPECT_EQ(refused(tiff_file(strips, {pixels.substr(30), pixels.substr(31)})), "TRUNCATED");
   EXPECT_EQ(
       refused(tiff_file(with_tags(tags, {{259, 3, {8}}}), {test::deflated(pixels.substr(1))})),
       "TRUNCATED");
