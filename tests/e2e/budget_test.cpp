@@ -20,7 +20,8 @@ using test::TempDir;
 
 class Budget : public testing::Test {
  protected:
-  Budget() { test::copy_portal_capture(dir_ / "capture", 3); }  // 168 x 126 pixels
+  // 252 x 189 pixels at 2, 168 x 126 at 3.
+  void make_capture(int divisor) const { test::copy_portal_capture(dir_ / "capture", divisor); }
 
   test::ProgramResult run(const std::string& budget, const std::string& more = "") const {
     return run_cgs("run " + (dir_ / "capture").string() +
@@ -35,16 +36,17 @@ class Budget : public testing::Test {
 };
 
 TEST_F(Budget, MuchTimeBuysEverythingAndTheChoiceIsKept) {
+  make_capture(2);
   const auto first = run("10h");
   ASSERT_EQ(first.exit_code, 0) << first.err;
   const json chosen = file("budget.json");
   EXPECT_EQ(chosen["downscale"], 1);
   EXPECT_EQ(chosen["preset"], "standard");
-  EXPECT_LT(chosen["trials"][0]["pixels"], 3.0 * 168 * 126);  // of smaller pictures than those
+  EXPECT_LT(chosen["trials"][0]["pixels"], 3.0 * 252 * 189);  // of smaller pictures than those
   EXPECT_FALSE(fs::exists(out() / "budget_trial"));
   EXPECT_EQ(file("run.json")["request"]["training"]["steps"], "60");
   const std::string words = file("report.json")["settings_reason"];
-  EXPECT_NE(words.find("168 x 126 pixels, --preset standard"), std::string::npos) << words;
+  EXPECT_NE(words.find("252 x 189 pixels, --preset standard"), std::string::npos) << words;
 
   const std::string model = test::read_bytes(out() / "model/gaussians.ply");
   fs::remove(out() / "report.html");
@@ -65,6 +67,7 @@ TEST_F(Budget, MuchTimeBuysEverythingAndTheChoiceIsKept) {
 }
 
 TEST_F(Budget, TooLittleTimeIsRefusedAndNothingStays) {
+  make_capture(3);
   const auto result = run("1s");
   EXPECT_EQ(result.exit_code, 4) << result.err;
   EXPECT_NE(result.err.find("--budget 1 s is too short; the quickest setting, 168 x 126 pixels"),
