@@ -189,7 +189,7 @@ TEST(Asset, HasTheSplatsOnItsSurface) {
     return distances[distances.size() / 2];
   };
   EXPECT_LT(median_distance(""), 0.5 * kVoxel * kMetresPerFoot);
-  EXPECT_LT(median_distance("--local-origin"), 0.5 * kVoxel * kMetresPerFoot);
+  EXPECT_LT(median_distance("-w --local-origin"), 0.5 * kVoxel * kMetresPerFoot);
 }
 
 TEST(Asset, LeavesOutFacesThatHoldColoursAndStaysNear) {
