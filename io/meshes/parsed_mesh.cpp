@@ -236,6 +236,10 @@ void settle_normals(ParsedMesh& parsed) {
   parsed.warnings.push_back("normals of " + counted(bad, "vertex") + " are not finite: none");
 }
 
+size_t first_dropped(const std::vector<uint32_t>& number) {
+  return size_t(std::find(number.begin(), number.end(), kDropped) - number.begin());
+}
+
 }  // namespace
 
 void drop_unusable(ParsedMesh& parsed, const std::filesystem::path& path) {
@@ -257,7 +261,8 @@ void drop_unusable(ParsedMesh& parsed, const std::filesystem::path& path) {
     };
     throw BadInput(Defect::Value,
                    path,
-                   "vertices that are not finite: " + share(dropped, vertices) +
+                   "vertices that are not finite: " + share(dropped, vertices) + ", the first is " +
+                       std::to_string(first_dropped(number) + 1) +
                        (is_cloud ? "" : ", faces there: " + share(dropped_faces, faces)) +
                        "; that is more than half");
   }

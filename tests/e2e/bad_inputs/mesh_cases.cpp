@@ -247,12 +247,12 @@ void add_obj(Cases& cases) {
       "a vertex is no number",
       "VALUE|SYNTAX",
       "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
-      {"line"});
+      {"the first is 1"});
   obj("M04",
       "a vertex is infinite",
       "VALUE|SYNTAX",
       "v 0 0 1e999\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
-      {"line"});
+      {"the first is 1"});
   obj("M05",
       "faces without area, and twice the same",
       "OK",
