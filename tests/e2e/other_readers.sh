@@ -88,11 +88,17 @@ doc = ezdxf.readfile(sys.argv[1] + "/a.dxf")
 audit = doc.audit()
 assert not audit.errors and not audit.fixes, audit.errors
 assert doc.layers.get("INFERRED").dxf.linetype == "DASHED"
-length = 0
-for line in doc.modelspace():
-    places = [v.dxf.location for v in line.vertices]
-    if line.is_closed: places.append(places[0])
-    length += sum((b - a).magnitude for a, b in zip(places, places[1:]))
+def length_of(lines):
+    length = 0
+    for line in lines:
+        places = [v.dxf.location for v in line.vertices]
+        if line.is_closed: places.append(places[0])
+        length += sum((b - a).magnitude for a, b in zip(places, places[1:]))
+    return length
+outlines = [line for line in doc.modelspace() if line.dxf.layer == "OUTLINE"]
+assert outlines and all(line.is_closed for line in outlines), "can be hatched"
+length = length_of(line for line in doc.modelspace() if line.dxf.layer != "OUTLINE")
+assert abs(length_of(outlines) / length - 1) < 1e-9, (length_of(outlines), length)
 stated = json.load(open(sys.argv[1] + "/a.json"))["figures"]["section_length"]["value"]
 assert abs(length / stated - 1) < 1e-9, (length, stated)
 PY
