@@ -84,16 +84,23 @@ bool MaskIndex::lacks(const fs::path& photograph) {
 
 namespace {
 
-void tell_of_other_sizes(Scene& scene) {
-  int count = 0;
-  for (const int i : scene.input) {
-    const View& view = scene.views[static_cast<size_t>(i)];
-    if (view.mask_path.empty() || view.image_path.empty()) continue;
+// What is damaged is told of when it is decoded.
+bool has_mask_of_other_size(const View& view) {
+  if (view.mask_path.empty() || view.image_path.empty()) return false;
+  const auto sides = [](const ImageSize& size) { return std::minmax(size.width, size.height); };
+  try {
     const ImageSize mask = image_size(view.mask_path);
     const ImageSize photograph = photograph_size(view);
-    const auto sides = [](const ImageSize& size) { return std::minmax(size.width, size.height); };
-    count += sides(mask) != sides(photograph) ? 1 : 0;  // a mask may lie turned
+    return sides(mask) != sides(photograph);  // a mask may lie turned
+  } catch (const BadInput&) {
+    return false;
   }
+}
+
+void tell_of_other_sizes(Scene& scene) {
+  const auto count = std::count_if(scene.input.begin(), scene.input.end(), [&](int i) {
+    return has_mask_of_other_size(scene.views[static_cast<size_t>(i)]);
+  });
   if (count == 0) return;
   scene.notes.push_back(std::to_string(count) + (count == 1 ? " mask is" : " masks are") +
                         " of another size than the photograph; each pixel takes the nearest");
