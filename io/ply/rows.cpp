@@ -107,6 +107,11 @@ class BinaryRows {
   bool big_endian_;
 };
 
+// Digits of a number that no double holds; infinity itself is spelled out.
+bool is_too_large(std::string_view token, double value) {
+  return std::isinf(value) && token.find_first_of("iI#") == std::string_view::npos;
+}
+
 /// One record per line, as every writer does it.
 class AsciiRows {
  public:
@@ -168,7 +173,7 @@ class AsciiRows {
     if (token.empty()) fail(Defect::Syntax, "no value for property " + what);
     double value = 0;
     const bool is_float = type == PlyType::Float32 || type == PlyType::Float64;
-    const bool is_number = is_float ? parse_measured(token, value)
+    const bool is_number = is_float ? parse_measured(token, value) && !is_too_large(token, value)
                                     : parse_number(token, value) && value == std::floor(value);
     if (!is_number) {
       fail(Defect::Syntax,
