@@ -43,13 +43,14 @@ class SceneReader {
                      "holds no triangles" + (is_cloud_ ? std::string(" and no points") : "") +
                          (lines_ > 0 ? ", but " + std::to_string(lines_) + " lines" : ""));
     }
-    const std::string odd = check_significance(file_.path(), stored_, kFloatDigits);
-    if (!odd.empty()) warn(odd);
     if (!has_colors_) mesh.colors.clear();
     if (!all_have_support_) mesh.support.clear();
     if (!all_have_sigma_) mesh.sigma.clear();
     if (!all_have_normals_ || !is_cloud_) mesh.normals.clear();
     settle_labels();
+    drop_unusable(out_.parsed, file_.path());
+    const std::string odd = check_significance(file_.path(), stored_, kFloatDigits);
+    if (!odd.empty()) warn(odd);
     for (const std::string& line : scene.warnings) warn(line);
     warn_of_what_is_left_out();
     return std::move(out_);
@@ -78,7 +79,6 @@ class SceneReader {
     if (has_splats_) warn("left out the splats that lie beside the triangles");
     left_out(points_, "points that lie beside the triangles");
     left_out(lines_, "line segments");
-    left_out(lost_points_, "points whose place is not a number");
     for (const std::string& line : colors_.warnings()) warn(line);
     out_.parsed.has_textures = colors_.has_textures();
     left_out(collapsed_, "faces with two corners in one place");
@@ -178,11 +178,7 @@ class SceneReader {
     const bool is_mirrored = world.linear().determinant() < 0;
     std::vector<uint32_t> numbers(in.positions.size() / 3);
     for (size_t v = 0; v < numbers.size(); ++v) {
-      const Eigen::Vector3d place = place_of(in, world, v);
-      if (!place.allFinite()) {
-        throw BadInput(Defect::Value, file_.path(), "a vertex is not finite");
-      }
-      numbers[v] = number_of(place, in, v);
+      numbers[v] = number_of(place_of(in, world, v), in, v);
     }
     for (size_t f = 0; f < in.faces.size(); ++f) {
       const auto& face = in.faces[f];
@@ -204,12 +200,7 @@ class SceneReader {
   void add_points(const GlbFaces& in, const Eigen::Affine3d& world) {
     const Eigen::Matrix3d turn = origin_.world_from_gltf * world.linear().inverse().transpose();
     for (const uint32_t v : in.points) {
-      const Eigen::Vector3d place = place_of(in, world, v);
-      if (!place.allFinite()) {
-        ++lost_points_;
-        continue;
-      }
-      append_vertex(place, in, v);
+      append_vertex(place_of(in, world, v), in, v);
       Eigen::Vector3d normal = Eigen::Vector3d::Zero();
       if (!in.normals.empty()) normal = (turn * three(in.normals, v)).stableNormalized();
       if (!normal.allFinite()) normal.setZero();
@@ -231,7 +222,7 @@ class SceneReader {
 
   Eigen::Vector3d place_of(const GlbFaces& in, const Eigen::Affine3d& world, size_t v) {
     const Eigen::Vector3d p = three(in.positions, v);
-    if (p.allFinite() || !is_cloud_) stored_.extend(world.linear() * p);
+    if (p.allFinite()) stored_.extend(world.linear() * p);
     return origin_.world(world * p);
   }
 
@@ -284,10 +275,9 @@ class SceneReader {
   bool all_have_sigma_ = true;
   bool all_have_normals_ = true;  // of a cloud
   bool has_splats_ = false;
-  bool is_cloud_ = false;     // no triangles, so that points are read
-  uint64_t points_ = 0;       // left out
-  uint64_t lines_ = 0;        // segments
-  uint64_t lost_points_ = 0;  // not finite
+  bool is_cloud_ = false;  // no triangles, so that points are read
+  uint64_t points_ = 0;    // left out
+  uint64_t lines_ = 0;     // segments
 };
 
 }  // namespace

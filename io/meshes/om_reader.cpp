@@ -41,6 +41,7 @@ class OmReader {
     }
     for (uint64_t f = 0; f < faces_; ++f) add_face(f);
     tell();
+    drop_unusable(out_, path_);
     return std::move(out_);
   }
 
@@ -152,9 +153,7 @@ class OmReader {
     out_.positions.clear();
     out_.positions.reserve(vertices_);
     for (uint64_t v = 0; v < vertices_; ++v) {
-      const Eigen::Vector3d& p = out_.positions.emplace_back(take_vector(bytes, "a vertex"));
-      if (p.allFinite()) continue;
-      throw BadInput(Defect::Value, path_, "vertex " + std::to_string(v) + " is not finite");
+      out_.positions.push_back(take_vector(bytes, "a vertex"));
     }
   }
 
@@ -165,8 +164,7 @@ class OmReader {
     in_.expect_records(count, 3 * bytes, "normals");
     out_.mesh.normals.clear();
     for (uint64_t v = 0; v < count; ++v) {
-      const Eigen::Vector3f n = take_vector(bytes, "a normal").cast<float>();
-      out_.mesh.normals.emplace_back(n.allFinite() ? n : Eigen::Vector3f::Zero());
+      out_.mesh.normals.emplace_back(take_vector(bytes, "a normal").cast<float>());
     }
   }
 

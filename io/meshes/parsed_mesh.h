@@ -71,7 +71,7 @@ std::string counted(size_t count, const std::string& what);
 /// Numbers places in the order they first appear, for formats that repeat a vertex per face.
 class PlaceNumbers {
  public:
-  /// \pre finite
+  /// A place that is not a number is like no other.
   uint32_t number(Eigen::Vector3d place) {
     place.array() += 0.0;  // -0 and 0 are one place
     return known_.try_emplace(place, static_cast<uint32_t>(known_.size())).first->second;

@@ -22,13 +22,17 @@ struct BoxGlb {
       "accessors": [], "bufferViews": [], "buffers": [{"byteLength": 0}]})");
   std::string binary;
 
-  BoxGlb() {
-    std::vector<float> corners;
+  static std::vector<float> corners() {
+    std::vector<float> out;
     for (int i = 0; i < 8; ++i) {
-      corners.insert(corners.end(),
-                     {(i & 1) != 0 ? 3.0f : 0, (i & 2) != 0 ? 2.0f : 0, (i & 4) != 0 ? 0.5f : 0});
+      out.insert(out.end(),
+                 {(i & 1) != 0 ? 3.0f : 0, (i & 2) != 0 ? 2.0f : 0, (i & 4) != 0 ? 0.5f : 0});
     }
-    primitive()["attributes"]["POSITION"] = accessor(corners, "VEC3", 5126);
+    return out;
+  }
+
+  BoxGlb() {
+    primitive()["attributes"]["POSITION"] = accessor(corners(), "VEC3", 5126);
     primitive()["indices"] =
         accessor(std::vector<uint16_t>{0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
                                        2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5},
@@ -187,7 +191,26 @@ TEST(GlbFaces, PointsThatAreNoNumbersAreCounted) {
   const GlbMesh mesh = t.read();
   EXPECT_EQ(mesh.parsed.positions.size(), 3U);
   ASSERT_EQ(mesh.parsed.warnings.size(), 1U);
-  EXPECT_EQ(mesh.parsed.warnings[0], "left out 1 points whose place is not a number");
+  EXPECT_EQ(mesh.parsed.warnings[0], "dropped 1 vertex of 4 that is not finite");
+}
+
+// Faces of the box about its corner 7: 5 7 6, 3 6 7 and 3 7 5.
+TEST(GlbFaces, AVertexThatIsNoNumberGoesWithItsFaces) {
+  for (const float bad : {NAN, INFINITY, -INFINITY}) {
+    BoxGlb t;
+    std::vector<float> corners = BoxGlb::corners();
+    corners[3 * 7 + 2] = bad;
+    t.primitive()["attributes"]["POSITION"] = t.accessor(corners, "VEC3", 5126);
+    const GlbMesh mesh = t.read();
+    EXPECT_EQ(mesh.parsed.positions.size(), 7U);
+    EXPECT_EQ(mesh.parsed.mesh.faces.size(), 9U);
+    ASSERT_EQ(mesh.parsed.warnings.size(), 1U);
+    EXPECT_EQ(mesh.parsed.warnings[0],
+              "dropped 1 vertex of 8 that is not finite, and 3 faces there");
+    for (const size_t v : {1, 2, 4}) corners[3 * v] = bad;
+    t.primitive()["attributes"]["POSITION"] = t.accessor(corners, "VEC3", 5126);
+    EXPECT_EQ(t.defect(), "VALUE");
+  }
 }
 
 // What had triangles is no cloud when all of them vanish.

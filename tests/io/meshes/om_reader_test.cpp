@@ -64,6 +64,23 @@ TEST(ReadOm, ReadsTrianglesThatOpenMeshWrote) {
   }
 }
 
+// The first corner has two of the four triangles.
+TEST(ReadOm, AVertexThatIsNoNumberGoesWithItsFaces) {
+  const test::TempDir dir;
+  test::OpenTriMesh mesh = square();
+  mesh.set_point(mesh.vertex_handle(0), {NAN, 0, 0});
+  mesh.set_normal(mesh.vertex_handle(1), {0, INFINITY, 0});
+  ASSERT_TRUE(test::write_with_openmesh(dir / "a.om", mesh));
+  const ParsedMesh back = read_om(dir / "a.om");
+  EXPECT_EQ(back.positions.size(), 4U);
+  EXPECT_EQ(back.mesh.faces.size(), 2U);
+  EXPECT_EQ(back.mesh.normals[0], Eigen::Vector3f::Zero());
+  EXPECT_EQ(
+      back.warnings,
+      (std::vector<std::string>{"normals of 1 vertex are not finite: none",
+                                "dropped 1 vertex of 5 that is not finite, and 2 faces there"}));
+}
+
 TEST(ReadOm, ReadsPolygonsAndDoublesThatOpenMeshWrote) {
   const test::TempDir dir;
   test::OpenDoubleMesh mesh;
