@@ -54,19 +54,17 @@ void run_render(const RenderArgs& args) {
     const std::vector<Camera> path =
         is_file ? camera_path_from(args.path, model)
                 : camera_path(model, args.path, args.frames.value_or(kFrames));
-    const nlohmann::ordered_json report =
-        write_path(model, path, args.output, terminal.begin("render"));
+    const auto frames = write_path(model, path, args.output, terminal.begin("render"));
     terminal.end(std::to_string(path.size()) + " frames");
-    if (args.common.json) std::cout << json_text(report) << "\n";
+    if (args.common.json) std::cout << json_text(frames_to_json(frames)) << "\n";
     return;
   }
   std::vector<int> views(model.scene.views.size());
   std::iota(views.begin(), views.end(), 0);
   if (!args.views.empty()) views = select_views(model.scene, args.views);
-  const nlohmann::ordered_json report =
-      write_views(model, views, args.output, terminal.begin("render"));
+  const auto written = write_views(model, views, args.output, terminal.begin("render"));
   terminal.end(std::to_string(views.size()) + " views");
-  if (args.common.json) std::cout << json_text(report) << "\n";
+  if (args.common.json) std::cout << json_text(views_to_json(written)) << "\n";
 }
 
 }  // namespace

@@ -28,17 +28,19 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// What a view was to the model; null where no view is an input, as of splats of other programs.
-Json role_of(const Scene& scene, int index) {
-  return scene.input.empty() ? Json() : Json(view_role(scene, index));
+// What a view was to the model; empty where no view is an input, as of splats of other programs.
+std::string role_of(const Scene& scene, int index) {
+  return scene.input.empty() ? std::string() : view_role(scene, index);
 }
 
 // Without the depth that input views saw, every pixel would look like a hole.
 bool knows_holes(const Model& model) { return !model.priors.empty(); }
 
 // Of the pixels that may be looked at; all may if there is no mask.
-Json hole_fractions(const Model& model, const RenderBuffers& buffers, const MaskMap& valid) {
-  if (!knows_holes(model)) return {{"hole_fraction", nullptr}};
+std::optional<HoleShares> hole_shares(const Model& model,
+                                      const RenderBuffers& buffers,
+                                      const MaskMap& valid) {
+  if (!knows_holes(model)) return std::nullopt;
   const std::vector<Hole>& holes = buffers.hole.data;
   std::array<size_t, kHoleKinds> counts{};
   size_t looked_at = 0;
@@ -47,22 +49,32 @@ Json hole_fractions(const Model& model, const RenderBuffers& buffers, const Mask
     ++counts.at(static_cast<size_t>(holes[i]));
     ++looked_at;
   }
-  const auto fraction = [&](Hole kind) {
+  const auto share = [&](Hole kind) {
     const size_t count = counts.at(static_cast<size_t>(kind));
     return looked_at > 0 ? static_cast<double>(count) / static_cast<double>(looked_at) : 0;
   };
-  const double transparent = fraction(Hole::Transparent);
-  const double occluded = fraction(Hole::Occluded);
-  const double outside = fraction(Hole::Outside);
-  Json out = {{"hole_fraction", transparent + occluded + outside},
-              {"transparent_fraction", transparent},
-              {"occluded_fraction", occluded},
-              {"outside_fraction", outside},
-              {"estimated_fraction", fraction(Hole::Estimated)},
-              {"sky_fraction", fraction(Hole::Sky)}};
+  HoleShares out{share(Hole::Transparent),
+                 share(Hole::Occluded),
+                 share(Hole::Outside),
+                 share(Hole::Estimated),
+                 share(Hole::Sky)};
   if (looked_at < holes.size()) {
-    out["masked_fraction"] = 1 - static_cast<double>(looked_at) / static_cast<double>(holes.size());
+    out.masked = 1 - static_cast<double>(looked_at) / static_cast<double>(holes.size());
   }
+  return out;
+}
+
+Json role_to_json(const std::string& role) { return role.empty() ? Json() : Json(role); }
+
+Json shares_to_json(const std::optional<HoleShares>& shares) {
+  if (!shares) return {{"hole_fraction", nullptr}};
+  Json out = {{"hole_fraction", shares->hole()},
+              {"transparent_fraction", shares->transparent},
+              {"occluded_fraction", shares->occluded},
+              {"outside_fraction", shares->outside},
+              {"estimated_fraction", shares->estimated},
+              {"sky_fraction", shares->sky}};
+  if (shares->masked > 0) out["masked_fraction"] = shares->masked;
   return out;
 }
 
@@ -99,10 +111,26 @@ ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
   return rasters;
 }
 
-Json write_view(const Model& model,
-                const std::vector<SupportView>& inputs,
-                int index,
-                const std::filesystem::path& folder) {
+// 1 where an input view shows what the others contradict; empty where it shows none, and for other
+// views.
+MaskMap transient_pixels(const Model& model, int view) {
+  const std::vector<int>& input = model.scene.input;
+  const auto k = static_cast<size_t>(std::find(input.begin(), input.end(), view) - input.begin());
+  if (k >= model.priors.size()) return {};
+  const Raster<DepthOrigin>& origin = model.priors[k].origin;
+  MaskMap out(origin.width, origin.height, 0);
+  bool any = false;
+  for (size_t i = 0; i < origin.data.size(); ++i) {
+    out.data[i] = origin.data[i] == DepthOrigin::Transient ? 1 : 0;
+    any = any || out.data[i] != 0;
+  }
+  return any ? out : MaskMap();
+}
+
+RenderedPicture write_view(const Model& model,
+                           const std::vector<SupportView>& inputs,
+                           int index,
+                           const std::filesystem::path& folder) {
   const View& view = model.scene.views[static_cast<size_t>(index)];
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
   ViewRasters rasters = view_rasters(buffers, view.camera);
@@ -117,9 +145,13 @@ Json write_view(const Model& model,
   } else {
     std::filesystem::remove(png("hole"));  // of another model
   }
-  Json out = {{"name", view.name}, {"role", role_of(model.scene, index)}};
-  out.update(hole_fractions(model, buffers, rasters.valid));
-  return out;
+  const MaskMap transient = transient_pixels(model, index);
+  if (transient.empty()) {
+    std::filesystem::remove(png("transient"));
+  } else {
+    write_png(png("transient"), transient);
+  }
+  return {view.name, role_of(model.scene, index), hole_shares(model, buffers, rasters.valid)};
 }
 
 std::string frame_name(size_t k) {
@@ -317,13 +349,13 @@ std::string unknown_holes_warning(const Model& model) {
          "written, and their figures are left out";
 }
 
-Json write_views(const Model& model,
-                 const std::vector<int>& views,
-                 const std::filesystem::path& folder,
-                 const Progress& progress) {
+std::vector<RenderedPicture> write_views(const Model& model,
+                                         const std::vector<int>& views,
+                                         const std::filesystem::path& folder,
+                                         const Progress& progress) {
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
-  Json out = Json::array();
+  std::vector<RenderedPicture> out;
   for (size_t k = 0; k < views.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(views.size()));
     out.push_back(write_view(model, inputs, views[k], folder));
@@ -332,10 +364,10 @@ Json write_views(const Model& model,
   return out;
 }
 
-Json write_path(const Model& model,
-                const std::vector<Camera>& path,
-                const std::filesystem::path& folder,
-                const Progress& progress) {
+std::vector<RenderedPicture> write_path(const Model& model,
+                                        const std::vector<Camera>& path,
+                                        const std::filesystem::path& folder,
+                                        const Progress& progress) {
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
   remove_frames(folder);
@@ -343,7 +375,7 @@ Json write_path(const Model& model,
   constexpr size_t kOnSheet = 12;
   const auto place_on_sheet = [&](size_t k) { return k * kOnSheet / path.size(); };
   std::vector<ColorImage> sheet;
-  Json out = Json::array();
+  std::vector<RenderedPicture> out;
   for (size_t k = 0; k < path.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(path.size()));
     const RenderBuffers buffers = render_camera(model, inputs, path[k]);
@@ -358,12 +390,29 @@ Json write_path(const Model& model,
     if (k == 0 || path.size() <= kOnSheet || place_on_sheet(k) != place_on_sheet(k - 1)) {
       sheet.push_back(thumbnail(tinted(shown, holes)));
     }
-    out.push_back({{"name", frame_name(k)}});
-    out.back().update(hole_fractions(model, buffers, {}));
+    out.push_back({frame_name(k), "", hole_shares(model, buffers, {})});
   }
   constexpr int kColumns = 4;
   write_png(folder / "contact.png", contact_sheet(sheet, kColumns));
   report(progress, 1);
+  return out;
+}
+
+Json views_to_json(const std::vector<RenderedPicture>& views) {
+  Json out = Json::array();
+  for (const RenderedPicture& view : views) {
+    out.push_back({{"name", view.name}, {"role", role_to_json(view.role)}});
+    out.back().update(shares_to_json(view.holes));
+  }
+  return out;
+}
+
+Json frames_to_json(const std::vector<RenderedPicture>& frames) {
+  Json out = Json::array();
+  for (const RenderedPicture& frame : frames) {
+    out.push_back({{"name", frame.name}});
+    out.back().update(shares_to_json(frame.holes));
+  }
   return out;
 }
 
@@ -378,7 +427,7 @@ Json figures_to_json(const ViewFigures& figures) {
 Json evaluation_to_json(const Evaluation& evaluation) {
   Json rows = Json::array();
   for (const EvaluatedView& view : evaluation.views) {
-    Json row = {{"name", view.name}, {"role", view.role.empty() ? Json() : Json(view.role)}};
+    Json row = {{"name", view.name}, {"role", role_to_json(view.role)}};
     row.update(figures_to_json(view.figures));
     row["exposure"] = view.exposure ? vector_to_json(view.exposure->cast<double>()) : Json();
     rows.push_back(row);

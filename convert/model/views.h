@@ -23,24 +23,47 @@ std::string view_role(const Scene& scene, int view);
 /// The input views and those held out, ascending.
 std::vector<int> views_with_photograph(const Scene& scene);
 
+/// Shares of the pixels of a picture that are not masked.
+struct HoleShares {
+  double transparent = 0;
+  double occluded = 0;
+  double outside = 0;
+  double estimated = 0;  ///< Shown, but by no evidence; no hole.
+  double sky = 0;        ///< No hole.
+  double masked = 0;     ///< Of all pixels.
+
+  double hole() const { return transparent + occluded + outside; }
+};
+
+/// What a picture of a model shows.
+struct RenderedPicture {
+  std::string name;
+  std::string role;                 ///< As view_role(); empty where no view is an input.
+  std::optional<HoleShares> holes;  ///< Empty where nobody knows of holes.
+};
+
 /// Writes NAME.exr and NAME.{color,depth,normal,hole}.png for each of the given views of the model.
-/// Returns per view {"name", "role", "hole_fraction", …}, the fraction of the pixels that are not
-/// masked. The role is view_role(), or null where no view is an input.
-/// Without priors no hole.png is written and the hole fraction is null; the EXR says, as it does of
-/// any pixel, that no input view can vouch for it.
-nlohmann::ordered_json write_views(const Model& model,
-                                   const std::vector<int>& views,
-                                   const std::filesystem::path& folder,
-                                   const Progress& progress);
+/// NAME.transient.png is the mask of what was left out of an input view because the others
+/// contradict it, where there is any. Without priors no hole.png is written; the EXR says, as it
+/// does of any pixel, that no input view can vouch for it.
+std::vector<RenderedPicture> write_views(const Model& model,
+                                         const std::vector<int>& views,
+                                         const std::filesystem::path& folder,
+                                         const Progress& progress);
 
 /// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
-/// says where they are, and contact.png: twelve of them, holes in magenta. Returns per frame
-/// {"name", "hole_fraction", …}. Without priors there are no masks and no magenta, and the fraction
-/// is null.
-nlohmann::ordered_json write_path(const Model& model,
-                                  const std::vector<Camera>& path,
-                                  const std::filesystem::path& folder,
-                                  const Progress& progress);
+/// says where they are, and contact.png: twelve of them, holes in magenta. Without priors there are
+/// no masks and no magenta. What is returned has no roles.
+std::vector<RenderedPicture> write_path(const Model& model,
+                                        const std::vector<Camera>& path,
+                                        const std::filesystem::path& folder,
+                                        const Progress& progress);
+
+/// Per view {"name", "role", "hole_fraction", …}, the role and the fraction null where they are
+/// empty.
+nlohmann::ordered_json views_to_json(const std::vector<RenderedPicture>& views);
+/// Per frame {"name", "hole_fraction", …}.
+nlohmann::ordered_json frames_to_json(const std::vector<RenderedPicture>& frames);
 
 /// Whether the photograph of a view, an index into model.scene.views, is to be matched in exposure
 /// to what is rendered: those of the input views were matched, and it is none of them.
@@ -71,7 +94,7 @@ struct Evaluation {
 
 /// {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}, null for what is empty.
 nlohmann::ordered_json figures_to_json(const ViewFigures& figures);
-/// {"mean": {…}, "views": [{"name", "role" as of write_views(), …, "exposure"}]}
+/// {"mean": {…}, "views": [{"name", "role" as of views_to_json(), …, "exposure"}]}
 nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
 
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those

@@ -238,13 +238,41 @@ ControlFit checked_fit(const std::vector<Sighted>& points, const std::filesystem
   }
 }
 
-Json rms_json(const Json& points, const std::string& role) {
+/// A control point beside the frame that all of them determine.
+struct Judged {
+  const Sighted& sighted;
+  const ControlResidual* residual;  // null where nothing was measured
+  std::string remark;               // why it is not used, or what it disagrees with
+
+  bool is_check() const { return sighted.point.is_check; }
+  bool is_used() const { return residual != nullptr && residual->is_used; }
+};
+
+std::vector<Judged> judged(const std::vector<Sighted>& points, const ControlFit& fit) {
+  std::vector<Judged> out;
+  size_t next = 0;
+  for (const Sighted& s : points) {
+    const ControlResidual* const residual = s.meeting ? &fit.residuals[next++] : nullptr;
+    std::string remark = s.remark;
+    if (residual != nullptr && !residual->is_used && !s.point.is_check) {
+      remark = "disagrees with the others";
+    }
+    if (residual != nullptr && s.point.is_check && !residual->is_met) {
+      remark = "disagrees with the control points";
+    }
+    out.push_back({s, residual, remark});
+  }
+  return out;
+}
+
+// Of the check points that were measured, or of the control points in use.
+Json rms_json(const std::vector<Judged>& points, bool of_checks) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   int count = 0;
-  for (const Json& point : points) {
-    const bool counts = point["role"] == role && (role == "check" || point["used"].get<bool>());
-    if (!counts || point["residual"].is_null()) continue;
-    for (int k = 0; k < 3; ++k) sum[k] += std::pow(point["residual"][k].get<double>(), 2);
+  for (const Judged& point : points) {
+    const bool counts = point.is_check() == of_checks && (of_checks || point.is_used());
+    if (!counts || point.residual == nullptr) continue;
+    sum += point.residual->off.cwiseAbs2();
     ++count;
   }
   if (count == 0) return nullptr;
@@ -252,61 +280,42 @@ Json rms_json(const Json& points, const std::string& role) {
   return {{"points", count}, {"x", rms.x()}, {"y", rms.y()}, {"z", rms.z()}, {"all", rms.norm()}};
 }
 
-Json point_json(const Sighted& s, const ControlResidual* residual) {
-  Json out = {{"name", s.point.name},
-              {"role", s.point.is_check ? "check" : "control"},
-              {"known", vector_to_json(s.point.position)},
-              {"sigma", s.point.sigma},
-              {"photographs", s.photographs},
-              {"reprojection", nullptr},
-              {"residual", nullptr},
-              {"sigmas", nullptr},
-              {"used", false},
-              {"remark", s.remark}};
-  if (residual == nullptr) return out;
-  out["reprojection"] = s.reprojection;
-  out["residual"] = vector_to_json(residual->off);
-  out["sigmas"] = residual->sigmas;
-  out["used"] = residual->is_used;
-  if (!residual->is_used && !s.point.is_check) out["remark"] = "disagrees with the others";
-  if (s.point.is_check && !residual->is_met) out["remark"] = "disagrees with the control points";
-  return out;
-}
-
-Json points_json(const std::vector<Sighted>& points, const ControlFit& fit) {
+Json points_json(const std::vector<Judged>& points) {
   Json out = Json::array();
-  size_t next = 0;
-  for (const Sighted& s : points) {
-    out.push_back(point_json(s, s.meeting ? &fit.residuals[next] : nullptr));
-    if (s.meeting) ++next;
+  for (const Judged& point : points) {
+    const Sighted& s = point.sighted;
+    const ControlResidual* const residual = point.residual;
+    out.push_back({{"name", s.point.name},
+                   {"role", point.is_check() ? "check" : "control"},
+                   {"known", vector_to_json(s.point.position)},
+                   {"sigma", s.point.sigma},
+                   {"photographs", s.photographs},
+                   {"reprojection", residual ? Json(s.reprojection) : Json()},
+                   {"residual", residual ? vector_to_json(residual->off) : Json()},
+                   {"sigmas", residual ? Json(residual->sigmas) : Json()},
+                   {"used", point.is_used()},
+                   {"remark", point.remark}});
   }
   return out;
 }
 
-void warn_of_points(const std::vector<Sighted>& points,
-                    const Json& report,
-                    const Frame& frame,
-                    Scene& scene) {
+void warn_of_points(const std::vector<Judged>& points, const Frame& frame, Scene& scene) {
   std::string unpicked;
-  for (size_t i = 0; i < points.size(); ++i) {
-    const Sighted& s = points[i];
-    const Json& told = report[i];
+  for (const Judged& point : points) {
+    const Sighted& s = point.sighted;
     if (s.point.picks.empty()) {
       unpicked += (unpicked.empty() ? "" : ", ") + printable(s.point.name);
       continue;
     }
-    const bool is_compared = s.point.is_check && s.meeting;
     const std::string name =
-        (s.point.is_check ? "check point " : "control point ") + printable(s.point.name);
-    const auto remark = told["remark"].get<std::string>();
-    if (!remark.empty()) {
+        (point.is_check() ? "check point " : "control point ") + printable(s.point.name);
+    if (!point.remark.empty()) {
+      const bool is_compared = point.is_check() && point.residual != nullptr;
       std::string text = name;
-      text.append(is_compared ? " " : " left out: ").append(remark);
-      if (s.meeting) {
-        const Json& off = told["residual"];
-        const Eigen::Vector3d v(off[0], off[1], off[2]);
-        text += " by " + format_length(v.norm(), frame) + ", " + number(told["sigmas"], "%.1f") +
-                " sigma";
+      text.append(is_compared ? " " : " left out: ").append(point.remark);
+      if (point.residual != nullptr) {
+        text += " by " + format_length(point.residual->off.norm(), frame) + ", " +
+                number(point.residual->sigmas, "%.1f") + " sigma";
       }
       scene.warnings.push_back(text);
     }
@@ -379,8 +388,8 @@ Json move_to_control_frame(const ControlRequest& request, Scene& scene) {
   if (!contradiction.empty()) scene.warnings.push_back(contradiction);
   move_scene(fit.control_from_scene, scene);
   scene.frame = control_frame(fit, metres);
-  const Json list = points_json(points, fit);
-  warn_of_points(points, list, scene.frame, scene);
+  const std::vector<Judged> list = judged(points, fit);
+  warn_of_points(list, scene.frame, scene);
   warn_of_frame(fit, scene);
   return {{"metres_per_unit", scene.frame.metres_per_unit},
           {"metres_sigma", scene.frame.metres_sigma},
@@ -390,9 +399,9 @@ Json move_to_control_frame(const ControlRequest& request, Scene& scene) {
             {"scale", scale},
             {"rotation_sigma", fit.rotation_sigma * 180 / std::numbers::pi},
             {"scatter", fit.scatter},
-            {"points", list},
-            {"control_rms", rms_json(list, "control")},
-            {"check_rms", rms_json(list, "check")}}}};
+            {"points", points_json(list)},
+            {"control_rms", rms_json(list, false)},
+            {"check_rms", rms_json(list, true)}}}};
 }
 
 std::string control_words(const Json& scale) {

@@ -144,9 +144,11 @@ TEST(WriteViews, WritesHolesWhereTheyAreKnownAlone) {
     const auto rows = write_views(model, {0, 1}, dir / "views", {});
     const auto frames = write_path(model, {model.scene.views[0].camera}, dir / "path", {});
     for (const auto& row : {rows[0], rows[1], frames[0]}) {
-      EXPECT_EQ(row["hole_fraction"].is_number(), is_known) << row;
+      EXPECT_EQ(row.holes.has_value(), is_known) << row.name;
     }
-    EXPECT_EQ(rows[1]["role"].is_string() && rows[1]["role"] == "not used", is_known);
+    EXPECT_EQ(views_to_json(rows)[1]["hole_fraction"].is_number(), is_known);
+    EXPECT_EQ(frames_to_json(frames)[0]["hole_fraction"].is_number(), is_known);
+    EXPECT_EQ(rows[1].role, is_known ? "not used" : "");
     EXPECT_EQ(std::filesystem::exists(dir / "views" / "0.hole.png"), is_known);
     EXPECT_EQ(std::filesystem::exists(dir / "path" / "frame_0000.hole.png"), is_known);
     EXPECT_TRUE(std::filesystem::exists(dir / "views" / "0.color.png"));
@@ -182,9 +184,10 @@ TEST(WriteViews, TellsSkyAndWhatIsEstimatedFromHoles) {
   const Model model = wall_below_sky(dir);
   const auto row = write_views(model, {0}, dir / "views", {})[0];
   constexpr double kSoftRim = 0.05;  // two rows
-  EXPECT_NEAR(row["sky_fraction"].get<double>(), 0.25, kSoftRim);
-  EXPECT_NEAR(row["estimated_fraction"].get<double>(), 0.375, kSoftRim);
-  EXPECT_NEAR(row["hole_fraction"].get<double>(), 0, kSoftRim);
+  ASSERT_TRUE(row.holes.has_value());
+  EXPECT_NEAR(row.holes->sky, 0.25, kSoftRim);
+  EXPECT_NEAR(row.holes->estimated, 0.375, kSoftRim);
+  EXPECT_NEAR(row.holes->hole(), 0, kSoftRim);
   const std::filesystem::path file = dir / "views" / "0.exr";
   const ExrImage image = read_exr(file);
   const auto at = [&](const char* channel, int x, int y) {
