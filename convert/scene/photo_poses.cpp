@@ -32,6 +32,8 @@ namespace {
 
 // Every pair is compared.
 constexpr size_t kMostPhotographs = 16;
+// Used where none are named.
+constexpr size_t kUsed = 3;
 
 std::vector<PhotoFile> checked_photographs(const SceneRoot& root,
                                            const std::vector<std::string>& wanted) {
@@ -76,6 +78,21 @@ Json hashes_of_model(const std::filesystem::path& folder) {
   return out;
 }
 
+// How many of the placed photographs are to be reconstructed from: those that are wanted or, where
+// none are named, as many as are used by default.
+size_t of_use(const std::vector<std::string>& placed, const std::vector<std::string>& wanted) {
+  if (wanted.empty()) return std::min(placed.size(), kUsed);
+  return static_cast<size_t>(std::count_if(wanted.begin(), wanted.end(), [&](const auto& name) {
+    return std::find(placed.begin(), placed.end(), name) != placed.end();
+  }));
+}
+
+std::vector<std::string> placed_names(const ColmapModel& model) {
+  std::vector<std::string> out;
+  for (const ColmapImage& image : model.images) out.push_back(image.name);
+  return out;
+}
+
 std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
                                        const std::string& inputs) {
   if (folder.empty() || !is_present(folder / "poses.json")) return std::nullopt;
@@ -95,6 +112,8 @@ std::optional<PhotoPoses> stored_poses(const std::filesystem::path& folder,
       for (size_t i = 0; i < notes->size(); ++i) out.notes.push_back(notes->at(i).text());
     }
     out.focal_sigma = record.at("focal_sigma").number();
+    const auto aside = record.find("from_aside");  // earlier versions always tried
+    out.tried_from_aside = !aside || aside->boolean();
     const std::filesystem::path model = folder / "sparse/0";
     out.model.cameras = read_colmap_cameras_text(model / "cameras.txt");
     out.model.images = read_colmap_images_text(model / "images.txt");
@@ -243,17 +262,19 @@ struct Attempt {
   std::vector<Colors> colors;
   PoseSolution solution;
 
-  size_t placed() const {
-    return static_cast<size_t>(std::count_if(solution.photos.begin(),
-                                             solution.photos.end(),
-                                             [](const SolvedPhoto& p) { return p.is_placed; }));
+  std::vector<std::string> placed() const {
+    std::vector<std::string> out;
+    for (size_t i = 0; i < photos.size(); ++i) {
+      if (solution.photos[i].is_placed) out.push_back(photos[i].name);
+    }
+    return out;
   }
 };
 
 std::string attempt_text(const Attempt& attempt) {
   char rms[32];
   std::snprintf(rms, sizeof rms, "%.2f", attempt.solution.rms);
-  return std::to_string(attempt.placed()) + " of " + std::to_string(attempt.photos.size()) +
+  return std::to_string(attempt.placed().size()) + " of " + std::to_string(attempt.photos.size()) +
          " placed, " + std::to_string(attempt.solution.points.size()) + " points, " + rms +
          " pixels rms";
 }
@@ -284,11 +305,17 @@ Attempt attempted(MaskIndex& masks,
   return out;
 }
 
-// Where not every photograph finds its place, once more with features as seen from aside.
-Attempt solved_photos(MaskIndex& masks,
-                      const std::vector<PhotoFile>& photographs,
-                      double focal,
-                      Terminal& terminal) {
+// Once more with features as seen from aside where a photograph to reconstruct from has found no
+// place, or, where none are named, fewer than are used by default have: it takes several times as
+// long, and moves those that have theirs.
+// \return what is best, and whether both were tried
+std::pair<Attempt, bool> solved_photos(MaskIndex& masks,
+                                       const std::vector<PhotoFile>& photographs,
+                                       const std::vector<std::string>& wanted,
+                                       double focal,
+                                       Terminal& terminal) {
+  const size_t all = wanted.empty() ? std::min(photographs.size(), kUsed) : wanted.size();
+  const auto used = [&](const Attempt& attempt) { return of_use(attempt.placed(), wanted); };
   std::optional<Attempt> first;
   std::exception_ptr failure;
   const Progress progress = terminal.begin("cameras of photographs");
@@ -298,17 +325,17 @@ Attempt solved_photos(MaskIndex& masks,
     failure = std::current_exception();
   }
   terminal.end(first ? attempt_text(*first) : "not found");
-  if (first && first->placed() == photographs.size()) return std::move(*first);
+  if (first && used(*first) >= all) return {std::move(*first), false};
   const Progress again = terminal.begin("cameras again, as if seen from aside");
   try {
     Attempt second = attempted(masks, photographs, focal, true, again);
     terminal.end(attempt_text(second));
-    if (!first || second.placed() > first->placed()) return second;
+    if (!first || used(second) > used(*first)) return {std::move(second), true};
   } catch (const NumericalError&) {
     terminal.end("not found");
   }
   if (failure) std::rethrow_exception(failure);
-  return std::move(*first);
+  return {std::move(*first), true};
 }
 
 // A focal length in pixels is that of one size of photographs, and no lens is 28 pixels long.
@@ -350,9 +377,15 @@ PhotoPoses photo_poses(const SceneRoot& root,
   if (focal > 0) check_focal(focal, photographs);
   MaskIndex masks(root);
   const std::string inputs = inputs_text(masks, photographs, focal);
-  if (auto poses = stored_poses(stored, inputs)) return *poses;
-  const Attempt attempt = solved_photos(masks, photographs, focal, terminal);
+  if (auto poses = stored_poses(stored, inputs)) {
+    if (poses->tried_from_aside || of_use(placed_names(poses->model), wanted) >= wanted.size()) {
+      return *poses;
+    }
+  }
+  const auto [attempt, tried_from_aside] =
+      solved_photos(masks, photographs, wanted, focal, terminal);
   PhotoPoses out;
+  out.tried_from_aside = tried_from_aside;
   out.model = colmap_model(attempt.photos, attempt.colors, attempt.solution);
   out.inputs = inputs;
   add_remarks(attempt.photos, attempt.solution, out);
@@ -368,6 +401,7 @@ void write_photo_poses(const std::filesystem::path& folder, const PhotoPoses& po
                        {"warnings", poses.warnings},
                        {"notes", poses.notes},
                        {"focal_sigma", poses.focal_sigma},
+                       {"from_aside", poses.tried_from_aside},
                        {"files", hashes_of_model(folder)}};
   write_file(folder / "poses.json", json_text(record) + "\n");  // last: it says the model is whole
 }

@@ -18,14 +18,17 @@ struct PhotoPoses {
   std::vector<std::string> warnings;  ///< Who is left out; whose Exif is refuted.
   std::vector<std::string> notes;     ///< How the focal length was found.
   double focal_sigma = 0;             ///< Largest of SolvedPhoto::focal_sigma.
+  bool tried_from_aside = false;      ///< Features as seen from aside were looked for, too.
   bool is_stored = false;  ///< Read, not solved; the places of features are then not known.
 };
 
 /// Solves for the cameras of the photographs in a folder, or reads what write_photo_poses() stored
 /// in `stored` if that was solved from the same.
 ///
-/// \param wanted  file names; if there are too many photographs to compare, only these are used;
-///                may be empty
+/// \param wanted  file names of those to reconstruct from; may be empty. If there are too many
+///                photographs to compare, only these are used. The others are placed where that is
+///                easy: features as seen from aside, which take minutes, are looked for on account
+///                of wanted ones alone.
 /// \param focal   [pixels] of every photograph as stored; 0 = from Exif, else solved for
 /// \param stored  may be empty or not exist
 /// \throws BadInput Empty (fewer than two photographs), and as read_image(); LimitError for more
