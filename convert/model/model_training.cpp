@@ -133,6 +133,14 @@ nlohmann::ordered_json given_depth_to_json(const PriorsReport& priors) {
   return out;
 }
 
+nlohmann::ordered_json unmeasured_to_json(const UnmeasuredShares& why) {
+  return {{"unseen", why.unseen},
+          {"hidden", why.hidden},
+          {"even", why.even},
+          {"wide", why.wide},
+          {"unconfirmed", why.unconfirmed}};
+}
+
 // Of the pixels of every input view.
 nlohmann::ordered_json coverage_to_json(const TrainedModel& trained) {
   nlohmann::ordered_json out = nlohmann::ordered_json::array();
@@ -145,8 +153,10 @@ nlohmann::ordered_json coverage_to_json(const TrainedModel& trained) {
                    {"guessed", coverage.guessed},
                    {"completed", coverage.completed},
                    {"sky", coverage.sky},
+                   {"transient", coverage.transient},
                    {"left_open", coverage.left_open},
                    {"estimated", coverage.estimated},
+                   {"unmeasured", unmeasured_to_json(coverage.unmeasured)},
                    {"words", words[i]}});
   }
   return out;

@@ -12,6 +12,7 @@
 #include "io/scenes/resample.h"
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/priors/transients.h"
 #include "meshing/pictures/exposure.h"
 #include "meshing/pictures/face_views.h"
 
@@ -113,7 +114,9 @@ double coarsen_texture(PhotoTexture& texture, const TriangleMesh& mesh, double t
   return largest_share > 0 ? largest_share : 1;
 }
 
-PhotographedMesh texture_from_photographs(const Scene& scene, const TriangleMesh& mesh) {
+PhotographedMesh texture_from_photographs(const Scene& scene,
+                                          const std::vector<ViewPriors>& priors,
+                                          const TriangleMesh& mesh) {
   PhotographedMesh out;
   for (const int i : scene.input) {
     const View& view = scene.views[static_cast<size_t>(i)];
@@ -126,6 +129,7 @@ PhotographedMesh texture_from_photographs(const Scene& scene, const TriangleMesh
   std::vector<View> views;
   load_images(loaded, scene.input);
   for (const int i : scene.input) views.push_back(std::move(loaded.views[static_cast<size_t>(i)]));
+  for (size_t i = 0; i < priors.size(); ++i) mask_transients(priors[i], views[i]);
   const FaceScores scores = face_scores(mesh, views);
   const FaceViews chosen = choose_face_views(mesh, scores);
   const ExposureGains exposure = exposure_gains(mesh, scores, views);

@@ -9,6 +9,7 @@
 #include "libcgs/core/photo_texture.h"
 #include "libcgs/core/scene.h"
 #include "libcgs/core/triangle_mesh.h"
+#include "libcgs/priors/view_priors.h"
 
 namespace cgs {
 
@@ -42,9 +43,12 @@ struct PhotographedMesh {
 };
 
 /// Loads the input photographs of a scene, chooses one for every face, and levels their exposure.
-/// \param scene  in the frame of the mesh
+/// \param scene   in the frame of the mesh
+/// \param priors  of its input views: what they call transient is not shown; may be empty
 /// \throws Error as load_images()
-PhotographedMesh texture_from_photographs(const Scene& scene, const TriangleMesh& mesh);
+PhotographedMesh texture_from_photographs(const Scene& scene,
+                                          const std::vector<ViewPriors>& priors,
+                                          const TriangleMesh& mesh);
 
 /// The size of a pixel on the surface [internal units], of the photograph where it is smallest, by
 /// the median over the faces that show it; 0 where none is shown.

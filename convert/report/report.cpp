@@ -159,9 +159,52 @@ std::string views_section(const std::filesystem::path& folder,
          << figure(folder / "views" / (name + ".color.png"), "rendered", holes)
          << figure(folder / "views" / (name + ".depth.png"), "depth (red = near)")
          << figure(folder / "views" / (name + ".normal.png"), "normals")
-         << figure(folder / "views" / (name + ".hole.png"), "holes (white = no input saw this)")
-         << "</div>\n";
+         << figure(folder / "views" / (name + ".hole.png"), "holes (white = no input saw this)");
+    const std::filesystem::path transient = folder / "views" / (name + ".transient.png");
+    if (is_present(transient)) {
+      html << figure(transient, "left out (white = moved: the other photographs do not show it)");
+    }
+    html << "</div>\n";
   }
+  return html.str();
+}
+
+// How much of the photographs is measured, and why the rest is not. Reports of earlier versions do
+// not say.
+std::string coverage_section(const Json& model) {
+  const Json depth = model.value("depth_of_views", Json());
+  if (!depth.is_array() || depth.empty() || !depth[0].contains("unmeasured")) return "";
+  std::ostringstream html;
+  html << "<h2>What was measured</h2>\n<p>Shares of the pixels. What adjoins a measured place of "
+          "the "
+          "same surface counts as measured by one photograph. Why there was no match: the place is "
+          "in no other picture, or something is before it there; the photograph shows no texture; "
+          "others see it at more than 40 degrees; or what matches is not confirmed from the other "
+          "side, as where a pattern repeats, a surface shines, or cameras are off.</p>\n<table>\n"
+          "<tr><th>view</th><th>matched</th><th>measured</th><th>sky</th><th>moved</th>"
+          "<th>estimated</th><th>open</th><th>in no other</th><th>hidden</th><th>no texture</th>"
+          "<th>wide angle</th><th>not confirmed</th></tr>\n";
+  for (const Json& view : depth) {
+    const Json& why = view["unmeasured"];
+    const double without = view["sky"].get<double>() + view["transient"].get<double>() +
+                           view["estimated"].get<double>() + view["left_open"].get<double>();
+    html << "<tr><td>" << escaped(view["view"].get<std::string>()) << "</td>";
+    for (const double share : {view["measured"].get<double>(),
+                               1 - without,
+                               view["sky"].get<double>(),
+                               view["transient"].get<double>(),
+                               view["estimated"].get<double>(),
+                               view["left_open"].get<double>(),
+                               why["unseen"].get<double>(),
+                               why["hidden"].get<double>(),
+                               why["even"].get<double>(),
+                               why["wide"].get<double>(),
+                               why["unconfirmed"].get<double>()}) {
+      html << "<td>" << percent(share) << "</td>";
+    }
+    html << "</tr>\n";
+  }
+  html << "</table>\n";
   return html.str();
 }
 
@@ -264,7 +307,7 @@ void write_html_report(const std::filesystem::path& folder,
   }
   html << viewer << refinement_section(report) << scale_section(report) << promises_section(report)
        << levels_section(report) << certificate_section(report) << simplification_section(report)
-       << deviation_section(report) << mesh_section(folder)
+       << deviation_section(report) << mesh_section(folder) << coverage_section(report["model"])
        << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
        << training_section(report["model"]) << thinning_section(report)
        << timing_section(report["stages"]) << "</body></html>\n";

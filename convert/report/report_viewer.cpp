@@ -195,7 +195,7 @@ ShownMesh shown_mesh(const TriangleMesh& mesh, size_t most_faces, const Progress
 Json viewer_scene(const Model& model, const TriangleMesh& mesh) {
   const Frame& frame = model.scene.frame;
   const FigureUnit unit = figure_unit(frame, "");
-  PhotoTexture texture = texture_from_photographs(model.scene, mesh).texture;
+  PhotoTexture texture = texture_from_photographs(model.scene, model.priors, mesh).texture;
   make_small(texture);
   Json cameras = Json::array();
   for (const int i : model.scene.input) {

@@ -66,6 +66,7 @@ class AssetWriter {
  public:
   AssetWriter(const Model& model, const AssetContent& content, const RunRequest& request)
       : scene_(model.scene),
+        priors_(model.priors),
         mesh_(content.mesh),
         texture_(content.texture),
         simplify_(content.texture.empty() ? 0 : content.simplify),
@@ -189,7 +190,7 @@ class AssetWriter {
         texture_.empty() ? std::min(1.0, coarser * options.max_color_error) : 1;
     options.max_area_change = std::min(0.1, coarser * options.max_area_change);
     out.mesh = simplify(mesh_, options).mesh;
-    if (!texture_.empty()) out.texture = texture_from_photographs(scene_, out.mesh).texture;
+    if (!texture_.empty()) out.texture = texture_from_photographs(scene_, priors_, out.mesh).texture;
   }
 
   // \param texel  of textures, in details
@@ -200,6 +201,7 @@ class AssetWriter {
   }
 
   const Scene& scene_;
+  const std::vector<ViewPriors>& priors_;
   const TriangleMesh& mesh_;
   const PhotoTexture& texture_;
   double simplify_;

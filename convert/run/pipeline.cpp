@@ -177,8 +177,8 @@ StageResult run_scale(Run& run, const Progress& progress) {
 
 StageResult run_views(Run& run, const Progress& progress) {
   Model& model = loaded_model(run);
-  return {write_views(
-      model, views_with_photograph(model.scene), run.request.output / "views", progress)};
+  return {views_to_json(write_views(
+      model, views_with_photograph(model.scene), run.request.output / "views", progress))};
 }
 
 StageResult run_evaluation(Run& run, const Progress& progress) {

@@ -261,7 +261,7 @@ AssetsReport write_assets(const Model& model,
                           const Progress& progress) {
   report(progress, 0);
   make_output_folder(request.output / "web");
-  const auto [texture, texture_report] = texture_from_photographs(model.scene, mesh);
+  const auto [texture, texture_report] = texture_from_photographs(model.scene, model.priors, mesh);
   report(progress, 0.3);
   write_obj(request.output / "mesh/watertight.obj", mesh, texture, model.scene.frame);
   if (!request.max_error.empty()) require_obj_in_place(request, mesh, model.scene.frame);

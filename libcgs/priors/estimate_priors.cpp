@@ -8,6 +8,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/priors/guessed_depth.h"
 #include "libcgs/priors/sky.h"
+#include "libcgs/priors/transients.h"
 
 namespace cgs {
 
@@ -29,8 +30,10 @@ PriorsCoverage coverage(const Raster<DepthOrigin>& before,
   out.completed = count(origin, DepthOrigin::Completed) / valid;
   out.guessed = count(origin, DepthOrigin::Guessed) / valid;
   out.sky = count(origin, DepthOrigin::Sky) / valid;
+  out.transient = count(origin, DepthOrigin::Transient) / valid;
   out.estimated = count(after.data, DepthOrigin::Estimated) / valid;
-  out.left_open = std::max(0.0, 1 - out.measured - out.completed - out.guessed - out.sky);
+  out.left_open =
+      std::max(0.0, 1 - out.measured - out.completed - out.guessed - out.sky - out.transient);
   return out;
 }
 
@@ -68,6 +71,8 @@ class Estimator {
     }
     const std::vector<MaskMap> sky = find_sky(scene_, out_.views);
     for (size_t i = 0; i < sky.size(); ++i) enter_sky(sky[i], out_.views[i]);
+    const std::vector<MaskMap> transients = find_transients(scene_, out_.views);
+    for (size_t i = 0; i < sky.size(); ++i) enter_transients(transients[i], out_.views[i]);
     const std::vector<DepthGuess> guesses = guesses_of(given);
     const auto count = static_cast<double>(out_.views.size());
     for (size_t i = 0; i < out_.views.size(); ++i) {
@@ -77,6 +82,8 @@ class Estimator {
     }
     set_backdrop(out_.views);
     for (size_t i = 0; i < out_.views.size(); ++i) tell_evidence(i);
+    const std::vector<UnmeasuredShares> why = unmeasured_shares(scene_, out_.views);
+    for (size_t i = 0; i < why.size(); ++i) out_.report.coverage[i].unmeasured = why[i];
     forget_unmeasured();
     report(progress, 1);
     return std::move(out_);
@@ -99,7 +106,9 @@ class Estimator {
   void forget_unmeasured() {
     const auto& shares = out_.report.coverage;
     const bool has_pixels = std::any_of(shares.begin(), shares.end(), [](const auto& share) {
-      return share.measured + share.completed + share.guessed + share.sky + share.left_open > 0;
+      return share.measured + share.completed + share.guessed + share.sky + share.transient +
+                 share.left_open >
+             0;
     });
     if (!has_pixels) throw InvalidInput("the masks leave nothing of any input view");
     if (std::none_of(shares.begin(), shares.end(), is_measured)) {

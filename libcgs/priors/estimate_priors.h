@@ -11,6 +11,7 @@
 #include "libcgs/priors/estimated_depth.h"
 #include "libcgs/priors/given_depth.h"
 #include "libcgs/priors/plane_sweep.h"
+#include "libcgs/priors/unmeasured.h"
 #include "libcgs/priors/view_priors.h"
 
 namespace cgs {
@@ -26,14 +27,16 @@ struct PriorsOptions {
   void validate() const;
 };
 
-/// Shares of the valid pixels of a view. The first five add up to 1.
+/// Shares of the valid pixels of a view. The first six add up to 1.
 struct PriorsCoverage {
   double measured = 0;
   double completed = 0;
   double guessed = 0;
   double sky = 0;
-  double left_open = 0;  ///< Not measured, and not filled in either.
-  double estimated = 0;  ///< The part of completed and guessed that is no evidence.
+  double transient = 0;         ///< Shows what the other photographs contradict; left out.
+  double left_open = 0;         ///< Not measured, and not filled in either.
+  double estimated = 0;         ///< The part of completed and guessed that is no evidence.
+  UnmeasuredShares unmeasured;  ///< Why the rest was not measured; of completed, too.
 };
 
 /// Below this share of a view, all that was measured may be false matches.
@@ -63,9 +66,9 @@ struct EstimatedPriors {
 };
 
 /// Everything known about the input views before training: sweep, align, enter the depth of
-/// sensors, find the sky, complete, put guesses of given depth where they are better, tell what of
-/// all that is estimated, layers. The depth of views of which nothing was measured stays unknown.
-/// Preconditions and errors as plane_sweep().
+/// sensors, find the sky and what moved, complete, put guesses of given depth where they are
+/// better, tell what of all that is estimated, layers. The depth of views of which nothing was
+/// measured stays unknown. Preconditions and errors as plane_sweep().
 /// \throws InvalidInput if masks leave nothing of all views; NumericalError if nothing of any was
 ///         measured
 EstimatedPriors estimate_priors(const Scene& scene,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <tbb/parallel_for.h>
 
@@ -75,16 +76,26 @@ void warp_row(const SweepImage& image,
   }
 }
 
+/// Planes t along a row: t = first + x * step at pixel x.
+struct PlanesOfRow {
+  float first;
+  float step;
+  float last;  // the nearest plane that counts
+};
+
 void seen_row(const SweepImage& image,
               const Eigen::Vector3f& first,
               const Eigen::Vector3f& step,
+              const PlanesOfRow& planes,
               int width,
               uint8_t* out) {
   for (int x = 0; x < width; ++x) {
     const Eigen::Vector3f h = first + static_cast<float>(x) * step;
+    const float t = planes.first + static_cast<float>(x) * planes.step;
     const float u = h.x() / h.z();
     const float v = h.y() / h.z();
-    const bool inside = h.z() > 0 && u >= 0 && v >= 0 && u < static_cast<float>(image.gray.width) &&
+    const bool inside = h.z() > 0 && t >= 0 && t <= planes.last && u >= 0 && v >= 0 &&
+                        u < static_cast<float>(image.gray.width) &&
                         v < static_cast<float>(image.gray.height);
     out[x] = inside && image.valid(static_cast<int>(u), static_cast<int>(v)) != 0;
   }
@@ -178,16 +189,21 @@ class BandCost {
     fixed_.finish_rows(width_);
   }
 
-  // Costs of all sources on plane t, source-major, then row-major over the band.
-  void plane(int t, std::vector<float>& costs) {
+  // Costs of all sources on a plane, source-major, then row-major over the band.
+  void plane(const Eigen::RowVector3d& t, std::vector<float>& costs) {
     const size_t band = static_cast<size_t>(rows_) * static_cast<size_t>(width_);
     costs.resize(band * geometry_.sources.size());
+    if (!is_in_range(t)) {
+      std::fill(costs.begin(), costs.end(), kUnseen);
+      return;
+    }
     for (size_t s = 0; s < geometry_.sources.size(); ++s) {
       const SweepSource& source = geometry_.sources[s];
       const SweepImage& image = images_[static_cast<size_t>(source.image)];
-      const Eigen::Vector3f step = source.A.col(0).cast<float>();
+      const Eigen::Vector3f step = (source.A.col(0) + t.x() * source.b).cast<float>();
+      const auto t_at = [&](int r) { return t.dot(Eigen::RowVector3d(0.5, clamped(r) + 0.5, 1)); };
       const auto start = [&](int r) -> Eigen::Vector3f {
-        return source.project(0.5, clamped(r) + 0.5, t).cast<float>();
+        return source.project(0.5, clamped(r) + 0.5, t_at(r)).cast<float>();
       };
       for (int r = -kMargin; r < rows_ + kMargin; ++r) {
         warp_row(image, start(r), step, width_, warped_.gray_row(r));
@@ -197,7 +213,9 @@ class BandCost {
         float* out = &costs[s * band + static_cast<size_t>(r) * static_cast<size_t>(width_)];
         census_row(fixed_, warped_, r, width_, out);
         zncc_.add(fixed_, warped_, r, width_, out);
-        seen_row(image, start(r), step, width_, seen_.data());
+        const PlanesOfRow planes{
+            float(t_at(r)), float(t.x()), static_cast<float>(geometry_.planes - 1)};
+        seen_row(image, start(r), step, planes, width_, seen_.data());
         for (int x = 0; x < width_; ++x) {
           if (seen_[static_cast<size_t>(x)] == 0) out[x] = kUnseen;
         }
@@ -206,6 +224,20 @@ class BandCost {
   }
 
  private:
+  // Whether a plane may lie in the range that is swept anywhere in the band.
+  bool is_in_range(const Eigen::RowVector3d& t) const {
+    double least = std::numeric_limits<double>::infinity();
+    double most = -least;
+    for (const double u : {0.0, double(width_)}) {
+      for (const double v : {double(first_), double(first_ + rows_)}) {
+        const double at = t.dot(Eigen::RowVector3d(u, v, 1));
+        least = std::min(least, at);
+        most = std::max(most, at);
+      }
+    }
+    return most >= 0 && least <= geometry_.planes - 1;
+  }
+
   int clamped(int r) const { return std::clamp(first_ + r, 0, reference_.gray.height - 1); }
 
   const std::vector<SweepImage>& images_;
@@ -224,10 +256,11 @@ class BandCost {
 
 CostVolume matching_cost(const std::vector<SweepImage>& images,
                          const SweepGeometry& geometry,
+                         const PlaneFamily& family,
                          const Progress& progress) {
   const Raster<float>& gray = images[static_cast<size_t>(geometry.image)].gray;
-  CostVolume volume{gray.width, gray.height, geometry.planes, {}};
-  const auto planes = static_cast<size_t>(geometry.planes);
+  CostVolume volume{gray.width, gray.height, family.count, {}};
+  const auto planes = static_cast<size_t>(family.count);
   volume.cost.resize(gray.data.size() * planes);
   const int bands = (gray.height + kBandRows - 1) / kBandRows;
   SharedProgress shared(progress, static_cast<size_t>(bands) * planes);
@@ -239,8 +272,8 @@ CostVolume matching_cost(const std::vector<SweepImage>& images,
     std::vector<float> of_pixel(geometry.sources.size());
     const size_t pixels = static_cast<size_t>(last - first) * static_cast<size_t>(gray.width);
     uint8_t* out = &volume.cost[static_cast<size_t>(first) * gray.width * planes];
-    for (int t = 0; t < geometry.planes; ++t) {
-      cost.plane(t, costs);
+    for (int t = 0; t < family.count; ++t) {
+      cost.plane(family.plane(t), costs);
       for (size_t p = 0; p < pixels; ++p) {
         for (size_t s = 0; s < of_pixel.size(); ++s) of_pixel[s] = costs[s * pixels + p];
         const float c = combine(of_pixel.data(), of_pixel.size());
@@ -251,6 +284,14 @@ CostVolume matching_cost(const std::vector<SweepImage>& images,
     }
   });
   return volume;
+}
+
+CostVolume matching_cost(const std::vector<SweepImage>& images,
+                         const SweepGeometry& geometry,
+                         const Progress& progress) {
+  PlaneFamily family;
+  family.count = geometry.planes;
+  return matching_cost(images, geometry, family, progress);
 }
 
 }  // namespace cgs

@@ -39,11 +39,27 @@ inline float combined_cost(std::span<const float> sorted) {
   return sum / weight;
 }
 
-/// Dissimilarity of a reference view and its sources, warped over every plane.
+/// Planes of the scene to compare the views on: plane k is t(u, v) = (base + k step) (u, v, 1).
+struct PlaneFamily {
+  Eigen::RowVector3d base = Eigen::RowVector3d::Zero();
+  Eigen::RowVector3d step = Eigen::RowVector3d::UnitZ();
+  int count = 0;
+
+  Eigen::RowVector3d plane(double k) const { return base + k * step; }
+};
+
+/// Dissimilarity of a reference view and its sources, warped over every plane of a family. What
+/// lies nearer than the nearest plane of the geometry, or behind the farthest, counts as unseen.
 ///
 /// Per source a census transform (7 x 7, robust to lighting, outliers and foreground fattening;
 /// Zabih and Woodfill 1994) plus normalised cross-correlation (5 x 5, sharper where there is
 /// texture). Sources that see a pixel are combined so that one of them may be occluded.
+CostVolume matching_cost(const std::vector<SweepImage>& images,
+                         const SweepGeometry& geometry,
+                         const PlaneFamily& family,
+                         const Progress& progress = {});
+
+/// The same on the planes of the geometry, which are square to the view.
 CostVolume matching_cost(const std::vector<SweepImage>& images,
                          const SweepGeometry& geometry,
                          const Progress& progress = {});

@@ -57,6 +57,7 @@ void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options, const P
   if (std::all_of(scene.input.begin(), scene.input.end(), states_range)) return;
   Scene small;
   small.folder = scene.folder;
+  small.frame = scene.frame;
   small.points = scene.points;
   for (size_t k = 0; k < scene.input.size(); ++k) {
     small.views.push_back(

@@ -11,6 +11,7 @@
 #include "libcgs/core/nan.h"
 #include "libcgs/priors/cross_check.h"
 #include "libcgs/priors/directions.h"
+#include "libcgs/priors/ground_sweep.h"
 
 namespace cgs {
 
@@ -285,14 +286,15 @@ std::vector<ViewPriors> plane_sweep(const Scene& scene,
     return part_of(of_all, double(i) / double(count), double(i + 1) / double(count));
   };
   for (size_t i = 0; i < count; ++i) {
-    const Progress sweeping = of_view(part_of(progress, 0, 0.5), i);
+    const Progress sweeping = of_view(part_of(progress, 0, 0.45), i);
     const CostVolume volume = matching_cost(images, matched[i], part_of(sweeping, 0, 0.8));
     const Raster<float> start =
         semi_global_planes(volume, images[i].gray, options.smoothness, part_of(sweeping, 0.8, 1));
     refinements.emplace_back(images, matched[i], start);
     report(sweeping, 1);
   }
-  std::vector<Raster<SlantedPlane>> extra(count);
+  std::vector<Raster<SlantedPlane>> extra = ground_planes(
+      scene, matched, options.sampling, options.smoothness, part_of(progress, 0.45, 0.5));
   const auto take_results = [&](const Progress& taking) {
     for (size_t i = 0; i < count; ++i) views[i].pixels = refinements[i].result(of_view(taking, i));
   };

@@ -29,7 +29,7 @@ constexpr float kGrayNoiseVariance = 4;  // [gray levels squared]
 constexpr float kSmoothness = 0.12f;     // cost of a full disagreement with the neighbours
 constexpr float kTruncation = 0.8f;      // largest disagreement that counts [planes]
 constexpr float kUnseenCost = 1.0f;      // as uncorrelated
-constexpr float kMaxSlope = 2.0f;        // [planes per pixel]
+constexpr float kMaxSlope = 6.0f;        // [planes per pixel]; ground before the feet has 3 to 4
 
 struct Offset {
   int dx, dy;
@@ -202,6 +202,18 @@ SlantedRefinement::SlantedRefinement(const std::vector<SweepImage>& images,
     for (int x = 0; x < start.width; ++x) {
       planes_(x, y) = {start(x, y), slope(x, y, 1, 0), slope(x, y, 0, 1)};
     }
+  }
+}
+
+SlantedRefinement::SlantedRefinement(const std::vector<SweepImage>& images,
+                                     const SweepGeometry& geometry,
+                                     Raster<SlantedPlane> start)
+    : images_(images),
+      geometry_(geometry),
+      reference_(images[static_cast<size_t>(geometry.image)]),
+      planes_(std::move(start)) {
+  for (SlantedPlane& plane : planes_.data) {
+    if (std::isnan(plane.t)) plane = {};
   }
 }
 

@@ -39,6 +39,10 @@ class SlantedRefinement {
   SlantedRefinement(const std::vector<SweepImage>& images,
                     const SweepGeometry& geometry,
                     const Raster<float>& start);
+  /// With planes to begin with; t NaN = none, and begins at the farthest.
+  SlantedRefinement(const std::vector<SweepImage>& images,
+                    const SweepGeometry& geometry,
+                    Raster<SlantedPlane> start);
 
   /// One round over all pixels. `extra` (may be empty) holds one more hypothesis per pixel, from
   /// other views; t NaN = none.

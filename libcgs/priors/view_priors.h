@@ -20,6 +20,7 @@ enum class DepthOrigin : uint8_t {
   Sky = 4,        ///< No surface; depth is that of a backdrop for pictures.
   Estimated = 5,  ///< Completed or Guessed, but not a small way from a measured pixel of the same
                   ///< surface (mark_estimated()): nothing tells whether it is right.
+  Transient = 6,  ///< No depth: something that the other photographs do not show in its place.
 };
 
 /// What vouches for a pixel.
@@ -40,11 +41,11 @@ inline DepthEvidence depth_evidence(DepthOrigin origin) {
 
 /// What is known about one input view before training; every raster has the size of its image.
 struct ViewPriors {
-  DepthMap depth;              ///< z-depth [internal units]; NaN exactly where origin is Unknown.
-  DepthMap sigma;              ///< Standard deviation of depth [internal units]; NaN as depth.
-  Raster<float> confidence;    ///< In [0, 1]; completed pixels keep the low value they had.
-  Raster<DepthOrigin> origin;  ///< See DepthOrigin.
-  Raster<uint8_t> layer;       ///< Depth layer, 0 = farthest … layer_count - 1 = nearest.
+  DepthMap depth;  ///< z-depth [internal units]; NaN exactly where origin is Unknown or Transient.
+  DepthMap sigma;  ///< Standard deviation of depth [internal units]; NaN as depth.
+  Raster<float> confidence;       ///< In [0, 1]; completed pixels keep the low value they had.
+  Raster<DepthOrigin> origin;     ///< See DepthOrigin.
+  Raster<uint8_t> layer;          ///< Depth layer, 0 = farthest … layer_count - 1 = nearest.
   Raster<uint8_t> matched_views;  ///< Number of other input views that confirm the depth.
 };
 

@@ -74,13 +74,16 @@ std::string percent_text(double share) {
 
 std::string words_on(const PriorsCoverage& share) {
   constexpr double kMentioned = 0.0005;
-  const std::array<std::pair<double, const char*>, 3> parts = {
+  const std::array<std::pair<double, const char*>, 4> parts = {
       {{share.sky, "is sky"},
        {share.estimated,
         "shows surface that nothing measured and is estimated from its surroundings"},
+       {share.transient,
+        "shows what the other photographs do not (people, cars, leaves) and is left out"},
        {share.left_open, "shows surface of which nothing is known and stays open"}}};
   std::vector<std::string> words = {
-      percent_text(1 - share.sky - share.estimated - share.left_open) + "is measured"};
+      percent_text(1 - share.sky - share.estimated - share.transient - share.left_open) +
+      "is measured"};
   for (const auto& [part, text] : parts) {
     if (part >= kMentioned) words.push_back(percent_text(part) + text);
   }

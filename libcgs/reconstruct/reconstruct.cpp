@@ -13,6 +13,7 @@
 #include "libcgs/core/exposure.h"
 #include "libcgs/priors/exposure.h"
 #include "libcgs/priors/measured_range.h"
+#include "libcgs/priors/transients.h"
 #include "libcgs/reconstruct/evidence_words.h"
 
 namespace cgs {
@@ -47,6 +48,14 @@ float match_exposures(Scene& scene, const std::vector<ViewPriors>& priors) {
     apply_exposure(view);
   }
   return exposure.difference();
+}
+
+// What moved is no picture of the scene: nothing is to be made to look like it.
+void leave_out_transients(const std::vector<ViewPriors>& priors, Scene& scene) {
+  for (size_t k = 0; k < scene.input.size(); ++k) {
+    View& view = scene.views[static_cast<size_t>(scene.input[k])];
+    mask_transients(priors[k], view);
+  }
 }
 
 PaneReport report_of(const Pane& pane, const Scene& scene) {
@@ -132,6 +141,7 @@ TrainedModel reconstruct(Scene scene,
   const std::optional<Pane> pane =
       look_behind_pane(scene, options, priors, part_of(progress, 0.18, 0.2));
   const Pane* const drawn_before = pane ? &*pane : nullptr;
+  leave_out_transients(priors.views, scene);
   if (pane) out.pane = report_of(*pane, scene);
   take_findings(priors.report, scene);
   out.priors = std::move(priors.report);

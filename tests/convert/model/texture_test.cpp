@@ -34,7 +34,7 @@ Scene scene_in(const test::TempDir& dir) {
 TEST(TextureFromPhotographs, LevelsExposureAndReportsWhatItDid) {
   const test::TempDir dir;
   const TriangleMesh mesh = test::box(20);
-  const auto [texture, report] = texture_from_photographs(scene_in(dir), mesh);
+  const auto [texture, report] = texture_from_photographs(scene_in(dir), {}, mesh);
   ASSERT_EQ(texture.photographs.size(), 3u);
   ASSERT_EQ(texture.of_face.size(), mesh.faces.size());
   // Every textured face has the colour of the pattern, at the mean exposure of the photographs.
@@ -71,7 +71,7 @@ TEST(TextureFromPhotographs, LevelsExposureAndReportsWhatItDid) {
 TEST(CoarsenTexture, MakesPixelsAsLargeAsAskedAndKeepsTheirPlaces) {
   const test::TempDir dir;
   const TriangleMesh mesh = test::box(20);
-  const PhotoTexture fine = texture_from_photographs(scene_in(dir), mesh).texture;
+  const PhotoTexture fine = texture_from_photographs(scene_in(dir), {}, mesh).texture;
   PhotoTexture same = fine;
   EXPECT_EQ(coarsen_texture(same, mesh, 1e-9), 1);
   EXPECT_EQ(same.photographs[0].image.data, fine.photographs[0].image.data);
@@ -98,7 +98,7 @@ TEST(TextureFromPhotographs, SaysWhenAPhotographIsGone) {
   const test::TempDir dir;
   const Scene scene = scene_in(dir);
   std::filesystem::remove(dir / "b.png");
-  const auto [texture, report] = texture_from_photographs(scene, test::box(4));
+  const auto [texture, report] = texture_from_photographs(scene, {}, test::box(4));
   EXPECT_TRUE(texture.empty());
   EXPECT_NE(report.left_out.find(" b "), std::string::npos);
   EXPECT_EQ(texture_to_json(report, {})["left_out"], report.left_out);

@@ -64,8 +64,10 @@ TEST(EstimatePriors, TellsSharesThatAddUpToAllOfAView) {
   const EstimatedPriors priors = estimate_priors(scene, {});
   for (size_t v = 0; v < 2; ++v) {
     const PriorsCoverage& share = priors.report.coverage[v];
-    EXPECT_NEAR(
-        share.measured + share.completed + share.guessed + share.sky + share.left_open, 1, 1e-9);
+    EXPECT_NEAR(share.measured + share.completed + share.guessed + share.sky + share.transient +
+                    share.left_open,
+                1,
+                1e-9);
     EXPECT_NEAR(share.sky, 1.0 / 3, 0.05);
     EXPECT_GT(share.measured, 0.3);
     EXPECT_LE(share.estimated, share.completed + share.guessed + 1e-9);
