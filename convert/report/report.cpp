@@ -189,10 +189,12 @@ std::string coverage_section(const Json& model) {
     const double without = view["sky"].get<double>() + view["transient"].get<double>() +
                            view["estimated"].get<double>() + view["left_open"].get<double>();
     html << "<tr><td>" << escaped(view["view"].get<std::string>()) << "</td>";
+    const bool can_tell_what_moved = depth.size() > 2;
+    const double moved = can_tell_what_moved ? view["transient"].get<double>() : -1;
     for (const double share : {view["measured"].get<double>(),
                                1 - without,
                                view["sky"].get<double>(),
-                               view["transient"].get<double>(),
+                               moved,
                                view["estimated"].get<double>(),
                                view["left_open"].get<double>(),
                                why["unseen"].get<double>(),
@@ -200,7 +202,7 @@ std::string coverage_section(const Json& model) {
                                why["even"].get<double>(),
                                why["wide"].get<double>(),
                                why["unconfirmed"].get<double>()}) {
-      html << "<td>" << percent(share) << "</td>";
+      html << "<td>" << (share < 0 ? "two photographs cannot tell" : percent(share)) << "</td>";
     }
     html << "</tr>\n";
   }

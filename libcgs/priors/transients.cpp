@@ -107,19 +107,34 @@ void remove_specks(MaskMap& mask) {
   }
 }
 
+MaskMap inverted(MaskMap mask) {
+  for (uint8_t& value : mask.data) value = value == 0 ? 1 : 0;
+  return mask;
+}
+
 cv::Mat disc(int radius) {
   return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1});
 }
 
-// Without specks, with what it surrounds, and a little wider: colours mix at rims.
-MaskMap cleaned(const MaskMap& found, const MaskMap& known) try {
+// Without specks, with what it surrounds and what of it resembles the surface behind by chance, and
+// a little wider: colours mix at rims.
+// \param unclear  where others agree on a surface that this view did not measure
+MaskMap cleaned(const MaskMap& found, const MaskMap& known, MaskMap unclear) try {
   constexpr int kGap = 6;
-  constexpr int kRim = 3;
+  constexpr int kReach = 12;
+  constexpr int kRim = 2;
   MaskMap out = majority(found, known);
   remove_specks(out);
   cv::morphologyEx(matrix(out), matrix(out), cv::MORPH_CLOSE, disc(kGap));
+  for (int k = 0; k < kReach; ++k) {
+    cv::Mat grown;
+    cv::dilate(matrix(out), grown, disc(1));
+    cv::bitwise_or(matrix(out), grown & matrix(unclear), matrix(out));
+  }
   cv::dilate(matrix(out), matrix(out), disc(kRim));
-  return out;
+  MaskMap rest = inverted(out);
+  remove_specks(rest);
+  return inverted(rest);
 } catch (const cv::Exception& error) {
   throw_if_out_of_memory(error);
   throw;
@@ -153,15 +168,17 @@ class Transients {
     const SmallView& view = views_[i];
     MaskMap known(view.depth.width, view.depth.height, 0);
     MaskMap found = known;
+    MaskMap unclear = known;
     tbb::parallel_for(0, found.height, [&](int y) {
       for (int x = 0; x < found.width; ++x) {
         const SharedSurface& behind = shared(x, y);
         if (std::isnan(behind.depth) || !view.usable(x, y)) continue;
         known(x, y) = 1;
+        unclear(x, y) = std::isnan(view.depth(x, y)) ? 1 : 0;
         found(x, y) = contradicts(view, x, y, behind) && !is_explained(i, x, y, behind.depth);
       }
     });
-    return at_full_size(cleaned(found, known), factor_[i], width, height);
+    return at_full_size(cleaned(found, known, std::move(unclear)), factor_[i], width, height);
   }
 
  private:
