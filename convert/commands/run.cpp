@@ -14,6 +14,7 @@
 #include "convert/report/report_surface.h"
 #include "convert/run/budget.h"
 #include "convert/run/pipeline.h"
+#include "convert/run/preview.h"
 #include "convert/run/verification.h"
 #include "convert/text/frame_json.h"
 #include "convert/text/length.h"
@@ -31,6 +32,7 @@ struct RunArgs {
   std::optional<EstimatedSurface> estimated;
   std::string max_size;
   std::string budget;
+  bool preview = false;
 };
 
 size_t asked_size(const std::string& text) {
@@ -70,7 +72,7 @@ void run_run(const RunArgs& args) {
   limit_threads(args.common.threads);
   keep_scene_apart(args.request.output,
                    args.request.scene.path,
-                   {"model", "views", "mesh", "web", kRecomputedFolder});
+                   {"model", "views", "mesh", "web", kPreviewFolder, kRecomputedFolder});
   RunRequest request = args.request;
   request.training = training_options(args.training);
   request.memory_limit = stated_memory_limit(args.common);
@@ -85,6 +87,13 @@ void run_run(const RunArgs& args) {
       set.begin(), set.end(), [](const std::string& s) { return s.rfind("steps=", 0) == 0; });
   if (budget > 0 && sets_steps) {
     throw InvalidInput("--budget chooses the steps of the training; give it or --set steps");
+  }
+  if (args.preview) {
+    const nlohmann::ordered_json report = write_preview(request, terminal);
+    if (args.common.json) std::cout << json_text(report) << "\n";
+    terminal.say("preview: " + preview_words(report));
+    terminal.say("open " + (request.output / kPreviewFolder / "report.html").string());
+    return;
   }
   if (budget > 0) request = within_budget(request, budget, start, terminal);
   const nlohmann::ordered_json report = run_pipeline(request, terminal).report;
@@ -140,6 +149,10 @@ void add_promises(CLI::App& command, RunArgs& args) {
       "Time for all of it, e.g. 3min: tries small pictures, then takes the largest "
       "size and the training that this machine can do in it; in place of --downscale and "
       "--preset");
+  command.add_flag("--preview",
+                   args.preview,
+                   "A first look, in seconds once the cameras are there: small pictures, no "
+                   "training, in OUT/preview; says how much is measured, and stops there");
 }
 
 }  // namespace
@@ -164,10 +177,13 @@ void add_run(CLI::App& app) {
   add_training_options(*cmd, args->training);
   for (const char* chosen : {"--downscale", "--preset"}) {
     cmd->get_option("--budget")->excludes(chosen);
+    cmd->get_option("--preview")->excludes(chosen);
   }
+  cmd->get_option("--preview")->excludes("--budget");
   add_common_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs run photos/portal --views 1,10,19 -o out/portal\n"
+      "         cgs run photos/portal --preview -o out/portal\n"
       "         cgs run photos/portal --max-size 2MB -o out/portal_small\n"
       "         cgs run photos/portal --budget 3min -o out/portal_soon\n"
       "         cgs run photos/portal --assume-unit m --max-error 2mm -o out/portal_true\n"

@@ -13,6 +13,7 @@
 #include "convert/model/memory_plan.h"
 #include "convert/model/model_training.h"
 #include "convert/run/pipeline.h"
+#include "convert/run/preview.h"
 #include "convert/run/request_fields.h"
 #include "convert/run/time_model.h"
 #include "convert/text/length.h"
@@ -76,18 +77,8 @@ std::string size_words(const Scene& scene, int downscale) {
 
 // One whole run, of which only the times are kept.
 TimedRun trial(const Search& search, int downscale, int steps) {
-  RunRequest request = search.request;
-  request.scene.options.downscale = downscale;
+  RunRequest request = small_run(search.request, search.opened, kTrialFolder, downscale);
   request.training.steps = steps;
-  request.output = search.request.output / kTrialFolder;
-  request.overwrite = true;
-  if (search.opened.poses) {  // not to be solved for again
-    make_output_folder(request.output / "model");
-    fs::copy(search.request.output / "model" / kPosesFolder,
-             request.output / "model" / kPosesFolder,
-             fs::copy_options::recursive | fs::copy_options::overwrite_existing);
-  }
-  if (search.opened.refined) write_refined_poses(request.output / "model", *search.opened.refined);
   (void)search.terminal.begin("trying " + size_words(search.opened.scene, downscale));
   Terminal silent = Terminal::silent();
   const auto start = Clock::now();
