@@ -111,6 +111,29 @@ Raster<SlantedPlane> refined(const std::vector<SweepImage>& images,
   return out;
 }
 
+// Whether a window of the refinement fits into the halved pictures.
+bool are_large_enough(const Scene& scene) {
+  constexpr int kLeastSide = 20;  // [pixels]
+  return std::all_of(scene.input.begin(), scene.input.end(), [&](int i) {
+    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+    return std::min(camera.width, camera.height) >= kLeastSide;
+  });
+}
+
+// The input views at half size, with their ranges of depth.
+Scene halved_inputs(const Scene& scene) {
+  Scene out;
+  out.folder = scene.folder;
+  for (const int i : scene.input) {
+    View& view = out.views.emplace_back(reduced_view(scene.views[static_cast<size_t>(i)], kHalf));
+    const DepthRange range = depth_range(scene, i);
+    view.near = range.near;
+    view.far = range.far;
+    out.input.push_back(static_cast<int>(out.input.size()));
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<Raster<SlantedPlane>> ground_planes(const Scene& scene,
@@ -120,16 +143,10 @@ std::vector<Raster<SlantedPlane>> ground_planes(const Scene& scene,
                                                 const Progress& progress) {
   const size_t count = geometry.size();
   std::vector<Raster<SlantedPlane>> out(count);
-  if (!scene.frame.knows_up()) return out;
-  Scene halved;
-  halved.folder = scene.folder;
-  halved.points = scene.points;
+  if (!scene.frame.knows_up() || !are_large_enough(scene)) return out;
+  const Scene halved = halved_inputs(scene);
   std::vector<SweepImage> images;
-  for (const int i : scene.input) {
-    halved.input.push_back(static_cast<int>(halved.views.size()));
-    halved.views.push_back(reduced_view(scene.views[static_cast<size_t>(i)], kHalf));
-    images.push_back(sweep_image(halved.views.back()));
-  }
+  for (const View& view : halved.views) images.push_back(sweep_image(view));
   for (size_t i = 0; i < count; ++i) {
     const Progress part =
         part_of(progress, double(i) / double(count), double(i + 1) / double(count));
