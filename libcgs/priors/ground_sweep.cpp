@@ -111,9 +111,10 @@ Raster<SlantedPlane> refined(const std::vector<SweepImage>& images,
   return out;
 }
 
-// Whether a window of the refinement fits into the halved pictures.
+// Whether the window of the refinement is a small part of the halved pictures: else it spans more
+// than ground.
 bool are_large_enough(const Scene& scene) {
-  constexpr int kLeastSide = 20;  // [pixels]
+  constexpr int kLeastSide = 64;  // [pixels]
   return std::all_of(scene.input.begin(), scene.input.end(), [&](int i) {
     const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
     return std::min(camera.width, camera.height) >= kLeastSide;

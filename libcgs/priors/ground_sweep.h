@@ -18,7 +18,7 @@ namespace cgs {
 /// \param scene     as plane_sweep() takes it
 /// \param geometry  of every input view, in whose planes the result is
 /// \return per input view and pixel, t NaN where there is none; empty for views that no ground is
-///         looked for in: where Frame::up is not known, pictures have less than 20 pixels, or
+///         looked for in: where Frame::up is not known, pictures have less than 64 pixels, or
 ///         nothing of them lies well below the horizon
 /// Source: Gallup et al. 2007, "Real-time plane-sweeping stereo with multiple sweeping directions".
 std::vector<Raster<SlantedPlane>> ground_planes(const Scene& scene,
