@@ -190,7 +190,8 @@ class AssetWriter {
         texture_.empty() ? std::min(1.0, coarser * options.max_color_error) : 1;
     options.max_area_change = std::min(0.1, coarser * options.max_area_change);
     out.mesh = simplify(mesh_, options).mesh;
-    if (!texture_.empty()) out.texture = texture_from_photographs(scene_, priors_, out.mesh).texture;
+    if (!texture_.empty())
+      out.texture = texture_from_photographs(scene_, priors_, out.mesh).texture;
   }
 
   // \param texel  of textures, in details
