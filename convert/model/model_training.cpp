@@ -156,6 +156,7 @@ nlohmann::ordered_json coverage_to_json(const TrainedModel& trained) {
                    {"transient", coverage.transient},
                    {"left_open", coverage.left_open},
                    {"estimated", coverage.estimated},
+                   {"with_evidence", coverage.with_evidence()},
                    {"unmeasured", unmeasured_to_json(coverage.unmeasured)},
                    {"words", words[i]}});
   }

@@ -20,6 +20,7 @@
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
+#include "libcgs/priors/transients.h"
 #include "libcgs/train/image_metrics.h"
 
 namespace cgs {
@@ -116,15 +117,7 @@ ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
 MaskMap transient_pixels(const Model& model, int view) {
   const std::vector<int>& input = model.scene.input;
   const auto k = static_cast<size_t>(std::find(input.begin(), input.end(), view) - input.begin());
-  if (k >= model.priors.size()) return {};
-  const Raster<DepthOrigin>& origin = model.priors[k].origin;
-  MaskMap out(origin.width, origin.height, 0);
-  bool any = false;
-  for (size_t i = 0; i < origin.data.size(); ++i) {
-    out.data[i] = origin.data[i] == DepthOrigin::Transient ? 1 : 0;
-    any = any || out.data[i] != 0;
-  }
-  return any ? out : MaskMap();
+  return k < model.priors.size() ? transient_mask(model.priors[k]) : MaskMap();
 }
 
 RenderedPicture write_view(const Model& model,

@@ -176,8 +176,8 @@ std::string coverage_section(const Json& model) {
   if (!depth.is_array() || depth.empty() || !depth[0].contains("unmeasured")) return "";
   std::ostringstream html;
   html << "<h2>What was measured</h2>\n<p>Shares of the pixels. What adjoins a measured place of "
-          "the "
-          "same surface counts as measured by one photograph. Why there was no match: the place is "
+          "the same surface counts as measured by one photograph. Why there was no match: the "
+          "place is "
           "in no other picture, or something is before it there; the photograph shows no texture; "
           "others see it at more than 40 degrees; or what matches is not confirmed from the other "
           "side, as where a pattern repeats, a surface shines, or cameras are off.</p>\n<table>\n"
@@ -186,13 +186,11 @@ std::string coverage_section(const Json& model) {
           "<th>wide angle</th><th>not confirmed</th></tr>\n";
   for (const Json& view : depth) {
     const Json& why = view["unmeasured"];
-    const double without = view["sky"].get<double>() + view["transient"].get<double>() +
-                           view["estimated"].get<double>() + view["left_open"].get<double>();
     html << "<tr><td>" << escaped(view["view"].get<std::string>()) << "</td>";
     const bool can_tell_what_moved = depth.size() > 2;
     const double moved = can_tell_what_moved ? view["transient"].get<double>() : -1;
     for (const double share : {view["measured"].get<double>(),
-                               1 - without,
+                               view["with_evidence"].get<double>(),
                                view["sky"].get<double>(),
                                moved,
                                view["estimated"].get<double>(),

@@ -7,14 +7,12 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/run/pipeline.h"
-#include "convert/scene/refined_poses.h"
+#include "convert/run/small_run.h"
 #include "convert/text/html.h"
 #include "io/bytes/scene_path.h"
-#include "libcgs/core/error.h"
 
 namespace cgs {
 
-namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 namespace {
@@ -44,8 +42,7 @@ double measured_share(const Json& depth_of_views) {
   double sum = 0;
   for (const Json& view : depth_of_views) {
     const double surface = 1 - view["sky"].get<double>() - view["transient"].get<double>();
-    const double unmeasured = view["estimated"].get<double>() + view["left_open"].get<double>();
-    sum += surface > 0 ? 1 - unmeasured / surface : 0;
+    sum += surface > 0 ? view["with_evidence"].get<double>() / surface : 0;
   }
   return sum / double(depth_of_views.size());
 }
@@ -76,24 +73,6 @@ std::string main_reason(const Json& depth_of_views) {
 }
 
 }  // namespace
-
-RunRequest small_run(const RunRequest& request,
-                     const OpenedScene& opened,
-                     const char* folder,
-                     int downscale) {
-  RunRequest out = request;
-  out.scene.options.downscale = downscale;
-  out.output = request.output / folder;
-  out.overwrite = true;
-  if (opened.poses) {  // not to be solved for again
-    make_output_folder(out.output / "model");
-    fs::copy(request.output / "model" / kPosesFolder,
-             out.output / "model" / kPosesFolder,
-             fs::copy_options::recursive | fs::copy_options::overwrite_existing);
-  }
-  if (opened.refined) write_refined_poses(out.output / "model", *opened.refined);
-  return out;
-}
 
 Json write_preview(const RunRequest& request, Terminal& terminal) {
   RunRequest full = request;

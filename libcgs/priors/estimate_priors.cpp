@@ -72,7 +72,7 @@ class Estimator {
     const std::vector<MaskMap> sky = find_sky(scene_, out_.views);
     for (size_t i = 0; i < sky.size(); ++i) enter_sky(sky[i], out_.views[i]);
     const std::vector<MaskMap> transients = find_transients(scene_, out_.views);
-    for (size_t i = 0; i < sky.size(); ++i) enter_transients(transients[i], out_.views[i]);
+    for (size_t i = 0; i < transients.size(); ++i) enter_transients(transients[i], out_.views[i]);
     const std::vector<DepthGuess> guesses = guesses_of(given);
     const auto count = static_cast<double>(out_.views.size());
     for (size_t i = 0; i < out_.views.size(); ++i) {

@@ -37,6 +37,9 @@ struct PriorsCoverage {
   double left_open = 0;         ///< Not measured, and not filled in either.
   double estimated = 0;         ///< The part of completed and guessed that is no evidence.
   UnmeasuredShares unmeasured;  ///< Why the rest was not measured; of completed, too.
+
+  /// Measured, or adjoining what is.
+  double with_evidence() const { return 1 - sky - estimated - transient - left_open; }
 };
 
 /// Below this share of a view, all that was measured may be false matches.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "libcgs/core/nan.h"
@@ -23,16 +22,6 @@ Eigen::RowVector3d drop_per_depth(const Camera& camera, const Eigen::Vector3d& u
   return down * camera.intrinsics().inverse();
 }
 
-double largest_at_corners(const Eigen::RowVector3d& affine, const Camera& camera) {
-  double out = -std::numeric_limits<double>::infinity();
-  for (const double u : {0.0, double(camera.width)}) {
-    for (const double v : {0.0, double(camera.height)}) {
-      out = std::max(out, affine.dot(Eigen::RowVector3d(u, v, 1)));
-    }
-  }
-  return out;
-}
-
 // Level planes from that of the horizon, where 1 / depth is 0, up to one that lies half as far
 // below the camera as the nearest place at the border of the picture could: steps and tables are
 // higher than the ground.
@@ -43,7 +32,7 @@ std::optional<PlaneFamily> level_planes(const SweepGeometry& geometry,
   constexpr double kHighest = 2;
   constexpr int kMost = 512;
   const Eigen::RowVector3d drop = drop_per_depth(camera, up);
-  const double most = largest_at_corners(drop, camera);
+  const double most = range_over(drop, {0, 0}, {camera.width, camera.height}).second;
   if (!(most > kLeastDrop)) return std::nullopt;
   const double horizon = geometry.plane_of(0);
   const double planes = kHighest * (geometry.planes - 1 - horizon);
@@ -123,14 +112,11 @@ bool are_large_enough(const Scene& scene) {
 
 // The input views at half size, with their ranges of depth.
 Scene halved_inputs(const Scene& scene) {
-  Scene out;
-  out.folder = scene.folder;
-  for (const int i : scene.input) {
-    View& view = out.views.emplace_back(reduced_view(scene.views[static_cast<size_t>(i)], kHalf));
-    const DepthRange range = depth_range(scene, i);
-    view.near = range.near;
-    view.far = range.far;
-    out.input.push_back(static_cast<int>(out.input.size()));
+  Scene out = reduced_inputs(scene, kHalf);
+  for (size_t k = 0; k < out.views.size(); ++k) {
+    const DepthRange range = depth_range(scene, scene.input[k]);
+    out.views[k].near = range.near;
+    out.views[k].far = range.far;
   }
   return out;
 }

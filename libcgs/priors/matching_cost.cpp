@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <tbb/parallel_for.h>
 
@@ -226,15 +225,7 @@ class BandCost {
  private:
   // Whether a plane may lie in the range that is swept anywhere in the band.
   bool is_in_range(const Eigen::RowVector3d& t) const {
-    double least = std::numeric_limits<double>::infinity();
-    double most = -least;
-    for (const double u : {0.0, double(width_)}) {
-      for (const double v : {double(first_), double(first_ + rows_)}) {
-        const double at = t.dot(Eigen::RowVector3d(u, v, 1));
-        least = std::min(least, at);
-        most = std::max(most, at);
-      }
-    }
+    const auto [least, most] = range_over(t, {0, first_}, {width_, first_ + rows_});
     return most >= 0 && least <= geometry_.planes - 1;
   }
 

@@ -55,15 +55,7 @@ void narrow_depth_ranges(Scene& scene, const PlaneSweepOptions& options, const P
     return view.near > 0 && view.far > view.near;
   };
   if (std::all_of(scene.input.begin(), scene.input.end(), states_range)) return;
-  Scene small;
-  small.folder = scene.folder;
-  small.frame = scene.frame;
-  small.points = scene.points;
-  for (size_t k = 0; k < scene.input.size(); ++k) {
-    small.views.push_back(
-        reduced_view(scene.views[static_cast<size_t>(scene.input[k])], kReduction));
-    small.input.push_back(static_cast<int>(k));
-  }
+  const Scene small = reduced_inputs(scene, kReduction);
   PlaneSweepOptions coarse = options;
   coarse.least_disparity /= kReduction;  // what the full sweep can tell must lie in the range
   const std::vector<ViewPriors> measured = plane_sweep(small, coarse, progress);

@@ -23,4 +23,16 @@ View reduced_view(const View& view, int factor) {
   return out;
 }
 
+Scene reduced_inputs(const Scene& scene, int factor) {
+  Scene out;
+  out.folder = scene.folder;
+  out.frame = scene.frame;
+  out.points = scene.points;
+  for (size_t k = 0; k < scene.input.size(); ++k) {
+    out.views.push_back(reduced_view(scene.views[static_cast<size_t>(scene.input[k])], factor));
+    out.input.push_back(static_cast<int>(k));
+  }
+  return out;
+}
+
 }  // namespace cgs

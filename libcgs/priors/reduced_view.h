@@ -10,4 +10,7 @@ namespace cgs {
 /// \pre its image is loaded; factor >= 1
 View reduced_view(const View& view, int factor);
 
+/// The input views of a scene alone, reduced, with what else a sweep asks a scene for.
+Scene reduced_inputs(const Scene& scene, int factor);
+
 }  // namespace cgs

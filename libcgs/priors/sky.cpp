@@ -370,13 +370,7 @@ std::vector<MaskMap> find_sky(const Scene& scene, const std::vector<ViewPriors>&
 }
 
 void enter_sky(const MaskMap& sky, ViewPriors& priors) {
-  for (size_t i = 0; i < sky.data.size(); ++i) {
-    if (sky.data[i] == 0) continue;
-    priors.depth.data[i] = std::nanf("");
-    priors.sigma.data[i] = std::nanf("");
-    priors.origin.data[i] = DepthOrigin::Sky;
-    priors.matched_views.data[i] = 0;
-  }
+  enter_without_depth(sky, DepthOrigin::Sky, priors);
 }
 
 void set_backdrop(std::vector<ViewPriors>& views) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "libcgs/core/error.h"
 
@@ -100,6 +101,21 @@ SweepImage sweep_image(const View& view) {
   }
   fill_invalid(out.gray, out.valid);
   return out;
+}
+
+std::pair<double, double> range_over(const Eigen::RowVector3d& affine,
+                                     const Eigen::Vector2d& from,
+                                     const Eigen::Vector2d& to) {
+  double least = std::numeric_limits<double>::infinity();
+  double most = -least;
+  for (const double u : {from.x(), to.x()}) {
+    for (const double v : {from.y(), to.y()}) {
+      const double at = affine.dot(Eigen::RowVector3d(u, v, 1));
+      least = std::min(least, at);
+      most = std::max(most, at);
+    }
+  }
+  return {least, most};
 }
 
 SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling& sampling) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -50,6 +51,11 @@ struct SweepGeometry {
   double inverse_depth(double t) const { return inverse_far + t * step; }
   double plane_of(double inverse_depth) const { return (inverse_depth - inverse_far) / step; }
 };
+
+/// The least and the largest value of an affine function of (u, v, 1) over a rectangle of pixels.
+std::pair<double, double> range_over(const Eigen::RowVector3d& affine,
+                                     const Eigen::Vector2d& from,
+                                     const Eigen::Vector2d& to);
 
 /// How densely the depth range is sampled.
 struct SweepSampling {

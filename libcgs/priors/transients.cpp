@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
@@ -310,23 +309,28 @@ std::vector<MaskMap> find_transients(const Scene& scene, const std::vector<ViewP
   return out;
 }
 
-void mask_transients(const ViewPriors& priors, View& view) {
-  const auto& origins = priors.origin;
-  if (std::find(origins.data.begin(), origins.data.end(), DepthOrigin::Transient) ==
-      origins.data.end()) {
-    return;
-  }
-  if (view.valid.empty()) view.valid = MaskMap(origins.width, origins.height, 1);
-  for (size_t i = 0; i < origins.data.size(); ++i) {
-    if (origins.data[i] == DepthOrigin::Transient) view.valid.data[i] = 0;
-  }
+void enter_transients(const MaskMap& transients, ViewPriors& priors) {
+  enter_without_depth(transients, DepthOrigin::Transient, priors);
 }
 
-void enter_transients(const MaskMap& transients, ViewPriors& priors) {
+MaskMap transient_mask(const ViewPriors& priors) {
+  const auto& origins = priors.origin;
+  MaskMap out(origins.width, origins.height, 0);
+  bool any = false;
+  for (size_t i = 0; i < origins.data.size(); ++i) {
+    if (origins.data[i] != DepthOrigin::Transient) continue;
+    out.data[i] = 1;
+    any = true;
+  }
+  return any ? out : MaskMap();
+}
+
+void mask_transients(const ViewPriors& priors, View& view) {
+  const MaskMap transients = transient_mask(priors);
+  if (transients.empty()) return;
+  if (view.valid.empty()) view.valid = MaskMap(transients.width, transients.height, 1);
   for (size_t i = 0; i < transients.data.size(); ++i) {
-    if (transients.data[i] == 0) continue;
-    priors.origin.data[i] = DepthOrigin::Transient;
-    priors.depth.data[i] = priors.sigma.data[i] = kNaN;
+    if (transients.data[i] != 0) view.valid.data[i] = 0;
   }
 }
 

@@ -25,6 +25,9 @@ std::vector<MaskMap> find_transients(const Scene& scene, const std::vector<ViewP
 /// Marks them in the priors: origin Transient, without depth.
 void enter_transients(const MaskMap& transients, ViewPriors& priors);
 
+/// Where the priors say that there are some; empty where there are none.
+MaskMap transient_mask(const ViewPriors& priors);
+
 /// Takes them out of the valid pixels of a view.
 void mask_transients(const ViewPriors& priors, View& view);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -48,5 +49,15 @@ struct ViewPriors {
   Raster<uint8_t> layer;          ///< Depth layer, 0 = farthest … layer_count - 1 = nearest.
   Raster<uint8_t> matched_views;  ///< Number of other input views that confirm the depth.
 };
+
+/// Gives an origin that has no depth to the pixels of a mask; empty = none.
+inline void enter_without_depth(const MaskMap& mask, DepthOrigin origin, ViewPriors& priors) {
+  for (size_t i = 0; i < mask.data.size(); ++i) {
+    if (mask.data[i] == 0) continue;
+    priors.depth.data[i] = priors.sigma.data[i] = std::nanf("");
+    priors.origin.data[i] = origin;
+    priors.matched_views.data[i] = 0;
+  }
+}
 
 }  // namespace cgs

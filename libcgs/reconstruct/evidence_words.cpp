@@ -81,9 +81,7 @@ std::string words_on(const PriorsCoverage& share) {
        {share.transient,
         "shows what the other photographs do not (people, cars, leaves) and is left out"},
        {share.left_open, "shows surface of which nothing is known and stays open"}}};
-  std::vector<std::string> words = {
-      percent_text(1 - share.sky - share.estimated - share.transient - share.left_open) +
-      "is measured"};
+  std::vector<std::string> words = {percent_text(share.with_evidence()) + "is measured"};
   for (const auto& [part, text] : parts) {
     if (part >= kMentioned) words.push_back(percent_text(part) + text);
   }

@@ -107,14 +107,14 @@ def row(program, evidence_accuracy, five, out):
     mean = (report.get("evaluation") or {}).get("mean", {})
     depth = report["model"]["depth_of_views"]
     part = {key: sum(view.get(key, 0) for view in depth) / len(depth)
-            for key in ("sky", "transient", "estimated", "left_open")}
+            for key in ("with_evidence", "sky", "transient", "estimated", "left_open")}
     psnr = mean.get("psnr_seen")
     return [
         name,
         str(placed),
         f"{psnr:.1f}" if psnr else "-",
         percent(mean.get("hole_fraction")),
-        percent(1 - sum(part.values())),
+        percent(part["with_evidence"]),
         percent(part["sky"]),
         percent(part["transient"]),
         percent(part["estimated"] + part["left_open"]),
