@@ -50,17 +50,17 @@ Foot foot_on(const Triangle& f, const Vector3f& x) {
 
 /// The new face that a witness lies nearest to.
 struct Heir {
-  const NewFace* face = nullptr;  ///< Null where no new face has its label.
+  uint32_t face = kNone;  ///< Index into the new faces; none where no one has its label.
   Foot foot{std::numeric_limits<float>::infinity(), 0, 0};
 };
 
 /// \param x  of the witness, from the new vertex
 Heir heir_of(const std::vector<NewFace>& fresh, Provenance label, const Vector3f& x) {
   Heir out;
-  for (const NewFace& face : fresh) {
-    if (face.label != label) continue;
-    const Foot foot = foot_on(face, x);
-    if (foot.squared_distance < out.foot.squared_distance) out = {&face, foot};
+  for (uint32_t i = 0; i < fresh.size(); ++i) {
+    if (fresh[i].label != label) continue;
+    const Foot foot = foot_on(fresh[i], x);
+    if (foot.squared_distance < out.foot.squared_distance) out = {i, foot};
   }
   return out;
 }
@@ -281,7 +281,7 @@ bool Collapser::folds(const Attempt& attempt) const {
 // Every witness of the old star must be near a new face of its label, in place and colour.
 bool Collapser::witnesses_allow(Attempt& attempt, const Vector3f& p) const {
   attempt.points.clear();
-  attempt.face_of_point.clear();
+  attempt.heir_of_point.clear();
   const auto find = [&](uint32_t f) {
     const Provenance label = mesh_.provenance[f];
     const bool compare_colors = !mesh_.colors.empty() && label != Provenance::Inferred;
@@ -290,13 +290,13 @@ bool Collapser::witnesses_allow(Attempt& attempt, const Vector3f& p) const {
       const auto [nearest, foot] = heir_of(attempt.fresh, label, x);
       if (!(foot.squared_distance <= limits_.tolerance[w] * limits_.tolerance[w])) return false;
       if (compare_colors) {
-        const Vector3f color =
-            nearest->color + foot.v * nearest->color_ab + foot.w * nearest->color_ac;
+        const NewFace& heir = attempt.fresh[nearest];
+        const Vector3f color = heir.color + foot.v * heir.color_ab + foot.w * heir.color_ac;
         const float change = (color - original_.colors[w]).cwiseAbs().maxCoeff();
         if (!(change <= limits_.color)) return false;
       }
       attempt.points.push_back(w);
-      attempt.face_of_point.push_back(nearest->face);
+      attempt.heir_of_point.push_back(nearest);
     }
     return true;
   };
@@ -308,14 +308,14 @@ bool Collapser::witnesses_allow(Attempt& attempt, const Vector3f& p) const {
 // one. Those of faces that move stay with them.
 bool Collapser::hand_over_witnesses(Attempt& attempt) const {
   attempt.points.clear();
-  attempt.face_of_point.clear();
+  attempt.heir_of_point.clear();
   const Vector3f p = (attempt.to.point + center_).cast<float>();
   for (const uint32_t f : attempt.dying) {
     for (uint32_t w = witness_[f]; w != kNone; w = next_witness_[w]) {
       const Heir heir = heir_of(attempt.fresh, mesh_.provenance[f], original_.vertices[w] - p);
-      if (heir.face == nullptr) return false;
+      if (heir.face == kNone) return false;
       attempt.points.push_back(w);
-      attempt.face_of_point.push_back(heir.face->face);
+      attempt.heir_of_point.push_back(heir.face);
     }
   }
   return true;
@@ -397,10 +397,11 @@ void Collapser::apply(const Attempt& attempt) {
     }
   }
   for (size_t i = 0; i < attempt.points.size(); ++i) {
-    uint32_t& head = witness_[attempt.face_of_point[i]];
+    uint32_t& head = witness_[attempt.moving[attempt.heir_of_point[i]]];
     next_witness_[attempt.points[i]] = head;
     head = attempt.points[i];
   }
+  remember(attempt);
 }
 
 }  // namespace cgs::edge_collapse

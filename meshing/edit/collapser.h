@@ -13,7 +13,8 @@
 #include "meshing/mesh/quadric.h"
 
 // The inside of collapse_edges(): state in one class, whose functions lie in edge_collapse.cpp
-// (setup and passes) and collapse_rules.cpp (what one collapse must keep).
+// (setup and passes), collapse_rules.cpp (what one collapse must keep) and collapse_history.cpp
+// (what an earlier run did).
 namespace cgs::edge_collapse {
 
 using Eigen::Vector3d;
@@ -79,9 +80,10 @@ struct Attempt {
   Outcome outcome = Outcome::Later;
   uint32_t u = kNone, v = kNone;  ///< v goes, u moves.
   Placement to;
-  std::vector<uint32_t> moving, dying;          ///< Faces around; those at the edge.
-  std::vector<uint32_t> points, face_of_point;  ///< Witnesses that change hands, and to whom.
-  std::vector<NewFace> fresh;                   ///< The moving faces, moved.
+  std::vector<uint32_t> moving, dying;  ///< Faces around; those at the edge.
+  std::vector<uint32_t> points;         ///< Witnesses that change hands,
+  std::vector<uint32_t> heir_of_point;  ///< and to whom: an index into `moving`.
+  std::vector<NewFace> fresh;           ///< The moving faces, moved.
   std::vector<EdgeNeighbor> around_u, around_v;
 };
 
@@ -89,7 +91,7 @@ struct Attempt {
 class Collapser {
  public:
   Collapser(const TriangleMesh& mesh, const CollapseLimits& limits);
-  CollapsedMesh run(const Progress& progress);
+  CollapsedMesh run(const CollapseHistory* before, const Progress& progress);
 
  private:
   struct Candidate {
@@ -129,6 +131,12 @@ class Collapser {
   void apply(const Attempt& attempt);
   void merge_knowledge(uint32_t u, uint32_t v, float t);
   void drop_dead_faces();
+  void end_pass();
+  void remember(const Attempt& attempt);
+  void repeat(const CollapseHistory& before);
+  void repeat_one(const CollapseHistory& before, size_t index, Attempt& attempt);
+  bool gather_witnesses(Attempt& attempt) const;
+  bool is_as_before(const Attempt& attempt) const;
   // Told by the corners themselves, which are looked at anyway: memory is what takes the time.
   bool is_dead(uint32_t f) const { return mesh_.faces[f][0] == kNone; }
   Vector3d vertex(uint32_t v) const { return mesh_.vertices[v].cast<double>() - center_; }
@@ -151,7 +159,7 @@ class Collapser {
   std::vector<uint8_t> changed_;  // per vertex: star changed in the last pass
   std::vector<float> cost_;       // per slot
   std::vector<Candidate> candidates_;
-  std::vector<float> pass_costs_;
+  CollapseHistory history_;
   std::vector<uint32_t> cursor_;   // per vertex: where its next face goes in around_
   std::vector<uint32_t> witness_;  // per face: list of original vertices
   std::vector<uint32_t> next_witness_;
@@ -159,6 +167,9 @@ class Collapser {
   std::vector<Attempt> batch_;            // candidates that are tried at once
   std::vector<uint32_t> stamp_;           // per vertex: the batch in which its star last changed
   uint32_t batches_ = 0;
+  // While an earlier run is repeated, per vertex: whether it or a face at it is not what it was
+  // then, and whether its tolerance is smaller than it was.
+  std::vector<uint8_t> differs_, is_tighter_;
 };
 
 }  // namespace cgs::edge_collapse

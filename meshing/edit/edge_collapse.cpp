@@ -252,11 +252,8 @@ void Collapser::find_candidates() {
   }
 }
 
-// The cost up to which this pass goes: that of an earlier run, else of the cheapest third.
+// The cost up to which this pass goes: that of the cheapest third.
 float Collapser::pass_cost() {
-  const size_t pass = pass_costs_.size();
-  if (pass < limits_.pass_costs.size()) return limits_.pass_costs[pass];
-  if (!limits_.pass_costs.empty()) return std::numeric_limits<float>::infinity();
   constexpr double kPart = 0.35;
   constexpr size_t kAtLeast = 1000;
   const size_t wanted = std::max(kAtLeast, size_t(kPart * double(candidates_.size())));
@@ -289,7 +286,6 @@ bool Collapser::pass(const Progress& progress) {
   find_candidates();
   if (candidates_.empty()) return false;
   const float most = pass_cost();
-  pass_costs_.push_back(most);
   const auto wanted = std::partition(candidates_.begin(),
                                      candidates_.end(),
                                      [most](const Candidate& c) { return c.cost <= most; });
@@ -316,9 +312,14 @@ bool Collapser::pass(const Progress& progress) {
     first += tried;
     report(progress, 1 - double(left) / double(original_.faces.size()));
   }
+  end_pass();
+  return true;
+}
+
+void Collapser::end_pass() {
   drop_dead_faces();
   index_faces();
-  return true;
+  history_.passes.push_back(history_.collapses.size());
 }
 
 void Collapser::drop_dead_faces() {
@@ -337,11 +338,13 @@ void Collapser::drop_dead_faces() {
   witness_.resize(n);
 }
 
-CollapsedMesh Collapser::run(const Progress& progress) {
+CollapsedMesh Collapser::run(const CollapseHistory* before, const Progress& progress) {
+  if (before != nullptr) repeat(*before);
   while (mesh_.faces.size() > limits_.target_faces && pass(progress)) {
   }
   CollapsedMesh out;
-  out.pass_costs = pass_costs_;
+  out.history = std::move(history_);
+  out.history.tolerance = limits_.tolerance;
   out.witness_of.assign(original_.vertices.size(), kNone);
   for (uint32_t f = 0; f < witness_.size(); ++f) {
     for (uint32_t w = witness_[f]; w != kNone; w = next_witness_[w]) out.witness_of[w] = f;
@@ -356,8 +359,9 @@ CollapsedMesh Collapser::run(const Progress& progress) {
 
 CollapsedMesh collapse_edges(const TriangleMesh& mesh,
                              const CollapseLimits& limits,
+                             const CollapseHistory* before,
                              const Progress& progress) {
-  return edge_collapse::Collapser(mesh, limits).run(progress);
+  return edge_collapse::Collapser(mesh, limits).run(before, progress);
 }
 
 }  // namespace cgs

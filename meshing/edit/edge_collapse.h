@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -19,16 +20,29 @@ struct CollapseLimits {
   float color = 1;          ///< Largest change of a colour channel at a witness on a face that
                             ///< is not Inferred.
   size_t target_faces = 0;  ///< Stop when so few are left.
-  /// How far each pass goes, as an earlier run gave it; empty = the cheapest third of what is left.
-  /// Two runs that go as far differ only near the vertices whose limits differ.
-  std::vector<float> pass_costs;
-  size_t batch = 0;  ///< Collapses tried at once; any number gives the same mesh, 0 is fast.
+  size_t batch = 0;         ///< Collapses tried at once; any number gives the same mesh, 0 is fast.
+};
+
+/// What a run did, for a run with smaller tolerances to repeat.
+struct CollapseHistory {
+  struct Collapse {
+    uint32_t from = 0, into = 0;  ///< The vertex that went, and the one that moved.
+    std::array<double, 3> point = {};
+    float t = 0;            ///< Where that is along the edge from `into`, in [0, 1].
+    size_t first_heir = 0;  ///< Of its entries in `heirs`, which end where the next one's begin.
+  };
+  std::vector<Collapse> collapses;
+  /// Per witness that changed hands the face that took it, counted among those that moved; none
+  /// where more than 255 did.
+  std::vector<uint8_t> heirs;
+  std::vector<size_t> passes;    ///< Number of collapses after each pass.
+  std::vector<float> tolerance;  ///< As in its limits.
 };
 
 struct CollapsedMesh {
   TriangleMesh mesh;                 ///< Attributes as in the input; unused vertices are gone.
   std::vector<uint32_t> witness_of;  ///< Per input vertex the output face it is near; ~0 = none.
-  std::vector<float> pass_costs;     ///< Highest cost that each pass tried.
+  CollapseHistory history;
 };
 
 /// Collapses edges, cheapest quadric error first, as long as the limits allow.
@@ -45,10 +59,16 @@ struct CollapsedMesh {
 /// number of threads.
 /// Sources: Garland, Heckbert 1997 (cost); Ciampalini et al. 1997, "Multiresolution decimation
 /// based on global error" (witnesses); Dey et al. 1999 (link condition).
+/// Where a run comes after another whose tolerances were no smaller, its collapses are repeated,
+/// and only those are judged anew that a changed tolerance or another outcome nearby concerns: the
+/// two meshes differ only there.
+/// \param before  history of a run on the same mesh with the same limits but larger or equal
+///                tolerances; null = none
 /// \pre face indices are below mesh.vertices.size(); limits.tolerance is as long as mesh.vertices.
 /// Progress is the share of the faces that are gone.
 CollapsedMesh collapse_edges(const TriangleMesh& mesh,
                              const CollapseLimits& limits,
+                             const CollapseHistory* before = nullptr,
                              const Progress& progress = {});
 
 }  // namespace cgs

@@ -10,6 +10,7 @@
 #include "libcgs/core/error.h"
 #include "meshing/edit/edge_collapse.h"
 #include "meshing/edit/stitching.h"
+#include "meshing/mesh/halfedges.h"
 #include "meshing/mesh/provenance.h"
 #include "meshing/mesh/self_intersections.h"
 
@@ -78,6 +79,38 @@ std::vector<float> tolerances(const TriangleMesh& mesh, const SimplifyOptions& o
     for (const uint32_t v : mesh.faces[f]) out[v] = float(kMargin * options.max_error);
   }
   return out;
+}
+
+// Holds the borders of labels with evidence so near that the areas within them hardly change.
+//
+// A border that moves outwards by d all along changes the area by d times its length; collapses
+// move it to both sides, so that it may move several times as far. What comes out is measured.
+void hold_borders(const TriangleMesh& mesh, double most_change, std::vector<float>& tolerance) {
+  constexpr double kBothSides = 10;
+  if (most_change >= 1) return;
+  const auto across = halfedges::adjacent_faces(mesh);
+  const auto label_of = [&](size_t f) {
+    return mesh.provenance.empty() ? Provenance::Inferred : mesh.provenance[f];
+  };
+  const auto for_each_border = [&](const auto& visit) {
+    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+      if (is_unmeasured(mesh, f)) continue;
+      for (size_t k = 0; k < 3; ++k) {
+        const uint32_t g = across[f].at(k);
+        if (g != f && label_of(g) == label_of(f)) continue;
+        visit(size_t(label_of(f)), mesh.faces[f].at(k), mesh.faces[f].at((k + 1) % 3));
+      }
+    }
+  };
+  std::array<double, kProvenanceCount> length = {};
+  for_each_border([&](size_t label, uint32_t a, uint32_t b) {
+    length.at(label) += double((mesh.vertices[a] - mesh.vertices[b]).norm());
+  });
+  const auto area = area_by_provenance(mesh);
+  for_each_border([&](size_t label, uint32_t a, uint32_t b) {
+    const auto most = float(kBothSides * most_change * area.at(label) / length.at(label));
+    for (const uint32_t v : {a, b}) tolerance[v] = std::min(tolerance[v], most);
+  });
 }
 
 // Holds input vertices nearer to the result than in the last round.
@@ -161,15 +194,17 @@ SimplifyResult simplify_connected(const TriangleMesh& mesh,
                                   const Progress& progress) {
   SimplifyResult result = unchanged(mesh);
   CollapseLimits limits{
-      tolerances(mesh, options), float(options.max_color_error), options.target_faces, {}, 0};
-  constexpr int kRounds = 6;
+      tolerances(mesh, options), float(options.max_color_error), options.target_faces, 0};
+  hold_borders(mesh, options.max_area_change, limits.tolerance);
+  CollapseHistory history;
+  constexpr int kRounds = 10;
   for (int round = 1; round <= kRounds; ++round) {
     const auto part = [&](double begin, double end) {
       return part_of(progress, (round - 1 + begin) / kRounds, (round - 1 + end) / kRounds);
     };
-    const CollapsedMesh out = collapse_edges(mesh, limits, part(0, 0.6));
+    CollapsedMesh out = collapse_edges(mesh, limits, round > 1 ? &history : nullptr, part(0, 0.6));
+    history = std::move(out.history);
     result.rounds = round;
-    if (round == 1) limits.pass_costs = out.pass_costs;
     result.area_after = area_by_provenance(out.mesh);
     if (tighten_for_area(mesh, result, options.max_area_change, limits.tolerance)) continue;
     Tightening tightening(limits.tolerance, options.max_error / 32);
@@ -181,8 +216,8 @@ SimplifyResult simplify_connected(const TriangleMesh& mesh,
     if (!bad.empty()) tightening.output_faces(out, bad);
     for (const uint32_t f : back.too_far) tightening.input_face(mesh, f);
     if (bad.empty() && back.too_far.empty()) {
-      result.mesh = out.mesh;
-      result.faces_after = out.mesh.faces.size();
+      result.mesh = std::move(out.mesh);
+      result.faces_after = result.mesh.faces.size();
       result.evidence = {forth.evidence, back.evidence};
       result.inferred = {forth.inferred, back.inferred};
       widen_sigma(result.mesh, result.evidence);

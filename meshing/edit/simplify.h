@@ -37,7 +37,7 @@ struct SimplifyResult {
   std::array<double, kProvenanceCount> area_before =
       {};  ///< By provenance [internal units squared].
   std::array<double, kProvenanceCount> area_after = {};
-  int rounds = 0;              ///< Times the collapses were run.
+  int rounds = 0;              ///< Times the result was measured or its areas found too different.
   size_t joined_vertices = 0;  ///< That were gone before, see with_joined_seams().
 };
 
@@ -51,8 +51,10 @@ struct SimplifyResult {
 /// collapse_edges(). A mesh without provenance counts as evidence. What comes out is then measured:
 /// in both directions by points over the area and along all edges (see DistanceToMesh::of_edges()),
 /// by the area of every label with evidence, and for self-intersections. Where a check fails, the
-/// tolerance of the input vertices nearby is quartered, finally to zero, and the collapses are run
-/// again. If that does not help within a few rounds, the result is the input.
+/// tolerance of the input vertices nearby is quartered, finally to zero, and the collapses that this
+/// concerns are done anew. If that does not help within ten rounds, the result is the input. Borders
+/// of labels are held nearer from the start, by their length and the area they enclose: ragged ones
+/// would lose too much of it.
 /// \throws InvalidInput if a vertex is not finite.
 SimplifyResult simplify(const TriangleMesh& mesh,
                         const SimplifyOptions& options,

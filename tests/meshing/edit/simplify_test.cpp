@@ -459,7 +459,8 @@ TEST(Simplify, GivesTheSameBitsForAnyNumberOfThreads) {
 }
 
 // One at a time is what the order of collapses means.
-TEST(CollapseEdges, GiveTheSameBitsTriedOneByOneOrManyAtOnce) {
+// An open tube with labels, colours, sigma and support.
+TriangleMesh labelled_tube() {
   TriangleMesh mesh = grid(60, 40, false, true, [](float u, float v) {
     const float r = 0.2f + 0.03f * std::sin(20 * u) * std::cos(float(3 * kTau) * v);
     return Vector3f(u, r * std::cos(float(kTau) * v), r * std::sin(float(kTau) * v));
@@ -472,6 +473,11 @@ TEST(CollapseEdges, GiveTheSameBitsTriedOneByOneOrManyAtOnce) {
     mesh.sigma.push_back(0.01f + p.y() * p.y());
   }
   mesh.support.assign(mesh.vertices.size(), 2);
+  return mesh;
+}
+
+TEST(CollapseEdges, GiveTheSameBitsTriedOneByOneOrManyAtOnce) {
+  const TriangleMesh mesh = labelled_tube();
   for (const float tolerance : {0.01f, 100.0f}) {  // the second looks at no distances
     CollapseLimits limits;
     limits.tolerance.assign(mesh.vertices.size(), tolerance);
@@ -489,6 +495,84 @@ TEST(CollapseEdges, GiveTheSameBitsTriedOneByOneOrManyAtOnce) {
       EXPECT_EQ(other.mesh.sigma, first.mesh.sigma) << batch;
       EXPECT_EQ(other.witness_of, first.witness_of) << batch;
     }
+  }
+}
+
+TEST(CollapseEdges, RepeatToTheSameBits) {
+  const TriangleMesh mesh = labelled_tube();
+  for (const float tolerance : {0.01f, 100.0f}) {
+    for (const size_t faces : {0, 600}) {
+      CollapseLimits limits;
+      limits.tolerance.assign(mesh.vertices.size(), tolerance);
+      limits.color = tolerance < 1 ? 0.1f : 1;
+      limits.target_faces = faces;
+      const CollapsedMesh first = collapse_edges(mesh, limits);
+      const CollapsedMesh again = collapse_edges(mesh, limits, &first.history);
+      EXPECT_EQ(again.mesh.faces, first.mesh.faces);
+      EXPECT_EQ(again.mesh.vertices, first.mesh.vertices);
+      EXPECT_EQ(again.mesh.colors, first.mesh.colors);
+      EXPECT_EQ(again.witness_of, first.witness_of);
+      EXPECT_EQ(again.history.heirs, first.history.heirs);
+    }
+  }
+}
+
+// A spot is held nearer: there the input is met, far from it nothing changes.
+TEST(CollapseEdges, RepeatDiffersOnlyWhereItIsHeldNearer) {
+  const TriangleMesh mesh = labelled_tube();
+  const Vector3f spot = mesh.vertices[mesh.vertices.size() / 2];
+  const auto distance_to_spot = [&](const Vector3f& p) { return (p - spot).norm(); };
+  CollapseLimits limits;
+  limits.tolerance.assign(mesh.vertices.size(), 0.01f);
+  const CollapsedMesh first = collapse_edges(mesh, limits);
+  constexpr float kNear = 1e-4f;
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (distance_to_spot(mesh.vertices[v]) < 0.05f) limits.tolerance[v] = kNear;
+  }
+  const CollapsedMesh again = collapse_edges(mesh, limits, &first.history);
+  EXPECT_GT(again.mesh.faces.size(), first.mesh.faces.size());
+  const auto farther_than = [&](const TriangleMesh& of, float least) {
+    std::vector<std::array<Vector3f, 3>> out;
+    for (const auto& f : of.faces) {
+      const std::array<Vector3f, 3> corners = {
+          of.vertices[f[0]], of.vertices[f[1]], of.vertices[f[2]]};
+      if (std::all_of(corners.begin(), corners.end(), [&](const Vector3f& p) {
+            return distance_to_spot(p) > least;
+          })) {
+        out.push_back(corners);
+      }
+    }
+    return out;
+  };
+  EXPECT_EQ(farther_than(again.mesh, 0.6f), farther_than(first.mesh, 0.6f));
+  EXPECT_GT(farther_than(first.mesh, 0.6f).size(), first.mesh.faces.size() / 4);
+  const DistanceToMesh distance(again.mesh);
+  size_t held = 0;
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (limits.tolerance[v] != kNear) continue;
+    ++held;
+    EXPECT_LE(distance.of({mesh.vertices[v]}).front(), 1.001f * kNear);
+  }
+  EXPECT_GT(held, 4U);
+}
+
+// A label of ragged islands: smoothing their borders takes their area.
+TEST(Simplify, HoldsTheAreaOfRaggedLabelsAtOnce) {
+  TriangleMesh mesh = grid(60, 60, false, false, [](float u, float v) {
+    return Vector3f(u, v, 1e-3f * std::sin(90 * u) * std::cos(70 * v));
+  });
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    const size_t row = f / 120;
+    const size_t column = f % 120 / 2;
+    const bool is_island = row % 10 < 4 + (column * 7 + row) % 3 && column % 12 < 5 + row % 2;
+    mesh.provenance.push_back(is_island ? Provenance::SingleView : Provenance::Observed);
+  }
+  const SimplifyResult result = simplify(mesh, {.max_error = 0.02});
+  EXPECT_EQ(result.rounds, 1);
+  EXPECT_LT(result.faces_after, result.faces_before);
+  for (const Provenance label : {Provenance::SingleView, Provenance::Observed}) {
+    const double before = result.area_before.at(size_t(label));
+    EXPECT_NEAR(result.area_after.at(size_t(label)), before, 0.01 * before);
   }
 }
 
