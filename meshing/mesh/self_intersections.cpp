@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -156,15 +158,15 @@ std::vector<uint8_t> degenerate_faces(const TriangleMesh& mesh) {
   return degenerate;
 }
 
-/// Tests pairs as they come, some millions at once: of a fan of n faces all n²/2 boxes touch, which
-/// must not be held.
+/// Tests pairs as they come, many at once: of a fan of n faces all n²/2 boxes touch, which must not
+/// be held.
 class PairTests {
  public:
-  PairTests(const TriangleMesh& mesh, const Progress& progress)
-      : mesh_(mesh), progress_(progress) {}
+  PairTests(const TriangleMesh& mesh, SharedProgress& progress, std::atomic<size_t>& count)
+      : mesh_(mesh), progress_(progress), count_(count) {}
 
   void add(const FacePair& pair) {
-    constexpr size_t kAtOnce = size_t{1} << 22;
+    constexpr size_t kAtOnce = size_t{1} << 18;
     waiting_.push_back(pair);
     if (waiting_.size() == kAtOnce) test_waiting();
   }
@@ -179,19 +181,21 @@ class PairTests {
     tbb::parallel_for(size_t(0), waiting_.size(), [&](size_t i) {
       hit_[i] = intersect(mesh_, mesh_.faces[waiting_[i].first], mesh_.faces[waiting_[i].second]);
     });
+    const size_t before = found_.size();
     for (size_t i = 0; i < waiting_.size(); ++i) {
       if (hit_[i] != 0) found_.push_back(waiting_[i]);
     }
     waiting_.clear();
-    report(progress_, 0);
+    progress_.tell();
     constexpr size_t kMost = 20'000'000;
-    if (found_.size() <= kMost) return;
+    if ((count_ += found_.size() - before) <= kMost) return;
     throw LimitError("more than " + std::to_string(kMost) +
                      " pairs of faces cut each other or lie on each other");
   }
 
   const TriangleMesh& mesh_;
-  const Progress& progress_;
+  SharedProgress& progress_;
+  std::atomic<size_t>& count_;
   std::vector<FacePair> waiting_;
   std::vector<uint8_t> hit_;
   std::vector<FacePair> found_;
@@ -216,17 +220,68 @@ std::vector<Box> face_boxes(const TriangleMesh& mesh, const std::vector<uint8_t>
   return boxes;
 }
 
+/// The boxes in slabs across the longest axis, those that reach over a border in several: slabs are
+/// searched in parallel, and each search is of few.
+struct Slabs {
+  int axis = 0;
+  std::vector<double> begins;  ///< Of each along the axis; the first is the least of all.
+  std::vector<std::vector<Box>> boxes;
+
+  /// The one slab in which a pair counts.
+  size_t of(const Box& a, const Box& b) const {
+    return of(std::max(a.min_coord(axis), b.min_coord(axis)));
+  }
+  size_t of(double place) const {
+    const auto after = std::upper_bound(begins.begin() + 1, begins.end(), place);
+    return static_cast<size_t>(after - begins.begin()) - 1;
+  }
+};
+
+Slabs slabs_of(const std::vector<Box>& boxes) {
+  constexpr size_t kBoxes = 50'000;
+  Slabs out;
+  CGAL::Bbox_3 all;
+  for (const Box& box : boxes) all += box.bbox();
+  for (int k = 1; k < 3; ++k) {
+    if (all.max(k) - all.min(k) > all.max(out.axis) - all.min(out.axis)) out.axis = k;
+  }
+  std::vector<double> places;
+  places.reserve(boxes.size());
+  for (const Box& box : boxes) places.push_back(box.min_coord(out.axis));
+  std::sort(places.begin(), places.end());
+  out.begins = {all.min(out.axis)};
+  for (size_t i = kBoxes; i + kBoxes / 2 < places.size(); i += kBoxes) {
+    if (places[i] > out.begins.back()) out.begins.push_back(places[i]);
+  }
+  out.boxes.resize(out.begins.size());
+  for (const Box& box : boxes) {
+    const size_t last = out.of(box.max_coord(out.axis));
+    for (size_t k = out.of(box.min_coord(out.axis)); k <= last; ++k) out.boxes[k].push_back(box);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<FacePair> self_intersections(const TriangleMesh& mesh, const Progress& progress) {
   CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
   const std::vector<uint8_t> degenerate = degenerate_faces(mesh);
-  std::vector<Box> boxes = face_boxes(mesh, degenerate);
-  PairTests tests(mesh, progress);
-  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& a, const Box& b) {
-    tests.add(std::minmax(a.info(), b.info()));
+  Slabs slabs = slabs_of(face_boxes(mesh, degenerate));
+  std::mutex mutex;
+  SharedProgress slabs_done(progress, slabs.boxes.size());
+  std::vector<FacePair> found;
+  std::atomic<size_t> count = 0;
+  tbb::parallel_for(size_t(0), slabs.boxes.size(), [&](size_t slab) {
+    PairTests tests(mesh, slabs_done, count);
+    std::vector<Box>& boxes = slabs.boxes[slab];
+    CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& a, const Box& b) {
+      if (slabs.of(a, b) == slab) tests.add(std::minmax(a.info(), b.info()));
+    });
+    const std::vector<FacePair> pairs = tests.found();
+    const std::lock_guard lock(mutex);
+    found.insert(found.end(), pairs.begin(), pairs.end());
+    slabs_done.advance();
   });
-  std::vector<FacePair> found = tests.found();
   for (uint32_t f = 0; f < degenerate.size(); ++f) {
     if (degenerate[f] != 0) found.emplace_back(f, f);
   }

@@ -13,7 +13,8 @@ namespace cgs {
 /// Pairs of faces (smaller index first, ascending) that touch beyond the vertices and edges they
 /// share by index. Decided with exact predicates, so there is no tolerance; works on any soup.
 /// A face of zero area counts as intersecting itself.
-/// \param progress  0 every few million pairs of boxes, as nobody knows how many there are; then 1
+/// \param progress  again after every hundred thousand pairs of boxes or so, of which nobody knows
+///                  how many there are
 /// \throws LimitError above 20 million pairs, as of a hundred thousand equal faces
 std::vector<std::pair<uint32_t, uint32_t>> self_intersections(const TriangleMesh& mesh,
                                                               const Progress& progress = {});

@@ -28,9 +28,12 @@ class SlowWay {
  public:
   explicit SlowWay(const TriangleMesh& mesh) : mesh_(mesh) {}
 
-  Pairs pairs() const {
+  Pairs pairs() const { return pairs_of_first(uint32_t(mesh_.faces.size())); }
+
+  /// \return those that the first faces are in
+  Pairs pairs_of_first(uint32_t faces) const {
     Pairs out;
-    for (uint32_t f = 0; f < mesh_.faces.size(); ++f) {
+    for (uint32_t f = 0; f < faces; ++f) {
       if (is_degenerate(mesh_.faces[f])) {
         out.emplace_back(f, f);
         continue;
@@ -177,6 +180,36 @@ TEST(SelfIntersections, AreThoseOfTheSlowWayOnNearlyFlatFans) {
     }
     expect_as_slow(with_random_faces(mesh, 150, true, random), seed);
   }
+}
+
+// Blades along a row of small faces that do not touch each other: so many that the row is searched
+// in parts, all of which the blades are in.
+TEST(SelfIntersections, AreThoseOfTheSlowWayInALongRow) {
+  constexpr int kSmall = 160'000;
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int> whole(-40, 40);
+  TriangleMesh mesh;
+  for (const int y : {-35, 0, 20}) {
+    mesh.vertices.emplace_back(0, y, y);
+    mesh.vertices.emplace_back(100 * kSmall, y + 3, -20);
+    mesh.vertices.emplace_back(100 * kSmall, y + 5, 30);
+    const auto n = static_cast<uint32_t>(mesh.vertices.size());
+    mesh.faces.push_back({n - 3, n - 2, n - 1});
+  }
+  for (int i = 0; i < kSmall; ++i) {
+    const auto n = static_cast<uint32_t>(mesh.vertices.size());
+    for (int k = 0; k < 3; ++k) {
+      mesh.vertices.emplace_back(100 * i + 50 + whole(random), whole(random), whole(random));
+    }
+    mesh.faces.push_back({n, n + 1, n + 2});
+  }
+  Pairs expected = SlowWay(mesh).pairs_of_first(3);
+  for (const auto& [f, g] : self_intersections(mesh)) {
+    if (f == g) expected.emplace_back(f, g);  // without area
+  }
+  std::sort(expected.begin(), expected.end());
+  EXPECT_GT(expected.size(), 20'000U);
+  EXPECT_EQ(self_intersections(mesh), expected);
 }
 
 TEST(SelfIntersections, IgnoreNeighboursThatOnlyTouchWhereTheyShare) {
