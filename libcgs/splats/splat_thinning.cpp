@@ -123,15 +123,25 @@ struct Trials {
   float pixel = 0;    ///< Of ThinnedSplats.
 };
 
-Gaussians thinned_by(const Trials& t, float most_cost, const Progress& progress) {
-  // Few splats need more passes, and these take little of the time: what fits them to the pictures
-  // halves what is lost, so that half as many do.
-  constexpr size_t kPasses = 96;
-  WeighedSplats merged = merge_splats(t.weighed, {.most_cost = most_cost});
-  const auto wanted = std::span(t.full).first(t.fitted);
-  refit_splats(merged.splats, merged.pixel, wanted, std::max(kPasses, wanted.size()), progress);
-  return std::move(merged.splats);
-}
+// Few splats need more passes than pictures, and these take little of the time: what fits them to
+// the pictures halves what is lost, so that half as many do.
+constexpr size_t kPasses = 96;
+constexpr size_t kFirstPasses = 24;  // tell which setting it will be
+constexpr double kLessByMore = 2;    // is lost after the first passes than after all, or less
+
+/// Fewer splats, and by how many passes they were fitted.
+struct Fitted {
+  Gaussians splats;
+  std::vector<float> pixel;
+  size_t passes = 0;
+
+  void fit(const Trials& t, size_t to_passes, const Progress& progress) {
+    const auto wanted = std::span(t.full).first(t.fitted);
+    const size_t more = std::max(to_passes, wanted.size()) - passes;
+    refit_splats(splats, pixel, wanted, more, progress);
+    passes += more;
+  }
+};
 
 // Mean over the pictures [dB].
 double loss_of(const Trials& t, const Gaussians& g) {
@@ -171,25 +181,56 @@ Trials prepare(const Gaussians& gaussians, const Scene& scene, double unseen_psn
   return out;
 }
 
-// The strongest setting of the ladder that loses little enough, if one does, by bisection.
+/// A setting of the ladder, and what became of it.
+struct Tried {
+  Fitted fitted;
+  double loss = 0;
+};
+
+// Fits for a first look, and on where that may help a setting that loses too much.
+Tried tried(const Trials& t, const WeighedSplats& merged, const Progress& progress) {
+  Tried out{{merged.splats, merged.pixel, 0}, 0};
+  out.fitted.fit(t, kFirstPasses, part_of(progress, 0, 0.3));
+  out.loss = loss_of(t, out.fitted.splats);
+  if (out.loss <= kMostThinningLoss || out.loss > kLessByMore * kMostThinningLoss) return out;
+  out.fitted.fit(t, kPasses, part_of(progress, 0.3, 1));
+  out.loss = loss_of(t, out.fitted.splats);
+  return out;
+}
+
+// The strongest setting of the ladder that loses little enough, if one does, by bisection. Stronger
+// merges go on from weaker ones, so that the cheapest come first.
 void choose(ThinnedSplats& out, const Trials& trials, const Progress& progress) {
   size_t low = 0;  // settings below lose little enough, those from `high` on too much
   size_t high = kLadder.size();
+  WeighedSplats weaker;
+  Tried chosen;
   while (low < high) {
     const size_t middle = (low + high) / 2;
-    const double done = 0.5 * double(out.tried.size());
-    Gaussians fewer =
-        thinned_by(trials, kLadder.at(middle), part_of(progress, done, std::min(1.0, done + 0.5)));
-    out.tried.push_back({kLadder.at(middle), fewer.size(), loss_of(trials, fewer)});
-    if (out.tried.back().loss <= kMostThinningLoss) {
+    const double done = 0.3 * double(out.tried.size());
+    WeighedSplats merged =
+        merge_splats(low > 0 ? weaker : trials.weighed, {.most_cost = kLadder.at(middle)});
+    Tried one = tried(trials, merged, part_of(progress, done, done + 0.3));
+    out.tried.push_back({kLadder.at(middle), one.fitted.splats.size(), one.loss});
+    if (one.loss <= kMostThinningLoss) {
       out.most_cost = kLadder.at(middle);
-      out.splats = std::move(fewer);
-      out.pixel = trials.pixel;
+      chosen = std::move(one);
+      weaker = std::move(merged);
       low = middle + 1;
     } else {
       high = middle;
     }
   }
+  if (!out.most_cost) return;
+  if (chosen.fitted.passes < kPasses) {
+    chosen.fitted.fit(trials, kPasses, part_of(progress, 0.9, 1));
+    chosen.loss = loss_of(trials, chosen.fitted.splats);
+  }
+  for (ThinningTrial& trial : out.tried) {
+    if (trial.most_cost == *out.most_cost) trial.loss = chosen.loss;
+  }
+  out.splats = std::move(chosen.fitted.splats);
+  out.pixel = trials.pixel;
 }
 
 }  // namespace

@@ -15,7 +15,8 @@ namespace cgs {
 struct ThinningTrial {
   float most_cost = 0;  ///< MergeOptions::most_cost
   size_t splats = 0;    ///< What was left.
-  double loss = 0;      ///< Of PSNR against photographs that nobody took [dB], see thin_splats().
+  double loss = 0;      ///< Of PSNR against photographs that nobody took [dB], see thin_splats();
+                        ///< of a setting that was not chosen after the first passes of fitting.
 };
 
 /// Fewer splats that look the same.
