@@ -36,6 +36,11 @@ void store(const Vector& vector, Scalar* to) {
 inline Floats min(Floats a, Floats b) { return _mm256_min_ps(a, b); }
 inline Floats max(Floats a, Floats b) { return _mm256_max_ps(a, b); }
 
+/// from[at] in each lane.
+inline Floats gather(const float* from, Ints at) {
+  return _mm256_i32gather_ps(from, std::bit_cast<__m256i>(at), sizeof(float));
+}
+
 /// a * b + c, rounded once.
 inline Floats multiply_add(Floats a, Floats b, Floats c) { return _mm256_fmadd_ps(a, b, c); }
 

@@ -2,9 +2,14 @@
 #include "libcgs/priors/matching_cost.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 
 #include <tbb/parallel_for.h>
+
+#include "libcgs/core/lanes.h"
 
 namespace cgs {
 
@@ -12,22 +17,26 @@ namespace {
 
 constexpr int kMargin = 3;  // census radius, the larger window
 constexpr int kZnccRadius = 2;
-constexpr int kBandRows = 16;
+constexpr int kBandRows = 32;
 constexpr float kCensusWeight = 0.6f;
 constexpr float kNoiseVariance = 4.0f;  // [gray levels squared]
 constexpr float kUnseen = 1e9f;
 constexpr float kNeutral = 0.5f;  // cost of a plane that no source sees
 
 // Rows [first - kMargin, last + kMargin) of an image, columns [-kMargin, width + kMargin), borders
-// repeated; as floats and, for the census, as integers.
+// repeated; as floats and, for the census, as integers. Whole lanes may be read and written from
+// any pixel on.
 struct Band {
+  static constexpr size_t kRoom = 16;
   int stride = 0;
+  size_t rows = 0;  // with margins
   std::vector<float> gray;
   std::vector<int16_t> level;
 
-  Band(int width, int rows)
+  Band(int width, int inner_rows)
       : stride(width + 2 * kMargin),
-        gray(static_cast<size_t>(stride) * static_cast<size_t>(rows + 2 * kMargin)),
+        rows(static_cast<size_t>(inner_rows) + 2 * kMargin),
+        gray(static_cast<size_t>(stride) * rows + kRoom),
         level(gray.size()) {}
   const float* gray_row(int row) const {
     return &gray[static_cast<size_t>(row + kMargin) * static_cast<size_t>(stride) + kMargin];
@@ -39,7 +48,8 @@ struct Band {
     return &level[static_cast<size_t>(row + kMargin) * static_cast<size_t>(stride) + kMargin];
   }
   void finish_rows(int width) {
-    for (size_t start = kMargin; start < gray.size(); start += static_cast<size_t>(stride)) {
+    for (size_t row = 0; row < rows; ++row) {
+      const size_t start = row * static_cast<size_t>(stride) + kMargin;
       for (int k = 1; k <= kMargin; ++k) {
         gray[start - k] = gray[start];
         gray[start + width - 1 + k] = gray[start + width - 1];
@@ -49,32 +59,6 @@ struct Band {
   }
 };
 
-// One row of the source as the reference would see it on plane t.
-void warp_row(const SweepImage& image,
-              const Eigen::Vector3f& first,
-              const Eigen::Vector3f& step,
-              int width,
-              float* out) {
-  const float max_u = static_cast<float>(image.gray.width) - 1.001f;
-  const float max_v = static_cast<float>(image.gray.height) - 1.001f;
-  const float* gray = image.gray.data.data();
-  const int stride = image.gray.width;
-  for (int x = 0; x < width; ++x) {
-    const float fx = static_cast<float>(x);
-    const float z = std::max(first.z() + fx * step.z(), 1e-6f);
-    const float u = std::clamp((first.x() + fx * step.x()) / z - 0.5f, 0.0f, max_u);
-    const float v = std::clamp((first.y() + fx * step.y()) / z - 0.5f, 0.0f, max_v);
-    const int iu = static_cast<int>(u);
-    const int iv = static_cast<int>(v);
-    const float a = u - static_cast<float>(iu);
-    const float b = v - static_cast<float>(iv);
-    const float* p = gray + static_cast<std::ptrdiff_t>(iv) * stride + iu;
-    const float top = p[0] + a * (p[1] - p[0]);
-    const float bottom = p[stride] + a * (p[stride + 1] - p[stride]);
-    out[x] = top + b * (bottom - top);
-  }
-}
-
 /// Planes t along a row: t = first + x * step at pixel x.
 struct PlanesOfRow {
   float first;
@@ -82,88 +66,224 @@ struct PlanesOfRow {
   float last;  // the nearest plane that counts
 };
 
-void seen_row(const SweepImage& image,
+// One row of the source as the reference would see it on plane t. `seen_at` tells which pixel of
+// the source that is, or -1 where the plane does not count or the source does not reach.
+// \pre out and seen_at have room for whole lanes
+void warp_row(const SweepImage& image,
               const Eigen::Vector3f& first,
               const Eigen::Vector3f& step,
               const PlanesOfRow& planes,
               int width,
-              uint8_t* out) {
-  for (int x = 0; x < width; ++x) {
-    const Eigen::Vector3f h = first + static_cast<float>(x) * step;
-    const float t = planes.first + static_cast<float>(x) * planes.step;
-    const float u = h.x() / h.z();
-    const float v = h.y() / h.z();
-    const bool inside = h.z() > 0 && t >= 0 && t <= planes.last && u >= 0 && v >= 0 &&
-                        u < static_cast<float>(image.gray.width) &&
-                        v < static_cast<float>(image.gray.height);
-    out[x] = inside && image.valid(static_cast<int>(u), static_cast<int>(v)) != 0;
+              float* out,
+              int32_t* seen_at) {
+  const Floats width_of = Floats{} + static_cast<float>(image.gray.width);
+  const Floats height_of = Floats{} + static_cast<float>(image.gray.height);
+  const Floats max_u = width_of - 1.001f;
+  const Floats max_v = height_of - 1.001f;
+  const float* gray = image.gray.data.data();
+  const int stride = image.gray.width;
+  constexpr Floats kCount = {0, 1, 2, 3, 4, 5, 6, 7};
+  for (int x = 0; x < width; x += kLanes) {
+    const Floats fx = static_cast<float>(x) + kCount;
+    const Floats z = first.z() + fx * step.z();
+    const Floats t = planes.first + fx * planes.step;
+    const Floats in_front = max(z, Floats{} + 1e-6f);
+    const Floats at_u = (first.x() + fx * step.x()) / in_front;
+    const Floats at_v = (first.y() + fx * step.y()) / in_front;
+    const Floats u = min(max(at_u - 0.5f, Floats{}), max_u);
+    const Floats v = min(max(at_v - 0.5f, Floats{}), max_v);
+    const Ints iu = __builtin_convertvector(u, Ints);
+    const Ints iv = __builtin_convertvector(v, Ints);
+    const Floats a = u - __builtin_convertvector(iu, Floats);
+    const Floats b = v - __builtin_convertvector(iv, Floats);
+    const Ints corner = iv * stride + iu;
+    const Floats top_left = gather(gray, corner);
+    const Floats top = top_left + a * (gather(gray + 1, corner) - top_left);
+    const Floats bottom_left = gather(gray + stride, corner);
+    const Floats bottom = bottom_left + a * (gather(gray + stride + 1, corner) - bottom_left);
+    store(top + b * (bottom - top), out + x);
+    const Ints inside = (z > 0.0f) & (t >= 0.0f) & (t <= planes.last) & (at_u >= 0.0f) &
+                        (at_v >= 0.0f) & (at_u < width_of) & (at_v < height_of);
+    const Ints row = __builtin_convertvector(min(max(at_v, Floats{}), height_of), Ints);
+    const Ints column = __builtin_convertvector(min(max(at_u, Floats{}), width_of), Ints);
+    const Ints pixel = row * stride + column;
+    store((pixel & inside) | ~inside, seen_at + x);
   }
 }
 
-// Adds the share of census bits that differ.
-void census_row(const Band& a, const Band& b, int row, int width, float* out) {
-  std::vector<int16_t> count(static_cast<size_t>(width), 0);
-  const int16_t* center_a = a.level_row(row);
-  const int16_t* center_b = b.level_row(row);
-  int16_t* n = count.data();
-  for (int dy = -kMargin; dy <= kMargin; ++dy) {
-    for (int dx = -kMargin; dx <= kMargin; ++dx) {
-      if (dx == 0 && dy == 0) continue;
-      const int16_t* ra = a.level_row(row + dy) + dx;
-      const int16_t* rb = b.level_row(row + dy) + dx;
-      for (int x = 0; x < width; ++x) {
-        n[x] = static_cast<int16_t>(n[x] + ((ra[x] > center_a[x]) != (rb[x] > center_b[x])));
-      }
+/// The census of a row: which of the 48 neighbours of a pixel are brighter than it, 16 in a word.
+class CensusRow {
+ public:
+  static constexpr int kWords = 3;
+
+  void take(const Band& band, int row, int width) {
+    words_.resize(static_cast<size_t>(kWords) * static_cast<size_t>(width));
+    take_word<0>(band, row, width);
+    take_word<1>(band, row, width);
+    take_word<2>(band, row, width);
+  }
+
+  // The share of bits that differ.
+  void compare(const CensusRow& other, int width, float* out) const {
+    constexpr int kBits = 16 * kWords;
+    const auto w = static_cast<size_t>(width);
+    const uint16_t* a = words_.data();
+    const uint16_t* b = other.words_.data();
+    for (size_t x = 0; x < w; ++x) {
+      const int differ = fours_of(a[x] ^ b[x]) + fours_of(a[w + x] ^ b[w + x]) +
+                         fours_of(a[2 * w + x] ^ b[2 * w + x]);
+      const int eights = (differ & 0x0f0f) + (differ >> 4 & 0x0f0f);
+      out[x] = kCensusWeight * static_cast<float>((eights & 0xff) + (eights >> 8)) / kBits;
     }
   }
-  constexpr int kBits = (2 * kMargin + 1) * (2 * kMargin + 1) - 1;
-  for (int x = 0; x < width; ++x) out[x] = kCensusWeight * static_cast<float>(n[x]) / kBits;
-}
+
+ private:
+  // The number of bits that are set in each group of four.
+  static int fours_of(int bits) {
+    const int twos = bits - (bits >> 1 & 0x5555);
+    return (twos & 0x3333) + (twos >> 2 & 0x3333);
+  }
+
+  // Neighbours from 16 * kWord on, row by row and without the pixel itself. The loop over them is
+  // unrolled, that over pixels uses all lanes there are.
+  template <int kWord>
+  void take_word(const Band& band, int row, int width) {
+    constexpr int kSide = 2 * kMargin + 1;
+    std::array<const int16_t*, 16> neighbor{};
+    for (int k = 0; k < 16; ++k) {
+      int at = 16 * kWord + k;
+      if (at >= kSide * kMargin + kMargin) ++at;
+      neighbor.at(static_cast<size_t>(k)) =
+          band.level_row(row + at / kSide - kMargin) + at % kSide - kMargin;
+    }
+    const int16_t* center = band.level_row(row);
+    uint16_t* out = words_.data() + static_cast<size_t>(kWord) * static_cast<size_t>(width);
+    for (int x = 0; x < width; x += kShortLanes) {
+      x = std::min(x, std::max(width - kShortLanes, 0));  // the last ones overlap those before
+      const auto middle = load<Shorts>(center + x);
+      Shorts word{};
+      for (const int16_t* from : neighbor) word += word - (load<Shorts>(from + x) > middle);
+      store_first(word, width, out + x);
+    }
+  }
+
+  static constexpr int kShortLanes = 16;
+  using Shorts = int16_t __attribute__((vector_size(sizeof(int16_t) * kShortLanes)));
+
+  // Rows may be shorter than the lanes.
+  static void store_first(const Shorts& word, int width, uint16_t* to) {
+    std::memcpy(to, &word, sizeof(uint16_t) * static_cast<size_t>(std::min(width, kShortLanes)));
+  }
+
+  std::vector<uint16_t> words_;
+};
+
+/// Sums of a row of box windows, in columns from -kMargin on.
+struct BoxSums {
+  std::vector<float> of_columns;
+
+  void clear(int width) { of_columns.assign(static_cast<size_t>(width) + 2 * kMargin, 0.0f); }
+  float at(int x) const {
+    static_assert(kZnccRadius == 2);
+    const float* s = &of_columns[static_cast<size_t>(x) + kMargin];
+    return s[-2] + s[-1] + s[0] + s[1] + s[2];
+  }
+};
+
+constexpr float kZnccArea = (2 * kZnccRadius + 1) * (2 * kZnccRadius + 1);
+constexpr float kMiddleGray = 128;  // smaller sums of squares round less
+
+/// Of the reference, for all planes: mean and variance of the window of each pixel of a row.
+struct WindowMoments {
+  std::vector<float> mean, variance;
+
+  void take(const Band& band, int row, int width) {
+    BoxSums a;
+    BoxSums aa;
+    for (BoxSums* sums : {&a, &aa}) sums->clear(width);
+    for (int dy = -kZnccRadius; dy <= kZnccRadius; ++dy) {
+      const float* from = band.gray_row(row + dy) - kMargin;
+      for (size_t x = 0; x < a.of_columns.size(); ++x) {
+        const float value = from[x] - kMiddleGray;
+        a.of_columns[x] += value;
+        aa.of_columns[x] += value * value;
+      }
+    }
+    mean.resize(static_cast<size_t>(width));
+    variance.resize(static_cast<size_t>(width));
+    for (int x = 0; x < width; ++x) {
+      const float m = a.at(x) / kZnccArea;
+      mean[static_cast<size_t>(x)] = m;
+      variance[static_cast<size_t>(x)] =
+          std::max(aa.at(x) / kZnccArea - m * m, 0.0f) + kNoiseVariance;
+    }
+  }
+};
 
 // Adds (1 - ZNCC) / 2 over a box window.
 struct ZnccRow {
-  std::vector<float> a, b, aa, bb, ab;  // column sums, from -kMargin
+  BoxSums b, bb, ab;
 
-  void add(const Band& A, const Band& B, int row, int width, float* out) {
-    const size_t n = static_cast<size_t>(width) + kMargin + kMargin;
-    for (auto* sums : {&a, &b, &aa, &bb, &ab}) sums->assign(n, 0.0f);
+  void add(
+      const WindowMoments& of_a, const Band& A, const Band& B, int row, int width, float* out) {
+    for (BoxSums* sums : {&b, &bb, &ab}) sums->clear(width);
+    const size_t n = b.of_columns.size();
     for (int dy = -kZnccRadius; dy <= kZnccRadius; ++dy) {
       const float* ra = A.gray_row(row + dy) - kMargin;
       const float* rb = B.gray_row(row + dy) - kMargin;
+      float* sum = b.of_columns.data();
+      float* sum_of_squares = bb.of_columns.data();
+      float* sum_of_products = ab.of_columns.data();
       for (size_t x = 0; x < n; ++x) {
-        const float va = ra[x] - 128;  // smaller sums of squares round less
-        const float vb = rb[x] - 128;
-        a[x] += va;
-        b[x] += vb;
-        aa[x] += va * va;
-        bb[x] += vb * vb;
-        ab[x] += va * vb;
+        const float va = ra[x] - kMiddleGray;
+        const float vb = rb[x] - kMiddleGray;
+        sum[x] += vb;
+        sum_of_squares[x] += vb * vb;
+        sum_of_products[x] += va * vb;
       }
     }
-    const auto box = [](const std::vector<float>& sums, int x) {
-      const float* s = &sums[static_cast<size_t>(x) + kMargin];
-      return s[-2] + s[-1] + s[0] + s[1] + s[2];
-    };
-    static_assert(kZnccRadius == 2);
-    constexpr float kArea = 25;
+    const float* ma = of_a.mean.data();
+    const float* va = of_a.variance.data();
     for (int x = 0; x < width; ++x) {
-      const float ma = box(a, x) / kArea;
-      const float mb = box(b, x) / kArea;
-      const float va = std::max(box(aa, x) / kArea - ma * ma, 0.0f) + kNoiseVariance;
-      const float vb = std::max(box(bb, x) / kArea - mb * mb, 0.0f) + kNoiseVariance;
-      const float zncc = (box(ab, x) / kArea - ma * mb) / std::sqrt(va * vb);
+      const float mb = b.at(x) / kZnccArea;
+      const float vb = std::max(bb.at(x) / kZnccArea - mb * mb, 0.0f) + kNoiseVariance;
+      const float zncc = (ab.at(x) / kZnccArea - ma[x] * mb) / std::sqrt(va[x] * vb);
       out[x] += (1 - kCensusWeight) * 0.5f * (1 - zncc);
     }
   }
 };
 
+uint8_t quantised(float cost) {
+  const float scaled = kLargestCost * std::clamp(cost, 0.0f, 1.0f);
+  const int whole = static_cast<int>(scaled);
+  return static_cast<uint8_t>(whole + (scaled - static_cast<float>(whole) >= 0.5f ? 1 : 0));
+}
+
 // Combined cost of one pixel on one plane, over the sources that see it.
-float combine(float* costs, size_t count) {
-  std::sort(costs, costs + count);
+float combine(std::span<float> costs) {
+  std::sort(costs.begin(), costs.end());
   size_t seen = 0;
-  while (seen < count && costs[seen] < kUnseen) ++seen;
-  if (seen == 0) return kNeutral;
-  return combined_cost({costs, seen});
+  while (seen < costs.size() && costs[seen] < kUnseen) ++seen;
+  return seen == 0 ? kNeutral : combined_cost(costs.first(seen));
+}
+
+// The same for two sources and all pixels of a band.
+void combine_two(const float* a, const float* b, size_t pixels, uint8_t* out) {
+  for (size_t p = 0; p < pixels; ++p) {
+    const std::array<float, 2> sorted = {std::min(a[p], b[p]), std::max(a[p], b[p])};
+    const float one = sorted[0] < kUnseen ? sorted[0] : kNeutral;
+    out[p] = quantised(sorted[1] < kUnseen ? combined_cost(sorted) : one);
+  }
+}
+
+// \param costs  as BandCost::plane() gives them
+void combine_all(const std::vector<float>& costs, size_t sources, size_t pixels, uint8_t* out) {
+  if (sources == 2) return combine_two(costs.data(), costs.data() + pixels, pixels, out);
+  std::vector<float> of_pixel(sources);
+  for (size_t p = 0; p < pixels; ++p) {
+    for (size_t s = 0; s < sources; ++s) of_pixel[s] = costs[s * pixels + p];
+    out[p] = quantised(combine(of_pixel));
+  }
 }
 
 class BandCost {
@@ -180,12 +300,16 @@ class BandCost {
         width_(reference_.gray.width),
         fixed_(width_, rows_),
         warped_(width_, rows_),
-        seen_(static_cast<size_t>(width_)) {
+        seen_at_(static_cast<size_t>(rows_ + 1) * static_cast<size_t>(width_) + kLanes) {
     for (int r = -kMargin; r < rows_ + kMargin; ++r) {
       const float* from = &reference_.gray.data[reference_.gray.index(0, clamped(r))];
       std::copy(from, from + width_, fixed_.gray_row(r));
     }
     fixed_.finish_rows(width_);
+    for (int r = 0; r < rows_; ++r) {
+      fixed_census_.emplace_back().take(fixed_, r, width_);
+      fixed_moments_.emplace_back().take(fixed_, r, width_);
+    }
   }
 
   // Costs of all sources on a plane, source-major, then row-major over the band.
@@ -205,18 +329,21 @@ class BandCost {
         return source.project(0.5, clamped(r) + 0.5, t_at(r)).cast<float>();
       };
       for (int r = -kMargin; r < rows_ + kMargin; ++r) {
-        warp_row(image, start(r), step, width_, warped_.gray_row(r));
+        const PlanesOfRow planes{
+            float(t_at(r)), float(t.x()), static_cast<float>(geometry_.planes - 1)};
+        const int place = r >= 0 && r < rows_ ? r : rows_;  // of margins nobody asks
+        warp_row(image, start(r), step, planes, width_, warped_.gray_row(r), seen_row(place));
       }
       warped_.finish_rows(width_);
       for (int r = 0; r < rows_; ++r) {
-        float* out = &costs[s * band + static_cast<size_t>(r) * static_cast<size_t>(width_)];
-        census_row(fixed_, warped_, r, width_, out);
-        zncc_.add(fixed_, warped_, r, width_, out);
-        const PlanesOfRow planes{
-            float(t_at(r)), float(t.x()), static_cast<float>(geometry_.planes - 1)};
-        seen_row(image, start(r), step, planes, width_, seen_.data());
+        const auto row = static_cast<size_t>(r);
+        float* out = &costs[s * band + row * static_cast<size_t>(width_)];
+        warped_census_.take(warped_, r, width_);
+        warped_census_.compare(fixed_census_[row], width_, out);
+        zncc_.add(fixed_moments_[row], fixed_, warped_, r, width_, out);
+        const int32_t* seen = seen_row(r);
         for (int x = 0; x < width_; ++x) {
-          if (seen_[static_cast<size_t>(x)] == 0) out[x] = kUnseen;
+          if (seen[x] < 0 || image.valid.data[static_cast<size_t>(seen[x])] == 0) out[x] = kUnseen;
         }
       }
     }
@@ -229,6 +356,9 @@ class BandCost {
     return most >= 0 && least <= geometry_.planes - 1;
   }
 
+  int32_t* seen_row(int r) {
+    return &seen_at_[static_cast<size_t>(r) * static_cast<size_t>(width_)];
+  }
   int clamped(int r) const { return std::clamp(first_ + r, 0, reference_.gray.height - 1); }
 
   const std::vector<SweepImage>& images_;
@@ -239,7 +369,10 @@ class BandCost {
   int width_;
   Band fixed_;
   Band warped_;
-  std::vector<uint8_t> seen_;
+  std::vector<int32_t> seen_at_;         // as warp_row() tells it, per row
+  std::vector<CensusRow> fixed_census_;  // per row
+  std::vector<WindowMoments> fixed_moments_;
+  CensusRow warped_census_;
   ZnccRow zncc_;
 };
 
@@ -260,18 +393,21 @@ CostVolume matching_cost(const std::vector<SweepImage>& images,
     const int last = std::min(gray.height, first + kBandRows);
     BandCost cost(images, geometry, first, last);
     std::vector<float> costs;
-    std::vector<float> of_pixel(geometry.sources.size());
     const size_t pixels = static_cast<size_t>(last - first) * static_cast<size_t>(gray.width);
     uint8_t* out = &volume.cost[static_cast<size_t>(first) * gray.width * planes];
-    for (int t = 0; t < family.count; ++t) {
-      cost.plane(family.plane(t), costs);
-      for (size_t p = 0; p < pixels; ++p) {
-        for (size_t s = 0; s < of_pixel.size(); ++s) of_pixel[s] = costs[s * pixels + p];
-        const float c = combine(of_pixel.data(), of_pixel.size());
-        out[p * planes + static_cast<size_t>(t)] =
-            static_cast<uint8_t>(std::lround(kLargestCost * std::clamp(c, 0.0f, 1.0f)));
+    constexpr size_t kAtOnce =
+        16;  // planes: those of a pixel lie together, those of a sweep do not
+    std::vector<uint8_t> of_planes(kAtOnce * pixels);
+    for (size_t t = 0; t < planes; t += kAtOnce) {
+      const size_t count = std::min(kAtOnce, planes - t);
+      for (size_t k = 0; k < count; ++k) {
+        cost.plane(family.plane(double(t + k)), costs);
+        combine_all(costs, geometry.sources.size(), pixels, &of_planes[k * pixels]);
+        shared.advance();
       }
-      shared.advance();
+      for (size_t p = 0; p < pixels; ++p) {
+        for (size_t k = 0; k < count; ++k) out[p * planes + t + k] = of_planes[k * pixels + p];
+      }
     }
   });
   return volume;
