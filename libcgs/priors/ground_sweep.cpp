@@ -92,7 +92,8 @@ Raster<SlantedPlane> refined(const std::vector<SweepImage>& images,
   for (int k = 0; k < kRounds; ++k) {
     refinement.round({}, part_of(progress, double(k) / kRounds, double(k + 1) / kRounds));
   }
-  const Raster<RefinedPixel> found = refinement.result();
+  Raster<RefinedPixel> found;
+  refinement.take_result(found);
   Raster<SlantedPlane> out = start;
   for (size_t i = 0; i < out.data.size(); ++i) {
     if (!std::isnan(out.data[i].t)) out.data[i] = found.data[i].plane;

@@ -296,7 +296,9 @@ std::vector<ViewPriors> plane_sweep(const Scene& scene,
   std::vector<Raster<SlantedPlane>> extra = ground_planes(
       scene, matched, options.sampling, options.smoothness, part_of(progress, 0.45, 0.5));
   const auto take_results = [&](const Progress& taking) {
-    for (size_t i = 0; i < count; ++i) views[i].pixels = refinements[i].result(of_view(taking, i));
+    for (size_t i = 0; i < count; ++i) {
+      refinements[i].take_result(views[i].pixels, of_view(taking, i));
+    }
   };
   for (int round = 0; round < options.refinement_rounds; ++round) {
     const double share = 0.45 / options.refinement_rounds;

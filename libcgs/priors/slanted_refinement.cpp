@@ -159,12 +159,33 @@ class Scratch {
   Scratch(const Scratch&) = delete;
   Scratch& operator=(const Scratch&) = delete;
   std::span<float> values() { return {many_.empty() ? few_.data() : many_.data(), count_}; }
+  void copy(Scratch& other) {
+    const std::span<float> from = other.values();
+    std::copy(from.begin(), from.end(), values().begin());
+  }
 
  private:
   size_t count_;
   std::array<float, 16> few_;
   std::vector<float> many_;
 };
+
+// The cost of correlations with the sources, NaN where one does not see the pixel.
+float data_cost(std::span<const float> scores) {
+  Scratch scratch(scores.size());
+  const std::span<float> costs = scratch.values();
+  size_t seen = 0;
+  for (const float c : scores) {
+    if (!std::isnan(c)) costs[seen++] = 1 - c;
+  }
+  if (seen == 0) return kUnseenCost;
+  std::sort(costs.begin(), costs.begin() + static_cast<std::ptrdiff_t>(seen));
+  return combined_cost(costs.first(seen));
+}
+
+bool is_same(const SlantedPlane& a, const SlantedPlane& b) {
+  return std::memcmp(&a, &b, sizeof a) == 0;  // NaN, too
+}
 
 }  // namespace
 
@@ -190,7 +211,9 @@ SlantedRefinement::SlantedRefinement(const std::vector<SweepImage>& images,
     : images_(images),
       geometry_(geometry),
       reference_(images[static_cast<size_t>(geometry.image)]),
-      planes_(start.width, start.height, SlantedPlane{}) {
+      planes_(start.width, start.height, SlantedPlane{}),
+      visited_(start.width, start.height, 0),
+      moved_(start.width, start.height, 0) {
   const auto slope = [&](int x, int y, int dx, int dy) {
     if (!start.contains(x - dx, y - dy) || !start.contains(x + dx, y + dy)) return 0.0f;
     const float before = start(x, y) - start(x - dx, y - dy);
@@ -211,7 +234,9 @@ SlantedRefinement::SlantedRefinement(const std::vector<SweepImage>& images,
     : images_(images),
       geometry_(geometry),
       reference_(images[static_cast<size_t>(geometry.image)]),
-      planes_(std::move(start)) {
+      planes_(std::move(start)),
+      visited_(planes_.width, planes_.height, 0),
+      moved_(planes_.width, planes_.height, 0) {
   for (SlantedPlane& plane : planes_.data) {
     if (std::isnan(plane.t)) plane = {};
   }
@@ -275,17 +300,10 @@ float SlantedRefinement::correlation(const Window& w,
   return (sum(sab) * inv - ma * mb) / std::sqrt(va * vb);
 }
 
-float SlantedRefinement::data_cost(const Window& w, const SlantedPlane& plane) const {
-  Scratch scratch(geometry_.sources.size());
-  const std::span<float> scores = scratch.values();
-  size_t seen = 0;
-  for (size_t s = 0; s < scores.size(); ++s) {
-    const float c = correlation(w, s, plane);
-    if (!std::isnan(c)) scores[seen++] = 1 - c;
-  }
-  if (seen == 0) return kUnseenCost;
-  std::sort(scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(seen));
-  return combined_cost(scores.first(seen));
+void SlantedRefinement::score(const Window& w,
+                              const SlantedPlane& plane,
+                              std::span<float> scores) const {
+  for (size_t s = 0; s < scores.size(); ++s) scores[s] = correlation(w, s, plane);
 }
 
 float SlantedRefinement::smoothness(const Window& w, const SlantedPlane& plane) const {
@@ -302,10 +320,6 @@ float SlantedRefinement::smoothness(const Window& w, const SlantedPlane& plane) 
     weight += k;
   }
   return total / weight / kTruncation;
-}
-
-float SlantedRefinement::cost(const Window& w, const SlantedPlane& plane) const {
-  return data_cost(w, plane) + kSmoothness * smoothness(w, plane);
 }
 
 bool SlantedRefinement::normal_equations(const Window& w,
@@ -361,14 +375,13 @@ bool SlantedRefinement::normal_equations(const Window& w,
   return true;
 }
 
+// \param scores  the correlations of the plane with the sources
 SlantedRefinement::Normal SlantedRefinement::normal_equations(const Window& w,
-                                                              const SlantedPlane& plane) const {
-  Scratch scratch(geometry_.sources.size());
-  const std::span<float> scores = scratch.values();
+                                                              const SlantedPlane& plane,
+                                                              std::span<const float> scores) const {
   float best = -2;
-  for (size_t s = 0; s < scores.size(); ++s) {
-    scores[s] = correlation(w, s, plane);
-    if (scores[s] > best) best = scores[s];
+  for (const float c : scores) {
+    if (c > best) best = c;
   }
   Normal total;
   constexpr float kBelowBest = 0.3f;  // a source this much worse is taken for occluded
@@ -381,7 +394,10 @@ SlantedRefinement::Normal SlantedRefinement::normal_equations(const Window& w,
 void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
   const Window w = window(x, y);
   SlantedPlane best = planes_(x, y);
-  float least = cost(w, best);
+  Scratch scores_of_best(geometry_.sources.size());
+  Scratch scores(geometry_.sources.size());
+  score(w, best, scores_of_best.values());
+  float least = data_cost(scores_of_best.values()) + kSmoothness * smoothness(w, best);
   const auto largest = static_cast<float>(geometry_.planes - 1);
   const auto try_plane = [&](const SlantedPlane& plane) {
     if (!(plane.t >= 0 && plane.t <= largest)) return;
@@ -391,10 +407,12 @@ void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
     if (change < 0.02f) return;
     const float smooth = kSmoothness * smoothness(w, plane);
     if (smooth >= least) return;
-    const float c = smooth + data_cost(w, plane);
+    score(w, plane, scores.values());
+    const float c = smooth + data_cost(scores.values());
     if (c < least) {
       least = c;
       best = plane;
+      scores_of_best.copy(scores);
     }
   };
   for (const Offset o : kNeighbours) {
@@ -406,7 +424,7 @@ void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
   if (!extra.empty()) try_plane(extra(x, y));
   constexpr int kSteps = 2;
   for (int k = 0; k < kSteps; ++k) {
-    Normal n = normal_equations(w, best);
+    Normal n = normal_equations(w, best, scores_of_best.values());
     // Damped towards the current plane: without texture the step must vanish, not explode.
     constexpr float kDamping = 0.02f;
     const float d = kDamping * std::max(n.weight, 1e-3f);
@@ -415,29 +433,46 @@ void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
     if (!step.allFinite() || std::abs(step.x()) > kTruncation) break;
     try_plane({best.t + step.x(), best.slope_x + step.y(), best.slope_y + step.z()});
   }
+  if (!is_same(planes_(x, y), best)) moved_(x, y) = time_;
+  visited_(x, y) = time_;
   planes_(x, y) = best;
+}
+
+bool SlantedRefinement::is_settled(int x, int y, const Raster<SlantedPlane>& extra) const {
+  const uint16_t visited = visited_(x, y);
+  if (visited == 0 || moved_(x, y) == visited) return false;
+  if (extra.empty() != extra_before_.empty()) return false;
+  if (!extra.empty() && !is_same(extra(x, y), extra_before_(x, y))) return false;
+  return std::none_of(kNeighbours.begin(), kNeighbours.end(), [&](const Offset& o) {
+    return planes_.contains(x + o.dx, y + o.dy) && moved_(x + o.dx, y + o.dy) > visited;
+  });
 }
 
 void SlantedRefinement::round(const Raster<SlantedPlane>& extra, const Progress& progress) {
   SharedProgress shared(progress, 2 * static_cast<size_t>(planes_.height));
   for (const int color : {0, 1}) {
+    ++time_;
     tbb::parallel_for(0, planes_.height, [&](int y) {
       for (int x = (y + color) % 2; x < planes_.width; x += 2) {
-        if (reference_.valid(x, y) != 0) visit(x, y, extra);
+        if (reference_.valid(x, y) != 0 && !is_settled(x, y, extra)) visit(x, y, extra);
       }
       shared.advance();
     });
   }
+  extra_before_ = extra;
 }
 
-Raster<RefinedPixel> SlantedRefinement::result(const Progress& progress) const {
-  Raster<RefinedPixel> out(planes_.width, planes_.height, RefinedPixel{{kNaN, 0, 0}, 0, 0});
+void SlantedRefinement::take_result(Raster<RefinedPixel>& out, const Progress& progress) const {
+  if (out.empty()) out = {planes_.width, planes_.height, RefinedPixel{{kNaN, 0, 0}, 0, 0}};
   SharedProgress shared(progress, static_cast<size_t>(planes_.height));
   tbb::parallel_for(0, planes_.height, [&](int y) {
     for (int x = 0; x < planes_.width; ++x) {
-      if (reference_.valid(x, y) == 0) continue;
+      if (reference_.valid(x, y) == 0 || is_same(out(x, y).plane, planes_(x, y))) continue;
       const Window w = window(x, y);
-      const Normal n = normal_equations(w, planes_(x, y));
+      Scratch scratch(geometry_.sources.size());
+      const std::span<float> scores = scratch.values();
+      score(w, planes_(x, y), scores);
+      const Normal n = normal_equations(w, planes_(x, y), scores);
       // Cramer-Rao: residual variance over information on the match, the slopes eliminated.
       const float total = std::max(n.weight, 1e-6f);
       const double least = 1e-6 * double(total);
@@ -449,11 +484,10 @@ Raster<RefinedPixel> SlantedRefinement::result(const Progress& progress) const {
       const double per_variance = inverse > 0 ? std::min(inverse, 1 / least) : 1 / least;
       const double variance = std::max(n.residual / total, 1e-4f);
       const auto sigma = static_cast<float>(std::sqrt(variance * per_variance));
-      out(x, y) = {planes_(x, y), 1 - data_cost(w, planes_(x, y)), sigma};
+      out(x, y) = {planes_(x, y), 1 - data_cost(scores), sigma};
     }
     shared.advance();
   });
-  return out;
 }
 
 }  // namespace cgs

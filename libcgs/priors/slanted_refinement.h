@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "libcgs/core/progress.h"
@@ -48,25 +50,33 @@ class SlantedRefinement {
   /// other views; t NaN = none.
   void round(const Raster<SlantedPlane>& extra, const Progress& progress = {});
 
-  /// \return NaN t at invalid pixels
-  Raster<RefinedPixel> result(const Progress& progress = {}) const;
+  /// Tells of every pixel, NaN t at invalid ones.
+  /// \param out  empty, or as an earlier call left it: pixels whose plane is still the same are kept
+  void take_result(Raster<RefinedPixel>& out, const Progress& progress = {}) const;
 
  private:
   struct Window;
   struct Normal;
   Window window(int x, int y) const;
   float correlation(const Window& window, size_t source, const SlantedPlane& plane) const;
-  float data_cost(const Window& window, const SlantedPlane& plane) const;
+  void score(const Window& window, const SlantedPlane& plane, std::span<float> scores) const;
   float smoothness(const Window& window, const SlantedPlane& plane) const;
-  float cost(const Window& window, const SlantedPlane& plane) const;
   bool normal_equations(const Window& w, size_t source, const SlantedPlane& p, Normal& total) const;
-  Normal normal_equations(const Window& window, const SlantedPlane& plane) const;
+  Normal normal_equations(const Window& window,
+                          const SlantedPlane& plane,
+                          std::span<const float> scores) const;
   void visit(int x, int y, const Raster<SlantedPlane>& extra);
+  bool is_settled(int x, int y, const Raster<SlantedPlane>& extra) const;
 
   const std::vector<SweepImage>& images_;
   const SweepGeometry& geometry_;
   const SweepImage& reference_;
   Raster<SlantedPlane> planes_;
+  // A visit that finds all that it looks at as the last one did would end as that did. In halves of
+  // rounds from 1 on: when a pixel was visited last, and when its plane was last changed.
+  Raster<uint16_t> visited_, moved_;
+  Raster<SlantedPlane> extra_before_;
+  uint16_t time_ = 0;
 };
 
 }  // namespace cgs
