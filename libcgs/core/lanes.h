@@ -37,7 +37,7 @@ inline Floats min(Floats a, Floats b) { return _mm256_min_ps(a, b); }
 inline Floats max(Floats a, Floats b) { return _mm256_max_ps(a, b); }
 
 /// from[at] in each lane.
-inline Floats gather(const float* from, Ints at) {
+inline Floats gathered(const float* from, Ints at) {
   return _mm256_i32gather_ps(from, std::bit_cast<__m256i>(at), sizeof(float));
 }
 

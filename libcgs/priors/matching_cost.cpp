@@ -97,10 +97,10 @@ void warp_row(const SweepImage& image,
     const Floats a = u - __builtin_convertvector(iu, Floats);
     const Floats b = v - __builtin_convertvector(iv, Floats);
     const Ints corner = iv * stride + iu;
-    const Floats top_left = gather(gray, corner);
-    const Floats top = top_left + a * (gather(gray + 1, corner) - top_left);
-    const Floats bottom_left = gather(gray + stride, corner);
-    const Floats bottom = bottom_left + a * (gather(gray + stride + 1, corner) - bottom_left);
+    const Floats top_left = gathered(gray, corner);
+    const Floats top = top_left + a * (gathered(gray + 1, corner) - top_left);
+    const Floats bottom_left = gathered(gray + stride, corner);
+    const Floats bottom = bottom_left + a * (gathered(gray + stride + 1, corner) - bottom_left);
     store(top + b * (bottom - top), out + x);
     const Ints inside = (z > 0.0f) & (t >= 0.0f) & (t <= planes.last) & (at_u >= 0.0f) &
                         (at_v >= 0.0f) & (at_u < width_of) & (at_v < height_of);

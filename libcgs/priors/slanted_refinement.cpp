@@ -11,6 +11,7 @@
 #include <Eigen/Cholesky>
 #include <tbb/parallel_for.h>
 
+#include "libcgs/core/lanes.h"
 #include "libcgs/core/nan.h"
 #include "libcgs/priors/matching_cost.h"
 
@@ -99,8 +100,7 @@ LocalMap local_map(const SweepImage& image, const SweepSource& s, Offset p, cons
   return m;
 }
 
-// The source around the image of a window: the bilinear cell of every sample. In three loops, so
-// that all but the loads are done eight samples at a time.
+// The source around the image of a window: the bilinear cell of every sample.
 struct Cells {
   Samples inside;              // 0 beyond the frame, else 1
   Samples a, b;                // position in the cell
@@ -124,11 +124,12 @@ struct Cells {
     }
     const float* top = gray.data.data();
     const float* bottom = top + gray.width;
-    for (size_t i = 0; i < kSamples; ++i) {
-      p00[i] = top[at[i]];
-      p10[i] = top[at[i] + 1];
-      p01[i] = bottom[at[i]];
-      p11[i] = bottom[at[i] + 1];
+    for (size_t i = 0; i < kSamples; i += kLanes) {
+      const auto cells = load<Ints>(&at[i]);
+      store(gathered(top, cells), &p00[i]);
+      store(gathered(top + 1, cells), &p10[i]);
+      store(gathered(bottom, cells), &p01[i]);
+      store(gathered(bottom + 1, cells), &p11[i]);
     }
   }
 
