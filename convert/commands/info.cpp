@@ -60,7 +60,9 @@ Json baselines_json(const Scene& scene) {
                       scene.views[static_cast<size_t>(pair.b)].name}},
                     {"length", pair.length},
                     {"baseline_to_depth", pair.to_depth},
-                    {"angle_degrees", pair.angle * 180 / std::numbers::pi}});
+                    {"angle_degrees", pair.angle * 180 / std::numbers::pi},
+                    {"shared_points", pair.points},
+                    {"overlap", pair.overlap}});
   }
   return rows;
 }
@@ -170,12 +172,19 @@ void print_scene(const Json& info) {
   }
   std::printf("\nbaselines between input views:\n");
   for (const Json& row : info["baselines"]) {
-    std::printf("  %s - %s: %.4g units, %.1f %% of the depth, %.1f degrees\n",
+    std::printf("  %s - %s: %.4g units, %.1f %% of the depth, %.1f degrees",
                 one_line(row["views"][0].get<std::string>()).c_str(),
                 one_line(row["views"][1].get<std::string>()).c_str(),
                 row["length"].get<double>(),
                 100 * row["baseline_to_depth"].get<double>(),
                 row["angle_degrees"].get<double>());
+    const auto shared = row["shared_points"].get<size_t>();
+    if (shared > 0) {
+      std::printf("; %zu sparse points in both, on %.0f %% of the picture",
+                  shared,
+                  100 * row["overlap"].get<double>());
+    }
+    std::printf("\n");
   }
   const Json& depth = info["depth_files"];
   if (!depth.is_null()) {

@@ -2,12 +2,55 @@
 #include "convert/scene/baselines.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <numbers>
 
 #include "libcgs/core/error.h"
 
 namespace cgs {
+
+namespace {
+
+/// The cells of a picture that hold one of some points.
+class CoveredCells {
+ public:
+  explicit CoveredCells(const Camera& camera)
+      : camera_(camera), cam_from_world_(camera.cam_from_world()) {}
+
+  void add(const Eigen::Vector3d& point) {
+    const Eigen::Vector3d uvz = camera_.project_in_cam(cam_from_world_ * point);
+    if (!camera_.sees(uvz)) return;
+    const auto column = static_cast<size_t>(uvz.x() / camera_.width * kColumns);
+    const auto row = static_cast<size_t>(uvz.y() / camera_.height * kRows);
+    holds_.set(std::min(row, kRows - 1) * kColumns + std::min(column, kColumns - 1));
+  }
+  double share() const { return double(holds_.count()) / double(holds_.size()); }
+
+ private:
+  static constexpr size_t kColumns = 8;
+  static constexpr size_t kRows = 6;
+  const Camera& camera_;
+  Eigen::Isometry3d cam_from_world_;
+  std::bitset<kColumns * kRows> holds_;
+};
+
+void add_overlap(const Scene& scene, Baseline& pair) {
+  CoveredCells of_a(scene.views[static_cast<size_t>(pair.a)].camera);
+  CoveredCells of_b(scene.views[static_cast<size_t>(pair.b)].camera);
+  for (const SparsePoint& point : scene.points) {
+    const auto shows = [&](int view) {
+      return std::find(point.views.begin(), point.views.end(), view) != point.views.end();
+    };
+    if (!shows(pair.a) || !shows(pair.b)) continue;
+    ++pair.points;
+    of_a.add(point.position);
+    of_b.add(point.position);
+  }
+  pair.overlap = std::min(of_a.share(), of_b.share());
+}
+
+}  // namespace
 
 std::vector<Baseline> baselines(const Scene& scene) {
   std::vector<Baseline> out;
@@ -24,7 +67,10 @@ std::vector<Baseline> baselines(const Scene& scene) {
                      scene.input[j],
                      length,
                      length / middle,
-                     std::acos(std::clamp(cosine, -1.0, 1.0))});
+                     std::acos(std::clamp(cosine, -1.0, 1.0)),
+                     0,
+                     0});
+      add_overlap(scene, out.back());
     }
   }
   return out;

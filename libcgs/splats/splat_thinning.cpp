@@ -127,7 +127,7 @@ struct Trials {
 // the pictures halves what is lost, so that half as many do.
 constexpr size_t kPasses = 96;
 constexpr size_t kFirstPasses = 24;  // tell which setting it will be
-constexpr double kLessByMore = 2;    // is lost after the first passes than after all, or less
+constexpr double kMostHelp = 3;      // by which the others divide what is lost, as measured at most
 
 /// Fewer splats, and by how many passes they were fitted.
 struct Fitted {
@@ -192,7 +192,7 @@ Tried tried(const Trials& t, const WeighedSplats& merged, const Progress& progre
   Tried out{{merged.splats, merged.pixel, 0}, 0};
   out.fitted.fit(t, kFirstPasses, part_of(progress, 0, 0.3));
   out.loss = loss_of(t, out.fitted.splats);
-  if (out.loss <= kMostThinningLoss || out.loss > kLessByMore * kMostThinningLoss) return out;
+  if (out.loss <= kMostThinningLoss || out.loss > kMostHelp * kMostThinningLoss) return out;
   out.fitted.fit(t, kPasses, part_of(progress, 0.3, 1));
   out.loss = loss_of(t, out.fitted.splats);
   return out;

@@ -86,7 +86,7 @@ std::vector<float> tolerances(const TriangleMesh& mesh, const SimplifyOptions& o
 // A border that moves outwards by d all along changes the area by d times its length; collapses
 // move it to both sides, so that it may move several times as far. What comes out is measured.
 void hold_borders(const TriangleMesh& mesh, double most_change, std::vector<float>& tolerance) {
-  constexpr double kBothSides = 10;
+  constexpr double kBothSides = 14;
   if (most_change >= 1) return;
   const auto across = halfedges::adjacent_faces(mesh);
   const auto label_of = [&](size_t f) {

@@ -35,6 +35,29 @@ TEST(Baselines, AreLengthsSharesOfDepthAndAngles) {
   EXPECT_NEAR(pairs[0].angle, std::numbers::pi / 2, 1e-6);
 }
 
+// A point amid each cell of the left half of a picture, seen by two cameras in one place.
+TEST(Baselines, TellHowMuchOfThePicturesIsShared) {
+  Scene scene = scene_of({{0, 0, -5}, {0, 0, -5}, {1, 0, -5}});
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      const Eigen::Vector3d at =
+          scene.views[0].camera.unproject(80.0 * column + 40, 80.0 * row + 40, 5);
+      scene.points.push_back({at, {0, 1}});
+      scene.points.push_back({at, {0, 2}});
+    }
+  }
+  scene.points.push_back({{0, 0, -50}, {0, 1}});  // behind both: in no cell
+  const std::vector<Baseline> pairs = baselines(scene);
+  ASSERT_EQ(pairs.size(), 3U);
+  EXPECT_EQ(pairs[0].points, 25U);
+  EXPECT_DOUBLE_EQ(pairs[0].overlap, 0.5);
+  EXPECT_EQ(pairs[1].points, 24U);
+  EXPECT_GT(pairs[1].overlap, 0);
+  EXPECT_LE(pairs[1].overlap, 0.5);
+  EXPECT_EQ(pairs[2].points, 0U);
+  EXPECT_DOUBLE_EQ(pairs[2].overlap, 0);
+}
+
 TEST(BaselineWarnings, NameWhatSharesTooLittleAndWhatTellsTooLittle) {
   EXPECT_TRUE(baseline_warnings(scene_of({{0, 0, -5}, {1, 0, -5}})).empty());
   const auto wide = baseline_warnings(scene_of({{0, 0, -5}, {1, 0, -5}, {5, 0, 0}}));
