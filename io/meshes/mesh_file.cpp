@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <utility>
 
 #include "io/bytes/scene_path.h"
@@ -76,6 +77,25 @@ size_t faces_without_area(const MeasurableMesh& content) {
   return count;
 }
 
+// One absurd number takes the middle of a mesh to where no frame can lie.
+void refuse_far_away(const std::vector<Eigen::Vector3d>& points,
+                     const Frame& frame,
+                     const std::filesystem::path& path) {
+  try {
+    frame.validate();
+  } catch (const InvalidInput& error) {
+    const auto size_of = [](const Eigen::Vector3d& p) { return p.cwiseAbs().maxCoeff(); };
+    const auto farthest =
+        std::max_element(points.begin(), points.end(), [&](const auto& a, const auto& b) {
+          return size_of(a) < size_of(b);
+        });
+    std::ostringstream words;
+    words << "vertex " << farthest - points.begin() << " lies at " << farthest->transpose() << ": "
+          << error.what();
+    throw BadInput(Defect::Value, path, words.str());
+  }
+}
+
 MeasurableFile measurable(ParsedMesh parsed,
                           const UpAxis& up,
                           const std::filesystem::path& path,
@@ -85,7 +105,7 @@ MeasurableFile measurable(ParsedMesh parsed,
       ply_placement(parsed.comments, opposite_corners(parsed.positions), frame);
   const bool tells_up = !frame && !up.direction.isZero(0);
   if (tells_up) placement.frame.up = up.direction.normalized();
-  placement.frame.validate();
+  refuse_far_away(parsed.positions, placement.frame, path);
   MeasurableFile out{
       {std::move(parsed.mesh), std::move(parsed.positions), placement.frame, placement.file_origin},
       std::move(parsed.warnings),

@@ -27,7 +27,7 @@ SIZE = (320, 240)
 FOCAL = 330.0
 DISTANCE = 2.0
 PATCH = 0.17  # [m]
-SAFE = 0.55  # the part of a patch, from its middle, that neither JPEG nor pixels of its rim reach
+SAFE = 0.45  # the part of a patch, from its middle, that neither blocks of JPEG nor pixels of its rim reach
 
 # 18 % grey is 118 in sRGB.
 COLORS = [(16,) * 3, (48,) * 3, (80,) * 3, (118,) * 3, (160,) * 3, (192,) * 3, (224,) * 3, (243,) * 3,
@@ -35,9 +35,9 @@ COLORS = [(16,) * 3, (48,) * 3, (80,) * 3, (118,) * 3, (160,) * 3, (192,) * 3, (
           (200, 30, 40), (40, 160, 60), (50, 70, 180), (230, 150, 60), (95, 60, 110), (190, 140, 120)]
 COLUMNS = 5
 
-# Levels of 255 that the median of a patch and its worst pixel may be off: JPEG leaves noise of up to 9. What is
-# rendered or fused is held to its medians.
-TEXTURE = 1, 12
+# Levels of 255 that the median of a patch and its worst pixel may be off. What is rendered or fused is held to its
+# medians.
+TEXTURE = 1, 3
 VERTICES = 1, 255
 PAGE = 1, 255
 BLENDER_SHOWS = 2, 255

@@ -47,6 +47,22 @@ TEST(ReadMeshFile, FarAwayCoordinatesLoseNoDigit) {
   EXPECT_NEAR(mesh.frame.scale * (mesh.points[1] - mesh.points[0]).x(), 1, 2e-9);
 }
 
+TEST(ReadMeshFile, NamesTheVertexThatLiesTooFarAway) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "a.obj", "v 0 0 0\nv 8e37 0 0\nv 0 1 0\nf 1 2 3\n");
+  test::write_bytes(dir / "a.off", "OFF\n3 1 0\n0 0 0\n8e37 0 0\n0 1 0\n3 0 1 2\n");
+  for (const char* name : {"a.obj", "a.off"}) {
+    try {
+      (void)read_mesh_file(dir / name);
+      FAIL() << name;
+    } catch (const BadInput& error) {
+      EXPECT_EQ(error.defect(), Defect::Value);
+      EXPECT_NE(std::string(error.what()).find("vertex 1 lies at 8e+37"), std::string::npos)
+          << error.what();
+    }
+  }
+}
+
 TEST(ReadMeshFile, SaysWhatItCannotRead) {
   const test::TempDir dir;
   test::write_bytes(dir / "a.fbx", "x");
