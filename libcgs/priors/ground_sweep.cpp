@@ -15,13 +15,6 @@ namespace {
 
 constexpr int kHalf = 2;
 
-// How far a point of depth 1 on the ray of a pixel lies below the camera: (u, v, 1) to units of the
-// depth.
-Eigen::RowVector3d drop_per_depth(const Camera& camera, const Eigen::Vector3d& up) {
-  const Eigen::RowVector3d down = -up.transpose() * camera.world_from_cam.rotation();
-  return down * camera.intrinsics().inverse();
-}
-
 // Level planes from that of the horizon, where 1 / depth is 0, up to one that lies half as far
 // below the camera as the nearest place at the border of the picture could: steps and tables are
 // higher than the ground.
@@ -31,7 +24,7 @@ std::optional<PlaneFamily> level_planes(const SweepGeometry& geometry,
   constexpr double kLeastDrop = 0.05;
   constexpr double kHighest = 2;
   constexpr int kMost = 512;
-  const Eigen::RowVector3d drop = drop_per_depth(camera, up);
+  const Eigen::RowVector3d drop = level_drop(camera, up);
   const double most = range_over(drop, {0, 0}, {camera.width, camera.height}).second;
   if (!(most > kLeastDrop)) return std::nullopt;
   const double horizon = geometry.plane_of(0);
@@ -86,9 +79,11 @@ Raster<SlantedPlane> at_full_size(const Raster<SlantedPlane>& half_planes,
 Raster<SlantedPlane> refined(const std::vector<SweepImage>& images,
                              const SweepGeometry& geometry,
                              const Raster<SlantedPlane>& start,
+                             const Eigen::RowVector3d& drop,
                              const Progress& progress) {
   constexpr int kRounds = 3;
   SlantedRefinement refinement(images, geometry, start);
+  refinement.expect_level(drop);
   for (int k = 0; k < kRounds; ++k) {
     refinement.round({}, part_of(progress, double(k) / kRounds, double(k + 1) / kRounds));
   }
@@ -124,6 +119,11 @@ Scene halved_inputs(const Scene& scene) {
 
 }  // namespace
 
+Eigen::RowVector3d level_drop(const Camera& camera, const Eigen::Vector3d& up) {
+  const Eigen::RowVector3d down = -up.transpose() * camera.world_from_cam.rotation();
+  return down * camera.intrinsics().inverse();
+}
+
 std::vector<Raster<SlantedPlane>> ground_planes(const Scene& scene,
                                                 const std::vector<SweepGeometry>& geometry,
                                                 const SweepSampling& sampling,
@@ -139,13 +139,17 @@ std::vector<Raster<SlantedPlane>> ground_planes(const Scene& scene,
     const Progress part =
         part_of(progress, double(i) / double(count), double(i + 1) / double(count));
     const SweepGeometry half = with_parallax(sweep_geometry(halved, static_cast<int>(i), sampling));
-    const auto family = level_planes(half, halved.views[i].camera, scene.frame.up);
+    const Camera& camera = halved.views[i].camera;
+    const auto family = level_planes(half, camera, scene.frame.up);
     if (!family) continue;
     const CostVolume volume = matching_cost(images, half, *family, part_of(part, 0, 0.5));
     const Raster<float> chosen =
         semi_global_planes(volume, images[i].gray, smoothness, part_of(part, 0.5, 0.7));
-    const Raster<SlantedPlane> found =
-        refined(images, half, chosen_planes(*family, chosen, half), part_of(part, 0.7, 1));
+    const Raster<SlantedPlane> found = refined(images,
+                                               half,
+                                               chosen_planes(*family, chosen, half),
+                                               level_drop(camera, scene.frame.up),
+                                               part_of(part, 0.7, 1));
     const View& view = scene.views[static_cast<size_t>(scene.input[i])];
     out[i] = at_full_size(found, half, geometry[i], view.image.width, view.image.height);
   }

@@ -11,6 +11,10 @@
 
 namespace cgs {
 
+/// How far what a pixel (u, v, 1) shows lies below the camera, per depth, as a row to multiply
+/// pixels with: level planes change their inverse depth in proportion. Zero where `up` is.
+Eigen::RowVector3d level_drop(const Camera& camera, const Eigen::Vector3d& up);
+
 /// Ground that the views look along, as starts for their refinement: a sweep of level planes at
 /// half size, refined there. A sweep of planes square to the view finds no pavement, lawn or floor:
 /// from row to row its depth changes by several planes, so that no window of it is like its match.

@@ -291,6 +291,7 @@ std::vector<ViewPriors> plane_sweep(const Scene& scene,
     const Raster<float> start =
         semi_global_planes(volume, images[i].gray, options.smoothness, part_of(sweeping, 0.8, 1));
     refinements.emplace_back(images, matched[i], start);
+    refinements.back().expect_level(level_drop(views[i].camera, scene.frame.up));
     report(sweeping, 1);
   }
   std::vector<Raster<SlantedPlane>> extra = ground_planes(

@@ -31,6 +31,9 @@ constexpr float kSmoothness = 0.12f;     // cost of a full disagreement with the
 constexpr float kTruncation = 0.8f;      // largest disagreement that counts [planes]
 constexpr float kUnseenCost = 1.0f;      // as uncorrelated
 constexpr float kMaxSlope = 6.0f;        // [planes per pixel]; ground before the feet has 3 to 4
+constexpr float kSteep = 2.0f;           // few surfaces are steeper: what is must correlate better,
+constexpr float kSteepCost = 0.1f;       // by so much per plane per pixel
+constexpr float kOffLevel = 0.5f;        // ground rises and falls a little [planes per pixel]
 
 struct Offset {
   int dx, dy;
@@ -307,7 +310,8 @@ void SlantedRefinement::score(const Window& w,
   for (size_t s = 0; s < scores.size(); ++s) scores[s] = correlation(w, s, plane);
 }
 
-float SlantedRefinement::smoothness(const Window& w, const SlantedPlane& plane) const {
+// Of a plane among those of its neighbours, and of one that is steep.
+float SlantedRefinement::prior_cost(const Window& w, const SlantedPlane& plane) const {
   float total = 0;
   float weight = 1e-6f;
   for (const Offset o : {Offset{-1, 0}, Offset{1, 0}, Offset{0, -1}, Offset{0, 1}}) {
@@ -320,7 +324,20 @@ float SlantedRefinement::smoothness(const Window& w, const SlantedPlane& plane) 
     total += k * std::min(std::abs(there - plane.t), kTruncation);
     weight += k;
   }
-  return total / weight / kTruncation;
+  return kSmoothness * total / weight / kTruncation + kSteepCost * steepness(w, plane);
+}
+
+// By how much a plane is steeper than most surfaces are, or off the level plane there if that is
+// less [planes per pixel].
+float SlantedRefinement::steepness(const Window& w, const SlantedPlane& plane) const {
+  const float steepest = std::max(std::abs(plane.slope_x), std::abs(plane.slope_y));
+  if (steepest <= kSteep) return 0;
+  const double drop = drop_.dot(Eigen::RowVector3d(w.x + 0.5, w.y + 0.5, 1));
+  if (!(drop > 0)) return steepest - kSteep;
+  const double share = (double(plane.t) - geometry_.plane_of(0)) / drop;
+  const double off = std::max(std::abs(double(plane.slope_x) - share * drop_.x()),
+                              std::abs(double(plane.slope_y) - share * drop_.y()));
+  return std::clamp(static_cast<float>(off) - kOffLevel, 0.0f, steepest - kSteep);
 }
 
 bool SlantedRefinement::normal_equations(const Window& w,
@@ -398,7 +415,7 @@ void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
   Scratch scores_of_best(geometry_.sources.size());
   Scratch scores(geometry_.sources.size());
   score(w, best, scores_of_best.values());
-  float least = data_cost(scores_of_best.values()) + kSmoothness * smoothness(w, best);
+  float least = data_cost(scores_of_best.values()) + prior_cost(w, best);
   const auto largest = static_cast<float>(geometry_.planes - 1);
   const auto try_plane = [&](const SlantedPlane& plane) {
     if (!(plane.t >= 0 && plane.t <= largest)) return;
@@ -406,10 +423,10 @@ void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
     const float change = std::abs(plane.t - best.t) + 2 * (std::abs(plane.slope_x - best.slope_x) +
                                                            std::abs(plane.slope_y - best.slope_y));
     if (change < 0.02f) return;
-    const float smooth = kSmoothness * smoothness(w, plane);
-    if (smooth >= least) return;
+    const float prior = prior_cost(w, plane);
+    if (prior >= least) return;
     score(w, plane, scores.values());
-    const float c = smooth + data_cost(scores.values());
+    const float c = prior + data_cost(scores.values());
     if (c < least) {
       least = c;
       best = plane;

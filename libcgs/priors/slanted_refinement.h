@@ -46,6 +46,10 @@ class SlantedRefinement {
                     const SweepGeometry& geometry,
                     Raster<SlantedPlane> start);
 
+  /// Planes may be steep where they are about level: what is steep otherwise must correlate better.
+  /// \param drop  of level_drop()
+  void expect_level(const Eigen::RowVector3d& drop) { drop_ = drop; }
+
   /// One round over all pixels. `extra` (may be empty) holds one more hypothesis per pixel, from
   /// other views; t NaN = none.
   void round(const Raster<SlantedPlane>& extra, const Progress& progress = {});
@@ -60,7 +64,8 @@ class SlantedRefinement {
   Window window(int x, int y) const;
   float correlation(const Window& window, size_t source, const SlantedPlane& plane) const;
   void score(const Window& window, const SlantedPlane& plane, std::span<float> scores) const;
-  float smoothness(const Window& window, const SlantedPlane& plane) const;
+  float prior_cost(const Window& window, const SlantedPlane& plane) const;
+  float steepness(const Window& window, const SlantedPlane& plane) const;
   bool normal_equations(const Window& w, size_t source, const SlantedPlane& p, Normal& total) const;
   Normal normal_equations(const Window& window,
                           const SlantedPlane& plane,
@@ -72,6 +77,7 @@ class SlantedRefinement {
   const SweepGeometry& geometry_;
   const SweepImage& reference_;
   Raster<SlantedPlane> planes_;
+  Eigen::RowVector3d drop_ = Eigen::RowVector3d::Zero();
   // A visit that finds all that it looks at as the last one did would end as that did. In halves of
   // rounds from 1 on: when a pixel was visited last, and when its plane was last changed.
   Raster<uint16_t> visited_, moved_;
