@@ -55,14 +55,15 @@ Json camera_json(const Scene& scene, int index) {
 Json baselines_json(const Scene& scene) {
   Json rows = Json::array();
   for (const Baseline& pair : baselines(scene)) {
+    const Overlap both = overlap(scene, pair.a, pair.b);
     rows.push_back({{"views",
                      {scene.views[static_cast<size_t>(pair.a)].name,
                       scene.views[static_cast<size_t>(pair.b)].name}},
                     {"length", pair.length},
                     {"baseline_to_depth", pair.to_depth},
                     {"angle_degrees", pair.angle * 180 / std::numbers::pi},
-                    {"shared_points", pair.points},
-                    {"overlap", pair.overlap}});
+                    {"shared_points", both.points},
+                    {"overlap", both.share}});
   }
   return rows;
 }

@@ -35,22 +35,24 @@ class CoveredCells {
   std::bitset<kColumns * kRows> holds_;
 };
 
-void add_overlap(const Scene& scene, Baseline& pair) {
-  CoveredCells of_a(scene.views[static_cast<size_t>(pair.a)].camera);
-  CoveredCells of_b(scene.views[static_cast<size_t>(pair.b)].camera);
+}  // namespace
+
+Overlap overlap(const Scene& scene, int a, int b) {
+  CoveredCells of_a(scene.views[static_cast<size_t>(a)].camera);
+  CoveredCells of_b(scene.views[static_cast<size_t>(b)].camera);
+  Overlap out;
   for (const SparsePoint& point : scene.points) {
     const auto shows = [&](int view) {
       return std::find(point.views.begin(), point.views.end(), view) != point.views.end();
     };
-    if (!shows(pair.a) || !shows(pair.b)) continue;
-    ++pair.points;
+    if (!shows(a) || !shows(b)) continue;
+    ++out.points;
     of_a.add(point.position);
     of_b.add(point.position);
   }
-  pair.overlap = std::min(of_a.share(), of_b.share());
+  out.share = std::min(of_a.share(), of_b.share());
+  return out;
 }
-
-}  // namespace
 
 std::vector<Baseline> baselines(const Scene& scene) {
   std::vector<Baseline> out;
@@ -67,10 +69,7 @@ std::vector<Baseline> baselines(const Scene& scene) {
                      scene.input[j],
                      length,
                      length / middle,
-                     std::acos(std::clamp(cosine, -1.0, 1.0)),
-                     0,
-                     0});
-      add_overlap(scene, out.back());
+                     std::acos(std::clamp(cosine, -1.0, 1.0))});
     }
   }
   return out;

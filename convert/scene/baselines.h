@@ -16,14 +16,18 @@ struct Baseline {
   double length = 0;    ///< [scene units]
   double to_depth = 0;  ///< The same as a share of the depth of what `a` shows.
   double angle = 0;     ///< Between the directions they look in [rad].
-  size_t points = 0;    ///< Sparse points that both show.
-  /// Share of the pictures, in 8 x 6 cells, where there are such points; of the picture with less.
-  /// What they share without texture is not counted.
-  double overlap = 0;
 };
 
 /// Of every pair of input views.
 std::vector<Baseline> baselines(const Scene& scene);
+
+/// What two views show both, as far as sparse points tell: what has no texture does not count.
+struct Overlap {
+  size_t points = 0;  ///< That both show.
+  double share = 0;   ///< Of the pictures, in 8 x 6 cells, of the one where fewer hold such points.
+};
+
+Overlap overlap(const Scene& scene, int a, int b);
 
 /// What a user should know before spending minutes: too little or too much baseline.
 std::vector<std::string> baseline_warnings(const Scene& scene);

@@ -45,18 +45,12 @@ constexpr std::array<Offset, 8> kNeighbours = {
 using Samples = std::array<float, kSamples>;
 
 // Eight samples at a time; sums of lanes have a fixed order.
-using Lanes = float __attribute__((vector_size(32)));
-Lanes lanes(const Samples& samples, size_t i) {
-  Lanes v;
-  std::memcpy(&v, &samples[i], sizeof v);
-  return v;
-}
-float sum(const Lanes& v) {
+float sum(const Floats& v) {
   return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
 }
 float dot(const Samples& a, const Samples& b) {
-  Lanes total{};
-  for (size_t i = 0; i < kSamples; i += 8) total += lanes(a, i) * lanes(b, i);
+  Floats total{};
+  for (size_t i = 0; i < kSamples; i += kLanes) total += load<Floats>(&a[i]) * load<Floats>(&b[i]);
   return sum(total);
 }
 
@@ -282,13 +276,13 @@ float SlantedRefinement::correlation(const Window& w,
   Samples value;
   cells.values(value);
   const float center = value[kCenter];
-  Lanes sw{}, sa{}, sb{}, saa{}, sbb{}, sab{};
-  for (size_t i = 0; i < kSamples; i += 8) {
-    const Lanes weight = lanes(w.weight, i) * lanes(cells.inside, i);
-    const Lanes a = lanes(w.value, i);
-    const Lanes b = lanes(value, i) - center;
-    const Lanes wa = weight * a;
-    const Lanes wb = weight * b;
+  Floats sw{}, sa{}, sb{}, saa{}, sbb{}, sab{};
+  for (size_t i = 0; i < kSamples; i += kLanes) {
+    const Floats weight = load<Floats>(&w.weight[i]) * load<Floats>(&cells.inside[i]);
+    const Floats a = load<Floats>(&w.value[i]);
+    const Floats b = load<Floats>(&value[i]) - center;
+    const Floats wa = weight * a;
+    const Floats wb = weight * b;
     sw += weight;
     sa += wa;
     sb += wb;

@@ -30,7 +30,6 @@ void Collapser::repeat(const CollapseHistory& before) {
   for (const size_t end : before.passes) {
     used_.assign(n, 0);
     for (; index < end && left > limits_.target_faces; ++index) {
-      attempt.dying.clear();
       repeat_one(before, index, attempt);
       if (attempt.outcome == Attempt::Outcome::Allowed) left -= attempt.dying.size();
     }

@@ -37,7 +37,7 @@ struct SimplifyResult {
   std::array<double, kProvenanceCount> area_before =
       {};  ///< By provenance [internal units squared].
   std::array<double, kProvenanceCount> area_after = {};
-  int rounds = 0;              ///< Times the result was measured or its areas found too different.
+  int rounds = 0;              ///< Times the collapses were done, wholly or in part.
   size_t joined_vertices = 0;  ///< That were gone before, see with_joined_seams().
 };
 

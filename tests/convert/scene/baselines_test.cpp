@@ -36,7 +36,7 @@ TEST(Baselines, AreLengthsSharesOfDepthAndAngles) {
 }
 
 // A point amid each cell of the left half of a picture, seen by two cameras in one place.
-TEST(Baselines, TellHowMuchOfThePicturesIsShared) {
+TEST(Overlap, IsWhereBothShowPoints) {
   Scene scene = scene_of({{0, 0, -5}, {0, 0, -5}, {1, 0, -5}});
   for (int row = 0; row < 6; ++row) {
     for (int column = 0; column < 4; ++column) {
@@ -47,15 +47,16 @@ TEST(Baselines, TellHowMuchOfThePicturesIsShared) {
     }
   }
   scene.points.push_back({{0, 0, -50}, {0, 1}});  // behind both: in no cell
-  const std::vector<Baseline> pairs = baselines(scene);
-  ASSERT_EQ(pairs.size(), 3U);
-  EXPECT_EQ(pairs[0].points, 25U);
-  EXPECT_DOUBLE_EQ(pairs[0].overlap, 0.5);
-  EXPECT_EQ(pairs[1].points, 24U);
-  EXPECT_GT(pairs[1].overlap, 0);
-  EXPECT_LE(pairs[1].overlap, 0.5);
-  EXPECT_EQ(pairs[2].points, 0U);
-  EXPECT_DOUBLE_EQ(pairs[2].overlap, 0);
+  const Overlap same = overlap(scene, 0, 1);
+  EXPECT_EQ(same.points, 25U);
+  EXPECT_DOUBLE_EQ(same.share, 0.5);
+  const Overlap beside = overlap(scene, 0, 2);
+  EXPECT_EQ(beside.points, 24U);
+  EXPECT_GT(beside.share, 0);
+  EXPECT_LE(beside.share, 0.5);
+  const Overlap none = overlap(scene, 1, 2);
+  EXPECT_EQ(none.points, 0U);
+  EXPECT_DOUBLE_EQ(none.share, 0);
 }
 
 TEST(BaselineWarnings, NameWhatSharesTooLittleAndWhatTellsTooLittle) {

@@ -24,15 +24,17 @@ std::vector<TexturedPatch> slanted_wall() {
 }
 
 // Views turned against each other, so that warping is no shift of rows.
-Scene three_views() {
+Scene views_at(const std::vector<double>& places) {
   std::vector<Camera> cameras;
-  for (const double x : {-0.4, 0.0, 0.5}) {
+  for (const double x : places) {
     Camera c = test::looking_at({x, 0.3 * x, -0.2 * x}, {0.2 * x, 0, 4}, kWidth, kHeight, 42);
     c.world_from_cam.linear() *= Eigen::AngleAxisd(0.15 * x, Vector3d::UnitZ()).toRotationMatrix();
     cameras.push_back(c);
   }
   return test::photographed_scene(slanted_wall(), cameras, 0.1);
 }
+
+Scene three_views() { return views_at({-0.4, 0.0, 0.5}); }
 
 std::vector<SweepImage> images_of(const Scene& scene) {
   std::vector<SweepImage> images;
@@ -118,8 +120,7 @@ bool sees(const SweepImage& image, const Vector3d& h) {
          image.valid(static_cast<int>(u), static_cast<int>(v)) != 0;
 }
 
-TEST(MatchingCost, EqualsItsDefinitionPixelByPixel) {
-  Scene scene = three_views();
+void expect_as_defined(Scene scene) {
   // A part of one source may not be used.
   scene.views[2].valid = MaskMap(kWidth, kHeight, 1);
   for (int y = 10; y < 20; ++y) {
@@ -155,6 +156,13 @@ TEST(MatchingCost, EqualsItsDefinitionPixelByPixel) {
   }
   EXPECT_GT(unseen, 0u);
   EXPECT_LT(differing, all / 100);
+}
+
+TEST(MatchingCost, EqualsItsDefinitionPixelByPixel) { expect_as_defined(three_views()); }
+
+// Two sources are combined by a loop of their own.
+TEST(MatchingCost, OfThreeSourcesEqualsItsDefinitionPixelByPixel) {
+  expect_as_defined(views_at({-0.4, 0.0, 0.5, 0.2}));
 }
 
 TEST(MatchingCost, IsLeastOnThePlaneOfTheSurface) {
