@@ -92,14 +92,17 @@ void run_train(const TrainArgs& args) {
   nlohmann::ordered_json report = training_to_json(trained, request);
   write_model(args.output, trained.model);  // first, as a distance may be refused
   if (opened.refined) report["refined_poses"] = refinement_to_json(opened.refined->report);
-  nlohmann::ordered_json scale = opened.control;
-  const bool is_measured = !distances.empty() || !markers.empty();
-  if (scale.is_null()) scale = scale_by(distances, markers, trained.model);
+  nlohmann::ordered_json scale;
+  if (opened.control) {
+    scale = control_to_json(*opened.control);
+  } else if (const auto by_distances = scale_by(distances, markers, trained.model)) {
+    terminal.warn(by_distances->warnings);
+    scale = distances_to_json(*by_distances);
+  }
   Frame& frame = trained.model.scene.frame;
   widen_by_focal(frame, opened.focal_sigma());
   if (scale.is_object()) scale["metres_sigma"] = frame.metres_sigma;
   if (frame.has_metric_scale()) (void)restate_frame(args.output, trained.model);
-  if (is_measured) terminal.warn(scale.at("warnings").get<std::vector<std::string>>());
   report["scale"] = scale;
   write_file(args.output / "training.json", json_text(report) + "\n");
   forget_checkpoints(args.output);

@@ -52,7 +52,7 @@ struct Run {
   Scene scene;  ///< As opened: world coordinates.
   std::vector<KnownDistance> distances;
   std::vector<MarkerBar> markers;
-  Json control;        ///< Of OpenedScene.
+  std::optional<ControlReport> control;  ///< Of OpenedScene.
   Json refined;        ///< As refinement_to_json(); null where it was not asked for.
   double focal_sigma;  ///< Of OpenedScene.
   // What the files of finished stages hold, read when a stage needs it. Never what a stage had in
@@ -157,8 +157,12 @@ StageResult run_scale(Run& run, const Progress& progress) {
   frame.scale_source = run.scene.frame.scale_source;
   frame.up = run.scene.frame.up;
   take_sensor_scale(recorded_sensor_scale(result_of(run, Stage::Model)), frame);
-  Json result = run.control;
-  if (result.is_null()) result = scale_by(run.distances, run.markers, model);
+  Json result;
+  if (run.control) {
+    result = control_to_json(*run.control);
+  } else if (const auto scale = scale_by(run.distances, run.markers, model)) {
+    result = distances_to_json(*scale);
+  }
   widen_by_focal(frame, run.focal_sigma);
   if (result.is_object()) result["metres_sigma"] = frame.metres_sigma;
   const bool is_new = frame.metres_per_unit != before.metres_per_unit ||

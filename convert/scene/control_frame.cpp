@@ -266,7 +266,7 @@ std::vector<Judged> judged(const std::vector<Sighted>& points, const ControlFit&
 }
 
 // Of the check points that were measured, or of the control points in use.
-Json rms_json(const std::vector<Judged>& points, bool of_checks) {
+std::optional<ControlRms> rms_of(const std::vector<Judged>& points, bool of_checks) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   int count = 0;
   for (const Judged& point : points) {
@@ -275,28 +275,48 @@ Json rms_json(const std::vector<Judged>& points, bool of_checks) {
     sum += point.residual->off.cwiseAbs2();
     ++count;
   }
-  if (count == 0) return nullptr;
-  const Eigen::Vector3d rms = (sum / count).cwiseSqrt();
-  return {{"points", count}, {"x", rms.x()}, {"y", rms.y()}, {"z", rms.z()}, {"all", rms.norm()}};
+  if (count == 0) return std::nullopt;
+  return ControlRms{count, (sum / count).cwiseSqrt()};
 }
 
-Json points_json(const std::vector<Judged>& points) {
-  Json out = Json::array();
-  for (const Judged& point : points) {
-    const Sighted& s = point.sighted;
-    const ControlResidual* const residual = point.residual;
-    out.push_back({{"name", s.point.name},
-                   {"role", point.is_check() ? "check" : "control"},
-                   {"known", vector_to_json(s.point.position)},
-                   {"sigma", s.point.sigma},
-                   {"photographs", s.photographs},
-                   {"reprojection", residual ? Json(s.reprojection) : Json()},
-                   {"residual", residual ? vector_to_json(residual->off) : Json()},
-                   {"sigmas", residual ? Json(residual->sigmas) : Json()},
-                   {"used", point.is_used()},
-                   {"remark", point.remark}});
+ComparedControlPoint compared(const Judged& point) {
+  const Sighted& s = point.sighted;
+  ComparedControlPoint out{.name = s.point.name,
+                           .is_check = point.is_check(),
+                           .known = s.point.position,
+                           .sigma = s.point.sigma,
+                           .photographs = s.photographs,
+                           .seen = {},
+                           .is_used = point.is_used(),
+                           .remark = point.remark};
+  if (const ControlResidual* const residual = point.residual) {
+    out.seen = {s.reprojection, residual->off, residual->sigmas};
   }
   return out;
+}
+
+Json rms_json(const std::optional<ControlRms>& rms) {
+  if (!rms) return nullptr;
+  const Eigen::Vector3d& along = rms->along;
+  return {{"points", rms->points},
+          {"x", along.x()},
+          {"y", along.y()},
+          {"z", along.z()},
+          {"all", along.norm()}};
+}
+
+Json point_json(const ComparedControlPoint& point) {
+  const auto& seen = point.seen;
+  return {{"name", point.name},
+          {"role", point.is_check ? "check" : "control"},
+          {"known", vector_to_json(point.known)},
+          {"sigma", point.sigma},
+          {"photographs", point.photographs},
+          {"reprojection", seen ? Json(seen->reprojection) : Json()},
+          {"residual", seen ? vector_to_json(seen->residual) : Json()},
+          {"sigmas", seen ? Json(seen->sigmas) : Json()},
+          {"used", point.is_used},
+          {"remark", point.remark}};
 }
 
 void warn_of_points(const std::vector<Judged>& points, const Frame& frame, Scene& scene) {
@@ -374,7 +394,7 @@ void warn_of_frame(const ControlFit& fit, Scene& scene) {
 
 }  // namespace
 
-Json move_to_control_frame(const ControlRequest& request, Scene& scene) {
+ControlReport move_to_control_frame(const ControlRequest& request, Scene& scene) {
   const std::string unit = request.unit.empty() ? "m" : request.unit;
   const double metres = metres_in(unit);
   std::vector<Sighted> points;
@@ -391,17 +411,34 @@ Json move_to_control_frame(const ControlRequest& request, Scene& scene) {
   const std::vector<Judged> list = judged(points, fit);
   warn_of_points(list, scene.frame, scene);
   warn_of_frame(fit, scene);
-  return {{"metres_per_unit", scene.frame.metres_per_unit},
-          {"metres_sigma", scene.frame.metres_sigma},
+  ControlReport out{.metres_per_unit = scene.frame.metres_per_unit,
+                    .metres_sigma = scene.frame.metres_sigma,
+                    .file = request.file,
+                    .unit = unit,
+                    .scale = scale,
+                    .rotation_sigma = fit.rotation_sigma,
+                    .scatter = fit.scatter,
+                    .points = {},
+                    .control_rms = rms_of(list, false),
+                    .check_rms = rms_of(list, true)};
+  for (const Judged& point : list) out.points.push_back(compared(point));
+  return out;
+}
+
+Json control_to_json(const ControlReport& report) {
+  Json points = Json::array();
+  for (const ComparedControlPoint& point : report.points) points.push_back(point_json(point));
+  return {{"metres_per_unit", report.metres_per_unit},
+          {"metres_sigma", report.metres_sigma},
           {"control_points",
-           {{"file", request.file.string()},
-            {"unit", unit},
-            {"scale", scale},
-            {"rotation_sigma", fit.rotation_sigma * 180 / std::numbers::pi},
-            {"scatter", fit.scatter},
-            {"points", points_json(list)},
-            {"control_rms", rms_json(list, false)},
-            {"check_rms", rms_json(list, true)}}}};
+           {{"file", report.file.string()},
+            {"unit", report.unit},
+            {"scale", report.scale},
+            {"rotation_sigma", report.rotation_sigma * 180 / std::numbers::pi},
+            {"scatter", report.scatter},
+            {"points", points},
+            {"control_rms", rms_json(report.control_rms)},
+            {"check_rms", rms_json(report.check_rms)}}}};
 }
 
 std::string control_words(const Json& scale) {

@@ -146,8 +146,8 @@ ScaleBar bar_of(const KnownDistance& distance, const Model& model) {
   return {scale * length, scale * std::sqrt(variance), distance.metres, distance.sigma};
 }
 
-Json warnings_of(const BarScale& scale, const std::vector<NamedBar>& bars) {
-  Json out = Json::array();
+std::vector<std::string> warnings_of(const BarScale& scale, const std::vector<NamedBar>& bars) {
+  std::vector<std::string> out;
   for (size_t i = 0; i < bars.size(); ++i) {
     if (scale.used[i]) continue;
     out.push_back("known distance " + printable(bars[i].name) +
@@ -192,14 +192,13 @@ ScaleBar bar_of_all(const std::vector<MarkerBar>& markers, const BarScale& scale
   return out;
 }
 
-Json bar_json(const NamedBar& named, double metres_per_unit, bool is_used) {
+ComparedDistance compared(const NamedBar& named, double metres_per_unit, bool is_used) {
   const ScaleBar& bar = named.bar;
-  return {{"distance", named.name},
-          {"known", bar.known},
-          {"measured", bar.measured * metres_per_unit},
-          {"sigma", bar.measured_sigma * metres_per_unit},
-          {"residual", bar.measured * metres_per_unit - bar.known},
-          {"used", is_used}};
+  return {named.name,
+          bar.known,
+          bar.measured * metres_per_unit,
+          bar.measured_sigma * metres_per_unit,
+          is_used};
 }
 
 }  // namespace
@@ -223,15 +222,15 @@ void check_picks(const std::vector<KnownDistance>& distances, const Model& model
   for (const KnownDistance& distance : distances) (void)bar_of(distance, model);
 }
 
-Json scale_by(const std::vector<KnownDistance>& distances,
-              const std::vector<MarkerBar>& markers,
-              Model& model) {
+std::optional<DistanceScale> scale_by(const std::vector<KnownDistance>& distances,
+                                      const std::vector<MarkerBar>& markers,
+                                      Model& model) {
   std::vector<NamedBar> picked;
   picked.reserve(distances.size());
   for (const KnownDistance& distance : distances) {
     picked.push_back({distance.text, bar_of(distance, model)});
   }
-  if (picked.empty() && markers.empty()) return nullptr;
+  if (picked.empty() && markers.empty()) return std::nullopt;
   const std::vector<NamedBar> sides = sides_of(markers);
   BarScale by_markers;
   std::vector<NamedBar> all = picked;
@@ -240,30 +239,43 @@ Json scale_by(const std::vector<KnownDistance>& distances,
     all.push_back({"of the markers", bar_of_all(markers, by_markers)});
   }
   const BarScale scale = scale_of(bars_of(all));
-  Json list = Json::array();
+  DistanceScale out{scale.metres_per_unit, scale.sigma, {}, {}};
   for (size_t i = 0; i < picked.size(); ++i) {
-    list.push_back(bar_json(picked[i], scale.metres_per_unit, scale.used[i]));
+    out.distances.push_back(compared(picked[i], scale.metres_per_unit, scale.used[i]));
   }
   for (size_t i = 0; i < sides.size(); ++i) {
     const bool is_used = by_markers.used[i] && scale.used.back();
-    list.push_back(bar_json(sides[i], scale.metres_per_unit, is_used));
+    out.distances.push_back(compared(sides[i], scale.metres_per_unit, is_used));
   }
-  Json warnings = sides.empty() ? Json::array() : warnings_of(by_markers, sides);
-  for (const Json& warning : warnings_of(scale, all)) warnings.push_back(warning);
+  if (!sides.empty()) out.warnings = warnings_of(by_markers, sides);
+  for (std::string& warning : warnings_of(scale, all)) out.warnings.push_back(std::move(warning));
   Frame& frame = model.scene.frame;
   const std::string contradiction =
       scale_contradiction(frame,
                           sides.empty() ? "the known distances" : "the markers",
                           scale.metres_per_unit,
                           scale.sigma);
-  if (!contradiction.empty()) warnings.push_back(contradiction);
+  if (!contradiction.empty()) out.warnings.push_back(contradiction);
   frame.metres_per_unit = scale.metres_per_unit;
   frame.metres_sigma = scale.sigma;
   frame.scale_source = ScaleSource::KnownDistance;
+  return out;
+}
+
+Json distances_to_json(const DistanceScale& scale) {
+  Json list = Json::array();
+  for (const ComparedDistance& d : scale.distances) {
+    list.push_back({{"distance", d.name},
+                    {"known", d.known},
+                    {"measured", d.measured},
+                    {"sigma", d.sigma},
+                    {"residual", d.measured - d.known},
+                    {"used", d.is_used}});
+  }
   return {{"metres_per_unit", scale.metres_per_unit},
-          {"metres_sigma", scale.sigma},
+          {"metres_sigma", scale.metres_sigma},
           {"distances", list},
-          {"warnings", warnings}};
+          {"warnings", scale.warnings}};
 }
 
 }  // namespace cgs

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,23 @@ struct KnownDistance {
 /// where its uncertainty is known.
 using DistanceWords = std::array<std::string, 3>;
 
+/// A known distance beside what the model, in the scale that all of them make, says of it.
+struct ComparedDistance {
+  std::string name;      ///< As typed, or which marker's side.
+  double known = 0;      ///< [m]
+  double measured = 0;   ///< [m]
+  double sigma = 0;      ///< Of measured [m].
+  bool is_used = false;  ///< The scale is also of it.
+};
+
+/// The scale that known distances make.
+struct DistanceScale {
+  double metres_per_unit = 0;
+  double metres_sigma = 0;
+  std::vector<ComparedDistance> distances;
+  std::vector<std::string> warnings;
+};
+
 /// \throws InvalidInput for what cannot be read, a view that is no input view, or a pixel outside
 ///         of its photograph
 std::vector<KnownDistance> known_distances(const std::vector<DistanceWords>& typed,
@@ -45,11 +63,13 @@ void check_picks(const std::vector<KnownDistance>& distances, const Model& model
 ///
 /// The sigma of a picked length in the scene is that of the depths at both ends and of half a pixel
 /// of the images worked on.
-/// \return {"metres_per_unit", "metres_sigma", "distances": [{"distance", "known", "measured",
-///          "sigma", "residual", "used"}], "warnings"}, lengths in metres; null for neither
 /// \throws InvalidInput where no depth was measured at a pixel, or both ends fall together
-nlohmann::ordered_json scale_by(const std::vector<KnownDistance>& distances,
-                                const std::vector<MarkerBar>& markers,
-                                Model& model);
+std::optional<DistanceScale> scale_by(const std::vector<KnownDistance>& distances,
+                                      const std::vector<MarkerBar>& markers,
+                                      Model& model);
+
+/// {"metres_per_unit", "metres_sigma", "distances": [{"distance", "known", "measured", "sigma",
+/// "residual", "used"}], "warnings"}, lengths in metres; residual is measured minus known.
+nlohmann::ordered_json distances_to_json(const DistanceScale& scale);
 
 }  // namespace cgs

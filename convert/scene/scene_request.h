@@ -42,9 +42,9 @@ inline constexpr const char* kPosesFolder = "colmap";
 /// What open_scene() returns.
 struct OpenedScene {
   Scene scene;
-  std::optional<PhotoPoses> poses;      ///< If they were solved for.
-  std::optional<RefinedPoses> refined;  ///< If that was asked for.
-  nlohmann::ordered_json control;       ///< As move_to_control_frame() returns it; null without.
+  std::optional<PhotoPoses> poses;       ///< If they were solved for.
+  std::optional<RefinedPoses> refined;   ///< If that was asked for.
+  std::optional<ControlReport> control;  ///< If control points were given.
 
   /// Relative standard deviation of focal lengths that were solved for; 0 = they were given.
   double focal_sigma() const { return poses ? poses->focal_sigma : 0; }

@@ -100,7 +100,7 @@ class ControlFrame : public testing::Test {
   }
   nlohmann::ordered_json move(const std::string& rows, const std::string& unit = "") {
     test::write_bytes(dir_ / "survey.csv", "name,x,y,z,sigma,role,view,px,py\n" + rows);
-    return move_to_control_frame({dir_ / "survey.csv", unit}, scene_);
+    return control_to_json(move_to_control_frame({dir_ / "survey.csv", unit}, scene_));
   }
   void make_fisheyes(double focal) {
     is_fisheye_ = true;

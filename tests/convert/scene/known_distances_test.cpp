@@ -54,8 +54,8 @@ class KnownDistances : public testing::Test {
     return priors;
   }
 
-  nlohmann::ordered_json scale(const std::vector<DistanceWords>& words) {
-    return scale_by(known_distances(words, model_.scene), {}, model_);
+  DistanceScale scale(const std::vector<DistanceWords>& words) {
+    return scale_by(known_distances(words, model_.scene), {}, model_).value();
   }
 
   /// Pixel of the file that sees a point of the wall, as users type it.
@@ -83,8 +83,8 @@ TEST_F(KnownDistances, GiveTheLengthOfAUnit) {
   const auto report = scale({{pixel_of(0, -0.1, 0), pixel_of(0, 0.1, 0), "400cm"}});
   EXPECT_NEAR(model_.scene.frame.metres_per_unit, 2.5, 1e-5);
   EXPECT_EQ(model_.scene.frame.scale_source, ScaleSource::KnownDistance);
-  EXPECT_NEAR(report["distances"][0]["measured"].get<double>(), 4, 1e-9);
-  EXPECT_TRUE(report["warnings"].empty());
+  EXPECT_NEAR(report.distances[0].measured, 4, 1e-9);
+  EXPECT_TRUE(report.warnings.empty());
 }
 
 TEST_F(KnownDistances, MayEndInTwoPhotographsAndBeTakenThroughALens) {
@@ -168,26 +168,25 @@ TEST_F(KnownDistances, NameTheOneOfThreeThatIsWrong) {
                              {pixel_of(0, -0.1, 0.1), pixel_of(0, 0.1, 0.1), "4m"},
                              {pixel_of(2, 0.1, -0.1), pixel_of(2, 0.3, -0.1), "6m"}});
   EXPECT_NEAR(model_.scene.frame.metres_per_unit, 2.5, 1e-5);
-  EXPECT_FALSE(report["distances"][2]["used"].get<bool>());
-  ASSERT_EQ(report["warnings"].size(), 1u);
-  EXPECT_NE(report["warnings"][0].get<std::string>().find("6m"), std::string::npos);
+  EXPECT_FALSE(report.distances[2].is_used);
+  ASSERT_EQ(report.warnings.size(), 1u);
+  EXPECT_NE(report.warnings[0].find("6m"), std::string::npos);
 }
 
 TEST_F(KnownDistances, WarnOfAScaleThatTheSceneContradicts) {
   model_.scene.frame.metres_per_unit = 1;
   model_.scene.frame.scale_source = ScaleSource::CameraPoses;
   const DistanceWords right = {pixel_of(0, 0, 0), pixel_of(0, 0.1, 0), "80cm"};
-  EXPECT_EQ(scale({right})["warnings"].size(), 0u);
+  EXPECT_EQ(scale({right}).warnings.size(), 0u);
   const DistanceWords wrong = {pixel_of(0, 0, 0), pixel_of(0, 0.1, 0), "1.6m"};
   const auto report = scale({wrong});
-  ASSERT_EQ(report["warnings"].size(), 1u);
-  EXPECT_NE(report["warnings"][0].get<std::string>().find("the known distances that it is 2 m"),
-            std::string::npos)
-      << report["warnings"][0];
+  ASSERT_EQ(report.warnings.size(), 1u);
+  EXPECT_NE(report.warnings[0].find("the known distances that it is 2 m"), std::string::npos)
+      << report.warnings[0];
 }
 
 TEST_F(KnownDistances, WithoutAnyNothingChanges) {
-  EXPECT_TRUE(scale({}).is_null());
+  EXPECT_FALSE(scale_by({}, {}, model_).has_value());
   EXPECT_FALSE(model_.scene.frame.has_metric_scale());
 }
 

@@ -75,10 +75,11 @@ TEST_F(MarkerBars, MeasureTheSideWithinItsSigma) {
   }
   Model model;
   model.scene = scene_;
-  const auto report = scale_by({}, bars, model);
+  const auto scale = scale_by({}, bars, model);
+  ASSERT_TRUE(scale);
   EXPECT_NEAR(model.scene.frame.metres_per_unit, kMetres, 0.003 * kMetres);
   EXPECT_EQ(model.scene.frame.scale_source, ScaleSource::KnownDistance);
-  EXPECT_EQ(report["distances"][0]["distance"], "side of marker AprilTag 36h11 1, 3 photographs");
+  EXPECT_EQ(scale->distances[0].name, "side of marker AprilTag 36h11 1, 3 photographs");
 }
 
 // One size is stated for all of them.
@@ -91,12 +92,13 @@ TEST_F(MarkerBars, ManyDoNotTellTheStatedSizeBetter) {
   ASSERT_EQ(bars.size(), 4u);
   Model model;
   model.scene = scene_;
-  const auto report = scale_by({}, bars, model);
+  const auto scale = scale_by({}, bars, model);
+  ASSERT_TRUE(scale);
   const double relative = model.scene.frame.metres_sigma / model.scene.frame.metres_per_unit;
   EXPECT_GT(relative, 0.02);
   EXPECT_LT(relative, 0.023);
-  EXPECT_EQ(report["distances"].size(), 4u);
-  EXPECT_LT(report["distances"][0]["sigma"].get<double>(), 0.002) << "of this side alone";
+  EXPECT_EQ(scale->distances.size(), 4u);
+  EXPECT_LT(scale->distances[0].sigma, 0.002) << "of this side alone";
 }
 
 TEST_F(MarkerBars, RefusesWhereNoTwoPhotographsShowASquare) {
