@@ -143,12 +143,12 @@ Content wanted_content(const ConversionRequest& request, const Source& source) {
                            (request.as == "splats" && out != Content::Splats);
   require(!asked_other, "--as must fit the output: " + extension + " cannot hold that", request.as);
   constexpr std::array<const char*, 3> kNames = {"splats", "a volume", "a mesh"};
-  require(
-      from == Content::Splats || out == Content::Mesh,
-      std::string("convert goes from splats to volume to mesh, not back: the output would be ") +
-          kNames.at(static_cast<size_t>(out)) + "; the input",
-      source.mesh.faces.empty() && from == Content::Mesh ? "a plain point cloud"
-                                                         : kNames.at(static_cast<size_t>(from)));
+  const bool is_cloud = source.mesh.faces.empty() && from == Content::Mesh;
+  const std::string input = is_cloud ? "a plain point cloud" : kNames.at(static_cast<size_t>(from));
+  if (from != Content::Splats && out != Content::Mesh) {
+    throw InvalidInput("convert goes from splats to volume to mesh, not back: of " + input +
+                       " it cannot make " + kNames.at(static_cast<size_t>(out)));
+  }
   return out;
 }
 

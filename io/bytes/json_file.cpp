@@ -173,6 +173,7 @@ int JsonValue::count() const {
   return static_cast<int>(value);
 }
 
+bool JsonValue::is_null() const { return value_->is_null(); }
 bool JsonValue::is_array() const { return value_->is_array(); }
 bool JsonValue::is_object() const { return value_->is_object(); }
 

@@ -59,6 +59,7 @@ class JsonValue {
   /// \throws BadInput Schema
   int count() const;
 
+  bool is_null() const;
   bool is_array() const;
   bool is_object() const;
   bool is_text() const;

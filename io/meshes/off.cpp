@@ -15,6 +15,11 @@ using OffWords = std::vector<std::string_view>;
 
 OffWords words_of(std::string_view line) { return tokens(line.substr(0, line.find('#'))); }
 
+bool is_whole_number(std::string_view word) {
+  uint64_t unused = 0;
+  return parse_number(word, unused);
+}
+
 struct OffHeader {
   uint64_t vertices = 0;
   uint64_t faces = 0;
@@ -41,10 +46,8 @@ OffHeader read_header(TextLines& lines) {
   OffWords words = words_of(expect_line(lines, "the OFF keyword"));
   if (words.empty()) lines.fail(Defect::Magic, "does not start with OFF");
   const auto kind = kind_in(words[0]);
-  uint64_t number = 0;
-  const bool is_bare = words.size() == 3 && std::all_of(words.begin(), words.end(), [&](auto word) {
-                         return parse_number(word, number);
-                       });
+  const bool is_bare =
+      words.size() == 3 && std::all_of(words.begin(), words.end(), is_whole_number);
   if (!kind && !is_bare) lines.fail(Defect::Magic, "does not start with OFF");
   OffHeader out;
   if (kind) {
@@ -79,6 +82,9 @@ class OffVertices {
   void read() {
     for (uint64_t i = 0; i < header_.vertices; ++i) add(words_of(expect_line(lines_, "a vertex")));
     if (!all_have_normals_) out_.mesh.normals.clear();
+    if (are_bytes_ && brightest_ > 1) {
+      for (Eigen::Vector3f& color : out_.mesh.colors) color /= 255;
+    }
     settle_colors(out_);
     fill_in_colors(out_, colored_);
   }
@@ -96,12 +102,18 @@ class OffVertices {
     if (header_.color == 0 || words.size() < header_.color + 3) return;
     colored_.push_back(out_.positions.size() - 1);
     out_.mesh.colors.emplace_back(off_triple(lines_, words, header_.color).cast<float>());
+    for (size_t i = header_.color; i < std::min(words.size(), header_.color + 4); ++i) {
+      are_bytes_ = are_bytes_ && is_whole_number(words[i]);
+      brightest_ = std::max(brightest_, lines_.measured(words[i]));
+    }
   }
 
   TextLines& lines_;
   const OffHeader& header_;
   ParsedMesh& out_;
   std::vector<size_t> colored_;  // vertices that state a colour
+  bool are_bytes_ = true;        // whole numbers, with the opacity where it is stated
+  double brightest_ = 0;
   bool all_have_normals_ = true;
 };
 
@@ -150,11 +162,7 @@ class OffFaces {
     if (words.size() == 1) has_numbered_colors_ = true;
     if (words.size() < 3) return;
     const Eigen::Vector3f color = off_triple(lines_, words, 0).cast<float>();
-    const bool is_whole = std::all_of(words.begin(), words.begin() + 3, [](std::string_view word) {
-      uint64_t unused = 0;
-      return parse_number(word, unused);
-    });
-    are_whole_ = are_whole_ && is_whole;
+    are_whole_ = are_whole_ && std::all_of(words.begin(), words.begin() + 3, is_whole_number);
     brightest_ = std::max(brightest_, color.maxCoeff());
     for (const uint32_t corner : corners_) colors_.emplace_back(corner, color);
   }
@@ -179,11 +187,61 @@ class OffFaces {
   uint64_t dropped_ = 0;
 };
 
-}  // namespace
+/// Takes words off a text and writes each record of them on a line of its own.
+class OffRecords {
+ public:
+  explicit OffRecords(const std::string& bytes) {
+    size_t at = 0;
+    while (at < bytes.size()) {
+      const size_t end = std::min(bytes.find('\n', at), bytes.size());
+      for (const std::string_view word : words_of(std::string_view(bytes).substr(at, end - at))) {
+        words_.push_back(word);
+      }
+      at = end + 1;
+    }
+  }
+  /// \return false where fewer are left
+  bool take(uint64_t count) {
+    if (count > words_.size() - next_) return false;
+    for (uint64_t i = 0; i < count; ++i) out_.append(words_[next_++]).push_back(' ');
+    out_.back() = '\n';
+    return true;
+  }
+  std::optional<uint64_t> number_ahead(size_t steps = 0) const {
+    uint64_t out = 0;
+    const bool is_there = next_ + steps < words_.size();
+    return is_there && parse_number(words_[next_ + steps], out) ? std::optional(out) : std::nullopt;
+  }
+  bool is_at_end() const { return next_ == words_.size(); }
+  std::string text() && { return std::move(out_); }
 
-ParsedMesh read_off(const std::filesystem::path& path) {
-  const std::string bytes = read_file(path);
-  refuse_foreign_content(path, bytes, "OFF");
+ private:
+  OffWords words_;
+  size_t next_ = 0;
+  std::string out_ = " ";
+};
+
+/// The format takes any white space between numbers; where lines are no records, this makes them
+/// such. Records can only be told apart without lines where the file states nothing but points and
+/// faces; nullopt for others.
+std::optional<std::string> one_record_per_line(const std::string& bytes) {
+  OffRecords records(bytes);
+  if (!bytes.starts_with("OFF") || !records.take(1)) return std::nullopt;
+  const auto vertices = records.number_ahead();
+  const auto faces = records.number_ahead(1);
+  if (!vertices || !faces || !records.take(3)) return std::nullopt;
+  for (uint64_t i = 0; i < *vertices; ++i) {
+    if (!records.take(3)) return std::nullopt;
+  }
+  for (uint64_t i = 0; i < *faces; ++i) {
+    const auto corners = records.number_ahead();
+    if (!corners || *corners > bytes.size() || !records.take(*corners + 1)) return std::nullopt;
+  }
+  if (!records.is_at_end()) return std::nullopt;
+  return std::move(records).text();
+}
+
+ParsedMesh parse_off(const std::string& bytes, const std::filesystem::path& path) {
   TextLines lines(bytes, path);
   const OffHeader header = read_header(lines);
   ByteReader(bytes, path).expect_records(header.vertices, 6, "vertices");
@@ -194,6 +252,20 @@ ParsedMesh read_off(const std::filesystem::path& path) {
   OffFaces(lines, header, out).read();
   drop_unusable(out, path);
   return out;
+}
+
+}  // namespace
+
+ParsedMesh read_off(const std::filesystem::path& path) {
+  const std::string bytes = read_file(path);
+  refuse_foreign_content(path, bytes, "OFF");
+  try {
+    return parse_off(bytes, path);
+  } catch (const BadInput&) {
+    const auto records = one_record_per_line(bytes);
+    if (!records) throw;
+    return parse_off(*records, path);
+  }
 }
 
 }  // namespace cgs

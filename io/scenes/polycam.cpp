@@ -84,7 +84,7 @@ Eigen::Isometry3d read_polycam_pose(const JsonValue& camera) {
 bool read_polycam_size(const JsonValue& document, const fs::path& image, Camera& camera) {
   const auto width = document.find("width");
   const auto height = document.find("height");
-  if (width && height) {
+  if (width && height && !width->is_null() && !height->is_null()) {
     camera.width = width->count();
     camera.height = height->count();
     return true;

@@ -34,7 +34,14 @@ TEST(ReadOff, ReadsColoursOfVertices) {
   const ParsedMesh bytes = read_off(dir / "a.off");
   ASSERT_EQ(bytes.mesh.colors.size(), 3U);
   EXPECT_LT((bytes.mesh.colors[0] - Eigen::Vector3f(1, 0, 0.2f)).norm(), 1e-6f);
-  EXPECT_EQ(bytes.warnings.size(), 1U);
+  EXPECT_TRUE(bytes.warnings.empty());
+  test::write_bytes(dir / "a.off",
+                    "COFF 3 1 0\n0 0 0 1 0 1 255\n1 0 0 0 0 1 255\n1 1 0 0 0 0 255\n" + faces);
+  const ParsedMesh dark = read_off(dir / "a.off");
+  EXPECT_LT((dark.mesh.colors[0] - Eigen::Vector3f(1, 0, 1) / 255).norm(), 1e-6f);
+  test::write_bytes(dir / "a.off",
+                    "COFF 3 1 0\n0 0 0 1 0 1 1\n1 0 0 0 0 1 1\n1 1 0 0 0 0 1\n" + faces);
+  EXPECT_EQ(read_off(dir / "a.off").mesh.colors[0], Eigen::Vector3f(1, 0, 1));
   test::write_bytes(
       dir / "a.off",
       "CNOFF 3 1 0\n0 0 0 9 9 9 1 0 .2 1\n1 0 0 9 9 9 0 0 0 1\n1 1 0 9 9 9 0 0 0 1\n" + faces);
@@ -83,6 +90,27 @@ TEST(ReadOff, TheKeywordMayStandRightBeforeTheNumbersOrBeMissing) {
   }
   EXPECT_EQ(defect("OFFX 4 2 0\n" + kPoints), "SYNTAX");
   EXPECT_EQ(defect("4 two 0\n" + kPoints), "MAGIC");
+}
+
+TEST(ReadOff, LinesNeedNotBeRecords) {
+  const test::TempDir dir;
+  const auto read = [&](std::string bytes) {
+    test::write_bytes(dir / "a.off", bytes);
+    return read_off(dir / "a.off");
+  };
+  const std::string square = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0 # corner\n0 1 0\n3 0 1 2\n3 0 2 3\n";
+  const ParsedMesh expected = read(square);
+  std::string on_one_line = square;
+  on_one_line.erase(on_one_line.find("# corner"), 8);
+  std::string on_many = on_one_line;
+  std::replace(on_one_line.begin(), on_one_line.end(), '\n', ' ');
+  std::replace(on_many.begin(), on_many.end(), ' ', '\n');
+  for (const std::string& bytes : {on_one_line, on_many}) {
+    const ParsedMesh mesh = read(bytes);
+    EXPECT_EQ(mesh.positions, expected.positions) << bytes;
+    EXPECT_EQ(mesh.mesh.faces, expected.mesh.faces) << bytes;
+  }
+  EXPECT_EQ(defect("OFF 4 2 0 0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 2 3 0 2"), "TRUNCATED");
 }
 
 TEST(ReadOff, ReadsNormals) {

@@ -139,6 +139,9 @@ TEST_F(ReadPolycam, TakesFromThePhotographWhatIsNotStated) {
   EXPECT_EQ(camera.width, 64);
   EXPECT_EQ(camera.height, 48);
   EXPECT_EQ(camera.cx, 31.25);
+  bare["width"] = bare["height"] = nullptr;
+  write_camera("corrected_cameras", 0, bare);
+  EXPECT_EQ(read_polycam({dir_.path()}).views[0].camera.width, 64) << "null is not stated";
   for (const char* key : {"cx", "cy", "fy"}) bare.erase(key);
   write_camera("corrected_cameras", 0, bare);
   camera = read_polycam({dir_.path()}).views[0].camera;
