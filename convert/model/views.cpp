@@ -21,6 +21,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
 #include "libcgs/priors/transients.h"
+#include "libcgs/render/picture.h"
 #include "libcgs/train/image_metrics.h"
 
 namespace cgs {
@@ -97,6 +98,33 @@ MaskMap valid_pixels(const Scene& scene, int view) {
   }
 }
 
+// What input views leave out: what is masked, or, where the photograph is gone, all without depth.
+double masked_share(const Model& model) {
+  double masked = 0;
+  double pixels = 0;
+  for (size_t k = 0; k < model.priors.size(); ++k) {
+    const int view = model.scene.input[k];
+    const auto& origin = model.priors[k].origin.data;
+    const bool is_there = is_present(model.scene.views[static_cast<size_t>(view)].image_path);
+    const auto& valid = valid_pixels(model.scene, view).data;
+    masked += double(is_there ? std::count(valid.begin(), valid.end(), uint8_t{0})
+                              : std::count(origin.begin(), origin.end(), DepthOrigin::Unknown));
+    pixels += double(origin.size());
+  }
+  return pixels > 0 ? masked / pixels : 1;
+}
+
+// Whether pictures may be completed where nothing is drawn. Around an object that was cut out by
+// masks, and where nothing is known of photographs, what is empty may be meant to be.
+bool may_complete(const Model& model) {
+  constexpr double kCutOut = 0.25;  // the rim that a wide lens leaves is half of that
+  return masked_share(model) < kCutOut;
+}
+
+ColorImage shown_picture(const RenderBuffers& buffers, bool is_completed) {
+  return is_completed ? filled_picture(buffers) : picture(buffers);
+}
+
 ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
   ViewRasters rasters;
   rasters.color = buffers.color;
@@ -122,6 +150,7 @@ MaskMap transient_pixels(const Model& model, int view) {
 
 RenderedPicture write_view(const Model& model,
                            const std::vector<SupportView>& inputs,
+                           bool is_completed,
                            int index,
                            const std::filesystem::path& folder) {
   const View& view = model.scene.views[static_cast<size_t>(index)];
@@ -130,7 +159,7 @@ RenderedPicture write_view(const Model& model,
   rasters.valid = valid_pixels(model.scene, index);  // what is masked was seen, and is not wanted
   write_view_exr(folder / (view.name + ".exr"), rasters, view.camera, model.scene.frame);
   const auto png = [&](const char* what) { return folder / (view.name + "." + what + ".png"); };
-  write_png(png("color"), picture(buffers));
+  write_png(png("color"), shown_picture(buffers, is_completed));
   write_png(png("depth"), depth_picture(rasters.depth));
   write_png(png("normal"), normal_picture(rasters.normal, view.camera.cam_from_world()));
   if (knows_holes(model)) {
@@ -217,10 +246,13 @@ double share_of(const MaskMap& part, const MaskMap& whole) {
   return count(part) / count(whole);
 }
 
-EvaluatedView evaluate_view(const Model& model, const std::vector<SupportView>& inputs, int index) {
+EvaluatedView evaluate_view(const Model& model,
+                            const std::vector<SupportView>& inputs,
+                            bool is_completed,
+                            int index) {
   View view = model.scene.views[static_cast<size_t>(index)];
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
-  const ColorImage shown = blackened(picture(buffers), view.valid);
+  const ColorImage shown = blackened(shown_picture(buffers, is_completed), view.valid);
   MaskMap seen = hole_mask(buffers);
   for (uint8_t& value : seen.data) value = 1 - value;
   const MaskMap everywhere(seen.width, seen.height, 1);
@@ -348,10 +380,11 @@ std::vector<RenderedPicture> write_views(const Model& model,
                                          const Progress& progress) {
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
+  const bool is_completed = may_complete(model);
   std::vector<RenderedPicture> out;
   for (size_t k = 0; k < views.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(views.size()));
-    out.push_back(write_view(model, inputs, views[k], folder));
+    out.push_back(write_view(model, inputs, is_completed, views[k], folder));
   }
   report(progress, 1);
   return out;
@@ -363,6 +396,7 @@ std::vector<RenderedPicture> write_path(const Model& model,
                                         const Progress& progress) {
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
+  const bool is_completed = may_complete(model);
   remove_frames(folder);
   write_cameras_json(folder / "cameras.json", scene_of_path(model, path));
   constexpr size_t kOnSheet = 12;
@@ -372,7 +406,7 @@ std::vector<RenderedPicture> write_path(const Model& model,
   for (size_t k = 0; k < path.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(path.size()));
     const RenderBuffers buffers = render_camera(model, inputs, path[k]);
-    const ColorImage shown = picture(buffers);
+    const ColorImage shown = shown_picture(buffers, is_completed);
     MaskMap holes(shown.width, shown.height, 0);
     const std::vector<std::string> names = pictures_of_frame(k);
     write_png(folder / names[0], shown);
@@ -435,11 +469,12 @@ Evaluation evaluate_views(Model& model, const std::vector<int>& views, const Pro
   }
   const std::vector<int> shown = with_photograph(model.scene, views);
   const std::vector<SupportView> inputs = support_views(model);
+  const bool is_completed = may_complete(model);
   Evaluation out;
   for (size_t k = 0; k < shown.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(shown.size()));
     load_images(model.scene, {shown[k]});
-    out.views.push_back(evaluate_view(model, inputs, shown[k]));
+    out.views.push_back(evaluate_view(model, inputs, is_completed, shown[k]));
     model.scene.views[static_cast<size_t>(shown[k])].image = {};  // one photograph at a time
   }
   out.mean = mean_of(out.views, warnings);

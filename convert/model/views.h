@@ -43,17 +43,20 @@ struct RenderedPicture {
 };
 
 /// Writes NAME.exr and NAME.{color,depth,normal,hole}.png for each of the given views of the model.
-/// NAME.transient.png is the mask of what was left out of an input view because the others
-/// contradict it, where there is any. Without priors no hole.png is written; the EXR says, as it
-/// does of any pixel, that no input view can vouch for it.
+/// Where nothing is drawn, the colours of the PNG go on with those around, as filled_picture()
+/// does, unless photographs were masked; those of the EXR, and all else, do not. NAME.transient.png
+/// is the mask of what was left out of an input view because the others contradict it, where there
+/// is any. Without priors no hole.png is written; the EXR says, as it does of any pixel, that no
+/// input view can vouch for it.
 std::vector<RenderedPicture> write_views(const Model& model,
                                          const std::vector<int>& views,
                                          const std::filesystem::path& folder,
                                          const Progress& progress);
 
-/// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
-/// says where they are, and contact.png: twelve of them, holes in magenta. Without priors there are
-/// no masks and no magenta. What is returned has no roles.
+/// Writes frame_0000.png, completed like colours of views, frame_0000.hole.png and so on for
+/// cameras along a path, cameras.json that says where they are, and contact.png: twelve of them,
+/// holes in magenta. Without priors there are no masks and no magenta. What is returned has no
+/// roles.
 std::vector<RenderedPicture> write_path(const Model& model,
                                         const std::vector<Camera>& path,
                                         const std::filesystem::path& folder,
@@ -98,7 +101,8 @@ nlohmann::ordered_json figures_to_json(const ViewFigures& figures);
 nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
 
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
-/// that are not holes, and MS-SSIM over all. Loads the photographs.
+/// that are not holes, and MS-SSIM over all. Pictures are those of write_views(). Loads the
+/// photographs.
 ///
 /// Where the exposures of input views were matched, the photographs of others are matched to what
 /// is rendered, by factors on red, green and blue light.

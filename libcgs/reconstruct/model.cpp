@@ -32,15 +32,4 @@ RenderBuffers render_camera(const Model& model,
   return buffers;
 }
 
-ColorImage picture(const RenderBuffers& buffers) {
-  ColorImage out = buffers.color;
-  constexpr float kMinAlpha = 0.5f;
-  for (size_t i = 0; i < out.data.size(); ++i) {
-    const float alpha = buffers.alpha.data[i];
-    if (alpha >= kMinAlpha) out.data[i] /= alpha;
-    out.data[i] = out.data[i].cwiseMax(0.0f).cwiseMin(1.0f);
-  }
-  return out;
-}
-
 }  // namespace cgs

@@ -31,8 +31,4 @@ RenderBuffers render_camera(const Model& model,
                             const std::vector<SupportView>& inputs,
                             const Camera& camera);
 
-/// The rendered colour as a picture: divided by alpha where alpha reaches one half, black in holes
-/// without colour. Values in [0, 1].
-ColorImage picture(const RenderBuffers& buffers);
-
 }  // namespace cgs

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "libcgs/core/order_statistics.h"
-#include "libcgs/reconstruct/model.h"
+#include "libcgs/render/picture.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/splats/splat_merging.h"
 #include "libcgs/splats/splat_refit.h"

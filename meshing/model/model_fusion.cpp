@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "libcgs/priors/estimated_depth.h"
+#include "libcgs/render/picture.h"
 
 namespace cgs {
 

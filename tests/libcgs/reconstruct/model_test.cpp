@@ -27,15 +27,5 @@ TEST(SupportViews, AreTheInputViewsWithWhatVouchesForTheirDepth) {
   EXPECT_TRUE(support_views(model).empty());
 }
 
-TEST(Picture, DividesByAlphaAboveOneHalfOnly) {
-  RenderBuffers buffers;
-  buffers.color = ColorImage(2, 1, Eigen::Vector3f(0.3f, 0.3f, 0.3f));
-  buffers.alpha = Raster<float>(2, 1, 0.6f);
-  buffers.alpha(1, 0) = 0.4f;
-  const ColorImage shown = picture(buffers);
-  EXPECT_NEAR(shown(0, 0).x(), 0.5f, 1e-6f);
-  EXPECT_NEAR(shown(1, 0).x(), 0.3f, 1e-6f);
-}
-
 }  // namespace
 }  // namespace cgs::reconstructed_model_test

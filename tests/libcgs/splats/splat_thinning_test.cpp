@@ -10,6 +10,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/reconstruct/model.h"
+#include "libcgs/render/picture.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/splats/splat_refit.h"
 #include "libcgs/splats/splat_selection.h"
