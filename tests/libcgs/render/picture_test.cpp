@@ -52,6 +52,29 @@ TEST(FilledPicture, GoesOnWithTheFarSideBehindAnEdge) {
   }
 }
 
+// Its backdrop is the farthest of all.
+TEST(FilledPicture, SkyYieldsToSurface) {
+  RenderBuffers buffers = gap_behind_an_edge(40, 40, 18, 22);
+  buffers.hole = Raster<Hole>(40, 40, Hole::None);
+  for (int y = 0; y < 40; ++y) {
+    for (int x = 22; x < 40; ++x) {
+      buffers.hole(x, y) = Hole::Sky;
+      buffers.median_depth(x, y) = 1000;
+    }
+  }
+  const ColorImage shown = filled_picture(buffers);
+  for (const int x : {18, 21}) EXPECT_LT((shown(x, 20) - kNear).norm(), 0.1f) << x;
+}
+
+// One side of a wide gap does not take all of it, as steps would show where cells of the pyramid
+// end.
+TEST(FilledPicture, WideGapsAreSmooth) {
+  const ColorImage shown = filled_picture(gap_behind_an_edge(512, 64, 40, 470));
+  for (int x = 80; x < 430; ++x) {
+    EXPECT_LT((shown(x, 32) - shown(x - 1, 32)).norm(), 0.08f) << x;
+  }
+}
+
 TEST(FilledPicture, LeavesWhatIsShownAsItIs) {
   const RenderBuffers buffers = gap_behind_an_edge(33, 16, 11, 20);
   const ColorImage filled = filled_picture(buffers);
