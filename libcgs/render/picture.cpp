@@ -13,9 +13,8 @@ namespace cgs {
 
 namespace {
 
-constexpr float kShown = 0.5f;       // alpha from which on a pixel has a colour of its own
-constexpr float kSkyDepth = 0.001f;  // of the median depth of surface
-constexpr size_t kNarrow = 5;        // halvings within which a gap is one behind an edge: 32 pixels
+constexpr float kShown = 0.5f;  // alpha from which on a pixel has a colour of its own
+constexpr size_t kNarrow = 5;   // halvings within which a gap is one behind an edge: 32 pixels
 
 /// Colours of one size of the picture, and how much is known of each: 0 to 1.
 struct Level {
@@ -30,7 +29,7 @@ struct Level {
 };
 
 /// A weighted mean. In narrow gaps it leans to what is far: at half the depth a colour counts a
-/// 256th. Wide ones are no gaps behind an edge, and there only sky yields.
+/// 256th. Wide ones are no gaps behind an edge.
 class FarMean {
  public:
   explicit FarMean(bool is_narrow) : is_narrow_(is_narrow) {}
@@ -59,8 +58,8 @@ class FarMean {
 
  private:
   float far_share(float ratio) const {
+    if (!is_narrow_) return 1;
     const float squared = ratio * ratio;
-    if (!is_narrow_) return std::min(1.0f, 20 * ratio);
     return squared * squared * squared * squared;
   }
 
@@ -81,8 +80,7 @@ float backdrop_depth(const DepthMap& depth, const Raster<Hole>& hole) {
   return of_sky.empty() ? std::numeric_limits<float>::infinity() : 0.5f * median(of_sky);
 }
 
-// The backdrop of the sky is not to be preferred as if it were far: surface goes on with it only
-// where there is hardly anything else.
+// The backdrop of the sky is not to be preferred as if it were far: no ground goes on with it.
 Level shown_pixels(const ColorImage& shown, const RenderBuffers& buffers) {
   Level out(shown.width, shown.height);
   const float backdrop = backdrop_depth(buffers.median_depth, buffers.hole);
@@ -96,8 +94,8 @@ Level shown_pixels(const ColorImage& shown, const RenderBuffers& buffers) {
     if (depth < backdrop) of_surface.push_back(depth);
   }
   if (of_surface.empty()) return out;
-  const float as_near = kSkyDepth * median(of_surface);
-  for (float& depth : out.depth.data) depth = depth < backdrop ? depth : as_near;
+  const float middle = median(of_surface);
+  for (float& depth : out.depth.data) depth = depth < backdrop ? depth : middle;
   return out;
 }
 
