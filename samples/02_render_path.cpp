@@ -7,7 +7,7 @@
 #include "io/images/png.h"
 #include "io/scenes/scene_reader.h"
 #include "io/splats/splat_reader.h"
-#include "libcgs/reconstruct/model.h"
+#include "libcgs/render/picture.h"
 #include "libcgs/render/rasterizer.h"
 
 int main(int argc, char** argv) try {

@@ -2,6 +2,7 @@
 #include "convert/commands/common_options.h"
 
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -48,6 +49,17 @@ void add_output_options(CLI::App& command, CommonOptions& options) {
   command.add_flag("--json", options.json, "Print the report as JSON on standard output");
   command.add_flag("-q,--quiet", options.quiet, "No progress on standard error");
   command.add_flag("--strict", options.strict, "A warning ends the command with exit code 3");
+}
+
+void add_fill_option(CLI::App& command, HoleFill& fill) {
+  static const std::map<std::string, HoleFill> kNames = {{"around", HoleFill::Around},
+                                                         {"none", HoleFill::None}};
+  command
+      .add_option("--fill",
+                  fill,
+                  "What pictures show where nothing was reconstructed: the colours around it "
+                  "(default; not around what masks cut out), or none: black")
+      ->transform(CLI::CheckedTransformer(kNames).description("around, none"));
 }
 
 void add_scene_options(CLI::App& command, SceneOptions& options) {

@@ -8,6 +8,7 @@
 #include <CLI/App.hpp>
 
 #include "convert/model/fusion.h"
+#include "convert/model/views.h"
 #include "convert/scene/scene_request.h"
 #include "io/meshes/gltf.h"
 #include "io/scenes/scene_reader.h"
@@ -46,6 +47,9 @@ size_t stated_memory_limit(const CommonOptions& options);
 
 /// The same options without --memory-limit, for commands that plan no memory.
 void add_output_options(CLI::App& command, CommonOptions& options);
+
+/// --fill of commands that show a model.
+void add_fill_option(CLI::App& command, HoleFill& fill);
 
 /// --assume-unit, --up, --known-distance, --marker-size, --control-points and --control-unit.
 void add_scale_options(CLI::App& command, SceneRequest& request);

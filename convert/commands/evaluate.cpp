@@ -25,6 +25,7 @@ struct EvaluateArgs {
   std::filesystem::path scene;
   std::string views;
   bool allow_external = false;
+  HoleFill fill = HoleFill::Around;
   CommonOptions common;
 };
 
@@ -55,6 +56,8 @@ void print_table(const nlohmann::ordered_json& report) {
     row(view["name"].get<std::string>(), role.is_null() ? "-" : role.get<std::string>(), view);
   }
   row("mean", "", report["mean"]);
+  const auto& eighth = report["every_eighth"];
+  if (!eighth.is_null()) row("every eighth, as papers", "", eighth);
   const auto& views = report["views"];
   if (std::any_of(
           views.begin(), views.end(), [](const auto& v) { return !v["exposure"].is_null(); })) {
@@ -80,7 +83,7 @@ void run_evaluate(const EvaluateArgs& args) {
                        " is gone; --scene says where the photographs are");
   }
   const size_t told = model.scene.warnings.size();
-  const Evaluation evaluation = evaluate_views(model, views, terminal.begin("evaluate"));
+  const Evaluation evaluation = evaluate_views(model, views, terminal.begin("evaluate"), args.fill);
   terminal.end(std::to_string(evaluation.views.size()) + " views");
   const auto& warnings = model.scene.warnings;
   terminal.warn(std::vector(warnings.begin() + static_cast<std::ptrdiff_t>(told), warnings.end()));
@@ -106,6 +109,7 @@ void add_evaluate(CLI::App& app) {
                 args->allow_external,
                 "Let --scene follow links and absolute paths out of its folder")
       ->needs("--scene");
+  add_fill_option(*cmd, args->fill);
   add_output_options(*cmd, args->common);
   cmd->footer(
       "The mean leaves input views out where there are others: the model was trained on them.\n"

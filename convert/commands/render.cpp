@@ -28,6 +28,7 @@ struct RenderArgs {
   std::string views;
   std::string path;
   std::optional<int> frames;
+  HoleFill fill = HoleFill::Around;
   CommonOptions common;
 };
 
@@ -54,7 +55,7 @@ void run_render(const RenderArgs& args) {
     const std::vector<Camera> path =
         is_file ? camera_path_from(args.path, model)
                 : camera_path(model, args.path, args.frames.value_or(kFrames));
-    const auto frames = write_path(model, path, args.output, terminal.begin("render"));
+    const auto frames = write_path(model, path, args.output, terminal.begin("render"), args.fill);
     terminal.end(std::to_string(path.size()) + " frames");
     if (args.common.json) std::cout << json_text(frames_to_json(frames)) << "\n";
     return;
@@ -62,7 +63,7 @@ void run_render(const RenderArgs& args) {
   std::vector<int> views(model.scene.views.size());
   std::iota(views.begin(), views.end(), 0);
   if (!args.views.empty()) views = select_views(model.scene, args.views);
-  const auto written = write_views(model, views, args.output, terminal.begin("render"));
+  const auto written = write_views(model, views, args.output, terminal.begin("render"), args.fill);
   terminal.end(std::to_string(views.size()) + " views");
   if (args.common.json) std::cout << json_text(views_to_json(written)) << "\n";
 }
@@ -85,6 +86,7 @@ void add_render(CLI::App& app) {
   path->excludes(views);
   cmd->add_option("--frames", args->frames, "Number of pictures along a path; default 60")
       ->needs(path);
+  add_fill_option(*cmd, args->fill);
   add_output_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs render out/portal/model --views 0,2 -o out/views\n"

@@ -116,9 +116,9 @@ double masked_share(const Model& model) {
 
 // Whether pictures may be completed where nothing is drawn. Around an object that was cut out by
 // masks, and where nothing is known of photographs, what is empty may be meant to be.
-bool may_complete(const Model& model) {
+bool may_complete(const Model& model, HoleFill fill) {
   constexpr double kCutOut = 0.25;  // the rim that a wide lens leaves is half of that
-  return masked_share(model) < kCutOut;
+  return fill == HoleFill::Around && masked_share(model) < kCutOut;
 }
 
 ColorImage shown_picture(const RenderBuffers& buffers, bool is_completed) {
@@ -296,6 +296,21 @@ constexpr std::array<std::pair<const char*, std::optional<double> ViewFigures::*
      {"hole_fraction", &ViewFigures::hole_fraction},
      {"ms_ssim", &ViewFigures::ms_ssim}}};
 
+ViewFigures mean_figures(const std::vector<const EvaluatedView*>& views) {
+  ViewFigures mean;
+  for (const auto& [name, figure] : kFigures) {
+    double sum = 0;
+    size_t count = 0;
+    for (const EvaluatedView* view : views) {
+      if (!(view->figures.*figure)) continue;
+      sum += *(view->figures.*figure);
+      ++count;
+    }
+    if (count > 0) mean.*figure = sum / static_cast<double>(count);
+  }
+  return mean;
+}
+
 // Of those views that say how well the model predicts, if there are any: it was trained on inputs.
 ViewFigures mean_of(const std::vector<EvaluatedView>& views, std::vector<std::string>& warnings) {
   const auto is_input = [](const EvaluatedView& view) { return view.role == "input"; };
@@ -305,18 +320,25 @@ ViewFigures mean_of(const std::vector<EvaluatedView>& views, std::vector<std::st
         "only input views are evaluated: the model was trained on them, so that the figures say "
         "how well it fits, not how well it predicts");
   }
-  ViewFigures mean;
-  for (const auto& [name, figure] : kFigures) {
-    double sum = 0;
-    size_t count = 0;
-    for (const EvaluatedView& view : views) {
-      if (!(view.figures.*figure) || (is_input(view) && !are_all_inputs)) continue;
-      sum += *(view.figures.*figure);
-      ++count;
-    }
-    if (count > 0) mean.*figure = sum / static_cast<double>(count);
+  std::vector<const EvaluatedView*> counted;
+  for (const EvaluatedView& view : views) {
+    if (!is_input(view) || are_all_inputs) counted.push_back(&view);
   }
-  return mean;
+  return mean_figures(counted);
+}
+
+std::optional<ViewFigures> mean_of_every_eighth(const std::vector<EvaluatedView>& views,
+                                                const Scene& scene) {
+  if (scene.kind != SceneKind::Llff) return std::nullopt;
+  std::vector<const EvaluatedView*> counted;
+  for (size_t i = 0; i < scene.views.size(); i += 8) {
+    const auto found = std::find_if(views.begin(), views.end(), [&](const EvaluatedView& view) {
+      return view.name == scene.views[i].name && view.role != "input";
+    });
+    if (found == views.end()) return std::nullopt;
+    counted.push_back(&*found);
+  }
+  return mean_figures(counted);
 }
 
 // Those that have a photograph. \throws BadInput if none has
@@ -377,10 +399,11 @@ std::string unknown_holes_warning(const Model& model) {
 std::vector<RenderedPicture> write_views(const Model& model,
                                          const std::vector<int>& views,
                                          const std::filesystem::path& folder,
-                                         const Progress& progress) {
+                                         const Progress& progress,
+                                         HoleFill fill) {
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
-  const bool is_completed = may_complete(model);
+  const bool is_completed = may_complete(model, fill);
   std::vector<RenderedPicture> out;
   for (size_t k = 0; k < views.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(views.size()));
@@ -393,10 +416,11 @@ std::vector<RenderedPicture> write_views(const Model& model,
 std::vector<RenderedPicture> write_path(const Model& model,
                                         const std::vector<Camera>& path,
                                         const std::filesystem::path& folder,
-                                        const Progress& progress) {
+                                        const Progress& progress,
+                                        HoleFill fill) {
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
-  const bool is_completed = may_complete(model);
+  const bool is_completed = may_complete(model, fill);
   remove_frames(folder);
   write_cameras_json(folder / "cameras.json", scene_of_path(model, path));
   constexpr size_t kOnSheet = 12;
@@ -459,17 +483,23 @@ Json evaluation_to_json(const Evaluation& evaluation) {
     row["exposure"] = view.exposure ? vector_to_json(view.exposure->cast<double>()) : Json();
     rows.push_back(row);
   }
-  return {{"mean", figures_to_json(evaluation.mean)}, {"views", rows}};
+  const auto& eighth = evaluation.every_eighth;
+  return {{"mean", figures_to_json(evaluation.mean)},
+          {"every_eighth", eighth ? figures_to_json(*eighth) : Json()},
+          {"views", rows}};
 }
 
-Evaluation evaluate_views(Model& model, const std::vector<int>& views, const Progress& progress) {
+Evaluation evaluate_views(Model& model,
+                          const std::vector<int>& views,
+                          const Progress& progress,
+                          HoleFill fill) {
   std::vector<std::string>& warnings = model.scene.warnings;
   if (const std::string text = unknown_holes_warning(model); !text.empty()) {
     warnings.push_back(text);
   }
   const std::vector<int> shown = with_photograph(model.scene, views);
   const std::vector<SupportView> inputs = support_views(model);
-  const bool is_completed = may_complete(model);
+  const bool is_completed = may_complete(model, fill);
   Evaluation out;
   for (size_t k = 0; k < shown.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(shown.size()));
@@ -478,6 +508,7 @@ Evaluation evaluate_views(Model& model, const std::vector<int>& views, const Pro
     model.scene.views[static_cast<size_t>(shown[k])].image = {};  // one photograph at a time
   }
   out.mean = mean_of(out.views, warnings);
+  out.every_eighth = mean_of_every_eighth(out.views, model.scene);
   report(progress, 1);
   return out;
 }

@@ -23,6 +23,12 @@ std::string view_role(const Scene& scene, int view);
 /// The input views and those held out, ascending.
 std::vector<int> views_with_photograph(const Scene& scene);
 
+/// What pictures of a model show where nothing is drawn.
+enum class HoleFill : uint8_t {
+  Around,  ///< The colours around it, as filled_picture(), unless photographs were masked.
+  None,    ///< Black, as other programs draw splats.
+};
+
 /// Shares of the pixels of a picture that are not masked.
 struct HoleShares {
   double transparent = 0;
@@ -43,24 +49,24 @@ struct RenderedPicture {
 };
 
 /// Writes NAME.exr and NAME.{color,depth,normal,hole}.png for each of the given views of the model.
-/// Where nothing is drawn, the colours of the PNG go on with those around, as filled_picture()
-/// does, unless photographs were masked; those of the EXR, and all else, do not. NAME.transient.png
-/// is the mask of what was left out of an input view because the others contradict it, where there
-/// is any. Without priors no hole.png is written; the EXR says, as it does of any pixel, that no
-/// input view can vouch for it.
+/// NAME.transient.png is the mask of what was left out of an input view because the others
+/// contradict it, where there is any. Without priors no hole.png is written; the EXR says, as it
+/// does of any pixel, that no input view can vouch for it.
+/// \param fill  of color.png alone: the EXR says what is drawn
 std::vector<RenderedPicture> write_views(const Model& model,
                                          const std::vector<int>& views,
                                          const std::filesystem::path& folder,
-                                         const Progress& progress);
+                                         const Progress& progress,
+                                         HoleFill fill = HoleFill::Around);
 
-/// Writes frame_0000.png, completed like colours of views, frame_0000.hole.png and so on for
-/// cameras along a path, cameras.json that says where they are, and contact.png: twelve of them,
-/// holes in magenta. Without priors there are no masks and no magenta. What is returned has no
-/// roles.
+/// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
+/// says where they are, and contact.png: twelve of them, holes in magenta. Without priors there are
+/// no masks and no magenta. What is returned has no roles.
 std::vector<RenderedPicture> write_path(const Model& model,
                                         const std::vector<Camera>& path,
                                         const std::filesystem::path& folder,
-                                        const Progress& progress);
+                                        const Progress& progress,
+                                        HoleFill fill = HoleFill::Around);
 
 /// Per view {"name", "role", "hole_fraction", …}, the role and the fraction null where they are
 /// empty.
@@ -92,12 +98,16 @@ struct EvaluatedView {
 
 struct Evaluation {
   ViewFigures mean;
+  /// Of every eighth view from the first, which papers test LLFF scenes by (Mildenhall et al. 2020,
+  /// "NeRF", 6.1); where the scene is one, and these were evaluated and no inputs.
+  std::optional<ViewFigures> every_eighth;
   std::vector<EvaluatedView> views;
 };
 
 /// {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}, null for what is empty.
 nlohmann::ordered_json figures_to_json(const ViewFigures& figures);
-/// {"mean": {…}, "views": [{"name", "role" as of views_to_json(), …, "exposure"}]}
+/// {"mean": {…}, "every_eighth": {…} or null, "views": [{"name", "role" as of views_to_json(), …,
+/// "exposure"}]}
 nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
 
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
@@ -110,6 +120,9 @@ nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
 /// Input views stay out of the mean where there are others. Warnings of the scene tell where there
 /// are none, and where nothing is known of holes, whose figures are then empty.
 /// \throws BadInput if none of the views has a photograph.
-Evaluation evaluate_views(Model& model, const std::vector<int>& views, const Progress& progress);
+Evaluation evaluate_views(Model& model,
+                          const std::vector<int>& views,
+                          const Progress& progress,
+                          HoleFill fill = HoleFill::Around);
 
 }  // namespace cgs

@@ -27,6 +27,7 @@
 #include "io/splats/splat_reader.h"
 #include "io/splats/spz.h"
 #include "libcgs/reconstruct/camera_path.h"
+#include "libcgs/render/picture.h"
 #include "libcgs/render/rasterizer.h"
 
 namespace {
@@ -54,7 +55,7 @@ Files read_back(cgs::Model& model,
   out.splats = model.gaussians.size();
   out.spz = bytes_of(folder / "splats.spz");
   out.glb = bytes_of(folder / "splats.glb");
-  out.shown = cgs::evaluate_views(model, views, {}).mean;
+  out.shown = cgs::evaluate_views(model, views, {}, cgs::HoleFill::None).mean;
   return out;
 }
 

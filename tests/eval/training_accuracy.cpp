@@ -25,6 +25,7 @@
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
+#include "libcgs/render/picture.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/train/image_metrics.h"
 #include "libcgs/train/trainer.h"

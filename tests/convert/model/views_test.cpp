@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/images/exr.h"
+#include "io/images/image.h"
 #include "io/images/png.h"
 #include "tests/support/exr_channel.h"
 #include "tests/support/splat_shapes.h"
@@ -109,6 +110,24 @@ TEST(EvaluateViews, KeepsInputsOutOfTheMeanAndSaysWhatAViewIs) {
   EXPECT_TRUE(model.scene.warnings.empty()) << model.scene.warnings.front();
 }
 
+TEST(EvaluateViews, TellsTheMeanThatPapersTellOfLlffScenes) {
+  const test::TempDir dir;
+  Model model = model_of_greys(dir, 10);
+  say_that_it_saw_nothing(model, 1);
+  const auto eighth = [&](const std::vector<int>& views) {
+    return evaluated(model, views)["every_eighth"];
+  };
+  EXPECT_TRUE(eighth({0, 5, 8}).is_null()) << "no LLFF scene";
+  model.scene.kind = SceneKind::Llff;
+  const auto report = evaluated(model, {0, 5, 8});
+  const auto psnr = [&](size_t k) { return report["views"][k]["psnr"].get<double>(); };
+  EXPECT_NEAR(report["every_eighth"]["psnr"].get<double>(), (psnr(0) + psnr(2)) / 2, 1e-9);
+  EXPECT_NE(report["every_eighth"]["psnr"], report["mean"]["psnr"]);
+  EXPECT_TRUE(eighth({0, 5}).is_null()) << "view 8 is missing";
+  say_that_it_saw_nothing(model, 8);
+  EXPECT_TRUE(eighth({0, 5, 8}).is_null()) << "view 8 is an input";
+}
+
 TEST(EvaluateViews, SaysOnceThatOnlyInputsAreEvaluated) {
   const test::TempDir dir;
   Model model = model_of_greys(dir, 3);
@@ -177,6 +196,26 @@ Model wall_below_sky(const test::TempDir& dir) {
     }
   }
   return model;
+}
+
+TEST(WriteViews, FillsWhatNothingIsDrawnInUnlessPhotographsWereMasked) {
+  const test::TempDir dir;
+  Model model = model_of_greys(dir, 1);
+  say_that_it_saw_nothing(model, 0);
+  test::add_sheet(model.gaussians, {-0.4, 0, 2}, {0.4, 0, 0}, {0, 1, 0}, 20);  // the left half
+  const auto corner = [&](HoleFill fill) {
+    write_views(model, {0}, dir / "views", {}, fill);
+    return read_image(dir / "views/0.color.png")(kSide - 2, 20).maxCoeff();
+  };
+  EXPECT_EQ(corner(HoleFill::None), 0);
+  EXPECT_GT(corner(HoleFill::Around), 0.1f);
+  model.scene.views[0].mask_path = dir / "mask.png";
+  ColorImage mask(kSide, kSide, Eigen::Vector3f::Ones());
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = kSide / 2; x < kSide; ++x) mask(x, y).setZero();
+  }
+  write_png(dir / "mask.png", mask);
+  EXPECT_EQ(corner(HoleFill::Around), 0) << "what is cut out is empty";
 }
 
 TEST(WriteViews, TellsSkyAndWhatIsEstimatedFromHoles) {
