@@ -309,7 +309,8 @@ TEST_F(Conversion, TellsPlainCloudsAndTriangleStripsFromSplats) {
     return test::message_of([&] { convert("cloud.ply", to); });
   };
   EXPECT_NE(refused("a.obj").find("cgs filter makes a surface of it"), std::string::npos);
-  EXPECT_NE(refused("a.spz").find("of a plain point cloud it cannot make splats"), std::string::npos);
+  EXPECT_NE(refused("a.spz").find("of a plain point cloud it cannot make splats"),
+            std::string::npos);
   test::write_bytes(dir_ / "strips.ply",
                     start +
                         "element tristrips 1\nproperty list int int vertex_indices\n"
