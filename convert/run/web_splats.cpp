@@ -68,13 +68,10 @@ std::string evidence_of_thinned(const Model& model, size_t kept) {
          " Gaussians";
 }
 
-// How they show what was held out, as the evaluation of the model says of all of them.
-std::optional<ViewFigures> held_out_figures(Model& model,
-                                            Gaussians& splats,
-                                            const Progress& progress) {
+// How the splats of a model show what was held out.
+std::optional<ViewFigures> held_out_figures(Model& model, const Progress& progress) {
   if (model.scene.held_out.empty()) return std::nullopt;
-  const Exchange exchange(model.gaussians, splats);
-  return evaluate_views(model, model.scene.held_out, progress).mean;
+  return evaluate_views(model, model.scene.held_out, progress, HoleFill::None).mean;
 }
 
 }  // namespace
@@ -94,7 +91,11 @@ WebSplats write_web_splats(const std::filesystem::path& folder,
                                   splats,
                                   frame,
                                   {y_up, evidence_of_thinned(model, splats.size()), local_origin});
-  out.held_out = held_out_figures(model, splats, part_of(progress, 0.9, 1));
+  out.held_out_of_all = held_out_figures(model, part_of(progress, 0.9, 0.95));
+  {
+    const Exchange exchange(model.gaussians, splats);
+    out.held_out = held_out_figures(model, part_of(progress, 0.95, 1));
+  }
   try {
     constexpr double kOfPixel = 1.0 / 16;
     out.spz = write_spz(folder / "splats.spz",
@@ -110,6 +111,8 @@ WebSplats write_web_splats(const std::filesystem::path& folder,
 Json web_splats_to_json(const WebSplats& made) {
   Json thinning = thinning_to_json(made.thinned, made.of);
   thinning["held_out"] = made.held_out ? figures_to_json(*made.held_out) : Json();
+  thinning["held_out_of_all"] =
+      made.held_out_of_all ? figures_to_json(*made.held_out_of_all) : Json();
   Json out = {{"thinning", thinning}, {"splats.glb", {{"bytes", made.glb_bytes}}}};
   if (made.spz) {
     out["splats.spz"] = {{"bytes", made.spz->bytes},

@@ -19,15 +19,18 @@ namespace cgs {
 struct WebSplats {
   ThinnedSplats thinned;
   size_t of = 0;  ///< Splats of the model.
-  std::optional<ViewFigures>
-      held_out;  ///< Mean of evaluate_views(); empty where none was held out.
+  /// Mean of evaluate_views() with holes black, as browsers show them; empty where none was held
+  /// out.
+  std::optional<ViewFigures> held_out;
+  std::optional<ViewFigures> held_out_of_all;  ///< Likewise, of the splats of the model.
   size_t glb_bytes = 0;
   std::optional<SpzReport> spz;
   std::string spz_left_out;  ///< Why there is none, for people.
 };
 
-/// {"thinning": {…, "held_out"}, "splats.glb": {…}, "splats.spz": {…}, "left_out": {"splats.spz":
-/// "why"}}
+/// {"thinning": {…, "held_out", "held_out_of_all"}, "splats.glb": {…}, "splats.spz": {…},
+/// "left_out":
+/// {"splats.spz": "why"}}
 nlohmann::ordered_json web_splats_to_json(const WebSplats& made);
 
 /// Writes the splats of a model for viewers in browsers: splats.glb and splats.spz, thinned by
