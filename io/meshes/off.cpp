@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "io/bytes/byte_reader.h"
@@ -73,6 +74,24 @@ Eigen::Vector3d off_triple(const TextLines& lines, const OffWords& words, size_t
   return {lines.measured(words[at]), lines.measured(words[at + 1]), lines.measured(words[at + 2])};
 }
 
+/// Whether colours are whole numbers from 0 to 255 or floats up to 1, which may be written without
+/// a point, so that all of them are looked at.
+class ColorScale {
+ public:
+  void look_at(std::span<const std::string_view> words, const TextLines& lines) {
+    are_whole_ = are_whole_ && std::all_of(words.begin(), words.end(), is_whole_number);
+    for (const std::string_view word : words) {
+      brightest_ = std::max(brightest_, lines.measured(word));
+    }
+  }
+  /// What one is divided by.
+  float white() const { return are_whole_ && brightest_ > 1 ? 255 : 1; }
+
+ private:
+  bool are_whole_ = true;
+  double brightest_ = 0;
+};
+
 /// The vertices and what is said of them.
 class OffVertices {
  public:
@@ -82,9 +101,7 @@ class OffVertices {
   void read() {
     for (uint64_t i = 0; i < header_.vertices; ++i) add(words_of(expect_line(lines_, "a vertex")));
     if (!all_have_normals_) out_.mesh.normals.clear();
-    if (are_bytes_ && brightest_ > 1) {
-      for (Eigen::Vector3f& color : out_.mesh.colors) color /= 255;
-    }
+    for (Eigen::Vector3f& color : out_.mesh.colors) color /= scale_.white();
     settle_colors(out_);
     fill_in_colors(out_, colored_);
   }
@@ -102,18 +119,15 @@ class OffVertices {
     if (header_.color == 0 || words.size() < header_.color + 3) return;
     colored_.push_back(out_.positions.size() - 1);
     out_.mesh.colors.emplace_back(off_triple(lines_, words, header_.color).cast<float>());
-    for (size_t i = header_.color; i < std::min(words.size(), header_.color + 4); ++i) {
-      are_bytes_ = are_bytes_ && is_whole_number(words[i]);
-      brightest_ = std::max(brightest_, lines_.measured(words[i]));
-    }
+    const size_t numbers = std::min<size_t>(words.size() - header_.color, 4);  // with the opacity
+    scale_.look_at(std::span(words).subspan(header_.color, numbers), lines_);
   }
 
   TextLines& lines_;
   const OffHeader& header_;
   ParsedMesh& out_;
   std::vector<size_t> colored_;  // vertices that state a colour
-  bool are_bytes_ = true;        // whole numbers, with the opacity where it is stated
-  double brightest_ = 0;
+  ColorScale scale_;
   bool all_have_normals_ = true;
 };
 
@@ -162,15 +176,13 @@ class OffFaces {
     if (words.size() == 1) has_numbered_colors_ = true;
     if (words.size() < 3) return;
     const Eigen::Vector3f color = off_triple(lines_, words, 0).cast<float>();
-    are_whole_ = are_whole_ && std::all_of(words.begin(), words.begin() + 3, is_whole_number);
-    brightest_ = std::max(brightest_, color.maxCoeff());
+    scale_.look_at(std::span(words).first(3), lines_);
     for (const uint32_t corner : corners_) colors_.emplace_back(corner, color);
   }
 
-  // Floats may be written without a point, so that all of them are looked at.
   void settle_face_colors() {
     if (colors_.empty()) return;
-    const float scale = are_whole_ && brightest_ > 1 ? 1.0f / 255 : 1.0f;
+    const float scale = 1 / scale_.white();
     CornerColors of_corners;
     for (const auto& [corner, color] : colors_) of_corners.add(corner, scale * color);
     of_corners.settle(out_);
@@ -181,8 +193,7 @@ class OffFaces {
   ParsedMesh& out_;
   std::vector<uint32_t> corners_;
   std::vector<std::pair<uint32_t, Eigen::Vector3f>> colors_;  // of corners
-  bool are_whole_ = true;                                     // all numbers of them
-  float brightest_ = 0;
+  ColorScale scale_;
   bool has_numbered_colors_ = false;
   uint64_t dropped_ = 0;
 };
@@ -200,6 +211,7 @@ class OffRecords {
       at = end + 1;
     }
   }
+  /// \pre count > 0
   /// \return false where fewer are left
   bool take(uint64_t count) {
     if (count > words_.size() - next_) return false;
@@ -218,7 +230,7 @@ class OffRecords {
  private:
   OffWords words_;
   size_t next_ = 0;
-  std::string out_ = " ";
+  std::string out_;
 };
 
 /// The format takes any white space between numbers; where lines are no records, this makes them
