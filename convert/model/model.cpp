@@ -47,6 +47,12 @@ Raster<T> as_raster(const ExrImage& image, const std::string& channel, const std
   throw BadInput(Defect::Schema, file, "has no channel '" + channel + "'");
 }
 
+bool has_channel(const ExrImage& image, const std::string& channel) {
+  return std::any_of(image.channels.begin(), image.channels.end(), [&](const auto& entry) {
+    return entry.first == channel;
+  });
+}
+
 std::filesystem::path priors_path(const std::filesystem::path& folder, const View& view) {
   return folder / "priors" / (view.name + ".exr");
 }
@@ -62,6 +68,9 @@ void write_priors(const std::filesystem::path& path, const ViewPriors& priors) {
                     {"matched.Y", as_floats(priors.matched_views)},
                     {"origin.Y", as_floats(priors.origin)},
                     {"sigma.Y", priors.sigma.data}};
+  if (!priors.shown_finer.empty()) {
+    image.channels.emplace_back("shown_finer.Y", as_floats(priors.shown_finer));
+  }
   image.text["cgs:units"] = "internal";
   write_exr(path, image);
 }
@@ -82,6 +91,9 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
   priors.confidence = as_raster<float>(image, "confidence.Y", file);
   priors.layer = as_raster<uint8_t>(image, "layer.Y", file);
   priors.matched_views = as_raster<uint8_t>(image, "matched.Y", file);
+  if (has_channel(image, "shown_finer.Y")) {
+    priors.shown_finer = as_raster<uint8_t>(image, "shown_finer.Y", file);
+  }
   const Raster<uint8_t> origin = as_raster<uint8_t>(image, "origin.Y", file);
   priors.origin = Raster<DepthOrigin>(image.width, image.height, DepthOrigin::Unknown);
   std::transform(origin.data.begin(), origin.data.end(), priors.origin.data.begin(), [](uint8_t v) {

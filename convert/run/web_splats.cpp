@@ -21,12 +21,12 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-// As many as the input views have pixels with depth, in their order.
+// As many as the input views have Gaussians, in their order.
 std::vector<size_t> counts_of_views(const Model& model) {
   std::vector<size_t> out;
   for (const ViewPriors& priors : model.priors) {
-    const std::vector<float>& depth = priors.depth.data;
-    out.push_back(static_cast<size_t>(std::count_if(depth.begin(), depth.end(), has_gaussian)));
+    size_t& count = out.emplace_back(0);
+    for (size_t i = 0; i < priors.depth.data.size(); ++i) count += draws(priors, i) ? 1 : 0;
   }
   return out;
 }

@@ -232,7 +232,7 @@ CoherentGaussians::CoherentGaussians(const Scene& scene,
     ViewState view{
         camera, depth, depth, {}, {}, {}, {}, {}, start_logit, options.radius_factor, false};
     for (size_t i = 0; i < depth.data.size(); ++i) {
-      if (!has_gaussian(depth.data[i])) continue;
+      if (!draws(priors[n], i)) continue;
       view.pixels.push_back(static_cast<int>(i));
       view.is_measured.push_back(!origin.empty() && origin[i] == DepthOrigin::Measured ? 1 : 0);
     }

@@ -41,7 +41,7 @@ std::vector<Provenance> labels_of(const std::vector<ViewPriors>& priors) {
       return {};
     }
     for (size_t i = 0; i < depth.size(); ++i) {
-      if (has_gaussian(depth[i])) out.push_back(label_of(p, i));
+      if (draws(p, i)) out.push_back(label_of(p, i));
     }
   }
   return out;
@@ -70,7 +70,7 @@ Gaussians initial_gaussians(const Scene& scene,
     for (int y = 0; y < depth.height; ++y) {
       for (int x = 0; x < depth.width; ++x) {
         const auto z = static_cast<double>(depth(x, y));
-        if (!has_gaussian(depth(x, y))) continue;
+        if (!draws(priors[n], depth.index(x, y))) continue;
         const auto radius = static_cast<float>(double(options.radius_factor) * z * pixel);
         out.position.push_back(view.camera.unproject(x + 0.5, y + 0.5, z).cast<float>());
         out.scale.push_back(Eigen::Vector3f::Constant(radius));

@@ -19,8 +19,14 @@ struct InitialisationOptions {
   void validate() const;
 };
 
-/// Whether a pixel of this depth gets a Gaussian.
+/// Whether a Gaussian can be drawn at this depth.
 inline bool has_gaussian(float depth) { return depth > 0 && !std::isinf(depth); }
+
+/// Whether a view draws a pixel: it has a depth, and no other view draws its place.
+inline bool draws(const ViewPriors& priors, size_t pixel) {
+  const bool is_shown = !priors.shown_finer.empty() && priors.shown_finer.data[pixel] != 0;
+  return !is_shown && has_gaussian(priors.depth.data[pixel]);
+}
 
 /// Width of a pixel at depth 1 [internal units].
 inline double pixel_size(const Camera& camera) { return 2 / (camera.fx + camera.fy); }
@@ -32,7 +38,8 @@ inline double pixel_size(const Camera& camera) { return 2 / (camera.fx + camera.
 /// view where a sensor measured it, or a place right beside it is measured; estimated elsewhere, in
 /// the sky too. None has a label where the priors of a view state no origin or matched views.
 ///
-/// \param priors in the order of scene.input; pixels of NaN depth are skipped
+/// \param priors in the order of scene.input; pixels of NaN depth are skipped, and those that
+///               another view shows finer
 /// \return view-major, row-major [internal units]
 /// \throws InvalidInput if priors, images and cameras are not of one size
 /// Source: Paliwal et al. 2024, "CoherentGS", section 3; rays there pass through pixel corners.

@@ -212,7 +212,7 @@ double add_slopes(const Scene& scene,
     const std::vector<ViewColors> others = fit.seen_by_others(n);
     for (int y = 0; y < priors[n].depth.height; ++y) {
       for (int x = 0; x < priors[n].depth.width; ++x) {
-        if (!has_gaussian(priors[n].depth(x, y))) continue;
+        if (!draws(priors[n], priors[n].depth.index(x, y))) continue;
         sh[i * kCount] = gaussians.sh[i];
         if (evidence.views[n](x / kPiece, y / kPiece).asks_for_directions()) {
           const Eigen::Vector3d point = gaussians.position[i].cast<double>();

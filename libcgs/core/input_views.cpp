@@ -23,20 +23,6 @@ struct Sight {
   std::vector<size_t> seen_by;
 };
 
-// What two views tell of a point between whose directions this angle lies, 0 to 1.
-double worth_of_angle(double radians) {
-  constexpr double kBest = 10;  // [degrees]
-  constexpr double kNarrower = 4;
-  constexpr double kWider = 12;
-  const auto bell = [](double off, double sigma) {
-    return std::exp(-off * off / (2 * sigma * sigma));
-  };
-  const double off = radians * 180 / std::numbers::pi - kBest;
-  if (off >= 0) return bell(off, kWider);
-  const double at_none = bell(kBest, kNarrower);  // views from one place tell nothing
-  return std::max(0.0, (bell(off, kNarrower) - at_none) / (1 - at_none));
-}
-
 // As many at most, evenly spread.
 template <typename T>
 std::vector<T> some_of(const std::vector<T>& all, size_t most) {
@@ -189,6 +175,19 @@ class Worth {
 };
 
 }  // namespace
+
+double worth_of_angle(double radians) {
+  constexpr double kBest = 10;  // [degrees]
+  constexpr double kNarrower = 4;
+  constexpr double kWider = 12;
+  const auto bell = [](double off, double sigma) {
+    return std::exp(-off * off / (2 * sigma * sigma));
+  };
+  const double off = radians * 180 / std::numbers::pi - kBest;
+  if (off >= 0) return bell(off, kWider);
+  const double at_none = bell(kBest, kNarrower);  // views from one place tell nothing
+  return std::max(0.0, (bell(off, kNarrower) - at_none) / (1 - at_none));
+}
 
 std::vector<int> choose_input_views(const Scene& scene,
                                     const std::vector<int>& candidates,

@@ -216,7 +216,8 @@ ViewPriors view_priors(const SweptView& view, const Raster<Agreement>& agreement
                  Raster<float>(w, h, 0.0f),
                  Raster<DepthOrigin>(w, h, DepthOrigin::Unknown),
                  Raster<uint8_t>(w, h, 0),
-                 Raster<uint8_t>(w, h, 0)};
+                 Raster<uint8_t>(w, h, 0),
+                 {}};
   const Raster<int> to_texture = distance_to_texture(view);
   for (size_t i = 0; i < view.pixels.data.size(); ++i) {
     const RefinedPixel& p = view.pixels.data[i];
@@ -280,7 +281,7 @@ std::vector<ViewPriors> plane_sweep(const Scene& scene,
   for (size_t i = 0; i < count; ++i) {
     views[i].camera = scene.views[static_cast<size_t>(scene.input[i])].camera;
     views[i].geometry = sweep_geometry(scene, static_cast<int>(i), options.sampling);
-    matched[i] = with_parallax(views[i].geometry);
+    matched[i] = matched_sources(views[i].geometry);
   }
   const auto of_view = [count](const Progress& of_all, size_t i) {
     return part_of(of_all, double(i) / double(count), double(i + 1) / double(count));

@@ -4,14 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
+#include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/input_views.h"
 
 namespace cgs {
 
 namespace {
 
 constexpr int kFewestPlanes = 8;
+constexpr size_t kMostMatched = 4;  // sources
 // Below this ratio of baseline to depth, disparities drown in the rounding of the poses.
 constexpr double kSmallestBaseline = 1e-6;
 
@@ -88,6 +92,71 @@ double largest_speed(const Camera& reference,
   return speed;
 }
 
+// Those that can tell planes apart.
+void match_with_parallax(std::vector<SweepSource>& sources) {
+  constexpr double kHardlyAny = 0.05;  // of the most
+  double most = 0;
+  for (const SweepSource& source : sources) most = std::max(most, source.speed);
+  for (SweepSource& source : sources) source.is_matched = !(source.speed < kHardlyAny * most);
+}
+
+// What each source tells of places that the reference may show, from far to near: rows are places.
+Eigen::MatrixXd worth_of_sources(const Scene& scene,
+                                 const std::pair<double, double>& inverse_depths,
+                                 const SweepGeometry& geometry) {
+  constexpr int kGrid = 12;   // places per side of the picture
+  constexpr int kDepths = 6;  // of each
+  const Camera& reference = input_view(scene, geometry.image).camera;
+  Eigen::MatrixXd out =
+      Eigen::MatrixXd::Zero(kGrid * kGrid * kDepths, Eigen::Index(geometry.sources.size()));
+  for (int i = 0; i < out.rows(); ++i) {
+    const double u = (i % kGrid + 0.5) / kGrid * reference.width;
+    const double v = (i / kGrid % kGrid + 0.5) / kGrid * reference.height;
+    const double share = (i / (kGrid * kGrid) + 0.5) / kDepths;
+    const double rho = std::lerp(inverse_depths.first, inverse_depths.second, share);
+    const Eigen::Vector3d point = reference.unproject(u, v, 1 / rho);
+    for (int k = 0; k < out.cols(); ++k) {
+      const Camera& other = input_view(scene, geometry.sources[size_t(k)].image).camera;
+      if (!other.sees(other.project(point))) continue;
+      out(i, k) = worth_of_angle(angle_between(reference.center() - point, other.center() - point));
+    }
+  }
+  return out;
+}
+
+// Marks up to kMostMatched sources, the one that adds the most to what the others tell first. A
+// place is told by its best source, half as much more by its second, and so on.
+// \return false if none tells anything
+bool match_best(const Eigen::MatrixXd& worth, std::vector<SweepSource>& sources) {
+  Eigen::VectorXd told = Eigen::VectorXd::Zero(worth.rows());
+  bool any = false;
+  for (SweepSource& source : sources) source.is_matched = false;
+  for (size_t n = 0; n < kMostMatched; ++n) {
+    double most = 0;
+    Eigen::Index best = 0;
+    for (Eigen::Index k = 0; k < worth.cols(); ++k) {
+      if (sources[size_t(k)].is_matched) continue;
+      const double gain = (worth.col(k).array() * (-told.array()).exp()).sum();
+      if (gain > most) std::tie(most, best) = std::pair(gain, k);
+    }
+    if (!(most > 0)) return any;
+    sources[size_t(best)].is_matched = any = true;
+    told += worth.col(best);
+  }
+  return any;
+}
+
+// \param inverse_depths  farthest and nearest
+void choose_matched(const Scene& scene,
+                    const std::pair<double, double>& inverse_depths,
+                    SweepGeometry& geometry) {
+  if (geometry.sources.size() > kMostMatched &&
+      match_best(worth_of_sources(scene, inverse_depths, geometry), geometry.sources)) {
+    return;
+  }
+  match_with_parallax(geometry.sources);
+}
+
 }  // namespace
 
 SweepImage sweep_image(const View& view) {
@@ -127,7 +196,6 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
   const double inverse_near = (1 + sampling.range_margin) / range.near;
   const double span = inverse_near - geometry.inverse_far;
   const double middle = 2 / (inverse_near + geometry.inverse_far);
-  double speed = 0;
   double baseline = 0;
   for (int j = 0; j < static_cast<int>(scene.input.size()); ++j) {
     if (j == input) continue;
@@ -135,7 +203,6 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
     SweepSource source = source_of(reference, other, geometry.inverse_far);
     source.image = j;
     source.speed = largest_speed(reference, other, span, source);
-    speed = std::max(speed, source.speed);
     baseline = std::max(baseline, (other.center() - reference.center()).norm());
     geometry.sources.push_back(source);
   }
@@ -145,6 +212,11 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
                    "the input cameras share one centre (baseline 0), so no depth can be measured; "
                    "choose views taken from different places");
   }
+  choose_matched(scene, {geometry.inverse_far, inverse_near}, geometry);
+  double speed = 0;
+  for (const SweepSource& source : geometry.sources) {
+    if (source.is_matched) speed = std::max(speed, source.speed);
+  }
   const double wanted = std::ceil(speed * span / sampling.pixels_per_plane) + 1;
   geometry.planes = static_cast<int>(std::clamp(
       wanted, double(kFewestPlanes), std::max<double>(kFewestPlanes, sampling.max_planes)));
@@ -153,12 +225,8 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
   return geometry;
 }
 
-SweepGeometry with_parallax(SweepGeometry geometry) {
-  constexpr double kHardlyAny = 0.05;  // of the most
-  double most = 0;
-  for (const SweepSource& source : geometry.sources) most = std::max(most, source.speed);
-  std::erase_if(geometry.sources,
-                [&](const SweepSource& source) { return source.speed < kHardlyAny * most; });
+SweepGeometry matched_sources(SweepGeometry geometry) {
+  std::erase_if(geometry.sources, [](const SweepSource& source) { return !source.is_matched; });
   return geometry;
 }
 

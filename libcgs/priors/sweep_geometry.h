@@ -25,6 +25,7 @@ SweepImage sweep_image(const View& view);
 struct SweepSource {
   int image = 0;     ///< Position in Scene::input.
   double speed = 0;  ///< Longest way of a seen pixel [pixels of the source per 1 / depth].
+  bool is_matched = true;  ///< See matched_sources().
   Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
 
@@ -67,9 +68,11 @@ struct SweepSampling {
 /// \throws BadInput(Value) if the cameras share one centre.
 SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling& sampling);
 
-/// The same without sources that cannot tell planes apart. A photograph taken from almost the same
-/// place as the reference, as in a burst, agrees with it on every plane and would outvote the
-/// others.
-SweepGeometry with_parallax(SweepGeometry geometry);
+/// The same with only those sources that the reference is matched with. Of up to four, that is all
+/// that can tell planes apart: a photograph taken from almost the same place as the reference, as
+/// in a burst, agrees with it on every plane and would outvote the others. Of more, it is the four
+/// that together tell the most of what the reference shows: time then grows with the number of
+/// photographs, not with its square.
+SweepGeometry matched_sources(SweepGeometry geometry);
 
 }  // namespace cgs

@@ -48,6 +48,8 @@ struct ViewPriors {
   Raster<DepthOrigin> origin;     ///< See DepthOrigin.
   Raster<uint8_t> layer;          ///< Depth layer, 0 = farthest … layer_count - 1 = nearest.
   Raster<uint8_t> matched_views;  ///< Number of other input views that confirm the depth.
+  MaskMap shown_finer;            ///< 1 where another view shows the place and draws it (see
+                                  ///< mark_shown_finer()); empty = nowhere.
 };
 
 /// Gives an origin that has no depth to the pixels of a mask; empty = none.

@@ -12,6 +12,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
 #include "libcgs/priors/exposure.h"
+#include "libcgs/priors/finest_view.h"
 #include "libcgs/priors/measured_range.h"
 #include "libcgs/priors/transients.h"
 #include "libcgs/reconstruct/evidence_words.h"
@@ -142,6 +143,7 @@ TrainedModel reconstruct(Scene scene,
       look_behind_pane(scene, options, priors, part_of(progress, 0.18, 0.2));
   const Pane* const drawn_before = pane ? &*pane : nullptr;
   leave_out_transients(priors.views, scene);
+  mark_shown_finer(scene, priors.views);
   if (pane) out.pane = report_of(*pane, scene);
   take_findings(priors.report, scene);
   out.priors = std::move(priors.report);

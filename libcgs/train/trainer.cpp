@@ -19,6 +19,9 @@ namespace cgs {
 
 namespace {
 
+// Views that one step draws: of more, each step draws the next ones.
+constexpr size_t kMostDrawn = 4;
+
 ColorPlanes planes_of(const ColorImage& image) {
   ColorPlanes out;
   for (int c = 0; c < 3; ++c) {
@@ -252,7 +255,7 @@ void Trainer::add_view(size_t n, GaussianGradients& sum, StepReport& report) {
     const bool valid = view.use.empty() || view.use.data[i] != 0;
     use.data[i] = valid && (options_.dropout <= 0 || rendered->alpha.data[i] > 0.3f);
   }
-  const double share = 1.0 / double(full_.size());
+  const double share = 1.0 / double(std::min(full_.size(), kMostDrawn));
   TrainingBuffers loss;
   report.l1 += multi_scale_l1(rendered->color,
                               view.photograph,
@@ -348,7 +351,10 @@ StepReport Trainer::step() {
   }
   StepReport report;
   GaussianGradients gaussians;
-  for (size_t n = 0; n < full_.size(); ++n) add_view(n, gaussians, report);
+  const size_t drawn = std::min(full_.size(), kMostDrawn);
+  for (size_t k = 0; k < drawn; ++k) {
+    add_view((static_cast<size_t>(step_) * drawn + k) % full_.size(), gaussians, report);
+  }
   std::vector<Raster<float>> depth(full_.size());
   add_depth_terms(depth, report);
   model_.add_gradients(gaussians, depth);
