@@ -12,6 +12,7 @@
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/bilinear.h"
 #include "libcgs/core/error.h"
+#include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/pixel_matches.h"
 
 namespace cgs {
@@ -76,26 +77,28 @@ struct PieceDifference {
 
 class ViewDependenceFit {
  public:
-  ViewDependenceFit(const Scene& scene, const std::vector<ViewPriors>& priors) : priors_(priors) {
+  ViewDependenceFit(const Scene& scene, const std::vector<ViewPriors>& priors)
+      : scene_(scene), priors_(priors) {
     for (const int i : scene.input) views_.push_back(&scene.views[static_cast<size_t>(i)]);
   }
 
   std::vector<ViewColors> seen_by_others(size_t n) const {
     const View& own = *views_[n];
-    std::vector<ViewColors> out;
-    for (size_t j = 0; j < views_.size(); ++j) {
-      if (j == n) continue;
+    const std::vector<size_t> compared = neighbours(scene_, n, kMostCompared);
+    std::vector<ViewColors> out(compared.size());
+    tbb::parallel_for(size_t{0}, compared.size(), [&](size_t k) {
+      const size_t j = compared[k];
       const View& other = *views_[j];
       const Eigen::Vector3f none =
           Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
-      ViewColors shown{{own.image.width, own.image.height, none}, other.camera.center()};
+      ViewColors& shown = out[k];
+      shown = {{own.image.width, own.image.height, none}, other.camera.center()};
       for (const PixelMatch& match :
            pixel_matches(own.camera, priors_[n], other.camera, priors_[j])) {
         const auto i = static_cast<size_t>(match.pixel);
         shown.difference.data[i] = color_at(other.image, match.u, match.v) - own.image.data[i];
       }
-      out.push_back(std::move(shown));
-    }
+    });
     return out;
   }
 
@@ -157,6 +160,7 @@ class ViewDependenceFit {
     ++sum.count;
   }
 
+  const Scene& scene_;
   const std::vector<ViewPriors>& priors_;
   std::vector<const View*> views_;
 };

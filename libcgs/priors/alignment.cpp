@@ -7,8 +7,10 @@
 #include <limits>
 
 #include <ceres/ceres.h>
+#include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/priors/neighbours.h"
 
 namespace cgs {
 
@@ -117,20 +119,18 @@ double capped_rms(const std::vector<Observation>& points,
   return points.empty() ? 0 : std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-void solve(const std::vector<Observation>& points,
+// Of one view: what the depth of another is does not change where a pixel of this one is seen.
+void solve(const std::vector<const Observation*>& points,
            double loss_scale,
-           std::vector<ScaleOffset>& solution) {
+           ScaleOffset& solution) {
+  if (points.size() < kFewestPoints) return;
   ceres::Problem problem;
-  std::vector<size_t> count(solution.size(), 0);
-  for (const Observation& p : points) ++count[p.view];
-  for (const Observation& p : points) {
-    if (count[p.view] < kFewestPoints) continue;
+  for (const Observation* p : points) {
     // The loss is per block, so every point needs its own.
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Projection, 2, 2>(new Projection{&p}),
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Projection, 2, 2>(new Projection{p}),
                              new ceres::CauchyLoss(loss_scale),
-                             solution[p.view].data());
+                             solution.data());
   }
-  if (problem.NumResidualBlocks() == 0) return;
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
   options.num_threads = 1;  // sums in one order: same bits every time
@@ -138,6 +138,15 @@ void solve(const std::vector<Observation>& points,
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
+}
+
+void solve(const std::vector<Observation>& points,
+           double loss_scale,
+           std::vector<ScaleOffset>& solution) {
+  std::vector<std::vector<const Observation*>> of_view(solution.size());
+  for (const Observation& p : points) of_view[p.view].push_back(&p);
+  tbb::parallel_for(
+      size_t{0}, solution.size(), [&](size_t i) { solve(of_view[i], loss_scale, solution[i]); });
 }
 
 void move_depths(const ScaleOffset& solution, ViewPriors& priors) {
@@ -176,8 +185,7 @@ std::vector<Correspondence> depth_correspondences(const Scene& scene,
     const DepthMap& depth = priors[i].depth;
     const double share = double(depth.data.size()) / options.max_correspondences;
     const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(share))));
-    for (size_t j = 0; j < priors.size(); ++j) {
-      if (j == i) continue;
+    for (const size_t j : neighbours(scene, i, kMostCompared)) {
       const Transfer there(input_camera(scene, i), input_camera(scene, j));
       const Transfer back(input_camera(scene, j), input_camera(scene, i));
       for (int y = step / 2; y < depth.height; y += step) {

@@ -14,10 +14,21 @@ namespace cgs {
 
 namespace {
 
-const SweepSource& towards(const SweptView& from, const SweptView& to) {
-  return *std::find_if(from.geometry.sources.begin(),
-                       from.geometry.sources.end(),
-                       [&](const SweepSource& s) { return s.image == to.geometry.image; });
+/// Another view, and how the two see each other's pixels.
+struct Pair {
+  const SweptView* other;
+  SweepSource there;
+  SweepSource back;
+};
+
+// \pre views are in the order of Scene::input
+std::vector<Pair> pairs_of(const std::vector<SweptView>& views, const SweptView& here) {
+  std::vector<Pair> out;
+  for (const SweepSource& source : here.geometry.sources) {
+    const SweptView& other = views[static_cast<size_t>(source.image)];
+    out.push_back({&other, source, sweep_source(other.camera, other.geometry, here.camera)});
+  }
+  return out;
 }
 
 struct Lifted {
@@ -62,15 +73,15 @@ struct Comparison {
 };
 
 Comparison compared(const SweptView& view,
-                    const SweptView& other,
+                    const Pair& pair,
                     const Lifted& p,
                     const AgreementLimits& limits) {
-  const SweepSource& source = towards(view, other);
-  const std::optional<Lifted> there = transfer(view, source, p);
+  const SweptView& other = *pair.other;
+  const std::optional<Lifted> there = transfer(view, pair.there, p);
   if (!there) return {};
   // Without parallax any two depths agree, and both may come from a third view that saw another
   // surface.
-  const double parallax = source.parallax(p.u, p.v, view.geometry.plane_of(p.inverse_depth));
+  const double parallax = pair.there.parallax(p.u, p.v, view.geometry.plane_of(p.inverse_depth));
   const double disparity = parallax * p.inverse_depth / view.geometry.step;
   if (!(disparity >= limits.least_disparity)) return {};
   const double expected = other.geometry.plane_of(there->inverse_depth);
@@ -79,7 +90,7 @@ Comparison compared(const SweptView& view,
   const Lifted seen{there->u, there->v, other.geometry.inverse_depth(t)};
   const Comparison otherwise = {seen.inverse_depth < there->inverse_depth ? Comparison::SeesThrough
                                                                           : Comparison::None};
-  const std::optional<Lifted> back = transfer(other, towards(other, view), seen);
+  const std::optional<Lifted> back = transfer(other, pair.back, seen);
   if (!back || std::hypot(back->u - p.u, back->v - p.v) > limits.max_disagreement) return otherwise;
   const double d = (back->inverse_depth - p.inverse_depth) / view.geometry.step;
   if (std::abs(d) > limits.max_disagreement) return otherwise;
@@ -103,6 +114,7 @@ Raster<Agreement> cross_check(const std::vector<SweptView>& views,
                               size_t view,
                               const AgreementLimits& limits) {
   const SweptView& here = views[view];
+  const std::vector<Pair> pairs = pairs_of(views, here);
   Raster<Agreement> out(here.pixels.width, here.pixels.height, Agreement{});
   tbb::parallel_for(0, out.height, [&](int y) {
     for (int x = 0; x < out.width; ++x) {
@@ -111,9 +123,8 @@ Raster<Agreement> cross_check(const std::vector<SweptView>& views,
       const Lifted p{x + 0.5, y + 0.5, here.geometry.inverse_depth(double(t))};
       if (!(p.inverse_depth > 0)) continue;
       double sum = 0;
-      for (size_t j = 0; j < views.size(); ++j) {
-        if (j == view) continue;
-        const Comparison c = compared(here, views[j], p, limits);
+      for (const Pair& pair : pairs) {
+        const Comparison c = compared(here, pair, p, limits);
         if (c.answer == Comparison::SeesThrough) ++out(x, y).seen_through;
         if (c.answer != Comparison::Confirms) continue;
         sum += c.difference * c.difference;
@@ -133,17 +144,16 @@ Raster<SlantedPlane> planes_of_others(const std::vector<SweptView>& views,
   const SweptView& here = views[view];
   const SweepGeometry& g = here.geometry;
   Raster<SlantedPlane> out(here.pixels.width, here.pixels.height, SlantedPlane{kNaN, 0, 0});
-  for (size_t j = 0; j < views.size(); ++j) {
-    if (j == view) continue;
-    const SweptView& other = views[j];
-    const SweepSource& s = towards(other, here);
+  for (const Pair& pair : pairs_of(views, here)) {
+    const SweptView& other = *pair.other;
+    const Raster<Agreement>& agreement = agreements[static_cast<size_t>(other.geometry.image)];
     const Eigen::Isometry3d other_from_here =
         other.camera.cam_from_world() * here.camera.world_from_cam;
     for (int y = 0; y < other.pixels.height; ++y) {
       for (int x = 0; x < other.pixels.width; ++x) {
-        if (agreements[j](x, y).views == 0) continue;
+        if (agreement(x, y).views == 0) continue;
         const double rho = other.geometry.inverse_depth(double(other.pixels(x, y).plane.t));
-        const std::optional<Lifted> seen = transfer(other, s, {x + 0.5, y + 0.5, rho});
+        const std::optional<Lifted> seen = transfer(other, pair.back, {x + 0.5, y + 0.5, rho});
         if (!seen || seen->u < 0 || seen->v < 0) continue;
         const int u = static_cast<int>(seen->u);
         const int v = static_cast<int>(seen->v);

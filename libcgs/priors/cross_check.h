@@ -29,9 +29,9 @@ struct AgreementLimits {
                             ///< [pixels]; > 0.
 };
 
-/// Checks a view against all others: another view confirms a pixel if its own depth, at the place
-/// the pixel projects to, leads back to within `max_disagreement`. A view from so nearly the same
-/// place that the pixel moves by less than `least_disparity` confirms nothing.
+/// Checks a view against the sources of its geometry: another view confirms a pixel if its own
+/// depth, at the place the pixel projects to, leads back to within `max_disagreement`. A view from
+/// so nearly the same place that the pixel moves by less than `least_disparity` confirms nothing.
 Raster<Agreement> cross_check(const std::vector<SweptView>& views,
                               size_t view,
                               const AgreementLimits& limits);

@@ -7,6 +7,7 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/priors/guessed_depth.h"
+#include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/sky.h"
 #include "libcgs/priors/transients.h"
 
@@ -136,8 +137,8 @@ class Estimator {
       completion.fallback_depth = 2 / (1 / range.near + 1 / range.far);
     }
     std::vector<CompletionWitness> witnesses;
-    for (size_t j = 0; j < out_.views.size(); ++j) {
-      if (j != i) witnesses.push_back({&view(j).camera, &out_.views[j]});
+    for (const size_t j : neighbours(scene_, i, kMostCompared)) {
+      witnesses.push_back({&view(j).camera, &out_.views[j]});
     }
     complete_depth(priors, view(i), completion, witnesses, progress);
   }

@@ -11,6 +11,7 @@
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/front_plane.h"
 #include "libcgs/priors/joint_surface.h"
+#include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/pane_layers.h"
 
 namespace cgs {
@@ -157,8 +158,9 @@ std::optional<Pane> find_pane(const Scene& scene,
                               const Progress& progress) {
   constexpr double kLeastGain = 1;  // [dB]
   constexpr float kUnknownOpacity = 0.3f;
-  if (scene.input.size() < 3)
-    return std::nullopt;  // two equations for two unknowns foretell nothing
+  // Two equations for two unknowns foretell nothing; and where each place is seen in each view is
+  // too much to hold of many.
+  if (scene.input.size() < 3 || scene.input.size() > kMostCompared + 1) return std::nullopt;
   const JointSurface surface = joint_surface(scene, priors);
   const std::vector<ColorImage> left = differences(surface);
   const std::optional<FrontPlane> front = find_front_plane(scene, priors, left, progress);

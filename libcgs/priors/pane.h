@@ -21,7 +21,7 @@ struct Pane {
   double gain = 0;                 ///< As foretelling_gain() [dB].
 };
 
-/// Finds a pane, if three or more views show two things at once.
+/// Finds a pane, if three to nine views show two things at once.
 ///
 /// Where views agree on the depth of a surface and not on its colour, what is left of each
 /// photograph without what the others show is matched again. What then lies in front, on one plane,

@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tuple>
 
-#include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
-#include "libcgs/core/input_views.h"
+#include "libcgs/priors/neighbours.h"
 
 namespace cgs {
 
@@ -100,61 +98,15 @@ void match_with_parallax(std::vector<SweepSource>& sources) {
   for (SweepSource& source : sources) source.is_matched = !(source.speed < kHardlyAny * most);
 }
 
-// What each source tells of places that the reference may show, from far to near: rows are places.
-Eigen::MatrixXd worth_of_sources(const Scene& scene,
-                                 const std::pair<double, double>& inverse_depths,
-                                 const SweepGeometry& geometry) {
-  constexpr int kGrid = 12;   // places per side of the picture
-  constexpr int kDepths = 6;  // of each
-  const Camera& reference = input_view(scene, geometry.image).camera;
-  Eigen::MatrixXd out =
-      Eigen::MatrixXd::Zero(kGrid * kGrid * kDepths, Eigen::Index(geometry.sources.size()));
-  for (int i = 0; i < out.rows(); ++i) {
-    const double u = (i % kGrid + 0.5) / kGrid * reference.width;
-    const double v = (i / kGrid % kGrid + 0.5) / kGrid * reference.height;
-    const double share = (i / (kGrid * kGrid) + 0.5) / kDepths;
-    const double rho = std::lerp(inverse_depths.first, inverse_depths.second, share);
-    const Eigen::Vector3d point = reference.unproject(u, v, 1 / rho);
-    for (int k = 0; k < out.cols(); ++k) {
-      const Camera& other = input_view(scene, geometry.sources[size_t(k)].image).camera;
-      if (!other.sees(other.project(point))) continue;
-      out(i, k) = worth_of_angle(angle_between(reference.center() - point, other.center() - point));
-    }
+void choose_matched(const Scene& scene, SweepGeometry& geometry) {
+  std::vector<SweepSource>& sources = geometry.sources;
+  const std::vector<size_t> best =
+      neighbours(scene, static_cast<size_t>(geometry.image), kMostMatched);
+  if (best.empty() || sources.size() <= kMostMatched) return match_with_parallax(sources);
+  for (SweepSource& source : sources) {
+    source.is_matched =
+        std::binary_search(best.begin(), best.end(), static_cast<size_t>(source.image));
   }
-  return out;
-}
-
-// Marks up to kMostMatched sources, the one that adds the most to what the others tell first. A
-// place is told by its best source, half as much more by its second, and so on.
-// \return false if none tells anything
-bool match_best(const Eigen::MatrixXd& worth, std::vector<SweepSource>& sources) {
-  Eigen::VectorXd told = Eigen::VectorXd::Zero(worth.rows());
-  bool any = false;
-  for (SweepSource& source : sources) source.is_matched = false;
-  for (size_t n = 0; n < kMostMatched; ++n) {
-    double most = 0;
-    Eigen::Index best = 0;
-    for (Eigen::Index k = 0; k < worth.cols(); ++k) {
-      if (sources[size_t(k)].is_matched) continue;
-      const double gain = (worth.col(k).array() * (-told.array()).exp()).sum();
-      if (gain > most) std::tie(most, best) = std::pair(gain, k);
-    }
-    if (!(most > 0)) return any;
-    sources[size_t(best)].is_matched = any = true;
-    told += worth.col(best);
-  }
-  return any;
-}
-
-// \param inverse_depths  farthest and nearest
-void choose_matched(const Scene& scene,
-                    const std::pair<double, double>& inverse_depths,
-                    SweepGeometry& geometry) {
-  if (geometry.sources.size() > kMostMatched &&
-      match_best(worth_of_sources(scene, inverse_depths, geometry), geometry.sources)) {
-    return;
-  }
-  match_with_parallax(geometry.sources);
 }
 
 }  // namespace
@@ -197,11 +149,10 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
   const double span = inverse_near - geometry.inverse_far;
   const double middle = 2 / (inverse_near + geometry.inverse_far);
   double baseline = 0;
-  for (int j = 0; j < static_cast<int>(scene.input.size()); ++j) {
-    if (j == input) continue;
-    const Camera& other = input_view(scene, j).camera;
+  for (const size_t j : neighbours(scene, static_cast<size_t>(input), kMostCompared)) {
+    const Camera& other = input_view(scene, static_cast<int>(j)).camera;
     SweepSource source = source_of(reference, other, geometry.inverse_far);
-    source.image = j;
+    source.image = static_cast<int>(j);
     source.speed = largest_speed(reference, other, span, source);
     baseline = std::max(baseline, (other.center() - reference.center()).norm());
     geometry.sources.push_back(source);
@@ -212,7 +163,7 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
                    "the input cameras share one centre (baseline 0), so no depth can be measured; "
                    "choose views taken from different places");
   }
-  choose_matched(scene, {geometry.inverse_far, inverse_near}, geometry);
+  choose_matched(scene, geometry);
   double speed = 0;
   for (const SweepSource& source : geometry.sources) {
     if (source.is_matched) speed = std::max(speed, source.speed);
@@ -223,6 +174,14 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
   geometry.step = span / (geometry.planes - 1);
   for (SweepSource& source : geometry.sources) source.b *= geometry.step;
   return geometry;
+}
+
+SweepSource sweep_source(const Camera& reference,
+                         const SweepGeometry& geometry,
+                         const Camera& other) {
+  SweepSource source = source_of(reference, other, geometry.inverse_far);
+  source.b *= geometry.step;
+  return source;
 }
 
 SweepGeometry matched_sources(SweepGeometry geometry) {

@@ -23,8 +23,8 @@ SweepImage sweep_image(const View& view);
 /// Reference point (u, v) [pixels] on plane t lies at A (u, v, 1) + t b, homogeneous, in the
 /// source; the third coordinate is source depth divided by reference depth.
 struct SweepSource {
-  int image = 0;     ///< Position in Scene::input.
-  double speed = 0;  ///< Longest way of a seen pixel [pixels of the source per 1 / depth].
+  int image = 0;           ///< Position in Scene::input.
+  double speed = 0;        ///< Longest way of a seen pixel [pixels of the source per 1 / depth].
   bool is_matched = true;  ///< See matched_sources().
   Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
@@ -47,7 +47,7 @@ struct SweepGeometry {
   double inverse_far = 0;
   double step = 0;  ///< > 0
   int planes = 0;
-  std::vector<SweepSource> sources;  ///< Every other input view, in input order.
+  std::vector<SweepSource> sources;  ///< The neighbours() that it is compared with.
 
   double inverse_depth(double t) const { return inverse_far + t * step; }
   double plane_of(double inverse_depth) const { return (inverse_depth - inverse_far) / step; }
@@ -67,6 +67,11 @@ struct SweepSampling {
 
 /// \throws BadInput(Value) if the cameras share one centre.
 SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling& sampling);
+
+/// How the pixels of a view, on its planes, appear in another; without image and speed.
+SweepSource sweep_source(const Camera& reference,
+                         const SweepGeometry& geometry,
+                         const Camera& other);
 
 /// The same with only those sources that the reference is matched with. Of up to four, that is all
 /// that can tell planes apart: a photograph taken from almost the same place as the reference, as

@@ -12,6 +12,7 @@
 #include "libcgs/core/opencv_memory.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/exposure.h"
+#include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/reduced_view.h"
 
 namespace cgs {
@@ -159,6 +160,7 @@ class Transients {
                         box_means(small.image),
                         std::move(small.valid),
                         measured_depth(priors[i], factor_.back(), small.camera)});
+      others_.push_back(neighbours(scene, i, kMostCompared));
     }
   }
 
@@ -197,8 +199,7 @@ class Transients {
   Raster<SharedSurface> shared_surface(size_t i) const {
     const SmallView& here = views_[i];
     Raster<SharedSurface> out(here.depth.width, here.depth.height, SharedSurface{});
-    for (size_t j = 0; j < views_.size(); ++j) {
-      if (j == i) continue;
+    for (const size_t j : others_[i]) {
       const SmallView& other = views_[j];
       for (int y = 0; y < other.depth.height; ++y) {
         for (int x = 0; x < other.depth.width; ++x) {
@@ -206,8 +207,9 @@ class Transients {
           const Eigen::Vector3d point =
               other.camera.unproject(x + 0.5, y + 0.5, double{other.depth(x, y)});
           bool is_confirmed = false;
-          for (size_t k = 0; k < views_.size() && !is_confirmed; ++k) {
-            is_confirmed = k != i && k != j && agrees(views_[k], point, other.color(x, y));
+          for (const size_t k : others_[i]) {
+            is_confirmed = k != j && agrees(views_[k], point, other.color(x, y));
+            if (is_confirmed) break;
           }
           if (is_confirmed) enter(here.camera.project(point), other.color(x, y), out);
         }
@@ -254,8 +256,8 @@ class Transients {
     for (int k = 0; k < kTried; ++k) {
       const double share = 1 + (1 / kNearest - 1) * k / (kTried - 1);
       int shown = 0;
-      for (size_t j = 0; j < views_.size() && shown < 2; ++j) {
-        if (j != i && is_alike(views_[i], x, y, double{depth} / share, views_[j])) ++shown;
+      for (const size_t j : others_[i]) {
+        if (is_alike(views_[i], x, y, double{depth} / share, views_[j]) && ++shown == 2) break;
       }
       if (shown >= 2) return true;
     }
@@ -295,6 +297,7 @@ class Transients {
 
   std::vector<SmallView> views_;
   std::vector<int> factor_;
+  std::vector<std::vector<size_t>> others_;  // that each is compared with
 };
 
 }  // namespace
