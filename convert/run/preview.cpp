@@ -17,6 +17,8 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
+constexpr int64_t kPreviewVoxels = 1'000'000;  // where depth reaches far, more would take minutes
+
 int preview_reduction(const Scene& scene) {
   constexpr int kSide = 256;  // [pixels]
   int side = 0;
@@ -25,16 +27,6 @@ int preview_reduction(const Scene& scene) {
     side = std::max({side, camera.width, camera.height});
   }
   return std::max(1, (side + kSide / 2) / kSide);
-}
-
-// Edge of a voxel [scene units]: six pixels of a small picture in the middle of the depths that are
-// expected. Chosen by the nearest pixels, as for a run, voxels would be far too many for a look.
-double preview_voxel(const Scene& scene, int reduction) {
-  constexpr double kPixels = 6;
-  const int first = scene.input.front();
-  const DepthRange range = depth_range(scene, first);
-  const double middle = 2 / (1 / range.near + 1 / range.far);
-  return kPixels * reduction * middle / scene.views[static_cast<size_t>(first)].camera.fx;
 }
 
 // Mean share that is measured of what is surface and stands still.
@@ -82,7 +74,7 @@ Json write_preview(const RunRequest& request, Terminal& terminal) {
   opened.keep(request.output / "model");
   const int reduction = preview_reduction(opened.scene);
   RunRequest small = small_run(request, opened, kPreviewFolder, reduction);
-  small.voxel_size = number(preview_voxel(opened.scene, reduction), "%.6g");
+  small.max_voxels = kPreviewVoxels;
   small.training.steps = 0;
   small.lods = 0;
   small.max_size = 0;

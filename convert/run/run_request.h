@@ -18,7 +18,8 @@ struct RunRequest {
   SceneRequest scene;
   std::filesystem::path output;
   TrainingOptions training;
-  std::string voxel_size;         ///< Empty = from the pixel footprint.
+  std::string voxel_size;                         ///< Empty = from the pixel footprint.
+  int64_t max_voxels = TsdfOptions().max_voxels;  ///< As in TsdfOptions; previews have fewer.
   std::string simplify;           ///< Largest error of simplification; empty = default, "0" = none.
   std::string compression_error;  ///< Of the compressed mesh; empty = 1/16384 of its size.
   GlbEncoding glb_encoding = GlbEncoding::Draco;  ///< Of asset.glb.

@@ -213,7 +213,8 @@ MeshesReport write_meshes(const Model& model, const RunRequest& request, const P
                                  {length_or_zero(request.voxel_size, frame),
                                   request.estimated,
                                   memory_budget(request.memory_limit),
-                                  promise},
+                                  promise,
+                                  request.max_voxels},
                                  part_of(progress, 0, 0.3));
   Surfaces surfaces;
   surfaces.open = open_surface(fused.volume, {});

@@ -30,8 +30,8 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-// Every pair is compared.
-constexpr size_t kMostPhotographs = 16;
+// Beyond, hours; and tools that solve for thousands exist.
+constexpr size_t kMostPhotographs = 200;
 // Used where none are named.
 constexpr size_t kUsed = 3;
 

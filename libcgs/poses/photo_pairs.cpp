@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/poses/photo_pairs.h"
 
+#include <algorithm>
 #include <cstdint>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -23,6 +25,66 @@ bool shows_no_photo_twice(const Track& track) {
     if (track.seen[i].photo == track.seen[i - 1].photo) return false;
   }
   return track.seen.size() >= 2;
+}
+
+std::vector<PhotoPair> every_pair(size_t photos) {
+  std::vector<PhotoPair> out;
+  for (int a = 0; a < static_cast<int>(photos); ++a) {
+    for (int b = a + 1; b < static_cast<int>(photos); ++b) out.push_back({a, b, {}, {}, false});
+  }
+  return out;
+}
+
+// The features of the highest contrast, which come first.
+PhotoFeatures strongest(const PhotoFeatures& features) {
+  constexpr Eigen::Index kStrongest = 600;  // descriptors
+  PhotoFeatures out;
+  out.points = features.points;
+  const Eigen::Index rows = std::min(kStrongest, features.descriptors.rows());
+  out.descriptors = features.descriptors.topRows(rows);
+  if (!features.point_of.empty()) {
+    out.point_of.assign(features.point_of.begin(), features.point_of.begin() + rows);
+  }
+  return out;
+}
+
+// The pairs worth a search among all features: those of the most matches among the strongest, a
+// few per photograph, and photographs that follow each other.
+std::vector<PhotoPair> likely_pairs(const std::vector<UnposedPhoto>& photos,
+                                    const Progress& progress) {
+  constexpr size_t kPerPhoto = 8;
+  constexpr size_t kFewest = 5;  // matches; as many come by chance
+  constexpr int kFollowing = 2;
+  std::vector<PhotoFeatures> features;
+  features.reserve(photos.size());
+  for (const UnposedPhoto& photo : photos) features.push_back(strongest(photo.features));
+  std::vector<PhotoPair> all = every_pair(photos.size());
+  std::vector<size_t> score(all.size(), 0);
+  SharedProgress compared(progress, all.size());
+  tbb::parallel_for(size_t{0}, all.size(), [&](size_t i) {
+    score[i] = match_features(features[static_cast<size_t>(all[i].a)],
+                              features[static_cast<size_t>(all[i].b)])
+                   .size();
+    compared.advance();
+  });
+  std::vector<char> is_likely(all.size(), 0);
+  for (int photo = 0; photo < static_cast<int>(photos.size()); ++photo) {
+    std::vector<size_t> own;
+    for (size_t i = 0; i < all.size(); ++i) {
+      const bool shows = all[i].a == photo || all[i].b == photo;
+      if (shows && score[i] >= kFewest) own.push_back(i);
+      if (shows && all[i].b - all[i].a <= kFollowing) is_likely[i] = 1;
+    }
+    std::stable_sort(
+        own.begin(), own.end(), [&](size_t x, size_t y) { return score[x] > score[y]; });
+    own.resize(std::min(own.size(), kPerPhoto));
+    for (const size_t i : own) is_likely[i] = 1;
+  }
+  std::vector<PhotoPair> out;
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (is_likely[i] != 0) out.push_back(std::move(all[i]));
+  }
+  return out;
 }
 
 }  // namespace
@@ -51,12 +113,12 @@ PhotoPair match_pair(const UnposedPhoto& a, const UnposedPhoto& b, const Progres
 
 std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,
                                     const Progress& progress) {
-  const int count = static_cast<int>(photos.size());
-  std::vector<PhotoPair> pairs;
-  for (int a = 0; a < count; ++a) {
-    for (int b = a + 1; b < count; ++b) pairs.push_back({a, b, {}, {}, false});
-  }
-  SharedProgress matched(progress, pairs.size());
+  constexpr double kChoosing = 0.1;  // of the time
+  std::vector<PhotoPair> pairs = photos.size() <= kAllCompared
+                                     ? every_pair(photos.size())
+                                     : likely_pairs(photos, part_of(progress, 0, kChoosing));
+  const Progress matching = part_of(progress, kChoosing, 1);  // outlives what shares it
+  SharedProgress matched(matching, pairs.size());
   tbb::parallel_for(size_t{0}, pairs.size(), [&](size_t i) {
     const int a = pairs[i].a;
     const int b = pairs[i].b;

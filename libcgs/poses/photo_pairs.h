@@ -25,7 +25,13 @@ inline constexpr size_t kFewestMatches = 24;
 /// Matches one pair, which is then (0, 1).
 PhotoPair match_pair(const UnposedPhoto& a, const UnposedPhoto& b, const Progress& progress = {});
 
-/// Matches every pair a < b.
+/// Most photographs of which every pair is matched.
+inline constexpr size_t kAllCompared = 12;
+
+/// Matches pairs a < b: all of them, or, of more than kAllCompared photographs, those whose
+/// strongest features match best, a few for each photograph.
+/// Source: Wu 2013, "Towards Linear-Time Incremental Structure from Motion", section 3 (preemptive
+///         matching; there by features of the largest scale).
 std::vector<PhotoPair> match_photos(const std::vector<UnposedPhoto>& photos,
                                     const Progress& progress);
 

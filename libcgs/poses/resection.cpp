@@ -204,11 +204,26 @@ void place_more(Reconstruction& scene,
                 const Progress& progress) {
   triangulate(scene, kMostError, kLeastAngle);
   std::vector<char> has_failed(scene.poses.size(), 0);
+  auto placed = static_cast<int>(
+      std::count_if(scene.poses.begin(), scene.poses.end(), [](const auto& pose) { return pose; }));
+  int unsettled = 0;
   for (int photo = 0; (photo = next_photo(scene, has_failed)) >= 0;) {
     has_failed[static_cast<size_t>(photo)] = 1;
     if (!resect(scene, photo)) continue;
-    settle(scene, priors, {.first = begun.first, .second = begun.second, .progress = progress});
+    ++placed;
+    ++unsettled;
+    // Of few photographs each is adjusted with all others at once; of many, once some are new.
+    constexpr int kNew = 12;  // one in so many
+    if (kNew * unsettled >= placed) {
+      settle(scene, priors, {.first = begun.first, .second = begun.second, .progress = progress});
+      unsettled = 0;
+    } else {
+      triangulate(scene, kMostError, kLeastAngle);
+    }
     if (points_in(scene, photo) < kFewestPoints) scene.poses[static_cast<size_t>(photo)].reset();
+  }
+  if (unsettled > 0) {
+    settle(scene, priors, {.first = begun.first, .second = begun.second, .progress = progress});
   }
 }
 

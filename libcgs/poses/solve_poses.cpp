@@ -26,6 +26,9 @@ namespace {
 // widest lenses (13 mm as on film) to short telephoto lenses (115 mm).
 constexpr std::array<double, 8> kFocals = {0.36, 0.5, 0.7, 0.9, 1.15, 1.5, 2.2, 3.2};
 
+// Of many photographs: more would tell little more, and take long.
+constexpr size_t kTracksPerPhoto = 400;
+
 double larger_side(const UnposedPhoto& photo) {
   return std::max(photo.width, photo.height) / photo.features.pixel;
 }
@@ -135,9 +138,10 @@ Attempt best_attempt(const std::vector<int>& lens_of,
                      const std::vector<PhotoPair>& pairs,
                      const std::vector<Track>& tracks,
                      const Progress& progress) {
-  constexpr size_t kTracks = 600;
+  constexpr size_t kTracks = 600;   // enough for few photographs
+  constexpr size_t kPerPhoto = 50;  // of many
   Reconstruction start;
-  start.tracks = sample(tracks, kTracks);
+  start.tracks = sample(tracks, std::max(kTracks, kPerPhoto * lens_of.size()));
   start.lens_of = lens_of;
   start.poses.resize(lens_of.size());
   const bool is_known = std::all_of(
@@ -290,7 +294,9 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
       best_attempt(lens_of, priors, matched.pairs, matched.tracks, part_of(progress, 0, kPlaced));
   if (!attempt.begun) throw NumericalError(unexplained_matches(photos, matched.pairs));
   Reconstruction scene = std::move(attempt.scene);
-  scene.tracks = matched.tracks;
+  scene.tracks = photos.size() <= kAllCompared
+                     ? matched.tracks
+                     : sample(matched.tracks, kTracksPerPhoto * photos.size());
   place_more(scene, priors, *attempt.begun, [&](double) { report(progress, kPlaced); });
   refine_observations(photos, scene, [&](double) { report(progress, kPlaced); });
   const std::vector<double> sigmas =

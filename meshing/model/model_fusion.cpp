@@ -49,6 +49,7 @@ FusedVolume fuse_model(const Model& model, const ModelFusion& request, const Pro
   TsdfOptions options;
   options.voxel_size = request.voxel_size;
   options.coarsest_voxel = request.coarsest_voxel;
+  options.max_voxels = request.max_voxels;
   options.memory_limit = request.memory_limit;
   return fuse(views, options, progress);
 }

@@ -22,6 +22,7 @@ struct ModelFusion {
   EstimatedSurface estimated = EstimatedSurface::FillOnly;
   size_t memory_limit = TsdfOptions().memory_limit;  ///< [bytes]
   double coarsest_voxel = 0;                         ///< As in TsdfOptions [internal units].
+  int64_t max_voxels = TsdfOptions().max_voxels;     ///< In the bounds, where voxels are chosen.
 };
 
 /// Fuses what the input views of a model see: measured depth, coloured as the Gaussians draw it.
