@@ -67,6 +67,7 @@ int run_program(int argc, char** argv) {
   cgs::add_train(app);
   cgs::add_evaluate(app);
   cgs::add_render(app);
+  cgs::add_next(app);
   cgs::add_fuse(app);
   cgs::add_mesh(app);
   cgs::add_filter(app);

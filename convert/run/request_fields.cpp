@@ -256,6 +256,7 @@ std::vector<RequestField> all_fields() {
   for (RequestField& field : found_in_scene()) out.push_back(std::move(field));
   out.push_back(control_points());
   out.push_back(chosen("chunk", Stage::Model, in_options(&SceneOptions::chunk)));
+  out.push_back(chosen("use_all", Stage::Report, in_options(&SceneOptions::all_views)));
   out.push_back(chosen("refine_poses", Stage::Model, in_scene(&SceneRequest::refine_poses)));
   out.push_back(lods());
   out.push_back(chosen("glb_encoding", Stage::Web, &RunRequest::glb_encoding));

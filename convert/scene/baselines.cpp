@@ -83,9 +83,16 @@ std::vector<std::string> baseline_warnings(const Scene& scene) {
   const auto name = [&](int view) {
     return printable(scene.views[static_cast<size_t>(view)].name);
   };
-  for (const Baseline& pair : baselines(scene)) {
+  const std::vector<Baseline> pairs = baselines(scene);
+  // Ends of a walk around a thing may be far apart, if others lie between.
+  const auto has_company = [&](int view) {
+    return std::any_of(pairs.begin(), pairs.end(), [&](const Baseline& pair) {
+      return (pair.a == view || pair.b == view) && pair.angle <= kWide;
+    });
+  };
+  for (const Baseline& pair : pairs) {
     largest = std::max(largest, pair.to_depth);
-    if (pair.angle <= kWide) continue;
+    if (pair.angle <= kWide || (has_company(pair.a) && has_company(pair.b))) continue;
     out.push_back("views " + name(pair.a) + " and " + name(pair.b) +
                   " look in directions more than 60 degrees apart; they may share too little");
   }

@@ -112,10 +112,23 @@ void check_presence(Scene& scene) {
   scene.warnings.push_back(text);
 }
 
-constexpr int kInputs = 3;  // of many views
+constexpr int kInputs = 3;  // of many views, at least; of LLFF's protocol
+constexpr size_t kHoldEvery = 8;
+
+// As many as kMostPixels allow, of which one in eight is held out to tell how good the others are.
+size_t input_count(const Scene& scene, const std::vector<int>& usable) {
+  double pixels = 0;
+  for (const int i : usable) {
+    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+    pixels += double(camera.width) * camera.height;
+  }
+  const auto count = static_cast<double>(usable.size());
+  const auto affordable = static_cast<size_t>(count * SceneOptions::kMostPixels / pixels);
+  const size_t held_out = (usable.size() + kHoldEvery - 1) / kHoldEvery;
+  return std::clamp(affordable, size_t{kInputs}, usable.size() - held_out);
+}
 
 std::vector<int> llff_protocol(const std::vector<int>& usable) {
-  constexpr size_t kHoldEvery = 8;
   std::vector<int> pool;
   for (size_t i = 0; i < usable.size(); ++i) {
     if (i % kHoldEvery != 0) pool.push_back(usable[i]);
@@ -131,7 +144,9 @@ std::vector<int> llff_protocol(const std::vector<int>& usable) {
 // LLFF's scenes have a protocol that others publish figures for.
 std::vector<int> some_views(const Scene& scene, const std::vector<int>& usable) {
   std::vector<int> out;
-  if (scene.kind != SceneKind::Llff) out = choose_input_views(scene, usable, kInputs);
+  if (scene.kind != SceneKind::Llff) {
+    out = choose_input_views(scene, usable, input_count(scene, usable));
+  }
   return out.empty() ? llff_protocol(usable) : out;
 }
 

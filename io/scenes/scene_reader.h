@@ -16,8 +16,9 @@ namespace cgs {
 /// What to take of a scene on disk.
 struct SceneOptions {
   /// Input views: comma-separated names (file stems) or indices in name order; a name wins where
-  /// both fit. Empty = choose: all of at most four, of more up to three that go well together, of
-  /// an LLFF scene those of its protocol.
+  /// both fit. Empty = choose: all of at most four, of more those that together show the most, up
+  /// to kMostPixels but at least three, seven of eight at most; of an LLFF scene those of its
+  /// protocol.
   std::string views;
   bool all_views = false;  ///< Where `views` is empty, take every one.
   /// Divide image sizes by this; >= 1. Empty = choose: the smallest that leaves no side above
@@ -32,6 +33,8 @@ struct SceneOptions {
 
   /// Three photographs of this size take minutes on two cores; time grows with their pixels.
   static constexpr int kLongestSide = 1024;  // [pixels]
+  /// Of all input views that are chosen together: some five minutes on two cores.
+  static constexpr double kMostPixels = 3.2e6;
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

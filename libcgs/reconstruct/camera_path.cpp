@@ -4,27 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "libcgs/core/error.h"
-#include "libcgs/core/order_statistics.h"
 
 namespace cgs {
 
 namespace {
-
-const Camera& input_camera(const Model& model, size_t k) {
-  return model.scene.views[static_cast<size_t>(model.scene.input.at(k))].camera;
-}
-
-// NaN where none is known.
-float median_depth(const DepthMap& depth) {
-  std::vector<float> known;
-  for (const float z : depth.data) {
-    if (std::isfinite(z)) known.push_back(z);
-  }
-  if (known.empty()) return std::nanf("");
-  return median(known);
-}
 
 /// What the input views look at, and from where on the whole.
 struct Subject {
@@ -43,9 +29,9 @@ Subject subject_of(const Model& model) {
     const Camera& camera = input_camera(model, k);
     out.eye += camera.center() / double(count);
     image_up -= camera.world_from_cam.linear().col(1);
-    const float z = median_depth(model.priors.at(k).depth);
-    if (std::isnan(z)) continue;
-    out.centre += camera.unproject(0.5 * camera.width, 0.5 * camera.height, z);
+    const std::optional<Eigen::Vector3d> seen = looked_at(model, k);
+    if (!seen) continue;
+    out.centre += *seen;
     ++with_depth;
   }
   if (with_depth == 0) throw NumericalError("no depth is known that a path could look at");

@@ -2,10 +2,26 @@
 #include "libcgs/reconstruct/model.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/render/rasterizer.h"
 
 namespace cgs {
+
+const Camera& input_camera(const Model& model, size_t input) {
+  return model.scene.views[static_cast<size_t>(model.scene.input.at(input))].camera;
+}
+
+std::optional<Eigen::Vector3d> looked_at(const Model& model, size_t input) {
+  std::vector<float> known;
+  for (const float z : model.priors.at(input).depth.data) {
+    if (std::isfinite(z)) known.push_back(z);
+  }
+  if (known.empty()) return std::nullopt;
+  const Camera& camera = input_camera(model, input);
+  return camera.unproject(0.5 * camera.width, 0.5 * camera.height, double{median(known)});
+}
 
 EvidenceMap evidence_of(const ViewPriors& priors) {
   EvidenceMap out(priors.origin.width, priors.origin.height, DepthEvidence::Measured);

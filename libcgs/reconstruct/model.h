@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,13 @@ struct Model {
   std::vector<ViewPriors> priors;  ///< In the order of scene.input; empty for foreign splats.
   std::string evidence;  ///< What the Gaussians rest on, in words; empty where nobody says.
 };
+
+/// Camera of an input view, by its position in scene.input.
+const Camera& input_camera(const Model& model, size_t input);
+
+/// The point that an input view looks at: in the middle of its picture, at the median of its depth
+/// [internal units]; nothing where no depth is known.
+std::optional<Eigen::Vector3d> looked_at(const Model& model, size_t input);
 
 /// What vouches for the depth of every pixel of a view.
 EvidenceMap evidence_of(const ViewPriors& priors);

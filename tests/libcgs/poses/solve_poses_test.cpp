@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/poses/photo_pairs.h"
 #include "tests/support/remedy_of_refusal.h"
 #include "tests/support/unposed_photos.h"
 
@@ -313,6 +315,23 @@ TEST(SolvePoses, TheUnitIsTheWayToTheFarthest) {
     farthest = std::max(farthest, photo.camera.center().norm());
   }
   EXPECT_NEAR(farthest, 1, 1e-9);
+}
+
+// All round a box full of points, more than are compared with each other.
+TEST(SolvePoses, FindsCamerasOfManyPhotographsAllRound) {
+  constexpr int kCount = 20;
+  static_assert(kCount > kAllCompared);
+  PointScene scene;
+  for (int i = 0; i < kCount; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kCount;
+    scene.cameras.push_back(test::looking_at(
+        {7 * std::sin(angle), 0.3 * (i % 3), 7 * std::cos(angle)}, {0, 0, 0.1}, 1200, 900, kFocal));
+  }
+  scene.points = test::scattered_points(800, {2.5, 1.8, 2.5});
+  const PoseSolution solution = solve_poses(with_focal(unposed_photos(scene), kFocal, 0.05));
+  const auto errors = pose_errors(cameras_of(solution), scene.cameras);
+  EXPECT_LT(errors.rotation, 0.1);
+  EXPECT_LT(errors.direction, 0.2);
 }
 
 }  // namespace

@@ -1,0 +1,106 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What more photographs bring: reconstructs a scene from more and more of them, each time measured
+on the same held-out ones, and prints a table.
+
+usage: photo_count.py PROGRAM SCENE OUT COUNT... [-- OPTION...]
+
+  tests/eval/photo_count.py build/release/bin/cgs fox out/fox 3 6 12 24 -- --downscale 4
+
+Every eighth photograph by name, from the first, is held out. Of the others, COUNT are taken, evenly
+spread. OPTIONs go to `cgs train`. What was trained already is read from OUT.
+
+Columns: photographs; PSNR and SSIM over all pixels of the held-out ones, PSNR over what an input saw
+of them and their share of holes; share of the input pixels that is measured or adjoins what is;
+Gaussians; processor seconds and memory of the training with depth.
+"""
+
+import json
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+HOLD_EVERY = 8
+
+
+def photographs(program, scene):
+    done = subprocess.run(
+        [program, "info", scene, "--json"], capture_output=True, text=True, check=True
+    )
+    cameras = json.loads(done.stdout)["cameras"]
+    return sorted(camera["name"] for camera in cameras if camera["role"] != "no image")
+
+
+def spread(names, count):
+    if count >= len(names):
+        return names
+    return [names[k * (len(names) - 1) // (count - 1)] for k in range(count)]
+
+
+def train(program, scene, names, out, options):
+    """Trains, if that was not done before. \\return processor seconds and peak memory [MiB]"""
+    record = out.with_suffix(".json")
+    if record.exists():
+        return json.loads(record.read_text())
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(
+        ["/usr/bin/time", "-f", "%M", "-o", out.with_suffix(".kib"), program, "train", scene,
+         "--views", ",".join(names), "-o", out, *options],
+        check=True,
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    memory = int(out.with_suffix(".kib").read_text()) / 1024
+    found = {"seconds": used, "memory": memory}
+    record.write_text(json.dumps(found))
+    return found
+
+
+def row(program, scene, inputs, held_out, out, options):
+    found = train(program, scene, inputs, out, options)
+    done = subprocess.run(
+        [program, "evaluate", out, "--views", ",".join(held_out), "--json"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    mean = json.loads(done.stdout)["mean"]
+    training = json.loads((out / "training.json").read_text())
+    depth = training["depth_of_views"]
+    measured = sum(view["with_evidence"] for view in depth) / len(depth)
+    return [
+        str(len(inputs)),
+        f"{mean['psnr']:.2f} dB / {mean['ssim']:.3f}",
+        f"{mean['psnr_seen']:.2f} dB",
+        f"{100 * mean['hole_fraction']:.1f} %",
+        f"{100 * measured:.0f} %",
+        f"{training['gaussians'] / 1e6:.2f} million",
+        f"{found['seconds']:.0f}",
+        f"{found['memory']:.0f} MiB",
+    ]
+
+
+def main(arguments):
+    split = arguments.index("--") if "--" in arguments else len(arguments)
+    options = arguments[split + 1 :]
+    if split < 4:
+        print(__doc__, file=sys.stderr)
+        return 2
+    program, scene, out = arguments[0], arguments[1], Path(arguments[2])
+    out.mkdir(parents=True, exist_ok=True)
+    names = photographs(program, scene)
+    held_out = names[::HOLD_EVERY]
+    others = [name for name in names if name not in held_out]
+    print("| photographs | held out, all pixels | seen | holes | measured | Gaussians "
+          "| core-s | memory |")
+    print("|---|---|---|---|---|---|---|---|")
+    for count in map(int, arguments[3:split]):
+        inputs = spread(others, count)
+        columns = row(program, scene, inputs, held_out, out / str(len(inputs)), options)
+        print("| " + " | ".join(columns) + " |", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
