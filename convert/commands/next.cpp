@@ -36,7 +36,7 @@ struct NextArgs {
   CommonOptions common;
 };
 
-// "30° to the right of view_02, 20° higher, 1.4 times as far away"
+// "from view_02: 30° to the right, 20° higher"
 std::string place_words(const NextView& view, const Model& model) {
   const auto degrees = [](double radians) {
     return static_cast<int>(std::lround(std::abs(radians) * 180 / std::numbers::pi));
@@ -57,7 +57,7 @@ std::string place_words(const NextView& view, const Model& model) {
   }
   const int nearest = model.scene.input[view.nearest];
   const std::string name = printable(model.scene.views[static_cast<size_t>(nearest)].name);
-  return out.empty() ? "from beside " + name : out + ", from " + name;
+  return out.empty() ? "beside " + name : "from " + name + ": " + out;
 }
 
 Json to_json(const std::vector<NextView>& views, const Model& model) {
@@ -79,7 +79,7 @@ void print_table(const std::vector<NextView>& views, const Model& model) {
   std::printf("%4s %8s %8s %8s  %s\n", "", "open", "unsure", "known", "where to stand");
   for (size_t i = 0; i < views.size(); ++i) {
     const NextView& view = views[i];
-    const std::string name = view.name.empty() ? "" : printable(view.name) + ": ";
+    const std::string name = view.name.empty() ? "" : printable(view.name) + ", ";
     std::printf("%4zu %8s %8s %8s  %s\n",
                 i + 1,
                 percent(view.open).c_str(),

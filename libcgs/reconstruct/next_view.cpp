@@ -77,19 +77,15 @@ void place(const Model& model,
   view.right = std::remainder(view.right, 2 * std::numbers::pi);
 }
 
-// An input camera turned around a point, about the axes of its picture, and moved away from it.
-Camera turned(const Camera& camera,
-              const Eigen::Vector3d& around,
-              double right,
-              double higher,
-              double farther) {
+// An input camera turned around a point, about the axes of its picture.
+Camera turned(const Camera& camera, const Eigen::Vector3d& around, double right, double higher) {
   const Eigen::Matrix3d axes = camera.world_from_cam.rotation();
   const Eigen::AngleAxisd aside(-right, axes.col(1));
   const Eigen::AngleAxisd up(-higher, aside * Eigen::Vector3d(axes.col(0)));
   const Eigen::Matrix3d turn = (up * aside).toRotationMatrix();
   Camera out = camera;
   out.world_from_cam.linear() = turn * axes;
-  out.world_from_cam.translation() = around + farther * (turn * (camera.center() - around));
+  out.world_from_cam.translation() = around + turn * (camera.center() - around);
   return out;
 }
 
@@ -115,21 +111,18 @@ std::vector<NextView> rank_next_views(const Model& model,
 }
 
 std::vector<NextView> places_around(const Model& model) {
-  constexpr double kFarther = 1.4;
   const auto seen = subjects(model);
   std::vector<NextView> out;
   for (size_t k = 0; k < seen.size(); ++k) {
     if (!seen[k]) continue;
-    const auto add = [&](double right, double higher, double farther) {
+    const auto add = [&](double right, double higher) {
       NextView& view = out.emplace_back();
-      view.camera =
-          turned(input_camera(model, k), *seen[k], right * kDegree, higher * kDegree, farther);
+      view.camera = turned(input_camera(model, k), *seen[k], right * kDegree, higher * kDegree);
     };
-    for (const double right : {-45.0, -30.0, -15.0, 15.0, 30.0, 45.0}) add(right, 0, 1);
+    for (const double right : {-45.0, -30.0, -15.0, 15.0, 30.0, 45.0}) add(right, 0);
     for (const double right : {-20.0, 0.0, 20.0}) {
-      for (const double higher : {-20.0, 20.0}) add(right, higher, 1);
+      for (const double higher : {-20.0, 20.0}) add(right, higher);
     }
-    add(0, 0, kFarther);
   }
   if (out.empty()) throw NumericalError("no depth is known around which one could look");
   return out;

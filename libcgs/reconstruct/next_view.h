@@ -38,8 +38,8 @@ std::vector<NextView> rank_next_views(const Model& model,
                                       std::vector<NextView> candidates,
                                       const Progress& progress = {});
 
-/// Places around the input views that look at what these look at: up to 45 degrees aside, 20 higher
-/// or lower, and farther away.
+/// Places around the input views, as far from what these look at: up to 45 degrees aside, and 20
+/// higher or lower.
 /// \throws NumericalError if no depth is known
 std::vector<NextView> places_around(const Model& model);
 

@@ -147,6 +147,23 @@ TEST(RestateFrame, WritesSplatsAnewThatAnotherProgramChanged) {
   EXPECT_NE(test::read_bytes(dir / "gaussians.ply").find("comment up 1 0 0"), std::string::npos);
 }
 
+TEST(ReadModel, KnowsWhichViewDrawsAPlace) {
+  const test::TempDir dir;
+  Model model = model_of_one_view(dir.path());
+  ViewPriors priors;
+  priors.depth = priors.sigma = priors.confidence = DepthMap(2, 2, 1);
+  priors.layer = priors.matched_views = Raster<uint8_t>(2, 2, 0);
+  priors.origin = Raster<DepthOrigin>(2, 2, DepthOrigin::Measured);
+  model.priors = {priors};
+  model.scene.input = {0};
+  write_model(dir.path(), model);
+  EXPECT_TRUE(read_model(dir.path()).priors[0].shown_finer.empty());
+  model.priors[0].shown_finer = MaskMap(2, 2, 0);
+  model.priors[0].shown_finer(1, 0) = 1;
+  write_model(dir.path(), model);
+  EXPECT_EQ(read_model(dir.path()).priors[0].shown_finer.data, model.priors[0].shown_finer.data);
+}
+
 // The cameras of such scenes are in a file that states no frame, those of their models are not.
 TEST(ReadModel, RestoresCamerasOfAnySceneBitForBit) {
   const test::TempDir dir;

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "libcgs/coherence/coherent_gaussians.h"
 #include "libcgs/core/error.h"
 
 namespace cgs::initialisation_test {
@@ -71,6 +72,16 @@ TEST(InitialGaussians, SkipPixelsWithoutDepth) {
   priors[0].depth(2, 1) = std::numeric_limits<float>::quiet_NaN();
   priors[1].depth(0, 0) = std::numeric_limits<float>::infinity();
   EXPECT_EQ(initial_gaussians(scene_of(2), priors).size(), 46u);
+}
+
+TEST(InitialGaussians, SkipPixelsThatAnotherViewShowsFiner) {
+  std::vector<ViewPriors> priors = priors_of(2);
+  priors[1].shown_finer = MaskMap(6, 4, 0);
+  priors[1].shown_finer(3, 2) = priors[1].shown_finer(4, 2) = 1;
+  EXPECT_EQ(initial_gaussians(scene_of(2), priors).size(), 46u);
+  CoherentGaussians model(scene_of(2), priors, {});
+  EXPECT_EQ(model.range(1).last - model.range(1).first, 22u);
+  EXPECT_EQ(model.pixel(1, 2 * 6 + 3), 2 * 6 + 5);
 }
 
 TEST(InitialGaussians, AreLabelledByWhatVouchesForTheirDepth) {

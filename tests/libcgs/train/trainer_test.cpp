@@ -32,10 +32,11 @@ std::vector<test::TexturedPatch> wall_and_box() {
 
 // A textured wall with a box in front, seen by three cameras; its depth is known up to a smooth
 // bump of `error` relative height, another one in each view.
-PlantedScene planted_scene(double error) {
+// \param places  x of the cameras
+PlantedScene planted_scene(double error, const std::vector<double>& places = {-0.12, 0.0, 0.12}) {
   const std::vector<test::TexturedPatch> patches = wall_and_box();
   std::vector<Camera> cameras;
-  for (const double x : {-0.12, 0.0, 0.12}) {
+  for (const double x : places) {
     cameras.push_back(test::looking_at({x, 0.03 * x, 0}, {0, 0, 0.9}, 72, 56, 70));
   }
   PlantedScene out;
@@ -107,6 +108,16 @@ TEST(Trainer, MovesDepthTowardsTheTruth) {
   RecordProperty("before", std::to_string(before));
   RecordProperty("after", std::to_string(after));
   EXPECT_LT(after, 0.8 * before) << "from " << before;
+}
+
+TEST(Trainer, DrawsManyViewsInTurn) {
+  const PlantedScene planted = planted_scene(0.2, {-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3});
+  TrainingOptions options = short_training(120);
+  options.depth_rate = 5e-3;
+  Trainer trainer(planted.scene, planted.priors, options);
+  const double before = mean_depth_error(planted, trainer.model());
+  run(trainer);
+  EXPECT_LT(mean_depth_error(planted, trainer.model()), 0.8 * before);
 }
 
 // What a camera between those of the photographs sees through a pane and beside it.
