@@ -259,6 +259,7 @@ std::vector<RequestField> all_fields() {
   out.push_back(chosen("use_all", Stage::Report, in_options(&SceneOptions::all_views)));
   out.push_back(chosen("refine_poses", Stage::Model, in_scene(&SceneRequest::refine_poses)));
   out.push_back(lods());
+  out.push_back(chosen("max_voxels", Stage::Mesh, &RunRequest::max_voxels));
   out.push_back(chosen("glb_encoding", Stage::Web, &RunRequest::glb_encoding));
   out.push_back(chosen("local_origin", Stage::Splats, &RunRequest::local_origin));
   out.push_back(chosen("estimated", Stage::Mesh, &RunRequest::estimated));

@@ -138,7 +138,8 @@ std::vector<Raster<SlantedPlane>> ground_planes(const Scene& scene,
   for (size_t i = 0; i < count; ++i) {
     const Progress part =
         part_of(progress, double(i) / double(count), double(i + 1) / double(count));
-    const SweepGeometry half = matched_sources(sweep_geometry(halved, static_cast<int>(i), sampling));
+    const SweepGeometry half =
+        matched_sources(sweep_geometry(halved, static_cast<int>(i), sampling));
     const Camera& camera = halved.views[i].camera;
     const auto family = level_planes(half, camera, scene.frame.up);
     if (!family) continue;

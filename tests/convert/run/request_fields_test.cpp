@@ -18,6 +18,7 @@ TEST(RequestFields, KeepEveryMemberOfARequestButWhatDecidesNothing) {
                output,
                training,
                voxel_size,
+               max_voxels,
                simplify,
                compression_error,
                glb_encoding,
@@ -43,6 +44,7 @@ TEST(RequestFields, KeepEveryMemberOfARequestButWhatDecidesNothing) {
   const std::map<std::string, const void*> members = {
       {"training", &training},
       {"voxel_size", &voxel_size},
+      {"max_voxels", &max_voxels},
       {"simplify", &simplify},
       {"compression_error", &compression_error},
       {"glb_encoding", &glb_encoding},
@@ -59,15 +61,16 @@ TEST(RequestFields, KeepEveryMemberOfARequestButWhatDecidesNothing) {
       {"scene.known_distances", &known_distances},
       {"scene.marker_size", &marker_size},
       {"scene.options.views", &views},
+      {"scene.options.all_views", &all_views},
       {"scene.options.downscale", &downscale},
       {"scene.options.chunk", &chunk},
       {"scene.options.allow_external", &allow_external},
       {"scene.options.depth", &depth},
       {"scene.control.file", &table},
       {"scene.control.unit", &unit}};
-  // Where and how it is worked; no option of a run sets all_views.
+  // Where and how it is worked.
   const std::set<const void*> decide_nothing = {
-      &output, &memory_limit, &overwrite, &settings_reason, &all_views};
+      &output, &memory_limit, &overwrite, &settings_reason};
   std::multiset<const void*> kept;
   for (const auto* fields : {&request_fields(), &noted_fields()}) {
     for (const RequestField& field : *fields) {

@@ -79,6 +79,7 @@ TEST(InitialGaussians, SkipPixelsThatAnotherViewShowsFiner) {
   priors[1].shown_finer = MaskMap(6, 4, 0);
   priors[1].shown_finer(3, 2) = priors[1].shown_finer(4, 2) = 1;
   EXPECT_EQ(initial_gaussians(scene_of(2), priors).size(), 46u);
+  for (ViewPriors& p : priors) p.layer = Raster<uint8_t>(6, 4, 0);
   CoherentGaussians model(scene_of(2), priors, {});
   EXPECT_EQ(model.range(1).last - model.range(1).first, 22u);
   EXPECT_EQ(model.pixel(1, 2 * 6 + 3), 2 * 6 + 5);

@@ -48,29 +48,24 @@ TEST(NextView, IsWhereMostIsOpenAndEnoughIsShared) {
   NextView away = at(model, 0, "away");
   away.camera.world_from_cam.rotate(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY()));
   const auto ranked = rank_next_views(
-      model, {at(model, 0, "same"), away, at(model, 2.5, "beside"), at(model, 5.8, "far")});
+      model, {at(model, 0, "same"), away, at(model, 2.5, "beside"), at(model, 4.4, "far")});
   ASSERT_EQ(ranked.size(), 4u);
   EXPECT_EQ(ranked[0].name, "beside");  // "far" shows more that is new, but shares too little
   EXPECT_EQ(ranked[1].name, "far");
   EXPECT_GT(ranked[1].open, ranked[0].open);
-  EXPECT_LT(ranked[1].shared, 0.1);
-  for (const NextView& view : ranked) {
-    if (view.name != "same") continue;
-    EXPECT_LT(view.worth, 0.05);
-    EXPECT_GT(view.shared, 0.95);
-  }
-  EXPECT_EQ(ranked[3].worth == 0 ? ranked[3].name : ranked[2].name, "away");
+  EXPECT_LT(ranked[1].shared, 0.2);
+  for (const size_t i : {2, 3}) EXPECT_EQ(ranked[i].worth, 0) << ranked[i].name;
 }
 
 TEST(NextView, WhatNothingMeasuredCountsByHalf) {
   Model model = wall();
-  const double measured = rank_next_views(model, {at(model, 1.5, "")})[0].worth;
+  const double measured = rank_next_views(model, {at(model, 1.2, "")})[0].worth;
   for (ViewPriors& priors : model.priors) {
     for (int y = 0; y < priors.origin.height; ++y) {
-      for (int x = 20; x < 30; ++x) priors.origin(x, y) = DepthOrigin::Estimated;
+      for (int x = 20; x < 40; ++x) priors.origin(x, y) = DepthOrigin::Estimated;
     }
   }
-  const NextView some = rank_next_views(model, {at(model, 1.5, "")})[0];
+  const NextView some = rank_next_views(model, {at(model, 1.2, "")})[0];
   EXPECT_GT(some.unsure, 0.1);
   EXPECT_NEAR(some.worth, some.open + 0.5 * some.unsure, 1e-12);
   EXPECT_GT(some.worth, measured);
