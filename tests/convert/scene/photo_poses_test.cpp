@@ -210,7 +210,7 @@ TEST(PhotoPoses, NeedTwoPhotographsAndNotTooMany) {
   const test::TempDir dir;
   test::write_bytes(dir / "photos/0.png", test::rgb_png(64, 64));
   EXPECT_EQ(test::defect_of([&] { solved(dir / "photos"); }), "EMPTY");
-  for (int i = 1; i <= 16; ++i) {
+  for (int i = 1; i <= 200; ++i) {
     test::write_bytes(dir / ("photos/" + std::to_string(i) + ".png"), test::rgb_png(64, 64, i));
   }
   EXPECT_EQ(test::defect_of([&] { solved(dir / "photos"); }), "LIMIT");
