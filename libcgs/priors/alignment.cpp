@@ -119,18 +119,23 @@ double capped_rms(const std::vector<Observation>& points,
   return points.empty() ? 0 : std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-// Of one view: what the depth of another is does not change where a pixel of this one is seen.
-void solve(const std::vector<const Observation*>& points,
+// Of some views, whose observations alone count: those of others do not depend on their depth.
+void solve(const std::vector<Observation>& points,
+           size_t first,
+           size_t last,
            double loss_scale,
-           ScaleOffset& solution) {
-  if (points.size() < kFewestPoints) return;
+           std::vector<ScaleOffset>& solution) {
   ceres::Problem problem;
-  for (const Observation* p : points) {
+  std::vector<size_t> count(solution.size(), 0);
+  for (const Observation& p : points) ++count[p.view];
+  for (const Observation& p : points) {
+    if (p.view < first || p.view >= last || count[p.view] < kFewestPoints) continue;
     // The loss is per block, so every point needs its own.
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Projection, 2, 2>(new Projection{p}),
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Projection, 2, 2>(new Projection{&p}),
                              new ceres::CauchyLoss(loss_scale),
-                             solution.data());
+                             solution[p.view].data());
   }
+  if (problem.NumResidualBlocks() == 0) return;
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
   options.num_threads = 1;  // sums in one order: same bits every time
@@ -143,10 +148,12 @@ void solve(const std::vector<const Observation*>& points,
 void solve(const std::vector<Observation>& points,
            double loss_scale,
            std::vector<ScaleOffset>& solution) {
-  std::vector<std::vector<const Observation*>> of_view(solution.size());
-  for (const Observation& p : points) of_view[p.view].push_back(&p);
-  tbb::parallel_for(
-      size_t{0}, solution.size(), [&](size_t i) { solve(of_view[i], loss_scale, solution[i]); });
+  constexpr size_t kTogether = 4;  // views; the matrix of all would be dense, and nearly all zero
+  const size_t groups = (solution.size() + kTogether - 1) / kTogether;
+  tbb::parallel_for(size_t{0}, groups, [&](size_t i) {
+    const size_t last = std::min(solution.size(), (i + 1) * kTogether);
+    solve(points, i * kTogether, last, loss_scale, solution);
+  });
 }
 
 void move_depths(const ScaleOffset& solution, ViewPriors& priors) {
