@@ -149,7 +149,10 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
   const double span = inverse_near - geometry.inverse_far;
   const double middle = 2 / (inverse_near + geometry.inverse_far);
   double baseline = 0;
-  for (const size_t j : neighbours(scene, static_cast<size_t>(input), kMostCompared)) {
+  std::vector<size_t> others = neighbours(scene, static_cast<size_t>(input), kMostCompared);
+  // A view that shows what no other does is compared with all, and confirmed by none.
+  if (others.empty()) others = neighbours(scene, static_cast<size_t>(input), scene.input.size());
+  for (const size_t j : others) {
     const Camera& other = input_view(scene, static_cast<int>(j)).camera;
     SweepSource source = source_of(reference, other, geometry.inverse_far);
     source.image = static_cast<int>(j);

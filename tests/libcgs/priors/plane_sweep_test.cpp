@@ -472,6 +472,29 @@ TEST(PlaneSweep, LooksAtEveryPhotographOfMany) {
   EXPECT_GT(double(measured), 0.9 * double(origin.size()));
 }
 
+TEST(PlaneSweep, MeasuresNothingOfOnePhotographOfManyThatShowsSomethingElse) {
+  const std::vector<TexturedPatch> wall = {
+      {Vector3d(0, 0, 4), Vector3d::UnitX(), Vector3d::UnitY()}};
+  std::vector<Camera> cameras;
+  for (int i = 0; i < 10; ++i) {
+    const double x = 0.2 * i - 0.9;
+    cameras.push_back(test::looking_at({x, 0.1 * x, 0}, {0.3 * x, 0, 4}, 48, 36, 45));
+  }
+  cameras.push_back(test::looking_at({100, 0, 0}, {100, 0, 4}, 48, 36, 45));
+  Scene scene = test::photographed_scene(wall, cameras, 0.1);
+  for (View& view : scene.views) {
+    view.near = 3;
+    view.far = 6;
+  }
+  const std::vector<ViewPriors> priors = plane_sweep(scene, one_round());
+  const auto measured = [&](size_t view) {
+    const std::vector<DepthOrigin>& origin = priors[view].origin.data;
+    return std::count(origin.begin(), origin.end(), DepthOrigin::Measured);
+  };
+  EXPECT_EQ(measured(10), 0);
+  EXPECT_GT(measured(5), 0.9 * 48 * 36);
+}
+
 // As a highlight that moves along with two photographs, and not with the others.
 TEST(PlaneSweep, TakesNothingThatMoreViewsSeeThroughThanConfirm) {
   std::vector<Camera> cameras;
