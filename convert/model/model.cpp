@@ -36,21 +36,15 @@ std::vector<float> as_floats(const Raster<T>& raster) {
 
 template <typename T>
 Raster<T> as_raster(const ExrImage& image, const std::string& channel, const std::string& file) {
-  for (const auto& [name, values] : image.channels) {
-    if (name != channel) continue;
-    Raster<T> raster(image.width, image.height, T{});
-    std::transform(values.begin(), values.end(), raster.data.begin(), [](float value) {
-      return static_cast<T>(value);
-    });
-    return raster;
+  const std::vector<float>* values = image.find(channel);
+  if (values == nullptr) {
+    throw BadInput(Defect::Schema, file, "has no channel '" + channel + "'");
   }
-  throw BadInput(Defect::Schema, file, "has no channel '" + channel + "'");
-}
-
-bool has_channel(const ExrImage& image, const std::string& channel) {
-  return std::any_of(image.channels.begin(), image.channels.end(), [&](const auto& entry) {
-    return entry.first == channel;
+  Raster<T> raster(image.width, image.height, T{});
+  std::transform(values->begin(), values->end(), raster.data.begin(), [](float value) {
+    return static_cast<T>(value);
   });
+  return raster;
 }
 
 std::filesystem::path priors_path(const std::filesystem::path& folder, const View& view) {
@@ -91,7 +85,7 @@ ViewPriors read_priors(const std::filesystem::path& path, const Camera& camera) 
   priors.confidence = as_raster<float>(image, "confidence.Y", file);
   priors.layer = as_raster<uint8_t>(image, "layer.Y", file);
   priors.matched_views = as_raster<uint8_t>(image, "matched.Y", file);
-  if (has_channel(image, "shown_finer.Y")) {
+  if (image.find("shown_finer.Y") != nullptr) {
     priors.shown_finer = as_raster<uint8_t>(image, "shown_finer.Y", file);
   }
   const Raster<uint8_t> origin = as_raster<uint8_t>(image, "origin.Y", file);

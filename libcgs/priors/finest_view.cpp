@@ -13,15 +13,12 @@ namespace {
 constexpr double kSamePlace = 0.01;  // of depth
 
 // How well a view knows the place that a pixel shows; the higher the surer.
+// \pre the pixel has a depth
 int certainty(DepthOrigin origin) {
-  switch (origin) {
-    case DepthOrigin::Measured:
-      return 3;
-    case DepthOrigin::Completed:
-    case DepthOrigin::Guessed:
+  switch (depth_evidence(origin)) {
+    case DepthEvidence::Measured:
       return 2;
-    case DepthOrigin::Estimated:
-    case DepthOrigin::Sky:
+    case DepthEvidence::Adjoining:
       return 1;
     default:
       return 0;
@@ -108,8 +105,8 @@ class Sharing {
       for (int u = u0; u <= u0 + 1; ++u) {
         if (!theirs.depth.contains(u, v)) return false;
         if (!theirs.shown_finer.empty() && theirs.shown_finer(u, v) != 0) return false;
-        if (certainty(theirs.origin(u, v)) < certainty(own.origin(x, y))) return false;
         if (!(std::abs(double(theirs.depth(u, v)) / uvz.z() - 1) < kSamePlace)) return false;
+        if (certainty(theirs.origin(u, v)) < certainty(own.origin(x, y))) return false;
         largest = std::max(largest, footprints_[other](u, v));
       }
     }

@@ -100,9 +100,9 @@ void match_with_parallax(std::vector<SweepSource>& sources) {
 
 void choose_matched(const Scene& scene, SweepGeometry& geometry) {
   std::vector<SweepSource>& sources = geometry.sources;
+  if (sources.size() <= kMostMatched) return match_with_parallax(sources);
   const std::vector<size_t> best =
       neighbours(scene, static_cast<size_t>(geometry.image), kMostMatched);
-  if (best.empty() || sources.size() <= kMostMatched) return match_with_parallax(sources);
   for (SweepSource& source : sources) {
     source.is_matched =
         std::binary_search(best.begin(), best.end(), static_cast<size_t>(source.image));
@@ -149,15 +149,15 @@ SweepGeometry sweep_geometry(const Scene& scene, int input, const SweepSampling&
   const double span = inverse_near - geometry.inverse_far;
   const double middle = 2 / (inverse_near + geometry.inverse_far);
   double baseline = 0;
-  std::vector<size_t> others = neighbours(scene, static_cast<size_t>(input), kMostCompared);
-  // A view that shows what no other does is compared with all, and confirmed by none.
-  if (others.empty()) others = neighbours(scene, static_cast<size_t>(input), scene.input.size());
-  for (const size_t j : others) {
+  for (const int i : scene.input) {
+    const Camera& other = scene.views[static_cast<size_t>(i)].camera;
+    baseline = std::max(baseline, (other.center() - reference.center()).norm());
+  }
+  for (const size_t j : neighbours(scene, static_cast<size_t>(input), kMostCompared)) {
     const Camera& other = input_view(scene, static_cast<int>(j)).camera;
     SweepSource source = source_of(reference, other, geometry.inverse_far);
     source.image = static_cast<int>(j);
     source.speed = largest_speed(reference, other, span, source);
-    baseline = std::max(baseline, (other.center() - reference.center()).norm());
     geometry.sources.push_back(source);
   }
   if (!(baseline >= kSmallestBaseline * middle)) {

@@ -19,8 +19,8 @@ namespace cgs {
 
 namespace {
 
-// Views that one step draws: of more, each step draws the next ones.
-constexpr size_t kMostDrawn = 4;
+// Views that one step draws: of more than four, each step draws the next ones.
+size_t drawn_at_once(size_t views) { return std::min<size_t>(views, 4); }
 
 ColorPlanes planes_of(const ColorImage& image) {
   ColorPlanes out;
@@ -255,7 +255,7 @@ void Trainer::add_view(size_t n, GaussianGradients& sum, StepReport& report) {
     const bool valid = view.use.empty() || view.use.data[i] != 0;
     use.data[i] = valid && (options_.dropout <= 0 || rendered->alpha.data[i] > 0.3f);
   }
-  const double share = 1.0 / double(std::min(full_.size(), kMostDrawn));
+  const double share = 1.0 / double(drawn_at_once(full_.size()));
   TrainingBuffers loss;
   report.l1 += multi_scale_l1(rendered->color,
                               view.photograph,
@@ -351,7 +351,7 @@ StepReport Trainer::step() {
   }
   StepReport report;
   GaussianGradients gaussians;
-  const size_t drawn = std::min(full_.size(), kMostDrawn);
+  const size_t drawn = drawn_at_once(full_.size());
   for (size_t k = 0; k < drawn; ++k) {
     add_view((static_cast<size_t>(step_) * drawn + k) % full_.size(), gaussians, report);
   }
