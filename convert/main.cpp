@@ -62,20 +62,7 @@ int run_program(int argc, char** argv) {
   app.require_subcommand(1);
   app.failure_message(cgs::usage_message);
   app.set_version_flag("--version", cgs::program_version());
-  cgs::add_run(app);
-  cgs::add_info(app);
-  cgs::add_train(app);
-  cgs::add_evaluate(app);
-  cgs::add_render(app);
-  cgs::add_next(app);
-  cgs::add_fuse(app);
-  cgs::add_mesh(app);
-  cgs::add_filter(app);
-  cgs::add_measure(app);
-  cgs::add_compare(app);
-  cgs::add_convert(app);
-  cgs::add_tradeoff(app);
-  cgs::add_verify(app);
+  cgs::add_commands(app);
   try {
     app.parse(with_dashes(argc, argv));
   } catch (const CLI::ParseError& error) {

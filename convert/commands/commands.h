@@ -25,4 +25,7 @@ void add_tradeoff(CLI::App& app);
 void add_train(CLI::App& app);
 void add_verify(CLI::App& app);
 
+/// All of them, in the order in which the help lists them.
+void add_commands(CLI::App& app);
+
 }  // namespace cgs

@@ -17,6 +17,10 @@ namespace {
 
 volatile std::sig_atomic_t interrupt_signal = 0;  // NOLINT: a signal handler can reach nothing else
 
+bool catches_interrupts = false;
+
+thread_local const TerminalListener* listener_of_thread = nullptr;
+
 void on_interrupt(int signal) {
   interrupt_signal = signal;
   // The second signal finds the default action and ends the program.
@@ -31,8 +35,18 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 std::string program_version() { return std::string("cgs ") + version(); }
 
+ListensToTerminals::ListensToTerminals(const TerminalListener& listener) {
+  listener_of_thread = &listener;
+}
+
+ListensToTerminals::~ListensToTerminals() { listener_of_thread = nullptr; }
+
 Terminal::Terminal(bool quiet, bool is_strict)
-    : quiet_(quiet), is_strict_(is_strict), rewrites_(::isatty(STDERR_FILENO) == 1), start_() {}
+    : listener_(listener_of_thread),
+      quiet_(quiet || listener_ != nullptr),
+      is_strict_(is_strict),
+      rewrites_(::isatty(STDERR_FILENO) == 1),
+      start_() {}
 
 Terminal Terminal::silent() {
   Terminal out(true);
@@ -45,6 +59,7 @@ Progress Terminal::begin(const std::string& stage) {
   start_ = std::chrono::steady_clock::now();
   return [this, last = -1](double fraction) mutable {
     if (interrupt_signal != 0) throw Cancelled();
+    if (listener_ != nullptr) listener_->progress(is_silent_ ? "" : stage_, fraction);
     const int percent = static_cast<int>(100 * std::clamp(fraction, 0.0, 1.0));
     if (quiet_ || !rewrites_ || percent == last) return;
     last = percent;
@@ -84,7 +99,12 @@ void Terminal::warn(const std::string& line) const { warn(std::vector{line}); }
 
 void Terminal::warn(const std::vector<std::string>& lines) const {
   for (const std::string& line : lines) {
-    if (!is_silent_) std::fprintf(stderr, "cgs: warning: %s\n", one_line(line).c_str());
+    if (is_silent_) continue;
+    if (listener_ != nullptr) {
+      listener_->warning(one_line(line));
+    } else {
+      std::fprintf(stderr, "cgs: warning: %s\n", one_line(line).c_str());
+    }
   }
   if (!is_strict_ || lines.empty()) return;
   constexpr int kBadInput = 3;
@@ -92,12 +112,14 @@ void Terminal::warn(const std::vector<std::string>& lines) const {
 }
 
 void catch_interrupts() {
+  catches_interrupts = true;
   (void)std::signal(SIGINT, on_interrupt);
   (void)std::signal(SIGTERM, on_interrupt);
   (void)std::signal(SIGPIPE, SIG_IGN);
 }
 
 void let_interrupts_end() {
+  if (!catches_interrupts) return;
   (void)std::signal(SIGINT, SIG_DFL);
   (void)std::signal(SIGTERM, SIG_DFL);
 }

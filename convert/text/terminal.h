@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,24 @@ namespace cgs {
 
 /// Name and version, for --version, run.json and report.json.
 std::string program_version();
+
+/// Who hears, in place of standard error, what the terminals say that a thread makes.
+struct TerminalListener {
+  /// Name of the stage, empty in work whose result nobody sees, and the fraction done; from one
+  /// thread at a time. May throw Cancelled.
+  std::function<void(const std::string& stage, double fraction)> progress;
+  std::function<void(const std::string& line)> warning;
+};
+
+/// Makes a listener hear the terminals that this thread makes while it exists.
+class ListensToTerminals {
+ public:
+  /// \param listener  not owned; must outlive the terminals
+  explicit ListensToTerminals(const TerminalListener& listener);
+  ~ListensToTerminals();
+  ListensToTerminals(const ListensToTerminals&) = delete;
+  ListensToTerminals& operator=(const ListensToTerminals&) = delete;
+};
 
 /// Progress and messages on standard error: a line that is rewritten on a terminal, one line per
 /// finished stage elsewhere.
@@ -36,6 +55,7 @@ class Terminal {
   void warn(const std::vector<std::string>& lines) const;
 
  private:
+  const TerminalListener* listener_;
   bool quiet_;
   bool is_strict_;
   bool is_silent_ = false;
@@ -47,7 +67,8 @@ class Terminal {
 /// From now on SIGINT and SIGTERM make the next progress report throw Cancelled; a second signal
 /// ends the program at once, with exit code 130 or 143.
 void catch_interrupts();
-/// Undoes it: for commands that write nothing before their end and report no progress.
+/// Undoes it, where it was done: for commands that write nothing before their end and report no
+/// progress.
 void let_interrupts_end();
 /// 130 after SIGINT, 143 after SIGTERM.
 int interrupt_exit_code();

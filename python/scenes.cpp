@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "python/arrays.h"
+#include "python/cameras.h"
+#include "python/module.h"
+#include "python/work.h"
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "convert/scene/scene_request.h"
+#include "io/scenes/scene_reader.h"
+#include "libcgs/core/scene.h"
+
+namespace cgs {
+
+namespace {
+
+namespace py = pybind11;
+
+DepthKind depth_kind_of(const std::string& name) {
+  const auto kinds = depth_kinds();
+  const auto found = kinds.find(name);
+  require(found != kinds.end(), "depth_kind must be metric, relative or disparity", name);
+  return found->second;
+}
+
+struct SceneArguments {
+  std::filesystem::path path;
+  std::string views;
+  std::optional<int> downscale;
+  bool all_views = false;
+  std::filesystem::path depth;
+  std::string depth_kind;
+  std::string assume_unit;
+  double focal = 0;
+};
+
+SceneRequest request_of(const SceneArguments& arguments) {
+  SceneRequest out;
+  out.path = arguments.path;
+  out.options.views = arguments.views;
+  out.options.downscale = arguments.downscale;
+  out.options.all_views = arguments.all_views;
+  out.options.depth.folder = arguments.depth;
+  if (!arguments.depth_kind.empty()) {
+    out.options.depth.kind = depth_kind_of(arguments.depth_kind);
+  }
+  out.assume_unit = arguments.assume_unit;
+  out.focal = arguments.focal;
+  return out;
+}
+
+Scene read(const SceneArguments& arguments, const py::object& progress) {
+  const SceneRequest request = request_of(arguments);
+  Scene scene = result_of(progress, [&](Terminal& terminal) {
+    OpenedScene opened = open_scene(request, {}, terminal);
+    (void)check_stated_cameras(opened, terminal);
+    return std::move(opened.scene);
+  });
+  warn(scene.warnings);
+  return scene;
+}
+
+void load(Scene& scene, const std::optional<std::vector<int>>& views, const py::object& progress) {
+  const std::vector<int> wanted = views.value_or(scene.input);
+  for (const int i : wanted) {
+    require(i >= 0 && static_cast<size_t>(i) < scene.views.size(),
+            "views must be indices below " + std::to_string(scene.views.size()),
+            i);
+  }
+  const size_t known = scene.warnings.size();
+  work_beside(progress, [&] {
+    Terminal terminal(true);
+    load_images(scene, wanted, terminal.begin("photographs"));
+  });
+  warn({scene.warnings.begin() + static_cast<std::ptrdiff_t>(known), scene.warnings.end()});
+}
+
+View& named(Scene& scene, const std::string& name) {
+  for (View& view : scene.views) {
+    if (view.name == name) return view;
+  }
+  throw py::key_error(name);
+}
+
+void add_view(py::module_& module) {
+  const auto array = [](auto member) {
+    return [member](const py::object& self) {
+      return raster_view<float>(self.cast<View&>().*member, self);
+    };
+  };
+  py::class_<View>(module, "View", "A photograph and the camera that took it.")
+      .def_readonly("name", &View::name)
+      .def_property_readonly(
+          "image_path",
+          [](const View& v) -> py::object {
+            return v.image_path.empty() ? py::object(py::none()) : py::cast(v.image_path);
+          },
+          "None where the file is missing.")
+      .def_readwrite("camera", &View::camera, "At the size that is worked on.")
+      .def_property(
+          "image",
+          array(&View::image),
+          [](View& v, const ArrayIn<float>& pixels) {
+            v.image = raster_of<Eigen::Vector3f>(pixels, v.camera.width, v.camera.height, "image");
+          },
+          "Height x width x 3, float32; None until Scene.load().")
+      .def_property(
+          "valid",
+          [](const py::object& self) { return raster_view<bool>(self.cast<View&>().valid, self); },
+          [](View& v, const ArrayIn<bool>& mask) {
+            v.valid = raster_of<uint8_t>(mask, v.camera.width, v.camera.height, "valid");
+          },
+          "Height x width, bool: which pixels may be used; None = all.")
+      .def_property(
+          "depth",
+          array(&View::given_depth),
+          [](View& v, const ArrayIn<float>& depth) {
+            v.given_depth = raster_of<float>(depth, v.camera.width, v.camera.height, "depth");
+          },
+          "Depth from elsewhere, height x width, float32, NaN where there is none; see "
+          "Scene.depth_kind. None = none.")
+      .def("__repr__", [](const View& v) { return "<cgs.View " + v.name + ">"; });
+}
+
+std::string name_of_kind(DepthKind kind) {
+  for (const auto& [name, value] : depth_kinds()) {
+    if (value == kind) return name;
+  }
+  return "";
+}
+
+void add_scene(py::module_& module) {
+  py::class_<Scene>(module, "Scene", "Photographs with their cameras, in world coordinates.")
+      .def_property_readonly(
+          "views",
+          [](py::object& self) {
+            py::list out;
+            for (View& view : self.cast<Scene&>().views) {
+              out.append(py::cast(&view, py::return_value_policy::reference_internal, self));
+            }
+            return out;
+          },
+          "All views, in the order of their names.")
+      .def("__getitem__",
+           named,
+           py::arg("name"),
+           py::return_value_policy::reference_internal,
+           "The view of that name.")
+      .def_readwrite("input", &Scene::input, "Indices of the views to reconstruct from; new.")
+      .def_readonly("held_out", &Scene::held_out, "Indices of those kept to compare with; new.")
+      .def_readonly("warnings", &Scene::warnings, "What is odd but usable, a line each; new.")
+      .def_readonly("notes", &Scene::notes, "What was chosen, a line each; new.")
+      .def_readonly("frame", &Scene::frame)
+      .def_property(
+          "depth_kind",
+          [](const Scene& s) { return name_of_kind(s.depth_kind); },
+          [](Scene& s, const std::string& name) { s.depth_kind = depth_kind_of(name); },
+          "What View.depth holds: \"metric\" (metres), \"relative\" (up to scale and offset), "
+          "\"disparity\" (inverse depth likewise); empty = found out.")
+      .def("load",
+           load,
+           py::arg("views") = py::none(),
+           py::kw_only(),
+           py::arg("progress") = py::none(),
+           "Decodes photographs, without distortion and at the size of their cameras, and depth "
+           "that came with them. views: indices; default: the input views.")
+      .def("__repr__", [](const Scene& s) {
+        return "<cgs.Scene, " + std::to_string(s.views.size()) + " views, " +
+               std::to_string(s.input.size()) + " of them input>";
+      });
+}
+
+}  // namespace
+
+void add_scenes(py::module_& module) {
+  add_view(module);
+  add_scene(module);
+  module.def(
+      "read_scene",
+      [](const std::filesystem::path& path,
+         const std::string& views,
+         std::optional<int> downscale,
+         bool all_views,
+         const std::optional<std::filesystem::path>& depth,
+         const std::string& depth_kind,
+         const std::string& assume_unit,
+         double focal,
+         const py::object& progress) {
+        return read(
+            {path, views, downscale, all_views, depth.value_or(""), depth_kind, assume_unit, focal},
+            progress);
+      },
+      py::arg("path"),
+      py::arg("views") = "",
+      py::arg("downscale") = py::none(),
+      py::kw_only(),
+      py::arg("all_views") = false,
+      py::arg("depth") = py::none(),
+      py::arg("depth_kind") = "",
+      py::arg("assume_unit") = "",
+      py::arg("focal") = 0.0,
+      py::arg("progress") = py::none(),
+      R"(Reads a scene in any layout that the program reads; of nothing but photographs, solves for
+the cameras.
+
+path         folder
+views        input views: names or indices, separated by commas; default: chosen
+downscale    divides the sides of the photographs; default: no side above 1024 pixels
+all_views    take every view as input where `views` is empty
+depth        folder of depth files, one per photograph
+depth_kind   "metric", "relative" or "disparity"; default: found out
+assume_unit  what a unit of the scene is, "m", "mm" ..., where it does not say
+focal        focal length of photographs without cameras [pixels]; 0 = found out
+
+Pixels are not loaded: see Scene.load(). Raises InvalidInput, BadInput.)");
+}
+
+}  // namespace cgs
