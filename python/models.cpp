@@ -187,7 +187,7 @@ void add_methods(Class& model) {
 void add_models(py::module_& module) {
   // By the numbers of DepthOrigin.
   module.attr("DEPTH_ORIGIN") = py::make_tuple(
-      "unknown", "measured", "completed", "guessed", "sky", "estimated", "transient");
+      "unknown", "measured", "completed", "guessed", "sky", "estimated", "transient", "background");
   py::class_<ModelObject> model(
       module, "Model", "Cameras, Gaussians, and what the input views know about depth.");
   model

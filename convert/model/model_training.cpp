@@ -154,6 +154,7 @@ nlohmann::ordered_json coverage_to_json(const TrainedModel& trained) {
                    {"completed", coverage.completed},
                    {"sky", coverage.sky},
                    {"transient", coverage.transient},
+                   {"background", coverage.background},
                    {"left_open", coverage.left_open},
                    {"estimated", coverage.estimated},
                    {"with_evidence", coverage.with_evidence()},

@@ -129,7 +129,7 @@ PhotographedMesh texture_from_photographs(const Scene& scene,
   std::vector<View> views;
   load_images(loaded, scene.input);
   for (const int i : scene.input) views.push_back(std::move(loaded.views[static_cast<size_t>(i)]));
-  for (size_t i = 0; i < priors.size(); ++i) mask_transients(priors[i], views[i]);
+  for (size_t i = 0; i < priors.size(); ++i) mask_other_than_scene(priors[i], views[i]);
   const FaceScores scores = face_scores(mesh, views);
   const FaceViews chosen = choose_face_views(mesh, scores);
   const ExposureGains exposure = exposure_gains(mesh, scores, views);

@@ -102,13 +102,16 @@ MaskMap valid_pixels(const Scene& scene, int view) {
 double masked_share(const Model& model) {
   double masked = 0;
   double pixels = 0;
+  const auto shows_nothing = [](DepthOrigin origin) {
+    return origin == DepthOrigin::Unknown || origin == DepthOrigin::Background;
+  };
   for (size_t k = 0; k < model.priors.size(); ++k) {
     const int view = model.scene.input[k];
     const auto& origin = model.priors[k].origin.data;
     const bool is_there = is_present(model.scene.views[static_cast<size_t>(view)].image_path);
     const auto& valid = valid_pixels(model.scene, view).data;
     masked += double(is_there ? std::count(valid.begin(), valid.end(), uint8_t{0})
-                              : std::count(origin.begin(), origin.end(), DepthOrigin::Unknown));
+                              : std::count_if(origin.begin(), origin.end(), shows_nothing));
     pixels += double(origin.size());
   }
   return pixels > 0 ? masked / pixels : 1;

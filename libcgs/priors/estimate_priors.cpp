@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "libcgs/core/error.h"
+#include "libcgs/priors/background.h"
 #include "libcgs/priors/guessed_depth.h"
 #include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/sky.h"
@@ -14,6 +15,16 @@
 namespace cgs {
 
 namespace {
+
+// Pixels of background that no mask leaves out.
+double usable_background(const Raster<DepthOrigin>& origin, const View& view) {
+  size_t out = 0;
+  for (size_t i = 0; i < origin.data.size(); ++i) {
+    const bool is_usable = view.valid.empty() || view.valid.data[i] != 0;
+    out += is_usable && origin.data[i] == DepthOrigin::Background ? 1 : 0;
+  }
+  return static_cast<double>(out);
+}
 
 // Before and after some of it was marked as estimated.
 PriorsCoverage coverage(const Raster<DepthOrigin>& before,
@@ -32,9 +43,9 @@ PriorsCoverage coverage(const Raster<DepthOrigin>& before,
   out.guessed = count(origin, DepthOrigin::Guessed) / valid;
   out.sky = count(origin, DepthOrigin::Sky) / valid;
   out.transient = count(origin, DepthOrigin::Transient) / valid;
+  out.background = usable_background(before, view) / valid;
   out.estimated = count(after.data, DepthOrigin::Estimated) / valid;
-  out.left_open =
-      std::max(0.0, 1 - out.measured - out.completed - out.guessed - out.sky - out.transient);
+  out.left_open = std::max(0.0, 1 - out.measured - out.completed - out.guessed - out.no_surface());
   return out;
 }
 
@@ -74,6 +85,7 @@ class Estimator {
     for (size_t i = 0; i < sky.size(); ++i) enter_sky(sky[i], out_.views[i]);
     const std::vector<MaskMap> transients = find_transients(scene_, out_.views);
     for (size_t i = 0; i < transients.size(); ++i) enter_transients(transients[i], out_.views[i]);
+    mark_background(scene_, out_.views);
     const std::vector<DepthGuess> guesses = guesses_of(given);
     const auto count = static_cast<double>(out_.views.size());
     for (size_t i = 0; i < out_.views.size(); ++i) {
@@ -107,7 +119,7 @@ class Estimator {
   void forget_unmeasured() {
     const auto& shares = out_.report.coverage;
     const bool has_pixels = std::any_of(shares.begin(), shares.end(), [](const auto& share) {
-      return share.measured + share.completed + share.guessed + share.sky + share.transient +
+      return share.measured + share.completed + share.guessed + share.no_surface() +
                  share.left_open >
              0;
     });
@@ -120,7 +132,9 @@ class Estimator {
     for (size_t i = 0; i < shares.size(); ++i) {
       if (is_measured(shares[i])) continue;
       ViewPriors& priors = out_.views[i];
-      std::fill(priors.origin.data.begin(), priors.origin.data.end(), DepthOrigin::Unknown);
+      for (DepthOrigin& origin : priors.origin.data) {
+        if (origin != DepthOrigin::Background) origin = DepthOrigin::Unknown;
+      }
       for (DepthMap* map : {&priors.depth, &priors.sigma}) {
         std::fill(map->data.begin(), map->data.end(), std::nanf(""));
       }

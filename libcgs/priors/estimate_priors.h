@@ -27,19 +27,22 @@ struct PriorsOptions {
   void validate() const;
 };
 
-/// Shares of the valid pixels of a view. The first six add up to 1.
+/// Shares of the valid pixels of a view. The first seven add up to 1.
 struct PriorsCoverage {
   double measured = 0;
   double completed = 0;
   double guessed = 0;
   double sky = 0;
   double transient = 0;         ///< Shows what the other photographs contradict; left out.
+  double background = 0;        ///< Around an object that stands alone.
   double left_open = 0;         ///< Not measured, and not filled in either.
   double estimated = 0;         ///< The part of completed and guessed that is no evidence.
   UnmeasuredShares unmeasured;  ///< Why the rest was not measured; of completed, too.
 
   /// Measured, or adjoining what is.
-  double with_evidence() const { return 1 - sky - estimated - transient - left_open; }
+  double with_evidence() const { return 1 - no_surface() - estimated - left_open; }
+  /// Shows nothing of the scene.
+  double no_surface() const { return sky + transient + background; }
 };
 
 /// Below this share of a view, all that was measured may be false matches.
@@ -69,9 +72,10 @@ struct EstimatedPriors {
 };
 
 /// Everything known about the input views before training: sweep, align, enter the depth of
-/// sensors, find the sky and what moved, complete, put guesses of given depth where they are
-/// better, tell what of all that is estimated, layers. The depth of views of which nothing was
-/// measured stays unknown. Preconditions and errors as plane_sweep().
+/// sensors, find the sky, what moved and what is around an object that stands alone, complete, put
+/// guesses of given depth where they are better, tell what of all that is estimated, layers. The
+/// depth of views of which nothing was measured stays unknown. Preconditions and errors as
+/// plane_sweep().
 /// \throws InvalidInput if masks leave nothing of all views; NumericalError if nothing of any was
 ///         measured
 EstimatedPriors estimate_priors(const Scene& scene,

@@ -165,8 +165,7 @@ EstimatedPatch estimated_patch(const ViewPriors& priors, int x0, int y0, MaskMap
       const int v = y + d.dy;
       const DepthOrigin there =
           priors.origin.contains(u, v) ? priors.origin(u, v) : DepthOrigin::Unknown;
-      const bool is_open = there == DepthOrigin::Unknown || there == DepthOrigin::Sky ||
-                           there == DepthOrigin::Transient;
+      const bool is_open = there == DepthOrigin::Unknown || shows_no_surface(there);
       const bool goes_on =
           !is_open && depth_step(priors.depth(x, y), priors.depth(u, v)) <= kOneSurface;
       if (goes_on && there == DepthOrigin::Estimated) {

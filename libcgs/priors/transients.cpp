@@ -328,12 +328,14 @@ MaskMap transient_mask(const ViewPriors& priors) {
   return any ? out : MaskMap();
 }
 
-void mask_transients(const ViewPriors& priors, View& view) {
-  const MaskMap transients = transient_mask(priors);
-  if (transients.empty()) return;
-  if (view.valid.empty()) view.valid = MaskMap(transients.width, transients.height, 1);
-  for (size_t i = 0; i < transients.data.size(); ++i) {
-    if (transients.data[i] != 0) view.valid.data[i] = 0;
+void mask_other_than_scene(const ViewPriors& priors, View& view) {
+  for (size_t i = 0; i < priors.origin.data.size(); ++i) {
+    const DepthOrigin origin = priors.origin.data[i];
+    if (origin != DepthOrigin::Transient && origin != DepthOrigin::Background) continue;
+    if (view.valid.empty()) {
+      view.valid = MaskMap(priors.origin.width, priors.origin.height, 1);
+    }
+    view.valid.data[i] = 0;
   }
 }
 

@@ -28,7 +28,8 @@ void enter_transients(const MaskMap& transients, ViewPriors& priors);
 /// Where the priors say that there are some; empty where there are none.
 MaskMap transient_mask(const ViewPriors& priors);
 
-/// Takes them out of the valid pixels of a view.
-void mask_transients(const ViewPriors& priors, View& view);
+/// Takes them, and the background of an object that stands alone, out of the valid pixels of a
+/// view.
+void mask_other_than_scene(const ViewPriors& priors, View& view);
 
 }  // namespace cgs

@@ -12,17 +12,24 @@ namespace cgs {
 
 /// How the depth of a pixel became known.
 enum class DepthOrigin : uint8_t {
-  Unknown = 0,    ///< No depth at all: masked out, or nothing to fill it in from.
-  Measured = 1,   ///< Matched in at least one other view and confirmed from there, or measured by
-                  ///< a depth sensor (then possibly with no matched view).
-  Completed = 2,  ///< Filled in from measured neighbours; no evidence of its own.
-  Guessed = 3,    ///< By a given depth that rests on this photograph alone, such as a network's,
-                  ///< fitted to the measured pixels.
-  Sky = 4,        ///< No surface; depth is that of a backdrop for pictures.
-  Estimated = 5,  ///< Completed or Guessed, but not a small way from a measured pixel of the same
-                  ///< surface (mark_estimated()): nothing tells whether it is right.
-  Transient = 6,  ///< No depth: something that the other photographs do not show in its place.
+  Unknown = 0,     ///< No depth at all: masked out, or nothing to fill it in from.
+  Measured = 1,    ///< Matched in at least one other view and confirmed from there, or measured by
+                   ///< a depth sensor (then possibly with no matched view).
+  Completed = 2,   ///< Filled in from measured neighbours; no evidence of its own.
+  Guessed = 3,     ///< By a given depth that rests on this photograph alone, such as a network's,
+                   ///< fitted to the measured pixels.
+  Sky = 4,         ///< No surface; depth is that of a backdrop for pictures.
+  Estimated = 5,   ///< Completed or Guessed, but not a small way from a measured pixel of the same
+                   ///< surface (mark_estimated()): nothing tells whether it is right.
+  Transient = 6,   ///< No depth: something that the other photographs do not show in its place.
+  Background = 7,  ///< No depth: around an object that stands alone (see mark_background()).
 };
+
+/// Whether a pixel shows no surface of the scene, so that none is to be filled in.
+constexpr bool shows_no_surface(DepthOrigin origin) {
+  return origin == DepthOrigin::Sky || origin == DepthOrigin::Transient ||
+         origin == DepthOrigin::Background;
+}
 
 /// What vouches for a pixel.
 /// \pre it has a depth
@@ -42,7 +49,8 @@ inline DepthEvidence depth_evidence(DepthOrigin origin) {
 
 /// What is known about one input view before training; every raster has the size of its image.
 struct ViewPriors {
-  DepthMap depth;  ///< z-depth [internal units]; NaN exactly where origin is Unknown or Transient.
+  DepthMap depth;  ///< z-depth [internal units]; NaN exactly where origin is Unknown, Transient or
+                   ///< Background.
   DepthMap sigma;  ///< Standard deviation of depth [internal units]; NaN as depth.
   Raster<float> confidence;       ///< In [0, 1]; completed pixels keep the low value they had.
   Raster<DepthOrigin> origin;     ///< See DepthOrigin.

@@ -74,8 +74,9 @@ std::string percent_text(double share) {
 
 std::string words_on(const PriorsCoverage& share) {
   constexpr double kMentioned = 0.0005;
-  const std::array<std::pair<double, const char*>, 4> parts = {
+  const std::array<std::pair<double, const char*>, 5> parts = {
       {{share.sky, "is sky"},
+       {share.background, "is background of an object that stands alone"},
        {share.estimated,
         "shows surface that nothing measured and is estimated from its surroundings"},
        {share.transient,

@@ -52,10 +52,10 @@ float match_exposures(Scene& scene, const std::vector<ViewPriors>& priors) {
 }
 
 // What moved is no picture of the scene: nothing is to be made to look like it.
-void leave_out_transients(const std::vector<ViewPriors>& priors, Scene& scene) {
+void leave_out_other_than_scene(const std::vector<ViewPriors>& priors, Scene& scene) {
   for (size_t k = 0; k < scene.input.size(); ++k) {
     View& view = scene.views[static_cast<size_t>(scene.input[k])];
-    mask_transients(priors[k], view);
+    mask_other_than_scene(priors[k], view);
   }
 }
 
@@ -142,7 +142,7 @@ TrainedModel reconstruct(Scene scene,
   const std::optional<Pane> pane =
       look_behind_pane(scene, options, priors, part_of(progress, 0.18, 0.2));
   const Pane* const drawn_before = pane ? &*pane : nullptr;
-  leave_out_transients(priors.views, scene);
+  leave_out_other_than_scene(priors.views, scene);
   mark_shown_finer(scene, priors.views);
   if (pane) out.pane = report_of(*pane, scene);
   take_findings(priors.report, scene);

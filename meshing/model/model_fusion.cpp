@@ -12,7 +12,8 @@ namespace cgs {
 
 namespace {
 
-// Depth as fusion takes it: none where estimated surface is not wanted, infinite at sky.
+// Depth as fusion takes it: none where estimated surface is not wanted, infinite at sky and around
+// an object that stands alone.
 void settle_depth(const ViewPriors& priors, EstimatedSurface wanted, TsdfView& view) {
   const MaskMap framed =
       wanted == EstimatedSurface::FillOnly ? framed_estimates(priors) : MaskMap();
@@ -20,7 +21,8 @@ void settle_depth(const ViewPriors& priors, EstimatedSurface wanted, TsdfView& v
     const DepthEvidence evidence = view.evidence.data[i];
     const bool is_wanted = wanted == EstimatedSurface::Keep ||
                            (wanted == EstimatedSurface::FillOnly && framed.data[i] != 0);
-    if (evidence == DepthEvidence::Sky) {
+    const bool is_background = priors.origin.data[i] == DepthOrigin::Background;
+    if (evidence == DepthEvidence::Sky || is_background) {
       view.depth.data[i] = std::numeric_limits<float>::infinity();
       view.sigma.data[i] = std::nanf("");
     } else if (evidence == DepthEvidence::Estimated && !is_wanted) {

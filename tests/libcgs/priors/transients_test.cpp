@@ -111,10 +111,10 @@ TEST(EnterTransients, LeavesNoDepthAndNoPicture) {
   EXPECT_TRUE(std::isnan(priors[0].depth(20, 30)));
   EXPECT_TRUE(std::isnan(priors[0].sigma(20, 30)));
   View& view = scene.views[0];
-  mask_transients(priors[0], view);
+  mask_other_than_scene(priors[0], view);
   EXPECT_EQ(std::count(view.valid.data.begin(), view.valid.data.end(), 0), 1);
   EXPECT_EQ(view.valid(20, 30), 0);
-  mask_transients(priors[1], scene.views[1]);
+  mask_other_than_scene(priors[1], scene.views[1]);
   EXPECT_TRUE(scene.views[1].valid.empty());
 }
 
