@@ -51,14 +51,16 @@ void add_option(const CLI::App& command,
     return;
   }
   const bool is_one_word = option->get_expected_max() == 1;
-  if (!is_row(value) || (is_one_word && option->get_allow_extra_args())) {
+  if (!is_row(value) || is_one_word) {
     out.insert(out.end(), {flag, typed(value)});
     return;
   }
   const auto parts = py::reinterpret_borrow<py::sequence>(value);
   const auto count = static_cast<int>(parts.size());
-  const bool takes_all =
-      !is_one_word && count >= option->get_expected_min() && count <= option->get_expected_max();
+  constexpr int kAnyNumber = 1 << 16;  // CLI11 has a larger one for options that may be repeated
+  const bool takes_all = option->get_expected_max() < kAnyNumber &&
+                         count >= option->get_expected_min() &&
+                         count <= option->get_expected_max();
   if (takes_all) out.push_back(flag);
   for (const auto& part : parts) {
     if (!takes_all) out.push_back(flag);
@@ -85,7 +87,9 @@ Outcome outcome_of(CLI::App& app, std::vector<std::string> words) {
   try {
     app.parse(words);
   } catch (const CLI::ParseError& error) {
-    return {{}, usage_message(&app, error)};
+    std::string misuse = usage_message(&app, error);
+    while (!misuse.empty() && misuse.back() == '\n') misuse.pop_back();
+    return {{}, misuse};
   }
   return {printed.str(), {}};
 }

@@ -123,6 +123,22 @@ TEST(FuseModel, GivesNoSupportToWhatIsEstimated) {
   }
 }
 
+TEST(FuseModel, SeesPastAnObjectThatStandsAlone) {
+  Model model = plane_below_sky();
+  for (ViewPriors& priors : model.priors) {
+    for (size_t i = 0; i < priors.origin.data.size(); ++i) {
+      if (priors.origin.data[i] != DepthOrigin::Sky) continue;
+      priors.origin.data[i] = DepthOrigin::Background;
+      priors.depth.data[i] = std::nanf("");
+    }
+  }
+  const Volume volume = fuse_model(model, {}, {}).volume;
+  for (const double z : {-0.05, 0.0, 0.05}) {
+    EXPECT_EQ(state_at(volume, kSky + Vector3d(0, 0, z)), VoxelState::Free) << z;
+  }
+  EXPECT_NE(state_at(volume, kMeasured + Vector3d(0, 0, 0.05)), VoxelState::Free);
+}
+
 TEST(FuseModel, SeesThroughTheSky) {
   for (const EstimatedSurface estimated : kAllWays) {
     const Volume volume = fused(estimated).volume;

@@ -1,0 +1,334 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python module against the program, against truth that is computed here, and as one uses it.
+
+usage: module_test.py PROGRAM CAPTURE WORK_FOLDER     (PYTHONPATH has the module)
+"""
+import gc
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+import unittest
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import cgs
+
+PROGRAM, CAPTURE, WORK = sys.argv[1:4]
+VIEWS = "view_01,view_02,view_03"
+
+
+def program(*words):
+    """What a command prints as JSON."""
+    done = subprocess.run([PROGRAM, *map(str, words), "--json"], check=True, capture_output=True)
+    return json.loads(done.stdout)
+
+
+def ball_depth(camera, radius=1.0):
+    """Depth of a ball around (0, 0, 0), row by row."""
+    v, u = np.mgrid[0 : camera.height, 0 : camera.width] + 0.5
+    rays = np.stack(
+        [(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u)], axis=-1
+    )
+    pose = camera.world_from_cam
+    rays = rays @ pose[:3, :3].T
+    a = (rays**2).sum(-1)
+    b = rays @ pose[:3, 3]
+    inside = b**2 - a * (pose[:3, 3] @ pose[:3, 3] - radius**2)
+    with np.errstate(invalid="ignore"):
+        return np.where(inside >= 0, (-b - np.sqrt(inside)) / a, np.inf)
+
+
+def looking_at_zero(direction, up=(0, 1, 0), distance=4.0):
+    z = -np.asarray(direction, float)
+    x = np.cross(up, z)
+    x /= np.linalg.norm(x)
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    pose[:3, 3] = -distance * z
+    return cgs.Camera(128, 128, 150, 150, 64, 64, pose)
+
+
+def six_cameras():
+    out = []
+    for axis in range(3):
+        for sign in (-1, 1):
+            direction = np.zeros(3)
+            direction[axis] = sign
+            out.append(looking_at_zero(direction, up=(0, 1, 0) if axis != 1 else (1, 0, 0)))
+    return out
+
+
+class Reconstruction(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.scene = cgs.read_scene(CAPTURE, views=VIEWS, assume_unit="m")
+        cls.model = cgs.reconstruct(cls.scene, preset="draft", settings={"steps": 4})
+        cls.folder = Path(WORK) / "trained"
+        program("train", CAPTURE, "--views", VIEWS, "--assume-unit", "m", "--preset", "draft",
+                "--set", "steps=4", "-o", cls.folder)  # fmt: skip
+
+    def test_gives_the_bits_of_the_program(self):
+        saved = Path(WORK) / "saved"
+        self.model.save(saved)
+        splats = "gaussians.ply"
+        self.assertEqual((saved / splats).read_bytes(), (self.folder / splats).read_bytes())
+        again = cgs.read_model(self.folder)
+        self.assertEqual(again.input, ["view_01", "view_02", "view_03"])
+        np.testing.assert_allclose(again.splats.positions, self.model.splats.positions, rtol=1e-6)
+
+    def test_fuses_and_closes_as_the_program(self):
+        volume, meshes = Path(WORK) / "v.vdb", Path(WORK) / "meshes"
+        program("fuse", self.folder, "-o", volume)
+        program("mesh", volume, "--simplify", "0", "-o", meshes)
+        mesh = self.model.fuse().watertight()
+        mesh.save(Path(WORK) / "closed.ply")
+        closed = meshes / "watertight.ply"
+        self.assertEqual((Path(WORK) / "closed.ply").read_bytes(), closed.read_bytes())
+        self.assertTrue(mesh.certificate()["passed"])
+        figures = cgs.read_mesh(closed).measure(volume=True, distance=((0, 0, 4), (1, 0, 4)))
+        told = program("measure", closed, "--volume", "--distance", "0,0,4", "1,0,4")["figures"]
+        self.assertEqual(figures, told)
+
+    def test_renders_what_the_program_writes(self):
+        name = self.model.held_out[0]
+        picture = self.model.render(self.model.cameras[name])
+        height, width = picture.alpha.shape
+        self.assertEqual(picture.color.shape, (height, width, 3))
+        self.assertEqual(picture.normal.shape, (height, width, 3))
+        told = program("render", self.folder, "--views", name, "-o", Path(WORK) / "views")
+        self.assertAlmostEqual(picture.is_hole.mean(), told[0]["hole_fraction"], places=12)
+        self.assertTrue(set(np.unique(picture.hole)) <= set(range(len(cgs.HOLE))))
+        seen = ~picture.is_hole & np.isfinite(picture.depth)
+        self.assertTrue((picture.depth[seen] > 0).all())
+
+    def test_tells_what_input_views_know(self):
+        known = self.model.input_depth("view_02")
+        measured = known["origin"] == cgs.DEPTH_ORIGIN.index("measured")
+        self.assertGreater(measured.mean(), 0.5)
+        self.assertTrue(np.isfinite(known["sigma"][measured]).all())
+        with self.assertRaises(cgs.InvalidInput):
+            self.model.input_depth(self.model.held_out[0])
+
+    def test_evaluates_as_the_program(self):
+        told = program("evaluate", self.folder)
+        self.assertEqual(cgs.read_model(self.folder).evaluate()["mean"], told["mean"])
+
+    def test_takes_pictures_from_arrays(self):
+        scene = cgs.read_scene(CAPTURE, views=VIEWS)
+        scene.load()
+        for i in scene.input:
+            scene.views[i].image = scene.views[i].image[:, :, ::-1]  # blue for red
+        model = cgs.reconstruct(scene, settings={"steps": 0})
+        of_file = self.model.render(self.model.cameras["view_02"]).color.mean((0, 1))
+        of_array = model.render(model.cameras["view_02"]).color.mean((0, 1))
+        np.testing.assert_allclose(of_array, of_file[::-1], atol=0.02)
+
+
+class LongWork(unittest.TestCase):
+    def work(self, progress=None):
+        scene = cgs.read_scene(CAPTURE, views=VIEWS)
+        return cgs.reconstruct(scene, settings={"steps": 100000}, progress=progress)
+
+    def test_stops_at_control_c(self):
+        sent = []
+
+        def interrupt():
+            sent.append(time.monotonic())
+            os.kill(os.getpid(), signal.SIGINT)
+
+        timer = threading.Timer(2, interrupt)
+        timer.start()
+        with self.assertRaises(KeyboardInterrupt):
+            self.work()
+        self.assertLess(time.monotonic() - sent[0], 3)  # a second on a machine that does no more
+
+    def test_lets_other_threads_run(self):
+        count = 0
+
+        def stop_after_many(stage, done):
+            if count > 50:
+                raise StopIteration
+
+        is_done = threading.Event()
+
+        def others():
+            nonlocal count
+            while not is_done.wait(0.01):
+                count += 1
+
+        thread = threading.Thread(target=others)
+        thread.start()
+        with self.assertRaises(StopIteration):
+            self.work(stop_after_many)
+        is_done.set()
+        thread.join()
+        self.assertGreater(count, 50)
+
+    def test_tells_how_far_it_is(self):
+        told = []
+
+        def listen(stage, done):
+            told.append((stage, done))
+            if done > 0.21:
+                raise StopIteration
+
+        with self.assertRaises(StopIteration):
+            self.work(listen)
+        self.assertEqual({stage for stage, _ in told}, {"depth and Gaussians"})
+        self.assertEqual([done for _, done in told], sorted(done for _, done in told))
+
+
+class Arrays(unittest.TestCase):
+    def test_are_views_that_live_on(self):
+        mesh = cgs.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        self.assertIsNone(mesh.colors)
+        mesh.colors = np.full((3, 3), 0.5)
+        mesh.colors[1] = (1, 0, 0)
+        self.assertEqual(mesh.colors[1].tolist(), [1, 0, 0])
+        self.assertTrue(np.shares_memory(mesh.faces, mesh.faces))
+        faces = mesh.faces
+        del mesh
+        gc.collect()
+        self.assertEqual(faces.tolist(), [[0, 1, 2]])
+
+    def test_keep_all_digits_far_from_zero(self):
+        corner = np.array([4.5e5, 5.4e6, 300])  # a survey's coordinates
+        points = corner + np.array([[0, 0, 0], [0.125, 0, 0], [0, 0.125, 0]])
+        np.testing.assert_array_equal(cgs.Mesh(points, [[0, 1, 2]]).vertices, points)
+
+    def test_that_do_not_fit_are_refused(self):
+        with self.assertRaisesRegex(cgs.InvalidInput, r"vertices must have the shape \(N, 3\)"):
+            cgs.Mesh(np.zeros((3, 2)))
+        with self.assertRaisesRegex(cgs.InvalidInput, "below 3, but is 3"):
+            cgs.Mesh(np.eye(3), [[0, 1, 3]])
+        with self.assertRaisesRegex(cgs.InvalidInput, "finite"):
+            cgs.Mesh([[0, 0, np.nan]])
+        camera = cgs.Camera(4, 3, 2, 2, 2, 1.5)
+        with self.assertRaisesRegex(cgs.InvalidInput, r"\(3, 4\) of its camera, but is \(4, 3\)"):
+            cgs.fuse([camera], [np.ones((4, 3))])
+        with self.assertRaisesRegex(cgs.InvalidInput, "a rotation"):
+            camera.world_from_cam = 2 * np.eye(4)
+
+
+class Volumes(unittest.TestCase):
+    def test_of_a_ball_have_its_size(self):
+        cameras = six_cameras()
+        volume = cgs.fuse(
+            cameras, [ball_depth(c) for c in cameras], voxel_size=0.02, metres_per_unit=0.001
+        )
+        ball = volume.watertight()
+        radii = np.linalg.norm(ball.vertices, axis=1)
+        self.assertLess(np.abs(radii - 1).max(), 0.02)
+        figure = ball.measure(volume=True, unit="mm")["volume"]
+        self.assertEqual(figure["unit"], "mm^3")
+        self.assertAlmostEqual(figure["value"], 4 / 3 * np.pi, delta=0.02)
+        volume.save(Path(WORK) / "ball.vdb")
+        again = cgs.read_volume(Path(WORK) / "ball.vdb")
+        self.assertEqual(again.voxel_size, volume.voxel_size)
+        np.testing.assert_array_equal(again.watertight().vertices, ball.vertices)
+
+
+class Meshes(unittest.TestCase):
+    def test_are_filtered_as_by_the_program(self):
+        cameras = six_cameras()
+        scan = cgs.fuse(cameras, [ball_depth(c) for c in cameras], voxel_size=0.1).surface()
+        file, out = Path(WORK) / "scan.ply", Path(WORK) / "filtered.ply"
+        scan.save(file)
+        operations = ["largest=1", "taubin=5", "simplify=0.01"]
+        program("filter", file, out, *(w for op in operations for w in ("--op", op)))
+        cgs.read_mesh(file).filter(*operations).save(Path(WORK) / "ours.ply")
+        self.assertEqual((Path(WORK) / "ours.ply").read_bytes(), out.read_bytes())
+
+    def test_are_compared_with_signs(self):
+        def square(z):
+            return cgs.Mesh([[0, 0, z], [1, 0, z], [1, 1, z], [0, 1, z]], [[0, 1, 2], [0, 2, 3]])
+
+        distance = square(0.25).compare(square(0))["distance"]
+        np.testing.assert_allclose(distance, 0.25)
+        np.testing.assert_allclose(square(-0.25).compare(square(0))["distance"], -0.25)
+
+
+class Splats(unittest.TestCase):
+    def one(self):
+        return cgs.Splats(
+            positions=[[0, 0, 4]],
+            scales=[[0.5, 0.5, 0.5]],
+            rotations=[[1, 0, 0, 0]],
+            opacities=[0.8],
+            sh=[[[1, 0, -1]]],
+        )
+
+    def test_are_drawn_as_the_equation_says(self):
+        splats = self.one()
+        picture = splats.render(cgs.Camera(33, 33, 30, 30, 16.5, 16.5), background=(0, 0, 0))
+        self.assertAlmostEqual(float(picture.alpha[16, 16]), 0.8, places=5)
+        expected = np.clip(0.28209479 * np.array([1, 0, -1]) + 0.5, 0, 1)
+        np.testing.assert_allclose(picture.color[16, 16], expected, atol=1e-5)
+        variance = (0.5 * 30 / 4) ** 2 + 0.3  # of the picture, with its blur [pixels^2]
+        self.assertAlmostEqual(
+            float(picture.alpha[16, 18]), 0.8 * np.exp(-(2**2) / 2 / variance), places=3
+        )
+        self.assertIsNone(picture.hole)
+
+    def test_come_back_from_their_file(self):
+        splats = self.one()
+        splats.save(Path(WORK) / "one.ply")
+        again = cgs.read_splats(Path(WORK) / "one.ply")
+        np.testing.assert_allclose(again.positions, splats.positions)
+        np.testing.assert_allclose(again.scales, splats.scales, rtol=1e-6)
+        np.testing.assert_allclose(again.sh, splats.sh, atol=1e-6)
+        self.assertEqual(len(again), 1)
+
+
+class Program(unittest.TestCase):
+    def test_takes_options_as_words(self):
+        mesh = Path(WORK) / "square.ply"
+        cgs.Mesh([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]).save(mesh)
+        told = cgs.program.measure(mesh, area=True, distance=[(0, 0, 0), (2, 0, 0)])
+        self.assertEqual(told, program("measure", mesh, "--area", "--distance", "0,0,0", "2,0,0"))
+        out = Path(WORK) / "moved.ply"
+        cgs.program.filter(mesh, out, op=["translate=1,0,0", "scale=2"])
+        self.assertEqual(cgs.read_mesh(out).vertices.min(0).tolist(), [2, 0, 0])
+
+    def test_explains_itself(self):
+        self.assertIn("Example: cgs run", cgs.program.run.__doc__)
+        self.assertIn("--assume-unit", cgs.program.measure.__doc__)
+
+
+class Errors(unittest.TestCase):
+    def test_have_the_words_and_the_code_of_the_program(self):
+        with self.assertRaises(cgs.BadInput) as raised:
+            cgs.read_mesh("nowhere.ply")
+        self.assertEqual(str(raised.exception), "OPEN: nowhere.ply: No such file or directory")
+        self.assertEqual((raised.exception.exit_code, raised.exception.defect), (3, "OPEN"))
+        self.assertIsInstance(raised.exception, ValueError)
+        with self.assertRaises(cgs.InvalidInput) as misuse:
+            cgs.program.measure("nowhere.ply", aera=True)
+        self.assertIn("takes no aera", str(misuse.exception))
+        with self.assertRaises(OSError):
+            cgs.Mesh(np.eye(3), [[0, 1, 2]]).save("/proc/no/such/folder/mesh.ply")
+
+    def test_warnings_can_be_made_errors(self):
+        folder = Path(WORK) / "without"
+        shutil.copytree(CAPTURE, folder, ignore=shutil.ignore_patterns("truth"))
+        next((folder / "images").glob("view_05*")).unlink()
+        with self.assertWarnsRegex(UserWarning, "missing"):
+            cgs.read_scene(folder)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with self.assertRaisesRegex(UserWarning, "missing"):
+                cgs.read_scene(folder)
+
+
+if __name__ == "__main__":
+    shutil.rmtree(WORK, ignore_errors=True)
+    Path(WORK).mkdir(parents=True)
+    unittest.main(argv=sys.argv[:1] + sys.argv[4:], verbosity=2)
