@@ -28,7 +28,7 @@
 namespace {
 
 constexpr const char* kDescription =
-    "cgs - two to four photographs to assets that say what was seen and what was invented";
+    "cgs - a few photographs to assets that say what was seen and what was invented";
 
 constexpr const char* kFooter =
     "Example: cgs run photos/portal --views 1,10,19 -o out/portal\n"

@@ -5,6 +5,7 @@ namespace cgs {
 
 void add_commands(CLI::App& app) {
   add_run(app);
+  add_batch(app);
   add_info(app);
   add_train(app);
   add_evaluate(app);

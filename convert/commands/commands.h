@@ -10,6 +10,7 @@ namespace cgs {
 
 // One function per command: adds it to the program, with its options and its help. Running it
 // throws what libcgs/core/error.h lists; main() turns that into the exit code.
+void add_batch(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_evaluate(CLI::App& app);

@@ -2,13 +2,12 @@
 #include <chrono>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include <nlohmann/json.hpp>
 
 #include "convert/commands/commands.h"
-#include "convert/commands/common_options.h"
+#include "convert/commands/run_options.h"
 #include "convert/files/mesh_files.h"
 #include "convert/report/report_frame.h"
 #include "convert/report/report_surface.h"
@@ -25,23 +24,9 @@ namespace cgs {
 
 namespace {
 
-struct RunArgs {
-  RunRequest request;
-  TrainingArguments training;
-  CommonOptions common;
-  std::optional<EstimatedSurface> estimated;
-  std::string max_size;
-  std::string budget;
+struct RunArgs : RunArguments {
   bool preview = false;
 };
-
-size_t asked_size(const std::string& text) {
-  constexpr size_t kLeast = 1000;  // of a file with nothing in it
-  const size_t bytes = parse_file_size(text);
-  if (bytes >= kLeast) return bytes;
-  throw InvalidInput("--max-size " + text + " is " + std::to_string(bytes) +
-                     " bytes, too few for any asset; write 800kB or 2MB");
-}
 
 // One paragraph a user reads after a run: what was made, how far to trust it, what to open.
 void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Terminal& terminal) {
@@ -73,21 +58,10 @@ void run_run(const RunArgs& args) {
   keep_scene_apart(args.request.output,
                    args.request.scene.path,
                    {"model", "views", "mesh", "web", kPreviewFolder, kRecomputedFolder});
-  RunRequest request = args.request;
-  request.training = training_options(args.training);
-  request.memory_limit = stated_memory_limit(args.common);
-  request.estimated = args.estimated.value_or(request.estimated);
-  if (!args.max_size.empty()) request.max_size = asked_size(args.max_size);
-  if (!request.scene.assume_unit.empty()) (void)metres_in(request.scene.assume_unit);
+  RunRequest request = run_request(args);
   Terminal terminal(args.common.quiet, args.common.strict);
   const auto start = std::chrono::steady_clock::now();
-  const double budget = args.budget.empty() ? 0 : parse_seconds(args.budget);
-  const std::vector<std::string>& set = args.training.settings;
-  const bool sets_steps = std::any_of(
-      set.begin(), set.end(), [](const std::string& s) { return s.rfind("steps=", 0) == 0; });
-  if (budget > 0 && sets_steps) {
-    throw InvalidInput("--budget chooses the steps of the training; give it or --set steps");
-  }
+  const double budget = stated_budget(args);
   if (args.preview) {
     const nlohmann::ordered_json report = write_preview(request, terminal);
     if (args.common.json) std::cout << json_text(report) << "\n";
@@ -105,56 +79,6 @@ void run_run(const RunArgs& args) {
   }
 }
 
-void add_surface_options(CLI::App& command, RunArgs& args) {
-  const OptionGroup group(command, "Surface and files");
-  command.add_option("--voxel-size",
-                     args.request.voxel_size,
-                     "Edge of a voxel, e.g. 5mm, or in scene units; default: from the pixel size");
-  command.add_option(
-      "--simplify",
-      args.request.simplify,
-      "Largest error of simplified meshes where there is evidence, e.g. 2mm; four times "
-      "that where inferred or estimated, as much again for asset.glb, whose photographs hold "
-      "the colours; default: a quarter of a voxel; 0 = do not simplify");
-  command.add_option("--compression-error",
-                     args.request.compression_error,
-                     "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
-  add_glb_option(command, args.request.glb_encoding);
-  add_local_origin_option(
-      command, args.request.local_origin, "What is in web/, but for splats.spz,");
-  add_estimated_option(command, args.estimated);
-  command
-      .add_option(
-          "--lods",
-          args.request.lods,
-          "Coarser levels of asset.glb to write, 0 to 5, with a tileset.json (3D Tiles) for "
-          "viewers that show the one that the distance asks for; default 0")
-      ->check(CLI::Range(size_t{0}, kMostLods).description("0 to " + std::to_string(kMostLods)));
-}
-
-void add_promises(CLI::App& command, RunArgs& args) {
-  const OptionGroup group(command, "Promises, kept or refused");
-  command.add_option("--max-error",
-                     args.request.max_error,
-                     "Every mesh written, asset.glb too but not its coarser levels, lies within "
-                     "this of the fused surface, measured on the files, e.g. 1mm, or in scene "
-                     "units; in place of --simplify and --compression-error");
-  command.add_option("--max-size",
-                     args.max_size,
-                     "asset.glb with its textures is no larger, e.g. 2MB; leaves out the "
-                     "least detail that is needed and says how much that is");
-  command.add_option(
-      "--budget",
-      args.budget,
-      "Time for all of it, e.g. 3min: tries small pictures, then takes the largest "
-      "size and the training that this machine can do in it; in place of --downscale and "
-      "--preset");
-  command.add_flag("--preview",
-                   args.preview,
-                   "A first look, in seconds once the cameras are there: small pictures, no "
-                   "training, in OUT/preview; says how much is measured, and stops there");
-}
-
 }  // namespace
 
 void add_run(CLI::App& app) {
@@ -169,18 +93,14 @@ void add_run(CLI::App& app) {
       ->required();
   cmd->add_option("-o,--output", args->request.output, "Folder to write")->required();
   cmd->add_flag("-w,--overwrite", args->request.overwrite, "Replace the results of another run");
-  add_scene_options(*cmd, args->request.scene.options);
-  add_camera_options(*cmd, args->request.scene);
-  add_scale_options(*cmd, args->request.scene);
-  add_surface_options(*cmd, *args);
-  add_promises(*cmd, *args);
-  add_training_options(*cmd, args->training);
-  for (const char* chosen : {"--downscale", "--preset"}) {
-    cmd->get_option("--budget")->excludes(chosen);
-    cmd->get_option("--preview")->excludes(chosen);
-  }
-  cmd->get_option("--preview")->excludes("--budget");
-  add_common_options(*cmd, args->common);
+  add_run_options(*cmd, *args);
+  cmd->add_flag("--preview",
+                args->preview,
+                "A first look, in seconds once the cameras are there: small pictures, no "
+                "training, in OUT/preview; says how much is measured, and stops there")
+      ->excludes("--downscale")
+      ->excludes("--preset")
+      ->excludes("--budget");
   cmd->footer(
       "Example: cgs run photos/portal --views 1,10,19 -o out/portal\n"
       "         cgs run photos/portal --preview -o out/portal\n"

@@ -33,7 +33,10 @@ int preview_reduction(const Scene& scene) {
 double measured_share(const Json& depth_of_views) {
   double sum = 0;
   for (const Json& view : depth_of_views) {
-    const double surface = 1 - view["sky"].get<double>() - view["transient"].get<double>();
+    double surface = 1;
+    for (const char* other : {"sky", "transient", "background"}) {
+      surface -= view[other].get<double>();
+    }
     sum += surface > 0 ? view["with_evidence"].get<double>() / surface : 0;
   }
   return sum / double(depth_of_views.size());

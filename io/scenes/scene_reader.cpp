@@ -115,17 +115,23 @@ void check_presence(Scene& scene) {
 constexpr int kInputs = 3;  // of many views, at least; of LLFF's protocol
 constexpr size_t kHoldEvery = 8;
 
-// As many as kMostPixels allow, of which one in eight is held out to tell how good the others are.
-size_t input_count(const Scene& scene, const std::vector<int>& usable) {
+// Of those that are chosen, one in eight is held out to tell how good the others are.
+size_t most_inputs(size_t usable) { return usable - (usable + kHoldEvery - 1) / kHoldEvery; }
+
+// As many as kMostPixels allow.
+// \param divisors  of the sizes that the cameras have
+size_t input_count(const Scene& scene,
+                   const std::vector<int>& usable,
+                   const std::vector<int>& divisors) {
   double pixels = 0;
   for (const int i : usable) {
-    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
-    pixels += double(camera.width) * camera.height;
+    const auto view = static_cast<size_t>(i);
+    const Camera& camera = scene.views[view].camera;
+    pixels += double(camera.width / divisors[view]) * (camera.height / divisors[view]);
   }
   const auto count = static_cast<double>(usable.size());
   const auto affordable = static_cast<size_t>(count * SceneOptions::kMostPixels / pixels);
-  const size_t held_out = (usable.size() + kHoldEvery - 1) / kHoldEvery;
-  return std::clamp(affordable, size_t{kInputs}, usable.size() - held_out);
+  return std::clamp(affordable, size_t{kInputs}, most_inputs(usable.size()));
 }
 
 std::vector<int> llff_protocol(const std::vector<int>& usable) {
@@ -141,17 +147,54 @@ std::vector<int> llff_protocol(const std::vector<int>& usable) {
   return out;
 }
 
-// LLFF's scenes have a protocol that others publish figures for.
+constexpr size_t kTakeAll = 4;
+
+// Whether of many photographs those are chosen that show the most. LLFF's scenes have a protocol
+// that others publish figures for.
+bool chooses_by_worth(const Scene& scene, const SceneOptions& options) {
+  return options.views.empty() && !options.all_views && scene.kind != SceneKind::Llff &&
+         views_with_files(scene).size() > kTakeAll;
+}
+
+// Of the largest size, or of a smaller one if more photographs fit that show much more together.
+std::vector<int> chosen_divisors(Scene& scene, const SceneOptions& options) {
+  std::vector<int> out = divisors_to(scene, SceneOptions::kLongestSide);
+  bool is_for_more = false;
+  if (chooses_by_worth(scene, options)) {
+    constexpr double kMuchLess = 0.95;
+    const std::vector<int> usable = views_with_files(scene);
+    const RankedViews ranked = rank_input_views(scene, usable, most_inputs(usable.size()));
+    const auto told = [&](const std::vector<int>& divisors) {
+      const size_t count = input_count(scene, usable, divisors);
+      return ranked.told[std::min(count, ranked.views.size()) - 2];
+    };
+    const int least = SceneOptions::kShortestChosen;
+    const double most = ranked.told.empty() ? 0 : told(divisors_to(scene, least));
+    for (int longest = SceneOptions::kLongestSide; most > 0 && longest >= least; --longest) {
+      const std::vector<int> divisors = divisors_to(scene, longest);
+      is_for_more = divisors != out;
+      if (told(divisors) >= kMuchLess * most) {
+        out = divisors;
+        break;
+      }
+    }
+  }
+  const std::string text = divisors_text(scene, out);
+  if (!text.empty())
+    scene.notes.push_back(text + (is_for_more ? "; fewer of them would then be used" : ""));
+  return out;
+}
+
 std::vector<int> some_views(const Scene& scene, const std::vector<int>& usable) {
   std::vector<int> out;
   if (scene.kind != SceneKind::Llff) {
-    out = choose_input_views(scene, usable, input_count(scene, usable));
+    const std::vector<int> as_they_are(scene.views.size(), 1);
+    out = choose_input_views(scene, usable, input_count(scene, usable, as_they_are));
   }
   return out.empty() ? llff_protocol(usable) : out;
 }
 
 void choose_views(Scene& scene, const std::string& list, bool all_views) {
-  constexpr size_t kTakeAll = 4;
   constexpr size_t kMostHeldOut = 24;
   const std::vector<int> usable = views_with_files(scene);
   if (!list.empty()) {
@@ -337,7 +380,7 @@ Scene prepared(Scene scene, const SceneOptions& options) {
   make_pinholes(scene);
   divide_sizes(scene,
                options.downscale ? std::vector<int>(scene.views.size(), *options.downscale)
-                                 : chosen_divisors(scene));
+                                 : chosen_divisors(scene, options));
   choose_views(scene, options.views, options.all_views);
   check_baselines(scene);
   check_places(scene);

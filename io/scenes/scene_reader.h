@@ -22,8 +22,9 @@ struct SceneOptions {
   std::string views;
   bool all_views = false;  ///< Where `views` is empty, take every one.
   /// Divide image sizes by this; >= 1. Empty = choose: the smallest that leaves no side above
-  /// kLongestSide; photographs much smaller than the largest have one of their own. What was chosen
-  /// becomes a note.
+  /// kLongestSide or, of many photographs that are chosen among, above what lets enough of them in;
+  /// photographs much smaller than the largest have one of their own. What was chosen becomes a
+  /// note.
   std::optional<int> downscale;
   /// Of Metashape's cameras, the chunk to read: its label or its index from 0. Empty = the first
   /// with aligned cameras.
@@ -35,6 +36,9 @@ struct SceneOptions {
   static constexpr int kLongestSide = 1024;  // [pixels]
   /// Of all input views that are chosen together: some five minutes on two cores.
   static constexpr double kMostPixels = 3.2e6;
+  /// Longest side that is chosen at least where more photographs then fit that show much more
+  /// together [pixels].
+  static constexpr int kShortestChosen = 480;
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

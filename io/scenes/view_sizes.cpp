@@ -86,33 +86,44 @@ void divide_sizes(Scene& scene, const std::vector<int>& divisors) {
   }
 }
 
-std::vector<int> chosen_divisors(Scene& scene) {
-  const auto longest = [](const View& view) {
-    return view.image_path.empty() ? 0 : std::max(view.camera.width, view.camera.height);
+namespace {
+
+int longest_side(const View& view) {
+  return view.image_path.empty() ? 0 : std::max(view.camera.width, view.camera.height);
+}
+
+const View& largest_of(const Scene& scene) {
+  const auto is_shorter = [](const View& a, const View& b) {
+    return longest_side(a) < longest_side(b);
   };
+  return *std::max_element(scene.views.begin(), scene.views.end(), is_shorter);
+}
+
+}  // namespace
+
+std::vector<int> divisors_to(const Scene& scene, int longest) {
   const auto divisor = [&](const View& view) {
-    constexpr int kLongest = SceneOptions::kLongestSide;
-    return std::max(1, (longest(view) + kLongest - 1) / kLongest);
+    return std::max(1, (longest_side(view) + longest - 1) / longest);
   };
-  const auto is_shorter = [&](const View& a, const View& b) { return longest(a) < longest(b); };
-  const View& largest = *std::max_element(scene.views.begin(), scene.views.end(), is_shorter);
-  const int common = divisor(largest);
+  const int common = divisor(largest_of(scene));
   std::vector<int> out(scene.views.size(), common);
-  bool has_smaller = false;
   for (size_t i = 0; i < out.size(); ++i) {
     const View& view = scene.views[i];
-    if (view.image_path.empty() || 2 * divisor(view) > common) continue;
-    out[i] = divisor(view);
-    has_smaller = true;
-  }
-  if (common > 1) {
-    scene.notes.push_back((largest.fisheye ? "undistorted pictures of " : "photographs of ") +
-                          size_text(largest.camera.width, largest.camera.height) +
-                          " pixels are worked on at 1/" + std::to_string(common) +
-                          " of their size" + (has_smaller ? ", smaller ones at more" : "") +
-                          "; a downscale of 1 takes all of it, and longer");
+    if (!view.image_path.empty() && 2 * divisor(view) <= common) out[i] = divisor(view);
   }
   return out;
+}
+
+std::string divisors_text(const Scene& scene, const std::vector<int>& divisors) {
+  const int common = *std::max_element(divisors.begin(), divisors.end());
+  if (common == 1) return "";
+  const View& largest = largest_of(scene);
+  const bool has_smaller =
+      std::any_of(divisors.begin(), divisors.end(), [&](int d) { return d < common; });
+  return (largest.fisheye ? "undistorted pictures of " : "photographs of ") +
+         size_text(largest.camera.width, largest.camera.height) + " pixels are worked on at 1/" +
+         std::to_string(common) + " of their size" + (has_smaller ? ", smaller ones at more" : "") +
+         "; a downscale of 1 takes all of it, and longer";
 }
 
 }  // namespace cgs

@@ -24,10 +24,13 @@ void fit_cameras(Scene& scene);
 void make_pinholes(Scene& scene);
 
 /// The divisors of image sizes where the options state none, one per view: that of the largest
-/// photograph (of a fisheye, its undistorted picture), so that no side is above
-/// SceneOptions::kLongestSide. A photograph of which it would leave half or less of what is
-/// possible has its own: cameras whose sizes differ little agree. What was chosen becomes a note.
-std::vector<int> chosen_divisors(Scene& scene);
+/// photograph (of a fisheye, its undistorted picture), so that no side is above `longest`. A
+/// photograph of which it would leave half or less of what is possible has its own: cameras whose
+/// sizes differ little agree.
+std::vector<int> divisors_to(const Scene& scene, int longest);
+
+/// What was chosen, for a note; empty where nothing is divided.
+std::string divisors_text(const Scene& scene, const std::vector<int>& divisors);
 
 /// Makes cameras smaller, rounded down to whole pixels.
 /// \param divisors  one per view

@@ -189,9 +189,7 @@ double worth_of_angle(double radians) {
   return std::max(0.0, (bell(off, kNarrower) - at_none) / (1 - at_none));
 }
 
-std::vector<int> choose_input_views(const Scene& scene,
-                                    const std::vector<int>& candidates,
-                                    size_t count) {
+RankedViews rank_input_views(const Scene& scene, const std::vector<int>& candidates, size_t count) {
   require(candidates.size() >= 2, "views to choose among", candidates.size());
   require(count >= 2, "views to choose", count);
   constexpr size_t kMostCandidates = 100;
@@ -208,10 +206,18 @@ std::vector<int> choose_input_views(const Scene& scene,
   std::vector<double> told(sights.size(), 0.0);
   for (size_t i = 0; i < sights.size(); ++i) told[i] = worth.with(sights[i], chosen, b);
   chosen.push_back(b);
-  while (chosen.size() < count && worth.add_best(chosen, told)) {
-  }
-  std::vector<int> out;
-  for (const size_t i : chosen) out.push_back(some[i]);
+  RankedViews out;
+  do {
+    out.told.push_back(std::accumulate(told.begin(), told.end(), 0.0));
+  } while (chosen.size() < count && worth.add_best(chosen, told));
+  for (const size_t i : chosen) out.views.push_back(some[i]);
+  return out;
+}
+
+std::vector<int> choose_input_views(const Scene& scene,
+                                    const std::vector<int>& candidates,
+                                    size_t count) {
+  std::vector<int> out = rank_input_views(scene, candidates, count).views;
   std::sort(out.begin(), out.end());
   return out;
 }

@@ -71,13 +71,28 @@ TEST_F(ReadScene, OfManyViewsTakesThoseThatGoWellTogether) {
 }
 
 TEST_F(ReadScene, OfManyLargeViewsTakesWhatSomeMinutesAllow) {
+  const auto enlarge = [&] {
+    for (int i = 0; i < 8; ++i) {
+      test::write_bytes(dir_ / ("images/v0" + std::to_string(i) + ".png"),
+                        test::rgb_png(1000, 750, i));
+    }
+  };
+  write(8, "SIMPLE_PINHOLE 80 60 100 40 30", 0.01);  // all show nearly the same
+  enlarge();
+  const Scene alike = read();
+  EXPECT_EQ(alike.views[0].camera.width, 1000);
+  EXPECT_LE(alike.input.size(), 4u);  // of 0.75 million pixels each
+  // Each shows something else: more of them, smaller.
   write(8);
-  for (int i = 0; i < 8; ++i) {
-    test::write_bytes(dir_ / ("images/v0" + std::to_string(i) + ".png"),
-                      test::rgb_png(1000, 750, i));
-  }
-  EXPECT_EQ(read().input.size(), 4u);  // of 0.75 million pixels each
+  enlarge();
+  const Scene apart = read();
+  EXPECT_EQ(apart.views[0].camera.width, 500);
+  EXPECT_EQ(apart.input.size(), 7u);
+  ASSERT_FALSE(apart.notes.empty());
+  EXPECT_NE(apart.notes.back().find("fewer of them would then be used"), std::string::npos);
+  EXPECT_EQ(read({.downscale = 1}).input.size(), 4u);
   EXPECT_EQ(read({.downscale = 4}).input.size(), 7u);
+  EXPECT_EQ(read({.all_views = true}).views[0].camera.width, 1000);
 }
 
 TEST_F(ReadScene, TakesEveryViewIfAsked) {

@@ -33,20 +33,19 @@ TEST(ViewSizes, HaveTheSameShapeWhereOneIsTheOtherRounded) {
 }
 
 TEST(ViewSizes, AreDividedSoThatTheLargestSideEndsInMinutes) {
-  Scene small = scene_of({{1024, 768}, {800, 600}});
-  EXPECT_EQ(chosen_divisors(small), (Divisors{1, 1}));
-  EXPECT_TRUE(small.notes.empty());
-  Scene large = scene_of({{768, 1025}, {4032, 3024}, {4000, 3000}});
-  EXPECT_EQ(chosen_divisors(large), (Divisors{2, 4, 4}));
-  EXPECT_TRUE(large.warnings.empty());
-  ASSERT_EQ(large.notes.size(), 1u);
-  EXPECT_NE(large.notes[0].find("4032 x 3024 pixels are worked on at 1/4"), std::string::npos);
-  EXPECT_NE(large.notes[0].find("smaller ones at more"), std::string::npos);
+  const Scene small = scene_of({{1024, 768}, {800, 600}});
+  EXPECT_EQ(divisors_to(small, 1024), (Divisors{1, 1}));
+  EXPECT_EQ(divisors_text(small, {1, 1}), "");
+  const Scene large = scene_of({{768, 1025}, {4032, 3024}, {4000, 3000}});
+  EXPECT_EQ(divisors_to(large, 1024), (Divisors{2, 4, 4}));
+  EXPECT_EQ(divisors_to(large, 800), (Divisors{2, 6, 6}));
+  const std::string text = divisors_text(large, {2, 4, 4});
+  EXPECT_NE(text.find("4032 x 3024 pixels are worked on at 1/4"), std::string::npos);
+  EXPECT_NE(text.find("smaller ones at more"), std::string::npos);
 }
 
 TEST(ViewSizes, LeavePhotographsOfAlmostTheSameSizeAlike) {
-  Scene scene = scene_of({{4032, 3024}, {3000, 2250}});
-  EXPECT_EQ(chosen_divisors(scene), (Divisors{4, 4}));
+  EXPECT_EQ(divisors_to(scene_of({{4032, 3024}, {3000, 2250}}), 1024), (Divisors{4, 4}));
 }
 
 TEST(ViewSizes, AreRoundedDownAndNeverNothing) {

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/commands/commands.h"
+#include "convert/commands/run_options.h"
+#include "convert/report/batch_page.h"
+#include "convert/run/budget.h"
+#include "convert/run/pipeline.h"
+#include "convert/text/advice.h"
+#include "convert/text/length.h"
+#include "io/bytes/atomic_file.h"
+#include "io/bytes/byte_reader.h"
+#include "io/bytes/json_file.h"
+#include "io/bytes/scene_path.h"
+#include "libcgs/core/error.h"
+
+namespace cgs {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct BatchArgs {
+  RunArguments run;
+  std::vector<fs::path> scenes;
+  fs::path output;
+  bool retry = false;
+};
+
+// In the folder of a scene whose run failed, or that is at work: what ends the program is known of
+// at the next start.
+constexpr const char* kFailure = "failure.txt";
+
+// "church" of photos/church and of photos/church/images.
+std::string name_of(const fs::path& scene) {
+  fs::path folder = fs::weakly_canonical(scene);
+  if (folder.filename() == "images" && folder.has_parent_path()) folder = folder.parent_path();
+  return folder.filename().string();
+}
+
+std::vector<std::string> names_of(const std::vector<fs::path>& scenes) {
+  std::vector<std::string> out;
+  std::set<std::string> known;
+  for (const fs::path& scene : scenes) {
+    out.push_back(name_of(scene));
+    if (known.insert(out.back()).second) continue;
+    throw InvalidInput("two scenes are called " + one_line(out.back()) +
+                       ", so that their results would lie in one folder; rename one");
+  }
+  return out;
+}
+
+std::string first_line(const fs::path& file) {
+  const std::string text = read_file(file);
+  return text.substr(0, text.find('\n'));
+}
+
+/// Runs scenes one after the other, each with all threads.
+class Batch {
+ public:
+  Batch(const BatchArgs& args, Terminal& terminal) : args_(args), terminal_(terminal) {}
+
+  BatchResult run(const fs::path& scene, const std::string& name) {
+    BatchResult out;
+    out.name = name;
+    const fs::path folder = args_.output / name;
+    const fs::path failure = folder / kFailure;
+    if (is_present(failure) && !args_.retry) {
+      out.failure = first_line(failure);
+      terminal_.say(name + ": failed before, --retry tries again: " + out.failure);
+      return out;
+    }
+    make_output_folder(folder);
+    write_file(failure, "the program ended in the middle of it\n");
+    const auto start = std::chrono::steady_clock::now();
+    try {
+      out.report = pipeline(scene, folder, start).report;
+      fs::remove(failure);
+    } catch (const Cancelled&) {
+      fs::remove(failure);
+      throw;
+    } catch (const Error& error) {
+      out.failure = words_of(error);
+      write_file(failure, out.failure + "\n");
+    }
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    terminal_.say(name + ": " +
+                  (out.failure.empty() ? "done in " + format_seconds(taken.count()) : out.failure));
+    return out;
+  }
+
+ private:
+  FinishedRun pipeline(const fs::path& scene,
+                       const fs::path& folder,
+                       std::chrono::steady_clock::time_point start) {
+    RunArguments arguments = args_.run;
+    arguments.request.scene.path = scene;
+    arguments.request.output = folder;
+    RunRequest request = run_request(arguments);
+    // What many scenes say of themselves is in their reports.
+    Terminal silent = Terminal::silent();
+    const double budget = stated_budget(arguments);
+    if (budget > 0) request = within_budget(request, budget, start, silent);
+    return run_pipeline(request, silent);
+  }
+
+  const BatchArgs& args_;
+  Terminal& terminal_;
+};
+
+void print_rows(const Json& rows) {
+  std::printf("%-24s %9s %9s %9s  %s\n", "scene", "measured", "observed", "invented", "");
+  const auto share = [](const Json& value) {
+    std::array<char, 16> out{};
+    if (value.is_number()) {
+      std::snprintf(out.data(), out.size(), "%.0f %%", 100 * value.get<double>());
+    } else {
+      out = {'-'};
+    }
+    return std::string(out.data());
+  };
+  for (const Json& row : rows) {
+    const std::string name = one_line(row["name"].get<std::string>());
+    if (row["state"] == Json("failed")) {
+      std::printf("%-24s failed: %s\n", name.c_str(), row["failure"].get<std::string>().c_str());
+      continue;
+    }
+    std::printf("%-24s %9s %9s %9s  %s\n",
+                name.c_str(),
+                share(row["measured"]).c_str(),
+                share(row["observed"]).c_str(),
+                share(row["invented"]).c_str(),
+                row["certified"].get<bool>() ? "certified" : "NOT certified");
+  }
+}
+
+void run_batch(const BatchArgs& args) {
+  limit_threads(args.run.common.threads);
+  const std::vector<std::string> names = names_of(args.scenes);
+  for (const fs::path& scene : args.scenes) keep_apart(args.output, scene);
+  Terminal terminal(args.run.common.quiet, args.run.common.strict);
+  make_output_folder(args.output);
+  Batch batch(args, terminal);
+  std::vector<BatchResult> results;
+  for (size_t i = 0; i < names.size(); ++i) {
+    terminal.begin(names[i])(double(i) / double(names.size()));
+    results.push_back(batch.run(args.scenes[i], names[i]));
+    write_batch_page(args.output, results);  // whoever looks in between sees what is done
+  }
+  Json rows = Json::array();
+  for (const BatchResult& result : results) rows.push_back(batch_row(result));
+  write_file(args.output / "batch.json", json_text(rows) + "\n");
+  if (args.run.common.json) {
+    std::cout << json_text(rows) << "\n";
+  } else {
+    print_rows(rows);
+  }
+  terminal.say("open " + (args.output / "index.html").string());
+}
+
+}  // namespace
+
+void add_batch(CLI::App& app) {
+  auto args = std::make_shared<BatchArgs>();
+  auto* cmd = app.add_subcommand("batch", "Many scenes to every asset, with one page over all");
+  cmd->add_option("scenes", args->scenes, "Folders of scenes, as for run")->required();
+  cmd->add_option("-o,--output", args->output, "Folder to write; each scene has one below it")
+      ->required();
+  cmd->add_flag("--retry", args->retry, "Also those that failed before");
+  add_run_options(*cmd, args->run);
+  cmd->footer(
+      "Example: cgs batch objects/*/ --preset draft -o out/objects\n"
+      "         opens as out/objects/index.html\n"
+      "Run again, it does what is not done yet. One that fails does not stop the others; why is "
+      "in\n"
+      "OUT/NAME/failure.txt. Each run takes all threads, so one after the other is as quick as "
+      "side "
+      "by side.");
+  cmd->callback([args] { run_batch(*args); });
+}
+
+}  // namespace cgs

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/report/batch_page.h"
+
+#include <algorithm>
+#include <array>
+#include <sstream>
+
+#include "convert/report/page_files.h"
+#include "convert/text/html.h"
+#include "io/bytes/atomic_file.h"
+
+namespace cgs {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+// Mean share of the input photographs that is measured, of what shows surface.
+Json measured_share(const Json& model) {
+  double sum = 0;
+  const Json& views = model["depth_of_views"];
+  for (const Json& view : views) {
+    double surface = 1;
+    for (const char* other : {"sky", "transient", "background"}) {
+      surface -= view.value(other, 0.0);
+    }
+    sum += surface > 0 ? view["with_evidence"].get<double>() / surface : 0;
+  }
+  return views.empty() ? Json() : Json(sum / double(views.size()));
+}
+
+Json area_share(const Json& certificate, std::initializer_list<const char*> labels) {
+  double all = 0;
+  double of_labels = 0;
+  for (const char* label :
+       {"observed", "single_view", "interpolated", "estimated", "inferred", "virtual"}) {
+    const double area = certificate.value(std::string("area_") + label, 0.0);
+    all += area;
+    if (std::find_if(labels.begin(), labels.end(), [&](const char* l) {
+          return std::string_view(l) == label;
+        }) != labels.end()) {
+      of_labels += area;
+    }
+  }
+  return all > 0 ? Json(of_labels / all) : Json();
+}
+
+size_t input_count(const Json& report) {
+  size_t out = 0;
+  for (const Json& view : report["views"]) out += view["role"] == Json("input") ? 1 : 0;
+  return out;
+}
+
+// The picture of the first input view, as a path below the folder.
+std::string thumbnail(const BatchResult& result) {
+  for (const Json& view : result.report["views"]) {
+    if (view["role"] != Json("input")) continue;
+    return result.name + "/views/" + view["name"].get<std::string>() + ".color.png";
+  }
+  return "";
+}
+
+std::string done_row(const BatchResult& result) {
+  const Json row = batch_row(result);
+  const std::string report = escaped(result.name + "/report.html");
+  std::ostringstream html;
+  html << "<tr><td><a href=\"" << report << "\"><img src=\"" << escaped(thumbnail(result))
+       << "\" style=\"max-width:12em;max-height:9em\" alt=\"\"></a></td><td><a href=\"" << report
+       << "\">" << escaped(result.name) << "</a></td><td>"
+       << verdict(row["certified"].get<bool>(), "certified", "NOT certified") << "</td>";
+  for (const char* share : {"measured", "observed", "invented"}) {
+    html << "<td>" << percent(row[share]) << "</td>";
+  }
+  std::string warnings;
+  for (const Json& line : result.report["warnings"]) {
+    warnings += (warnings.empty() ? "" : "\n") + line.get<std::string>();
+  }
+  html << "<td>" << row["photographs"] << "</td><td>" << number(row["psnr"], "%.1f") << "</td><td>"
+       << escaped(row["units"].get<std::string>()) << "</td><td title=\"" << escaped(warnings)
+       << "\">" << row["warnings"] << "</td><td>" << number(row["seconds"], "%.0f")
+       << "</td></tr>\n";
+  return html.str();
+}
+
+}  // namespace
+
+Json batch_row(const BatchResult& result) {
+  if (!result.failure.empty()) {
+    return {{"name", result.name}, {"state", "failed"}, {"failure", result.failure}};
+  }
+  const Json& report = result.report;
+  const Json& evaluation = report["evaluation"];
+  double seconds = 0;
+  for (const Json& stage : report["stages"]) seconds += stage["seconds"].get<double>();
+  return {{"name", result.name},
+          {"state", "done"},
+          {"photographs", input_count(report)},
+          {"measured", measured_share(report["model"])},
+          {"observed", area_share(report["certificate"], {"observed", "single_view"})},
+          {"invented", area_share(report["certificate"], {"inferred"})},
+          {"certified", report["certificate"]["passed"]},
+          {"units", report["units"]},
+          {"psnr", evaluation.is_object() ? evaluation["mean"]["psnr"] : Json()},
+          {"warnings", report["warnings"].size()},
+          {"seconds", seconds},
+          {"failure", nullptr}};
+}
+
+void write_batch_page(const std::filesystem::path& folder,
+                      const std::vector<BatchResult>& results) {
+  std::ostringstream html;
+  const auto failed = std::count_if(
+      results.begin(), results.end(), [](const BatchResult& r) { return !r.failure.empty(); });
+  html << "<!DOCTYPE html>\n<html lang=en><meta charset=utf-8><title>" << results.size()
+       << " scenes</title>\n<style>" << page_files().style << "</style>\n<h1>"
+       << results.size() - size_t(failed) << " of " << results.size() << " scenes</h1>\n"
+       << "<p>Measured: of what the input photographs show of surface. Observed and invented: of "
+          "the area of the closed mesh. PSNR: of held-out photographs.</p>\n<table>\n<tr><th></th>"
+          "<th>scene</th><th>closed mesh</th><th>measured</th><th>observed</th><th>invented</th>"
+          "<th>photographs</th><th>PSNR [dB]</th><th>unit</th><th>warnings</th><th>seconds</th>"
+          "</tr>\n";
+  for (const BatchResult& result : results) {
+    if (result.failure.empty()) html << done_row(result);
+  }
+  html << "</table>\n";
+  if (failed > 0) html << "<h2>Failed</h2>\n<table>\n";
+  for (const BatchResult& result : results) {
+    if (!result.failure.empty()) html << table_row(result.name, escaped(result.failure));
+  }
+  if (failed > 0) html << "</table>\n";
+  html << "</html>\n";
+  write_file(folder / "index.html", html.str());
+}
+
+}  // namespace cgs
