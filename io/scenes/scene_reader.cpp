@@ -156,40 +156,69 @@ bool chooses_by_worth(const Scene& scene, const SceneOptions& options) {
          views_with_files(scene).size() > kTakeAll;
 }
 
-// Of the largest size, or of a smaller one if more photographs fit that show much more together.
+// Of the largest size, or of a smaller one that lets enough photographs in.
 std::vector<int> chosen_divisors(Scene& scene, const SceneOptions& options) {
-  std::vector<int> out = divisors_to(scene, SceneOptions::kLongestSide);
-  bool is_for_more = false;
+  const std::vector<int> largest = divisors_to(scene, SceneOptions::kLongestSide);
+  std::vector<int> out = largest;
   if (chooses_by_worth(scene, options)) {
-    constexpr double kMuchLess = 0.95;
     const std::vector<int> usable = views_with_files(scene);
-    const RankedViews ranked = rank_input_views(scene, usable, most_inputs(usable.size()));
-    const auto told = [&](const std::vector<int>& divisors) {
-      const size_t count = input_count(scene, usable, divisors);
-      return ranked.told[std::min(count, ranked.views.size()) - 2];
-    };
-    const int least = SceneOptions::kShortestChosen;
-    const double most = ranked.told.empty() ? 0 : told(divisors_to(scene, least));
-    for (int longest = SceneOptions::kLongestSide; most > 0 && longest >= least; --longest) {
-      const std::vector<int> divisors = divisors_to(scene, longest);
-      is_for_more = divisors != out;
-      if (told(divisors) >= kMuchLess * most) {
-        out = divisors;
-        break;
+    const size_t wanted = std::min(SceneOptions::kWantedViews, most_inputs(usable.size()));
+    const auto longest_side = [&](const std::vector<int>& divisors) {
+      int longest = 0;
+      for (const int i : usable) {
+        const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+        longest = std::max(longest, std::max(camera.width, camera.height) / divisors[size_t(i)]);
       }
+      return longest;
+    };
+    for (int longest = SceneOptions::kLongestSide; longest >= SceneOptions::kShortestChosen;
+         --longest) {
+      const std::vector<int> divisors = divisors_to(scene, longest);
+      if (longest_side(divisors) < SceneOptions::kShortestChosen) break;
+      out = divisors;
+      if (input_count(scene, usable, divisors) >= wanted) break;
     }
   }
   const std::string text = divisors_text(scene, out);
-  if (!text.empty())
+  const bool is_for_more = out != largest;
+  if (!text.empty()) {
     scene.notes.push_back(text + (is_for_more ? "; fewer of them would then be used" : ""));
+  }
   return out;
+}
+
+// Adds views, each as far as there is one from those that are there, until there are so many: what
+// they show again is measured better.
+void fill_up(const Scene& scene,
+             const std::vector<int>& usable,
+             size_t count,
+             std::vector<int>& in) {
+  const auto center = [&](int view) -> Eigen::Vector3d {
+    return scene.views[static_cast<size_t>(view)].camera.center();
+  };
+  std::vector<double> off(usable.size(), std::numeric_limits<double>::infinity());
+  const auto come_near = [&](int view) {
+    for (size_t i = 0; i < usable.size(); ++i) {
+      off[i] = std::min(off[i], (center(usable[i]) - center(view)).norm());
+    }
+  };
+  for (const int view : in) come_near(view);
+  while (in.size() < count) {
+    const auto farthest = std::max_element(off.begin(), off.end());
+    if (!(*farthest > 0)) break;
+    in.push_back(usable[static_cast<size_t>(farthest - off.begin())]);
+    come_near(in.back());
+  }
+  std::sort(in.begin(), in.end());
 }
 
 std::vector<int> some_views(const Scene& scene, const std::vector<int>& usable) {
   std::vector<int> out;
   if (scene.kind != SceneKind::Llff) {
     const std::vector<int> as_they_are(scene.views.size(), 1);
-    out = choose_input_views(scene, usable, input_count(scene, usable, as_they_are));
+    const size_t count = input_count(scene, usable, as_they_are);
+    out = choose_input_views(scene, usable, count);
+    if (!out.empty()) fill_up(scene, usable, count, out);
   }
   return out.empty() ? llff_protocol(usable) : out;
 }

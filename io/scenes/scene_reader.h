@@ -16,13 +16,13 @@ namespace cgs {
 /// What to take of a scene on disk.
 struct SceneOptions {
   /// Input views: comma-separated names (file stems) or indices in name order; a name wins where
-  /// both fit. Empty = choose: all of at most four, of more those that together show the most, up
-  /// to kMostPixels but at least three, seven of eight at most; of an LLFF scene those of its
-  /// protocol.
+  /// both fit. Empty = choose: all of at most four, of more those that together show the most and
+  /// others far from these, up to kMostPixels but at least three, seven of eight at most; of an
+  /// LLFF scene those of its protocol.
   std::string views;
   bool all_views = false;  ///< Where `views` is empty, take every one.
   /// Divide image sizes by this; >= 1. Empty = choose: the smallest that leaves no side above
-  /// kLongestSide or, of many photographs that are chosen among, above what lets enough of them in;
+  /// kLongestSide or, of many photographs that are chosen among, lets kWantedViews of them in;
   /// photographs much smaller than the largest have one of their own. What was chosen becomes a
   /// note.
   std::optional<int> downscale;
@@ -36,9 +36,10 @@ struct SceneOptions {
   static constexpr int kLongestSide = 1024;  // [pixels]
   /// Of all input views that are chosen together: some five minutes on two cores.
   static constexpr double kMostPixels = 3.2e6;
-  /// Longest side that is chosen at least where more photographs then fit that show much more
-  /// together [pixels].
-  static constexpr int kShortestChosen = 480;
+  /// So many input views, where there are, are worth smaller pictures, but of this longest side at
+  /// least [pixels].
+  static constexpr size_t kWantedViews = 12;
+  static constexpr int kShortestChosen = 400;
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

@@ -71,10 +71,12 @@ std::vector<Sight> known_sights(const Scene& scene, const std::vector<int>& cand
 }
 
 // Places all over each picture, as far as what the cameras look at, and who has them in the
-// picture. What hides them is not known: opposite cameras see the same, at an angle worth nothing.
+// picture, from the same side: what hides them is not known, but surface that looks at one camera
+// is the rear for another that looks from far aside.
 std::vector<Sight> guessed_sights(const Scene& scene, const std::vector<int>& candidates) {
   constexpr int kGrid = 4;  // places per side of a picture
   constexpr size_t kMostPoints = 20000;
+  constexpr double kSameSide = 60 * std::numbers::pi / 180;
   Scene all;
   all.folder = scene.folder;
   all.views = scene.views;
@@ -91,7 +93,12 @@ std::vector<Sight> guessed_sights(const Scene& scene, const std::vector<int>& ca
       Sight sight{camera.unproject(u, v, depth), {}};
       for (size_t j = 0; j < candidates.size(); ++j) {
         const Camera& other = scene.views[static_cast<size_t>(candidates[j])].camera;
-        if (other.sees(other.project(sight.position))) sight.seen_by.push_back(j);
+        const double aside = i == j ? 0
+                                    : angle_between(camera.center() - sight.position,
+                                                    other.center() - sight.position);
+        if (aside <= kSameSide && other.sees(other.project(sight.position))) {
+          sight.seen_by.push_back(j);
+        }
       }
       out.push_back(std::move(sight));
     }
@@ -115,23 +122,30 @@ class Worth {
     return worth_of_angle(angle_between(to_a, to_b));
   }
 
-  // The two that tell the most; equal if no two tell anything.
-  std::pair<size_t, size_t> best_pair() const {
+  /// Two candidates, and what they add to what is told; equal if no two add anything.
+  struct Pair {
+    size_t a = 0, b = 0;
+    double gain = 0;
+  };
+  // \param told  of each place so far
+  Pair best_pair(const std::vector<double>& told) const {
     const auto n = static_cast<Eigen::Index>(centers_.size());
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(n, n);
-    for (const Sight& sight : sights_) {
+    for (size_t i = 0; i < sights_.size(); ++i) {
+      const Sight& sight = sights_[i];
       for (size_t k = 0; k < sight.seen_by.size(); ++k) {
         for (size_t l = k + 1; l < sight.seen_by.size(); ++l) {
           const size_t a = sight.seen_by[k];
           const size_t b = sight.seen_by[l];
-          const double worth = of_pair(sight, a, b);
-          if (worth > 0) sum(Eigen::Index(a), Eigen::Index(b)) += worth;  // NaN is not
+          const double gain = of_pair(sight, a, b) - told[i];
+          if (gain > 0) sum(Eigen::Index(a), Eigen::Index(b)) += gain;  // NaN is not
         }
       }
     }
     Eigen::Index a = 0;
     Eigen::Index b = 0;
-    return sum.maxCoeff(&a, &b) > 0 ? std::pair(size_t(a), size_t(b)) : std::pair<size_t, size_t>();
+    const double most = sum.maxCoeff(&a, &b);
+    return most > 0 ? Pair{size_t(a), size_t(b), most} : Pair{};
   }
 
   // What is known of a place from some views, and one more.
@@ -147,10 +161,14 @@ class Worth {
     return best;
   }
 
-  // Adds the view that adds the most to what the chosen ones tell. \return false if none adds
-  // anything to speak of
-  bool add_best(std::vector<size_t>& chosen, std::vector<double>& told) const {
-    double most = 0;
+  // Adds the view that adds the most to what the chosen ones tell, or, where none adds anything to
+  // speak of, two of another side that tell something together.
+  // \param most  to add
+  // \return false if nothing does
+  bool add_best(size_t most, std::vector<size_t>& chosen, std::vector<double>& told) const {
+    constexpr double kLeast = 0.01;
+    const double least = kLeast * std::accumulate(told.begin(), told.end(), 0.0);
+    double gained = 0;
     size_t best = 0;
     for (size_t view = 0; view < centers_.size(); ++view) {
       if (std::find(chosen.begin(), chosen.end(), view) != chosen.end()) continue;
@@ -158,15 +176,26 @@ class Worth {
       for (size_t i = 0; i < sights_.size(); ++i) {
         gain += std::max(0.0, with(sights_[i], chosen, view) - told[i]);
       }
-      if (gain > most) std::tie(most, best) = std::pair(gain, view);
+      if (gain > gained) std::tie(gained, best) = std::pair(gain, view);
     }
-    constexpr double kLeast = 0.01;
-    if (!(most > kLeast * std::accumulate(told.begin(), told.end(), 0.0))) return false;
-    for (size_t i = 0; i < sights_.size(); ++i) {
-      told[i] = std::max(told[i], with(sights_[i], chosen, best));
+    if (gained > least) {
+      add(best, chosen, told);
+      return true;
     }
-    chosen.push_back(best);
+    const Pair pair = most >= 2 ? best_pair(told) : Pair{};
+    if (!(pair.gain > 2 * least)) return false;
+    for (const size_t view : {pair.a, pair.b}) {
+      const bool is_new = std::find(chosen.begin(), chosen.end(), view) == chosen.end();
+      if (is_new) add(view, chosen, told);
+    }
     return true;
+  }
+
+  void add(size_t view, std::vector<size_t>& chosen, std::vector<double>& told) const {
+    for (size_t i = 0; i < sights_.size(); ++i) {
+      told[i] = std::max(told[i], with(sights_[i], chosen, view));
+    }
+    chosen.push_back(view);
   }
 
  private:
@@ -189,7 +218,9 @@ double worth_of_angle(double radians) {
   return std::max(0.0, (bell(off, kNarrower) - at_none) / (1 - at_none));
 }
 
-RankedViews rank_input_views(const Scene& scene, const std::vector<int>& candidates, size_t count) {
+std::vector<int> choose_input_views(const Scene& scene,
+                                    const std::vector<int>& candidates,
+                                    size_t count) {
   require(candidates.size() >= 2, "views to choose among", candidates.size());
   require(count >= 2, "views to choose", count);
   constexpr size_t kMostCandidates = 100;
@@ -200,24 +231,16 @@ RankedViews rank_input_views(const Scene& scene, const std::vector<int>& candida
   if (sights.size() < kEnough) sights = guessed_sights(scene, some);
 
   const Worth worth(scene, some, sights);
-  const auto [a, b] = worth.best_pair();
-  if (a == b) return {};
-  std::vector<size_t> chosen = {a};
   std::vector<double> told(sights.size(), 0.0);
-  for (size_t i = 0; i < sights.size(); ++i) told[i] = worth.with(sights[i], chosen, b);
-  chosen.push_back(b);
-  RankedViews out;
-  do {
-    out.told.push_back(std::accumulate(told.begin(), told.end(), 0.0));
-  } while (chosen.size() < count && worth.add_best(chosen, told));
-  for (const size_t i : chosen) out.views.push_back(some[i]);
-  return out;
-}
-
-std::vector<int> choose_input_views(const Scene& scene,
-                                    const std::vector<int>& candidates,
-                                    size_t count) {
-  std::vector<int> out = rank_input_views(scene, candidates, count).views;
+  const Worth::Pair first = worth.best_pair(told);
+  if (first.a == first.b) return {};
+  std::vector<size_t> chosen;
+  worth.add(first.a, chosen, told);
+  worth.add(first.b, chosen, told);
+  while (chosen.size() < count && worth.add_best(count - chosen.size(), chosen, told)) {
+  }
+  std::vector<int> out;
+  for (const size_t i : chosen) out.push_back(some[i]);
   std::sort(out.begin(), out.end());
   return out;
 }

@@ -26,12 +26,4 @@ std::vector<int> choose_input_views(const Scene& scene,
                                     const std::vector<int>& candidates,
                                     size_t count);
 
-/// The same, and what more of them bring.
-struct RankedViews {
-  std::vector<int> views;    ///< In the order in which they were chosen; the first two go together.
-  std::vector<double> told;  ///< What is known of the scene from as many of them, by its places:
-                             ///< told[0] is of two. Only its growth has a meaning.
-};
-RankedViews rank_input_views(const Scene& scene, const std::vector<int>& candidates, size_t count);
-
 }  // namespace cgs

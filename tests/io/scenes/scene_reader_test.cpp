@@ -77,19 +77,13 @@ TEST_F(ReadScene, OfManyLargeViewsTakesWhatSomeMinutesAllow) {
                         test::rgb_png(1000, 750, i));
     }
   };
-  write(8, "SIMPLE_PINHOLE 80 60 100 40 30", 0.01);  // all show nearly the same
-  enlarge();
-  const Scene alike = read();
-  EXPECT_EQ(alike.views[0].camera.width, 1000);
-  EXPECT_LE(alike.input.size(), 4u);  // of 0.75 million pixels each
-  // Each shows something else: more of them, smaller.
   write(8);
   enlarge();
-  const Scene apart = read();
-  EXPECT_EQ(apart.views[0].camera.width, 500);
-  EXPECT_EQ(apart.input.size(), 7u);
-  ASSERT_FALSE(apart.notes.empty());
-  EXPECT_NE(apart.notes.back().find("fewer of them would then be used"), std::string::npos);
+  const Scene chosen = read();
+  EXPECT_EQ(chosen.views[0].camera.width, 500);  // smaller, and more of them
+  EXPECT_EQ(chosen.input.size(), 7u);
+  ASSERT_FALSE(chosen.notes.empty());
+  EXPECT_NE(chosen.notes.back().find("fewer of them would then be used"), std::string::npos);
   EXPECT_EQ(read({.downscale = 1}).input.size(), 4u);
   EXPECT_EQ(read({.downscale = 4}).input.size(), 7u);
   EXPECT_EQ(read({.all_views = true}).views[0].camera.width, 1000);
@@ -107,8 +101,8 @@ TEST_F(ReadScene, OfHundredsHoldsOutSomeFromFirstToLast) {
   const Scene scene = read();
   EXPECT_GE(scene.input.size(), 3u);
   EXPECT_EQ(scene.held_out.size(), 24u);
-  EXPECT_LE(scene.held_out.front(), 3);
-  EXPECT_GE(scene.held_out.back(), 196);
+  EXPECT_LE(scene.held_out.front(), 20);
+  EXPECT_GE(scene.held_out.back(), 180);
   EXPECT_TRUE(std::is_sorted(scene.held_out.begin(), scene.held_out.end()));
 }
 

@@ -156,6 +156,17 @@ TEST(ChooseInputViews, TakesAsManyAsAreAskedForOfHundreds) {
   for (int i = 0; i < 4; ++i) EXPECT_GE(chosen[i + 1] - chosen[i], 6);
 }
 
+TEST(ChooseInputViews, TakesPairsOfOtherSides) {
+  // Three pairs, 120 degrees apart: no single view adds anything to one of them.
+  Scene scene;
+  scene.folder = "pairs";
+  for (const double degrees : {0, 10, 120, 130, 240, 250}) {
+    scene.views.push_back(view_from(on_ring(degrees, 4), Eigen::Vector3d::Zero()));
+  }
+  EXPECT_EQ(choose_input_views(scene, all_of(scene), 6), (std::vector<int>{0, 1, 2, 3, 4, 5}));
+  EXPECT_EQ(choose_input_views(scene, all_of(scene), 5).size(), 4u);
+}
+
 TEST(ChooseInputViews, SaysThatNothingIsSeenTogether) {
   Scene scene;
   for (int i = 0; i < 5; ++i) {  // away from each other
