@@ -30,6 +30,7 @@
 #include "libcgs/core/input_views.h"
 #include "libcgs/core/photograph_cache.h"
 #include "libcgs/core/remedy.h"
+#include "libcgs/core/split_mix.h"
 
 namespace cgs {
 
@@ -204,9 +205,16 @@ void fill_up(const Scene& scene,
   };
   for (const int view : in) come_near(view);
   while (in.size() < count) {
-    const auto farthest = std::max_element(off.begin(), off.end());
-    if (!(*farthest > 0)) break;
-    in.push_back(usable[static_cast<size_t>(farthest - off.begin())]);
+    size_t farthest = 0;
+    for (size_t i = 1; i < off.size(); ++i) {
+      // Of as far ones not always the first: what is left over lies all over, too.
+      if (off[i] > off[farthest] ||
+          (off[i] == off[farthest] && random_number(i) > random_number(farthest))) {
+        farthest = i;
+      }
+    }
+    if (!(off[farthest] > 0)) break;
+    in.push_back(usable[farthest]);
     come_near(in.back());
   }
   std::sort(in.begin(), in.end());

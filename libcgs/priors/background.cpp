@@ -12,7 +12,8 @@ namespace cgs {
 namespace {
 
 constexpr double kLeastMasked = 0.2;   // of a picture: silhouettes, not passers-by
-constexpr double kLeastBorder = 0.6;   // of it, that a backdrop runs along
+constexpr double kLeastBorder = 0.8;   // of it, that a backdrop runs along
+constexpr double kLeastViews = 0.75;   // that show background: one or two with a bare wall do not
 constexpr double kEnclosing = 0.98;    // of the border, around all of an object
 constexpr float kEvenChange = 0.035f;  // largest change from pixel to pixel of it, in sRGB
 constexpr double kMostMeasured = 0.1;  // of a backdrop: nothing can be matched on it
@@ -63,8 +64,9 @@ MaskMap masked_out(const View& view) {
   return share_set(out) >= kLeastMasked ? out : MaskMap();
 }
 
-// Where neighbouring pixels hardly differ, noise aside.
-MaskMap even_pixels(const View& view) {
+// Where neighbouring pixels hardly differ, noise aside. Sky is no backdrop, nor the rim that
+// undistorting leaves.
+MaskMap even_pixels(const View& view, const ViewPriors& priors) {
   const ColorImage& image = view.image;
   const cv::Mat3f colors(image.height,
                          image.width,
@@ -80,7 +82,9 @@ MaskMap even_pixels(const View& view) {
       const cv::Vec3f& below = smooth(std::min(y + 1, image.height - 1), x);
       const double change =
           std::max(cv::norm(right - here, cv::NORM_INF), cv::norm(below - here, cv::NORM_INF));
-      out(x, y) = change < double(kEvenChange) ? 1 : 0;
+      const bool is_usable =
+          (view.valid.empty() || view.valid(x, y) != 0) && priors.origin(x, y) != DepthOrigin::Sky;
+      out(x, y) = is_usable && change < double(kEvenChange) ? 1 : 0;
     }
   }
   return out;
@@ -97,7 +101,7 @@ size_t measured_in(const MaskMap& mask, const ViewPriors& priors) {
 // The even parts that reach the border, if they are along most of it and nothing was measured
 // there.
 MaskMap even_backdrop(const View& view, const ViewPriors& priors) {
-  MaskMap even = even_pixels(view);
+  MaskMap even = even_pixels(view, priors);
   cv::Mat1i labels;
   const int count = cv::connectedComponents(as_mat(even), labels, 4);
   std::vector<size_t> along(static_cast<size_t>(count), 0);
@@ -141,11 +145,12 @@ class Backgrounds {
   }
 
   void mark() {
-    const auto is_any = [&] {
-      return std::any_of(
+    const auto are_enough = [&] {
+      const auto count = std::count_if(
           with_rim_.begin(), with_rim_.end(), [](const auto& m) { return !m.empty(); });
+      return double(count) >= kLeastViews * double(with_rim_.size());
     };
-    if (!is_any()) return;
+    if (!are_enough()) return;
     std::vector<MaskMap> lost = beyond_silhouettes();
     if (share_lost(lost) > kMostLost) return;
     const std::vector<Measured> points = measured_points(lost);
@@ -156,7 +161,7 @@ class Backgrounds {
     for (size_t k = 0; k < priors_.size(); ++k) {
       if (confirmed[k].empty()) with_rim_[k] = {};
     }
-    if (!is_any()) return;
+    if (!are_enough()) return;
     lost = beyond_silhouettes();  // of those that are left
     for (size_t k = 0; k < priors_.size(); ++k) {
       enter_without_depth(lost[k], DepthOrigin::Unknown, priors_[k]);

@@ -122,6 +122,46 @@ TEST(Background, IsNotABusyRoom) {
   for (size_t k = 0; k < ball.priors.size(); ++k) EXPECT_EQ(ball.marked(k), 0) << k;
 }
 
+TEST(Background, IsNotTheRimThatUndistortingLeaves) {
+  Ball ball;
+  std::mt19937 random(3);
+  for (View& view : ball.scene.views) {
+    view.valid = MaskMap(kWidth, kHeight, 1);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const bool is_rim = x < 3 || y < 3 || x >= kWidth - 3 || y >= kHeight - 3;
+        view.valid(x, y) = is_rim ? 0 : 1;
+        view.image(x, y).setConstant(is_rim ? 0 : float(random() % 100) / 100);
+      }
+    }
+  }
+  ball.mark();
+  for (size_t k = 0; k < ball.priors.size(); ++k) EXPECT_EQ(ball.marked(k), 0) << k;
+}
+
+TEST(Background, IsNotTheSky) {
+  Ball ball;
+  for (ViewPriors& own : ball.priors) {
+    for (size_t i = 0; i < own.origin.data.size() / 2; ++i) {
+      if (own.origin.data[i] == DepthOrigin::Unknown) own.origin.data[i] = DepthOrigin::Sky;
+    }
+  }
+  ball.mark();
+  for (size_t k = 0; k < ball.priors.size(); ++k) EXPECT_EQ(ball.marked(k), 0) << k;
+}
+
+TEST(Background, IsNotTheBareWallOfOneView) {
+  Ball ball;
+  std::mt19937 random(3);
+  for (size_t k = 1; k < ball.scene.views.size(); ++k) {
+    for (Eigen::Vector3f& c : ball.scene.views[k].image.data) {
+      c.setConstant(float(random() % 100) / 100);
+    }
+  }
+  ball.mark();
+  EXPECT_EQ(ball.marked(0), 0);
+}
+
 TEST(Background, IsNotAWallThatOthersMeasured) {
   Ball ball;
   // The first camera sees behind the ball what is not even for the others: they measured it.
