@@ -17,7 +17,7 @@
 namespace cgs {
 
 /// An array of what another Python object holds, which it keeps alive.
-/// \param Scalar  of the array: float for Eigen::Vector3f, bool for a mask
+/// \tparam Scalar  of the array: float for Eigen::Vector3f, bool for a mask
 template <typename Scalar>
 pybind11::object view_of(void* data,
                          std::vector<pybind11::ssize_t> shape,
