@@ -59,8 +59,7 @@ void add_option(const CLI::App& command,
   const auto count = static_cast<int>(parts.size());
   constexpr int kAnyNumber = 1 << 16;  // CLI11 has a larger one for options that may be repeated
   const bool takes_all = option->get_expected_max() < kAnyNumber &&
-                         count >= option->get_expected_min() &&
-                         count <= option->get_expected_max();
+                         count >= option->get_expected_min() && count <= option->get_expected_max();
   if (takes_all) out.push_back(flag);
   for (const auto& part : parts) {
     if (!takes_all) out.push_back(flag);
