@@ -56,8 +56,7 @@ ModelObject reconstructed(const Scene& scene,
     made.coverage = coverage_words(trained.priors, made.model.scene);
     return made;
   });
-  const auto& warnings = out.model.scene.warnings;
-  warn({warnings.begin() + static_cast<std::ptrdiff_t>(known), warnings.end()});
+  warn(out.model.scene.warnings, known);
   return out;
 }
 

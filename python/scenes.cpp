@@ -72,7 +72,7 @@ void load(Scene& scene, const std::optional<std::vector<int>>& views, const py::
     Terminal terminal(true);
     load_images(scene, wanted, terminal.begin("photographs"));
   });
-  warn({scene.warnings.begin() + static_cast<std::ptrdiff_t>(known), scene.warnings.end()});
+  warn(scene.warnings, known);
 }
 
 View& named(Scene& scene, const std::string& name) {

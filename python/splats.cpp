@@ -129,14 +129,18 @@ auto raster(Raster<T> RenderBuffers::*member) {
   };
 }
 
+template <typename T>
+auto own_raster(Raster<T> PictureObject::*member) {
+  return [member](const py::object& self) {
+    return raster_view<float>(self.cast<PictureObject&>().*member, self);
+  };
+}
+
 void add_picture(py::module_& module) {
   py::class_<PictureObject>(module, "Picture", "What a camera sees of splats or of a model.")
-      .def_property_readonly(
-          "color",
-          [](const py::object& self) {
-            return raster_view<float>(self.cast<PictureObject&>().color, self);
-          },
-          "Height x width x 3, float32; black where nothing is drawn.")
+      .def_property_readonly("color",
+                             own_raster(&PictureObject::color),
+                             "Height x width x 3, float32; black where nothing is drawn.")
       .def_property_readonly(
           "filled",
           [](const py::object& self) {
@@ -149,15 +153,11 @@ void add_picture(py::module_& module) {
           "alpha", raster(&RenderBuffers::alpha), "Height x width, float32: how much is covered.")
       .def_property_readonly(
           "depth",
-          [](const py::object& self) {
-            return raster_view<float>(self.cast<PictureObject&>().depth, self);
-          },
+          own_raster(&PictureObject::depth),
           "Height x width, float32: of the surface [world units], NaN where there is none.")
       .def_property_readonly(
           "normal",
-          [](const py::object& self) {
-            return raster_view<float>(self.cast<PictureObject&>().normal, self);
-          },
+          own_raster(&PictureObject::normal),
           "Height x width x 3, float32: in world axes, towards the camera; 0 = unknown.")
       .def_property_readonly(
           "support",

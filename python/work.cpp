@@ -78,9 +78,9 @@ class Watch {
 
 }  // namespace
 
-void warn(const std::vector<std::string>& lines) {
-  for (const std::string& line : lines) {
-    if (PyErr_WarnEx(PyExc_UserWarning, line.c_str(), 1) != 0) throw py::error_already_set();
+void warn(const std::vector<std::string>& lines, size_t from) {
+  for (size_t i = from; i < lines.size(); ++i) {
+    if (PyErr_WarnEx(PyExc_UserWarning, lines[i].c_str(), 1) != 0) throw py::error_already_set();
   }
 }
 

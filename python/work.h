@@ -33,8 +33,8 @@ auto result_of(const pybind11::object& progress, Work work) {
   return std::move(*out);
 }
 
-/// Raises a UserWarning for each line.
+/// Raises a UserWarning for each line from an index on.
 /// \throws pybind11::error_already_set where warnings are errors
-void warn(const std::vector<std::string>& lines);
+void warn(const std::vector<std::string>& lines, size_t from = 0);
 
 }  // namespace cgs

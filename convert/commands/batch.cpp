@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <array>
 #include <chrono>
 #include <cstdio>
 #include <iostream>
@@ -16,6 +15,7 @@
 #include "convert/run/budget.h"
 #include "convert/run/pipeline.h"
 #include "convert/text/advice.h"
+#include "convert/text/html.h"
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/byte_reader.h"
@@ -120,15 +120,6 @@ class Batch {
 
 void print_rows(const Json& rows) {
   std::printf("%-24s %9s %9s %9s  %s\n", "scene", "measured", "observed", "invented", "");
-  const auto share = [](const Json& value) {
-    std::array<char, 16> out{};
-    if (value.is_number()) {
-      std::snprintf(out.data(), out.size(), "%.0f %%", 100 * value.get<double>());
-    } else {
-      out = {'-'};
-    }
-    return std::string(out.data());
-  };
   for (const Json& row : rows) {
     const std::string name = one_line(row["name"].get<std::string>());
     if (row["state"] == Json("failed")) {
@@ -137,9 +128,9 @@ void print_rows(const Json& rows) {
     }
     std::printf("%-24s %9s %9s %9s  %s\n",
                 name.c_str(),
-                share(row["measured"]).c_str(),
-                share(row["observed"]).c_str(),
-                share(row["invented"]).c_str(),
+                percent(row["measured"]).c_str(),
+                percent(row["observed"]).c_str(),
+                percent(row["invented"]).c_str(),
                 row["certified"].get<bool>() ? "certified" : "NOT certified");
   }
 }
@@ -181,11 +172,8 @@ void add_batch(CLI::App& app) {
   cmd->footer(
       "Example: cgs batch objects/*/ --preset draft -o out/objects\n"
       "         opens as out/objects/index.html\n"
-      "Run again, it does what is not done yet. One that fails does not stop the others; why is "
-      "in\n"
-      "OUT/NAME/failure.txt. Each run takes all threads, so one after the other is as quick as "
-      "side "
-      "by side.");
+      "Run again, it does what is not done yet. One that fails does not stop the others; why is\n"
+      "in OUT/NAME/failure.txt. Each run takes all threads.");
   cmd->callback([args] { run_batch(*args); });
 }
 

@@ -70,7 +70,8 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
         options.views,
         "Input views: names, or indices in name order from 0, e.g. 1,10,19; the rest is "
         "held out. Default: all of up to four; of more those that show the most together, as many "
-        "as take some five minutes on two cores (four of 1024 x 768 pixels, sixteen of 512 x 384)");
+        "as take some five minutes on two cores (four of 1024 x 768 pixels, sixteen of 512 x 384); "
+        "for up to twelve, they are made smaller");
     command
         .add_flag(
             "--use-all",

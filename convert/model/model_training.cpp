@@ -260,6 +260,18 @@ GivenDepthReport recorded_sensor_scale(const nlohmann::ordered_json& training) {
   return out;
 }
 
+double measured_share(const nlohmann::ordered_json& depth_of_views) {
+  double sum = 0;
+  for (const auto& view : depth_of_views) {
+    double surface = 1;
+    for (const char* other : {"sky", "transient", "background"}) {
+      surface -= view.value(other, 0.0);  // models of earlier versions tell of no background
+    }
+    sum += surface > 0 ? view["with_evidence"].get<double>() / surface : 0;
+  }
+  return sum / static_cast<double>(depth_of_views.size());
+}
+
 std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training) {
   std::vector<std::string> out;
   for (const char* key : {"exposure", "view_dependence", "pane"}) {

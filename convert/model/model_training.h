@@ -56,6 +56,11 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
 /// \throws nlohmann::json::exception
 GivenDepthReport recorded_sensor_scale(const nlohmann::ordered_json& training);
 
+/// Mean share of the photographs that is measured, of what shows surface that stands still, from
+/// "depth_of_views" of training_to_json().
+/// \pre it tells of a view
+double measured_share(const nlohmann::ordered_json& depth_of_views);
+
 /// What training_to_json() tells of the photographs that their owner may not know.
 std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training);
 

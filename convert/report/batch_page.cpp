@@ -2,12 +2,14 @@
 #include "convert/report/batch_page.h"
 
 #include <algorithm>
-#include <array>
 #include <sstream>
 
+#include "convert/model/model_training.h"
 #include "convert/report/page_files.h"
+#include "convert/text/figures.h"
 #include "convert/text/html.h"
 #include "io/bytes/atomic_file.h"
+#include "libcgs/core/provenance.h"
 
 namespace cgs {
 
@@ -15,34 +17,23 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-// Mean share of the input photographs that is measured, of what shows surface.
-Json measured_share(const Json& model) {
-  double sum = 0;
-  const Json& views = model["depth_of_views"];
-  for (const Json& view : views) {
-    double surface = 1;
-    for (const char* other : {"sky", "transient", "background"}) {
-      surface -= view.value(other, 0.0);
-    }
-    sum += surface > 0 ? view["with_evidence"].get<double>() / surface : 0;
-  }
-  return views.empty() ? Json() : Json(sum / double(views.size()));
+// Null for models of earlier versions, which do not say.
+Json measured(const Json& model) {
+  const Json views = model.value("depth_of_views", Json());
+  return views.is_array() && !views.empty() ? Json(measured_share(views)) : Json();
 }
 
-Json area_share(const Json& certificate, std::initializer_list<const char*> labels) {
+// Of the area of the closed mesh, that of the labels which the trait is true of.
+template <typename Trait>
+Json area_share(const Json& certificate, const Trait& has_trait) {
   double all = 0;
-  double of_labels = 0;
-  for (const char* label :
-       {"observed", "single_view", "interpolated", "estimated", "inferred", "virtual"}) {
-    const double area = certificate.value(std::string("area_") + label, 0.0);
+  double of_trait = 0;
+  for (const Provenance label : kProvenanceOrder) {
+    const auto area = certificate["area_" + provenance_key(label)].get<double>();
     all += area;
-    if (std::find_if(labels.begin(), labels.end(), [&](const char* l) {
-          return std::string_view(l) == label;
-        }) != labels.end()) {
-      of_labels += area;
-    }
+    if (has_trait(label)) of_trait += area;
   }
-  return all > 0 ? Json(of_labels / all) : Json();
+  return all > 0 ? Json(of_trait / all) : Json();
 }
 
 size_t input_count(const Json& report) {
@@ -90,14 +81,16 @@ Json batch_row(const BatchResult& result) {
   }
   const Json& report = result.report;
   const Json& evaluation = report["evaluation"];
+  const auto was_seen = [](Provenance label) { return traits(label).was_seen; };
+  const auto is_invented = [](Provenance label) { return label == Provenance::Inferred; };
   double seconds = 0;
   for (const Json& stage : report["stages"]) seconds += stage["seconds"].get<double>();
   return {{"name", result.name},
           {"state", "done"},
           {"photographs", input_count(report)},
-          {"measured", measured_share(report["model"])},
-          {"observed", area_share(report["certificate"], {"observed", "single_view"})},
-          {"invented", area_share(report["certificate"], {"inferred"})},
+          {"measured", measured(report["model"])},
+          {"observed", area_share(report["certificate"], was_seen)},
+          {"invented", area_share(report["certificate"], is_invented)},
           {"certified", report["certificate"]["passed"]},
           {"units", report["units"]},
           {"psnr", evaluation.is_object() ? evaluation["mean"]["psnr"] : Json()},

@@ -19,7 +19,7 @@ struct BatchResult {
 /// {"name", "state": "done" or "failed", "photographs": inputs, "measured": share of what input
 /// photographs show of surface, "observed", "invented": shares of the closed mesh's area,
 /// "certified", "units", "psnr": of held-out photographs [dB] or null, "warnings": how many,
-/// "seconds": of its stages, "failure": words or null}
+/// "seconds": of its stages, "failure": null}; of one that failed, name, state and failure in words
 nlohmann::ordered_json batch_row(const BatchResult& result);
 
 /// index.html: a row for each scene with a picture that leads to its report, and the failures.

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/model_training.h"
 #include "convert/run/pipeline.h"
 #include "convert/run/small_run.h"
 #include "convert/text/html.h"
@@ -27,19 +28,6 @@ int preview_reduction(const Scene& scene) {
     side = std::max({side, camera.width, camera.height});
   }
   return std::max(1, (side + kSide / 2) / kSide);
-}
-
-// Mean share that is measured of what is surface and stands still.
-double measured_share(const Json& depth_of_views) {
-  double sum = 0;
-  for (const Json& view : depth_of_views) {
-    double surface = 1;
-    for (const char* other : {"sky", "transient", "background"}) {
-      surface -= view[other].get<double>();
-    }
-    sum += surface > 0 ? view["with_evidence"].get<double>() / surface : 0;
-  }
-  return sum / double(depth_of_views.size());
 }
 
 // What most of the unmeasured is, with what helps.

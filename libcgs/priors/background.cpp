@@ -7,6 +7,9 @@
 #include <opencv2/imgproc.hpp>
 #include <tbb/parallel_for.h>
 
+#include "libcgs/core/opencv_memory.h"
+#include "libcgs/priors/mask_operations.h"
+
 namespace cgs {
 
 namespace {
@@ -23,12 +26,10 @@ constexpr double kMostLost = 0.25;     // of what was measured, beyond all silho
 constexpr int kObjectRim = 2;          // [pixels]
 constexpr int kPointsAlong = 60;       // of the points along each side of a picture
 
-cv::Mat1b as_mat(MaskMap& mask) { return {mask.height, mask.width, mask.data.data()}; }
-
 MaskMap dilated(MaskMap mask, int reach) {
   const int side = 2 * reach + 1;
   const cv::Mat element = cv::getStructuringElement(cv::MORPH_RECT, {side, side});
-  cv::dilate(as_mat(mask), as_mat(mask), element);
+  cv::dilate(mask_matrix(mask), mask_matrix(mask), element);
   return mask;
 }
 
@@ -59,8 +60,7 @@ double border_share(const MaskMap& mask) {
 // What is left out by masks, if that is much.
 MaskMap masked_out(const View& view) {
   if (view.valid.empty()) return {};
-  MaskMap out = view.valid;
-  for (uint8_t& pixel : out.data) pixel = pixel == 0 ? 1 : 0;
+  MaskMap out = inverted(view.valid);
   return share_set(out) >= kLeastMasked ? out : MaskMap();
 }
 
@@ -103,7 +103,7 @@ size_t measured_in(const MaskMap& mask, const ViewPriors& priors) {
 MaskMap even_backdrop(const View& view, const ViewPriors& priors) {
   MaskMap even = even_pixels(view, priors);
   cv::Mat1i labels;
-  const int count = cv::connectedComponents(as_mat(even), labels, 4);
+  const int count = cv::connectedComponents(mask_matrix(even), labels, 4);
   std::vector<size_t> along(static_cast<size_t>(count), 0);
   each_at_border(even, [&](int x, int y) { ++along[static_cast<size_t>(labels(y, x))]; });
   along[0] = 0;  // is not even
@@ -137,9 +137,7 @@ class Backgrounds {
       candidates_[k] = masked_out(*views_[k]);
       if (candidates_[k].empty()) candidates_[k] = even_backdrop(*views_[k], priors[k]);
       if (candidates_[k].empty()) return;
-      with_rim_[k] = candidates_[k];
-      for (uint8_t& pixel : with_rim_[k].data) pixel = pixel == 0 ? 1 : 0;
-      with_rim_[k] = dilated(with_rim_[k], kObjectRim);
+      with_rim_[k] = dilated(inverted(candidates_[k]), kObjectRim);
       is_enclosing_[k] = border_share(candidates_[k]) >= kEnclosing ? 1 : 0;
     });
   }
@@ -158,11 +156,14 @@ class Backgrounds {
     tbb::parallel_for(size_t{0}, priors_.size(), [&](size_t k) {
       if (!candidates_[k].empty()) confirmed[k] = confirm(k, lost[k], points);
     });
+    bool is_less = false;
     for (size_t k = 0; k < priors_.size(); ++k) {
-      if (confirmed[k].empty()) with_rim_[k] = {};
+      if (with_rim_[k].empty() || !confirmed[k].empty()) continue;
+      with_rim_[k] = {};
+      is_less = true;
     }
     if (!are_enough()) return;
-    lost = beyond_silhouettes();  // of those that are left
+    if (is_less) lost = beyond_silhouettes();
     for (size_t k = 0; k < priors_.size(); ++k) {
       enter_without_depth(lost[k], DepthOrigin::Unknown, priors_[k]);
       enter_without_depth(confirmed[k], DepthOrigin::Background, priors_[k]);
@@ -284,8 +285,11 @@ class Backgrounds {
 
 }  // namespace
 
-void mark_background(const Scene& scene, std::vector<ViewPriors>& priors) {
+void mark_background(const Scene& scene, std::vector<ViewPriors>& priors) try {
   Backgrounds(scene, priors).mark();
+} catch (const cv::Exception& error) {
+  throw_if_out_of_memory(error);
+  throw;
 }
 
 }  // namespace cgs

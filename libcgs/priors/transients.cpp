@@ -12,6 +12,7 @@
 #include "libcgs/core/opencv_memory.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/exposure.h"
+#include "libcgs/priors/mask_operations.h"
 #include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/reduced_view.h"
 
@@ -75,16 +76,14 @@ DepthMap measured_depth(const ViewPriors& priors, int factor, const Camera& came
   return out;
 }
 
-cv::Mat matrix(MaskMap& mask) { return {mask.height, mask.width, CV_8U, mask.data.data()}; }
-
 // Pixels around which at least half of what is known was found.
 MaskMap majority(MaskMap found, MaskMap known) {
   constexpr int kWindow = 7;
   constexpr double kLeastKnown = 0.2;  // of the window
   cv::Mat found_share;
   cv::Mat known_share;
-  cv::boxFilter(matrix(found), found_share, CV_32F, {kWindow, kWindow});
-  cv::boxFilter(matrix(known), known_share, CV_32F, {kWindow, kWindow});
+  cv::boxFilter(mask_matrix(found), found_share, CV_32F, {kWindow, kWindow});
+  cv::boxFilter(mask_matrix(known), known_share, CV_32F, {kWindow, kWindow});
   MaskMap out(found.width, found.height, 0);
   const cv::Mat is_most = (2 * found_share >= known_share) & (known_share >= kLeastKnown);
   for (int y = 0; y < out.height; ++y) {
@@ -98,18 +97,13 @@ void remove_specks(MaskMap& mask) {
   cv::Mat labels;
   cv::Mat stats;
   cv::Mat centroids;
-  cv::connectedComponentsWithStats(matrix(mask), labels, stats, centroids);
+  cv::connectedComponentsWithStats(mask_matrix(mask), labels, stats, centroids);
   for (int y = 0; y < mask.height; ++y) {
     for (int x = 0; x < mask.width; ++x) {
       const int area = stats.at<int>(labels.at<int>(y, x), cv::CC_STAT_AREA);
       if (area < kSmallest * double(mask.data.size())) mask(x, y) = 0;
     }
   }
-}
-
-MaskMap inverted(MaskMap mask) {
-  for (uint8_t& value : mask.data) value = value == 0 ? 1 : 0;
-  return mask;
 }
 
 cv::Mat disc(int radius) {
@@ -125,13 +119,13 @@ MaskMap cleaned(const MaskMap& found, const MaskMap& known, MaskMap unclear) try
   constexpr int kRim = 2;
   MaskMap out = majority(found, known);
   remove_specks(out);
-  cv::morphologyEx(matrix(out), matrix(out), cv::MORPH_CLOSE, disc(kGap));
+  cv::morphologyEx(mask_matrix(out), mask_matrix(out), cv::MORPH_CLOSE, disc(kGap));
   for (int k = 0; k < kReach; ++k) {
     cv::Mat grown;
-    cv::dilate(matrix(out), grown, disc(1));
-    cv::bitwise_or(matrix(out), grown & matrix(unclear), matrix(out));
+    cv::dilate(mask_matrix(out), grown, disc(1));
+    cv::bitwise_or(mask_matrix(out), grown & mask_matrix(unclear), mask_matrix(out));
   }
-  cv::dilate(matrix(out), matrix(out), disc(kRim));
+  cv::dilate(mask_matrix(out), mask_matrix(out), disc(kRim));
   MaskMap rest = inverted(out);
   remove_specks(rest);
   return inverted(rest);

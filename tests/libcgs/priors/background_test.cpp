@@ -69,6 +69,27 @@ struct Ball {
     return std::hypot(x + 0.5 - 48, y + 0.5 - 36) / silhouette;
   }
 
+  // What a view shows where is_busy(x, y) is now speckled, as a room.
+  template <typename IsBusy>
+  void make_busy(size_t view, const IsBusy& is_busy) {
+    std::mt19937 random(3 + unsigned(view));
+    ColorImage& image = scene.views[view].image;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        if (is_busy(x, y)) image(x, y).setConstant(float(random() % 100) / 100);
+      }
+    }
+  }
+
+  // A mask leaves out of a view where is_out(x, y).
+  template <typename IsOut>
+  void leave_out(size_t view, const IsOut& is_out) {
+    MaskMap& valid = scene.views[view].valid = MaskMap(kWidth, kHeight, 1);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) valid(x, y) = is_out(x, y) ? 0 : 1;
+    }
+  }
+
   void mark() { mark_background(scene, priors); }
 
   void expect_background_around_the_ball() const {
@@ -89,6 +110,8 @@ struct Ball {
   }
 };
 
+bool everywhere(int /*x*/, int /*y*/) { return true; }
+
 TEST(Background, IsAnEvenBackdropAroundAnObject) {
   Ball ball;
   ball.mark();
@@ -97,16 +120,10 @@ TEST(Background, IsAnEvenBackdropAroundAnObject) {
 
 TEST(Background, IsWhatMasksLeaveOutAroundAnObject) {
   Ball ball;
-  std::mt19937 random(3);
-  for (View& view : ball.scene.views) {
-    view.valid = MaskMap(kWidth, kHeight, 1);
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
-        if (Ball::radii(x, y) <= 1.02) continue;
-        view.valid(x, y) = 0;
-        view.image(x, y) = Eigen::Vector3f::Constant(float(random() % 100) / 100);  // a busy room
-      }
-    }
+  const auto is_room = [](int x, int y) { return Ball::radii(x, y) > 1.02; };
+  for (size_t k = 0; k < ball.priors.size(); ++k) {
+    ball.make_busy(k, is_room);
+    ball.leave_out(k, is_room);
   }
   ball.mark();
   ball.expect_background_around_the_ball();
@@ -114,26 +131,20 @@ TEST(Background, IsWhatMasksLeaveOutAroundAnObject) {
 
 TEST(Background, IsNotABusyRoom) {
   Ball ball;
-  std::mt19937 random(3);
-  for (View& view : ball.scene.views) {
-    for (Eigen::Vector3f& c : view.image.data) c.setConstant(float(random() % 100) / 100);
-  }
+  for (size_t k = 0; k < ball.priors.size(); ++k) ball.make_busy(k, everywhere);
   ball.mark();
   for (size_t k = 0; k < ball.priors.size(); ++k) EXPECT_EQ(ball.marked(k), 0) << k;
 }
 
 TEST(Background, IsNotTheRimThatUndistortingLeaves) {
   Ball ball;
-  std::mt19937 random(3);
-  for (View& view : ball.scene.views) {
-    view.valid = MaskMap(kWidth, kHeight, 1);
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
-        const bool is_rim = x < 3 || y < 3 || x >= kWidth - 3 || y >= kHeight - 3;
-        view.valid(x, y) = is_rim ? 0 : 1;
-        view.image(x, y).setConstant(is_rim ? 0 : float(random() % 100) / 100);
-      }
-    }
+  const auto is_rim = [](int x, int y) {
+    return x < 3 || y < 3 || x >= kWidth - 3 || y >= kHeight - 3;
+  };
+  for (size_t k = 0; k < ball.priors.size(); ++k) {
+    ball.scene.views[k].image = ColorImage(kWidth, kHeight, Eigen::Vector3f::Zero());
+    ball.make_busy(k, [&](int x, int y) { return !is_rim(x, y); });
+    ball.leave_out(k, is_rim);
   }
   ball.mark();
   for (size_t k = 0; k < ball.priors.size(); ++k) EXPECT_EQ(ball.marked(k), 0) << k;
@@ -152,12 +163,7 @@ TEST(Background, IsNotTheSky) {
 
 TEST(Background, IsNotTheBareWallOfOneView) {
   Ball ball;
-  std::mt19937 random(3);
-  for (size_t k = 1; k < ball.scene.views.size(); ++k) {
-    for (Eigen::Vector3f& c : ball.scene.views[k].image.data) {
-      c.setConstant(float(random() % 100) / 100);
-    }
-  }
+  for (size_t k = 1; k < ball.priors.size(); ++k) ball.make_busy(k, everywhere);
   ball.mark();
   EXPECT_EQ(ball.marked(0), 0);
 }

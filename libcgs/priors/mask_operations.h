@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "libcgs/core/raster.h"
+
+namespace cgs {
+
+/// A mask as OpenCV takes it, of the same memory.
+inline cv::Mat1b mask_matrix(MaskMap& mask) { return {mask.height, mask.width, mask.data.data()}; }
+
+/// 1 where it is 0, and 0 elsewhere.
+inline MaskMap inverted(MaskMap mask) {
+  for (uint8_t& value : mask.data) value = value == 0 ? 1 : 0;
+  return mask;
+}
+
+}  // namespace cgs
