@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Writes the capture of a carved portal, with its truth, that the README, the tests and the
-// evaluation use, or that of a courtyard, which holds what photographs cannot measure.
+// evaluation use, or that of a courtyard, which holds what photographs cannot measure, of a vase on
+// a table, photographed from all sides and cut out by masks, or of a long facade.
 //
-// usage: cgs_make_capture OUT [--scene portal|courtyard] [--downscale N] [--views NAME,...]
+// usage: cgs_make_capture OUT [--scene portal|courtyard|vase|facade] [--downscale N]
+//                             [--views NAME,...]
 #include <algorithm>
 #include <exception>
 #include <filesystem>
@@ -14,9 +16,24 @@
 
 #include "libcgs/core/error.h"
 #include "samples/capture/courtyard.h"
+#include "samples/capture/facade.h"
 #include "samples/capture/files.h"
+#include "samples/capture/vase.h"
 
 namespace {
+
+struct Planted {
+  cgs::PortalScene scene;
+  std::vector<cgs::CaptureView> views;
+  std::string only = {};  // The part that masks cut out; empty = there are none.
+};
+
+Planted planted(const std::string& name, int downscale) {
+  if (name == "courtyard") return {cgs::courtyard_scene(), cgs::courtyard_views(downscale)};
+  if (name == "vase") return {cgs::vase_scene(), cgs::vase_views(downscale), cgs::kVase};
+  if (name == "facade") return {cgs::facade_scene(), cgs::facade_views(downscale)};
+  return {cgs::portal_scene(), cgs::capture_views(downscale)};
+}
 
 int run(int argc, char** argv) {
   CLI::App app("Writes a procedural capture of a scene: photographs, cameras and truth");
@@ -25,14 +42,17 @@ int run(int argc, char** argv) {
   int downscale = 1;
   std::vector<std::string> names;
   app.add_option("OUT", out, "Folder to write")->required();
-  app.add_option("--scene", scene, "A carved portal, or a courtyard under the sky with glass")
-      ->check(CLI::IsMember({"portal", "courtyard"}))
+  app.add_option(
+         "--scene",
+         scene,
+         "A carved portal, a courtyard under the sky with glass, a vase from all sides with "
+         "masks, a long facade")
+      ->check(CLI::IsMember({"portal", "courtyard", "vase", "facade"}))
       ->capture_default_str();
   app.add_option("--downscale", downscale, "Divisor of the size 504 x 378")->capture_default_str();
   app.add_option("--views", names, "Only these views (view_01,view_02,...)")->delimiter(',');
   CLI11_PARSE(app, argc, argv);
-  const bool is_portal = scene == "portal";
-  auto views = is_portal ? cgs::capture_views(downscale) : cgs::courtyard_views(downscale);
+  auto [made, views, only] = planted(scene, downscale);
   const auto inputs = cgs::input_cameras(views);
   if (!names.empty()) {
     for (const auto& name : names) {
@@ -44,7 +64,8 @@ int run(int argc, char** argv) {
       return std::find(names.begin(), names.end(), view.name) == names.end();
     });
   }
-  cgs::write_capture(out, is_portal ? cgs::portal_scene() : cgs::courtyard_scene(), views, inputs);
+  cgs::write_capture(out, made, views, inputs);
+  if (!only.empty()) cgs::write_masks(out, made, views, only);
   return 0;
 }
 

@@ -22,7 +22,8 @@ namespace cgs {
 namespace {
 
 struct FuseArgs {
-  DepthFusionRequest request;  // its scene may be a model
+  std::vector<std::filesystem::path> inputs;  // models, or one folder of depth frames
+  DepthFusionRequest request;                 // its scene is the first of them
   std::filesystem::path output;
   std::optional<EstimatedSurface> estimated;
   CommonOptions common;
@@ -51,6 +52,19 @@ void refuse_depth_options(const DepthFusionRequest& request) {
   }
 }
 
+std::string files_refused(const FuseArgs& args) {
+  for (const std::filesystem::path& input : args.inputs) {
+    if (lower_extension(input) != ".vdb") continue;
+    return printable(input) +
+           " is a volume, which does not tell how surely its free space is free; give the models "
+           "that the volumes were made of: they are fused into one as if they were one model";
+  }
+  for (const std::filesystem::path& input : args.inputs) {
+    if (!is_model(input)) return printable(input) + " is no model; only models are fused together";
+  }
+  return {};
+}
+
 void print_json(const FuseArgs& args,
                 const TsdfReport& fusion,
                 const Frame& frame,
@@ -59,28 +73,48 @@ void print_json(const FuseArgs& args,
   if (args.common.json) std::cout << json_text(report) << "\n";
 }
 
-void run_fuse(const FuseArgs& args) {
-  limit_threads(args.common.threads);
+ModelFusion model_fusion(const FuseArgs& args, const Frame& frame) {
+  return {length_or_zero(args.request.voxel_size, frame),
+          args.estimated.value_or(EstimatedSurface::FillOnly),
+          memory_budget(args.request.memory_limit)};
+}
+
+void fuse_one_model(const FuseArgs& args, Terminal& terminal) {
+  refuse_depth_options(args.request);
+  const Model model = read_model(args.request.scene);
+  const Frame& frame = model.scene.frame;
+  terminal.warn(model.scene.warnings);
+  const FusedVolume fused = fuse_model(model, model_fusion(args, frame), terminal.begin("fuse"));
+  write_volume(args.output, fused.volume, frame);
+  terminal.end("voxel " + format_length(fused.report.voxel_size, frame));
+  print_json(args, fused.report, frame, {});
+}
+
+void fuse_several_models(const FuseArgs& args, Terminal& terminal) {
+  const std::string refused = files_refused(args);
+  if (!refused.empty()) throw InvalidInput(refused);
+  refuse_depth_options(args.request);
+  const ModelSource source = {args.inputs.size(), [&](size_t i) {
+                                return std::make_shared<const Model>(read_model(args.inputs[i]));
+                              }};
+  const Frame first = read_model(args.inputs.front()).scene.frame;
+  const JoinedVolume joined =
+      fuse_models(source, model_fusion(args, first), terminal.begin("fuse"));
+  write_volume(args.output, joined.fused.volume, joined.frame);
+  terminal.end(std::to_string(joined.photographs) + " photographs of " +
+               std::to_string(args.inputs.size()) + " models, " +
+               std::to_string(joined.in_several) + " of them in several, voxel " +
+               format_length(joined.fused.report.voxel_size, joined.frame));
+  print_json(args,
+             joined.fused.report,
+             joined.frame,
+             {{"models", args.inputs.size()},
+              {"photographs", joined.photographs},
+              {"in_several", joined.in_several}});
+}
+
+void fuse_frames(const FuseArgs& args, Terminal& terminal) {
   const DepthFusionRequest& request = args.request;
-  keep_apart(args.output, request.scene);
-  if (lower_extension(args.output) != ".vdb") {
-    throw InvalidInput(printable(args.output) + " is no name of a volume: write NAME.vdb");
-  }
-  Terminal terminal(args.common.quiet, args.common.strict);
-  if (is_model(request.scene)) {
-    refuse_depth_options(request);
-    const Model model = read_model(request.scene);
-    terminal.warn(model.scene.warnings);
-    const FusedVolume fused = fuse_model(model,
-                                         {length_or_zero(request.voxel_size, model.scene.frame),
-                                          args.estimated.value_or(EstimatedSurface::FillOnly),
-                                          memory_budget(request.memory_limit)},
-                                         terminal.begin("fuse"));
-    write_volume(args.output, fused.volume, model.scene.frame);
-    terminal.end("voxel " + format_length(fused.report.voxel_size, model.scene.frame));
-    print_json(args, fused.report, model.scene.frame, {});
-    return;
-  }
   if (args.estimated) {
     throw InvalidInput("--estimated is for models; " + printable(request.scene) +
                        " holds depth frames, of which nothing is estimated");
@@ -97,6 +131,22 @@ void run_fuse(const FuseArgs& args) {
              {{"frames", fusion.frames}, {"disagreement", fusion.disagreement}});
 }
 
+void run_fuse(const FuseArgs& args) {
+  limit_threads(args.common.threads);
+  for (const std::filesystem::path& input : args.inputs) keep_apart(args.output, input);
+  if (lower_extension(args.output) != ".vdb") {
+    throw InvalidInput(printable(args.output) + " is no name of a volume: write NAME.vdb");
+  }
+  Terminal terminal(args.common.quiet, args.common.strict);
+  if (args.inputs.size() > 1) {
+    fuse_several_models(args, terminal);
+  } else if (is_model(args.request.scene)) {
+    fuse_one_model(args, terminal);
+  } else {
+    fuse_frames(args, terminal);
+  }
+}
+
 }  // namespace
 
 void add_fuse(CLI::App& app) {
@@ -107,8 +157,9 @@ void add_fuse(CLI::App& app) {
       "occupied / estimated / never seen");
   DepthFusionRequest& request = args->request;
   cmd->add_option("input",
-                  request.scene,
-                  "Model folder, e.g. out/portal/model, or scene folder with metric depth")
+                  args->inputs,
+                  "Model folder, e.g. out/portal/model, several of one world, or a scene folder "
+                  "with metric depth")
       ->required();
   cmd->add_option("-o,--output", args->output, "Volume to write (.vdb)")->required();
   cmd->add_option("--voxel-size",
@@ -131,11 +182,15 @@ void add_fuse(CLI::App& app) {
       ->expected(3);
   cmd->footer(
       "Example: cgs fuse out/portal/model --voxel-size 10mm -o portal.vdb\n"
+      "         cgs fuse out/facade/group_*/model -o facade.vdb\n"
       "         cgs fuse rgbd/desk --depth-scale 5000 --voxel-size 5mm -o desk.vdb\n"
       "A depth frame counts as one view, measured to 0.5 % of its depth (one standard deviation),\n"
       "as in cgs train: what two or more frames measured is observed, what one did, single view.\n"
+      "Several models, as of the groups of cgs split, become one volume: that of a model of all "
+      "their views.\n"
       "Frames are read one after the other, up to three times: memory follows the surface.");
   cmd->callback([args] {
+    args->request.scene = args->inputs.front();
     args->request.memory_limit = stated_memory_limit(args->common);
     run_fuse(*args);
   });

@@ -26,6 +26,7 @@ namespace {
 
 struct RunArgs : RunArguments {
   bool preview = false;
+  bool no_preview = false;
 };
 
 // One paragraph a user reads after a run: what was made, how far to trust it, what to open.
@@ -69,8 +70,13 @@ void run_run(const RunArgs& args) {
     terminal.say("open " + (request.output / kPreviewFolder / "report.html").string());
     return;
   }
-  if (budget > 0) request = within_budget(request, budget, start, terminal);
-  const nlohmann::ordered_json report = run_pipeline(request, terminal).report;
+  FirstLook first_look;
+  if (budget > 0) {
+    request = within_budget(request, budget, start, terminal);
+  } else if (!args.no_preview) {
+    first_look = [&](const OpenedScene& opened) { look_first(request, opened, terminal); };
+  }
+  const nlohmann::ordered_json report = run_pipeline(request, terminal, first_look).report;
   if (args.common.json) std::cout << json_text(report) << "\n";
   say_summary(report, args, terminal);
   if (budget > 0) {
@@ -101,6 +107,11 @@ void add_run(CLI::App& app) {
       ->excludes("--downscale")
       ->excludes("--preset")
       ->excludes("--budget");
+  cmd->add_flag(
+         "--no-preview",
+         args->no_preview,
+         "No such look before a run that takes minutes; default: OUT/preview is written first")
+      ->excludes("--preview");
   cmd->footer(
       "Example: cgs run photos/portal --views 1,10,19 -o out/portal\n"
       "         cgs run photos/portal --preview -o out/portal\n"

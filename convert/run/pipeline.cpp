@@ -395,7 +395,9 @@ void remove_all_abandoned_files(const std::filesystem::path& output) {
 
 }  // namespace
 
-FinishedRun run_pipeline(const RunRequest& request, Terminal& terminal) {
+FinishedRun run_pipeline(const RunRequest& request,
+                         Terminal& terminal,
+                         const FirstLook& first_look) {
   refuse_contradictions(request);
   check_lengths_of_photographs(request);
   OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
@@ -433,6 +435,8 @@ FinishedRun run_pipeline(const RunRequest& request, Terminal& terminal) {
   record.note("camera_fit", fit);
   const Json refined = opened.refined ? refinement_to_json(opened.refined->report) : Json();
   record.note("refined_poses", refined);
+  const StageFiles& first = stages.front();
+  if (first_look && !record.is_done(traits(first.stage).name, first.files)) first_look(opened);
   Run run{request,
           std::move(stages),
           std::move(record),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -18,7 +19,14 @@ struct FinishedRun {
   std::vector<std::pair<Stage, double>> seconds;  ///< That stages took, whichever run did them.
 };
 
+/// What to do with the scene of a run before its first stage.
+using FirstLook = std::function<void(const OpenedScene&)>;
+
 /// Photographs to every asset, in stages that are skipped when their output is there already.
-FinishedRun run_pipeline(const RunRequest& request, Terminal& terminal);
+/// \param first_look  called once the cameras are stored, where no stage was done before; may be
+///                    empty
+FinishedRun run_pipeline(const RunRequest& request,
+                         Terminal& terminal,
+                         const FirstLook& first_look = {});
 
 }  // namespace cgs

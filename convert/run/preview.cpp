@@ -11,6 +11,7 @@
 #include "convert/run/small_run.h"
 #include "convert/text/html.h"
 #include "io/bytes/scene_path.h"
+#include "libcgs/core/error.h"
 
 namespace cgs {
 
@@ -20,14 +21,54 @@ namespace {
 
 constexpr int64_t kPreviewVoxels = 1'000'000;  // where depth reaches far, more would take minutes
 
-int preview_reduction(const Scene& scene) {
-  constexpr int kSide = 256;  // [pixels]
-  int side = 0;
+constexpr int kPreviewSide = 256;  // [pixels]
+
+int longest_side(const Scene& scene) {
+  int out = 0;
   for (const int i : scene.input) {
     const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
-    side = std::max({side, camera.width, camera.height});
+    out = std::max({out, camera.width, camera.height});
   }
-  return std::max(1, (side + kSide / 2) / kSide);
+  return out;
+}
+
+int preview_reduction(const Scene& full) {
+  return std::max(1, (longest_side(full) + kPreviewSide / 2) / kPreviewSide);
+}
+
+// The views that a run uses as --views names them. Empty = as it chooses by itself.
+std::string views_of_run(const RunRequest& request, const Scene& scene) {
+  if (!request.scene.options.views.empty()) return request.scene.options.views;
+  std::string out;
+  for (const int i : scene.input) {
+    const std::string& name = scene.views[static_cast<size_t>(i)].name;
+    if (name.find(',') != std::string::npos) return {};
+    out += (out.empty() ? "" : ",") + name;
+  }
+  return request.scene.options.all_views ? std::string() : out;
+}
+
+// Of the same views; the cameras must be stored.
+RunRequest preview_request(const RunRequest& request,
+                           const OpenedScene& opened,
+                           const Scene& full) {
+  RunRequest out = small_run(request, opened, kPreviewFolder, preview_reduction(full));
+  out.scene.options.views = views_of_run(request, opened.scene);
+  out.max_voxels = kPreviewVoxels;
+  out.training.steps = 0;
+  out.lods = 0;
+  out.max_size = 0;
+  out.max_error.clear();
+  out.settings_reason = "a preview: small pictures, and Gaussians that were not trained";
+  return out;
+}
+
+// The scene of a run with pictures as they are.
+Scene full_scene(const RunRequest& request) {
+  RunRequest full = request;
+  full.scene.options.downscale = 1;
+  Terminal silent = Terminal::silent();
+  return open_scene(full.scene, request.output / "model", silent).scene;
 }
 
 // What most of the unmeasured is, with what helps.
@@ -58,20 +99,39 @@ std::string main_reason(const Json& depth_of_views) {
 }  // namespace
 
 Json write_preview(const RunRequest& request, Terminal& terminal) {
-  RunRequest full = request;
-  full.scene.options.downscale = 1;
-  const OpenedScene opened = open_scene(full.scene, request.output / "model", terminal);
+  const OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   make_output_folder(request.output / "model");
   opened.keep(request.output / "model");
-  const int reduction = preview_reduction(opened.scene);
-  RunRequest small = small_run(request, opened, kPreviewFolder, reduction);
-  small.max_voxels = kPreviewVoxels;
-  small.training.steps = 0;
-  small.lods = 0;
-  small.max_size = 0;
-  small.max_error.clear();
-  small.settings_reason = "a preview: small pictures, and Gaussians that were not trained";
-  return run_pipeline(small, terminal).report;
+  return run_pipeline(preview_request(request, opened, full_scene(request)), terminal).report;
+}
+
+bool is_worth_a_preview(const Scene& scene, const Scene& full) {
+  constexpr int64_t kManyPixels = 800'000;  // of all input views: more than a minute
+  int64_t pixels = 0;
+  for (const int i : scene.input) {
+    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+    pixels += int64_t{camera.width} * camera.height;
+  }
+  return pixels >= kManyPixels &&
+         2 * longest_side(full) <= longest_side(scene) * preview_reduction(full);
+}
+
+void look_first(const RunRequest& request, const OpenedScene& opened, Terminal& terminal) {
+  const Scene full = full_scene(request);
+  if (!is_worth_a_preview(opened.scene, full)) return;
+  (void)terminal.begin("first look");
+  try {
+    Terminal silent = Terminal::silent();
+    const Json report = run_pipeline(preview_request(request, opened, full), silent).report;
+    (void)terminal.end("");
+    terminal.say("first look: " + preview_words(report) + "; open " +
+                 (request.output / kPreviewFolder / "report.html").string() +
+                 " while the rest is made");
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    (void)terminal.end("failed: " + std::string(error.what()));
+  }
 }
 
 std::string preview_words(const Json& report) {

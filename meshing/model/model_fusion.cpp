@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "meshing/model/model_fusion.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <mutex>
+#include <string>
 #include <utility>
+#include <vector>
 
+#include "libcgs/core/error.h"
 #include "libcgs/priors/estimated_depth.h"
 #include "libcgs/render/picture.h"
 
@@ -31,29 +37,183 @@ void settle_depth(const ViewPriors& priors, EstimatedSurface wanted, TsdfView& v
   }
 }
 
+// What an input view of a model sees.
+TsdfView seen_by_input(const Model& model,
+                       size_t k,
+                       const std::vector<SupportView>& inputs,
+                       EstimatedSurface estimated,
+                       bool with_color) {
+  TsdfView view;
+  view.camera = input_camera(model, k);
+  view.depth = model.priors[k].depth;
+  view.sigma = model.priors[k].sigma;
+  view.evidence = inputs[k].evidence;
+  if (with_color) view.color = picture(render_camera(model, inputs, view.camera));
+  settle_depth(model.priors[k], estimated, view);
+  return view;
+}
+
+TsdfOptions tsdf_options(const ModelFusion& request) {
+  TsdfOptions options;
+  options.voxel_size = request.voxel_size;
+  options.coarsest_voxel = request.coarsest_voxel;
+  options.max_voxels = request.max_voxels;
+  options.memory_limit = request.memory_limit;
+  return options;
+}
+
+// An input view of one of several models.
+struct Witness {
+  size_t model = 0;
+  size_t input = 0;  // position in its scene.input
+  std::string name;
+  Eigen::Isometry3d world_from_cam;
+  size_t measured = 0;  // pixels
+};
+
+size_t measured_pixels(const ViewPriors& priors) {
+  const EvidenceMap evidence = evidence_of(priors);
+  size_t out = 0;
+  for (size_t i = 0; i < evidence.data.size(); ++i) {
+    out += evidence.data[i] == DepthEvidence::Measured && std::isfinite(priors.depth.data[i]);
+  }
+  return out;
+}
+
+// Cameras of one photograph may have been refined apart.
+bool is_same_photograph(const Witness& a, const Witness& b, double extent) {
+  constexpr double kNear = 1e-2;
+  if (a.name != b.name) return false;
+  const double apart = (a.world_from_cam.translation() - b.world_from_cam.translation()).norm();
+  const double turned =
+      (a.world_from_cam.rotation() - b.world_from_cam.rotation()).norm() / std::sqrt(2.0);
+  return apart < kNear * extent && turned < kNear;
+}
+
+// Keeps the one of each photograph that measured the most; the first of equals.
+// \param extent  of what one model shows [world]
+// \return how many photographs were in several models
+size_t keep_best_witnesses(std::vector<Witness>& witnesses, double extent) {
+  std::vector<Witness> kept;
+  std::vector<bool> is_in_several;
+  for (Witness& witness : witnesses) {
+    const auto same = std::find_if(kept.begin(), kept.end(), [&](const Witness& other) {
+      return other.model != witness.model && is_same_photograph(other, witness, extent);
+    });
+    if (same == kept.end()) {
+      kept.push_back(std::move(witness));
+      is_in_several.push_back(false);
+      continue;
+    }
+    is_in_several[static_cast<size_t>(same - kept.begin())] = true;
+    if (witness.measured > same->measured) *same = std::move(witness);
+  }
+  std::stable_sort(kept.begin(), kept.end(), [](const Witness& a, const Witness& b) {
+    return std::pair(a.model, a.input) < std::pair(b.model, b.input);
+  });
+  witnesses = std::move(kept);
+  return static_cast<size_t>(std::count(is_in_several.begin(), is_in_several.end(), true));
+}
+
+void check_units(const Frame& first, const Frame& other, size_t model) {
+  constexpr double kSame = 1e-6;
+  const double allowed = kSame * first.metres_per_unit;
+  if (std::abs(other.metres_per_unit - first.metres_per_unit) <= allowed) return;
+  throw InvalidInput(
+      "models that are fused together must be of one world: a unit of the first is " +
+      first.unit_name() + ", of model " + std::to_string(model + 1) + " " + other.unit_name());
+}
+
+// Moves a view from the frame of its model into another. Scales are powers of two: depth keeps its
+// bits.
+void move_to_frame(const Frame& own, const Frame& wanted, TsdfView& view) {
+  view.camera.world_from_cam =
+      internal_from_world(wanted, world_from_internal(own, view.camera.world_from_cam));
+  const auto factor = static_cast<float>(own.scale / wanted.scale);
+  for (float& depth : view.depth.data) depth *= factor;
+  for (float& sigma : view.sigma.data) sigma *= factor;
+}
+
+// Holds the models that were asked for last.
+class ModelShelf {
+ public:
+  // \param source  not owned; must outlive this
+  explicit ModelShelf(const ModelSource& source) : source_(source) {}
+
+  struct Entry {
+    size_t index = 0;
+    std::shared_ptr<const Model> model;
+    std::vector<SupportView> inputs;
+  };
+
+  std::shared_ptr<const Entry> operator()(size_t i) {
+    const std::lock_guard lock(mutex_);
+    for (const auto& held : held_) {
+      if (held && held->index == i) return held;
+    }
+    std::swap(held_[0], held_[1]);
+    held_[0].reset();  // before another is read
+    auto entry = std::make_shared<Entry>();
+    entry->index = i;
+    entry->model = source_.model(i);
+    entry->inputs = support_views(*entry->model);
+    held_[0] = std::move(entry);
+    return held_[0];
+  }
+
+ private:
+  const ModelSource& source_;
+  std::mutex mutex_;
+  std::array<std::shared_ptr<const Entry>, 2> held_;
+};
+
 }  // namespace
 
 FusedVolume fuse_model(const Model& model, const ModelFusion& request, const Progress& progress) {
   std::vector<TsdfView> views;
   const std::vector<SupportView> inputs = support_views(model);
   for (size_t k = 0; k < model.scene.input.size(); ++k) {
-    const Camera& camera = model.scene.views[static_cast<size_t>(model.scene.input[k])].camera;
-    const RenderBuffers buffers = render_camera(model, inputs, camera);
-    TsdfView view;
-    view.camera = camera;
-    view.depth = model.priors[k].depth;
-    view.sigma = model.priors[k].sigma;
-    view.evidence = inputs[k].evidence;
-    view.color = picture(buffers);
-    settle_depth(model.priors[k], request.estimated, view);
-    views.push_back(std::move(view));
+    views.push_back(seen_by_input(model, k, inputs, request.estimated, true));
   }
-  TsdfOptions options;
-  options.voxel_size = request.voxel_size;
-  options.coarsest_voxel = request.coarsest_voxel;
-  options.max_voxels = request.max_voxels;
-  options.memory_limit = request.memory_limit;
-  return fuse(views, options, progress);
+  return fuse(views, tsdf_options(request), progress);
+}
+
+JoinedVolume fuse_models(const ModelSource& source,
+                         const ModelFusion& request,
+                         const Progress& progress) {
+  require(source.count > 0, "fuse needs at least one model, their number", source.count);
+  JoinedVolume out;
+  ModelShelf shelf(source);
+  std::vector<Witness> witnesses;
+  for (size_t i = 0; i < source.count; ++i) {
+    const auto held = shelf(i);
+    const Model& model = *held->model;
+    const Frame& frame = model.scene.frame;
+    if (i == 0) out.frame = frame;
+    check_units(out.frame, frame, i);
+    for (size_t k = 0; k < model.scene.input.size(); ++k) {
+      const View& view = model.scene.views[static_cast<size_t>(model.scene.input[k])];
+      witnesses.push_back({i,
+                           k,
+                           view.name,
+                           world_from_internal(frame, view.camera.world_from_cam),
+                           measured_pixels(model.priors[k])});
+    }
+    report(progress, 0.1 * static_cast<double>(i + 1) / static_cast<double>(source.count));
+  }
+  out.in_several = keep_best_witnesses(witnesses, out.frame.scale);
+  out.photographs = witnesses.size();
+  const TsdfSource views = {
+      witnesses.size(), [&](size_t i, bool with_color) {
+        const Witness& witness = witnesses[i];
+        const auto held = shelf(witness.model);
+        TsdfView view =
+            seen_by_input(*held->model, witness.input, held->inputs, request.estimated, with_color);
+        move_to_frame(held->model->scene.frame, out.frame, view);
+        return view;
+      }};
+  out.fused = fuse_streamed(views, tsdf_options(request), part_of(progress, 0.1, 1));
+  return out;
 }
 
 }  // namespace cgs

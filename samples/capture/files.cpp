@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "samples/capture/files.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <utility>
@@ -144,6 +145,24 @@ void write_capture(const std::filesystem::path& folder,
   }
   write_mesh(folder / "truth" / "mesh.ply", scene.mesh);
   write_cameras(folder, views);
+}
+
+void write_masks(const std::filesystem::path& folder,
+                 const PortalScene& scene,
+                 const std::vector<CaptureView>& views,
+                 const std::string& part) {
+  const auto named = std::find_if(
+      scene.parts.begin(), scene.parts.end(), [&](const auto& p) { return p.name == part; });
+  require(named != scene.parts.end(), "a part of the scene must be named", part);
+  make_output_folder(folder / "masks");
+  for (const auto& view : views) {
+    const Raster<uint8_t> shown =
+        part_mask(scene, view.camera, static_cast<size_t>(named - scene.parts.begin()));
+    cv::Mat mask(shown.height, shown.width, CV_8UC1);
+    std::memcpy(mask.data, shown.data.data(), shown.data.size());
+    write_png(folder / "masks" / (view.name + ".png"), mask);
+  }
+  write_mesh(folder / "truth" / (part + ".ply"), part_mesh(scene, *named));
 }
 
 }  // namespace cgs

@@ -23,4 +23,12 @@ void write_capture(const std::filesystem::path& folder,
                    const std::vector<CaptureView>& views,
                    std::span<const Camera> inputs);
 
+/// Writes masks/<view>.png, white where a view shows that part of the scene, and the part alone as
+/// truth/<part>.ply.
+/// \throws InvalidInput if there is no such part; IoError
+void write_masks(const std::filesystem::path& folder,
+                 const PortalScene& scene,
+                 const std::vector<CaptureView>& views,
+                 const std::string& part);
+
 }  // namespace cgs

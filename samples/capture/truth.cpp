@@ -101,6 +101,17 @@ ViewTruth view_truth(const PortalScene& scene,
   return truth;
 }
 
+Raster<uint8_t> part_mask(const PortalScene& scene, const Camera& camera, size_t part) {
+  Raster<uint8_t> out(camera.width, camera.height, 0);
+  tbb::parallel_for(0, camera.height, [&](int y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const auto hit = first_hit(scene.bvh, pixel_ray(camera, x, y));
+      if (hit && scene.part_of_face[hit->face] == part) out(x, y) = 255;
+    }
+  });
+  return out;
+}
+
 DepthMap exact_depth(const PortalScene& scene, const Camera& camera) {
   return view_truth(scene, camera, {}).depth;
 }

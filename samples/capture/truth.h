@@ -47,6 +47,9 @@ ViewTruth view_truth(const PortalScene& scene,
 /// z-depth at the pixel centres [m]; NaN where a ray leaves the scene.
 DepthMap exact_depth(const PortalScene& scene, const Camera& camera);
 
+/// 255 where a ray through the pixel centre meets that part of the scene first, else 0.
+Raster<uint8_t> part_mask(const PortalScene& scene, const Camera& camera, size_t part);
+
 /// Number of cameras that have a point of the surface in their picture with nothing before it.
 /// A distance that differs by less than one part in ten million counts as the point itself.
 int seen_by(const Bvh& bvh, const Eigen::Vector3d& point_in_world, std::span<const Camera> cameras);

@@ -3,9 +3,12 @@
 
 #include <array>
 #include <map>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "libcgs/core/error.h"
 #include "tests/support/depth_scenes.h"
 
 namespace cgs::model_fusion_test {
@@ -30,12 +33,12 @@ DepthOrigin origin_at(const Vector3d& p) {
 }
 
 // A plane with an estimated patch amid what was measured, an estimated slab that goes on beyond
-// the pictures, and sky above.
-Model plane_below_sky() {
+// the pictures, and sky above; seen from these places on the x axis.
+Model plane_below_sky(const std::vector<double>& places = {-0.1, 0.1}) {
   Model model;
-  for (const double x : {-0.1, 0.1}) {
+  for (const double x : places) {
     View view;
-    view.name = x < 0 ? "left" : "right";
+    view.name = "from " + std::to_string(x);
     view.camera = test::camera_at({x, 0, -1}, {0, 0, 0}, 64);
     const TsdfView seen = test::photographed(test::plane({0, 0, 1}, 0), view.camera);
     ViewPriors priors;
@@ -152,6 +155,92 @@ TEST(FuseModel, SeesThroughTheSky) {
       ASSERT_GT(at.getCoord().y() * double(volume.voxel_size), -0.26) << int(estimated);
     }
   }
+}
+
+// The same model in another frame, moved and scaled by powers of two, so that nothing is rounded.
+Model in_frame(Model model, const Vector3d& origin, double scale) {
+  Frame& frame = model.scene.frame;
+  const Frame before = frame;
+  frame.origin = origin;
+  frame.scale = scale;
+  const auto factor = static_cast<float>(before.scale / scale);
+  for (View& view : model.scene.views) {
+    view.camera.world_from_cam =
+        internal_from_world(frame, world_from_internal(before, view.camera.world_from_cam));
+  }
+  for (ViewPriors& priors : model.priors) {
+    for (float& depth : priors.depth.data) depth *= factor;
+    for (float& sigma : priors.sigma.data) sigma *= factor;
+  }
+  return model;
+}
+
+ModelSource source_of(const std::vector<Model>& models) {
+  return {models.size(), [&](size_t i) { return std::make_shared<const Model>(models[i]); }};
+}
+
+template <typename Grid>
+bool are_equal(const Grid& a, const Grid& b) {
+  if (a.activeVoxelCount() != b.activeVoxelCount()) return false;
+  for (auto at = a.cbeginValueOn(); at; ++at) {
+    if (!b.tree().isValueOn(at.getCoord()) || b.tree().getValue(at.getCoord()) != *at) return false;
+  }
+  return true;
+}
+
+constexpr ModelFusion kFine = {.voxel_size = 1.0 / 64};
+
+void expect_same_volume(const Volume& a, const Volume& b) {
+  EXPECT_TRUE(are_equal(*a.tsdf, *b.tsdf));
+  EXPECT_TRUE(are_equal(*a.weight, *b.weight));
+  EXPECT_TRUE(are_equal(*a.support, *b.support));
+  EXPECT_TRUE(are_equal(*a.sigma, *b.sigma));
+  EXPECT_TRUE(are_equal(*a.state, *b.state));
+}
+
+TEST(FuseModels, GiveTheVolumeOfAModelThatHoldsAllViews) {
+  const FusedVolume all = fuse_model(plane_below_sky({-0.1, 0.1, 0.25}), kFine);
+  const std::vector<Model> groups = {
+      plane_below_sky({-0.1, 0.1}),
+      in_frame(plane_below_sky({0.1, 0.25}), Vector3d(0.5, -0.25, 0), 2)};
+  const JoinedVolume joined = fuse_models(source_of(groups), kFine);
+  EXPECT_EQ(joined.photographs, 3u);
+  EXPECT_EQ(joined.in_several, 1u);
+  EXPECT_EQ(joined.frame.scale, 1);
+  expect_same_volume(joined.fused.volume, all.volume);
+}
+
+// Twice the same photograph is no second witness; the model that measured more of it is heard.
+TEST(FuseModels, CountAPhotographOnce) {
+  Model poor = plane_below_sky();
+  for (ViewPriors& priors : poor.priors) {
+    for (float& depth : priors.depth.data) depth = std::nanf("");
+  }
+  const FusedVolume once = fuse_model(plane_below_sky(), kFine);
+  for (const std::vector<Model>& models :
+       {std::vector<Model>{poor, plane_below_sky()}, std::vector<Model>{plane_below_sky(), poor}}) {
+    const JoinedVolume joined = fuse_models(source_of(models), kFine);
+    EXPECT_EQ(joined.photographs, 2u);
+    expect_same_volume(joined.fused.volume, once.volume);
+  }
+}
+
+// Photographs of two cameras may have one name.
+TEST(FuseModels, TellPhotographsOfOneNameApart) {
+  Model other = plane_below_sky({0.25, 0.4});
+  other.scene.views[0].name = plane_below_sky().scene.views[0].name;
+  const std::vector<Model> both = {plane_below_sky(), other};
+  const JoinedVolume joined = fuse_models(source_of(both), kFine);
+  EXPECT_EQ(joined.photographs, 4u);
+  EXPECT_EQ(joined.in_several, 0u);
+}
+
+TEST(FuseModels, RefuseModelsOfOtherUnits) {
+  Model other = plane_below_sky();
+  other.scene.frame.metres_per_unit = 0.001;
+  const std::vector<Model> both = {plane_below_sky(), other};
+  EXPECT_THROW(fuse_models(source_of(both), kFine), InvalidInput);
+  EXPECT_THROW(fuse_models({}, kFine), InvalidInput);
 }
 
 }  // namespace
