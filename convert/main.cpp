@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <new>
 #include <string>
 #include <string_view>
@@ -20,20 +21,11 @@
 #include <unistd.h>
 
 #include "convert/commands/commands.h"
-#include "convert/commands/usage.h"
 #include "convert/text/advice.h"
 #include "convert/text/terminal.h"
 #include "libcgs/core/error.h"
 
 namespace {
-
-constexpr const char* kDescription =
-    "cgs - a few photographs to assets that say what was seen and what was invented";
-
-constexpr const char* kFooter =
-    "Example: cgs run photos/portal --views 1,10,19 -o out/portal\n"
-    "         opens as out/portal/report.html\n"
-    "Each command explains itself: cgs run --help";
 
 // --voxel_size and --voxel-size are the same flag; values are left alone.
 std::vector<std::string> with_dashes(int argc, char** argv) {
@@ -57,16 +49,11 @@ void check_standard_output() {
 
 int run_program(int argc, char** argv) {
   FLAGS_minloglevel = google::GLOG_FATAL;  // steps that Ceres tries in vain are no news to a user
-  CLI::App app(kDescription, "cgs");
-  app.footer(kFooter);
-  app.require_subcommand(1);
-  app.failure_message(cgs::usage_message);
-  app.set_version_flag("--version", cgs::program_version());
-  cgs::add_commands(app);
+  const std::unique_ptr<CLI::App> app = cgs::command_line();
   try {
-    app.parse(with_dashes(argc, argv));
+    app->parse(with_dashes(argc, argv));
   } catch (const CLI::ParseError& error) {
-    if (app.exit(error) != 0) return 2;  // else it was --help or --version
+    if (app->exit(error) != 0) return 2;  // else it was --help or --version
   }
   check_standard_output();
   return 0;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+
 // The other two define what a program that uses CLI::App needs to link.
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -22,11 +24,16 @@ void add_mesh(CLI::App& app);
 void add_next(CLI::App& app);
 void add_render(CLI::App& app);
 void add_run(CLI::App& app);
+void add_split(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 void add_train(CLI::App& app);
 void add_verify(CLI::App& app);
 
 /// All of them, in the order in which the help lists them.
 void add_commands(CLI::App& app);
+
+/// All that the program takes, with what it says of itself and of mistakes. The pages of the manual
+/// and the completion of shells are made of the same.
+std::unique_ptr<CLI::App> command_line();
 
 }  // namespace cgs

@@ -209,6 +209,8 @@ void add_training_options(CLI::App& command, TrainingArguments& arguments) {
                   "draft, standard, fine (a third, all, twice the training steps), or "
                   "reference: the published CoherentGS schedule with convolutional decoders, hours "
                   "instead of a minute")
+      // Says what there is, to help and completion; training_preset() refuses others.
+      ->check(CLI::Validator("{draft,standard,fine,reference}"))
       ->capture_default_str();
   command
       .add_option("--set",
