@@ -3,10 +3,12 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 #include <tbb/parallel_for.h>
@@ -198,6 +200,51 @@ void print_photographs(const Json& photographs) {
   }
 }
 
+// Of many views the table would be long: of each the two others that stand nearest.
+std::vector<Json> told_baselines(const Json& all) {
+  constexpr size_t kFew = 15;  // of six views
+  constexpr int kOfEach = 2;
+  std::vector<Json> rows(all.begin(), all.end());
+  if (rows.size() <= kFew) return rows;
+  std::stable_sort(rows.begin(), rows.end(), [](const Json& a, const Json& b) {
+    return a["length"].get<double>() < b["length"].get<double>();
+  });
+  std::map<std::string, int> told;
+  std::erase_if(rows, [&](const Json& row) {
+    int& first = told[row["views"][0].get<std::string>()];
+    int& second = told[row["views"][1].get<std::string>()];
+    if (first >= kOfEach && second >= kOfEach) return true;
+    ++first;
+    ++second;
+    return false;
+  });
+  std::stable_sort(rows.begin(), rows.end(), [](const Json& a, const Json& b) {
+    return a["views"] < b["views"];
+  });
+  return rows;
+}
+
+void print_baselines(const Json& all) {
+  const std::vector<Json> rows = told_baselines(all);
+  std::printf("\nbaselines between input views%s:\n",
+              rows.size() < all.size() ? ", of each to those that stand nearest" : "");
+  for (const Json& row : rows) {
+    std::printf("  %s - %s: %.4g units, %.1f %% of the depth, %.1f degrees",
+                one_line(row["views"][0].get<std::string>()).c_str(),
+                one_line(row["views"][1].get<std::string>()).c_str(),
+                row["length"].get<double>(),
+                100 * row["baseline_to_depth"].get<double>(),
+                row["angle_degrees"].get<double>());
+    const auto shared = row["shared_points"].get<size_t>();
+    if (shared > 0) {
+      std::printf("; %zu sparse points in both, on %.0f %% of the picture",
+                  shared,
+                  100 * row["overlap"].get<double>());
+    }
+    std::printf("\n");
+  }
+}
+
 void print_scene(const Json& info) {
   const Json& counts = info["counts"];
   std::printf(
@@ -228,22 +275,7 @@ void print_scene(const Json& info) {
     if (near > 0) std::printf("  %9.4g ... %-9.4g", near, c["far"].get<double>());
     std::printf("\n");
   }
-  std::printf("\nbaselines between input views:\n");
-  for (const Json& row : info["baselines"]) {
-    std::printf("  %s - %s: %.4g units, %.1f %% of the depth, %.1f degrees",
-                one_line(row["views"][0].get<std::string>()).c_str(),
-                one_line(row["views"][1].get<std::string>()).c_str(),
-                row["length"].get<double>(),
-                100 * row["baseline_to_depth"].get<double>(),
-                row["angle_degrees"].get<double>());
-    const auto shared = row["shared_points"].get<size_t>();
-    if (shared > 0) {
-      std::printf("; %zu sparse points in both, on %.0f %% of the picture",
-                  shared,
-                  100 * row["overlap"].get<double>());
-    }
-    std::printf("\n");
-  }
+  print_baselines(info["baselines"]);
   const Json& depth = info["depth_files"];
   if (!depth.is_null()) {
     const auto kind = depth["kind"].get<std::string>();

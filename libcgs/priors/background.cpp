@@ -266,7 +266,7 @@ class Backgrounds {
     if (asked < kLeastPoints || double(contradict) > kMostAgainst * double(asked)) return {};
     for (size_t i = 0; i < against.data.size(); ++i) {
       const bool is_kept = priors_[k].origin.data[i] == DepthOrigin::Measured && lost.data[i] == 0;
-      if (is_kept) against.data[i] = 1;
+      if (is_kept && background.data[i] != 0) against.data[i] = 1;
     }
     // As far as from one of these points to the next.
     against = dilated(against, std::max(kObjectRim, background.width / kPointsAlong));

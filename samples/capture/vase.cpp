@@ -92,7 +92,8 @@ std::vector<CaptureView> vase_views(int downscale) {
     int count;
     double elevation, distance, first;  // [degrees], [m], [degrees]
   };
-  constexpr std::array<Ring, 3> kRings = {{{12, 6, 1.45, 0}, {8, 32, 1.45, 10}, {4, 58, 1.4, 25}}};
+  constexpr std::array<Ring, 3> kRings = {
+      {{14, -12, 1.45, 0}, {7, 28, 1.45, 10}, {3, 58, 1.4, 25}}};
   const Vector3d middle(0, 0, 0.44);
   std::vector<CaptureView> out;
   for (const Ring& ring : kRings) {

@@ -16,8 +16,8 @@ inline constexpr const char* kVase = "vase";
 /// top of the table is z = 0. Always the same scene.
 PortalScene vase_scene();
 
-/// Its 24 views, all inputs, in the order of their names: twelve around it at about its own height,
-/// eight from above, four from high above.
+/// Its 24 views, all inputs, in the order of their names: fourteen around it from a little above
+/// the table, seven from above, three from high above.
 ///
 /// \param downscale  as for capture_views()
 /// \throws InvalidInput for another downscale

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // `cgs run --preview`: a first look, and nothing of the run itself.
+#include "convert/run/preview.h"
+
 #include <filesystem>
 
 #include <gtest/gtest.h>
@@ -34,6 +36,47 @@ TEST(Preview, SaysHowMuchIsMeasuredAndLeavesTheRunToCome) {
   const auto report = nlohmann::json::parse(test::read_bytes(out / "preview/report.json"));
   EXPECT_EQ(report["model"]["settings"]["steps"], "0");
   EXPECT_TRUE(report["certificate"]["passed"].get<bool>());
+}
+
+// The input of the portal is small: a minute needs no look before it.
+TEST(Preview, ComesFirstWhereARunTakesMinutes) {
+  Scene full;
+  for (int i = 0; i < 4; ++i) {
+    View view;
+    view.camera.width = 2000;
+    view.camera.height = 1500;
+    full.input.push_back(i);
+    full.views.push_back(view);
+  }
+  const auto of_size = [&](int width, int height) {
+    Scene scene = full;
+    for (View& view : scene.views) {
+      view.camera.width = width;
+      view.camera.height = height;
+    }
+    return scene;
+  };
+  EXPECT_TRUE(is_worth_a_preview(of_size(1000, 750), full));
+  EXPECT_TRUE(is_worth_a_preview(full, full));
+  EXPECT_FALSE(is_worth_a_preview(of_size(250, 188), full)) << "a minute";
+  EXPECT_FALSE(is_worth_a_preview(of_size(504, 378), of_size(504, 378))) << "a minute";
+  full.input.assign(40, 0);
+  EXPECT_FALSE(is_worth_a_preview(of_size(250, 188), full)) << "as small as its preview";
+}
+
+TEST(Preview, OfARunShowsItsPhotographs) {
+  const TempDir dir;
+  Terminal terminal = Terminal::silent();
+  RunRequest request;
+  request.scene.path = test::portal_capture(3);
+  request.scene.options.views = "view_01,view_03";
+  request.output = dir / "out";
+  const OpenedScene opened = open_scene(request.scene, {}, terminal);
+  look_first(request, opened, terminal);
+  EXPECT_FALSE(fs::exists(dir / "out")) << "not worth it";
+  (void)write_preview(request, terminal);
+  const auto report = nlohmann::json::parse(test::read_bytes(dir / "out/preview/report.json"));
+  EXPECT_EQ(report["model"]["depth_of_views"].size(), 2U);
 }
 
 TEST(Preview, ExcludesWhatItChooses) {

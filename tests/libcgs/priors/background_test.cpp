@@ -129,6 +129,26 @@ TEST(Background, IsWhatMasksLeaveOutAroundAnObject) {
   ball.expect_background_around_the_ball();
 }
 
+// A mask says where the object ends: what is measured up to it keeps no wide margin free.
+TEST(Background, BeginsAtTheRimOfAMask) {
+  Ball ball;
+  const auto is_room = [](int x, int y) { return Ball::radii(x, y) > 1.02; };
+  for (size_t k = 0; k < ball.priors.size(); ++k) ball.leave_out(k, is_room);
+  ball.mark();
+  constexpr int kRim = 2;  // [pixels]
+  for (const ViewPriors& own : ball.priors) {
+    for (int y = kRim; y < kHeight - kRim; ++y) {
+      for (int x = kRim; x < kWidth - kRim; ++x) {
+        bool is_far = true;
+        for (int dy = -kRim; dy <= kRim; ++dy) {
+          for (int dx = -kRim; dx <= kRim; ++dx) is_far = is_far && is_room(x + dx, y + dy);
+        }
+        if (is_far) EXPECT_EQ(own.origin(x, y), DepthOrigin::Background) << x << ", " << y;
+      }
+    }
+  }
+}
+
 TEST(Background, IsNotABusyRoom) {
   Ball ball;
   for (size_t k = 0; k < ball.priors.size(); ++k) ball.make_busy(k, everywhere);
