@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <chrono>
 #include <cstdio>
-#include <iostream>
 #include <memory>
 #include <set>
 #include <string>
@@ -17,6 +16,7 @@
 #include "convert/text/advice.h"
 #include "convert/text/html.h"
 #include "convert/text/length.h"
+#include "convert/text/report_json.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/byte_reader.h"
 #include "io/bytes/json_file.h"
@@ -152,7 +152,7 @@ void run_batch(const BatchArgs& args) {
   for (const BatchResult& result : results) rows.push_back(batch_row(result));
   write_file(args.output / "batch.json", json_text(rows) + "\n");
   if (args.run.common.json) {
-    std::cout << json_text(rows) << "\n";
+    print_report(rows);
   } else {
     print_rows(rows);
   }

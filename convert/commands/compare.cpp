@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <iostream>
 #include <memory>
 #include <optional>
 
@@ -15,9 +14,9 @@
 #include "convert/measure/m3c2_comparison.h"
 #include "convert/measure/measured_file.h"
 #include "convert/text/length.h"
+#include "convert/text/report_json.h"
 #include "convert/text/stated_frame.h"
 #include "convert/text/terminal.h"
-#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 #include "meshing/measure/surface_measures.h"
 
@@ -142,7 +141,7 @@ void print_json(const CompareArgs& args,
   nlohmann::ordered_json report = {{"a", measured_json(args.a, a, unit)},
                                    {"b", measured_json(args.b, b, unit)}};
   report.update(found);
-  std::cout << json_text(report) << "\n";
+  print_report(report);
 }
 
 void print_text(const CompareArgs& args, const Comparison& comparison, const FigureUnit& unit) {

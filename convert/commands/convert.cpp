@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <iostream>
 #include <memory>
 
 #include <nlohmann/json.hpp>
@@ -7,7 +6,7 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/splats/conversion.h"
-#include "io/bytes/json_file.h"
+#include "convert/text/report_json.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -36,7 +35,7 @@ void run_convert(const ConvertArgs& args) {
   request.volume.memory_limit = stated_memory_limit(args.common);
   Terminal terminal(args.common.quiet, args.common.strict);
   const nlohmann::ordered_json report = convert_file(request, terminal);
-  if (args.common.json) std::cout << json_text(report) << "\n";
+  if (args.common.json) print_report(report);
 }
 
 }  // namespace

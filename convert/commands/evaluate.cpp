@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cstdio>
-#include <iostream>
 #include <memory>
 
 #include <nlohmann/json.hpp>
@@ -11,8 +10,8 @@
 #include "convert/model/model.h"
 #include "convert/model/views.h"
 #include "convert/text/html.h"
+#include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
-#include "io/bytes/json_file.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 
@@ -89,7 +88,7 @@ void run_evaluate(const EvaluateArgs& args) {
   terminal.warn(std::vector(warnings.begin() + static_cast<std::ptrdiff_t>(told), warnings.end()));
   const nlohmann::ordered_json report = evaluation_to_json(evaluation);
   if (args.common.json) {
-    std::cout << json_text(report) << "\n";
+    print_report(report);
   } else {
     print_table(report);
   }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <iostream>
 #include <memory>
 
 #include <nlohmann/json.hpp>
@@ -9,10 +8,10 @@
 #include "convert/files/mesh_files.h"
 #include "convert/filter/chain.h"
 #include "convert/measure/measured_file.h"
+#include "convert/text/report_json.h"
 #include "convert/text/stated_frame.h"
 #include "convert/text/terminal.h"
 #include "io/bytes/atomic_file.h"
-#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -81,7 +80,7 @@ void run_filter_command(const FilterArgs& args) {
   if (!moved.empty()) terminal.warn(moved);
   const std::string place = glb_place_text(args.output, state.frame, args.local_origin);
   if (!place.empty()) terminal.say(place);
-  if (args.common.json) std::cout << json_text({{"operations", report}}) << "\n";
+  if (args.common.json) print_report({{"operations", report}});
 }
 
 }  // namespace

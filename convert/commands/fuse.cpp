@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <iostream>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -13,7 +12,7 @@
 #include "convert/model/fusion.h"
 #include "convert/model/memory_plan.h"
 #include "convert/text/length.h"
-#include "io/bytes/json_file.h"
+#include "convert/text/report_json.h"
 #include "io/bytes/scene_path.h"
 #include "libcgs/core/error.h"
 
@@ -70,7 +69,7 @@ void print_json(const FuseArgs& args,
                 const Frame& frame,
                 nlohmann::ordered_json report) {
   report.update(fusion_to_json(fusion, frame));
-  if (args.common.json) std::cout << json_text(report) << "\n";
+  if (args.common.json) print_report(report);
 }
 
 ModelFusion model_fusion(const FuseArgs& args, const Frame& frame) {

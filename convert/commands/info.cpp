@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <iostream>
 #include <map>
 #include <memory>
 #include <numbers>
@@ -22,7 +21,7 @@
 #include "convert/text/advice.h"
 #include "convert/text/frame_json.h"
 #include "convert/text/html.h"
-#include "io/bytes/json_file.h"
+#include "convert/text/report_json.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/photo_quality.h"
@@ -336,7 +335,7 @@ Json tell_scene(const InfoArgs& args) {
   });
   Json info = scene_json(opened, fit, photographs);
   if (args.json) {
-    std::cout << json_text(info) << "\n";
+    print_report(info);
   } else {
     print_scene(info);
   }

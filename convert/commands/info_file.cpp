@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <iostream>
 #include <string>
 
 #include <openvdb/tools/Count.h>
@@ -16,7 +15,7 @@
 #include "convert/splats/splat_files.h"
 #include "convert/text/frame_json.h"
 #include "convert/text/html.h"
-#include "io/bytes/json_file.h"
+#include "convert/text/report_json.h"
 #include "io/bytes/scene_path.h"
 #include "io/images/exr.h"
 #include "io/splats/splat_reader.h"
@@ -35,7 +34,7 @@ Json vec3d_to_json(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 template <typename Print>
 Json print_info(Json info, bool as_json, Print print) {
   if (as_json) {
-    std::cout << json_text(info) << "\n";
+    print_report(info);
   } else {
     print(info);
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cstdio>
-#include <iostream>
 #include <memory>
 
 #include <nlohmann/json.hpp>
@@ -9,8 +8,8 @@
 #include "convert/commands/common_options.h"
 #include "convert/commands/measuring.h"
 #include "convert/measure/measured_file.h"
+#include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
-#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -96,7 +95,7 @@ void run_measure(const MeasureArgs& args) {
   if (!args.thickness_ply.empty()) measuring.thickness_ply(args.thickness_ply);
   if (all) measuring.certificate();
   if (args.common.json) {
-    std::cout << json_text({{"mesh", about}, {"figures", measuring.figures()}}) << "\n";
+    print_report({{"mesh", about}, {"figures", measuring.figures()}});
   }
 }
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <iostream>
 #include <memory>
 
 #include <nlohmann/json.hpp>
@@ -10,9 +9,9 @@
 #include "convert/files/volume_file.h"
 #include "convert/model/memory_plan.h"
 #include "convert/model/simplification.h"
+#include "convert/text/report_json.h"
 #include "convert/text/stated_frame.h"
 #include "convert/text/terminal.h"
-#include "io/bytes/json_file.h"
 #include "io/meshes/obj.h"
 #include "meshing/surface/isosurface.h"
 
@@ -58,7 +57,7 @@ void run_mesh_command(const MeshArgs& args) {
       {"method", closed.method},
       {"simplification", simplification_to_json(simplification, file.frame)},
       {"output", mesh_files_to_json(files)}};
-  std::cout << json_text(report) << "\n";
+  print_report(report);
 }
 
 }  // namespace

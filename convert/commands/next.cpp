@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cmath>
 #include <cstdio>
-#include <iostream>
 #include <memory>
 #include <numbers>
 #include <string>
@@ -14,8 +13,8 @@
 #include "convert/model/model.h"
 #include "convert/model/views.h"
 #include "convert/text/html.h"
+#include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
-#include "io/bytes/json_file.h"
 #include "io/bytes/scene_path.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
@@ -125,7 +124,7 @@ void run_next(const NextArgs& args) {
     terminal.end("holes in magenta: " + (args.output / "contact.png").string());
   }
   if (args.common.json) {
-    std::cout << json_text(to_json(ranked, model)) << "\n";
+    print_report(to_json(ranked, model));
     return;
   }
   print_table(ranked, model);

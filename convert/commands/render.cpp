@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <iostream>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -11,8 +10,8 @@
 #include "convert/model/camera_path_file.h"
 #include "convert/model/model.h"
 #include "convert/model/views.h"
+#include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
-#include "io/bytes/json_file.h"
 #include "io/bytes/scene_path.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
@@ -57,7 +56,7 @@ void run_render(const RenderArgs& args) {
                 : camera_path(model, args.path, args.frames.value_or(kFrames));
     const auto frames = write_path(model, path, args.output, terminal.begin("render"), args.fill);
     terminal.end(std::to_string(path.size()) + " frames");
-    if (args.common.json) std::cout << json_text(frames_to_json(frames)) << "\n";
+    if (args.common.json) print_report(frames_to_json(frames));
     return;
   }
   std::vector<int> views(model.scene.views.size());
@@ -65,7 +64,7 @@ void run_render(const RenderArgs& args) {
   if (!args.views.empty()) views = select_views(model.scene, args.views);
   const auto written = write_views(model, views, args.output, terminal.begin("render"), args.fill);
   terminal.end(std::to_string(views.size()) + " views");
-  if (args.common.json) std::cout << json_text(views_to_json(written)) << "\n";
+  if (args.common.json) print_report(views_to_json(written));
 }
 
 }  // namespace

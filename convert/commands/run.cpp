@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <chrono>
-#include <iostream>
 #include <memory>
 #include <string>
 
@@ -12,12 +11,13 @@
 #include "convert/report/report_frame.h"
 #include "convert/report/report_surface.h"
 #include "convert/run/budget.h"
+#include "convert/run/forecast.h"
 #include "convert/run/pipeline.h"
 #include "convert/run/preview.h"
 #include "convert/run/verification.h"
 #include "convert/text/frame_json.h"
 #include "convert/text/length.h"
-#include "io/bytes/json_file.h"
+#include "convert/text/report_json.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -27,6 +27,7 @@ namespace {
 struct RunArgs : RunArguments {
   bool preview = false;
   bool no_preview = false;
+  bool dry_run = false;
 };
 
 // One paragraph a user reads after a run: what was made, how far to trust it, what to open.
@@ -63,9 +64,15 @@ void run_run(const RunArgs& args) {
   Terminal terminal(args.common.quiet, args.common.strict);
   const auto start = std::chrono::steady_clock::now();
   const double budget = stated_budget(args);
+  if (args.dry_run) {
+    const nlohmann::ordered_json found = forecast(request, terminal);
+    if (args.common.json) print_report(found);
+    terminal.say(forecast_words(found));
+    return;
+  }
   if (args.preview) {
     const nlohmann::ordered_json report = write_preview(request, terminal);
-    if (args.common.json) std::cout << json_text(report) << "\n";
+    if (args.common.json) print_report(report);
     terminal.say("preview: " + preview_words(report));
     terminal.say("open " + (request.output / kPreviewFolder / "report.html").string());
     return;
@@ -77,7 +84,7 @@ void run_run(const RunArgs& args) {
     first_look = [&](const OpenedScene& opened) { look_first(request, opened, terminal); };
   }
   const nlohmann::ordered_json report = run_pipeline(request, terminal, first_look).report;
-  if (args.common.json) std::cout << json_text(report) << "\n";
+  if (args.common.json) print_report(report);
   say_summary(report, args, terminal);
   if (budget > 0) {
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
@@ -112,6 +119,12 @@ void add_run(CLI::App& app) {
          args->no_preview,
          "No such look before a run that takes minutes; default: OUT/preview is written first")
       ->excludes("--preview");
+  cmd->add_flag("--dry-run",
+                args->dry_run,
+                "Say which photographs would be used, and what memory and disk a run would take; "
+                "with --json for schedulers. Nothing is made, but cameras that are solved for stay")
+      ->excludes("--preview")
+      ->excludes("--budget");
   cmd->footer(
       "Example: cgs run photos/portal --views 1,10,19 -o out/portal\n"
       "         cgs run photos/portal --preview -o out/portal\n"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cstdio>
-#include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,10 +9,12 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/scene/scene_request.h"
+#include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/json_file.h"
 #include "io/bytes/scene_path.h"
+#include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/view_groups.h"
 
@@ -36,12 +37,12 @@ std::string group_name(size_t i, size_t count) {
   return "group_" + std::string(std::to_string(count).size() - number.size(), '0') + number;
 }
 
-std::vector<std::string> names_of(const std::vector<int>& views, const Scene& scene) {
-  std::vector<std::string> out;
-  for (const int i : views) {
-    out.push_back(scene.views[static_cast<size_t>(i)].name);
-    if (out.back().find(',') == std::string::npos) continue;
-    throw InvalidInput("photograph " + printable(out.back()) +
+// Names as --views takes them.
+std::vector<std::string> listable_names(const std::vector<int>& views, const Scene& scene) {
+  std::vector<std::string> out = view_names(scene, views);
+  for (const std::string& name : out) {
+    if (name.find(',') == std::string::npos) continue;
+    throw InvalidInput("photograph " + printable(name) +
                        " has a comma in its name, which ends a name in --views; rename it");
   }
   return out;
@@ -51,8 +52,8 @@ Json groups_json(const std::vector<ViewGroup>& groups, const SplitArgs& args, co
   Json out = {{"scene", args.scene.path.string()}, {"size", args.size}, {"groups", Json::array()}};
   for (size_t i = 0; i < groups.size(); ++i) {
     out["groups"].push_back({{"name", group_name(i, groups.size())},
-                             {"views", names_of(groups[i].all, scene)},
-                             {"own", names_of(groups[i].own, scene)}});
+                             {"views", listable_names(groups[i].all, scene)},
+                             {"own", listable_names(groups[i].own, scene)}});
   }
   return out;
 }
@@ -76,7 +77,7 @@ void write_groups(const Json& groups, const OpenedScene& opened, const SplitArgs
     write_file(folder / "views.txt", listed(group["views"]) + "\n");
   }
   // Last: where it is, all is.
-  write_file(args.output / "groups.json", json_text(groups) + "\n");
+  write_file(args.output / "groups.json", json_text(versioned(groups)) + "\n");
 }
 
 void run_split(const SplitArgs& args) {
@@ -91,7 +92,7 @@ void run_split(const SplitArgs& args) {
   const Json groups = groups_json(group_views(opened.scene, args.size), args, opened.scene);
   make_output_folder(args.output);
   write_groups(groups, opened, args);
-  if (args.common.json) std::cout << json_text(groups) << "\n";
+  if (args.common.json) print_report(groups);
   for (const Json& group : groups["groups"]) {
     terminal.say(group["name"].get<std::string>() + ": " + std::to_string(group["views"].size()) +
                  " photographs, " + std::to_string(group["own"].size()) + " of them its own");

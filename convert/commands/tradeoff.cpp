@@ -10,8 +10,8 @@
 #include "convert/commands/common_options.h"
 #include "convert/measure/measured_file.h"
 #include "convert/text/length.h"
+#include "convert/text/report_json.h"
 #include "convert/tradeoff/tradeoff_report.h"
-#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -61,7 +61,7 @@ void run_tradeoff(const TradeoffArgs& args) {
       recommend(figures_of(report.tradeoff), report.wants, report.tradeoff.noise);
   write_tradeoff(request.output, report);
   if (args.common.json) {
-    std::cout << json_text(tradeoff_json(report)) << "\n";
+    print_report(tradeoff_json(report));
   } else {
     std::cout << tradeoff_text(report);
   }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <iostream>
 #include <memory>
 
 #include <nlohmann/json.hpp>
@@ -11,6 +10,7 @@
 #include "convert/model/model_training.h"
 #include "convert/scene/marker_bars.h"
 #include "convert/scene/scene_request.h"
+#include "convert/text/report_json.h"
 #include "convert/text/stated_frame.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/json_file.h"
@@ -104,14 +104,14 @@ void run_train(const TrainArgs& args) {
   if (scale.is_object()) scale["metres_sigma"] = frame.metres_sigma;
   if (frame.has_metric_scale()) (void)restate_frame(args.output, trained.model);
   report["scale"] = scale;
-  write_file(args.output / "training.json", json_text(report) + "\n");
+  write_file(args.output / "training.json", json_text(versioned(report)) + "\n");
   forget_checkpoints(args.output);
   const size_t count = trained.model.gaussians.size();
   report["seconds"] = terminal.end(std::to_string(count) + " Gaussians");
   const std::string& depth = trained.priors.given.found;
   if (!depth.empty()) terminal.say("depth files: " + depth);
   for (const std::string& remark : remarks_on_photographs(report)) terminal.say(remark);
-  if (args.common.json) std::cout << json_text(report) << "\n";
+  if (args.common.json) print_report(report);
   terminal.warn(found);
   terminal.warn(checkpoint_warnings);
 }

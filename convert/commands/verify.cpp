@@ -7,8 +7,8 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/run/verification.h"
+#include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
-#include "io/bytes/json_file.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -35,10 +35,8 @@ void run_verify(const VerifyArgs& args) {
   limit_threads(args.common.threads);
   const Verification found = found_by(args);
   if (args.common.json) {
-    std::cout << json_text(nlohmann::ordered_json{{"inputs", found.inputs},
-                                                  {"outputs", found.outputs},
-                                                  {"differing", found.differing}})
-              << "\n";
+    print_report(
+        {{"inputs", found.inputs}, {"outputs", found.outputs}, {"differing", found.differing}});
   } else {
     for (const std::string& line : found.differing) std::cout << one_line(line) << "\n";
     if (args.other.empty()) std::cout << found.inputs << " inputs and ";

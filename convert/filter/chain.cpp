@@ -12,6 +12,7 @@
 
 #include "convert/filter/operations.h"
 #include "convert/text/closest_name.h"
+#include "convert/text/figures.h"
 #include "io/bytes/mesh_arrays.h"
 #include "libcgs/core/error.h"
 
@@ -56,7 +57,7 @@ Tally tally(const FilterState& state) {
 Json tally_json(const Tally& tally) {
   Json area = Json::object();
   for (const Provenance label : kProvenanceOrder) {
-    area[std::string(provenance_name(label))] = tally.area.at(static_cast<size_t>(label));
+    area[provenance_key(label)] = tally.area.at(static_cast<size_t>(label));
   }
   if (!tally.states_provenance) area = nullptr;
   return {{"vertices", tally.vertices}, {"faces", tally.faces}, {"area", area}};

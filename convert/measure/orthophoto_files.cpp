@@ -15,6 +15,7 @@
 #include "convert/model/memory_plan.h"
 #include "convert/text/frame_json.h"
 #include "convert/text/length.h"
+#include "convert/text/report_json.h"
 #include "convert/text/stated_frame.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/json_file.h"
@@ -257,7 +258,7 @@ std::string description_of(Json report, const std::vector<std::filesystem::path>
   report["files"] = Json::array();
   for (const auto& file : files) report["files"].push_back(file.filename().string());
   report["provenance_colors"] = provenance_colors_json();
-  return json_text(report) + "\n";
+  return json_text(versioned(report)) + "\n";
 }
 
 // All files appear together, once all could be encoded and written, so that no picture is left

@@ -27,6 +27,7 @@
 #include "convert/run/web_splats.h"
 #include "convert/scene/marker_bars.h"
 #include "convert/text/frame_json.h"
+#include "convert/text/report_json.h"
 #include "convert/text/stated_frame.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/json_file.h"
@@ -91,10 +92,9 @@ void refuse_unreadable_images(const Scene& scene) {
 
 // What photographs may be kept in [bytes]: some of what no stage needs.
 size_t spare_memory(const std::vector<StageMemory>& plan, size_t budget) {
-  constexpr size_t kMost = size_t{256} << 20;
   size_t most = 0;
   for (const StageMemory& stage : plan) most = std::max(most, stage.bytes);
-  return std::min(kMost, budget - std::min(budget, most));
+  return std::min(kKeptPhotographs, budget - std::min(budget, most));
 }
 
 Model& loaded_model(Run& run) {
@@ -136,7 +136,7 @@ StageResult run_model(Run& run, const Progress& progress) {
   report["warnings"] = std::vector<std::string>(
       found.begin() + static_cast<std::ptrdiff_t>(run.scene.warnings.size()), found.end());
   write_model(folder, trained.model);
-  write_file(folder / "training.json", json_text(report) + "\n");
+  write_file(folder / "training.json", json_text(versioned(report)) + "\n");
   const GivenDepthReport& given = trained.priors.given;
   std::string remark = given.kind == DepthKind::Unknown ? "" : "depth files: " + given.found;
   for (const std::string& words : remarks_on_photographs(report)) {
@@ -265,7 +265,7 @@ StageResult run_report(Run& run, const Progress& progress) {
   loaded_model(run);
   report(progress, 0);
   const Json json = report_json(run);
-  write_file(run.request.output / "report.json", json_text(json) + "\n");
+  write_file(run.request.output / "report.json", json_text(versioned(json)) + "\n");
   const std::string viewer = viewer_section(loaded_model(run), loaded_mesh(run), progress);
   write_html_report(run.request.output, json, run.model->scene, viewer);
   return {Json{{"pages", 1}}};

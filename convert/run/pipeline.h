@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <utility>
 #include <vector>
@@ -18,6 +19,9 @@ struct FinishedRun {
   nlohmann::ordered_json report;                  ///< The content of OUT/report.json.
   std::vector<std::pair<Stage, double>> seconds;  ///< That stages took, whichever run did them.
 };
+
+/// What a run keeps photographs in at most, beside its stages, where there is room [bytes].
+inline constexpr size_t kKeptPhotographs = size_t{256} << 20;
 
 /// What to do with the scene of a run before its first stage.
 using FirstLook = std::function<void(const OpenedScene&)>;

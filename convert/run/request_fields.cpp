@@ -11,6 +11,7 @@
 #include "io/bytes/json_file.h"
 #include "io/scenes/depth_file.h"
 #include "io/scenes/lens.h"
+#include "io/scenes/view_names.h"
 
 namespace cgs {
 
@@ -133,12 +134,6 @@ RequestField stating_scale(RequestField field) {
   return field;
 }
 
-Json names_of(const Scene& scene, const std::vector<int>& views) {
-  Json out = Json::array();
-  for (const int i : views) out.push_back(scene.views[static_cast<size_t>(i)].name);
-  return out;
-}
-
 // Hashes of the photographs and masks of views.
 Json photograph_hashes(const Scene& scene, const std::vector<int>& views) {
   Json out = Json::object();
@@ -226,7 +221,7 @@ std::vector<RequestField> found_in_scene() {
            }},
           {"held_out",
            Stage::Model,
-           [](const RunRequest&, const Scene& scene) { return names_of(scene, scene.held_out); }},
+           [](const RunRequest&, const Scene& scene) { return view_names(scene, scene.held_out); }},
           {"held_out_images",
            Stage::Views,
            [](const RunRequest&, const Scene& scene) {

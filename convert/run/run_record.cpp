@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/byte_reader.h"
@@ -209,6 +210,8 @@ void RunRecord::note(const std::string& key, const Json& value) {
   save();
 }
 
-void RunRecord::save() const { write_file(folder_ / "run.json", json_text(json_) + "\n"); }
+void RunRecord::save() const {
+  write_file(folder_ / "run.json", json_text(versioned(json_)) + "\n");
+}
 
 }  // namespace cgs

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "convert/text/html.h"
+#include "convert/text/report_json.h"
 #include "convert/tradeoff/pareto.h"
 #include "convert/tradeoff/scatter_plot.h"
 #include "io/bytes/atomic_file.h"
@@ -370,7 +371,7 @@ void write_tradeoff(const std::filesystem::path& folder, const TradeoffReport& r
   const std::string svg = plots_svg(report.tradeoff);
   const std::string title =
       escaped("Speed against accuracy: " + folder_name(report.tradeoff.scene.folder));
-  write_file(folder / "tradeoff.json", json_text(tradeoff_json(report)) + "\n");
+  write_file(folder / "tradeoff.json", json_text(versioned(tradeoff_json(report))) + "\n");
   write_file(folder / "tradeoff.svg", svg);
   write_file(folder / "tradeoff.html",
              "<!doctype html>\n<html lang=en><head><meta charset=utf-8>"

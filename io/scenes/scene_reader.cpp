@@ -231,6 +231,17 @@ std::vector<int> some_views(const Scene& scene, const std::vector<int>& usable) 
   return out.empty() ? llff_protocol(usable) : out;
 }
 
+// Which of many photographs are used, and why not all.
+std::string choice_words(const Scene& scene, size_t usable) {
+  const std::string count = std::to_string(scene.input.size()) + " of " + std::to_string(usable) +
+                            " photographs are used: ";
+  if (scene.kind == SceneKind::Llff) return count + "those of the protocol that papers follow";
+  const bool is_bounded = scene.input.size() < most_inputs(usable);
+  return count + "those that show the most together" +
+         (is_bounded ? ", as many as take some five minutes" : "") +
+         "; the others tell how good it is";
+}
+
 void choose_views(Scene& scene, const std::string& list, bool all_views) {
   constexpr size_t kMostHeldOut = 24;
   const std::vector<int> usable = views_with_files(scene);
@@ -249,6 +260,7 @@ void choose_views(Scene& scene, const std::string& list, bool all_views) {
   } else {
     const bool takes_all = all_views || usable.size() <= kTakeAll;
     scene.input = takes_all ? usable : some_views(scene, usable);
+    if (!takes_all) scene.notes.push_back(choice_words(scene, usable.size()));
   }
   if (scene.input.size() < 2) throw BadInput(Defect::Empty, scene.folder, "need at least 2 views");
   std::vector<int> others;

@@ -157,4 +157,10 @@ std::vector<int> select_views(const Scene& scene, const std::string& list) {
   return out;
 }
 
+std::vector<std::string> view_names(const Scene& scene, const std::vector<int>& views) {
+  std::vector<std::string> out;
+  for (const int i : views) out.push_back(scene.views[static_cast<size_t>(i)].name);
+  return out;
+}
+
 }  // namespace cgs

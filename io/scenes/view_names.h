@@ -13,6 +13,10 @@ namespace cgs {
 /// begin the names of output files.
 void name_views(Scene& scene);
 
+/// The names of views.
+/// \param views  indices into scene.views
+std::vector<std::string> view_names(const Scene& scene, const std::vector<int>& views);
+
 /// The first few names, separated by commas, for messages.
 std::string first_few(const std::vector<std::string>& names);
 

@@ -79,6 +79,26 @@ TEST(Preview, OfARunShowsItsPhotographs) {
   EXPECT_EQ(report["model"]["depth_of_views"].size(), 2U);
 }
 
+TEST(DryRun, ForetellsWhatARunTakesAndMakesNothing) {
+  const TempDir dir;
+  const std::string scene = test::portal_capture(3).string();
+  const auto foretold = [&](const std::string& more) {
+    const test::ProgramResult run =
+        test::run_cgs("run " + scene + more + " --dry-run --json -o " + (dir / "out").string());
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return nlohmann::json::parse(run.out);
+  };
+  const nlohmann::json small = foretold(" --views view_01,view_02 --threads 1");
+  EXPECT_EQ(small["input"], nlohmann::json({"view_01", "view_02"}));
+  EXPECT_EQ(small["held_out"].size(), 6U);
+  EXPECT_EQ(small["pixels"], 2 * 168 * 126);
+  EXPECT_EQ(small["threads"], 1);
+  const nlohmann::json large = foretold(" --use-all");
+  EXPECT_GT(large["most_memory"], small["most_memory"]);
+  EXPECT_GT(large["disk"], small["disk"]);
+  EXPECT_FALSE(fs::exists(dir / "out"));
+}
+
 TEST(Preview, ExcludesWhatItChooses) {
   const TempDir dir;
   const test::ProgramResult run = preview(dir / "out", " --downscale 2");

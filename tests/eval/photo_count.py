@@ -5,6 +5,8 @@ on the same held-out ones, and prints a table.
 
 usage: photo_count.py PROGRAM SCENE OUT COUNT... [-- OPTION...]
 
+It also draws OUT/photo_count.svg, where Matplotlib is installed.
+
   tests/eval/photo_count.py build/release/bin/cgs fox out/fox 3 6 12 24 -- --downscale 4
 
 Every eighth photograph by name, from the first, is held out. Of the others, COUNT are taken, evenly
@@ -69,7 +71,13 @@ def row(program, scene, inputs, held_out, out, options):
     training = json.loads((out / "training.json").read_text())
     depth = training["depth_of_views"]
     measured = sum(view["with_evidence"] for view in depth) / len(depth)
-    return [
+    figures = {
+        "photographs": len(inputs),
+        "psnr": mean["psnr"],
+        "measured": measured,
+        "seconds": found["seconds"],
+    }
+    return figures, [
         str(len(inputs)),
         f"{mean['psnr']:.2f} dB / {mean['ssim']:.3f}",
         f"{mean['psnr_seen']:.2f} dB",
@@ -79,6 +87,34 @@ def row(program, scene, inputs, held_out, out, options):
         f"{found['seconds']:.0f}",
         f"{found['memory']:.0f} MiB",
     ]
+
+
+def draw(rows, path):
+    """Decibels, share measured and processor seconds over the number of photographs."""
+    try:
+        import matplotlib
+    except ImportError:
+        print("no plot: Matplotlib is not installed", file=sys.stderr)
+        return
+    matplotlib.use("svg")
+    matplotlib.rcParams["svg.hashsalt"] = "cgs"  # the same bytes every time
+    from matplotlib import pyplot
+
+    counts = [row["photographs"] for row in rows]
+    panels = [
+        ("PSNR of held-out photographs [dB]", [row["psnr"] for row in rows]),
+        ("measured share of the input pixels [%]", [100 * row["measured"] for row in rows]),
+        ("processor seconds", [row["seconds"] for row in rows]),
+    ]
+    figure, axes = pyplot.subplots(1, len(panels), figsize=(10, 3), layout="constrained")
+    for axis, (title, values) in zip(axes, panels):
+        axis.plot(counts, values, "o-", color="#1f6fb5")
+        axis.set(title=title, xlabel="photographs", xscale="log", xticks=counts, xticklabels=counts)
+        axis.set_ylim(bottom=0)
+        axis.title.set_fontsize(9)
+        axis.minorticks_off()
+        axis.grid(color="#d5dae0")
+    figure.savefig(path, metadata={"Date": None})
 
 
 def main(arguments):
@@ -95,10 +131,13 @@ def main(arguments):
     print("| photographs | held out, all pixels | seen | holes | measured | Gaussians "
           "| core-s | memory |")
     print("|---|---|---|---|---|---|---|---|")
+    rows = []
     for count in map(int, arguments[3:split]):
         inputs = spread(others, count)
-        columns = row(program, scene, inputs, held_out, out / str(len(inputs)), options)
+        figures, columns = row(program, scene, inputs, held_out, out / str(len(inputs)), options)
+        rows.append(figures)
         print("| " + " | ".join(columns) + " |", flush=True)
+    draw(rows, out / "photo_count.svg")
     return 0
 
 

@@ -201,6 +201,8 @@ TEST(WriteOrthophoto, LeavesBesideThePicturesWhatTheyMean) {
   // The highest place, by this file alone: the first point of the plane is its zero.
   const std::vector<double> origin = told["origin"];
   EXPECT_NEAR(origin[2] + told["highest"].get<double>(), 300 + 0.25 + 0.3, 0.01);
+  EXPECT_EQ(told["schema_version"], kSchemaVersion);
+  told.erase("schema_version");
   told.erase("files");
   told.erase("provenance_colors");
   returned.erase("files");
