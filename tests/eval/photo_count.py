@@ -5,7 +5,7 @@ on the same held-out ones, and prints a table.
 
 usage: photo_count.py PROGRAM SCENE OUT COUNT... [-- OPTION...]
 
-It also draws OUT/photo_count.svg, where Matplotlib is installed.
+It also draws OUT/photo_count.svg, where there are two COUNTs or more.
 
   tests/eval/photo_count.py build/release/bin/cgs fox out/fox 3 6 12 24 -- --downscale 4
 
@@ -18,6 +18,7 @@ Gaussians; processor seconds and memory of the training with depth.
 """
 
 import json
+import math
 import resource
 import subprocess
 import sys
@@ -89,32 +90,46 @@ def row(program, scene, inputs, held_out, out, options):
     ]
 
 
+def panel(title, counts, values, left):
+    """A curve over the number of photographs, whose axis is logarithmic; the other begins at zero."""
+    width, height, top = 240, 150, 30
+    first, last = math.log(counts[0]), math.log(counts[-1])
+    most = max(values)
+    points = [
+        (left + width * (math.log(count) - first) / (last - first), top + height * (1 - value / most))
+        for count, value in zip(counts, values)
+    ]
+    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+    parts = [
+        f'<text x="{left}" y="16">{title}</text>',
+        f'<path d="M{left} {top}V{top + height}H{left + width}" fill="none" stroke="#75808c"/>',
+        f'<polyline points="{line}" fill="none" stroke="#1f6fb5" stroke-width="2"/>',
+    ]
+    for (x, y), count, value in zip(points, counts, values):
+        parts += [
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="#1f6fb5"/>',
+            f'<text x="{x:.1f}" y="{y - 8:.1f}" text-anchor="middle">{value:.3g}</text>',
+            f'<text x="{x:.1f}" y="{top + height + 16}" text-anchor="middle">{count}</text>',
+        ]
+    return parts
+
+
 def draw(rows, path):
     """Decibels, share measured and processor seconds over the number of photographs."""
-    try:
-        import matplotlib
-    except ImportError:
-        print("no plot: Matplotlib is not installed", file=sys.stderr)
-        return
-    matplotlib.use("svg")
-    matplotlib.rcParams["svg.hashsalt"] = "cgs"  # the same bytes every time
-    from matplotlib import pyplot
-
     counts = [row["photographs"] for row in rows]
     panels = [
-        ("PSNR of held-out photographs [dB]", [row["psnr"] for row in rows]),
-        ("measured share of the input pixels [%]", [100 * row["measured"] for row in rows]),
+        ("held out, all pixels [dB]", [row["psnr"] for row in rows]),
+        ("measured of the inputs [%]", [100 * row["measured"] for row in rows]),
         ("processor seconds", [row["seconds"] for row in rows]),
     ]
-    figure, axes = pyplot.subplots(1, len(panels), figsize=(10, 3), layout="constrained")
-    for axis, (title, values) in zip(axes, panels):
-        axis.plot(counts, values, "o-", color="#1f6fb5")
-        axis.set(title=title, xlabel="photographs", xscale="log", xticks=counts, xticklabels=counts)
-        axis.set_ylim(bottom=0)
-        axis.title.set_fontsize(9)
-        axis.minorticks_off()
-        axis.grid(color="#d5dae0")
-    figure.savefig(path, metadata={"Date": None})
+    parts = [
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 890 210" font-size="12" '
+        'font-family="system-ui, sans-serif" fill="#1d2733">',
+        '<rect width="890" height="210" fill="#ffffff"/>',
+    ]
+    for i, (title, values) in enumerate(panels):
+        parts += panel(title, counts, values, 20 + 295 * i)
+    path.write_text("\n".join(parts + ["</svg>"]) + "\n")
 
 
 def main(arguments):
@@ -137,7 +152,8 @@ def main(arguments):
         figures, columns = row(program, scene, inputs, held_out, out / str(len(inputs)), options)
         rows.append(figures)
         print("| " + " | ".join(columns) + " |", flush=True)
-    draw(rows, out / "photo_count.svg")
+    if len(rows) > 1:
+        draw(rows, out / "photo_count.svg")
     return 0
 
 

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "convert/text/report_json.h"
 #include "libcgs/core/error.h"
 #include "tests/support/solid_meshes.h"
 #include "tests/support/temp_dir.h"
