@@ -231,15 +231,16 @@ std::vector<int> some_views(const Scene& scene, const std::vector<int>& usable) 
   return out.empty() ? llff_protocol(usable) : out;
 }
 
-// Which of many photographs are used, and why not all.
+// Which of many photographs are used, and why no more; empty where all but those held out are.
 std::string choice_words(const Scene& scene, size_t usable) {
-  const std::string count = std::to_string(scene.input.size()) + " of " + std::to_string(usable) +
-                            " photographs are used: ";
-  if (scene.kind == SceneKind::Llff) return count + "those of the protocol that papers follow";
-  const bool is_bounded = scene.input.size() < most_inputs(usable);
-  return count + "those that show the most together" +
-         (is_bounded ? ", as many as take some five minutes" : "") +
-         "; the others tell how good it is";
+  if (scene.input.size() >= most_inputs(usable)) return {};
+  const std::string count = std::to_string(scene.input.size()) + " of " + std::to_string(usable);
+  if (scene.kind == SceneKind::Llff) {
+    return count + " photographs are used: those of the protocol that papers follow";
+  }
+  return count +
+         " photographs are used: those that show the most together, as many as take some five "
+         "minutes; the others tell how good it is";
 }
 
 void choose_views(Scene& scene, const std::string& list, bool all_views) {
@@ -260,7 +261,8 @@ void choose_views(Scene& scene, const std::string& list, bool all_views) {
   } else {
     const bool takes_all = all_views || usable.size() <= kTakeAll;
     scene.input = takes_all ? usable : some_views(scene, usable);
-    if (!takes_all) scene.notes.push_back(choice_words(scene, usable.size()));
+    const std::string words = choice_words(scene, usable.size());
+    if (!words.empty()) scene.notes.push_back(words);
   }
   if (scene.input.size() < 2) throw BadInput(Defect::Empty, scene.folder, "need at least 2 views");
   std::vector<int> others;
