@@ -51,17 +51,18 @@ void refuse_depth_options(const DepthFusionRequest& request) {
   }
 }
 
-std::string files_refused(const FuseArgs& args) {
-  for (const std::filesystem::path& input : args.inputs) {
+void refuse_other_than_models(const std::vector<std::filesystem::path>& inputs) {
+  for (const std::filesystem::path& input : inputs) {
     if (lower_extension(input) != ".vdb") continue;
-    return printable(input) +
-           " is a volume, which does not tell how surely its free space is free; give the models "
-           "that the volumes were made of: they are fused into one as if they were one model";
+    throw InvalidInput(
+        printable(input) +
+        " is a volume, which does not tell how surely its free space is free; give the models "
+        "that the volumes were made of: they are fused into one as if they were one model");
   }
-  for (const std::filesystem::path& input : args.inputs) {
-    if (!is_model(input)) return printable(input) + " is no model; only models are fused together";
+  for (const std::filesystem::path& input : inputs) {
+    if (is_model(input)) continue;
+    throw InvalidInput(printable(input) + " is no model; only models are fused together");
   }
-  return {};
 }
 
 void print_json(const FuseArgs& args,
@@ -90,15 +91,17 @@ void fuse_one_model(const FuseArgs& args, Terminal& terminal) {
 }
 
 void fuse_several_models(const FuseArgs& args, Terminal& terminal) {
-  const std::string refused = files_refused(args);
-  if (!refused.empty()) throw InvalidInput(refused);
+  refuse_other_than_models(args.inputs);
   refuse_depth_options(args.request);
+  const auto read = [&](size_t i) {
+    return std::make_shared<const Model>(read_model(args.inputs[i]));
+  };
+  std::shared_ptr<const Model> first = read(0);  // tells what lengths mean, and is handed on once
+  const ModelFusion request = model_fusion(args, first->scene.frame);
   const ModelSource source = {args.inputs.size(), [&](size_t i) {
-                                return std::make_shared<const Model>(read_model(args.inputs[i]));
+                                return i == 0 && first ? std::exchange(first, nullptr) : read(i);
                               }};
-  const Frame first = read_model(args.inputs.front()).scene.frame;
-  const JoinedVolume joined =
-      fuse_models(source, model_fusion(args, first), terminal.begin("fuse"));
+  const JoinedVolume joined = fuse_models(source, request, terminal.begin("fuse"));
   write_volume(args.output, joined.fused.volume, joined.frame);
   terminal.end(std::to_string(joined.photographs) + " photographs of " +
                std::to_string(args.inputs.size()) + " models, " +

@@ -63,7 +63,7 @@ Json photographs_json(Scene& scene) {
   used.insert(used.end(), scene.held_out.begin(), scene.held_out.end());
   std::sort(used.begin(), used.end());
   std::vector<PhotoQuality> quality(used.size());
-  std::vector<std::vector<std::string>> ignored(used.size());  // told when the cameras are checked
+  std::vector<std::vector<std::string>> ignored(used.size());  // of odd pixels: training tells
   tbb::parallel_for(size_t{0}, used.size(), [&](size_t k) {
     quality[k] = photo_quality(loaded_view(scene, used[k], true, ignored[k]).image);
   });

@@ -41,7 +41,7 @@ std::string group_name(size_t i, size_t count) {
 std::vector<std::string> listable_names(const std::vector<int>& views, const Scene& scene) {
   std::vector<std::string> out = view_names(scene, views);
   for (const std::string& name : out) {
-    if (name.find(',') == std::string::npos) continue;
+    if (is_listable(name)) continue;
     throw InvalidInput("photograph " + printable(name) +
                        " has a comma in its name, which ends a name in --views; rename it");
   }
@@ -58,12 +58,6 @@ Json groups_json(const std::vector<ViewGroup>& groups, const SplitArgs& args, co
   return out;
 }
 
-std::string listed(const Json& names) {
-  std::string out;
-  for (const Json& name : names) out += (out.empty() ? "" : ",") + name.get<std::string>();
-  return out;
-}
-
 void refuse_to_replace(const std::filesystem::path& output) {
   if (!is_present(output / "groups.json")) return;
   throw InvalidInput(printable(output) + " holds the groups of a scene; choose another folder");
@@ -74,7 +68,7 @@ void write_groups(const Json& groups, const OpenedScene& opened, const SplitArgs
     const std::filesystem::path folder = args.output / group["name"].get<std::string>();
     make_output_folder(folder / "model");
     opened.keep(folder / "model");
-    write_file(folder / "views.txt", listed(group["views"]) + "\n");
+    write_file(folder / "views.txt", view_list(group["views"]) + "\n");
   }
   // Last: where it is, all is.
   write_file(args.output / "groups.json", json_text(versioned(groups)) + "\n");

@@ -6,11 +6,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/memory_plan.h"
 #include "convert/model/model_training.h"
 #include "convert/run/pipeline.h"
 #include "convert/run/small_run.h"
 #include "convert/text/html.h"
 #include "io/bytes/scene_path.h"
+#include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -38,14 +40,11 @@ int preview_reduction(const Scene& full) {
 
 // The views that a run uses as --views names them. Empty = as it chooses by itself.
 std::string views_of_run(const RunRequest& request, const Scene& scene) {
-  if (!request.scene.options.views.empty()) return request.scene.options.views;
-  std::string out;
-  for (const int i : scene.input) {
-    const std::string& name = scene.views[static_cast<size_t>(i)].name;
-    if (name.find(',') != std::string::npos) return {};
-    out += (out.empty() ? "" : ",") + name;
-  }
-  return request.scene.options.all_views ? std::string() : out;
+  const SceneOptions& options = request.scene.options;
+  if (options.all_views || !options.views.empty()) return options.views;
+  const std::vector<std::string> names = view_names(scene, scene.input);
+  const bool are_listable = std::all_of(names.begin(), names.end(), &is_listable);
+  return are_listable ? view_list(names) : std::string();
 }
 
 // Of the same views; the cameras must be stored.
@@ -106,13 +105,8 @@ Json write_preview(const RunRequest& request, Terminal& terminal) {
 }
 
 bool is_worth_a_preview(const Scene& scene, const Scene& full) {
-  constexpr int64_t kManyPixels = 800'000;  // of all input views: more than a minute
-  int64_t pixels = 0;
-  for (const int i : scene.input) {
-    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
-    pixels += int64_t{camera.width} * camera.height;
-  }
-  return pixels >= kManyPixels &&
+  constexpr double kManyPixels = 8e5;  // of all input views: more than a minute
+  return pixels_of(scene, scene.input) >= kManyPixels &&
          2 * longest_side(full) <= longest_side(scene) * preview_reduction(full);
 }
 

@@ -71,7 +71,6 @@ std::vector<std::string> names_of(const SceneRoot& root, const std::string& view
 
 // The same views among those that could be placed. \throws InvalidInput if one could not
 std::string placed_views(const std::vector<std::string>& names, const ColmapModel& model) {
-  std::string out;
   for (const std::string& name : names) {
     const bool is_placed =
         std::any_of(model.images.begin(), model.images.end(), [&](const ColmapImage& image) {
@@ -81,13 +80,12 @@ std::string placed_views(const std::vector<std::string>& names, const ColmapMode
       throw InvalidInput("--views: photograph " + printable(name) +
                          " could not be placed: too little of what it shows is in the others");
     }
-    if (name.find(',') != std::string::npos) {
+    if (!is_listable(name)) {
       throw InvalidInput("--views: photograph " + printable(name) +
                          " has a comma in its name, which ends a name there; rename it");
     }
-    out += (out.empty() ? "" : ",") + name;
   }
-  return out;
+  return view_list(names);
 }
 
 }  // namespace

@@ -157,6 +157,14 @@ std::vector<int> select_views(const Scene& scene, const std::string& list) {
   return out;
 }
 
+bool is_listable(const std::string& name) { return name.find(',') == std::string::npos; }
+
+std::string view_list(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) out += (out.empty() ? "" : ",") + name;
+  return out;
+}
+
 std::vector<std::string> view_names(const Scene& scene, const std::vector<int>& views) {
   std::vector<std::string> out;
   for (const int i : views) out.push_back(scene.views[static_cast<size_t>(i)].name);

@@ -41,4 +41,11 @@ int find_view(const Scene& scene, const std::string& word, const std::string& op
 /// \throws InvalidInput for a view that does not exist or is named twice
 std::vector<int> select_views(const Scene& scene, const std::string& list);
 
+/// Whether such a list can hold the name: a comma ends a name there.
+bool is_listable(const std::string& name);
+
+/// Such a list of names.
+/// \pre is_listable() of each
+std::string view_list(const std::vector<std::string>& names);
+
 }  // namespace cgs

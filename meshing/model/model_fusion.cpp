@@ -69,6 +69,7 @@ struct Witness {
   std::string name;
   Eigen::Isometry3d world_from_cam;
   size_t measured = 0;  // pixels
+  bool is_in_several = false;
 };
 
 size_t measured_pixels(const ViewPriors& priors) {
@@ -92,27 +93,23 @@ bool is_same_photograph(const Witness& a, const Witness& b, double extent) {
 
 // Keeps the one of each photograph that measured the most; the first of equals.
 // \param extent  of what one model shows [world]
-// \return how many photographs were in several models
-size_t keep_best_witnesses(std::vector<Witness>& witnesses, double extent) {
+void keep_best_witnesses(std::vector<Witness>& witnesses, double extent) {
   std::vector<Witness> kept;
-  std::vector<bool> is_in_several;
   for (Witness& witness : witnesses) {
     const auto same = std::find_if(kept.begin(), kept.end(), [&](const Witness& other) {
       return other.model != witness.model && is_same_photograph(other, witness, extent);
     });
     if (same == kept.end()) {
       kept.push_back(std::move(witness));
-      is_in_several.push_back(false);
       continue;
     }
-    is_in_several[static_cast<size_t>(same - kept.begin())] = true;
     if (witness.measured > same->measured) *same = std::move(witness);
+    same->is_in_several = true;
   }
   std::stable_sort(kept.begin(), kept.end(), [](const Witness& a, const Witness& b) {
     return std::pair(a.model, a.input) < std::pair(b.model, b.input);
   });
   witnesses = std::move(kept);
-  return static_cast<size_t>(std::count(is_in_several.begin(), is_in_several.end(), true));
 }
 
 void check_units(const Frame& first, const Frame& other, size_t model) {
@@ -201,8 +198,10 @@ JoinedVolume fuse_models(const ModelSource& source,
     }
     report(progress, 0.1 * static_cast<double>(i + 1) / static_cast<double>(source.count));
   }
-  out.in_several = keep_best_witnesses(witnesses, out.frame.scale);
+  keep_best_witnesses(witnesses, out.frame.scale);
   out.photographs = witnesses.size();
+  out.in_several = static_cast<size_t>(std::count_if(
+      witnesses.begin(), witnesses.end(), [](const Witness& w) { return w.is_in_several; }));
   const TsdfSource views = {
       witnesses.size(), [&](size_t i, bool with_color) {
         const Witness& witness = witnesses[i];

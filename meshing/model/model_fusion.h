@@ -37,7 +37,7 @@ FusedVolume fuse_model(const Model& model,
                        const Progress& progress = {});
 
 /// Models of one world, such as groups of the photographs of a large scene, each in a frame of its
-/// own. They are read when they are asked for: up to three times, from several threads.
+/// own. They are read when they are asked for: several times, one at a time, from any thread.
 struct ModelSource {
   size_t count = 0;
   std::function<std::shared_ptr<const Model>(size_t i)> model;
