@@ -29,7 +29,7 @@ struct EvaluateArgs {
 };
 
 void print_table(const nlohmann::ordered_json& report) {
-  std::printf("%-24s %-8s %8s %8s %10s %10s %8s %8s\n",
+  std::printf("%-24s %-8s %8s %8s %10s %10s %8s %8s %6s\n",
               "view",
               "role",
               "PSNR",
@@ -37,10 +37,11 @@ void print_table(const nlohmann::ordered_json& report) {
               "PSNR seen",
               "SSIM seen",
               "holes",
-              "MS-SSIM");
+              "MS-SSIM",
+              "FLIP");
   const auto row =
       [](const std::string& name, const std::string& role, const nlohmann::ordered_json& r) {
-        std::printf("%-24s %-8s %8s %8s %10s %10s %8s %8s\n",
+        std::printf("%-24s %-8s %8s %8s %10s %10s %8s %8s %6s\n",
                     name.c_str(),
                     role.c_str(),
                     number(r["psnr"], "%.2f").c_str(),
@@ -48,7 +49,8 @@ void print_table(const nlohmann::ordered_json& report) {
                     number(r["psnr_seen"], "%.2f").c_str(),
                     number(r["ssim_seen"], "%.3f").c_str(),
                     percent(r["hole_fraction"]).c_str(),
-                    number(r["ms_ssim"], "%.3f").c_str());
+                    number(r["ms_ssim"], "%.3f").c_str(),
+                    number(r["flip"], "%.3f").c_str());
       };
   for (const auto& view : report["views"]) {
     const auto& role = view["role"];
@@ -99,7 +101,7 @@ void run_evaluate(const EvaluateArgs& args) {
 void add_evaluate(CLI::App& app) {
   auto args = std::make_shared<EvaluateArgs>();
   auto* cmd = app.add_subcommand(
-      "evaluate", "PSNR and SSIM on held-out views, over all pixels and without holes");
+      "evaluate", "PSNR, SSIM and FLIP on held-out views, over all pixels and without holes");
   cmd->add_option("model", args->model, "Model folder, e.g. out/portal/model")->required();
   cmd->add_option("--scene", args->scene, "Scene folder, where the photographs have moved");
   cmd->add_option(

@@ -22,6 +22,7 @@
 #include "libcgs/core/exposure.h"
 #include "libcgs/priors/transients.h"
 #include "libcgs/render/picture.h"
+#include "libcgs/train/flip.h"
 #include "libcgs/train/image_metrics.h"
 
 namespace cgs {
@@ -279,6 +280,7 @@ EvaluatedView evaluate_view(const Model& model,
   if (has_any(all)) {
     out.figures.psnr = psnr(shown, photograph, &all);
     out.figures.ssim = ssim(shown, photograph, &all);
+    out.figures.flip = flip(shown, photograph, &all);
   }
   if (share_of(all, everywhere) >= kNearlyWhole) out.figures.ms_ssim = ms_ssim(shown, photograph);
   if (!knows_holes(model)) return out;
@@ -291,13 +293,14 @@ EvaluatedView evaluate_view(const Model& model,
 }
 
 // By their names in reports.
-constexpr std::array<std::pair<const char*, std::optional<double> ViewFigures::*>, 6> kFigures = {
+constexpr std::array<std::pair<const char*, std::optional<double> ViewFigures::*>, 7> kFigures = {
     {{"psnr", &ViewFigures::psnr},
      {"ssim", &ViewFigures::ssim},
      {"psnr_seen", &ViewFigures::psnr_seen},
      {"ssim_seen", &ViewFigures::ssim_seen},
      {"hole_fraction", &ViewFigures::hole_fraction},
-     {"ms_ssim", &ViewFigures::ms_ssim}}};
+     {"ms_ssim", &ViewFigures::ms_ssim},
+     {"flip", &ViewFigures::flip}}};
 
 ViewFigures mean_figures(const std::vector<const EvaluatedView*>& views) {
   ViewFigures mean;

@@ -87,6 +87,7 @@ struct ViewFigures {
   std::optional<double> ssim_seen = {};
   std::optional<double> hole_fraction = {};  ///< Of the pixels that are not masked.
   std::optional<double> ms_ssim = {};
+  std::optional<double> flip = {};  ///< 0 = the same.
 };
 
 struct EvaluatedView {
@@ -104,14 +105,14 @@ struct Evaluation {
   std::vector<EvaluatedView> views;
 };
 
-/// {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}, null for what is empty.
+/// {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim", "flip"}, null for what is empty.
 nlohmann::ordered_json figures_to_json(const ViewFigures& figures);
 /// {"mean": {…}, "every_eighth": {…} or null, "views": [{"name", "role" as of views_to_json(), …,
 /// "exposure"}]}
 nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
 
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
-/// that are not holes, and MS-SSIM over all. Pictures are those of write_views(). Loads the
+/// that are not holes, and MS-SSIM and FLIP over all. Pictures are those of write_views(). Loads the
 /// photographs.
 ///
 /// Where the exposures of input views were matched, the photographs of others are matched to what

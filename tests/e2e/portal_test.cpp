@@ -187,7 +187,8 @@ TEST(Portal, StagesByHandGiveTheFilesOfARun) {
   const auto evaluation = run_cgs("evaluate " + out + "/model -q --json");
   ASSERT_EQ(evaluation.exit_code, 0) << evaluation.err;
   const auto mean = ordered_json::parse(evaluation.out)["mean"];
-  for (const auto* key : {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim"}) {
+  for (const auto* key :
+       {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim", "flip"}) {
     EXPECT_TRUE(mean[key].is_number()) << key;
   }
   for (const auto* file :
