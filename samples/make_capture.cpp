@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Writes the capture of a carved portal, with its truth, that the README, the tests and the
 // evaluation use, or that of a courtyard, which holds what photographs cannot measure, of a vase on
-// a table, photographed from all sides and cut out by masks, or of a long facade.
+// a table, photographed from all sides and cut out by masks, of a long facade, or of a reef at two
+// dates.
 //
-// usage: cgs_make_capture OUT [--scene portal|courtyard|vase|facade] [--downscale N]
-//                             [--views NAME,...]
+// usage: cgs_make_capture OUT [--scene portal|courtyard|vase|facade|reef|reef-later]
+//                             [--downscale N] [--views NAME,...]
 #include <algorithm>
 #include <exception>
 #include <filesystem>
@@ -18,6 +19,7 @@
 #include "samples/capture/courtyard.h"
 #include "samples/capture/facade.h"
 #include "samples/capture/files.h"
+#include "samples/capture/reef.h"
 #include "samples/capture/vase.h"
 
 namespace {
@@ -32,6 +34,11 @@ Planted planted(const std::string& name, int downscale) {
   if (name == "courtyard") return {cgs::courtyard_scene(), cgs::courtyard_views(downscale)};
   if (name == "vase") return {cgs::vase_scene(), cgs::vase_views(downscale), cgs::kVase};
   if (name == "facade") return {cgs::facade_scene(), cgs::facade_views(downscale)};
+  const auto reef = [downscale](cgs::ReefDate date) {
+    return Planted{cgs::reef_scene(date), cgs::reef_views(date, downscale)};
+  };
+  if (name == "reef") return reef(cgs::ReefDate::Earlier);
+  if (name == "reef-later") return reef(cgs::ReefDate::Later);
   return {cgs::portal_scene(), cgs::capture_views(downscale)};
 }
 
@@ -46,8 +53,8 @@ int run(int argc, char** argv) {
          "--scene",
          scene,
          "A carved portal, a courtyard under the sky with glass, a vase from all sides with "
-         "masks, a long facade")
-      ->check(CLI::IsMember({"portal", "courtyard", "vase", "facade"}))
+         "masks, a long facade, a reef at two dates")
+      ->check(CLI::IsMember({"portal", "courtyard", "vase", "facade", "reef", "reef-later"}))
       ->capture_default_str();
   app.add_option("--downscale", downscale, "Divisor of the size 504 x 378")->capture_default_str();
   app.add_option("--views", names, "Only these views (view_01,view_02,...)")->delimiter(',');

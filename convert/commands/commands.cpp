@@ -32,6 +32,7 @@ void add_commands(CLI::App& app) {
   add_filter(app);
   add_measure(app);
   add_compare(app);
+  add_monitor(app);
   add_convert(app);
   add_tradeoff(app);
   add_verify(app);

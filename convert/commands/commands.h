@@ -21,6 +21,7 @@ void add_fuse(CLI::App& app);
 void add_info(CLI::App& app);
 void add_measure(CLI::App& app);
 void add_mesh(CLI::App& app);
+void add_monitor(CLI::App& app);
 void add_next(CLI::App& app);
 void add_render(CLI::App& app);
 void add_run(CLI::App& app);
