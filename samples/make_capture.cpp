@@ -5,11 +5,12 @@
 // dates.
 //
 // usage: cgs_make_capture OUT [--scene portal|courtyard|vase|facade|reef|reef-later]
-//                             [--downscale N] [--views NAME,...]
+//                             [--downscale N] [--views NAME,...] [--water]
 #include <algorithm>
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -58,6 +59,11 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--downscale", downscale, "Divisor of the size 504 x 378")->capture_default_str();
   app.add_option("--views", names, "Only these views (view_01,view_02,...)")->delimiter(',');
+  bool is_under_water = false;
+  app.add_flag("--water",
+               is_under_water,
+               "Photographs are taken through water; capture.json states it, pictures without it "
+               "are truth/VIEW_clear.png");
   CLI11_PARSE(app, argc, argv);
   auto [made, views, only] = planted(scene, downscale);
   const auto inputs = cgs::input_cameras(views);
@@ -71,7 +77,9 @@ int run(int argc, char** argv) {
       return std::find(names.begin(), names.end(), view.name) == names.end();
     });
   }
-  cgs::write_capture(out, made, views, inputs);
+  std::optional<cgs::PlantedWater> water;
+  if (is_under_water) water.emplace();
+  cgs::write_capture(out, made, views, inputs, water);
   if (!only.empty()) cgs::write_masks(out, made, views, only);
   return 0;
 }

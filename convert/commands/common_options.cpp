@@ -10,6 +10,7 @@
 #include <opencv2/core/utility.hpp>
 #include <tbb/global_control.h>
 
+#include "convert/model/water_report.h"
 #include "convert/text/length.h"
 #include "io/bytes/scene_path.h"
 #include "libcgs/core/error.h"
@@ -199,6 +200,17 @@ void add_camera_options(CLI::App& command, SceneRequest& request) {
       "Correct cameras that are slightly off (of phones, from elsewhere) by what the "
       "photographs show; focal lengths, the scale and the first input camera that shares "
       "enough with others stay");
+}
+
+void add_medium_option(CLI::App& command, Medium& medium) {
+  const OptionGroup group(command, "Photographs");
+  command
+      .add_option("--medium",
+                  medium,
+                  "What the photographs were taken through: none (air), or water, which is "
+                  "estimated from what they show of the same surface from nearer and from farther "
+                  "away, and taken out of them; refused where ranges vary too little; default none")
+      ->transform(CLI::CheckedTransformer(media()).description("none, water"));
 }
 
 void add_training_options(CLI::App& command, TrainingArguments& arguments) {

@@ -74,6 +74,9 @@ void add_estimated_option(CLI::App& command, std::optional<EstimatedSurface>& es
 /// --focal and --refine-poses.
 void add_camera_options(CLI::App& command, SceneRequest& request);
 
+/// --medium.
+void add_medium_option(CLI::App& command, Medium& medium);
+
 /// How to train, as typed.
 struct TrainingArguments {
   std::string preset = "standard";

@@ -59,6 +59,9 @@ void print_table(const nlohmann::ordered_json& report) {
   row("mean", "", report["mean"]);
   const auto& eighth = report["every_eighth"];
   if (!eighth.is_null()) row("every eighth, as papers", "", eighth);
+  if (report.contains("through_water")) {
+    std::printf("pictures are rendered through the water that the photographs show\n");
+  }
   const auto& views = report["views"];
   if (std::any_of(
           views.begin(), views.end(), [](const auto& v) { return !v["exposure"].is_null(); })) {

@@ -120,7 +120,7 @@ void run_next(const NextArgs& args) {
   if (!args.output.empty()) {
     std::vector<Camera> cameras;
     for (const NextView& view : ranked) cameras.push_back(view.camera);
-    write_path(model, cameras, args.output, terminal.begin("pictures"), HoleFill::None);
+    write_path(model, cameras, args.output, terminal.begin("pictures"), {HoleFill::None});
     terminal.end("holes in magenta: " + (args.output / "contact.png").string());
   }
   if (args.common.json) {

@@ -27,7 +27,7 @@ struct RenderArgs {
   std::string views;
   std::string path;
   std::optional<int> frames;
-  HoleFill fill = HoleFill::Around;
+  PictureOptions shown;
   CommonOptions common;
 };
 
@@ -38,6 +38,11 @@ void run_render(const RenderArgs& args) {
   keep_apart(args.output, args.model);
   Terminal terminal(args.common.quiet, args.common.strict);
   const Model model = read_model(args.model);
+  if (args.shown.through_water && !model.scene.water) {
+    throw InvalidInput("--water: " + printable(args.model) +
+                       " states no water; it is of photographs that were trained on without "
+                       "--medium water, or that showed none");
+  }
   terminal.warn(model.scene.warnings);
   if (const std::string text = unknown_holes_warning(model); !text.empty()) terminal.warn({text});
   if (!args.path.empty()) {
@@ -54,7 +59,7 @@ void run_render(const RenderArgs& args) {
     const std::vector<Camera> path =
         is_file ? camera_path_from(args.path, model)
                 : camera_path(model, args.path, args.frames.value_or(kFrames));
-    const auto frames = write_path(model, path, args.output, terminal.begin("render"), args.fill);
+    const auto frames = write_path(model, path, args.output, terminal.begin("render"), args.shown);
     terminal.end(std::to_string(path.size()) + " frames");
     if (args.common.json) print_report(frames_to_json(frames));
     return;
@@ -62,7 +67,7 @@ void run_render(const RenderArgs& args) {
   std::vector<int> views(model.scene.views.size());
   std::iota(views.begin(), views.end(), 0);
   if (!args.views.empty()) views = select_views(model.scene, args.views);
-  const auto written = write_views(model, views, args.output, terminal.begin("render"), args.fill);
+  const auto written = write_views(model, views, args.output, terminal.begin("render"), args.shown);
   terminal.end(std::to_string(views.size()) + " views");
   if (args.common.json) print_report(views_to_json(written));
 }
@@ -85,7 +90,10 @@ void add_render(CLI::App& app) {
   path->excludes(views);
   cmd->add_option("--frames", args->frames, "Number of pictures along a path; default 60")
       ->needs(path);
-  add_fill_option(*cmd, args->fill);
+  add_fill_option(*cmd, args->shown.fill);
+  cmd->add_flag("--water",
+                args->shown.through_water,
+                "Put back the water that --medium water took out; default: pictures without it");
   add_output_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs render out/portal/model --views 0,2 -o out/views\n"

@@ -70,11 +70,12 @@ void add_promises(CLI::App& command, RunArguments& args) {
 void add_run_options(CLI::App& command, RunArguments& arguments) {
   add_scene_options(command, arguments.request.scene.options);
   add_camera_options(command, arguments.request.scene);
+  add_medium_option(command, arguments.request.medium);
   add_scale_options(command, arguments.request.scene);
   add_surface_options(command, arguments);
   add_promises(command, arguments);
   add_training_options(command, arguments.training);
-  for (const char* chosen : {"--downscale", "--preset"}) {
+  for (const char* chosen : {"--downscale", "--preset", "--medium"}) {
     command.get_option("--budget")->excludes(command.get_option(chosen));
   }
   add_common_options(command, arguments.common);

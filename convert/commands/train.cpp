@@ -8,6 +8,7 @@
 #include "convert/model/memory_plan.h"
 #include "convert/model/model.h"
 #include "convert/model/model_training.h"
+#include "convert/model/water_report.h"
 #include "convert/scene/marker_bars.h"
 #include "convert/scene/scene_request.h"
 #include "convert/text/report_json.h"
@@ -24,6 +25,7 @@ struct TrainArgs {
   SceneRequest scene;
   std::filesystem::path output;
   TrainingArguments training;
+  Medium medium = Medium::None;
   bool overwrite = false;
   CommonOptions common;
 };
@@ -68,7 +70,8 @@ void run_train(const TrainArgs& args) {
       [&](const Model& model, const PriorsReport& priors) {
         terminal.note(coverage_words(priors, model.scene));
       },
-      [&](const std::string& words) { checkpoint_warnings.push_back(words); }};
+      [&](const std::string& words) { checkpoint_warnings.push_back(words); },
+      args.medium};
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   check_training_memory(
       opened.scene, memory_budget(stated_memory_limit(args.common)), request.training.coherence);
@@ -104,6 +107,7 @@ void run_train(const TrainArgs& args) {
   if (scale.is_object()) scale["metres_sigma"] = frame.metres_sigma;
   if (frame.has_metric_scale()) (void)restate_frame(args.output, trained.model);
   report["scale"] = scale;
+  if (trained.water) report["water"] = water_to_json(*trained.water, frame);
   write_file(args.output / "training.json", json_text(versioned(report)) + "\n");
   forget_checkpoints(args.output);
   const size_t count = trained.model.gaussians.size();
@@ -126,6 +130,7 @@ void add_train(CLI::App& app) {
   add_scene_options(*cmd, args->scene.options);
   add_camera_options(*cmd, args->scene);
   add_scale_options(*cmd, args->scene);
+  add_medium_option(*cmd, args->medium);
   add_training_options(*cmd, args->training);
   cmd->add_flag("-w,--overwrite", args->overwrite, "Replace a finished model");
   add_common_options(*cmd, args->common);

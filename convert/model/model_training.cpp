@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/water_report.h"
 #include "convert/text/terminal.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/checkpoint.h"
@@ -180,7 +181,8 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
   hooks.after_step = [&](const Trainer& trainer) { checkpoint.try_to_save_at_times(trainer); };
   hooks.after_training = [&](const Trainer& trainer) { checkpoint.try_to_save(trainer); };
   hooks.on_cancel = [&](const Trainer& trainer) { checkpoint.save(trainer); };
-  return reconstruct(std::move(scene), {request.priors, request.training, hooks}, progress);
+  return reconstruct(
+      std::move(scene), {request.priors, request.training, hooks, request.medium}, progress);
 }
 
 bool has_checkpoints(const std::filesystem::path& folder) {
@@ -274,7 +276,7 @@ double measured_share(const nlohmann::ordered_json& depth_of_views) {
 
 std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training) {
   std::vector<std::string> out;
-  for (const char* key : {"exposure", "view_dependence", "pane"}) {
+  for (const char* key : {"exposure", "view_dependence", "pane", "water"}) {
     const auto found = training.find(key);
     if (found == training.end() || !found->is_object()) continue;
     const auto words = found->find("words");
@@ -290,20 +292,23 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
     loss.push_back(step.total());
     skipped += step.skipped;
   }
-  return {{"description", description_of(trained, request.training)},
-          {"gaussians", trained.model.gaussians.size()},
-          {"settings", settings_to_json(request.training)},
-          {"loss", loss},
-          {"gradients_not_finite", skipped},
-          {"alignment",
-           {{"scale", trained.priors.alignment.scale},
-            {"offset", trained.priors.alignment.offset},
-            {"correspondences", trained.priors.alignment.correspondences}}},
-          {"depth_of_views", coverage_to_json(trained)},
-          {"exposure", exposure_to_json(trained)},
-          {"view_dependence", view_dependence_to_json(trained.view_dependence)},
-          {"pane", pane_to_json(trained.pane)},
-          {"given_depth", given_depth_to_json(trained.priors)}};
+  nlohmann::ordered_json out = {
+      {"description", description_of(trained, request.training)},
+      {"gaussians", trained.model.gaussians.size()},
+      {"settings", settings_to_json(request.training)},
+      {"loss", loss},
+      {"gradients_not_finite", skipped},
+      {"alignment",
+       {{"scale", trained.priors.alignment.scale},
+        {"offset", trained.priors.alignment.offset},
+        {"correspondences", trained.priors.alignment.correspondences}}},
+      {"depth_of_views", coverage_to_json(trained)},
+      {"exposure", exposure_to_json(trained)},
+      {"view_dependence", view_dependence_to_json(trained.view_dependence)},
+      {"pane", pane_to_json(trained.pane)},
+      {"given_depth", given_depth_to_json(trained.priors)}};
+  if (trained.water) out["water"] = water_to_json(*trained.water, trained.model.scene.frame);
+  return out;
 }
 
 }  // namespace cgs

@@ -30,6 +30,7 @@ struct ModelRequest {
   std::function<void(const Model&, const PriorsReport&)> inspect = {};
   /// Hears of a checkpoint that could not be read or written, which changes no result.
   std::function<void(const std::string&)> warn = {};
+  Medium medium = Medium::None;  ///< As ReconstructionOptions::medium.
 };
 
 /// reconstruct() of a scene from its files, going on from a checkpoint of the same work. If the

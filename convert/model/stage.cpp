@@ -22,7 +22,7 @@ const std::array<StageTraits, kStages>& stage_table() {
          "views/<view>.depth.png",
          "views/<view>.normal.png",
          "views/<view>.hole.png"},
-        {"views/*.transient.png"}},
+        {"views/*.restored.png", "views/*.transient.png"}},
        {Stage::Evaluation, "evaluation", "held-out views", {105 * kMebi, 160, 231, 0, 0}},
        {Stage::Splats,
         "splats",

@@ -13,6 +13,7 @@
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/transients.h"
+#include "libcgs/priors/water.h"
 #include "meshing/pictures/exposure.h"
 #include "meshing/pictures/face_views.h"
 
@@ -128,6 +129,7 @@ PhotographedMesh texture_from_photographs(const Scene& scene,
   Scene loaded = scene;
   std::vector<View> views;
   load_images(loaded, scene.input);
+  take_out_water(priors, loaded);
   for (const int i : scene.input) views.push_back(std::move(loaded.views[static_cast<size_t>(i)]));
   for (size_t i = 0; i < priors.size(); ++i) mask_other_than_scene(priors[i], views[i]);
   const FaceScores scores = face_scores(mesh, views);

@@ -23,6 +23,7 @@
 #include "libcgs/priors/transients.h"
 #include "libcgs/render/picture.h"
 #include "libcgs/train/flip.h"
+#include "libcgs/priors/water.h"
 #include "libcgs/train/image_metrics.h"
 
 namespace cgs {
@@ -88,47 +89,6 @@ MaskMap intersection(const MaskMap& a, const MaskMap& b) {
   return out;
 }
 
-// Where the photograph of a view may be looked at; empty = everywhere, also where it is gone.
-MaskMap valid_pixels(const Scene& scene, int view) {
-  if (scene.views[static_cast<size_t>(view)].image_path.empty()) return {};
-  std::vector<std::string> told_before;
-  try {
-    return loaded_view(scene, view, /*with_image=*/false, told_before).valid;
-  } catch (const BadInput&) {
-    return {};
-  }
-}
-
-// What input views leave out: what is masked, or, where the photograph is gone, all without depth.
-double masked_share(const Model& model) {
-  double masked = 0;
-  double pixels = 0;
-  const auto shows_nothing = [](DepthOrigin origin) {
-    return origin == DepthOrigin::Unknown || origin == DepthOrigin::Background;
-  };
-  for (size_t k = 0; k < model.priors.size(); ++k) {
-    const int view = model.scene.input[k];
-    const auto& origin = model.priors[k].origin.data;
-    const bool is_there = is_present(model.scene.views[static_cast<size_t>(view)].image_path);
-    const auto& valid = valid_pixels(model.scene, view).data;
-    masked += double(is_there ? std::count(valid.begin(), valid.end(), uint8_t{0})
-                              : std::count_if(origin.begin(), origin.end(), shows_nothing));
-    pixels += double(origin.size());
-  }
-  return pixels > 0 ? masked / pixels : 1;
-}
-
-// Whether pictures may be completed where nothing is drawn. Around an object that was cut out by
-// masks, and where nothing is known of photographs, what is empty may be meant to be.
-bool may_complete(const Model& model, HoleFill fill) {
-  constexpr double kCutOut = 0.25;  // the rim that a wide lens leaves is half of that
-  return fill == HoleFill::Around && masked_share(model) < kCutOut;
-}
-
-ColorImage shown_picture(const RenderBuffers& buffers, bool is_completed) {
-  return is_completed ? filled_picture(buffers) : picture(buffers);
-}
-
 ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
   ViewRasters rasters;
   rasters.color = buffers.color;
@@ -152,9 +112,22 @@ MaskMap transient_pixels(const Model& model, int view) {
   return k < model.priors.size() ? transient_mask(model.priors[k]) : MaskMap();
 }
 
+// The photograph of an input view without the water; empty where there is none, for other views,
+// and where the photograph is gone.
+ColorImage restored_photograph(const Model& model, int view) {
+  const std::vector<int>& input = model.scene.input;
+  const auto k = static_cast<size_t>(std::find(input.begin(), input.end(), view) - input.begin());
+  const std::filesystem::path& photograph = model.scene.views[static_cast<size_t>(view)].image_path;
+  if (!model.scene.water || k >= model.priors.size() || !is_present(photograph)) return {};
+  std::vector<std::string> told_before;
+  View loaded = loaded_view(model.scene, view, /*with_image=*/true, told_before);
+  take_out_water(model.priors[k], *model.scene.water, loaded);
+  return loaded.image;
+}
+
 RenderedPicture write_view(const Model& model,
                            const std::vector<SupportView>& inputs,
-                           bool is_completed,
+                           const ModelPictures& pictures,
                            int index,
                            const std::filesystem::path& folder) {
   const View& view = model.scene.views[static_cast<size_t>(index)];
@@ -163,7 +136,7 @@ RenderedPicture write_view(const Model& model,
   rasters.valid = valid_pixels(model.scene, index);  // what is masked was seen, and is not wanted
   write_view_exr(folder / (view.name + ".exr"), rasters, view.camera, model.scene.frame);
   const auto png = [&](const char* what) { return folder / (view.name + "." + what + ".png"); };
-  write_png(png("color"), shown_picture(buffers, is_completed));
+  write_png(png("color"), pictures.of(buffers, view.camera));
   write_png(png("depth"), depth_picture(rasters.depth));
   write_png(png("normal"), normal_picture(rasters.normal, view.camera.cam_from_world()));
   if (knows_holes(model)) {
@@ -176,6 +149,12 @@ RenderedPicture write_view(const Model& model,
     std::filesystem::remove(png("transient"));
   } else {
     write_png(png("transient"), transient);
+  }
+  const ColorImage restored = restored_photograph(model, index);
+  if (restored.empty()) {
+    std::filesystem::remove(png("restored"));
+  } else {
+    write_png(png("restored"), restored);
   }
   return {view.name, role_of(model.scene, index), hole_shares(model, buffers, rasters.valid)};
 }
@@ -252,11 +231,11 @@ double share_of(const MaskMap& part, const MaskMap& whole) {
 
 EvaluatedView evaluate_view(const Model& model,
                             const std::vector<SupportView>& inputs,
-                            bool is_completed,
+                            const ModelPictures& pictures,
                             int index) {
   View view = model.scene.views[static_cast<size_t>(index)];
   const RenderBuffers buffers = render_camera(model, inputs, view.camera);
-  const ColorImage shown = blackened(shown_picture(buffers, is_completed), view.valid);
+  const ColorImage shown = blackened(pictures.of(buffers, view.camera), view.valid);
   MaskMap seen = hole_mask(buffers);
   for (uint8_t& value : seen.data) value = 1 - value;
   const MaskMap everywhere(seen.width, seen.height, 1);
@@ -406,14 +385,14 @@ std::vector<RenderedPicture> write_views(const Model& model,
                                          const std::vector<int>& views,
                                          const std::filesystem::path& folder,
                                          const Progress& progress,
-                                         HoleFill fill) {
+                                         const PictureOptions& shown) {
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
-  const bool is_completed = may_complete(model, fill);
+  const ModelPictures pictures(model, shown);
   std::vector<RenderedPicture> out;
   for (size_t k = 0; k < views.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(views.size()));
-    out.push_back(write_view(model, inputs, is_completed, views[k], folder));
+    out.push_back(write_view(model, inputs, pictures, views[k], folder));
   }
   report(progress, 1);
   return out;
@@ -423,10 +402,10 @@ std::vector<RenderedPicture> write_path(const Model& model,
                                         const std::vector<Camera>& path,
                                         const std::filesystem::path& folder,
                                         const Progress& progress,
-                                        HoleFill fill) {
+                                        const PictureOptions& shown) {
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
-  const bool is_completed = may_complete(model, fill);
+  const ModelPictures pictures(model, shown);
   remove_frames(folder);
   write_cameras_json(folder / "cameras.json", scene_of_path(model, path));
   constexpr size_t kOnSheet = 12;
@@ -436,16 +415,16 @@ std::vector<RenderedPicture> write_path(const Model& model,
   for (size_t k = 0; k < path.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(path.size()));
     const RenderBuffers buffers = render_camera(model, inputs, path[k]);
-    const ColorImage shown = shown_picture(buffers, is_completed);
-    MaskMap holes(shown.width, shown.height, 0);
+    const ColorImage picture = pictures.of(buffers, path[k]);
+    MaskMap holes(picture.width, picture.height, 0);
     const std::vector<std::string> names = pictures_of_frame(k);
-    write_png(folder / names[0], shown);
+    write_png(folder / names[0], picture);
     if (knows_holes(model)) {
       holes = hole_mask(buffers);
       write_png(folder / names[1], holes);
     }
     if (k == 0 || path.size() <= kOnSheet || place_on_sheet(k) != place_on_sheet(k - 1)) {
-      sheet.push_back(thumbnail(tinted(shown, holes)));
+      sheet.push_back(thumbnail(tinted(picture, holes)));
     }
     out.push_back({frame_name(k), "", hole_shares(model, buffers, {})});
   }
@@ -490,9 +469,11 @@ Json evaluation_to_json(const Evaluation& evaluation) {
     rows.push_back(row);
   }
   const auto& eighth = evaluation.every_eighth;
-  return {{"mean", figures_to_json(evaluation.mean)},
-          {"every_eighth", eighth ? figures_to_json(*eighth) : Json()},
-          {"views", rows}};
+  Json out = {{"mean", figures_to_json(evaluation.mean)},
+              {"every_eighth", eighth ? figures_to_json(*eighth) : Json()},
+              {"views", rows}};
+  if (evaluation.through_water) out["through_water"] = true;
+  return out;
 }
 
 Evaluation evaluate_views(Model& model,
@@ -505,12 +486,13 @@ Evaluation evaluate_views(Model& model,
   }
   const std::vector<int> shown = with_photograph(model.scene, views);
   const std::vector<SupportView> inputs = support_views(model);
-  const bool is_completed = may_complete(model, fill);
+  const ModelPictures pictures(model, {fill, /*through_water=*/true});
   Evaluation out;
+  out.through_water = model.scene.water.has_value();
   for (size_t k = 0; k < shown.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(shown.size()));
     load_images(model.scene, {shown[k]});
-    out.views.push_back(evaluate_view(model, inputs, is_completed, shown[k]));
+    out.views.push_back(evaluate_view(model, inputs, pictures, shown[k]));
     model.scene.views[static_cast<size_t>(shown[k])].image = {};  // one photograph at a time
   }
   out.mean = mean_of(out.views, warnings);

@@ -9,6 +9,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "convert/model/model.h"
+#include "convert/model/model_pictures.h"
 #include "libcgs/core/progress.h"
 
 namespace cgs {
@@ -22,12 +23,6 @@ std::string view_role(const Scene& scene, int view);
 
 /// The input views and those held out, ascending.
 std::vector<int> views_with_photograph(const Scene& scene);
-
-/// What pictures of a model show where nothing is drawn.
-enum class HoleFill : uint8_t {
-  Around,  ///< The colours around it, as filled_picture(), unless photographs were masked.
-  None,    ///< Black, as other programs draw splats.
-};
 
 /// Shares of the pixels of a picture that are not masked.
 struct HoleShares {
@@ -50,14 +45,15 @@ struct RenderedPicture {
 
 /// Writes NAME.exr and NAME.{color,depth,normal,hole}.png for each of the given views of the model.
 /// NAME.transient.png is the mask of what was left out of an input view because the others
-/// contradict it, where there is any. Without priors no hole.png is written; the EXR says, as it
+/// contradict it, where there is any; NAME.restored.png its photograph without the water, where the
+/// model states some. Without priors no hole.png is written; the EXR says, as it
 /// does of any pixel, that no input view can vouch for it.
-/// \param fill  of color.png alone: the EXR says what is drawn
+/// \param shown  of color.png alone: the EXR says what is drawn
 std::vector<RenderedPicture> write_views(const Model& model,
                                          const std::vector<int>& views,
                                          const std::filesystem::path& folder,
                                          const Progress& progress,
-                                         HoleFill fill = HoleFill::Around);
+                                         const PictureOptions& shown = {});
 
 /// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
 /// says where they are, and contact.png: twelve of them, holes in magenta. Without priors there are
@@ -66,7 +62,7 @@ std::vector<RenderedPicture> write_path(const Model& model,
                                         const std::vector<Camera>& path,
                                         const std::filesystem::path& folder,
                                         const Progress& progress,
-                                        HoleFill fill = HoleFill::Around);
+                                        const PictureOptions& shown = {});
 
 /// Per view {"name", "role", "hole_fraction", …}, the role and the fraction null where they are
 /// empty.
@@ -103,12 +99,13 @@ struct Evaluation {
   /// "NeRF", 6.1); where the scene is one, and these were evaluated and no inputs.
   std::optional<ViewFigures> every_eighth;
   std::vector<EvaluatedView> views;
+  bool through_water = false;  ///< Rendered through the water that the photographs show.
 };
 
 /// {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim", "flip"}, null for what is empty.
 nlohmann::ordered_json figures_to_json(const ViewFigures& figures);
 /// {"mean": {…}, "every_eighth": {…} or null, "views": [{"name", "role" as of views_to_json(), …,
-/// "exposure"}]}
+/// "exposure"}]}, and "through_water": true where it is
 nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
 
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
@@ -116,7 +113,9 @@ nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
 /// photographs.
 ///
 /// Where the exposures of input views were matched, the photographs of others are matched to what
-/// is rendered, by factors on red, green and blue light.
+/// is rendered, by factors on red, green and blue light. Where water was taken out of them,
+/// pictures are rendered through it: they are held against real photographs, never against what an
+/// estimate makes of these.
 ///
 /// Input views stay out of the mean where there are others. Warnings of the scene tell where there
 /// are none, and where nothing is known of holes, whose figures are then empty.

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/water_report.h"
 #include "convert/report/page_files.h"
 #include "convert/report/report_frame.h"
 #include "convert/report/report_surface.h"
@@ -140,6 +141,11 @@ std::string thinning_section(const Json& report) {
   return html.str();
 }
 
+// Of input photographs that were taken through water; else empty.
+std::string restored_figure(const std::filesystem::path& file) {
+  return is_present(file) ? figure(file, "restored: the photograph without the water") : "";
+}
+
 std::string views_section(const std::filesystem::path& folder,
                           const Json& views,
                           const Scene& scene) {
@@ -157,6 +163,7 @@ std::string views_section(const std::filesystem::path& folder,
     html << "<h3>" << escaped(name) << " (" << view["role"].get<std::string>() << "), "
          << hole_words(view) << "</h3>\n<div class=row>\n"
          << figure_of([&] { return photograph_of(scene, index); }, "photograph", holes)
+         << restored_figure(folder / "views" / (name + ".restored.png"))
          << figure(folder / "views" / (name + ".color.png"), "rendered", holes)
          << figure(folder / "views" / (name + ".depth.png"), "depth (red = near)")
          << figure(folder / "views" / (name + ".normal.png"), "normals")
@@ -309,6 +316,7 @@ void write_html_report(const std::filesystem::path& folder,
   html << viewer << refinement_section(report) << scale_section(report) << promises_section(report)
        << levels_section(report) << certificate_section(report) << simplification_section(report)
        << deviation_section(report) << mesh_section(folder) << coverage_section(report["model"])
+       << water_section(report["model"].value("water", Json()))
        << evaluation_section(report["evaluation"]) << views_section(folder, report["views"], scene)
        << training_section(report["model"]) << thinning_section(report)
        << timing_section(report["stages"]) << "</body></html>\n";

@@ -16,6 +16,7 @@
 #include "convert/model/model_training.h"
 #include "convert/model/stage.h"
 #include "convert/model/views.h"
+#include "convert/model/water_report.h"
 #include "convert/report/report.h"
 #include "convert/report/report_viewer.h"
 #include "convert/run/disk_plan.h"
@@ -128,6 +129,7 @@ StageResult run_model(Run& run, const Progress& progress) {
     check_picks(run.distances, model);
     run.terminal.note(coverage_words(priors, model.scene));
   };
+  request.medium = run.request.medium;
   request.warn = [&](const std::string& words) { run.warnings.push_back(words); };
   const TrainedModel trained = train_model(run.scene, request, progress);
   // Pixels were read for the first time: more may be odd than the cameras told.
@@ -236,7 +238,9 @@ Json report_json(const Run& run) {
     warnings.insert(warnings.end(), found.begin(), found.end());
   }
   std::vector<std::string> notes = run.scene.notes;
-  const Json model = result_of(run, Stage::Model);
+  Json model = result_of(run, Stage::Model);
+  // Of the model stage it is in the unit of the cameras; the scale may have been told since.
+  if (scene.water) model["water"].update(water_json(*scene.water, scene.frame));
   for (std::string& remark : remarks_on_photographs(model)) notes.push_back(std::move(remark));
   Json out = {{"program", program_version()},
               {"scene", scene_kind_name(run.scene.kind)},

@@ -54,8 +54,9 @@ RunRequest recorded_request(const Json& record, const fs::path& path) {
   } catch (const Json::exception&) {
     throw BadInput(Defect::Schema, path, "\"request\" is not as a run writes it");
   } catch (const std::out_of_range&) {
-    throw BadInput(
-        Defect::Schema, path, "\"glb_encoding\" or \"estimated\" is not one of this version");
+    throw BadInput(Defect::Schema,
+                   path,
+                   "\"glb_encoding\", \"estimated\" or \"medium\" is not one of this version");
   }
 }
 

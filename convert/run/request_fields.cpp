@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "convert/model/model_training.h"
+#include "convert/model/water_report.h"
 #include "io/bytes/content_hash.h"
 #include "io/bytes/json_file.h"
 #include "io/scenes/depth_file.h"
@@ -70,6 +71,11 @@ void take(const Json& json, GlbEncoding& out) {
 Json kept(EstimatedSurface value) { return name_of(estimated_surfaces(), value); }
 void take(const Json& json, EstimatedSurface& out) {
   if (json.is_string()) out = estimated_surfaces().at(json.get<std::string>());
+}
+
+Json kept(Medium value) { return name_of(media(), value); }
+void take(const Json& json, Medium& out) {
+  if (json.is_string()) out = media().at(json.get<std::string>());
 }
 
 Json kept(const DepthOptions& depth) {
@@ -253,6 +259,7 @@ std::vector<RequestField> all_fields() {
   out.push_back(chosen("chunk", Stage::Model, in_options(&SceneOptions::chunk)));
   out.push_back(chosen("use_all", Stage::Report, in_options(&SceneOptions::all_views)));
   out.push_back(chosen("refine_poses", Stage::Model, in_scene(&SceneRequest::refine_poses)));
+  out.push_back(chosen("medium", Stage::Model, &RunRequest::medium));
   out.push_back(lods());
   out.push_back(chosen("max_voxels", Stage::Mesh, &RunRequest::max_voxels));
   out.push_back(chosen("glb_encoding", Stage::Web, &RunRequest::glb_encoding));

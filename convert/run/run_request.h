@@ -18,6 +18,7 @@ struct RunRequest {
   SceneRequest scene;
   std::filesystem::path output;
   TrainingOptions training;
+  Medium medium = Medium::None;                   ///< Between the cameras and the surface.
   std::string voxel_size;                         ///< Empty = from the pixel footprint.
   int64_t max_voxels = TsdfOptions().max_voxels;  ///< As in TsdfOptions; previews have fewer.
   std::string simplify;           ///< Largest error of simplification; empty = default, "0" = none.

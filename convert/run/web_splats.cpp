@@ -14,6 +14,7 @@
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/up_axis.h"
+#include "libcgs/priors/water.h"
 
 namespace cgs {
 
@@ -44,6 +45,7 @@ ThinnedSplats thinned_splats(const Model& model, const Progress& progress) {
     return all;
   }
   load_images(scene, scene.input);
+  take_out_water(model.priors, scene);
   return thin_splats(model.gaussians, scene, counts_of_views(model), progress);
 }
 

@@ -29,6 +29,8 @@ const char* options_for(Remedy remedy) {
       return "without --icp";
     case Remedy::PoissonSpacing:
       return "--op statistical-outliers=NEIGHBOURS,SIGMAS; --op poisson=SPACING";
+    case Remedy::NoWater:
+      return "--medium none";
   }
   return "";
 }

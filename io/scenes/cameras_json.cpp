@@ -36,6 +36,20 @@ Json frame_json(const Scene& scene) {
   return out;
 }
 
+constexpr std::array<std::pair<const char*, Eigen::Vector3d Water::*>, 6> kWaterFields = {
+    {{"attenuation", &Water::attenuation},
+     {"attenuation_sigma", &Water::attenuation_sigma},
+     {"backscatter", &Water::backscatter},
+     {"backscatter_sigma", &Water::backscatter_sigma},
+     {"veil", &Water::veil},
+     {"veil_sigma", &Water::veil_sigma}}};
+
+Json water_json(const Water& water) {
+  Json out = Json::object();
+  for (const auto& [name, field] : kWaterFields) out[name] = vector_json(water.*field);
+  return out;
+}
+
 Json fisheye_json(const Fisheye& fisheye) {
   const Camera& c = fisheye.photograph;
   return {{"width", c.width},
@@ -128,6 +142,19 @@ void read_frame(const JsonValue& value, Scene& scene) {
       scene.photographs.push_back(names->at(i).text());
     }
   }
+}
+
+Water read_water(const JsonValue& value) {
+  Water out;
+  for (const auto& [name, field] : kWaterFields) {
+    const JsonValue numbers = value.at(name);
+    out.*field = read_vector(numbers);
+    if (!((out.*field).allFinite() && (out.*field).minCoeff() >= 0)) {
+      numbers.fail(Defect::Value, "must be >= 0");
+    }
+  }
+  if (out.veil.maxCoeff() > 1) value.at("veil").fail(Defect::Value, "must be <= 1");
+  return out;
 }
 
 Eigen::Vector3d read_position(const JsonValue& entry, const Frame& frame) {
@@ -260,7 +287,9 @@ void write_cameras_json(const std::filesystem::path& path, const Scene& scene) {
   Json document = Json::array();
   for (size_t i = 0; i < scene.views.size(); ++i) {
     document.push_back(camera_json(scene, i));
-    if (i == 0) document.back()["frame"] = frame_json(scene);
+    if (i > 0) continue;
+    document.back()["frame"] = frame_json(scene);
+    if (scene.water) document.back()["water"] = water_json(*scene.water);
   }
   // File names need not be UTF-8, JSON has to be.
   write_file(path, document.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
@@ -278,7 +307,11 @@ Scene read_cameras_json(const std::filesystem::path& path, std::vector<std::stri
   scene.kind = SceneKind::ForeignCameras;
   scene.folder = path.parent_path();
   const auto frame = entries.at(size_t{0}).find("frame");
-  if (frame) read_frame(*frame, scene);
+  if (frame) {
+    read_frame(*frame, scene);
+    const auto water = entries.at(size_t{0}).find("water");
+    if (water) scene.water = read_water(*water);
+  }
   std::set<std::string> taken;
   for (size_t i = 0; i < entries.size(); ++i) {
     const JsonValue entry = entries.at(i);

@@ -15,7 +15,7 @@ namespace cgs {
 ///
 /// Keys that other viewers ignore make the scene complete: per entry cx, cy, role ("input",
 /// "held_out" or ""), near, far, distortion, fisheye, image_path (absolute) and internal_position,
-/// in the first entry also frame.
+/// in the first entry also frame and water [1 / internal unit].
 /// \throws InvalidInput if a camera is not finite; IoError
 /// Source: graphdeco-inria/gaussian-splatting, the cameras.json of a trained model.
 void write_cameras_json(const std::filesystem::path& path, const Scene& scene);

@@ -48,6 +48,7 @@ Scene read_cameras_json_scene(const SceneRoot& root) {
   scene.input.clear();
   scene.held_out.clear();
   scene.missing.clear();
+  scene.water.reset();  // of another choice of input views, too
   for (size_t i = 0; i < scene.views.size(); ++i) {
     View& view = scene.views[i];
     view.image_path = photograph_in_folder(root, names[i]);

@@ -20,6 +20,7 @@ enum class Remedy : uint8_t {
   ExternalFiles,   ///< Allow them.
   NoRegistration,  ///< Compare surfaces where they lie.
   PoissonSpacing,  ///< State it, or remove outliers.
+  NoWater,         ///< Take photographs as they are.
 };
 
 /// An error that has a remedy is one of these, too.

@@ -14,6 +14,7 @@
 #include "libcgs/core/fisheye.h"
 #include "libcgs/core/frame.h"
 #include "libcgs/core/raster.h"
+#include "libcgs/core/water.h"
 
 namespace cgs {
 
@@ -110,6 +111,9 @@ struct Scene {
   std::vector<std::string> warnings;  ///< One line each: what is odd but usable.
   std::vector<std::string> notes;     ///< One line each: what was done that raises no doubt.
   Frame frame;
+  /// What photographs show and results do not: load_images() leaves it in, take_out_water() takes
+  /// it out. Empty = none.
+  std::optional<Water> water = {};
   /// Where load_images() looks before it reads files, and keeps what it made of them; copies of a
   /// scene share it. Empty = nothing is kept.
   std::shared_ptr<PhotographCache> cache = {};

@@ -41,8 +41,7 @@ void load_photographs(Scene& scene, const ReconstructionHooks& hooks, const Prog
 // Splats keep the colours of the photographs they stem from: where exposures differ, the same
 // surface would come in two colours, and every step of the training would fight over them.
 // Returns ExposureGains::difference().
-float match_exposures(Scene& scene, const std::vector<ViewPriors>& priors) {
-  const ExposureGains exposure = exposure_gains(scene, priors);
+float match_exposures(Scene& scene, const ExposureGains& exposure) {
   for (size_t k = 0; k < scene.input.size(); ++k) {
     View& view = scene.views[static_cast<size_t>(scene.input[k])];
     view.exposure = exposure.gain[k];
@@ -80,6 +79,33 @@ std::optional<Pane> look_behind_pane(const Scene& scene,
   priors = estimate_priors(behind_pane(scene, *pane), options.priors, part_of(progress, 0.1, 0.9));
   std::optional<Pane> better = find_pane(scene, priors.views, part_of(progress, 0.9, 1));
   return better ? better : pane;
+}
+
+// The water before the surface, taken out of the photographs, and then the priors of what these
+// show: far places get back the contrast by which they are matched, and the better they are
+// matched, the better the water is known. Exposures are compared without it, as it dims what is
+// farther away; photographs are matched before it is taken out, as load_images() does.
+void look_through_water(const PriorsOptions& options,
+                        EstimatedPriors& priors,
+                        TrainedModel& out,
+                        Scene& scene,
+                        const Progress& progress) {
+  const WaterEstimate first = estimate_water(scene, priors.views);
+  out.water = first;
+  if (!first.water) return;
+  const auto cleared = [&](const Water& water) {
+    Scene clear = scene;
+    clear.water = water;
+    take_out_water(priors.views, clear);
+    return clear;
+  };
+  out.exposure_difference =
+      match_exposures(scene, exposure_gains(cleared(*first.water), priors.views));
+  priors = estimate_priors(cleared(*first.water), options, progress);
+  out.water = estimate_water(scene, priors.views);
+  // Where there is hardly any, it may be found once and not again: one of the two has to be taken.
+  if (!out.water->water) out.water->water = first.water;
+  scene = cleared(*out.water->water);
 }
 
 // Views whose depth rests on little.
@@ -137,10 +163,15 @@ TrainedModel reconstruct(Scene scene,
   to_canonical(scene);
   narrow_depth_ranges(scene, options.priors.sweep, part_of(progress, 0.01, 0.02));
   EstimatedPriors priors = estimate_priors(scene, options.priors, part_of(progress, 0.02, 0.18));
-  out.exposure_difference = match_exposures(scene, priors.views);
-  // There hardly ever is one, and without one this is quick.
-  const std::optional<Pane> pane =
-      look_behind_pane(scene, options, priors, part_of(progress, 0.18, 0.2));
+  const Progress again = part_of(progress, 0.18, 0.2);
+  if (options.medium == Medium::Water)
+    look_through_water(options.priors, priors, out, scene, again);
+  std::optional<Pane> pane;
+  if (!scene.water) {
+    out.exposure_difference = match_exposures(scene, exposure_gains(scene, priors.views));
+    // There hardly ever is one, and without one this is quick.
+    pane = look_behind_pane(scene, options, priors, again);
+  }
   const Pane* const drawn_before = pane ? &*pane : nullptr;
   leave_out_other_than_scene(priors.views, scene);
   mark_shown_finer(scene, priors.views);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/estimate_priors.h"
 #include "libcgs/priors/pane.h"
+#include "libcgs/priors/water.h"
 #include "libcgs/reconstruct/model.h"
 #include "libcgs/train/trainer.h"
 
@@ -32,6 +34,8 @@ struct ReconstructionOptions {
   PriorsOptions priors;
   TrainingOptions training;
   ReconstructionHooks hooks = {};
+  /// What lies before the surface, which is to be taken out of the photographs.
+  Medium medium = Medium::None;
 };
 
 /// What became of a pane in the photographs.
@@ -49,13 +53,16 @@ struct TrainedModel {
   float exposure_difference = 0;  ///< ExposureGains::difference() of the input views
   ViewDependence view_dependence;
   PaneReport pane;
-  std::vector<StepReport> steps;  ///< Of the training; empty = aligned initialisation.
+  std::optional<WaterEstimate> water;  ///< Where it was looked for.
+  std::vector<StepReport> steps;       ///< Of the training; empty = aligned initialisation.
 };
 
 /// The method from photographs with cameras to Gaussians: canonical frame, depth priors, exposures,
 /// a pane, one Gaussian on the ray of each pixel, training. Where the photographs show a pane,
-/// depth is estimated once more from what lies behind it. Same scene and options, same bits, for
-/// any number of threads.
+/// depth is estimated once more from what lies behind it. Where they were taken through water, that
+/// is estimated from what was measured, taken out of the photographs, and depth estimated once more
+/// from these; Scene::water says what was taken out, and no pane is looked for. Same scene and
+/// options, same bits, for any number of threads.
 ///
 /// \param scene  in world coordinates with the identity frame; Scene::input are the views to
 ///               reconstruct from, two or more. Their photographs are loaded, sRGB-coded in [0, 1]
@@ -63,7 +70,8 @@ struct TrainedModel {
 /// \return the model in its canonical frame [internal units], with metres per unit where
 ///         depth of a sensor tells them; what is odd of the photographs is in Scene::warnings
 /// \throws InvalidInput for an option out of range, too few pixels for the decoder, photographs
-///         that are not loaded; and as to_canonical(), estimate_priors() and the Trainer
+///         that are not loaded; and as to_canonical(), estimate_priors(), fit_water() and the
+///         Trainer
 /// Source: Paliwal et al. 2024, "CoherentGS", section 3, with depth of a plane sweep.
 TrainedModel reconstruct(Scene scene,
                          const ReconstructionOptions& options,

@@ -96,7 +96,9 @@ Json opengl_pose(const Camera& camera) {
 
 std::string image_path(const CaptureView& view) { return "images/" + view.name + ".png"; }
 
-void write_cameras(const std::filesystem::path& folder, const std::vector<CaptureView>& views) {
+void write_cameras(const std::filesystem::path& folder,
+                   const std::vector<CaptureView>& views,
+                   const std::optional<PlantedWater>& water) {
   Json transforms = {{"camera_model", "OPENCV"}};
   Json capture = {{"unit", "m"}, {"input", Json::array()}, {"held_out", Json::array()}};
   for (const auto& view : views) {
@@ -111,6 +113,11 @@ void write_cameras(const std::filesystem::path& folder, const std::vector<Captur
                                     {"transform_matrix", opengl_pose(c)}});
     transforms[view.input ? "train_filenames" : "test_filenames"].push_back(image_path(view));
     capture[view.input ? "input" : "held_out"].push_back(view.name);
+  }
+  if (water) {
+    capture["water"] = {{"attenuation", water->attenuation},
+                        {"backscatter", water->backscatter},
+                        {"veil", water->veil}};
   }
   write_file(folder / "transforms.json", transforms.dump(1) + "\n");
   write_file(folder / "capture.json", capture.dump(1) + "\n");
@@ -135,16 +142,23 @@ void write_truth(const std::filesystem::path& folder,
 void write_capture(const std::filesystem::path& folder,
                    const PortalScene& scene,
                    const std::vector<CaptureView>& views,
-                   std::span<const Camera> inputs) {
+                   std::span<const Camera> inputs,
+                   const std::optional<PlantedWater>& water) {
   make_output_folder(folder / "images");
   make_output_folder(folder / "truth");
   const std::vector<float> sky = sky_visibility(scene);
   for (const auto& view : views) {
-    write_png(folder / image_path(view), bgr8(render_view(scene, sky, view.camera, view.seed)));
-    write_truth(folder / "truth", view.name, view_truth(scene, view.camera, inputs));
+    const ViewTruth truth = view_truth(scene, view.camera, inputs);
+    ColorImage picture = render_view(scene, sky, view.camera, view.seed);
+    if (water) {
+      write_png(folder / "truth" / (view.name + "_clear.png"), bgr8(picture));
+      picture = under_water(picture, view.camera, truth.depth, *water);
+    }
+    write_png(folder / image_path(view), bgr8(picture));
+    write_truth(folder / "truth", view.name, truth);
   }
   write_mesh(folder / "truth" / "mesh.ply", scene.mesh);
-  write_cameras(folder, views);
+  write_cameras(folder, views, water);
 }
 
 void write_masks(const std::filesystem::path& folder,

@@ -187,6 +187,20 @@ def test_train():
     assert told["given_depth"]["kind"] == "depth"
 
 
+def test_water():
+    """Taken out of photographs, and put back to be compared with them."""
+    told = cgs("run", captures / "water", "--views", "view_01,view_02,view_03,view_08", *DRAFT,
+               "--medium", "water", "--voxel-size", "0.1", "-o", "watered")
+    assert told["model"]["water"]["found"] and told["evaluation"]["through_water"]
+    assert file("watered/run.json", "run-record")["request"]["medium"] == "water"
+    assert file("watered/model/cameras.json", "cameras")[0]["water"]["veil"]
+    assert file("watered/model/training.json", "train")["water"]["matches"] > 1000
+    assert cgs("evaluate", "watered/model")["through_water"] is True
+    assert (work / "watered/views/view_08.restored.png").exists()
+    assert not (work / "watered/views/view_04.restored.png").exists()
+    assert "restored" in (work / "watered/report.html").read_text()
+
+
 def test_pictures():
     assert cgs("evaluate", "trained")["mean"]["psnr"] > 5
     assert cgs("evaluate", "trained", "--views", "view_02")["views"][0]["role"] == "input"

@@ -13,6 +13,8 @@ std::filesystem::path portal_capture(int divisor) {
   return std::filesystem::path(CGS_CAPTURES) / std::to_string(divisor);
 }
 
+std::filesystem::path underwater_capture() { return std::filesystem::path(CGS_CAPTURES) / "water"; }
+
 void copy_portal_capture(const std::filesystem::path& folder, int divisor, size_t views) {
   namespace fs = std::filesystem;
   const fs::path made = portal_capture(divisor);

@@ -11,6 +11,10 @@ namespace cgs::test {
 /// made it for the divisors that tests/CMakeLists.txt lists; not to be changed.
 std::filesystem::path portal_capture(int divisor);
 
+/// The same for the divisor 2, taken through PlantedWater(); truth/<view>_clear.png are its
+/// pictures without the water.
+std::filesystem::path underwater_capture();
+
 /// Copies it.
 ///
 /// \param views  so many of its views, the first; the truth of all is copied

@@ -204,7 +204,7 @@ TEST(WriteViews, FillsWhatNothingIsDrawnInUnlessPhotographsWereMasked) {
   say_that_it_saw_nothing(model, 0);
   test::add_sheet(model.gaussians, {-0.4, 0, 2}, {0.4, 0, 0}, {0, 1, 0}, 20);  // the left half
   const auto corner = [&](HoleFill fill) {
-    write_views(model, {0}, dir / "views", {}, fill);
+    write_views(model, {0}, dir / "views", {}, {fill});
     return read_image(dir / "views/0.color.png")(kSide - 2, 20).maxCoeff();
   };
   EXPECT_EQ(corner(HoleFill::None), 0);

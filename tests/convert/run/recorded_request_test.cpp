@@ -40,6 +40,7 @@ RunRequest unusual_request(const test::TempDir& dir) {
   out.scene.marker_size = "80mm";
   out.scene.control = {dir / "survey.csv", "cm"};
   out.training = unusual_training();
+  out.medium = Medium::Water;
   out.voxel_size = "5mm";
   out.simplify = "2mm";
   out.compression_error = "1mm";

@@ -17,6 +17,7 @@ TEST(RequestFields, KeepEveryMemberOfARequestButWhatDecidesNothing) {
   const auto& [scene,
                output,
                training,
+               medium,
                voxel_size,
                max_voxels,
                simplify,
@@ -43,6 +44,7 @@ TEST(RequestFields, KeepEveryMemberOfARequestButWhatDecidesNothing) {
   const auto& [table, unit] = control;
   const std::map<std::string, const void*> members = {
       {"training", &training},
+      {"medium", &medium},
       {"voxel_size", &voxel_size},
       {"max_voxels", &max_voxels},
       {"simplify", &simplify},

@@ -27,7 +27,7 @@ TEST(WordsOf, KeepsTheKindOfTheError) {
 }
 
 TEST(WordsOf, HasAnOptionForEveryRemedy) {
-  for (int i = 1; i <= static_cast<int>(Remedy::PoissonSpacing); ++i) {
+  for (int i = 1; i <= static_cast<int>(Remedy::NoWater); ++i) {
     const WithRemedy<InvalidInput> error(static_cast<Remedy>(i), "wrong");
     EXPECT_NE(words_of(error).find("--"), std::string::npos) << i;
   }

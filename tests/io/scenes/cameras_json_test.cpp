@@ -99,6 +99,28 @@ TEST_F(CamerasJson, RestoresTheSceneBitForBit) {
   EXPECT_EQ(out.frame.scale_source, ScaleSource::KnownDistance);
 }
 
+TEST_F(CamerasJson, KeepsTheWaterThatWasTakenOut) {
+  Scene scene = far_away_scene();
+  write_cameras_json(path_, scene);
+  EXPECT_FALSE(document()[0].contains("water"));
+  EXPECT_FALSE(read_cameras_json(path_).water);
+  Water& water = scene.water.emplace();
+  water.attenuation = {1 / 3.0, 0.2, 0.1};
+  water.attenuation_sigma = {0.01, 0.02, 0.03};
+  water.backscatter = {0.4, 0.3, 1 / 7.0};
+  water.veil = {0.05, 0.2, 1};
+  write_cameras_json(path_, scene);
+  const Water found = read_cameras_json(path_).water.value();
+  EXPECT_EQ(found.attenuation, water.attenuation);
+  EXPECT_EQ(found.attenuation_sigma, water.attenuation_sigma);
+  EXPECT_EQ(found.backscatter, water.backscatter);
+  EXPECT_EQ(found.backscatter_sigma, water.backscatter_sigma);
+  EXPECT_EQ(found.veil, water.veil);
+  EXPECT_EQ(refused("/0/water/veil/0", 1.5), "VALUE");
+  EXPECT_EQ(refused("/0/water/attenuation/1", -0.1), "VALUE");
+  EXPECT_EQ(refused("/0/water/backscatter", {1, 2}), "SCHEMA");
+}
+
 TEST_F(CamerasJson, CountsPhotographsWithoutCamera) {
   Scene scene = far_away_scene();
   scene.photographs = {"0.jpg", "1.jpg", "2.jpg", "3.jpg"};

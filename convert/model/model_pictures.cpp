@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/model/model_pictures.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "io/bytes/scene_path.h"
+#include "io/scenes/scene_reader.h"
+#include "libcgs/core/error.h"
+#include "libcgs/render/picture.h"
+
+namespace cgs {
+
+namespace {
+
+// What input views leave out: what is masked, or, where the photograph is gone, all without depth.
+double masked_share(const Model& model) {
+  double masked = 0;
+  double pixels = 0;
+  const auto shows_nothing = [](DepthOrigin origin) {
+    return origin == DepthOrigin::Unknown || origin == DepthOrigin::Background;
+  };
+  for (size_t k = 0; k < model.priors.size(); ++k) {
+    const int view = model.scene.input[k];
+    const auto& origin = model.priors[k].origin.data;
+    const bool is_there = is_present(model.scene.views[static_cast<size_t>(view)].image_path);
+    const auto& valid = valid_pixels(model.scene, view).data;
+    masked += double(is_there ? std::count(valid.begin(), valid.end(), uint8_t{0})
+                              : std::count_if(origin.begin(), origin.end(), shows_nothing));
+    pixels += double(origin.size());
+  }
+  return pixels > 0 ? masked / pixels : 1;
+}
+
+// Whether pictures may be completed where nothing is drawn. Around an object that was cut out by
+// masks, and where nothing is known of photographs, what is empty may be meant to be.
+bool may_complete(const Model& model, HoleFill fill) {
+  constexpr double kCutOut = 0.25;  // the rim that a wide lens leaves is half of that
+  return fill == HoleFill::Around && masked_share(model) < kCutOut;
+}
+
+}  // namespace
+
+MaskMap valid_pixels(const Scene& scene, int view) {
+  if (scene.views[static_cast<size_t>(view)].image_path.empty()) return {};
+  std::vector<std::string> told_before;
+  try {
+    return loaded_view(scene, view, /*with_image=*/false, told_before).valid;
+  } catch (const BadInput&) {
+    return {};
+  }
+}
+
+ModelPictures::ModelPictures(const Model& model, const PictureOptions& options)
+    : is_completed_(may_complete(model, options.fill)),
+      water_(options.through_water ? model.scene.water : std::nullopt) {}
+
+ColorImage ModelPictures::of(const RenderBuffers& buffers, const Camera& camera) const {
+  ColorImage out = is_completed_ ? filled_picture(buffers) : picture(buffers);
+  if (!water_) return out;
+  // Open water was left as it is; without a surface nobody knows how much water there is.
+  DepthMap depth = buffers.median_depth;
+  for (size_t i = 0; i < depth.data.size(); ++i) {
+    if (buffers.hole.data[i] == Hole::Sky) depth.data[i] = 0;
+  }
+  return through_water(out, camera, depth, *water_);
+}
+
+}  // namespace cgs

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "convert/model/water_report.h"
+
+#include <array>
+#include <cstdio>
+#include <sstream>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "convert/text/figures.h"
+#include "convert/text/html.h"
+
+namespace cgs {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json rgb(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+// "0.450 ± 0.004, 0.200 ± 0.003, 0.120 ± 0.003"
+std::string three_with_sigma(const Eigen::Vector3d& value, const Eigen::Vector3d& sigma) {
+  std::array<char, 160> text{};
+  std::snprintf(text.data(),
+                text.size(),
+                "%.3f ± %.3f, %.3f ± %.3f, %.3f ± %.3f",
+                value.x(),
+                sigma.x(),
+                value.y(),
+                sigma.y(),
+                value.z(),
+                sigma.z());
+  return text.data();
+}
+
+std::string words_without_water() {
+  std::array<char, 160> text{};
+  std::snprintf(text.data(),
+                text.size(),
+                "no water was found: less than %.0f %% of the light is lost over the median range, "
+                "and nothing is taken out of the photographs",
+                100 * kLeastLoss);
+  return text.data();
+}
+
+}  // namespace
+
+const std::map<std::string, Medium>& media() {
+  static const std::map<std::string, Medium> kNames = {{"none", Medium::None},
+                                                       {"water", Medium::Water}};
+  return kNames;
+}
+
+Json water_json(const Water& water, const Frame& frame) {
+  const FigureUnit unit = figure_unit(frame, "");
+  const Eigen::Vector3d attenuation = water.attenuation / unit.length;
+  const Eigen::Vector3d attenuation_sigma = water.attenuation_sigma / unit.length;
+  const Eigen::Vector3d backscatter = water.backscatter / unit.length;
+  const Eigen::Vector3d backscatter_sigma = water.backscatter_sigma / unit.length;
+  return {{"words",
+           "water was taken out of the photographs; of red, green, blue light: attenuation " +
+               three_with_sigma(attenuation, attenuation_sigma) + " and backscatter " +
+               three_with_sigma(backscatter, backscatter_sigma) + " per " +
+               (unit.name == "units" ? "unit" : unit.name) + ", veil " +
+               three_with_sigma(water.veil, water.veil_sigma)},
+          {"unit", unit.name},
+          {"attenuation", rgb(attenuation)},
+          {"attenuation_sigma", rgb(attenuation_sigma)},
+          {"backscatter", rgb(backscatter)},
+          {"backscatter_sigma", rgb(backscatter_sigma)},
+          {"veil", rgb(water.veil)},
+          {"veil_sigma", rgb(water.veil_sigma)}};
+}
+
+Json water_to_json(const WaterEstimate& found, const Frame& frame) {
+  Json out = {{"words", words_without_water()},
+              {"found", found.water.has_value()},
+              {"matches", found.matches},
+              {"range_ratio", found.range_ratio}};
+  if (found.water) out.update(water_json(*found.water, frame));
+  return out;
+}
+
+std::string water_section(const Json& water) {
+  if (!water.is_object()) return "";
+  std::ostringstream html;
+  html << "<h2>Water</h2>\n";
+  if (!water["found"].get<bool>()) {
+    html << "<p>" << escaped(water["words"].get<std::string>()) << ".</p>\n";
+    return html.str();
+  }
+  const std::string unit = escaped(water["unit"].get<std::string>());
+  html
+      << "<p>From " << water["matches"].get<size_t>()
+      << " places that two photographs show, half of them from within "
+      << number(water["median_range"], "%.3g") << " " << unit
+      << ". Light of a surface arrives as exp(-attenuation x range), and water before it adds veil "
+         "x (1 - exp(-backscatter x range)); the veil is linear light, 1 = white. All results are "
+         "made of the restored photographs below; held-out views are rendered through the "
+         "water.</p>\n<table>\n<tr><th></th><th>red</th><th>green</th><th>blue</th></tr>\n";
+  for (const auto& [key, name] : {std::pair("attenuation", "attenuation [1 / " + unit + "]"),
+                                  std::pair("backscatter", "backscatter [1 / " + unit + "]"),
+                                  std::pair("veil", std::string("veil"))}) {
+    html << "<tr><td>" << name << "</td>";
+    const Json& sigma = water[std::string(key) + "_sigma"];
+    for (size_t c = 0; c < 3; ++c) {
+      html << "<td>" << number(water[key][c], "%.3f") << " ± " << number(sigma[c], "%.3f")
+           << "</td>";
+    }
+    html << "</tr>\n";
+  }
+  html << "</table>\n";
+  return html.str();
+}
+
+}  // namespace cgs
