@@ -21,7 +21,6 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
 #include "libcgs/priors/transients.h"
-#include "libcgs/render/picture.h"
 #include "libcgs/train/flip.h"
 #include "libcgs/priors/water.h"
 #include "libcgs/train/image_metrics.h"

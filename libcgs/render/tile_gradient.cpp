@@ -100,6 +100,7 @@ void reset(std::array<int, 2> size, TileEnd& end, TileSums& sums) {
   for (TilePlane& plane : sums.color) plane.fill(0);
   sums.depth.fill(0);
   sums.depth_square.fill(0);
+  if (sums.has_weight_squares) sums.weight_square.fill(0);
 }
 
 // Positions of the bits that are set in a byte, one per byte.
@@ -145,6 +146,7 @@ void draw_tile(const TileSplats& splats, std::array<int, 2> size, TileEnd& end, 
   size_t visited = 0;
   WindowList list;
   list.pairs = has_sixteen_lanes();
+  list.squares = sums.has_weight_squares;
   while (visited < splats.nearest_first.size() && open != 0) {
     const size_t count = std::min(WindowList::kSplats, splats.nearest_first.size() - visited);
     list.count = 0;

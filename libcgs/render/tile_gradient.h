@@ -46,8 +46,10 @@ struct alignas(32) TileEnd {
 /// Sums over the splats at every pixel of a tile.
 struct alignas(32) TileSums {
   std::array<TilePlane, 3> color;
-  TilePlane depth;         ///< Sum w z
-  TilePlane depth_square;  ///< Sum w z^2
+  TilePlane depth;          ///< Sum w z
+  TilePlane depth_square;   ///< Sum w z^2
+  TilePlane weight_square;  ///< Sum w^2; only drawn if has_weight_squares.
+  bool has_weight_squares = false;
 };
 
 /// Blends splats as blend_tile() does, for training.
@@ -61,6 +63,7 @@ struct alignas(32) TileLoss {
   TilePlane transmittance;  ///< With respect to 1 - Sum w, which lets the background through.
   TilePlane depth_sum;
   TilePlane depth_square_sum;
+  TilePlane weight_square_sum;
 };
 
 /// Which planes of TileLoss are not zero, and what is asked for.
@@ -68,6 +71,7 @@ struct LossChannels {
   bool color = false;
   bool depth = false;             ///< Any of the two depth sums.
   bool color_derivative = false;  ///< Of the splats; needs color.
+  bool weight_squares = false;    ///< As if color and depth were not zero, too.
 };
 
 /// Derivatives with respect to one splat over the pixels of a tile, as moments of m = alpha *

@@ -28,7 +28,8 @@ struct WindowList {
   std::array<uint8_t, kSplats * kWindows + 8> window;       ///< Position in the planes / kLanes.
   std::array<uint8_t, kSplats * kWindows + 8> splat_index;  ///< In splats.
   size_t count = 0;
-  bool pairs = false;  ///< Each stands for itself and the next.
+  bool pairs = false;    ///< Each stands for itself and the next.
+  bool squares = false;  ///< Sums of squared weights are drawn as well.
 };
 
 /// With AVX-512: 16 pixels at once. Windows are pairs, the first of even position.
@@ -86,8 +87,8 @@ inline void add_to(float* plane, typename Lanes::Values a, float b) {
 }
 
 // Blends the windows of a list.
-template <typename Lanes>
-void draw_windows(const WindowList& list, int32_t first, TileEnd& end, TileSums& sums) {
+template <typename Lanes, bool kSquares>
+void blend_windows(const WindowList& list, int32_t first, TileEnd& end, TileSums& sums) {
   for (size_t n = 0; n < list.count; ++n) {
     const size_t i = list.splat_index[n];
     const BandSplat& s = *list.splats[i];
@@ -105,11 +106,21 @@ void draw_windows(const WindowList& list, int32_t first, TileEnd& end, TileSums&
     const auto wz = w * s.depth;
     Lanes::store(Lanes::load(&sums.depth[at]) + wz, &sums.depth[at]);
     add_to<Lanes>(&sums.depth_square[at], wz, s.depth);
+    if constexpr (kSquares) {
+      Lanes::store(Lanes::multiply_add(w, w, Lanes::load(&sums.weight_square[at])),
+                   &sums.weight_square[at]);
+    }
     const auto finished = Lanes::both(blended, Lanes::below(after, Lanes::fill(kMinTransmittance)));
     if (Lanes::any(finished)) {
       Lanes::store_where(finished, first + static_cast<int32_t>(i), &end.last[at]);
     }
   }
+}
+
+template <typename Lanes>
+void draw_windows(const WindowList& list, int32_t first, TileEnd& end, TileSums& sums) {
+  if (list.squares) return blend_windows<Lanes, true>(list, first, end, sums);
+  blend_windows<Lanes, false>(list, first, end, sums);
 }
 
 // What the way back knows about what lies behind the splats not yet visited.
@@ -148,7 +159,7 @@ struct SplatInTile {
   int32_t position;
 };
 
-template <typename Lanes, bool kColor, bool kDepth, bool kColorDerivative>
+template <typename Lanes, bool kColor, bool kDepth, bool kColorDerivative, bool kSquares = false>
 struct Channels {
   using Values = typename Lanes::Values;
 
@@ -221,7 +232,10 @@ struct Channels {
     const Values before = Lanes::load(&behind.transmittance[at]) * inverse;
     const Values rest = Lanes::load(&behind.weighted[at]);
     const Values w = alpha * before;
-    const Values weighted = of_weight(of.splat, of.anchor, loss, at);
+    Values weighted = of_weight(of.splat, of.anchor, loss, at);
+    if constexpr (kSquares) {
+      weighted = Lanes::multiply_add(Lanes::load(&loss.weight_square_sum[at]), w + w, weighted);
+    }
     const Values of_alpha = before * weighted - rest * inverse;
     Lanes::store(before, &behind.transmittance[at]);
     Lanes::store(Lanes::multiply_add(w, weighted, rest), &behind.weighted[at]);
@@ -283,6 +297,10 @@ void differentiate_with(const TileSplats& splats,
                         const TileRecords& records) {
   const auto run = [&](auto kind) { decltype(kind)::differentiate(splats, end, loss, records); };
   const bool derivative = channels.color && channels.color_derivative;
+  if (channels.weight_squares) {
+    if (derivative) return run(Channels<Lanes, true, true, true, true>{});
+    return run(Channels<Lanes, true, true, false, true>{});
+  }
   if (channels.depth) {
     if (derivative) return run(Channels<Lanes, true, true, true>{});
     if (channels.color) return run(Channels<Lanes, true, true, false>{});

@@ -218,6 +218,11 @@ void TrainingRasterizer::Tape::resize_outputs() {
                                 &out.depth_square_sum}) {
     if (raster->width != width || raster->height != height) *raster = {width, height, 0};
   }
+  if (!options.weight_squares) {
+    out.weight_square_sum = {};
+  } else if (out.weight_square_sum.width != width || out.weight_square_sum.height != height) {
+    out.weight_square_sum = {width, height, 0};
+  }
 }
 
 void TrainingRasterizer::Tape::draw(int column, int row) {
@@ -225,6 +230,7 @@ void TrainingRasterizer::Tape::draw(int column, int row) {
   TileEnd& end =
       ends[static_cast<size_t>(row) * static_cast<size_t>(columns) + static_cast<size_t>(column)];
   TileSums sums;
+  sums.has_weight_squares = options.weight_squares;
   draw_tile(tile_splats(column, row), size, end, sums);
   for (int y = 0; y < size[1]; ++y) {
     const size_t to = out.alpha.index(column * kTileSize, row * kTileSize + y);
@@ -237,6 +243,7 @@ void TrainingRasterizer::Tape::draw(int column, int row) {
       out.alpha.data[to + x] = 1.0f - T;
       out.depth_sum.data[to + x] = sums.depth[from];
       out.depth_square_sum.data[to + x] = sums.depth_square[from];
+      if (options.weight_squares) out.weight_square_sum.data[to + x] = sums.weight_square[from];
     }
   }
 }
@@ -258,6 +265,7 @@ void TrainingRasterizer::Tape::read_loss(const TrainingBuffers& loss,
   for (float& of_transmittance : tile.transmittance) of_transmittance = -of_transmittance;
   read(loss.depth_sum, tile.depth_sum);
   read(loss.depth_square_sum, tile.depth_square_sum);
+  read(loss.weight_square_sum, tile.weight_square_sum);
   for (int c = 0; c < 3; ++c) {
     read(loss.color[c], tile.color[c]);
     if (options.background[c] == 0) continue;
@@ -440,14 +448,16 @@ void TrainingRasterizer::backward(const TrainingBuffers& loss, GaussianGradients
                                       &loss.color[2],
                                       &loss.alpha,
                                       &loss.depth_sum,
-                                      &loss.depth_square_sum}) {
+                                      &loss.depth_square_sum,
+                                      &loss.weight_square_sum}) {
     check_loss(*raster, tape.view.camera);
   }
   tape.prepare(sum);
-  if (!color && !depth && loss.alpha.empty()) return;
+  const bool squares = !loss.weight_square_sum.empty();
+  if (!color && !depth && !squares && loss.alpha.empty()) return;
   const bool color_derivative =
       color && (tape.options.sh_gradients || tape.gaussians->sh_degree > 0);
-  const LossChannels channels{color, depth, color_derivative};
+  const LossChannels channels{color, depth, color_derivative, squares};
   tape.moments.resize(tape.splats.size());
   if (color_derivative) tape.color_derivatives.resize(tape.splats.size());
   tbb::parallel_for(0, tape.rows, [&](int row) { tape.differentiate_row(loss, channels, row); });

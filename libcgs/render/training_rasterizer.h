@@ -24,6 +24,8 @@ struct TrainingBuffers {
   Raster<float> alpha;             ///< Sum w_i
   Raster<float> depth_sum;         ///< Sum w_i z_i, not divided by alpha.
   Raster<float> depth_square_sum;  ///< Sum w_i z_i^2
+  /// Sum w_i^2; empty unless TrainingRasterizerOptions::weight_squares.
+  Raster<float> weight_square_sum;
 };
 
 /// What the Gaussians of a set may be, and so which derivatives exist.
@@ -38,7 +40,8 @@ struct TrainingRasterizerOptions {
   float dilation = 0.3f;     ///< Added to both image variances [pixels^2]; >= 0.
   float near_depth = 1e-3f;  ///< Centres nearer than this are culled [internal units]; > 0.
   GaussianShape shape = GaussianShape::Balls;
-  bool sh_gradients = false;  ///< Fill GaussianGradients::sh.
+  bool sh_gradients = false;    ///< Fill GaussianGradients::sh.
+  bool weight_squares = false;  ///< Draw TrainingBuffers::weight_square_sum.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
 #include <vector>
 
 #include <tbb/blocked_range.h>
@@ -35,6 +38,18 @@ auto sum_over_rows(int height, const Value& value) {
   return total;
 }
 
+/// Sum over i < count of what value(i) returns, each added once in a fixed order.
+template <typename Value>
+double sum_over_blocks(size_t count, const Value& value) {
+  constexpr size_t kBlock = 4096;
+  std::vector<double> sums((count + kBlock - 1) / kBlock, 0);
+  tbb::parallel_for(size_t{0}, sums.size(), [&](size_t block) {
+    const size_t end = std::min(count, (block + 1) * kBlock);
+    for (size_t i = block * kBlock; i < end; ++i) sums[block] += value(i);
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
 template <typename T>
 bool same_size(const Raster<float>& a, const Raster<T>& b) {
   return a.width == b.width && a.height == b.height;
@@ -46,6 +61,14 @@ inline Raster<float>& gradient_like(const Raster<float>& value, Raster<float>& r
   require(
       same_size(value, raster), "losses: gradient must have the size of the view", raster.width);
   return raster;
+}
+
+/// Makes a gradient with respect to opacities one entry per Gaussian, zeros if it is empty.
+inline void opacity_gradient_like(const Gaussians& gaussians, std::vector<float>& gradient) {
+  if (gradient.empty()) gradient.assign(gaussians.size(), 0.0f);
+  require(gradient.size() == gaussians.size(),
+          "losses: gradient must have one entry per Gaussian",
+          gradient.size());
 }
 
 /// \throws InvalidInput unless all planes and the mask have one size and are not empty

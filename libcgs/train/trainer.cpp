@@ -14,6 +14,9 @@
 #include "libcgs/core/remedy.h"
 #include "libcgs/core/split_mix.h"
 #include "libcgs/train/learning_rate.h"
+#include "libcgs/train/losses.h"
+#include "libcgs/train/picture_terms.h"
+#include "libcgs/train/virtual_view.h"
 
 namespace cgs {
 
@@ -22,73 +25,8 @@ namespace {
 // Views that one step draws: of more than four, each step draws the next ones.
 size_t drawn_at_once(size_t views) { return std::min<size_t>(views, 4); }
 
-ColorPlanes planes_of(const ColorImage& image) {
-  ColorPlanes out;
-  for (int c = 0; c < 3; ++c) {
-    out[c] = Raster<float>(image.width, image.height, 0);
-    for (size_t i = 0; i < image.data.size(); ++i) out[c].data[i] = image.data[i][c];
-  }
-  return out;
-}
-
-Raster<float> halved(const Raster<float>& in) {
-  Raster<float> out(in.width / 2, in.height / 2, 0);
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) {
-      out(x, y) = 0.25f * (in(2 * x, 2 * y) + in(2 * x + 1, 2 * y) + in(2 * x, 2 * y + 1) +
-                           in(2 * x + 1, 2 * y + 1));
-    }
-  }
-  return out;
-}
-
-template <typename T>
-Raster<T> every_other(const Raster<T>& in) {
-  if (in.empty()) return in;
-  Raster<T> out(in.width / 2, in.height / 2, T{});
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) out(x, y) = in(2 * x, 2 * y);
-  }
-  return out;
-}
-
-// Where all four pixels may be used, of which halved() takes the mean.
-MaskMap all_usable(const MaskMap& in) {
-  if (in.empty()) return in;
-  MaskMap out(in.width / 2, in.height / 2, 0);
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) {
-      const auto is_set = [&](int dx, int dy) { return in(2 * x + dx, 2 * y + dy) != 0; };
-      out(x, y) = is_set(0, 0) && is_set(1, 0) && is_set(0, 1) && is_set(1, 1) ? 1 : 0;
-    }
-  }
-  return out;
-}
-
-// The camera of the image that halved() gives: odd rows and columns at the end are cut off.
-Camera halved(const Camera& camera) {
-  Camera out = camera;
-  out.width /= 2;
-  out.height /= 2;
-  out.fx /= 2;
-  out.fy /= 2;
-  out.cx /= 2;
-  out.cy /= 2;
-  return out;
-}
-
 Camera doubled(const Camera& camera) {
   return resized(camera, camera.width * 2, camera.height * 2);
-}
-
-// The derivative with respect to an image whose 2x2 means the loss was taken of.
-Raster<float> spread(const Raster<float>& gradient) {
-  if (gradient.empty()) return {};
-  Raster<float> out(gradient.width * 2, gradient.height * 2, 0);
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) out(x, y) = 0.25f * gradient(x / 2, y / 2);
-  }
-  return out;
 }
 
 // A well-mixed number for a triple of counters: dropout must not depend on what ran before.
@@ -168,6 +106,15 @@ bool is_decoded(ParameterRole role) {
   return role == ParameterRole::Depth || role == ParameterRole::Opacity;
 }
 
+std::vector<TrainingView> training_views(const Scene& scene,
+                                         const std::vector<ViewPriors>& priors) {
+  std::vector<TrainingView> out;
+  for (size_t n = 0; n < priors.size(); ++n) {
+    out.push_back(training_view(scene.views[static_cast<size_t>(scene.input[n])], priors[n]));
+  }
+  return out;
+}
+
 CoherentGaussians model_of(const Scene& scene,
                            const std::vector<ViewPriors>& priors,
                            const CoherenceOptions& options,
@@ -185,23 +132,18 @@ Trainer::Trainer(const Scene& scene,
     : priors_(priors),
       options_(options),
       model_(model_of(scene, priors, options.coherence, pane)),
+      full_(training_views(scene, priors)),
+      depth_terms_(scene, priors, full_, options),
+      opacity_terms_(model_, priors, options),
       rasterizer_(TrainingRasterizerOptions{}) {
   options.validate();
-  for (size_t n = 0; n < priors.size(); ++n) {
-    const View& view = scene.views[static_cast<size_t>(scene.input[n])];
-    full_.push_back({view.camera, planes_of(view.image), view.valid, priors[n].layer});
-    if (!(options.coarse_until > 0)) continue;
-    TrainingView coarse{
-        halved(view.camera), {}, all_usable(view.valid), every_other(priors[n].layer)};
-    for (int c = 0; c < 3; ++c) coarse.photograph[c] = halved(full_.back().photograph[c]);
-    coarse_.push_back(std::move(coarse));
+  for (size_t n = 0; n < full_.size() && options.coarse_until > 0; ++n) {
+    coarse_.push_back(halved(full_[n]));
   }
-  for (size_t i = 0; i < priors.size() && options.flow_weight > 0; ++i) {
-    for (size_t j = 0; j < priors.size(); ++j) {
-      if (i == j) continue;
-      // An optical flow, which the flow loss was published with, would also match what the sweep
-      // could not measure.
-      pairs_.push_back(
+  for (size_t i = 0; i < full_.size(); ++i) {
+    if (!(options.virtual_weight > 0 || options.virtual_tv_weight > 0)) break;
+    for (size_t j = i + 1; j < full_.size(); ++j) {
+      between_.push_back(
           {i, j, pixel_matches(full_[i].camera, priors[i], full_[j].camera, priors[j])});
     }
   }
@@ -231,87 +173,52 @@ const Gaussians& Trainer::drawn_for(size_t view) {
   return with_gaps_;
 }
 
+// \param view  number by which the background differs from that of others in this step
+const TrainingBuffers& Trainer::draw(const Gaussians& gaussians,
+                                     const Camera& camera,
+                                     size_t view) {
+  TrainingRasterizerOptions how;
+  how.background = background(static_cast<uint64_t>(step_), view);
+  how.sh_gradients = options_.color_rate > 0;
+  how.weight_squares = options_.emptiness_weight > 0;
+  how.shape = model_.shapes_are_free() ? GaussianShape::Ellipsoids : GaussianShape::Balls;
+  rasterizer_.set_options(how);
+  return rasterizer_.forward(gaussians, camera);
+}
+
 void Trainer::add_view(size_t n, GaussianGradients& sum, StepReport& report) {
   const bool coarse = time() < options_.coarse_until;
   const bool sharp = time() >= options_.sharp_from;
   const TrainingView& view = coarse ? coarse_[n] : full_[n];
-  TrainingRasterizerOptions how;
-  how.background = background(static_cast<uint64_t>(step_), n);
-  how.sh_gradients = options_.color_rate > 0;
-  how.shape = model_.shapes_are_free() ? GaussianShape::Ellipsoids : GaussianShape::Balls;
-  rasterizer_.set_options(how);
   const Camera camera = sharp ? doubled(view.camera) : view.camera;
-  const TrainingBuffers* rendered = &rasterizer_.forward(drawn_for(n), camera);
+  const TrainingBuffers* rendered = &draw(drawn_for(n), camera, n);
   TrainingBuffers pooled;
   if (sharp) {
-    for (int c = 0; c < 3; ++c) pooled.color[c] = halved(rendered->color[c]);
-    pooled.alpha = halved(rendered->alpha);
-    pooled.depth_sum = halved(rendered->depth_sum);
+    pooled = *rendered;
+    for_each_raster(pooled, [](Raster<float>& raster) { raster = halved(raster); });
     rendered = &pooled;
   }
-  // Where the other views do not reach, a dropped block shows nothing and teaches nothing.
-  MaskMap use(view.camera.width, view.camera.height, 1);
-  for (size_t i = 0; i < use.data.size(); ++i) {
-    const bool valid = view.use.empty() || view.use.data[i] != 0;
-    use.data[i] = valid && (options_.dropout <= 0 || rendered->alpha.data[i] > 0.3f);
-  }
-  const double share = 1.0 / double(drawn_at_once(full_.size()));
   TrainingBuffers loss;
-  report.l1 += multi_scale_l1(rendered->color,
-                              view.photograph,
-                              &use,
-                              options_.l1_levels,
-                              share * options_.l1_weight,
-                              loss.color);
-  report.ssim += structural_dissimilarity(
-      rendered->color, view.photograph, &use, share * options_.ssim_weight, loss.color);
-  const double gone_over = options_.tv_to_layers * time() * options_.tv_weight;
-  report.tv += total_variation(
-      *rendered, disparity_unit_, nullptr, share * (options_.tv_weight - gone_over), loss);
-  report.tv += total_variation(*rendered,
-                               disparity_unit_,
-                               &view.layer,
-                               share * (options_.masked_tv_weight + gone_over),
-                               loss);
-  if (sharp) {
-    for (int c = 0; c < 3; ++c) loss.color[c] = spread(loss.color[c]);
-    loss.alpha = spread(loss.alpha);
-    loss.depth_sum = spread(loss.depth_sum);
-  }
+  const double share = 1.0 / double(drawn_at_once(full_.size()));
+  add_picture_terms(*rendered, view, {options_, share, time(), disparity_unit_}, loss, report);
+  if (sharp) for_each_raster(loss, [](Raster<float>& raster) { raster = spread(raster); });
   rasterizer_.backward(loss, sum);
 }
 
-void Trainer::add_depth_terms(std::vector<Raster<float>>& sum, StepReport& report) {
-  const double share = 1.0 / double(std::max<size_t>(pairs_.size(), 1));
-  if (options_.flow_weight > 0) {
-    for (const Pair& pair : pairs_) {
-      report.flow += flow_consistency(full_[pair.first].camera,
-                                      model_.depth(pair.first),
-                                      full_[pair.second].camera,
-                                      model_.depth(pair.second),
-                                      pair.matches,
-                                      share * options_.flow_weight,
-                                      sum[pair.first],
-                                      sum[pair.second]);
-    }
-  }
-  if (!(options_.prior_weight > 0)) return;
-  for (size_t n = 0; n < priors_.size(); ++n) {
-    const ViewPriors& prior = priors_[n];
-    const DepthMap& depth = model_.depth(n);
-    if (sum[n].empty()) sum[n] = Raster<float>(depth.width, depth.height, 0);
-    const double weight =
-        options_.prior_weight / double(depth.data.size()) / double(priors_.size());
-    double value = 0;
-    for (size_t i = 0; i < depth.data.size(); ++i) {
-      if (prior.origin.data[i] != DepthOrigin::Measured) continue;
-      const double d = double(depth.data[i] - prior.depth.data[i]) / double(prior.sigma.data[i]);
-      const double root = std::sqrt(1 + d * d);
-      value += weight * (root - 1);
-      sum[n].data[i] += static_cast<float>(weight * d / root / double(prior.sigma.data[i]));
-    }
-    report.prior += value;
-  }
+// One step looks from one place between two of the views, by chance but the same every time.
+void Trainer::add_virtual_view(GaussianGradients& sum, StepReport& report) {
+  if (between_.empty()) return;
+  const uint64_t chance = mixed(static_cast<uint64_t>(step_), full_.size(), 0xBE7);
+  const Between& pair = between_[chance % between_.size()];
+  const double share = 0.25 + 0.5 * double(chance >> 11) * 0x1p-53;
+  const VirtualView view = virtual_view(full_[pair.first], full_[pair.second], pair.matches, share);
+  const TrainingBuffers& drawn = draw(model_.gaussians(), view.camera, full_.size());
+  TrainingBuffers loss;
+  report.related += multi_scale_l1(
+      drawn.color, view.photograph, &view.use, 1, options_.virtual_weight, loss.color);
+  report.related +=
+      total_variation(drawn, disparity_unit_, nullptr, options_.virtual_tv_weight, loss);
+  rasterizer_.backward(loss, sum);
 }
 
 float Trainer::rate(ParameterRole role) const {
@@ -355,8 +262,10 @@ StepReport Trainer::step() {
   for (size_t k = 0; k < drawn; ++k) {
     add_view((static_cast<size_t>(step_) * drawn + k) % full_.size(), gaussians, report);
   }
+  add_virtual_view(gaussians, report);
   std::vector<Raster<float>> depth(full_.size());
-  add_depth_terms(depth, report);
+  depth_terms_.add(model_, priors_, full_, depth, report);
+  opacity_terms_.add(model_, full_, gaussians, report);
   model_.add_gradients(gaussians, depth);
   report.bending = model_.add_bending(options_.depth_bending, options_.opacity_bending) +
                    model_.add_opacity_prior(options_.opacity_prior) +
@@ -370,6 +279,8 @@ StepReport Trainer::step() {
   }
   report.skipped = update();
   ++step_;
+  if (options_.average_decay > 0) average_.add(model_.parameters, options_.average_decay);
+  if (done()) average_.write(model_.parameters);
   model_.decode();
   history_.push_back(report);
   return report;
@@ -381,6 +292,8 @@ std::string Trainer::save() const {
   append(out, static_cast<int64_t>(model_.shapes_are_free()));
   out.append(reinterpret_cast<const char*>(history_.data()), history_.size() * sizeof(StepReport));
   for (size_t i = 0; i < states_.size(); ++i) append(out, model_.parameters[i].value, states_[i]);
+  append(out, static_cast<int64_t>(average_.values.size()));
+  for (const std::vector<float>& values : average_.values) append(out, values);
   return out;
 }
 
@@ -393,6 +306,14 @@ void Trainer::restore(std::string_view state) {
   history_.clear();
   for (int i = 0; i < step_; ++i) history_.push_back(take<StepReport>(state));
   for (size_t i = 0; i < states_.size(); ++i) take(state, model_.parameters[i].value, states_[i]);
+  const auto averaged = take<int64_t>(state);
+  require(averaged == 0 || averaged == static_cast<int64_t>(states_.size()),
+          "a saved state must fit the model",
+          averaged);
+  average_.values.resize(static_cast<size_t>(averaged));
+  for (size_t i = 0; i < average_.values.size(); ++i) {
+    take(state, average_.values[i], model_.parameters[i].value.size(), true);
+  }
   require(state.empty(), "a saved state must end with its last block", state.size());
   model_.decode();
 }

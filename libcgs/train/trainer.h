@@ -8,25 +8,18 @@
 
 #include "libcgs/coherence/coherent_gaussians.h"
 #include "libcgs/core/scene.h"
+#include "libcgs/priors/pixel_matches.h"
 #include "libcgs/priors/view_priors.h"
 #include "libcgs/render/training_rasterizer.h"
 #include "libcgs/train/adam.h"
-#include "libcgs/train/losses.h"
+#include "libcgs/train/depth_terms.h"
+#include "libcgs/train/opacity_terms.h"
+#include "libcgs/train/parameter_average.h"
+#include "libcgs/train/step_report.h"
 #include "libcgs/train/training_options.h"
+#include "libcgs/train/training_view.h"
 
 namespace cgs {
-
-/// What one step did: each term already multiplied by its weight, summed over views.
-struct StepReport {
-  double l1 = 0;
-  double ssim = 0;
-  double tv = 0;
-  double flow = 0;
-  double prior = 0;
-  double bending = 0;
-  size_t skipped = 0;  ///< Parameters left alone because their gradient was not finite.
-  double total() const { return l1 + ssim + tv + flow + prior + bending; }
-};
 
 /// Optimises coherent Gaussians against the photographs of the input views.
 ///
@@ -56,20 +49,15 @@ class Trainer {
   void restore(std::string_view state);
 
  private:
-  struct TrainingView {
-    Camera camera;
-    ColorPlanes photograph;
-    MaskMap use;
-    Raster<uint8_t> layer;
-  };
-  struct Pair {
+  struct Between {
     size_t first, second;
     std::vector<PixelMatch> matches;
   };
   double time() const { return double(step_) / options_.steps; }
   const Gaussians& drawn_for(size_t view);
   void add_view(size_t n, GaussianGradients& sum, StepReport& report);
-  void add_depth_terms(std::vector<Raster<float>>& sum, StepReport& report);
+  void add_virtual_view(GaussianGradients& sum, StepReport& report);
+  const TrainingBuffers& draw(const Gaussians& gaussians, const Camera& camera, size_t view);
   float rate(ParameterRole role) const;
   size_t update();  ///< \return gradients that were not finite
 
@@ -78,10 +66,13 @@ class Trainer {
   CoherentGaussians model_;
   std::vector<TrainingView> full_;    // per input view
   std::vector<TrainingView> coarse_;  // at half size; empty unless the schedule has a coarse part
-  std::vector<Pair> pairs_;           // empty unless the flow term has a weight
+  std::vector<Between> between_;      // pairs of views; empty unless virtual views have a weight
+  DepthTerms depth_terms_;
+  OpacityTerms opacity_terms_;
   TrainingRasterizer rasterizer_;
   Gaussians with_gaps_;            // what dropout leaves for one view; unused without it
   std::vector<AdamState> states_;  // of the blocks of the model
+  ParameterAverage average_;       // empty unless the model is to be the mean
   float disparity_unit_ = 1;
   std::vector<StepReport> history_;
   int step_ = 0;

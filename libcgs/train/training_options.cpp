@@ -36,6 +36,16 @@ std::vector<Field> fields_of(TrainingOptions& o) {
           {"tv_to_layers", &o.tv_to_layers},
           {"flow_weight", &o.flow_weight},
           {"prior_weight", &o.prior_weight},
+          {"spread_weight", &o.spread_weight},
+          {"emptiness_weight", &o.emptiness_weight},
+          {"near_opacity_weight", &o.near_opacity_weight},
+          {"edge_smooth_weight", &o.edge_smooth_weight},
+          {"seen_through_weight", &o.seen_through_weight},
+          {"order_weight", &o.order_weight},
+          {"patch_depth_weight", &o.patch_depth_weight},
+          {"virtual_weight", &o.virtual_weight},
+          {"virtual_tv_weight", &o.virtual_tv_weight},
+          {"average_decay", &o.average_decay},
           {"depth_bending", &o.depth_bending},
           {"opacity_bending", &o.opacity_bending},
           {"opacity_prior", &o.opacity_prior},
@@ -135,6 +145,17 @@ void TrainingOptions::validate() const {
   require_weight(masked_tv_weight, "masked_tv_weight");
   require_weight(flow_weight, "flow_weight");
   require_weight(prior_weight, "prior_weight");
+  require_weight(spread_weight, "spread_weight");
+  require_weight(emptiness_weight, "emptiness_weight");
+  require_weight(near_opacity_weight, "near_opacity_weight");
+  require_weight(edge_smooth_weight, "edge_smooth_weight");
+  require_weight(seen_through_weight, "seen_through_weight");
+  require_weight(order_weight, "order_weight");
+  require_weight(patch_depth_weight, "patch_depth_weight");
+  require_weight(virtual_weight, "virtual_weight");
+  require_weight(virtual_tv_weight, "virtual_tv_weight");
+  require(
+      average_decay >= 0 && average_decay < 1, "average_decay must be in [0, 1)", average_decay);
   require_weight(depth_bending, "depth_bending");
   require_weight(opacity_bending, "opacity_bending");
   require_weight(opacity_prior, "opacity_prior");

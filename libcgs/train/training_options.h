@@ -46,7 +46,20 @@ struct TrainingOptions {
   double prior_weight = 0.002;  ///< Departure of measured depths from their prior, in sigmas. With
                                 ///< less, rounding decides where photographs hardly determine
                                 ///< depth.
-  double depth_bending = 0;     ///< Of the depth lattice; 0 with decoder=conv, which has no knots.
+  /// Terms of related systems, each as the function of losses.h that its name begins with. All are
+  /// off: docs/ablation.md has what each brings. Those of given depth do nothing without it.
+  double spread_weight = 0;        ///< depth_spread(): depth along rays around what is measured.
+  double emptiness_weight = 0;     ///< emptiness(): one Gaussian per ray.
+  double near_opacity_weight = 0;  ///< near_opacity(), below 0.8 of the nearest measured depth.
+  double edge_smooth_weight = 0;   ///< edge_smoothness() of depth that is not measured.
+  double seen_through_weight = 0;  ///< seen_through() of Gaussians without measured depth.
+  double order_weight = 0;         ///< depth_order() by given depth.
+  double patch_depth_weight = 0;   ///< patch_depth() against given depth.
+  double virtual_weight = 0;  ///< multi_scale_l1() on one scale, of a virtual_view() in each step.
+  double virtual_tv_weight = 0;  ///< total_variation() of the same.
+  double average_decay = 0;      ///< The model is the running mean of its parameters, of which a
+                                 ///< step replaces 1 - this share; 0 = the last ones. In [0, 1).
+  double depth_bending = 0;      ///< Of the depth lattice; 0 with decoder=conv, which has no knots.
   double opacity_bending = 0;
   double opacity_prior = 0.001;  ///< Squared change of the logit, mean over Gaussians.
   double color_prior = 0.6;      ///< The same of the colour, summed over its channels.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What one training step on a 504 x 378 view pays for its losses and its lattice.
+#include <cmath>
 #include <random>
 
 #include <benchmark/benchmark.h>
@@ -75,6 +76,41 @@ void bench_total_variation(benchmark::State& state) {
   }
 }
 
+void bench_depth_spread(benchmark::State& state) {
+  const auto limit = threads(state);
+  TrainingBuffers rendered;
+  rendered.alpha = noise(1);
+  rendered.depth_sum = noise(2);
+  rendered.depth_square_sum = noise(3);
+  const DepthMap measured = noise(4);
+  const DepthMap sigma = noise(5);
+  TrainingBuffers gradient;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(depth_spread(rendered, measured, sigma, 0.1, gradient));
+  }
+}
+
+void bench_edge_smoothness(benchmark::State& state) {
+  const auto limit = threads(state);
+  const DepthMap depth = noise(1);
+  const DepthMap nothing_measured(kWidth, kHeight, std::nanf(""));
+  const ColorPlanes photograph = picture(2);
+  Raster<float> gradient;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(edge_smoothness(depth, photograph, nothing_measured, 0.1, gradient));
+  }
+}
+
+void bench_patch_depth(benchmark::State& state) {
+  const auto limit = threads(state);
+  const DepthMap depth = noise(1);
+  const DepthMap given = noise(2);
+  Raster<float> gradient;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(patch_depth(depth, given, false, 0.1, gradient));
+  }
+}
+
 void bench_flow_consistency(benchmark::State& state) {
   const auto limit = threads(state);
   const Camera first{
@@ -125,6 +161,9 @@ void for_threads(benchmark::internal::Benchmark* bench) {
 BENCHMARK(bench_multi_scale_l1)->Apply(for_threads);
 BENCHMARK(bench_total_variation)->Apply(for_threads);
 BENCHMARK(bench_flow_consistency)->Apply(for_threads);
+BENCHMARK(bench_depth_spread)->Apply(for_threads);
+BENCHMARK(bench_edge_smoothness)->Apply(for_threads);
+BENCHMARK(bench_patch_depth)->Apply(for_threads);
 
 void for_threads_and(benchmark::internal::Benchmark* bench, const char* name) {
   bench->ArgNames({"threads", name})

@@ -9,7 +9,8 @@ CGS_BUILD is the folder of the programs (build/release/bin). Each MODEL is a fol
 `cgs train SCENE --set steps=0 -o MODEL` wrote. Every setting is trained from the same start on each
 of them, by training_accuracy; the fox needs --limit 2. A row says what is changed from the standard
 setting, a column PSNR [dB] and SSIM over all pixels, the share of holes and, with --time, the
-core-seconds of the steps. Rows of many steps or of networks (decoder=conv) only run where named.
+core-seconds of the steps. Rows of many steps, of networks (decoder=conv) and of terms of related
+systems (all of them: --rows related) only run where named.
 """
 import argparse
 import pathlib
@@ -47,6 +48,24 @@ SLOW = {
     "networks 240 steps": ["decoder=conv", "steps=240"],
     "reference 240 steps": ["preset=reference", "steps=240"],
 }
+# Terms of related systems, two weights each; `--rows related` runs all of them.
+RELATED = {
+    f"{name} {value}": [f"{field}={value}"]
+    for name, field, values in [
+        ("spread of depth", "spread_weight", ("0.0005", "0.003")),
+        ("emptiness", "emptiness_weight", ("0.003", "0.03")),
+        ("near opacity", "near_opacity_weight", ("0.1", "1")),
+        ("mean of parameters", "average_decay", ("0.8", "0.95")),
+        ("edge-aware smoothness", "edge_smooth_weight", ("0.3", "1")),
+        ("seen through", "seen_through_weight", ("0.1", "1")),
+        ("order of depth", "order_weight", ("0.1", "1")),
+        ("depth of patches", "patch_depth_weight", ("0.001", "0.01")),
+        ("virtual views", "virtual_weight", ("0.2", "0.8")),
+        ("TV of virtual views", "virtual_tv_weight", ("0.003", "0.03")),
+        ("pruned before the mode", "prune", ("0.05", "0.2")),
+    ]
+    for value in values
+}
 
 
 def last_line(program, model, held_out, settings):
@@ -73,7 +92,9 @@ def main():
     args = parser.parse_args()
     program = str(pathlib.Path(args.build) / "training_accuracy")
     rows = args.rows.split(",") if args.rows else list(ROWS)
-    known = ROWS | SLOW
+    if rows == ["related"]:
+        rows = list(RELATED)
+    known = ROWS | SLOW | RELATED
     unknown = [row for row in rows if row not in known]
     if unknown:
         sys.exit(f"--rows: {', '.join(unknown)} is none of {', '.join(known)}")

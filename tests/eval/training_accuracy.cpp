@@ -2,10 +2,12 @@
 // What training settings bring on held-out views.
 //
 // usage: training_accuracy MODEL [preset=NAME] [every=STEPS] [limit=COUNT | views=NAME,NAME]
-//                          [FIELD=VALUE ...]
+//                          [prune=GAP] [given=BUMPS] [FIELD=VALUE ...]
 //
 // MODEL is a folder that `cgs train --set steps=0` wrote. Fields are those of TrainingOptions; a
-// preset sets all, so that fields come after it.
+// preset sets all, so that fields come after it. prune takes away Gaussians before what is drawn,
+// see kept_by_mode(), from what is evaluated. given makes given depth of the truth (below), as a
+// network errs: see Corruption, with bumps of that height and one square turned inside out.
 // Photographs are matched in exposure to the model where its input views were, as by cgs evaluate.
 // Prints one line per evaluation: PSNR and SSIM over all pixels, over the pixels that were seen
 // before training (a fixed set, so that lines can be compared), and over those seen now. Times are
@@ -29,6 +31,8 @@
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/train/image_metrics.h"
 #include "libcgs/train/trainer.h"
+#include "tests/support/corrupted_depth.h"
+#include "tests/support/mode_pruning.h"
 
 namespace {
 
@@ -131,12 +135,37 @@ Means evaluate(const cgs::Gaussians& gaussians,
   return {m.psnr / n, m.ssim / n, m.psnr_fixed / n, m.ssim_fixed / n, m.psnr_seen / n, m.holes / n};
 }
 
+void give_corrupted_depth(const std::vector<cgs::DepthMap>& truth,
+                          double bumps,
+                          cgs::Scene& scene) {
+  cgs::require(!truth.empty(), "given depth is made from the truth of the scene", truth.size());
+  for (size_t n = 0; n < truth.size(); ++n) {
+    const cgs::test::Corruption how{
+        .bumps = bumps, .inverted_x = truth[n].width / 2, .inverted_y = truth[n].height / 2};
+    scene.views[static_cast<size_t>(scene.input[n])].given_depth =
+        cgs::test::corrupted_depth(truth[n], static_cast<unsigned>(n), how);
+  }
+}
+
+cgs::Gaussians pruned(cgs::Gaussians gaussians, const cgs::Scene& scene, double gap) {
+  if (!(gap > 0)) return gaussians;
+  std::vector<cgs::Camera> cameras;
+  for (const int i : scene.input) cameras.push_back(scene.views[static_cast<size_t>(i)].camera);
+  const std::vector<uint8_t> keep = cgs::test::kept_by_mode(gaussians, cameras, gap);
+  for (size_t g = 0; g < keep.size(); ++g) {
+    if (keep[g] == 0) gaussians.opacity[g] = 0;
+  }
+  return gaussians;
+}
+
 void run(int argc, char** argv) {
   cgs::Model model = cgs::read_model(argv[1]);
   cgs::TrainingOptions options;
   int every = 100;
   size_t limit = 6;
   std::string views;
+  double prune = 0;
+  double bumps = -1;
   for (int i = 2; i < argc; ++i) {
     const std::string argument = argv[i];
     const size_t equals = std::min(argument.find('='), argument.size() - 1);
@@ -150,6 +179,10 @@ void run(int argc, char** argv) {
       options = cgs::training_preset(value);
     } else if (name == "views") {
       views = value;
+    } else if (name == "prune") {
+      prune = std::atof(value.c_str());
+    } else if (name == "given") {
+      bumps = std::atof(value.c_str());
     } else {
       cgs::set_training_field(options, name, value);
     }
@@ -166,6 +199,8 @@ void run(int argc, char** argv) {
                         {}});
   }
   const std::vector<cgs::SupportView> inputs = cgs::support_views(model);
+  const std::vector<cgs::DepthMap> truth = true_depths(model.scene);
+  if (bumps >= 0) give_corrupted_depth(truth, bumps, model.scene);
   cgs::Trainer trainer(model.scene, model.priors, options);
   std::printf(
       "%5s %7s | %6s %5s | %6s %5s | %6s %5s |  l1      ssim    tv      flow    prior   bend\n",
@@ -177,12 +212,12 @@ void run(int argc, char** argv) {
       "ssim",
       "seen",
       "holes");
-  const std::vector<cgs::DepthMap> truth = true_depths(model.scene);
   double seconds = 0;
   cgs::StepReport last;
   while (true) {
     if (trainer.steps_done() % every == 0 || trainer.done()) {
-      const Means m = evaluate(trainer.model().gaussians(), inputs, held_out);
+      const Means m =
+          evaluate(pruned(trainer.model().gaussians(), model.scene, prune), inputs, held_out);
       std::printf(
           "%5d %7.1f | %6.2f %.3f | %6.2f %.3f | %6.2f %4.1f%% | %.5f %.5f %.5f %.5f %.5f %.5f",
           trainer.steps_done(),
@@ -216,7 +251,7 @@ int main(int argc, char** argv) {
   if (argc < 2) {
     std::fprintf(stderr,
                  "usage: training_accuracy MODEL [preset=NAME] [every=STEPS] [limit=COUNT | "
-                 "views=NAME,NAME] [FIELD=VALUE ...]\n");
+                 "views=NAME,NAME] [prune=GAP] [given=BUMPS] [FIELD=VALUE ...]\n");
     return 2;
   }
   try {

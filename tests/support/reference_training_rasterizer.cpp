@@ -99,6 +99,7 @@ ReferencePlanes draw_reference(const std::vector<ReferenceGaussian>& gaussians,
       out[3][p] += w;
       out[4][p] += w * s.z;
       out[5][p] += w * s.z * s.z;
+      out[6][p] += w * w;
       T *= 1 - alpha;
     }
     for (int c = 0; c < 3; ++c) out[size_t(c)][p] += T * background[c];

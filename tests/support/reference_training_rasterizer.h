@@ -20,8 +20,8 @@ struct ReferenceGaussian {
 
 std::vector<ReferenceGaussian> reference_gaussians(const Gaussians& gaussians);
 
-/// Red, green, blue, alpha, sum of w z and sum of w z^2, row-major.
-using ReferencePlanes = std::array<std::vector<double>, 6>;
+/// Red, green, blue, alpha, sums of w z, w z^2 and w^2, row-major.
+using ReferencePlanes = std::array<std::vector<double>, 7>;
 
 /// Slow and obvious: every pixel visits every Gaussian, nearest first, with the textbook inverse of
 /// the 2x2 covariance, all in double. For drawable Gaussians: nothing is checked.

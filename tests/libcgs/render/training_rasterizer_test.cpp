@@ -66,8 +66,14 @@ Gaussians random_gaussians(const Camera& camera, const Spread& spread, unsigned 
   return g;
 }
 
-std::array<Raster<float>*, 6> planes(TrainingBuffers& b) {
-  return {&b.color[0], &b.color[1], &b.color[2], &b.alpha, &b.depth_sum, &b.depth_square_sum};
+std::array<Raster<float>*, 7> planes(TrainingBuffers& b) {
+  return {&b.color[0],
+          &b.color[1],
+          &b.color[2],
+          &b.alpha,
+          &b.depth_sum,
+          &b.depth_square_sum,
+          &b.weight_square_sum};
 }
 
 // Random derivatives for the planes whose bit is set, nothing for the others.
@@ -86,7 +92,7 @@ TrainingBuffers random_loss(const Camera& camera, unsigned channels, unsigned se
   return out;
 }
 
-constexpr unsigned kEveryChannel = 63;
+constexpr unsigned kEveryChannel = 127;
 
 // Every derivative of a set as one list, and how to reach the entry in the reference scene.
 struct Entry {
@@ -140,7 +146,7 @@ double loss_of(const test::ReferencePlanes& planes_of_scene, TrainingBuffers& we
 }
 
 struct Comparison {
-  std::vector<unsigned> channels = {1, 2, 4, 8, 16, 32, kEveryChannel};
+  std::vector<unsigned> channels = {1, 2, 4, 8, 16, 32, 64, kEveryChannel};
   Camera camera = oblique_camera();
   size_t every = 1;          // compares one derivative in so many
   size_t most = size_t(-1);  // of the first so many
@@ -274,7 +280,7 @@ TEST(TrainingRasterizer, DifferentiatesAHundredThousandSplatsAtOneDepth) {
 void expect_drawn(const Gaussians& g, GaussianShape shape) {
   const Camera camera = oblique_camera();
   const Eigen::Vector3f background(0.2f, 0.4f, 0.8f);
-  TrainingRasterizer rasterizer({.background = background, .shape = shape});
+  TrainingRasterizer rasterizer({.background = background, .shape = shape, .weight_squares = true});
   const TrainingBuffers& got = rasterizer.forward(g, camera);
   const test::ReferenceImage truth =
       test::rasterize_reference(g, camera, background.cast<double>(), 1e-4);
@@ -286,6 +292,7 @@ void expect_drawn(const Gaussians& g, GaussianShape shape) {
     ASSERT_NEAR(double(got.depth_sum.data[p]), alpha * depth, 2 * room) << p;
     const double square = alpha * (depth * depth + truth.depth_variance.data[p]);
     ASSERT_NEAR(double(got.depth_square_sum.data[p]), square, 2 * room) << p;
+    ASSERT_NEAR(double(got.weight_square_sum.data[p]), truth.weight_squared.data[p], 2 * room) << p;
     for (int c = 0; c < 3; ++c) {
       ASSERT_NEAR(double(got.color[size_t(c)].data[p]), truth.color.data[p][c], 4 * room) << p;
     }

@@ -8,54 +8,21 @@
 #include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
-#include "libcgs/priors/depth_layers.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/train/image_metrics.h"
 #include "tests/support/pane_scene.h"
+#include "tests/support/planted_training.h"
 #include "tests/support/stereo_scene.h"
 
 namespace cgs::trainer_test {
 namespace {
 
-struct PlantedScene {
-  Scene scene;
-  std::vector<DepthMap> truth;
-  std::vector<ViewPriors> priors;
-};
-
-std::vector<test::TexturedPatch> wall_and_box() {
-  std::vector<test::TexturedPatch> patches;
-  patches.push_back({{0, 0, 1.0}, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()});
-  test::add_box(patches, {-0.15, -0.12, 0.7}, {0.15, 0.12, 0.9});
-  return patches;
-}
-
-// A textured wall with a box in front, seen by three cameras; its depth is known up to a smooth
-// bump of `error` relative height, another one in each view.
-// \param places  x of the cameras
-PlantedScene planted_scene(double error, const std::vector<double>& places = {-0.12, 0.0, 0.12}) {
-  const std::vector<test::TexturedPatch> patches = wall_and_box();
-  std::vector<Camera> cameras;
-  for (const double x : places) {
-    cameras.push_back(test::looking_at({x, 0.03 * x, 0}, {0, 0, 0.9}, 72, 56, 70));
-  }
-  PlantedScene out;
-  out.scene = test::photographed_scene(patches, cameras, 0.02);
-  out.priors = test::true_priors(patches, cameras);
-  for (size_t n = 0; n < cameras.size(); ++n) {
-    ViewPriors& p = out.priors[n];
-    out.truth.push_back(p.depth);
-    for (float& s : p.sigma.data) s *= 2;
-    for (int y = 0; y < p.depth.height; ++y) {
-      for (int x = 0; x < p.depth.width; ++x) {
-        const double bump = std::sin(0.09 * x + 2.0 * double(n)) * std::cos(0.11 * y + double(n));
-        p.depth(x, y) *= static_cast<float>(1 + error * bump);
-      }
-    }
-    p.layer = depth_layers(p.depth, {.count = 2, .sample_step = 2});
-  }
-  return out;
-}
+using test::planted_scene;
+using test::PlantedScene;
+using test::run;
+using test::same_bits;
+using test::short_training;
+using test::wall_and_box;
 
 double mean_depth_error(const PlantedScene& planted, const CoherentGaussians& model) {
   double sum = 0;
@@ -69,14 +36,6 @@ double mean_depth_error(const PlantedScene& planted, const CoherentGaussians& mo
   return sum / count;
 }
 
-TrainingOptions short_training(int steps) {
-  TrainingOptions options;
-  options.steps = steps;
-  options.coherence.depth_spacing = {32, 16};
-  options.coherence.opacity_spacing = {16, 8};
-  return options;
-}
-
 TrainingOptions short_training_of_networks(int steps) {
   TrainingOptions options;
   options.steps = steps;
@@ -86,15 +45,6 @@ TrainingOptions short_training_of_networks(int steps) {
   options.conv_depth_rate = 1e-3;
   options.conv_opacity_rate = 1e-3;
   return options;
-}
-
-void run(Trainer& trainer) {
-  while (!trainer.done()) trainer.step();
-}
-
-bool same_bits(const Gaussians& a, const Gaussians& b) {
-  return a.position == b.position && a.scale == b.scale && a.rotation == b.rotation &&
-         a.opacity == b.opacity && a.sh == b.sh;
 }
 
 TEST(Trainer, MovesDepthTowardsTheTruth) {

@@ -49,7 +49,8 @@ TEST(TrainingOptions, ValidateNamesTheFieldOutOfRange) {
                               "sh_degree",
                               "layers_per_ray",
                               "color_rate",
-                              "color_prior"}) {
+                              "color_prior",
+                              "average_decay"}) {
     TrainingOptions options;
     set_training_field(options, setting, "-1");
     try {
@@ -68,6 +69,16 @@ TEST(TrainingOptions, WeightsAreFinite) {
                              "masked_tv_weight",
                              "flow_weight",
                              "prior_weight",
+                             "spread_weight",
+                             "emptiness_weight",
+                             "near_opacity_weight",
+                             "edge_smooth_weight",
+                             "seen_through_weight",
+                             "order_weight",
+                             "patch_depth_weight",
+                             "virtual_weight",
+                             "virtual_tv_weight",
+                             "average_decay",
                              "depth_bending",
                              "opacity_bending",
                              "opacity_prior"}) {
