@@ -49,7 +49,7 @@ ModelObject reconstructed(const Scene& scene,
   };
   const size_t known = scene.warnings.size();
   ModelObject out = result_of(progress, [&](Terminal& terminal) {
-    check_training_memory(scene, memory_budget(0), options.training.coherence);
+    check_training_memory(scene, memory_budget(0), options.training);
     TrainedModel trained = reconstruct(scene, options, terminal.begin(traits(Stage::Model).title));
     ModelObject made{std::move(trained.model), {}};
     made.model.evidence = description_of(trained, options.training);
@@ -235,7 +235,7 @@ void add_models(py::module_& module) {
 
 scene     from read_scene(); photographs that are not loaded are loaded. Images and depth that you
           put into its views are taken as they are.
-preset    "draft", "standard", "fine" or "reference"
+preset    "draft", "standard", "fine", "reference" or "classical"
 settings  fields of the training, such as {"steps": 500}; `cgs train --help` tells more
 
 Returns a Model. The same scene gives the same bits as `cgs train`, for any number of threads.

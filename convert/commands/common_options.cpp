@@ -218,11 +218,12 @@ void add_training_options(CLI::App& command, TrainingArguments& arguments) {
   command
       .add_option("--preset",
                   arguments.preset,
-                  "draft, standard, fine (a third, all, twice the training steps), or "
-                  "reference: the published CoherentGS schedule with convolutional decoders, hours "
-                  "instead of a minute")
+                  "draft, standard, fine (a third, all, twice the training steps), "
+                  "reference (the published CoherentGS schedule with convolutional decoders, hours "
+                  "instead of a minute), or classical: 3D Gaussian Splatting without coherence, to "
+                  "compare with")
       // Says what there is, to help and completion; training_preset() refuses others.
-      ->check(CLI::Validator("{draft,standard,fine,reference}"))
+      ->check(CLI::Validator("{draft,standard,fine,reference,classical}"))
       ->capture_default_str();
   command
       .add_option("--set",

@@ -10,6 +10,7 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/commands/compare_splats.h"
 #include "convert/measure/comparison.h"
 #include "convert/measure/m3c2_comparison.h"
 #include "convert/measure/measured_file.h"
@@ -36,6 +37,7 @@ struct CompareArgs {
   std::filesystem::path svg;
   std::string unit;
   std::string assume_unit;
+  SplatCompareArgs splats;
   CommonOptions common;
 };
 
@@ -213,10 +215,34 @@ void check_clouds(const CompareArgs& args, const MeasurableMesh& b) {
   }
 }
 
+// Both files hold splats, which have pictures, or neither does.
+bool are_splats(const CompareArgs& args) {
+  const bool a = holds_splats(args.a);
+  const bool b = holds_splats(args.b);
+  if (a != b) {
+    throw InvalidInput(printable(a ? args.a : args.b) + " holds splats and " +
+                       printable(a ? args.b : args.a) +
+                       " does not: compare pictures of two files of splats, or make a mesh of them "
+                       "with cgs convert");
+  }
+  const bool looks = !args.splats.scene.empty() || !args.splats.pictures.empty();
+  if (looks && !a) throw InvalidInput("--scene and --pictures are for two files of splats");
+  const bool measures = args.icp || args.m3c2.wanted || !args.threshold.empty() ||
+                        !args.ply.empty() || !args.svg.empty() || !args.unit.empty() ||
+                        !args.assume_unit.empty();
+  if (measures && a) {
+    throw InvalidInput(
+        "two files of splats are compared by their pictures: distances, as --icp, --m3c2, "
+        "--threshold, --ply, --svg, --unit and --assume-unit ask for, are those of meshes");
+  }
+  return a;
+}
+
 void run_compare(const CompareArgs& args) {
-  let_interrupts_end();
   limit_threads(args.common.threads);
   check_options(args);
+  if (are_splats(args)) return run_splat_compare(args.a, args.b, args.splats, args.common);
+  let_interrupts_end();
   Terminal terminal(args.common.quiet, args.common.strict);
   MeasurableFile first = read_measured(args.a, args.assume_unit);
   MeasurableFile second = read_measured(args.b, args.assume_unit);
@@ -297,14 +323,21 @@ void add_m3c2(CLI::App& cmd, M3c2Request& request) {
 
 void add_compare(CLI::App& app) {
   auto args = std::make_shared<CompareArgs>();
-  auto* cmd = app.add_subcommand(
-      "compare", "Signed distances of a mesh or point cloud to a mesh, and what really changed");
+  auto* cmd = app.add_subcommand("compare",
+                                 "Signed distances of a mesh or point cloud to a mesh, and what "
+                                 "really changed; or pictures of "
+                                 "two files of splats");
   cmd->add_option(
-         "a", args->a, "Mesh or point cloud: .ply, .obj, .stl, .off, .om, .3mf, .glb, .gltf")
+         "a",
+         args->a,
+         "Mesh or point cloud: .ply, .obj, .stl, .off, .om, .3mf, .glb, .gltf; or splats: .ply, "
+         ".splat, .spz, .sog, .ksplat, .glb, .gltf")
       ->required();
-  cmd->add_option("b",
-                  args->b,
-                  "Mesh to measure from (with --m3c2 also a cloud): reference, or the earlier date")
+  cmd->add_option(
+         "b",
+         args->b,
+         "Mesh to measure from (with --m3c2 also a cloud): reference, or the earlier date; or "
+         "splats in the same coordinates")
       ->required();
   cmd->add_option("--samples", args->samples, "Points on A, evenly by area (of a cloud: all)")
       ->capture_default_str();
@@ -323,12 +356,14 @@ void add_compare(CLI::App& app) {
   cmd->add_option("--unit", args->unit, "Unit of the figures; default m");
   cmd->add_option(
       "--assume-unit", args->assume_unit, "What a unit of a file is, where it does not say");
+  add_splat_compare_options(*cmd, args->splats);
   add_output_options(*cmd, args->common);
   cmd->footer(
       "Positive distances lie on the side that B's faces look to; with --m3c2: that A's look to.\n"
       "Example: cgs compare 2026.ply 2024.ply --icp --unit mm --ply change.ply --threshold 5mm\n"
       "         cgs compare 2026.ply 2024.ply --m3c2 --cylinder 5cm --registration-error 2mm "
-      "--ply change.ply");
+      "--ply change.ply\n"
+      "         cgs compare splats.ply smaller.spz --scene photos/portal --pictures out/compared");
   cmd->callback([args] { run_compare(*args); });
 }
 

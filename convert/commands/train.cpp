@@ -26,6 +26,7 @@ struct TrainArgs {
   std::filesystem::path output;
   TrainingArguments training;
   Medium medium = Medium::None;
+  std::filesystem::path start;
   bool overwrite = false;
   CommonOptions common;
 };
@@ -55,6 +56,17 @@ void refuse_to_replace(const TrainArgs& args) {
   }
 }
 
+// Given splats are refined as free ones: they belong to no pixel.
+TrainingOptions options_of(const TrainArgs& args) {
+  TrainingOptions options = training_options(args.training);
+  if (args.start.empty()) return options;
+  if (options.method != SplatMethod::Classical) {
+    throw InvalidInput("--start refines splats that are free: it goes with --preset classical");
+  }
+  if (!is_present(args.start)) throw BadInput(Defect::Open, args.start, "no such file");
+  return options;
+}
+
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
   keep_scene_apart(args.output, args.scene.path, {"priors", "colmap"});
@@ -63,7 +75,7 @@ void run_train(const TrainArgs& args) {
   std::vector<std::string> checkpoint_warnings;
   const ModelRequest request = {
       {},
-      training_options(args.training),
+      options_of(args),
       args.output,
       args.scene.options.depth.network,
       !args.overwrite,
@@ -71,10 +83,11 @@ void run_train(const TrainArgs& args) {
         terminal.note(coverage_words(priors, model.scene));
       },
       [&](const std::string& words) { checkpoint_warnings.push_back(words); },
-      args.medium};
+      args.medium,
+      args.start};
   OpenedScene opened = open_scene(args.scene, args.output, terminal);
   check_training_memory(
-      opened.scene, memory_budget(stated_memory_limit(args.common)), request.training.coherence);
+      opened.scene, memory_budget(stated_memory_limit(args.common)), request.training);
   (void)check_stated_cameras(opened, terminal);
   const NewFolder folder(args.output);
   const FolderLock lock(args.output);
@@ -132,11 +145,18 @@ void add_train(CLI::App& app) {
   add_scale_options(*cmd, args->scene);
   add_medium_option(*cmd, args->medium);
   add_training_options(*cmd, args->training);
+  cmd->add_option("--start",
+                  args->start,
+                  "With --preset classical: splats to begin from and refine, in the coordinates of "
+                  "the scene, of any format that convert reads; their number stays");
   cmd->add_flag("-w,--overwrite", args->overwrite, "Replace a finished model");
   add_common_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs train photos/portal --views 1,10,19 --preset draft -o out/model\n"
-      "Interrupted, it goes on where it was when it is run again.");
+      "         cgs train photos/portal --preset classical --start splats.ply -o out/refined\n"
+      "Interrupted, it goes on where it was when it is run again; with --preset classical it "
+      "begins "
+      "anew.");
   cmd->callback([args] { run_train(*args); });
 }
 

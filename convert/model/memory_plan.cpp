@@ -80,6 +80,13 @@ double of_networks(const CoherenceOptions& coherence, size_t views, double pixel
   return of_one(widths.depth) + of_one(widths.opacity);
 }
 
+// What free Gaussians hold beyond coherent ones, of which there may be as many as pixels: colours
+// of 16 harmonics, their derivatives and means. Measured at 63,504.
+double of_free_splats(SplatMethod method, double pixels) {
+  constexpr double kOfPixel = 1650;
+  return method == SplatMethod::Classical ? kOfPixel * pixels : 0;
+}
+
 constexpr size_t kUnlimited = std::numeric_limits<size_t>::max();
 
 size_t free_of_machine() {
@@ -135,7 +142,8 @@ std::vector<StageMemory> memory_plan(const Scene& scene, const PictureWork& work
     double bytes =
         f.base + f.of_pixel * input.all + f.of_largest * largest + of_voxel * voxel_pixels;
     if (stage.id == Stage::Model) {
-      bytes += of_networks(work.coherence, scene.input.size(), input.all);
+      bytes += of_networks(work.coherence, scene.input.size(), input.all) +
+               of_free_splats(work.method, input.all);
     }
     // The report shows photographs beside all that it holds; other stages read them before.
     bytes = stage.id == Stage::Report ? bytes + std::max(reading_input, reading_held_out)
@@ -179,10 +187,13 @@ void check_memory_plan(const Scene& scene, const PictureWork& work, size_t budge
   });
 }
 
-void check_training_memory(const Scene& scene, size_t budget, const CoherenceOptions& coherence) {
+void check_training_memory(const Scene& scene, size_t budget, const TrainingOptions& training) {
   refuse_above(budget, [&](int factor) {
     return memory_plan(scene,
-                       {.chooses_voxels = false, .coherence = coherence, .downscale = factor})
+                       {.chooses_voxels = false,
+                        .coherence = training.coherence,
+                        .method = training.method,
+                        .downscale = factor})
         .front();
   });
 }

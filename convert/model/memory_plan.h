@@ -10,6 +10,7 @@
 #include "convert/model/stage.h"
 #include "libcgs/coherence/coherent_gaussians.h"
 #include "libcgs/core/scene.h"
+#include "libcgs/train/training_options.h"
 
 namespace cgs {
 
@@ -32,7 +33,8 @@ struct PictureWork {
   bool chooses_voxels = true;
   MeasuredFiles measured = {};
   CoherenceOptions coherence = {};  ///< Of the training: networks hold much more than lattices.
-  int downscale = 1;                ///< Divides the sides of the pictures once more.
+  SplatMethod method = SplatMethod::Coherent;  ///< Free Gaussians hold more each.
+  int downscale = 1;                           ///< Divides the sides of the pictures once more.
 };
 
 /// Predicts what the stages of a run will need, from the sizes of its pictures alone.
@@ -56,7 +58,7 @@ void check_memory_plan(const Scene& scene, const PictureWork& work, size_t budge
 
 /// The same for the training alone, the first stage.
 /// \throws LimitError
-void check_training_memory(const Scene& scene, size_t budget, const CoherenceOptions& coherence);
+void check_training_memory(const Scene& scene, size_t budget, const TrainingOptions& training);
 
 /// What `convert` makes of splats that came without cameras.
 struct SplatWork {

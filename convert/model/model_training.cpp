@@ -14,6 +14,7 @@
 #include "io/bytes/checkpoint.h"
 #include "io/bytes/content_hash.h"
 #include "io/scenes/scene_reader.h"
+#include "io/splats/splat_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/priors/depth_network.h"
 #include "libcgs/priors/pane.h"
@@ -174,6 +175,11 @@ TrainedModel train_model(Scene scene, const ModelRequest& request, const Progres
     load_images(of, of.input, loading);
     if (!request.depth_network.empty()) guess_by_network(request.depth_network, of);
   };
+  if (!request.start.empty()) {
+    hooks.load_splats = [&](const Frame& frame) {
+      return std::move(read_splats(request.start, frame).gaussians);
+    };
+  }
   hooks.inspect = request.inspect;
   hooks.begin_training = [&](const Model& model, const Pane* pane, Trainer& trainer) {
     checkpoint.restore(trainer, training_key(model, request.training, pane));
@@ -285,6 +291,23 @@ std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& tr
   return out;
 }
 
+namespace {
+
+// Null for coherent Gaussians, of which there are as many as pixels.
+nlohmann::ordered_json density_to_json(const TrainedModel& trained, const ModelRequest& request) {
+  if (!trained.density) return nullptr;
+  const DensityReport& density = *trained.density;
+  nlohmann::ordered_json start;
+  if (density.is_from_splats) start = request.start.filename().string();
+  return {{"start", start},
+          {"begun_with", density.begun_with},
+          {"cloned", density.cloned},
+          {"split", density.split},
+          {"pruned", density.pruned}};
+}
+
+}  // namespace
+
 nlohmann::ordered_json training_to_json(const TrainedModel& trained, const ModelRequest& request) {
   nlohmann::ordered_json loss = nlohmann::ordered_json::array();
   size_t skipped = 0;
@@ -306,6 +329,7 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
       {"exposure", exposure_to_json(trained)},
       {"view_dependence", view_dependence_to_json(trained.view_dependence)},
       {"pane", pane_to_json(trained.pane)},
+      {"density", density_to_json(trained, request)},
       {"given_depth", given_depth_to_json(trained.priors)}};
   if (trained.water) out["water"] = water_to_json(*trained.water, trained.model.scene.frame);
   return out;

@@ -31,6 +31,8 @@ struct ModelRequest {
   /// Hears of a checkpoint that could not be read or written, which changes no result.
   std::function<void(const std::string&)> warn = {};
   Medium medium = Medium::None;  ///< As ReconstructionOptions::medium.
+  /// Splats that free Gaussians begin from, in the coordinates of the scene; empty = none.
+  std::filesystem::path start = {};
 };
 
 /// reconstruct() of a scene from its files, going on from a checkpoint of the same work. If the

@@ -15,7 +15,8 @@ PictureWork picture_work(const RunRequest& request) {
   return {.chooses_voxels = request.voxel_size.empty(),
           .measured = {.meshes = !request.max_error.empty(),
                        .asset = !request.max_error.empty() || request.max_size > 0},
-          .coherence = request.training.coherence};
+          .coherence = request.training.coherence,
+          .method = request.training.method};
 }
 
 void check_lengths(const RunRequest& request, Frame frame) {

@@ -116,6 +116,7 @@ StageResults run_setting(Bench& bench, const Setting& setting) {
     check_memory_plan(bench.scene,
                       {.chooses_voxels = setting.voxel == 1,
                        .coherence = bench.standard.training.coherence,
+                       .method = bench.standard.training.method,
                        .downscale = setting.coarser},
                       memory_budget(bench.request.memory_limit));
     return make_model(request(model_key(setting)), bench.request.output, bench.scene, progress);

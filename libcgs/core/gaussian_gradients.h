@@ -27,6 +27,8 @@ struct GaussianGradients {
   std::vector<float> radius;  ///< Balls: with respect to the common value of scale.
   std::vector<CovarianceGradient> covariance;  ///< Ellipsoids; shape_gradient() goes on from here.
   std::vector<Eigen::Vector3f> sh;             ///< All sh_count() coefficients, if asked for.
+  std::vector<Eigen::Vector2f> image_place;    ///< Place of the centre in the image, if asked for
+                                               ///< [1 / pixels].
 };
 
 }  // namespace cgs

@@ -89,9 +89,22 @@ std::string words_on(const PriorsCoverage& share) {
   return listed(words);
 }
 
+std::string free_words(const TrainedModel& trained) {
+  const DensityReport& density = *trained.density;
+  const std::string start = density.is_from_splats
+                                ? std::to_string(density.begun_with) + " given splats"
+                                : std::to_string(density.begun_with) + " points " +
+                                      "measured by a multi-view plane sweep";
+  return "classical 3D Gaussian splatting: begun from " + start +
+         ", free to move apart, so that nothing vouches for where they are; optimised against the "
+         "photographs in " +
+         std::to_string(trained.steps.size()) + " steps of one view";
+}
+
 }  // namespace
 
 std::string description_of(const TrainedModel& trained, const TrainingOptions& options) {
+  if (trained.density) return free_words(trained);
   const std::string start =
       "one Gaussian per pixel at a depth that is " + depth_words(trained.priors) + "; ";
   const std::string pane = trained.pane.view.empty() ? "" : "before them a pane; ";

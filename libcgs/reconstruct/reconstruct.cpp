@@ -25,7 +25,9 @@ namespace {
 void require_possible(const Scene& scene, const ReconstructionOptions& options) {
   options.priors.validate();
   options.training.validate();
-  require_decodable(scene, options.training.coherence);
+  if (options.training.method == SplatMethod::Coherent) {
+    require_decodable(scene, options.training.coherence);
+  }
 }
 
 void load_photographs(Scene& scene, const ReconstructionHooks& hooks, const Progress& progress) {
@@ -134,14 +136,18 @@ void take_findings(const PriorsReport& found, Scene& scene) {
   warn_of_little_depth(found.coverage, scene);
 }
 
-void train(Trainer& trainer,
-           int steps,
-           const ReconstructionHooks& hooks,
-           const Progress& progress) {
+void train_coherent(const Pane* pane,
+                    const ReconstructionOptions& options,
+                    const Progress& progress,
+                    TrainedModel& out) {
+  const ReconstructionHooks& hooks = options.hooks;
+  // Its constructor places one Gaussian on the ray of each pixel.
+  Trainer trainer(out.model.scene, out.model.priors, options.training, pane);
+  if (hooks.begin_training) hooks.begin_training(out.model, pane, trainer);
   while (!trainer.done()) {
     trainer.step();
     try {
-      report(progress, double(trainer.steps_done()) / steps);
+      report(progress, double(trainer.steps_done()) / options.training.steps);
     } catch (const Cancelled&) {
       if (hooks.on_cancel) hooks.on_cancel(trainer);
       throw;
@@ -149,6 +155,25 @@ void train(Trainer& trainer,
     if (hooks.after_step) hooks.after_step(trainer);
   }
   if (hooks.after_training) hooks.after_training(trainer);
+  out.model.gaussians = trainer.model().gaussians();
+  out.view_dependence = trainer.model().view_dependence();
+  out.steps = trainer.history();
+}
+
+void train_classical(const ReconstructionOptions& options,
+                     const Progress& progress,
+                     TrainedModel& out) {
+  const Scene& scene = out.model.scene;
+  std::optional<Gaussians> start;
+  if (options.hooks.load_splats) start = options.hooks.load_splats(scene.frame);
+  FreeSplats splats(scene, out.model.priors, options.training, std::move(start));
+  while (!splats.done()) {
+    splats.step();
+    report(progress, double(splats.steps_done()) / options.training.steps);
+  }
+  out.model.gaussians = splats.gaussians();
+  out.density = splats.density();
+  out.steps = splats.history();
 }
 
 }  // namespace
@@ -181,13 +206,12 @@ TrainedModel reconstruct(Scene scene,
   out.model.priors = std::move(priors.views);
   out.model.scene = std::move(scene);
   if (hooks.inspect) hooks.inspect(out.model, out.priors);
-  // Its constructor places one Gaussian on the ray of each pixel.
-  Trainer trainer(out.model.scene, out.model.priors, options.training, drawn_before);
-  if (hooks.begin_training) hooks.begin_training(out.model, drawn_before, trainer);
-  train(trainer, options.training.steps, hooks, part_of(progress, 0.2, 1));
-  out.model.gaussians = trainer.model().gaussians();
-  out.view_dependence = trainer.model().view_dependence();
-  out.steps = trainer.history();
+  const Progress training = part_of(progress, 0.2, 1);
+  if (options.training.method == SplatMethod::Classical) {
+    train_classical(options, training, out);
+  } else {
+    train_coherent(drawn_before, options, training, out);
+  }
   // The depth of the priors stays that of the sweep: meshes and support rest on what was measured,
   // pictures on what was optimised to look right.
   out.model.evidence = description_of(out, options.training);

@@ -12,6 +12,7 @@
 #include "libcgs/priors/pane.h"
 #include "libcgs/priors/water.h"
 #include "libcgs/reconstruct/model.h"
+#include "libcgs/train/free_splats.h"
 #include "libcgs/train/trainer.h"
 
 namespace cgs {
@@ -20,8 +21,12 @@ namespace cgs {
 struct ReconstructionHooks {
   /// Fills View::image, valid and given_depth of the input views, in place of having them.
   std::function<void(Scene&, const Progress&)> load_photographs = {};
+  /// Of method=classical: gives the splats to begin from, in the frame of the scene, in place of
+  /// measured_points().
+  std::function<Gaussians(const Frame&)> load_splats = {};
   /// Sees the cameras and what was measured, before the training, which takes much longer.
   std::function<void(const Model&, const PriorsReport&)> inspect = {};
+  // The next four are told of coherent Gaussians alone.
   /// Before the first step: may Trainer::restore() what a trainer of the same model and pane saved.
   std::function<void(const Model&, const Pane*, Trainer&)> begin_training = {};
   std::function<void(const Trainer&)> after_step = {};
@@ -55,14 +60,16 @@ struct TrainedModel {
   PaneReport pane;
   std::optional<WaterEstimate> water;  ///< Where it was looked for.
   std::vector<StepReport> steps;       ///< Of the training; empty = aligned initialisation.
+  std::optional<DensityReport> density = {};  ///< Of method=classical.
 };
 
 /// The method from photographs with cameras to Gaussians: canonical frame, depth priors, exposures,
 /// a pane, one Gaussian on the ray of each pixel, training. Where the photographs show a pane,
 /// depth is estimated once more from what lies behind it. Where they were taken through water, that
 /// is estimated from what was measured, taken out of the photographs, and depth estimated once more
-/// from these; Scene::water says what was taken out, and no pane is looked for. Same scene and
-/// options, same bits, for any number of threads.
+/// from these; Scene::water says what was taken out, and no pane is looked for. With
+/// method=classical the priors are the same, and free Gaussians are trained. Same scene and options,
+/// same bits, for any number of threads.
 ///
 /// \param scene  in world coordinates with the identity frame; Scene::input are the views to
 ///               reconstruct from, two or more. Their photographs are loaded, sRGB-coded in [0, 1]

@@ -13,7 +13,6 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/render/depth_sort.h"
-#include "libcgs/render/projection.h"
 #include "libcgs/render/projection_gradient.h"
 #include "libcgs/render/spherical_harmonics.h"
 #include "libcgs/render/tile_gradient.h"
@@ -333,6 +332,9 @@ void TrainingRasterizer::Tape::prepare(GaussianGradients& sum) const {
   if (options.sh_gradients) {
     match_size<Eigen::Vector3f>(sum.sh, gaussians->sh.size(), Eigen::Vector3f::Zero());
   }
+  if (options.image_place_gradients) {
+    match_size<Eigen::Vector2f>(sum.image_place, n, Eigen::Vector2f::Zero());
+  }
 }
 
 void TrainingRasterizer::Tape::add_color(size_t i,
@@ -367,6 +369,9 @@ void TrainingRasterizer::Tape::add_block(size_t block,
   const auto finish = [&](size_t i, const GaussianMoments& total) {
     const Splat& splat = projected.splats[i];
     const SplatGradient gradient = splat_gradient(splat, total);
+    if (options.image_place_gradients) {
+      sum.image_place[i] += Eigen::Vector2d(gradient.u, gradient.v).cast<float>();
+    }
     if (g.opacity[i] <= 1) {
       sum.opacity[i] += static_cast<float>(total.moments[0] / double(g.opacity[i]));
     }
@@ -437,6 +442,8 @@ const TrainingBuffers& TrainingRasterizer::forward(const Gaussians& gaussians,
   });
   return tape.out;
 }
+
+const ProjectedGaussians& TrainingRasterizer::projected() const { return tape_->projected; }
 
 void TrainingRasterizer::backward(const TrainingBuffers& loss, GaussianGradients& sum) {
   Tape& tape = *tape_;

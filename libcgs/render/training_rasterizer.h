@@ -9,6 +9,7 @@
 #include "libcgs/core/gaussian_gradients.h"
 #include "libcgs/core/gaussians.h"
 #include "libcgs/core/raster.h"
+#include "libcgs/render/projection.h"
 
 namespace cgs {
 
@@ -40,8 +41,9 @@ struct TrainingRasterizerOptions {
   float dilation = 0.3f;     ///< Added to both image variances [pixels^2]; >= 0.
   float near_depth = 1e-3f;  ///< Centres nearer than this are culled [internal units]; > 0.
   GaussianShape shape = GaussianShape::Balls;
-  bool sh_gradients = false;    ///< Fill GaussianGradients::sh.
-  bool weight_squares = false;  ///< Draw TrainingBuffers::weight_square_sum.
+  bool sh_gradients = false;           ///< Fill GaussianGradients::sh.
+  bool weight_squares = false;         ///< Draw TrainingBuffers::weight_square_sum.
+  bool image_place_gradients = false;  ///< Fill GaussianGradients::image_place.
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
@@ -72,6 +74,9 @@ class TrainingRasterizer {
   /// \throws InvalidInput, LimitError as rasterize(); InvalidInput if a set promised as balls
   ///         holds something else.
   const TrainingBuffers& forward(const Gaussians& gaussians, const Camera& camera);
+
+  /// Where the last forward() placed each Gaussian, and which it drew.
+  const ProjectedGaussians& projected() const;
 
   /// Adds the derivatives of the loss to `sum`, whose arrays are created, filled with zero, if
   /// they are empty. Gaussians that were not drawn get nothing.

@@ -10,12 +10,11 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
-#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/remedy.h"
-#include "libcgs/core/split_mix.h"
 #include "libcgs/train/learning_rate.h"
 #include "libcgs/train/losses.h"
 #include "libcgs/train/picture_terms.h"
+#include "libcgs/train/training_inputs.h"
 #include "libcgs/train/virtual_view.h"
 
 namespace cgs {
@@ -27,12 +26,6 @@ size_t drawn_at_once(size_t views) { return std::min<size_t>(views, 4); }
 
 Camera doubled(const Camera& camera) {
   return resized(camera, camera.width * 2, camera.height * 2);
-}
-
-// A well-mixed number for a triple of counters: dropout must not depend on what ran before.
-uint64_t mixed(uint64_t a, uint64_t b, uint64_t c) {
-  return split_mix(a * kSplitMixStep ^ (b + 1) * 0xC2B2AE3D27D4EB4FULL ^
-                   (c + 1) * 0x165667B19E3779F9ULL);
 }
 
 void append(std::string& out, int64_t value) {
@@ -78,27 +71,6 @@ void take(std::string_view& from, std::vector<float>& values, AdamState& adam) {
   take(from, adam.mean, values.size(), true);
   take(from, adam.square, values.size(), true);
   adam.steps = take<int64_t>(from);
-}
-
-// Another colour in every step, so that no surface can hide in front of it half transparent.
-Eigen::Vector3f background(uint64_t step, size_t view) {
-  const uint64_t bits = mixed(step, view, 0xBACC);
-  constexpr uint64_t kMask = (1U << 21) - 1;
-  const auto channel = [&](int shift) {
-    return static_cast<float>(bits >> shift & kMask) / static_cast<float>(kMask);
-  };
-  return {channel(0), channel(21), channel(42)};
-}
-
-float median_depth(const std::vector<ViewPriors>& priors) {
-  std::vector<float> all;
-  for (const ViewPriors& p : priors) {
-    std::copy_if(p.depth.data.begin(), p.depth.data.end(), std::back_inserter(all), [](float z) {
-      return z > 0 && std::isfinite(z);
-    });
-  }
-  if (all.empty()) return 1;
-  return median(all);
 }
 
 // Whether a decoder, lattices or networks, gives what the parameters move.
@@ -178,7 +150,7 @@ const TrainingBuffers& Trainer::draw(const Gaussians& gaussians,
                                      const Camera& camera,
                                      size_t view) {
   TrainingRasterizerOptions how;
-  how.background = background(static_cast<uint64_t>(step_), view);
+  how.background = random_background(static_cast<uint64_t>(step_), view);
   how.sh_gradients = options_.color_rate > 0;
   how.weight_squares = options_.emptiness_weight > 0;
   how.shape = model_.shapes_are_free() ? GaussianShape::Ellipsoids : GaussianShape::Balls;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/train/training_options.h"
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <variant>
@@ -13,11 +15,12 @@ namespace {
 
 struct Field {
   std::string_view name;
-  std::variant<int*, float*, double*, std::vector<int>*, ResidualDecoder*> value;
+  std::variant<int*, float*, double*, std::vector<int>*, ResidualDecoder*, SplatMethod*> value;
 };
 
 std::vector<Field> fields_of(TrainingOptions& o) {
-  return {{"steps", &o.steps},
+  return {{"method", &o.method},
+          {"steps", &o.steps},
           {"coarse_until", &o.coarse_until},
           {"free_from", &o.free_from},
           {"sharp_from", &o.sharp_from},
@@ -94,6 +97,13 @@ void parse(std::string_view name, std::string_view text, ResidualDecoder& out) {
   out = text == "conv" ? ResidualDecoder::Conv : ResidualDecoder::Lattice;
 }
 
+void parse(std::string_view name, std::string_view text, SplatMethod& out) {
+  require(text == "coherent" || text == "classical",
+          std::string(name).append(" must be coherent or classical"),
+          text);
+  out = text == "classical" ? SplatMethod::Classical : SplatMethod::Coherent;
+}
+
 template <typename T>
 std::string print(T value) {
   std::array<char, 64> text{};
@@ -114,6 +124,10 @@ std::string print(ResidualDecoder value) {
   return value == ResidualDecoder::Conv ? "conv" : "lattice";
 }
 
+std::string print(SplatMethod value) {
+  return value == SplatMethod::Classical ? "classical" : "coherent";
+}
+
 void require_fraction(double value, std::string name) {
   require(value >= 0 && value <= 1, name.append(" must be in [0, 1]"), value);
 }
@@ -122,10 +136,31 @@ void require_weight(double value, std::string name) {
   require(value >= 0 && std::isfinite(value), name.append(" must be >= 0"), value);
 }
 
+// What free Gaussians do not have would be asked for in vain.
+void require_classical(const TrainingOptions& options) {
+  constexpr std::array<std::string_view, 5> kTaken = {
+      "steps", "sh_degree", "l1_weight", "ssim_weight", "l1_levels"};
+  const auto fields = training_fields(options);
+  const auto preset = training_fields(training_preset("classical"));
+  for (size_t k = 0; k < fields.size(); ++k) {
+    const auto& [name, value] = fields[k];
+    const bool is_taken = std::find(kTaken.begin(), kTaken.end(), name) != kTaken.end();
+    require(is_taken || value == preset[k].second,
+            "method=classical has no " + name + ": it must stay " + preset[k].second,
+            value);
+  }
+  const int degree = options.coherence.sh_degree;
+  require(degree >= 0 && degree <= 3, "sh_degree must be 0 ... 3", degree);
+}
+
 }  // namespace
 
 void TrainingOptions::validate() const {
-  coherence.validate();
+  if (method == SplatMethod::Classical) {
+    require_classical(*this);
+  } else {
+    coherence.validate();
+  }
   require(steps >= 0, "steps must be >= 0", steps);
   require_fraction(coarse_until, "coarse_until");
   require_fraction(free_from, "free_from");
@@ -203,6 +238,16 @@ TrainingOptions reference_options() {
   return options;
 }
 
+TrainingOptions classical_options() {
+  TrainingOptions options;
+  options.method = SplatMethod::Classical;
+  options.steps = 3000;  // of 30 000
+  options.coherence.sh_degree = 3;
+  options.coherence.layers_per_ray = 1;
+  options.l1_levels = 1;
+  return options;
+}
+
 }  // namespace
 
 TrainingOptions training_preset(std::string_view name) {
@@ -217,7 +262,8 @@ TrainingOptions training_preset(std::string_view name) {
     return options;
   }
   if (name == "reference") return reference_options();
-  throw InvalidInput("the preset must be draft, standard, fine or reference, but is " +
+  if (name == "classical") return classical_options();
+  throw InvalidInput("the preset must be draft, standard, fine, reference or classical, but is " +
                      std::string(name));
 }
 

@@ -10,10 +10,16 @@
 
 namespace cgs {
 
+/// What is trained: coherent Gaussians, one on the ray of each pixel (Trainer), or free ones that
+/// nothing holds together (FreeSplats), the control that coherence is measured against.
+enum class SplatMethod { Coherent, Classical };
+
 /// How a model is trained. One step looks at all input views. Points in time are fractions of the
 /// whole schedule. Rates are per step: with lattices, a run of more steps goes further, and is not
 /// the same run more slowly.
 struct TrainingOptions {
+  SplatMethod method =
+      SplatMethod::Coherent;  ///< Classical takes a few fields, as FreeSplats says.
   CoherenceOptions coherence;
 
   int steps = 60;           ///< >= 0; 0 leaves the aligned initialisation.
@@ -68,7 +74,7 @@ struct TrainingOptions {
   double dropout = 0;      ///< Share of a view's own blocks left out of its picture; in [0, 1).
   int dropout_block = 32;  ///< Edge of a block [pixels].
 
-  /// \throws InvalidInput naming the first field out of range.
+  /// \throws InvalidInput naming the first field out of range, or that the method does not have
   void validate() const;
 };
 
@@ -84,6 +90,9 @@ struct TrainingOptions {
 ///   theirs are from an optical flow, as a mean over the pixels of all pairs of views; a background
 ///   of another colour in each step; drawing at twice the size along each axis; a change of depth
 ///   that is bounded by max_depth_change; steps and rates for three views, however many there are.
+/// - "classical": 3D Gaussian Splatting as published in 2023, without coherence, a tenth of its
+/// steps
+///   of one view each (FreeSplats).
 ///
 /// \throws InvalidInput for another name
 TrainingOptions training_preset(std::string_view name);

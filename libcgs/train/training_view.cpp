@@ -3,18 +3,11 @@
 
 #include <cmath>
 
+#include "libcgs/train/training_inputs.h"
+
 namespace cgs {
 
 namespace {
-
-ColorPlanes planes_of(const ColorImage& image) {
-  ColorPlanes out;
-  for (int c = 0; c < 3; ++c) {
-    out[c] = Raster<float>(image.width, image.height, 0);
-    for (size_t i = 0; i < image.data.size(); ++i) out[c].data[i] = image.data[i][c];
-  }
-  return out;
-}
 
 template <typename T>
 Raster<T> every_other(const Raster<T>& in) {

@@ -12,6 +12,7 @@
 #include "tests/support/measuring_commands.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/solid_meshes.h"
+#include "tests/support/splat_ply.h"
 
 namespace cgs {
 namespace {
@@ -22,6 +23,75 @@ using test::json_of;
 using test::obj_text;
 using test::run_cgs;
 using test::TempDir;
+
+// A ball of splats in many colours as text, of which half may be missing.
+std::string ball_of_splats(bool is_whole) {
+  constexpr int kCount = 3000;
+  std::ostringstream rows;
+  size_t count = 0;
+  for (int i = 0; i < kCount; ++i) {
+    const double z = 1 - 2 * (i + 0.5) / kCount;
+    const double angle = 2.399963 * i;  // the golden one
+    const double x = std::sqrt(1 - z * z) * std::cos(angle);
+    const double y = std::sqrt(1 - z * z) * std::sin(angle);
+    if (!is_whole && x > 0) continue;
+    ++count;
+    rows << x << ' ' << y << ' ' << z << ' ' << std::sin(4 * x) << ' ' << std::cos(5 * y) << ' '
+         << z << " 3 -3 -3 -3 1 0 0 0\n";
+  }
+  return test::splat_ply_header("ascii", count) + rows.str();
+}
+
+// What SPZ rounds is little, and hides nothing.
+TEST(Compare, SplatsWithTheirLossyCopy) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.ply", ball_of_splats(true));
+  const std::string a = (dir / "a.ply").string();
+  const std::string b = (dir / "b.spz").string();
+  ASSERT_EQ(run_cgs("convert " + a + " " + b + " -q").exit_code, 0);
+  const json found = json_of("compare " + a + " " + b + " --pictures " + (dir / "out").string());
+  EXPECT_GT(found["psnr"], 35);
+  EXPECT_NEAR(found["a"]["unseen"], found["b"]["unseen"].get<double>(), 1e-3);
+  EXPECT_GT(found["a"]["unseen"], 0.05);
+  EXPECT_EQ(found["a"]["splats"], 3000);
+  EXPECT_EQ(found["cameras"], "around");
+  EXPECT_EQ(test::read_bytes(dir / "out/around_1.png").substr(1, 3), "PNG");
+  EXPECT_EQ(json_of("compare " + a + " " + a)["psnr"], "same");
+}
+
+TEST(Compare, SplatsOfWhichHalfIsMissing) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.ply", ball_of_splats(true));
+  test::write_bytes(dir / "half.ply", ball_of_splats(false));
+  const std::string both = (dir / "a.ply").string() + " " + (dir / "half.ply").string();
+  const json found = json_of("compare " + both);
+  EXPECT_GT(found["b"]["unseen"], found["a"]["unseen"].get<double>() + 0.05);
+  EXPECT_LT(found["psnr"], 25);
+  const auto told = run_cgs("compare " + both);
+  EXPECT_NE(told.err.find("B shows nothing at "), std::string::npos) << told.err;
+  EXPECT_EQ(told.exit_code, 0);
+  EXPECT_EQ(run_cgs("compare " + both + " --strict").exit_code, 3);
+}
+
+TEST(Compare, PicturesOrDistancesAsFilesHoldThem) {
+  const TempDir dir;
+  test::write_bytes(dir / "a.ply", ball_of_splats(true));
+  test::write_bytes(dir / "b.obj", obj_text(test::torus_mesh(0.6, 0.2)));
+  const std::string a = (dir / "a.ply").string();
+  const std::string mesh = (dir / "b.obj").string();
+  const auto refused = [](const std::string& arguments, const char* words) {
+    const auto result = run_cgs("compare " + arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments << result.err;
+    EXPECT_NE(result.err.find(words), std::string::npos) << result.err;
+  };
+  refused(a + " " + mesh, "holds splats and");
+  refused(mesh + " " + a, "holds splats and");
+  refused(a + " " + a + " --icp", "compared by their pictures");
+  refused(mesh + " " + mesh + " --scene nowhere", "are for two files of splats");
+  refused(mesh + " " + mesh + " --pictures out", "are for two files of splats");
+  EXPECT_EQ(run_cgs("compare " + a + " " + a + " --scene nowhere").exit_code, 3);
+  expect_kept(dir, "compare " + a + " " + a + " --pictures " + a, "a.ply");
+}
 
 TEST(Compare, MovedSphereAndBack) {
   const TempDir dir;

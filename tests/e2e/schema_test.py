@@ -123,6 +123,14 @@ def test_runs():
     assert "preview" in told["settings_reason"]
 
 
+def test_classical_training():
+    words = ["--preset", "classical", "--set", "steps=3"]
+    told = cgs("train", small, *THREE, *words, "-o", "free")
+    assert told["density"]["begun_with"] == told["gaussians"] and told["density"]["start"] is None
+    told = cgs("train", small, *THREE, *words, "--start", "free/gaussians.ply", "-o", "refined")
+    assert told["density"]["start"] == "gaussians.ply"
+
+
 def test_verify():
     assert cgs("verify", "metric")["differing"] == []
     (work / "metric/web/splats.spz").write_bytes(b"changed")
@@ -289,6 +297,15 @@ def test_meshes():
     told = cgs("compare", mesh, "whole.stl", "--samples", "2000", "--assume-unit", "mm")
     assert told["registration"] is None
     assert cgs("compare", mesh, mesh, "--m3c2", "--cylinder", "50cm")["m3c2"]
+
+
+def test_splats_compared():
+    around = cgs("compare", "metric/web/splats.spz", "metric/model/gaussians.ply", schema="compare-splats")
+    assert around["cameras"] == "around" and around["a"]["psnr"] is None
+    words = ["--scene", "metric", "--pictures", "compared"]
+    seen = cgs("compare", "metric/model/gaussians.ply", "metric/model/gaussians.ply", *words,
+               schema="compare-splats")
+    assert seen["psnr"] == "same" and seen["a"]["psnr"] and len(seen["views"]) > 1
 
 
 def test_batch():

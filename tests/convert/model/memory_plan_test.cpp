@@ -149,6 +149,18 @@ TEST(MemoryPlan, CountsNetworksWhileTheyAreTrained) {
   EXPECT_NO_THROW(check_memory_plan(scene, {}, needed - 1));
 }
 
+TEST(MemoryPlan, CountsWhatFreeGaussiansHold) {
+  const Scene scene = scene_of(3, 400, 300);
+  const auto coherent = memory_plan(scene);
+  const auto free = memory_plan(scene, {.method = SplatMethod::Classical});
+  for (size_t i = 0; i < coherent.size(); ++i) {
+    EXPECT_EQ(free[i].bytes > coherent[i].bytes, coherent[i].stage == Stage::Model);
+  }
+  const size_t needed = free.front().bytes;
+  EXPECT_THROW(check_training_memory(scene, needed - 1, training_preset("classical")), LimitError);
+  EXPECT_NO_THROW(check_training_memory(scene, needed - 1, training_preset("standard")));
+}
+
 TEST(MemoryPlan, CountsTheFusedSurfaceWhereFilesAreHeldAgainstIt) {
   const Scene scene = scene_of(3, 400, 300);
   const auto plain = memory_plan(scene);

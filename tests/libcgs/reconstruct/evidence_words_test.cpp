@@ -54,6 +54,20 @@ TEST(DescriptionOf, SaysWhatWasOptimised) {
   expect("; not optimised against the photographs");
 }
 
+TEST(DescriptionOf, SaysThatNothingVouchesForFreeGaussians) {
+  TrainedModel trained;
+  trained.steps.resize(30);
+  trained.density = DensityReport{.begun_with = 12};
+  EXPECT_EQ(described(trained, training_preset("classical"))
+                .rfind("classical 3D Gaussian splatting: begun from 12 points measured", 0),
+            0u);
+  trained.density->is_from_splats = true;
+  const std::string words = described(trained, training_preset("classical"));
+  EXPECT_NE(words.find("from 12 given splats, free to move apart, so that nothing vouches"),
+            std::string::npos)
+      << words;
+}
+
 // Of one photograph.
 std::string covered(const PriorsCoverage& coverage) {
   PriorsReport priors;

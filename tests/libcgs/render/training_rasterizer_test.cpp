@@ -206,6 +206,48 @@ TEST(TrainingRasterizer, DifferentiatesEllipsoids) {
                      {.shape = GaussianShape::Ellipsoids, .sh_gradients = true});
 }
 
+// Sum of the derivatives with respect to the places of all centres.
+Eigen::Vector2d moved_together(const Gaussians& g, const Camera& camera, TrainingBuffers& loss) {
+  TrainingRasterizer rasterizer(
+      {.shape = GaussianShape::Ellipsoids, .image_place_gradients = true});
+  GaussianGradients sum;
+  rasterizer.forward(g, camera);
+  rasterizer.backward(loss, sum);
+  Eigen::Vector2d out = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2f& of_place : sum.image_place) out += of_place.cast<double>();
+  return out;
+}
+
+// Moving the principal point moves every centre in the image, and changes nothing else of splats
+// whose slopes are not clamped.
+TEST(TrainingRasterizer, DifferentiatesPlacesInTheImage) {
+  const Camera camera = oblique_camera();
+  const Gaussians all = random_gaussians(camera, {.sigma_px = 3, .anisotropy = 4}, 12);
+  TrainingBuffers loss = random_loss(camera, kEveryChannel, 7);
+  Gaussians inside;  // grows, splat by splat
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (!camera.sees(camera.project(all.position[i].cast<double>()))) continue;
+    inside.position.push_back(all.position[i]);
+    inside.scale.push_back(all.scale[i]);
+    inside.rotation.push_back(all.rotation[i]);
+    inside.opacity.push_back(all.opacity[i]);
+    inside.sh.push_back(all.sh[i]);
+    const auto loss_at = [&](double dx, double dy) {
+      Camera moved = camera;
+      moved.cx += dx;
+      moved.cy += dy;
+      const auto scene = test::reference_gaussians(inside);
+      return loss_of(test::draw_reference(scene, moved, Eigen::Vector3d::Zero()), loss);
+    };
+    constexpr double kStep = 1e-6;
+    const Eigen::Vector2d truth((loss_at(kStep, 0) - loss_at(-kStep, 0)) / (2 * kStep),
+                                (loss_at(0, kStep) - loss_at(0, -kStep)) / (2 * kStep));
+    const Eigen::Vector2d got = moved_together(inside, camera, loss);
+    EXPECT_LT((got - truth).norm(), 1e-3 * truth.norm() + 1e-5) << inside.size();
+  }
+  EXPECT_GT(inside.size(), 5u);
+}
+
 TEST(TrainingRasterizer, DifferentiatesDirectionalColour) {
   for (const int degree : {1, 2, 3}) {
     expect_differences(random_gaussians(oblique_camera(), {.count = 15, .sh_degree = degree}, 3),

@@ -100,8 +100,34 @@ TEST(TrainingOptions, NetworksHaveNoKnotsToBend) {
   }
 }
 
+TEST(TrainingOptions, FreeGaussiansHaveFewSettings) {
+  for (const auto& [name, value] :
+       {std::pair("steps", "10"), {"sh_degree", "0"}, {"l1_weight", "1"}, {"l1_levels", "2"}}) {
+    TrainingOptions options = training_preset("classical");
+    set_training_field(options, name, value);
+    EXPECT_NO_THROW(options.validate()) << name;
+  }
+  for (const auto& [name, value] : {std::pair("dropout", "0.1"),
+                                    {"color_rate", "0"},
+                                    {"decoder", "conv"},
+                                    {"sh_degree", "4"}}) {
+    TrainingOptions options = training_preset("classical");
+    set_training_field(options, name, value);
+    try {
+      options.validate();
+      ADD_FAILURE() << name << " = " << value << " was accepted";
+    } catch (const InvalidInput& error) {
+      EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+    }
+  }
+  TrainingOptions options;
+  set_training_field(options, "method", "classical");
+  EXPECT_THROW(options.validate(), InvalidInput);  // the preset says more than that
+  EXPECT_THROW(set_training_field(options, "method", "free"), InvalidInput);
+}
+
 TEST(TrainingPreset, EveryNameIsValidAndOthersAreRefused) {
-  for (const char* name : {"draft", "standard", "fine", "reference"}) {
+  for (const char* name : {"draft", "standard", "fine", "reference", "classical"}) {
     EXPECT_NO_THROW(training_preset(name).validate()) << name;
   }
   EXPECT_EQ(training_preset("reference").coherence.decoder, ResidualDecoder::Conv);
