@@ -25,6 +25,7 @@ void add_commands(CLI::App& app) {
   add_train(app);
   add_evaluate(app);
   add_render(app);
+  add_fill(app);
   add_next(app);
   add_split(app);
   add_fuse(app);

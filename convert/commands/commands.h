@@ -16,6 +16,7 @@ void add_batch(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_evaluate(CLI::App& app);
+void add_fill(CLI::App& app);
 void add_filter(CLI::App& app);
 void add_fuse(CLI::App& app);
 void add_info(CLI::App& app);

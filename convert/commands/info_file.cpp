@@ -117,6 +117,9 @@ void print_splats(const Json& info) {
   if (!info["provenance"].is_null()) {
     std::printf("%s\n", info["provenance"]["words"].get<std::string>().c_str());
   }
+  if (!info["synthetic"].is_null()) {
+    std::printf("%s\n", info["synthetic"]["words"].get<std::string>().c_str());
+  }
   print_warnings(info);
 }
 

@@ -8,8 +8,10 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/model/camera_path_file.h"
+#include "convert/model/hole_pictures.h"
 #include "convert/model/model.h"
 #include "convert/model/views.h"
+#include "convert/text/html.h"
 #include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
 #include "io/bytes/scene_path.h"
@@ -28,10 +30,21 @@ struct RenderArgs {
   std::string path;
   std::optional<int> frames;
   PictureOptions shown;
+  bool holes = false;
   CommonOptions common;
 };
 
 constexpr int kFrames = 60;
+
+void render_holes(const RenderArgs& args, const Model& model, Terminal& terminal) {
+  const HolePictures made =
+      write_hole_pictures(model, args.output, args.shown.fill, terminal.begin("holes"));
+  terminal.end(std::to_string(made.pictures.size()) + " pictures see " + percent(made.covered) +
+               " of the holes that " + std::to_string(made.candidates) + " cameras see");
+  terminal.say("paint in the white of the masks, then cgs fill; see " +
+               printable(args.output / "README.txt"));
+  if (args.common.json) print_report(hole_pictures_to_json(made));
+}
 
 void run_render(const RenderArgs& args) {
   limit_threads(args.common.threads);
@@ -45,6 +58,10 @@ void run_render(const RenderArgs& args) {
   }
   terminal.warn(model.scene.warnings);
   if (const std::string text = unknown_holes_warning(model); !text.empty()) terminal.warn({text});
+  if (args.holes) {
+    render_holes(args, model, terminal);
+    return;
+  }
   if (!args.path.empty()) {
     const bool is_file = lower_extension(args.path) == ".json";
     std::error_code ignored;
@@ -90,6 +107,12 @@ void add_render(CLI::App& app) {
   path->excludes(views);
   cmd->add_option("--frames", args->frames, "Number of pictures along a path; default 60")
       ->needs(path);
+  cmd->add_flag("--holes",
+                args->holes,
+                "Pictures to paint the holes of the model in, from few cameras that see nearly all "
+                "of them, with masks, depth and cameras instead; cgs fill takes them back")
+      ->excludes(views)
+      ->excludes(path);
   add_fill_option(*cmd, args->shown.fill);
   cmd->add_flag("--water",
                 args->shown.through_water,
@@ -99,7 +122,8 @@ void add_render(CLI::App& app) {
       "Example: cgs render out/portal/model --views 0,2 -o out/views\n"
       "         cgs render out/portal/model --path spiral -o out/spiral; its frames as a film:\n"
       "         ffmpeg -framerate 24 -i out/spiral/frame_%04d.png -pix_fmt yuv420p "
-      "-vf crop=trunc(iw/2)*2:trunc(ih/2)*2 portal.mp4");
+      "-vf crop=trunc(iw/2)*2:trunc(ih/2)*2 portal.mp4\n"
+      "         cgs render out/portal/model --holes -o out/holes");
   cmd->callback([args] { run_render(*args); });
 }
 

@@ -6,19 +6,23 @@
 
 namespace cgs {
 
-std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Model& model) {
+std::vector<View> camera_views_from(const std::filesystem::path& file, const Model& model) {
   Scene path = read_cameras_json(file);
   use_metres_where_measured(path);  // as read_model() does
   const bool states_frame = path.kind != SceneKind::ForeignCameras;
-  std::vector<Camera> out;
-  for (const View& view : path.views) {
-    Camera camera = view.camera;
+  for (View& view : path.views) {
+    Camera& camera = view.camera;
     const Frame& frame = model.scene.frame;  // whose coordinates in files may have another origin
     camera.world_from_cam.translation() =
         states_frame ? frame.internal_from_world(path.frame.world_from_internal(camera.center()))
                      : frame.internal_from_file(camera.center());
-    out.push_back(camera);
   }
+  return path.views;
+}
+
+std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Model& model) {
+  std::vector<Camera> out;
+  for (const View& view : camera_views_from(file, model)) out.push_back(view.camera);
   return out;
 }
 

@@ -10,6 +10,7 @@
 
 #include "convert/text/stated_frame.h"
 #include "io/bytes/atomic_file.h"
+#include "io/bytes/byte_reader.h"
 #include "io/bytes/scene_path.h"
 #include "io/images/exif.h"
 #include "io/images/exr.h"
@@ -124,6 +125,40 @@ std::set<std::filesystem::path> priors_in(const std::filesystem::path& folder) {
   return out;
 }
 
+// Where the files of a model are: of the folder of a run, in the model in it.
+std::filesystem::path folder_of_model(const std::filesystem::path& folder) {
+  const bool is_of_run = !is_present(folder / "cameras.json") && is_present(folder / "run.json") &&
+                         is_folder(folder / "model");
+  return is_of_run ? folder / "model" : folder;
+}
+
+void write_fill(const std::filesystem::path& folder, const Gaussians& fill, const Frame& frame) {
+  if (fill.size() == 0) {
+    std::filesystem::remove(folder / kFillFile);  // of another model
+    return;
+  }
+  write_gaussian_ply(folder / kFillFile, fill, frame, "painted into holes: no photograph saw it");
+}
+
+// \throws BadInput if some of it is not said to be made up
+Gaussians read_fill(const std::filesystem::path& path, const Frame& frame) {
+  GaussianFile file = read_gaussian_ply(path, frame);
+  const size_t made_up = synthetic_count(file.gaussians);
+  if (made_up < file.gaussians.size()) {
+    throw BadInput(Defect::Value,
+                   path,
+                   std::to_string(file.gaussians.size() - made_up) +
+                       " splats are not tagged synthetic; in a fill all must be");
+  }
+  return std::move(file.gaussians);
+}
+
+void copy_bytes(const std::filesystem::path& from, const std::filesystem::path& to) {
+  AtomicFile file(to);
+  read_in_parts(from, [&](std::string_view bytes) { file.write(bytes); });
+  file.commit();
+}
+
 }  // namespace
 
 void write_model(const std::filesystem::path& folder, const Model& model) {
@@ -135,7 +170,26 @@ void write_model(const std::filesystem::path& folder, const Model& model) {
     earlier.erase(priors_path(folder, view));
   }
   write_gaussian_ply(folder / "gaussians.ply", model.gaussians, model.scene.frame, model.evidence);
+  write_fill(folder, model.fill, model.scene.frame);
   write_cameras_json(folder / "cameras.json", model.scene);  // last: by it the scale is told
+  for (const std::filesystem::path& file : earlier) std::filesystem::remove(file);
+}
+
+void write_filled_model(const std::filesystem::path& folder,
+                        const Model& model,
+                        const Gaussians& fill,
+                        const std::filesystem::path& output) {
+  const std::filesystem::path from = folder_of_model(folder);
+  std::set<std::filesystem::path> earlier = priors_in(output);
+  make_output_folder(output / "priors");
+  for (const int i : model.scene.input) {
+    const View& view = model.scene.views[static_cast<size_t>(i)];
+    copy_bytes(priors_path(from, view), priors_path(output, view));
+    earlier.erase(priors_path(output, view));
+  }
+  copy_bytes(from / "gaussians.ply", output / "gaussians.ply");
+  write_fill(output, fill, model.scene.frame);
+  copy_bytes(from / "cameras.json", output / "cameras.json");
   for (const std::filesystem::path& file : earlier) std::filesystem::remove(file);
 }
 
@@ -165,9 +219,7 @@ Model read_model_as_written(const std::filesystem::path& folder) {
   if (!is_folder(folder)) {
     throw BadInput(Defect::Open, folder, "no such folder; give the model folder of a run");
   }
-  const bool is_of_run = !is_present(folder / "cameras.json") && is_present(folder / "run.json") &&
-                         is_folder(folder / "model");
-  if (is_of_run) return read_model_as_written(folder / "model");
+  if (folder_of_model(folder) != folder) return read_model_as_written(folder_of_model(folder));
   Model model;
   model.scene = read_cameras_json(folder / "cameras.json");
   const bool has_frame = model.scene.kind != SceneKind::ForeignCameras;
@@ -177,6 +229,9 @@ Model read_model_as_written(const std::filesystem::path& folder) {
   if (!model.scene.frame.knows_up()) model.scene.frame.up = world_up(model.scene);
   model.gaussians = std::move(file.gaussians);
   model.evidence = std::move(file.evidence);
+  if (is_present(folder / kFillFile)) {
+    model.fill = read_fill(folder / kFillFile, model.scene.frame);
+  }
   model.scene.warnings = std::move(file.warnings);
   for (const int i : model.scene.input) {
     const View& view = model.scene.views[static_cast<size_t>(i)];

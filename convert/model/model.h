@@ -9,9 +9,20 @@
 
 namespace cgs {
 
-/// Writes gaussians.ply, cameras.json and priors/VIEW.exr.
+/// The file in the folder of a model that holds Model::fill.
+inline constexpr const char* kFillFile = "fill.ply";
+
+/// Writes gaussians.ply, cameras.json and priors/VIEW.exr, and fill.ply where the model has a fill.
 /// \throws IoError
 void write_model(const std::filesystem::path& folder, const Model& model);
+
+/// Copies the files of a model byte for byte, with another fill.
+/// \param folder  as read_model() takes it
+/// \throws BadInput; IoError
+void write_filled_model(const std::filesystem::path& folder,
+                        const Model& model,
+                        const Gaussians& fill,
+                        const std::filesystem::path& output);
 
 /// Writes anew what `model.scene.frame` tells of unit and up, in the files that write_model() wrote
 /// of this model. The splats keep their bytes: written again from what was read, logarithms could

@@ -9,6 +9,7 @@
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/render/picture.h"
+#include "libcgs/render/rasterizer.h"
 
 namespace cgs {
 
@@ -53,7 +54,9 @@ MaskMap valid_pixels(const Scene& scene, int view) {
 }
 
 ModelPictures::ModelPictures(const Model& model, const PictureOptions& options)
-    : is_completed_(may_complete(model, options.fill)),
+    : model_(model),
+      fill_(options.fill),
+      is_completed_(may_complete(model, options.fill)),
       water_(options.through_water ? model.scene.water : std::nullopt) {}
 
 ColorImage ModelPictures::of(const RenderBuffers& buffers, const Camera& camera) const {
@@ -65,6 +68,17 @@ ColorImage ModelPictures::of(const RenderBuffers& buffers, const Camera& camera)
     if (buffers.hole.data[i] == Hole::Sky) depth.data[i] = 0;
   }
   return through_water(out, camera, depth, *water_);
+}
+
+PaintedPicture ModelPictures::painted(const RenderBuffers& buffers, const Camera& camera) const {
+  if (fill_ == HoleFill::None || model_.fill.size() == 0) return {of(buffers, camera), {}};
+  const RenderBuffers made_up = rasterize(model_.fill, camera);
+  PaintedPicture out{of(with_fill(buffers, made_up), camera),
+                     MaskMap(camera.width, camera.height, 0)};
+  for (size_t i = 0; i < out.painted.data.size(); ++i) {
+    out.painted.data[i] = shows_fill(buffers, made_up, i) ? 1 : 0;
+  }
+  return out;
 }
 
 }  // namespace cgs

@@ -11,7 +11,8 @@ namespace cgs {
 
 /// What pictures of a model show where nothing is drawn.
 enum class HoleFill : uint8_t {
-  Around,  ///< The colours around it, as filled_picture(), unless photographs were masked.
+  Around,  ///< What was painted there, else the colours around it, as filled_picture(), unless
+           ///< photographs were masked.
   None,    ///< Black, as other programs draw splats.
 };
 
@@ -22,15 +23,27 @@ struct PictureOptions {
   bool through_water = false;
 };
 
-/// Makes the pictures of a model that people look at.
+/// A picture for people.
+struct PaintedPicture {
+  ColorImage color;
+  MaskMap painted;  ///< 1 = shows what somebody painted there; empty where nobody did.
+};
+
+/// Makes the pictures of a model that people look at. `buffers` are of the camera, as
+/// render_camera().
 class ModelPictures {
  public:
+  /// \param model  must outlive it
   ModelPictures(const Model& model, const PictureOptions& options);
 
-  /// \param buffers  of the camera, as render_camera()
+  /// What the Gaussians of the model show, nothing that was painted: figures rest on it.
   ColorImage of(const RenderBuffers& buffers, const Camera& camera) const;
+  /// The same with Model::fill in holes, unless the options say that they stay black.
+  PaintedPicture painted(const RenderBuffers& buffers, const Camera& camera) const;
 
  private:
+  const Model& model_;
+  HoleFill fill_;
   bool is_completed_;
   std::optional<Water> water_;
 };

@@ -68,11 +68,10 @@ MaskMap hole_mask(const RenderBuffers& buffers) {
   return mask;
 }
 
-ColorImage tinted(ColorImage picture, const MaskMap& mask) {
-  const Eigen::Vector3f magenta(0.9f, 0.1f, 0.8f);
+ColorImage tinted(ColorImage picture, const MaskMap& mask, const Eigen::Vector3f& tint) {
   constexpr float kShine = 0.25f;
   for (size_t i = 0; i < picture.data.size(); ++i) {
-    if (mask.data[i] != 0) picture.data[i] = kShine * picture.data[i] + (1 - kShine) * magenta;
+    if (mask.data[i] != 0) picture.data[i] = kShine * picture.data[i] + (1 - kShine) * tint;
   }
   return picture;
 }

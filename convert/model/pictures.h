@@ -21,8 +21,12 @@ ColorImage normal_picture(const NormalMap& normals, const Eigen::Isometry3d& cam
 /// 1 = hole.
 MaskMap hole_mask(const RenderBuffers& buffers);
 
-/// A picture with its masked pixels in magenta, through which it shines a little.
-ColorImage tinted(ColorImage picture, const MaskMap& mask);
+/// sRGB-coded colours that mark what pictures show: holes, and what somebody painted there.
+inline const Eigen::Vector3f kHoleTint(0.9f, 0.1f, 0.8f);
+inline const Eigen::Vector3f kPaintedTint(0.45f, 0.15f, 1);
+
+/// A picture with its masked pixels in a colour, through which it shines a little.
+ColorImage tinted(ColorImage picture, const MaskMap& mask, const Eigen::Vector3f& tint = kHoleTint);
 
 /// Pictures side by side, row by row, smaller ones amid places for the largest.
 /// \pre pictures are not empty, columns > 0

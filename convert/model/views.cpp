@@ -21,8 +21,8 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
 #include "libcgs/priors/transients.h"
-#include "libcgs/train/flip.h"
 #include "libcgs/priors/water.h"
+#include "libcgs/train/flip.h"
 #include "libcgs/train/image_metrics.h"
 
 namespace cgs {
@@ -69,7 +69,8 @@ std::optional<HoleShares> hole_shares(const Model& model,
 
 Json role_to_json(const std::string& role) { return role.empty() ? Json() : Json(role); }
 
-Json shares_to_json(const std::optional<HoleShares>& shares) {
+Json shares_to_json(const RenderedPicture& picture) {
+  const std::optional<HoleShares>& shares = picture.holes;
   if (!shares) return {{"hole_fraction", nullptr}};
   Json out = {{"hole_fraction", shares->hole()},
               {"transparent_fraction", shares->transparent},
@@ -78,6 +79,7 @@ Json shares_to_json(const std::optional<HoleShares>& shares) {
               {"estimated_fraction", shares->estimated},
               {"sky_fraction", shares->sky}};
   if (shares->masked > 0) out["masked_fraction"] = shares->masked;
+  if (picture.painted) out["synthetic_fraction"] = *picture.painted;
   return out;
 }
 
@@ -86,6 +88,13 @@ MaskMap intersection(const MaskMap& a, const MaskMap& b) {
   MaskMap out = a;
   for (size_t i = 0; i < out.data.size(); ++i) out.data[i] = a.data[i] & b.data[i];
   return out;
+}
+
+// Of all pixels; nothing where nobody painted.
+std::optional<double> painted_share(const PaintedPicture& shown) {
+  const auto& painted = shown.painted.data;
+  if (painted.empty()) return std::nullopt;
+  return double(std::count(painted.begin(), painted.end(), 1)) / double(painted.size());
 }
 
 ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
@@ -135,7 +144,8 @@ RenderedPicture write_view(const Model& model,
   rasters.valid = valid_pixels(model.scene, index);  // what is masked was seen, and is not wanted
   write_view_exr(folder / (view.name + ".exr"), rasters, view.camera, model.scene.frame);
   const auto png = [&](const char* what) { return folder / (view.name + "." + what + ".png"); };
-  write_png(png("color"), pictures.of(buffers, view.camera));
+  const PaintedPicture shown = pictures.painted(buffers, view.camera);
+  write_png(png("color"), shown.color);
   write_png(png("depth"), depth_picture(rasters.depth));
   write_png(png("normal"), normal_picture(rasters.normal, view.camera.cam_from_world()));
   if (knows_holes(model)) {
@@ -155,7 +165,10 @@ RenderedPicture write_view(const Model& model,
   } else {
     write_png(png("restored"), restored);
   }
-  return {view.name, role_of(model.scene, index), hole_shares(model, buffers, rasters.valid)};
+  return {view.name,
+          role_of(model.scene, index),
+          hole_shares(model, buffers, rasters.valid),
+          painted_share(shown)};
 }
 
 std::string frame_name(size_t k) {
@@ -211,6 +224,15 @@ ColorImage thumbnail(ColorImage picture) {
   const int height = std::max(1, picture.height * kWidest / picture.width);
   area_downscale(picture, all, kWidest, height);
   return picture;
+}
+
+// Holes in magenta, in violet where somebody painted.
+ColorImage with_tints(const PaintedPicture& shown, MaskMap holes) {
+  for (size_t i = 0; i < shown.painted.data.size(); ++i) {
+    if (shown.painted.data[i] != 0) holes.data[i] = 0;
+  }
+  ColorImage out = tinted(shown.color, holes);
+  return shown.painted.empty() ? out : tinted(std::move(out), shown.painted, kPaintedTint);
 }
 
 // With black where nothing may be compared: windows beside it reach there.
@@ -414,18 +436,18 @@ std::vector<RenderedPicture> write_path(const Model& model,
   for (size_t k = 0; k < path.size(); ++k) {
     report(progress, static_cast<double>(k) / static_cast<double>(path.size()));
     const RenderBuffers buffers = render_camera(model, inputs, path[k]);
-    const ColorImage picture = pictures.of(buffers, path[k]);
-    MaskMap holes(picture.width, picture.height, 0);
+    const PaintedPicture made = pictures.painted(buffers, path[k]);
+    MaskMap holes(path[k].width, path[k].height, 0);
     const std::vector<std::string> names = pictures_of_frame(k);
-    write_png(folder / names[0], picture);
+    write_png(folder / names[0], made.color);
     if (knows_holes(model)) {
       holes = hole_mask(buffers);
       write_png(folder / names[1], holes);
     }
     if (k == 0 || path.size() <= kOnSheet || place_on_sheet(k) != place_on_sheet(k - 1)) {
-      sheet.push_back(thumbnail(tinted(picture, holes)));
+      sheet.push_back(thumbnail(with_tints(made, holes)));
     }
-    out.push_back({frame_name(k), "", hole_shares(model, buffers, {})});
+    out.push_back({frame_name(k), "", hole_shares(model, buffers, {}), painted_share(made)});
   }
   constexpr int kColumns = 4;
   write_png(folder / "contact.png", contact_sheet(sheet, kColumns));
@@ -437,7 +459,7 @@ Json views_to_json(const std::vector<RenderedPicture>& views) {
   Json out = Json::array();
   for (const RenderedPicture& view : views) {
     out.push_back({{"name", view.name}, {"role", role_to_json(view.role)}});
-    out.back().update(shares_to_json(view.holes));
+    out.back().update(shares_to_json(view));
   }
   return out;
 }
@@ -446,7 +468,7 @@ Json frames_to_json(const std::vector<RenderedPicture>& frames) {
   Json out = Json::array();
   for (const RenderedPicture& frame : frames) {
     out.push_back({{"name", frame.name}});
-    out.back().update(shares_to_json(frame.holes));
+    out.back().update(shares_to_json(frame));
   }
   return out;
 }

@@ -39,8 +39,9 @@ struct HoleShares {
 /// What a picture of a model shows.
 struct RenderedPicture {
   std::string name;
-  std::string role;                 ///< As view_role(); empty where no view is an input.
-  std::optional<HoleShares> holes;  ///< Empty where nobody knows of holes.
+  std::string role;                    ///< As view_role(); empty where no view is an input.
+  std::optional<HoleShares> holes;     ///< Empty where nobody knows of holes.
+  std::optional<double> painted = {};  ///< Share that shows Model::fill; empty without any.
 };
 
 /// Writes NAME.exr and NAME.{color,depth,normal,hole}.png for each of the given views of the model.
@@ -56,8 +57,9 @@ std::vector<RenderedPicture> write_views(const Model& model,
                                          const PictureOptions& shown = {});
 
 /// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
-/// says where they are, and contact.png: twelve of them, holes in magenta. Without priors there are
-/// no masks and no magenta. What is returned has no roles.
+/// says where they are, and contact.png: twelve of them, holes in magenta, in violet where
+/// Model::fill shows. Without priors there are no masks and no magenta. What is returned has no
+/// roles.
 std::vector<RenderedPicture> write_path(const Model& model,
                                         const std::vector<Camera>& path,
                                         const std::filesystem::path& folder,
@@ -109,8 +111,8 @@ nlohmann::ordered_json figures_to_json(const ViewFigures& figures);
 nlohmann::ordered_json evaluation_to_json(const Evaluation& evaluation);
 
 /// PSNR and SSIM of the rendered views against their photographs, over all pixels and over those
-/// that are not holes, and MS-SSIM and FLIP over all. Pictures are those of write_views(). Loads the
-/// photographs.
+/// that are not holes, and MS-SSIM and FLIP over all. Pictures are those of write_views(), but for
+/// what was painted (Model::fill), which no figure rests on. Loads the photographs.
 ///
 /// Where the exposures of input views were matched, the photographs of others are matched to what
 /// is rendered, by factors on red, green and blue light. Where water was taken out of them,

@@ -29,8 +29,8 @@
 #include "io/splats/splat_glb_reader.h"
 #include "io/splats/splat_reader.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/splat_selection.h"
 #include "libcgs/splats/floaters.h"
-#include "libcgs/splats/splat_selection.h"
 #include "meshing/surface/isosurface.h"
 #include "meshing/surface/watertight.h"
 
@@ -328,19 +328,51 @@ void settle_frame(const ConversionRequest& request, Source& source) {
   if (!refused.empty()) source.warnings.push_back(refused);
 }
 
+/// What a model shows and what was painted into its holes, the latter tagged: it goes where splats
+/// go, and into nothing that is measured.
+GaussianFile painted_splats(const Model& model) {
+  GaussianFile out;
+  out.gaussians = model.gaussians;
+  append(out.gaussians, model.fill);
+  out.evidence = model.evidence;
+  if (!out.evidence.empty()) out.evidence += "; ";
+  out.evidence += "with " + std::to_string(model.fill.size()) + " synthetic Gaussians";
+  return out;
+}
+
+/// Meshes and volumes take nothing that somebody painted.
+void leave_out_synthetic(GaussianFile& file, const ConversionRequest& request, Terminal& terminal) {
+  const size_t count = synthetic_count(file.gaussians);
+  if (count == 0) return;
+  if (count == file.gaussians.size()) {
+    throw BadInput(Defect::Empty,
+                   request.input,
+                   "all of its splats are synthetic; meshes and volumes take none of these");
+  }
+  std::vector<uint8_t> keep;
+  for (const uint8_t tag : file.gaussians.synthetic) keep.push_back(tag == 0 ? 1 : 0);
+  keep_only(file.gaussians, keep);
+  terminal.say(std::to_string(count) +
+               " synthetic splats left out: no mesh and no volume takes them");
+}
+
 void write_as_splats(const ConversionRequest& request,
                      const Source& source,
                      Terminal& terminal,
                      Json& report) {
-  report["output"] =
-      write_splat_file(request.output,
-                       source.model ? source.model->gaussians : source.splats->gaussians,
-                       source.frame,
-                       {request.spz_version,
-                        request.volume.memory_limit,
-                        source.model ? source.model->evidence : source.splats->evidence,
-                        request.local_origin},
-                       terminal);
+  GaussianFile painted;
+  const bool has_fill = source.model && source.model->fill.size() > 0;
+  if (has_fill) painted = painted_splats(*source.model);
+  const bool is_bare_model = source.model && !has_fill;
+  const GaussianFile& file = source.splats ? *source.splats : painted;
+  report["output"] = write_splat_file(request.output,
+                                      is_bare_model ? source.model->gaussians : file.gaussians,
+                                      source.frame,
+                                      {request.spz_version,
+                                       request.volume.memory_limit,
+                                       is_bare_model ? source.model->evidence : file.evidence,
+                                       request.local_origin},
+                                      terminal);
 }
 
 // Says what of it the file cannot hold.
@@ -417,6 +449,7 @@ Json convert_file(const ConversionRequest& given, Terminal& terminal) {
   }
   const bool from_splats_alone = source.splats.has_value();
   if (from_splats_alone) {
+    leave_out_synthetic(*source.splats, request, terminal);
     check_pictures(request, source.splats->gaussians);
     report["evidence"] = "none: the surface was seen by virtual cameras only";
     terminal.say(

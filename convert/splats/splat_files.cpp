@@ -104,6 +104,7 @@ std::string lost_of_scene(const std::filesystem::path& path,
   add(is_bare && !frame.up.isApprox(-Eigen::Vector3d::UnitY()), "direction that is up");
   add(is_bare && !evidence.empty(), "evidence");
   add(!g.provenance.empty() && !holds_provenance(path), "provenance");
+  add(!g.synthetic.empty() && !holds_provenance(path), "mark of what is synthetic");
   const std::string ending = is_bare ? lower_extension(path) : ".compressed.ply";
   return out.empty() ? out : ending + " files hold no " + out + " of the scene";
 }
@@ -130,6 +131,22 @@ Json provenance_json(const Gaussians& g) {
        "estimated: " + share_text(count(Provenance::Estimated), g.size()) + " of the splats"}};
   for (const Provenance label : kProvenanceOrder) out[provenance_key(label)] = count(label);
   return out;
+}
+
+/// Likewise.
+Json synthetic_json(const Gaussians& g) {
+  if (g.synthetic.empty()) return nullptr;
+  const size_t count = synthetic_count(g);
+  Json sources = Json::array();
+  for (const auto& [file, hash] : g.synthetic_sources) {
+    sources.push_back({{"file", file}, {"sha256", hash}});
+  }
+  return {{"words",
+           "synthetic: " + share_text(count, g.size()) + " of the splats, from " +
+               std::to_string(sources.size()) + (sources.size() == 1 ? " picture" : " pictures") +
+               " that somebody painted"},
+          {"splats", count},
+          {"sources", sources}};
 }
 
 /// Where a hundredth of the splats cannot be held as it is; "" elsewhere.
@@ -187,6 +204,9 @@ Json write_splat_file(const std::filesystem::path& path,
   const Json provenance = provenance_json(g);
   report["provenance"] = holds_provenance(path) ? provenance : Json();
   if (!provenance.is_null()) terminal.say(provenance["words"].get<std::string>());
+  const Json synthetic = synthetic_json(g);
+  report["synthetic"] = holds_provenance(path) ? synthetic : Json();
+  if (!synthetic.is_null()) terminal.say(synthetic["words"].get<std::string>());
   const std::string lost = lost_of_scene(path, g, frame, options.evidence);
   if (!lost.empty()) terminal.say(lost);
   std::vector<std::string> missing;  // why splats are, or parts of them
@@ -228,6 +248,7 @@ Json splat_file_to_json(const GaussianFile& file) {
           {"units", file.frame.unit_name()},
           {"evidence", evidence},
           {"provenance", provenance_json(file.gaussians)},
+          {"synthetic", synthetic_json(file.gaussians)},
           {"findings",
            {{"not_finite", f.not_finite},
             {"without_rotation", f.without_rotation},

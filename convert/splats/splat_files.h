@@ -36,9 +36,9 @@ struct SplatFileOptions {
 /// Writes splats in the format that the name of the file says, reads them back and says on the
 /// terminal what they lost, and how many are estimated.
 /// \param frame  whose `up` becomes +Y in GLB, and must be known for it
-/// \return {"format", "splats", "provenance", "loss", …}; "provenance" of the file as
-///         splat_file_to_json() has it; "loss" is {"not_measured": why} where the file could not be
-///         read back
+/// \return {"format", "splats", "provenance", "synthetic", "loss", …}; "provenance" and "synthetic"
+///         of the file as splat_file_to_json() has them; "loss" is {"not_measured": why} where the
+///         file could not be read back
 /// \throws Error as the writers; Cancelled
 nlohmann::ordered_json write_splat_file(const std::filesystem::path& path,
                                         const Gaussians& gaussians,
@@ -47,9 +47,10 @@ nlohmann::ordered_json write_splat_file(const std::filesystem::path& path,
                                         Terminal& terminal);
 
 /// What a file of splats holds and what is wrong with it: {"kind", "format", "counts", "bounds",
-/// "units", "evidence": words or null, "provenance", "findings", "warnings"}. "provenance" is null
-/// where it is not stated, else {"words": "estimated: 12 % of the splats", "observed": splats,
-/// "single_view", …: one for each label}.
+/// "units", "evidence": words or null, "provenance", "synthetic", "findings", "warnings"}.
+/// "provenance" is null where it is not stated, else {"words": "estimated: 12 % of the splats",
+/// "observed": splats, "single_view", …: one for each label}; "synthetic" is null where nothing is
+/// made up, else {"words", "splats", "sources": [{"file", "sha256"}]}.
 nlohmann::ordered_json splat_file_to_json(const GaussianFile& file);
 
 }  // namespace cgs

@@ -14,10 +14,10 @@
 #include "convert/text/length.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/core/splat_selection.h"
 #include "libcgs/render/picture.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/render/thin_sheets.h"
-#include "libcgs/splats/splat_selection.h"
 
 namespace cgs {
 

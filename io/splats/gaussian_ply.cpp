@@ -20,17 +20,42 @@ namespace {
 constexpr const char* kHeaderStart = "ply\nformat binary_little_endian 1.0\ncomment ";
 
 constexpr const char* kProvenanceProperty = "provenance";
+constexpr const char* kSyntheticProperty = "synthetic";
+constexpr std::string_view kSyntheticComment = "synthetic ";
 
-constexpr size_t kLongestHeader = 4096;  // of those that write_gaussian_ply() writes
+constexpr size_t kLongestHeader = 131072;  // of those that write_gaussian_ply() writes
 
-std::string header_start(const Frame& frame, const std::string& evidence) {
+std::string header_start(const Frame& frame,
+                         const std::string& evidence,
+                         const std::vector<SyntheticSource>& sources) {
   std::string out = kHeaderStart;
   out += kPlyGenerator;
-  return out + '\n' + ply_frame_comments(frame) + ply_evidence_comment(evidence);
+  out += '\n' + ply_frame_comments(frame) + ply_evidence_comment(evidence);
+  for (size_t k = 0; k < sources.size(); ++k) {
+    const auto& [file, sha256] = sources[k];
+    out += "comment " + std::string(kSyntheticComment) + std::to_string(k + 1) +
+           " sha256:" + sha256 + " " + one_line(file) + "\n";
+  }
+  return out;
+}
+
+// What header_start() says of them, in files of ours.
+std::vector<SyntheticSource> sources_in(const std::vector<std::string>& comments) {
+  std::vector<SyntheticSource> out;
+  if (!is_our_ply(comments)) return out;
+  for (const std::string& comment : comments) {
+    const std::string mark =
+        std::string(kSyntheticComment) + std::to_string(out.size() + 1) + " sha256:";
+    if (!comment.starts_with(mark)) continue;
+    const std::string rest = comment.substr(mark.size());
+    const size_t end = rest.find(' ');
+    out.push_back({end == std::string::npos ? "" : rest.substr(end + 1), rest.substr(0, end)});
+  }
+  return out;
 }
 
 std::string header_text(const Gaussians& g, const Frame& frame, const std::string& evidence) {
-  std::string out = header_start(frame, evidence);
+  std::string out = header_start(frame, evidence, g.synthetic_sources);
   out += "element vertex " + std::to_string(g.size()) + "\n";
   const auto add = [&](const std::string& name) { out += "property float " + name + "\n"; };
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
@@ -39,6 +64,7 @@ std::string header_text(const Gaussians& g, const Frame& frame, const std::strin
   for (const char* name : {"opacity", "scale_0", "scale_1", "scale_2"}) add(name);
   for (const char* name : {"rot_0", "rot_1", "rot_2", "rot_3"}) add(name);
   if (!g.provenance.empty()) add(kProvenanceProperty);
+  if (!g.synthetic.empty()) add(kSyntheticProperty);
   return out + "end_header\n";
 }
 
@@ -57,6 +83,7 @@ void append_gaussian(std::string& out, const Gaussians& g, const Frame& frame, s
   for (const float s : g.scale[i]) append_bytes(out, static_cast<float>(std::log(s * frame.scale)));
   for (const float q : g.rotation[i]) append_bytes(out, q);
   if (!g.provenance.empty()) append_bytes(out, static_cast<float>(g.provenance[i]));
+  if (!g.synthetic.empty()) append_bytes(out, static_cast<float>(g.synthetic[i]));
 }
 
 /// Columns of the properties of a splat within the vertex element.
@@ -69,6 +96,7 @@ struct SplatColumns {
   std::array<int, 4> rotation{};
   int filter = -1;            ///< filter_3D, -1 if there is none.
   int provenance = -1;        ///< -1 if there is none.
+  int synthetic = -1;         ///< -1 if there is none.
   double color_range = 0;     ///< Largest value of red, green and blue; 0 = f_dc_*.
   bool may_be_bytes = false;  ///< These are floats, which some programs write up to 255.
 };
@@ -160,6 +188,7 @@ SplatColumns splat_columns(const PlyHeader& header, const std::filesystem::path&
   out.opacity = find.column("opacity");
   if (find.has("filter_3D")) out.filter = find.column("filter_3D");
   out.provenance = find.optional_column(kProvenanceProperty);
+  out.synthetic = find.optional_column(kSyntheticProperty);
   if (const auto names = find.color_names(); names && !find.has("f_dc_0")) {
     for (size_t k = 0; k < 3; ++k) out.color.at(k) = find.column(names->at(k));
     out.color_range = find.color_range(out.color[0]);
@@ -221,6 +250,7 @@ class SplatRows {
     }
     splats_.reserve(count);
     if (columns_.provenance >= 0) splats_.provenance.reserve(count);
+    if (columns_.synthetic >= 0) splats_.synthetic.reserve(count);
   }
 
   void add(const PlyRow& row) {
@@ -242,6 +272,10 @@ class SplatRows {
     if (columns_.provenance >= 0) {
       const double label = row.values[static_cast<size_t>(columns_.provenance)];
       splats_.provenance.push_back(static_cast<float>(label));
+    }
+    if (columns_.synthetic >= 0) {
+      const double tag = row.values[static_cast<size_t>(columns_.synthetic)];
+      splats_.synthetic.push_back(static_cast<float>(tag));
     }
     add_color(row);
   }
@@ -310,7 +344,7 @@ bool restate_gaussian_ply(const std::filesystem::path& path, const Frame& frame)
     return false;
   }
   AtomicFile file(path);
-  file.write(header_start(frame, ply_evidence(comments)));
+  file.write(header_start(frame, ply_evidence(comments), sources_in(comments)));
   file.write(std::string_view(bytes).substr(splats + 1));
   file.commit();
   return true;
@@ -330,6 +364,7 @@ RawSplats parse_gaussian_ply(std::string_view bytes, const std::filesystem::path
   RawSplats out = rows.take();
   out.comments = header.comments;
   out.evidence = ply_evidence(out.comments);
+  out.synthetic_sources = sources_in(out.comments);
   out.may_be_linear =  // no program that states filters writes lengths
       vertex.find("filter_3D") < 0 && !is_our_ply(out.comments);
   const PlyProperty& x = vertex.properties[static_cast<size_t>(vertex.find("x"))];

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "io/bytes/significance.h"
+#include "libcgs/core/gaussians.h"
 
 namespace cgs {
 
@@ -25,13 +26,15 @@ struct RawSplats {
   std::vector<float> logit;                ///< Of the opacity.
   std::vector<Eigen::Vector3f> sh;         ///< Gaussian-major, (sh_degree + 1)^2 for each.
   std::vector<float> provenance;           ///< Numbers of Provenance; empty = not stated.
-  int digits = kFloatDigits;               ///< Binary digits of a position as stored.
-  bool may_be_linear = false;              ///< Programs differ: scales may really be lengths, and
-                                           ///< opacities probabilities.
-  bool is_antialiased = false;             ///< For viewers that compensate opacity for blur.
-  std::vector<std::string> comments;       ///< Of a PLY header.
-  std::string evidence;                    ///< As GaussianFile.
-  std::vector<std::string> notes;          ///< One line each: what was left out, or looks odd.
+  std::vector<float> synthetic;            ///< As Gaussians; any numbers. Empty = none is made up.
+  std::vector<SyntheticSource> synthetic_sources;  ///< As the file lists them.
+  int digits = kFloatDigits;                       ///< Binary digits of a position as stored.
+  bool may_be_linear = false;         ///< Programs differ: scales may really be lengths, and
+                                      ///< opacities probabilities.
+  bool is_antialiased = false;        ///< For viewers that compensate opacity for blur.
+  std::vector<std::string> comments;  ///< Of a PLY header.
+  std::string evidence;               ///< As GaussianFile.
+  std::vector<std::string> notes;     ///< One line each: what was left out, or looks odd.
 
   size_t size() const { return position.size(); }
   /// RGB coefficients of a splat.

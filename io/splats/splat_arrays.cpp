@@ -17,6 +17,14 @@ void require_writable(const Gaussians& g) {
   require(g.provenance.empty() || g.provenance.size() == n,
           "Gaussians.provenance must be empty or as long as position",
           g.provenance.size());
+  require(g.synthetic.empty() || g.synthetic.size() == n,
+          "Gaussians.synthetic must be empty or as long as position",
+          g.synthetic.size());
+  for (const uint8_t tag : g.synthetic) {
+    require(tag <= g.synthetic_sources.size(),
+            "Gaussians.synthetic must be at most the number of sources",
+            int{tag});
+  }
   for (size_t i = 0; i < n; ++i) {
     require(g.position[i].allFinite() && g.rotation[i].allFinite(),
             "Gaussians: positions and rotations must be finite; index",

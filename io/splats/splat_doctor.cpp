@@ -177,6 +177,7 @@ class Examination {
                 sh_count,
                 raw_.sh.begin() + static_cast<ptrdiff_t>(to * sh_count));
     if (!raw_.provenance.empty()) raw_.provenance[to] = raw_.provenance[from];
+    if (!raw_.synthetic.empty()) raw_.synthetic[to] = raw_.synthetic[from];
   }
 
   void shrink_to(size_t count) {
@@ -186,6 +187,7 @@ class Examination {
     raw_.logit.resize(count);
     raw_.sh.resize(count * raw_.sh_count());
     if (!raw_.provenance.empty()) raw_.provenance.resize(count);
+    if (!raw_.synthetic.empty()) raw_.synthetic.resize(count);
   }
 
   void drop_unusable() {
@@ -300,7 +302,27 @@ class Examination {
     for (const float number : raw_.provenance) {
       out.provenance.push_back(static_cast<Provenance>(number));
     }
+    tag_synthetic(out);
     return out;
+  }
+
+  /// A tag whose picture the file does not list stays one: nobody says which picture it was. So
+  /// does what is no tag at all.
+  void tag_synthetic(Gaussians& out) {
+    constexpr size_t kMost = 255;
+    std::vector<SyntheticSource>& sources = raw_.synthetic_sources;
+    if (sources.size() > kMost) sources.resize(kMost);
+    size_t largest = 0;
+    for (const float number : raw_.synthetic) {
+      const bool is_tag = number >= 0 && number <= float{kMost} && number == std::floor(number);
+      const auto tag = is_tag ? static_cast<uint8_t>(number) : uint8_t{kMost};
+      out.synthetic.push_back(tag);
+      largest = std::max(largest, size_t{tag});
+    }
+    if (largest == 0) out.synthetic.clear();
+    if (largest == 0) return;
+    if (sources.size() < largest) sources.resize(largest);
+    out.synthetic_sources = std::move(sources);
   }
 
   void add_warnings(std::vector<std::string>& out) const {

@@ -53,6 +53,7 @@ struct GaussianFile {
 /// - Quaternions are normalised.
 /// - Labels of provenance are kept where every splat has one; else they are left out, with a
 ///   warning.
+/// - Tags of what is made up are kept in any case; what is no tag counts as one.
 ///
 /// \param raw    taken apart, so that no second copy is in memory
 /// \param frame  read into exactly this frame; without it a canonical frame is made from the 1st

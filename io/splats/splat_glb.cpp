@@ -112,10 +112,21 @@ void add_harmonics(SplatBuffer& buffer, const Gaussians& g) {
 
 /// As floats, like all else: whole numbers of one or two bytes would be padded to four.
 void add_provenance(SplatBuffer& buffer, const Gaussians& g) {
-  if (g.provenance.empty()) return;
-  buffer.add(kSplatProvenance, "SCALAR", [&](size_t i) {
-    return std::array{static_cast<float>(g.provenance[i])};
+  if (!g.provenance.empty()) {
+    buffer.add(kSplatProvenance, "SCALAR", [&](size_t i) {
+      return std::array{static_cast<float>(g.provenance[i])};
+    });
+  }
+  if (g.synthetic.empty()) return;
+  buffer.add(kSplatSynthetic, "SCALAR", [&](size_t i) {
+    return std::array{static_cast<float>(g.synthetic[i])};
   });
+}
+
+Json sources_json(const std::vector<SyntheticSource>& sources) {
+  Json out = Json::array();
+  for (const auto& [file, sha256] : sources) out.push_back({{"file", file}, {"sha256", sha256}});
+  return out;
 }
 
 std::string named(const char* what) { return std::string(kGaussianSplatting) + ":" + what; }
@@ -171,7 +182,7 @@ size_t write_splat_glb(const std::filesystem::path& path,
             i);
   }
   constexpr size_t kRoomForJson = size_t{1} << 20;
-  const size_t labels = g.provenance.empty() ? 0 : 1;
+  const size_t labels = (g.provenance.empty() ? 0U : 1U) + (g.synthetic.empty() ? 0U : 1U);
   const size_t floats = 15 + 3 * static_cast<size_t>(g.sh_count()) + labels;
   if (g.size() > (std::numeric_limits<uint32_t>::max() - kRoomForJson) / (4 * floats)) {
     throw LimitError("write_splat_glb: glTF binary files end at 4 GiB");
@@ -194,6 +205,7 @@ size_t write_splat_glb(const std::filesystem::path& path,
   extras = glb_place_to_json(place, frame);
   extras["file_origin"] = vector(frame.file_origin);
   if (!options.evidence.empty()) extras["evidence"] = options.evidence;
+  if (!g.synthetic.empty()) extras["synthetic_sources"] = sources_json(g.synthetic_sources);
   const std::string out = glb_bytes(json_text(document, -1), buffer.take_bytes());
   write_file(path, out);
   return out.size();

@@ -14,6 +14,9 @@ namespace cgs {
 
 /// The attribute of the label of a splat, a number of Provenance: our own, so it begins with _.
 inline constexpr const char* kSplatProvenance = "_PROVENANCE";
+/// The attribute of the picture that a splat was made up from, as Gaussians::synthetic; the
+/// pictures are listed in asset.extras.synthetic_sources.
+inline constexpr const char* kSplatSynthetic = "_SYNTHETIC";
 
 /// The attribute of a spherical harmonic: degree 0 to 3, order 0 to 2 degree.
 std::string splat_harmonic_name(int degree, int order);
@@ -29,7 +32,8 @@ struct SplatGlbOptions {
 
 /// Writes splats as .glb with KHR_gaussian_splatting: points with rotation (x, y, z, w), scale,
 /// opacity and spherical harmonics as float attributes, and COLOR_0 (linear, with opacity) for
-/// readers that only know points; also _PROVENANCE, the number of the label, where splats state it.
+/// readers that only know points; also _PROVENANCE, the number of the label, where splats state it,
+/// and _SYNTHETIC where some are made up.
 ///
 /// In metres where the scale is known, else in world units; positions are relative to their median.
 /// The node turns them +Y up and moves them, in double, to where GlbPlace has them, so that they

@@ -175,6 +175,7 @@ struct Attributes {
   std::vector<float> position, rotation, scale, opacity;
   std::vector<std::vector<float>> harmonics;
   std::vector<float> provenance;  ///< Empty = not stated.
+  std::vector<float> synthetic;   ///< Likewise.
   double opacity_step = 0;        ///< Of whole numbers; 0 for floats.
 
   Eigen::Vector3d three(const std::vector<float>& values, size_t i) const {
@@ -197,6 +198,7 @@ class SplatScene {
     place();
     for (const GlbInstance& instance : scene.instances) add_mesh(instance);
     if (!splats_.provenance.empty()) leave_unlabelled(splats_.size());
+    if (!splats_.synthetic.empty()) splats_.synthetic.resize(splats_.size(), 0);
     if (splats_.size() == 0) throw BadInput(Defect::Empty, file_.path(), "holds no splats");
     const std::string odd = check_significance(file_.path(), stored_, kFloatDigits);
     if (!odd.empty()) splats_.notes.push_back(odd);
@@ -245,6 +247,12 @@ class SplatScene {
       for (int i = 0; i < 3; ++i) file_origin[i] = stated->at(static_cast<size_t>(i)).number();
     }
     if (const auto stated = extras.find("evidence")) splats_.evidence = stated->text();
+    if (const auto stated = extras.find("synthetic_sources")) {
+      for (size_t i = 0; i < stated->size(); ++i) {
+        const JsonValue source = stated->at(i);
+        splats_.synthetic_sources.push_back({source.at("file").text(), source.at("sha256").text()});
+      }
+    }
     file_from_gltf_.linear() = origin_.units_per_metre * origin_.world_from_gltf;
     file_from_gltf_.translation() = origin_.origin - file_origin;
     add_comment("file_origin", file_origin);
@@ -358,6 +366,9 @@ class SplatScene {
     if (in.find(kSplatProvenance) && accessor(kSplatProvenance).at("type").text() == "SCALAR") {
       out.provenance = values(kSplatProvenance, 1);
     }
+    if (in.find(kSplatSynthetic) && accessor(kSplatSynthetic).at("type").text() == "SCALAR") {
+      out.synthetic = values(kSplatSynthetic, 1);
+    }
     return out;
   }
 
@@ -395,6 +406,10 @@ class SplatScene {
       leave_unlabelled(splats_.size());
       splats_.provenance.insert(
           splats_.provenance.end(), in.provenance.begin(), in.provenance.end());
+    }
+    if (!in.synthetic.empty()) {
+      splats_.synthetic.resize(splats_.size(), 0);
+      splats_.synthetic.insert(splats_.synthetic.end(), in.synthetic.begin(), in.synthetic.end());
     }
     const SplatTurn turn(linear);
     for (size_t i = 0; i < in.count; ++i) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -16,8 +17,15 @@ inline constexpr float kShC0 = 0.28209479177387814f;
 /// That of the linear ones: Y_1 = kShC1 * (-y, z, -x).
 inline constexpr float kShC1 = 0.4886025119029199f;
 
+/// A picture from elsewhere of which Gaussians were made up; empty texts = nobody says which.
+struct SyntheticSource {
+  std::string file;    ///< Its name, without folder.
+  std::string sha256;  ///< Of its bytes, 64 hexadecimal digits.
+  bool operator==(const SyntheticSource&) const = default;
+};
+
 /// A set of 3D Gaussians, one entry per Gaussian in every array, as values (no log, no logit); only
-/// provenance may be empty.
+/// provenance and synthetic may be empty.
 /// Positions and scales are in internal units of the canonical frame that comes with it.
 struct Gaussians {
   std::vector<Eigen::Vector3f> position;  ///< [internal units]
@@ -27,10 +35,21 @@ struct Gaussians {
   int sh_degree = 0;                      ///< 0 … 3
   std::vector<Eigen::Vector3f> sh;        ///< size() * sh_count() RGB coefficients, Gaussian-major.
   std::vector<Provenance> provenance;     ///< What vouches for each; empty = nobody states it.
+  /// k = made up from synthetic_sources[k - 1], no photograph; 0 = not. Empty = none is.
+  std::vector<uint8_t> synthetic;
+  std::vector<SyntheticSource> synthetic_sources;  ///< 255 at most.
 
   size_t size() const { return position.size(); }
   int sh_count() const { return (sh_degree + 1) * (sh_degree + 1); }
 };
+
+/// How many are made up.
+size_t synthetic_count(const Gaussians& gaussians);
+
+/// Appends Gaussians; harmonics that they lack are 0. Labels that either set lacks, both lose.
+/// \throws InvalidInput if `more` has harmonics of a higher degree, or there are more than 255
+///         sources together
+void append(Gaussians& gaussians, const Gaussians& more);
 
 /// Covariance of a Gaussian from its scale and rotation, Sigma = R S S^T R^T.
 ///

@@ -18,4 +18,16 @@ ColorImage picture(const RenderBuffers& buffers);
 /// Source: pull and push, Gortler et al. 1996, "The Lumigraph", 3.4, here with weights by depth.
 ColorImage filled_picture(const RenderBuffers& buffers);
 
+/// What a picture shows whose holes are filled by Gaussians that somebody made up: these lie over
+/// what is drawn in holes, which no photograph vouches for, be it nearer or not. Other pixels, and
+/// holes as such, stay as they are.
+/// \param fill  the buffers of these Gaussians alone, of the same camera
+RenderBuffers with_fill(RenderBuffers buffers, const RenderBuffers& fill);
+
+/// Whether a pixel of with_fill() shows the fill.
+inline bool shows_fill(const RenderBuffers& buffers, const RenderBuffers& fill, size_t pixel) {
+  constexpr float kShown = 0.5f;
+  return is_hole(buffers.hole.data[pixel]) && fill.alpha.data[pixel] >= kShown;
+}
+
 }  // namespace cgs

@@ -14,10 +14,10 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/kd_tree.h"
+#include "libcgs/core/splat_selection.h"
 #include "libcgs/core/split_mix.h"
 #include "libcgs/render/projection.h"
 #include "libcgs/render/training_rasterizer.h"
-#include "libcgs/splats/splat_selection.h"
 
 namespace cgs {
 
@@ -253,6 +253,7 @@ void merge_into(WeighedSplats& s, uint32_t i, uint32_t j) {
   if (!g.provenance.empty()) {
     g.provenance[i] = weaker_evidence(g.provenance[i], g.provenance[j]);
   }
+  if (!g.synthetic.empty()) g.synthetic[i] = std::max(g.synthetic[i], g.synthetic[j]);
   if (s.pixel[j] < s.pixel[i]) s.ray[i] = s.ray[j];
   s.weight[i] += s.weight[j];
   s.pixel[i] = pixel;

@@ -49,7 +49,8 @@ struct MergeOptions {
 /// The merged splat has the moments of the two (centre, covariance, colour). Its opacity keeps
 /// their optical depth -ln(1 - alpha), added up over the picture, a pixel's blur included: that of
 /// layers adds up, alpha does not. What no opacity of one splat reaches, it gains in size. Its
-/// label is that of the weaker evidence. Same bits for any number of threads.
+/// label is that of the weaker evidence, and it is made up if one of the two is. Same bits for any
+/// number of threads.
 ///
 /// Sources: Ward 1963, "Hierarchical grouping to optimize an objective function"; Kerbl et al.
 /// 2024, "A Hierarchical 3D Gaussian Representation", for opacities.

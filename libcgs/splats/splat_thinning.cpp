@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/core/splat_selection.h"
 #include "libcgs/render/picture.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/splats/splat_merging.h"
 #include "libcgs/splats/splat_refit.h"
-#include "libcgs/splats/splat_selection.h"
 
 namespace cgs {
 

@@ -159,8 +159,34 @@ def control_table(path):
 
 def write_mask(path, width, height):
     """A picture that leaves out the rows above the middle."""
-    rows = b"".join(b"\0" + bytes([255 if y > height / 2 else 0]) * width for y in range(height))
-    parts = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),
+    write_png(path, width, height, 0, [bytes([255 if y > height / 2 else 0]) * width for y in range(height)])
+
+
+def read_png(data, channels):
+    """Width, height and rows of an 8-bit picture."""
+    at, parts = 8, {}
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        parts[kind] = parts.get(kind, b"") + data[at + 8:at + 8 + length]
+        at += 12 + length
+    width, height = struct.unpack(">II", parts[b"IHDR"][:8])
+    data, above, rows = zlib.decompress(parts[b"IDAT"]), bytes(width * channels), []
+    for y in range(height):
+        method, *row = data[y * (width * channels + 1):(y + 1) * (width * channels + 1)]
+        for i, value in enumerate(row):
+            left = row[i - channels] if i >= channels else 0
+            corner = above[i - channels] if i >= channels else 0
+            paeth = min((abs(above[i] - corner), 0, left), (abs(left - corner), 1, above[i]),
+                        (abs(left + above[i] - 2 * corner), 2, corner))[2]
+            row[i] = value + [0, left, above[i], (left + above[i]) // 2, paeth][method] & 255
+        above = bytearray(row)
+        rows.append(above)
+    return width, height, rows
+
+
+def write_png(path, width, height, kind, lines):
+    rows = b"".join(b"\0" + bytes(line) for line in lines)
+    parts = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)),
              (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
@@ -209,12 +235,33 @@ def test_water():
     assert "restored" in (work / "watered/report.html").read_text()
 
 
+def painted_holes():
+    """A picture that is white in holes, of which splats are made; nothing is known of pixels else."""
+    assert cgs("render", "trained", "--holes", "--fill", "none", "-o", "holes")["views"][0]["hole_fraction"] > 0
+    file("holes/cameras.json", "cameras")
+    path = work / "holes/hole_1.png"
+    width, height, rows = read_png(path.read_bytes(), 3)
+    _, _, holes = read_png((work / "holes/hole_1_mask.png").read_bytes(), 1)
+    for row, mask in zip(rows, holes):
+        for x, hole in enumerate(mask):
+            if hole:
+                row[3 * x:3 * x + 3] = b"\xff\xff\xff"
+    write_png(path, width, height, 2, rows)
+    told = cgs("fill", "trained", "holes", "-o", "filled")
+    assert told["views"][0]["lifted"] and told["splats"]
+    assert cgs("render", "filled", "--path", "holes/cameras.json", "-o", "shown")[0]["synthetic_fraction"] > 0
+    assert cgs("render", "filled", "--views", "view_04", "-o", "shown_view")[0]["synthetic_fraction"] >= 0
+    assert cgs("convert", "filled", "painted.ply")["output"]["synthetic"]["splats"]
+    assert cgs("info", "painted.ply", schema="info-splats")["synthetic"]["sources"]
+
+
 def test_pictures():
     assert cgs("evaluate", "trained")["mean"]["psnr"] > 5
     assert cgs("evaluate", "trained", "--views", "view_02")["views"][0]["role"] == "input"
     assert cgs("render", "trained", "--views", "view_02", "-o", "views")[0]["role"] == "input"
     assert len(cgs("render", "trained", "--path", "spiral", "--frames", "2", "-o", "path")) == 2
     file("path/cameras.json", "cameras")
+    painted_holes()
     assert cgs("render", "sensed", "--views", "view_01", "-o", "masked")[0]["masked_fraction"] > 0.3
     (work / "bare").mkdir()  # splats beside the cameras of another program
     shutil.copy(work / "trained/gaussians.ply", work / "bare")

@@ -334,6 +334,48 @@ TEST(GaussianPly, ReadsLabelsOfAnyTypeAndLeavesOutWhatIsNone) {
   EXPECT_FALSE(warns(others, "provenance"));
 }
 
+TEST(GaussianPly, BringsTagsOfWhatIsMadeUpBackAlsoAfterItsFrameIsToldAnew) {
+  const test::TempDir dir;
+  Gaussians g = labelled(sample(1));
+  g.synthetic.assign(g.size(), 0);
+  g.synthetic[1] = 2;
+  g.synthetic[3] = 1;
+  g.synthetic_sources = {{"hole 1.png", std::string(64, 'a')}, {"b.jpg", std::string(64, '7')}};
+  Frame frame = exact_frame();
+  write_gaussian_ply(dir / "a.ply", g, frame);
+  const std::string head = test::read_bytes(dir / "a.ply");
+  EXPECT_NE(head.find("comment synthetic 1 sha256:" + std::string(64, 'a') + " hole 1.png\n"),
+            std::string::npos);
+  EXPECT_NE(head.find("property float provenance\nproperty float synthetic\nend_header\n"),
+            std::string::npos);
+  frame.metres_per_unit = 0.025;
+  EXPECT_TRUE(restate_gaussian_ply(dir / "a.ply", frame));
+  const GaussianFile back = read_gaussian_ply(dir / "a.ply", frame);
+  EXPECT_TRUE(back.warnings.empty());
+  EXPECT_EQ(back.gaussians.synthetic, g.synthetic);
+  EXPECT_EQ(back.gaussians.synthetic_sources, g.synthetic_sources);
+  EXPECT_EQ(back.gaussians.provenance, g.provenance);
+}
+
+// Whoever took the list of pictures away did not make a photograph of it.
+TEST(GaussianPly, KeepsTagsWhosePictureNobodyNames) {
+  const auto read = [](const std::string& value) {
+    return read_dialect("property double synthetic\n" +
+                            lines_of({"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"}) +
+                            lines_of({"scale_0", "scale_1", "scale_2"}) +
+                            lines_of({"rot_0", "rot_1", "rot_2", "rot_3"}),
+                        value + " 0 0 0 0 0 0 2 -3 -4 -5 1 0 0 0")
+        .gaussians;
+  };
+  EXPECT_TRUE(read("0").synthetic.empty());
+  const Gaussians third = read("3");
+  EXPECT_EQ(third.synthetic, (std::vector<uint8_t>{3, 3}));
+  EXPECT_EQ(third.synthetic_sources, std::vector<SyntheticSource>(3));
+  for (const std::string value : {"256", "-1", "0.5", "nan", "1e300"}) {
+    EXPECT_EQ(synthetic_count(read(value)), 2u) << value;
+  }
+}
+
 TEST(GaussianPly, Reads2DSplatsAsThinOnes) {
   const GaussianFile out =
       read_dialect(lines_of({"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"}) +

@@ -205,6 +205,29 @@ TEST(SplatGlbReader, BringsLabelsBack) {
   EXPECT_EQ(back.gaussians.provenance, g.provenance);
 }
 
+TEST(SplatGlbReader, BringsTagsOfWhatIsMadeUpBack) {
+  const test::TempDir dir;
+  Gaussians g = test::varied_splats(20, 1);
+  write_splat_glb(dir / "a.glb", g, Frame{});
+  EXPECT_TRUE(read_splats(dir / "a.glb").gaussians.synthetic.empty());
+  for (size_t i = 0; i < 20; ++i) g.synthetic.push_back(static_cast<uint8_t>(i % 3));
+  g.synthetic_sources = {{"one.png", std::string(64, '1')}, {"two.png", std::string(64, '2')}};
+  write_splat_glb(dir / "a.glb", g, Frame{});
+  const GaussianFile back = read_splats(dir / "a.glb");
+  EXPECT_TRUE(back.warnings.empty());
+  EXPECT_EQ(back.gaussians.synthetic, g.synthetic);
+  EXPECT_EQ(back.gaussians.synthetic_sources, g.synthetic_sources);
+}
+
+TEST(SplatGlbReader, PrimitivesWithoutTagsAreNotMadeUp) {
+  OthersGlb file = others(3, 0);
+  file.add(test::varied_splats(2, 0));
+  const size_t index = file.accessor(std::vector<float>{1, 0}, "SCALAR", kFloat);
+  file.json["accessors"][index]["normalized"] = false;
+  file.primitive(1)["attributes"]["_SYNTHETIC"] = index;
+  EXPECT_EQ(file.read().synthetic, (std::vector<float>{0, 0, 0, 1, 0}));
+}
+
 TEST(SplatGlbReader, ReadsLabelsOfEveryPrimitiveInWholeNumbersToo) {
   OthersGlb file = others(3, 0);
   file.add(test::varied_splats(2, 0));

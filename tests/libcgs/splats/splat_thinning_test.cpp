@@ -9,11 +9,11 @@
 #include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/splat_selection.h"
 #include "libcgs/reconstruct/model.h"
 #include "libcgs/render/picture.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/splats/splat_refit.h"
-#include "libcgs/splats/splat_selection.h"
 #include "tests/support/reference_rasterizer.h"
 
 namespace cgs::splat_thinning_test {

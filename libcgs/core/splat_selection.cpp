@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "libcgs/splats/splat_selection.h"
+#include "libcgs/core/splat_selection.h"
 
 #include <algorithm>
 
@@ -18,6 +18,7 @@ size_t keep_only(Gaussians& g, const std::vector<uint8_t>& keep) {
                 sh_count,
                 g.sh.begin() + static_cast<std::ptrdiff_t>(kept * sh_count));
     if (!g.provenance.empty()) g.provenance[kept] = g.provenance[i];
+    if (!g.synthetic.empty()) g.synthetic[kept] = g.synthetic[i];
     ++kept;
   }
   const size_t dropped = g.size() - kept;
@@ -27,6 +28,7 @@ size_t keep_only(Gaussians& g, const std::vector<uint8_t>& keep) {
   g.opacity.resize(kept);
   g.sh.resize(kept * sh_count);
   if (!g.provenance.empty()) g.provenance.resize(kept);
+  if (!g.synthetic.empty()) g.synthetic.resize(kept);
   return dropped;
 }
 

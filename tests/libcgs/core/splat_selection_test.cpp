@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "libcgs/splats/splat_selection.h"
+#include "libcgs/core/splat_selection.h"
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,9 @@ TEST(KeepOnly, KeepsAllThatBelongsToASplatTogether) {
         g.provenance.push_back(static_cast<Provenance>(number));
       }
     }
+    g.synthetic = {0, 1, 2, 3, 4, 5};
     EXPECT_EQ(keep_only(g, {0, 1, 0, 0, 1, 1}), 3u);
+    EXPECT_EQ(g.synthetic, (std::vector<uint8_t>{1, 4, 5}));
     ASSERT_EQ(g.size(), 3u);
     const std::vector<size_t> kept = {1, 4, 5};
     for (size_t i = 0; i < kept.size(); ++i) {

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/reconstruct/hole_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include <tbb/parallel_for.h>
+
+#include "libcgs/core/angle_between.h"
+#include "libcgs/core/error.h"
+#include "libcgs/reconstruct/camera_path.h"
+#include "libcgs/reconstruct/next_view.h"
+#include "libcgs/render/hidden_depth.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr size_t kMostCameras = 6;
+constexpr double kEnoughSeen = 0.95;
+
+// Coarse: which holes a camera sees needs no detail.
+Camera coarse(const Camera& camera) {
+  constexpr int kSide = 120;  // [pixels]
+  const double factor = double(std::max(camera.width, camera.height)) / kSide;
+  if (factor <= 1) return camera;
+  const auto side = [&](int pixels) {
+    return std::max(1, static_cast<int>(std::lround(pixels / factor)));
+  };
+  return resized(camera, side(camera.width), side(camera.height));
+}
+
+// Those beside input views that stand at a small angle from one, around what that one looks at.
+void add_cameras_beside(const Model& model, std::vector<Camera>& out) {
+  constexpr double kBeside = 20.5 * std::numbers::pi / 180;
+  std::vector<std::optional<Eigen::Vector3d>> subjects;
+  for (size_t k = 0; k < model.priors.size(); ++k) subjects.push_back(looked_at(model, k));
+  for (const NextView& place : places_around(model)) {
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t k = 0; k < subjects.size(); ++k) {
+      if (!subjects[k]) continue;
+      const Eigen::Vector3d from = input_camera(model, k).center() - *subjects[k];
+      least = std::min(least, angle_between(from, place.camera.center() - *subjects[k]));
+    }
+    if (least <= kBeside) out.push_back(place.camera);
+  }
+}
+
+// Evenly out of many, for a bounded time and memory.
+template <typename T>
+std::vector<T> thinned(const std::vector<T>& all, size_t most) {
+  const size_t step = (all.size() + most - 1) / most;
+  if (step <= 1) return all;
+  std::vector<T> out;
+  for (size_t i = 0; i < all.size(); i += step) out.push_back(all[i]);
+  return out;
+}
+
+std::vector<Camera> cameras_around(const Model& model) {
+  std::vector<Camera> out;
+  for (const int i : model.scene.held_out) {
+    out.push_back(model.scene.views[static_cast<size_t>(i)].camera);
+  }
+  const size_t inputs = model.scene.input.size();
+  if (inputs > 1) {
+    constexpr size_t kPerGap = 4;
+    constexpr size_t kMost = 64;  // of the way there, which is also the way back
+    const size_t steps = std::min(kMost, kPerGap * (inputs - 1));
+    const auto path = camera_path(model, "between", static_cast<int>(2 * steps));
+    out.insert(out.end(), path.begin() + 1, path.begin() + static_cast<std::ptrdiff_t>(steps));
+  }
+  add_cameras_beside(model, out);
+  return out;
+}
+
+/// The holes of a candidate.
+struct SeenHoles {
+  Camera camera;   ///< Coarse.
+  DepthMap depth;  ///< Of its holes; NaN elsewhere.
+};
+
+SeenHoles holes_of(const Model& model, const std::vector<SupportView>& inputs, const Camera& from) {
+  SeenHoles out{coarse(from), {}};
+  const RenderBuffers buffers = render_camera(model, inputs, out.camera);
+  MaskMap open(out.camera.width, out.camera.height, 0);
+  for (size_t i = 0; i < open.data.size(); ++i)
+    open.data[i] = is_hole(buffers.hole.data[i]) ? 1 : 0;
+  out.depth = hidden_depth(buffers, open);
+  return out;
+}
+
+std::vector<Eigen::Vector3d> points_of(const std::vector<SeenHoles>& candidates) {
+  std::vector<Eigen::Vector3d> out;
+  for (const SeenHoles& holes : candidates) {
+    for (int y = 0; y < holes.depth.height; ++y) {
+      for (int x = 0; x < holes.depth.width; ++x) {
+        const double z = holes.depth(x, y);
+        if (z > 0) out.push_back(holes.camera.unproject(x + 0.5, y + 0.5, z));
+      }
+    }
+  }
+  return out;
+}
+
+bool sees_hole(const SeenHoles& holes, const Eigen::Vector3d& point) {
+  constexpr double kAgrees = 0.1;
+  const Eigen::Vector3d uvz = holes.camera.project(point);
+  if (!holes.camera.sees(uvz)) return false;
+  const double z = holes.depth(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
+  return std::abs(uvz.z() - z) <= kAgrees * z;  // not if unknown
+}
+
+/// Points that a camera sees, one byte each.
+using Sight = std::vector<uint8_t>;
+
+std::vector<Sight> sights_of(const std::vector<SeenHoles>& candidates,
+                             const std::vector<Eigen::Vector3d>& points) {
+  std::vector<Sight> out(candidates.size());
+  tbb::parallel_for(size_t{0}, candidates.size(), [&](size_t k) {
+    out[k].resize(points.size());
+    for (size_t i = 0; i < points.size(); ++i) {
+      out[k][i] = sees_hole(candidates[k], points[i]) ? 1 : 0;
+    }
+  });
+  return out;
+}
+
+// How many points a camera sees that are not seen yet.
+size_t gain(const Sight& sight, const Sight& seen) {
+  size_t out = 0;
+  for (size_t i = 0; i < sight.size(); ++i) out += sight[i] & (1 - seen[i]);
+  return out;
+}
+
+}  // namespace
+
+HoleViews hole_views(const Model& model, const Progress& progress) {
+  require(!model.priors.empty(),
+          "what is a hole is told by the input views of a model; the number of these",
+          model.priors.size());
+  constexpr size_t kMostCandidates = 200;
+  constexpr size_t kMostPoints = 100'000;
+  const std::vector<Camera> around = thinned(cameras_around(model), kMostCandidates);
+  const std::vector<SupportView> inputs = support_views(model);
+  std::vector<SeenHoles> candidates;
+  for (size_t k = 0; k < around.size(); ++k) {
+    report(progress, double(k) / double(around.size()));
+    candidates.push_back(holes_of(model, inputs, around[k]));
+  }
+  const std::vector<Eigen::Vector3d> points = thinned(points_of(candidates), kMostPoints);
+  const std::vector<Sight> sights = sights_of(candidates, points);
+  HoleViews out;
+  out.candidates = around.size();
+  Sight seen(points.size(), 0);
+  size_t count = 0;
+  while (out.cameras.size() < kMostCameras && double(count) < kEnoughSeen * double(points.size())) {
+    std::vector<size_t> gains;
+    for (const Sight& sight : sights) gains.push_back(gain(sight, seen));
+    const auto best = std::max_element(gains.begin(), gains.end());  // the first of equal ones
+    if (*best == 0) break;
+    const auto k = static_cast<size_t>(best - gains.begin());
+    out.cameras.push_back(around[k]);
+    for (size_t i = 0; i < seen.size(); ++i) seen[i] |= sights[k][i];
+    count += *best;
+  }
+  out.covered = points.empty() ? 1 : double(count) / double(points.size());
+  report(progress, 1);
+  return out;
+}
+
+}  // namespace cgs

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/reconstruct/painted_fill.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <Eigen/Eigenvalues>
+#include <tbb/parallel_for.h>
+
+#include "libcgs/core/error.h"
+#include "libcgs/reconstruct/synthetic_sight.h"
+#include "libcgs/render/hidden_depth.h"
+#include "libcgs/render/membrane.h"
+#include "libcgs/render/picture.h"
+#include "libcgs/render/rasterizer.h"
+
+namespace cgs {
+
+namespace {
+
+/// A painted view and what is known of its holes.
+struct Painting {
+  const PaintedView& view;
+  RenderBuffers shown;  ///< With what earlier views painted.
+  MaskMap open;         ///< 1 = to be filled from this one.
+  DepthMap depth;       ///< Of what is painted; NaN = nowhere.
+};
+
+constexpr std::array<std::pair<int, int>, 4> kNeighbours = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
+
+Painting painting_of(const Model& model,
+                     const std::vector<SupportView>& inputs,
+                     const Gaussians& earlier,
+                     const PaintedView& view,
+                     ViewFill& report) {
+  Painting out{view, render_camera(model, inputs, view.camera), {}, {}};
+  const RenderBuffers fill = rasterize(earlier, view.camera);
+  out.open = MaskMap(view.camera.width, view.camera.height, 0);
+  for (size_t i = 0; i < out.open.data.size(); ++i) {
+    if (!is_hole(out.shown.hole.data[i])) continue;
+    ++report.holes;
+    const bool is_filled = shows_fill(out.shown, fill, i);
+    report.filled_before += is_filled ? 1 : 0;
+    out.open.data[i] = is_filled ? 0 : 1;
+  }
+  out.shown = with_fill(std::move(out.shown), fill);
+  out.depth = hidden_depth(out.shown, out.open);
+  return out;
+}
+
+// Moves painted pixels out of the way of input views.
+void clear_sights(const std::vector<SupportView>& inputs, Painting& painting, ViewFill& report) {
+  const Camera& camera = painting.view.camera;
+  DepthMap& depth = painting.depth;
+  const DepthMap before = depth;
+  tbb::parallel_for(0, depth.height, [&](int y) {
+    for (int x = 0; x < depth.width; ++x) {
+      if (painting.open(x, y) == 0 || std::isnan(depth(x, y))) continue;
+      depth(x, y) = hidden_from_all(inputs, camera, x, y, depth(x, y));
+    }
+  });
+  for (size_t i = 0; i < depth.data.size(); ++i) {
+    if (painting.open.data[i] == 0) continue;
+    report.unplaced += std::isnan(depth.data[i]) ? 1 : 0;
+    report.moved_back += depth.data[i] > before.data[i] ? 1 : 0;
+  }
+}
+
+// By how much a painted pixel beside a seam differs from the far side next to it; nothing where it
+// has none.
+std::optional<Eigen::Vector3f> seam_offset(const Painting& painting,
+                                           const ColorImage& around,
+                                           int x,
+                                           int y) {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  float count = 0;
+  for (const auto& [dx, dy] : kNeighbours) {
+    const int u = x + dx;
+    const int v = y + dy;
+    if (!around.contains(u, v) || painting.open(u, v) != 0) continue;
+    const float there = painting.shown.median_depth(u, v);
+    const float here = painting.depth(x, y);
+    const bool goes_on = there >= kFarSide * here && here >= kFarSide * there;
+    if (!goes_on) continue;  // what stands before it, the sky behind it, or unknown
+    sum += around(u, v) - painting.view.picture(x, y);
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / count;
+}
+
+// What was painted, with colours that go over into those of the far side.
+ColorImage without_seams(const Painting& painting) {
+  constexpr float kReach = 8;  // [pixels]
+  constexpr int kSweeps = 100;
+  const ColorImage around = picture(painting.shown);
+  ColorImage out = painting.view.picture;
+  Raster<MembranePixel> pixels(out.width, out.height, MembranePixel::Outside);
+  std::array<Raster<float>, 3> offset;
+  offset.fill(Raster<float>(out.width, out.height, 0));
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      if (painting.open(x, y) == 0 || std::isnan(painting.depth(x, y))) continue;
+      const auto at_seam = seam_offset(painting, around, x, y);
+      pixels(x, y) = at_seam ? MembranePixel::Fixed : MembranePixel::Open;
+      for (int c = 0; at_seam && c < 3; ++c)
+        offset.at(static_cast<size_t>(c))(x, y) = (*at_seam)[c];
+    }
+  }
+  for (int c = 0; c < 3; ++c) {
+    Raster<float>& plane = offset.at(static_cast<size_t>(c));
+    relax_membrane(plane, pixels, kReach, kSweeps);
+    for (size_t i = 0; i < out.data.size(); ++i) {
+      out.data[i][c] = std::clamp(out.data[i][c] + plane.data[i], 0.0f, 1.0f);
+    }
+  }
+  return out;
+}
+
+// How a painted surface moves on from pixel to pixel along an axis; a pixel sideways where it is
+// torn.
+Eigen::Vector3d step_on(const Painting& painting, int x, int y, int dx, int dy) {
+  const Camera& camera = painting.view.camera;
+  const double z = painting.depth(x, y);
+  const Eigen::Vector3d here = camera.unproject(x + 0.5, y + 0.5, z);
+  const Eigen::Vector3d flat = camera.unproject(x + 0.5 + dx, y + 0.5 + dy, z) - here;
+  const auto to = [&](int sign) -> std::optional<Eigen::Vector3d> {
+    constexpr double kTorn = 0.05;  // of the depth, from a pixel to the next
+    const int u = x + sign * dx;
+    const int v = y + sign * dy;
+    if (!painting.depth.contains(u, v)) return std::nullopt;
+    const double beside = painting.depth(u, v);
+    if (!(std::abs(beside - z) < kTorn * z)) return std::nullopt;  // also if unknown
+    return sign * (camera.unproject(u + 0.5, v + 0.5, beside) - here);
+  };
+  const auto after = to(1);
+  const auto before = to(-1);
+  if (after && before) return 0.5 * (*after + *before);
+  return after ? *after : before ? *before : flat;
+}
+
+// A disc of half a pixel along the surface.
+void add_disc(const Painting& painting, int x, int y, Gaussians& out) {
+  constexpr double kRadius = 0.5;  // [pixels]
+  constexpr double kFlat = 0.2;    // thickness, in radii
+  const double pixel =
+      2.0 * painting.depth(x, y) / (painting.view.camera.fx + painting.view.camera.fy);
+  Eigen::Matrix3d M;
+  M.col(0) = step_on(painting, x, y, 1, 0);
+  M.col(1) = step_on(painting, x, y, 0, 1);
+  M.col(2) = kFlat * pixel * M.col(0).cross(M.col(1)).normalized();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(kRadius * kRadius * M * M.transpose());
+  Eigen::Matrix3d R = axes.eigenvectors();
+  if (R.determinant() < 0) R.col(0) *= -1;
+  const Eigen::Quaterniond turn(R);
+  const double z = painting.depth(x, y);
+  out.position.push_back(painting.view.camera.unproject(x + 0.5, y + 0.5, z).cast<float>());
+  const Eigen::Vector3d variance = axes.eigenvalues().cwiseMax(1e-4 * pixel * pixel);
+  out.scale.push_back(variance.cwiseSqrt().cast<float>());
+  out.rotation.push_back(Eigen::Vector4d(turn.w(), turn.x(), turn.y(), turn.z()).cast<float>());
+}
+
+// The Gaussians of a painting; tags count from its own source.
+Gaussians discs_of(const Painting& painting, const ColorImage& colors) {
+  constexpr float kOpacity = 0.98f;
+  Gaussians out;
+  for (int y = 0; y < colors.height; ++y) {
+    for (int x = 0; x < colors.width; ++x) {
+      if (painting.open(x, y) == 0 || std::isnan(painting.depth(x, y))) continue;
+      add_disc(painting, x, y, out);
+      out.sh.push_back((colors(x, y) - Eigen::Vector3f::Constant(0.5f)) / kShC0);
+    }
+  }
+  out.opacity.assign(out.size(), kOpacity);
+  out.provenance.assign(out.size(), Provenance::Inferred);
+  out.synthetic.assign(out.size(), 1);
+  out.synthetic_sources = {painting.view.source};
+  return out;
+}
+
+void check_painted(const Model& model, const std::vector<PaintedView>& views) {
+  require(!model.priors.empty(),
+          "what is a hole is told by the input views of a model; the number of these",
+          model.priors.size());
+  constexpr size_t kMost = 255;
+  require(views.size() <= kMost, "the number of painted views must be <= 255", views.size());
+  for (const PaintedView& view : views) {
+    require(view.picture.width == view.camera.width && view.picture.height == view.camera.height,
+            "a painted picture must be of the size of its camera; its width",
+            view.picture.width);
+  }
+}
+
+}  // namespace
+
+PaintedFill lift_painted(const Model& model,
+                         const std::vector<PaintedView>& views,
+                         const Progress& progress) {
+  check_painted(model, views);
+  const std::vector<SupportView> inputs = support_views(model);
+  PaintedFill out;
+  for (size_t k = 0; k < views.size(); ++k) {
+    report(progress, double(k) / double(views.size()));
+    ViewFill& told = out.views.emplace_back();
+    Painting painting = painting_of(model, inputs, out.gaussians, views[k], told);
+    clear_sights(inputs, painting, told);
+    const size_t before = out.gaussians.size();
+    append(out.gaussians, discs_of(painting, without_seams(painting)));
+    told.lifted = out.gaussians.size() - before;
+    told.shone_through = drop_visible(model, out.gaussians);
+    told.lifted -= std::min(told.lifted, told.shone_through);
+  }
+  report(progress, 1);
+  return out;
+}
+
+}  // namespace cgs

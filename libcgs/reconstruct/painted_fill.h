@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "libcgs/core/camera.h"
+#include "libcgs/core/gaussians.h"
+#include "libcgs/core/progress.h"
+#include "libcgs/core/raster.h"
+#include "libcgs/reconstruct/model.h"
+
+namespace cgs {
+
+/// A picture of a model in whose holes somebody painted.
+struct PaintedView {
+  Camera camera;       ///< [internal units]
+  ColorImage picture;  ///< Of the size of the camera.
+  SyntheticSource source;
+};
+
+/// What became of the holes of a painted view [pixels].
+struct ViewFill {
+  size_t holes = 0;          ///< All of them.
+  size_t filled_before = 0;  ///< Shown by what an earlier view painted: the first wins.
+  size_t lifted = 0;         ///< Became a Gaussian.
+  size_t moved_back = 0;     ///< Of these, so that it stands in no input view's way.
+  size_t unplaced = 0;       ///< Stay open: nowhere on their ray are they hidden from all inputs.
+  size_t shone_through = 0;  ///< Stay open: input views would have shown what was painted.
+};
+
+struct PaintedFill {
+  Gaussians gaussians;  ///< Tagged synthetic, labelled inferred; as views, row-major.
+  std::vector<ViewFill> views;
+};
+
+/// Makes a Gaussian of every painted pixel in a hole.
+///
+/// Its depth is hidden_depth(): the far side of the hole goes on. Where an input view sees through
+/// there, it is moved back along its ray to right behind what that view sees, so that nothing made
+/// up ever stands before what a photograph shows. What an input view would show all the same,
+/// through Gaussians that are not quite opaque (over a sixteenth of a pixel, or at all in its own
+/// holes), is left out.
+///
+/// Colours go over into those of the far side at the seam, by an offset that fades out over 8
+/// pixels; within, they are as painted. Views are taken in their order: a hole that shows what an
+/// earlier one painted is not painted again.
+///
+/// Gaussians are discs of half a pixel along the surface, of opacity 0.98 and degree 0. Same bits
+/// for any number of threads.
+/// \throws InvalidInput if the model has no input views, a picture is not of the size of its
+///         camera, or there are more than 255
+/// Source: seams: Pérez et al. 2003, "Poisson Image Editing", with an offset that fades out.
+PaintedFill lift_painted(const Model& model,
+                         const std::vector<PaintedView>& views,
+                         const Progress& progress = {});
+
+}  // namespace cgs

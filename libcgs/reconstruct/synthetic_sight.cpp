@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/reconstruct/synthetic_sight.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include <tbb/parallel_for.h>
+
+#include "libcgs/core/splat_selection.h"
+#include "libcgs/render/rasterizer.h"
+
+namespace cgs {
+
+namespace {
+
+constexpr double kBehind = 1.01;  // of the depth that an input view saw
+
+// Whether a point stands before what an input view saw.
+bool stands_before(const SupportView& input, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d uvz = input.camera.project(point);
+  if (!input.camera.sees(uvz)) return false;
+  const float seen = input.depth(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
+  return uvz.z() < kBehind * double{seen};  // not if unknown
+}
+
+Gaussians in_one_color(const Gaussians& like, float value) {
+  Gaussians out;
+  out.position = like.position;
+  out.scale = like.scale;
+  out.rotation = like.rotation;
+  out.opacity = like.opacity;
+  out.sh.assign(like.size(), Eigen::Vector3f::Constant((value - 0.5f) / kShC0));
+  return out;
+}
+
+/// Pixels of an input view that show too much of a fill.
+MaskMap showing_pixels(const RenderBuffers& drawn, const Raster<Hole>& holes) {
+  constexpr float kShinesThrough = 1.0f / 16;
+  constexpr float kSeen = 1.0f / 255;
+  MaskMap out(holes.width, holes.height, 0);
+  for (size_t i = 0; i < holes.data.size(); ++i) {
+    const float most = is_hole(holes.data[i]) ? kSeen : kShinesThrough;
+    out.data[i] = drawn.color.data[i].x() > most ? 1 : 0;
+  }
+  return out;
+}
+
+bool has_any_set(const MaskMap& mask) {
+  return std::find(mask.data.begin(), mask.data.end(), 1) != mask.data.end();
+}
+
+// Whether a Gaussian is drawn in a pixel that is set, within so many standard deviations.
+bool touches(const MaskMap& mask,
+             const Camera& camera,
+             const Eigen::Vector3f& at,
+             float scale,
+             double reach) {
+  const Eigen::Vector3d uvz = camera.project(at.cast<double>());
+  if (!(uvz.z() > 0)) return false;
+  constexpr double kBlur = 0.3;  // of the rasterizer [pixels squared]
+  const double sigma = double{scale} * std::max(camera.fx, camera.fy) / uvz.z();
+  const double radius = reach * std::sqrt(sigma * sigma + kBlur) + 0.5;
+  const auto limit = [](double value, int end) {
+    return static_cast<int>(std::clamp(std::floor(value), 0.0, double(end)));
+  };
+  const int right = limit(uvz.x() + radius + 1, mask.width);
+  const int bottom = limit(uvz.y() + radius + 1, mask.height);
+  for (int y = limit(uvz.y() - radius, mask.height); y < bottom; ++y) {
+    for (int x = limit(uvz.x() - radius, mask.width); x < right; ++x) {
+      if (mask(x, y) != 0) return true;
+    }
+  }
+  return false;
+}
+
+// 0 = a view shows too much of it.
+std::vector<uint8_t> hidden_ones(const Model& model,
+                                 const Gaussians& dark,
+                                 const std::vector<Raster<Hole>>& holes,
+                                 const Gaussians& fill,
+                                 double reach) {
+  Gaussians together = dark;
+  append(together, in_one_color(fill, 1));
+  std::vector<uint8_t> keep(fill.size(), 1);
+  for (size_t k = 0; k < holes.size(); ++k) {
+    const Camera& camera = input_camera(model, k);
+    const MaskMap showing = showing_pixels(rasterize(together, camera), holes[k]);
+    if (!has_any_set(showing)) continue;
+    tbb::parallel_for(size_t{0}, fill.size(), [&](size_t i) {
+      const float scale = fill.scale[i].maxCoeff();
+      if (touches(showing, camera, fill.position[i], scale, reach)) keep[i] = 0;
+    });
+  }
+  return keep;
+}
+
+}  // namespace
+
+float hidden_from_all(
+    const std::vector<SupportView>& inputs, const Camera& camera, int x, int y, float depth) {
+  constexpr double kStep = 1.01;
+  constexpr int kSteps = 700;  // to a thousand times the depth
+  double z = depth;
+  for (int step = 0; step < kSteps; ++step, z *= kStep) {
+    const Eigen::Vector3d point = camera.unproject(x + 0.5, y + 0.5, z);
+    const bool is_hidden =
+        std::none_of(inputs.begin(), inputs.end(), [&](const SupportView& input) {
+          return stands_before(input, point);
+        });
+    if (is_hidden) return static_cast<float>(z);
+  }
+  return std::numeric_limits<float>::quiet_NaN();
+}
+
+size_t drop_visible(const Model& model, Gaussians& fill) {
+  const std::vector<SupportView> inputs = support_views(model);
+  const Gaussians dark = in_one_color(model.gaussians, 0);
+  std::vector<Raster<Hole>> holes;
+  for (size_t k = 0; k < inputs.size(); ++k) {
+    holes.push_back(render_camera(model, inputs, inputs[k].camera).hole);
+  }
+  // First what is mostly drawn there; then all that may be, as far as alpha reaches 1/255.
+  size_t dropped = 0;
+  for (const double reach : {1.0, 3.5}) {
+    while (fill.size() > 0) {
+      const size_t now = keep_only(fill, hidden_ones(model, dark, holes, fill, reach));
+      if (now == 0) break;
+      dropped += now;
+    }
+  }
+  return dropped;
+}
+
+}  // namespace cgs
