@@ -194,6 +194,19 @@ void add_camera_options(CLI::App& command, SceneRequest& request) {
       request.focal,
       "Focal length of photographs without cameras, in pixels of the files; default: "
       "what they say (Exif), else solved for");
+  static const std::map<std::string, bool> kLenses = {{"shared", false}, {"each", true}};
+  command
+      .add_option("--lenses",
+                  request.each_lens,
+                  "Whether photographs without cameras share a focal length: shared (those of one "
+                  "size and, by their Exif, one camera and lens; default), or each has its own, as "
+                  "scans do")
+      ->transform(CLI::CheckedTransformer(kLenses).description("shared, each"));
+  command.add_flag(
+      "--old-photographs",
+      request.old_photographs,
+      "Prints and films: even borders are left out, and gain, gamma, falling off of the light "
+      "and mixing of colours of each are told, as far as others show the same places");
   command.add_flag(
       "--refine-poses",
       request.refine_poses,

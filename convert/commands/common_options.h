@@ -71,7 +71,7 @@ void add_local_origin_option(CLI::App& command, bool& local_origin, const std::s
 /// --estimated.
 void add_estimated_option(CLI::App& command, std::optional<EstimatedSurface>& estimated);
 
-/// --focal and --refine-poses.
+/// --focal, --lenses, --old-photographs and --refine-poses.
 void add_camera_options(CLI::App& command, SceneRequest& request);
 
 /// --medium.

@@ -225,6 +225,91 @@ nlohmann::ordered_json exposure_to_json(const TrainedModel& trained) {
   return {{"words", words.data()}, {"views", views}};
 }
 
+nlohmann::ordered_json response_to_json(const View& view) {
+  const PhotoResponse& response = view.response;
+  const Eigen::Vector3f& gain = view.exposure;
+  nlohmann::ordered_json matrix = nlohmann::ordered_json::array();
+  for (int c = 0; c < 3; ++c) {
+    const Eigen::RowVector3d row = response.matrix.row(c);
+    matrix.push_back({row.x(), row.y(), row.z()});
+  }
+  return {{"view", view.name},
+          {"grey", response.is_grey},
+          {"gain", {gain.x(), gain.y(), gain.z()}},
+          {"gamma", response.gamma},
+          {"vignette", {response.vignette.x(), response.vignette.y()}},
+          {"matrix", matrix}};
+}
+
+// Empty where nothing was done to the photographs that gains do not do.
+std::string words_of(const TrainedModel& trained) {
+  const PhotoResponses& responses = trained.responses;
+  const Scene& scene = trained.model.scene;
+  std::string used;
+  for (const ResponseTerm& term : responses.terms) {
+    if (term.is_used) used += (used.empty() ? "" : ", ") + term.name;
+  }
+  std::string out;
+  if (responses.is_applied && !used.empty()) {
+    out = "responses of the photographs were matched to that of view " +
+          scene.views[static_cast<size_t>(scene.input[responses.reference])].name + ": " + used;
+  }
+  double mended = 0;
+  for (const double share : trained.mended) mended += share / double(trained.mended.size());
+  if (mended > 0) {
+    std::array<char, 100> words{};
+    std::snprintf(words.data(),
+                  words.size(),
+                  "%.1f %% of their pixels, which others contradict, were mended by these",
+                  100 * mended);
+    out += (out.empty() ? "" : "; ") + std::string(words.data());
+  }
+  return out;
+}
+
+// Words only where photographs were corrected.
+nlohmann::ordered_json responses_to_json(const TrainedModel& trained) {
+  const PhotoResponses& responses = trained.responses;
+  const Scene& scene = trained.model.scene;
+  nlohmann::ordered_json terms = nlohmann::ordered_json::array();
+  for (const ResponseTerm& term : responses.terms) {
+    terms.push_back({{"name", term.name},
+                     {"parameters", term.parameters},
+                     {"saved_bits", term.saved_bits},
+                     {"residual", term.residual},
+                     {"used", term.is_used}});
+  }
+  nlohmann::ordered_json views = nlohmann::ordered_json::array();
+  for (const int i : scene.input) {
+    views.push_back(response_to_json(scene.views[static_cast<size_t>(i)]));
+  }
+  nlohmann::ordered_json out = {{"words", nullptr},
+                                {"reference", views[responses.reference]["view"]},
+                                {"places", responses.samples},
+                                {"residual", responses.residual},
+                                {"terms", terms},
+                                {"views", views}};
+  for (size_t k = 0; k < trained.mended.size(); ++k) out["views"][k]["mended"] = trained.mended[k];
+  const std::string words = words_of(trained);
+  if (!words.empty()) out["words"] = words;
+  return out;
+}
+
+nlohmann::ordered_json grey_to_json(const TrainedModel& trained) {
+  std::string words;
+  nlohmann::ordered_json views = nlohmann::ordered_json::array();
+  for (const GreyReport& grey : trained.grey) {
+    std::array<char, 100> share{};
+    std::snprintf(share.data(),
+                  share.size(),
+                  " has no colours: of %.0f %% of what it shows they are unknown, and shown grey",
+                  100 * grey.share_without_color);
+    words += (words.empty() ? "view " : "; view ") + grey.view + share.data();
+    views.push_back({{"view", grey.view}, {"share_without_color", grey.share_without_color}});
+  }
+  return {{"words", words}, {"views", views}};
+}
+
 // Null where there is none.
 nlohmann::ordered_json pane_to_json(const PaneReport& pane) {
   if (pane.view.empty()) return nullptr;
@@ -282,7 +367,8 @@ double measured_share(const nlohmann::ordered_json& depth_of_views) {
 
 std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training) {
   std::vector<std::string> out;
-  for (const char* key : {"exposure", "view_dependence", "pane", "water"}) {
+  for (const char* key :
+       {"exposure", "responses", "grey", "view_dependence", "pane", "water"}) {
     const auto found = training.find(key);
     if (found == training.end() || !found->is_object()) continue;
     const auto words = found->find("words");
@@ -331,7 +417,10 @@ nlohmann::ordered_json training_to_json(const TrainedModel& trained, const Model
       {"pane", pane_to_json(trained.pane)},
       {"density", density_to_json(trained, request)},
       {"given_depth", given_depth_to_json(trained.priors)}};
+  // Left out of the many models that have none of it.
   if (trained.water) out["water"] = water_to_json(*trained.water, trained.model.scene.frame);
+  if (!trained.responses.terms.empty()) out["responses"] = responses_to_json(trained);
+  if (!trained.grey.empty()) out["grey"] = grey_to_json(trained);
   return out;
 }
 

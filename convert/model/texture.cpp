@@ -12,6 +12,8 @@
 #include "io/scenes/resample.h"
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/order_statistics.h"
+#include "libcgs/priors/grey_photographs.h"
+#include "libcgs/priors/scratches.h"
 #include "libcgs/priors/transients.h"
 #include "libcgs/priors/water.h"
 #include "meshing/pictures/exposure.h"
@@ -130,6 +132,11 @@ PhotographedMesh texture_from_photographs(const Scene& scene,
   std::vector<View> views;
   load_images(loaded, scene.input);
   take_out_water(priors, loaded);
+  const auto is_old = [&](int i) { return scene.views[static_cast<size_t>(i)].may_have_border; };
+  if (std::any_of(scene.input.begin(), scene.input.end(), is_old)) {
+    (void)mend_scratches(loaded, priors);
+  }
+  (void)color_grey_photographs(loaded, priors);
   for (const int i : scene.input) views.push_back(std::move(loaded.views[static_cast<size_t>(i)]));
   for (size_t i = 0; i < priors.size(); ++i) mask_other_than_scene(priors[i], views[i]);
   const FaceScores scores = face_scores(mesh, views);

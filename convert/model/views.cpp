@@ -378,7 +378,8 @@ bool is_exposed_otherwise(const Model& model, int view) {
   const Scene& scene = model.scene;
   const std::string role = view_role(scene, view);
   return role != "input" && std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
-           return scene.views[static_cast<size_t>(i)].exposure != Eigen::Vector3f::Ones();
+           const View& input = scene.views[static_cast<size_t>(i)];
+           return input.exposure != Eigen::Vector3f::Ones() || input.response != PhotoResponse{};
          });
 }
 

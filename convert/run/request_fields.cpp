@@ -260,6 +260,7 @@ std::vector<RequestField> all_fields() {
   out.push_back(chosen("use_all", Stage::Report, in_options(&SceneOptions::all_views)));
   out.push_back(chosen("refine_poses", Stage::Model, in_scene(&SceneRequest::refine_poses)));
   out.push_back(chosen("medium", Stage::Model, &RunRequest::medium));
+  out.push_back(chosen("old_photographs", Stage::Model, in_scene(&SceneRequest::old_photographs)));
   out.push_back(lods());
   out.push_back(chosen("max_voxels", Stage::Mesh, &RunRequest::max_voxels));
   out.push_back(chosen("glb_encoding", Stage::Web, &RunRequest::glb_encoding));
@@ -280,6 +281,7 @@ const std::vector<RequestField>& request_fields() {
 const std::vector<RequestField>& noted_fields() {
   static const std::vector<RequestField> kFields = {
       asked("focal", Stage::Model, in_scene(&SceneRequest::focal)),
+      chosen("each_lens", Stage::Model, in_scene(&SceneRequest::each_lens)),
       chosen("control_points", Stage::Model, in_control(&ControlRequest::file)),
       asked("allow_external", Stage::Model, in_options(&SceneOptions::allow_external)),
       asked("depth_options", Stage::Model, in_options(&SceneOptions::depth))};

@@ -58,7 +58,9 @@ std::vector<PhotoFile> checked_photographs(const SceneRoot& root,
   return photographs;
 }
 
-std::string inputs_text(MaskIndex& masks, const std::vector<PhotoFile>& photographs, double focal) {
+std::string inputs_text(MaskIndex& masks,
+                        const std::vector<PhotoFile>& photographs,
+                        const PhotoPoseOptions& how) {
   Json hashes = Json::object();
   for (const PhotoFile& photograph : photographs) {
     const std::string name = photograph.path.filename().string();
@@ -66,7 +68,10 @@ std::string inputs_text(MaskIndex& masks, const std::vector<PhotoFile>& photogra
     const std::filesystem::path mask = masks.mask_of(photograph.path);
     if (!mask.empty()) hashes[name + ", mask"] = file_hash(mask);
   }
-  return json_text({{"program", program_version()}, {"focal", focal}, {"photographs", hashes}}, -1);
+  Json out = {{"program", program_version()}, {"focal", how.focal}, {"photographs", hashes}};
+  if (how.each_lens) out["each_lens"] = true;
+  if (how.may_have_border) out["may_have_border"] = true;
+  return json_text(out, -1);
 }
 
 // Of the files that write_photo_poses() writes: cameras that somebody moved are not solved ones.
@@ -143,6 +148,7 @@ using Colors = std::vector<std::array<int, 3>>;  // of features, 0 ... 255
 
 UnposedPhoto unposed_photo(MaskIndex& masks,
                            const PhotoFile& photograph,
+                           const PhotoPoseOptions& how,
                            bool from_aside,
                            const Progress& progress,
                            Colors& colors) {
@@ -150,6 +156,7 @@ UnposedPhoto unposed_photo(MaskIndex& masks,
   view.image_path = photograph.path;
   view.mask_path = masks.mask_of(photograph.path);
   view.orientation = photograph.orientation;
+  view.may_have_border = how.may_have_border;
   MaskMap usable;
   const ColorImage image = read_photograph(view, usable);
   UnposedPhoto out;
@@ -281,7 +288,7 @@ std::string attempt_text(const Attempt& attempt) {
 
 Attempt attempted(MaskIndex& masks,
                   const std::vector<PhotoFile>& photographs,
-                  double focal,
+                  const PhotoPoseOptions& how,
                   bool from_aside,
                   const Progress& progress) {
   Attempt out;
@@ -293,10 +300,10 @@ Attempt attempted(MaskIndex& masks,
     const Progress part =
         part_of(progress, kShare * double(i) / count, kShare * double(i + 1) / count);
     report(part, 0);
-    UnposedPhoto photo = unposed_photo(masks, photographs[i], from_aside, part, out.colors[i]);
-    photo.lens = lens_of(photographs[i], lenses);
-    if (focal > 0) {
-      photo.focal = focal;
+    UnposedPhoto photo = unposed_photo(masks, photographs[i], how, from_aside, part, out.colors[i]);
+    photo.lens = how.each_lens ? static_cast<int>(i) : lens_of(photographs[i], lenses);
+    if (how.focal > 0) {
+      photo.focal = how.focal;
       photo.focal_sigma = 0;
     }
     out.photos.push_back(std::move(photo));
@@ -312,7 +319,7 @@ Attempt attempted(MaskIndex& masks,
 std::pair<Attempt, bool> solved_photos(MaskIndex& masks,
                                        const std::vector<PhotoFile>& photographs,
                                        const std::vector<std::string>& wanted,
-                                       double focal,
+                                       const PhotoPoseOptions& how,
                                        Terminal& terminal) {
   const size_t all = wanted.empty() ? std::min(photographs.size(), kUsed) : wanted.size();
   const auto used = [&](const Attempt& attempt) { return of_use(attempt.placed(), wanted); };
@@ -320,7 +327,7 @@ std::pair<Attempt, bool> solved_photos(MaskIndex& masks,
   std::exception_ptr failure;
   const Progress progress = terminal.begin("cameras of photographs");
   try {
-    first = attempted(masks, photographs, focal, false, progress);
+    first = attempted(masks, photographs, how, false, progress);
   } catch (const NumericalError&) {
     failure = std::current_exception();
   }
@@ -328,7 +335,7 @@ std::pair<Attempt, bool> solved_photos(MaskIndex& masks,
   if (first && used(*first) >= all) return {std::move(*first), false};
   const Progress again = terminal.begin("cameras again, as if seen from aside");
   try {
-    Attempt second = attempted(masks, photographs, focal, true, again);
+    Attempt second = attempted(masks, photographs, how, true, again);
     terminal.end(attempt_text(second));
     if (!first || used(second) > used(*first)) return {std::move(second), true};
   } catch (const NumericalError&) {
@@ -370,20 +377,19 @@ void check_focal(double focal, const std::vector<PhotoFile>& photographs) {
 
 PhotoPoses photo_poses(const SceneRoot& root,
                        const std::vector<std::string>& wanted,
-                       double focal,
+                       const PhotoPoseOptions& how,
                        const std::filesystem::path& stored,
                        Terminal& terminal) {
   const std::vector<PhotoFile> photographs = checked_photographs(root, wanted);
-  if (focal > 0) check_focal(focal, photographs);
+  if (how.focal > 0) check_focal(how.focal, photographs);
   MaskIndex masks(root);
-  const std::string inputs = inputs_text(masks, photographs, focal);
+  const std::string inputs = inputs_text(masks, photographs, how);
   if (auto poses = stored_poses(stored, inputs)) {
     if (poses->tried_from_aside || of_use(placed_names(poses->model), wanted) >= wanted.size()) {
       return *poses;
     }
   }
-  const auto [attempt, tried_from_aside] =
-      solved_photos(masks, photographs, wanted, focal, terminal);
+  const auto [attempt, tried_from_aside] = solved_photos(masks, photographs, wanted, how, terminal);
   PhotoPoses out;
   out.tried_from_aside = tried_from_aside;
   out.model = colmap_model(attempt.photos, attempt.colors, attempt.solution);

@@ -22,6 +22,14 @@ struct PhotoPoses {
   bool is_stored = false;  ///< Read, not solved; the places of features are then not known.
 };
 
+/// What is known of photographs beforehand.
+struct PhotoPoseOptions {
+  double focal = 0;        ///< [pixels] of every photograph as stored; 0 = from Exif, else solved.
+  bool each_lens = false;  ///< Every photograph has a focal length and a distortion of its own;
+                           ///< else those of one camera, size and marked focal length share them.
+  bool may_have_border = false;  ///< As View::may_have_border.
+};
+
 /// Solves for the cameras of the photographs in a folder, or reads what write_photo_poses() stored
 /// in `stored` if that was solved from the same.
 ///
@@ -29,13 +37,12 @@ struct PhotoPoses {
 ///                photographs to compare, only these are used. The others are placed where that is
 ///                easy: features as seen from aside, which take minutes, are looked for on account
 ///                of wanted ones alone.
-/// \param focal   [pixels] of every photograph as stored; 0 = from Exif, else solved for
 /// \param stored  may be empty or not exist
 /// \throws BadInput Empty (fewer than two photographs), and as read_image(); LimitError for more
 ///         photographs than can be compared in reasonable time; NumericalError as solve_poses()
 PhotoPoses photo_poses(const SceneRoot& root,
                        const std::vector<std::string>& wanted,
-                       double focal,
+                       const PhotoPoseOptions& how,
                        const std::filesystem::path& stored,
                        Terminal& terminal);
 

@@ -51,6 +51,11 @@ void warn_of_turned(Scene& scene) {
       "so views are shown lying; up is as Exif says");
 }
 
+void expect_old_photographs(Scene& scene) {
+  scene.has_old_photographs = true;
+  for (View& view : scene.views) view.may_have_border = true;
+}
+
 // Which photographs there are is known before their cameras are, minutes earlier.
 // \return the names that a list stands for: indices are those of all photographs, also where some
 //         cannot be placed
@@ -116,10 +121,12 @@ OpenedScene open_scene(const SceneRequest& request,
     const SceneRoot root{request.path, request.options.allow_external};
     const std::vector<std::string> names = names_of(root, request.options.views);
     const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
-    out.poses = photo_poses(root, names, request.focal, stored, terminal);
+    const PhotoPoseOptions how{request.focal, request.each_lens, request.old_photographs};
+    out.poses = photo_poses(root, names, how, stored, terminal);
     SceneOptions options = request.options;
     options.views = placed_views(names, out.poses->model);
     out.scene = scene_of_photographs(request.path, out.poses->model, options);
+    if (request.old_photographs) expect_old_photographs(out.scene);
     auto& warnings = out.scene.warnings;
     warnings.insert(warnings.end(), out.poses->warnings.begin(), out.poses->warnings.end());
     auto& notes = out.scene.notes;
@@ -130,6 +137,12 @@ OpenedScene open_scene(const SceneRequest& request,
       throw InvalidInput("--focal is for photographs without cameras; " + printable(request.path) +
                          " states them (" + scene_kind_name(out.scene.kind) + ")");
     }
+    if (request.each_lens) {
+      throw InvalidInput("--lenses each is for photographs without cameras; " +
+                         printable(request.path) + " states them (" +
+                         scene_kind_name(out.scene.kind) + ")");
+    }
+    if (request.old_photographs) expect_old_photographs(out.scene);
     warn_of_turned(out.scene);
     if (request.refine_poses) refine(model, terminal, out);
   }

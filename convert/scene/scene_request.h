@@ -26,6 +26,8 @@ struct SceneRequest {
   std::string assume_unit;
   std::vector<double> up;  ///< World direction that is up; empty = judged by the cameras.
   double focal = 0;        ///< Of photographs without cameras [pixels]; 0 = not given.
+  bool each_lens = false;  ///< Photographs without cameras share no focal length by their Exif.
+  bool old_photographs = false;  ///< Of prints and films: borders, and responses of their own.
   /// Move the cameras a scene states to where the photographs have them.
   bool refine_poses = false;
   std::vector<DistanceWords> known_distances;  ///< Exclude assume_unit.

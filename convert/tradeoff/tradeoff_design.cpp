@@ -147,6 +147,8 @@ std::string command_line(const RunRequest& request, int threads) {
   add("--chunk", scene.options.chunk);
   if (scene.options.allow_external) out += " --allow-external";
   if (scene.focal > 0) add("--focal", exact(scene.focal));
+  if (scene.each_lens) add("--lenses", "each");
+  if (scene.old_photographs) out += " --old-photographs";
   if (scene.refine_poses) out += " --refine-poses";
   add("--assume-unit", scene.assume_unit);
   add("--marker-size", scene.marker_size);

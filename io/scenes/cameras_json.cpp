@@ -63,6 +63,15 @@ Json fisheye_json(const Fisheye& fisheye) {
           {"radius", fisheye.radius}};
 }
 
+Json response_json(const PhotoResponse& response) {
+  const Eigen::Matrix3d& m = response.matrix;
+  return {{"grey", response.is_grey},
+          {"gamma", response.gamma},
+          {"vignette", {response.vignette.x(), response.vignette.y()}},
+          {"matrix",
+           Json::array({vector_json(m.row(0)), vector_json(m.row(1)), vector_json(m.row(2))})}};
+}
+
 Json camera_json(const Scene& scene, size_t index) {
   const View& view = scene.views[index];
   const Camera& camera = view.camera;
@@ -98,6 +107,8 @@ Json camera_json(const Scene& scene, size_t index) {
   if (view.exposure != Eigen::Vector3f::Ones()) {
     entry["exposure"] = vector_json(view.exposure.cast<double>());
   }
+  if (view.response != PhotoResponse{}) entry["response"] = response_json(view.response);
+  if (view.may_have_border) entry["may_have_border"] = true;
   if (!view.image_path.empty()) {
     entry["image_path"] = std::filesystem::absolute(view.image_path).lexically_normal().string();
   }
@@ -269,6 +280,31 @@ void read_exposure(const JsonValue& entry, View& view) {
   }
 }
 
+// Of files that this program wrote.
+void read_response(const JsonValue& entry, View& view) {
+  if (const auto border = entry.find("may_have_border")) view.may_have_border = border->boolean();
+  const auto response = entry.find("response");
+  if (!response) return;
+  constexpr double kMost = 1000;
+  PhotoResponse& out = view.response;
+  out.is_grey = response->at("grey").boolean();
+  out.gamma = response->at("gamma").number();
+  const JsonValue vignette = response->at("vignette");
+  const JsonValue matrix = response->at("matrix");
+  if (vignette.size() != 2) vignette.fail(Defect::Schema, "expected 2 numbers");
+  if (matrix.size() != 3) matrix.fail(Defect::Schema, "expected 3 rows");
+  for (size_t i = 0; i < 2; ++i) {
+    out.vignette[static_cast<Eigen::Index>(i)] = vignette.at(i).number();
+  }
+  for (size_t i = 0; i < 3; ++i) {
+    out.matrix.row(static_cast<Eigen::Index>(i)) = read_vector(matrix.at(i)).transpose();
+  }
+  const bool is_sound = out.gamma > 0 && out.gamma <= kMost &&
+                        out.vignette.cwiseAbs().maxCoeff() <= kMost &&
+                        out.matrix.cwiseAbs().maxCoeff() <= kMost;
+  if (!is_sound) response->fail(Defect::Value, "numbers of a response must be at most 1000");
+}
+
 void read_paths(const JsonValue& entry, View& view, Scene& scene) {
   const auto name = entry.find("image_path");
   if (!name) return;
@@ -316,7 +352,10 @@ Scene read_cameras_json(const std::filesystem::path& path, std::vector<std::stri
   for (size_t i = 0; i < entries.size(); ++i) {
     const JsonValue entry = entries.at(i);
     View view = read_view(entry, scene.frame);
-    if (frame) read_exposure(entry, view);
+    if (frame) {
+      read_exposure(entry, view);
+      read_response(entry, view);
+    }
     view.name = read_name(entry.at("img_name"), !frame, taken);
     if (names != nullptr) names->push_back(entry.at("img_name").text());
     read_paths(entry, view, scene);

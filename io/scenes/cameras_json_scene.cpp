@@ -55,6 +55,8 @@ Scene read_cameras_json_scene(const SceneRoot& root) {
     if (view.image_path.empty()) view.image_path = photographs.take(names[i]);
     if (view.image_path.empty()) scene.missing.push_back(names[i]);
     view.exposure.setOnes();  // of another choice of input views
+    view.response = {};
+    view.may_have_border = false;
     // What this program wrote is in its internal frame.
     Camera& camera = view.camera;
     const Eigen::Isometry3d pose = world_from_internal(scene.frame, camera.world_from_cam);

@@ -3,6 +3,7 @@
 
 #include "io/images/exif.h"
 #include "io/scenes/masks.h"
+#include "io/scenes/scan_border.h"
 
 namespace cgs {
 
@@ -105,6 +106,7 @@ ColorImage read_photograph(const View& view, MaskMap& usable) {
   ColorImage image = turned(read_image(view.image_path, &usable), view.orientation);
   usable = turned(usable, view.orientation);
   apply_mask(view, {image.width, image.height}, usable);
+  if (view.may_have_border) mask_scan_border(image, usable);
   return image;
 }
 

@@ -43,7 +43,8 @@ ImageSize photograph_size(const View& view);
 /// The photograph itself, turned likewise.
 /// \throws BadInput, LimitError as image_size() and read_image()
 ColorImage read_photograph(const View& view);
-/// \param usable  receives the pixels neither transparent nor masked, as read_image() gives them
+/// \param usable  receives the pixels neither transparent nor masked, as read_image() gives them, nor
+///                in the border of a print, if View::may_have_border
 /// \throws BadInput, LimitError as read_photograph() and apply_mask()
 ColorImage read_photograph(const View& view, MaskMap& usable);
 

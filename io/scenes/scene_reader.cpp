@@ -317,7 +317,7 @@ void check_places(const Scene& scene) {
 bool is_whole(const View& view) {
   const fs::path extension = view.image_path.extension();
   const bool is_jpeg = extension == ".jpg" || extension == ".jpeg";  // has no transparent pixels
-  return is_jpeg && !has_lens_distortion(view) && view.mask_path.empty();
+  return is_jpeg && !has_lens_distortion(view) && view.mask_path.empty() && !view.may_have_border;
 }
 
 // The bytes of a number.
@@ -339,12 +339,13 @@ void append(std::string& key, const Camera& camera) {
   for (const double length : {camera.fx, camera.fy, camera.cx, camera.cy}) append(key, length);
 }
 
-// All that the pixels of a view depend on, but for its exposure.
+// All that the pixels of a view depend on, but for its response and exposure.
 std::string cache_key(const View& view) {
   std::string key;
   append(key, view.image_path);
   append(key, view.mask_path);
   append(key, view.orientation);
+  append(key, view.may_have_border);
   append(key, view.camera);
   for (const double k : view.distortion) append(key, k);
   if (view.fisheye) {

@@ -171,7 +171,8 @@ Eigen::Vector3f matching_gain(const ColorImage& picture,
 }
 
 void apply_exposure(View& view) {
-  if (view.exposure == Eigen::Vector3f::Ones()) return;
+  if (view.exposure == Eigen::Vector3f::Ones() && view.response == PhotoResponse{}) return;
+  apply_response(view.image, view.response);
   apply_gain(view.image, view.exposure);
   for (Eigen::Vector3f& color : view.image.data) color = color.cwiseMin(1.0f);
 }

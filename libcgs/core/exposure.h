@@ -39,8 +39,8 @@ Eigen::Vector3f matching_gain(const ColorImage& picture,
                               const ColorImage& wanted,
                               const MaskMap& use);
 
-/// Multiplies the photograph of a view by its exposure. What that makes brighter than white is
-/// white: no picture of the surface could show more.
+/// Applies its response to the photograph of a view, and multiplies it by its exposure. What that
+/// makes brighter than white is white: no picture of the surface could show more.
 void apply_exposure(View& view);
 
 /// Multiplies the linear light of an sRGB-coded picture; a factor of exactly 1 changes no bit.

@@ -13,6 +13,7 @@
 #include "libcgs/core/camera.h"
 #include "libcgs/core/fisheye.h"
 #include "libcgs/core/frame.h"
+#include "libcgs/core/photo_response.h"
 #include "libcgs/core/raster.h"
 #include "libcgs/core/water.h"
 
@@ -71,8 +72,10 @@ struct View {
   /// Factors on the linear light of the photograph, by which load_images() makes it agree with the
   /// other input views.
   Eigen::Vector3f exposure = Eigen::Vector3f::Ones();
-  ColorImage image;                  ///< Empty until loaded; same size as camera.
-  MaskMap valid;                     ///< Empty = every pixel; else 1 where the image may be used.
+  PhotoResponse response;        ///< Of an old photograph; what load_images() does before exposure.
+  bool may_have_border = false;  ///< load_images() looks for the border of a print, and masks it.
+  ColorImage image;              ///< Empty until loaded; same size as camera.
+  MaskMap valid;                 ///< Empty = every pixel; else 1 where the image may be used.
   std::filesystem::path depth_path;  ///< File with depth from elsewhere; empty = none.
   /// Depth from elsewhere, in metres if it is metric; NaN = none. Empty until loaded, and where
   /// there is none; same size as camera.
@@ -98,9 +101,10 @@ struct Scene {
   std::vector<View> views;       ///< All of them, sorted by name.
   /// Names of all photographs in their order, where some may have no camera; else empty.
   std::vector<std::string> photographs;
-  std::vector<int> input;           ///< Views to reconstruct from.
-  std::vector<int> held_out;        ///< Views kept for evaluation.
-  std::vector<SparsePoint> points;  ///< May be empty.
+  std::vector<int> input;            ///< Views to reconstruct from.
+  std::vector<int> held_out;         ///< Views kept for evaluation.
+  std::vector<SparsePoint> points;   ///< May be empty.
+  bool has_old_photographs = false;  ///< Their responses are to be told apart, not exposures alone.
   double depth_scale = 0;  ///< Values of depth files per metre; 0 = 1000 where they are whole
                            ///< numbers, else 1.
   DepthKind depth_kind = DepthKind::Unknown;  ///< Of View::given_depth.

@@ -12,6 +12,7 @@
 #include "libcgs/core/opencv_memory.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/exposure.h"
+#include "libcgs/priors/grey_photographs.h"
 #include "libcgs/priors/mask_operations.h"
 #include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/reduced_view.h"
@@ -299,7 +300,8 @@ class Transients {
 std::vector<MaskMap> find_transients(const Scene& scene, const std::vector<ViewPriors>& priors) {
   std::vector<MaskMap> out(priors.size());
   if (priors.size() < 3) return out;
-  const Transients transients(scene, priors);
+  const Transients transients(has_grey_photographs(scene) ? Transients(in_luminance(scene), priors)
+                                                          : Transients(scene, priors));
   for (size_t i = 0; i < priors.size(); ++i) {
     out[i] = transients.of_view(i, priors[i].depth.width, priors[i].depth.height);
   }

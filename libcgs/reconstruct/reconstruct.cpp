@@ -13,7 +13,9 @@
 #include "libcgs/core/exposure.h"
 #include "libcgs/priors/exposure.h"
 #include "libcgs/priors/finest_view.h"
+#include "libcgs/priors/grey_photographs.h"
 #include "libcgs/priors/measured_range.h"
+#include "libcgs/priors/scratches.h"
 #include "libcgs/priors/transients.h"
 #include "libcgs/reconstruct/evidence_words.h"
 
@@ -25,6 +27,9 @@ namespace {
 void require_possible(const Scene& scene, const ReconstructionOptions& options) {
   options.priors.validate();
   options.training.validate();
+  if (options.medium == Medium::Water && scene.has_old_photographs) {
+    throw InvalidInput("old photographs are not looked at through water: leave one of the two out");
+  }
   if (options.training.method == SplatMethod::Coherent) {
     require_decodable(scene, options.training.coherence);
   }
@@ -50,6 +55,65 @@ float match_exposures(Scene& scene, const ExposureGains& exposure) {
     apply_exposure(view);
   }
   return exposure.difference();
+}
+
+// Corrects photographs by what they have in common, as PhotoResponses says.
+PhotoResponses match_responses(Scene& scene, const std::vector<ViewPriors>& priors) {
+  PhotoResponses out = fit_photo_responses(scene, priors);
+  out.is_applied = out.is_richer() || has_grey_photographs(scene);
+  if (!out.is_applied) return out;
+  for (size_t k = 0; k < scene.input.size(); ++k) {
+    View& view = scene.views[static_cast<size_t>(scene.input[k])];
+    view.response = out.response[k];
+    view.exposure = out.gain[k];
+    apply_exposure(view);
+  }
+  return out;
+}
+
+std::vector<double> mended_shares(Scene& scene, const std::vector<ViewPriors>& priors) {
+  std::vector<double> out;
+  for (const MaskMap& mask : mend_scratches(scene, priors)) {
+    const auto mended = std::count(mask.data.begin(), mask.data.end(), 1);
+    out.push_back(static_cast<double>(mended) / static_cast<double>(mask.data.size()));
+  }
+  return out;
+}
+
+// Brings the photographs to one response, as far as they need it. Where that does more than gains
+// do, the priors are estimated again: what moved, for one, is told by colours.
+void match_photographs(const ReconstructionOptions& options,
+                       EstimatedPriors& priors,
+                       Scene& scene,
+                       TrainedModel& out,
+                       const Progress& progress) {
+  if (scene.has_old_photographs || has_grey_photographs(scene)) {
+    out.responses = match_responses(scene, priors.views);
+  }
+  if (!out.responses.is_applied) {
+    out.exposure_difference = match_exposures(scene, exposure_gains(scene, priors.views));
+  }
+  if (scene.has_old_photographs) out.mended = mended_shares(scene, priors.views);
+  const bool is_mended =
+      std::any_of(out.mended.begin(), out.mended.end(), [](double share) { return share > 0; });
+  if (out.responses.is_applied || is_mended) {
+    priors = estimate_priors(scene, options.priors, progress);
+  }
+}
+
+// Gives grey photographs the colours that others tell.
+std::vector<GreyReport> color_grey(Scene& scene, const std::vector<ViewPriors>& priors) {
+  std::vector<GreyReport> out;
+  const std::vector<MaskMap> unknown = color_grey_photographs(scene, priors);
+  for (size_t k = 0; k < unknown.size(); ++k) {
+    if (unknown[k].empty()) continue;
+    const auto& depth = priors[k].depth.data;
+    const auto surface = std::count_if(depth.begin(), depth.end(), has_gaussian);
+    const auto without = std::count(unknown[k].data.begin(), unknown[k].data.end(), 1);
+    out.push_back({scene.views[static_cast<size_t>(scene.input[k])].name,
+                   surface > 0 ? double(without) / double(surface) : 0});
+  }
+  return out;
 }
 
 // What moved is no picture of the scene: nothing is to be made to look like it.
@@ -187,15 +251,20 @@ TrainedModel reconstruct(Scene scene,
   load_photographs(scene, hooks, part_of(progress, 0, 0.01));
   to_canonical(scene);
   narrow_depth_ranges(scene, options.priors.sweep, part_of(progress, 0.01, 0.02));
-  EstimatedPriors priors = estimate_priors(scene, options.priors, part_of(progress, 0.02, 0.18));
-  const Progress again = part_of(progress, 0.18, 0.2);
+  mark_grey_photographs(scene);
+  const bool may_go_twice = options.medium != Medium::None || scene.has_old_photographs ||
+                            has_grey_photographs(scene);
+  const double first = may_go_twice ? 0.1 : 0.18;
+  EstimatedPriors priors = estimate_priors(scene, options.priors, part_of(progress, 0.02, first));
+  const Progress again = part_of(progress, first, 0.18);
   if (options.medium == Medium::Water)
     look_through_water(options.priors, priors, out, scene, again);
   std::optional<Pane> pane;
   if (!scene.water) {
-    out.exposure_difference = match_exposures(scene, exposure_gains(scene, priors.views));
+    match_photographs(options, priors, scene, out, again);
+    out.grey = color_grey(scene, priors.views);
     // There hardly ever is one, and without one this is quick.
-    pane = look_behind_pane(scene, options, priors, again);
+    pane = look_behind_pane(scene, options, priors, part_of(progress, 0.18, 0.2));
   }
   const Pane* const drawn_before = pane ? &*pane : nullptr;
   leave_out_other_than_scene(priors.views, scene);

@@ -10,6 +10,7 @@
 #include "libcgs/core/scene.h"
 #include "libcgs/priors/estimate_priors.h"
 #include "libcgs/priors/pane.h"
+#include "libcgs/priors/photo_response.h"
 #include "libcgs/priors/water.h"
 #include "libcgs/reconstruct/model.h"
 #include "libcgs/train/free_splats.h"
@@ -51,11 +52,20 @@ struct PaneReport {
   double gain = 0;     ///< Pane::gain [dB]
 };
 
+/// What became of a photograph without colours among others with some.
+struct GreyReport {
+  std::string view;
+  double share_without_color = 0;  ///< Of its pixels of surface: no photograph tells their colour.
+};
+
 /// A model, and how it was come by.
 struct TrainedModel {
   Model model;
   PriorsReport priors;
   float exposure_difference = 0;  ///< ExposureGains::difference() of the input views
+  PhotoResponses responses;       ///< Empty where gains were all that was looked for.
+  std::vector<GreyReport> grey;
+  std::vector<double> mended;  ///< Of old photographs, the shares that mend_scratches() changed.
   ViewDependence view_dependence;
   PaneReport pane;
   std::optional<WaterEstimate> water;  ///< Where it was looked for.
@@ -67,9 +77,11 @@ struct TrainedModel {
 /// a pane, one Gaussian on the ray of each pixel, training. Where the photographs show a pane,
 /// depth is estimated once more from what lies behind it. Where they were taken through water, that
 /// is estimated from what was measured, taken out of the photographs, and depth estimated once more
-/// from these; Scene::water says what was taken out, and no pane is looked for. With
-/// method=classical the priors are the same, and free Gaussians are trained. Same scene and options,
-/// same bits, for any number of threads.
+/// from these; Scene::water says what was taken out, and no pane is looked for. Where
+/// Scene::has_old_photographs, or one is grey among others with colours, their responses are fitted;
+/// where that tells more than gains, depth is estimated once more from corrected photographs. Of
+/// grey ones, the luminance is compared. With method=classical the priors are the same, and free
+/// Gaussians are trained. Same scene and options, same bits, for any number of threads.
 ///
 /// \param scene  in world coordinates with the identity frame; Scene::input are the views to
 ///               reconstruct from, two or more. Their photographs are loaded, sRGB-coded in [0, 1]

@@ -1,11 +1,41 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/train/picture_terms.h"
 
+#include <tbb/parallel_for.h>
+
+#include "libcgs/core/photo_response.h"
 #include "libcgs/train/losses.h"
 
 namespace cgs {
 
 namespace {
+
+/// Luminance of a picture, three times as losses want it, with its derivatives.
+struct LuminancePlanes {
+  ColorPlanes planes;
+  ColorImage derivative;
+};
+
+LuminancePlanes luminance_planes(const ColorPlanes& color) {
+  LuminancePlanes out;
+  out.planes[0] = Raster<float>(color[0].width, color[0].height, 0);
+  out.derivative = ColorImage(color[0].width, color[0].height, Eigen::Vector3f::Zero());
+  tbb::parallel_for(size_t(0), out.derivative.data.size(), [&](size_t i) {
+    const Eigen::Vector3f at(color[0].data[i], color[1].data[i], color[2].data[i]);
+    out.planes[0].data[i] = coded_luminance(at, out.derivative.data[i]);
+  });
+  out.planes[1] = out.planes[2] = out.planes[0];
+  return out;
+}
+
+// From derivatives with respect to the three copies of the luminance to those by colours.
+void chain(const LuminancePlanes& luminance, ColorPlanes& gradient) {
+  if (gradient[0].empty()) return;  // no loss has a weight
+  for (size_t i = 0; i < luminance.derivative.data.size(); ++i) {
+    const float sum = gradient[0].data[i] + gradient[1].data[i] + gradient[2].data[i];
+    for (int c = 0; c < 3; ++c) gradient[c].data[i] = sum * luminance.derivative.data[i][c];
+  }
+}
 
 // Where the other views do not reach, a dropped block shows nothing and teaches nothing.
 MaskMap pixels_that_teach(const TrainingBuffers& rendered, const TrainingView& view, bool dropped) {
@@ -26,14 +56,14 @@ void add_picture_terms(const TrainingBuffers& rendered,
                        StepReport& report) {
   const auto& [options, share, time, unit] = terms;
   const MaskMap use = pixels_that_teach(rendered, view, options.dropout > 0);
-  report.l1 += multi_scale_l1(rendered.color,
-                              view.photograph,
-                              &use,
-                              options.l1_levels,
-                              share * options.l1_weight,
-                              loss.color);
+  LuminancePlanes luminance;
+  if (view.is_grey) luminance = luminance_planes(rendered.color);
+  const ColorPlanes& shown = view.is_grey ? luminance.planes : rendered.color;
+  report.l1 += multi_scale_l1(
+      shown, view.photograph, &use, options.l1_levels, share * options.l1_weight, loss.color);
   report.ssim += structural_dissimilarity(
-      rendered.color, view.photograph, &use, share * options.ssim_weight, loss.color);
+      shown, view.photograph, &use, share * options.ssim_weight, loss.color);
+  if (view.is_grey) chain(luminance, loss.color);
   const double gone_over = options.tv_to_layers * time * options.tv_weight;
   report.tv +=
       total_variation(rendered, unit, nullptr, share * (options.tv_weight - gone_over), loss);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "libcgs/core/photo_response.h"
 #include "libcgs/train/training_inputs.h"
 
 namespace cgs {
@@ -47,8 +48,14 @@ Camera halved(const Camera& camera) {
 
 TrainingView training_view(const View& view, const ViewPriors& priors) {
   const DepthMap unknown(priors.depth.width, priors.depth.height, std::nanf(""));
-  TrainingView out{
-      view.camera, planes_of(view.image), view.valid, priors.layer, unknown, priors.sigma};
+  const bool is_grey = view.response.is_grey;
+  TrainingView out{view.camera,
+                   planes_of(is_grey ? in_grey(view.image) : view.image),
+                   is_grey,
+                   view.valid,
+                   priors.layer,
+                   unknown,
+                   priors.sigma};
   for (size_t i = 0; i < priors.origin.data.size(); ++i) {
     if (priors.origin.data[i] != DepthOrigin::Measured) continue;
     out.measured.data[i] = priors.depth.data[i];
@@ -70,6 +77,7 @@ Raster<float> halved(const Raster<float>& in) {
 TrainingView halved(const TrainingView& view) {
   TrainingView out{halved(view.camera),
                    {},
+                   view.is_grey,
                    all_usable(view.use),
                    every_other(view.layer),
                    every_other(view.measured),

@@ -12,7 +12,8 @@ namespace cgs {
 /// What one input view is compared with; all rasters are of the camera's size.
 struct TrainingView {
   Camera camera;
-  ColorPlanes photograph;
+  ColorPlanes photograph;  ///< Of a grey one, three times the luminance.
+  bool is_grey = false;
   MaskMap use;            ///< Pixels of the photograph that may be used; empty = all.
   Raster<uint8_t> layer;  ///< As ViewPriors::layer.
   DepthMap measured;      ///< Depth where it is measured, else NaN [internal units].

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "convert/scene/photo_poses.h"
 
+#include <array>
+#include <map>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -42,7 +45,7 @@ PhotoPoses solved(const fs::path& folder,
                   const fs::path& stored = {},
                   const std::vector<std::string>& wanted = {}) {
   Terminal terminal(true);
-  return photo_poses({folder, false}, wanted, focal, stored, terminal);
+  return photo_poses({folder, false}, wanted, {focal, false, false}, stored, terminal);
 }
 
 std::vector<Camera> cameras_of(const Scene& scene) {
@@ -115,6 +118,32 @@ TEST(PhotoPoses, OfTheCaptureAreItsCameras) {
 
   OpenedScene().keep(dir / "model");  // of cameras that were stated
   EXPECT_FALSE(fs::exists(dir / "model/colmap"));
+}
+
+// Scans of one size, as of prints that were enlarged differently; nothing says so but what they
+// show.
+TEST(PhotoPoses, OfEachScanHaveALensOfItsOwn) {
+  const test::TempDir dir;
+  std::map<std::string, double> truth;
+  const std::array<double, 3> zooms = {1, 1.25, 1.54};
+  for (const CaptureView& view : capture_views()) {
+    if (!view.input) continue;
+    Camera camera = view.camera;
+    camera.fx *= zooms.at(truth.size());
+    camera.fy = camera.fx;
+    const std::string file = view.name + ".png";
+    photograph(dir / "photos" / file, camera, uint32_t(truth.size()));
+    truth[file] = camera.fx;
+  }
+  Terminal terminal(true);
+  const PhotoPoses poses =
+      photo_poses({dir / "photos", false}, {}, {.each_lens = true}, {}, terminal);
+  ASSERT_EQ(poses.model.images.size(), 3u);
+  EXPECT_EQ(poses.model.cameras.size(), 3u);
+  for (const ColmapImage& image : poses.model.images) {
+    const double found = poses.model.cameras.at(image.camera_id).camera.fx;
+    EXPECT_NEAR(found / truth.at(image.name), 1, 0.03) << image.name;
+  }
 }
 
 TEST(PhotoPoses, AreRefusedForACameraThatWasOnlyTurned) {

@@ -8,6 +8,8 @@
 #include <tbb/global_control.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/photo_response.h"
+#include "libcgs/priors/depth_layers.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/train/image_metrics.h"
 #include "tests/support/pane_scene.h"
@@ -280,6 +282,40 @@ TEST(Trainer, ColoursThatMoveMakeHeldOutViewsBetter) {
     psnr.push_back(held_out_psnr(trainer.model().gaussians()));
   }
   EXPECT_GT(psnr[1], psnr[0] + 0.3) << "from " << psnr[0] << " dB";
+}
+
+// A photograph without colours pulls no colour of others towards grey.
+TEST(Trainer, TakesNoColorsFromAGreyPhotograph) {
+  PlantedScene planted = planted_scene(0.01);
+  const auto tint = [](ColorImage& image) {
+    for (Eigen::Vector3f& color : image.data)
+      color = color.cwiseProduct(Eigen::Vector3f(1, 0.7f, 0.4f));
+  };
+  for (View& view : planted.scene.views) tint(view.image);
+  const View& colored = planted.scene.views[0];
+  planted.scene.views[1].image = in_grey(planted.scene.views[1].image);
+  std::vector<double> chroma;
+  for (const bool is_known : {false, true}) {
+    planted.scene.views[1].response.is_grey = is_known;
+    Trainer trainer(planted.scene, planted.priors, short_training(60));
+    run(trainer);
+    const auto [first, last] = trainer.model().range(0);
+    const Gaussians& gaussians = trainer.model().gaussians();
+    const size_t per_gaussian = gaussians.sh.size() / gaussians.position.size();
+    double sum = 0;
+    for (size_t i = first; i < last; ++i) {
+      const Eigen::Vector3f& sh = gaussians.sh[i * per_gaussian];
+      sum += double{sh.x()} - double{sh.z()};
+    }
+    chroma.push_back(sum / double(last - first));
+  }
+  double wanted = 0;
+  for (const Eigen::Vector3f& color : colored.image.data) {
+    wanted += double{color.x() - color.z()} / double(kShC0) / double(colored.image.data.size());
+  }
+  // What it draws itself stays grey, so that others must add to their colours.
+  EXPECT_GT(chroma[1], 0.95 * wanted);
+  EXPECT_LT(chroma[0], chroma[1] - 0.05 * wanted);
 }
 
 // Completed depth tells of no surface, and colours there would fit one photograph alone.

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "libcgs/priors/scratches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+#include "libcgs/core/srgb.h"
+#include "libcgs/priors/grey_photographs.h"
+#include "libcgs/priors/neighbours.h"
+
+namespace cgs {
+
+namespace {
+
+/// A place of one view in another one.
+struct SeenThere {
+  size_t view;
+  int x, y;
+};
+
+class Mending {
+ public:
+  Mending(const Scene& scene, const std::vector<ViewPriors>& priors)
+      : scene_(scene), priors_(priors) {
+    if (has_grey_photographs(scene)) in_luminance_ = in_luminance(scene);
+  }
+
+  MaskMap contradicted(size_t k) const {
+    const Camera& camera = view(k).camera;
+    const std::vector<size_t> others = neighbours(scene_, k, kMostCompared);
+    MaskMap out(camera.width, camera.height, 0);
+    if (others.size() < 2) return out;
+    tbb::parallel_for(0, camera.height, [&](int y) {
+      for (int x = 0; x < camera.width; ++x) {
+        out(x, y) = is_usable(view(k), x, y) && is_contradicted(k, others, x, y) ? 1 : 0;
+      }
+    });
+    return out;
+  }
+
+  // Mean colour of the others where they show a pixel; nothing where they tell none.
+  std::optional<Eigen::Vector3f> color_of_others(size_t k, int x, int y) const {
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    int count = 0;
+    for (const SeenThere& seen : places(k, neighbours(scene_, k, kMostCompared), x, y)) {
+      if (view(seen.view).response.is_grey && !view(k).response.is_grey) continue;
+      sum += view(seen.view).image(seen.x, seen.y).unaryExpr(&linear_from_srgb);
+      ++count;
+    }
+    if (count == 0) return std::nullopt;
+    const Eigen::Vector3f color = (sum / static_cast<float>(count)).unaryExpr(&srgb_from_linear);
+    if (!view(k).response.is_grey) return color;
+    return Eigen::Vector3f::Constant(coded_luminance(color));
+  }
+
+ private:
+  const View& view(size_t k) const { return scene_.views[static_cast<size_t>(scene_.input[k])]; }
+  const ColorImage& compared(size_t k) const {
+    const Scene& scene = in_luminance_ ? *in_luminance_ : scene_;
+    return scene.views[static_cast<size_t>(scene.input[k])].image;
+  }
+  static bool is_usable(const View& of, int x, int y) {
+    return of.valid.empty() || of.valid(x, y) != 0;
+  }
+
+  std::vector<SeenThere> places(size_t k, const std::vector<size_t>& others, int x, int y) const {
+    constexpr double kSame = 0.02;  // of the depth
+    std::vector<SeenThere> out;
+    const double depth{priors_[k].depth(x, y)};
+    if (!std::isfinite(depth) || shows_no_surface(priors_[k].origin(x, y))) return out;
+    const Eigen::Vector3d point = view(k).camera.unproject(x + 0.5, y + 0.5, depth);
+    for (const size_t j : others) {
+      const Eigen::Vector3d uvz = view(j).camera.project(point);
+      if (!view(j).camera.sees(uvz)) continue;
+      const int u = static_cast<int>(uvz.x());
+      const int v = static_cast<int>(uvz.y());
+      const double there{priors_[j].depth(u, v)};
+      const bool is_same = std::abs(there - uvz.z()) <= kSame * uvz.z();  // not where it is NaN
+      if (is_same && is_usable(view(j), u, v)) out.push_back({j, u, v});
+    }
+    return out;
+  }
+
+  bool is_contradicted(size_t k, const std::vector<size_t>& others, int x, int y) const {
+    const std::vector<SeenThere> seen = places(k, others, x, y);
+    return seen.size() >= 2 && std::all_of(seen.begin(), seen.end(), [&](const SeenThere& there) {
+             return !shows_alike(there, compared(k)(x, y));
+           });
+  }
+
+  // Whether a pixel or one beside it is of a colour.
+  bool shows_alike(const SeenThere& there, const Eigen::Vector3f& color) const {
+    constexpr float kOther = 0.16f;  // of a channel
+    const ColorImage& image = compared(there.view);
+    for (int v = there.y - 1; v <= there.y + 1; ++v) {
+      for (int u = there.x - 1; u <= there.x + 1; ++u) {
+        if (image.contains(u, v) && (image(u, v) - color).cwiseAbs().maxCoeff() < kOther) {
+          return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  const Scene& scene_;
+  const std::vector<ViewPriors>& priors_;
+  std::optional<Scene> in_luminance_;  // where colours cannot be compared
+};
+
+MaskMap with_neighbours(const MaskMap& mask) {
+  MaskMap out = mask;
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      for (int k = 0; k < 9 && out(x, y) == 0; ++k) {
+        const int u = x + k % 3 - 1;
+        const int v = y + k / 3 - 1;
+        if (mask.contains(u, v)) out(x, y) = mask(u, v);
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<MaskMap> mend_scratches(Scene& scene, const std::vector<ViewPriors>& priors) {
+  const Mending mending(scene, priors);
+  std::vector<MaskMap> out;
+  std::vector<ColorImage> mended;
+  for (size_t k = 0; k < priors.size(); ++k) {
+    out.push_back(with_neighbours(mending.contradicted(k)));
+    const View& view = scene.views[static_cast<size_t>(scene.input[k])];
+    mended.push_back(view.image);
+    for (int y = 0; y < view.image.height; ++y) {
+      for (int x = 0; x < view.image.width; ++x) {
+        if (out[k](x, y) == 0) continue;
+        const auto color = mending.color_of_others(k, x, y);
+        if (color) mended[k](x, y) = *color;
+        out[k](x, y) = color ? 1 : 0;
+      }
+    }
+  }
+  // All at once: none is mended by what another was.
+  for (size_t k = 0; k < priors.size(); ++k) {
+    scene.views[static_cast<size_t>(scene.input[k])].image = std::move(mended[k]);
+  }
+  return out;
+}
+
+}  // namespace cgs
