@@ -22,6 +22,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/reconstruct/hole_views.h"
 #include "libcgs/render/hidden_depth.h"
+#include "libcgs/render/picture.h"
 
 namespace cgs {
 

@@ -52,15 +52,6 @@ Gaussians wall(const ColorOf& color_of, double z = 1) {
   return out;
 }
 
-void append(Gaussians& to, const Gaussians& g) {
-  to.position.insert(to.position.end(), g.position.begin(), g.position.end());
-  to.scale.insert(to.scale.end(), g.scale.begin(), g.scale.end());
-  to.rotation.insert(to.rotation.end(), g.rotation.begin(), g.rotation.end());
-  to.opacity.insert(to.opacity.end(), g.opacity.begin(), g.opacity.end());
-  to.sh.insert(to.sh.end(), g.sh.begin(), g.sh.end());
-  to.provenance.insert(to.provenance.end(), g.provenance.begin(), g.provenance.end());
-}
-
 WeighedSplats merged(const Gaussians& g, float most_cost) {
   const std::vector<Camera> cameras = {camera_at(0)};
   return merge_splats(weigh_splats(g, cameras), {.most_cost = most_cost});

@@ -9,7 +9,6 @@
 
 #include "libcgs/core/error.h"
 #include "libcgs/core/photo_response.h"
-#include "libcgs/priors/depth_layers.h"
 #include "libcgs/render/rasterizer.h"
 #include "libcgs/train/image_metrics.h"
 #include "tests/support/pane_scene.h"
