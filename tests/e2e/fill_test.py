@@ -106,8 +106,10 @@ class FillTest(unittest.TestCase):
             self.assertTrue(same, name)
         self.assertEqual(told('evaluate', 'model'), told('evaluate', 'filled'))
         for model in ('model', 'filled'):
-            cgs('convert', model, f'{model}.obj')
-        self.assertEqual((FOLDER / 'model.obj').read_bytes(), (FOLDER / 'filled.obj').read_bytes())
+            (FOLDER / f'mesh_{model}').mkdir()
+            cgs('convert', model, f'mesh_{model}/mesh.obj')
+        a, b = ((FOLDER / f'mesh_{model}/mesh.obj').read_bytes() for model in ('model', 'filled'))
+        self.assertEqual(a, b)
 
     def test_pictures_differ_in_holes_alone(self):
         changed = 0

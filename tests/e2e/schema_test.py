@@ -107,10 +107,11 @@ def test_runs():
     (work / "cut/transforms.json").write_text(json.dumps(cameras))
     told = cgs("run", "cut", "--preset", "draft", "--set", "steps=2", "--max-size", "60kB",
                "--max-error", "0.5", "--estimated", "keep",
-               "--local-origin", "--use-all", "-o", "plain")
+               "--local-origin", "--use-all", "--old-photographs", "-o", "plain")
     assert told["evaluation"] is None and told["units"] == "unknown"
     assert told["mesh"]["output"]["left_out"] and told["mesh"]["promise"]
     assert len(told["model"]["loss"]) == 2 and told["web"]["asset.glb"]["words"]
+    assert told["model"]["responses"]["terms"]
     for name in ("metric", "plain"):
         assert "seconds" not in file(f"{name}/model/training.json", "train")
         file(f"{name}/report.json", "run")
@@ -347,7 +348,7 @@ def test_meshes():
 
 
 def test_splats_compared():
-    around = cgs("compare", "metric/web/splats.spz", "metric/model/gaussians.ply", schema="compare-splats")
+    around = cgs("compare", "metric/web/splats.glb", "metric/model/gaussians.ply", schema="compare-splats")
     assert around["cameras"] == "around" and around["a"]["psnr"] is None
     words = ["--scene", "metric", "--pictures", "compared"]
     seen = cgs("compare", "metric/model/gaussians.ply", "metric/model/gaussians.ply", *words,
