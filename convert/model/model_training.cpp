@@ -367,8 +367,7 @@ double measured_share(const nlohmann::ordered_json& depth_of_views) {
 
 std::vector<std::string> remarks_on_photographs(const nlohmann::ordered_json& training) {
   std::vector<std::string> out;
-  for (const char* key :
-       {"exposure", "responses", "grey", "view_dependence", "pane", "water"}) {
+  for (const char* key : {"exposure", "responses", "grey", "view_dependence", "pane", "water"}) {
     const auto found = training.find(key);
     if (found == training.end() || !found->is_object()) continue;
     const auto words = found->find("words");

@@ -104,7 +104,8 @@ struct Evaluation {
   bool through_water = false;  ///< Rendered through the water that the photographs show.
 };
 
-/// {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim", "flip"}, null for what is empty.
+/// {"psnr", "ssim", "psnr_seen", "ssim_seen", "hole_fraction", "ms_ssim", "flip"}, null for what is
+/// empty.
 nlohmann::ordered_json figures_to_json(const ViewFigures& figures);
 /// {"mean": {…}, "every_eighth": {…} or null, "views": [{"name", "role" as of views_to_json(), …,
 /// "exposure"}]}, and "through_water": true where it is

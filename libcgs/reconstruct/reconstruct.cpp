@@ -252,8 +252,8 @@ TrainedModel reconstruct(Scene scene,
   to_canonical(scene);
   narrow_depth_ranges(scene, options.priors.sweep, part_of(progress, 0.01, 0.02));
   mark_grey_photographs(scene);
-  const bool may_go_twice = options.medium != Medium::None || scene.has_old_photographs ||
-                            has_grey_photographs(scene);
+  const bool may_go_twice =
+      options.medium != Medium::None || scene.has_old_photographs || has_grey_photographs(scene);
   const double first = may_go_twice ? 0.1 : 0.18;
   EstimatedPriors priors = estimate_priors(scene, options.priors, part_of(progress, 0.02, first));
   const Progress again = part_of(progress, first, 0.18);
