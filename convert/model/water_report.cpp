@@ -19,12 +19,12 @@ using Json = nlohmann::ordered_json;
 
 Json rgb(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-// "0.450 ± 0.004, 0.200 ± 0.003, 0.120 ± 0.003"
+// "0.4501 ± 0.0004, 0.2003 ± 0.0003, 0.1201 ± 0.0003"
 std::string three_with_sigma(const Eigen::Vector3d& value, const Eigen::Vector3d& sigma) {
   std::array<char, 160> text{};
   std::snprintf(text.data(),
                 text.size(),
-                "%.3f ± %.3f, %.3f ± %.3f, %.3f ± %.3f",
+                "%.4f ± %.4f, %.4f ± %.4f, %.4f ± %.4f",
                 value.x(),
                 sigma.x(),
                 value.y(),
@@ -91,21 +91,22 @@ std::string water_section(const Json& water) {
     return html.str();
   }
   const std::string unit = escaped(water["unit"].get<std::string>());
-  html
-      << "<p>From " << water["matches"].get<size_t>()
-      << " places that two photographs show, half of them from within "
-      << number(water["median_range"], "%.3g") << " " << unit
-      << ". Light of a surface arrives as exp(-attenuation x range), and water before it adds veil "
-         "x (1 - exp(-backscatter x range)); the veil is linear light, 1 = white. All results are "
-         "made of the restored photographs below; held-out views are rendered through the "
-         "water.</p>\n<table>\n<tr><th></th><th>red</th><th>green</th><th>blue</th></tr>\n";
+  html << "<p>From " << water["matches"].get<size_t>()
+       << " places that two photographs show, nine of ten from ranges "
+          "within "
+       << percent(Json(water["range_ratio"].get<double>() - 1))
+       << " of each other. Light of a surface arrives as exp(-attenuation x range), and water "
+          "before it adds veil "
+          "x (1 - exp(-backscatter x range)); the veil is linear light, 1 = white. All results are "
+          "made of the restored photographs below; held-out views are rendered through the "
+          "water.</p>\n<table>\n<tr><th></th><th>red</th><th>green</th><th>blue</th></tr>\n";
   for (const auto& [key, name] : {std::pair("attenuation", "attenuation [1 / " + unit + "]"),
                                   std::pair("backscatter", "backscatter [1 / " + unit + "]"),
                                   std::pair("veil", std::string("veil"))}) {
     html << "<tr><td>" << name << "</td>";
     const Json& sigma = water[std::string(key) + "_sigma"];
     for (size_t c = 0; c < 3; ++c) {
-      html << "<td>" << number(water[key][c], "%.3f") << " ± " << number(sigma[c], "%.3f")
+      html << "<td>" << number(water[key][c], "%.4f") << " ± " << number(sigma[c], "%.4f")
            << "</td>";
     }
     html << "</tr>\n";

@@ -210,8 +210,15 @@ PaintedFill lift_painted(const Model& model,
     const size_t before = out.gaussians.size();
     append(out.gaussians, discs_of(painting, without_seams(painting)));
     told.lifted = out.gaussians.size() - before;
-    told.shone_through = drop_visible(model, out.gaussians);
-    told.lifted -= std::min(told.lifted, told.shone_through);
+    drop_visible(model, out.gaussians);
+  }
+  // Those of an earlier view may only show once a later one is there.
+  const std::vector<uint8_t>& tags = out.gaussians.synthetic;
+  for (size_t k = 0; k < views.size(); ++k) {
+    ViewFill& told = out.views[k];
+    const auto kept = std::count(tags.begin(), tags.end(), static_cast<uint8_t>(k + 1));
+    told.shone_through = told.lifted - static_cast<size_t>(kept);
+    told.lifted = static_cast<size_t>(kept);
   }
   report(progress, 1);
   return out;

@@ -114,7 +114,7 @@ float hidden_from_all(
   return std::numeric_limits<float>::quiet_NaN();
 }
 
-size_t drop_visible(const Model& model, Gaussians& fill) {
+void drop_visible(const Model& model, Gaussians& fill) {
   const std::vector<SupportView> inputs = support_views(model);
   const Gaussians dark = in_one_color(model.gaussians, 0);
   std::vector<Raster<Hole>> holes;
@@ -122,15 +122,10 @@ size_t drop_visible(const Model& model, Gaussians& fill) {
     holes.push_back(render_camera(model, inputs, inputs[k].camera).hole);
   }
   // First what is mostly drawn there; then all that may be, as far as alpha reaches 1/255.
-  size_t dropped = 0;
   for (const double reach : {1.0, 3.5}) {
-    while (fill.size() > 0) {
-      const size_t now = keep_only(fill, hidden_ones(model, dark, holes, fill, reach));
-      if (now == 0) break;
-      dropped += now;
+    while (fill.size() > 0 && keep_only(fill, hidden_ones(model, dark, holes, fill, reach)) > 0) {
     }
   }
-  return dropped;
 }
 
 }  // namespace cgs

@@ -23,7 +23,6 @@ float hidden_from_all(
 /// Leaves out Gaussians of a fill that input views would show if they were drawn together with
 /// those of the model: over a sixteenth of a pixel, through Gaussians that are not quite opaque, or
 /// over 1/255 of one in a hole of an input view.
-/// \return how many went
-size_t drop_visible(const Model& model, Gaussians& fill);
+void drop_visible(const Model& model, Gaussians& fill);
 
 }  // namespace cgs
