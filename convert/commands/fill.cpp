@@ -88,9 +88,9 @@ void add_fill(CLI::App& app) {
       ->required();
   add_output_options(*cmd, args->common);
   cmd->footer(
-      "Example: cgs render out/portal/model --holes -o out/holes\n"
-      "         (paint in out/holes/hole_1.png and so on)\n"
-      "         cgs fill out/portal/model out/holes -o out/filled\n"
+      "Pictures to paint are those of cgs render out/portal/model --holes -o out/holes; paint in\n"
+      "out/holes/hole_1.png and so on.\n"
+      "Example: cgs fill out/portal/model out/holes -o out/filled\n"
       "         cgs render out/filled --path spiral -o out/spiral\n"
       "The evidence keeps its bits. fill.ply is tagged synthetic, with the SHA-256 of each\n"
       "picture; pictures and splat files show it, and no mesh, mask or figure takes it.");

@@ -87,12 +87,13 @@ void add_monitor(CLI::App& app) {
   cmd->add_option("--unit", args->unit, "Unit of the figures; default m");
   add_output_options(*cmd, args->common);
   cmd->footer(
-      "Each date is reconstructed from its own photographs. One is laid onto the other by what\n"
-      "photographs of both show, then by the surfaces, so that what did not change agrees.\n"
+      "Each date is reconstructed before, from its own photographs, as by\n"
+      "cgs run photos/reef2026 --marker-size 80mm -o out/reef2026.\n"
+      "One is laid onto the other by what photographs of both show, then by the surfaces, so that\n"
+      "what did not change agrees.\n"
       "Volumes are known where the scale of one date is: a tape or a marker in its photographs.\n"
-      "Example: cgs run photos/reef2024 --marker-size 80mm -o out/reef2024\n"
-      "         cgs run photos/reef2026 --marker-size 80mm -o out/reef2026\n"
-      "         cgs monitor out/reef2024 out/reef2026 --unit mm -o out/reef");
+      "Example: cgs monitor out/reef2024 out/reef2026 --unit mm -o out/reef\n"
+      "         xdg-open out/reef/index.html");
   cmd->callback([args] { run_monitor(*args); });
 }
 

@@ -43,6 +43,7 @@ uint64_t training_key(const Model& model, const TrainingOptions& options, const 
     add(priors.origin.data.data(), priors.origin.data.size());
     add(priors.layer.data.data(), priors.layer.data.size());
     add(view.valid.data.data(), view.valid.data.size());
+    if (view.response.is_grey) key = content_hash("grey", key);
     const Camera& camera = view.camera;
     const std::array<double, 4> intrinsics = {camera.fx, camera.fy, camera.cx, camera.cy};
     add(intrinsics.data(), sizeof intrinsics);

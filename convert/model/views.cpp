@@ -379,7 +379,9 @@ bool is_exposed_otherwise(const Model& model, int view) {
   const std::string role = view_role(scene, view);
   return role != "input" && std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
            const View& input = scene.views[static_cast<size_t>(i)];
-           return input.exposure != Eigen::Vector3f::Ones() || input.response != PhotoResponse{};
+           PhotoResponse response = input.response;
+           response.is_grey = false;  // without colours, but exposed as the others
+           return input.exposure != Eigen::Vector3f::Ones() || response != PhotoResponse{};
          });
 }
 

@@ -364,6 +364,13 @@ def test_batch():
     assert file("batch/batch.json", "batch") == rows
 
 
+def test_monitor():
+    """A date held against itself."""
+    told = cgs("monitor", "metric", "metric", "--registered", "--unit", "mm", "-o", "watched")
+    assert told["unit"] == "mm" and told["gained"]["comparable"] > 0.5
+    assert file("watched/changes.json", "monitor") == told
+
+
 def test_tradeoff():
     words = ["--views", "view_01,view_03", "--want", "size<1MB", "--assume-unit", "m",
              "--reference", capture / "truth/mesh.ply", "-o", "tradeoff"]
