@@ -94,7 +94,7 @@ std::optional<Eigen::Vector3f> seam_offset(const Painting& painting,
 
 // What was painted, with colours that go over into those of the far side.
 ColorImage without_seams(const Painting& painting) {
-  constexpr float kReach = 8;  // [pixels]
+  const float reach = static_cast<float>(painting.view.picture.width) / 64;  // [pixels]
   constexpr int kSweeps = 100;
   const ColorImage around = picture(painting.shown);
   ColorImage out = painting.view.picture;
@@ -112,7 +112,7 @@ ColorImage without_seams(const Painting& painting) {
   }
   for (int c = 0; c < 3; ++c) {
     Raster<float>& plane = offset.at(static_cast<size_t>(c));
-    relax_membrane(plane, pixels, kReach, kSweeps);
+    relax_membrane(plane, pixels, reach, kSweeps);
     for (size_t i = 0; i < out.data.size(); ++i) {
       out.data[i][c] = std::clamp(out.data[i][c] + plane.data[i], 0.0f, 1.0f);
     }

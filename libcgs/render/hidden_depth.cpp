@@ -45,24 +45,20 @@ DepthMap leaning_depth(const DepthMap& around) {
   return pulled_and_pushed(std::move(finest), kAnyWidth).depth;
 }
 
-}  // namespace
-
-DepthMap hidden_depth(const RenderBuffers& buffers, const MaskMap& open) {
-  DepthMap around = depth_around(buffers, open, /*with_sky=*/false);
-  if (!has_any(around)) around = depth_around(buffers, open, /*with_sky=*/true);
-  if (!has_any(around)) return around;
-  const DepthMap start = leaning_depth(around);
+// Relaxes inverse depth in gaps, held where the depth beside them is not before that found so far.
+// \return by how many pixels it is held
+size_t relax_held(const DepthMap& around, const MaskMap& open, DepthMap& found) {
   Raster<MembranePixel> pixels(open.width, open.height, MembranePixel::Outside);
   Raster<float> inverse(open.width, open.height, 0);
   for (int y = 0; y < open.height; ++y) {
     for (int x = 0; x < open.width; ++x) {
       if (open(x, y) == 0) continue;
       pixels(x, y) = MembranePixel::Open;
-      inverse(x, y) = 1 / start(x, y);
+      inverse(x, y) = 1 / found(x, y);
       for (const auto& [dx, dy] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}}) {
         if (!open.contains(x + dx, y + dy)) continue;
         const float beside = around(x + dx, y + dy);
-        if (!(beside >= kFarSide * start(x, y))) continue;  // also if unknown
+        if (!(beside >= kFarSide * found(x, y))) continue;  // also if unknown
         pixels(x + dx, y + dy) = MembranePixel::Fixed;
         inverse(x + dx, y + dy) = 1 / beside;
       }
@@ -70,11 +66,33 @@ DepthMap hidden_depth(const RenderBuffers& buffers, const MaskMap& open) {
   }
   constexpr int kSweeps = 300;
   relax_membrane(inverse, pixels, 0, kSweeps);
-  DepthMap out(open.width, open.height, kNoDepth);
-  for (size_t i = 0; i < out.data.size(); ++i) {
-    if (open.data[i] != 0 && inverse.data[i] > 0) out.data[i] = 1 / inverse.data[i];
+  for (size_t i = 0; i < found.data.size(); ++i) {
+    if (open.data[i] != 0) found.data[i] = inverse.data[i] > 0 ? 1 / inverse.data[i] : kNoDepth;
   }
-  return out;
+  const auto is_held = [](MembranePixel pixel) { return pixel == MembranePixel::Fixed; };
+  return static_cast<size_t>(std::count_if(pixels.data.begin(), pixels.data.end(), is_held));
+}
+
+}  // namespace
+
+DepthMap hidden_depth(const RenderBuffers& buffers, const MaskMap& open) {
+  DepthMap around = depth_around(buffers, open, /*with_sky=*/false);
+  if (!has_any(around)) around = depth_around(buffers, open, /*with_sky=*/true);
+  if (!has_any(around)) return around;
+  DepthMap found = leaning_depth(around);
+  for (size_t i = 0; i < found.data.size(); ++i) {
+    if (open.data[i] == 0) found.data[i] = kNoDepth;
+  }
+  // A slanted surface is nearer on one side, too, which is told from what stands before it only
+  // once the others hold the membrane.
+  constexpr int kMostRounds = 12;
+  size_t held = 0;
+  for (int round = 0; round < kMostRounds; ++round) {
+    const size_t now = relax_held(around, open, found);
+    if (now == held) break;
+    held = now;
+  }
+  return found;
 }
 
 }  // namespace cgs

@@ -52,7 +52,6 @@ void age(const std::filesystem::path& capture) {
   change(capture, 1, [](ColorImage& image) {
     test::print(image, {0.8, 0.75, 0.7}, 0.8, 0.3);
     scratch(image, 0.2, 0.5, Vector3f::Constant(0.95f));
-    frame(image, 7, {0.93f, 0.92f, 0.88f});
   });
   change(capture, 2, [](ColorImage& image) {
     test::print(image, {1, 1, 1}, 1, 0.3);
@@ -62,7 +61,6 @@ void age(const std::filesystem::path& capture) {
     image = in_grey(image);
     test::print(image, {1.1, 1.1, 1.1}, 1.25, 0.3);
     scratch(image, 0.4, 0.9, Vector3f::Constant(0.95f));
-    frame(image, 7, Vector3f::Constant(0.02f));
   });
 }
 

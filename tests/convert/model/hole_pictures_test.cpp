@@ -108,10 +108,10 @@ TEST_F(HolePicturesTest, RefuseWhatIsSeenToBeChanged) {
 }
 
 TEST_F(HolePicturesTest, AllowJpegWhatItDoesToAllPixels) {
-  std::filesystem::remove(file(".png"));
-  test::write_bytes(file(".jpg"), encode_jpeg(painted(), 92));
-  EXPECT_EQ(read().views.size(), 1u);
   ColorImage darker = painted();
+  std::filesystem::remove(file(".png"));
+  test::write_bytes(file(".jpg"), encode_jpeg(darker, 92));
+  EXPECT_EQ(read().views.size(), 1u);
   for (Eigen::Vector3f& c : darker.data) c *= 0.8f;
   test::write_bytes(file(".jpg"), encode_jpeg(darker, 92));
   EXPECT_EQ(test::defect_of([&] { (void)read(); }), "MISMATCH");

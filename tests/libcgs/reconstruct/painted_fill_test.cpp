@@ -140,7 +140,7 @@ TEST(PaintedFill, HasNoSeamTowardsTheWall) {
 
 TEST(PaintedFill, IsWhatWasPaintedAwayFromSeams) {
   Model model = panel_model();
-  const PaintedView view = painted_at(model, 1.6, kPaint);
+  const PaintedView view = painted_at(model, 2.4, kPaint);
   const RenderBuffers plain = drawn(model, view.camera);
   model.fill = lift_painted(model, {view}).gaussians;
   const ColorImage shown = picture(with_fill(plain, rasterize(model.fill, view.camera)));

@@ -56,8 +56,13 @@ TEST(HiddenDepth, IsNotPulledNearerByWhatStandsBefore) {
     for (int x = 0; x < 30; ++x) buffers.median_depth(x, y) = 0.4f * plane(x, y);
   }
   const DepthMap found = hidden_depth(buffers, gap(30, 0, 45, kHeight));
+  // Where the gap leaves the picture, nothing holds the membrane, and it levels out.
+  constexpr int kFreeEnd = 15;
   for (int y = 0; y < kHeight; ++y) {
-    for (int x = 30; x < 45; ++x) EXPECT_NEAR(found(x, y) / plane(x, y), 1, 0.12) << x << ", " << y;
+    for (int x = 30; x < 45; ++x) {
+      const bool is_free = y < kFreeEnd || y >= kHeight - kFreeEnd;
+      EXPECT_NEAR(found(x, y) / plane(x, y), 1, is_free ? 0.25 : 0.12) << x << ", " << y;
+    }
   }
 }
 
