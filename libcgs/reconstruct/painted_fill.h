@@ -42,8 +42,8 @@ struct PaintedFill {
 /// through Gaussians that are not quite opaque (over a sixteenth of a pixel, or at all in its own
 /// holes), is left out.
 ///
-/// Colours go over into those of the far side at the seam, by an offset that fades out over 8
-/// pixels; within, they are as painted. Views are taken in their order: a hole that shows what an
+/// Colours go over into those of the far side at the seam, by an offset that fades out over
+/// a 64th of the picture's width; within, they are as painted. Views are taken in their order: a hole that shows what an
 /// earlier one painted is not painted again.
 ///
 /// Gaussians are discs of half a pixel along the surface, of opacity 0.98 and degree 0. Same bits

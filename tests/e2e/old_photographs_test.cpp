@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The portal as three old prints show it, against the portal as three good photographs do.
 #include <cmath>
+#include <cstdio>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -47,7 +48,7 @@ void change(const std::filesystem::path& capture, int view, const Change& by) {
   write_png(file, image);
 }
 
-// All at once: gains, gammas, the light falling off, one in grey, scratches, borders.
+// All at once: gains, gammas, the light falling off, one in grey, scratches.
 void age(const std::filesystem::path& capture) {
   change(capture, 1, [](ColorImage& image) {
     test::print(image, {0.8, 0.75, 0.7}, 0.8, 0.3);
@@ -81,6 +82,12 @@ ordered_json training_of(const std::filesystem::path& model) {
   return ordered_json::parse(test::read_bytes(model / "training.json"));
 }
 
+// Borders of paper, which hide some of what clean ones show.
+void mount(const std::filesystem::path& capture) {
+  change(capture, 1, [](ColorImage& image) { frame(image, 7, {0.93f, 0.92f, 0.88f}); });
+  change(capture, 3, [](ColorImage& image) { frame(image, 7, Vector3f::Constant(0.02f)); });
+}
+
 TEST(OldPhotographs, ComeNearWhatCleanOnesGive) {
   const test::TempDir dir;
   std::filesystem::copy(kClean, dir / "old", std::filesystem::copy_options::recursive);
@@ -88,8 +95,10 @@ TEST(OldPhotographs, ComeNearWhatCleanOnesGive) {
   const double clean = held_out_psnr(kClean, dir / "clean", "");
   const double unaided = held_out_psnr(dir / "old", dir / "unaided", "");
   const double aided = held_out_psnr(dir / "old", dir / "aided", "--old-photographs");
-  EXPECT_GT(aided, clean - 0.5) << "unaided " << unaided;
-  EXPECT_LT(unaided, clean - 3) << "or there is nothing to mend";
+  std::printf("clean %.2f dB; aged %.2f, with --old-photographs %.2f\n", clean, unaided, aided);
+  EXPECT_GT(aided, clean - 0.5);
+  // One of them is grey, so that responses are fitted unasked.
+  EXPECT_GT(unaided, clean - 0.5);
 
   const ordered_json training = training_of(dir / "aided");
   EXPECT_EQ(training["responses"]["reference"], "view_02");
@@ -100,6 +109,17 @@ TEST(OldPhotographs, ComeNearWhatCleanOnesGive) {
   for (const auto& view : views) EXPECT_GT(view["mended"].get<double>(), 0.002);
   EXPECT_GT(training["grey"]["views"][0]["share_without_color"].get<double>(), 0);
   EXPECT_LT(training["grey"]["views"][0]["share_without_color"].get<double>(), 0.6);
+}
+
+TEST(OldPhotographs, AreLookedAtWithinTheirBorders) {
+  const test::TempDir dir;
+  std::filesystem::copy(kClean, dir / "old", std::filesystem::copy_options::recursive);
+  age(dir / "old");
+  mount(dir / "old");
+  const double unaided = held_out_psnr(dir / "old", dir / "unaided", "");
+  const double aided = held_out_psnr(dir / "old", dir / "aided", "--old-photographs");
+  std::printf("in borders %.2f dB, with --old-photographs %.2f\n", unaided, aided);
+  EXPECT_GT(aided, unaided + 3);
 }
 
 TEST(OldPhotographs, AreNotMadeOfCleanOnes) {
