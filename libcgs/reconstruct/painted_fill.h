@@ -43,8 +43,8 @@ struct PaintedFill {
 /// holes), is left out.
 ///
 /// Colours go over into those of the far side at the seam, by an offset that fades out over
-/// a 64th of the picture's width; within, they are as painted. Views are taken in their order: a hole that shows what an
-/// earlier one painted is not painted again.
+/// a 64th of the picture's width; within, they are as painted. Views are taken in their order: a
+/// hole that shows what an earlier one painted is not painted again.
 ///
 /// Gaussians are discs of half a pixel along the surface, of opacity 0.98 and degree 0. Same bits
 /// for any number of threads.

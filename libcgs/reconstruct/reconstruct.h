@@ -68,8 +68,8 @@ struct TrainedModel {
   std::vector<double> mended;  ///< Of old photographs, the shares that mend_scratches() changed.
   ViewDependence view_dependence;
   PaneReport pane;
-  std::optional<WaterEstimate> water;  ///< Where it was looked for.
-  std::vector<StepReport> steps;       ///< Of the training; empty = aligned initialisation.
+  std::optional<WaterEstimate> water;         ///< Where it was looked for.
+  std::vector<StepReport> steps;              ///< Of the training; empty = aligned initialisation.
   std::optional<DensityReport> density = {};  ///< Of method=classical.
 };
 
@@ -78,10 +78,11 @@ struct TrainedModel {
 /// depth is estimated once more from what lies behind it. Where they were taken through water, that
 /// is estimated from what was measured, taken out of the photographs, and depth estimated once more
 /// from these; Scene::water says what was taken out, and no pane is looked for. Where
-/// Scene::has_old_photographs, or one is grey among others with colours, their responses are fitted;
-/// where that tells more than gains, depth is estimated once more from corrected photographs. Of
-/// grey ones, the luminance is compared. With method=classical the priors are the same, and free
-/// Gaussians are trained. Same scene and options, same bits, for any number of threads.
+/// Scene::has_old_photographs, or one is grey among others with colours, their responses are
+/// fitted; where that tells more than gains, depth is estimated once more from corrected
+/// photographs. Of grey ones, the luminance is compared. With method=classical the priors are the
+/// same, and free Gaussians are trained. Same scene and options, same bits, for any number of
+/// threads.
 ///
 /// \param scene  in world coordinates with the identity frame; Scene::input are the views to
 ///               reconstruct from, two or more. Their photographs are loaded, sRGB-coded in [0, 1]
