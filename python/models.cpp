@@ -9,9 +9,9 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "convert/commands/common_options.h"
+#include "convert/model/evaluation.h"
 #include "convert/model/memory_plan.h"
 #include "convert/model/model.h"
-#include "convert/model/views.h"
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
 #include "io/scenes/scene_reader.h"

@@ -68,23 +68,12 @@ std::string title_of(const CompareArgs& args) {
   return printable(args.a.filename()) + " against " + printable(args.b.filename());
 }
 
-// Places that somebody saw; all of a surface that nobody saw.
-std::vector<Eigen::Vector3d> seen_places(ComparedPoints points) {
-  std::vector<Eigen::Vector3d> out;
-  for (size_t i = 0; i < points.places.size(); ++i) {
-    if (points.observed[i] != 0) out.push_back(points.places[i]);
-  }
-  return out.empty() ? std::move(points.places) : out;
-}
-
 Registration lay_onto(MeasurableMesh& a,
                       const MeasurableMesh& b,
                       const NearestSurface& surface,
                       bool with_scale,
                       const Terminal& terminal) {
-  constexpr size_t kPoints = 20'000;
-  Registration out =
-      register_points(seen_places(points_by_area(a, kPoints)), b, surface, with_scale);
+  Registration out = motion_onto(a, b, surface, with_scale);
   if (!out.converged) {
     terminal.warn({"--icp still moved A after " + std::to_string(out.iterations) +
                    " iterations: the surfaces hold each other badly"});
@@ -157,11 +146,7 @@ void print_text(const CompareArgs& args, const Comparison& comparison, const Fig
 // these now.
 void share_unit(Frame& a, const Frame& b, double growth) {
   if (a.has_metric_scale() == b.has_metric_scale()) return;
-  const double units_of_b = a.has_metric_scale() ? growth : 1;
-  const Frame known = a.has_metric_scale() ? a : b;
-  a.metres_per_unit = known.metres_per_unit / units_of_b;
-  a.metres_sigma = known.metres_sigma / units_of_b;
-  a.scale_source = known.scale_source;
+  a.has_metric_scale() ? take_scale(a, a, growth) : take_scale(a, b, 1);
 }
 
 // Cloud against cloud, along normals: what --m3c2 asks for.

@@ -7,8 +7,8 @@
 
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
+#include "convert/model/evaluation.h"
 #include "convert/model/model.h"
-#include "convert/model/views.h"
 #include "convert/text/html.h"
 #include "convert/text/report_json.h"
 #include "convert/text/terminal.h"

@@ -73,6 +73,15 @@ Json registration_json(const Registration& r, const MeasurableMesh& a, const Fig
           {"iterations", r.iterations}};
 }
 
+// Places that somebody saw; all of a surface that nobody saw.
+std::vector<Eigen::Vector3d> seen_places(ComparedPoints points) {
+  std::vector<Eigen::Vector3d> out;
+  for (size_t i = 0; i < points.places.size(); ++i) {
+    if (points.observed[i] != 0) out.push_back(points.places[i]);
+  }
+  return out.empty() ? std::move(points.places) : out;
+}
+
 }  // namespace
 
 double range_of(const std::vector<Deviation>& deviations) {
@@ -116,6 +125,22 @@ MeasurableMesh moved(const MeasurableMesh& mesh, const Registration& motion) {
   for (Eigen::Vector3f& n : out.mesh.normals) n = rotation * n;
   for (float& s : out.mesh.sigma) s *= static_cast<float>(motion.scale);
   return out;
+}
+
+Registration motion_onto(const MeasurableMesh& a,
+                         const MeasurableMesh& b,
+                         const NearestSurface& surface,
+                         bool with_scale) {
+  constexpr size_t kPoints = 20'000;
+  return register_points(seen_places(points_by_area(a, kPoints)), b, surface, with_scale);
+}
+
+void take_scale(Frame& to, const Frame& from, double growth) {
+  const double metres = from.metres_per_unit / growth;
+  const double sigma = from.metres_sigma / growth;
+  to.metres_per_unit = metres;
+  to.metres_sigma = sigma;
+  to.scale_source = from.scale_source;
 }
 
 Json comparison_json(const Comparison& comparison,

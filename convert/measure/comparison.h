@@ -19,6 +19,19 @@ MeasurableMesh in_frame_of(const MeasurableMesh& mesh, const Frame& frame);
 /// The mesh after a motion of its points; sigma grows with the scale.
 MeasurableMesh moved(const MeasurableMesh& mesh, const Registration& motion);
 
+/// The motion that lays a mesh onto another one, near which it lies already, by places that
+/// somebody saw, or all of a surface that nobody saw.
+/// \param surface  of `b`
+/// \throws Error as register_points()
+Registration motion_onto(const MeasurableMesh& a,
+                         const MeasurableMesh& b,
+                         const NearestSurface& surface,
+                         bool with_scale);
+
+/// Takes over how long a unit is from a frame, one unit of which has grown into `growth` of those
+/// of `to`. Both may be one.
+void take_scale(Frame& to, const Frame& from, double growth);
+
 /// How much of both surfaces lies within a distance of the other.
 struct SurfaceAgreement {
   double threshold = 0;     ///< [internal units]

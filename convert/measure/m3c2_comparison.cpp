@@ -192,15 +192,6 @@ std::string variance_source(const std::vector<M3c2Place>& places,
       " to either side: are both in the same place and unit? --cylinder-depth reaches farther");
 }
 
-std::vector<double> known_detections(const M3c2Comparison& found) {
-  std::vector<double> out;
-  for (const M3c2Place& place : found.places) {
-    if (std::isfinite(place.detection)) out.push_back(place.detection);
-  }
-  std::sort(out.begin(), out.end());
-  return out;
-}
-
 double at_share(const std::vector<double>& sorted, double share) {
   if (sorted.empty()) return std::nan("");
   return sorted[static_cast<size_t>(share * static_cast<double>(sorted.size() - 1))];
@@ -276,6 +267,15 @@ M3c2Comparison compare_m3c2(const M3c2Request& request,
   out.comparison.half_range = range_of(out.comparison.by_area);
   out.comparison.change_rule = "beyond the level of detection (95 %)";
   out.comparison.no_change_rule = "no cylinder holds four points of either side";
+  return out;
+}
+
+std::vector<double> known_detections(const M3c2Comparison& found) {
+  std::vector<double> out;
+  for (const M3c2Place& place : found.places) {
+    if (std::isfinite(place.detection)) out.push_back(place.detection);
+  }
+  std::sort(out.begin(), out.end());
   return out;
 }
 

@@ -54,6 +54,9 @@ M3c2Comparison compare_m3c2(const M3c2Request& request,
                             const MeasurableMesh& a,
                             const MeasurableMesh& b);
 
+/// The levels of detection of all places that have one, ascending [internal units].
+std::vector<double> known_detections(const M3c2Comparison& found);
+
 /// comparison_json() and "m3c2": {"normal_scale", "cylinder", "cylinder_depth",
 /// "registration_error", "scale_sigma", "sign_known", "variance_a": "sigma", "roughness" or
 /// "mixed", "variance_b", "places", "with_distance": share, "with_detection": share, "split":

@@ -26,4 +26,19 @@ std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Mo
   return out;
 }
 
+Scene scene_of_cameras(const Model& model,
+                       const std::vector<Camera>& cameras,
+                       const std::function<std::string(size_t)>& name_of) {
+  Scene out;
+  out.kind = model.scene.kind;
+  out.folder = model.scene.folder;
+  out.frame = model.scene.frame;
+  for (size_t k = 0; k < cameras.size(); ++k) {
+    View& view = out.views.emplace_back();
+    view.name = name_of(k);
+    view.camera = cameras[k];
+  }
+  return out;
+}
+
 }  // namespace cgs

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "libcgs/core/camera.h"
@@ -17,5 +19,11 @@ std::vector<View> camera_views_from(const std::filesystem::path& file, const Mod
 /// Its cameras alone.
 /// \throws BadInput as read_cameras_json()
 std::vector<Camera> camera_path_from(const std::filesystem::path& file, const Model& model);
+
+/// Cameras in the frame of a model, as write_cameras_json() takes them.
+/// \param name_of  of each, by its place
+Scene scene_of_cameras(const Model& model,
+                       const std::vector<Camera>& cameras,
+                       const std::function<std::string(size_t)>& name_of);
 
 }  // namespace cgs

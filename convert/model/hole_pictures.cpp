@@ -20,6 +20,7 @@
 #include "io/images/png.h"
 #include "io/scenes/cameras_json.h"
 #include "libcgs/core/error.h"
+#include "libcgs/priors/mask_operations.h"
 #include "libcgs/reconstruct/hole_views.h"
 #include "libcgs/render/hidden_depth.h"
 #include "libcgs/render/picture.h"
@@ -43,21 +44,6 @@ constexpr const char* kReadMe =
     "as they are do not count. Then: cgs fill MODEL THIS_FOLDER -o FILLED_MODEL, and look at\n"
     "FILLED_MODEL with cgs render. All that you paint is tagged as synthetic and measured by "
     "nobody.\n";
-
-// Cameras by the names of their pictures, in the frame of the model.
-Scene scene_of_holes(const Model& model, const std::vector<Camera>& cameras) {
-  Scene out;
-  out.kind = model.scene.kind;
-  out.folder = model.scene.folder;
-  out.frame = model.scene.frame;
-  for (const Camera& camera : cameras) {
-    View view;
-    view.name = "hole_" + std::to_string(out.views.size() + 1);
-    view.camera = camera;
-    out.views.push_back(view);
-  }
-  return out;
-}
 
 ExrImage depth_exr(const RenderBuffers& buffers, const MaskMap& holes, const Frame& frame) {
   const DepthMap hidden = hidden_depth(buffers, holes);
@@ -105,25 +91,6 @@ int difference(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
   return static_cast<int>(out);
 }
 
-// A mask with all pixels that lie near set ones, in a square.
-MaskMap widened(const MaskMap& mask, int by) {
-  MaskMap rows = mask;
-  MaskMap out = mask;
-  const auto spread = [&](const MaskMap& from, MaskMap& to, int dx, int dy) {
-    for (int y = 0; y < mask.height; ++y) {
-      for (int x = 0; x < mask.width; ++x) {
-        for (int k = -by; k <= by && to(x, y) == 0; ++k) {
-          if (from.contains(x + k * dx, y + k * dy)) to(x, y) = from(x + k * dx, y + k * dy);
-        }
-      }
-    }
-  };
-  spread(mask, rows, 1, 0);
-  out = rows;
-  spread(rows, out, 0, 1);
-  return out;
-}
-
 /// How much of what is seen a picture may change, by its format.
 struct Tolerance {
   int difference = 1;  ///< Of 255.
@@ -141,7 +108,7 @@ void check_seen(const std::filesystem::path& path,
                 const ColorImage& shown,
                 const MaskMap& holes) {
   const Tolerance may = lower_extension(path) == ".png" ? Tolerance{} : Tolerance{16, 0.01, 16};
-  const MaskMap left_out = may.margin > 0 ? widened(holes, may.margin) : holes;
+  const MaskMap left_out = may.margin > 0 ? dilated(holes, may.margin) : holes;
   size_t changed = 0;
   size_t compared = 0;
   for (size_t i = 0; i < shown.data.size(); ++i) {
@@ -228,7 +195,8 @@ HolePictures write_hole_pictures(const Model& model,
   make_output_folder(folder);
   const std::vector<SupportView> inputs = support_views(model);
   const ModelPictures pictures(model, {.fill = fill});
-  const Scene scene = scene_of_holes(model, chosen.cameras);
+  const Scene scene = scene_of_cameras(
+      model, chosen.cameras, [](size_t k) { return "hole_" + std::to_string(k + 1); });
   write_cameras_json(cameras, scene);
   HolePictures out{{}, chosen.candidates, chosen.covered};
   // Cameras as they are read again, so that what is painted is compared with the same bits.

@@ -61,6 +61,13 @@ ColorImage normal_picture(const NormalMap& normals, const Eigen::Isometry3d& cam
   return out;
 }
 
+MaskMap intersection(const MaskMap& a, const MaskMap& b) {
+  if (b.empty()) return a;
+  MaskMap out = a;
+  for (size_t i = 0; i < out.data.size(); ++i) out.data[i] = a.data[i] & b.data[i];
+  return out;
+}
+
 MaskMap hole_mask(const RenderBuffers& buffers) {
   MaskMap mask(buffers.hole.width, buffers.hole.height, 0);
   for (size_t i = 0; i < mask.data.size(); ++i)

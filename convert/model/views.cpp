@@ -9,8 +9,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/camera_path_file.h"
 #include "convert/model/pictures.h"
-#include "convert/text/frame_json.h"
 #include "io/bytes/atomic_file.h"
 #include "io/bytes/scene_path.h"
 #include "io/images/png.h"
@@ -19,25 +19,14 @@
 #include "io/scenes/resample.h"
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
-#include "libcgs/core/exposure.h"
 #include "libcgs/priors/transients.h"
 #include "libcgs/priors/water.h"
-#include "libcgs/train/flip.h"
-#include "libcgs/train/image_metrics.h"
 
 namespace cgs {
 
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-// What a view was to the model; empty where no view is an input, as of splats of other programs.
-std::string role_of(const Scene& scene, int index) {
-  return scene.input.empty() ? std::string() : view_role(scene, index);
-}
-
-// Without the depth that input views saw, every pixel would look like a hole.
-bool knows_holes(const Model& model) { return !model.priors.empty(); }
 
 // Of the pixels that may be looked at; all may if there is no mask.
 std::optional<HoleShares> hole_shares(const Model& model,
@@ -67,8 +56,6 @@ std::optional<HoleShares> hole_shares(const Model& model,
   return out;
 }
 
-Json role_to_json(const std::string& role) { return role.empty() ? Json() : Json(role); }
-
 Json shares_to_json(const RenderedPicture& picture) {
   const std::optional<HoleShares>& shares = picture.holes;
   if (!shares) return {{"hole_fraction", nullptr}};
@@ -80,13 +67,6 @@ Json shares_to_json(const RenderedPicture& picture) {
               {"sky_fraction", shares->sky}};
   if (shares->masked > 0) out["masked_fraction"] = shares->masked;
   if (picture.painted) out["synthetic_fraction"] = *picture.painted;
-  return out;
-}
-
-MaskMap intersection(const MaskMap& a, const MaskMap& b) {
-  if (b.empty()) return a;
-  MaskMap out = a;
-  for (size_t i = 0; i < out.data.size(); ++i) out.data[i] = a.data[i] & b.data[i];
   return out;
 }
 
@@ -112,24 +92,29 @@ ViewRasters view_rasters(const RenderBuffers& buffers, const Camera& camera) {
   return rasters;
 }
 
+// What is known of the depth of a view; nothing where it is no input.
+const ViewPriors* priors_of(const Model& model, int view) {
+  const std::vector<int>& input = model.scene.input;
+  const auto k = static_cast<size_t>(std::find(input.begin(), input.end(), view) - input.begin());
+  return k < model.priors.size() ? &model.priors[k] : nullptr;
+}
+
 // 1 where an input view shows what the others contradict; empty where it shows none, and for other
 // views.
 MaskMap transient_pixels(const Model& model, int view) {
-  const std::vector<int>& input = model.scene.input;
-  const auto k = static_cast<size_t>(std::find(input.begin(), input.end(), view) - input.begin());
-  return k < model.priors.size() ? transient_mask(model.priors[k]) : MaskMap();
+  const ViewPriors* const priors = priors_of(model, view);
+  return priors != nullptr ? transient_mask(*priors) : MaskMap();
 }
 
 // The photograph of an input view without the water; empty where there is none, for other views,
 // and where the photograph is gone.
 ColorImage restored_photograph(const Model& model, int view) {
-  const std::vector<int>& input = model.scene.input;
-  const auto k = static_cast<size_t>(std::find(input.begin(), input.end(), view) - input.begin());
+  const ViewPriors* const priors = priors_of(model, view);
   const std::filesystem::path& photograph = model.scene.views[static_cast<size_t>(view)].image_path;
-  if (!model.scene.water || k >= model.priors.size() || !is_present(photograph)) return {};
+  if (!model.scene.water || priors == nullptr || !is_present(photograph)) return {};
   std::vector<std::string> told_before;
   View loaded = loaded_view(model.scene, view, /*with_image=*/true, told_before);
-  take_out_water(model.priors[k], *model.scene.water, loaded);
+  take_out_water(*priors, *model.scene.water, loaded);
   return loaded.image;
 }
 
@@ -201,21 +186,6 @@ void remove_frames(const std::filesystem::path& folder) {
   }
 }
 
-// Where the frames were taken from, in the frame of the model.
-Scene scene_of_path(const Model& model, const std::vector<Camera>& path) {
-  Scene out;
-  out.kind = model.scene.kind;
-  out.folder = model.scene.folder;
-  out.frame = model.scene.frame;
-  for (size_t k = 0; k < path.size(); ++k) {
-    View view;
-    view.name = frame_name(k);
-    view.camera = path[k];
-    out.views.push_back(view);
-  }
-  return out;
-}
-
 // Small enough for a sheet of them to fit a screen.
 ColorImage thumbnail(ColorImage picture) {
   constexpr int kWidest = 320;
@@ -235,155 +205,13 @@ ColorImage with_tints(const PaintedPicture& shown, MaskMap holes) {
   return shown.painted.empty() ? out : tinted(std::move(out), shown.painted, kPaintedTint);
 }
 
-// With black where nothing may be compared: windows beside it reach there.
-ColorImage blackened(ColorImage image, const MaskMap& valid) {
-  for (size_t i = 0; i < valid.data.size(); ++i) {
-    if (valid.data[i] == 0) image.data[i] = Eigen::Vector3f::Zero();
-  }
-  return image;
-}
-
-double share_of(const MaskMap& part, const MaskMap& whole) {
-  const auto count = [](const MaskMap& pixels) {
-    return static_cast<double>(std::count(pixels.data.begin(), pixels.data.end(), 1));
-  };
-  return count(part) / count(whole);
-}
-
-EvaluatedView evaluate_view(const Model& model,
-                            const std::vector<SupportView>& inputs,
-                            const ModelPictures& pictures,
-                            int index) {
-  View view = model.scene.views[static_cast<size_t>(index)];
-  const RenderBuffers buffers = render_camera(model, inputs, view.camera);
-  const ColorImage shown = blackened(pictures.of(buffers, view.camera), view.valid);
-  MaskMap seen = hole_mask(buffers);
-  for (uint8_t& value : seen.data) value = 1 - value;
-  const MaskMap everywhere(seen.width, seen.height, 1);
-  const MaskMap all = intersection(everywhere, view.valid);
-  const MaskMap use = intersection(seen, view.valid);
-  EvaluatedView out;
-  out.name = view.name;
-  if (!model.scene.input.empty()) out.role = view_role(model.scene, index);
-  if (is_exposed_otherwise(model, index)) {
-    view.exposure = matching_gain(view.image, shown, use);
-    apply_exposure(view);
-    out.exposure = view.exposure;
-  }
-  const ColorImage photograph = blackened(view.image, view.valid);
-  // The coarse scales of MS-SSIM mix what is masked with the rest, and count it as equal; the rim
-  // that a lens leaves does not matter.
-  constexpr double kNearlyWhole = 0.95;
-  const auto has_any = [](const MaskMap& pixels) {
-    return std::find(pixels.data.begin(), pixels.data.end(), 1) != pixels.data.end();
-  };
-  if (has_any(all)) {
-    out.figures.psnr = psnr(shown, photograph, &all);
-    out.figures.ssim = ssim(shown, photograph, &all);
-    out.figures.flip = flip(shown, photograph, &all);
-  }
-  if (share_of(all, everywhere) >= kNearlyWhole) out.figures.ms_ssim = ms_ssim(shown, photograph);
-  if (!knows_holes(model)) return out;
-  if (has_any(use)) {
-    out.figures.psnr_seen = psnr(shown, photograph, &use);
-    out.figures.ssim_seen = ssim(shown, photograph, &use);
-  }
-  if (has_any(all)) out.figures.hole_fraction = 1 - share_of(use, all);
-  return out;
-}
-
-// By their names in reports.
-constexpr std::array<std::pair<const char*, std::optional<double> ViewFigures::*>, 7> kFigures = {
-    {{"psnr", &ViewFigures::psnr},
-     {"ssim", &ViewFigures::ssim},
-     {"psnr_seen", &ViewFigures::psnr_seen},
-     {"ssim_seen", &ViewFigures::ssim_seen},
-     {"hole_fraction", &ViewFigures::hole_fraction},
-     {"ms_ssim", &ViewFigures::ms_ssim},
-     {"flip", &ViewFigures::flip}}};
-
-ViewFigures mean_figures(const std::vector<const EvaluatedView*>& views) {
-  ViewFigures mean;
-  for (const auto& [name, figure] : kFigures) {
-    double sum = 0;
-    size_t count = 0;
-    for (const EvaluatedView* view : views) {
-      if (!(view->figures.*figure)) continue;
-      sum += *(view->figures.*figure);
-      ++count;
-    }
-    if (count > 0) mean.*figure = sum / static_cast<double>(count);
-  }
-  return mean;
-}
-
-// Of those views that say how well the model predicts, if there are any: it was trained on inputs.
-ViewFigures mean_of(const std::vector<EvaluatedView>& views, std::vector<std::string>& warnings) {
-  const auto is_input = [](const EvaluatedView& view) { return view.role == "input"; };
-  const bool are_all_inputs = std::all_of(views.begin(), views.end(), is_input);
-  if (are_all_inputs) {
-    warnings.emplace_back(
-        "only input views are evaluated: the model was trained on them, so that the figures say "
-        "how well it fits, not how well it predicts");
-  }
-  std::vector<const EvaluatedView*> counted;
-  for (const EvaluatedView& view : views) {
-    if (!is_input(view) || are_all_inputs) counted.push_back(&view);
-  }
-  return mean_figures(counted);
-}
-
-std::optional<ViewFigures> mean_of_every_eighth(const std::vector<EvaluatedView>& views,
-                                                const Scene& scene) {
-  if (scene.kind != SceneKind::Llff) return std::nullopt;
-  std::vector<const EvaluatedView*> counted;
-  for (size_t i = 0; i < scene.views.size(); i += 8) {
-    const auto found = std::find_if(views.begin(), views.end(), [&](const EvaluatedView& view) {
-      return view.name == scene.views[i].name && view.role != "input";
-    });
-    if (found == views.end()) return std::nullopt;
-    counted.push_back(&*found);
-  }
-  return mean_figures(counted);
-}
-
-// Those that have a photograph. \throws BadInput if none has
-std::vector<int> with_photograph(Scene& scene, const std::vector<int>& views) {
-  std::vector<int> out;
-  for (const int i : views) {
-    const View& view = scene.views[static_cast<size_t>(i)];
-    if (view.image_path.empty()) {
-      scene.warnings.push_back("view " + printable(view.name) +
-                               " has no photograph and is not evaluated");
-    } else {
-      out.push_back(i);
-    }
-  }
-  if (out.empty() && !is_folder(scene.folder)) {
-    throw BadInput(Defect::Open,
-                   scene.folder,
-                   "the folder of the photographs is gone; --scene says where they are");
-  }
-  if (out.empty()) {
-    throw BadInput(Defect::Empty, scene.folder, "no view to evaluate has a photograph");
-  }
-  return out;
-}
-
 }  // namespace
 
-// The exposure of the model is that of its input views. Where these had to be matched, the other
-// photographs of the scene were exposed by whatever they show.
-bool is_exposed_otherwise(const Model& model, int view) {
-  const Scene& scene = model.scene;
-  const std::string role = view_role(scene, view);
-  return role != "input" && std::any_of(scene.input.begin(), scene.input.end(), [&](int i) {
-           const View& input = scene.views[static_cast<size_t>(i)];
-           PhotoResponse response = input.response;
-           response.is_grey = false;  // without colours, but exposed as the others
-           return input.exposure != Eigen::Vector3f::Ones() || response != PhotoResponse{};
-         });
+std::string role_of(const Scene& scene, int view) {
+  return scene.input.empty() ? std::string() : view_role(scene, view);
 }
+
+Json role_to_json(const std::string& role) { return role.empty() ? Json() : Json(role); }
 
 std::string view_role(const Scene& scene, int view) {
   const auto is_in = [&](const std::vector<int>& views) {
@@ -431,7 +259,7 @@ std::vector<RenderedPicture> write_path(const Model& model,
   const std::vector<SupportView> inputs = support_views(model);
   const ModelPictures pictures(model, shown);
   remove_frames(folder);
-  write_cameras_json(folder / "cameras.json", scene_of_path(model, path));
+  write_cameras_json(folder / "cameras.json", scene_of_cameras(model, path, frame_name));
   constexpr size_t kOnSheet = 12;
   const auto place_on_sheet = [&](size_t k) { return k * kOnSheet / path.size(); };
   std::vector<ColorImage> sheet;
@@ -473,55 +301,6 @@ Json frames_to_json(const std::vector<RenderedPicture>& frames) {
     out.push_back({{"name", frame.name}});
     out.back().update(shares_to_json(frame));
   }
-  return out;
-}
-
-Json figures_to_json(const ViewFigures& figures) {
-  Json out;
-  for (const auto& [name, figure] : kFigures) {
-    out[name] = figures.*figure ? Json(*(figures.*figure)) : Json();
-  }
-  return out;
-}
-
-Json evaluation_to_json(const Evaluation& evaluation) {
-  Json rows = Json::array();
-  for (const EvaluatedView& view : evaluation.views) {
-    Json row = {{"name", view.name}, {"role", role_to_json(view.role)}};
-    row.update(figures_to_json(view.figures));
-    row["exposure"] = view.exposure ? vector_to_json(view.exposure->cast<double>()) : Json();
-    rows.push_back(row);
-  }
-  const auto& eighth = evaluation.every_eighth;
-  Json out = {{"mean", figures_to_json(evaluation.mean)},
-              {"every_eighth", eighth ? figures_to_json(*eighth) : Json()},
-              {"views", rows}};
-  if (evaluation.through_water) out["through_water"] = true;
-  return out;
-}
-
-Evaluation evaluate_views(Model& model,
-                          const std::vector<int>& views,
-                          const Progress& progress,
-                          HoleFill fill) {
-  std::vector<std::string>& warnings = model.scene.warnings;
-  if (const std::string text = unknown_holes_warning(model); !text.empty()) {
-    warnings.push_back(text);
-  }
-  const std::vector<int> shown = with_photograph(model.scene, views);
-  const std::vector<SupportView> inputs = support_views(model);
-  const ModelPictures pictures(model, {fill, /*through_water=*/true});
-  Evaluation out;
-  out.through_water = model.scene.water.has_value();
-  for (size_t k = 0; k < shown.size(); ++k) {
-    report(progress, static_cast<double>(k) / static_cast<double>(shown.size()));
-    load_images(model.scene, {shown[k]});
-    out.views.push_back(evaluate_view(model, inputs, pictures, shown[k]));
-    model.scene.views[static_cast<size_t>(shown[k])].image = {};  // one photograph at a time
-  }
-  out.mean = mean_of(out.views, warnings);
-  out.every_eighth = mean_of_every_eighth(out.views, model.scene);
-  report(progress, 1);
   return out;
 }
 

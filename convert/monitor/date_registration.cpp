@@ -104,7 +104,7 @@ PlaceFit fit_places(const std::vector<PlacePair>& pairs, bool with_scale) {
   return out;
 }
 
-std::vector<PlacePair> shared_places(Model& earlier, Model& later, const Progress& progress) {
+std::vector<PlacePair> places_of_both(Model& earlier, Model& later, const Progress& progress) {
   constexpr double kTolerance = 0.01;  // of the depth
   const std::vector<SearchedPhoto> before = searched(earlier, part_of(progress, 0, 0.2));
   const std::vector<SearchedPhoto> after = searched(later, part_of(progress, 0.2, 0.4));

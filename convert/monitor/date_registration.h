@@ -36,6 +36,6 @@ PlaceFit fit_places(const std::vector<PlacePair>& pairs, bool with_scale);
 /// each in the world coordinates of its model; the tolerance is a hundredth of the depth in
 /// `earlier`. Loads photographs.
 /// \throws BadInput for photographs that cannot be read
-std::vector<PlacePair> shared_places(Model& earlier, Model& later, const Progress& progress);
+std::vector<PlacePair> places_of_both(Model& earlier, Model& later, const Progress& progress);
 
 }  // namespace cgs

@@ -43,7 +43,7 @@ Registration after(const Registration& second, const Registration& first) {
 void lay_by_photographs(TwoDates& dates, bool with_scale, Terminal& terminal) {
   constexpr size_t kFewest = 12;
   std::vector<PlacePair> pairs =
-      shared_places(dates.earlier, dates.later, terminal.begin("places that both dates show"));
+      places_of_both(dates.earlier, dates.later, terminal.begin("places that both dates show"));
   const Frame& frame = dates.earlier_surface.frame;
   for (PlacePair& pair : pairs) {
     pair.from = dates.from_later(pair.from);
@@ -66,15 +66,10 @@ void lay_by_photographs(TwoDates& dates, bool with_scale, Terminal& terminal) {
 }
 
 void lay_by_surfaces(TwoDates& dates, bool with_scale, Terminal& terminal) {
-  constexpr size_t kPoints = 20'000;
   terminal.begin("laying the surfaces onto each other");
-  const ComparedPoints points = points_by_area(dates.later_surface, kPoints);
-  std::vector<Eigen::Vector3d> seen;
-  for (size_t i = 0; i < points.places.size(); ++i) {
-    if (points.observed[i] != 0) seen.push_back(points.places[i]);
-  }
   const NearestSurface surface(dates.earlier_surface);
-  const Registration refined = register_points(seen, dates.earlier_surface, surface, with_scale);
+  const Registration refined =
+      motion_onto(dates.later_surface, dates.earlier_surface, surface, with_scale);
   dates.motion = after(refined, dates.motion);
   dates.later_surface = moved(dates.later_surface, refined);
   terminal.end(std::to_string(std::lround(100 * refined.share)) + " % take part");
@@ -84,9 +79,7 @@ void lay_by_surfaces(TwoDates& dates, bool with_scale, Terminal& terminal) {
 void share_scale(TwoDates& dates, const Frame& later) {
   Frame& frame = dates.earlier_surface.frame;
   if (!frame.has_metric_scale() && later.has_metric_scale()) {
-    frame.metres_per_unit = later.metres_per_unit / dates.motion.scale;
-    frame.metres_sigma = later.metres_sigma / dates.motion.scale;
-    frame.scale_source = later.scale_source;
+    take_scale(frame, later, dates.motion.scale);
   }
   dates.later_surface.frame = frame;
 }
@@ -110,11 +103,7 @@ Json side_json(const Changes& changes, const FigureUnit& unit, const Frame& fram
           patch.volume ? Json(with_scale(*patch.volume, patch.volume_sigma)) : Json()},
          {"center", {center.x(), center.y(), center.z()}}});
   }
-  std::vector<double> detections;
-  for (const M3c2Place& place : changes.found.places) {
-    if (place.detection > 0) detections.push_back(place.detection);
-  }
-  std::sort(detections.begin(), detections.end());
+  const std::vector<double> detections = known_detections(changes.found);
   const double detection = detections.empty() ? 0 : detections[detections.size() / 2];
   return {{"area", area * total.area},
           {"volume", volume * total.volume},

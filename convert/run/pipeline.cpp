@@ -11,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/evaluation.h"
 #include "convert/model/memory_plan.h"
 #include "convert/model/model.h"
 #include "convert/model/model_training.h"

@@ -7,8 +7,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/evaluation.h"
 #include "convert/model/model.h"
-#include "convert/model/views.h"
 #include "io/splats/spz.h"
 #include "libcgs/core/progress.h"
 #include "libcgs/splats/splat_thinning.h"

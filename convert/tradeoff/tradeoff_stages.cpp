@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/evaluation.h"
 #include "convert/model/model_training.h"
 #include "convert/model/views.h"
 #include "convert/run/run_stages.h"

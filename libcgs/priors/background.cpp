@@ -26,13 +26,6 @@ constexpr double kMostLost = 0.25;     // of what was measured, beyond all silho
 constexpr int kObjectRim = 2;          // [pixels]
 constexpr int kPointsAlong = 60;       // of the points along each side of a picture
 
-MaskMap dilated(MaskMap mask, int reach) {
-  const int side = 2 * reach + 1;
-  const cv::Mat element = cv::getStructuringElement(cv::MORPH_RECT, {side, side});
-  cv::dilate(mask_matrix(mask), mask_matrix(mask), element);
-  return mask;
-}
-
 double share_set(const MaskMap& mask) {
   return double(std::count(mask.data.begin(), mask.data.end(), uint8_t{1})) /
          double(mask.data.size());

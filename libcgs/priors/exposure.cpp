@@ -6,21 +6,11 @@
 #include <utility>
 
 #include "libcgs/core/error.h"
+#include "libcgs/priors/shown_pixel.h"
 
 namespace cgs {
 
 namespace {
-
-/// Whether a view measured depth where it shows a point, and that of the point.
-bool confirms(const Camera& camera, const ViewPriors& priors, const Eigen::Vector3d& point) {
-  constexpr double kSame = 0.01;  // of the depth
-  const Eigen::Vector3d uvz = camera.project(point);
-  if (!camera.sees(uvz)) return false;
-  const int x = static_cast<int>(uvz.x());
-  const int y = static_cast<int>(uvz.y());
-  return priors.origin(x, y) == DepthOrigin::Measured &&
-         std::abs(priors.depth(x, y) - uvz.z()) <= kSame * uvz.z();
-}
 
 std::vector<Eigen::Vector3d> shared_surface(const View& a,
                                             const ViewPriors& priors_of_a,
@@ -34,7 +24,7 @@ std::vector<Eigen::Vector3d> shared_surface(const View& a,
     for (int x = 0; x < a.camera.width; x += step) {
       if (priors_of_a.origin(x, y) != DepthOrigin::Measured) continue;
       const Eigen::Vector3d point = a.camera.unproject(x + 0.5, y + 0.5, priors_of_a.depth(x, y));
-      if (confirms(b.camera, priors_of_b, point)) out.push_back(point);
+      if (confirmed_pixel(b.camera, priors_of_b, point)) out.push_back(point);
     }
   }
   return out;

@@ -10,6 +10,7 @@
 
 #include "libcgs/core/photo_response.h"
 #include "libcgs/core/srgb.h"
+#include "libcgs/priors/shown_pixel.h"
 
 namespace cgs {
 
@@ -57,14 +58,9 @@ Eigen::Vector3f light_of_others(
   for (size_t j = 0; j < priors.size(); ++j) {
     const View& other = photograph_of(scene, j);
     if (other.response.is_grey) continue;
-    const Eigen::Vector3d uvz = other.camera.project(point);
-    if (!other.camera.sees(uvz)) continue;
-    const int u = static_cast<int>(uvz.x());
-    const int v = static_cast<int>(uvz.y());
-    const bool is_valid = other.valid.empty() || other.valid(u, v) != 0;
-    const double depth{priors[j].depth(u, v)};
-    if (!is_valid || !(std::abs(depth - uvz.z()) <= kSame * uvz.z())) continue;
-    sum += other.image(u, v).unaryExpr(&linear_from_srgb);
+    const auto at = shown_pixel(other.camera, priors[j].depth, point, kSame);
+    if (!at || (!other.valid.empty() && other.valid(at->x(), at->y()) == 0)) continue;
+    sum += other.image(at->x(), at->y()).unaryExpr(&linear_from_srgb);
     ++count;
   }
   return count > 0 ? Eigen::Vector3f(sum / static_cast<float>(count)) : sum;

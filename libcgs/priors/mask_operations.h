@@ -2,6 +2,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "libcgs/core/raster.h"
 
@@ -13,6 +14,14 @@ inline cv::Mat1b mask_matrix(MaskMap& mask) { return {mask.height, mask.width, m
 /// 1 where it is 0, and 0 elsewhere.
 inline MaskMap inverted(MaskMap mask) {
   for (uint8_t& value : mask.data) value = value == 0 ? 1 : 0;
+  return mask;
+}
+
+/// All pixels that lie near set ones: up to `reach` to each side.
+inline MaskMap dilated(MaskMap mask, int reach) {
+  const int side = 2 * reach + 1;
+  const cv::Mat element = cv::getStructuringElement(cv::MORPH_RECT, {side, side});
+  cv::dilate(mask_matrix(mask), mask_matrix(mask), element);
   return mask;
 }
 

@@ -10,7 +10,9 @@
 
 #include "libcgs/core/srgb.h"
 #include "libcgs/priors/grey_photographs.h"
+#include "libcgs/priors/mask_operations.h"
 #include "libcgs/priors/neighbours.h"
+#include "libcgs/priors/shown_pixel.h"
 
 namespace cgs {
 
@@ -29,9 +31,10 @@ class Mending {
     if (has_grey_photographs(scene)) in_luminance_ = in_luminance(scene);
   }
 
-  MaskMap contradicted(size_t k) const {
+  std::vector<size_t> others_of(size_t k) const { return neighbours(scene_, k, kMostCompared); }
+
+  MaskMap contradicted(size_t k, const std::vector<size_t>& others) const {
     const Camera& camera = view(k).camera;
-    const std::vector<size_t> others = neighbours(scene_, k, kMostCompared);
     MaskMap out(camera.width, camera.height, 0);
     if (others.size() < 2) return out;
     tbb::parallel_for(0, camera.height, [&](int y) {
@@ -43,10 +46,13 @@ class Mending {
   }
 
   // Mean colour of the others where they show a pixel; nothing where they tell none.
-  std::optional<Eigen::Vector3f> color_of_others(size_t k, int x, int y) const {
+  std::optional<Eigen::Vector3f> color_of_others(size_t k,
+                                                 const std::vector<size_t>& others,
+                                                 int x,
+                                                 int y) const {
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     int count = 0;
-    for (const SeenThere& seen : places(k, neighbours(scene_, k, kMostCompared), x, y)) {
+    for (const SeenThere& seen : places(k, others, x, y)) {
       if (view(seen.view).response.is_grey && !view(k).response.is_grey) continue;
       sum += view(seen.view).image(seen.x, seen.y).unaryExpr(&linear_from_srgb);
       ++count;
@@ -74,13 +80,8 @@ class Mending {
     if (!std::isfinite(depth) || shows_no_surface(priors_[k].origin(x, y))) return out;
     const Eigen::Vector3d point = view(k).camera.unproject(x + 0.5, y + 0.5, depth);
     for (const size_t j : others) {
-      const Eigen::Vector3d uvz = view(j).camera.project(point);
-      if (!view(j).camera.sees(uvz)) continue;
-      const int u = static_cast<int>(uvz.x());
-      const int v = static_cast<int>(uvz.y());
-      const double there{priors_[j].depth(u, v)};
-      const bool is_same = std::abs(there - uvz.z()) <= kSame * uvz.z();  // not where it is NaN
-      if (is_same && is_usable(view(j), u, v)) out.push_back({j, u, v});
+      const auto at = shown_pixel(view(j).camera, priors_[j].depth, point, kSame);
+      if (at && is_usable(view(j), at->x(), at->y())) out.push_back({j, at->x(), at->y()});
     }
     return out;
   }
@@ -111,20 +112,6 @@ class Mending {
   std::optional<Scene> in_luminance_;  // where colours cannot be compared
 };
 
-MaskMap with_neighbours(const MaskMap& mask) {
-  MaskMap out = mask;
-  for (int y = 0; y < mask.height; ++y) {
-    for (int x = 0; x < mask.width; ++x) {
-      for (int k = 0; k < 9 && out(x, y) == 0; ++k) {
-        const int u = x + k % 3 - 1;
-        const int v = y + k / 3 - 1;
-        if (mask.contains(u, v)) out(x, y) = mask(u, v);
-      }
-    }
-  }
-  return out;
-}
-
 }  // namespace
 
 std::vector<MaskMap> mend_scratches(Scene& scene, const std::vector<ViewPriors>& priors) {
@@ -132,13 +119,15 @@ std::vector<MaskMap> mend_scratches(Scene& scene, const std::vector<ViewPriors>&
   std::vector<MaskMap> out;
   std::vector<ColorImage> mended;
   for (size_t k = 0; k < priors.size(); ++k) {
-    out.push_back(with_neighbours(mending.contradicted(k)));
+    const std::vector<size_t> others = mending.others_of(k);
+    constexpr int kRim = 1;  // [pixels] where a scratch and the picture mix
+    out.push_back(dilated(mending.contradicted(k, others), kRim));
     const View& view = scene.views[static_cast<size_t>(scene.input[k])];
     mended.push_back(view.image);
     for (int y = 0; y < view.image.height; ++y) {
       for (int x = 0; x < view.image.width; ++x) {
         if (out[k](x, y) == 0) continue;
-        const auto color = mending.color_of_others(k, x, y);
+        const auto color = mending.color_of_others(k, others, x, y);
         if (color) mended[k](x, y) = *color;
         out[k](x, y) = color ? 1 : 0;
       }

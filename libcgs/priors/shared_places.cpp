@@ -3,26 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "libcgs/core/srgb.h"
+#include "libcgs/priors/shown_pixel.h"
 
 namespace cgs {
 
 namespace {
-
-// Where another view shows a point whose depth it measured alike; nothing elsewhere.
-std::optional<Eigen::Vector2i> confirmed_pixel(const View& view,
-                                               const ViewPriors& priors,
-                                               const Eigen::Vector3d& point) {
-  constexpr double kSame = 0.01;  // of the depth
-  const Eigen::Vector3d uvz = view.camera.project(point);
-  if (!view.camera.sees(uvz)) return std::nullopt;
-  const Eigen::Vector2i at(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
-  const bool is_same = priors.origin(at.x(), at.y()) == DepthOrigin::Measured &&
-                       std::abs(double{priors.depth(at.x(), at.y())} - uvz.z()) <= kSame * uvz.z();
-  return is_same ? std::optional(at) : std::nullopt;
-}
 
 ShownPlace place_at(const ColorImage& light, int x, int y) {
   return {light(x, y).cast<double>(), squared_radius(x + 0.5, y + 0.5, light.width, light.height)};
@@ -71,7 +58,7 @@ std::vector<SharedPlace> shared_places(const LitView& a, const LitView& b) {
       if (a.priors.origin(x, y) != DepthOrigin::Measured) continue;
       const Eigen::Vector3d point =
           camera.unproject(x + 0.5, y + 0.5, double{a.priors.depth(x, y)});
-      const auto there = confirmed_pixel(b.view, b.priors, point);
+      const auto there = confirmed_pixel(b.view.camera, b.priors, point);
       if (!there) continue;
       SharedPlace place{place_at(a.light, x, y), place_at(b.light, there->x(), there->y()), 0};
       place.coded = 0.5 * (coded_mean(place.a.light) + coded_mean(place.b.light));

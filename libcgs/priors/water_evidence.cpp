@@ -12,6 +12,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/core/srgb.h"
+#include "libcgs/core/thinned.h"
 #include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/pixel_matches.h"
 
@@ -174,16 +175,6 @@ std::vector<std::pair<double, Eigen::Vector3d>> lights_of(const PlacesOf& places
   return out;
 }
 
-// Enough of them, evenly.
-std::vector<WaterMatch> some_of(const std::vector<WaterMatch>& matches) {
-  constexpr size_t kMost = 60000;
-  const size_t step = (matches.size() + kMost - 1) / kMost;
-  if (step <= 1) return matches;
-  std::vector<WaterMatch> out;
-  for (size_t i = 0; i < matches.size(); i += step) out.push_back(matches[i]);
-  return out;
-}
-
 // The middle colour of what shows no surface, where it is a hundredth of the photographs or more.
 std::optional<Eigen::Vector3d> open_water(const Scene& scene,
                                           const std::vector<ViewPriors>& priors) {
@@ -232,7 +223,8 @@ WaterEvidence water_evidence(const Scene& scene, const std::vector<ViewPriors>& 
       out.matches.push_back(match);
     }
   }
-  out.matches = some_of(out.matches);
+  constexpr size_t kMostMatches = 60000;
+  out.matches = thinned(out.matches, kMostMatches);
   std::vector<std::pair<double, Eigen::Vector3d>> lights;
   for (const auto& of_view : of_views) lights.insert(lights.end(), of_view.begin(), of_view.end());
   out.darkest = darkest_of(std::move(lights));

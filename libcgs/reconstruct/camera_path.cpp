@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "libcgs/core/camera_between.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -93,12 +94,8 @@ Camera between(const Model& model, double turn) {
   const size_t k = std::min(static_cast<size_t>(place), last > 0 ? last - 1 : 0);
   const double part = place - double(k);
   Camera out = input_camera(model, 0);
-  const Eigen::Isometry3d& a = input_camera(model, k).world_from_cam;
-  const Eigen::Isometry3d& b = input_camera(model, std::min(k + 1, last)).world_from_cam;
-  const Eigen::Quaterniond from(a.linear());
-  out.world_from_cam.linear() =
-      from.slerp(part, Eigen::Quaterniond(b.linear())).normalized().toRotationMatrix();
-  out.world_from_cam.translation() = (1 - part) * a.translation() + part * b.translation();
+  const Camera& next = input_camera(model, std::min(k + 1, last));
+  out.world_from_cam = camera_between(input_camera(model, k), next, part).world_from_cam;
   return out;
 }
 

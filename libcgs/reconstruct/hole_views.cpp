@@ -11,6 +11,7 @@
 
 #include "libcgs/core/angle_between.h"
 #include "libcgs/core/error.h"
+#include "libcgs/core/thinned.h"
 #include "libcgs/reconstruct/camera_path.h"
 #include "libcgs/reconstruct/next_view.h"
 #include "libcgs/render/hidden_depth.h"
@@ -47,16 +48,6 @@ void add_cameras_beside(const Model& model, std::vector<Camera>& out) {
     }
     if (least <= kBeside) out.push_back(place.camera);
   }
-}
-
-// Evenly out of many, for a bounded time and memory.
-template <typename T>
-std::vector<T> thinned(const std::vector<T>& all, size_t most) {
-  const size_t step = (all.size() + most - 1) / most;
-  if (step <= 1) return all;
-  std::vector<T> out;
-  for (size_t i = 0; i < all.size(); i += step) out.push_back(all[i]);
-  return out;
 }
 
 std::vector<Camera> cameras_around(const Model& model) {

@@ -201,6 +201,7 @@ PaintedFill lift_painted(const Model& model,
                          const Progress& progress) {
   check_painted(model, views);
   const std::vector<SupportView> inputs = support_views(model);
+  const SyntheticSight sight(model);
   PaintedFill out;
   for (size_t k = 0; k < views.size(); ++k) {
     report(progress, double(k) / double(views.size()));
@@ -210,7 +211,7 @@ PaintedFill lift_painted(const Model& model,
     const size_t before = out.gaussians.size();
     append(out.gaussians, discs_of(painting, without_seams(painting)));
     told.lifted = out.gaussians.size() - before;
-    drop_visible(model, out.gaussians);
+    sight.drop_visible(out.gaussians);
   }
   // Those of an earlier view may only show once a later one is there.
   const std::vector<uint8_t>& tags = out.gaussians.synthetic;

@@ -75,27 +75,6 @@ bool touches(const MaskMap& mask,
   return false;
 }
 
-// 0 = a view shows too much of it.
-std::vector<uint8_t> hidden_ones(const Model& model,
-                                 const Gaussians& dark,
-                                 const std::vector<Raster<Hole>>& holes,
-                                 const Gaussians& fill,
-                                 double reach) {
-  Gaussians together = dark;
-  append(together, in_one_color(fill, 1));
-  std::vector<uint8_t> keep(fill.size(), 1);
-  for (size_t k = 0; k < holes.size(); ++k) {
-    const Camera& camera = input_camera(model, k);
-    const MaskMap showing = showing_pixels(rasterize(together, camera), holes[k]);
-    if (!has_any_set(showing)) continue;
-    tbb::parallel_for(size_t{0}, fill.size(), [&](size_t i) {
-      const float scale = fill.scale[i].maxCoeff();
-      if (touches(showing, camera, fill.position[i], scale, reach)) keep[i] = 0;
-    });
-  }
-  return keep;
-}
-
 }  // namespace
 
 float hidden_from_all(
@@ -114,16 +93,34 @@ float hidden_from_all(
   return std::numeric_limits<float>::quiet_NaN();
 }
 
-void drop_visible(const Model& model, Gaussians& fill) {
+SyntheticSight::SyntheticSight(const Model& model)
+    : model_(model), dark_(in_one_color(model.gaussians, 0)) {
   const std::vector<SupportView> inputs = support_views(model);
-  const Gaussians dark = in_one_color(model.gaussians, 0);
-  std::vector<Raster<Hole>> holes;
-  for (size_t k = 0; k < inputs.size(); ++k) {
-    holes.push_back(render_camera(model, inputs, inputs[k].camera).hole);
+  for (const SupportView& input : inputs) {
+    holes_.push_back(render_camera(model, inputs, input.camera).hole);
   }
+}
+
+std::vector<uint8_t> SyntheticSight::hidden_ones(const Gaussians& fill, double reach) const {
+  Gaussians together = dark_;
+  append(together, in_one_color(fill, 1));
+  std::vector<uint8_t> keep(fill.size(), 1);
+  for (size_t k = 0; k < holes_.size(); ++k) {
+    const Camera& camera = input_camera(model_, k);
+    const MaskMap showing = showing_pixels(rasterize(together, camera), holes_[k]);
+    if (!has_any_set(showing)) continue;
+    tbb::parallel_for(size_t{0}, fill.size(), [&](size_t i) {
+      const float scale = fill.scale[i].maxCoeff();
+      if (touches(showing, camera, fill.position[i], scale, reach)) keep[i] = 0;
+    });
+  }
+  return keep;
+}
+
+void SyntheticSight::drop_visible(Gaussians& fill) const {
   // First what is mostly drawn there; then all that may be, as far as alpha reaches 1/255.
   for (const double reach : {1.0, 3.5}) {
-    while (fill.size() > 0 && keep_only(fill, hidden_ones(model, dark, holes, fill, reach)) > 0) {
+    while (fill.size() > 0 && keep_only(fill, hidden_ones(fill, reach)) > 0) {
     }
   }
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "libcgs/core/camera.h"
@@ -20,9 +20,25 @@ namespace cgs {
 float hidden_from_all(
     const std::vector<SupportView>& inputs, const Camera& camera, int x, int y, float depth);
 
-/// Leaves out Gaussians of a fill that input views would show if they were drawn together with
-/// those of the model: over a sixteenth of a pixel, through Gaussians that are not quite opaque, or
-/// over 1/255 of one in a hole of an input view.
-void drop_visible(const Model& model, Gaussians& fill);
+/// What input views of a model show of a fill.
+class SyntheticSight {
+ public:
+  /// Draws the input views.
+  /// \param model  must outlive it
+  explicit SyntheticSight(const Model& model);
+
+  /// Leaves out Gaussians of a fill that input views would show if they were drawn together with
+  /// those of the model: over a sixteenth of a pixel, through Gaussians that are not quite opaque,
+  /// or over 1/255 of one in a hole of an input view.
+  void drop_visible(Gaussians& fill) const;
+
+ private:
+  // 0 = a view shows too much of it, looking for what is drawn within so many of its sigmas.
+  std::vector<uint8_t> hidden_ones(const Gaussians& fill, double reach) const;
+
+  const Model& model_;
+  Gaussians dark_;                   // those of the model, in black
+  std::vector<Raster<Hole>> holes_;  // of the input views
+};
 
 }  // namespace cgs

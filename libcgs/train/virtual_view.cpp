@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "libcgs/core/camera_between.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -52,15 +53,6 @@ std::optional<Eigen::Vector3f> color_of(const TrainingView& view, const Eigen::V
 }
 
 }  // namespace
-
-Camera camera_between(const Camera& first, const Camera& second, double share) {
-  Camera out = first;
-  const Eigen::Quaterniond from(first.world_from_cam.rotation());
-  const Eigen::Quaterniond to(second.world_from_cam.rotation());
-  out.world_from_cam.linear() = from.slerp(share, to).toRotationMatrix();
-  out.world_from_cam.translation() = (1 - share) * first.center() + share * second.center();
-  return out;
-}
 
 VirtualView virtual_view(const TrainingView& first,
                          const TrainingView& second,

@@ -16,11 +16,6 @@ struct VirtualView {
   MaskMap use;  ///< 1 where the colour is known.
 };
 
-/// The camera on the way from one to another: its centre on the line between theirs, its rotation
-/// on the shortest way, its size and lens those of the first.
-/// \param share  of the way, in [0, 1]
-Camera camera_between(const Camera& first, const Camera& second, double share);
-
 /// Warps two photographs into a camera between them.
 ///
 /// Depth there is that of the nearest of the corresponding points that fall into a pixel; at that

@@ -19,8 +19,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/evaluation.h"
 #include "convert/model/model_training.h"
-#include "convert/model/views.h"
 #include "io/bytes/atomic_file.h"
 #include "io/images/png.h"
 #include "io/scenes/scene_reader.h"

@@ -17,8 +17,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "convert/model/evaluation.h"
 #include "convert/model/model.h"
-#include "convert/model/views.h"
 #include "convert/run/web_splats.h"
 #include "io/bytes/atomic_file.h"
 #include "io/images/png.h"

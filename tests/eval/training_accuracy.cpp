@@ -20,8 +20,8 @@
 #include <exception>
 #include <string>
 
+#include "convert/model/evaluation.h"
 #include "convert/model/model.h"
-#include "convert/model/views.h"
 #include "io/images/exr.h"
 #include "io/scenes/scene_reader.h"
 #include "io/scenes/view_names.h"

@@ -29,21 +29,6 @@ TwoViews two_views() {
                         planted.priors[2])};
 }
 
-TEST(CameraBetween, IsEitherCameraAtTheEndsAndHalfwayBetweenThem) {
-  const TwoViews views = two_views();
-  const Camera& a = views.first.camera;
-  const Camera& b = views.second.camera;
-  EXPECT_TRUE(camera_between(a, b, 0).world_from_cam.isApprox(a.world_from_cam, 1e-12));
-  EXPECT_TRUE(camera_between(a, b, 1).world_from_cam.isApprox(b.world_from_cam, 1e-12));
-  const Camera half = camera_between(a, b, 0.5);
-  EXPECT_TRUE(half.center().isApprox(0.5 * (a.center() + b.center()), 1e-12));
-  const auto angle_to = [&](const Camera& other) {
-    return Eigen::Quaterniond(half.world_from_cam.rotation())
-        .angularDistance(Eigen::Quaterniond(other.world_from_cam.rotation()));
-  };
-  EXPECT_NEAR(angle_to(a), angle_to(b), 1e-9);
-}
-
 // Against a photograph from there, also where the box hides the wall from one of the two.
 TEST(VirtualView, ShowsWhatAPhotographFromThereWould) {
   const TwoViews views = two_views();
