@@ -34,6 +34,11 @@ void add_surface_options(CLI::App& command, RunArguments& args) {
                      args.request.compression_error,
                      "Largest error of the compressed mesh, e.g. 0.2mm; default: size / 16384");
   add_glb_option(command, args.request.glb_encoding);
+  command.add_option("--texture",
+                     args.request.texture,
+                     "Pictures of watertight.obj and asset.glb: photographs, as they were taken; "
+                     "atlas, one picture of what faces show of them; or atlas= with the size of "
+                     "its pixels, e.g. atlas=2mm; default photographs");
   add_local_origin_option(
       command, args.request.local_origin, "What is in web/, but for splats.spz,");
   add_estimated_option(command, args.estimated);

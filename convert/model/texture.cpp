@@ -18,6 +18,7 @@
 #include "libcgs/priors/water.h"
 #include "meshing/pictures/exposure.h"
 #include "meshing/pictures/face_views.h"
+#include "meshing/pictures/seam_levelling.h"
 
 namespace cgs {
 
@@ -155,7 +156,14 @@ PhotographedMesh texture_from_photographs(const Scene& scene,
   out.report.largest_stretch = largest_stretch(mesh, out.texture);
   out.report.seam_length = chosen.seam_length * scene.frame.scale;
   out.report.seam_length_unsmoothed = chosen.best_seam_length * scene.frame.scale;
+  const SeamLevelling levelled = level_seams(mesh, out.texture, texel_size(out.texture, mesh));
+  out.report.seam_step_unlevelled = levelled.step_before;
+  out.report.seam_step = levelled.step_after;
   return out;
+}
+
+bool TextureReport::shows_nothing() const {
+  return std::all_of(views.begin(), views.end(), [](const Shown& v) { return v.faces == 0; });
 }
 
 Json texture_to_json(const TextureReport& report, const Frame& frame) {
@@ -168,13 +176,22 @@ Json texture_to_json(const TextureReport& report, const Frame& frame) {
                      {"gain", {view.gain.x(), view.gain.y(), view.gain.z()}},
                      {"samples", view.samples}});
   }
-  return {{"views", views},
+  Json out = {{"views", views},
           {"faces_without_view", report.faces_without_view},
           {"area_without_view", report.area_without_view},
           {"largest_stretch", report.largest_stretch},
           {"units", frame.unit_name()},
           {"seam_length", report.seam_length},
-          {"seam_length_unsmoothed", report.seam_length_unsmoothed}};
+          {"seam_length_unsmoothed", report.seam_length_unsmoothed},
+          {"seam_step", report.seam_step},
+          {"seam_step_unlevelled", report.seam_step_unlevelled}};
+  if (report.atlas) {
+    out["atlas"] = {{"width", report.atlas->size.x()},
+                    {"height", report.atlas->size.y()},
+                    {"charts", report.atlas->charts},
+                    {"texel", report.atlas->texel}};
+  }
+  return out;
 }
 
 }  // namespace cgs

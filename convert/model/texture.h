@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
 #include <nlohmann/json_fwd.hpp>
 
 #include "libcgs/core/photo_texture.h"
@@ -31,6 +33,20 @@ struct TextureReport {
   double largest_stretch = 0;
   double seam_length = 0;
   double seam_length_unsmoothed = 0;
+  /// Mean difference of colour across seams before they were levelled, and left after it [of 1].
+  double seam_step_unlevelled = 0;
+  double seam_step = 0;
+
+  /// Of watertight.obj, where there is one.
+  struct Atlas {
+    Eigen::Vector2i size = Eigen::Vector2i::Zero();  ///< Width and height [pixels].
+    size_t charts = 0;
+    double texel = 0;  ///< Of the finest charts, on the surface.
+  };
+  std::optional<Atlas> atlas;
+
+  /// No face takes its colour from a photograph.
+  bool shows_nothing() const;
 };
 
 /// {"views": [{"name", "faces", "area", "gain": [r, g, b], "samples"}], "faces_without_view", …};
@@ -42,7 +58,8 @@ struct PhotographedMesh {
   TextureReport report;
 };
 
-/// Loads the input photographs of a scene, chooses one for every face, and levels their exposure.
+/// Loads the input photographs of a scene, chooses one for every face, and levels their exposure
+/// and what differs along their seams.
 /// \param scene   in the frame of the mesh
 /// \param priors  of its input views: what they call transient is not shown; may be empty
 /// \throws Error as load_images()

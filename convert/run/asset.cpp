@@ -11,6 +11,7 @@
 
 #include "convert/files/mesh_files.h"
 #include "convert/model/texture.h"
+#include "convert/model/texture_atlas.h"
 #include "convert/text/html.h"
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
@@ -76,6 +77,7 @@ class AssetWriter {
         description_(content.description),
         certificate_(content.certificate),
         encoding_(request.glb_encoding),
+        texel_(atlas_texel(request, model.scene.frame)),
         box_(box_of(content.mesh)) {
     if (!request.compression_error.empty()) {
       rounding_ = parse_length(request.compression_error, frame_);
@@ -116,6 +118,12 @@ class AssetWriter {
   }
 
   GlbFile made(const Form& form) const {
+    const auto shows = [](int photograph) { return photograph >= 0; };
+    const std::vector<int>& of_face = form.texture.of_face;
+    if (texel_ && std::any_of(of_face.begin(), of_face.end(), shows)) {
+      const PackedTexture packed = packed_texture(form.mesh, form.texture, *texel_);
+      return make_glb(form.mesh, packed.texture, frame_, form.options);
+    }
     return make_glb(form.mesh, form.texture, frame_, form.options);
   }
 
@@ -212,6 +220,7 @@ class AssetWriter {
   const std::string& description_;
   const Json& certificate_;  ///< Of mesh_.
   GlbEncoding encoding_;
+  std::optional<double> texel_;    ///< Of an atlas.
   Eigen::AlignedBox3d box_;        ///< Of mesh_.
   double rounding_ = 0;            ///< [internal units]; 0 = default of the format
   std::optional<double> promise_;  ///< [internal units]

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "convert/model/simplification.h"
@@ -26,6 +27,7 @@ void check_lengths(const RunRequest& request, Frame frame) {
     if (!length.empty()) (void)parse_length(length, frame);
   }
   (void)simplify_options(request.simplify, 1, frame);
+  (void)atlas_texel(request, frame);
 }
 
 void check_lengths(const RunRequest& request, const Scene& scene) {
@@ -35,6 +37,17 @@ void check_lengths(const RunRequest& request, const Scene& scene) {
                                request.scene.options.depth.network.empty();
   if (has_given_depth(request.scene, scene) && may_tell_metres) frame.metres_per_unit = 1;
   check_lengths(request, frame);
+}
+
+std::optional<double> atlas_texel(const RunRequest& request, const Frame& frame) {
+  constexpr std::string_view kSized = "atlas=";
+  if (request.texture == "photographs") return {};
+  if (request.texture == "atlas") return 0;
+  if (!request.texture.starts_with(kSized)) {
+    throw InvalidInput("--texture " + request.texture +
+                       ": allowed are photographs, atlas, and atlas= with the size of a pixel");
+  }
+  return parse_length(request.texture.substr(kSized.size()), frame);
 }
 
 void refuse_contradictions(const RunRequest& request) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "convert/model/fusion.h"
@@ -24,6 +25,7 @@ struct RunRequest {
   std::string simplify;           ///< Largest error of simplification; empty = default, "0" = none.
   std::string compression_error;  ///< Of the compressed mesh; empty = 1/16384 of its size.
   GlbEncoding glb_encoding = GlbEncoding::Draco;  ///< Of asset.glb.
+  std::string texture = "photographs";  ///< Of the meshes: see atlas_texel().
   EstimatedSurface estimated = EstimatedSurface::FillOnly;
   std::string max_error;      ///< Promise: how far the written meshes lie from the fused
                               ///< surface at most; empty = none.
@@ -50,6 +52,12 @@ void refuse_contradictions(const RunRequest& request);
 /// \throws InvalidInput as parse_length()
 void check_lengths(const RunRequest& request, Frame frame);
 void check_lengths(const RunRequest& request, const Scene& scene);
+
+/// How large the pixels of an atlas are to be [internal units], 0 = as photographs have them.
+/// \return nothing where files hold the photographs themselves
+/// \throws InvalidInput as parse_length(), and where RunRequest::texture is neither "photographs"
+///         nor "atlas" nor "atlas=LENGTH"
+std::optional<double> atlas_texel(const RunRequest& request, const Frame& frame);
 
 /// True if depth goes in beside the photographs, from files or a network.
 bool has_given_depth(const SceneRequest& request, const Scene& scene);

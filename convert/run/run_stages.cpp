@@ -10,6 +10,7 @@
 #include "convert/files/volume_file.h"
 #include "convert/model/fusion.h"
 #include "convert/model/memory_plan.h"
+#include "convert/model/texture_atlas.h"
 #include "convert/text/html.h"
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
@@ -262,9 +263,20 @@ AssetsReport write_assets(const Model& model,
                           const Progress& progress) {
   report(progress, 0);
   make_output_folder(request.output / "web");
-  const auto [texture, texture_report] = texture_from_photographs(model.scene, model.priors, mesh);
+  auto [texture, texture_report] = texture_from_photographs(model.scene, model.priors, mesh);
   report(progress, 0.3);
-  write_obj(request.output / "mesh/watertight.obj", mesh, texture, model.scene.frame);
+  const std::optional<double> texel = atlas_texel(request, model.scene.frame);
+  std::optional<PackedTexture> atlas;
+  if (texel && !texture_report.shows_nothing()) {
+    atlas = packed_texture(mesh, texture, *texel);
+    texture_report.atlas = {.size = atlas->texture.atlas->size,
+                            .charts = atlas->texture.photographs.size(),
+                            .texel = atlas->texel * model.scene.frame.scale};
+  }
+  write_obj(request.output / "mesh/watertight.obj",
+            mesh,
+            atlas ? atlas->texture : texture,
+            model.scene.frame);
   if (!request.max_error.empty()) require_obj_in_place(request, mesh, model.scene.frame);
   // As much as the watertight mesh may go off the fused surface, where nothing was promised of
   // both.

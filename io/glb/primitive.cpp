@@ -10,12 +10,11 @@
 #include "io/bytes/mesh_arrays.h"
 #include "libcgs/core/crease_normals.h"
 #include "libcgs/core/srgb.h"
+#include "libcgs/core/texture_corners.h"
 
 namespace cgs {
 
 namespace {
-
-constexpr uint32_t kUnused = std::numeric_limits<uint32_t>::max();
 
 /// What says something of where the surface is: NaN does not, nor what exceeds all coordinates.
 bool is_known_sigma(double sigma) { return sigma >= 0 && sigma <= kFarthestInGlb; }
@@ -66,39 +65,40 @@ class Splitter {
     shading_ = mesh.normals.empty() ? split_at_creases(mesh) : with_normals_of(mesh);
   }
 
-  /// Faces of a class (all without labels) and a photograph.
-  GlbPrimitive part(std::optional<Provenance> label, int photograph) const {
+  /// Faces of a class (all without labels) and an image.
+  GlbPrimitive part(std::optional<Provenance> label, int image) const {
     GlbPrimitive out;
     out.name = label ? provenance_name(*label) : "surface";
-    out.photograph = photograph;
+    out.image = image;
     out.is_unlit = is_unlit(label, !texture_.empty());
-    if (photograph != PhotoTexture::kNone) {
-      out.texture_size = images_[static_cast<size_t>(photograph)].size;
+    if (image != PhotoTexture::kNone) out.texture_size = images_[static_cast<size_t>(image)].size;
+    std::vector<int> photographs;
+    for (size_t f = 0; f < mesh_.faces.size(); ++f) {
+      if (label && mesh_.provenance[f] != *label) continue;
+      if (image_of(f) != image || !has_three_places(mesh_.faces[f])) continue;
+      out.faces.push_back(shading_.faces[f]);
+      photographs.push_back(image == PhotoTexture::kNone ? 0 : texture_.of_face[f]);
     }
-    const auto wanted = [&](size_t f) {
-      return (!label || mesh_.provenance[f] == *label) &&
-             (texture_.empty() || texture_.of_face[f] == photograph);
-    };
-    std::vector<uint32_t> renumbered(shading_.vertex.size(), kUnused);
-    for (size_t i = 0; i < mesh_.faces.size(); ++i) {
-      if (wanted(i) && has_three_places(mesh_.faces[i])) out.faces.push_back(shading_.faces[i]);
-    }
-    for (const auto& face : out.faces) {
-      for (const uint32_t corner : face) renumbered[corner] = 0;
-    }
-    for (size_t i = 0; i < renumbered.size(); ++i) {
-      if (renumbered[i] == kUnused) continue;
-      renumbered[i] = static_cast<uint32_t>(out.positions.size());
-      append_vertex(out, shading_.vertex[i], shading_.normal[i]);
+    const TextureCorners corners(out.faces, photographs, shading_.vertex.size());
+    for (size_t i = 0; i < corners.size(); ++i) {
+      append_vertex(out, corners.vertex(i), static_cast<size_t>(corners.photograph(i)));
     }
     if (label) out.features.assign(out.positions.size(), static_cast<float>(*label));
-    for (auto& face : out.faces) {
-      for (uint32_t& corner : face) corner = renumbered[corner];
+    for (size_t f = 0; f < out.faces.size(); ++f) {
+      for (uint32_t& corner : out.faces[f]) {
+        corner = static_cast<uint32_t>(corners(corner, photographs[f]));
+      }
     }
     return out;
   }
 
  private:
+  int image_of(size_t face) const {
+    const int photograph = texture_.empty() ? PhotoTexture::kNone : texture_.of_face[face];
+    if (photograph == PhotoTexture::kNone) return photograph;
+    return images_[static_cast<size_t>(photograph)].image;
+  }
+
   bool has_three_places(const std::array<uint32_t, 3>& f) const {
     const Eigen::Vector3f& a = positions_[f[0]];
     const Eigen::Vector3f& b = positions_[f[1]];
@@ -106,17 +106,17 @@ class Splitter {
     return a != b && b != c && c != a;
   }
 
-  void append_vertex(GlbPrimitive& out, uint32_t v, const Eigen::Vector3f& shading_normal) const {
+  void append_vertex(GlbPrimitive& out, uint32_t shaded, size_t photograph) const {
+    const uint32_t v = shading_.vertex[shaded];
     out.positions.push_back(positions_[v]);
-    const Eigen::Vector3d normal = placement_.rotation * shading_normal.cast<double>();
+    const Eigen::Vector3d normal = placement_.rotation * shading_.normal[shaded].cast<double>();
     const bool known = normal.allFinite() && normal.norm() > 0;
     out.normals.push_back(known ? Eigen::Vector3f(normal.stableNormalized().cast<float>())
                                 : Eigen::Vector3f::UnitY());
-    if (out.photograph != PhotoTexture::kNone) {
-      const auto i = static_cast<size_t>(out.photograph);
-      const Camera& camera = texture_.photographs[i].camera;
+    if (out.image != PhotoTexture::kNone) {
+      const Camera& camera = texture_.photographs[photograph].camera;
       const Eigen::Vector3d uvz = camera.project(mesh_.vertices[v].cast<double>());
-      out.texcoords.push_back(images_[i].texcoord(uvz));
+      out.texcoords.push_back(images_[photograph].texcoord(uvz));
     } else if (!mesh_.colors.empty()) {
       Eigen::Vector3f color = Eigen::Vector3f::Zero();
       for (int c = 0; c < 3; ++c) {
@@ -159,6 +159,7 @@ std::vector<GlbPrimitive> glb_primitives(const TriangleMesh& mesh,
   std::vector<GlbPrimitive> out;
   for (const std::optional<Provenance> label : labels) {
     for (size_t i = 0; i < images.size(); ++i) {
+      if (images[i].image != static_cast<int>(i)) continue;
       out.push_back(splitter.part(label, static_cast<int>(i)));
     }
     out.push_back(splitter.part(label, PhotoTexture::kNone));

@@ -15,12 +15,12 @@
 
 namespace cgs {
 
-/// Faces of one provenance class and one photograph with vertices of their own, as glTF wants them.
+/// Faces of one provenance class and one image with vertices of their own, as glTF wants them.
 struct GlbPrimitive {
-  std::string name;  ///< Of the class.
-  int photograph = PhotoTexture::kNone;
+  std::string name;                            ///< Of the class.
+  int image = PhotoTexture::kNone;             ///< TextureImage::image.
   bool is_unlit = false;                       ///< Its colours hold the light of the scene already.
-  std::vector<Eigen::Vector2f> texcoords;      ///< Into the photograph's image; may be empty.
+  std::vector<Eigen::Vector2f> texcoords;      ///< Into the image; may be empty.
   Eigen::Vector2i texture_size = {0, 0};       ///< Of that image [pixels].
   std::vector<Eigen::Vector3f> positions;      ///< [units of the file], glTF axes, local origin
   std::vector<Eigen::Vector3f> normals;        ///< Unit length; may be empty.
@@ -45,9 +45,10 @@ struct GlbPlacement {
   }
 };
 
-/// Splits a mesh into its provenance classes, from most to least evidence, and these by photograph,
+/// Splits a mesh into its provenance classes, from most to least evidence, and these by image,
 /// faces without one last; what has no faces is left out. Vertices keep their order; those without
-/// a face are left out. Without normals, a vertex on a crease is there once for each of its sides.
+/// a face are left out. Without normals, a vertex on a crease is there once for each of its sides;
+/// in an atlas, once for each photograph.
 /// \param images  one for each photograph of the texture
 /// \pre the arrays of the mesh and of the texture fit
 std::vector<GlbPrimitive> glb_primitives(const TriangleMesh& mesh,

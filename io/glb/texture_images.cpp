@@ -80,11 +80,57 @@ TextureImage encoded(const ColorImage& photograph, const UsedBlocks& used, int q
   return out;
 }
 
+/// A picture of all photographs; between them is their mean colour.
+std::string encoded_atlas(const PhotoTexture& texture, int quality) {
+  const TextureAtlas& atlas = *texture.atlas;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  size_t count = 0;
+  for (const Photograph& photograph : texture.photographs) {
+    for (const Eigen::Vector3f& color : photograph.image.data) sum += color.cast<double>();
+    count += photograph.image.data.size();
+  }
+  const Eigen::Vector3d mean = sum / double(std::max(count, size_t(1)));
+  ColorImage picture(atlas.size.x(), atlas.size.y(), mean.cast<float>());
+  for (size_t i = 0; i < texture.photographs.size(); ++i) {
+    const ColorImage& image = texture.photographs[i].image;
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        picture(atlas.corner[i].x() + x, atlas.corner[i].y() + y) = image(x, y);
+      }
+    }
+  }
+  return encode_jpeg(picture, quality);
+}
+
+std::vector<TextureImage> atlas_images(const PhotoTexture& texture, int quality) {
+  std::vector<TextureImage> out;
+  for (const Eigen::Vector2i& corner : texture.atlas->corner) {
+    out.push_back({{}, 0, -corner, texture.atlas->size});
+  }
+  if (!out.empty()) out[0].jpeg = encoded_atlas(texture, quality);
+  return out;
+}
+
+void require_atlas(const PhotoTexture& texture, const std::string& prefix) {
+  const TextureAtlas& atlas = *texture.atlas;
+  require(atlas.corner.size() == texture.photographs.size(),
+          prefix + "atlas.corner must be " + std::to_string(texture.photographs.size()) + " long",
+          atlas.corner.size());
+  for (size_t i = 0; i < atlas.corner.size(); ++i) {
+    const Camera& camera = texture.photographs[i].camera;
+    const Eigen::Vector2i end = atlas.corner[i] + Eigen::Vector2i(camera.width, camera.height);
+    require(atlas.corner[i].minCoeff() >= 0 && (atlas.size - end).minCoeff() >= 0,
+            prefix + "atlas must hold all of every photograph",
+            texture.photographs[i].name);
+  }
+}
+
 }  // namespace
 
 std::vector<TextureImage> texture_images(const TriangleMesh& mesh,
                                          const PhotoTexture& texture,
                                          int quality) {
+  if (texture.atlas) return atlas_images(texture, quality);
   std::vector<TextureImage> out(texture.photographs.size());
   tbb::parallel_for(size_t(0), out.size(), [&](size_t i) {
     const Camera& camera = texture.photographs[i].camera;
@@ -98,7 +144,16 @@ std::vector<TextureImage> texture_images(const TriangleMesh& mesh,
       used.add(box);
     }
     out[i] = encoded(texture.photographs[i].image, used, quality);
+    out[i].image = static_cast<int>(i);
   });
+  return out;
+}
+
+std::vector<std::string> texture_names(const PhotoTexture& texture) {
+  std::vector<std::string> out;
+  for (const Photograph& photograph : texture.photographs) {
+    out.push_back(texture.atlas ? "atlas" : photograph.name);
+  }
   return out;
 }
 
@@ -116,6 +171,7 @@ void require_texture(const TriangleMesh& mesh,
             prefix + "photographs must be as large as their cameras",
             photograph.name);
   }
+  if (texture.atlas) require_atlas(texture, prefix);
   const int count = static_cast<int>(texture.photographs.size());
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     const int i = texture.of_face[f];

@@ -106,12 +106,12 @@ void GlbBuilder::add_photographs(const PhotoTexture& texture,
   sampler.magFilter = TINYGLTF_TEXTURE_FILTER_LINEAR;
   sampler.wrapS = sampler.wrapT = TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE;
   model_->samplers = {sampler};
+  names_ = texture_names(texture);
   for (size_t i = 0; i < images.size(); ++i) {
-    names_.push_back(texture.photographs[i].name);
     texture_of_.push_back(static_cast<int>(model_->textures.size()));
     if (images[i].jpeg.empty()) continue;
     tinygltf::Image image;
-    image.name = names_.back();
+    image.name = names_[i];
     image.mimeType = "image/jpeg";
     image.bufferView = raw_view(images[i].jpeg.data(), images[i].jpeg.size(), 0);
     tinygltf::Texture out;
@@ -275,8 +275,8 @@ tinygltf::Material GlbBuilder::material_for(const GlbPrimitive& in) {
     out.extensions[kUnlit] = tinygltf::Value(tinygltf::Value::Object());
     use_extension(kUnlit);
   }
-  if (in.photograph != PhotoTexture::kNone) {
-    const auto i = static_cast<size_t>(in.photograph);
+  if (in.image != PhotoTexture::kNone) {
+    const auto i = static_cast<size_t>(in.image);
     out.name += " " + names_[i];
     out.pbrMetallicRoughness.baseColorTexture.index = texture_of_[i];
   }

@@ -18,6 +18,7 @@
 #include "io/ply/frame.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/provenance.h"
+#include "libcgs/core/texture_corners.h"
 
 namespace cgs {
 
@@ -36,17 +37,17 @@ std::string material_prefix(const TriangleMesh& mesh, Provenance label) {
   return (mesh.provenance.empty() ? "view" : group_name(label)) + "_";
 }
 
-/// A name that files and materials may have; each but once.
+/// Names of images that files and materials may have; but for the atlas, each once.
 std::vector<std::string> safe_names(const PhotoTexture& texture) {
   std::vector<std::string> out;
-  for (const Photograph& photograph : texture.photographs) {
-    std::string name = photograph.name;
+  for (std::string name : texture_names(texture)) {
     for (char& c : name) {
       const bool plain = (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') ||
                          (c >= 'a' && c <= 'z') || c == '-' || c == '_' || c == '.';
       if (!plain) c = '_';
     }
-    while (std::find(out.begin(), out.end(), name) != out.end()) name += '_';
+    const bool is_shared = texture.atlas.has_value();
+    while (!is_shared && std::find(out.begin(), out.end(), name) != out.end()) name += '_';
     out.push_back(std::move(name));
   }
   return out;
@@ -58,8 +59,9 @@ struct ObjTexture {
   std::vector<std::string> names;
   std::vector<TextureImage> images;
 
-  int photograph(size_t face) const {
-    return texture.empty() ? PhotoTexture::kNone : texture.of_face[face];
+  int image(size_t face) const {
+    const int photograph = texture.empty() ? PhotoTexture::kNone : texture.of_face[face];
+    return photograph < 0 ? photograph : images[static_cast<size_t>(photograph)].image;
   }
 };
 
@@ -100,13 +102,13 @@ std::string diffuse_text(Provenance label) {
   return out;
 }
 
-/// Classes of the faces that show a photograph, one if the mesh has no labels.
+/// Classes of the faces that show an image, one if the mesh has no labels.
 std::array<bool, kProvenanceCount> classes_in(const TriangleMesh& mesh,
                                               const ObjTexture& texture,
-                                              size_t photograph) {
+                                              size_t image) {
   std::array<bool, kProvenanceCount> out = {};
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    if (texture.photograph(f) != static_cast<int>(photograph)) continue;
+    if (texture.image(f) != static_cast<int>(image)) continue;
     out.at(mesh.provenance.empty() ? 0 : static_cast<size_t>(mesh.provenance[f])) = true;
   }
   return out;
@@ -162,48 +164,39 @@ void write_vertices(AtomicFile& file, const TriangleMesh& mesh, const Frame& fra
   }
 }
 
-/// Writes "vt" lines: one for every vertex of every photograph that a face shows it in.
-/// \return their numbers by photograph and vertex, 0 = none
-std::vector<std::vector<uint64_t>> write_texcoords(AtomicFile& file,
-                                                   const TriangleMesh& mesh,
-                                                   const ObjTexture& texture) {
-  std::vector<std::vector<uint64_t>> number(texture.images.size());
-  uint64_t next = 1;
+/// Writes "vt" lines: one for every corner, in their order.
+void write_texcoords(AtomicFile& file,
+                     const TriangleMesh& mesh,
+                     const ObjTexture& texture,
+                     const TextureCorners& corners) {
   std::string line;
-  for (size_t i = 0; i < number.size(); ++i) {
-    if (texture.images[i].jpeg.empty()) continue;
-    number[i].assign(mesh.vertices.size(), 0);
-    for (size_t f = 0; f < mesh.faces.size(); ++f) {
-      if (texture.photograph(f) != static_cast<int>(i)) continue;
-      for (const uint32_t v : mesh.faces[f]) {
-        if (number[i][v] != 0) continue;
-        number[i][v] = next++;
-        const Camera& camera = texture.texture.photographs[i].camera;
-        Eigen::Vector2f t =
-            texture.images[i].texcoord(camera.project(mesh.vertices[v].cast<double>()));
-        t.y() = 1 - t.y();
-        line.clear();
-        append_line(line, "vt", t);
-        file.write(line + "\n");
-      }
-    }
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const auto photograph = static_cast<size_t>(corners.photograph(i));
+    const Camera& camera = texture.texture.photographs[photograph].camera;
+    const Eigen::Vector3d uvz = camera.project(mesh.vertices[corners.vertex(i)].cast<double>());
+    Eigen::Vector2f t = texture.images[photograph].texcoord(uvz);
+    t.y() = 1 - t.y();
+    line.clear();
+    append_line(line, "vt", t);
+    file.write(line + "\n");
   }
-  return number;
 }
 
-/// Writes faces; texture coordinates and normals have the numbers in `texcoord` (none where null)
-/// and of the vertices.
+/// Writes faces; normals have the numbers of the vertices.
 struct FaceWriter {
   AtomicFile& file;
+  const TextureCorners& corners;
   bool has_normals = false;
 
-  void write(const std::array<uint32_t, 3>& face, const std::vector<uint64_t>* texcoord) const {
+  /// \param photograph  that it shows, or kNone
+  void write(const std::array<uint32_t, 3>& face, int photograph) const {
+    const bool has_texcoords = photograph != PhotoTexture::kNone;
     std::string line = "f";
     for (const uint32_t corner : face) {
       line += ' ';
       append_number(line, uint64_t{corner} + 1);
-      if (texcoord != nullptr || has_normals) line += '/';
-      if (texcoord != nullptr) append_number(line, (*texcoord)[corner]);
+      if (has_texcoords || has_normals) line += '/';
+      if (has_texcoords) append_number(line, uint64_t{corners(corner, photograph)} + 1);
       if (!has_normals) continue;
       line += '/';
       append_number(line, uint64_t{corner} + 1);
@@ -214,15 +207,19 @@ struct FaceWriter {
 
 /// Groups by provenance, materials within.
 void write_faces(AtomicFile& file, const TriangleMesh& mesh, const ObjTexture& texture) {
-  const std::vector<std::vector<uint64_t>> numbers = write_texcoords(file, mesh, texture);
-  const FaceWriter writer{file, !mesh.normals.empty()};
+  const std::vector<int> untextured(texture.texture.empty() ? mesh.faces.size() : 0,
+                                    PhotoTexture::kNone);
+  const std::vector<int>& shown = texture.texture.empty() ? untextured : texture.texture.of_face;
+  const TextureCorners corners(mesh.faces, shown, mesh.vertices.size());
+  write_texcoords(file, mesh, texture, corners);
+  const FaceWriter writer{file, corners, !mesh.normals.empty()};
   std::vector<std::vector<size_t>> faces(kProvenanceCount * (texture.images.size() + 1));
-  const auto slot = [&](size_t group, int photograph) {
-    return group * (texture.images.size() + 1) + static_cast<size_t>(photograph + 1);
+  const auto slot = [&](size_t group, int image) {
+    return group * (texture.images.size() + 1) + static_cast<size_t>(image + 1);
   };
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     const auto group = mesh.provenance.empty() ? 0 : static_cast<size_t>(mesh.provenance[f]);
-    faces[slot(group, texture.photograph(f))].push_back(f);
+    faces[slot(group, texture.image(f))].push_back(f);
   }
   const size_t groups = mesh.provenance.empty() ? 1 : kProvenanceOrder.size();
   for (size_t g = 0; g < groups; ++g) {
@@ -240,8 +237,7 @@ void write_faces(AtomicFile& file, const TriangleMesh& mesh, const ObjTexture& t
       } else if (!mesh.provenance.empty()) {
         file.write("usemtl " + group_name(group) + "\n");
       }
-      const auto* texcoord = i >= 0 ? &numbers[static_cast<size_t>(i)] : nullptr;
-      for (const size_t f : part) writer.write(mesh.faces[f], texcoord);
+      for (const size_t f : part) writer.write(mesh.faces[f], shown[f]);
     }
   }
 }

@@ -24,7 +24,8 @@ void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh, cons
 /// The same with photographs as texture: within their group, faces with a photograph have material
 /// "observed_PHOTOGRAPH" ("view_PHOTOGRAPH" without labels) and texture coordinates ("vt u v",
 /// v upwards), and the used part of the photograph lies beside the file as
-/// STEM.PHOTOGRAPH.jpg. Characters that do not belong in such names become '_'.
+/// STEM.PHOTOGRAPH.jpg. Characters that do not belong in such names become '_'. With an atlas,
+/// PHOTOGRAPH is "atlas", the one picture.
 ///
 /// Images are replaced first and the .obj last; what was not there before a failure is removed.
 /// \throws Error as above; InvalidInput if the texture does not fit the mesh, see require_texture()

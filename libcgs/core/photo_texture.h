@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "libcgs/core/camera.h"
 #include "libcgs/core/raster.h"
@@ -16,13 +19,21 @@ struct Photograph {
   ColorImage image;
 };
 
-/// Photographs as the texture of a mesh. There is no atlas: the texture coordinates of a face are
-/// the projections of its corners into its photograph, so every pixel is used as it was taken.
+/// Where photographs lie in one picture that holds them all.
+struct TextureAtlas {
+  Eigen::Vector2i size = Eigen::Vector2i::Zero();  ///< Width and height [pixels].
+  std::vector<Eigen::Vector2i> corner;             ///< Top left of each photograph [pixels].
+};
+
+/// Photographs as the texture of a mesh: the texture coordinates of a face are the projections of
+/// its corners into its photograph, so that every pixel is used as it was taken. Without an atlas
+/// files hold a picture for each photograph.
 struct PhotoTexture {
   static constexpr int kNone = -1;  ///< In `of_face`: the face keeps its vertex colours.
 
   std::vector<Photograph> photographs;
   std::vector<int> of_face;  ///< Per face an index into photographs, or kNone. Empty = no texture.
+  std::optional<TextureAtlas> atlas;
 
   bool empty() const { return of_face.empty(); }
 };

@@ -49,6 +49,7 @@ RunRequest unusual_request(const test::TempDir& dir) {
   out.local_origin = true;
   out.lods = 2;
   out.glb_encoding = GlbEncoding::Quantized;
+  out.texture = "atlas=2mm";
   out.estimated = EstimatedSurface::Drop;
   return out;
 }
