@@ -1,4 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
 #include "python/arrays.h"
 #include "python/cameras.h"
 #include "python/module.h"
@@ -12,6 +17,7 @@
 #include "convert/model/evaluation.h"
 #include "convert/model/memory_plan.h"
 #include "convert/model/model.h"
+#include "convert/model/water_report.h"
 #include "convert/text/length.h"
 #include "io/bytes/atomic_file.h"
 #include "io/scenes/scene_reader.h"
@@ -34,11 +40,20 @@ std::vector<std::string> typed_settings(const py::dict& settings) {
   return out;
 }
 
+template <typename T>
+T named(const std::map<std::string, T>& values, const std::string& name, const char* allowed) {
+  const auto value = values.find(name);
+  require(value != values.end(), allowed, name);
+  return value->second;
+}
+
 ModelObject reconstructed(const Scene& scene,
                           const std::string& preset,
                           const py::dict& settings,
+                          const std::string& medium,
                           const py::object& progress) {
   ReconstructionOptions options;
+  options.medium = named(media(), medium, "medium must be none or water");
   options.training = training_options({preset, typed_settings(settings)});
   options.hooks.load_photographs = [](Scene& wanted, const Progress& done) {
     std::vector<int> missing;
@@ -99,20 +114,43 @@ PictureObject rendered(const ModelObject& m, const Camera& camera) {
   });
 }
 
+ModelFusion model_fusion(const std::string& voxel_size,
+                         const std::string& estimated,
+                         const Frame& frame) {
+  ModelFusion out;
+  if (!voxel_size.empty()) out.voxel_size = parse_length(voxel_size, frame);
+  out.estimated =
+      named(estimated_surfaces(), estimated, "estimated must be keep, fill-only or drop");
+  out.memory_limit = memory_budget(0);
+  return out;
+}
+
 VolumeObject fused(const ModelObject& m,
                    const std::string& voxel_size,
                    const std::string& estimated,
                    const py::object& progress) {
-  const auto kinds = estimated_surfaces();
-  const auto kind = kinds.find(estimated);
-  require(kind != kinds.end(), "estimated must be keep, fill-only or drop", estimated);
   const Frame& frame = m.model.scene.frame;
-  ModelFusion request;
-  if (!voxel_size.empty()) request.voxel_size = parse_length(voxel_size, frame);
-  request.estimated = kind->second;
-  request.memory_limit = memory_budget(0);
+  const ModelFusion request = model_fusion(voxel_size, estimated, frame);
   return result_of(progress, [&](Terminal& terminal) {
     return VolumeObject{fuse_model(m.model, request, terminal.begin("fuse")).volume, frame};
+  });
+}
+
+VolumeObject joined(const std::vector<const ModelObject*>& models,
+                    const std::string& voxel_size,
+                    const std::string& estimated,
+                    const py::object& progress) {
+  require(!models.empty(), "number of models must be > 0", 0);
+  const ModelFusion request =
+      model_fusion(voxel_size, estimated, models.front()->model.scene.frame);
+  // Python holds them.
+  const ModelSource source = {models.size(), [&](size_t i) {
+                                return std::shared_ptr<const Model>(std::shared_ptr<void>(),
+                                                                    &models[i]->model);
+                              }};
+  return result_of(progress, [&](Terminal& terminal) {
+    JoinedVolume out = fuse_models(source, request, terminal.begin("fuse"));
+    return VolumeObject{std::move(out.fused.volume), out.frame};
   });
 }
 
@@ -230,6 +268,7 @@ void add_models(py::module_& module) {
              py::kw_only(),
              py::arg("preset") = "standard",
              py::arg("settings") = py::dict(),
+             py::arg("medium") = "none",
              py::arg("progress") = py::none(),
              R"(Photographs with cameras to coherent Gaussians, one on the ray of each pixel.
 
@@ -237,9 +276,20 @@ scene     from read_scene(); photographs that are not loaded are loaded. Images 
           put into its views are taken as they are.
 preset    "draft", "standard", "fine", "reference" or "classical"
 settings  fields of the training, such as {"steps": 500}; `cgs train --help` tells more
+medium    "none", or "water", which is estimated and taken out of the photographs
 
 Returns a Model. The same scene gives the same bits as `cgs train`, for any number of threads.
 Raises InvalidInput, BadInput, LimitError.)");
+  module.def("fuse_models",
+             joined,
+             py::arg("models"),
+             py::kw_only(),
+             py::arg("voxel_size") = "",
+             py::arg("estimated") = "fill-only",
+             py::arg("progress") = py::none(),
+             "What the input views of several Models of one world measured, as one Volume in the "
+             "frame of the first: of a photograph that is in several, the model counts that "
+             "measured more of it. Arguments as of Model.fuse().");
 }
 
 }  // namespace cgs

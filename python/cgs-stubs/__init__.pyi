@@ -243,8 +243,16 @@ def reconstruct(
     *,
     preset: str = "standard",
     settings: dict[str, object] = ...,
+    medium: str = "none",
     progress: _Progress = None,
 ) -> Model: ...
+def fuse_models(
+    models: Sequence[Model],
+    *,
+    voxel_size: str = "",
+    estimated: str = "fill-only",
+    progress: _Progress = None,
+) -> Volume: ...
 def read_model(folder: _Path) -> Model: ...
 def read_mesh(path: _Path, *, assume_unit: str = "") -> Mesh: ...
 def read_splats(path: _Path) -> Splats: ...

@@ -97,6 +97,24 @@ class Reconstruction(unittest.TestCase):
         told = program("measure", closed, "--volume", "--distance", "0,0,4", "1,0,4")["figures"]
         self.assertEqual(figures, told)
 
+    def test_fuses_several_models_as_the_program(self):
+        other = Path(WORK) / "other"
+        program("train", CAPTURE, "--views", "view_02,view_04", "--assume-unit", "m", "--preset",
+                "draft", "--set", "steps=0", "-o", other)  # fmt: skip
+        joined = Path(WORK) / "joined.vdb"
+        program("fuse", self.folder, other, "-o", joined)
+        models = [cgs.read_model(folder) for folder in (self.folder, other)]
+        mesh = cgs.fuse_models(models).surface()
+        told = cgs.read_volume(joined).surface()
+        np.testing.assert_array_equal(mesh.vertices, told.vertices)
+        np.testing.assert_array_equal(mesh.faces, told.faces)
+        with self.assertRaises(cgs.InvalidInput):
+            cgs.fuse_models([])
+
+    def test_medium_is_one_that_is_known(self):
+        with self.assertRaisesRegex(cgs.InvalidInput, "none or water"):
+            cgs.reconstruct(self.scene, medium="mist")
+
     def test_renders_what_the_program_writes(self):
         name = self.model.held_out[0]
         picture = self.model.render(self.model.cameras[name])
