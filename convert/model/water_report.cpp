@@ -38,8 +38,8 @@ std::string words_without_water() {
   std::array<char, 160> text{};
   std::snprintf(text.data(),
                 text.size(),
-                "no water was found: less than %.0f %% of the light is lost over the median range, "
-                "and nothing is taken out of the photographs",
+                "no water was found: it is not certain that %.0f %% of the light is lost over the "
+                "median range, and nothing is taken out of the photographs",
                 100 * kLeastLoss);
   return text.data();
 }

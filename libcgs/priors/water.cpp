@@ -314,8 +314,9 @@ WaterEstimate fit_water(const WaterEvidence& evidence) {
     out.residual[c] = fit.scale();
   });
   refuse_doubt(doubt, out);
-  const double loss = 1 - water.transmission(out.range).minCoeff();
-  if (loss >= kLeastLoss) out.water = water;
+  constexpr double kSure = 2;  // standard deviations
+  const double least = (water.attenuation - kSure * water.attenuation_sigma).maxCoeff();
+  if (1 - std::exp(-least * out.range) >= kLeastLoss) out.water = water;
   return out;
 }
 

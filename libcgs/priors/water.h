@@ -56,8 +56,8 @@ struct WaterEstimate {
 /// Sigma is that of the normal equations, with residuals of one group taken as dependent (Liang and
 /// Zeger 1986, "Longitudinal Data Analysis Using Generalized Linear Models").
 ///
-/// No water is found where every channel loses less than kLeastLoss of the light over the median
-/// range.
+/// Water is found where a channel loses kLeastLoss of the light over the median range, two standard
+/// deviations less taken.
 /// \throws NumericalError if there are too few matches, or ranges vary too little to tell the
 ///         transmission over the median range to kMostDoubt
 WaterEstimate fit_water(const WaterEvidence& evidence);

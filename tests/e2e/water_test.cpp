@@ -41,7 +41,7 @@ class UnderWater : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     dir_ = new test::TempDir;
-    const auto result = train(wet(), model(), "--medium water");
+    const auto result = train(wet(), model(), "--medium water --set steps=12");
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
   static void TearDownTestSuite() { delete dir_; }
@@ -53,10 +53,13 @@ class UnderWater : public testing::Test {
                                    const fs::path& out,
                                    const std::string& more) {
     return run_cgs("train " + scene.string() +
-                   " --views view_01,view_02,view_03,view_08 --set steps=12 --assume-unit m "
+                   " --views view_01,view_02,view_03,view_08 --assume-unit m "
                    "--threads 2 -o " +
                    out.string() + " " + more);
   }
+  // Small, where only bits are compared.
+  static constexpr const char* kSmall = "--downscale 2 --set steps=2";
+
   static json read(const fs::path& file) { return json::parse(test::read_bytes(file)); }
 
   static test::TempDir* dir_;
@@ -112,8 +115,8 @@ TEST_F(UnderWater, IsPutBackToCompareWithPhotographs) {
 }
 
 TEST_F(UnderWater, IsNotLookedForUnlessAskedFor) {
-  ASSERT_EQ(train(wet(), *dir_ / "absent", "").exit_code, 0);
-  ASSERT_EQ(train(wet(), *dir_ / "none", "--medium none").exit_code, 0);
+  ASSERT_EQ(train(wet(), *dir_ / "absent", kSmall).exit_code, 0);
+  ASSERT_EQ(train(wet(), *dir_ / "none", std::string("--medium none ") + kSmall).exit_code, 0);
   for (const char* file : {"gaussians.ply", "cameras.json", "training.json"}) {
     EXPECT_TRUE(test::read_bytes(*dir_ / "absent" / file) ==
                 test::read_bytes(*dir_ / "none" / file))
@@ -127,8 +130,8 @@ TEST_F(UnderWater, IsNotLookedForUnlessAskedFor) {
 }
 
 TEST_F(UnderWater, IsNotFoundInAir) {
-  ASSERT_EQ(train(clear(), *dir_ / "air", "").exit_code, 0);
-  const auto result = train(clear(), *dir_ / "looked", "--medium water");
+  ASSERT_EQ(train(clear(), *dir_ / "air", kSmall).exit_code, 0);
+  const auto result = train(clear(), *dir_ / "looked", std::string("--medium water ") + kSmall);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json found = read(*dir_ / "looked/training.json")["water"];
   EXPECT_EQ(found["found"], false);
@@ -192,7 +195,8 @@ double depth_error(const fs::path& model) {
 
 TEST_F(UnderWater, IsSeenThroughByCamerasThatWereOff) {
   write_with_cameras_off(wet(), *dir_ / "off");
-  const auto result = train(*dir_ / "off", *dir_ / "moved", "--refine-poses --medium water");
+  const auto result =
+      train(*dir_ / "off", *dir_ / "moved", "--refine-poses --medium water --set steps=0");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json found = read(*dir_ / "moved/training.json")["water"];
   for (size_t c = 0; c < 3; ++c) {

@@ -142,6 +142,12 @@ TEST(FitWater, FindsNoneInAir) {
   EXPECT_NEAR(found.range, 4, 0.3);
 }
 
+// A seventh of the red light is lost, of which matches as noisy as that say nothing.
+TEST(FitWater, FindsNoneThatIsNotCertain) {
+  EXPECT_TRUE(fit_water(evidence({.count = 1000, .noise = 0.001, .strength = 0.1})).water);
+  EXPECT_FALSE(fit_water(evidence({.count = 1000, .noise = 0.05, .strength = 0.1})).water);
+}
+
 TEST(FitWater, RefusesRangesThatHardlyVary) {
   const WaterEvidence planted = evidence({.ratio = 1.001, .noise = 0.004});
   EXPECT_THROW(fit_water(planted), NumericalError);
