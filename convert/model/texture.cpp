@@ -177,14 +177,14 @@ Json texture_to_json(const TextureReport& report, const Frame& frame) {
                      {"samples", view.samples}});
   }
   Json out = {{"views", views},
-          {"faces_without_view", report.faces_without_view},
-          {"area_without_view", report.area_without_view},
-          {"largest_stretch", report.largest_stretch},
-          {"units", frame.unit_name()},
-          {"seam_length", report.seam_length},
-          {"seam_length_unsmoothed", report.seam_length_unsmoothed},
-          {"seam_step", report.seam_step},
-          {"seam_step_unlevelled", report.seam_step_unlevelled}};
+              {"faces_without_view", report.faces_without_view},
+              {"area_without_view", report.area_without_view},
+              {"largest_stretch", report.largest_stretch},
+              {"units", frame.unit_name()},
+              {"seam_length", report.seam_length},
+              {"seam_length_unsmoothed", report.seam_length_unsmoothed},
+              {"seam_step", report.seam_step},
+              {"seam_step_unlevelled", report.seam_step_unlevelled}};
   if (report.atlas) {
     out["atlas"] = {{"width", report.atlas->size.x()},
                     {"height", report.atlas->size.y()},
