@@ -25,7 +25,7 @@ struct RunRequest {
   std::string simplify;           ///< Largest error of simplification; empty = default, "0" = none.
   std::string compression_error;  ///< Of the compressed mesh; empty = 1/16384 of its size.
   GlbEncoding glb_encoding = GlbEncoding::Draco;  ///< Of asset.glb.
-  std::string texture = "photographs";  ///< Of the meshes: see atlas_texel().
+  std::string texture = "photographs";            ///< Of the meshes: see atlas_texel().
   EstimatedSurface estimated = EstimatedSurface::FillOnly;
   std::string max_error;      ///< Promise: how far the written meshes lie from the fused
                               ///< surface at most; empty = none.

@@ -87,7 +87,8 @@ TEST(PackedTexture, GetsCoarserUntilItFits) {
   TriangleMesh mesh;
   mesh.vertices = {{1, 1, 1}, {8999, 1, 1}, {1, 7, 1}};
   mesh.faces = {{0, 2, 1}};
-  const PhotoTexture texture = {{{"wide", camera, ColorImage(9000, 8, Eigen::Vector3f::Zero())}}, {0}, {}};
+  const PhotoTexture texture = {
+      {{"wide", camera, ColorImage(9000, 8, Eigen::Vector3f::Zero())}}, {0}, {}};
   const PackedTexture packed = packed_texture(mesh, texture, 0);
   EXPECT_LE(packed.texture.atlas->size.x(), kLargestAtlasSide);
   EXPECT_GT(packed.texture.atlas->size.x(), kLargestAtlasSide * 9 / 10);
