@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/images/image.h"
 #include "tests/support/portal_capture.h"
 #include "tests/support/run_cgs.h"
 #include "tests/support/triangles.h"
@@ -205,6 +206,29 @@ TEST(Asset, LeavesOutFacesThatHoldColoursAndStaysNear) {
   const double allowed = mesh["simplification"]["max_error"];
   EXPECT_GT(off["max"], 0.2 * allowed);
   EXPECT_LT(off["max"], allowed + asset["measured_max_error"].get<double>());
+}
+
+TEST(Asset, HoldsOnePictureIfAskedFor) {
+  constexpr double kTexel = 0.1;  // [feet]
+  const TempDir dir;
+  test::copy_portal_capture(dir / "capture", 3);
+  const auto run = run_cgs(run_arguments(dir, "--json --voxel-size 0.08 --texture atlas=0.1"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json atlas = json::parse(run.out)["web"]["texture"]["atlas"];
+  EXPECT_NEAR(atlas["texel"].get<double>(), kTexel, 1e-9);
+  const ColorImage picture = read_image(dir / "out/mesh/watertight.atlas.jpg");
+  EXPECT_EQ(picture.width, atlas["width"]);
+  EXPECT_EQ(picture.height, atlas["height"]);
+  EXPECT_FALSE(fs::exists(dir / "out/mesh/watertight.view_01.jpg"));
+  const test::Glb glb = test::parse_glb(test::read_bytes(dir / "out/web/asset.glb"));
+  ASSERT_EQ(glb.images.size(), 1u);
+  EXPECT_TRUE(std::any_of(glb.parts.begin(), glb.parts.end(), [](const test::GlbPart& part) {
+    return part.material == "observed atlas";
+  }));
+  const auto refused = run_cgs(run_arguments(dir, "-w --texture mural"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("--texture mural: allowed are photographs, atlas"), std::string::npos)
+      << refused.err;
 }
 
 TEST(Levels, AreSmallerAndAsFarOffAsTheySay) {

@@ -107,7 +107,8 @@ def test_runs():
     (work / "cut/transforms.json").write_text(json.dumps(cameras))
     told = cgs("run", "cut", "--preset", "draft", "--set", "steps=2", "--max-size", "60kB",
                "--max-error", "0.5", "--estimated", "keep",
-               "--local-origin", "--use-all", "--old-photographs", "-o", "plain")
+               "--local-origin", "--use-all", "--old-photographs", "--texture", "atlas", "-o", "plain")
+    assert told["web"]["texture"]["atlas"]["charts"] > 0
     assert told["evaluation"] is None and told["units"] == "unknown"
     assert told["mesh"]["output"]["left_out"] and told["mesh"]["promise"]
     assert len(told["model"]["loss"]) == 2 and told["web"]["asset.glb"]["words"]
