@@ -71,6 +71,15 @@ void count_faces(const TriangleMesh& mesh,
   }
 }
 
+// Of a grey photograph colours are those of others at best: it counts where it is much finer, and
+// where no other shows the surface.
+void prefer_colors(const std::vector<View>& views, FaceScores& scores) {
+  constexpr float kGrey = 0.1f;
+  for (size_t i = 0; i < scores.score.size(); ++i) {
+    if (views[i % scores.views].response.is_grey) scores.score[i] *= kGrey;
+  }
+}
+
 // Median size of a pixel of a photograph on the faces that show it [internal units]; 0 = no face.
 double pixel_size(const TriangleMesh& mesh, const PhotoTexture& texture, size_t photograph) {
   const Camera& camera = texture.photographs[photograph].camera;
@@ -140,7 +149,8 @@ PhotographedMesh texture_from_photographs(const Scene& scene,
   (void)color_grey_photographs(loaded, priors);
   for (const int i : scene.input) views.push_back(std::move(loaded.views[static_cast<size_t>(i)]));
   for (size_t i = 0; i < priors.size(); ++i) mask_other_than_scene(priors[i], views[i]);
-  const FaceScores scores = face_scores(mesh, views);
+  FaceScores scores = face_scores(mesh, views);
+  prefer_colors(views, scores);
   const FaceViews chosen = choose_face_views(mesh, scores);
   const ExposureGains exposure = exposure_gains(mesh, scores, views);
   out.texture.of_face = chosen.of_face;

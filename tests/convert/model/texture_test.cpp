@@ -68,6 +68,20 @@ TEST(TextureFromPhotographs, LevelsExposureAndReportsWhatItDid) {
   EXPECT_EQ(json["seam_length"].get<double>(), report.seam_length);
 }
 
+// The second photograph stands between the others, which show all that it shows but the top of the
+// box: they see it too flat.
+TEST(TextureFromPhotographs, PrefersPhotographsWithColors) {
+  const test::TempDir dir;
+  const TriangleMesh mesh = test::box(20);
+  Scene scene = scene_in(dir);
+  constexpr size_t kTop = 800;  // faces
+  EXPECT_GT(texture_from_photographs(scene, {}, mesh).report.views[1].faces, kTop + 100);
+  scene.views[1].response.is_grey = true;
+  const TextureReport report = texture_from_photographs(scene, {}, mesh).report;
+  EXPECT_EQ(report.views[1].faces, kTop);
+  EXPECT_GT(report.views[0].faces + report.views[2].faces, 1500u);
+}
+
 TEST(CoarsenTexture, MakesPixelsAsLargeAsAskedAndKeepsTheirPlaces) {
   const test::TempDir dir;
   const TriangleMesh mesh = test::box(20);

@@ -129,6 +129,18 @@ TEST(LevelSeams, BelievesLargeStepsLess) {
   EXPECT_GT(share_mended(0.05f), share_mended(0.6f));
 }
 
+TEST(LevelSeams, BearsAFaceWithoutAreaAndNeighbours) {
+  Strip strip = seam_levelling_test::strip(Vector3f::Constant(0.5f), Vector3f::Constant(0.52f));
+  const auto first = static_cast<uint32_t>(strip.mesh.vertices.size());
+  for (int k = 0; k < 3; ++k) strip.mesh.vertices.emplace_back(50.0f + float(k), 5.0f, 1.0f);
+  strip.mesh.faces.push_back({first, first + 1, first + 2});
+  strip.texture.of_face.push_back(0);
+  EXPECT_LT(level_seams(strip.mesh, strip.texture, 1).step_after, 0.015);
+  for (const Vector3f& color : strip.texture.photographs[0].image.data) {
+    ASSERT_NEAR(color.x(), 0.5, 0.02);
+  }
+}
+
 TEST(LevelSeams, LeavesOnePhotographAsItIs) {
   Strip strip = seam_levelling_test::strip(Vector3f::Constant(0.5f), Vector3f::Constant(0.6f));
   std::fill(strip.texture.of_face.begin(), strip.texture.of_face.end(), 0);
