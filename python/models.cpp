@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -7,6 +6,7 @@
 #include "python/arrays.h"
 #include "python/cameras.h"
 #include "python/module.h"
+#include "python/named.h"
 #include "python/objects.h"
 #include "python/work.h"
 #include <nlohmann/json.hpp>
@@ -38,13 +38,6 @@ std::vector<std::string> typed_settings(const py::dict& settings) {
     out.push_back(py::str(name).cast<std::string>() + "=" + py::str(value).cast<std::string>());
   }
   return out;
-}
-
-template <typename T>
-T named(const std::map<std::string, T>& values, const std::string& name, const char* allowed) {
-  const auto value = values.find(name);
-  require(value != values.end(), allowed, name);
-  return value->second;
 }
 
 ModelObject reconstructed(const Scene& scene,

@@ -2,6 +2,7 @@
 #include "python/arrays.h"
 #include "python/cameras.h"
 #include "python/module.h"
+#include "python/named.h"
 #include "python/work.h"
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -17,10 +18,7 @@ namespace {
 namespace py = pybind11;
 
 DepthKind depth_kind_of(const std::string& name) {
-  const auto kinds = depth_kinds();
-  const auto found = kinds.find(name);
-  require(found != kinds.end(), "depth_kind must be metric, relative or disparity", name);
-  return found->second;
+  return named(depth_kinds(), name, "depth_kind must be metric, relative or disparity");
 }
 
 struct SceneArguments {

@@ -104,6 +104,12 @@ double texel_size(const PhotoTexture& texture, const TriangleMesh& mesh) {
   return smallest;
 }
 
+void reduce(Photograph& photograph, int width, int height) {
+  MaskMap all_usable;
+  area_downscale(photograph.image, all_usable, width, height);
+  photograph.camera = resized(photograph.camera, width, height);
+}
+
 double coarsen_texture(PhotoTexture& texture, const TriangleMesh& mesh, double texel) {
   constexpr int kSmallest = 16;  // [pixels]
   double largest_share = 0;
@@ -120,9 +126,7 @@ double coarsen_texture(PhotoTexture& texture, const TriangleMesh& mesh, double t
     const int height = reduced(photograph.image.height);
     largest_share = std::max(largest_share, double(width) / before);
     if (width == before && height == photograph.image.height) continue;
-    MaskMap all_usable;
-    area_downscale(photograph.image, all_usable, width, height);
-    photograph.camera = resized(photograph.camera, width, height);
+    reduce(photograph, width, height);
   }
   return largest_share > 0 ? largest_share : 1;
 }
@@ -170,10 +174,6 @@ PhotographedMesh texture_from_photographs(const Scene& scene,
   out.report.seam_step_unlevelled = levelled.step_before;
   out.report.seam_step = levelled.step_after;
   return out;
-}
-
-bool TextureReport::shows_nothing() const {
-  return std::all_of(views.begin(), views.end(), [](const Shown& v) { return v.faces == 0; });
 }
 
 Json texture_to_json(const TextureReport& report, const Frame& frame) {

@@ -44,9 +44,6 @@ struct TextureReport {
     double texel = 0;  ///< Of the finest charts, on the surface.
   };
   std::optional<Atlas> atlas;
-
-  /// No face takes its colour from a photograph.
-  bool shows_nothing() const;
 };
 
 /// {"views": [{"name", "faces", "area", "gain": [r, g, b], "samples"}], "faces_without_view", …};
@@ -70,6 +67,9 @@ PhotographedMesh texture_from_photographs(const Scene& scene,
 /// The size of a pixel on the surface [internal units], of the photograph where it is smallest, by
 /// the median over the faces that show it; 0 where none is shown.
 double texel_size(const PhotoTexture& texture, const TriangleMesh& mesh);
+
+/// Brings a photograph and its camera to a smaller size.
+void reduce(Photograph& photograph, int width, int height);
 
 /// Makes photographs smaller whose pixels cover less of the surface than `texel` [internal units],
 /// by the median over the faces that show them, until they cover that; none below 16 pixels.

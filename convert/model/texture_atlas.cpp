@@ -12,7 +12,7 @@
 #include <Eigen/Geometry>
 #include <stb_rect_pack.h>
 
-#include "io/scenes/resample.h"
+#include "convert/model/texture.h"
 #include "libcgs/core/order_statistics.h"
 #include "meshing/mesh/halfedges.h"
 
@@ -98,10 +98,7 @@ Photograph cut_out(const Chart& chart, const Photograph& photograph, double texe
   const auto reduced = [&](int size) { return std::max(1, int(std::lround(share * size))); };
   const int width = reduced(out.camera.width);
   const int height = reduced(out.camera.height);
-  if (width == out.camera.width && height == out.camera.height) return out;
-  MaskMap all_usable;
-  area_downscale(out.image, all_usable, width, height);
-  out.camera = resized(out.camera, width, height);
+  if (width != out.camera.width || height != out.camera.height) reduce(out, width, height);
   return out;
 }
 

@@ -118,9 +118,7 @@ class AssetWriter {
   }
 
   GlbFile made(const Form& form) const {
-    const auto shows = [](int photograph) { return photograph >= 0; };
-    const std::vector<int>& of_face = form.texture.of_face;
-    if (texel_ && std::any_of(of_face.begin(), of_face.end(), shows)) {
+    if (texel_ && form.texture.shows_any()) {
       const PackedTexture packed = packed_texture(form.mesh, form.texture, *texel_);
       return make_glb(form.mesh, packed.texture, frame_, form.options);
     }

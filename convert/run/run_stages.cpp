@@ -267,7 +267,7 @@ AssetsReport write_assets(const Model& model,
   report(progress, 0.3);
   const std::optional<double> texel = atlas_texel(request, model.scene.frame);
   std::optional<PackedTexture> atlas;
-  if (texel && !texture_report.shows_nothing()) {
+  if (texel && texture.shows_any()) {
     atlas = packed_texture(mesh, texture, *texel);
     texture_report.atlas = {.size = atlas->texture.atlas->size,
                             .charts = atlas->texture.photographs.size(),

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -59,9 +60,16 @@ struct ObjTexture {
   std::vector<std::string> names;
   std::vector<TextureImage> images;
 
+  int photograph(size_t face) const {
+    return texture.empty() ? PhotoTexture::kNone : texture.of_face[face];
+  }
   int image(size_t face) const {
-    const int photograph = texture.empty() ? PhotoTexture::kNone : texture.of_face[face];
-    return photograph < 0 ? photograph : images[static_cast<size_t>(photograph)].image;
+    const int i = photograph(face);
+    return i == PhotoTexture::kNone ? i : images[static_cast<size_t>(i)].image;
+  }
+  TextureCorners corners(const TriangleMesh& mesh) const {
+    const std::span<const std::array<uint32_t, 3>> none;
+    return {texture.empty() ? none : mesh.faces, texture.of_face, mesh.vertices.size()};
   }
 };
 
@@ -207,10 +215,7 @@ struct FaceWriter {
 
 /// Groups by provenance, materials within.
 void write_faces(AtomicFile& file, const TriangleMesh& mesh, const ObjTexture& texture) {
-  const std::vector<int> untextured(texture.texture.empty() ? mesh.faces.size() : 0,
-                                    PhotoTexture::kNone);
-  const std::vector<int>& shown = texture.texture.empty() ? untextured : texture.texture.of_face;
-  const TextureCorners corners(mesh.faces, shown, mesh.vertices.size());
+  const TextureCorners corners = texture.corners(mesh);
   write_texcoords(file, mesh, texture, corners);
   const FaceWriter writer{file, corners, !mesh.normals.empty()};
   std::vector<std::vector<size_t>> faces(kProvenanceCount * (texture.images.size() + 1));
@@ -237,7 +242,7 @@ void write_faces(AtomicFile& file, const TriangleMesh& mesh, const ObjTexture& t
       } else if (!mesh.provenance.empty()) {
         file.write("usemtl " + group_name(group) + "\n");
       }
-      for (const size_t f : part) writer.write(mesh.faces[f], shown[f]);
+      for (const size_t f : part) writer.write(mesh.faces[f], texture.photograph(f));
     }
   }
 }

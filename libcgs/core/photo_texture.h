@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,10 @@ struct PhotoTexture {
   std::optional<TextureAtlas> atlas;
 
   bool empty() const { return of_face.empty(); }
+  /// Whether any face takes its colour from a photograph.
+  bool shows_any() const {
+    return std::any_of(of_face.begin(), of_face.end(), [](int i) { return i != kNone; });
+  }
 };
 
 }  // namespace cgs

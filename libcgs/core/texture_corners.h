@@ -22,16 +22,20 @@ class TextureCorners {
                  std::span<const int> photographs,
                  size_t vertices)
       : first_(vertices + 1, 0) {
-    std::vector<Corner> all;
-    for (size_t f = 0; f < faces.size(); ++f) {
-      if (photographs[f] < 0) continue;
-      for (const uint32_t v : faces[f]) all.emplace_back(v, photographs[f]);
-    }
-    std::sort(all.begin(), all.end());
-    all.erase(std::unique(all.begin(), all.end()), all.end());
-    for (const Corner& corner : all) ++first_[corner.first + 1];
+    const auto for_each = [&](const auto& visit) {
+      for (size_t f = 0; f < faces.size(); ++f) {
+        if (photographs[f] < 0) continue;
+        for (const uint32_t v : faces[f]) visit(v, photographs[f]);
+      }
+    };
+    for_each([&](uint32_t v, int) { ++first_[v + 1]; });
     for (size_t v = 0; v < vertices; ++v) first_[v + 1] += first_[v];
-    corners_ = std::move(all);
+    corners_.resize(static_cast<size_t>(first_[vertices]));
+    std::vector<std::ptrdiff_t> next(first_.begin(), first_.end() - 1);
+    for_each([&](uint32_t v, int photograph) {
+      corners_[static_cast<size_t>(next[v]++)] = {v, photograph};
+    });
+    leave_out_repeated();
   }
 
   size_t size() const { return corners_.size(); }
@@ -48,6 +52,19 @@ class TextureCorners {
 
  private:
   using Corner = std::pair<uint32_t, int>;
+
+  void leave_out_repeated() {
+    auto end = corners_.begin();
+    for (size_t v = 0; v + 1 < first_.size(); ++v) {
+      const auto from = corners_.begin() + first_[v];
+      const auto to = corners_.begin() + first_[v + 1];
+      first_[v] = end - corners_.begin();
+      std::sort(from, to);
+      end = std::unique_copy(from, to, end);
+    }
+    first_.back() = end - corners_.begin();
+    corners_.erase(end, corners_.end());
+  }
 
   std::vector<std::ptrdiff_t> first_;  // per vertex, and the end
   std::vector<Corner> corners_;

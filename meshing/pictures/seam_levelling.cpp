@@ -165,24 +165,22 @@ Eigen::MatrixX3d offsets(const TriangleMesh& mesh,
   return membrane.solve();
 }
 
-/// The mean along seams once `added` is on the corners; before, where it is null.
+/// The mean along seams once `added` is on the corners.
 double mean_step(const std::vector<Seam>& seams,
                  const TextureCorners& corners,
-                 const Eigen::MatrixX3d* added) {
+                 const Eigen::MatrixX3d& added) {
   double sum = 0;
   double length = 0;
   for (const Seam& seam : seams) {
     for (size_t k = 0; k < 2; ++k) {
-      Eigen::Vector3d step = seam.step.at(k);
-      if (added != nullptr) {
-        step += added->row(Eigen::Index(corners(seam.ends.at(k), seam.photographs[0]))).transpose();
-        step -= added->row(Eigen::Index(corners(seam.ends.at(k), seam.photographs[1]))).transpose();
-      }
-      sum += seam.length * step.cwiseAbs().mean();
+      const auto on = [&](size_t side) {
+        return added.row(Eigen::Index(corners(seam.ends.at(k), seam.photographs.at(side))));
+      };
+      sum += seam.length * (seam.step.at(k).transpose() + on(0) - on(1)).cwiseAbs().mean();
       length += seam.length;
     }
   }
-  return length > 0 ? sum / length : 0;
+  return sum / length;
 }
 
 /// What is added to the pixels of one photograph, and which pixels faces cover.
@@ -269,7 +267,8 @@ SeamLevelling level_seams(const TriangleMesh& mesh,
     add_to_photograph(
         mesh, texture, static_cast<int>(i), corners, added, texture.photographs[i].image);
   });
-  return {mean_step(seams, corners, nullptr), mean_step(seams, corners, &added)};
+  const Eigen::MatrixX3d none = Eigen::MatrixX3d::Zero(added.rows(), 3);
+  return {mean_step(seams, corners, none), mean_step(seams, corners, added)};
 }
 
 }  // namespace cgs

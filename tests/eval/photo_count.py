@@ -35,6 +35,12 @@ def photographs(program, scene):
     return sorted(camera["name"] for camera in cameras if camera["role"] != "no image")
 
 
+def held_out_and_others(program, scene):
+    names = photographs(program, scene)
+    held_out = names[::HOLD_EVERY]
+    return held_out, [name for name in names if name not in held_out]
+
+
 def spread(names, count):
     if count >= len(names):
         return names
@@ -140,9 +146,7 @@ def main(arguments):
         return 2
     program, scene, out = arguments[0], arguments[1], Path(arguments[2])
     out.mkdir(parents=True, exist_ok=True)
-    names = photographs(program, scene)
-    held_out = names[::HOLD_EVERY]
-    others = [name for name in names if name not in held_out]
+    held_out, others = held_out_and_others(program, scene)
     print("| photographs | held out, all pixels | seen | holes | measured | Gaussians "
           "| core-s | memory |")
     print("|---|---|---|---|---|---|---|---|")

@@ -21,7 +21,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from photo_count import HOLD_EVERY, photographs, spread, train
+from photo_count import held_out_and_others, spread, train
 
 CAMERAS = 3
 # What changes: cameras, or settings as factors of the standard ones.
@@ -74,9 +74,7 @@ def main(arguments):
         return 2
     program, scene, out = arguments[0], arguments[1], Path(arguments[2])
     out.mkdir(parents=True, exist_ok=True)
-    names = photographs(program, scene)
-    held_out = names[::HOLD_EVERY]
-    others = [name for name in names if name not in held_out]
+    held_out, others = held_out_and_others(program, scene)
     print("| | held out, all pixels | seen | holes | Gaussians | core-s |")
     print("|---|---|---|---|---|---|")
     standard = None
