@@ -11,6 +11,7 @@
 #include "convert/model/hole_pictures.h"
 #include "convert/model/model.h"
 #include "convert/model/views.h"
+#include "convert/report/film_page.h"
 #include "convert/text/html.h"
 #include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
@@ -77,7 +78,8 @@ void run_render(const RenderArgs& args) {
         is_file ? camera_path_from(args.path, model)
                 : camera_path(model, args.path, args.frames.value_or(kFrames));
     const auto frames = write_path(model, path, args.output, terminal.begin("render"), args.shown);
-    terminal.end(std::to_string(path.size()) + " frames");
+    write_film_page(args.output, frames);
+    terminal.end(std::to_string(path.size()) + " frames; film.html plays them");
     if (args.common.json) print_report(frames_to_json(frames));
     return;
   }
@@ -102,7 +104,8 @@ void add_render(CLI::App& app) {
   auto* path = cmd->add_option(
       "--path",
       args->path,
-      "Pictures and hole masks along a path instead: between (the input views), spiral (before "
+      "Pictures, hole masks and a page that plays them along a path instead: between (the input "
+      "views), spiral (before "
       "them), orbit (once around what they look at), or a .json of cameras as in cameras.json");
   path->excludes(views);
   cmd->add_option("--frames", args->frames, "Number of pictures along a path; default 60")
@@ -116,7 +119,8 @@ void add_render(CLI::App& app) {
   add_fill_option(*cmd, args->shown.fill);
   cmd->add_flag("--water",
                 args->shown.through_water,
-                "Put back the water that --medium water took out; default: pictures without it");
+                "Put back the water that --medium water took out; default: pictures without it")
+      ->excludes("--holes");
   add_output_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs render out/portal/model --views 0,2 -o out/views\n"

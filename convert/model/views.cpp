@@ -163,7 +163,7 @@ std::string frame_name(size_t k) {
 }
 
 std::vector<std::string> pictures_of_frame(size_t k) {
-  return {frame_name(k) + ".png", frame_name(k) + ".hole.png"};
+  return {frame_name(k) + ".png", frame_name(k) + ".hole.png", frame_name(k) + ".painted.png"};
 }
 
 // Pictures of an earlier path: those of a longer one must not follow the new ones.
@@ -275,6 +275,7 @@ std::vector<RenderedPicture> write_path(const Model& model,
       holes = hole_mask(buffers);
       write_png(folder / names[1], holes);
     }
+    if (!made.painted.empty()) write_png(folder / names[2], made.painted);
     if (k == 0 || path.size() <= kOnSheet || place_on_sheet(k) != place_on_sheet(k - 1)) {
       sheet.push_back(thumbnail(with_tints(made, holes)));
     }

@@ -67,8 +67,8 @@ std::vector<RenderedPicture> write_views(const Model& model,
 
 /// Writes frame_0000.png, frame_0000.hole.png and so on for cameras along a path, cameras.json that
 /// says where they are, and contact.png: twelve of them, holes in magenta, in violet where
-/// Model::fill shows. Without priors there are no masks and no magenta. What is returned has no
-/// roles.
+/// Model::fill shows, of which frame_0000.painted.png is the mask where the model has one. Without
+/// priors there are no masks of holes and no magenta. What is returned has no roles.
 std::vector<RenderedPicture> write_path(const Model& model,
                                         const std::vector<Camera>& path,
                                         const std::filesystem::path& folder,

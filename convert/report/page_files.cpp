@@ -13,6 +13,8 @@ CGS_EMBED(kPageStyle, CGS_PAGE_STYLE);
 CGS_EMBED(kViewerMarkup, CGS_VIEWER_MARKUP);
 CGS_EMBED(kSceneScript, CGS_SCENE_SCRIPT);
 CGS_EMBED(kViewerScript, CGS_VIEWER_SCRIPT);
+CGS_EMBED(kFilmMarkup, CGS_FILM_MARKUP);
+CGS_EMBED(kFilmScript, CGS_FILM_SCRIPT);
 CGS_EMBED(kThreeLicence, CGS_THREE_LICENCE);
 #ifdef CGS_THREE
 CGS_EMBED(kThree, CGS_THREE);
@@ -27,6 +29,8 @@ PageFiles page_files() {
   out.viewer_markup = {kViewerMarkupBegin, kViewerMarkupEnd};
   out.scene_script = {kSceneScriptBegin, kSceneScriptEnd};
   out.viewer_script = {kViewerScriptBegin, kViewerScriptEnd};
+  out.film_markup = {kFilmMarkupBegin, kFilmMarkupEnd};
+  out.film_script = {kFilmScriptBegin, kFilmScriptEnd};
   out.three_licence = {kThreeLicenceBegin, kThreeLicenceEnd};
 #ifdef CGS_THREE
   out.three = {kThreeBegin, kThreeEnd};

@@ -54,6 +54,7 @@ function viewerScene(scene, changed) {
   // ---- What is drawn ------------------------------------------------------------------------
 
   const clip = { value: new THREE.Vector4(0, 0, 0, -1) };  // n, d: gone where n.p + d > 0
+  const withInvented = { value: 1 };  // 0: surface without evidence is not drawn
   const lit = { value: 0 };       // 0: colours as they are; 1: under a light at the camera
   const textured = { value: 0 };  // 1: photographs where a face has one
   const pixelsPerTangent = { value: 500 };  // of the canvas: how large a thing is at distance 1
@@ -61,23 +62,28 @@ function viewerScene(scene, changed) {
   function surfaceMaterial(map) {
     return new THREE.ShaderMaterial({
       side: THREE.DoubleSide,
-      uniforms: { clip, lit, textured, map: { value: map }, hasMap: { value: map ? 1 : 0 } },
+      uniforms: { clip, withInvented, lit, textured, map: { value: map }, hasMap: { value: map ? 1 : 0 } },
       vertexShader: `
         attribute vec3 paint;
+        attribute float invented;
         varying vec3 vPaint, vNormal, vPlace, vEye;
         varying vec2 vUv;
+        varying float vInvented;
         void main() {
+          vInvented = invented;
           vec4 eye = modelViewMatrix * vec4(position, 1.0);
           vPaint = paint; vNormal = normalMatrix * normal; vPlace = position; vEye = eye.xyz; vUv = uv;
           gl_Position = projectionMatrix * eye;
         }`,
       fragmentShader: `
         uniform vec4 clip;
-        uniform float lit, textured, hasMap;
+        uniform float withInvented, lit, textured, hasMap;
         uniform sampler2D map;
         varying vec3 vPaint, vNormal, vPlace, vEye;
         varying vec2 vUv;
+        varying float vInvented;
         void main() {
+          if (vInvented > withInvented) discard;
           if (dot(clip, vec4(vPlace, 1.0)) > 0.0) discard;
           if (!gl_FrontFacing) {  // the inside of a closed surface: where it is cut
             float hatch = step(mod(gl_FragCoord.x + gl_FragCoord.y, 12.0), 1.5);
@@ -126,7 +132,9 @@ function viewerScene(scene, changed) {
     const place = new Float32Array(3 * corners);
     const normal = new Float32Array(3 * corners);
     const uv = new Float32Array(2 * corners);
+    const invented = new Uint8Array(corners);
     for (let c = 0; c < corners; ++c) {
+      invented[c] = isInvented(Math.floor(c / 3));
       for (let k = 0; k < 3; ++k) {
         place[3 * c + k] = vertices[3 * faces[c] + k];
         normal[3 * c + k] = normals[3 * faces[c] + k];
@@ -146,6 +154,7 @@ function viewerScene(scene, changed) {
     geometry.setAttribute('normal', new THREE.BufferAttribute(normal, 3));
     geometry.setAttribute('uv', new THREE.BufferAttribute(uv, 2));
     geometry.setAttribute('paint', paint);
+    geometry.setAttribute('invented', new THREE.BufferAttribute(invented, 1));
     return new THREE.Mesh(geometry, materials);
   })();
   function writeCoordinates(uv, begin, end, photograph) {
@@ -192,6 +201,7 @@ function viewerScene(scene, changed) {
     let front = false;
     let nearest = Infinity;
     for (let c = 0; c < corners; c += 3) {
+      if (!withInvented.value && isInvented(c / 3)) continue;
       const a = 3 * faces[c], b = 3 * faces[c + 1], d = 3 * faces[c + 2];
       const ax = vertices[a], ay = vertices[a + 1], az = vertices[a + 2];
       const ux = vertices[b] - ax, uy = vertices[b + 1] - ay, uz = vertices[b + 2] - az;
@@ -233,7 +243,7 @@ function viewerScene(scene, changed) {
   return {
     vertices, faces, vertexColors, sigmas, provenance, statesLabels, corners,
     vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt, sigmaAlong,
-    surface, paint, cloud, clip, lit, textured, pixelsPerTangent,
+    surface, paint, cloud, clip, withInvented, lit, textured, pixelsPerTangent,
     isComplete: () => pending === 0,
   };
 }

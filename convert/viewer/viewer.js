@@ -18,7 +18,7 @@
   const {
     vertices, faces, vertexColors, sigmas, provenance, statesLabels, corners,
     vector, isInvented, statesSigma, areaOf, poseOf, firstHit, sigmaAt, sigmaAlong,
-    surface, paint, cloud, clip, lit, textured, pixelsPerTangent, isComplete,
+    surface, paint, cloud, clip, withInvented, lit, textured, pixelsPerTangent, isComplete,
   } = viewerScene(scene, () => redraw());
 
   const renderer = new THREE.WebGLRenderer({ canvas, context, antialias: true, alpha: true });
@@ -359,6 +359,16 @@
     section();
   });
 
+  // ---- Surface without evidence -------------------------------------------------------------
+
+  const invented = part('invented');
+  invented.hidden = !provenance.some((_, face) => isInvented(face));
+  invented.addEventListener('click', () => {
+    withInvented.value = 1 - withInvented.value;
+    invented.setAttribute('aria-pressed', withInvented.value === 1);
+    redraw();
+  });
+
   // ---- Mouse, touch and keys ----------------------------------------------------------------
 
   let pressed = null;
@@ -378,7 +388,7 @@
     ArrowLeft: () => turn(-STEP, 0), ArrowRight: () => turn(STEP, 0),
     ArrowUp: () => turn(0, -STEP), ArrowDown: () => turn(0, STEP),
     '+': () => zoom(0.9), '=': () => zoom(0.9), '-': () => zoom(1 / 0.9),
-    Enter: () => pick(0, 0), Escape: clearEnds,
+    Enter: () => pick(0, 0), Escape: clearEnds, h: () => invented.click(),
   };
   canvas.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || !keys[event.key]) return;

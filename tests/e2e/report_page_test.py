@@ -265,6 +265,20 @@ class ReportPage(unittest.TestCase):
         self.assertIsNone(figure['sigma'])
         self.assertEqual(figure['to']['provenance'], 'inferred')
 
+    def test_what_nothing_measured_can_be_hidden(self):
+        canvas = self.page.canvas()
+        for _ in range(36):  # to the back, which no photograph saw
+            canvas.send_keys(Keys.ARROW_RIGHT)
+        self.page.press('Provenance')
+        self.assertGreater(share_of_magenta(self.page.picture()), 0.2)
+        canvas.send_keys('h')
+        self.page.driver.save_screenshot(str(SCREENS / 'without_invented.png'))
+        self.assertEqual(share_of_magenta(self.page.picture()), 0)
+        canvas.send_keys(Keys.ENTER)  # nothing is there to be picked
+        self.assertIn('Pick two points', self.page.measured())
+        self.page.press('Surface that nothing measured')
+        self.assertGreater(share_of_magenta(self.page.picture()), 0.2)
+
     def test_keys_turn_zoom_and_clear(self):
         canvas = self.page.canvas()
         seen = [self.page.picture()]
@@ -325,6 +339,60 @@ class ReportPage(unittest.TestCase):
             self.assertEqual(share_of_magenta(before), 0)
             self.assertAlmostEqual(share_of_magenta(after), mask.mean(), delta=0.2 * mask.mean())
             self.assertLess(changed(before[mask == 0], after[mask == 0]), 0.01)
+
+
+class Film(unittest.TestCase):
+    FRAMES = 6
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = FOLDER / 'film'
+        subprocess.run([CGS, 'render', OUT / 'model', '--path', 'spiral', '--frames', str(cls.FRAMES), '-q',
+                        '-o', cls.folder], check=True)
+        cls.driver = browser()
+        cls.driver.get((cls.folder / 'film.html').as_uri())
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.driver.quit()
+
+    def shown(self):
+        return next(f for f in self.driver.find_elements(By.CSS_SELECTOR, '#film figure') if f.is_displayed())
+
+    def press(self, key):
+        self.driver.find_element(By.TAG_NAME, 'body').send_keys(key)
+
+    def test_tints_at_a_key_what_no_photograph_saw(self):
+        before = pixels(self.shown())
+        self.press('h')
+        after = pixels(self.shown())
+        self.driver.save_screenshot(str(SCREENS / 'film.png'))
+        self.press('h')
+        self.assertEqual(changed(before, pixels(self.shown())), 0)
+        picture = self.shown().find_element(By.CSS_SELECTOR, '.picture img')
+        height, width = picture.size['height'], picture.size['width']
+        own = Image.open(self.folder / 'frame_0000.hole.png').convert('L')
+        scale = min(width / own.width, height / own.height)
+        size = int(own.width * scale), int(own.height * scale)
+        mask = np.asarray(own.resize(size)) > 127
+        top, left = (height - size[1]) // 2, (width - size[0]) // 2
+        tinted = np.abs(before - after).max(axis=-1)[top:top + size[1], left:left + size[0]] > 0.02
+        self.assertGreater(mask.mean(), 0.01)
+        self.assertGreater(np.mean(tinted == mask), 0.98)
+
+    def test_goes_by_keys_and_plays(self):
+        for key, frame in ((Keys.ARROW_RIGHT, 1), (Keys.ARROW_RIGHT, 2), (Keys.ARROW_LEFT, 1)):
+            self.press(key)
+            self.assertIn(f'frame_000{frame}: no photograph saw', self.shown().text)
+        self.press(' ')
+        seen = set()
+        for _ in range(100):
+            seen.add(self.driver.find_element(By.ID, 'frame').get_attribute('value'))
+            time.sleep(0.02)
+        self.press(' ')
+        self.press(Keys.ARROW_LEFT * self.FRAMES)
+        self.assertEqual(seen, {str(k) for k in range(self.FRAMES)})
+        self.assertIn('frame_0000', self.shown().text)
 
 
 class OtherBrowsers(unittest.TestCase):
