@@ -18,6 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// But of what macOS hides ("._a.jpg").
+bool is_image_name(const fs::path& name) {
+  return has_image_extension(name) && !name.native().starts_with('.');
+}
+
 bool is_beneath(const fs::path& path, const fs::path& folder) {
   const auto [end, rest] = std::mismatch(folder.begin(), folder.end(), path.begin(), path.end());
   (void)rest;
@@ -188,14 +193,18 @@ std::vector<std::string> sorted_entries(const fs::path& folder) {
   return out;
 }
 
+bool holds_images(const fs::path& folder) {
+  const std::vector<std::string> names = sorted_entries(folder);
+  return std::any_of(names.begin(), names.end(), is_image_name);
+}
+
 std::vector<fs::path> image_files(const SceneRoot& root, const std::string& subfolder) {
   const fs::path folder = resolve_in_scene(root, subfolder, root.folder);
   std::vector<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (!has_image_extension(entry->path())) continue;
-    if (entry->path().filename().native().starts_with('.')) continue;  // "._a.jpg" of macOS
+    if (!is_image_name(entry->path().filename())) continue;
     const fs::path name = fs::path(subfolder) / entry->path().filename();
     files.push_back(resolve_in_scene(root, name.string(), folder));
     if (files.size() > ReadLimits{}.max_views) {

@@ -72,6 +72,9 @@ bool has_image_extension(const std::filesystem::path& path);
 /// True for the extensions of glTF: .glb .gltf, in any case.
 bool has_gltf_extension(const std::filesystem::path& path);
 
+/// True if a folder holds image files directly, but for those that macOS hides ("._a.jpg").
+bool holds_images(const std::filesystem::path& folder);
+
 /// The image files directly inside a folder, sorted by file name.
 /// \throws BadInput Open if the folder cannot be listed, Path as resolve_in_scene(); LimitError
 std::vector<std::filesystem::path> image_files(const SceneRoot& root, const std::string& subfolder);

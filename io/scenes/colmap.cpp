@@ -305,11 +305,13 @@ Scene read_colmap(const SceneRoot& root) {
   return scene;
 }
 
-Scene scene_of_colmap(const SceneRoot& root, const ColmapModel& model) {
+Scene scene_of_colmap(const SceneRoot& root,
+                      const ColmapModel& model,
+                      const std::filesystem::path& photographs) {
   Scene scene;
   scene.kind = SceneKind::Colmap;
   scene.folder = root.folder;
-  add_model(root, ".", model, scene);
+  add_model(root, photographs.string(), model, scene);
   return scene;
 }
 

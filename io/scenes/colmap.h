@@ -26,8 +26,11 @@ bool is_colmap(const std::filesystem::path& folder);
 /// Source: COLMAP documentation, "Output format"; poses are cam_from_world.
 Scene read_colmap(const SceneRoot& root);
 
-/// The scene of a model in memory whose photographs lie in the folder itself.
+/// The scene of a model in memory.
+/// \param photographs  the folder they lie in, relative to the scene
 /// \throws BadInput as read_colmap()
-Scene scene_of_colmap(const SceneRoot& root, const ColmapModel& model);
+Scene scene_of_colmap(const SceneRoot& root,
+                      const ColmapModel& model,
+                      const std::filesystem::path& photographs = ".");
 
 }  // namespace cgs

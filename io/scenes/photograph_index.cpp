@@ -14,31 +14,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Folders whose pictures are no photographs, or smaller copies of them.
-bool holds_no_photographs(const std::string& name) {
-  static constexpr std::array<std::string_view, 17> kOthers = {"mask",
-                                                               "masks",
-                                                               "depth",
-                                                               "depths",
-                                                               "depth_maps",
-                                                               "confidence",
-                                                               "sparse",
-                                                               "normal",
-                                                               "normals",
-                                                               "stereo",
-                                                               "views",
-                                                               "model",
-                                                               "web",
-                                                               "thumbnails",
-                                                               "cameras",
-                                                               "mesh",
-                                                               "render"};
-  constexpr std::string_view kCopies = "images_";  // images_4, of LLFF and nerfstudio
-  const std::string folded = folded_name(name);
-  return name.starts_with('.') || folded.starts_with(kCopies) ||
-         std::find(kOthers.begin(), kOthers.end(), folded) != kOthers.end();
-}
-
 std::string without_ending(const std::string& name) {
   const fs::path path(name);
   return has_image_extension(path) ? fs::path(path).replace_extension().string() : name;
@@ -68,6 +43,30 @@ size_t common_folders(const std::vector<std::string>& a, const std::vector<std::
 }
 
 }  // namespace
+
+bool holds_no_photographs(const std::string& name) {
+  static constexpr std::array<std::string_view, 17> kOthers = {"mask",
+                                                               "masks",
+                                                               "depth",
+                                                               "depths",
+                                                               "depth_maps",
+                                                               "confidence",
+                                                               "sparse",
+                                                               "normal",
+                                                               "normals",
+                                                               "stereo",
+                                                               "views",
+                                                               "model",
+                                                               "web",
+                                                               "thumbnails",
+                                                               "cameras",
+                                                               "mesh",
+                                                               "render"};
+  constexpr std::string_view kCopies = "images_";  // images_4, of LLFF and nerfstudio
+  const std::string folded = folded_name(name);
+  return name.starts_with('.') || folded.starts_with(kCopies) ||
+         std::find(kOthers.begin(), kOthers.end(), folded) != kOthers.end();
+}
 
 PhotographIndex::PhotographIndex(SceneRoot root, std::vector<std::string> folders)
     : root_(std::move(root)) {

@@ -12,6 +12,10 @@
 
 namespace cgs {
 
+/// True of folders, by their names, whose pictures are no photographs (masks, depth, results) or
+/// smaller copies of them.
+bool holds_no_photographs(const std::string& folder_name);
+
 /// The photographs of a scene by the names that other programs give them: those in some folders and
 /// below these, but for folders of masks, of depth, of smaller copies and of results.
 class PhotographIndex {

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "io/scenes/orientation.h"
+#include "io/scenes/photograph_index.h"
 #include "io/scenes/scene_layouts.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
@@ -29,14 +30,20 @@ bool is_one_of(const std::array<std::string_view, N>& known, const std::string& 
 
 }  // namespace
 
-bool is_photographs(const fs::path& folder) {
-  if (!is_folder(folder) || layout_of(folder) != nullptr) return false;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    if (has_image_extension(entry->path())) return true;
+fs::path folder_of_photographs(const fs::path& scene) {
+  if (holds_images(scene)) return ".";
+  const fs::path usual = "images";
+  if (holds_images(scene / usual)) return usual;
+  std::vector<fs::path> found;
+  for (const std::string& name : sorted_entries(scene)) {
+    if (!holds_no_photographs(name) && holds_images(scene / name)) found.emplace_back(name);
   }
-  return false;
+  return found.size() == 1 ? found.front() : fs::path();
+}
+
+bool is_photographs(const fs::path& folder) {
+  return is_folder(folder) && layout_of(folder) == nullptr &&
+         !folder_of_photographs(folder).empty();
 }
 
 std::vector<std::string> unread_files(const fs::path& folder) {
@@ -57,7 +64,9 @@ std::vector<std::string> unread_files(const fs::path& folder) {
 
 std::vector<PhotoFile> list_photographs(const SceneRoot& root) {
   std::vector<PhotoFile> out;
-  for (const fs::path& path : image_files(root, ".")) {
+  const fs::path folder = folder_of_photographs(root.folder);
+  if (folder.empty()) return out;
+  for (const fs::path& path : image_files(root, folder.string())) {
     const std::string name = path.filename().string();
     const bool is_plain = std::none_of(
         name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; });

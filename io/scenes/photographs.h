@@ -17,15 +17,20 @@ struct PhotoFile {
   LensHint hint;
 };
 
-/// True if the folder holds image files and no file that states cameras in a layout that
-/// read_scene() knows.
+/// The folder of a scene that its photographs lie in, relative to it: itself (".") if it holds
+/// image files; else images/ or the only one that does, but for those of masks, depth, copies and
+/// results. Empty if there is none, or none of several that could be told from the others.
+std::filesystem::path folder_of_photographs(const std::filesystem::path& scene);
+
+/// True if the folder has a folder_of_photographs() and no file that states cameras in a layout
+/// that read_scene() knows.
 bool is_photographs(const std::filesystem::path& folder);
 
 /// What people should know of files in a folder that are not read: raw photographs and other kinds
 /// of pictures, and cameras of other programs, one line each; empty if there are none.
 std::vector<std::string> unread_files(const std::filesystem::path& folder);
 
-/// The image files directly in a folder, in the order of their names.
+/// The image files directly in the folder_of_photographs() of a scene, in the order of their names.
 /// \throws BadInput Path (names with control characters, links that leave the folder), and as
 ///         image_size(); LimitError
 std::vector<PhotoFile> list_photographs(const SceneRoot& root);

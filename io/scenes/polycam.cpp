@@ -38,13 +38,6 @@ bool holds_cameras(const fs::path& folder) {
   return false;
 }
 
-bool holds_images(const fs::path& folder) {
-  const std::vector<std::string> entries = sorted_entries(folder);
-  return std::any_of(entries.begin(), entries.end(), [](const std::string& entry) {
-    return has_image_extension(entry);
-  });
-}
-
 // The folders of a capture, relative to the scene.
 struct Keyframes {
   fs::path base;

@@ -42,12 +42,13 @@ namespace fs = std::filesystem;
 std::string hints(const fs::path& folder) {
   std::string out;
   for (const std::string& line : unread_files(folder)) out += line + "; ";
+  std::vector<std::string> found;
   for (const std::string& name : sorted_entries(folder)) {
-    if (!is_photographs(folder / name)) continue;
-    out += "the photographs seem to lie in " + printable(folder / name) + ": give that; ";
-    break;
+    if (is_photographs(folder / name)) found.push_back(name);
   }
-  return out;
+  if (found.empty()) return out;
+  out += "photographs lie in " + first_few(found);
+  return out + (found.size() > 1 ? ": give one of these; " : ": give that; ");
 }
 
 Scene read_layout(const SceneRoot& root, const std::string& chunk) {
@@ -163,7 +164,7 @@ std::vector<int> chosen_divisors(Scene& scene, const SceneOptions& options) {
   std::vector<int> out = largest;
   if (chooses_by_worth(scene, options)) {
     const std::vector<int> usable = views_with_files(scene);
-    const size_t wanted = std::min(SceneOptions::kWantedViews, most_inputs(usable.size()));
+    const size_t wanted = options.wanted_views(usable.size());
     const auto longest_side = [&](const std::vector<int>& divisors) {
       int longest = 0;
       for (const int i : usable) {
@@ -443,6 +444,11 @@ Scene prepared(Scene scene, const SceneOptions& options) {
 
 }  // namespace
 
+size_t SceneOptions::wanted_views(size_t photographs) const {
+  if (all_views || photographs <= kTakeAll) return photographs;
+  return std::min(kWantedViews, most_inputs(photographs));
+}
+
 void SceneOptions::validate() const {
   require(
       !downscale || *downscale >= 1, "SceneOptions.downscale must be >= 1", downscale.value_or(1));
@@ -458,12 +464,16 @@ Scene scene_of_photographs(const fs::path& folder,
                            const ColmapModel& model,
                            const SceneOptions& options) {
   options.validate();
-  Scene scene = scene_of_colmap({folder, options.allow_external}, model);
+  const fs::path photographs = folder_of_photographs(folder);
+  Scene scene = scene_of_colmap({folder, options.allow_external}, model, photographs);
   scene.kind = SceneKind::Photographs;
   for (const PhotoFile& photograph : list_photographs({folder, options.allow_external})) {
     scene.photographs.push_back(photograph.path.filename().string());
   }
   for (const std::string& line : unread_files(folder)) scene.warnings.push_back(line);
+  if (photographs != ".") {
+    scene.notes.push_back("the photographs are those in " + printable(photographs));
+  }
   for (View& view : scene.views) {
     if (!view.image_path.empty()) view.orientation = exif_orientation(view.image_path);
   }

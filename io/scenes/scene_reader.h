@@ -41,6 +41,10 @@ struct SceneOptions {
   static constexpr size_t kWantedViews = 12;
   static constexpr int kShortestChosen = 400;
 
+  /// How many of so many photographs are wanted as input views where `views` names none: all of few
+  /// or where that is asked for, of more kWantedViews.
+  size_t wanted_views(size_t photographs) const;
+
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;
 };

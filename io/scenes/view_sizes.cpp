@@ -79,7 +79,7 @@ void divide_sizes(Scene& scene, const std::vector<int>& divisors) {
     const int height = camera.height / divisors[i];
     constexpr int kSmallest = 8;  // below, no stage has anything to work on
     if (width < kSmallest || height < kSmallest) {
-      throw InvalidInput("SceneOptions.downscale " + std::to_string(divisors[i]) + " leaves " +
+      throw InvalidInput("downscale " + std::to_string(divisors[i]) + " leaves " +
                          size_text(width, height) + " pixels of view " + printable(view.name));
     }
     camera = resized(camera, width, height);

@@ -98,6 +98,10 @@ TEST_F(ResolveInScene, ListsImagesByName) {
   EXPECT_EQ(files[0].filename(), "B.JPG");
   EXPECT_EQ(files[1].filename(), "a.png");
   EXPECT_EQ(defect_of([&] { image_files({dir_ / "scene"}, "nothing"); }), "OPEN");
+  EXPECT_TRUE(holds_images(dir_ / "scene/images"));
+  EXPECT_FALSE(holds_images(dir_ / "scene/nothing"));
+  test::write_bytes(dir_ / "scene/hidden/._B.JPG", "x");
+  EXPECT_FALSE(holds_images(dir_ / "scene/hidden"));
 }
 
 }  // namespace

@@ -97,5 +97,16 @@ TEST(SceneOfColmap, IsTheSceneOfTheFiles) {
   EXPECT_EQ(read.points[1].views, built.points[1].views);
 }
 
+TEST(SceneOfColmap, FindsPhotographsInTheirFolder) {
+  const test::TempDir dir;
+  const ColmapModel model = sample_model();
+  for (const ColmapImage& image : model.images) {
+    test::write_bytes(dir / "July" / image.name, test::rgb_png(80, 60));
+  }
+  for (const View& view : scene_of_colmap({dir.path(), false}, model, "July").views) {
+    EXPECT_TRUE(is_present(view.image_path)) << view.name;
+  }
+}
+
 }  // namespace
 }  // namespace cgs::colmap_writer_test

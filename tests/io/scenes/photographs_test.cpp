@@ -27,6 +27,29 @@ TEST(Photographs, AreAFolderOfImagesWithoutCameras) {
   EXPECT_EQ(photographs[1].hint.focal, 0);
 }
 
+TEST(Photographs, MayLieInAFolderOfTheirOwn) {
+  const test::TempDir dir;
+  test::write_bytes(dir / "masks/a.png", test::rgb_png(20, 10));
+  test::write_bytes(dir / "images_4/a.png", test::rgb_png(5, 3));
+  test::write_bytes(dir / "other/._a.png", test::rgb_png(20, 10));
+  EXPECT_FALSE(is_photographs(dir.path()));
+  test::write_bytes(dir / "July/a.png", test::rgb_png(20, 10));
+  EXPECT_TRUE(is_photographs(dir.path()));
+  EXPECT_EQ(folder_of_photographs(dir.path()), "July");
+  test::write_bytes(dir / "August/b.png", test::rgb_png(20, 10));
+  EXPECT_FALSE(is_photographs(dir.path()));  // of which of the two?
+  EXPECT_TRUE(list_photographs({dir.path(), false}).empty());
+  test::write_bytes(dir / "images/c.png", test::rgb_png(20, 10));
+  const auto usual = list_photographs({dir.path(), false});
+  ASSERT_EQ(usual.size(), 1u);
+  EXPECT_EQ(usual[0].path.filename(), "c.png");
+  test::write_bytes(dir / "d.png", test::rgb_png(20, 10));
+  EXPECT_EQ(folder_of_photographs(dir.path()), ".");
+  const auto own = list_photographs({dir.path(), false});
+  ASSERT_EQ(own.size(), 1u);
+  EXPECT_EQ(own[0].path.filename(), "d.png");
+}
+
 TEST(Photographs, WithCamerasBesideThemAreAnotherLayout) {
   const test::TempDir dir;
   test::write_bytes(dir / "a.png", test::rgb_png(20, 10));
