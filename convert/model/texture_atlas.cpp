@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -23,7 +24,7 @@ namespace {
 // Of a photograph around the faces of its chart: what bilinear lookups and mipmaps reach for.
 constexpr int kMargin = 4;  // [pixels of the atlas]
 
-/// Connected faces of one photograph.
+/// Faces of one photograph that are cut out of it together.
 struct Chart {
   int photograph = 0;
   Eigen::AlignedBox2d box;  ///< Of the faces, in the photograph [pixels].
@@ -43,7 +44,7 @@ double extend(const TriangleMesh& mesh, const Camera& camera, size_t face, Chart
     chart.box.extend(uvz.head<2>());
     depth += uvz.z() / 3;
   }
-  return 2 * depth / (camera.fx + camera.fy);
+  return camera.pixel_size(depth);
 }
 
 Charts charts_of(const TriangleMesh& mesh, const PhotoTexture& texture) {
@@ -73,10 +74,55 @@ Charts charts_of(const TriangleMesh& mesh, const PhotoTexture& texture) {
   return out;
 }
 
+/// How much smaller a chart becomes, whose pixels are to be as large as a texel at least.
+double share_of(const Chart& chart, double texel) { return std::min(1.0, chart.pixel / texel); }
+
+double room(const Chart& chart, double texel) {
+  const Eigen::Vector2d size = chart.box.sizes() * share_of(chart, texel);
+  return (size.array() + 2 * kMargin).prod();
+}
+
+/// Joins charts that take no more room together than apart, as those within and close to each other
+/// do: a ragged surface has thousands of few faces each.
+Charts joined(Charts all, double texel) {
+  std::vector<Chart>& charts = all.charts;
+  std::vector<size_t> order(charts.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return room(charts[a], texel) > room(charts[b], texel);
+  });
+  std::vector<int> number(charts.size(), PhotoTexture::kNone);  // of the chart it becomes a part of
+  std::vector<Chart> out;
+  for (const size_t first : order) {
+    if (number[first] >= 0) continue;
+    number[first] = static_cast<int>(out.size());
+    Chart whole = charts[first];
+    for (bool has_grown = true; has_grown;) {
+      has_grown = false;
+      for (const size_t other : order) {
+        if (number[other] >= 0 || charts[other].photograph != whole.photograph) continue;
+        const Chart both{whole.photograph,
+                         whole.box.merged(charts[other].box),
+                         std::max(whole.pixel, charts[other].pixel)};
+        if (room(both, texel) > room(whole, texel) + room(charts[other], texel)) continue;
+        whole = both;
+        number[other] = number[first];
+        has_grown = true;
+      }
+    }
+    out.push_back(whole);
+  }
+  charts = std::move(out);
+  for (int& chart : all.of_face) {
+    if (chart >= 0) chart = number[static_cast<size_t>(chart)];
+  }
+  return all;
+}
+
 /// The part of a photograph that a chart shows, with a margin.
 /// \param texel  [internal units]; its pixels are made as large where they are smaller
 Photograph cut_out(const Chart& chart, const Photograph& photograph, double texel) {
-  const double share = std::min(1.0, chart.pixel / texel);
+  const double share = share_of(chart, texel);
   const double margin = kMargin / share;
   const Eigen::Vector2i limit(photograph.camera.width, photograph.camera.height);
   const Eigen::Vector2i low =
@@ -147,6 +193,7 @@ PackedTexture packed_texture(const TriangleMesh& mesh, const PhotoTexture& textu
   for (const Chart& chart : charts.charts) finest = std::min(finest, chart.pixel);
   PackedTexture out;
   out.texel = std::max(texel, finest);
+  charts = joined(std::move(charts), out.texel);
   out.texture.of_face = std::move(charts.of_face);
   constexpr double kCoarser = 1.05;
   for (;; out.texel *= kCoarser) {

@@ -16,7 +16,8 @@ struct PackedTexture {
 };
 
 /// Packs what faces show of photographs into one picture. Connected faces of one photograph are a
-/// chart, which keeps their projection, so that no pixel is resampled but for size.
+/// chart, which keeps their projection, so that no pixel is resampled but for size; charts of one
+/// photograph that lie so close that they take no more room together are one.
 ///
 /// \param texel  what pixels of finer charts are made as large as, by their medians [internal
 ///               units]; 0 = as photographs have them. Where all does not fit into

@@ -63,6 +63,18 @@ TEST(PackedTexture, SplitsAPhotographWhereItsFacesDoNotTouch) {
   EXPECT_EQ(packed_texture(box.mesh, box.texture, 0).texture.photographs.size(), 4u);
 }
 
+TEST(PackedTexture, CutsAnIslandOutTogetherWithWhatIsAroundIt) {
+  test::TexturedBox box = test::textured_box();
+  for (int row = 4; row <= 6; ++row) {
+    for (int column = 4; column <= 6; ++column) {
+      if (row == 5 && column == 5) continue;
+      const auto face = static_cast<size_t>(4 * 200 + 20 * row + 2 * column);
+      box.texture.of_face[face] = box.texture.of_face[face + 1] = -1;
+    }
+  }
+  EXPECT_EQ(packed_texture(box.mesh, box.texture, 0).texture.photographs.size(), 3u);
+}
+
 TEST(PackedTexture, MakesPixelsAsLargeAsAsked) {
   const test::TexturedBox box = test::textured_box();
   constexpr double kTexel = 0.01;
