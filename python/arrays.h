@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstring>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -43,6 +45,26 @@ pybind11::object rows_view(std::vector<T>& rows,
   std::vector<pybind11::ssize_t> shape = {static_cast<pybind11::ssize_t>(rows.size())};
   if constexpr (sizeof(T) > sizeof(Scalar)) shape.push_back(sizeof(T) / sizeof(Scalar));
   return view_of<Scalar>(rows.data(), std::move(shape), holder);
+}
+
+/// Makes an array that Python may see another one of the same size, in its place: NumPy arrays of
+/// the old one would else show memory that is gone. Of another size the old one is kept for as long
+/// as the module is, as nobody knows who still looks at it.
+template <typename T>
+void replace(std::vector<T>& old, std::vector<T>&& by) {
+  if (old.size() == by.size()) {
+    std::copy(by.begin(), by.end(), old.begin());
+    return;
+  }
+  static std::vector<std::vector<T>> kept;
+  if (!old.empty()) kept.push_back(std::move(old));
+  old = std::move(by);
+}
+template <typename T>
+void replace(Raster<T>& old, Raster<T>&& by) {
+  old.width = by.width;
+  old.height = by.height;
+  replace(old.data, std::move(by.data));
 }
 
 /// An array as it may come in: of any type and layout, converted.

@@ -9,6 +9,7 @@
 #include "python/work.h"
 #include <nlohmann/json.hpp>
 
+#include "convert/commands/common_options.h"
 #include "convert/commands/usage.h"
 #include "libcgs/core/error.h"
 
@@ -82,6 +83,9 @@ Outcome outcome_of(CLI::App& app, std::vector<std::string> words) {
     std::streambuf* before;
     ~Redirected() { std::cout.rdbuf(before); }
   } const redirected{std::cout.rdbuf(printed.rdbuf())};
+  struct ThreadsFreed {
+    ~ThreadsFreed() { release_threads(); }
+  } const threads_freed;
   std::reverse(words.begin(), words.end());  // the order CLI11 takes a vector in
   try {
     app.parse(words);

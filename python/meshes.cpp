@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
-#include <cstdio>
+#include <string>
 
 #include "python/arrays.h"
 #include "python/cameras.h"
@@ -17,6 +17,7 @@
 #include "convert/measure/comparison.h"
 #include "convert/measure/measured_file.h"
 #include "convert/text/stated_frame.h"
+#include "io/bytes/byte_writer.h"
 #include "meshing/measure/deviation.h"
 
 namespace cgs {
@@ -83,8 +84,8 @@ std::vector<Provenance> labels_of(const ArrayIn<uint8_t>& array, size_t faces) {
 }
 
 void set_colors(MeshObject& m, const ArrayIn<float>& colors) {
-  m.content.mesh.colors =
-      as_many<Eigen::Vector3f>(colors, "colors", m.content.mesh.vertices.size());
+  replace(m.content.mesh.colors,
+          as_many<Eigen::Vector3f>(colors, "colors", m.content.mesh.vertices.size()));
 }
 
 void set_sigma(MeshObject& m, const ArrayIn<float>& sigma) {
@@ -150,9 +151,12 @@ MeshObject filtered(const MeshObject& mesh,
 }
 
 std::string point_text(const Eigen::Vector3d& p) {
-  std::array<char, 100> out{};
-  std::snprintf(out.data(), out.size(), "%.17g,%.17g,%.17g", p.x(), p.y(), p.z());
-  return out.data();
+  std::string out;
+  for (const double c : p) {
+    if (!out.empty()) out += ',';
+    append_number(out, c);
+  }
+  return out;
 }
 
 using Ends = std::optional<std::pair<Eigen::Vector3d, Eigen::Vector3d>>;
@@ -190,9 +194,19 @@ py::object measured(const MeshObject& mesh, const WantedFigures& wanted) {
 
 py::dict compared(const MeshObject& a, const MeshObject& b) {
   require(!b.content.mesh.faces.empty(), "the other mesh needs faces, their number", 0);
+  const Frame& frame = a.content.frame;
+  if (frame.has_metric_scale() != b.content.frame.has_metric_scale()) {
+    throw InvalidInput(
+        "only one of the meshes says how long a unit of it is: give the other "
+        "metres_per_unit, or assume_unit where it is read");
+  }
   const std::vector<Deviation> found = result_of(py::none(), [&](Terminal&) {
-    const MeasurableMesh other = in_frame_of(b.content, a.content.frame);
-    return deviations(points_by_vertex(a.content), other, NearestSurface(other));
+    const MeasurableMesh other = in_frame_of(b.content, frame);
+    ComparedPoints points = points_by_vertex(a.content);
+    add_scale_sigma(points,
+                    relative_scale_sigma(frame, b.content.frame),
+                    unmoved_by_scale(a.content, b.content.frame, false));
+    return deviations(points, other, NearestSurface(other));
   });
   const auto count = static_cast<py::ssize_t>(found.size());
   py::array_t<double> distance(count);
@@ -230,9 +244,12 @@ void add_arrays(Class& mesh) {
       .def_property_readonly(
           "faces",
           [](const py::object& self) {
-            return rows_view<uint32_t>(self.cast<MeshObject&>().content.mesh.faces, self, true);
+            py::object out =
+                rows_view<uint32_t>(self.cast<MeshObject&>().content.mesh.faces, self, true);
+            out.attr("flags").attr("writeable") = false;  // they were checked, and certified
+            return out;
           },
-          "M x 3, uint32, counter-clockwise seen from outside.")
+          "M x 3, uint32, counter-clockwise seen from outside; read only.")
       .def_property(
           "colors",
           [](const py::object& self) {

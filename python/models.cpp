@@ -150,9 +150,13 @@ VolumeObject joined(const std::vector<const ModelObject*>& models,
 py::object evaluated(ModelObject& m, const std::string& views, const py::object& progress) {
   const std::vector<int> wanted =
       views.empty() ? m.model.scene.held_out : select_views(m.model.scene, views);
-  return python_of(result_of(progress, [&](Terminal& terminal) {
+  const size_t known = m.model.scene.warnings.size();
+  py::object out = python_of(result_of(progress, [&](Terminal& terminal) {
     return evaluation_to_json(evaluate_views(m.model, wanted, terminal.begin("evaluate")));
   }));
+  warn(m.model.scene.warnings, known);
+  m.model.scene.warnings.resize(known);
+  return out;
 }
 
 // What an input view knows, in arrays of its own.

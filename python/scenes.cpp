@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <set>
+
 #include "python/arrays.h"
 #include "python/cameras.h"
 #include "python/module.h"
@@ -18,7 +20,7 @@ namespace {
 namespace py = pybind11;
 
 DepthKind depth_kind_of(const std::string& name) {
-  return named(depth_kinds(), name, "depth_kind must be metric, relative or disparity");
+  return named(depth_kinds(), name, "depth_kind must be auto, metric, depth or disparity");
 }
 
 struct SceneArguments {
@@ -30,6 +32,9 @@ struct SceneArguments {
   std::string depth_kind;
   std::string assume_unit;
   double focal = 0;
+  bool each_lens = false;
+  bool old_photographs = false;
+  bool refine_poses = false;
 };
 
 SceneRequest request_of(const SceneArguments& arguments) {
@@ -44,6 +49,9 @@ SceneRequest request_of(const SceneArguments& arguments) {
   }
   out.assume_unit = arguments.assume_unit;
   out.focal = arguments.focal;
+  out.each_lens = arguments.each_lens;
+  out.old_photographs = arguments.old_photographs;
+  out.refine_poses = arguments.refine_poses;
   return out;
 }
 
@@ -58,18 +66,37 @@ Scene read(const SceneArguments& arguments, const py::object& progress) {
   return scene;
 }
 
+void require_view(const Scene& scene, int view) {
+  require(view >= 0 && static_cast<size_t>(view) < scene.views.size(),
+          "views must be indices below " + std::to_string(scene.views.size()),
+          view);
+}
+
+void set_input(Scene& scene, const std::vector<int>& views) {
+  const std::set<int> different(views.begin(), views.end());
+  for (const int view : views) require_view(scene, view);
+  require(
+      different.size() == views.size(), "input views must be different ones, number", views.size());
+  scene.input = views;
+}
+
 void load(Scene& scene, const std::optional<std::vector<int>>& views, const py::object& progress) {
   const std::vector<int> wanted = views.value_or(scene.input);
-  for (const int i : wanted) {
-    require(i >= 0 && static_cast<size_t>(i) < scene.views.size(),
-            "views must be indices below " + std::to_string(scene.views.size()),
-            i);
-  }
+  for (const int i : wanted) require_view(scene, i);
   const size_t known = scene.warnings.size();
+  Scene loaded = scene;
   work_beside(progress, [&] {
     Terminal terminal(true);
-    load_images(scene, wanted, terminal.begin("photographs"));
+    load_images(loaded, wanted, terminal.begin("photographs"));
   });
+  scene.warnings = loaded.warnings;
+  for (const int i : wanted) {
+    View& from = loaded.views[static_cast<size_t>(i)];
+    View& to = scene.views[static_cast<size_t>(i)];
+    replace(to.image, std::move(from.image));
+    replace(to.valid, std::move(from.valid));
+    replace(to.given_depth, std::move(from.given_depth));
+  }
   warn(scene.warnings, known);
 }
 
@@ -99,21 +126,23 @@ void add_view(py::module_& module) {
           "image",
           array(&View::image),
           [](View& v, const ArrayIn<float>& pixels) {
-            v.image = raster_of<Eigen::Vector3f>(pixels, v.camera.width, v.camera.height, "image");
+            replace(v.image,
+                    raster_of<Eigen::Vector3f>(pixels, v.camera.width, v.camera.height, "image"));
           },
           "Height x width x 3, float32; None until Scene.load().")
       .def_property(
           "valid",
           [](const py::object& self) { return raster_view<bool>(self.cast<View&>().valid, self); },
           [](View& v, const ArrayIn<bool>& mask) {
-            v.valid = raster_of<uint8_t>(mask, v.camera.width, v.camera.height, "valid");
+            replace(v.valid, raster_of<uint8_t>(mask, v.camera.width, v.camera.height, "valid"));
           },
           "Height x width, bool: which pixels may be used; None = all.")
       .def_property(
           "depth",
           array(&View::given_depth),
           [](View& v, const ArrayIn<float>& depth) {
-            v.given_depth = raster_of<float>(depth, v.camera.width, v.camera.height, "depth");
+            replace(v.given_depth,
+                    raster_of<float>(depth, v.camera.width, v.camera.height, "depth"));
           },
           "Depth from elsewhere, height x width, float32, NaN where there is none; see "
           "Scene.depth_kind. None = none.")
@@ -144,7 +173,11 @@ void add_scene(py::module_& module) {
            py::arg("name"),
            py::return_value_policy::reference_internal,
            "The view of that name.")
-      .def_readwrite("input", &Scene::input, "Indices of the views to reconstruct from; new.")
+      .def_property(
+          "input",
+          [](const Scene& s) { return s.input; },
+          set_input,
+          "Indices of the views to reconstruct from; new.")
       .def_readonly("held_out", &Scene::held_out, "Indices of those kept to compare with; new.")
       .def_readonly("warnings", &Scene::warnings, "What is odd but usable, a line each; new.")
       .def_readonly("notes", &Scene::notes, "What was chosen, a line each; new.")
@@ -153,8 +186,8 @@ void add_scene(py::module_& module) {
           "depth_kind",
           [](const Scene& s) { return name_of_kind(s.depth_kind); },
           [](Scene& s, const std::string& name) { s.depth_kind = depth_kind_of(name); },
-          "What View.depth holds: \"metric\" (metres), \"relative\" (up to scale and offset), "
-          "\"disparity\" (inverse depth likewise); empty = found out.")
+          "What View.depth holds: \"metric\" (metres), \"depth\" (up to scale and offset), "
+          "\"disparity\" (inverse depth likewise); \"auto\" = found out.")
       .def("load",
            load,
            py::arg("views") = py::none(),
@@ -183,10 +216,22 @@ void add_scenes(py::module_& module) {
          const std::string& depth_kind,
          const std::string& assume_unit,
          double focal,
+         bool each_lens,
+         bool old_photographs,
+         bool refine_poses,
          const py::object& progress) {
-        return read(
-            {path, views, downscale, all_views, depth.value_or(""), depth_kind, assume_unit, focal},
-            progress);
+        return read({path,
+                     views,
+                     downscale,
+                     all_views,
+                     depth.value_or(""),
+                     depth_kind,
+                     assume_unit,
+                     focal,
+                     each_lens,
+                     old_photographs,
+                     refine_poses},
+                    progress);
       },
       py::arg("path"),
       py::arg("views") = "",
@@ -197,6 +242,9 @@ void add_scenes(py::module_& module) {
       py::arg("depth_kind") = "",
       py::arg("assume_unit") = "",
       py::arg("focal") = 0.0,
+      py::arg("each_lens") = false,
+      py::arg("old_photographs") = false,
+      py::arg("refine_poses") = false,
       py::arg("progress") = py::none(),
       R"(Reads a scene in any layout that the program reads; of nothing but photographs, solves for
 the cameras.
@@ -206,9 +254,13 @@ views        input views: names or indices, separated by commas; default: chosen
 downscale    divides the sides of the photographs; default: no side above 1024 pixels
 all_views    take every view as input where `views` is empty
 depth        folder of depth files, one per photograph
-depth_kind   "metric", "relative" or "disparity"; default: found out
+depth_kind   "metric", "depth" (up to scale and offset) or "disparity"; default: found out
 assume_unit  what a unit of the scene is, "m", "mm" ..., where it does not say
 focal        focal length of photographs without cameras [pixels]; 0 = found out
+each_lens    photographs without cameras have a focal length each
+old_photographs  of prints and films: borders are left out, and what film, print and scanner did to
+             the light of each is found out, as far as matches tell
+refine_poses cameras that the scene states are moved so that the photographs agree
 
 Pixels are not loaded: see Scene.load(). Raises InvalidInput, BadInput.)");
 }

@@ -10,6 +10,7 @@
 #include <opencv2/core/utility.hpp>
 #include <tbb/global_control.h>
 
+#include "convert/model/model_training.h"
 #include "convert/model/water_report.h"
 #include "convert/text/length.h"
 #include "io/bytes/scene_path.h"
@@ -18,6 +19,12 @@
 namespace cgs {
 
 namespace {
+
+// What limit_threads() set; empty = nothing.
+std::unique_ptr<tbb::global_control>& thread_control() {
+  static std::unique_ptr<tbb::global_control> out;
+  return out;
+}
 
 constexpr const char* kDepthHeading = "Depth";
 
@@ -79,11 +86,13 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
             options.all_views,
             "Every photograph is an input view, none is held out; time grows with their number")
         ->excludes("--views");
-    command.add_option(
-        "--downscale",
-        options.downscale,
-        "Divide the image size by this; default: the smallest that leaves no side above " +
-            std::to_string(SceneOptions::kLongestSide) + " pixels");
+    command
+        .add_option(
+            "--downscale",
+            options.downscale,
+            "Divide the image size by this; default: the smallest that leaves no side above " +
+                std::to_string(SceneOptions::kLongestSide) + " pixels")
+        ->check(CLI::Range(1, 1 << 15).description("at least 1"));
   }
   add_depth_options(command, options);
   const OptionGroup group(command, kDepthHeading);
@@ -115,10 +124,12 @@ void add_depth_options(CLI::App& command, SceneOptions& options) {
                   "network); default auto: whichever fits what the photographs show")
       ->transform(
           CLI::CheckedTransformer(depth_kinds()).description("auto, metric, depth, disparity"));
-  command.add_option("--depth-scale",
-                     options.depth.scale,
-                     "Values of metric depth files per metre; default: 1000 where they are whole "
-                     "numbers (5000 in TUM data sets), else 1");
+  command
+      .add_option("--depth-scale",
+                  options.depth.scale,
+                  "Values of metric depth files per metre; default: 1000 where they are whole "
+                  "numbers (5000 in TUM data sets), else 1")
+      ->check(CLI::NonNegativeNumber);
 }
 
 void add_scale_options(CLI::App& command, SceneRequest& request) {
@@ -288,6 +299,30 @@ void keep_scene_apart(const std::filesystem::path& output,
   }
 }
 
+void refuse_to_replace_model(const std::filesystem::path& output, bool overwrite) {
+  std::error_code error;
+  const auto folder = std::filesystem::weakly_canonical(output, error);
+  if (folder.filename() == "model" && is_present(folder.parent_path() / "run.json")) {
+    throw InvalidInput(printable(output) +
+                       " is the model of a run, which only cgs run may change; choose another "
+                       "folder");
+  }
+  if (is_present(output / "run.json")) {
+    throw InvalidInput(printable(output) +
+                       " holds a run, which has a model of its own; choose another folder");
+  }
+  if (overwrite) return;
+  if (is_present(output / "cameras.json")) {
+    throw InvalidInput(printable(output) +
+                       " holds a finished model; choose another folder, or say --overwrite");
+  }
+  if (is_present(output / "gaussians.ply") && !has_checkpoints(output)) {
+    throw InvalidInput(printable(output) +
+                       " holds gaussians.ply, which no training here wrote; choose another folder, "
+                       "or say --overwrite");
+  }
+}
+
 void require_ending(const std::filesystem::path& output, const char* ending, const char* option) {
   if (output.empty() || lower_extension(output) == ending) return;
   throw InvalidInput(std::string(option) + " " + printable(output) +
@@ -299,10 +334,14 @@ void limit_threads(int threads) {
   require(threads >= 0 && threads <= kMost, "--threads must be in 0 ... 1024", threads);
   const int count =
       threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  static std::unique_ptr<tbb::global_control> control;
-  control = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
-                                                  static_cast<size_t>(count));
+  thread_control() = std::make_unique<tbb::global_control>(
+      tbb::global_control::max_allowed_parallelism, static_cast<size_t>(count));
   cv::setNumThreads(count);
+}
+
+void release_threads() {
+  thread_control().reset();
+  cv::setNumThreads(-1);
 }
 
 }  // namespace cgs

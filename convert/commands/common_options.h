@@ -102,8 +102,16 @@ void keep_scene_apart(const std::filesystem::path& output,
                       const std::filesystem::path& scene,
                       std::initializer_list<const char*> folders);
 
+/// Refuses a model folder that holds something: a model may have taken hours, and a run vouches for
+/// the one it made.
+/// \param overwrite  a finished model may go, but not that of a run
+/// \throws InvalidInput
+void refuse_to_replace_model(const std::filesystem::path& output, bool overwrite);
+
 /// Keeps every library within the number of threads for the rest of the program.
 /// \throws InvalidInput if it is negative or above 1024.
 void limit_threads(int threads);
+/// Lets them take as many as they like again.
+void release_threads();
 
 }  // namespace cgs

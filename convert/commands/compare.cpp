@@ -18,6 +18,7 @@
 #include "convert/text/report_json.h"
 #include "convert/text/stated_frame.h"
 #include "convert/text/terminal.h"
+#include "io/bytes/atomic_file.h"
 #include "libcgs/core/error.h"
 #include "meshing/measure/surface_measures.h"
 
@@ -82,42 +83,18 @@ Registration lay_onto(MeasurableMesh& a,
   return out;
 }
 
-// Relative standard deviation of one scale against the other; none where A was made to fit.
-double scale_sigma(const Frame& a, const Frame& b, bool fits_scale) {
-  if (fits_scale) return 0;
-  return std::hypot(figure_unit(a, "").relative_sigma, figure_unit(b, "").relative_sigma);
-}
-
-Eigen::AlignedBox3d box_around(const MeasurableMesh& mesh) {
-  Eigen::AlignedBox3d out;
-  for (const Eigen::Vector3d& p : mesh.points) out.extend(p);
-  return out;
-}
-
 // How wrong one scale may be against the other.
 struct ScaleError {
   double relative = 0;                               // standard deviation
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  // what it leaves in its place
 };
 
-// Units were matched about the zero of the world. Where A was laid onto B afterwards, it is held in
-// the middle; and control points hold what lies among them, however far from that zero.
-Eigen::Vector3d unmoved_by_scale(const MeasurableMesh& a, const Frame& b, bool is_registered) {
-  const bool by_control_points = a.frame.scale_source == ScaleSource::ControlPoints &&
-                                 b.scale_source == ScaleSource::ControlPoints;
-  if (!is_registered && !by_control_points) {
-    return a.frame.internal_from_world(Eigen::Vector3d::Zero());
-  }
-  return box_around(a).center();
-}
-
 // Faces say the sign of all distances, and a closed mesh says whether they lie.
 void warn_of_inward(const std::filesystem::path& path,
                     const MeasurableMesh& mesh,
                     const Terminal& terminal) {
   constexpr double kFlat = 1e-9;  // what rounding makes of the volume of two sides of a sheet
-  if (!(enclosed_volume(mesh).value < -kFlat * std::pow(box_around(mesh).diagonal().norm(), 3)))
-    return;
+  if (!(enclosed_volume(mesh).value < -kFlat * std::pow(box_of(mesh).diagonal().norm(), 3))) return;
   if (has_rim(mesh)) return;
   terminal.warn("the faces of " + printable(path) +
                 " look inward, so that nearer and farther are exchanged; cgs filter --op repair "
@@ -182,6 +159,9 @@ void check_options(const CompareArgs& args) {
   }
   require_ending(args.ply, ".ply", "--ply");
   require_ending(args.svg, ".svg", "--svg");
+  for (const auto& output : {args.ply, args.svg}) {
+    if (!output.empty()) const AtomicFile can_be_written(output);  // before all the work
+  }
   require(args.samples >= 100 && args.samples <= 100'000'000,
           "--samples must be in 100 ... 100000000",
           args.samples);
@@ -234,11 +214,12 @@ void run_compare(const CompareArgs& args) {
   terminal.warn(first.warnings);
   terminal.warn(second.warnings);
   check_clouds(args, second.content);
+  if (!args.threshold.empty()) (void)parse_length(args.threshold, first.content.frame);
   check_units(args, first.content.frame, second.content.frame);
   const std::string turned = turned_text(first.content.frame, second.content.frame);
   if (!turned.empty() && !args.icp) terminal.warn({turned});
   MeasurableMesh a = std::move(first.content);
-  ScaleError of_scale{scale_sigma(a.frame, second.content.frame, args.scale)};
+  ScaleError of_scale{args.scale ? 0 : relative_scale_sigma(a.frame, second.content.frame)};
   MeasurableMesh b = in_frame_of(second.content, a.frame);
   warn_of_inward(args.m3c2.wanted ? args.a : args.b, args.m3c2.wanted ? a : b, terminal);
   if (!args.scale) (void)figure_unit(a.frame, args.unit);  // before all the work

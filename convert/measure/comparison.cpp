@@ -135,6 +135,25 @@ Registration motion_onto(const MeasurableMesh& a,
   return register_points(seen_places(points_by_area(a, kPoints)), b, surface, with_scale);
 }
 
+Eigen::AlignedBox3d box_of(const MeasurableMesh& mesh) {
+  Eigen::AlignedBox3d out;
+  for (const Eigen::Vector3d& p : mesh.points) out.extend(p);
+  return out;
+}
+
+double relative_scale_sigma(const Frame& a, const Frame& b) {
+  return std::hypot(figure_unit(a, "").relative_sigma, figure_unit(b, "").relative_sigma);
+}
+
+Eigen::Vector3d unmoved_by_scale(const MeasurableMesh& a, const Frame& b, bool is_registered) {
+  const bool by_control_points = a.frame.scale_source == ScaleSource::ControlPoints &&
+                                 b.scale_source == ScaleSource::ControlPoints;
+  if (!is_registered && !by_control_points) {
+    return a.frame.internal_from_world(Eigen::Vector3d::Zero());
+  }
+  return box_of(a).center();
+}
+
 void take_scale(Frame& to, const Frame& from, double growth) {
   const double metres = from.metres_per_unit / growth;
   const double sigma = from.metres_sigma / growth;

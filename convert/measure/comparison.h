@@ -28,6 +28,17 @@ Registration motion_onto(const MeasurableMesh& a,
                          const NearestSurface& surface,
                          bool with_scale);
 
+/// The box around its points [internal units].
+Eigen::AlignedBox3d box_of(const MeasurableMesh& mesh);
+
+/// Relative standard deviation of one scale against the other.
+double relative_scale_sigma(const Frame& a, const Frame& b);
+
+/// The place that an error of the scale leaves where it is [internal units of `a`]: units were
+/// matched about the zero of the world. Where A was laid onto B afterwards, it is held in the
+/// middle; and control points hold what lies among them, however far from that zero.
+Eigen::Vector3d unmoved_by_scale(const MeasurableMesh& a, const Frame& b, bool is_registered);
+
 /// Takes over how long a unit is from a frame, one unit of which has grown into `growth` of those
 /// of `to`. Both may be one.
 void take_scale(Frame& to, const Frame& from, double growth);

@@ -236,6 +236,9 @@ def read_scene(
     depth_kind: str = "",
     assume_unit: str = "",
     focal: float = 0.0,
+    each_lens: bool = False,
+    old_photographs: bool = False,
+    refine_poses: bool = False,
     progress: _Progress = None,
 ) -> Scene: ...
 def reconstruct(

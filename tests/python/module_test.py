@@ -111,6 +111,20 @@ class Reconstruction(unittest.TestCase):
         with self.assertRaises(cgs.InvalidInput):
             cgs.fuse_models([])
 
+    def test_takes_photographs_as_the_program(self):
+        scene = cgs.read_scene(CAPTURE, views=VIEWS, old_photographs=True, refine_poses=True)
+        model = cgs.reconstruct(scene, preset="draft", settings={"steps": 0})
+        saved, folder = Path(WORK) / "old_saved", Path(WORK) / "old"
+        model.save(saved)
+        program("train", CAPTURE, "--views", VIEWS, "--old-photographs", "--refine-poses", "--preset",
+                "draft", "--set", "steps=0", "-o", folder)  # fmt: skip
+        splats = "gaussians.ply"
+        self.assertEqual((saved / splats).read_bytes(), (folder / splats).read_bytes())
+        plain = cgs.reconstruct(self.scene, preset="draft", settings={"steps": 0})
+        self.assertFalse(np.array_equal(plain.splats.positions, model.splats.positions))
+        with self.assertRaisesRegex(cgs.InvalidInput, "without cameras"):
+            cgs.read_scene(CAPTURE, each_lens=True)
+
     def test_medium_is_one_that_is_known(self):
         with self.assertRaisesRegex(cgs.InvalidInput, "none or water"):
             cgs.reconstruct(self.scene, medium="mist")
@@ -217,6 +231,24 @@ class Arrays(unittest.TestCase):
         gc.collect()
         self.assertEqual(faces.tolist(), [[0, 1, 2]])
 
+    def test_of_replaced_arrays_live_on(self):
+        mesh = cgs.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        mesh.colors = np.full((3, 3), 0.5)
+        colors = mesh.colors
+        mesh.colors = np.full((3, 3), 0.25)
+        np.testing.assert_array_equal(colors, mesh.colors)  # memory that is still there
+        scene = cgs.read_scene(CAPTURE, views=VIEWS)
+        scene.load()
+        view = scene.views[scene.input[0]]
+        image = view.image
+        before = image.copy()
+        view.image = 1 - image
+        np.testing.assert_allclose(image, 1 - before, atol=1e-6)
+        scene.load()
+        np.testing.assert_array_equal(image, before)
+        with self.assertRaisesRegex(ValueError, "read-only"):
+            mesh.faces[0, 0] = 7
+
     def test_keep_all_digits_far_from_zero(self):
         corner = np.array([4.5e5, 5.4e6, 300])  # a survey's coordinates
         points = corner + np.array([[0, 0, 0], [0.125, 0, 0], [0, 0.125, 0]])
@@ -229,6 +261,13 @@ class Arrays(unittest.TestCase):
             cgs.Mesh(np.eye(3), [[0, 1, 3]])
         with self.assertRaisesRegex(cgs.InvalidInput, "finite"):
             cgs.Mesh([[0, 0, np.nan]])
+        scene = cgs.read_scene(CAPTURE, views=VIEWS)
+        for wrong in ([0, -1], [0, 10000], [1, 1]):
+            with self.assertRaises(cgs.InvalidInput):
+                scene.input = wrong
+        for kind in ("metric", "depth", "disparity", "auto"):
+            scene.depth_kind = kind
+            self.assertEqual(scene.depth_kind, kind)
         camera = cgs.Camera(4, 3, 2, 2, 2, 1.5)
         with self.assertRaisesRegex(cgs.InvalidInput, r"\(3, 4\) of its camera, but is \(4, 3\)"):
             cgs.fuse([camera], [np.ones((4, 3))])
@@ -272,6 +311,10 @@ class Meshes(unittest.TestCase):
         distance = square(0.25).compare(square(0))["distance"]
         np.testing.assert_allclose(distance, 0.25)
         np.testing.assert_allclose(square(-0.25).compare(square(0))["distance"], -0.25)
+        points = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        with_unit = cgs.Mesh(points, [[0, 1, 2]], metres_per_unit=1)
+        with self.assertRaisesRegex(cgs.InvalidInput, "how long a unit"):
+            with_unit.compare(square(0))
 
 
 class Splats(unittest.TestCase):
