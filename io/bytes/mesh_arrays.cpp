@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <string>
 
@@ -68,11 +68,17 @@ Eigen::Vector3d millimetres(const Eigen::Vector3f& point,
 std::string origin_in_millimetres(const Frame& frame, const Eigen::Matrix3d& up_rotation) {
   if (frame.file_origin.isZero(0)) return "";
   const Eigen::Vector3d p = 1e3 * frame.metres_per_unit * (up_rotation * frame.file_origin);
-  std::array<char, 100> text{};
   // Micrometres, or nine digits where those would be too many for the header of an STL.
-  const char* const format = p.cwiseAbs().maxCoeff() < 1e11 ? "%.3f %.3f %.3f" : "%.9g %.9g %.9g";
-  std::snprintf(text.data(), text.size(), format, p.x(), p.y(), p.z());
-  return text.data();
+  const bool is_far = !(p.cwiseAbs().maxCoeff() < 1e11);
+  std::string out;
+  for (const double c : p) {
+    std::array<char, 40> text{};
+    const auto end = is_far
+                         ? std::to_chars(text.begin(), text.end(), c, std::chars_format::general, 9)
+                         : std::to_chars(text.begin(), text.end(), c, std::chars_format::fixed, 3);
+    out += (out.empty() ? "" : " ") + std::string(text.begin(), end.ptr);
+  }
+  return out;
 }
 
 uint8_t color_byte(float value) {

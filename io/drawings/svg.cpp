@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/drawings/svg.h"
 
+#include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 
 #include <Eigen/Geometry>
 
@@ -37,10 +38,11 @@ struct Picture {
   std::string digits(double value) const {
     // A ten-thousandth of a pixel at the size it is shown.
     const double step = std::pow(10, std::floor(std::log10(extent())) - 7);
-    std::array<char, 64> text{};
-    const int places = std::max(0, static_cast<int>(-std::log10(step)));
-    std::snprintf(text.data(), text.size(), "%.*f", places, value);
-    return text.data();
+    std::array<char, 400> text{};  // of the largest number, which has 309 digits
+    const int places = std::clamp(static_cast<int>(-std::log10(step)), 0, 60);
+    const auto end =
+        std::to_chars(text.begin(), text.end(), value, std::chars_format::fixed, places);
+    return {text.begin(), end.ptr};
   }
   double extent() const { return std::max(box.sizes().maxCoeff(), 1e-300); }
   std::string x(double value) const { return digits(value - box.min().x()); }
@@ -67,8 +69,8 @@ double bar_length(double extent) {
 
 std::string number(double value) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.10g", value);
-  return text.data();
+  const auto end = std::to_chars(text.begin(), text.end(), value, std::chars_format::general, 10);
+  return {text.begin(), end.ptr};
 }
 
 std::string legend(const Drawing& drawing, const Picture& picture, double line_height) {

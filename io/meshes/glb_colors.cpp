@@ -125,6 +125,9 @@ const ColorImage* GlbColors::image(int index) {
   } catch (const BadInput& error) {
     warn("texture " + std::to_string(index) + " is left out: " + error.what());
     return nullptr;
+  } catch (const LimitError& error) {
+    warn("texture " + std::to_string(index) + " is left out: " + error.what());
+    return nullptr;
   }
   return &out;
 }

@@ -111,7 +111,8 @@ ParsedMesh read_binary(const std::string& bytes, const std::filesystem::path& pa
     out.comments.emplace_back("metres_per_unit 0.001");
     const std::string_view rest = header.substr(kOurs.size());
     if (rest.starts_with(kAdd)) {
-      out.comments.push_back("file_origin " + std::string(rest.substr(kAdd.size())));
+      const std::string_view origin = rest.substr(kAdd.size());
+      out.comments.push_back("file_origin " + std::string(origin.substr(0, origin.find(','))));
     }
   }
   Corners corners(out);

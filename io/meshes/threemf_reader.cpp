@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,6 +13,7 @@
 
 #include "io/bytes/byte_reader.h"
 #include "io/bytes/byte_writer.h"
+#include "io/bytes/text_lines.h"
 #include "io/bytes/xml_events.h"
 #include "io/bytes/zip.h"
 #include "io/meshes/material_labels.h"
@@ -36,6 +36,13 @@ std::string part_name(std::string name, const fs::path& named_in) {
   const std::string between = "/" + name + "/";
   if (!name.empty() && between.find("/../") == std::string::npos) return name;
   throw BadInput(Defect::Path, named_in, "names the part '" + one_line(name.substr(0, 60)) + "'");
+}
+
+// \pre the model states it
+double metres_per_unit(const ThreeMfModel& model) {
+  double out = 0;
+  (void)parse_number(model.metres_per_unit, out);
+  return out;
 }
 
 // The model that the relations of the whole file name.
@@ -285,7 +292,7 @@ class Assembly {
       return;
     }
     std::string comment = "metres_sigma ";
-    append_number(comment, relative * std::stod(model.metres_per_unit));
+    append_number(comment, relative * metres_per_unit(model));
     out_.comments.push_back(comment);
   }
 
@@ -301,10 +308,12 @@ class Assembly {
       return;
     }
     const size_t begin = at + kAdd.size();
-    std::istringstream in(description.substr(begin, end - begin));
-    const double units_per_millimetre = 1e-3 / std::stod(model.metres_per_unit);
+    const std::string numbers = description.substr(begin, end - begin);
+    const double units_per_millimetre = 1e-3 / metres_per_unit(model);
     std::string comment = "file_origin";
-    for (double millimetres = 0; in >> millimetres;) {
+    for (const std::string_view word : tokens(numbers)) {
+      double millimetres = 0;
+      if (!parse_number(word, millimetres)) break;
       comment += ' ';
       append_number(comment, units_per_millimetre * millimetres);
     }

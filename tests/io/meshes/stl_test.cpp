@@ -81,6 +81,20 @@ TEST(WriteStl, FarFromTheOriginTheHeaderLeadsBack) {
   EXPECT_LT((in_world / 10 - wanted).norm(), 1e-5);
 }
 
+TEST(WriteStl, TheHeaderLeadsBackBesideWhatItSaysOfEvidence) {
+  const test::TempDir dir;
+  TriangleMesh mesh = test::labelled_sphere();
+  Frame frame;
+  frame.metres_per_unit = 1;
+  frame.file_origin = frame.origin = {8.5, 1.2, 0.3};
+  write_stl(dir / "a.stl", mesh, frame, Eigen::Matrix3d::Identity());
+  const std::string header = test::read_bytes(dir / "a.stl").substr(0, 80);
+  EXPECT_NE(header.find(", add 8500.000 1200.000 300.000, "), std::string::npos) << header;
+  EXPECT_NE(header.find(" % seen"), std::string::npos) << header;
+  const Eigen::Vector3d origin = read_mesh_file(dir / "a.stl").content.file_origin;
+  EXPECT_LT((origin - Eigen::Vector3d(8500, 1200, 300)).norm(), 1e-9) << origin.transpose();
+}
+
 TEST(WriteStl, NormalsFollowTheCornersOutwards) {
   const test::TempDir dir;
   const Frame frame = test::centimetre_frame();

@@ -64,6 +64,15 @@ TEST(DotSplat, ComesBackWithinHalfAStep) {
   }
 }
 
+TEST(DotSplat, TurnsAsQuaternionsOfAnyLengthDo) {
+  const test::TempDir dir;
+  Gaussians g = test::varied_splats(1, 0);
+  g.rotation[0] = {3, 1, 0, 0};
+  write_dot_splat(dir / "a.splat", g, test::centimetre_frame());
+  const GaussianFile back = read_splats(dir / "a.splat", test::centimetre_frame());
+  EXPECT_LT(test::angle_between(back.gaussians.rotation[0], g.rotation[0].normalized()), 0.02);
+}
+
 TEST(DotSplat, SaysWhatDidNotFit) {
   const test::TempDir dir;
   Gaussians g = test::varied_splats(5, 1);
