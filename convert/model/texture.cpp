@@ -13,6 +13,7 @@
 #include "io/scenes/scene_reader.h"
 #include "libcgs/core/order_statistics.h"
 #include "libcgs/priors/grey_photographs.h"
+#include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/scratches.h"
 #include "libcgs/priors/transients.h"
 #include "libcgs/priors/water.h"
@@ -87,7 +88,7 @@ double pixel_size(const TriangleMesh& mesh, const PhotoTexture& texture, size_t 
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     if (texture.of_face[f] != static_cast<int>(photograph)) continue;
     const double depth = camera.project(mesh.vertices[mesh.faces[f][0]].cast<double>()).z();
-    sizes.push_back(2 * depth / (camera.fx + camera.fy));
+    sizes.push_back(camera.pixel_size(depth));
   }
   if (sizes.empty()) return 0;
   return median(sizes);
@@ -156,7 +157,7 @@ PhotographedMesh texture_from_photographs(const Scene& scene,
   FaceScores scores = face_scores(mesh, views);
   prefer_colors(views, scores);
   const FaceViews chosen = choose_face_views(mesh, scores);
-  const ExposureGains exposure = exposure_gains(mesh, scores, views);
+  const ExposureGains exposure = exposure_gains(mesh, scores, views, neighbouring_pairs(scene));
   out.texture.of_face = chosen.of_face;
   for (size_t i = 0; i < views.size(); ++i) {
     View& view = views[i];

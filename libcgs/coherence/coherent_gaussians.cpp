@@ -54,7 +54,7 @@ Eigen::Vector3d surface_step(
     const Camera& camera, const DepthMap& depth, int x, int y, Eigen::Vector2i along) {
   constexpr double kSteepest = 10;  // depth per pixel [pixels]
   const double z = depth(x, y);
-  const double steepest = kSteepest * z * pixel_size(camera);
+  const double steepest = kSteepest * z * camera.pixel_size(1);
   const Eigen::Vector3d here = point_at(camera, depth, x, y);
   Eigen::Vector3d step = camera.unproject(x + 0.5 + along.x(), y + 0.5 + along.y(), z) - here;
   for (const int side : {-1, 1}) {
@@ -256,9 +256,8 @@ void CoherentGaussians::add_pane(const Pane& pane, const Camera& camera) {
   // Wider than a pixel is small: what pictures of other sizes add to a splat, a fixed part of
   // their pixel, then changes little.
   constexpr float kRadius = 1;
-  constexpr float kAdded = 0.3f;  // TrainingRasterizerOptions::dilation [pixels^2]
   // So many of equal height lie over each other at a pixel.
-  constexpr float kOverlap = 2 * std::numbers::pi_v<float> * (kRadius * kRadius + kAdded);
+  constexpr float kOverlap = 2 * std::numbers::pi_v<float> * (kRadius * kRadius + kSplatDilation);
   const float opacity = -std::log1p(-pane.opacity) / kOverlap;
   const size_t first = gaussians_.size();
   const auto harmonics = static_cast<size_t>(gaussians_.sh_count());
@@ -336,7 +335,7 @@ void CoherentGaussians::decode_view(size_t n) {
   std::vector<float>& shapes = shape(n).value;
   const std::vector<float>& colors = color(n).value;
   const auto harmonics = static_cast<size_t>(gaussians_.sh_count());
-  const auto unit = static_cast<float>(pixel_size(view.camera));
+  const auto unit = static_cast<float>(view.camera.pixel_size(1));
   const float max_depth = options_.max_depth_change;
   const float max_logit = options_.max_logit_change;
   for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
@@ -385,7 +384,7 @@ float CoherentGaussians::add_shape_gradient(size_t n,
   const Eigen::Matrix2d L = triangle(value);
   const Eigen::Matrix3d G = as_matrix(gradient);
   const Eigen::Vector3d normal = P.col(0).cross(P.col(1)).normalized();
-  const double thickness = double(options_.min_radius) * z * pixel_size(view.camera);
+  const double thickness = double(options_.min_radius) * z * view.camera.pixel_size(1);
   const Eigen::Matrix2d of_triangle = 2 * P.transpose() * G * P * L;
   float* sum = &own.gradient[k * kShapeSize];
   sum[0] += static_cast<float>(of_triangle(0, 0) * L(0, 0));
@@ -404,7 +403,7 @@ void CoherentGaussians::add_view_gradients(size_t n,
   const ViewState& view = views_[n];
   std::vector<float>& by_color = color(n).gradient;
   const auto harmonics = static_cast<size_t>(gaussians_.sh_count());
-  const auto unit = static_cast<float>(pixel_size(view.camera));
+  const auto unit = static_cast<float>(view.camera.pixel_size(1));
   const Eigen::Matrix3d R = view.camera.world_from_cam.linear();
   for_each_gaussian(view.pixels, [&](size_t k, int pixel) {
     const size_t g = view.range.first + k;

@@ -66,7 +66,7 @@ Gaussians initial_gaussians(const Scene& scene,
     const View& view = scene.views[static_cast<size_t>(scene.input[n])];
     require_same_sizes(view, priors[n]);
     const DepthMap& depth = priors[n].depth;
-    const double pixel = pixel_size(view.camera);
+    const double pixel = view.camera.pixel_size(1);
     for (int y = 0; y < depth.height; ++y) {
       for (int x = 0; x < depth.width; ++x) {
         const auto z = static_cast<double>(depth(x, y));

@@ -28,9 +28,6 @@ inline bool draws(const ViewPriors& priors, size_t pixel) {
   return !is_shown && has_gaussian(priors.depth.data[pixel]);
 }
 
-/// Width of a pixel at depth 1 [internal units].
-inline double pixel_size(const Camera& camera) { return 2 / (camera.fx + camera.fy); }
-
 /// One isotropic Gaussian per pixel with depth, on the ray through the pixel's centre, of the
 /// pixel's colour (SH degree 0).
 ///

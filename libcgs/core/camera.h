@@ -43,6 +43,8 @@ struct Camera {
   Eigen::Vector3d project(const Eigen::Vector3d& point_in_world) const {
     return project_in_cam(cam_from_world() * point_in_world);
   }
+  /// How wide a pixel is at a z-depth, in the unit of the depth.
+  double pixel_size(double depth) const { return 2 * depth / (fx + fy); }
   bool sees(const Eigen::Vector3d& uvz) const {
     return uvz.z() > 0 && uvz.x() >= 0 && uvz.y() >= 0 && uvz.x() < width && uvz.y() < height;
   }

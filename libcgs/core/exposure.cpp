@@ -110,20 +110,19 @@ Eigen::VectorXd log_gains(const std::vector<Pair>& pairs, size_t views, size_t c
 
 }  // namespace
 
-ExposureGains exposure_gains(std::span<const View* const> views, const SharedSurface& shared) {
+ExposureGains exposure_gains(std::span<const View* const> views,
+                             const std::vector<std::pair<size_t, size_t>>& compared,
+                             const SharedSurface& shared) {
   for (const View* view : views) {
     require(!view->image.empty(), "exposure_gains: every view must have its image", view->name);
   }
   ExposureGains out;
   out.gain.assign(views.size(), Eigen::Vector3f::Ones());
   out.samples.assign(views.size(), 0);
-  std::vector<std::pair<size_t, size_t>> which;
-  for (size_t a = 0; a < views.size(); ++a) {
-    for (size_t b = a + 1; b < views.size(); ++b) which.emplace_back(a, b);
-  }
-  std::vector<Pair> pairs(which.size());
-  tbb::parallel_for(
-      size_t(0), which.size(), [&](size_t i) { pairs[i] = compare(views, shared, which[i]); });
+  std::vector<Pair> pairs(compared.size());
+  tbb::parallel_for(size_t(0), compared.size(), [&](size_t i) {
+    pairs[i] = compare(views, shared, compared[i]);
+  });
   std::erase_if(pairs, [](const Pair& p) { return p.samples < kFewestSamples; });
   DisjointSets groups(views.size());
   for (const Pair& pair : pairs) {

@@ -25,12 +25,15 @@ struct ExposureGains {
 /// number of threads may ask at once.
 using SharedSurface = std::function<std::vector<Eigen::Vector3d>(size_t a, size_t b)>;
 
-/// Estimates the gains of views from what several of them show: for each pair the median of the log
-/// ratio of their colours, then least squares over the pairs, weighted by their samples. The
-/// product of the gains is 1 in every connected group of views; one that shares nothing with
+/// Estimates the gains of views from what several of them show: for each of some pairs the median
+/// of the log ratio of their colours, then least squares over the pairs, weighted by their samples.
+/// The product of the gains is 1 in every connected group of views; one that shares nothing with
 /// another keeps 1. Clipped and nearly black colours take no part.
+/// \param compared  pairs of indices into views, the smaller first
 /// \throws InvalidInput if the image of a view is not loaded
-ExposureGains exposure_gains(std::span<const View* const> views, const SharedSurface& shared);
+ExposureGains exposure_gains(std::span<const View* const> views,
+                             const std::vector<std::pair<size_t, size_t>>& compared,
+                             const SharedSurface& shared);
 
 /// Factors on the linear light of a picture that make it agree with another one of the same pixels:
 /// per channel the median ratio of those that `use` marks with 1. Clipped and nearly black ones

@@ -17,6 +17,10 @@ inline constexpr float kShC0 = 0.28209479177387814f;
 /// That of the linear ones: Y_1 = kShC1 * (-y, z, -x).
 inline constexpr float kShC1 = 0.4886025119029199f;
 
+/// What is added to both variances of a splat in a picture [pixels^2]. The value of 3DGS makes
+/// every splat at least about a pixel wide.
+inline constexpr float kSplatDilation = 0.3f;
+
 /// A picture from elsewhere of which Gaussians were made up; empty texts = nobody says which.
 struct SyntheticSource {
   std::string file;    ///< Its name, without folder.

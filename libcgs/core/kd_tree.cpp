@@ -119,7 +119,10 @@ void KdTree::nearest(const Eigen::Vector3f& query, size_t count, std::vector<Nei
   out.clear();
   count = std::min(count, order_.size());
   if (count == 0) return;
-  // Kept sorted; `worst` is what a newcomer must beat.
+  // A few are kept sorted, many as a heap with the farthest in front; `worst` is what a newcomer
+  // must beat.
+  constexpr size_t kFew = 64;
+  const bool is_heap = count > kFew;
   thread_local std::vector<uint64_t> best;
   best.assign(count, std::numeric_limits<uint64_t>::max());
   float worst = std::numeric_limits<float>::infinity();
@@ -134,14 +137,22 @@ void KdTree::nearest(const Eigen::Vector3f& query, size_t count, std::vector<Nei
         for (size_t k = 0; k < n; ++k) {
           if (squares[k] > worst) continue;
           const uint64_t key = sort_key(squares[k], order_[begin + k]);
-          if (key >= best.back()) continue;
-          size_t slot = count - 1;
-          for (; slot > 0 && best[slot - 1] > key; --slot) best[slot] = best[slot - 1];
-          best[slot] = key;
-          if (best.back() != std::numeric_limits<uint64_t>::max()) worst = squared_of(best.back());
+          const uint64_t& farthest = is_heap ? best.front() : best.back();
+          if (key >= farthest) continue;
+          if (is_heap) {
+            std::pop_heap(best.begin(), best.end());
+            best.back() = key;
+            std::push_heap(best.begin(), best.end());
+          } else {
+            size_t slot = count - 1;
+            for (; slot > 0 && best[slot - 1] > key; --slot) best[slot] = best[slot - 1];
+            best[slot] = key;
+          }
+          if (farthest != std::numeric_limits<uint64_t>::max()) worst = squared_of(farthest);
         }
         return true;
       });
+  if (is_heap) std::sort_heap(best.begin(), best.end());
   out.reserve(count);
   for (const uint64_t key : best) out.push_back({static_cast<uint32_t>(key), squared_of(key)});
 }

@@ -16,7 +16,7 @@ enum class Provenance : uint8_t {
   SingleView = 1,    ///< One input view saw it, and a depth sensor or the surface that was measured
                      ///< right beside it tells its depth.
   Observed = 2,      ///< Two or more input views saw it.
-  Interpolated = 3,  ///< Bridges a hole whose whole rim was observed.
+  Interpolated = 3,  ///< Bridges a hole whose whole rim photographs saw.
   Virtual = 4,       ///< Seen by virtual cameras alone, in splats that came without photographs:
                      ///< nobody can vouch for it.
   Estimated = 5,     ///< An input view shows it, but nothing measured its depth: filled in from its
@@ -40,7 +40,7 @@ inline constexpr std::array<ProvenanceTraits, kProvenanceCount> kProvenanceTrait
     {"inferred", "no photograph saw it, invented", {242, 26, 217}, 0, false, false},
     {"single view", "one photograph saw it", {91, 155, 213}, 4, true, true},
     {"observed", "two or more photographs saw it", {196, 200, 204}, 5, true, true},
-    {"interpolated", "between observed rims", {255, 128, 26}, 3, false, true},
+    {"interpolated", "between rims that photographs saw", {255, 128, 26}, 3, false, true},
     {"virtual", "seen in splats only", {154, 127, 209}, 2, false, true},
     {"estimated",
      "a photograph shows it, nothing measured its depth",

@@ -21,6 +21,7 @@ enum class Remedy : uint8_t {
   NoRegistration,  ///< Compare surfaces where they lie.
   PoissonSpacing,  ///< State it, or remove outliers.
   NoWater,         ///< Take photographs as they are.
+  LargerVoxels,    ///< Or more memory.
 };
 
 /// An error that has a remedy is one of these, too.

@@ -130,17 +130,24 @@ DepthRange depth_range(const Scene& scene, int view) {
   return range_of(scene, view, [&] { return median_baseline(scene); });
 }
 
-std::vector<Eigen::Vector3d> subject_points(const Scene& scene) {
-  std::vector<Eigen::Vector3d> points;
+std::vector<DepthRange> depth_ranges(const Scene& scene) {
   std::optional<double> baseline;
   const auto median_of = [&] {
     if (!baseline) baseline = median_baseline(scene);
     return *baseline;
   };
-  for (const int i : scene.input) {
-    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+  std::vector<DepthRange> out;
+  for (const int i : scene.input) out.push_back(range_of(scene, i, median_of));
+  return out;
+}
+
+std::vector<Eigen::Vector3d> subject_points(const Scene& scene) {
+  std::vector<Eigen::Vector3d> points;
+  const std::vector<DepthRange> ranges = depth_ranges(scene);
+  for (size_t k = 0; k < scene.input.size(); ++k) {
+    const Camera& camera = scene.views[static_cast<size_t>(scene.input[k])].camera;
     points.push_back(camera.center());
-    const DepthRange range = range_of(scene, i, median_of);
+    const DepthRange& range = ranges[k];
     // The far bound may be guessed generously; the near half of the range in inverse depth is
     // where the subject stands.
     const double middle = 2 / (1 / range.near + 1 / range.far);

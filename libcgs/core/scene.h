@@ -76,6 +76,8 @@ struct View {
   bool may_have_border = false;  ///< load_images() looks for the border of a print, and masks it.
   ColorImage image;              ///< Empty until loaded; same size as camera.
   MaskMap valid;                 ///< Empty = every pixel; else 1 where the image may be used.
+  bool is_usable(size_t pixel) const { return valid.empty() || valid.data[pixel] != 0; }
+  bool is_usable(int x, int y) const { return valid.empty() || valid(x, y) != 0; }
   std::filesystem::path depth_path;  ///< File with depth from elsewhere; empty = none.
   /// Depth from elsewhere, in metres if it is metric; NaN = none. Empty until loaded, and where
   /// there is none; same size as camera.
@@ -147,5 +149,7 @@ struct DepthRange {
 /// has them, else from sparse points, else from where the optical axes converge.
 /// \throws BadInput(Value) if the cameras share one centre (no depth can be measured).
 DepthRange depth_range(const Scene& scene, int view);
+/// Those of the input views.
+std::vector<DepthRange> depth_ranges(const Scene& scene);
 
 }  // namespace cgs

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "libcgs/poses/bundle_adjustment.h"
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -310,34 +311,77 @@ CameraColumns camera_columns(Unknowns& unknowns,
   return out;
 }
 
-// Normal equations of the cameras with the points eliminated (Schur complement).
-Eigen::MatrixXd reduced_normal_equations(const ceres::CRSMatrix& jacobian, int cameras) {
-  using Point = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+/// A row of a Jacobian: what it says of cameras, and of a point if there is one.
+struct JacobianRow {
+  std::vector<std::pair<int, double>> cameras;  ///< Columns and values.
+  Eigen::RowVector3d point = Eigen::RowVector3d::Zero();
+};
+
+/// The rows of every point, and last those of none.
+std::vector<std::vector<JacobianRow>> rows_by_point(const ceres::CRSMatrix& jacobian, int cameras) {
   const size_t points = static_cast<size_t>(jacobian.num_cols - cameras) / 3;
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(cameras, cameras);
-  std::vector<Eigen::Matrix3d> of_point(points, Eigen::Matrix3d::Zero());
-  std::vector<Point> with_point(points, Point::Zero(cameras, 3));
-  for (int row = 0; row < jacobian.num_rows; ++row) {
-    Eigen::VectorXd c = Eigen::VectorXd::Zero(cameras);
-    Eigen::RowVector3d p = Eigen::RowVector3d::Zero();
-    size_t point = points;  // none: a prior
-    for (int k = jacobian.rows[row]; k < jacobian.rows[row + 1]; ++k) {
+  std::vector<std::vector<JacobianRow>> out(points + 1);
+  for (int r = 0; r < jacobian.num_rows; ++r) {
+    JacobianRow row;
+    size_t point = points;
+    for (int k = jacobian.rows[r]; k < jacobian.rows[r + 1]; ++k) {
       const int column = jacobian.cols[k];
       if (column < cameras) {
-        c[column] = jacobian.values[k];
+        row.cameras.emplace_back(column, jacobian.values[k]);
       } else {
         point = static_cast<size_t>(column - cameras) / 3;
-        p[(column - cameras) % 3] = jacobian.values[k];
+        row.point[(column - cameras) % 3] = jacobian.values[k];
       }
     }
-    H += c * c.transpose();
-    if (point == points) continue;
-    of_point[point] += p.transpose() * p;
-    with_point[point] += c * p;
+    out[point].push_back(std::move(row));
   }
-  for (size_t i = 0; i < points; ++i) {
-    H -= with_point[i] * of_point[i].ldlt().solve(with_point[i].transpose());
+  return out;
+}
+
+std::vector<int> columns_of(const std::vector<JacobianRow>& rows) {
+  std::vector<int> out;
+  for (const JacobianRow& row : rows) {
+    for (const auto& [column, value] : row.cameras) out.push_back(column);
   }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+// What a point tells of the cameras that see it, once it is eliminated: of their columns alone, as
+// hundreds of cameras have thousands.
+void add_point(const std::vector<JacobianRow>& rows, bool is_point, Eigen::MatrixXd& H) {
+  const std::vector<int> columns = columns_of(rows);
+  const auto count = static_cast<Eigen::Index>(columns.size());
+  Eigen::MatrixXd own = Eigen::MatrixXd::Zero(count, count);
+  Eigen::Matrix<double, Eigen::Dynamic, 3> with_point = decltype(with_point)::Zero(count, 3);
+  Eigen::Matrix3d of_point = Eigen::Matrix3d::Zero();
+  Eigen::VectorXd c(count);
+  for (const JacobianRow& row : rows) {
+    c.setZero();
+    for (const auto& [column, value] : row.cameras) {
+      c[std::lower_bound(columns.begin(), columns.end(), column) - columns.begin()] = value;
+    }
+    own += c * c.transpose();
+    with_point += c * row.point;
+    of_point += row.point.transpose() * row.point;
+  }
+  if (is_point) own -= with_point * of_point.ldlt().solve(with_point.transpose());
+  for (Eigen::Index a = 0; a < count; ++a) {
+    for (Eigen::Index b = 0; b < count; ++b) {
+      H(columns[static_cast<size_t>(a)], columns[static_cast<size_t>(b)]) += own(a, b);
+    }
+  }
+}
+
+// Normal equations of the cameras with the points eliminated (Schur complement).
+Eigen::MatrixXd reduced_normal_equations(const ceres::CRSMatrix& jacobian, int cameras) {
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(cameras, cameras);
+  const std::vector<std::vector<JacobianRow>> rows = rows_by_point(jacobian, cameras);
+  for (const std::vector<JacobianRow>& of_point : rows) {
+    if (&of_point != &rows.back()) add_point(of_point, true, H);
+  }
+  for (const JacobianRow& prior : rows.back()) add_point({prior}, false, H);
   return H;
 }
 

@@ -75,8 +75,7 @@ MaskMap even_pixels(const View& view, const ViewPriors& priors) {
       const cv::Vec3f& below = smooth(std::min(y + 1, image.height - 1), x);
       const double change =
           std::max(cv::norm(right - here, cv::NORM_INF), cv::norm(below - here, cv::NORM_INF));
-      const bool is_usable =
-          (view.valid.empty() || view.valid(x, y) != 0) && priors.origin(x, y) != DepthOrigin::Sky;
+      const bool is_usable = view.is_usable(x, y) && priors.origin(x, y) != DepthOrigin::Sky;
       out(x, y) = is_usable && change < double(kEvenChange) ? 1 : 0;
     }
   }

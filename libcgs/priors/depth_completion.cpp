@@ -105,8 +105,7 @@ class Completion {
   }
 
   bool usable(int x, int y) const {
-    return (view_.valid.empty() || view_.valid(x, y) != 0) &&
-           !shows_no_surface(priors_.origin(x, y));
+    return view_.is_usable(x, y) && !shows_no_surface(priors_.origin(x, y));
   }
   bool is_sky(int x, int y) const { return priors_.origin(x, y) == DepthOrigin::Sky; }
   bool measured(int x, int y) const { return priors_.origin(x, y) == DepthOrigin::Measured; }

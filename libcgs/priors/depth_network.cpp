@@ -135,8 +135,8 @@ DepthMap DepthNetwork::operator()(const View& view) {
   DepthMap out(image.width, image.height, std::numeric_limits<float>::quiet_NaN());
   for (int y = 0; y < out.height; ++y) {
     for (int x = 0; x < out.width; ++x) {
-      const bool is_usable = view.valid.empty() || view.valid(x, y) != 0;
-      if (is_usable) out(x, y) = static_cast<float>(double(resized.at<float>(y, x)) + lift);
+      if (view.is_usable(x, y))
+        out(x, y) = static_cast<float>(double(resized.at<float>(y, x)) + lift);
     }
   }
   return out;

@@ -20,8 +20,7 @@ namespace {
 double usable_background(const Raster<DepthOrigin>& origin, const View& view) {
   size_t out = 0;
   for (size_t i = 0; i < origin.data.size(); ++i) {
-    const bool is_usable = view.valid.empty() || view.valid.data[i] != 0;
-    out += is_usable && origin.data[i] == DepthOrigin::Background ? 1 : 0;
+    out += view.is_usable(i) && origin.data[i] == DepthOrigin::Background ? 1 : 0;
   }
   return static_cast<double>(out);
 }

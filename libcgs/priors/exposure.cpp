@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "libcgs/core/error.h"
+#include "libcgs/priors/neighbours.h"
 #include "libcgs/priors/shown_pixel.h"
 
 namespace cgs {
@@ -59,7 +60,7 @@ ExposureGains exposure_gains(const Scene& scene, const std::vector<ViewPriors>& 
   require(priors.size() == views.size(),
           "exposure_gains: number of priors must be that of the input views",
           priors.size());
-  ExposureGains out = exposure_gains(views, [&](size_t a, size_t b) {
+  ExposureGains out = exposure_gains(views, neighbouring_pairs(scene), [&](size_t a, size_t b) {
     return shared_surface(*views[a], priors[a], *views[b], priors[b]);
   });
   keep_most_as_they_are(out);

@@ -272,8 +272,7 @@ void merge_sensor_depth(const FittedDepth& sensor, const View& view, ViewPriors&
   for (int y = 0; y < sensor.depth.height; ++y) {
     for (int x = 0; x < sensor.depth.width; ++x) {
       const auto z = double(sensor.depth(x, y));
-      const bool is_usable = view.valid.empty() || view.valid(x, y) != 0;
-      if (!(z > 0) || !is_usable || is_at_depth_edge(sensor.depth, x, y)) continue;
+      if (!(z > 0) || !view.is_usable(x, y) || is_at_depth_edge(sensor.depth, x, y)) continue;
       const double sigma = relative * z;
       if (priors.origin(x, y) == DepthOrigin::Measured) {
         if (is_of_photographs) continue;

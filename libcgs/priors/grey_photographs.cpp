@@ -129,8 +129,7 @@ std::vector<MaskMap> color_grey_photographs(Scene& scene, const std::vector<View
     ColorImage colored = view.image;
     tbb::parallel_for(0, view.image.height, [&](int y) {
       for (int x = 0; x < view.image.width; ++x) {
-        const bool is_valid = view.valid.empty() || view.valid(x, y) != 0;
-        if (!is_valid || !shows_surface(priors[k], x, y)) continue;
+        if (!view.is_usable(x, y) || !shows_surface(priors[k], x, y)) continue;
         const Eigen::Vector3f light = light_of_others(scene, priors, k, x, y);
         if (light.isZero()) {
           unknown[k](x, y) = 1;

@@ -22,10 +22,6 @@ constexpr float kNoGuess = std::numeric_limits<float>::quiet_NaN();
 constexpr double kFloor = 0.005;   // relative sigma that no guess goes below
 constexpr double kDeviations = 3;  // of the fit: beyond, given or measured depth is wrong
 
-bool is_usable(const View& view, int x, int y) {
-  return view.valid.empty() || view.valid(x, y) != 0;
-}
-
 // A guess and how far the next measured pixel is.
 struct Bent {
   float depth = kNoGuess;  // [internal units]
@@ -74,7 +70,7 @@ Raster<Bent> bend(const FittedDepth& fitted, const View& view, const ViewPriors&
   Raster<Bent> out(fitted.depth.width, fitted.depth.height, Bent{});
   tbb::parallel_for(0, out.height, [&](int y) {
     for (int x = 0; x < out.width; ++x) {
-      const bool wanted = is_usable(view, x, y) && fitted.depth(x, y) > 0 &&
+      const bool wanted = view.is_usable(x, y) && fitted.depth(x, y) > 0 &&
                           priors.origin(x, y) != DepthOrigin::Measured;
       if (wanted) out(x, y) = bent_at(fitted, priors, x, y);
     }

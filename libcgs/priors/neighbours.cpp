@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <tuple>
 
 #include "libcgs/core/angle_between.h"
@@ -67,6 +68,14 @@ std::vector<size_t> neighbours(const Scene& scene, size_t input, size_t most) {
   }
   std::sort(out.begin(), out.end());
   return out;
+}
+
+std::vector<std::pair<size_t, size_t>> neighbouring_pairs(const Scene& scene) {
+  std::set<std::pair<size_t, size_t>> out;
+  for (size_t a = 0; a < scene.input.size(); ++a) {
+    for (const size_t b : neighbours(scene, a, kMostCompared)) out.insert(std::minmax(a, b));
+  }
+  return {out.begin(), out.end()};
 }
 
 }  // namespace cgs

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "libcgs/core/scene.h"
@@ -19,5 +20,9 @@ inline constexpr size_t kMostCompared = 8;
 /// \param input  position in scene.input
 /// \return positions in scene.input, ascending
 std::vector<size_t> neighbours(const Scene& scene, size_t input, size_t most);
+
+/// The pairs of input views of which one is among the kMostCompared neighbours of the other.
+/// \return positions in scene.input, the smaller first, ascending
+std::vector<std::pair<size_t, size_t>> neighbouring_pairs(const Scene& scene);
 
 }  // namespace cgs

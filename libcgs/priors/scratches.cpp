@@ -39,7 +39,7 @@ class Mending {
     if (others.size() < 2) return out;
     tbb::parallel_for(0, camera.height, [&](int y) {
       for (int x = 0; x < camera.width; ++x) {
-        out(x, y) = is_usable(view(k), x, y) && is_contradicted(k, others, x, y) ? 1 : 0;
+        out(x, y) = view(k).is_usable(x, y) && is_contradicted(k, others, x, y) ? 1 : 0;
       }
     });
     return out;
@@ -69,9 +69,6 @@ class Mending {
     const Scene& scene = in_luminance_ ? *in_luminance_ : scene_;
     return scene.views[static_cast<size_t>(scene.input[k])].image;
   }
-  static bool is_usable(const View& of, int x, int y) {
-    return of.valid.empty() || of.valid(x, y) != 0;
-  }
 
   std::vector<SeenThere> places(size_t k, const std::vector<size_t>& others, int x, int y) const {
     constexpr double kSame = 0.02;  // of the depth
@@ -81,7 +78,7 @@ class Mending {
     const Eigen::Vector3d point = view(k).camera.unproject(x + 0.5, y + 0.5, depth);
     for (const size_t j : others) {
       const auto at = shown_pixel(view(j).camera, priors_[j].depth, point, kSame);
-      if (at && is_usable(view(j), at->x(), at->y())) out.push_back({j, at->x(), at->y()});
+      if (at && view(j).is_usable(at->x(), at->y())) out.push_back({j, at->x(), at->y()});
     }
     return out;
   }

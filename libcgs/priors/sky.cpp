@@ -134,12 +134,10 @@ class SkyFinder {
  private:
   static constexpr int kRimPixels = 3;
 
-  bool usable(int x, int y) const { return view_.valid.empty() || view_.valid(x, y) != 0; }
-
   // Nothing but pixels of no use, as undistorting leaves them, lies between it and the border.
   bool is_at_border(int x, int y, Direction up) const {
     for (x += up.dx, y += up.dy; sky_.contains(x, y); x += up.dx, y += up.dy) {
-      if (usable(x, y)) return false;
+      if (view_.is_usable(x, y)) return false;
     }
     return true;
   }
@@ -147,7 +145,7 @@ class SkyFinder {
   float change_at(int x, int y) const {
     float out = 0;
     for (const Direction d : {Direction{1, 0}, Direction{0, 1}}) {
-      if (!colors_.contains(x + d.dx, y + d.dy) || !usable(x + d.dx, y + d.dy)) continue;
+      if (!colors_.contains(x + d.dx, y + d.dy) || !view_.is_usable(x + d.dx, y + d.dy)) continue;
       const Eigen::Vector3f step = colors_(x + d.dx, y + d.dy) - colors_(x, y);
       out = std::max(out, step.cwiseAbs().maxCoeff());
     }
@@ -157,7 +155,7 @@ class SkyFinder {
   bool looks_like_sky(int x, int y) const {
     const Eigen::Vector3f& c = colors_(x, y);
     constexpr float kLeast = 0.72f;
-    return usable(x, y) && (is_blue(c) || is_white(c, kLeast)) && change_at(x, y) < kEven;
+    return view_.is_usable(x, y) && (is_blue(c) || is_white(c, kLeast)) && change_at(x, y) < kEven;
   }
 
   Eigen::Vector3f median_color(const Component& part) const {
@@ -236,7 +234,7 @@ class SkyFinder {
           for (const auto& [x, y] : part) {
             // Whatever reaches the lower border stands on the ground.
             if (!sky_.contains(x - up.dx, y - up.dy)) return;
-            if (!usable(x, y)) continue;
+            if (!view_.is_usable(x, y)) continue;
             sum += colors_(x, y);
             seen.emplace_back(x, y);
           }
@@ -286,7 +284,7 @@ class SkyFinder {
     Component found;
     for (int y = 0; y < sky_.height; ++y) {
       for (int x = 0; x < sky_.width; ++x) {
-        if (sky_(x, y) != 0 || !usable(x, y)) continue;
+        if (sky_(x, y) != 0 || !view_.is_usable(x, y)) continue;
         const bool is_rim = std::any_of(kNeighbors.begin(), kNeighbors.end(), [&](Direction d) {
           const int u = x + d.dx;
           const int v = y + d.dy;

@@ -36,8 +36,7 @@ bool is_even(const ColorImage& image, int x, int y) {
 
 bool is_asked_for(const View& view, const ViewPriors& priors, int x, int y) {
   const DepthOrigin origin = priors.origin(x, y);
-  return (view.valid.empty() || view.valid(x, y) != 0) && origin != DepthOrigin::Measured &&
-         !shows_no_surface(origin);
+  return view.is_usable(x, y) && origin != DepthOrigin::Measured && !shows_no_surface(origin);
 }
 
 class Reasons {

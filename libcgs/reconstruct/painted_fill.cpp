@@ -146,8 +146,7 @@ Eigen::Vector3d step_on(const Painting& painting, int x, int y, int dx, int dy) 
 void add_disc(const Painting& painting, int x, int y, Gaussians& out) {
   constexpr double kRadius = 0.5;  // [pixels]
   constexpr double kFlat = 0.2;    // thickness, in radii
-  const double pixel =
-      2.0 * painting.depth(x, y) / (painting.view.camera.fx + painting.view.camera.fy);
+  const double pixel = painting.view.camera.pixel_size(double(painting.depth(x, y)));
   Eigen::Matrix3d M;
   M.col(0) = step_on(painting, x, y, 1, 0);
   M.col(1) = step_on(painting, x, y, 0, 1);

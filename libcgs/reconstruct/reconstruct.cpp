@@ -11,6 +11,7 @@
 #include "libcgs/coherence/initialisation.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/exposure.h"
+#include "libcgs/core/remedy.h"
 #include "libcgs/priors/exposure.h"
 #include "libcgs/priors/finest_view.h"
 #include "libcgs/priors/grey_photographs.h"
@@ -18,6 +19,7 @@
 #include "libcgs/priors/scratches.h"
 #include "libcgs/priors/transients.h"
 #include "libcgs/reconstruct/evidence_words.h"
+#include "libcgs/render/support.h"
 
 namespace cgs {
 
@@ -29,6 +31,14 @@ void require_possible(const Scene& scene, const ReconstructionOptions& options) 
   options.training.validate();
   if (options.medium == Medium::Water && scene.has_old_photographs) {
     throw InvalidInput("old photographs are not looked at through water: leave one of the two out");
+  }
+  if (scene.input.size() > kMostInputs) {
+    throw WithRemedy<InvalidInput>(Remedy::ChosenViews,
+                                   std::to_string(scene.input.size()) +
+                                       " input views, of which at most " +
+                                       std::to_string(kMostInputs) +
+                                       " can be reconstructed together: use fewer, or cut the "
+                                       "scene into groups with cgs split");
   }
   if (options.training.method == SplatMethod::Coherent) {
     require_decodable(scene, options.training.coherence);

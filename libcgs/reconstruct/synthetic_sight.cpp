@@ -59,9 +59,8 @@ bool touches(const MaskMap& mask,
              double reach) {
   const Eigen::Vector3d uvz = camera.project(at.cast<double>());
   if (!(uvz.z() > 0)) return false;
-  constexpr double kBlur = 0.3;  // of the rasterizer [pixels squared]
   const double sigma = double{scale} * std::max(camera.fx, camera.fy) / uvz.z();
-  const double radius = reach * std::sqrt(sigma * sigma + kBlur) + 0.5;
+  const double radius = reach * std::sqrt(sigma * sigma + double{kSplatDilation}) + 0.5;
   const auto limit = [](double value, int end) {
     return static_cast<int>(std::clamp(std::floor(value), 0.0, double(end)));
   };

@@ -14,8 +14,7 @@ inline constexpr float kMinSplatAlpha = 1.0f / 255.0f;
 
 /// How Gaussians are projected.
 struct ProjectionOptions {
-  float dilation = 0.3f;  ///< Added to both image variances [pixels^2]; >= 0. The 3DGS value makes
-                          ///< every splat at least about a pixel wide.
+  float dilation = kSplatDilation;  ///< Added to both image variances [pixels^2]; >= 0.
   float near_depth =
       1e-3f;  ///< Centres nearer than this are culled [internal units]; > 0. Relative
               ///< to the scene because the internal extent lies in [0.5, 1).

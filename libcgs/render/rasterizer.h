@@ -13,9 +13,9 @@ namespace cgs {
 /// How Gaussians are drawn.
 struct RasterizerOptions {
   Eigen::Vector3f background = Eigen::Vector3f::Zero();  ///< Shown through what is transparent.
-  float min_alpha = 0.5f;    ///< Pixels less opaque than this have no depth; in (0, 1].
-  float dilation = 0.3f;     ///< ProjectionOptions::dilation [pixels^2].
-  float near_depth = 1e-3f;  ///< ProjectionOptions::near_depth [internal units].
+  float min_alpha = 0.5f;           ///< Pixels less opaque than this have no depth; in (0, 1].
+  float dilation = kSplatDilation;  ///< ProjectionOptions::dilation [pixels^2].
+  float near_depth = 1e-3f;         ///< ProjectionOptions::near_depth [internal units].
 
   /// \throws InvalidInput naming the first field out of range.
   void validate() const;

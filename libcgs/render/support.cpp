@@ -202,7 +202,7 @@ void check_arguments(const RenderBuffers& buffers,
               fits(buffers.median_depth, camera),
           "annotate_support: the buffers must have the size of the camera",
           buffers.alpha.width);
-  require(views.size() <= std::numeric_limits<uint8_t>::max(),
+  require(views.size() <= kMostInputs,
           "annotate_support: number of views must be <= 255",
           views.size());
   for (const SupportView& view : views) {

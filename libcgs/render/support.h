@@ -9,6 +9,9 @@
 
 namespace cgs {
 
+/// Views that can support a pixel, at most: their number is kept in a byte.
+inline constexpr size_t kMostInputs = 255;
+
 /// An input view as a witness: what it saw, how far away, how sure.
 struct SupportView {
   Camera camera;

@@ -38,8 +38,8 @@ enum class GaussianShape {
 /// How Gaussians are drawn and differentiated.
 struct TrainingRasterizerOptions {
   Eigen::Vector3f background = Eigen::Vector3f::Zero();
-  float dilation = 0.3f;     ///< Added to both image variances [pixels^2]; >= 0.
-  float near_depth = 1e-3f;  ///< Centres nearer than this are culled [internal units]; > 0.
+  float dilation = kSplatDilation;  ///< Added to both image variances [pixels^2]; >= 0.
+  float near_depth = 1e-3f;         ///< Centres nearer than this are culled [internal units]; > 0.
   GaussianShape shape = GaussianShape::Balls;
   bool sh_gradients = false;           ///< Fill GaussianGradients::sh.
   bool weight_squares = false;         ///< Draw TrainingBuffers::weight_square_sum.

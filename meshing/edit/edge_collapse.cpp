@@ -140,7 +140,12 @@ bool Collapser::one_fan(uint32_t v) const {
 }
 
 Kind Collapser::kind_of(uint32_t v, const std::vector<EdgeNeighbor>& neighbors) const {
-  if (neighbors.empty() || !(limits_.tolerance[v] > 0) || !one_fan(v)) return Kind::Fixed;
+  // What is asked of the faces around a vertex takes their square.
+  constexpr uint32_t kMostFaces = 1000;
+  const bool is_hub = first_[v + 1] - first_[v] > kMostFaces;
+  if (neighbors.empty() || is_hub || !(limits_.tolerance[v] > 0) || !one_fan(v)) {
+    return Kind::Fixed;
+  }
   size_t borders = 0;
   for (const EdgeNeighbor& n : neighbors) {
     const bool consistent = n.faces == 1 || (n.faces == 2 && n.winding == 0);

@@ -134,12 +134,15 @@ FilledMesh holes_filled(const TriangleMesh& mesh,
                         size_t longest_rim) {
   CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
   PlacedMesh closed = placed(mesh);
-  FilledMesh out{mesh, 0, 0, 0};
+  FilledMesh out;
+  out.mesh = mesh;
   std::vector<Hole> holes = holes_of(closed);
   for (size_t i = 0; i < holes.size(); ++i) {
     report(progress, double(i) / double(holes.size()));
     Hole& hole = holes[i];
-    if (hole.rim.size() <= longest_rim && width_of(mesh, hole.rim) <= widest) {
+    const bool is_long = hole.rim.size() > longest_rim;
+    out.long_rims += is_long ? 1 : 0;
+    if (!is_long && width_of(mesh, hole.rim) <= widest) {
       CGAL::Polygon_mesh_processing::triangulate_refine_and_fair_hole(
           closed, hole.start, std::back_inserter(hole.faces), std::back_inserter(hole.vertices));
     }

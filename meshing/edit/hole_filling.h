@@ -14,6 +14,7 @@ struct FilledMesh {
   TriangleMesh mesh;
   size_t filled = 0;     ///< Holes that were closed.
   size_t left_open = 0;  ///< Holes that were wider, or could not be triangulated.
+  size_t long_rims = 0;  ///< Of these, with more edges than allowed.
   double area = 0;       ///< Of the new faces [internal units squared].
 };
 

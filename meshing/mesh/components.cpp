@@ -8,19 +8,13 @@
 
 #include <Eigen/Geometry>
 
+#include "libcgs/core/disjoint_sets.h"
+
 namespace cgs {
 
 namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
-
-uint32_t find_root(std::vector<uint32_t>& parent, uint32_t v) {
-  while (parent[v] != v) {
-    parent[v] = parent[parent[v]];
-    v = parent[v];
-  }
-  return v;
-}
 
 Eigen::Vector3d box_center(const std::vector<Eigen::Vector3f>& points) {
   Eigen::AlignedBox3f box;
@@ -31,14 +25,10 @@ Eigen::Vector3d box_center(const std::vector<Eigen::Vector3f>& points) {
 }  // namespace
 
 MeshComponents components(const TriangleMesh& mesh) {
-  std::vector<uint32_t> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0U);
+  DisjointSets parts(mesh.vertices.size());
   for (const auto& face : mesh.faces) {
-    for (const int k : {1, 2}) {
-      const uint32_t a = find_root(parent, face[0]);
-      const uint32_t b = find_root(parent, face[size_t(k)]);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
+    parts.join(face[0], face[1]);
+    parts.join(face[0], face[2]);
   }
   MeshComponents out;
   out.of_face.reserve(mesh.faces.size());
@@ -46,7 +36,7 @@ MeshComponents components(const TriangleMesh& mesh) {
   // Far from the origin the signed tetrahedra of the volume would cancel.
   const Eigen::Vector3d center = box_center(mesh.vertices);
   for (const auto& face : mesh.faces) {
-    uint32_t& id = number[find_root(parent, face[0])];
+    uint32_t& id = number[parts.root(face[0])];
     if (id == kNone) {
       id = static_cast<uint32_t>(out.area.size());
       out.area.push_back(0);

@@ -43,8 +43,8 @@ VertexEvidence annotate_vertices(TriangleMesh& mesh, const Volume& volume);
 ///
 /// Where all three vertices have evidence: Estimated if one of them is, else Observed, SingleView
 /// or Virtual (no support at all), by the smallest support. Other faces are Interpolated if they
-/// form a disc of at most gap x gap area, rimmed by observed faces only and facing as these do;
-/// else Inferred.
+/// form a disc of at most gap x gap area, rimmed by Observed and SingleView faces only and facing
+/// as these do; else Inferred.
 /// \param gap  [internal units]
 void label_faces(TriangleMesh& mesh, const VertexEvidence& evidence, double gap);
 

@@ -49,6 +49,27 @@ ShellNesting::ShellNesting(const TriangleMesh& mesh, const MeshComponents& parts
     faces_[shell].push_back(f);
     for (const uint32_t v : mesh.faces[f]) boxes_[shell].extend(mesh.vertices[v]);
   }
+  by_low_x_.resize(boxes_.size());
+  std::iota(by_low_x_.begin(), by_low_x_.end(), 0U);
+  std::stable_sort(by_low_x_.begin(), by_low_x_.end(), [&](uint32_t a, uint32_t b) {
+    return boxes_[a].min().x() < boxes_[b].min().x();
+  });
+}
+
+// A foam has hundreds of thousands, of which few begin between the ends of one.
+std::vector<uint32_t> ShellNesting::in_box_of(uint32_t outer,
+                                              const std::vector<uint32_t>& shells) const {
+  const Eigen::AlignedBox3f& box = boxes_[outer];
+  const auto begin = std::partition_point(by_low_x_.begin(), by_low_x_.end(), [&](uint32_t s) {
+    return boxes_[s].min().x() < box.min().x();
+  });
+  std::vector<uint32_t> out;
+  for (auto s = begin; s != by_low_x_.end() && boxes_[*s].min().x() <= box.max().x(); ++s) {
+    const bool is_asked = std::binary_search(shells.begin(), shells.end(), *s);
+    if (is_asked && *s != outer && box.contains(boxes_[*s])) out.push_back(*s);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
 }
 
 MeasurableMesh ShellNesting::alone(uint32_t shell) const {
@@ -80,10 +101,7 @@ bool ShellNesting::is_within(uint32_t shell, const NearestSurface& outer, bool i
 
 std::vector<uint32_t> ShellNesting::within(uint32_t outer,
                                            const std::vector<uint32_t>& shells) const {
-  std::vector<uint32_t> out;
-  for (const uint32_t s : shells) {
-    if (s != outer && boxes_[outer].contains(boxes_[s])) out.push_back(s);
-  }
+  std::vector<uint32_t> out = in_box_of(outer, shells);
   if (out.empty()) return out;
   const MeasurableMesh shell = alone(outer);
   if (!has_area(shell, double(boxes_[outer].diagonal().norm()))) return {};

@@ -21,19 +21,21 @@ class ShellNesting {
  public:
   ShellNesting(const TriangleMesh& mesh, const MeshComponents& parts);
 
-  /// Those of `shells` on the inner side of `outer`, whichever way that one looks. Costs no more
-  /// than boxes where none lies in the box of `outer`. Shells that cut it are on the side of the
-  /// first vertex off its surface; those that lie on it are not within.
+  /// Those of `shells`, ascending, on the inner side of `outer`, whichever way that one looks.
+  /// Costs no more than boxes where none lies in the box of `outer`. Shells that cut it are on the
+  /// side of the first vertex off its surface; those that lie on it are not within.
   std::vector<uint32_t> within(uint32_t outer, const std::vector<uint32_t>& shells) const;
 
  private:
   MeasurableMesh alone(uint32_t shell) const;
+  std::vector<uint32_t> in_box_of(uint32_t outer, const std::vector<uint32_t>& shells) const;
   bool is_within(uint32_t shell, const NearestSurface& outer, bool inside_out) const;
 
   const TriangleMesh& mesh_;
   const MeshComponents& parts_;
   std::vector<std::vector<uint32_t>> faces_;  // per shell
   std::vector<Eigen::AlignedBox3f> boxes_;    // per shell
+  std::vector<uint32_t> by_low_x_;            // shells, by where their boxes begin
 };
 
 /// A mesh whose shells bound one solid.

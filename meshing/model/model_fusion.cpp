@@ -13,6 +13,7 @@
 #include "libcgs/core/error.h"
 #include "libcgs/priors/estimated_depth.h"
 #include "libcgs/render/picture.h"
+#include "libcgs/render/rasterizer.h"
 
 namespace cgs {
 
@@ -48,7 +49,7 @@ TsdfView seen_by_input(const Model& model,
   view.depth = model.priors[k].depth;
   view.sigma = model.priors[k].sigma;
   view.evidence = inputs[k].evidence;
-  if (with_color) view.color = picture(render_camera(model, inputs, view.camera));
+  if (with_color) view.color = picture(rasterize(model.gaussians, view.camera));
   settle_depth(model.priors[k], estimated, view);
   return view;
 }

@@ -5,7 +5,8 @@ namespace cgs {
 
 ExposureGains exposure_gains(const TriangleMesh& mesh,
                              const FaceScores& scores,
-                             const std::vector<View>& views) {
+                             const std::vector<View>& views,
+                             const std::vector<std::pair<size_t, size_t>>& compared) {
   constexpr size_t kMostSamples = 200000;  // of the faces of a pair, evenly taken
   const auto shared = [&](size_t a, size_t b) {
     std::vector<size_t> faces;
@@ -25,7 +26,7 @@ ExposureGains exposure_gains(const TriangleMesh& mesh,
   std::vector<const View*> pointers;
   pointers.reserve(views.size());
   for (const View& view : views) pointers.push_back(&view);
-  return exposure_gains(pointers, shared);
+  return exposure_gains(pointers, compared, shared);
 }
 
 }  // namespace cgs

@@ -68,8 +68,7 @@ class ViewScorer {
     for_each_pixel(face,
                    {0, 0, nearest_.width, nearest_.height},
                    [&](int x, int y, const Eigen::Vector3f&, float nearness) {
-                     clear = clear && nearness * behind >= nearest_(x, y) &&
-                             (view_.valid.empty() || view_.valid(x, y) != 0);
+                     clear = clear && nearness * behind >= nearest_(x, y) && view_.is_usable(x, y);
                    });
     return clear;
   }

@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/split_mix.h"
 
 namespace cgs {
 
@@ -16,18 +17,10 @@ namespace {
 
 using Plane = Eigen::Hyperplane<double, 3>;
 
-// A number that depends on nothing but the counter (Steele et al. 2014, SplitMix).
-uint64_t random_at(uint64_t counter) {
-  uint64_t z = (counter + 1) * 0x9e3779b97f4a7c15;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
-  return z ^ (z >> 31);
-}
-
 std::optional<Plane> plane_of_try(const std::vector<Eigen::Vector3f>& points, size_t number) {
   std::array<Eigen::Vector3d, 3> p;
   for (size_t k = 0; k < 3; ++k) {
-    p.at(k) = points[random_at(3 * number + k) % points.size()].cast<double>();
+    p.at(k) = points[random_number(3 * number + k) % points.size()].cast<double>();
   }
   const Eigen::Vector3d normal = (p[1] - p[0]).cross(p[2] - p[0]);
   constexpr double kOnALine = 1e-9;
@@ -41,7 +34,7 @@ size_t score(const std::vector<Eigen::Vector3f>& points, const Plane& plane, dou
   const size_t count = std::min(kSample, points.size());
   size_t found = 0;
   for (size_t i = 0; i < count; ++i) {
-    const size_t v = points.size() <= kSample ? i : random_at(~i) % points.size();
+    const size_t v = points.size() <= kSample ? i : random_number(~i) % points.size();
     found += plane.absDistance(points[v].cast<double>()) <= distance ? 1 : 0;
   }
   return found;

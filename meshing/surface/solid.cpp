@@ -45,28 +45,11 @@ class Parts {
  public:
   explicit Parts(Solid& solid) : solid_(solid), seen_(solid.inside.size(), 0) {}
 
+  // Matter first: what was a cavity of matter that goes belongs to the emptiness around it then.
   SolidParts remove_small(double relative_size) {
-    std::array<std::vector<Part>, 2> parts;  // by sign; empty parts first
-    for (size_t i = 0; i < seen_.size(); ++i) {
-      if (seen_[i] == 0) parts.at(solid_.inside[i]).push_back(flood(i, false));
-    }
     SolidParts out;
-    for (size_t sign = 0; sign < 2; ++sign) {
-      size_t largest = 0;
-      for (const Part& part : parts.at(sign)) {
-        if (sign == 0 || part.is_observed) largest = std::max(largest, part.size);
-      }
-      const auto limit = static_cast<double>(largest) * relative_size;
-      for (const Part& part : parts.at(sign)) {
-        const bool is_outside = sign == 0 && part.seed == 0;
-        // Matter that only fills what several views hide from each other is no body of its own.
-        const bool is_invented = sign == 1 && !part.is_observed && largest > 0;
-        const bool is_large = static_cast<double>(part.size) >= limit;
-        if (is_outside || (is_large && !is_invented)) continue;
-        flood(part.seed, true);
-        ++(sign == 0 ? out.cavities : out.floaters);
-      }
-    }
+    out.floaters = flip_small(1, relative_size);
+    out.cavities = flip_small(0, relative_size);
     return out;
   }
 
@@ -76,6 +59,30 @@ class Parts {
     size_t size = 0;           // [voxels]
     bool is_observed = false;  // somewhere
   };
+
+  size_t flip_small(uint8_t sign, double relative_size) {
+    std::fill(seen_.begin(), seen_.end(), uint8_t{0});
+    std::vector<Part> parts;
+    for (size_t i = 0; i < seen_.size(); ++i) {
+      if (seen_[i] == 0 && solid_.inside[i] == sign) parts.push_back(flood(i, false));
+    }
+    size_t largest = 0;
+    for (const Part& part : parts) {
+      if (sign == 0 || part.is_observed) largest = std::max(largest, part.size);
+    }
+    const auto limit = static_cast<double>(largest) * relative_size;
+    size_t out = 0;
+    for (const Part& part : parts) {
+      const bool is_outside = sign == 0 && part.seed == 0;
+      // Matter that only fills what several views hide from each other is no body of its own.
+      const bool is_invented = sign == 1 && !part.is_observed && largest > 0;
+      const bool is_large = static_cast<double>(part.size) >= limit;
+      if (is_outside || (is_large && !is_invented)) continue;
+      flood(part.seed, true);
+      ++out;
+    }
+    return out;
+  }
 
   // Visits the part of `seed`, the first time (flip = false) to count it, then to change its sign.
   Part flood(size_t seed, bool flip) {

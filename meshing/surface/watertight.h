@@ -17,8 +17,8 @@ struct WatertightOptions {
   double min_part = 0.001;  ///< Parts of matter below this fraction of the largest part's volume
                             ///< are floaters and removed; so are cavities against the largest empty
                             ///< part; in [0, 1].
-  int max_gap = 16;         ///< Holes rimmed by observed surface up to this diameter [voxels] are
-                            ///< labelled Interpolated, larger ones Inferred; >= 0.
+  int max_gap = 16;  ///< Holes rimmed by seen surface, of an area up to its square [voxels], are
+                     ///< labelled Interpolated, larger ones Inferred; >= 0.
   size_t memory_limit = size_t(4) << 30;  ///< [bytes] to work in, beside the volume.
 
   /// \throws InvalidInput naming the first field out of range.

@@ -176,7 +176,7 @@ Floats given_sigma(const TsdfView& view, int x, int y) {
 
 Raster<uint8_t> continuous_quads(const DepthMap& depth, const Camera& camera) {
   Raster<uint8_t> out(depth.width, depth.height, 0);
-  const auto inverse_focal = static_cast<float>(2 / (camera.fx + camera.fy));
+  const auto inverse_focal = static_cast<float>(camera.pixel_size(1));
   const Raster<float> padded = with_margin(depth, 1);
   const float noise = relative_noise(padded, depth.width, depth.height);
   const auto step = [&](int x, int y, int dx, int dy) {  // from (x, y)

@@ -110,7 +110,7 @@ ViewExtent view_extent(const TsdfView& view, double depth_trunc, size_t most) {
     if (i++ % stride != 0) continue;
     const float sigma = view.sigma.empty() ? 0 : view.sigma(p.x, p.y);
     if (sigma > 0) out.sigmas.push_back(double(sigma));
-    out.footprints.push_back(2 * double(p.depth) / (view.camera.fx + view.camera.fy));
+    out.footprints.push_back(view.camera.pixel_size(double(p.depth)));
   }
   return out;
 }

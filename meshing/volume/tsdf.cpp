@@ -14,6 +14,7 @@
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/remedy.h"
 #include "meshing/volume/block_evidence.h"
 #include "meshing/volume/block_grid.h"
 #include "meshing/volume/depth_field.h"
@@ -35,10 +36,12 @@ void check_memory(TsdfReport& report, size_t predicted, size_t limit) {
   report.predicted_bytes = predicted;
   if (predicted <= limit) return;
   constexpr size_t kMebi = size_t{1} << 20;
-  throw LimitError("fusing " + std::to_string(report.voxels) + " voxels may take " +
-                   std::to_string((predicted + kMebi - 1) / kMebi) + " MiB, allowed are " +
-                   std::to_string(limit / kMebi) +
-                   " MiB; larger voxels need less, a larger memory limit allows it");
+  throw WithRemedy<LimitError>(
+      Remedy::LargerVoxels,
+      "fusing " + std::to_string(report.voxels) + " voxels may take " +
+          std::to_string((predicted + kMebi - 1) / kMebi) + " MiB, allowed are " +
+          std::to_string(limit / kMebi) +
+          " MiB; larger voxels need less, a larger memory limit allows it");
 }
 
 // A view that is held, ready to be asked.

@@ -42,7 +42,7 @@ TEST(KdTree, FindsWhatBruteForceFindsInItsOrder) {
     std::vector<Neighbor> found;
     for (const Eigen::Vector3f& query : cloud(60)) {
       const std::vector<Neighbor> all = sorted_by_distance(points, query);
-      for (const size_t k : {1U, 5U, 30U}) {
+      for (const size_t k : {1U, 5U, 30U, 100U}) {
         tree.nearest(query, k, found);
         ASSERT_EQ(found.size(), std::min<size_t>(k, count));
         for (size_t i = 0; i < found.size(); ++i) {

@@ -49,6 +49,20 @@ TEST(Neighbours, StandBesideTheViewToBothSides) {
   }
 }
 
+TEST(NeighbouringPairs, AreAllOfFewAndNearOnesOfMany) {
+  EXPECT_EQ(neighbouring_pairs(circle_of(3)),
+            (std::vector<std::pair<size_t, size_t>>{{0, 1}, {0, 2}, {1, 2}}));
+  constexpr int kCount = 36;
+  const auto pairs = neighbouring_pairs(circle_of(kCount));
+  EXPECT_TRUE(std::is_sorted(pairs.begin(), pairs.end()));
+  EXPECT_LE(pairs.size(), kCount * kMostCompared);
+  for (const auto& [a, b] : pairs) {
+    EXPECT_LT(a, b);
+    EXPECT_LE(steps_apart(a, b, kCount), 9);
+  }
+  EXPECT_EQ(std::count(pairs.begin(), pairs.end(), std::pair<size_t, size_t>(0, kCount - 1)), 1);
+}
+
 TEST(Neighbours, LookAtTheSame) {
   Scene scene = circle_of(12);
   scene.views[1].camera.world_from_cam.rotate(

@@ -76,6 +76,13 @@ TEST(HolesFilled, LeavesWiderHolesOpen) {
   EXPECT_FALSE(certify(out.mesh).closed);
 }
 
+TEST(HolesFilled, LeavesHolesWithLongRimsOpenAndCountsThem) {
+  const FilledMesh out = holes_filled(punctured_ball(), 10, {}, 12);
+  EXPECT_EQ(out.filled, 1U);
+  EXPECT_EQ(out.left_open, 1U);
+  EXPECT_EQ(out.long_rims, 1U);
+}
+
 TEST(HolesFilled, ClosesHolesThatTouchEachForItselfInWhateverOrderFacesCome) {
   TriangleMesh torus = test::torus_mesh(1, 0.4, 24, 12).mesh;
   std::mt19937 random(1);

@@ -22,7 +22,11 @@ std::vector<View> photographs() {
 
 ExposureGains estimated(const std::vector<View>& views) {
   const TriangleMesh mesh = test::box(40);
-  return exposure_gains(mesh, face_scores(mesh, views), views);
+  std::vector<std::pair<size_t, size_t>> all;
+  for (size_t a = 0; a < views.size(); ++a) {
+    for (size_t b = a + 1; b < views.size(); ++b) all.emplace_back(a, b);
+  }
+  return exposure_gains(mesh, face_scores(mesh, views), views, all);
 }
 
 TEST(ExposureGains, FindPlantedGains) {
