@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <chrono>
 #include <cstdio>
+#include <exception>
 #include <memory>
+#include <new>
 #include <set>
 #include <string>
 #include <vector>
@@ -36,6 +38,14 @@ struct BatchArgs {
   fs::path output;
   bool retry = false;
 };
+
+// Before any of them is begun.
+void keep_results_apart(const BatchArgs& args, const std::vector<std::string>& names) {
+  for (size_t i = 0; i < names.size(); ++i) {
+    keep_apart(args.output, args.scenes[i]);
+    keep_run_apart(args.output / names[i], args.scenes[i]);
+  }
+}
 
 // In the folder of a scene whose run failed, or that is at work: what ends the program is known of
 // at the next start.
@@ -80,6 +90,7 @@ class Batch {
       terminal_.say(name + ": failed before, --retry tries again: " + out.failure);
       return out;
     }
+    const bool is_run = is_present(folder / "run.json");
     make_output_folder(folder);
     write_file(failure, "the program ended in the middle of it\n");
     const auto start = std::chrono::steady_clock::now();
@@ -89,8 +100,18 @@ class Batch {
     } catch (const Cancelled&) {
       fs::remove(failure);
       throw;
+    } catch (const InvalidInput& error) {
+      out.failure = words_of(error);
+      write_file(failure, out.failure + "\n");
+      if (is_run)
+        fs::remove(failure);  // it is these options that do not suit the run that is there
     } catch (const Error& error) {
       out.failure = words_of(error);
+      write_file(failure, out.failure + "\n");
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::exception& error) {  // of a library
+      out.failure = one_line(error.what());
       write_file(failure, out.failure + "\n");
     }
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
@@ -108,7 +129,7 @@ class Batch {
     arguments.request.output = folder;
     RunRequest request = run_request(arguments);
     // What many scenes say of themselves is in their reports.
-    Terminal silent = Terminal::silent();
+    Terminal silent = Terminal::silent(arguments.common.strict);
     const double budget = stated_budget(arguments);
     if (budget > 0) request = within_budget(request, budget, start, silent);
     return run_pipeline(request, silent);
@@ -138,7 +159,7 @@ void print_rows(const Json& rows) {
 void run_batch(const BatchArgs& args) {
   limit_threads(args.run.common.threads);
   const std::vector<std::string> names = names_of(args.scenes);
-  for (const fs::path& scene : args.scenes) keep_apart(args.output, scene);
+  keep_results_apart(args, names);
   Terminal terminal(args.run.common.quiet, args.run.common.strict);
   make_output_folder(args.output);
   Batch batch(args, terminal);
@@ -169,11 +190,14 @@ void add_batch(CLI::App& app) {
       ->required();
   cmd->add_flag("--retry", args->retry, "Also those that failed before");
   add_run_options(*cmd, args->run);
+  add_overwrite_option(*cmd, args->run.request);
   cmd->footer(
       "Example: cgs batch objects/*/ --preset draft -o out/objects\n"
       "         opens as out/objects/index.html\n"
-      "Run again, it does what is not done yet. One that fails does not stop the others; why is\n"
-      "in OUT/NAME/failure.txt. Each run takes all threads.");
+      "Run again, it does what is not done yet. One that fails does not stop the others, nor is "
+      "it\n"
+      "a failure of the command: why is in OUT/NAME/failure.txt, and batch.json says which.\n"
+      "Each run takes all threads.");
   cmd->callback([args] { run_batch(*args); });
 }
 

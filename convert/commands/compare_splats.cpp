@@ -29,17 +29,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The folder of a model, or of the run that made one.
-bool is_model_folder(const std::filesystem::path& folder) {
-  const auto has_model = [](const std::filesystem::path& in) {
-    return is_present(in / "cameras.json") && is_present(in / "gaussians.ply");
-  };
-  return has_model(folder) || has_model(folder / "model");
-}
-
 // In its canonical frame. Splats of a model are in the unit of its cameras, whatever it is.
 Scene scene_in(const std::filesystem::path& folder) {
-  if (is_model_folder(folder)) return std::move(read_model_as_written(folder).scene);
+  if (holds_model(folder)) return std::move(read_model_as_written(folder).scene);
   Scene out = read_scene(folder);
   to_canonical(out);
   return out;
@@ -57,7 +49,7 @@ std::vector<int> spread(const std::vector<int>& views) {
 // Where only a scene is known, nobody knows which of its views the splats were made of.
 std::vector<int> compared_views(const Scene& scene, const SplatCompareArgs& args) {
   if (!args.views.empty()) return select_views(scene, args.views);
-  if (is_model_folder(args.scene) && !scene.held_out.empty()) return spread(scene.held_out);
+  if (holds_model(args.scene) && !scene.held_out.empty()) return spread(scene.held_out);
   std::vector<int> all;
   for (int i = 0; i < static_cast<int>(scene.views.size()); ++i) all.push_back(i);
   return spread(all);

@@ -23,6 +23,7 @@ struct FillArgs {
   std::filesystem::path model;
   std::filesystem::path painted;
   std::filesystem::path output;
+  bool overwrite = false;
   CommonOptions common;
 };
 
@@ -52,6 +53,7 @@ void run_fill(const FillArgs& args) {
   limit_threads(args.common.threads);
   keep_apart(args.output, args.model);
   keep_apart(args.output, args.painted);
+  refuse_to_replace_model(args.output, args.overwrite);
   Terminal terminal(args.common.quiet, args.common.strict);
   const Model model = read_model(args.model);
   terminal.warn(model.scene.warnings);
@@ -86,6 +88,7 @@ void add_fill(CLI::App& app) {
       ->required();
   cmd->add_option("-o,--output", args->output, "Model folder to write: the model with fill.ply")
       ->required();
+  cmd->add_flag("-w,--overwrite", args->overwrite, "Replace a finished model");
   add_output_options(*cmd, args->common);
   cmd->footer(
       "Pictures to paint are those of cgs render out/portal/model --holes -o out/holes; paint in\n"

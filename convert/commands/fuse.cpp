@@ -11,6 +11,7 @@
 #include "convert/model/depth_fusion.h"
 #include "convert/model/fusion.h"
 #include "convert/model/memory_plan.h"
+#include "convert/model/model.h"
 #include "convert/text/length.h"
 #include "convert/text/report_json.h"
 #include "io/bytes/scene_path.h"
@@ -29,9 +30,7 @@ struct FuseArgs {
 };
 
 bool is_model(const std::filesystem::path& folder) {
-  std::error_code ignored;
-  return std::filesystem::exists(folder / "gaussians.ply", ignored) ||
-         std::filesystem::exists(folder / "model/gaussians.ply", ignored);
+  return is_present(model_folder(folder) / "gaussians.ply");
 }
 
 void refuse_depth_options(const DepthFusionRequest& request) {
@@ -43,6 +42,7 @@ void refuse_depth_options(const DepthFusionRequest& request) {
         std::pair("--depth", !options.depth.folder.empty()),
         std::pair("--depth-kind", options.depth.kind != DepthKind::Unknown),
         std::pair("--depth-scale", options.depth.scale != 0),
+        std::pair("--allow-external", options.allow_external),
         std::pair("--assume-unit", !request.assume_unit.empty()),
         std::pair("--up", !request.up.empty())}) {
     if (!is_given) continue;

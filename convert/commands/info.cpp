@@ -15,6 +15,7 @@
 #include "convert/commands/commands.h"
 #include "convert/commands/common_options.h"
 #include "convert/commands/info_file.h"
+#include "convert/model/model.h"
 #include "convert/model/views.h"
 #include "convert/scene/baselines.h"
 #include "convert/scene/scene_request.h"
@@ -22,6 +23,7 @@
 #include "convert/text/frame_json.h"
 #include "convert/text/html.h"
 #include "convert/text/report_json.h"
+#include "io/bytes/scene_path.h"
 #include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 #include "libcgs/core/photo_quality.h"
@@ -311,15 +313,19 @@ Json told_or_warned(Scene& scene, const std::string& question, const Look& look)
   return nullptr;
 }
 
-// Options of scenes would change nothing of what is said of a file.
-void refuse_for_files(const CLI::App& command, const std::filesystem::path& path) {
+// Options of scenes would change nothing of what is said of anything else.
+void refuse_for_others(const CLI::App& command, const std::filesystem::path& path) {
   std::error_code none;
-  if (!std::filesystem::is_regular_file(path, none)) return;
+  const char* const kind = std::filesystem::is_regular_file(path, none) ? "a file"
+                           : is_present(path / "run.json")              ? "a run"
+                           : holds_model(path)                          ? "a model"
+                                                                        : nullptr;
+  if (kind == nullptr) return;
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_name(false, true);
     const bool is_for_all = option->get_positional() || name == "--json" || name == "--strict";
     if (option->count() == 0 || is_for_all) continue;
-    throw InvalidInput(name + " is for folders of photographs; " + printable(path) + " is a file");
+    throw InvalidInput(name + " is for folders of photographs; " + printable(path) + " is " + kind);
   }
 }
 
@@ -376,7 +382,7 @@ void add_info(CLI::App& app) {
       "(0.2\n"
       "to 0.4: sharp), exposure is in stops beside their median, burnt and black are clipped.");
   cmd->callback([args, cmd] {
-    refuse_for_files(*cmd, args->scene.path);
+    refuse_for_others(*cmd, args->scene.path);
     run_info(*args);
   });
 }

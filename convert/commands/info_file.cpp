@@ -11,6 +11,7 @@
 #include "convert/files/mesh_files.h"
 #include "convert/files/volume_file.h"
 #include "convert/measure/measured_file.h"
+#include "convert/model/model.h"
 #include "convert/run/run_record.h"
 #include "convert/splats/splat_files.h"
 #include "convert/text/frame_json.h"
@@ -310,14 +311,21 @@ void print_run(const Json& info) {
 // Files that no mesh reader takes, and those of its kinds that hold splats.
 bool holds_splats(const fs::path& path) { return !is_mesh_name(path) || is_splat_file(path); }
 
+// What was painted into a model lies in a file of its own.
+Json tell_model(const fs::path& folder, bool as_json) {
+  Json info = splat_file_to_json(read_splats(folder / "gaussians.ply"));
+  if (is_present(folder / kFillFile)) {
+    info["synthetic"] = splat_file_to_json(read_splats(folder / kFillFile))["synthetic"];
+  }
+  return print_info(info, as_json, print_splats);
+}
+
 std::optional<Json> tell_folder(const fs::path& folder, bool as_json) {
   const fs::path path = folder / "run.json";
   const Json record = is_present(path) ? read_run_record(path) : Json();
   if (!record.is_null()) return print_info(run_json(record, path), as_json, print_run);
-  if (is_present(folder / "gaussians.ply") && is_present(folder / "cameras.json")) {
-    return tell_splats(folder / "gaussians.ply", as_json);
-  }
-  return std::nullopt;
+  return holds_model(folder) ? std::optional(tell_model(model_folder(folder), as_json))
+                             : std::nullopt;
 }
 
 }  // namespace

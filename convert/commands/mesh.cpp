@@ -23,6 +23,7 @@ struct MeshArgs {
   std::filesystem::path volume;
   std::filesystem::path output;
   std::vector<double> up;
+  std::string assume_unit;
   std::string simplify;
   CommonOptions common;
 };
@@ -31,7 +32,12 @@ void run_mesh_command(const MeshArgs& args) {
   limit_threads(args.common.threads);
   Terminal terminal(args.common.quiet, args.common.strict);
   VolumeFile file = read_volume(args.volume);
-  (void)settle_up(file.frame, args.up);
+  if (!args.assume_unit.empty()) {
+    const std::string refused = assume_unit(file.frame, args.assume_unit);
+    if (!refused.empty()) terminal.warn(refused);
+  }
+  const std::string assumed = settle_up(file.frame, args.up);
+  if (!assumed.empty()) terminal.note({assumed});
   const Progress progress = terminal.begin("mesh");
   const auto options = simplify_options(args.simplify, file.volume.voxel_size, file.frame);
   TriangleMesh open = open_surface(file.volume, {});
@@ -72,6 +78,8 @@ void add_mesh(CLI::App& app) {
                   args->up,
                   "Direction that is up, three numbers; default: as the volume says, else 0 0 1")
       ->expected(3);
+  cmd->add_option(
+      "--assume-unit", args->assume_unit, "What a unit of the volume is, where it does not say");
   cmd->add_option(
       "--simplify",
       args->simplify,

@@ -9,6 +9,7 @@
 #include "convert/monitor/monitor_page.h"
 #include "convert/monitor/two_dates.h"
 #include "convert/text/html.h"
+#include "convert/text/length.h"
 #include "convert/text/report_json.h"
 #include "convert/text/terminal.h"
 #include "io/bytes/atomic_file.h"
@@ -44,12 +45,18 @@ void print_side(const char* name, const Json& side, const std::string& unit) {
 }
 
 void run_monitor(const MonitorArgs& args) {
-  catch_interrupts();
   limit_threads(args.common.threads);
   Terminal terminal(args.common.quiet, args.common.strict);
   keep_apart(args.output, args.earlier);
   keep_apart(args.output, args.later);
+  if (!args.unit.empty()) (void)metres_in(args.unit);
+  const NewFolder folder(args.output);  // before minutes are spent
   TwoDates dates = read_two_dates(args.earlier, args.later, args.is_registered, terminal);
+  if (!args.unit.empty() && !dates.earlier_surface.frame.has_metric_scale()) {
+    throw InvalidInput("--unit " + args.unit +
+                       ": neither date knows its scale; run one of them again with --marker-size "
+                       "or --known-distance");
+  }
   const FigureUnit unit = figure_unit(dates.earlier_surface.frame, args.unit);
   const DateChanges changes = changes_between(dates, terminal.begin("comparing"));
   terminal.end(std::to_string(changes.gained.patches.size()) + " pieces gained, " +
@@ -58,7 +65,6 @@ void run_monitor(const MonitorArgs& args) {
   terminal.end((args.output / "index.html").string());
   Json report = {{"earlier", args.earlier.string()}, {"later", args.later.string()}};
   report.update(monitor_json(dates, changes, unit));
-  make_output_folder(args.output);
   write_m3c2_ply(args.output / "later.ply", dates.later_surface, changes.gained.found);
   write_m3c2_ply(args.output / "earlier.ply", dates.earlier_surface, changes.lost.found);
   write_file(args.output / "changes.json", json_text(versioned(report)) + "\n");

@@ -148,7 +148,7 @@ void add_next(CLI::App& app) {
       ->excludes(views);
   cmd->add_option("--count", args->count, "Places to name at most; default 5")
       ->check(CLI::Range(size_t{1}, size_t{100}).description("1 to 100"));
-  add_common_options(*cmd, args->common);
+  add_output_options(*cmd, args->common);
   cmd->footer(
       "Example: cgs next out/portal/model -o out/next\n"
       "         cgs next out/portal/model --views view_04,view_05,view_08\n"

@@ -14,7 +14,6 @@
 #include "convert/run/forecast.h"
 #include "convert/run/pipeline.h"
 #include "convert/run/preview.h"
-#include "convert/run/verification.h"
 #include "convert/text/frame_json.h"
 #include "convert/text/length.h"
 #include "convert/text/report_json.h"
@@ -57,9 +56,7 @@ void say_summary(const nlohmann::ordered_json& report, const RunArgs& args, Term
 
 void run_run(const RunArgs& args) {
   limit_threads(args.common.threads);
-  keep_scene_apart(args.request.output,
-                   args.request.scene.path,
-                   {"model", "views", "mesh", "web", kPreviewFolder, kRecomputedFolder});
+  keep_run_apart(args.request.output, args.request.scene.path);
   RunRequest request = run_request(args);
   Terminal terminal(args.common.quiet, args.common.strict);
   const auto start = std::chrono::steady_clock::now();
@@ -105,7 +102,7 @@ void add_run(CLI::App& app) {
          "photographs")
       ->required();
   cmd->add_option("-o,--output", args->request.output, "Folder to write")->required();
-  cmd->add_flag("-w,--overwrite", args->request.overwrite, "Replace the results of another run");
+  add_overwrite_option(*cmd, args->request);
   add_run_options(*cmd, *args);
   cmd->add_flag("--preview",
                 args->preview,

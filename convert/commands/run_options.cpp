@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "convert/run/preview.h"
+#include "convert/run/verification.h"
 #include "convert/text/length.h"
 #include "libcgs/core/error.h"
 
@@ -84,6 +86,15 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
     command.get_option("--budget")->excludes(command.get_option(chosen));
   }
   add_common_options(command, arguments.common);
+}
+
+void add_overwrite_option(CLI::App& command, RunRequest& request) {
+  command.add_flag("-w,--overwrite", request.overwrite, "Replace the results of another run");
+}
+
+void keep_run_apart(const std::filesystem::path& output, const std::filesystem::path& scene) {
+  keep_scene_apart(
+      output, scene, {"model", "views", "mesh", "web", kPreviewFolder, kRecomputedFolder});
 }
 
 RunRequest run_request(const RunArguments& arguments) {

@@ -24,6 +24,12 @@ struct RunArguments {
 /// All options of a run but for the scene and the output.
 void add_run_options(CLI::App& command, RunArguments& arguments);
 
+void add_overwrite_option(CLI::App& command, RunRequest& request);
+
+/// Refuses an output in the scene, and a scene in what a run writes to.
+/// \throws InvalidInput
+void keep_run_apart(const std::filesystem::path& output, const std::filesystem::path& scene);
+
 /// What they ask for together; the scene and the output are as in arguments.request.
 /// \throws InvalidInput
 RunRequest run_request(const RunArguments& arguments);

@@ -31,31 +31,6 @@ struct TrainArgs {
   CommonOptions common;
 };
 
-// A model may have taken hours, and a run vouches for the one it made.
-void refuse_to_replace(const TrainArgs& args) {
-  std::error_code error;
-  const auto folder = std::filesystem::weakly_canonical(args.output, error);
-  if (folder.filename() == "model" && is_present(folder.parent_path() / "run.json")) {
-    throw InvalidInput(printable(args.output) +
-                       " is the model of a run, which only cgs run may change; choose another "
-                       "folder");
-  }
-  if (is_present(args.output / "run.json")) {
-    throw InvalidInput(printable(args.output) +
-                       " holds a run, which has a model of its own; choose another folder");
-  }
-  if (args.overwrite) return;
-  if (is_present(args.output / "cameras.json")) {
-    throw InvalidInput(printable(args.output) +
-                       " holds a finished model; choose another folder, or say --overwrite");
-  }
-  if (is_present(args.output / "gaussians.ply") && !has_checkpoints(args.output)) {
-    throw InvalidInput(printable(args.output) +
-                       " holds gaussians.ply, which no training here wrote; choose another folder, "
-                       "or say --overwrite");
-  }
-}
-
 // Given splats are refined as free ones: they belong to no pixel.
 TrainingOptions options_of(const TrainArgs& args) {
   TrainingOptions options = training_options(args.training);
@@ -70,9 +45,10 @@ TrainingOptions options_of(const TrainArgs& args) {
 void run_train(const TrainArgs& args) {
   limit_threads(args.common.threads);
   keep_scene_apart(args.output, args.scene.path, {"priors", "colmap"});
-  refuse_to_replace(args);
+  refuse_to_replace_model(args.output, args.overwrite);
   Terminal terminal(args.common.quiet, args.common.strict);
   std::vector<std::string> checkpoint_warnings;
+  std::vector<KnownDistance> distances;
   const ModelRequest request = {
       {},
       options_of(args),
@@ -80,6 +56,7 @@ void run_train(const TrainArgs& args) {
       args.scene.options.depth.network,
       !args.overwrite,
       [&](const Model& model, const PriorsReport& priors) {
+        check_picks(distances, model);
         terminal.note(coverage_words(priors, model.scene));
       },
       [&](const std::string& words) { checkpoint_warnings.push_back(words); },
@@ -91,11 +68,11 @@ void run_train(const TrainArgs& args) {
   (void)check_stated_cameras(opened, terminal);
   const NewFolder folder(args.output);
   const FolderLock lock(args.output);
-  refuse_to_replace(args);  // another start may have ended since
+  refuse_to_replace_model(args.output, args.overwrite);  // another start may have ended since
   remove_abandoned_files(args.output);
   opened.keep(args.output);
   Scene& scene = opened.scene;
-  const auto distances = known_distances(args.scene.known_distances, scene);
+  distances = known_distances(args.scene.known_distances, scene);
   const auto markers = marker_bars(scene, args.scene.marker_size);
   const size_t known = scene.warnings.size();
   terminal.note(scene.notes);

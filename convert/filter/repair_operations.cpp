@@ -54,10 +54,16 @@ FilterStep prepare_fill_holes(FilterArguments& arguments) {
   return [widest](FilterState& state, const Progress& progress) {
     require_faces(state, "fill-holes");
     const std::string seams = seams_text(state.mesh);
-    FilledMesh result = holes_filled(state.mesh, widest / state.frame.scale, progress);
+    // Such a hole is the border of an open surface, and would take hours.
+    constexpr size_t kLongestRim = 2000;
+    FilledMesh result = holes_filled(state.mesh, widest / state.frame.scale, progress, kLongestRim);
     state.mesh = std::move(result.mesh);
     std::string remark = std::to_string(result.filled) + " holes filled, " +
                          std::to_string(result.left_open) + " left open";
+    if (result.long_rims > 0) {
+      remark += ", " + std::to_string(result.long_rims) + " of these with rims of more than " +
+                std::to_string(kLongestRim) + " edges";
+    }
     if (state.mesh.provenance.empty()) {
       remark += "; the file does not say what was observed, so what is filled is not marked";
     }

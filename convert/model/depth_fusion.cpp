@@ -128,30 +128,57 @@ class Frames {
     if (relative > relative_sigma_) relative_sigma_ = relative;
   }
 
-  size_t left_out() const { return damaged_.size(); }
+  size_t count_left_out() const { return left_out_.size(); }
   std::vector<std::string> warnings() const { return {warnings_.begin(), warnings_.end()}; }
 
  private:
-  // One damaged file of many is no reason to lose the others: its frame then has no depth.
+  // One damaged file of many is no reason to lose the others.
   View loaded(size_t i, bool with_color) const {
     std::vector<std::string> warnings;
     View out;
     try {
       out = loaded_view(scene_, scene_.input[i], with_color, warnings);
     } catch (const BadInput& error) {
-      const std::lock_guard lock(mutex_);
-      damaged_.insert(i);
-      constexpr size_t kOneIn = 10;
-      if (damaged_.size() > size() / kOneIn) throw;
-      out = scene_.views[static_cast<size_t>(scene_.input[i])];
-      out.given_depth = DepthMap(out.camera.width, out.camera.height, kNaN);
-      out.depth_states_metres = true;
-      if (with_color)
-        out.image = ColorImage(out.camera.width, out.camera.height, Eigen::Vector3f::Zero());
-      warnings.push_back("view " + printable(out.name) + " is left out: " + words_of(error));
+      count_damaged(i);
+      // Its depth was taken before, where that is told without the photograph.
+      if (with_color && is_whole(i, warnings, out)) {
+        warnings.push_back("view " + printable(out.name) + " has no colours: " + words_of(error));
+      } else {
+        out = left_out(i);
+        warnings.push_back("view " + printable(out.name) + " is left out: " + words_of(error));
+      }
     }
     const std::lock_guard lock(mutex_);
     warnings_.insert(warnings.begin(), warnings.end());
+    return out;
+  }
+
+  // \throws the error at hand if too many are
+  void count_damaged(size_t i) const {
+    constexpr size_t kOneIn = 10;
+    const std::lock_guard lock(mutex_);
+    damaged_.insert(i);
+    if (damaged_.size() > size() / kOneIn) throw;
+  }
+
+  // Whether a frame has all but its colours.
+  bool is_whole(size_t i, std::vector<std::string>& warnings, View& out) const {
+    try {
+      out = loaded_view(scene_, scene_.input[i], false, warnings);
+      return true;
+    } catch (const BadInput&) {
+      return false;
+    }
+  }
+
+  View left_out(size_t i) const {
+    {
+      const std::lock_guard lock(mutex_);
+      left_out_.insert(i);
+    }
+    View out = scene_.views[static_cast<size_t>(scene_.input[i])];
+    out.given_depth = DepthMap(out.camera.width, out.camera.height, kNaN);
+    out.depth_states_metres = true;
     return out;
   }
 
@@ -160,6 +187,7 @@ class Frames {
   mutable std::mutex mutex_;
   mutable std::set<std::string> warnings_;  // in an order that no thread decides
   mutable std::set<size_t> damaged_;
+  mutable std::set<size_t> left_out_;  // of these; the others lack their colours
 };
 
 std::string percent(double part) { return std::to_string(std::lround(100 * part)) + " %"; }
@@ -267,7 +295,7 @@ DepthFusion fuse_depth(const DepthFusionRequest& request, const Progress& progre
   fusing.common_sigma = kCommonSensorSigma;
   const TsdfSource source = {frames.size(), std::cref(frames)};
   out.fused = fuse_streamed(source, fusing, progress);
-  out.frames -= frames.left_out();
+  out.frames -= frames.count_left_out();
   const std::vector<std::string> odd = frames.warnings();
   out.warnings.insert(out.warnings.end(), odd.begin(), odd.end());
   return out;

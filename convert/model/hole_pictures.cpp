@@ -197,10 +197,12 @@ HolePictures write_hole_pictures(const Model& model,
   const ModelPictures pictures(model, {.fill = fill});
   const Scene scene = scene_of_cameras(
       model, chosen.cameras, [](size_t k) { return "hole_" + std::to_string(k + 1); });
-  write_cameras_json(cameras, scene);
+  // Called cameras.json when all is there: pictures beside that may be painted.
+  const std::filesystem::path unfinished = folder / "cameras.unfinished.json";
+  write_cameras_json(unfinished, scene);
   HolePictures out{{}, chosen.candidates, chosen.covered};
   // Cameras as they are read again, so that what is painted is compared with the same bits.
-  for (const View& view : camera_views_from(cameras, model)) {
+  for (const View& view : camera_views_from(unfinished, model)) {
     report(progress, 0.8 + 0.2 * double(out.pictures.size()) / double(scene.views.size()));
     const RenderBuffers buffers = render_camera(model, inputs, view.camera);
     const MaskMap holes = hole_mask(buffers);
@@ -211,6 +213,7 @@ HolePictures write_hole_pictures(const Model& model,
     out.pictures.push_back({view.name, double(count) / double(holes.data.size())});
   }
   write_file(folder / "README.txt", kReadMe);
+  std::filesystem::rename(unfinished, cameras);
   report(progress, 1);
   return out;
 }

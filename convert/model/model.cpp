@@ -125,13 +125,6 @@ std::set<std::filesystem::path> priors_in(const std::filesystem::path& folder) {
   return out;
 }
 
-// Where the files of a model are: of the folder of a run, in the model in it.
-std::filesystem::path folder_of_model(const std::filesystem::path& folder) {
-  const bool is_of_run = !is_present(folder / "cameras.json") && is_present(folder / "run.json") &&
-                         is_folder(folder / "model");
-  return is_of_run ? folder / "model" : folder;
-}
-
 void write_fill(const std::filesystem::path& folder, const Gaussians& fill, const Frame& frame) {
   if (fill.size() == 0) {
     std::filesystem::remove(folder / kFillFile);  // of another model
@@ -161,6 +154,17 @@ void copy_bytes(const std::filesystem::path& from, const std::filesystem::path& 
 
 }  // namespace
 
+std::filesystem::path model_folder(const std::filesystem::path& folder) {
+  const std::filesystem::path within = folder / "model";
+  const bool is_within = is_present(folder / "run.json") || is_present(within / "gaussians.ply");
+  return !is_present(folder / "gaussians.ply") && is_folder(within) && is_within ? within : folder;
+}
+
+bool holds_model(const std::filesystem::path& folder) {
+  const std::filesystem::path model = model_folder(folder);
+  return is_present(model / "gaussians.ply") && is_present(model / "cameras.json");
+}
+
 void write_model(const std::filesystem::path& folder, const Model& model) {
   std::set<std::filesystem::path> earlier = priors_in(folder);
   make_output_folder(folder / "priors");
@@ -179,7 +183,7 @@ void write_filled_model(const std::filesystem::path& folder,
                         const Model& model,
                         const Gaussians& fill,
                         const std::filesystem::path& output) {
-  const std::filesystem::path from = folder_of_model(folder);
+  const std::filesystem::path from = model_folder(folder);
   std::set<std::filesystem::path> earlier = priors_in(output);
   make_output_folder(output / "priors");
   for (const int i : model.scene.input) {
@@ -219,7 +223,7 @@ Model read_model_as_written(const std::filesystem::path& folder) {
   if (!is_folder(folder)) {
     throw BadInput(Defect::Open, folder, "no such folder; give the model folder of a run");
   }
-  if (folder_of_model(folder) != folder) return read_model_as_written(folder_of_model(folder));
+  if (model_folder(folder) != folder) return read_model_as_written(model_folder(folder));
   Model model;
   model.scene = read_cameras_json(folder / "cameras.json");
   const bool has_frame = model.scene.kind != SceneKind::ForeignCameras;

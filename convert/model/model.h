@@ -12,6 +12,13 @@ namespace cgs {
 /// The file in the folder of a model that holds Model::fill.
 inline constexpr const char* kFillFile = "fill.ply";
 
+/// Where the files of a model are: in the folder, or in model/ of that of a run or of a group of
+/// views.
+std::filesystem::path model_folder(const std::filesystem::path& folder);
+
+/// Whether splats and cameras are there, as read_model() takes them.
+bool holds_model(const std::filesystem::path& folder);
+
 /// Writes gaussians.ply, cameras.json and priors/VIEW.exr, and fill.ply where the model has a fill.
 /// \throws IoError
 void write_model(const std::filesystem::path& folder, const Model& model);
@@ -33,7 +40,7 @@ void write_filled_model(const std::filesystem::path& folder,
 bool restate_frame(const std::filesystem::path& folder, const Model& model);
 
 /// Reads what write_model() wrote, or gaussians.ply and cameras.json of 3DGS, which state no frame:
-/// it is then the canonical one of the splats. Of the folder of a run, the model in it.
+/// it is then the canonical one of the splats. The files are those in model_folder().
 ///
 /// Where cameras were solved from photographs alone and something measured tells their scale, the
 /// frame is in metres: nobody else knows the unit of these cameras.

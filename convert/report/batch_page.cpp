@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <string_view>
 
 #include "convert/model/model_training.h"
 #include "convert/report/page_files.h"
@@ -42,6 +43,25 @@ size_t input_count(const Json& report) {
   return out;
 }
 
+// A path below the folder of the page as an address in it.
+// Source: RFC 3986, 2.3: what stands for itself.
+std::string address(const std::string& path) {
+  static constexpr std::string_view kPlain = "-._~/";
+  std::ostringstream out;
+  out << std::hex << std::uppercase;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_plain = (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') ||
+                          (c >= 'a' && c <= 'z') || kPlain.find(c) != std::string_view::npos;
+    if (is_plain) {
+      out << c;
+    } else {
+      out << '%' << (byte >> 4) << (byte & 15);
+    }
+  }
+  return out.str();
+}
+
 // The picture of the first input view, as a path below the folder.
 std::string thumbnail(const BatchResult& result) {
   for (const Json& view : result.report["views"]) {
@@ -53,9 +73,9 @@ std::string thumbnail(const BatchResult& result) {
 
 std::string done_row(const BatchResult& result) {
   const Json row = batch_row(result);
-  const std::string report = escaped(result.name + "/report.html");
+  const std::string report = address(result.name + "/report.html");
   std::ostringstream html;
-  html << "<tr><td><a href=\"" << report << "\"><img src=\"" << escaped(thumbnail(result))
+  html << "<tr><td><a href=\"" << report << "\"><img src=\"" << address(thumbnail(result))
        << "\" style=\"max-width:12em;max-height:9em\" alt=\"\"></a></td><td><a href=\"" << report
        << "\">" << escaped(result.name) << "</a></td><td>"
        << verdict(row["certified"].get<bool>(), "certified", "NOT certified") << "</td>";

@@ -301,24 +301,22 @@ class TrialFolder {
   FolderLock lock_;
 };
 
-// What an earlier start chose for the same, if it still fits into memory.
+// What an earlier start chose for the same.
 std::optional<Choice> chosen_before(const fs::path& file,
                                     double seconds,
-                                    const std::string& asked,
-                                    const std::vector<int>& sizes) {
+                                    const std::string& asked) {
   std::error_code ignored;
   if (!fs::is_regular_file(file, ignored)) return std::nullopt;
   const Json record = read_json(file);
   const bool is_same = record.is_object() && record.value("seconds", Json()) == Json(seconds) &&
                        record.value("request", Json()) == Json(asked) &&
+                       record.value("downscale", Json()).is_number_integer() &&
                        record.value("preset", Json()).is_string() &&
                        record.value("words", Json()).is_string();
   if (!is_same) return std::nullopt;
-  const auto size = std::find_if(sizes.begin(), sizes.end(), [&](int usable) {
-    return record.value("downscale", Json()) == Json(usable);
-  });
-  if (size == sizes.end()) return std::nullopt;
-  return Choice{*size, record["preset"].get<std::string>(), record["words"].get<std::string>()};
+  return Choice{record["downscale"].get<int>(),
+                record["preset"].get<std::string>(),
+                record["words"].get<std::string>()};
 }
 
 void refuse_other_run(const RunRequest& request) {
@@ -329,25 +327,31 @@ void refuse_other_run(const RunRequest& request) {
 }
 
 // The choice of an earlier start, so that its run can go on, or a new one.
-Choice choice(const RunRequest& request,
-              const RunRequest& full,
+// \param opened  the scene of the run as it would choose the size itself
+// \param full  the run with its views, and pictures as they are
+Choice choice(const RunRequest& full,
+              const OpenedScene& opened,
               double seconds,
               Clock::time_point start,
               Terminal& terminal) {
-  const fs::path file = request.output / kRecordFile;
-  const OpenedScene opened = open_scene(full.scene, request.output / "model", terminal);
+  const fs::path file = full.output / kRecordFile;
   Json key = request_json(full, opened.scene);
   key["threads"] = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
   const std::string asked = std::to_string(content_hash(json_text(key, -1)));
-  const Sizes sizes = usable_sizes(request, opened.scene);
-  const std::optional<Choice> before = chosen_before(file, seconds, asked, sizes.usable);
-  if (!before) refuse_other_run(request);
-  const TrialFolder trials(request.output);
-  if (before) return *before;
-  opened.keep(request.output / "model");
-  Search search{request,
-                opened,
-                pixels_of(opened.scene, opened.scene.input),
+  const std::optional<Choice> before = chosen_before(file, seconds, asked);
+  if (!before) refuse_other_run(full);
+  const TrialFolder trials(full.output);
+  opened.keep(full.output / "model");
+  const OpenedScene large = open_scene(full.scene, full.output / "model", terminal);
+  const Sizes sizes = usable_sizes(full, large.scene);
+  const bool still_fits =
+      before &&
+      std::find(sizes.usable.begin(), sizes.usable.end(), before->downscale) != sizes.usable.end();
+  if (still_fits) return *before;
+  refuse_other_run(full);
+  Search search{full,
+                large,
+                pixels_of(large.scene, large.scene.input),
                 sizes.usable,
                 sizes.larger_bytes,
                 seconds,
@@ -365,9 +369,11 @@ RunRequest within_budget(const RunRequest& request,
   if (request.scene.options.downscale) {
     throw InvalidInput("--budget chooses the size of the pictures; give it or --downscale");
   }
+  const OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   RunRequest full = request;
+  full.scene.options.views = views_of_run(request, opened.scene);
   full.scene.options.downscale = 1;
-  const Choice chosen = choice(request, full, seconds, start, terminal);
+  const Choice chosen = choice(full, opened, seconds, start, terminal);
   full.scene.options.downscale = chosen.downscale;
   full.training.steps = training_preset(chosen.preset).steps;
   full.settings_reason = chosen.words;

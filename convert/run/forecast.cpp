@@ -11,6 +11,7 @@
 #include "convert/model/memory_plan.h"
 #include "convert/run/disk_plan.h"
 #include "convert/run/pipeline.h"
+#include "io/bytes/atomic_file.h"
 #include "io/bytes/scene_path.h"
 #include "io/scenes/view_names.h"
 
@@ -22,8 +23,10 @@ Json forecast(const RunRequest& request, Terminal& terminal) {
   refuse_contradictions(request);
   const OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
   const Scene& scene = opened.scene;
-  if (opened.poses && !opened.poses->is_stored) {
+  const bool is_run = is_present(request.output / "run.json");  // which has cameras of its own
+  if (opened.poses && !opened.poses->is_stored && !is_run) {
     make_output_folder(request.output / "model");
+    const FolderLock lock(request.output);
     opened.keep(request.output / "model");
   }
   terminal.note(scene.notes);

@@ -11,8 +11,8 @@
 #include "convert/run/pipeline.h"
 #include "convert/run/small_run.h"
 #include "convert/text/html.h"
+#include "io/bytes/atomic_file.h"
 #include "io/bytes/scene_path.h"
-#include "io/scenes/view_names.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -38,16 +38,7 @@ int preview_reduction(const Scene& full) {
   return std::max(1, (longest_side(full) + kPreviewSide / 2) / kPreviewSide);
 }
 
-// The views that a run uses as --views names them. Empty = as it chooses by itself.
-std::string views_of_run(const RunRequest& request, const Scene& scene) {
-  const SceneOptions& options = request.scene.options;
-  if (options.all_views || !options.views.empty()) return options.views;
-  const std::vector<std::string> names = view_names(scene, scene.input);
-  const bool are_listable = std::all_of(names.begin(), names.end(), &is_listable);
-  return are_listable ? view_list(names) : std::string();
-}
-
-// Of the same views; the cameras must be stored.
+// Of the same views.
 RunRequest preview_request(const RunRequest& request,
                            const OpenedScene& opened,
                            const Scene& full) {
@@ -63,11 +54,21 @@ RunRequest preview_request(const RunRequest& request,
 }
 
 // The scene of a run with pictures as they are.
-Scene full_scene(const RunRequest& request) {
-  RunRequest full = request;
-  full.scene.options.downscale = 1;
+// \param model  where its cameras are stored
+Scene full_scene(const RunRequest& request, const std::filesystem::path& model) {
+  SceneRequest full = request.scene;
+  full.options.downscale = 1;
   Terminal silent = Terminal::silent();
-  return open_scene(full.scene, request.output / "model", silent).scene;
+  return open_scene(full, model, silent).scene;
+}
+
+// Where the cameras of a preview are stored: for the run that follows, but a run that was made has
+// its own.
+std::filesystem::path model_of_preview(const RunRequest& request, const OpenedScene& opened) {
+  const bool are_stored =
+      (opened.poses && opened.poses->is_stored) || (opened.refined && opened.refined->is_stored);
+  const bool is_run = is_present(request.output / "run.json");
+  return request.output / (is_run && !are_stored ? kPreviewFolder : "") / "model";
 }
 
 // What most of the unmeasured is, with what helps.
@@ -99,9 +100,13 @@ std::string main_reason(const Json& depth_of_views) {
 
 Json write_preview(const RunRequest& request, Terminal& terminal) {
   const OpenedScene opened = open_scene(request.scene, request.output / "model", terminal);
-  make_output_folder(request.output / "model");
-  opened.keep(request.output / "model");
-  return run_pipeline(preview_request(request, opened, full_scene(request)), terminal).report;
+  make_output_folder(request.output);
+  const FolderLock lock(request.output);
+  const std::filesystem::path model = model_of_preview(request, opened);
+  make_output_folder(model);
+  opened.keep(model);
+  return run_pipeline(preview_request(request, opened, full_scene(request, model)), terminal)
+      .report;
 }
 
 bool is_worth_a_preview(const Scene& scene, const Scene& full) {
@@ -111,7 +116,7 @@ bool is_worth_a_preview(const Scene& scene, const Scene& full) {
 }
 
 void look_first(const RunRequest& request, const OpenedScene& opened, Terminal& terminal) {
-  const Scene full = full_scene(request);
+  const Scene full = full_scene(request, request.output / "model");
   if (!is_worth_a_preview(opened.scene, full)) return;
   (void)terminal.begin("first look");
   try {

@@ -14,7 +14,8 @@ namespace cgs {
 inline constexpr const char* kPreviewFolder = "preview";
 
 /// A first look at what a run would come to: one on pictures of some 250 pixels, without training,
-/// in OUT/preview. The cameras stay, so that the run that follows need not solve for them again.
+/// in OUT/preview. The cameras stay, so that the run that follows need not solve for them again; a
+/// run that is there keeps its own.
 /// \return its report
 nlohmann::ordered_json write_preview(const RunRequest& request, Terminal& terminal);
 

@@ -150,8 +150,10 @@ WrittenSurfaces write_surfaces_within(const Surfaces& fused,
 // The OBJ is written from the mesh that was held against the promise before; its decimals may not
 // take up what that left.
 void require_obj_in_place(const RunRequest& request, const TriangleMesh& mesh, const Frame& frame) {
-  const double moved = vertex_moves(request.output / "mesh/watertight.obj", mesh, frame);
+  const std::filesystem::path file = request.output / "mesh/watertight.obj";
+  const double moved = vertex_moves(file, mesh, frame);
   if (moved <= kRoomForRounding * parse_length(request.max_error, frame)) return;
+  std::filesystem::remove(file);
   throw NumericalError("--max-error: watertight.obj was rounded by " + format_length(moved, frame));
 }
 

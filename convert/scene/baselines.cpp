@@ -56,15 +56,15 @@ Overlap overlap(const Scene& scene, int a, int b) {
 
 std::vector<Baseline> baselines(const Scene& scene) {
   std::vector<Baseline> out;
+  const std::vector<DepthRange> ranges = depth_ranges(scene);
   for (size_t i = 0; i < scene.input.size(); ++i) {
+    const double middle = 2 / (1 / ranges[i].near + 1 / ranges[i].far);
     for (size_t j = i + 1; j < scene.input.size(); ++j) {
       const Camera& a = scene.views[static_cast<size_t>(scene.input[i])].camera;
       const Camera& b = scene.views[static_cast<size_t>(scene.input[j])].camera;
       const double length = (a.center() - b.center()).norm();
       const double cosine =
           a.world_from_cam.rotation().col(2).dot(b.world_from_cam.rotation().col(2));
-      const DepthRange range = depth_range(scene, scene.input[i]);
-      const double middle = 2 / (1 / range.near + 1 / range.far);
       out.push_back({scene.input[i],
                      scene.input[j],
                      length,

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <exception>
 #include <optional>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -21,6 +22,7 @@
 #include "io/scenes/masks.h"
 #include "io/scenes/orientation.h"
 #include "io/scenes/photographs.h"
+#include "io/scenes/scene_reader.h"
 #include "libcgs/core/error.h"
 #include "libcgs/poses/solve_poses.h"
 
@@ -32,9 +34,6 @@ namespace {
 
 // Beyond, hours; and tools that solve for thousands exist.
 constexpr size_t kMostPhotographs = 200;
-// Used where none are named.
-constexpr size_t kUsed = 3;
-
 std::vector<PhotoFile> checked_photographs(const SceneRoot& root,
                                            const std::vector<std::string>& wanted) {
   std::vector<PhotoFile> photographs = list_photographs(root);
@@ -83,13 +82,24 @@ Json hashes_of_model(const std::filesystem::path& folder) {
   return out;
 }
 
-// How many of the placed photographs are to be reconstructed from: those that are wanted or, where
-// none are named, as many as are used by default.
-size_t of_use(const std::vector<std::string>& placed, const std::vector<std::string>& wanted) {
-  if (wanted.empty()) return std::min(placed.size(), kUsed);
-  return static_cast<size_t>(std::count_if(wanted.begin(), wanted.end(), [&](const auto& name) {
-    return std::find(placed.begin(), placed.end(), name) != placed.end();
-  }));
+/// Which photographs are to be reconstructed from.
+struct Wanted {
+  std::vector<std::string> names;  ///< Empty = any.
+  size_t count = 0;                ///< How many are enough.
+
+  /// How many of the placed ones count.
+  size_t among(const std::vector<std::string>& placed) const {
+    if (names.empty()) return std::min(placed.size(), count);
+    return static_cast<size_t>(std::count_if(names.begin(), names.end(), [&](const auto& name) {
+      return std::find(placed.begin(), placed.end(), name) != placed.end();
+    }));
+  }
+};
+
+Wanted wanted_of(const std::vector<std::string>& names, size_t photographs, bool all_views) {
+  SceneOptions options;
+  options.all_views = all_views;
+  return {names, names.empty() ? options.wanted_views(photographs) : names.size()};
 }
 
 std::vector<std::string> placed_names(const ColmapModel& model) {
@@ -207,15 +217,14 @@ std::string focal_text(const UnposedPhoto& photo, const SolvedPhoto& solved) {
 void add_remarks(const std::vector<UnposedPhoto>& photos,
                  const PoseSolution& solution,
                  PhotoPoses& out) {
-  int told = -1;  // lens
+  std::set<int> told;  // lenses
   for (size_t i = 0; i < photos.size(); ++i) {
     const SolvedPhoto& solved = solution.photos[i];
     const UnposedPhoto& photo = photos[i];
     if (!solved.is_placed) {
       out.warnings.push_back("photograph " + printable(photo.name) +
                              " was left out: too little of what it shows is in the others");
-    } else if (solved.focal_sigma > 0 && photo.lens > told) {
-      told = photo.lens;
+    } else if (solved.focal_sigma > 0 && told.insert(photo.lens).second) {
       constexpr double kSure = 0.05;  // lengths along the view err by about as much
       const bool is_doubtful = solved.is_refuted || solved.focal_sigma > kSure;
       (is_doubtful ? out.warnings : out.notes).push_back(focal_text(photo, solved));
@@ -312,17 +321,15 @@ Attempt attempted(MaskIndex& masks,
   return out;
 }
 
-// Once more with features as seen from aside where a photograph to reconstruct from has found no
-// place, or, where none are named, fewer than are used by default have: it takes several times as
-// long, and moves those that have theirs.
+// Once more with features as seen from aside where too few that are to be reconstructed from have
+// found a place: it takes several times as long, and moves those that have theirs.
 // \return what is best, and whether both were tried
 std::pair<Attempt, bool> solved_photos(MaskIndex& masks,
                                        const std::vector<PhotoFile>& photographs,
-                                       const std::vector<std::string>& wanted,
+                                       const Wanted& wanted,
                                        const PhotoPoseOptions& how,
                                        Terminal& terminal) {
-  const size_t all = wanted.empty() ? std::min(photographs.size(), kUsed) : wanted.size();
-  const auto used = [&](const Attempt& attempt) { return of_use(attempt.placed(), wanted); };
+  const auto used = [&](const Attempt& attempt) { return wanted.among(attempt.placed()); };
   std::optional<Attempt> first;
   std::exception_ptr failure;
   const Progress progress = terminal.begin("cameras of photographs");
@@ -332,7 +339,7 @@ std::pair<Attempt, bool> solved_photos(MaskIndex& masks,
     failure = std::current_exception();
   }
   terminal.end(first ? attempt_text(*first) : "not found");
-  if (first && used(*first) >= all) return {std::move(*first), false};
+  if (first && used(*first) >= wanted.count) return {std::move(*first), false};
   const Progress again = terminal.begin("cameras again, as if seen from aside");
   try {
     Attempt second = attempted(masks, photographs, how, true, again);
@@ -376,16 +383,17 @@ void check_focal(double focal, const std::vector<PhotoFile>& photographs) {
 }  // namespace
 
 PhotoPoses photo_poses(const SceneRoot& root,
-                       const std::vector<std::string>& wanted,
+                       const std::vector<std::string>& names,
                        const PhotoPoseOptions& how,
                        const std::filesystem::path& stored,
                        Terminal& terminal) {
-  const std::vector<PhotoFile> photographs = checked_photographs(root, wanted);
+  const std::vector<PhotoFile> photographs = checked_photographs(root, names);
+  const Wanted wanted = wanted_of(names, photographs.size(), how.all_views);
   if (how.focal > 0) check_focal(how.focal, photographs);
   MaskIndex masks(root);
   const std::string inputs = inputs_text(masks, photographs, how);
   if (auto poses = stored_poses(stored, inputs)) {
-    if (poses->tried_from_aside || of_use(placed_names(poses->model), wanted) >= wanted.size()) {
+    if (poses->tried_from_aside || wanted.among(placed_names(poses->model)) >= wanted.count) {
       return *poses;
     }
   }

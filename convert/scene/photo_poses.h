@@ -28,20 +28,21 @@ struct PhotoPoseOptions {
   bool each_lens = false;  ///< Every photograph has a focal length and a distortion of its own;
                            ///< else those of one camera, size and marked focal length share them.
   bool may_have_border = false;  ///< As View::may_have_border.
+  bool all_views = false;        ///< As SceneOptions::all_views.
 };
 
 /// Solves for the cameras of the photographs in a folder, or reads what write_photo_poses() stored
 /// in `stored` if that was solved from the same.
 ///
-/// \param wanted  file names of those to reconstruct from; may be empty. If there are too many
-///                photographs to compare, only these are used. The others are placed where that is
-///                easy: features as seen from aside, which take minutes, are looked for on account
-///                of wanted ones alone.
+/// \param names   file names of those to reconstruct from; if empty, as many as
+///                SceneOptions::wanted_views(). If there are too many photographs to compare, only
+///                these are used. The others are placed where that is easy: features as seen from
+///                aside, which take minutes, are looked for on account of wanted ones alone.
 /// \param stored  may be empty or not exist
 /// \throws BadInput Empty (fewer than two photographs), and as read_image(); LimitError for more
 ///         photographs than can be compared in reasonable time; NumericalError as solve_poses()
 PhotoPoses photo_poses(const SceneRoot& root,
-                       const std::vector<std::string>& wanted,
+                       const std::vector<std::string>& names,
                        const PhotoPoseOptions& how,
                        const std::filesystem::path& stored,
                        Terminal& terminal);

@@ -121,7 +121,8 @@ OpenedScene open_scene(const SceneRequest& request,
     const SceneRoot root{request.path, request.options.allow_external};
     const std::vector<std::string> names = names_of(root, request.options.views);
     const std::filesystem::path stored = model.empty() ? model : model / kPosesFolder;
-    const PhotoPoseOptions how{request.focal, request.each_lens, request.old_photographs};
+    const PhotoPoseOptions how{
+        request.focal, request.each_lens, request.old_photographs, request.options.all_views};
     out.poses = photo_poses(root, names, how, stored, terminal);
     SceneOptions options = request.options;
     options.views = placed_views(names, out.poses->model);

@@ -31,6 +31,8 @@ const char* options_for(Remedy remedy) {
       return "--op statistical-outliers=NEIGHBOURS,SIGMAS; --op poisson=SPACING";
     case Remedy::NoWater:
       return "--medium none";
+    case Remedy::LargerVoxels:
+      return "--voxel-size, --memory-limit";
   }
   return "";
 }

@@ -48,8 +48,8 @@ Terminal::Terminal(bool quiet, bool is_strict)
       rewrites_(::isatty(STDERR_FILENO) == 1),
       start_() {}
 
-Terminal Terminal::silent() {
-  Terminal out(true);
+Terminal Terminal::silent(bool is_strict) {
+  Terminal out(true, is_strict);
   out.is_silent_ = true;
   return out;
 }
@@ -108,7 +108,8 @@ void Terminal::warn(const std::vector<std::string>& lines) const {
   }
   if (!is_strict_ || lines.empty()) return;
   constexpr int kBadInput = 3;
-  throw Error(kBadInput, "--strict: a warning counts as an error");
+  throw Error(kBadInput,
+              "--strict: a warning counts as an error" + (is_silent_ ? ": " + lines[0] : ""));
 }
 
 void catch_interrupts() {

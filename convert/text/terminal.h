@@ -38,7 +38,7 @@ class Terminal {
   /// \param is_strict  a warning, or all that come together, throws an Error with exit code 3
   explicit Terminal(bool quiet, bool is_strict = false);
   /// One that says nothing, not even warnings: for work whose result nobody sees.
-  static Terminal silent();
+  static Terminal silent(bool is_strict = false);
 
   /// Begins a named stage and returns the function that shows how far it is. The function throws
   /// Cancelled after SIGINT or SIGTERM.

@@ -13,7 +13,7 @@ from pathlib import Path
 
 program, capture, work = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
 shutil.rmtree(work, ignore_errors=True)
-for name in ("first", "second"):
+for name in ("first", "second #2"):
     for part in ("images", "transforms.json"):
         copy = shutil.copytree if (capture / part).is_dir() else shutil.copy
         (work / name).mkdir(parents=True, exist_ok=True)
@@ -21,7 +21,7 @@ for name in ("first", "second"):
 (work / "broken").mkdir()
 (work / "broken/transforms.json").write_text('{"frames": [')
 
-scenes = [work / name for name in ("first", "broken", "second")]
+scenes = [work / name for name in ("first", "broken", "second #2")]
 out = work / "out"
 options = ["--views", "view_01,view_03", "--preset", "draft", "--set", "steps=2", "--assume-unit", "m"]
 
@@ -37,8 +37,8 @@ def batch(*more):
 
 
 rows, said = batch()
-assert list(rows) == ["first", "broken", "second"], rows
-for name in ("first", "second"):
+assert list(rows) == ["first", "broken", "second #2"], rows
+for name in ("first", "second #2"):
     assert rows[name]["state"] == "done" and rows[name]["certified"], rows[name]
     assert rows[name]["photographs"] == 2 and 0.3 < rows[name]["measured"] <= 1, rows[name]
     assert 0 < rows[name]["observed"] < 1 and rows[name]["psnr"] > 10, rows[name]
@@ -50,7 +50,7 @@ assert json.loads((out / "batch.json").read_text()) == list(rows.values())
 
 page = (out / "index.html").read_text()
 assert "2 of 3 scenes" in page and "SYNTAX: " in page
-assert 'href="first/report.html"' in page
+assert 'href="first/report.html"' in page and 'href="second%20%232/report.html"' in page
 thumbnail = page.split('<img src="')[1].split('"')[0]
 assert (out / thumbnail).is_file(), thumbnail
 
@@ -64,6 +64,17 @@ rows, _ = batch("--retry")
 assert rows["broken"]["state"] == "done", rows["broken"]
 assert all(f.stat().st_mtime_ns == at for f, at in before.items())
 assert "3 of 3 scenes" in (out / "index.html").read_text()
+
+# Options that do not suit a finished run make no failure of it, nor does the folder of a scene take results.
+rows, _ = batch("--set", "steps=3")
+assert "--overwrite" in rows["first"]["failure"] and not (out / "first/failure.txt").exists(), rows["first"]
+rows, _ = batch()
+assert all(row["state"] == "done" for row in rows.values()), rows
+rows, _ = batch("--set", "steps=3", "--overwrite")
+assert rows["first"]["state"] == "done", rows["first"]
+assert all(f.stat().st_mtime_ns != at for f, at in before.items())
+onto = subprocess.run([program, "batch", work / "first", "-o", work], capture_output=True, text=True)
+assert onto.returncode == 2 and "lies in the input" in onto.stderr, onto.stderr
 
 same = subprocess.run([program, "batch", work / "first", work / "out/../first", "-o", out], capture_output=True, text=True)
 assert same.returncode == 2 and "two scenes are called first" in same.stderr, same.stderr

@@ -100,6 +100,19 @@ class FillTest(unittest.TestCase):
         holes = sum(view['hole_pixels'] - view['filled_before'] for view in self.fill['views'])
         self.assertGreater(self.fill['splats'], 0.5 * holes)
 
+    def test_no_model_is_replaced_by_accident(self):
+        before = (FOLDER / 'filled/fill.ply').read_bytes()
+        said = cgs('fill', 'model', 'holes', '-o', 'filled', code=2).stderr
+        self.assertIn('--overwrite', said)
+        cgs('fill', 'model', 'holes', '-o', 'filled', '-w')
+        self.assertEqual((FOLDER / 'filled/fill.ply').read_bytes(), before)
+
+    def test_the_model_tells_of_it(self):
+        self.assertIsNone(told('info', 'model')['synthetic'])
+        made_up = told('info', 'filled')['synthetic']
+        self.assertEqual(made_up, told('info', 'filled/fill.ply')['synthetic'])
+        self.assertEqual(made_up['splats'], self.fill['splats'])
+
     def test_evidence_keeps_its_bits(self):
         for name in EVIDENCE:
             same = (FOLDER / 'model' / name).read_bytes() == (FOLDER / 'filled' / name).read_bytes()

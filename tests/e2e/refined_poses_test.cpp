@@ -108,5 +108,13 @@ TEST_F(RefinedPoses, DecideAllStages) {
   EXPECT_GT(read(plain / "run.json")["camera_fit"]["error"], 0.5);
 }
 
+TEST_F(RefinedPoses, StayWhereALookWithoutThemIsTaken) {
+  const std::string poses = test::read_bytes(out() / "model/refined_poses.json");
+  ASSERT_EQ(run(out(), " --preview").exit_code, 0);
+  EXPECT_EQ(test::read_bytes(out() / "model/refined_poses.json"), poses);
+  EXPECT_TRUE(fs::exists(out() / "preview/report.html"));
+  EXPECT_FALSE(fs::exists(out() / "preview/model/refined_poses.json"));
+}
+
 }  // namespace
 }  // namespace cgs

@@ -246,6 +246,25 @@ TEST_F(SphereFrames, OneDamagedFileOfManyLeavesTheOthers) {
   EXPECT_EQ(test::defect_of([&] { fuse_depth(request(), {}); }), "TRUNCATED");
 }
 
+// A JPEG tells its size in its head, and needs no decoding where depth alone is asked for.
+TEST_F(SphereFrames, OfADamagedPhotographKeepTheirDepthWithoutColours) {
+  const DepthFusion whole = fuse_depth(request(), {});
+  document_["frames"][3]["file_path"] = "images/" + name(3) + ".jpg";
+  document_["frames"][3]["depth_file_path"] = "depth/" + name(3) + ".png";
+  test::write_bytes(dir_ / "transforms.json", document_.dump());
+  const std::filesystem::path file = dir_ / "images" / (name(3) + ".jpg");
+  test::write_bytes(file, test::jpeg(kWidth, kHeight));
+  std::filesystem::remove(dir_ / "images" / (name(3) + ".png"));
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  const DepthFusion out = fuse_depth(request(), {});
+  EXPECT_EQ(out.frames, size_t{kFrames});
+  ASSERT_EQ(out.warnings.size(), 1u);
+  EXPECT_EQ(out.warnings[0].substr(0, 23), "view f13 has no colours") << out.warnings[0];
+  const TriangleMesh expected = open_surface(whole.fused.volume, {});
+  const TriangleMesh found = open_surface(out.fused.volume, {});
+  EXPECT_EQ(found.vertices, expected.vertices);
+}
+
 TEST_F(SphereFrames, TellTheScaleWhereTheyAgree) {
   const DepthFusion out = fuse_depth(request(), {});
   EXPECT_TRUE(out.warnings.empty());

@@ -120,6 +120,21 @@ Model model_of_one_view(const std::filesystem::path& folder) {
   return model;
 }
 
+TEST(ModelFolder, IsThatWithinWhereTheFolderHasNoneOfItsOwn) {
+  const test::TempDir dir;
+  EXPECT_FALSE(holds_model(dir.path()));
+  write_model(dir / "group/model", model_of_one_view(dir.path()));
+  test::write_bytes(dir / "group/cameras.json", "[]");  // of its photographs
+  EXPECT_TRUE(holds_model(dir / "group"));
+  EXPECT_EQ(model_folder(dir / "group"), dir / "group/model");
+  EXPECT_EQ(model_folder(dir / "group/model"), dir / "group/model");
+  EXPECT_EQ(read_model(dir / "group").gaussians.size(), 5u);
+  test::write_bytes(dir / "run/run.json", "{}");
+  test::write_bytes(dir / "run/model/colmap/poses.json", "{}");
+  EXPECT_EQ(model_folder(dir / "run"), dir / "run/model");  // of which nothing is there yet
+  EXPECT_FALSE(holds_model(dir / "run"));
+}
+
 TEST(WriteModel, SaysWhatItsGaussiansRestOn) {
   const test::TempDir dir;
   Model model = model_of_one_view(dir.path());
