@@ -5,7 +5,7 @@
 #
 # usage: tests/run.sh [--tidy|--long]
 #   --tidy adds static analysis (tests/tidy.sh), half an hour
-#   --long adds all faults and kills, and ten million runs of the fuzzer, two hours
+#   --long adds all faults and kills, and ten million runs of the fuzzer, an hour and a half
 #     (tests/reliability.sh --long)
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -12,7 +12,8 @@ VOXEL = "" if config["voxel"] in ("", None) else f"--voxel-size {shlex.quote(str
 # Which of `options` these commands take. Training is given all but those of fuse and mesh: it refuses what it
 # does not know.
 TAKEN = {
-    "split": ("--allow-external", "--chunk", "--depth", "--depth-kind", "--depth-scale", "--focal", "--refine-poses"),
+    "split": ("--allow-external", "--chunk", "--depth", "--depth-kind", "--depth-scale", "--focal", "--lenses",
+              "--old-photographs", "--refine-poses"),
     "fuse": ("--estimated",),
     "mesh": ("--simplify",),
 }

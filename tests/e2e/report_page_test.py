@@ -273,7 +273,7 @@ class ReportPage(unittest.TestCase):
         self.assertGreater(share_of_magenta(self.page.picture()), 0.2)
         canvas.send_keys('h')
         self.page.driver.save_screenshot(str(SCREENS / 'without_invented.png'))
-        self.assertEqual(share_of_magenta(self.page.picture()), 0)
+        self.assertLess(share_of_magenta(self.page.picture()), 1e-4)  # the cross is of that colour
         canvas.send_keys(Keys.ENTER)  # nothing is there to be picked
         self.assertIn('Pick two points', self.page.measured())
         self.page.press('Surface that nothing measured')
