@@ -214,7 +214,10 @@ void run_compare(const CompareArgs& args) {
   terminal.warn(first.warnings);
   terminal.warn(second.warnings);
   check_clouds(args, second.content);
-  if (!args.threshold.empty()) (void)parse_length(args.threshold, first.content.frame);
+  // With --scale it may be in a unit that is known afterwards alone.
+  if (!args.threshold.empty() && !args.scale) {
+    (void)parse_length(args.threshold, first.content.frame);
+  }
   check_units(args, first.content.frame, second.content.frame);
   const std::string turned = turned_text(first.content.frame, second.content.frame);
   if (!turned.empty() && !args.icp) terminal.warn({turned});

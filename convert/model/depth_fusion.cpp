@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 
 #include <nlohmann/json.hpp>
@@ -56,14 +58,32 @@ void refuse_other_kinds(const Scene& scene) {
       "scale to the photographs");
 }
 
-// Works at the size of the depth, since a larger picture has nothing to add but time.
+// How much larger a photograph is than its depth; nothing if that cannot be read, which is told
+// when it is fused.
+std::optional<int> times_larger(const View& view) {
+  try {
+    const Raster<float> values = read_depth_file(view.depth_path).values;
+    return std::max(view.camera.width, view.camera.height) / std::max(values.width, values.height);
+  } catch (const BadInput&) {
+    return std::nullopt;
+  }
+}
+
+// Works at the size of the depth, since a larger picture has nothing to add but time. One frame of
+// each size tells it.
 void take_size_of_depth(Scene& scene) {
-  const Raster<float> values = read_depth_file(first_input(scene).depth_path).values;
-  const Camera& camera = first_input(scene).camera;
-  const int factor = std::max(camera.width, camera.height) / std::max(values.width, values.height);
-  if (factor < 2) return;
-  for (View& view : scene.views) {
-    view.camera = resized(view.camera, view.camera.width / factor, view.camera.height / factor);
+  std::map<std::pair<int, int>, int> factors;
+  for (const int i : scene.input) {
+    View& view = scene.views[static_cast<size_t>(i)];
+    const std::pair size(view.camera.width, view.camera.height);
+    if (factors.contains(size)) continue;
+    if (const auto factor = times_larger(view)) factors.emplace(size, *factor);
+  }
+  for (const int i : scene.input) {
+    Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+    const auto factor = factors.find({camera.width, camera.height});
+    if (factor == factors.end() || factor->second < 2) continue;
+    camera = resized(camera, camera.width / factor->second, camera.height / factor->second);
   }
 }
 

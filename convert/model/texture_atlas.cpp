@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -91,26 +92,25 @@ Charts joined(Charts all, double texel) {
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
     return room(charts[a], texel) > room(charts[b], texel);
   });
+  std::map<int, std::vector<size_t>> left;  // of each photograph, those that are no part yet
+  for (const size_t i : order) left[charts[i].photograph].push_back(i);
   std::vector<int> number(charts.size(), PhotoTexture::kNone);  // of the chart it becomes a part of
   std::vector<Chart> out;
-  for (const size_t first : order) {
-    if (number[first] >= 0) continue;
-    number[first] = static_cast<int>(out.size());
-    Chart whole = charts[first];
-    for (bool has_grown = true; has_grown;) {
-      has_grown = false;
-      for (const size_t other : order) {
-        if (number[other] >= 0 || charts[other].photograph != whole.photograph) continue;
-        const Chart both{whole.photograph,
-                         whole.box.merged(charts[other].box),
-                         std::max(whole.pixel, charts[other].pixel)};
-        if (room(both, texel) > room(whole, texel) + room(charts[other], texel)) continue;
+  for (auto& [photograph, rest] : left) {
+    while (!rest.empty()) {
+      Chart whole = charts[rest.front()];
+      const auto becomes_part = [&](size_t i) {
+        const Chart both{
+            photograph, whole.box.merged(charts[i].box), std::max(whole.pixel, charts[i].pixel)};
+        if (room(both, texel) > room(whole, texel) + room(charts[i], texel)) return false;
         whole = both;
-        number[other] = number[first];
-        has_grown = true;
+        number[i] = static_cast<int>(out.size());
+        return true;
+      };
+      while (std::erase_if(rest, becomes_part) > 0) {
       }
+      out.push_back(whole);
     }
-    out.push_back(whole);
   }
   charts = std::move(out);
   for (int& chart : all.of_face) {

@@ -85,14 +85,16 @@ std::vector<std::string> baseline_warnings(const Scene& scene) {
   };
   const std::vector<Baseline> pairs = baselines(scene);
   // Ends of a walk around a thing may be far apart, if others lie between.
-  const auto has_company = [&](int view) {
-    return std::any_of(pairs.begin(), pairs.end(), [&](const Baseline& pair) {
-      return (pair.a == view || pair.b == view) && pair.angle <= kWide;
-    });
-  };
+  std::vector<bool> has_company(scene.views.size(), false);
+  for (const Baseline& pair : pairs) {
+    if (pair.angle > kWide) continue;
+    has_company[static_cast<size_t>(pair.a)] = has_company[static_cast<size_t>(pair.b)] = true;
+  }
   for (const Baseline& pair : pairs) {
     largest = std::max(largest, pair.to_depth);
-    if (pair.angle <= kWide || (has_company(pair.a) && has_company(pair.b))) continue;
+    const bool have_company =
+        has_company[static_cast<size_t>(pair.a)] && has_company[static_cast<size_t>(pair.b)];
+    if (pair.angle <= kWide || have_company) continue;
     out.push_back("views " + name(pair.a) + " and " + name(pair.b) +
                   " look in directions more than 60 degrees apart; they may share too little");
   }

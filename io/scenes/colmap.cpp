@@ -125,21 +125,26 @@ ColmapCameras used_cameras(const fs::path& file, const std::vector<ColmapImage>&
                                     : read_colmap_cameras_text(file, &used);
 }
 
-ColmapModel read_model(const fs::path& folder, Scene& scene) {
+// \param where  of the model, relative to the scene
+ColmapModel read_model(const SceneRoot& root, const std::string& where, Scene& scene) {
+  const fs::path folder = resolve_in_scene(root, where, root.folder);
+  const auto file = [&](const char* name) {
+    return resolve_in_scene(root, (fs::path(where) / name).lexically_normal().string(), folder);
+  };
   ColmapModel model;
   const bool is_binary = holds_model(folder, ".bin");
   if (is_binary && holds_model(folder, ".txt")) {
     scene.warnings.emplace_back("the model is there as .bin and as .txt; .bin was read");
   }
   if (is_binary) {
-    model.images = read_colmap_images_binary(folder / "images.bin");
-    model.cameras = used_cameras(folder / "cameras.bin", model.images);
-    const fs::path points = folder / "points3D.bin";
+    model.images = read_colmap_images_binary(file("images.bin"));
+    model.cameras = used_cameras(file("cameras.bin"), model.images);
+    const fs::path points = file("points3D.bin");
     if (is_present(points)) model.points = read_colmap_points_binary(points);
   } else {
-    model.images = read_colmap_images_text(folder / "images.txt");
-    model.cameras = used_cameras(folder / "cameras.txt", model.images);
-    const fs::path points = folder / "points3D.txt";
+    model.images = read_colmap_images_text(file("images.txt"));
+    model.cameras = used_cameras(file("cameras.txt"), model.images);
+    const fs::path points = file("points3D.txt");
     if (is_present(points)) model.points = read_colmap_points_text(points);
   }
   return model;
@@ -300,7 +305,7 @@ Scene read_colmap(const SceneRoot& root) {
   scene.kind = SceneKind::Colmap;
   scene.folder = root.folder;
   const std::string folder = largest_model(root, scene);
-  const ColmapModel model = read_model(resolve_in_scene(root, folder, root.folder), scene);
+  const ColmapModel model = read_model(root, folder, scene);
   add_model(root, photograph_folder(root, folder, model), model, scene);
   return scene;
 }

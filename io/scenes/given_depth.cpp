@@ -175,6 +175,29 @@ float averaged(const Raster<float>& values, double u, double v, double width, do
   return static_cast<float>(sum / count);
 }
 
+// Whether a value lies between those on two sides of it, far from both.
+bool is_between(float a, float value, float b) {
+  const auto [low, high] = std::minmax(a, b);
+  return low < value && value < high && !is_like(low, value) && !is_like(high, value);
+}
+
+// Without what a sensor measured where a pixel of it saw two surfaces: on neither of them. Spread
+// over several pixels of a photograph it would look like surface.
+Raster<float> without_mixed(const Raster<float>& values) {
+  Raster<float> out = values;
+  for (int y = 0; y < values.height; ++y) {
+    for (int x = 0; x < values.width; ++x) {
+      const bool has_sides = x > 0 && x + 1 < values.width;
+      const bool has_rows = y > 0 && y + 1 < values.height;
+      const float value = values(x, y);
+      const bool is_mixed = (has_sides && is_between(values(x - 1, y), value, values(x + 1, y))) ||
+                            (has_rows && is_between(values(x, y - 1), value, values(x, y + 1)));
+      if (is_mixed) out(x, y) = kNaN;
+    }
+  }
+  return out;
+}
+
 // How many views would find each file beside their photograph: names repeat in folders of rigs.
 std::map<fs::path, int> uses_of_files_beside(const Scene& scene, const SceneRoot& root) {
   std::map<fs::path, int> out;
@@ -408,8 +431,11 @@ void load_given_depth(const Scene& scene, View& view, const ImageSize& photograp
                        : file.whole_bits > 0 ? kMillimetres
                                              : 1;
   for (float& value : file.values.data) value = static_cast<float>(double(value) / scale);
-  view.given_depth = resampled(upright(file.values, view, photograph), view);
   view.depth_states_metres = file.whole_bits == 16 || scene.depth_scale > 0;
+  const Raster<float> values = upright(file.values, view, photograph);
+  const bool is_of_sensor = view.depth_states_metres || scene.depth_kind == DepthKind::Metric;
+  const bool is_coarser = values.width < view.camera.width;
+  view.given_depth = resampled(is_of_sensor && is_coarser ? without_mixed(values) : values, view);
 }
 
 }  // namespace cgs

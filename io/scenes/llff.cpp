@@ -93,8 +93,9 @@ std::map<size_t, std::string> read_index(const fs::path& path, size_t rows) {
 }
 
 void pair_by_index(const SceneRoot& root, const std::string& folder, Scene& scene) {
-  const fs::path index = root.folder / "INDEX.txt";
+  const fs::path index = resolve_in_scene(root, "INDEX.txt", root.folder);
   std::vector<View> named;
+  std::vector<int> place(scene.views.size(), -1);  // of each row
   for (const auto& [row, name] : read_index(index, scene.views.size())) {
     View view = scene.views[row];
     view.name = name;
@@ -104,9 +105,15 @@ void pair_by_index(const SceneRoot& root, const std::string& folder, Scene& scen
     } else {
       scene.missing.push_back((fs::path(folder) / name).string());
     }
+    place[row] = static_cast<int>(named.size());
     named.push_back(std::move(view));
   }
   scene.views = std::move(named);
+  for (SparsePoint& point : scene.points) {
+    for (int& view : point.views) view = place[static_cast<size_t>(view)];
+    std::erase(point.views, -1);
+  }
+  std::erase_if(scene.points, [](const SparsePoint& point) { return point.views.empty(); });
 }
 
 void pair_with_images(const SceneRoot& root, Scene& scene) {
@@ -130,10 +137,11 @@ void pair_with_images(const SceneRoot& root, Scene& scene) {
 
 // LLFF keeps COLMAP's points but not always its list of images; by convention image id i + 1 is
 // row i. The points are taken only if nearly all of their observations bear that out.
-void add_sparse_points(Scene& scene) {
-  fs::path path = scene.folder / "sparse" / "0" / "points3D.bin";
-  if (!is_present(path)) path = scene.folder / "sparse" / "points3D.bin";
-  if (!is_present(path)) return;
+void add_sparse_points(const SceneRoot& root, Scene& scene) {
+  std::string name = "sparse/0/points3D.bin";
+  if (!is_present(root.folder / name)) name = "sparse/points3D.bin";
+  if (!is_present(root.folder / name)) return;
+  const fs::path path = resolve_in_scene(root, name, root.folder);
   std::vector<SparsePoint> points;
   size_t observations = 0;
   size_t agreeing = 0;
@@ -184,8 +192,8 @@ Scene read_llff(const SceneRoot& root) {
   scene.kind = SceneKind::Llff;
   scene.folder = root.folder;
   scene.views = views_of_rows(array, path);
+  add_sparse_points(root, scene);
   pair_with_images(root, scene);
-  add_sparse_points(scene);
   return scene;
 }
 

@@ -89,7 +89,8 @@ Scene read_strecha(const SceneRoot& root) {
   const fs::path cameras = resolve_in_scene(root, *folder, root.folder);
   std::optional<PhotographIndex> index;  // made for the first name that is not there as it is
   for (const std::string& name : camera_files(cameras)) {
-    const fs::path path = cameras / name;
+    const fs::path path =
+        resolve_in_scene(root, (fs::path(*folder) / name).lexically_normal().string(), cameras);
     View view;
     view.camera = read_strecha_camera(path);
     view.name = path.stem().string();  // 0000.jpg.camera belongs to 0000.jpg

@@ -16,11 +16,11 @@ namespace cgs {
 
 namespace {
 
-// Pixels of background that no mask leaves out.
-double usable_background(const Raster<DepthOrigin>& origin, const View& view) {
+// Pixels of an origin that no mask leaves out: of what is marked in regions, these may hold some.
+double usable(const Raster<DepthOrigin>& origin, DepthOrigin which, const View& view) {
   size_t out = 0;
   for (size_t i = 0; i < origin.data.size(); ++i) {
-    out += view.is_usable(i) && origin.data[i] == DepthOrigin::Background ? 1 : 0;
+    out += view.is_usable(i) && origin.data[i] == which ? 1 : 0;
   }
   return static_cast<double>(out);
 }
@@ -41,8 +41,8 @@ PriorsCoverage coverage(const Raster<DepthOrigin>& before,
   out.completed = count(origin, DepthOrigin::Completed) / valid;
   out.guessed = count(origin, DepthOrigin::Guessed) / valid;
   out.sky = count(origin, DepthOrigin::Sky) / valid;
-  out.transient = count(origin, DepthOrigin::Transient) / valid;
-  out.background = usable_background(before, view) / valid;
+  out.transient = usable(before, DepthOrigin::Transient, view) / valid;
+  out.background = usable(before, DepthOrigin::Background, view) / valid;
   out.estimated = count(after.data, DepthOrigin::Estimated) / valid;
   out.left_open = std::max(0.0, 1 - out.measured - out.completed - out.guessed - out.no_surface());
   return out;

@@ -247,30 +247,37 @@ void remove_contradictions(const std::vector<Camera>& cameras,
                            const std::vector<FittedDepth>& fitted,
                            const std::vector<ViewPriors>& priors,
                            std::vector<DepthGuess>& guesses) {
-  std::vector<std::pair<size_t, size_t>> contradicted;  // view and pixel
+  std::vector<MaskMap> contradicted;
+  for (const DepthGuess& guess : guesses) {
+    contradicted.emplace_back(guess.depth.width, guess.depth.height, uint8_t{0});
+  }
   for (size_t i = 0; i < guesses.size(); ++i) {
     if (guesses[i].depth.empty()) continue;
     const DepthMap& depth = guesses[i].depth;
     for (size_t j = 0; j < guesses.size(); ++j) {
       if (j == i) continue;
+      const Eigen::Isometry3d j_from_i = cameras[j].cam_from_world() * cameras[i].world_from_cam;
       for (int y = 0; y < depth.height; ++y) {
         for (int x = 0; x < depth.width; ++x) {
           if (!(depth(x, y) > 0)) continue;
-          const Eigen::Vector3d uvz =
-              cameras[j].project(cameras[i].unproject(x + 0.5, y + 0.5, double(depth(x, y))));
+          const Eigen::Vector3d uvz = cameras[j].project_in_cam(
+              j_from_i * (double(depth(x, y)) * cameras[i].ray_in_cam(x + 0.5, y + 0.5)));
           if (!cameras[j].sees(uvz)) continue;
           const auto u = static_cast<int>(uvz.x());
           const auto v = static_cast<int>(uvz.y());
           const Shown shown = shown_at(fitted[j], priors[j], guesses[j], u, v);
           if (!floats(uvz.z(), double(guesses[i].sigma(x, y)), shown)) continue;
-          contradicted.emplace_back(i, depth.index(x, y));
-          if (shown.is_guess) contradicted.emplace_back(j, guesses[j].depth.index(u, v));
+          contradicted[i](x, y) = 1;
+          if (shown.is_guess) contradicted[j](u, v) = 1;
         }
       }
     }
   }
-  for (const auto& [view, pixel] : contradicted) {
-    guesses[view].depth.data[pixel] = guesses[view].sigma.data[pixel] = kNoGuess;
+  for (size_t i = 0; i < guesses.size(); ++i) {
+    for (size_t k = 0; k < contradicted[i].data.size(); ++k) {
+      if (contradicted[i].data[k] == 0) continue;
+      guesses[i].depth.data[k] = guesses[i].sigma.data[k] = kNoGuess;
+    }
   }
 }
 

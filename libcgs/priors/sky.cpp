@@ -207,9 +207,9 @@ class SkyFinder {
   }
 
   bool is_well_measured(int x, int y) const {
-    constexpr float kConfident = 0.5f;
+    constexpr float kConfident = 0.5f;  // as a depth sensor alone is
     return !priors_.origin.empty() && priors_.origin(x, y) == DepthOrigin::Measured &&
-           priors_.confidence(x, y) > kConfident;
+           priors_.confidence(x, y) >= kConfident;
   }
 
   static float median_depth(const ViewPriors& priors) {

@@ -185,7 +185,7 @@ class FillTest(unittest.TestCase):
 
     def test_same_bits_for_any_number_of_threads(self):
         for threads in (1, 2, 3, 4):
-            cgs('fill', 'model', 'holes', '-o', 'again_filled', '--threads', threads)
+            cgs('fill', 'model', 'holes', '-o', 'again_filled', '-w', '--threads', threads)
             same = (FOLDER / 'again_filled/fill.ply').read_bytes() == (FOLDER / 'filled/fill.ply').read_bytes()
             self.assertTrue(same, threads)
         cgs('render', 'model', '--holes', '-o', 'once_more', '--threads', 1)

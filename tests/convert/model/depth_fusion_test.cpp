@@ -246,6 +246,20 @@ TEST_F(SphereFrames, OneDamagedFileOfManyLeavesTheOthers) {
   EXPECT_EQ(test::defect_of([&] { fuse_depth(request(), {}); }), "TRUNCATED");
 }
 
+TEST_F(SphereFrames, TheFirstMayBeTheDamagedOne) {
+  for (json& frame : document_["frames"]) {
+    const std::filesystem::path picture = frame["file_path"].get<std::string>();
+    frame["depth_file_path"] = "depth/" + picture.stem().string() + ".png";
+  }
+  test::write_bytes(dir_ / "transforms.json", document_.dump());
+  const std::filesystem::path file = dir_ / "depth" / (name(0) + ".png");
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  const DepthFusion out = fuse_depth(request(), {});
+  EXPECT_EQ(out.frames, size_t{kFrames} - 1);
+  ASSERT_EQ(out.warnings.size(), 1u);
+  EXPECT_EQ(out.warnings[0].substr(0, 20), "view f10 is left out");
+}
+
 // A JPEG tells its size in its head, and needs no decoding where depth alone is asked for.
 TEST_F(SphereFrames, OfADamagedPhotographKeepTheirDepthWithoutColours) {
   const DepthFusion whole = fuse_depth(request(), {});

@@ -97,6 +97,20 @@ TEST(SceneOfColmap, IsTheSceneOfTheFiles) {
   EXPECT_EQ(read.points[1].views, built.points[1].views);
 }
 
+TEST(ReadColmap, RefusesAFileThatIsALinkToElsewhere) {
+  const test::TempDir dir;
+  const test::TempDir elsewhere;
+  write_colmap_text(dir / "sparse/0", sample_model());
+  for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"}) {
+    const std::filesystem::path file = dir / "sparse/0" / name;
+    std::filesystem::rename(file, elsewhere / name);
+    std::filesystem::create_symlink(elsewhere / name, file);
+    EXPECT_EQ(test::defect_of([&] { read_colmap({dir.path(), false}); }), "PATH") << name;
+    std::filesystem::remove(file);
+    std::filesystem::rename(elsewhere / name, file);
+  }
+}
+
 TEST(SceneOfColmap, FindsPhotographsInTheirFolder) {
   const test::TempDir dir;
   const ColmapModel model = sample_model();

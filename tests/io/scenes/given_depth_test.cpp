@@ -133,6 +133,19 @@ TEST_F(GivenDepthFiles, NeverMixBothSidesOfADepthEdge) {
   }
 }
 
+TEST_F(GivenDepthFiles, LeavesOutWhatACoarseSensorMixed) {
+  // A column of pixels that saw both sides.
+  write("depth/v1.npy", 16, 12, [](double u, double) { return u < 20 ? 2.0 : u < 24 ? 3.1 : 5.0; });
+  SceneOptions options;
+  options.depth.kind = DepthKind::Metric;
+  size_t left_out = 0;
+  for (const float z : first(options).given_depth.data) {
+    EXPECT_TRUE(z == 2 || z == 5 || std::isnan(z)) << z;
+    left_out += std::isnan(z) ? 1 : 0;
+  }
+  EXPECT_EQ(left_out, size_t{4} * kHeight);
+}
+
 TEST_F(GivenDepthFiles, NothingIsInventedWhereThereIsNone) {
   write("depth/v1.npy", 32, 24, [](double u, double) { return u < 32 ? 0.0 : 4.0; });
   const View view = first();

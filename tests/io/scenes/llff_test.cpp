@@ -125,6 +125,11 @@ TEST_F(ReadLlff, PairsAPartOfTheImagesByTheirIndex) {
   EXPECT_EQ(refused(), "PATH");
   test::write_bytes(dir_ / "INDEX.txt", "1 b.png\n1 c.png\n");
   EXPECT_EQ(refused(), "SYNTAX");
+  const test::TempDir elsewhere;
+  test::write_bytes(elsewhere / "secret", "1 b.png\n");
+  std::filesystem::remove(dir_ / "INDEX.txt");
+  std::filesystem::create_symlink(elsewhere / "secret", dir_ / "INDEX.txt");
+  EXPECT_EQ(refused(), "PATH");
 }
 
 TEST_F(ReadLlff, TakesSparsePointsOnlyWhereTheyFitTheCameras) {
@@ -146,6 +151,21 @@ TEST_F(ReadLlff, TakesSparsePointsOnlyWhereTheyFitTheCameras) {
   const Scene other = read_llff({dir_.path()});
   EXPECT_TRUE(other.points.empty());
   EXPECT_EQ(other.warnings.size(), 1u);
+}
+
+TEST_F(ReadLlff, KeepsSparsePointsOfThoseThatAnIndexNames) {
+  write({row(0), row(0.25), row(0.5)}, 2);
+  std::string points = test::packed(uint64_t(20));
+  for (int i = 0; i < 20; ++i) {
+    points += test::packed(uint64_t(i), 5.0, 0.01 * i, 0.0) + "rgb" +
+              test::packed(0.1, uint64_t(2), uint32_t(1), uint32_t(0), uint32_t(3), uint32_t(0));
+  }
+  test::write_bytes(dir_ / "sparse/0/points3D.bin", points);
+  test::write_bytes(dir_ / "INDEX.txt", "0 im0.png\n2 im1.png\n");
+  const Scene scene = read_llff({dir_.path()});
+  EXPECT_TRUE(scene.warnings.empty());
+  ASSERT_EQ(scene.points.size(), 20u);
+  EXPECT_EQ(scene.points[0].views, (std::vector<int>{0, 1}));
 }
 
 }  // namespace

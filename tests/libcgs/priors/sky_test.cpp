@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "libcgs/core/split_mix.h"
+#include "libcgs/priors/given_depth.h"
 #include "tests/support/unmeasured_priors.h"
 
 namespace cgs::sky_test {
@@ -201,6 +202,15 @@ TEST(FindSky, LeavesAWhiteWallThatWasMeasured) {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) photo.measure(x, y, 2 + 0.001f * static_cast<float>(x));
   }
+  EXPECT_TRUE(photo.sky().empty());
+}
+
+TEST(FindSky, LeavesAWhiteWallThatADepthSensorMeasured) {
+  Photo photo(
+      kWidth, kHeight, [](int x, int y) { return x < 50 && y < 70 ? kPaleWall : ground(x, y); });
+  FittedDepth sensor;
+  sensor.depth = DepthMap(kWidth, kHeight, 2.0f);
+  merge_sensor_depth(sensor, photo.view, photo.priors);
   EXPECT_TRUE(photo.sky().empty());
 }
 
