@@ -58,11 +58,10 @@ void write_mesh_pictures(const Scene& scene,
       scene.views[static_cast<size_t>(scene.input[scene.input.size() / 2])].camera;
   constexpr double kSide = 0.6;       // [rad]
   constexpr double kFromAbove = 0.3;  // [rad]
-  const Camera front = overview_camera(mesh, reference, 0, 0);
-  const Camera side = overview_camera(mesh, reference, kSide, kFromAbove);
-  write_png(folder / "front.png", preview(mesh, front, {}));
+  const Camera side = turned_camera(mesh, reference, kSide, kFromAbove);
+  write_png(folder / "front.png", preview(mesh, reference, {}));
   write_png(folder / "side.png", preview(mesh, side, {}));
-  write_png(folder / "front.provenance.png", preview(mesh, front, {.by_provenance = true}));
+  write_png(folder / "front.provenance.png", preview(mesh, reference, {.by_provenance = true}));
   write_png(folder / "side.provenance.png", preview(mesh, side, {.by_provenance = true}));
 }
 

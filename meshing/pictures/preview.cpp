@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "libcgs/core/error.h"
+#include "libcgs/core/order_statistics.h"
 #include "libcgs/core/provenance.h"
 #include "meshing/mesh/projected_faces.h"
 
@@ -83,6 +85,37 @@ class Painter {
   Raster<float> nearness_;  // 1 / z, 0 = nothing
 };
 
+// The depth in the picture of a camera of the surface with evidence that it shows: what closes a
+// surface may lie anywhere. Of all that it shows where none has evidence; 0 where it shows nothing.
+double depth_of_subject(const TriangleMesh& mesh, const Camera& camera) {
+  constexpr int kWidth = 128;  // enough for a median
+  const Camera small = resized(
+      camera, kWidth, std::max(1, static_cast<int>(kWidth * double(camera.height) / camera.width)));
+  Raster<float> nearness(small.width, small.height, 0);
+  Raster<uint8_t> has_any(small.width, small.height, 0);
+  const std::vector<ProjectedFace> faces = projected_faces(mesh, small);
+  for (size_t f = 0; f < faces.size(); ++f) {
+    if (!faces[f].in_front) continue;
+    const bool counts = mesh.provenance.empty() || has_evidence(mesh.provenance[f]);
+    for_each_pixel(faces[f],
+                   {0, 0, small.width, small.height},
+                   [&](int x, int y, const Eigen::Vector3f&, float near) {
+                     if (near <= nearness(x, y)) return;
+                     nearness(x, y) = near;
+                     has_any(x, y) = counts ? 1 : 0;
+                   });
+  }
+  std::vector<float> all;
+  std::vector<float> with_evidence;
+  for (size_t i = 0; i < nearness.data.size(); ++i) {
+    if (!(nearness.data[i] > 0)) continue;
+    all.push_back(nearness.data[i]);
+    if (has_any.data[i] != 0) with_evidence.push_back(nearness.data[i]);
+  }
+  if (all.empty()) return 0;
+  return 1 / double{median(with_evidence.empty() ? all : with_evidence)};
+}
+
 }  // namespace
 
 void PreviewOptions::validate() const {
@@ -105,35 +138,24 @@ ColorImage preview(const TriangleMesh& mesh, const Camera& camera, const Preview
   return Painter(mesh, scaled, options.by_provenance).paint();
 }
 
-Camera overview_camera(const TriangleMesh& mesh,
-                       const Camera& reference,
-                       double azimuth_rad,
-                       double elevation_rad) {
-  Eigen::AlignedBox3d box;
-  for (const auto& v : mesh.vertices) box.extend(v.cast<double>());
-  const Eigen::Vector3d center = box.center();
+Camera turned_camera(const TriangleMesh& mesh,
+                     const Camera& reference,
+                     double azimuth_rad,
+                     double elevation_rad) {
+  const double depth = depth_of_subject(mesh, reference);
+  if (!(depth > 0)) return reference;
   // Turns in the axes of the reference camera, whose y points down: moving the camera to the right
-  // around the mesh turns it about -y, raising it about -x.
+  // around the subject turns it about -y, raising it about -x.
   const Eigen::Matrix3d turn = (Eigen::AngleAxisd(-azimuth_rad, Eigen::Vector3d::UnitY()) *
                                 Eigen::AngleAxisd(-elevation_rad, Eigen::Vector3d::UnitX()))
                                    .toRotationMatrix();
+  const Eigen::Vector3d pivot =
+      reference.unproject(0.5 * reference.width, 0.5 * reference.height, depth);
+  const Eigen::Matrix3d R = reference.world_from_cam.rotation();
+  const Eigen::Vector3d from_pivot = R.transpose() * (reference.center() - pivot);
   Camera out = reference;
-  out.cx = 0.5 * reference.width;
-  out.cy = 0.5 * reference.height;
-  const Eigen::Matrix3d R = reference.world_from_cam.rotation() * turn;
-  // Far enough for every vertex: |x| <= tan * (z + distance) in camera axes about the centre.
-  double distance = 0;
-  constexpr double kFill = 0.95;
-  const double tan_x = kFill * 0.5 * reference.width / reference.fx;
-  const double tan_y = kFill * 0.5 * reference.height / reference.fy;
-  for (const auto& v : mesh.vertices) {
-    const Eigen::Vector3d p = R.transpose() * (v.cast<double>() - center);
-    distance =
-        std::max({distance, std::abs(p.x()) / tan_x - p.z(), std::abs(p.y()) / tan_y - p.z()});
-  }
-  out.world_from_cam = Eigen::Isometry3d::Identity();
-  out.world_from_cam.linear() = R;
-  out.world_from_cam.translation() = center - distance * R.col(2);
+  out.world_from_cam.linear() = R * turn;
+  out.world_from_cam.translation() = pivot + R * turn * from_pivot;
   return out;
 }
 

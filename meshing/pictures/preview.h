@@ -24,14 +24,13 @@ struct PreviewOptions {
 /// \param camera   scaled to the size in the options; faces that reach behind it are left out
 ColorImage preview(const TriangleMesh& mesh, const Camera& camera, const PreviewOptions& options);
 
-/// A camera that looks at the middle of the bounding box from the side of `reference`, turned
-/// around it by `azimuth_rad` about the vertical axis of the reference picture (positive = to the
-/// right) and raised by `elevation_rad`, as far away as frames the whole mesh.
-///
-/// \pre mesh has vertices.
-Camera overview_camera(const TriangleMesh& mesh,
-                       const Camera& reference,
-                       double azimuth_rad,
-                       double elevation_rad);
+/// A camera moved around what it shows, so that this stays in the middle and as large:
+/// `azimuth_rad` about the vertical axis of its picture (positive = to the right), raised by
+/// `elevation_rad`. Whoever took the photograph framed what matters; a closed mesh may reach far
+/// beyond.
+Camera turned_camera(const TriangleMesh& mesh,
+                     const Camera& reference,
+                     double azimuth_rad,
+                     double elevation_rad);
 
 }  // namespace cgs

@@ -97,7 +97,7 @@ TEST(SceneOfColmap, IsTheSceneOfTheFiles) {
   EXPECT_EQ(read.points[1].views, built.points[1].views);
 }
 
-TEST(ReadColmap, RefusesAFileThatIsALinkToElsewhere) {
+TEST(ColmapFiles, ThatAreLinksToElsewhereAreRefused) {
   const test::TempDir dir;
   const test::TempDir elsewhere;
   write_colmap_text(dir / "sparse/0", sample_model());

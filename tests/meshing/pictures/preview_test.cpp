@@ -60,23 +60,30 @@ TEST(Preview, RefusesSizesOutOfRange) {
   EXPECT_THROW(preview(squares(), reference(), {.height = 100000}), InvalidInput);
 }
 
-TEST(OverviewCamera, FramesEveryVertexFromEverySide) {
-  const TriangleMesh mesh = squares();
+TEST(TurnedCamera, KeepsWhatWasSeenInTheMiddleAndAsLarge) {
+  const TriangleMesh mesh = squares();  // of which the red one behind was seen
   for (const double azimuth : {-2.0, 0.0, 0.7}) {
     for (const double elevation : {-0.5, 0.0, 0.6}) {
-      const Camera c = overview_camera(mesh, reference(), azimuth, elevation);
-      for (const auto& v : mesh.vertices) {
-        EXPECT_TRUE(c.sees(c.project(v.cast<double>()))) << azimuth << " " << elevation;
-      }
+      const Camera c = turned_camera(mesh, reference(), azimuth, elevation);
+      const Eigen::Vector3d uvz = c.project({0, 0, 2});
+      EXPECT_NEAR(uvz.x(), 32, 1e-9);
+      EXPECT_NEAR(uvz.y(), 24, 1e-9);
+      EXPECT_NEAR(uvz.z(), 2, 1e-5);
     }
   }
 }
 
-TEST(OverviewCamera, GoesRightForPositiveAzimuthAndUpForPositiveElevation) {
-  const Camera right = overview_camera(squares(), reference(), 0.5, 0);
+TEST(TurnedCamera, StaysWhereThereIsNothingToTurnAround) {
+  TriangleMesh mesh = squares();
+  for (auto& v : mesh.vertices) v.z() = -1;
+  EXPECT_EQ(turned_camera(mesh, reference(), 1, 1).center(), reference().center());
+}
+
+TEST(TurnedCamera, GoesRightForPositiveAzimuthAndUpForPositiveElevation) {
+  const Camera right = turned_camera(squares(), reference(), 0.5, 0);
   EXPECT_GT(right.center().x(), 0.1);
   EXPECT_NEAR(right.center().y(), 0, 1e-9);
-  const Camera up = overview_camera(squares(), reference(), 0, 0.5);
+  const Camera up = turned_camera(squares(), reference(), 0, 0.5);
   EXPECT_LT(up.center().y(), -0.1);  // y points down
   EXPECT_NEAR(up.center().x(), 0, 1e-9);
 }
