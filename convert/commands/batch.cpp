@@ -100,19 +100,14 @@ class Batch {
     } catch (const Cancelled&) {
       fs::remove(failure);
       throw;
-    } catch (const InvalidInput& error) {
-      out.failure = words_of(error);
-      write_file(failure, out.failure + "\n");
-      if (is_run)
-        fs::remove(failure);  // it is these options that do not suit the run that is there
-    } catch (const Error& error) {
-      out.failure = words_of(error);
-      write_file(failure, out.failure + "\n");
     } catch (const std::bad_alloc&) {
       throw;
-    } catch (const std::exception& error) {  // of a library
-      out.failure = one_line(error.what());
+    } catch (const std::exception& error) {
+      const auto* const own = dynamic_cast<const Error*>(&error);  // else that of a library
+      out.failure = own != nullptr ? words_of(*own) : one_line(error.what());
       write_file(failure, out.failure + "\n");
+      // Where a run is already, it is these options that do not suit it.
+      if (is_run && dynamic_cast<const InvalidInput*>(&error) != nullptr) fs::remove(failure);
     }
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
     terminal_.say(name + ": " +
@@ -194,10 +189,9 @@ void add_batch(CLI::App& app) {
   cmd->footer(
       "Example: cgs batch objects/*/ --preset draft -o out/objects\n"
       "         opens as out/objects/index.html\n"
-      "Run again, it does what is not done yet. One that fails does not stop the others, nor is "
-      "it\n"
-      "a failure of the command: why is in OUT/NAME/failure.txt, and batch.json says which.\n"
-      "Each run takes all threads.");
+      "Run again, it does what is not done yet. One that fails does not stop the others, and\n"
+      "the exit code is 0: OUT/batch.json says which, OUT/NAME/failure.txt why. Each run takes\n"
+      "all threads.");
   cmd->callback([args] { run_batch(*args); });
 }
 

@@ -176,6 +176,7 @@ double capped_error(const Reconstruction& scene) {
 std::optional<FirstPair> place_photos(Reconstruction& scene,
                                       const std::vector<LensPrior>& priors,
                                       const std::vector<PhotoPair>& pairs,
+                                      size_t most,
                                       const Progress& progress) {
   std::optional<FirstPair> begun;
   double least = std::numeric_limits<double>::infinity();
@@ -185,7 +186,7 @@ std::optional<FirstPair> place_photos(Reconstruction& scene,
   int tries = 0;
   for (const PhotoPair* pair : ranked_pairs(scene, pairs)) {
     if (!begin_with(*pair, priors, progress, scene)) continue;
-    place_more(scene, priors, {pair->a, pair->b}, progress);
+    place_more(scene, priors, {pair->a, pair->b}, most, progress);
     const double error = capped_error(scene);
     if (error < least) {
       least = error;
@@ -201,13 +202,16 @@ std::optional<FirstPair> place_photos(Reconstruction& scene,
 void place_more(Reconstruction& scene,
                 const std::vector<LensPrior>& priors,
                 const FirstPair& begun,
+                size_t most,
                 const Progress& progress) {
   triangulate(scene, kMostError, kLeastAngle);
   std::vector<char> has_failed(scene.poses.size(), 0);
   auto placed = static_cast<int>(
       std::count_if(scene.poses.begin(), scene.poses.end(), [](const auto& pose) { return pose; }));
   int unsettled = 0;
-  for (int photo = 0; (photo = next_photo(scene, has_failed)) >= 0;) {
+  while (static_cast<size_t>(placed) < most) {
+    const int photo = next_photo(scene, has_failed);
+    if (photo < 0) break;
     has_failed[static_cast<size_t>(photo)] = 1;
     if (!resect(scene, photo)) continue;
     ++placed;

@@ -25,17 +25,21 @@ struct FirstPair {
 /// and again. Of the most promising pairs to begin with, the one that explains most is kept.
 ///
 /// \param scene     with tracks and lenses; poses and positions are overwritten
+/// \param most      photographs to place, at most
 /// \param progress  told again and again, never how much is done
 /// \return nothing, and no pose, if no pair could be placed
 std::optional<FirstPair> place_photos(Reconstruction& scene,
                                       const std::vector<LensPrior>& priors,
                                       const std::vector<PhotoPair>& pairs,
+                                      size_t most,
                                       const Progress& progress = {});
 
-/// Goes on from there: triangulates what the placed photographs show and places further ones.
+/// Goes on from there: triangulates what the placed photographs show and places further ones, until
+/// there are `most`.
 void place_more(Reconstruction& scene,
                 const std::vector<LensPrior>& priors,
                 const FirstPair& begun,
+                size_t most,
                 const Progress& progress = {});
 
 /// Mean squared error of all observations, each at most kMostError² (those without a point or pose

@@ -72,13 +72,14 @@ Attempt attempt_at(double focal_of_side,
                    const Reconstruction& start,
                    const std::vector<LensPrior>& priors,
                    const std::vector<PhotoPair>& pairs,
+                   size_t most_placed,
                    const Progress& progress) {
   Attempt out;
   out.scene = start;
   for (const LensPrior& prior : priors) {
     out.scene.lenses.push_back({prior.focal > 0 ? prior.focal : focal_of_side * prior.side, 0});
   }
-  out.begun = place_photos(out.scene, priors, pairs, progress);
+  out.begun = place_photos(out.scene, priors, pairs, most_placed, progress);
   if (!out.begun) return out;
   const BundleOptions options{.first = out.begun->first,
                               .second = out.begun->second,
@@ -147,19 +148,27 @@ Attempt best_attempt(const std::vector<int>& lens_of,
   const bool is_known = std::all_of(
       priors.begin(), priors.end(), [](const LensPrior& prior) { return prior.focal > 0; });
   std::vector<Attempt> attempts(is_known ? 1 : kFocals.size());
-  SharedProgress tried(progress, attempts.size());
+  // A dozen photographs tell the focal length as well as hundreds, in a fraction of the time.
+  const size_t all = lens_of.size();
+  const size_t enough = is_known ? all : std::min(all, kAllCompared);
+  const size_t whole = enough < all ? 1 : 0;  // attempts to come
+  SharedProgress tried(progress, attempts.size() + whole);
+  const auto attempt_of = [&](size_t i, size_t most_placed) {
+    return attempt_at(kFocals[i], start, priors, pairs, most_placed, [&](double) { tried.tell(); });
+  };
   tbb::parallel_for(size_t{0}, attempts.size(), [&](size_t i) {
-    attempts[i] = attempt_at(kFocals[i], start, priors, pairs, [&](double) { tried.tell(); });
+    attempts[i] = attempt_of(i, enough);
     tried.advance();
   });
-  const Attempt& best =
-      *std::min_element(attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
+  const auto best =
+      std::min_element(attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
         return a.error < b.error;
       });
-  if (best.begun && has_rival(best, attempts, priors)) {
+  if (best->begun && has_rival(*best, attempts, priors)) {
     throw undetermined_focal(pairs, "several explain them equally well");
   }
-  return best;
+  if (!best->begun || whole == 0) return std::move(*best);
+  return attempt_of(static_cast<size_t>(best - attempts.begin()), all);
 }
 
 // Rounds of adjusting everything and looking again what agrees.
@@ -297,7 +306,8 @@ PoseSolution solve(const std::vector<UnposedPhoto>& photos,
   scene.tracks = photos.size() <= kAllCompared
                      ? matched.tracks
                      : sample(matched.tracks, kTracksPerPhoto * photos.size());
-  place_more(scene, priors, *attempt.begun, [&](double) { report(progress, kPlaced); });
+  place_more(
+      scene, priors, *attempt.begun, photos.size(), [&](double) { report(progress, kPlaced); });
   refine_observations(photos, scene, [&](double) { report(progress, kPlaced); });
   const std::vector<double> sigmas =
       polish_with_shape(priors, *attempt.begun, part_of(progress, kPlaced, 1), scene);
