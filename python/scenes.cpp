@@ -80,6 +80,18 @@ void set_input(Scene& scene, const std::vector<int>& views) {
   scene.input = views;
 }
 
+// All of another view, but with its arrays where Python may see those of this one.
+void take(View& to, View& from) {
+  const auto keep_place = [](auto& old, auto& by) {
+    replace(old, std::move(by));
+    by = std::move(old);
+  };
+  keep_place(to.image, from.image);
+  keep_place(to.valid, from.valid);
+  keep_place(to.given_depth, from.given_depth);
+  to = std::move(from);
+}
+
 void load(Scene& scene, const std::optional<std::vector<int>>& views, const py::object& progress) {
   const std::vector<int> wanted = views.value_or(scene.input);
   for (const int i : wanted) require_view(scene, i);
@@ -91,11 +103,7 @@ void load(Scene& scene, const std::optional<std::vector<int>>& views, const py::
   });
   scene.warnings = loaded.warnings;
   for (const int i : wanted) {
-    View& from = loaded.views[static_cast<size_t>(i)];
-    View& to = scene.views[static_cast<size_t>(i)];
-    replace(to.image, std::move(from.image));
-    replace(to.valid, std::move(from.valid));
-    replace(to.given_depth, std::move(from.given_depth));
+    take(scene.views[static_cast<size_t>(i)], loaded.views[static_cast<size_t>(i)]);
   }
   warn(scene.warnings, known);
 }

@@ -8,6 +8,7 @@ import gc
 import json
 import os
 import shutil
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 import cgs
 
@@ -124,6 +126,27 @@ class Reconstruction(unittest.TestCase):
         self.assertFalse(np.array_equal(plain.splats.positions, model.splats.positions))
         with self.assertRaisesRegex(cgs.InvalidInput, "without cameras"):
             cgs.read_scene(CAPTURE, each_lens=True)
+
+    def test_loads_all_that_depth_files_state(self):
+        places = []
+        for name, is_loaded in (("d.png", False), ("d.png", True), ("d.npy", False)):
+            folder = Path(WORK) / f"depth_{name[2:]}_{is_loaded}"
+            shutil.copytree(CAPTURE, folder)
+            (folder / "depth").mkdir()
+            for view in self.model.input:
+                depth = 1000 * self.model.input_depth(view)["depth"]
+                file = folder / "depth" / (view + name[1:])
+                if name.endswith("png"):  # 16 bits: whole millimetres
+                    Image.fromarray(np.nan_to_num(depth, posinf=0).astype(np.uint16)).save(file)
+                else:
+                    np.save(file, np.nan_to_num(depth / 1000, posinf=0))
+            scene = cgs.read_scene(folder, views=VIEWS)
+            if is_loaded:
+                scene.load()
+            model = cgs.reconstruct(scene, preset="draft", settings={"steps": 0})
+            places.append(model.splats.positions)
+        np.testing.assert_array_equal(places[0], places[1])
+        self.assertFalse(np.array_equal(places[0], places[2]))  # which states no unit
 
     def test_medium_is_one_that_is_known(self):
         with self.assertRaisesRegex(cgs.InvalidInput, "none or water"):
