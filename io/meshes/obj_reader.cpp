@@ -63,12 +63,11 @@ class ObjRows {
 
  private:
   void add(std::string_view line) {
-    if (line.starts_with('#')) return;
     auto words = tokens(line);
+    const auto begins_comment = [](std::string_view word) { return word.starts_with('#'); };
+    words.erase(std::find_if(words.begin(), words.end(), begins_comment), words.end());
     if (words.empty()) return;
     const std::string_view rest = rest_of_line(line, words[0]);
-    const auto has_comment = [](std::string_view word) { return word.starts_with('#'); };
-    words.erase(std::find_if(words.begin(), words.end(), has_comment), words.end());
     if (words[0] == "v") add_vertex(words);
     if (words[0] == "f") add_face(words);
     if (words[0] == "mtllib") paint_.add_library(rest);

@@ -108,7 +108,8 @@ TEST(ReadObj, CommentsAndFileNamesEndWithTheirLine) {
       parsed("# from C:\\models\\\nv 0 0 0\nmtllib C:\\a\\\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   EXPECT_EQ(mesh.positions.size(), 3U);
   EXPECT_EQ(mesh.positions[0], Eigen::Vector3d::Zero());
-  const ParsedMesh remarks = parsed("v 0 0 0 # first\nv 1 0 0 #\nv 0 1 0\nf 1 2 3 # a face\n");
+  const ParsedMesh remarks =
+      parsed("  # indented\nv 0 0 0 # first\nv 1 0 0 #\nv 0 1 0\nf 1 2 3 # a face\n");
   EXPECT_EQ(remarks.positions.size(), 3U);
   EXPECT_TRUE(remarks.mesh.colors.empty());
   EXPECT_EQ(remarks.mesh.faces.size(), 1U);
