@@ -105,8 +105,8 @@ void add_render(CLI::App& app) {
       "--path",
       args->path,
       "Pictures, hole masks and a page that plays them along a path instead: between (the input "
-      "views), spiral (before "
-      "them), orbit (once around what they look at), or a .json of cameras as in cameras.json");
+      "views), spiral (before them), orbit (once around what they look at), or a .json of cameras "
+      "as in cameras.json");
   path->excludes(views);
   cmd->add_option("--frames", args->frames, "Number of pictures along a path; default 60")
       ->needs(path);

@@ -3,26 +3,23 @@
 
 #include <sstream>
 #include <string>
-#include <utility>
 
 #include "convert/report/page_files.h"
 #include "convert/text/html.h"
 #include "io/bytes/atomic_file.h"
-#include "io/bytes/scene_path.h"
 
 namespace cgs {
 
 namespace {
 
 // The masks that lie over a frame where the page is told to show them.
-std::string overlays(const std::filesystem::path& folder, const std::string& frame) {
+std::string overlays(const RenderedPicture& frame) {
   std::string out;
-  for (const auto& [mask, looks] :
-       {std::pair("hole", "hole"), std::pair("painted", "hole painted")}) {
-    const std::string file = frame + "." + mask + ".png";
-    if (!is_present(folder / file)) continue;
-    out += "<img class=\"" + std::string(looks) + "\" alt=\"\" src=\"" + file + "\">";
-  }
+  const auto add = [&](const char* looks, const char* mask) {
+    out += std::string("<img class=\"") + looks + "\" alt=\"\" src=\"" + frame.name + mask + "\">";
+  };
+  if (frame.holes) add("hole", ".hole.png");
+  if (frame.painted) add("hole painted", ".painted.png");
   return out;
 }
 
@@ -46,8 +43,7 @@ void write_film_page(const std::filesystem::path& folder,
   for (const RenderedPicture& frame : frames) {
     html << "<figure" << (&frame == &frames.front() ? "" : " hidden")
          << "><div class=picture><img decoding=sync alt=\"\" src=\"" << frame.name << ".png\">"
-         << overlays(folder, frame.name) << "</div><figcaption>" << caption(frame)
-         << "</figcaption></figure>\n";
+         << overlays(frame) << "</div><figcaption>" << caption(frame) << "</figcaption></figure>\n";
   }
   html << "</div>\n<script>" << files.film_script << "</script></body></html>\n";
   write_file(folder / "film.html", html.str());

@@ -34,6 +34,7 @@ namespace {
 
 // Beyond, hours; and tools that solve for thousands exist.
 constexpr size_t kMostPhotographs = 200;
+
 std::vector<PhotoFile> checked_photographs(const SceneRoot& root,
                                            const std::vector<std::string>& wanted) {
   std::vector<PhotoFile> photographs = list_photographs(root);

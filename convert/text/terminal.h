@@ -37,7 +37,8 @@ class Terminal {
  public:
   /// \param is_strict  a warning, or all that come together, throws an Error with exit code 3
   explicit Terminal(bool quiet, bool is_strict = false);
-  /// One that says nothing, not even warnings: for work whose result nobody sees.
+  /// One that says nothing, not even warnings: for work whose result nobody sees, or whose report
+  /// says it.
   static Terminal silent(bool is_strict = false);
 
   /// Begins a named stage and returns the function that shows how far it is. The function throws

@@ -120,14 +120,16 @@ const ColorImage* GlbColors::image(int index) {
   }
   const JsonValue images = file_.root().at("images");
   if (static_cast<size_t>(index) >= images.size()) images.fail(Defect::Ref, "has no such image");
+  const auto leave_out = [&](const Error& error) {
+    warn("texture " + std::to_string(index) + " is left out: " + error.what());
+    return nullptr;
+  };
   try {
     out = decode_image(file_.image_bytes(images.at(static_cast<size_t>(index))), file_.path());
   } catch (const BadInput& error) {
-    warn("texture " + std::to_string(index) + " is left out: " + error.what());
-    return nullptr;
+    return leave_out(error);
   } catch (const LimitError& error) {
-    warn("texture " + std::to_string(index) + " is left out: " + error.what());
-    return nullptr;
+    return leave_out(error);
   }
   return &out;
 }

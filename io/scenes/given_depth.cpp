@@ -432,10 +432,10 @@ void load_given_depth(const Scene& scene, View& view, const ImageSize& photograp
                                              : 1;
   for (float& value : file.values.data) value = static_cast<float>(double(value) / scale);
   view.depth_states_metres = file.whole_bits == 16 || scene.depth_scale > 0;
-  const Raster<float> values = upright(file.values, view, photograph);
+  Raster<float> values = upright(file.values, view, photograph);
   const bool is_of_sensor = view.depth_states_metres || scene.depth_kind == DepthKind::Metric;
-  const bool is_coarser = values.width < view.camera.width;
-  view.given_depth = resampled(is_of_sensor && is_coarser ? without_mixed(values) : values, view);
+  if (is_of_sensor && values.width < view.camera.width) values = without_mixed(values);
+  view.given_depth = resampled(values, view);
 }
 
 }  // namespace cgs

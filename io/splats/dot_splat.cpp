@@ -63,12 +63,6 @@ uint8_t rotation_byte(float q) {
   return static_cast<uint8_t>(std::lround(std::clamp(128 * double{q} + 128, 0.0, 255.0)));
 }
 
-/// Of unit length: a byte holds no more than 1.
-Eigen::Vector4f unit_rotation(const Eigen::Vector4f& q) {
-  const float norm = q.stableNorm();
-  return norm > 0 ? Eigen::Vector4f(q / norm) : q;
-}
-
 /// Zero where a difference that is rounded away would make the number implausible.
 float coordinate(double c) {
   const auto rounded = static_cast<float>(c);
@@ -89,7 +83,7 @@ Record record_of(const Gaussians& g, size_t i, const Eigen::Vector3d& color, con
     out.color.at(at) = unit_byte(color[k]);
   }
   out.color[3] = unit_byte(g.opacity[i]);
-  const Eigen::Vector4f rotation = unit_rotation(g.rotation[i]);
+  const Eigen::Vector4f rotation = g.rotation[i].stableNormalized();  // a byte holds 1 at most
   for (size_t k = 0; k < 4; ++k) {
     out.rotation.at(k) = rotation_byte(rotation[static_cast<int>(k)]);
   }

@@ -76,6 +76,7 @@ struct View {
   bool may_have_border = false;  ///< load_images() looks for the border of a print, and masks it.
   ColorImage image;              ///< Empty until loaded; same size as camera.
   MaskMap valid;                 ///< Empty = every pixel; else 1 where the image may be used.
+  /// As `valid` says.
   bool is_usable(size_t pixel) const { return valid.empty() || valid.data[pixel] != 0; }
   bool is_usable(int x, int y) const { return valid.empty() || valid(x, y) != 0; }
   std::filesystem::path depth_path;  ///< File with depth from elsewhere; empty = none.
@@ -136,7 +137,8 @@ std::vector<Eigen::Vector3d> subject_points(const Scene& scene);
 /// \pre scene.frame is the identity.
 void to_canonical(Scene& scene);
 
-/// Median length of the baselines between input views [scene units]; 0 for fewer than two.
+/// Median length of the baselines between input views [scene units], of more than a thousand
+/// between some of them; 0 for fewer than two.
 double median_baseline(const Scene& scene);
 
 /// What depth_range() returns: z-depths [scene units].

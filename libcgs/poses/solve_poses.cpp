@@ -151,8 +151,8 @@ Attempt best_attempt(const std::vector<int>& lens_of,
   // A dozen photographs tell the focal length as well as hundreds, in a fraction of the time.
   const size_t all = lens_of.size();
   const size_t enough = is_known ? all : std::min(all, kAllCompared);
-  const size_t whole = enough < all ? 1 : 0;  // attempts to come
-  SharedProgress tried(progress, attempts.size() + whole);
+  const bool goes_on = enough < all;
+  SharedProgress tried(progress, attempts.size() + (goes_on ? 1 : 0));
   const auto attempt_of = [&](size_t i, size_t most_placed) {
     return attempt_at(kFocals[i], start, priors, pairs, most_placed, [&](double) { tried.tell(); });
   };
@@ -167,7 +167,7 @@ Attempt best_attempt(const std::vector<int>& lens_of,
   if (best->begun && has_rival(*best, attempts, priors)) {
     throw undetermined_focal(pairs, "several explain them equally well");
   }
-  if (!best->begun || whole == 0) return std::move(*best);
+  if (!best->begun || !goes_on) return std::move(*best);
   return attempt_of(static_cast<size_t>(best - attempts.begin()), all);
 }
 

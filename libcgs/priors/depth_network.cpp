@@ -135,8 +135,8 @@ DepthMap DepthNetwork::operator()(const View& view) {
   DepthMap out(image.width, image.height, std::numeric_limits<float>::quiet_NaN());
   for (int y = 0; y < out.height; ++y) {
     for (int x = 0; x < out.width; ++x) {
-      if (view.is_usable(x, y))
-        out(x, y) = static_cast<float>(double(resized.at<float>(y, x)) + lift);
+      if (!view.is_usable(x, y)) continue;
+      out(x, y) = static_cast<float>(double(resized.at<float>(y, x)) + lift);
     }
   }
   return out;

@@ -59,7 +59,7 @@ Eigen::Vector3f light_of_others(
     const View& other = photograph_of(scene, j);
     if (other.response.is_grey) continue;
     const auto at = shown_pixel(other.camera, priors[j].depth, point, kSame);
-    if (!at || (!other.valid.empty() && other.valid(at->x(), at->y()) == 0)) continue;
+    if (!at || !other.is_usable(at->x(), at->y())) continue;
     sum += other.image(at->x(), at->y()).unaryExpr(&linear_from_srgb);
     ++count;
   }

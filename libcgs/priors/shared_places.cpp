@@ -31,8 +31,8 @@ ColorImage smooth_light(const View& view) {
   ColorImage light(image.width, image.height, unknown);
   for (size_t i = 0; i < image.data.size(); ++i) {
     const Eigen::Vector3f& color = image.data[i];
-    if (!view.is_usable(i) || color.minCoeff() <= kDarkest || color.maxCoeff() >= kBrightest)
-      continue;
+    const bool is_clipped = color.minCoeff() <= kDarkest || color.maxCoeff() >= kBrightest;
+    if (is_clipped || !view.is_usable(i)) continue;
     light.data[i] = color.unaryExpr(&linear_from_srgb);
   }
   ColorImage out(image.width, image.height, unknown);

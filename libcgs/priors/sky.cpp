@@ -69,7 +69,7 @@ ColorImage smoothed(const View& view) {
       float count = 0;
       for (int v = std::max(0, y - 1); v <= std::min(image.height - 1, y + 1); ++v) {
         for (int u = std::max(0, x - 1); u <= std::min(image.width - 1, x + 1); ++u) {
-          if (!view.valid.empty() && view.valid(u, v) == 0) continue;
+          if (!view.is_usable(u, v)) continue;
           sum += image(u, v);
           ++count;
         }

@@ -79,7 +79,7 @@ class Reasons {
       if (!other.camera.sees(uvz)) continue;
       const int u = static_cast<int>(uvz.x());
       const int v = static_cast<int>(uvz.y());
-      if (!other.valid.empty() && other.valid(u, v) == 0) continue;
+      if (!other.is_usable(u, v)) continue;
       ++out.seen;
       const bool is_hidden = priors_[j].origin(u, v) == DepthOrigin::Measured &&
                              double{priors_[j].depth(u, v)} < (1 - kBefore) * uvz.z();

@@ -72,7 +72,7 @@ std::optional<double> error_of(const Gaussians& g, const View& view, size_t own)
   double sum = 0;
   size_t count = 0;
   for (size_t i = 0; i < shown.data.size(); ++i) {
-    if (!view.valid.empty() && view.valid.data[i] == 0) continue;
+    if (!view.is_usable(i)) continue;
     if (buffers.alpha.data[i] < kShown) continue;
     sum += (shown.data[i] - view.image.data[i]).cast<double>().squaredNorm();
     ++count;

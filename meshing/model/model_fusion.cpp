@@ -39,16 +39,12 @@ void settle_depth(const ViewPriors& priors, EstimatedSurface wanted, TsdfView& v
 }
 
 // What an input view of a model sees.
-TsdfView seen_by_input(const Model& model,
-                       size_t k,
-                       const std::vector<SupportView>& inputs,
-                       EstimatedSurface estimated,
-                       bool with_color) {
+TsdfView seen_by_input(const Model& model, size_t k, EstimatedSurface estimated, bool with_color) {
   TsdfView view;
   view.camera = input_camera(model, k);
   view.depth = model.priors[k].depth;
   view.sigma = model.priors[k].sigma;
-  view.evidence = inputs[k].evidence;
+  view.evidence = evidence_of(model.priors[k]);
   if (with_color) view.color = picture(rasterize(model.gaussians, view.camera));
   settle_depth(model.priors[k], estimated, view);
   return view;
@@ -141,7 +137,6 @@ class ModelShelf {
   struct Entry {
     size_t index = 0;
     std::shared_ptr<const Model> model;
-    std::vector<SupportView> inputs;
   };
 
   std::shared_ptr<const Entry> operator()(size_t i) {
@@ -154,7 +149,6 @@ class ModelShelf {
     auto entry = std::make_shared<Entry>();
     entry->index = i;
     entry->model = source_.model(i);
-    entry->inputs = support_views(*entry->model);
     held_[0] = std::move(entry);
     return held_[0];
   }
@@ -169,9 +163,8 @@ class ModelShelf {
 
 FusedVolume fuse_model(const Model& model, const ModelFusion& request, const Progress& progress) {
   std::vector<TsdfView> views;
-  const std::vector<SupportView> inputs = support_views(model);
   for (size_t k = 0; k < model.scene.input.size(); ++k) {
-    views.push_back(seen_by_input(model, k, inputs, request.estimated, true));
+    views.push_back(seen_by_input(model, k, request.estimated, true));
   }
   return fuse(views, tsdf_options(request), progress);
 }
@@ -203,15 +196,14 @@ JoinedVolume fuse_models(const ModelSource& source,
   out.photographs = witnesses.size();
   out.in_several = static_cast<size_t>(std::count_if(
       witnesses.begin(), witnesses.end(), [](const Witness& w) { return w.is_in_several; }));
-  const TsdfSource views = {
-      witnesses.size(), [&](size_t i, bool with_color) {
-        const Witness& witness = witnesses[i];
-        const auto held = shelf(witness.model);
-        TsdfView view =
-            seen_by_input(*held->model, witness.input, held->inputs, request.estimated, with_color);
-        move_to_frame(held->model->scene.frame, out.frame, view);
-        return view;
-      }};
+  const TsdfSource views = {witnesses.size(), [&](size_t i, bool with_color) {
+                              const Witness& witness = witnesses[i];
+                              const auto held = shelf(witness.model);
+                              TsdfView view = seen_by_input(
+                                  *held->model, witness.input, request.estimated, with_color);
+                              move_to_frame(held->model->scene.frame, out.frame, view);
+                              return view;
+                            }};
   out.fused = fuse_streamed(views, tsdf_options(request), part_of(progress, 0.1, 1));
   return out;
 }

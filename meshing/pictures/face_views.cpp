@@ -56,10 +56,8 @@ class ViewScorer {
       const float right = static_cast<float>(nearest_.width - 1);
       const float bottom = static_cast<float>(nearest_.height - 1);
       if (!(u >= 0 && v >= 0 && u <= right && v <= bottom)) return false;
-      if (!view_.valid.empty() &&
-          view_.valid(static_cast<int>(corner.x()), static_cast<int>(corner.y())) == 0) {
+      if (!view_.is_usable(static_cast<int>(corner.x()), static_cast<int>(corner.y())))
         return false;
-      }
       const Nearest nearest = nearest_between(u, v);
       const float extra = nearest.is_whole ? 0.0f : slope * footprint_;
       if (corner.z() * (behind + extra) < nearest.nearness) return false;

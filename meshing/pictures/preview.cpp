@@ -91,26 +91,18 @@ double depth_of_subject(const TriangleMesh& mesh, const Camera& camera) {
   constexpr int kWidth = 128;  // enough for a median
   const Camera small = resized(
       camera, kWidth, std::max(1, static_cast<int>(kWidth * double(camera.height) / camera.width)));
-  Raster<float> nearness(small.width, small.height, 0);
-  Raster<uint8_t> has_any(small.width, small.height, 0);
-  const std::vector<ProjectedFace> faces = projected_faces(mesh, small);
-  for (size_t f = 0; f < faces.size(); ++f) {
-    if (!faces[f].in_front) continue;
-    const bool counts = mesh.provenance.empty() || has_evidence(mesh.provenance[f]);
-    for_each_pixel(faces[f],
-                   {0, 0, small.width, small.height},
-                   [&](int x, int y, const Eigen::Vector3f&, float near) {
-                     if (near <= nearness(x, y)) return;
-                     nearness(x, y) = near;
-                     has_any(x, y) = counts ? 1 : 0;
-                   });
+  std::vector<ProjectedFace> faces = projected_faces(mesh, small);
+  const Raster<float> nearest = nearness_map(faces, small.width, small.height);
+  for (size_t f = 0; f < mesh.provenance.size(); ++f) {
+    if (!has_evidence(mesh.provenance[f])) faces[f].in_front = false;
   }
+  const Raster<float> nearest_evidence = nearness_map(faces, small.width, small.height);
   std::vector<float> all;
   std::vector<float> with_evidence;
-  for (size_t i = 0; i < nearness.data.size(); ++i) {
-    if (!(nearness.data[i] > 0)) continue;
-    all.push_back(nearness.data[i]);
-    if (has_any.data[i] != 0) with_evidence.push_back(nearness.data[i]);
+  for (size_t i = 0; i < nearest.data.size(); ++i) {
+    if (!(nearest.data[i] > 0)) continue;
+    all.push_back(nearest.data[i]);
+    if (nearest_evidence.data[i] == nearest.data[i]) with_evidence.push_back(nearest.data[i]);
   }
   if (all.empty()) return 0;
   return 1 / double{median(with_evidence.empty() ? all : with_evidence)};
@@ -146,16 +138,13 @@ Camera turned_camera(const TriangleMesh& mesh,
   if (!(depth > 0)) return reference;
   // Turns in the axes of the reference camera, whose y points down: moving the camera to the right
   // around the subject turns it about -y, raising it about -x.
-  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(-azimuth_rad, Eigen::Vector3d::UnitY()) *
-                                Eigen::AngleAxisd(-elevation_rad, Eigen::Vector3d::UnitX()))
-                                   .toRotationMatrix();
+  const Eigen::Quaterniond turn = Eigen::AngleAxisd(-azimuth_rad, Eigen::Vector3d::UnitY()) *
+                                  Eigen::AngleAxisd(-elevation_rad, Eigen::Vector3d::UnitX());
   const Eigen::Vector3d pivot =
-      reference.unproject(0.5 * reference.width, 0.5 * reference.height, depth);
-  const Eigen::Matrix3d R = reference.world_from_cam.rotation();
-  const Eigen::Vector3d from_pivot = R.transpose() * (reference.center() - pivot);
+      depth * reference.ray_in_cam(0.5 * reference.width, 0.5 * reference.height);
   Camera out = reference;
-  out.world_from_cam.linear() = R * turn;
-  out.world_from_cam.translation() = pivot + R * turn * from_pivot;
+  out.world_from_cam =
+      reference.world_from_cam * Eigen::Translation3d(pivot) * turn * Eigen::Translation3d(-pivot);
   return out;
 }
 
