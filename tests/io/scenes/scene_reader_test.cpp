@@ -53,23 +53,6 @@ TEST_F(ReadScene, SortsViewsByNameWithTheirCameras) {
   EXPECT_EQ(scene.points.at(0).views, (Indices{0, 2}));
 }
 
-TEST_F(ReadScene, TakesAllOfUpToFourViews) {
-  write(4);
-  EXPECT_EQ(read().input, (Indices{0, 1, 2, 3}));
-  EXPECT_TRUE(read().held_out.empty());
-}
-
-TEST_F(ReadScene, OfManyViewsTakesThoseThatGoWellTogether) {
-  write(20);  // side by side, 60 degrees of view
-  const Scene scene = read();
-  ASSERT_GT(scene.input.size(), 3u);
-  for (size_t i = 1; i < scene.input.size(); ++i) {
-    EXPECT_LE(scene.input[i] - scene.input[i - 1], 6);
-  }
-  EXPECT_GE(scene.held_out.size(), 3u);  // one in eight
-  EXPECT_EQ(scene.input.size() + scene.held_out.size(), 20u);
-}
-
 TEST_F(ReadScene, OfManyLargeViewsTakesWhatSomeMinutesAllow) {
   const auto enlarge = [&] {
     for (int i = 0; i < 8; ++i) {
@@ -92,23 +75,6 @@ TEST_F(ReadScene, OfManyLargeViewsTakesWhatSomeMinutesAllow) {
   EXPECT_EQ(read({.all_views = true}).views[0].camera.width, 1000);
 }
 
-TEST_F(ReadScene, TakesEveryViewIfAsked) {
-  write(20);
-  const Scene scene = read({.all_views = true});
-  EXPECT_EQ(scene.input.size(), 20u);
-  EXPECT_TRUE(scene.held_out.empty());
-}
-
-TEST_F(ReadScene, OfHundredsHoldsOutSomeFromFirstToLast) {
-  write(200);
-  const Scene scene = read();
-  EXPECT_GE(scene.input.size(), 3u);
-  EXPECT_EQ(scene.held_out.size(), 24u);
-  EXPECT_LE(scene.held_out.front(), 20);
-  EXPECT_GE(scene.held_out.back(), 180);
-  EXPECT_TRUE(std::is_sorted(scene.held_out.begin(), scene.held_out.end()));
-}
-
 TEST_F(ReadScene, FollowsTheLlffProtocolAboveFourViewsOfLlff) {
   std::vector<std::vector<double>> rows;
   for (int i = 0; i < 20; ++i) {
@@ -122,22 +88,6 @@ TEST_F(ReadScene, FollowsTheLlffProtocolAboveFourViewsOfLlff) {
   EXPECT_EQ(scene.input, (Indices{1, 10, 19}));  // as published for the 20 views of "fern"
   EXPECT_EQ(scene.held_out.size(), 17u);
   EXPECT_EQ(scene.held_out[0], 0);
-}
-
-TEST_F(ReadScene, TakesNamesAndIndicesInAnyOrder) {
-  write(6);
-  EXPECT_EQ(read({.views = "v03, 0,v05"}).input, (Indices{0, 3, 5}));
-  EXPECT_EQ(read({.views = "3,1"}).held_out, (Indices{0, 2, 4, 5}));
-  EXPECT_EQ(read({.views = "v01.png,2"}).input, (Indices{1, 2}));
-}
-
-TEST_F(ReadScene, RefusesUnknownAndRepeatedViews) {
-  write(6);
-  for (const char* views : {"v03,v9", "0,6", "0,-1", "0,,1", "v00,0", "1,1"}) {
-    EXPECT_THROW(read({.views = views}), InvalidInput) << views;
-  }
-  EXPECT_NE(message_of([&] { read({.views = "0,nope"}); }).find("v00, v01"), std::string::npos);
-  EXPECT_THROW(read({.views = "2"}), InvalidInput);
 }
 
 TEST_F(ReadScene, RefusesOptionsOutOfRange) {
