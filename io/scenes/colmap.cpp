@@ -95,7 +95,8 @@ std::string largest_model(const SceneRoot& root, Scene& scene) {
 std::string photograph_folder(const SceneRoot& root,
                               const std::string& model_folder,
                               const ColmapModel& model) {
-  std::vector<std::string> places = {"images", "input", "."};
+  // Smaller copies are read where they are all that was kept of a published scene.
+  std::vector<std::string> places = {"images", "input", ".", "images_2", "images_4", "images_8"};
   for (const std::string base : {"colmap", "distorted"}) {
     if (!model_folder.starts_with(base + "/")) continue;
     places.insert(places.begin(), base + "/images");

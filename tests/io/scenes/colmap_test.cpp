@@ -101,6 +101,14 @@ TEST_F(ReadColmap, TakesThePhotographsThatAModelIsOf) {
   EXPECT_EQ(read().views[0].image_path.parent_path().filename(), "input");
 }
 
+TEST_F(ReadColmap, TakesSmallerCopiesWhereTheyAreAllThatIsThere) {
+  std::filesystem::rename(dir_ / "images", dir_ / "images_4");
+  const Scene scene = read();
+  ASSERT_EQ(scene.views.size(), 2u);
+  EXPECT_TRUE(scene.missing.empty());
+  EXPECT_EQ(scene.views[0].image_path.parent_path().filename(), "images_4");
+}
+
 TEST_F(ReadColmap, JudgesNoCameraThatNoImageNames) {
   write("cameras.txt",
         "1 PINHOLE 80 60 100 110 41 29\n2 FULL_OPENCV 80 60 1 1 1 1 0 0 0 0 0 0 0 0\n");
