@@ -327,19 +327,19 @@ MaskMap find_sky(const View& view, const ViewPriors& priors, const Eigen::Vector
 
 namespace {
 
+// \param steps  per view, towards the border where its sky begins
 std::vector<MaskMap> skies_towards(const Scene& scene,
                                    const std::vector<ViewPriors>& priors,
-                                   const Eigen::Vector3d& up) {
+                                   const std::vector<Direction>& steps) {
   std::vector<SkyFinder> finders;
   std::vector<std::vector<SkyFinder::Candidate>> found;
   std::vector<Eigen::Vector3f> skies;
   const auto view = [&](size_t i) -> const View& {
     return scene.views[static_cast<size_t>(scene.input[i])];
   };
-  const auto step = [&](size_t i) { return step_towards(up, view(i).camera); };
   for (size_t i = 0; i < priors.size(); ++i) {
     finders.emplace_back(view(i), priors[i]);
-    found.push_back(finders.back().candidates(step(i)));
+    found.push_back(finders.back().candidates(steps[i]));
     for (const auto& part : found.back()) {
       if (part.stands_out) skies.push_back(part.color);
     }
@@ -351,7 +351,7 @@ std::vector<MaskMap> skies_towards(const Scene& scene,
         return (part.color - sky).cwiseAbs().maxCoeff() < kAlike;
       });
     });
-    out.push_back(finders[i].grown_from(found[i], step(i)));
+    out.push_back(finders[i].grown_from(found[i], steps[i]));
   }
   return out;
 }
@@ -359,12 +359,24 @@ std::vector<MaskMap> skies_towards(const Scene& scene,
 }  // namespace
 
 std::vector<MaskMap> find_sky(const Scene& scene, const std::vector<ViewPriors>& priors) {
+  const Direction upright{0, -1};
+  std::vector<Direction> stated;
+  for (const int i : scene.input) {
+    const Camera& camera = scene.views[static_cast<size_t>(i)].camera;
+    stated.push_back(scene.frame.knows_up() ? step_towards(scene.frame.up, camera) : upright);
+  }
   // People hold cameras upright, and what is up in the world is a guess where cameras only moved
-  // on.
-  std::vector<MaskMap> out = skies_towards(scene, priors, Eigen::Vector3d::Zero());
+  // on: it counts first only for those that lie on their side beside others that do not.
+  std::vector<Direction> as_held = stated;
+  const auto lies = [](const Direction& step) { return step.dx != 0; };
+  const bool all_lie = std::all_of(stated.begin(), stated.end(), lies);
+  for (Direction& step : as_held) {
+    if (all_lie || !lies(step)) step = upright;
+  }
+  std::vector<MaskMap> out = skies_towards(scene, priors, as_held);
   const bool is_any =
       std::any_of(out.begin(), out.end(), [](const MaskMap& sky) { return !sky.empty(); });
-  return is_any || !scene.frame.knows_up() ? out : skies_towards(scene, priors, scene.frame.up);
+  return is_any || !scene.frame.knows_up() ? out : skies_towards(scene, priors, stated);
 }
 
 void enter_sky(const MaskMap& sky, ViewPriors& priors) {

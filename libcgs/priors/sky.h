@@ -22,9 +22,9 @@ namespace cgs {
 /// \param priors  of plane_sweep(), or empty rasters where nothing was measured
 MaskMap find_sky(const View& view, const ViewPriors& priors, const Eigen::Vector3d& up);
 
-/// The same for the input views of a scene, in their order, towards the top of the pictures and,
-/// where that finds none, towards frame.up: what looks like the sky of another view need not stand
-/// out from the rest of its own.
+/// The same for the input views of a scene, in their order: what looks like the sky of another view
+/// need not stand out from the rest of its own. Up is the top of the pictures; of those that lie on
+/// their side beside others and, where no sky is found so, of all, it is frame.up.
 std::vector<MaskMap> find_sky(const Scene& scene, const std::vector<ViewPriors>& priors);
 
 /// Marks sky and what was measured there by mistake: origin Sky, without depth.

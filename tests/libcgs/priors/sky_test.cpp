@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -89,6 +90,20 @@ Photo sky_above_ground(Vector3f (*sky)(int, int)) {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) out.truth(x, y) = y < skyline(x) ? 1 : 0;
   }
+  return out;
+}
+
+// The sky of a photograph that lies on its side, its camera turned with it.
+Photo lying() {
+  Photo out(kHeight, kWidth, [](int x, int y) {
+    const int from_top = kHeight - 1 - x;
+    return from_top < skyline(y) ? blue(y, from_top) : ground(y, from_top);
+  });
+  for (int y = 0; y < kWidth; ++y) {
+    for (int x = 0; x < kHeight; ++x) out.truth(x, y) = kHeight - 1 - x < skyline(y) ? 1 : 0;
+  }
+  out.view.camera.world_from_cam.linear() =
+      Eigen::AngleAxisd(-std::numbers::pi / 2, Vector3d::UnitZ()).toRotationMatrix();
   return out;
 }
 
@@ -276,18 +291,38 @@ TEST(FindSky, BeginsAtTheFirstRowOfUse) {
 }
 
 TEST(FindSky, LooksForItWhereUpIs) {
-  Photo rolled(kHeight, kWidth, [](int x, int y) {
-    const int from_top = kHeight - 1 - x;
-    return from_top < skyline(y) ? blue(y, from_top) : ground(y, from_top);
-  });
-  for (int y = 0; y < kWidth; ++y) {
-    for (int x = 0; x < kHeight; ++x) rolled.truth(x, y) = kHeight - 1 - x < skyline(y) ? 1 : 0;
-  }
+  Photo rolled = lying();
+  rolled.view.camera.world_from_cam = Eigen::Isometry3d::Identity();
   expect_all_of_it(rolled, rolled.sky(Vector3d::UnitX()));
   EXPECT_TRUE(rolled.sky(-Vector3d::UnitX()).empty());
   // The same turned with its camera: the axes of the picture count, not those of the world.
   rolled.view.camera.world_from_cam.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   expect_all_of_it(rolled, rolled.sky(-Vector3d::UnitY()));
+}
+
+TEST(FindSky, OfAPhotographOnItsSideBesideUprightOnesBeginsAtItsSide) {
+  const std::vector<Photo> photos = {sky_above_ground(blue), lying(), sky_above_ground(overcast)};
+  Scene scene;
+  std::vector<ViewPriors> priors;
+  for (const Photo& photo : photos) {
+    scene.input.push_back(static_cast<int>(scene.views.size()));
+    scene.views.push_back(photo.view);
+    priors.push_back(photo.priors);
+  }
+  scene.frame.up = -Vector3d::UnitY();
+  const std::vector<MaskMap> skies = find_sky(scene, priors);
+  for (size_t i = 0; i < photos.size(); ++i) expect_all_of_it(photos[i], skies[i]);
+}
+
+TEST(FindSky, DoubtsWhatIsUpWhereAllPhotographsWouldLieOnTheirSide) {
+  const Photo photo = sky_above_ground(blue);
+  Scene scene;
+  scene.views = {photo.view, photo.view};
+  scene.input = {0, 1};
+  scene.frame.up = Vector3d::UnitX();
+  for (const MaskMap& sky : find_sky(scene, {photo.priors, photo.priors})) {
+    expect_all_of_it(photo, sky);
+  }
 }
 
 TEST(FindSky, IsEmptyWhereThereIsNone) {
