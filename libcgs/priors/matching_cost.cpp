@@ -264,21 +264,68 @@ float combine(std::span<float> costs) {
   std::sort(costs.begin(), costs.end());
   size_t seen = 0;
   while (seen < costs.size() && costs[seen] < kUnseen) ++seen;
-  return seen == 0 ? kNeutral : combined_cost(costs.first(seen));
+  return seen == 0 ? kNeutral : combined_cost<float>(costs.first(seen));
 }
 
-// The same for two sources and all pixels of a band.
-void combine_two(const float* a, const float* b, size_t pixels, uint8_t* out) {
-  for (size_t p = 0; p < pixels; ++p) {
-    const std::array<float, 2> sorted = {std::min(a[p], b[p]), std::max(a[p], b[p])};
-    const float one = sorted[0] < kUnseen ? sorted[0] : kNeutral;
-    out[p] = quantised(sorted[1] < kUnseen ? combined_cost(sorted) : one);
+// In each lane the lesser of two values first. (Costs are never NaN.)
+void order(Floats& a, Floats& b) {
+  const Floats least = min(a, b);
+  b = max(a, b);
+  a = least;
+}
+
+// Sorts the costs of each lane: a network of exchanges for two to four.
+template <size_t kSources>
+void sort_lanes(std::array<Floats, kSources>& costs) {
+  static_assert(kSources >= 2 && kSources <= 4);
+  if constexpr (kSources == 2) {
+    order(costs[0], costs[1]);
+  } else if constexpr (kSources == 3) {
+    order(costs[0], costs[1]);
+    order(costs[1], costs[2]);
+    order(costs[0], costs[1]);
+  } else {
+    order(costs[0], costs[1]);
+    order(costs[2], costs[3]);
+    order(costs[0], costs[2]);
+    order(costs[1], costs[3]);
+    order(costs[1], costs[2]);
   }
 }
 
+// As combine(), of eight pixels at once.
+template <size_t kSources>
+Floats combined_lanes(std::array<Floats, kSources> costs) {
+  sort_lanes(costs);
+  Floats out = Floats{} + kNeutral;
+  for (size_t seen = 1; seen <= kSources; ++seen) {  // as many as are seen, or more
+    out =
+        select(costs[seen - 1] < kUnseen, combined_cost<Floats>(std::span(costs).first(seen)), out);
+  }
+  return out;
+}
+
 // \param costs  as BandCost::plane() gives them
+template <size_t kSources>
+void combine_few(const float* costs, size_t pixels, uint8_t* out) {
+  size_t p = 0;
+  for (; p + kLanes <= pixels; p += kLanes) {
+    std::array<Floats, kSources> of_sources;
+    for (size_t s = 0; s < kSources; ++s) of_sources[s] = load<Floats>(costs + s * pixels + p);
+    const Floats combined = combined_lanes(of_sources);
+    for (size_t lane = 0; lane < kLanes; ++lane) out[p + lane] = quantised(combined[lane]);
+  }
+  for (; p < pixels; ++p) {
+    std::array<float, kSources> of_sources;
+    for (size_t s = 0; s < kSources; ++s) of_sources[s] = costs[s * pixels + p];
+    out[p] = quantised(combine(of_sources));
+  }
+}
+
 void combine_all(const std::vector<float>& costs, size_t sources, size_t pixels, uint8_t* out) {
-  if (sources == 2) return combine_two(costs.data(), costs.data() + pixels, pixels, out);
+  if (sources == 2) return combine_few<2>(costs.data(), pixels, out);
+  if (sources == 3) return combine_few<3>(costs.data(), pixels, out);
+  if (sources == 4) return combine_few<4>(costs.data(), pixels, out);
   std::vector<float> of_pixel(sources);
   for (size_t p = 0; p < pixels; ++p) {
     for (size_t s = 0; s < sources; ++s) of_pixel[s] = costs[s * pixels + p];

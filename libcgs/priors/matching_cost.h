@@ -25,11 +25,13 @@ inline constexpr int kLargestCost = 120;
 
 /// One cost from those of several sources: the better half counts fully and the rest little, so
 /// that a surface hidden from half of the sources is still found.
+/// \tparam Cost  a float, or several of them in lanes
 /// \pre `sorted` is ascending and not empty. Inline: called per pixel and plane.
-inline float combined_cost(std::span<const float> sorted) {
+template <typename Cost>
+Cost combined_cost(std::span<const Cost> sorted) {
   constexpr float kSecondWeight = 0.15f;  // of the worse half of the sources
   const size_t full = (sorted.size() + 1) / 2;
-  float sum = 0;
+  Cost sum{};
   float weight = 0;
   for (size_t i = 0; i < sorted.size(); ++i) {
     const float w = i < full ? 1.0f : kSecondWeight;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include <tbb/parallel_for.h>
 
@@ -129,14 +130,15 @@ void remove_outvoted(Raster<Agreement>& agreement) {
 std::vector<Raster<Agreement>> check_all(const std::vector<SweptView>& views,
                                          const PlaneSweepOptions& options,
                                          const Progress& progress) {
-  std::vector<Raster<Agreement>> out;
-  for (size_t i = 0; i < views.size(); ++i) {
-    report(progress, double(i) / double(views.size()));
-    out.push_back(cross_check(views, i, {options.max_disagreement, options.least_disparity}));
-    remove_outvoted(out.back());
-    remove_bare(views[i], out.back());
-    remove_speckles(views[i], out.back());
-  }
+  std::vector<Raster<Agreement>> out(views.size());
+  SharedProgress shared(progress, views.size());
+  tbb::parallel_for(size_t{0}, views.size(), [&](size_t i) {
+    out[i] = cross_check(views, i, {options.max_disagreement, options.least_disparity});
+    remove_outvoted(out[i]);
+    remove_bare(views[i], out[i]);
+    remove_speckles(views[i], out[i]);
+    shared.advance();
+  });
   return out;
 }
 
@@ -237,6 +239,31 @@ ViewPriors view_priors(const SweptView& view, const Raster<Agreement>& agreement
   return out;
 }
 
+// What the others of each view have found, as it sees it.
+std::vector<Raster<SlantedPlane>> exchanged_planes(const std::vector<SweptView>& views,
+                                                   const std::vector<Raster<Agreement>>& agreements,
+                                                   const Progress& progress) {
+  std::vector<Raster<SlantedPlane>> out(views.size());
+  SharedProgress shared(progress, views.size());
+  tbb::parallel_for(size_t{0}, views.size(), [&](size_t i) {
+    out[i] = planes_of_others(views, i, agreements);
+    shared.advance();
+  });
+  return out;
+}
+
+std::vector<ViewPriors> priors_of(const std::vector<SweptView>& views,
+                                  const std::vector<Raster<Agreement>>& agreements,
+                                  const Progress& progress) {
+  std::vector<ViewPriors> out(views.size());
+  SharedProgress shared(progress, views.size());
+  tbb::parallel_for(size_t{0}, views.size(), [&](size_t i) {
+    out[i] = view_priors(views[i], agreements[i]);
+    shared.advance();
+  });
+  return out;
+}
+
 }  // namespace
 
 void PlaneSweepOptions::validate() const {
@@ -309,19 +336,11 @@ std::vector<ViewPriors> plane_sweep(const Scene& scene,
     for (size_t i = 0; i < count; ++i) refinements[i].round(extra[i], of_view(rounding, i));
     take_results(part_of(refining, 0.8, 0.9));
     const auto agreements = check_all(views, options, part_of(refining, 0.9, 0.95));
-    for (size_t i = 0; i < count; ++i) {
-      report(of_view(part_of(refining, 0.95, 1), i), 0);
-      extra[i] = planes_of_others(views, i, agreements);
-    }
+    extra = exchanged_planes(views, agreements, part_of(refining, 0.95, 1));
   }
   take_results(part_of(progress, 0.95, 0.97));
   const auto agreements = check_all(views, options, part_of(progress, 0.97, 0.98));
-  std::vector<ViewPriors> priors;
-  for (size_t i = 0; i < count; ++i) {
-    report(of_view(part_of(progress, 0.98, 1), i), 0);
-    priors.push_back(view_priors(views[i], agreements[i]));
-  }
-  return priors;
+  return priors_of(views, agreements, part_of(progress, 0.98, 1));
 }
 
 }  // namespace cgs

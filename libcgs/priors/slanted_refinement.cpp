@@ -178,7 +178,7 @@ float data_cost(std::span<const float> scores) {
   }
   if (seen == 0) return kUnseenCost;
   std::sort(costs.begin(), costs.begin() + static_cast<std::ptrdiff_t>(seen));
-  return combined_cost(costs.first(seen));
+  return combined_cost<float>(costs.first(seen));
 }
 
 bool is_same(const SlantedPlane& a, const SlantedPlane& b) {
@@ -443,7 +443,9 @@ void SlantedRefinement::visit(int x, int y, const Raster<SlantedPlane>& extra) {
     n.H.diagonal() += Eigen::Vector3f(d, 10 * d, 10 * d);
     const Eigen::Vector3f step = n.H.ldlt().solve(n.g);
     if (!step.allFinite() || std::abs(step.x()) > kTruncation) break;
+    const SlantedPlane before = best;
     try_plane({best.t + step.x(), best.slope_x + step.y(), best.slope_y + step.z()});
+    if (is_same(best, before)) break;  // the next step would be this one
   }
   if (!is_same(planes_(x, y), best)) moved_(x, y) = time_;
   visited_(x, y) = time_;

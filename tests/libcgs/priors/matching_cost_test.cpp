@@ -160,9 +160,11 @@ void expect_as_defined(Scene scene) {
 
 TEST(MatchingCost, EqualsItsDefinitionPixelByPixel) { expect_as_defined(three_views()); }
 
-// Two sources are combined by a loop of their own.
-TEST(MatchingCost, OfThreeSourcesEqualsItsDefinitionPixelByPixel) {
+// Few sources are combined in lanes, more one by one.
+TEST(MatchingCost, OfAnyNumberOfSourcesEqualsItsDefinitionPixelByPixel) {
   expect_as_defined(views_at({-0.4, 0.0, 0.5, 0.2}));
+  expect_as_defined(views_at({-0.4, 0.0, 0.5, 0.2, -0.2}));
+  expect_as_defined(views_at({-0.4, 0.0, 0.5, 0.2, -0.2, 0.35}));
 }
 
 TEST(MatchingCost, IsLeastOnThePlaneOfTheSurface) {
@@ -206,11 +208,11 @@ TEST(MatchingCost, DoesNotDependOnTheNumberOfThreads) {
 
 TEST(CombinedCost, AHiddenSourceCountsLittle) {
   const std::vector<float> one = {0.25f};
-  EXPECT_FLOAT_EQ(combined_cost(one), 0.25f);
+  EXPECT_FLOAT_EQ(combined_cost<float>(one), 0.25f);
   const std::vector<float> two = {0.1f, 0.9f};
-  EXPECT_FLOAT_EQ(combined_cost(two), (0.1f + 0.15f * 0.9f) / 1.15f);
+  EXPECT_FLOAT_EQ(combined_cost<float>(two), (0.1f + 0.15f * 0.9f) / 1.15f);
   const std::vector<float> three = {0.1f, 0.2f, 0.9f};
-  EXPECT_FLOAT_EQ(combined_cost(three), (0.1f + 0.2f + 0.15f * 0.9f) / 2.15f);
+  EXPECT_FLOAT_EQ(combined_cost<float>(three), (0.1f + 0.2f + 0.15f * 0.9f) / 2.15f);
 }
 
 }  // namespace
