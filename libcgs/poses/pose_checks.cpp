@@ -113,11 +113,20 @@ void refuse_unsure(const std::vector<UnposedPhoto>& photos,
                    const Reconstruction& scene,
                    const std::vector<double>& focal_sigmas) {
   size_t known = 0;
-  for (const Track& track : scene.tracks) known += track.is_known ? 1 : 0;
+  size_t all = 0;  // of photographs that are not placed nothing can fit
+  for (const Track& track : scene.tracks) {
+    const auto placed =
+        std::count_if(track.seen.begin(), track.seen.end(), [&](const Observation& s) -> bool {
+          return scene.pose(s.photo).has_value();
+        });
+    if (placed < 2) continue;
+    ++all;
+    known += track.is_known ? 1 : 0;
+  }
   constexpr double kLeastShare = 0.3;
-  if (double(known) < std::max(kLeastShare * double(scene.tracks.size()), 12.0)) {
+  if (double(known) < std::max(kLeastShare * double(all), 12.0)) {
     throw NumericalError(unexplained_matches(photos, pairs) + " (" + std::to_string(known) +
-                         " of " + std::to_string(scene.tracks.size()) + " points fit)");
+                         " of " + std::to_string(all) + " points fit)");
   }
   constexpr double kMostSigma = 0.1;
   constexpr double kShortest = 0.32;  // [larger sides] phones' widest lenses have 0.36,
