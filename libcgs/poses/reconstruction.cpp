@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <Eigen/Dense>
 
@@ -22,40 +23,75 @@ Eigen::Vector3d ray_in_world(const Reconstruction& scene, const Observation& s) 
   return scene.pose(s.photo)->rotation.conjugate() * direction.homogeneous().normalized();
 }
 
-// The two observations whose rays meet under the largest angle.
-struct WidestPair {
-  const Observation* a = nullptr;
-  const Observation* b = nullptr;
-  double angle = 0;  // [rad]
+struct Ray {
+  const Observation* of;
+  Eigen::Vector3d direction;  // in the world, of unit length
 };
 
-WidestPair widest_pair(const Reconstruction& scene, const Track& track) {
-  WidestPair widest;
-  for (size_t i = 0; i < track.seen.size(); ++i) {
-    if (!counts(scene, track.seen[i])) continue;
-    for (size_t j = i + 1; j < track.seen.size(); ++j) {
-      if (!counts(scene, track.seen[j])) continue;
-      const double angle =
-          angle_between(ray_in_world(scene, track.seen[i]), ray_in_world(scene, track.seen[j]));
-      if (angle > widest.angle) widest = {&track.seen[i], &track.seen[j], angle};
+std::vector<Ray> rays_of(const Reconstruction& scene, const Track& track) {
+  std::vector<Ray> out;
+  for (const Observation& s : track.seen) {
+    if (counts(scene, s)) out.push_back({&s, ray_in_world(scene, s)});
+  }
+  return out;
+}
+
+// Two rays, and the angle under which they meet [rad].
+struct RayPair {
+  size_t a = 0;
+  size_t b = 0;
+  double angle = 0;
+};
+
+RayPair widest_pair(const std::vector<Ray>& rays) {
+  RayPair widest;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    for (size_t j = i + 1; j < rays.size(); ++j) {
+      const double angle = angle_between(rays[i].direction, rays[j].direction);
+      if (angle > widest.angle) widest = {i, j, angle};
     }
   }
   return widest;
 }
 
+// The widest first, as many as are worth trying.
+std::vector<RayPair> wide_pairs(const std::vector<Ray>& rays, double least_angle) {
+  std::vector<RayPair> out;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    for (size_t j = i + 1; j < rays.size(); ++j) {
+      const double angle = angle_between(rays[i].direction, rays[j].direction);
+      if (angle >= least_angle) out.push_back({i, j, angle});
+    }
+  }
+  std::stable_sort(
+      out.begin(), out.end(), [](const RayPair& x, const RayPair& y) { return x.angle > y.angle; });
+  constexpr size_t kMost = 8;
+  if (out.size() > kMost) out.resize(kMost);
+  return out;
+}
+
 // The point nearest to two rays.
-Eigen::Vector3d meeting_point(const Reconstruction& scene,
-                              const Observation& a,
-                              const Observation& b) {
+Eigen::Vector3d meeting_point(const Reconstruction& scene, const Ray& a, const Ray& b) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
   Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
-  for (const Observation* s : {&a, &b}) {
-    const Eigen::Vector3d ray = ray_in_world(scene, *s);
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray * ray.transpose();
+  for (const Ray* ray : {&a, &b}) {
+    const Eigen::Matrix3d across =
+        Eigen::Matrix3d::Identity() - ray->direction * ray->direction.transpose();
     A += across;
-    rhs += across * scene.pose(s->photo)->center();
+    rhs += across * scene.pose(ray->of->photo)->center();
   }
   return A.ldlt().solve(rhs);
+}
+
+// Puts a track where two of its rays meet. \return whether both observations agree with it
+bool is_met(const Reconstruction& scene,
+            const std::vector<Ray>& rays,
+            const RayPair& pair,
+            double most_error,
+            Track& track) {
+  track.position = meeting_point(scene, rays[pair.a], rays[pair.b]);
+  return reprojection_error(scene, track.position, *rays[pair.a].of) <= most_error &&
+         reprojection_error(scene, track.position, *rays[pair.b].of) <= most_error;
 }
 
 // \return observations that agree with the position
@@ -94,12 +130,17 @@ double reprojection_error(const Reconstruction& scene,
 void triangulate(Reconstruction& scene, double most_error, double least_angle) {
   for (Track& track : scene.tracks) {
     if (track.is_known) continue;
-    const WidestPair widest = widest_pair(scene, track);
+    const std::vector<Ray> rays = rays_of(scene, track);
+    const RayPair widest = widest_pair(rays);
     if (!(widest.angle >= least_angle)) continue;
-    track.position = meeting_point(scene, *widest.a, *widest.b);
-    const bool is_met = reprojection_error(scene, track.position, *widest.a) <= most_error &&
-                        reprojection_error(scene, track.position, *widest.b) <= most_error;
-    if (is_met) track.is_known = use_what_agrees(scene, most_error, track) >= 2;
+    bool is_found = is_met(scene, rays, widest, most_error, track);
+    if (!is_found && rays.size() > 2) {  // a wrong observation is likely to be one of the widest
+      const std::vector<RayPair> pairs = wide_pairs(rays, least_angle);
+      is_found = std::any_of(pairs.begin(), pairs.end(), [&](const RayPair& pair) {
+        return is_met(scene, rays, pair, most_error, track);
+      });
+    }
+    if (is_found) track.is_known = use_what_agrees(scene, most_error, track) >= 2;
   }
 }
 
@@ -112,7 +153,7 @@ void drop_outliers(Reconstruction& scene, double most_error, double least_angle)
 }
 
 double ray_angle(const Reconstruction& scene, const Track& track) {
-  return widest_pair(scene, track).angle;
+  return widest_pair(rays_of(scene, track)).angle;
 }
 
 }  // namespace cgs

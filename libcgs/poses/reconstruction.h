@@ -83,7 +83,8 @@ double reprojection_error(const Reconstruction& scene,
 
 /// Gives a position to every track that has none and can have one: two placed photographs see it
 /// under an angle of at least `least_angle` [rad], and it projects to within `most_error` of where
-/// they see it. Observations further off are no longer used.
+/// they see it; of several such pairs those under the widest angles are tried. Observations further
+/// off are no longer used.
 void triangulate(Reconstruction& scene, double most_error, double least_angle);
 
 /// Stops using observations further than `most_error` from their point, and forgets the positions

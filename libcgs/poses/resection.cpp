@@ -7,6 +7,7 @@
 
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
+#include <tbb/parallel_for.h>
 
 namespace cgs {
 
@@ -178,25 +179,31 @@ std::optional<FirstPair> place_photos(Reconstruction& scene,
                                       const std::vector<PhotoPair>& pairs,
                                       size_t most,
                                       const Progress& progress) {
-  std::optional<FirstPair> begun;
-  double least = std::numeric_limits<double>::infinity();
-  Reconstruction best = scene;
-  forget(best);
-  constexpr int kMostTries = 3;
-  int tries = 0;
+  struct Try {
+    Reconstruction scene;
+    FirstPair begun;
+    double error = 0;
+  };
+  constexpr size_t kMostTries = 3;
+  std::vector<Try> tries;
   for (const PhotoPair* pair : ranked_pairs(scene, pairs)) {
-    if (!begin_with(*pair, priors, progress, scene)) continue;
-    place_more(scene, priors, {pair->a, pair->b}, most, progress);
-    const double error = capped_error(scene);
-    if (error < least) {
-      least = error;
-      best = scene;
-      begun = FirstPair{pair->a, pair->b};
-    }
-    if (++tries == kMostTries) break;
+    if (tries.size() == kMostTries) break;
+    Reconstruction candidate = scene;
+    if (!begin_with(*pair, priors, progress, candidate)) continue;
+    tries.push_back({std::move(candidate), {pair->a, pair->b}});
   }
-  scene = best;
-  return begun;
+  if (tries.empty()) {
+    forget(scene);
+    return std::nullopt;
+  }
+  tbb::parallel_for(size_t{0}, tries.size(), [&](size_t i) {
+    place_more(tries[i].scene, priors, tries[i].begun, most, progress);
+    tries[i].error = capped_error(tries[i].scene);
+  });
+  Try& best = *std::min_element(
+      tries.begin(), tries.end(), [](const Try& a, const Try& b) { return a.error < b.error; });
+  scene = std::move(best.scene);
+  return best.begun;
 }
 
 void place_more(Reconstruction& scene,

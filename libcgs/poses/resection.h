@@ -26,7 +26,7 @@ struct FirstPair {
 ///
 /// \param scene     with tracks and lenses; poses and positions are overwritten
 /// \param most      photographs to place, at most
-/// \param progress  told again and again, never how much is done
+/// \param progress  told again and again, never how much is done; from any thread, several at once
 /// \return nothing, and no pose, if no pair could be placed
 std::optional<FirstPair> place_photos(Reconstruction& scene,
                                       const std::vector<LensPrior>& priors,

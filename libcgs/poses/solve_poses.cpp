@@ -10,6 +10,7 @@
 #include <optional>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include "libcgs/core/error.h"
 #include "libcgs/poses/bundle_adjustment.h"
@@ -67,6 +68,19 @@ std::vector<Track> sample(const std::vector<Track>& tracks, size_t most) {
   return out;
 }
 
+// \pre it has begun
+void adjust_focal(const std::vector<LensPrior>& priors,
+                  const Progress& progress,
+                  Attempt& attempt) {
+  const BundleOptions options{.first = attempt.begun->first,
+                              .second = attempt.begun->second,
+                              .solve_focal = true,
+                              .progress = progress};
+  adjust_bundle(attempt.scene, priors, options);
+  drop_outliers(attempt.scene, kMostError, kLeastAngle);
+  attempt.error = capped_error(attempt.scene);
+}
+
 // \param start  without lenses and places
 Attempt attempt_at(double focal_of_side,
                    const Reconstruction& start,
@@ -80,14 +94,7 @@ Attempt attempt_at(double focal_of_side,
     out.scene.lenses.push_back({prior.focal > 0 ? prior.focal : focal_of_side * prior.side, 0});
   }
   out.begun = place_photos(out.scene, priors, pairs, most_placed, progress);
-  if (!out.begun) return out;
-  const BundleOptions options{.first = out.begun->first,
-                              .second = out.begun->second,
-                              .solve_focal = true,
-                              .progress = progress};
-  adjust_bundle(out.scene, priors, options);
-  drop_outliers(out.scene, kMostError, kLeastAngle);
-  out.error = capped_error(out.scene);
+  if (out.begun) adjust_focal(priors, progress, out);
   return out;
 }
 
@@ -148,68 +155,76 @@ Attempt best_attempt(const std::vector<int>& lens_of,
   const bool is_known = std::all_of(
       priors.begin(), priors.end(), [](const LensPrior& prior) { return prior.focal > 0; });
   std::vector<Attempt> attempts(is_known ? 1 : kFocals.size());
-  // A dozen photographs tell the focal length as well as hundreds, in a fraction of the time.
+  // A dozen photographs tell the focal length, and with whom to begin, as well as hundreds.
   const size_t all = lens_of.size();
-  const size_t enough = is_known ? all : std::min(all, kAllCompared);
-  const bool goes_on = enough < all;
-  SharedProgress tried(progress, attempts.size() + (goes_on ? 1 : 0));
-  const auto attempt_of = [&](size_t i, size_t most_placed) {
-    return attempt_at(kFocals[i], start, priors, pairs, most_placed, [&](double) { tried.tell(); });
-  };
+  const size_t enough = std::min(all, kAllCompared);
+  SharedProgress tried(progress, attempts.size() + (enough < all ? 1 : 0));
+  const Progress tell = [&](double) { tried.tell(); };
   tbb::parallel_for(size_t{0}, attempts.size(), [&](size_t i) {
-    attempts[i] = attempt_of(i, enough);
+    attempts[i] = attempt_at(kFocals[i], start, priors, pairs, enough, tell);
     tried.advance();
   });
-  const auto best =
-      std::min_element(attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
+  Attempt& best =
+      *std::min_element(attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
         return a.error < b.error;
       });
-  if (best->begun && has_rival(*best, attempts, priors)) {
+  if (best.begun && has_rival(best, attempts, priors)) {
     throw undetermined_focal(pairs, "several explain them equally well");
   }
-  if (!best->begun || !goes_on) return std::move(*best);
-  return attempt_of(static_cast<size_t>(best - attempts.begin()), all);
+  if (best.begun && enough < all) {
+    place_more(best.scene, priors, *best.begun, all, tell);
+    adjust_focal(priors, tell, best);
+  }
+  return std::move(best);
 }
 
-// Rounds of adjusting everything and looking again what agrees.
+// Adjusts everything and looks again what agrees.
+void polish_once(const std::vector<LensPrior>& priors,
+                 const BundleOptions& options,
+                 double most_error,
+                 Reconstruction& scene) {
+  adjust_bundle(scene, priors, options);
+  drop_outliers(scene, most_error, kLeastAngle);
+  triangulate(scene, most_error, kLeastAngle);
+}
+
+// Goes on until nothing changes any more.
 // \return relative standard deviations of the focal lengths, per lens
 std::vector<double> polish(const std::vector<LensPrior>& priors,
-                           const BundleOptions& wanted,
+                           BundleOptions options,
                            Reconstruction& scene) {
-  BundleOptions options = wanted;
-  options.solve_shape = false;
-  constexpr double kRoundShare = 0.2;  // of the time, of each round but the last
-  double done = 0;
-  for (const double most_error : {kMostError, 3.0, 2.5}) {
-    options.progress = part_of(wanted.progress, done, done + kRoundShare);
-    done += kRoundShare;
-    adjust_bundle(scene, priors, options);
-    drop_outliers(scene, most_error, kLeastAngle);
-    triangulate(scene, most_error, kLeastAngle);
-    options.solve_shape = wanted.solve_shape;
-  }
+  for (const double most_error : {3.0, 2.5}) polish_once(priors, options, most_error, scene);
   constexpr int kUntilSettled = 200;
   options.most_iterations = kUntilSettled;
-  options.progress = part_of(wanted.progress, done, 1);
   return adjust_bundle(scene, priors, options, true);
 }
 
-// The same with the shape of the lenses, unless that pulls a focal length away from where plain
+// Polished with the shape of the lenses, unless that pulls a focal length away from where plain
 // lenses have it: then the photographs cannot tell one from the other, and plain lenses stay.
 std::vector<double> polish_with_shape(const std::vector<LensPrior>& priors,
                                       const FirstPair& begun,
                                       const Progress& progress,
                                       Reconstruction& scene) {
   constexpr double kMostPull = 0.1;  // of log(focal); distortion of real lenses does less
-  BundleOptions options{.first = begun.first,
-                        .second = begun.second,
-                        .solve_focal = true,
-                        .progress = part_of(progress, 0, 0.5)};
+  SharedProgress rounds(progress, 3);
+  const BundleOptions as_plain{
+      .first = begun.first, .second = begun.second, .solve_focal = true, .progress = [&](double) {
+        rounds.tell();
+      }};
+  BundleOptions with_shape = as_plain;
+  with_shape.solve_shape = true;
+  polish_once(priors, as_plain, kMostError, scene);
+  rounds.advance();
   Reconstruction plain = scene;
-  std::vector<double> plain_sigmas = polish(priors, options, plain);
-  options.solve_shape = true;
-  options.progress = part_of(progress, 0.5, 1);
-  std::vector<double> sigmas = polish(priors, options, scene);
+  std::vector<double> plain_sigmas;
+  std::vector<double> sigmas;
+  const auto polish_into =
+      [&](const BundleOptions& options, Reconstruction& polished, std::vector<double>& out) {
+        out = polish(priors, options, polished);
+        rounds.advance();
+      };
+  tbb::parallel_invoke([&] { polish_into(as_plain, plain, plain_sigmas); },
+                       [&] { polish_into(with_shape, scene, sigmas); });
   for (size_t i = 0; i < scene.lenses.size(); ++i) {
     const double pull = std::abs(std::log(scene.lenses[i].focal / plain.lenses[i].focal));
     if (pull <= kMostPull) {

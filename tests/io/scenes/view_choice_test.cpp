@@ -80,7 +80,7 @@ TEST(ChooseViews, LeavesOutThoseWithoutAFile) {
   EXPECT_EQ(chosen(scene).input, (Indices{0, 2, 3, 4}));
   EXPECT_THROW(chosen(scene, {.views = "0,1"}), InvalidInput);
   for (size_t i = 1; i < 5; ++i) scene.views[i].image_path.clear();
-  EXPECT_EQ(test::defect_of([&] { chosen(scene); }), "empty");
+  EXPECT_EQ(test::defect_of([&] { chosen(scene); }), "EMPTY");
 }
 
 TEST(ChooseViews, TakesNamesAndIndicesInAnyOrder) {

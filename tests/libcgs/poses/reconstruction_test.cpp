@@ -50,6 +50,22 @@ TEST(Triangulate, FindsPointsAndTellsWrongObservations) {
   EXPECT_NEAR(ray_angle(scene, scene.tracks[2]), 1.0 / 5000, 1e-6);
 }
 
+TEST(Triangulate, LeavesOutTheOneWrongObservationOfThree) {
+  Reconstruction scene = two_of_three();
+  scene.poses[2] = PhotoPose{Eigen::Quaterniond::Identity(), {-3, 0, 0}};
+  const Eigen::Vector3d truth(0.4, -0.3, 5);
+  for (const size_t wrong : {0u, 1u, 2u}) {
+    Track track;
+    for (const int photo : {0, 1, 2}) track.seen.push_back(observation(scene, photo, truth));
+    track.seen[wrong].at.y() += 50;
+    scene.tracks = {track};
+    triangulate(scene, 2, 0.01);
+    ASSERT_TRUE(scene.tracks[0].is_known) << wrong;
+    EXPECT_LT((scene.tracks[0].position - truth).norm(), 1e-9) << wrong;
+    for (const size_t i : {0u, 1u, 2u}) EXPECT_EQ(scene.tracks[0].seen[i].is_used, i != wrong);
+  }
+}
+
 TEST(DropOutliers, ForgetsPointsThatOnePhotographVouchesFor) {
   Reconstruction scene = two_of_three();
   const Eigen::Vector3d truth(0.4, -0.3, 5);
