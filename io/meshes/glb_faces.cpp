@@ -5,6 +5,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "io/glb/extensions.h"
 #include "io/meshes/draco_reader.h"
@@ -168,13 +169,25 @@ class PrimitiveReader {
     return out;  // lines have no surface
   }
 
+  // An attribute that the compressed mesh lacks lies in its accessor, as without compression; one
+  // that holds no bytes stands for what was compressed.
+  std::vector<float> beside(const JsonValue& attributes, const char* name, int components) const {
+    const auto index = attributes.find(name);
+    if (!index) return {};
+    const JsonValue accessor = file_.element("accessors", *index);
+    if (!accessor.find("bufferView") && !accessor.find("sparse")) return {};
+    const bool is_color = std::string_view(name) == "COLOR_0";
+    return is_color ? colors(attributes) : attribute(attributes, name, components);
+  }
+
+  // Source: KHR_draco_mesh_compression, Khronos Group, section Conformance.
   GlbFaces compressed(const JsonValue& primitive, const JsonValue& draco) const {
     const DracoMesh mesh = read_draco(file_.view_bytes(draco.at("bufferView")), file_.path());
     const JsonValue ids = draco.at("attributes");
     const JsonValue attributes = primitive.at("attributes");
     const auto values = [&](const char* name, int least) -> std::vector<float> {
       const auto id = ids.find(name);
-      if (!id) return {};
+      if (!id) return beside(attributes, name, least);
       const auto it = mesh.attributes.find(id->count());
       if (it == mesh.attributes.end() || it->second.components < least) {
         id->fail(Defect::Ref, "names no such attribute of the compressed mesh");

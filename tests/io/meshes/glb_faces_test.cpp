@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "io/meshes/draco_codec.h"
 #include "io/meshes/glb_reader.h"
 #include "io/meshes/mesh_file.h"
 #include "tests/support/full_disk.h"
@@ -179,6 +180,41 @@ TEST(GlbFaces, AFileOfPointsAloneIsACloud) {
   };
   EXPECT_LT((place(7) - Eigen::Vector3d(3, -0.5, 9)).norm(), 1e-6);
   EXPECT_LT((file.content.mesh.normals[7] - Eigen::Vector3f(0, -1, 0)).norm(), 1e-6f);
+}
+
+// Programs that paint or measure a mesh add arrays of their own beside what was compressed.
+TEST(GlbFaces, AttributesBesideACompressedMeshAreReadToo) {
+  BoxGlb t;
+  GlbPrimitive box;
+  const std::vector<float> corners = BoxGlb::corners();
+  for (size_t i = 0; i < 8; ++i) {
+    box.positions.emplace_back(corners[3 * i], corners[3 * i + 1], corners[3 * i + 2]);
+  }
+  box.faces = {{0, 2, 1},
+               {1, 2, 3},
+               {4, 5, 6},
+               {5, 7, 6},
+               {0, 1, 4},
+               {1, 5, 4},
+               {2, 6, 3},
+               {3, 6, 7},
+               {0, 4, 2},
+               {2, 4, 6},
+               {1, 3, 5},
+               {3, 7, 5}};
+  const DracoPrimitive packed = draco_compress(box, {Eigen::Vector3f::Zero(), 4, 14}, 5);
+  t.primitive()["extensions"]["KHR_draco_mesh_compression"] = {
+      {"bufferView", t.view(std::vector<char>(packed.bytes.begin(), packed.bytes.end()))},
+      {"attributes", packed.attribute_ids}};
+  EXPECT_NEAR(t.volume(), 3, 1e-2);
+  const size_t n = packed.vertices;
+  t.primitive()["attributes"]["COLOR_0"] = t.accessor(std::vector<float>(3 * n, 1), "VEC3", 5126);
+  t.primitive()["attributes"]["_SUPPORT"] = t.accessor(std::vector<float>(n, 7), "SCALAR", 5126);
+  const ParsedMesh mesh = t.read().parsed;
+  ASSERT_FALSE(mesh.mesh.colors.empty());
+  EXPECT_EQ(mesh.mesh.support, std::vector<float>(mesh.positions.size(), 7));
+  t.primitive()["attributes"]["_SUPPORT"] = t.accessor(std::vector<float>{7}, "SCALAR", 5126);
+  EXPECT_EQ(t.defect(), "COUNT");
 }
 
 // As clouds of depth cameras have them; two points in one place are two.
