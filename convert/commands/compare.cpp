@@ -300,7 +300,7 @@ void add_compare(CLI::App& app) {
          "a",
          args->a,
          "Mesh or point cloud: .ply, .obj, .stl, .off, .om, .3mf, .glb, .gltf; or splats: .ply, "
-         ".splat, .spz, .sog, .ksplat, .glb, .gltf")
+         ".splat, .spz, .sog or its meta.json, .ksplat, .glb, .gltf")
       ->required();
   cmd->add_option(
          "b",

@@ -137,7 +137,8 @@ void add_splat_compare_options(CLI::App& command, SplatCompareArgs& args) {
 
 bool holds_splats(const std::filesystem::path& path) {
   const std::string ending = lower_extension(path);
-  return is_bare_splat_name(path) || ending == ".sog" || ending == ".ksplat" || is_splat_file(path);
+  const bool is_sog = ending == ".sog" || ending == ".json";  // the latter of one that is unpacked
+  return is_bare_splat_name(path) || is_sog || ending == ".ksplat" || is_splat_file(path);
 }
 
 void run_splat_compare(const std::filesystem::path& a,

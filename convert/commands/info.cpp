@@ -369,7 +369,8 @@ void add_info(CLI::App& app) {
          args->scene.path,
          "Folder of a scene, as for run, or what run made of one, or its model; a mesh (.ply, "
          ".obj, .stl, .off, .om, .3mf, .glb, .gltf), which gets a certificate; splats (.ply, .spz, "
-         ".splat, .sog, .ksplat, .glb, .gltf); a volume (.vdb); layers of a picture (.exr)")
+         ".splat, .sog or its meta.json, .ksplat, .glb, .gltf); a volume (.vdb); layers of a "
+         "picture (.exr)")
       ->required();
   add_scene_options(*cmd, args->scene.options);
   add_camera_options(*cmd, args->scene);

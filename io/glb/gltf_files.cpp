@@ -80,19 +80,18 @@ std::string data_of(std::string_view rest, const JsonValue& object) {
   return std::move(*out);
 }
 
-/// A mesh comes alone, so that nobody can vouch for what it names outside of its folder.
-std::filesystem::path resolved(const std::filesystem::path& gltf,
-                               const std::string& name,
-                               const JsonValue& object) {
+}  // namespace
+
+std::filesystem::path resolve_beside(const std::filesystem::path& file,
+                                     const std::string& name,
+                                     const JsonValue& stated) {
   try {
-    return resolve_in_scene({gltf.parent_path()}, name, gltf);
+    return resolve_in_scene({file.parent_path()}, name, file);
   } catch (const BadInput& error) {
     if (remedy_of(error) == Remedy::None) throw;
-    object.at("uri").fail(Defect::Path, "leads out of the folder of the file");
+    stated.fail(Defect::Path, "leads out of the folder of the file");
   }
 }
-
-}  // namespace
 
 std::string_view GltfFiles::kept(const std::string& key, std::string bytes) {
   size_ += bytes.size();
@@ -109,8 +108,8 @@ std::string_view GltfFiles::bytes(const JsonValue& object) {
     return kept(key, data_of(std::string_view(uri).substr(kData.size()), object));
   }
   const std::string name = percent_decoded(uri);
-  std::filesystem::path path = resolved(gltf_, name, object);
-  if (!is_present(path)) path = resolved(gltf_, with_slashes(name), object);
+  std::filesystem::path path = resolve_beside(gltf_, name, object.at("uri"));
+  if (!is_present(path)) path = resolve_beside(gltf_, with_slashes(name), object.at("uri"));
   const std::string key = std::filesystem::weakly_canonical(path).string();
   const auto known = known_.find(key);
   return known != known_.end() ? std::string_view(known->second) : kept(key, read_file(path));

@@ -11,6 +11,14 @@
 
 namespace cgs {
 
+/// Where a name leads that a file states of another one beside it. Meshes and splats come alone, so
+/// that nobody can vouch for what they name outside of their folder.
+/// \param stated  the name in the file, for the message
+/// \throws BadInput Path as resolve_in_scene()
+std::filesystem::path resolve_beside(const std::filesystem::path& file,
+                                     const std::string& name,
+                                     const JsonValue& stated);
+
 /// What the buffers and images of a glTF file name by `uri`: files beside it, and data: URIs.
 class GltfFiles {
  public:

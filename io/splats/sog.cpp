@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/splats/sog.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 #include <webp/decode.h>
 
 #include "io/bytes/json_file.h"
 #include "io/bytes/zip.h"
+#include "io/glb/container.h"
+#include "io/glb/gltf_files.h"
 #include "libcgs/core/error.h"
 
 namespace cgs {
@@ -19,6 +23,48 @@ namespace {
 
 constexpr size_t kChannels = 4;
 constexpr int kPaletteColumns = 64;
+constexpr uint64_t kMostMetaBytes = uint64_t{16} << 20;
+
+/// Whether JSON is that of SOG; glTF has none of these keys.
+bool is_sog_meta(std::string_view bytes) {
+  const auto has = [&](std::string_view key) { return bytes.find(key) != std::string_view::npos; };
+  return is_gltf_text(bytes) && has("\"means\"") && has("\"quats\"") && has("\"sh0\"");
+}
+
+/// meta.json and the images that it names, in an archive or in the folder of meta.json.
+class SogParts {
+ public:
+  SogParts(std::string_view bytes, const std::filesystem::path& path) : path_(path) {
+    if (!is_sog_meta(bytes)) {
+      archive_.emplace(bytes, path);
+      json_ = parse_json(archive_->read("meta.json", kMostMetaBytes), path);
+    } else if (bytes.size() <= kMostMetaBytes) {
+      json_ = parse_json(bytes, path);
+    } else {
+      throw LimitError(printable(path) + ": " + std::to_string(bytes.size()) + " bytes of JSON");
+    }
+  }
+
+  JsonValue meta() const { return {json_, path_}; }
+  const nlohmann::json& json() const { return json_; }
+  std::string image(const JsonValue& name) const {
+    return archive_ ? archive_->read(name.text(), ReadLimits().max_file_bytes)
+                    : read_file(place_of(name));
+  }
+  std::string image_start(const JsonValue& name, size_t most) const {
+    return archive_ ? archive_->read_start(name.text(), most)
+                    : read_file_start(place_of(name), most);
+  }
+
+ private:
+  std::filesystem::path place_of(const JsonValue& name) const {
+    return resolve_beside(path_, name.text(), name);
+  }
+
+  const std::filesystem::path& path_;
+  std::optional<ZipArchive> archive_;
+  nlohmann::json json_;
+};
 
 /// RGBA pixels, one per splat.
 class Pixels {
@@ -26,6 +72,9 @@ class Pixels {
   Pixels(const std::string& webp, const std::string& name, const std::filesystem::path& path) {
     const ReadLimits limits;
     const auto* const first = reinterpret_cast<const uint8_t*>(webp.data());
+    if (webp.starts_with("\x89PNG")) {
+      throw BadInput(Defect::Unsupported, path, name + " is PNG; of SOG, only WebP is read");
+    }
     if (WebPGetInfo(first, webp.size(), &width, &height) == 0) {
       throw BadInput(Defect::Syntax, path, name + " is no WebP image");
     }
@@ -51,17 +100,19 @@ class Pixels {
   std::unique_ptr<uint8_t, Free> rgba_;
 };
 
+JsonValue image_name(const JsonValue& part, size_t number) {
+  const JsonValue files = part.at("files");
+  if (number >= files.size()) files.fail(Defect::Schema, "names too few images");
+  return files.at(number);
+}
+
 class SogReader {
  public:
   SogReader(std::string_view bytes, const std::filesystem::path& path)
-      : path_(path), archive_(bytes, path) {}
+      : path_(path), parts_(bytes, path) {}
 
   RawSplats read() {
-    const ReadLimits limits;
-    constexpr uint64_t kMostMetaBytes = uint64_t{16} << 20;
-    const nlohmann::json json =
-        parse_json(archive_.read("meta.json", kMostMetaBytes), path_, limits);
-    const JsonValue meta(json, path_);
+    const JsonValue meta = parts_.meta();
     const auto version = meta.find("version");
     if (!version || version->count() != 2) {
       throw BadInput(Defect::Unsupported, path_, "meta.json is not of SOG version 2");
@@ -70,8 +121,8 @@ class SogReader {
     if (count_ == 0) throw BadInput(Defect::Empty, path_, "0 splats");
     splats_.format = "SOG 2";
     const auto states = [&](const char* key, const nlohmann::json& value) {
-      const auto found = json.find(key);
-      return found != json.end() && *found == value;
+      const auto found = parts_.json().find(key);
+      return found != parts_.json().end() && *found == value;
     };
     // The specification has the first, splat-transform writes the second.
     splats_.is_antialiased = states("antialias", true) || states("model", "antialiased");
@@ -94,14 +145,14 @@ class SogReader {
 
  private:
   Pixels image(const JsonValue& part, size_t number, size_t needed) const {
-    const std::string name = part.at("files").at(number).text();
-    Pixels out(
-        archive_.read(name, ReadLimits().max_file_bytes), one_line(name.substr(0, 60)), path_);
+    const JsonValue name = image_name(part, number);
+    const std::string shown = one_line(name.text().substr(0, 60));
+    Pixels out(parts_.image(name), shown, path_);
     if (out.size() < needed) {
       throw BadInput(Defect::Count,
                      path_,
-                     one_line(name.substr(0, 60)) + " has " + std::to_string(out.size()) +
-                         " pixels, needed are " + std::to_string(needed));
+                     shown + " has " + std::to_string(out.size()) + " pixels, needed are " +
+                         std::to_string(needed));
     }
     return out;
   }
@@ -202,7 +253,7 @@ class SogReader {
   }
 
   const std::filesystem::path& path_;
-  ZipArchive archive_;
+  SogParts parts_;
   size_t count_ = 0;
   RawSplats splats_;
 };
@@ -210,7 +261,27 @@ class SogReader {
 }  // namespace
 
 bool looks_like_sog(std::string_view bytes) {
-  return bytes.substr(0, 4) == std::string_view("PK\x03\x04", 4);
+  return bytes.substr(0, 4) == std::string_view("PK\x03\x04", 4) || is_sog_meta(bytes);
+}
+
+SogCount stated_sog_splats(std::string_view bytes, const std::filesystem::path& path) {
+  constexpr size_t kImageHeader = 64;  // more than WebP has before the size
+  const SogParts parts(bytes, path);
+  const JsonValue meta = parts.meta();
+  SogCount out;
+  out.splats = static_cast<uint64_t>(meta.at("count").count());
+  if (const auto harmonics = meta.find("shN")) {
+    const auto side = static_cast<uint64_t>(std::min(harmonics->at("bands").count(), 3)) + 1;
+    out.harmonics = side * side;
+  }
+  const std::string start = parts.image_start(image_name(meta.at("means"), 0), kImageHeader);
+  int width = 0;
+  int height = 0;
+  const auto* const first = reinterpret_cast<const uint8_t*>(start.data());
+  if (WebPGetInfo(first, start.size(), &width, &height) != 0) {
+    out.splats = std::min(out.splats, static_cast<uint64_t>(width) * static_cast<uint64_t>(height));
+  }
+  return out;
 }
 
 RawSplats parse_sog(std::string_view bytes, const std::filesystem::path& path) {

@@ -41,8 +41,8 @@ RawSplats parse(std::string bytes, const std::filesystem::path& path) {
   refuse_foreign_content(path, all, "splats");
   throw BadInput(Defect::Magic,
                  path,
-                 "no splats: expected .ply, .spz, .sog, .ksplat, .glb, .gltf, or records of .splat "
-                 "(32 bytes each)");
+                 "no splats: expected .ply, .spz, .sog or its meta.json, .ksplat, .glb, .gltf, or "
+                 "records of .splat (32 bytes each)");
 }
 
 }  // namespace
@@ -53,6 +53,12 @@ std::optional<SplatCount> stated_splats(const std::filesystem::path& path) {
   std::error_code unknown;
   out.file_bytes = std::filesystem::file_size(path, unknown);
   if (unknown) return {};
+  if (looks_like_sog(start)) {
+    const SogCount found = stated_sog_splats(read_file(path), path);
+    out.splats = found.splats;
+    out.harmonics = found.harmonics;
+    return out;
+  }
   if (looks_like_gltf(start, path)) {
     const GlbSplatCount found = count_glb_splats(path);
     out.splats = found.splats;
@@ -67,8 +73,7 @@ std::optional<SplatCount> stated_splats(const std::filesystem::path& path) {
   }
   if (start.substr(0, 3) != "ply") {
     constexpr uint64_t kRecord = 32;
-    const bool is_plain = !looks_like_sog(start) && !looks_like_ksplat(start);
-    if (!is_plain || out.file_bytes % kRecord != 0) return {};
+    if (looks_like_ksplat(start) || out.file_bytes % kRecord != 0) return {};
     out.splats = out.file_bytes / kRecord;
     return out;
   }

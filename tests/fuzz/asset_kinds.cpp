@@ -119,6 +119,11 @@ void add_splats(Kinds& kinds) {
     sog.add_harmonics();
     write_bytes(file, sog.bytes());
   }));
+  kinds.push_back(of_splats("sog-unpacked", "meta.json", [](const fs::path& file) {
+    SogFile sog;
+    sog.add_harmonics();
+    sog.unpack(file.parent_path());
+  }));
   kinds.push_back(of_own_splats("packed-ply-of-ours",
                                 "a.compressed.ply",
                                 [](const fs::path& file, const Gaussians& g, const Frame& f) {

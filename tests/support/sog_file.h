@@ -3,13 +3,16 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <webp/encode.h>
 
+#include "tests/support/temp_dir.h"
 #include "tests/support/zip_bytes.h"
 
 namespace cgs::test {
@@ -66,18 +69,24 @@ struct SogFile {
     meta["shN"] = {{"count", 2}, {"bands", 1}, {"files", {"palette.webp", "labels.webp"}}};
     for (int i = 0; i < 256; ++i) meta["shN"]["codebook"].push_back(0.0078125 * i);
   }
-  std::string bytes() const {
+  /// meta.json and its images, by their names.
+  std::vector<std::pair<std::string, std::string>> files() const {
     std::vector<SogPixel> palette(64 * 3, SogPixel{0, 0, 0, 255});
     palette[3] = {1, 2, 3, 255};  // of the second entry
     palette[5] = {7, 8, 9, 255};
-    return zip_bytes({{"meta.json", meta.dump()},
-                      {"low.webp", webp(low, static_cast<int>(low.size()))},
-                      {"high.webp", webp(high, 2)},
-                      {"quats.webp", webp(rotation, 2)},
-                      {"scales.webp", webp(scale, 2)},
-                      {"sh0.webp", webp(color, 2)},
-                      {"palette.webp", webp(palette, 64 * 3)},
-                      {"labels.webp", webp(labels, 2)}});
+    return {{"meta.json", meta.dump()},
+            {"low.webp", webp(low, static_cast<int>(low.size()))},
+            {"high.webp", webp(high, 2)},
+            {"quats.webp", webp(rotation, 2)},
+            {"scales.webp", webp(scale, 2)},
+            {"sh0.webp", webp(color, 2)},
+            {"palette.webp", webp(palette, 64 * 3)},
+            {"labels.webp", webp(labels, 2)}};
+  }
+  std::string bytes() const { return zip_bytes(files()); }
+  /// The same unpacked, as programs that serve it from the web have it.
+  void unpack(const std::filesystem::path& folder) const {
+    for (const auto& [name, content] : files()) write_bytes(folder / name, content);
   }
 };
 

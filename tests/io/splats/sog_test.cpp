@@ -65,6 +65,54 @@ TEST(Sog, LooksHarmonicsUpInThePalette) {
   EXPECT_EQ(out.sh[5], Eigen::Vector3f::Zero());
 }
 
+std::string defect_of_unpacked(const std::filesystem::path& folder) {
+  try {
+    (void)read_splats(folder / "meta.json");
+  } catch (const BadInput& error) {
+    return std::string(defect_name(error.defect()));
+  }
+  return "OK";
+}
+
+TEST(Sog, IsReadUnpackedByItsMeta) {
+  SogFile file;
+  file.add_harmonics();
+  file.meta["asset"] = {{"generator", "splat-transform v1.0"}};  // a key of glTF
+  const test::TempDir dir;
+  file.unpack(dir.path());
+  const GaussianFile out = read_splats(dir / "meta.json");
+  test::write_bytes(dir / "a.sog", file.bytes());
+  const GaussianFile packed = read_splats(dir / "a.sog");
+  EXPECT_EQ(out.format, "SOG 2");
+  ASSERT_EQ(out.gaussians.size(), 2u);
+  EXPECT_EQ(out.gaussians.position, packed.gaussians.position);
+  EXPECT_EQ(out.gaussians.sh, packed.gaussians.sh);
+}
+
+TEST(Sog, UnpackedReadsNothingOutsideOfItsFolder) {
+  const test::TempDir dir;
+  const std::filesystem::path inner = dir / "inner";
+  std::filesystem::create_directory(inner);
+  SogFile file;
+  file.unpack(dir.path());
+  file.unpack(inner);
+  EXPECT_EQ(defect_of_unpacked(inner), "OK");
+  file.meta["sh0"]["files"] = nlohmann::json::array({"../sh0.webp"});
+  test::write_bytes(inner / "meta.json", file.meta.dump());
+  EXPECT_EQ(defect_of_unpacked(inner), "PATH");
+  file.meta["sh0"]["files"] = nlohmann::json::array({"other.webp"});
+  test::write_bytes(inner / "meta.json", file.meta.dump());
+  EXPECT_EQ(defect_of_unpacked(inner), "OPEN");
+}
+
+TEST(Sog, SaysThatPicturesInPngAreNotRead) {
+  SogFile file;
+  const test::TempDir dir;
+  file.unpack(dir.path());
+  test::write_bytes(dir / "sh0.webp", "\x89PNG\r\n\x1a\n and so on");
+  EXPECT_EQ(defect_of_unpacked(dir.path()), "UNSUPPORTED");
+}
+
 TEST(Sog, RefusesWhatDoesNotFitTogether) {
   const auto with = [](const auto& change) {
     SogFile file;
@@ -82,6 +130,7 @@ TEST(Sog, RefusesWhatDoesNotFitTogether) {
   EXPECT_EQ(with([](SogFile& f) { f.meta["scales"]["codebook"].erase(3); }), "SCHEMA");
   EXPECT_EQ(with([](SogFile& f) { f.meta["sh0"]["files"] = {"../low.webp"}; }), "MISSING");
   EXPECT_EQ(with([](SogFile& f) { f.meta["sh0"]["files"] = {"meta.json"}; }), "SYNTAX");
+  EXPECT_EQ(with([](SogFile& f) { f.meta["means"]["files"].erase(1); }), "SCHEMA");
   EXPECT_EQ(with([](SogFile& f) { f.labels[1] = {2, 0, 0, 255}; }), "REF");
   EXPECT_EQ(with([](SogFile& f) { f.meta["shN"]["bands"] = 2; }), "COUNT");
 }

@@ -11,6 +11,7 @@
 #include "io/splats/spz.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/sample_splats.h"
+#include "tests/support/sog_file.h"
 #include "tests/support/temp_dir.h"
 
 namespace cgs::splat_reader_test {
@@ -63,6 +64,25 @@ TEST(SplatReader, TellsSizesBeforeReading) {
   write_spz(dir / "some.spz", test::varied_splats(7, 0), Frame{});
   EXPECT_EQ(stated_splats(dir / "some.spz")->splats, 7u);
   EXPECT_EQ(stated_splats(dir / "some.spz")->harmonics, 1u);
+}
+
+TEST(SplatReader, TellsSizesOfSogByItsMeta) {
+  const test::TempDir dir;
+  test::SogFile file;
+  file.add_harmonics();
+  file.meta["shN"]["bands"] = 3;
+  test::write_bytes(dir / "some.sog", file.bytes());
+  file.unpack(dir.path());
+  for (const char* name : {"some.sog", "meta.json"}) {
+    const std::optional<SplatCount> stated = stated_splats(dir / name);
+    ASSERT_TRUE(stated.has_value()) << name;
+    EXPECT_EQ(stated->splats, 2u) << name;
+    EXPECT_EQ(stated->harmonics, 16u) << name;
+    EXPECT_EQ(stated->file_bytes, std::filesystem::file_size(dir / name)) << name;
+  }
+  file.meta["count"] = 2'000'000'000;
+  test::write_bytes(dir / "some.sog", file.bytes());
+  EXPECT_EQ(stated_splats(dir / "some.sog")->splats, 2u) << "its pictures hold no more";
 }
 
 /// Files that other programs made. Counts and corners are those that another reader finds.
