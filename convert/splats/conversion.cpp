@@ -69,11 +69,7 @@ bool holds_mesh(const std::filesystem::path& path) {
     if (faces != nullptr && faces->count > 0) return true;
   }
   const PlyElement* const vertex = header->find("vertex");
-  if (vertex == nullptr || vertex->find("x") < 0) return false;
-  const auto of_splats = {"f_dc_0", "opacity", "scale_0", "rot_0", "packed_position"};
-  return std::none_of(of_splats.begin(), of_splats.end(), [&](const char* name) {
-    return vertex->find(name) >= 0;
-  });
+  return vertex != nullptr && vertex->find("x") >= 0 && !is_splat_file(path);
 }
 
 /// \throws LimitError before a file is read that would not fit

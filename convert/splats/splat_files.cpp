@@ -191,7 +191,8 @@ bool is_splat_file(const std::filesystem::path& path) {
   const PlyElement* vertex = header ? header->find("vertex") : nullptr;
   if (vertex == nullptr) return false;
   const auto has = [&](const char* name) { return vertex->find(name) >= 0; };
-  return has("packed_position") || has("rot_0") || (has("scale_0") && has("f_dc_0"));
+  const int parts = int{has("f_dc_0")} + int{has("opacity")} + int{has("scale_0")};
+  return has("packed_position") || has("rot_0") || parts >= 2;
 }
 
 Json write_splat_file(const std::filesystem::path& path,

@@ -14,8 +14,8 @@
 
 namespace cgs {
 
-/// True for a PLY file whose vertices have what makes a splat, and for a .glb or .gltf file of
-/// splats.
+/// True for a PLY file whose vertices have what makes a splat, or so much of it that a part is
+/// missing, and for a .glb or .gltf file of splats. Opacity alone makes none: clouds have it, too.
 /// \throws BadInput as read_ply_header() and is_splat_glb()
 bool is_splat_file(const std::filesystem::path& path);
 

@@ -311,6 +311,17 @@ TEST_F(Conversion, TellsPlainCloudsAndTriangleStripsFromSplats) {
   EXPECT_NE(refused("a.obj").find("cgs filter makes a surface of it"), std::string::npos);
   EXPECT_NE(refused("a.spz").find("of a plain point cloud it cannot make splats"),
             std::string::npos);
+  const std::string opacity = "property float opacity\nend_header\n";
+  test::write_bytes(dir_ / "hazy.ply", start + opacity + "0 0 0 1\n1 0 0 1\n0 1 0 0\n1 1 0 1\n");
+  convert("hazy.ply", "again.ply");
+  EXPECT_EQ(read_mesh_ply(dir_ / "again.ply").mesh.vertices.size(), 4U);
+  test::write_bytes(dir_ / "broken.ply",
+                    start + "property float f_dc_0\n" + opacity + "0 0 0 1 1\n1 0 0 1 1\n" +
+                        "0 1 0 1 1\n1 1 0 1 1\n");
+  EXPECT_NE(test::message_of([&] {
+              convert("broken.ply", "again.ply");
+            }).find("missing property scale_0"),
+            std::string::npos);
   test::write_bytes(dir_ / "strips.ply",
                     start +
                         "element tristrips 1\nproperty list int int vertex_indices\n"

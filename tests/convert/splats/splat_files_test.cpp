@@ -154,5 +154,21 @@ TEST(SplatFileToJson, StatesCountsAndBounds) {
   EXPECT_NEAR(info["bounds"]["max"][2].get<double>(), 2.5, 1e-2);
 }
 
+TEST(IsSplatFile, IsToldByWhatVerticesHave) {
+  const test::TempDir dir;
+  const auto with = [&](const std::vector<std::string>& names) {
+    std::string text = "ply\nformat ascii 1.0\nelement vertex 0\n";
+    for (const std::string& name : names) text += "property float " + name + "\n";
+    test::write_bytes(dir / "a.ply", text + "end_header\n");
+    return is_splat_file(dir / "a.ply");
+  };
+  EXPECT_FALSE(with({"x", "y", "z", "red", "green", "blue", "opacity"}));
+  EXPECT_FALSE(with({"x", "y", "z", "scale_0"}));
+  EXPECT_TRUE(with({"x", "y", "z", "opacity", "f_dc_0"})) << "a splat that lacks something";
+  EXPECT_TRUE(with({"x", "y", "z", "opacity", "scale_0"}));
+  EXPECT_TRUE(with({"x", "y", "z", "rot_0"}));
+  EXPECT_TRUE(with({"packed_position"}));
+}
+
 }  // namespace
 }  // namespace cgs::splat_files_test
