@@ -10,7 +10,7 @@ namespace cgs {
 
 namespace {
 
-constexpr size_t kMaxProperties = 256;
+constexpr size_t kMaxProperties = 4096;  // splats with features have hundreds
 constexpr size_t kMaxElements = 64;
 
 std::vector<std::string_view> split(std::string_view line) {
@@ -64,10 +64,12 @@ class HeaderParser {
       : bytes_(bytes), path_(path), limits_(limits) {}
 
   PlyHeader parse() {
-    if (bytes_.substr(0, 4) != "ply\n" && bytes_.substr(0, 5) != "ply\r\n") {
+    if (!bytes_.starts_with("ply\n") && !bytes_.starts_with("ply\r")) {
       refuse_foreign_content(path_, bytes_, "PLY");
       throw BadInput(Defect::Magic, path_, "expected PLY, the first line is not 'ply'");
     }
+    // As plyfile has it: the first line says how all of them end.
+    if (bytes_.starts_with("ply\r") && !bytes_.starts_with("ply\r\n")) header_.line_end = '\r';
     (void)next_line();
     bool has_format = false;
     for (;;) {
@@ -100,7 +102,7 @@ class HeaderParser {
   std::string_view next_line() {
     ++line_;
     const std::string_view rest = bytes_.substr(offset_);
-    const size_t end = rest.find('\n');
+    const size_t end = rest.find(header_.line_end);
     if (offset_ + std::min(end, rest.size()) > limits_.max_header_bytes) {
       throw LimitError(printable(path_) + ": header exceeds " +
                        std::to_string(limits_.max_header_bytes >> 10) + " KiB");

@@ -38,15 +38,16 @@ struct PlyHeader {
   std::vector<std::string> comments;  ///< Text after "comment " and "obj_info ".
   size_t data_offset = 0;             ///< First byte after the end_header line.
   size_t line_count = 0;              ///< Lines of the header.
+  char line_end = '\n';               ///< Of its lines, and those of ASCII; may have '\r' before.
 
   const PlyElement* find(std::string_view element) const;
 };
 
-/// Reads the header of a PLY file, both line ends allowed.
+/// Reads the header of a PLY file. Lines may end in LF, CR LF or CR.
 ///
 /// \throws BadInput Magic (no "ply" line), Syntax (with the line number), Unsupported (format,
 ///         version, scalar type); LimitError for headers above limits.max_header_bytes or elements
-///         with more than 256 properties.
+///         with more than 4096 properties.
 /// Source: G. Turk, "The PLY Polygon File Format", 1994.
 PlyHeader parse_ply_header(std::string_view bytes,
                            const std::filesystem::path& path,

@@ -115,8 +115,8 @@ bool is_too_large(std::string_view token, double value) {
 /// One record per line, as every writer does it.
 class AsciiRows {
  public:
-  AsciiRows(std::string_view data, const std::filesystem::path& path, size_t first_line)
-      : data_(data), path_(path), line_(first_line) {}
+  AsciiRows(std::string_view data, const std::filesystem::path& path, const PlyHeader& header)
+      : data_(data), path_(path), line_(header.line_count), line_end_(header.line_end) {}
 
   void expect(const PlyElement& element) const {
     if (element.properties.empty() || element.count <= data_.size()) return;
@@ -154,7 +154,7 @@ class AsciiRows {
     do {
       ++line_;
       if (data_.empty()) fail(Defect::Truncated, "the file ends within element " + element.name);
-      const size_t end = std::min(data_.find('\n'), data_.size());
+      const size_t end = std::min(data_.find(line_end_), data_.size());
       rest_ = data_.substr(0, end);
       data_.remove_prefix(std::min(end + 1, data_.size()));
     } while (rest_.find_first_not_of(" \t\r") == std::string_view::npos);
@@ -190,6 +190,7 @@ class AsciiRows {
   std::string_view data_;
   const std::filesystem::path& path_;
   size_t line_;
+  char line_end_;
   std::string_view rest_;
 };
 
@@ -216,7 +217,7 @@ uint64_t read_ply_rows(std::string_view bytes,
                        const PlyRowVisitor& visit) {
   const std::string_view data = bytes.substr(header.data_offset);
   if (header.format == PlyFormat::Ascii) {
-    return visit_all(AsciiRows(data, path, header.line_count), header, visit);
+    return visit_all(AsciiRows(data, path, header), header, visit);
   }
   const bool big_endian = header.format == PlyFormat::BinaryBigEndian;
   return visit_all(BinaryRows(data, path, big_endian), header, visit);

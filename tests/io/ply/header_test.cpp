@@ -37,6 +37,25 @@ TEST(ParsePlyHeader, ReadsElementsPropertiesAndComments) {
   EXPECT_EQ(text.substr(header.data_offset), "DATA");
 }
 
+TEST(ParsePlyHeader, LinesMayEndInCarriageReturnsAlone) {
+  const std::string text =
+      "ply\rformat binary_little_endian 1.0\rcomment why\relement vertex 1\r"
+      "property float x\rend_header\r\nDA";
+  const PlyHeader header = parse_ply_header(text, "a.ply");
+  EXPECT_EQ(header.comments, std::vector<std::string>{"why"});
+  EXPECT_EQ(header.find("vertex")->count, 1u);
+  EXPECT_EQ(text.substr(header.data_offset), "\nDA") << "a line feed is data";
+  EXPECT_EQ(header.line_count, 6u);
+}
+
+// As splats with a feature of every kind have them: semantic_0 to semantic_255, and their shape.
+TEST(ParsePlyHeader, ElementsMayHaveHundredsOfProperties) {
+  std::string text = kStart + "element vertex 1\n";
+  for (int i = 0; i < 256; ++i) text += "property float semantic_" + std::to_string(i) + "\n";
+  const PlyHeader header = parse_ply_header(text + kEnd, "a.ply");
+  EXPECT_EQ(header.find("vertex")->properties.size(), 257u);
+}
+
 TEST(ParsePlyHeader, NamesWhatIsWrong) {
   EXPECT_EQ(defect("plyx\n"), "MAGIC");
   EXPECT_EQ(defect("<!DOCTYPE html>"), "MAGIC");

@@ -71,6 +71,17 @@ TEST(ReadPlyRows, AllThreeFormatsAgree) {
   }
 }
 
+TEST(ReadPlyRows, LinesMayEndInAnyOfThreeWays) {
+  const std::string text = header("ascii", "2") + "1.5 -2 3 7 -8 9\n-0.25 300 0\n";
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    std::string bytes;
+    for (const char c : text) bytes += c == '\n' ? end : std::string(1, c);
+    const Seen seen = read(bytes);
+    EXPECT_EQ(seen.rows, (std::vector<std::vector<double>>{{1.5, -2, 3}, {-0.25, 300, 0}}));
+    EXPECT_EQ(seen.trailing, 0u);
+  }
+}
+
 TEST(ReadPlyRows, CountsBytesAfterTheLastRecord) {
   EXPECT_EQ(read(header("binary_little_endian", "1") + record(1, 2, {3}, false) + "abc").trailing,
             3u);
