@@ -94,7 +94,7 @@ std::string ply_evidence_comment(const std::string& evidence) {
   if (words.size() > kLongest) {
     size_t end = kLongest;
     while (end > 0 && (words[end] & '\xc0') == '\x80') --end;  // not amid a character
-    words = words.substr(0, end) + "…";
+    words = words.substr(0, end) + "...";  // some readers take headers for ASCII
   }
   return "comment " + std::string(kEvidence) + words + "\n";
 }

@@ -49,7 +49,7 @@ TEST(PlyEvidence, IsOneLineOfBoundedLength) {
   EXPECT_LT(ply_evidence_comment(std::string(5000, 'a')).size(), 1024u);
   std::string accents = "a";
   for (int i = 0; i < 1000; ++i) accents += "é";
-  EXPECT_TRUE(ply_evidence_comment(accents).ends_with("é…\n"));
+  EXPECT_TRUE(ply_evidence_comment(accents).ends_with("é...\n"));
 }
 
 TEST(PlyEvidence, IsReadFromFilesOfOursAlone) {

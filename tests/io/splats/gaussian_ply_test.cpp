@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/splats/gaussian_ply.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -355,6 +356,20 @@ TEST(GaussianPly, BringsTagsOfWhatIsMadeUpBackAlsoAfterItsFrameIsToldAnew) {
   EXPECT_EQ(back.gaussians.synthetic, g.synthetic);
   EXPECT_EQ(back.gaussians.synthetic_sources, g.synthetic_sources);
   EXPECT_EQ(back.gaussians.provenance, g.provenance);
+}
+
+// plyfile of Python refuses a header with any other byte.
+TEST(GaussianPly, NamesOfPaintedPicturesAreAsciiInTheHeader) {
+  const test::TempDir dir;
+  Gaussians g = sample(1);
+  g.synthetic.assign(g.size(), 1);
+  g.synthetic_sources = {{"h\xC3\xB6hle 50% of%20it.png", std::string(64, 'a')}};
+  write_gaussian_ply(dir / "a.ply", g, exact_frame());
+  const std::string bytes = test::read_bytes(dir / "a.ply");
+  const std::string head = bytes.substr(0, bytes.find("end_header"));
+  EXPECT_TRUE(std::all_of(head.begin(), head.end(), [](char c) { return c > 0; }));
+  EXPECT_NE(head.find(" h%C3%B6hle 50%25 of%2520it.png\n"), std::string::npos) << head;
+  EXPECT_EQ(read_gaussian_ply(dir / "a.ply").gaussians.synthetic_sources, g.synthetic_sources);
 }
 
 // Whoever took the list of pictures away did not make a photograph of it.
