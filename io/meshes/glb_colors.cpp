@@ -30,9 +30,12 @@ int wrapped(int64_t at, int size, int wrap) {
 Eigen::Vector3f sampled(const ColorImage& image,
                         const std::array<double, 2>& uv,
                         const std::array<int, 2>& wrap) {
-  constexpr double kFarthest = 1e6;  // repetitions
-  const double x = std::clamp(uv[0], -kFarthest, kFarthest) * image.width - 0.5;
-  const double y = std::clamp(uv[1], -kFarthest, kFarthest) * image.height - 0.5;
+  constexpr double kFarthest = 1e6;     // repetitions
+  const auto bounded = [&](double t) {  // large numbers transform to none
+    return std::isfinite(t) ? std::clamp(t, -kFarthest, kFarthest) : 0;
+  };
+  const double x = bounded(uv[0]) * image.width - 0.5;
+  const double y = bounded(uv[1]) * image.height - 0.5;
   const auto left = static_cast<int64_t>(std::floor(x));
   const auto top = static_cast<int64_t>(std::floor(y));
   Eigen::Vector3f out = Eigen::Vector3f::Zero();

@@ -359,11 +359,14 @@ class MeshRows {
   }
 
   void require_vertex(double corner, const char* what, uint64_t row_number) const {
-    if (corner >= 0 && corner < static_cast<double>(vertex_count_)) return;
+    const bool is_whole = std::abs(corner) < 1e15 && corner == std::floor(corner);  // no NaN
+    if (is_whole && corner >= 0 && corner < static_cast<double>(vertex_count_)) return;
+    std::string number;
+    if (is_whole) append_number(number, static_cast<int64_t>(corner));
+    if (!is_whole) append_number(number, corner);  // of a list of floats
     throw BadInput(Defect::Ref,
                    path_,
-                   what + std::to_string(row_number) + " names vertex " +
-                       std::to_string(static_cast<int64_t>(corner)) + " of " +
+                   what + std::to_string(row_number) + " names vertex " + number + " of " +
                        std::to_string(vertex_count_));
   }
 

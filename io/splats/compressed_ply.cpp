@@ -226,7 +226,7 @@ class PackedRows {
     if (chunk_.find("min_r") >= 0) {
       for (const char* channel : {"r", "g", "b"}) add_range(color_, "", channel);
     }
-    for (size_t k = 0; k < packed_.size(); ++k) packed_.at(k) = column(vertex_, kPacked.at(k));
+    for (size_t k = 0; k < packed_.size(); ++k) packed_.at(k) = word_column(kPacked.at(k));
     const PlyElement* sh = header.find("sh");
     if (sh != nullptr) find_coefficients(*sh);
     const uint64_t needed = (vertex_.count + kChunk - 1) / kChunk;
@@ -251,6 +251,15 @@ class PackedRows {
     const int i = element.find(name);
     if (i < 0 || element.properties[static_cast<size_t>(i)].is_list) {
       fail(Defect::Schema, "element " + element.name + " has no number " + name);
+    }
+    return i;
+  }
+
+  int word_column(const char* name) const {
+    const int i = column(vertex_, name);
+    const PlyType type = vertex_.properties[static_cast<size_t>(i)].type;
+    if (type != PlyType::UInt32 && type != PlyType::Int32) {
+      fail(Defect::Schema, std::string(name) + " is no whole number of 32 bits");
     }
     return i;
   }

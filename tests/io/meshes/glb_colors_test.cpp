@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/meshes/glb_colors.h"
 
+#include <cstring>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -109,6 +111,17 @@ TEST(GlbColors, TexturesAreTurnedScaledAndMoved) {
   // either side (1/4, 1/4).
   transform["scale"] = {1, 3};
   EXPECT_LT((t.linear_colors()[1] - Eigen::Vector3f(1, 0, 0)).norm(), 1e-4f);
+}
+
+// Infinity times a sine of 0 is no number.
+TEST(GlbColors, CoordinatesThatTransformToNoNumberAreTheCorner) {
+  TexturedTriangle t;
+  const float far = 1e30f;
+  std::memcpy(t.binary.data() + t.json["bufferViews"][2]["byteOffset"].get<size_t>(), &far, 4);
+  t.material()["baseColorTexture"]["extensions"]["KHR_texture_transform"] = {{"scale", {1e300, 1}},
+                                                                             {"rotation", 0}};
+  EXPECT_LT((t.linear_colors()[0] - Eigen::Vector3f(0.5f, 0.5f, 0.5f)).norm(), 1e-3f)
+      << "the mean of all four pixels, which repeat";
 }
 
 TEST(GlbColors, TheTransformOfATextureMayNameOtherCoordinates) {

@@ -253,6 +253,18 @@ TEST(MeshPly, RefusesWhatIsNoMesh) {
             "VALUE");
 }
 
+// Lists of floats are allowed, but not every float is a number of a vertex.
+TEST(MeshPly, RefusesVerticesThatAreNoWholeNumbers) {
+  std::string start = kTriangle;
+  const std::string usual = "list uchar int";
+  start.replace(start.find(usual), usual.size(), "list uchar float");
+  start += "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 ";
+  EXPECT_EQ(defect(start + "2\n"), "OK");
+  for (const std::string corner : {"1.5", "nan", "inf", "1e300", "-1e300"}) {
+    EXPECT_EQ(defect(start + corner + "\n"), "REF") << corner;
+  }
+}
+
 TEST(MeshPly, WarnsOfTrailingBytesAndFacesThatAreNone) {
   const test::TempDir dir;
   test::write_bytes(dir / "a.ply", kTriangle + "0 0 0\n1 0 0\n0 1 0\n0 0 1\n2 0 1\nleft over\n");

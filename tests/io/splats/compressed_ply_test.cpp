@@ -42,6 +42,18 @@ TEST(CompressedPly, UnpacksWithinTheRangesOfTheChunk) {
   EXPECT_LT((plain - Eigen::Vector3f(1, 1, 1)).norm(), 1e-6f);
 }
 
+TEST(CompressedPly, PacksIntoWholeNumbersOf32Bits) {
+  const auto with = [](const std::string& type) {
+    std::string bytes = PackedFile().bytes();
+    const std::string usual = "uint packed_scale";
+    bytes.replace(bytes.find(usual), usual.size(), type + " packed_scale");
+    return test::defect_of(bytes, [](const auto& path) { (void)read_splats(path); });
+  };
+  EXPECT_EQ(with("uint"), "OK");
+  EXPECT_EQ(with("int"), "OK");
+  EXPECT_EQ(with("float"), "SCHEMA") << "some of which are no numbers";
+}
+
 // 11, 10, 11 bits: a number in the middle of each shows where the borders are.
 TEST(CompressedPly, KnowsItsBits) {
   PackedFile file;
