@@ -9,6 +9,13 @@ namespace cgs {
 namespace {
 
 constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
+constexpr uint64_t kMostInstances = uint64_t{1} << 20;
+
+void refuse_many_instances(const GlbContainer& file, uint64_t count) {
+  if (count <= kMostInstances) return;
+  throw LimitError(printable(file.path()) + ": nodes show meshes more than " +
+                   std::to_string(kMostInstances) + " times");
+}
 
 /// The matrix of a node: given as such, or as translation, rotation and scale.
 Eigen::Affine3d node_matrix(const JsonValue& node) {
@@ -37,7 +44,9 @@ std::vector<Eigen::Affine3d> places_of_mesh(const GlbContainer& file, const Json
   const auto values = [&](const char* name, size_t components) -> std::vector<float> {
     const auto index = attributes.find(name);
     if (!index) return {};
-    auto out = file.floats(file.element("accessors", *index), static_cast<int>(components));
+    const JsonValue accessor = file.element("accessors", *index);
+    refuse_many_instances(file, whole_number(accessor.at("count")));
+    auto out = file.floats(accessor, static_cast<int>(components));
     if (count != 0 && out.size() != components * count) {
       index->fail(Defect::Count, "differs in length from the other attributes");
     }
@@ -135,7 +144,9 @@ class NodeVisitor {
       const JsonValue mesh = file_.element("meshes", *index);
       const auto own_weights = node.find("weights");
       const auto weights = own_weights ? own_weights : mesh.find("weights");
-      for (const Eigen::Affine3d& place : places_of_mesh(file_, node)) {
+      const std::vector<Eigen::Affine3d> places = places_of_mesh(file_, node);
+      refuse_many_instances(file_, out_.instances.size() + places.size());
+      for (const Eigen::Affine3d& place : places) {
         out_.instances.push_back({mesh, world * place, weights});
       }
     }

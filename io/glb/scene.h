@@ -31,7 +31,7 @@ struct GlbScene {
 /// those that KHR_node_visibility hides.
 /// \throws BadInput Unsupported for a required extension that is not known, or for a skin; Ref for
 ///         a node with two parents; Schema, Count, Value for a node's matrix; LimitError for nodes
-///         too deep
+///         too deep, and for meshes shown more than 2^20 times
 /// Source: glTF 2.0, section 3.5, EXT_mesh_gpu_instancing and KHR_node_visibility, Khronos Group.
 GlbScene glb_scene(const GlbContainer& file);
 

@@ -249,6 +249,11 @@ uint64_t stated_elements(const GlbContainer& file, const JsonValue& primitive) {
       return count > 1 ? count : 0;
     case kLineStrip:
       return count > 1 ? count - 1 : 0;
+    case kTriangleList:
+      return count / 3;
+    case kTriangleStrip:
+    case kTriangleFan:
+      return count > 2 ? count - 2 : 0;
     default:
       return count / 2;
   }

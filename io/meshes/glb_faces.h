@@ -16,8 +16,7 @@ enum class GlbKind { Points, Lines, Triangles };
 /// \throws BadInput Schema for a mode that glTF 2.0 does not know
 GlbKind glb_kind(const JsonValue& primitive);
 
-/// How many points or line segments a primitive states to have.
-/// \pre it is none of triangles
+/// How many points, line segments or triangles a primitive states to have.
 /// \throws BadInput as GlbContainer
 uint64_t stated_elements(const GlbContainer& file, const JsonValue& primitive);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 #include <utility>
@@ -35,6 +36,7 @@ class SceneReader {
   GlbMesh read() {
     const GlbScene scene = glb_scene(file_);
     is_cloud_ = !shows_triangles(scene);
+    refuse_multiplication(scene);
     for (const GlbInstance& instance : scene.instances) add_mesh(instance);
     TriangleMesh& mesh = out_.parsed.mesh;
     if (is_cloud_ ? out_.parsed.positions.empty() : mesh.faces.empty()) {
@@ -70,6 +72,38 @@ class SceneReader {
       }
     }
     return false;
+  }
+
+  // Nodes show meshes again and again, and meshes share arrays: the size of the file is no bound.
+  void refuse_multiplication(const GlbScene& scene) const {
+    constexpr double kMayMultiplyTo = 1 << 25;
+    std::map<std::string, double> costs;             // of meshes
+    std::set<std::pair<uint64_t, uint64_t>> arrays;  // of corners and positions
+    double shown = 0;
+    double stored = 0;
+    for (const GlbInstance& instance : scene.instances) {
+      const auto [known, is_new] = costs.try_emplace(instance.mesh.pointer(), 0.0);
+      const JsonValue primitives = instance.mesh.at("primitives");
+      for (size_t i = 0; is_new && i < primitives.size(); ++i) {
+        const JsonValue primitive = primitives.at(i);
+        known->second += 1;  // that of looking at it
+        stored += 1;
+        if (extension_of(primitive, kGaussianSplatting) || !is_read(glb_kind(primitive))) continue;
+        const auto corners = primitive.find("indices");
+        const JsonValue positions = primitive.at("attributes").at("POSITION");
+        const uint64_t vertices = whole_number(file_.element("accessors", positions).at("count"));
+        const auto cost = double(std::max(stated_elements(file_, primitive), vertices));
+        known->second += cost;
+        const bool is_first =
+            arrays.emplace(whole_number(corners.value_or(positions)), whole_number(positions))
+                .second;
+        if (is_first) stored += cost;
+      }
+      shown += known->second;
+    }
+    if (shown <= std::max(kMayMultiplyTo, stored)) return;
+    throw LimitError(printable(file_.path()) + ": nodes show meshes so often that there are more " +
+                     "than 33 million triangles or vertices");
   }
 
   void warn_of_what_is_left_out() {

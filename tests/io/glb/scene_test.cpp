@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "io/meshes/glb_reader.h"
+#include "libcgs/core/error.h"
 #include "tests/support/triangle_glb.h"
 
 namespace cgs::glb_scene_test {
@@ -69,6 +70,17 @@ TEST(GlbScene, NodesShareMeshes) {
     const auto corner = [&](size_t k) { return mesh.parsed.positions[face.at(k)]; };
     EXPECT_GT((corner(1) - corner(0)).cross(corner(2) - corner(0)).z(), 0);
   }
+}
+
+// The count is judged before anything is read: the buffer holds only one.
+TEST(GlbScene, AMeshIsNotShownMoreThanAMillionTimes) {
+  test::TriangleGlb t;
+  t.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = 3;
+  t.json["accessors"].push_back(t.json["accessors"][1]);
+  t.json["accessors"][3]["count"] = (1 << 20) + 1;
+  EXPECT_THROW(read(t), LimitError);
+  t.json["accessors"][3]["count"] = 1 << 20;
+  EXPECT_THROW(read(t), BadInput) << "the buffer does not hold that many";
 }
 
 }  // namespace

@@ -121,6 +121,32 @@ TEST(ReadGlb, InstancesAreShownWhereTheyAreListed) {
   EXPECT_EQ(defect(t.bytes()), "COUNT");
 }
 
+// A small file that would fill the memory: 3000 triangles in 12,000 places.
+TEST(ReadGlb, RefusesMeshesThatAreShownTooOften) {
+  Triangle t;
+  const auto add = [&](const std::string& bytes, const Json& accessor) {
+    t.binary.resize((t.binary.size() + 3) / 4 * 4);
+    t.json["bufferViews"].push_back(
+        {{"buffer", 0}, {"byteOffset", t.binary.size()}, {"byteLength", bytes.size()}});
+    t.binary += bytes;
+    t.json["buffers"][0]["byteLength"] = t.binary.size();
+    t.json["accessors"].push_back(accessor);
+    t.json["accessors"].back()["bufferView"] = t.json["bufferViews"].size() - 1;
+    return t.json["accessors"].size() - 1;
+  };
+  std::string corners;
+  for (int i = 0; i < 3000; ++i) corners += std::string("\0\1\2", 3);
+  t.json["meshes"][0]["primitives"][0]["indices"] =
+      add(corners, {{"componentType", 5121}, {"count", 9000}, {"type", "SCALAR"}});
+  const size_t places = add(std::string(size_t{12} * 12'000, '\0'),
+                            {{"componentType", 5126}, {"count", 12'000}, {"type", "VEC3"}});
+  t.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+      {"TRANSLATION", places}};
+  EXPECT_EQ(defect(t.bytes()), "LIMIT");
+  t.json["accessors"][places]["count"] = 2;
+  EXPECT_EQ(t.read().parsed.mesh.faces.size(), 6000U);
+}
+
 TEST(ReadGlb, PointsBesideTrianglesAddNothing) {
   Triangle t;
   t.json["meshes"][0]["primitives"].push_back({{"mode", 0}, {"attributes", {{"POSITION", 3}}}});
