@@ -195,6 +195,13 @@ bool is_splat_file(const std::filesystem::path& path) {
   return has("packed_position") || has("rot_0") || parts >= 2;
 }
 
+std::string refused_by_others(const std::filesystem::path& path, size_t splats) {
+  constexpr size_t kMostInSpz = 10'000'000;  // nianticlabs/spz, load-spz.cc, kMaxPointsToRead
+  if (lower_extension(path) != ".spz" || splats <= kMostInSpz) return "";
+  return "programs that read .spz with its reference library refuse more than " +
+         std::to_string(kMostInSpz) + " splats; this file has " + std::to_string(splats);
+}
+
 Json write_splat_file(const std::filesystem::path& path,
                       const Gaussians& g,
                       const Frame& frame,
@@ -211,6 +218,9 @@ Json write_splat_file(const std::filesystem::path& path,
   const std::string lost = lost_of_scene(path, g, frame, options.evidence);
   if (!lost.empty()) terminal.say(lost);
   std::vector<std::string> missing;  // why splats are, or parts of them
+  if (const std::string refused = refused_by_others(path, g.size()); !refused.empty()) {
+    missing.push_back(refused);
+  }
   if (const std::string clamped = clamped_text(report); !clamped.empty()) {
     missing.push_back(clamped);
   }

@@ -33,6 +33,9 @@ struct SplatFileOptions {
   bool local_origin = false;  ///< Of a .glb, as SplatGlbOptions.
 };
 
+/// Why other programs may refuse a file of that many splats; "" if none is known to.
+std::string refused_by_others(const std::filesystem::path& path, size_t splats);
+
 /// Writes splats in the format that the name of the file says, reads them back and says on the
 /// terminal what they lost, and how many are estimated.
 /// \param frame  whose `up` becomes +Y in GLB, and must be known for it

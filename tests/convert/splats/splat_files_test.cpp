@@ -154,6 +154,14 @@ TEST(SplatFileToJson, StatesCountsAndBounds) {
   EXPECT_NEAR(info["bounds"]["max"][2].get<double>(), 2.5, 1e-2);
 }
 
+TEST(RefusedByOthers, AreFilesOfSpzWithMoreThanTenMillionSplats) {
+  EXPECT_EQ(refused_by_others("a.spz", 10'000'000), "");
+  EXPECT_EQ(refused_by_others("a.SPZ", 10'000'001),
+            "programs that read .spz with its reference library refuse more than 10000000 splats; "
+            "this file has 10000001");
+  EXPECT_EQ(refused_by_others("a.ply", 20'000'000), "");
+}
+
 TEST(IsSplatFile, IsToldByWhatVerticesHave) {
   const test::TempDir dir;
   const auto with = [&](const std::vector<std::string>& names) {
