@@ -41,11 +41,19 @@ std::optional<JsonValue> spz_extension(const JsonValue& splats) {
   return spz ? spz : extension_of(splats, "KHR_gaussian_splatting_compression_spz");
 }
 
+/// An attribute of splats as a primitive has it: drafts of the extension have _SCALE for
+/// KHR_gaussian_splatting:SCALE, and so on.
+std::string attribute_name(const JsonValue& attributes, const std::string& name) {
+  const std::string draft = "_" + name.substr(name.find(':') + 1);
+  return !attributes.find(name) && attributes.find(draft) ? draft : name;
+}
+
 /// The highest degree of which anything is there.
 int sh_degree(const JsonValue& attributes) {
   for (int degree = 3; degree > 0; --degree) {
     for (int order = 0; order <= 2 * degree; ++order) {
-      if (attributes.find(splat_harmonic_name(degree, order))) return degree;
+      const std::string name = splat_harmonic_name(degree, order);
+      if (attributes.find(attribute_name(attributes, name))) return degree;
     }
   }
   return 0;
@@ -171,7 +179,6 @@ void srgb_from_linear_harmonics(std::span<Eigen::Vector3f> harmonics) {
 /// The attributes of a primitive; all have `count` entries.
 struct Attributes {
   size_t count = 0;
-  int degree = 0;
   std::vector<float> position, rotation, scale, opacity;
   std::vector<std::vector<float>> harmonics;
   std::vector<float> provenance;  ///< Empty = not stated.
@@ -317,16 +324,11 @@ class SplatScene {
     }
   }
 
-  /// Drafts of the extension named attributes otherwise.
-  static std::string attribute_name(const JsonValue& attributes, const char* what) {
-    const std::string name = std::string(kGaussianSplatting) + ":" + what;
-    const std::string draft = std::string("_") + what;
-    return !attributes.find(name) && attributes.find(draft) ? draft : name;
-  }
-
   Attributes attributes_of(const JsonValue& primitive) const {
     const JsonValue in = primitive.at("attributes");
-    const auto named = [&](const char* what) { return attribute_name(in, what); };
+    const auto named = [&](const char* what) {
+      return attribute_name(in, std::string(kGaussianSplatting) + ":" + what);
+    };
     Attributes out;
     const auto accessor = [&](const std::string& name) {
       return file_.element("accessors", in.at(name));
@@ -345,22 +347,19 @@ class SplatScene {
     out.position = values("POSITION", 3);
     out.rotation = values(named("ROTATION"), 4);
     out.scale = values(named("SCALE"), 3);
-    if (named("ROTATION").front() == '_' && !in.find(named("OPACITY"))) {
+    // Drafts had the colour that all directions share, and the opacity, in COLOR_0.
+    const bool has_colors =
+        in.find("COLOR_0") && !in.find(named("OPACITY")) && !in.find(named("SH_DEGREE_0_COEF_0"));
+    if (has_colors) {
       take_colors(values("COLOR_0", 4), out);
-      return out;
+    } else {
+      out.opacity = values(named("OPACITY"), 1);
+      out.opacity_step = step_of(accessor(named("OPACITY")));
     }
-    out.opacity = values(named("OPACITY"), 1);
-    if (const auto normalized = accessor(named("OPACITY")).find("normalized")) {
-      constexpr int kUnsignedByte = 5121;
-      constexpr int kUnsignedShort = 5123;
-      const int type = accessor(named("OPACITY")).at("componentType").count();
-      if (normalized->boolean() && type == kUnsignedByte) out.opacity_step = 1 / 255.0;
-      if (normalized->boolean() && type == kUnsignedShort) out.opacity_step = 1 / 65535.0;
-    }
-    out.degree = sh_degree(in);
-    for (int degree = 0; degree <= out.degree; ++degree) {
+    const int last = sh_degree(in);
+    for (int degree = has_colors ? 1 : 0; degree <= last; ++degree) {
       for (int order = 0; order <= 2 * degree; ++order) {
-        out.harmonics.push_back(values(splat_harmonic_name(degree, order), 3));
+        out.harmonics.push_back(values(attribute_name(in, splat_harmonic_name(degree, order)), 3));
       }
     }
     if (in.find(kSplatProvenance) && accessor(kSplatProvenance).at("type").text() == "SCALAR") {
@@ -370,6 +369,15 @@ class SplatScene {
       out.synthetic = values(kSplatSynthetic, 1);
     }
     return out;
+  }
+
+  static double step_of(const JsonValue& accessor) {
+    constexpr int kUnsignedByte = 5121;
+    constexpr int kUnsignedShort = 5123;
+    const auto normalized = accessor.find("normalized");
+    const int type = accessor.at("componentType").count();
+    if (!normalized || !normalized->boolean()) return 0;
+    return type == kUnsignedByte ? 1 / 255.0 : type == kUnsignedShort ? 1 / 65535.0 : 0;
   }
 
   static void take_colors(const std::vector<float>& rgba, Attributes& out) {

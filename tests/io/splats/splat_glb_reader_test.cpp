@@ -450,6 +450,44 @@ TEST(SplatGlbReader, ReadsDraftsOfTheExtensionAndText) {
   EXPECT_NEAR(g.sh[0].z() * kFirst + 0.5f, 0.2f, 1e-5f);
 }
 
+/// Harmonics of degree 1 of one splat, 0 but for the one along z.
+void add_draft_harmonics(OthersGlb& file, const std::string& prefix) {
+  for (int order = 0; order < 3; ++order) {
+    const float value = order == 1 ? 0.5f : 0;
+    file.primitive()["attributes"][prefix + "SH_DEGREE_1_COEF_" + std::to_string(order)] =
+        file.accessor(std::vector<float>{value, 0, -value}, "VEC3", kFloat);
+  }
+}
+
+// The two that programs wrote in 2025, one with names of its own and one with those of today.
+TEST(SplatGlbReader, ReadsColoursAndHarmonicsOfDrafts) {
+  for (const std::string& prefix : {std::string("_"), kPrefix}) {
+    OthersGlb file;
+    Json attributes;
+    attributes["POSITION"] = file.accessor(std::vector<float>{1, 2, 3}, "VEC3", kFloat);
+    attributes[prefix + "ROTATION"] = file.accessor(std::vector<float>{0, 0, 0, 1}, "VEC4", kFloat);
+    attributes[prefix + "SCALE"] = file.accessor(std::vector<float>{1, 2, 4}, "VEC3", kFloat);
+    attributes["COLOR_0"] =
+        file.accessor(std::vector<uint8_t>{255, 0, 51, 204}, "VEC4", kUnsignedByte);
+    Json primitive = {{"mode", 0}, {"attributes", attributes}};
+    primitive["extensions"]["KHR_gaussian_splatting"] = Json::object();
+    file.json["meshes"][0]["primitives"] = {primitive};
+    EXPECT_EQ(file.read().sh_degree, 0) << prefix;
+    add_draft_harmonics(file, prefix);
+    const RawSplats raw = file.read();
+    ASSERT_EQ(raw.size(), 1u) << prefix;
+    ASSERT_EQ(raw.sh_degree, 1) << prefix;
+    EXPECT_NEAR(1 / (1 + std::exp(-raw.logit[0])), 0.8, 1e-6) << prefix;
+    EXPECT_NEAR(raw.sh[0].z() * 0.28209479 + 0.5, 0.2, 1e-5) << prefix;
+    // The half turn around z leaves what goes with z as it is.
+    EXPECT_LT((raw.sh[2] - Eigen::Vector3f(0.5f, 0, -0.5f)).norm(), 1e-6f) << prefix;
+    EXPECT_LT(raw.sh[1].norm() + raw.sh[3].norm(), 1e-6f) << prefix;
+    const test::TempDir dir;
+    test::write_bytes(dir / "a.glb", file.bytes());
+    EXPECT_EQ(stated_splats(dir / "a.glb")->harmonics, 4u) << prefix;
+  }
+}
+
 TEST(SplatGlbReader, TurnsLinearLightIntoSrgb) {
   OthersGlb file = others(20, 0);
   file.primitive()["extensions"]["KHR_gaussian_splatting"]["colorSpace"] = "lin_rec709_display";
