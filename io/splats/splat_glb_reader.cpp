@@ -31,13 +31,15 @@ constexpr uint64_t kMostSplats = uint64_t{1} << 26;
 constexpr uint64_t kMostHarmonics = uint64_t{1} << 28;
 constexpr uint64_t kMostPrimitives = uint64_t{1} << 20;
 
+constexpr const char* kSpz2 = "KHR_gaussian_splatting_compression_spz_2";
+
 std::optional<JsonValue> splat_extension(const JsonValue& primitive) {
   return extension_of(primitive, kGaussianSplatting);
 }
 
 /// The extension by which splats are compressed with SPZ, inside that of splats.
 std::optional<JsonValue> spz_extension(const JsonValue& splats) {
-  const auto spz = extension_of(splats, "KHR_gaussian_splatting_compression_spz_2");
+  const auto spz = extension_of(splats, kSpz2);
   return spz ? spz : extension_of(splats, "KHR_gaussian_splatting_compression_spz");
 }
 
@@ -220,6 +222,11 @@ class SplatScene {
     if (has_logarithms_) {
       splats_.notes.emplace_back("scales below 0: read as logarithms, as drafts of the format had");
     }
+    if (has_draft_axes_) {
+      splats_.notes.emplace_back(
+          "SPZ of a draft that states neither kernel nor colour space: its axes are read as those "
+          "of glTF");
+    }
     if (is_linear_) {
       splats_.notes.emplace_back(
           "colours were in linear light, now in sRGB: where splats overlap, they blend "
@@ -287,7 +294,7 @@ class SplatScene {
         primitives.at(i).fail(Defect::Value, "lies in a node that flattens splats");
       }
       if (const auto spz = spz_extension(*extension)) {
-        add_compressed(*spz, file_from_mesh);
+        add_compressed(*spz, *extension, file_from_mesh);
       } else {
         add(primitives.at(i), *extension, file_from_mesh);
       }
@@ -295,12 +302,20 @@ class SplatScene {
   }
 
   /// What parse_spz() turned into the axes of the 3DGS PLY is turned on into those of glTF: blobs
-  /// are packed as left, up, front.
+  /// are packed as left, up, front. Files of its draft that state neither kernel nor colour space,
+  /// as Cesium ion makes them, hold the coordinates of glTF as they are.
   /// Source: Khronos Group, KHR_gaussian_splatting_compression_spz_2, draft of 2025.
-  void add_compressed(const JsonValue& spz, const Eigen::Affine3d& file_from_mesh) {
+  void add_compressed(const JsonValue& spz,
+                      const JsonValue& extension,
+                      const Eigen::Affine3d& file_from_mesh) {
     const RawSplats in = parse_spz(file_.view_bytes(spz.at("bufferView")), file_.path());
-    const Eigen::Affine3d file_from_spz =
-        file_from_mesh * Eigen::Affine3d(Eigen::Scaling(-1.0, -1.0, 1.0));
+    const bool is_draft = extension_of(extension, kSpz2) && !extension.find("kernel") &&
+                          !extension.find("colorSpace");
+    has_draft_axes_ = has_draft_axes_ || is_draft;
+    const bool is_linear = note_look(extension);
+    const Eigen::Vector3d signs =
+        is_draft ? Eigen::Vector3d(1, -1, -1) : Eigen::Vector3d(-1, -1, 1);
+    const Eigen::Affine3d file_from_spz = file_from_mesh * Eigen::Affine3d(Eigen::Scaling(signs));
     splats_.is_antialiased = splats_.is_antialiased || in.is_antialiased;
     for (const std::string& note : in.notes) splats_.notes.push_back(note);
     if (!splats_.provenance.empty()) leave_unlabelled(splats_.size() + in.size());
@@ -320,6 +335,7 @@ class SplatScene {
       std::copy_n(in.sh.begin() + static_cast<std::ptrdiff_t>(i * in.sh_count()),
                   std::min(in.sh_count(), out.size()),
                   out.begin());
+      if (is_linear) srgb_from_linear_harmonics(out);
       turn.apply(out);
     }
   }
@@ -389,11 +405,8 @@ class SplatScene {
     }
   }
 
-  void add(const JsonValue& primitive,
-           const JsonValue& extension,
-           const Eigen::Affine3d& file_from_mesh) {
-    const auto mode = primitive.find("mode");
-    if (!mode || mode->count() != 0) primitive.fail(Defect::Schema, "splats must be points");
+  /// \return whether colours are in linear light
+  bool note_look(const JsonValue& extension) {
     const auto kernel = extension.find("kernel");
     const auto space = extension.find("colorSpace");
     const std::string color_space = space ? space->text() : "srgb_rec709_display";
@@ -401,6 +414,15 @@ class SplatScene {
     has_unknown_ = has_unknown_ || (kernel && kernel->text() != "ellipse") ||
                    (!is_linear && color_space != "srgb_rec709_display");
     is_linear_ = is_linear_ || is_linear;
+    return is_linear;
+  }
+
+  void add(const JsonValue& primitive,
+           const JsonValue& extension,
+           const Eigen::Affine3d& file_from_mesh) {
+    const auto mode = primitive.find("mode");
+    if (!mode || mode->count() != 0) primitive.fail(Defect::Schema, "splats must be points");
+    const bool is_linear = note_look(extension);
     const Eigen::Matrix3d linear = file_from_mesh.linear();
     Attributes in = attributes_of(primitive);
     // The extension's text says lengths; files after its draft hold logarithms.
@@ -468,6 +490,7 @@ class SplatScene {
   size_t others_ = 0;           // primitives
   bool has_unknown_ = false;    // kernel or colour space
   bool is_linear_ = false;
+  bool has_draft_axes_ = false;
   bool has_logarithms_ = false;
 };
 

@@ -13,6 +13,7 @@
 #include "io/splats/splat_reader.h"
 #include "io/splats/spz.h"
 #include "io/splats/spz_reader.h"
+#include "libcgs/core/srgb.h"
 #include "libcgs/core/up_axis.h"
 #include "libcgs/render/spherical_harmonics.h"
 #include "tests/support/full_disk.h"
@@ -377,6 +378,22 @@ TEST(SplatGlbReader, ReadsScalesOfDraftsAsLogarithms) {
   EXPECT_NE(raw.notes[0].find("read as logarithms"), std::string::npos);
 }
 
+/// What parse_spz() reads, in glTF by an extension of that name.
+OthersGlb with_spz(const std::string& blob, const char* name) {
+  OthersGlb file;
+  file.json["bufferViews"] = {{{"buffer", 0}, {"byteLength", blob.size()}}};
+  file.json["buffers"][0]["byteLength"] = blob.size();
+  file.binary = blob;
+  file.binary.resize((blob.size() + 3) / 4 * 4);
+  Json primitive = {{"mode", 0}, {"attributes", Json::object()}};
+  Json& splats = primitive["extensions"]["KHR_gaussian_splatting"];
+  splats = {{"kernel", "ellipse"}, {"colorSpace", "srgb_rec709_display"}};
+  splats["extensions"][name] = {{"bufferView", 0}};
+  file.json["meshes"][0]["primitives"] = {primitive};
+  file.json["extensionsRequired"] = {"KHR_gaussian_splatting", name};
+  return file;
+}
+
 // Their blob is packed as left, up, front: the half turn around y of what SPZ alone has, and glTF
 // of others is turned half around z when it is read. What remains is a half turn around x, as of
 // SPZ files.
@@ -387,17 +404,10 @@ TEST(SplatGlbReader, ReadsSplatsCompressedWithSpz) {
   const RawSplats alone = parse_spz(blob, "a.spz");
   for (const char* name :
        {"KHR_gaussian_splatting_compression_spz_2", "KHR_gaussian_splatting_compression_spz"}) {
-    OthersGlb file;
-    file.json["bufferViews"] = {{{"buffer", 0}, {"byteLength", blob.size()}}};
-    file.json["buffers"][0]["byteLength"] = blob.size();
-    file.binary = blob;
-    file.binary.resize((blob.size() + 3) / 4 * 4);
-    Json primitive = {{"mode", 0}, {"attributes", Json::object()}};
-    primitive["extensions"]["KHR_gaussian_splatting"]["extensions"][name] = {{"bufferView", 0}};
-    file.json["meshes"][0]["primitives"] = {primitive};
-    file.json["extensionsRequired"] = {"KHR_gaussian_splatting", name};
+    OthersGlb file = with_spz(blob, name);
     const RawSplats raw = file.read();
     ASSERT_EQ(raw.size(), 40u);
+    EXPECT_TRUE(raw.notes.empty());
     EXPECT_EQ(raw.sh_degree, 2);
     for (size_t i = 0; i < 40; ++i) {
       EXPECT_LT((raw.position[i] - alone.position[i]).norm(), 1e-9);
@@ -414,6 +424,49 @@ TEST(SplatGlbReader, ReadsSplatsCompressedWithSpz) {
               1e-9);
     file.json["bufferViews"][0]["byteLength"] = blob.size() / 2;
     EXPECT_NE(file.defect(), "OK");
+  }
+}
+
+// As Cesium ion made them: what is stored are coordinates of glTF.
+TEST(SplatGlbReader, ReadsSpzOfADraftInTheAxesOfGltf) {
+  const test::TempDir dir;
+  write_spz(dir / "a.spz", test::varied_splats(40, 1), Frame{}, {});
+  const std::string blob = test::read_bytes(dir / "a.spz");
+  const RawSplats alone = parse_spz(blob, "a.spz");  // x, -y, -z of what is stored
+  OthersGlb file = with_spz(blob, "KHR_gaussian_splatting_compression_spz_2");
+  Json& splats = file.primitive()["extensions"]["KHR_gaussian_splatting"];
+  splats.erase("kernel");
+  splats.erase("colorSpace");
+  const RawSplats raw = file.read();
+  ASSERT_EQ(raw.size(), 40u);
+  ASSERT_EQ(raw.notes.size(), 1u);
+  EXPECT_NE(raw.notes[0].find("its axes are read as those of glTF"), std::string::npos);
+  const Eigen::Matrix3d turn = Eigen::Vector3d(-1, 1, -1).asDiagonal();  // a half turn around y
+  for (size_t i = 0; i < 40; ++i) {
+    EXPECT_LT((raw.position[i] - turn * alone.position[i]).norm(), 1e-9);
+    const Eigen::Matrix3d expected = turn * test::covariance_of(alone, i) * turn;
+    EXPECT_LT((test::covariance_of(raw, i) - expected).norm(), 1e-5 * expected.norm());
+    EXPECT_LT((raw.sh[4 * i + 1] - alone.sh[4 * i + 1]).norm(), 1e-5f) << "along y";
+    EXPECT_LT((raw.sh[4 * i + 2] + alone.sh[4 * i + 2]).norm(), 1e-5f) << "along z";
+  }
+}
+
+TEST(SplatGlbReader, TurnsLinearLightOfSpzIntoSrgb) {
+  const test::TempDir dir;
+  write_spz(dir / "a.spz", test::varied_splats(20, 0), Frame{}, {});
+  OthersGlb file =
+      with_spz(test::read_bytes(dir / "a.spz"), "KHR_gaussian_splatting_compression_spz_2");
+  const RawSplats stored = file.read();
+  Json& splats = file.primitive()["extensions"]["KHR_gaussian_splatting"];
+  splats["colorSpace"] = "lin_rec709_display";
+  const RawSplats raw = file.read();
+  ASSERT_EQ(raw.notes.size(), 1u);
+  EXPECT_NE(raw.notes[0].find("linear light"), std::string::npos);
+  for (size_t i = 0; i < 20; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const float linear = std::clamp(kShC0 * stored.sh[i][k] + 0.5f, 0.0f, 1.0f);
+      EXPECT_NEAR(kShC0 * raw.sh[i][k] + 0.5f, srgb_from_linear(linear), 1e-5f);
+    }
   }
 }
 
