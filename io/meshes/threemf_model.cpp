@@ -139,6 +139,8 @@ class ModelReader {
       colors_->push_back(color_of(element.find("color").value_or("")));
     } else if (name == "texture2dgroup") {
       model_.has_textures = true;
+    } else if (name == "compositematerials" || name == "multiproperties") {
+      model_.has_mixtures = true;
     }
   }
 

@@ -51,6 +51,7 @@ struct ThreeMfModel {
   /// Of base materials and colours by group, sRGB-coded in [0, 1]; NaN = not stated.
   std::map<uint64_t, std::vector<Eigen::Vector3f>> colors;
   bool has_textures = false;
+  bool has_mixtures = false;  ///< Of materials, or several properties over each other.
   std::vector<ThreeMfPlacement> build;
   std::string application;  ///< Metadata of the model; empty = not stated.
   std::string description;

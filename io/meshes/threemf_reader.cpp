@@ -227,6 +227,7 @@ class Assembly {
   void append_colors(const ThreeMfObject& object, uint32_t first, const ThreeMfModel& model) {
     constexpr float kOtherColor = 0.1f;
     has_textures_ = has_textures_ || model.has_textures;
+    has_mixtures_ = has_mixtures_ || model.has_mixtures;
     if (model.colors.empty()) return;
     const Eigen::Vector3f none = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
     std::vector<Eigen::Vector3f> colors(out_.positions.size() - first, none);
@@ -251,6 +252,10 @@ class Assembly {
   // Where materials tell labels, their colours tell these apart, and are not of the surface.
   void settle_colors() {
     if (has_textures_) out_.warnings.emplace_back("textures are not read");
+    if (has_mixtures_) {
+      out_.warnings.emplace_back(
+          "mixed materials (multiproperties, compositematerials) are not read, nor their colours");
+    }
     if (!out_.mesh.provenance.empty()) {
       out_.mesh.colors.clear();
       return;
@@ -347,6 +352,7 @@ class Assembly {
   std::vector<size_t> colored_;  // vertices that state a colour
   size_t recolored_ = 0;         // corners where surfaces of other colours meet
   bool has_textures_ = false;
+  bool has_mixtures_ = false;
   bool is_moved_ = false;  // an object, or built more than once
   ParsedMesh out_;
 };

@@ -16,7 +16,8 @@ namespace cgs {
 /// and other are left out, surfaces are kept; warnings say how many. In other files labels are
 /// those that MaterialLabels finds in names of materials. The type of an object speaks for its own
 /// mesh, not for its components. Colours of faces and their corners become those of vertices, but
-/// not where labels have them. Textures, mixtures and what is not built are not read.
+/// not where labels have them. Textures and mixtures, which warnings name, and what is not built
+/// are not read.
 ///
 /// Own code, because lib3mf, which writes, keeps coordinates as float.
 /// \throws BadInput Magic (no ZIP archive), as ZipArchive and parse_threemf_model(); Missing (a

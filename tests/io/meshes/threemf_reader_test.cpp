@@ -265,6 +265,28 @@ TEST_F(Read3mf, VerticesTakeTheColoursOfFaces) {
   EXPECT_EQ(read(file).warnings, std::vector<std::string>{"textures are not read"});
 }
 
+TEST_F(Read3mf, SaysThatMixedMaterialsAreNotRead) {
+  for (const std::string mixture :
+       {"<m:multiproperties id=\"6\" pids=\"5\"><m:multi pindices=\"0\"/></m:multiproperties>",
+        "<m:compositematerials id=\"6\" matid=\"5\" matindices=\"0\">"
+        "<m:composite values=\"1\"/></m:compositematerials>"}) {
+    ThreeMfFile file;
+    file.attributes =
+        "unit=\"millimeter\" requiredextensions=\"m\" "
+        "xmlns:m=\"http://schemas.microsoft.com/3dmanufacturing/material/2015/02\"";
+    file.resources =
+        "<basematerials id=\"5\"><base name=\"PLA\" displaycolor=\"#FF0000\"/>"
+        "</basematerials>" +
+        mixture + "<object id=\"1\" pid=\"6\" pindex=\"0\">" + ThreeMfFile::tetrahedron() +
+        "</object>";
+    const ParsedMesh mesh = read(file);
+    EXPECT_TRUE(mesh.mesh.colors.empty());
+    EXPECT_EQ(mesh.warnings,
+              std::vector<std::string>{"mixed materials (multiproperties, compositematerials) are "
+                                       "not read, nor their colours"});
+  }
+}
+
 // A group of colours inside one of materials ends before it, as no file should have it.
 TEST_F(Read3mf, KeepsGroupsOfColoursAndMaterialsApart) {
   ThreeMfFile file;
