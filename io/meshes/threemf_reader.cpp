@@ -30,7 +30,37 @@ constexpr std::string_view kOwnApplication = "cgs";     // of write_3mf()
 constexpr uint64_t kMostRelations = uint64_t{1} << 20;  // [bytes]
 constexpr uint64_t kMostModel = uint64_t{2} << 30;      // [bytes]
 
-// A name of a part as the archive has it: without the '/' of its root.
+/// Names of parts, which programs write in one letter case and look for in another.
+/// Source: ECMA-376 part 2 (Open Packaging Conventions): equal but for the case of ASCII letters.
+class PartNames {
+ public:
+  explicit PartNames(const ZipArchive& archive) : archive_(archive) {
+    for (const std::string& name : archive.names()) {
+      const auto [known, is_new] = by_folded_.emplace(folded(name), name);
+      if (!is_new) known->second.clear();  // of two none is meant
+    }
+  }
+
+  /// As the archive has it, or the same name where it has none.
+  std::string stored(const std::string& name) const {
+    if (archive_.has(name)) return name;
+    const auto found = by_folded_.find(folded(name));
+    return found == by_folded_.end() || found->second.empty() ? name : found->second;
+  }
+
+ private:
+  static std::string folded(std::string name) {
+    for (char& c : name) {
+      if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    }
+    return name;
+  }
+
+  const ZipArchive& archive_;
+  std::map<std::string, std::string> by_folded_;
+};
+
+// A name of a part without the '/' of its root.
 std::string part_name(std::string name, const fs::path& named_in) {
   if (name.starts_with('/')) name.erase(0, 1);
   const std::string between = "/" + name + "/";
@@ -51,14 +81,16 @@ std::string root_part(const ZipArchive& archive, const fs::path& path) {
       "http://schemas.openxmlformats.org/package/2006/relationships|Relationship";
   constexpr std::string_view kModel =
       "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel";
-  const std::string relations = "_rels/.rels";
+  const PartNames names(archive);
+  const std::string relations = names.stored("_rels/.rels");
   const std::string xml = archive.read(relations, kMostRelations);
   const fs::path place = path / relations;
   std::string out;
   XmlHandlers handlers;
   handlers.start = [&](const XmlElement& element) {
     if (element.name() != kRelation || element.at("Type") != kModel) return;
-    if (out.empty()) out = part_name(std::string(element.at("Target")), place);
+    if (!out.empty()) return;
+    out = names.stored(part_name(std::string(element.at("Target")), place));
   };
   read_xml(xml, place, handlers);
   if (out.empty()) throw BadInput(Defect::Schema, place, "names no 3D model");
@@ -68,7 +100,8 @@ std::string root_part(const ZipArchive& archive, const fs::path& path) {
 /// Puts together what the build of a file places.
 class Assembly {
  public:
-  Assembly(const ZipArchive& archive, const fs::path& path) : archive_(archive), path_(path) {}
+  Assembly(const ZipArchive& archive, const fs::path& path)
+      : archive_(archive), names_(archive), path_(path) {}
 
   ParsedMesh build() {
     const std::string root = root_part(archive_, path_);
@@ -120,7 +153,9 @@ class Assembly {
 
   ThreeMfPlacement placed(const ThreeMfPlacement& component, const std::string& parent) const {
     ThreeMfPlacement out = component;
-    out.part = component.part.empty() ? parent : part_name(component.part, path_ / parent);
+    out.part = parent;
+    if (component.part.empty()) return out;
+    out.part = names_.stored(part_name(component.part, path_ / parent));
     return out;
   }
 
@@ -338,6 +373,7 @@ class Assembly {
   }
 
   const ZipArchive& archive_;
+  const PartNames names_;
   const fs::path& path_;
   std::map<std::string, ThreeMfModel> parts_;
   size_t entries_ = 0;              // of all parts

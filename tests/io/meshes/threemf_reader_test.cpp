@@ -173,6 +173,18 @@ TEST_F(Read3mf, ReadsObjectsOfOtherPartsOfTheArchive) {
   EXPECT_EQ(refused(file), "MISSING");
 }
 
+TEST_F(Read3mf, FindsPartsWhoseNamesDifferInLetterCase) {
+  ThreeMfFile file;
+  file.target = "/3d/3DModel.MODEL";
+  file.build = "<item objectid=\"1\"/><item objectid=\"1\" p:path=\"/3D/Objects/O.model\"/>";
+  const std::string other = ThreeMfFile::document(
+      "", "<resources>" + ThreeMfFile::object(1, ThreeMfFile::tetrahedron()) + "</resources>");
+  file.more_files = {{"3D/objects/o.model", other}};
+  EXPECT_EQ(read(file).mesh.faces.size(), 8u);
+  file.more_files.emplace_back("3D/OBJECTS/o.model", other);
+  EXPECT_EQ(refused(file), "MISSING") << "which of the two is not known";
+}
+
 TEST_F(Read3mf, LabelsOfOthersAreNoProvenance) {
   ThreeMfFile file;
   file.resources =
